@@ -1,0 +1,307 @@
+//! From a [`ForceModel`] to its function table: the trampolines that keep panics inside the plugin.
+
+use super::entry::{CallStatus, Entry, Instance, PluginKind, interface_ids};
+use super::{CenterlineTable, ForceTable, Message, Str, panics};
+use crate::{
+    CenterlineInfo, CenterlineModel, ForceModel, Input, LoopConfig, Output, ParameterValue, Pose,
+    RefusalKind, Settings,
+};
+use std::ffi::c_void;
+use std::marker::PhantomData;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// What an [`Instance`] pointer of a model points at.
+struct Slot<M> {
+    model: M,
+    /// A model that panicked is in an unknown state: it is never called again.
+    dead: bool,
+    message: Message,
+}
+
+impl<M> Slot<M> {
+    /// Runs `body` with the model; a panic kills the instance and keeps its words.
+    #[inline]
+    fn guard(&mut self, body: impl FnOnce(&mut M) -> CallStatus) -> u32 {
+        if self.dead {
+            return CallStatus::Panicked as u32;
+        }
+        let model = &mut self.model;
+        match catch_unwind(AssertUnwindSafe(|| body(model))) {
+            Ok(status) => status as u32,
+            Err(panic) => {
+                self.dead = true;
+                panics::record(panic, &mut self.message);
+                CallStatus::Panicked as u32
+            }
+        }
+    }
+}
+
+/// Reads `count` values a host passed by pointer.
+///
+/// # Safety
+/// `values` points at `count` values that live for `'a`, or `count` is 0.
+pub(super) unsafe fn values_from_raw<'a>(values: *const ParameterValue, count: u32) -> &'a [ParameterValue] {
+    if values.is_null() || count == 0 {
+        return &[];
+    }
+    // SAFETY: by the contract of this function.
+    unsafe { std::slice::from_raw_parts(values, count as usize) }
+}
+
+unsafe extern "C" fn create<M: ForceModel>(
+    values: *const ParameterValue,
+    count: u32,
+    message: *mut Message,
+    out: *mut Instance,
+) -> u32 {
+    // SAFETY: the contract of `create`: `values` and `count` describe a slice valid for the call.
+    let values = unsafe { values_from_raw(values, count) };
+    // SAFETY: the contract of `create`: `message` and `out` are valid for writes for the call.
+    let (message, out) = unsafe { (&mut *message, &mut *out) };
+    match catch_unwind(|| M::create(&Settings::new(M::PARAMETERS, values))) {
+        Ok(Ok(model)) => {
+            *out = Box::into_raw(Box::new(Slot { model, dead: false, message: Message::default() })).cast();
+            0
+        }
+        Ok(Err(refusal)) => {
+            message.set(&refusal.reason);
+            refusal.kind as u32
+        }
+        Err(panic) => {
+            panics::record(panic, message);
+            RefusalKind::Broken as u32
+        }
+    }
+}
+
+unsafe extern "C" fn destroy<M>(instance: Instance) {
+    // SAFETY: the contract of `destroy`: `instance` came from `create` of this type and is not used again.
+    let slot = unsafe { Box::from_raw(instance.cast::<Slot<M>>()) };
+    if let Err(panic) = catch_unwind(AssertUnwindSafe(|| drop(slot))) {
+        panics::discard(panic);
+    }
+}
+
+/// The slot behind an instance.
+///
+/// # Safety
+/// `instance` came from `create::<M>`, is alive, and no other reference to it exists during `'a`.
+#[inline]
+unsafe fn slot<'a, M>(instance: Instance) -> &'a mut Slot<M> {
+    // SAFETY: by the contract of this function.
+    unsafe { &mut *instance.cast::<Slot<M>>() }
+}
+
+unsafe extern "C" fn prepare<M: ForceModel>(
+    instance: Instance,
+    config: *const LoopConfig,
+    message: *mut Message,
+) -> u32 {
+    // SAFETY: the contract of every table call: a live instance, used by one thread, pointers valid for the call.
+    let (slot, config, message) = unsafe { (slot::<M>(instance), &*config, &mut *message) };
+    if slot.dead {
+        return RefusalKind::Broken as u32;
+    }
+    match catch_unwind(AssertUnwindSafe(|| slot.model.prepare(config))) {
+        Ok(Ok(())) => 0,
+        Ok(Err(refusal)) => {
+            message.set(&refusal.reason);
+            refusal.kind as u32
+        }
+        Err(panic) => {
+            slot.dead = true;
+            panics::record(panic, message);
+            RefusalKind::Broken as u32
+        }
+    }
+}
+
+unsafe extern "C" fn step<M: ForceModel>(
+    instance: Instance,
+    input: *const Input,
+    output: *mut Output,
+) -> u32 {
+    // SAFETY: as in `prepare`.
+    let (slot, input, output) = unsafe { (slot::<M>(instance), &*input, &mut *output) };
+    slot.guard(|model| {
+        *output = model.step(input);
+        CallStatus::Ok
+    })
+}
+
+unsafe extern "C" fn step_batch<M: ForceModel>(
+    instance: Instance,
+    count: u64,
+    inputs: *const Input,
+    outputs: *mut Output,
+) -> u32 {
+    if count == 0 {
+        return CallStatus::Ok as u32;
+    }
+    let Ok(count) = usize::try_from(count) else { return CallStatus::Unsupported as u32 };
+    // SAFETY: as in `prepare`; `inputs` and `outputs` point at `count` structs each, which do not overlap.
+    let (slot, inputs, outputs) = unsafe {
+        (
+            slot::<M>(instance),
+            std::slice::from_raw_parts(inputs, count),
+            std::slice::from_raw_parts_mut(outputs, count),
+        )
+    };
+    slot.guard(|model| {
+        model.step_batch(inputs, outputs);
+        CallStatus::Ok
+    })
+}
+
+unsafe extern "C" fn set_parameter<M: ForceModel>(instance: Instance, index: u32, value: f64) -> u32 {
+    let Some(parameter) = M::PARAMETERS.get(index as usize) else { return CallStatus::OutOfRange as u32 };
+    if parameter.check(value).is_err() || parameter.mutability() != crate::Mutability::Live {
+        return CallStatus::OutOfRange as u32;
+    }
+    // SAFETY: as in `prepare`.
+    let slot = unsafe { slot::<M>(instance) };
+    slot.guard(|model| match model.set_parameter(index as usize, value) {
+        Ok(()) => CallStatus::Ok,
+        Err(_) => CallStatus::OutOfRange,
+    })
+}
+
+unsafe extern "C" fn parameter<M: ForceModel>(instance: Instance, index: u32) -> f64 {
+    // SAFETY: as in `prepare`.
+    let slot = unsafe { slot::<M>(instance) };
+    let mut value = f64::NAN;
+    let _ = slot.guard(|model| {
+        value = model.parameter(index as usize);
+        CallStatus::Ok
+    });
+    value
+}
+
+unsafe extern "C" fn reset<M: ForceModel>(instance: Instance) -> u32 {
+    // SAFETY: as in `prepare`.
+    let slot = unsafe { slot::<M>(instance) };
+    slot.guard(|model| {
+        model.reset();
+        CallStatus::Ok
+    })
+}
+
+unsafe extern "C" fn last_message<M>(instance: Instance, message: *mut Message) {
+    // SAFETY: as in `prepare`.
+    let (slot, message) = unsafe { (slot::<M>(instance), &mut *message) };
+    *message = slot.message;
+}
+
+unsafe extern "C" fn centerline_info<M: CenterlineModel>(
+    instance: Instance,
+    out: *mut CenterlineInfo,
+) -> u32 {
+    // SAFETY: as in `prepare`.
+    let (slot, out) = unsafe { (slot::<M>(instance), &mut *out) };
+    slot.guard(|model| {
+        *out = model.centerline_info();
+        CallStatus::Ok
+    })
+}
+
+unsafe extern "C" fn centerline<M: CenterlineModel>(
+    instance: Instance,
+    input: *const Input,
+    points: *mut Pose,
+    capacity: u32,
+    count: *mut u32,
+) -> u32 {
+    if capacity == 0 {
+        return CallStatus::OutOfRange as u32;
+    }
+    // SAFETY: as in `prepare`; `points` has room for `capacity` poses.
+    let (slot, input, points, count) = unsafe {
+        let points = std::slice::from_raw_parts_mut(points, capacity as usize);
+        (slot::<M>(instance), &*input, points, &mut *count)
+    };
+    slot.guard(|model| {
+        *count = u32::try_from(model.centerline(input, points)).unwrap_or(capacity).min(capacity);
+        CallStatus::Ok
+    })
+}
+
+/// The tables of one model type, as constants that are promoted to statics.
+struct Tables<M>(PhantomData<M>);
+
+#[allow(clippy::cast_possible_truncation)] // table sizes and parameter counts are small
+impl<M: ForceModel> Tables<M> {
+    const FORCE: ForceTable = ForceTable {
+        size: size_of::<ForceTable>() as u32,
+        parameter_count: M::PARAMETERS.len() as u32,
+        parameters: M::PARAMETERS.as_ptr(),
+        info: M::INFO,
+        create: Some(create::<M>),
+        destroy: Some(destroy::<M>),
+        prepare: Some(prepare::<M>),
+        step: Some(step::<M>),
+        step_batch: Some(step_batch::<M>),
+        set_parameter: Some(set_parameter::<M>),
+        parameter: Some(parameter::<M>),
+        reset: Some(reset::<M>),
+        last_message: Some(last_message::<M>),
+    };
+}
+
+#[allow(clippy::cast_possible_truncation)] // table sizes are small
+impl<M: CenterlineModel> Tables<M> {
+    const CENTERLINE: CenterlineTable = CenterlineTable {
+        size: size_of::<CenterlineTable>() as u32,
+        reserved: 0,
+        info: Some(centerline_info::<M>),
+        centerline: Some(centerline::<M>),
+    };
+}
+
+unsafe extern "C" fn interface<M: ForceModel>(id: Str) -> *const c_void {
+    match id.as_str() {
+        interface_ids::FORCE => std::ptr::from_ref(&Tables::<M>::FORCE).cast(),
+        _ => std::ptr::null(),
+    }
+}
+
+unsafe extern "C" fn interface_with_centerline<M: CenterlineModel>(id: Str) -> *const c_void {
+    match id.as_str() {
+        interface_ids::FORCE => std::ptr::from_ref(&Tables::<M>::FORCE).cast(),
+        interface_ids::CENTERLINE => std::ptr::from_ref(&Tables::<M>::CENTERLINE).cast(),
+        _ => std::ptr::null(),
+    }
+}
+
+/// The entry of a model plugin; [`crate::export_model!`] makes a static of it.
+#[must_use]
+pub const fn model_entry<M: ForceModel>() -> Entry {
+    Entry::of(PluginKind::Model, interface::<M>)
+}
+
+/// The entry of a model plugin with a shape; [`crate::export_model!`] makes a static of it.
+#[must_use]
+pub const fn model_entry_with_centerline<M: CenterlineModel>() -> Entry {
+    Entry::of(PluginKind::Model, interface_with_centerline::<M>)
+}
+
+/// Makes a [`crate::ForceModel`] a plugin: `export_model!(Spring);`, or `export_model!(Spring, centerline);`
+/// for a type that is a [`crate::CenterlineModel`] too. One per crate.
+#[macro_export]
+macro_rules! export_model {
+    ($model:ty) => {
+        $crate::export_model!(@entry $model, $crate::abi::model_entry::<$model>());
+    };
+    ($model:ty, centerline) => {
+        $crate::export_model!(@entry $model, $crate::abi::model_entry_with_centerline::<$model>());
+    };
+    (@entry $model:ty, $entry:expr) => {
+        $crate::export_entry!(
+            $entry,
+            $crate::abi::PluginKind::Model,
+            <$model as $crate::ForceModel>::INFO.id(),
+            <$model as $crate::ForceModel>::INFO.name(),
+            <$model as $crate::ForceModel>::INFO.doc()
+        );
+    };
+}

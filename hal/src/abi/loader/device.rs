@@ -1,0 +1,275 @@
+//! A device a host may use, in two types: opened (it answers) and active (it moves hands).
+
+use super::Setting;
+use super::model::refusal_from;
+use crate::abi::{CallStatus, DeviceTable, EnergyLedgerTable, Instance, Message};
+use crate::{
+    Axes, Capabilities, Cycle, DeviceState, EnergyLedger, LoopConfig, Parameter, ParameterValue, Refusal,
+    Tick, Wrench,
+};
+use std::sync::Arc;
+
+/// One opened instance; closed when the last handle is gone.
+struct Handle {
+    instance: Instance,
+    table: &'static DeviceTable,
+    ledger: Option<&'static EnergyLedgerTable>,
+    parameters: &'static [Parameter],
+}
+
+// SAFETY: shared between the owner (`OpenedDevice` or `ActiveDevice`, of which there is exactly one, with `&mut`
+// for every call) and `Stopper`s, which only call `safe_stop`; the contract allows that from any thread.
+unsafe impl Send for Handle {}
+// SAFETY: as above.
+unsafe impl Sync for Handle {}
+
+impl Drop for Handle {
+    fn drop(&mut self) {
+        if let Some(close) = self.table.close {
+            // SAFETY: the last handle: nobody uses the instance after this.
+            unsafe { close(self.instance) };
+        }
+    }
+}
+
+/// A device that is opened: known, not energised.
+pub struct OpenedDevice {
+    handle: Arc<Handle>,
+}
+
+/// A device that is energised. Dropping it deactivates it.
+pub struct ActiveDevice {
+    /// `None` only after `deactivate` has taken it.
+    handle: Option<Arc<Handle>>,
+    instance: Instance,
+    read: unsafe extern "C" fn(Instance, *const Tick, *mut DeviceState) -> u32,
+    write: unsafe extern "C" fn(Instance, *const Tick, *const Wrench) -> u32,
+}
+
+// SAFETY: the contract lets an instance be used by any one thread at a time; `&mut self` sees to "one".
+unsafe impl Send for ActiveDevice {}
+
+/// Stops a device from any thread, at any time.
+#[derive(Clone)]
+pub struct Stopper {
+    handle: Arc<Handle>,
+}
+
+impl Stopper {
+    /// Actuators safe, now. Bounded, no allocation, no lock.
+    pub fn safe_stop(&self) {
+        if let Some(safe_stop) = self.handle.table.safe_stop {
+            // SAFETY: a live instance (this handle keeps it open); `safe_stop` may come from any thread.
+            unsafe { safe_stop(self.handle.instance) };
+        }
+    }
+}
+
+impl OpenedDevice {
+    pub(super) fn open(
+        table: &'static DeviceTable,
+        ledger: Option<&'static EnergyLedgerTable>,
+        parameters: &'static [Parameter],
+        settings: &[Setting],
+    ) -> Result<Self, Refusal> {
+        // SAFETY: `settings` outlives the call, and the plugin keeps no copy past it (contract).
+        let values: Vec<ParameterValue> =
+            settings.iter().map(|setting| unsafe { setting.to_raw() }).collect();
+        let Some(open) = table.open else { return Err(Refusal::broken("its table has lost a function")) };
+        let mut message = Message::default();
+        let mut instance = std::ptr::null_mut();
+        let count = u32::try_from(values.len()).unwrap_or(u32::MAX);
+        // SAFETY: all pointers are valid for the call, as the contract of `open` asks.
+        let code = unsafe { open(values.as_ptr(), count, &raw mut message, &raw mut instance) };
+        refusal_from(code, &message)?;
+        if instance.is_null() {
+            return Err(Refusal::broken("it reported success but opened nothing"));
+        }
+        Ok(Self { handle: Arc::new(Handle { instance, table, ledger, parameters }) })
+    }
+
+    /// What the device can be told.
+    #[must_use]
+    pub fn parameters(&self) -> &'static [Parameter] {
+        self.handle.parameters
+    }
+
+    /// The value in force of the parameter at `index`, presets resolved; NaN if unknown.
+    #[must_use]
+    pub fn parameter(&mut self, index: usize) -> f64 {
+        let (Some(parameter), Ok(index)) = (self.handle.table.parameter, u32::try_from(index)) else {
+            return f64::NAN;
+        };
+        // SAFETY: a live instance, used by this thread only (`&mut`).
+        unsafe { parameter(self.handle.instance, index) }
+    }
+
+    /// What the device can do.
+    ///
+    /// # Errors
+    /// A [`Refusal`] if the plugin failed or answered numbers that make no sense.
+    pub fn capabilities(&mut self) -> Result<Capabilities, Refusal> {
+        let Some(ask) = self.handle.table.capabilities else {
+            return Err(Refusal::broken("its table has lost a function"));
+        };
+        let mut capabilities = UNKNOWN;
+        // SAFETY: a live instance, used by this thread only (`&mut`), an out pointer valid for the call.
+        let code = unsafe { ask(self.handle.instance, &raw mut capabilities) };
+        if code != CallStatus::Ok as u32 {
+            return Err(Refusal::broken(self.last_message()));
+        }
+        check_capabilities(&capabilities)?;
+        Ok(capabilities)
+    }
+
+    /// The handle by which another thread stops the device.
+    #[must_use]
+    pub fn stopper(&self) -> Stopper {
+        Stopper { handle: Arc::clone(&self.handle) }
+    }
+
+    /// Energises the device.
+    ///
+    /// # Errors
+    /// The device itself, still open, and its [`Refusal`].
+    pub fn activate(self, config: &LoopConfig) -> Result<ActiveDevice, (Self, Refusal)> {
+        let table = self.handle.table;
+        let (Some(activate), Some(read), Some(write)) = (table.activate, table.read, table.write) else {
+            return Err((self, Refusal::broken("its table has lost a function")));
+        };
+        let mut message = Message::default();
+        // SAFETY: a live instance, used by this thread only (`self` is owned), pointers valid for the call.
+        let code = unsafe { activate(self.handle.instance, config, &raw mut message) };
+        match refusal_from(code, &message) {
+            Ok(()) => {
+                let instance = self.handle.instance;
+                Ok(ActiveDevice { handle: Some(self.handle), instance, read, write })
+            }
+            Err(refusal) => Err((self, refusal)),
+        }
+    }
+
+    fn last_message(&mut self) -> String {
+        let mut message = Message::default();
+        if let Some(last_message) = self.handle.table.last_message {
+            // SAFETY: a live instance, used by this thread only (`&mut`), an out pointer valid for the call.
+            unsafe { last_message(self.handle.instance, &raw mut message) };
+        }
+        message.as_str().to_owned()
+    }
+}
+
+impl ActiveDevice {
+    /// Takes the newest sample. Real-time: bounded by the device, no allocation.
+    #[inline]
+    pub fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
+        // SAFETY: a live, active instance used by this thread only (`&mut`), pointers valid for the call.
+        Cycle::from_code(unsafe { (self.read)(self.instance, tick, state) })
+    }
+
+    /// Commands the wrench on the hand until the next write. Real-time: bounded by the device, no allocation.
+    #[inline]
+    pub fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle {
+        // SAFETY: as in `read`.
+        Cycle::from_code(unsafe { (self.write)(self.instance, tick, wrench) })
+    }
+
+    /// Changes a live parameter at a tick boundary. Real-time: bounded, no allocation.
+    pub fn set_parameter(&mut self, setting: &Setting) -> CallStatus {
+        let Some(set_parameter) = self.handle.as_ref().and_then(|handle| handle.table.set_parameter) else {
+            return CallStatus::Unsupported;
+        };
+        // SAFETY: as in `read`.
+        let code = unsafe { set_parameter(self.instance, setting.index, setting.number) };
+        CallStatus::from_code(code)
+    }
+
+    /// Energy account of the plant, where there is one. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn energy_ledger(&mut self) -> Option<EnergyLedger> {
+        let ask = self.handle.as_ref()?.ledger?.ledger?;
+        let mut ledger = EnergyLedger::default();
+        // SAFETY: as in `read`; the out pointer is valid for the call.
+        let code = unsafe { ask(self.instance, &raw mut ledger) };
+        (code == CallStatus::Ok as u32).then_some(ledger)
+    }
+
+    /// What the device said when a call failed. Not real-time.
+    #[must_use]
+    pub fn last_message(&mut self) -> String {
+        let mut message = Message::default();
+        if let Some(last_message) = self.handle.as_ref().and_then(|handle| handle.table.last_message) {
+            // SAFETY: as in `read`; the out pointer is valid for the call.
+            unsafe { last_message(self.instance, &raw mut message) };
+        }
+        message.as_str().to_owned()
+    }
+
+    /// Zero wrench, then opened again. Not real-time. `None` if the plugin broke.
+    #[must_use]
+    pub fn deactivate(mut self) -> Option<OpenedDevice> {
+        let handle = self.handle.take()?;
+        match deactivate(&handle) {
+            CallStatus::Ok => Some(OpenedDevice { handle }),
+            _ => None,
+        }
+    }
+}
+
+impl Drop for ActiveDevice {
+    fn drop(&mut self) {
+        if let Some(handle) = self.handle.take() {
+            let _ = deactivate(&handle);
+        }
+    }
+}
+
+fn deactivate(handle: &Handle) -> CallStatus {
+    let Some(deactivate) = handle.table.deactivate else { return CallStatus::Unsupported };
+    // SAFETY: called from the owner of the one working handle, which is giving it up.
+    CallStatus::from_code(unsafe { deactivate(handle.instance) })
+}
+
+/// What the out parameter holds before the plugin fills it: fails every check if it does not.
+const UNKNOWN: Capabilities = Capabilities {
+    sensed: Axes::NONE,
+    actuated: Axes::NONE,
+    range_m: [f64::NAN; 3],
+    range_rad: [f64::NAN; 3],
+    resolution_m: f64::NAN,
+    max_force_n: [f64::NAN; 3],
+    max_torque_nm: [f64::NAN; 3],
+    max_force_slew_n_per_s: f64::NAN,
+    max_torque_slew_nm_per_s: f64::NAN,
+    max_stiffness_n_per_m: f64::NAN,
+    rate_hz: [f64::NAN; 2],
+    latency_s: f64::NAN,
+};
+
+/// Limits the envelope will enforce must be numbers: a NaN limit would limit nothing.
+fn check_capabilities(capabilities: &Capabilities) -> Result<(), Refusal> {
+    let positive = |value: f64| value > 0.0; // false for NaN; infinity is "no limit", said explicitly
+    let vectors = [
+        ("range_m", capabilities.range_m),
+        ("range_rad", capabilities.range_rad),
+        ("max_force_n", capabilities.max_force_n),
+        ("max_torque_nm", capabilities.max_torque_nm),
+    ];
+    for (name, values) in vectors {
+        if !values.iter().all(|value| *value >= 0.0) {
+            return Err(Refusal::broken(format!("its capability `{name}` is {values:?}")));
+        }
+    }
+    let scalars = [
+        ("max_force_slew_n_per_s", capabilities.max_force_slew_n_per_s),
+        ("max_torque_slew_nm_per_s", capabilities.max_torque_slew_nm_per_s),
+        ("rate_hz, slowest", capabilities.rate_hz[0]),
+        ("rate_hz, fastest", capabilities.rate_hz[1]),
+    ];
+    for (name, value) in scalars {
+        if !positive(value) {
+            return Err(Refusal::broken(format!("its capability `{name}` is {value}")));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,130 @@
+//! Why a plugin was refused: one readable line with file, cause and remedy.
+
+use crate::Refusal;
+use std::path::PathBuf;
+
+/// Why a plugin was not loaded. Every variant prints one line: file, cause, what to do.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LoadError {
+    /// The file cannot be read.
+    #[error("{}: cannot read the plugin: {cause}; check the path and its permissions", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        cause: std::io::Error,
+    },
+    /// The file is no shared library, or a damaged one.
+    #[error("{}: not a shared library ({cause}); build the plugin again", path.display())]
+    NotALibrary {
+        /// The file.
+        path: PathBuf,
+        /// What the parser said.
+        cause: object::Error,
+    },
+    /// The library ends before its own tables say.
+    #[error("{}: the file is truncated ({have} bytes of at least {need}); copy or build it again", path.display())]
+    Truncated {
+        /// The file.
+        path: PathBuf,
+        /// Bytes in the file.
+        have: u64,
+        /// Bytes its tables speak of.
+        need: u64,
+    },
+    /// The library carries no metadata section.
+    #[error(
+        "{}: a shared library, but not a Flotor plugin (no `.flotor` section); \
+         export one with `export_model!`, `export_device!` or FLOTOR_METADATA", path.display()
+    )]
+    NotAPlugin {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The metadata section does not say what it must.
+    #[error("{}: unreadable plugin metadata: {cause}; build it with the export macros or the current header", path.display())]
+    BadMetadata {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with the text.
+        cause: String,
+    },
+    /// Built for another contract.
+    #[error(
+        "{}: built for plugin contract {theirs}, this host speaks {ours}; rebuild the plugin against this \
+         version (drafts 0.x match exactly)", path.display()
+    )]
+    OtherContract {
+        /// The file.
+        path: PathBuf,
+        /// Contract of the plugin.
+        theirs: String,
+        /// Contract of the host.
+        ours: String,
+    },
+    /// The dynamic linker refused.
+    #[error("{}: the system cannot link the library: {cause}; install what is missing or rebuild the plugin", path.display())]
+    Link {
+        /// The file.
+        path: PathBuf,
+        /// What the linker said, all of it.
+        cause: String,
+    },
+    /// No private copy could be made.
+    #[error("{}: cannot make a private copy of the plugin: {cause}; check memory limits", path.display())]
+    Copy {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        cause: std::io::Error,
+    },
+    /// The entry that the metadata names is not exported, or not an entry.
+    #[error("{}: no plugin entry `{symbol}` in the library; export it with default visibility", path.display())]
+    NoEntry {
+        /// The file.
+        path: PathBuf,
+        /// The name in the metadata.
+        symbol: String,
+    },
+    /// A struct of the contract differs between host and plugin.
+    #[error("{}: the contract differs: {difference}; rebuild the plugin against this host's flotor-hal", path.display())]
+    LayoutDiffers {
+        /// The file.
+        path: PathBuf,
+        /// Which struct and field, on both sides.
+        difference: String,
+    },
+    /// The plugin does not offer the interface its kind promises, or a required function is missing in it.
+    #[error("{}: `{interface}` lacks {missing}; a plugin must offer it", path.display())]
+    MissingFunction {
+        /// The file.
+        path: PathBuf,
+        /// Which interface.
+        interface: &'static str,
+        /// Which function, or the whole table.
+        missing: &'static str,
+    },
+    /// The plugin is of the other kind.
+    #[error("{}: `{id}` is a {found}, a {wanted} is needed here; name another plugin", path.display())]
+    OtherKind {
+        /// The file.
+        path: PathBuf,
+        /// Id of the plugin.
+        id: String,
+        /// What it is.
+        found: &'static str,
+        /// What is needed.
+        wanted: &'static str,
+    },
+    /// The plugin itself said no.
+    #[error("{}: `{id}` refused: {refusal}", path.display())]
+    Refused {
+        /// The file.
+        path: PathBuf,
+        /// Id of the plugin.
+        id: String,
+        /// Its reason.
+        refusal: Refusal,
+    },
+}

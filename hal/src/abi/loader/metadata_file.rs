@@ -1,0 +1,104 @@
+//! Reads what a file says about itself without running any of it.
+
+use super::LoadError;
+use crate::abi::{ABI_MAJOR, ABI_MINOR, PluginKind, metadata};
+use object::read::elf::{ElfFile64, FileHeader, ProgramHeader, SectionHeader};
+use object::{Endianness, Object, ObjectSection};
+use std::path::{Path, PathBuf};
+
+/// What a plugin says about itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Metadata {
+    /// The file it was read from; empty for a plugin linked into this program.
+    pub path: PathBuf,
+    /// Model or device.
+    pub kind: PluginKind,
+    /// What scenes and commands call it.
+    pub id: String,
+    /// What people call it.
+    pub name: String,
+    /// One sentence for people.
+    pub doc: String,
+    /// Version of the plugin.
+    pub version: String,
+    /// Contract it was built for, "major.minor".
+    pub abi: String,
+    /// Name of the exported entry.
+    pub entry: String,
+}
+
+/// Reads the metadata of a plugin file. Runs and maps none of its code. Not real-time.
+///
+/// # Errors
+/// Everything of [`LoadError`] that can be known without `dlopen`, except the contract version, which a list
+/// may want to show: see [`Metadata::check_contract`].
+pub fn read_metadata(path: &Path) -> Result<Metadata, LoadError> {
+    let bytes = std::fs::read(path).map_err(|cause| LoadError::Unreadable { path: path.into(), cause })?;
+    parse(path, &bytes)
+}
+
+impl Metadata {
+    /// Checks that the plugin was built for the contract this host speaks.
+    ///
+    /// # Errors
+    /// [`LoadError::OtherContract`]. While the interfaces are drafts (major 0), the minor must match too.
+    pub fn check_contract(&self) -> Result<(), LoadError> {
+        let ours = format!("{ABI_MAJOR}.{ABI_MINOR}");
+        if self.abi == ours {
+            return Ok(());
+        }
+        Err(LoadError::OtherContract { path: self.path.clone(), theirs: self.abi.clone(), ours })
+    }
+}
+
+/// Finds and reads the metadata section of the bytes of a library.
+pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Metadata, LoadError> {
+    let not_a_library = |cause| LoadError::NotALibrary { path: path.into(), cause };
+    let elf = ElfFile64::<Endianness>::parse(bytes).map_err(not_a_library)?;
+    check_extent(path, &elf, bytes.len() as u64)?;
+    let section = elf.section_by_name(metadata::SECTION);
+    let section = section.ok_or_else(|| LoadError::NotAPlugin { path: path.into() })?;
+    let text = section.data().map_err(not_a_library)?;
+    let bad = |cause: String| LoadError::BadMetadata { path: path.into(), cause };
+    let text = std::str::from_utf8(text).map_err(|cause| bad(cause.to_string()))?;
+    let table: toml::Table = text
+        .trim_end_matches('\0')
+        .parse()
+        .map_err(|cause: toml::de::Error| bad(cause.message().to_owned()))?;
+    let value = |key: &str| {
+        let found = table.get(key).and_then(toml::Value::as_str).filter(|text| !text.is_empty());
+        found.map(str::to_owned).ok_or_else(|| bad(format!("`{key}` is missing")))
+    };
+    let kind = match value("kind")?.as_str() {
+        "model" => PluginKind::Model,
+        "device" => PluginKind::Device,
+        other => return Err(bad(format!("kind `{other}` is neither model nor device"))),
+    };
+    Ok(Metadata {
+        path: path.into(),
+        kind,
+        id: value("id")?,
+        name: value("name").unwrap_or_default(),
+        doc: value("doc").unwrap_or_default(),
+        version: value("version")?,
+        abi: value("abi")?,
+        entry: value("entry")?,
+    })
+}
+
+/// Refuses a file shorter than its own headers say: `dlopen` would map it and die of SIGBUS.
+fn check_extent(path: &Path, elf: &ElfFile64<'_, Endianness>, have: u64) -> Result<(), LoadError> {
+    let endian = elf.endian();
+    let header = elf.elf_header();
+    let section_headers = u64::from(header.e_shnum(endian)) * u64::from(header.e_shentsize(endian));
+    let mut need = header.e_shoff(endian).saturating_add(section_headers);
+    for segment in elf.elf_program_headers() {
+        need = need.max(segment.p_offset(endian).saturating_add(segment.p_filesz(endian)));
+    }
+    for section in elf.elf_section_table().iter() {
+        if let Some((offset, size)) = section.file_range(endian) {
+            need = need.max(offset.saturating_add(size));
+        }
+    }
+    if need > have { Err(LoadError::Truncated { path: path.into(), have, need }) } else { Ok(()) }
+}

@@ -1,0 +1,22 @@
+//! The host's side of the contract: find out what a file is, open it, prove that both sides mean the same
+//! structs, and wrap its tables in types that cannot be called in the wrong order.
+//!
+//! Order of a load, each step cheaper and safer than the next:
+//! file -> ELF section with metadata -> contract version -> private copy -> `dlopen` -> entry -> sizes ->
+//! layouts -> interface table. Nothing of the plugin runs before `dlopen`, and a file that fails before it
+//! never gets that far: a truncated library would otherwise raise SIGBUS inside `dlopen`.
+
+mod check;
+mod device;
+mod error;
+mod library;
+mod metadata_file;
+mod model;
+mod setting;
+
+pub use device::{ActiveDevice, OpenedDevice, Stopper};
+pub use error::LoadError;
+pub use library::Plugin;
+pub use metadata_file::{Metadata, read_metadata};
+pub use model::{Centerline, Model};
+pub use setting::{Setting, SettingError};

@@ -1,0 +1,147 @@
+//! What a person typed (`spring.gamma_n=17`) into what a plugin understands, checked against its schema.
+
+use crate::abi::Str;
+use crate::{OutOfRange, Parameter, ParameterKind, ParameterValue};
+
+/// One checked value for one parameter of one schema.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    pub(super) index: u32,
+    pub(super) number: f64,
+    text: String,
+}
+
+/// Why a setting is refused. Prints what, and what would be right.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SettingError {
+    /// No parameter has this id.
+    #[error("no parameter `{id}`{}", nearest.as_ref().map_or(String::new(), |n| format!("; did you mean `{n}`?")))]
+    Unknown {
+        /// What was asked for.
+        id: String,
+        /// The most similar id there is.
+        nearest: Option<String>,
+    },
+    /// A number was expected.
+    #[error("`{id}` is a number{}, not `{value}`", if unit.is_empty() { String::new() } else { format!(" in {unit}") })]
+    NotANumber {
+        /// The parameter.
+        id: String,
+        /// Its unit.
+        unit: String,
+        /// What was given.
+        value: String,
+    },
+    /// The number is outside the range.
+    #[error("`{id}` = {}: legal is {} to {}{}", range.value, range.min, range.max, if unit.is_empty() { String::new() } else { format!(" {unit}") })]
+    OutOfRange {
+        /// The parameter.
+        id: String,
+        /// Its unit.
+        unit: String,
+        /// The number and its range.
+        range: OutOfRange,
+    },
+    /// Not one of the choices.
+    #[error("`{id}` = `{value}`: legal is {}", choices.join(" | "))]
+    NotAChoice {
+        /// The parameter.
+        id: String,
+        /// What was given.
+        value: String,
+        /// What there is.
+        choices: Vec<String>,
+    },
+}
+
+impl Setting {
+    /// Reads a value for the parameter `id` of a schema.
+    ///
+    /// # Errors
+    /// [`SettingError`] with the nearest right id, the range, or the choices.
+    pub fn parse(schema: &'static [Parameter], id: &str, value: &str) -> Result<Self, SettingError> {
+        let (index, parameter) = find(schema, id)?;
+        match parameter.kind() {
+            ParameterKind::Text => Ok(Self { index, number: 0.0, text: value.to_owned() }),
+            ParameterKind::Choice => {
+                let names = parameter.choices();
+                let choice = names.iter().position(|name| name.as_str() == value);
+                let choice = choice.ok_or_else(|| SettingError::NotAChoice {
+                    id: id.to_owned(),
+                    value: value.to_owned(),
+                    choices: names.iter().map(|name| name.as_str().to_owned()).collect(),
+                })?;
+                #[allow(clippy::cast_precision_loss)] // a handful of choices
+                Ok(Self { index, number: choice as f64, text: String::new() })
+            }
+            ParameterKind::Real => {
+                let number = value.trim().parse::<f64>().map_err(|_| SettingError::NotANumber {
+                    id: id.to_owned(),
+                    unit: parameter.unit().to_owned(),
+                    value: value.to_owned(),
+                })?;
+                Self::number(schema, id, number)
+            }
+        }
+    }
+
+    /// Takes a number for the parameter `id` of a schema (for a choice, its index).
+    ///
+    /// # Errors
+    /// [`SettingError`] with the nearest right id or the range.
+    pub fn number(schema: &'static [Parameter], id: &str, number: f64) -> Result<Self, SettingError> {
+        let (index, parameter) = find(schema, id)?;
+        parameter.check(number).map_err(|range| SettingError::OutOfRange {
+            id: id.to_owned(),
+            unit: parameter.unit().to_owned(),
+            range,
+        })?;
+        Ok(Self { index, number, text: String::new() })
+    }
+
+    /// Index of the parameter in its schema.
+    #[must_use]
+    pub fn index(&self) -> usize {
+        self.index as usize
+    }
+
+    /// The number (for a choice, its index; 0 for text).
+    #[must_use]
+    pub fn value(&self) -> f64 {
+        self.number
+    }
+
+    /// The value as a person would type it.
+    #[must_use]
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked indices of a few choices
+    pub fn display(&self, schema: &'static [Parameter]) -> String {
+        let Some(parameter) = schema.get(self.index()) else { return String::new() };
+        match parameter.kind() {
+            ParameterKind::Text => self.text.clone(),
+            ParameterKind::Choice => {
+                parameter.choices().get(self.number as usize).map_or("", Str::as_str).to_owned()
+            }
+            ParameterKind::Real => self.number.to_string(),
+        }
+    }
+
+    /// The form that crosses the boundary.
+    ///
+    /// # Safety
+    /// The result must not outlive `self`.
+    pub(super) unsafe fn to_raw(&self) -> ParameterValue {
+        // SAFETY: by the contract of this function nothing borrowed here outlives `self`.
+        let text = unsafe { Str::borrowed(&self.text) };
+        ParameterValue { index: self.index, reserved: 0, number: self.number, text }
+    }
+}
+
+fn find(schema: &'static [Parameter], id: &str) -> Result<(u32, &'static Parameter), SettingError> {
+    let found = (0u32..).zip(schema).find(|(_, parameter)| parameter.id() == id);
+    found.ok_or_else(|| {
+        let similarity = |p: &&Parameter| (strsim::jaro_winkler(p.id(), id) * 1.0e6).round();
+        let nearest = schema.iter().max_by(|a, b| similarity(a).total_cmp(&similarity(b)));
+        SettingError::Unknown { id: id.to_owned(), nearest: nearest.map(|p| p.id().to_owned()) }
+    })
+}

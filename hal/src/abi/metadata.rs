@@ -1,0 +1,140 @@
+//! What can be read of a plugin without running it: TOML text in a section of the file.
+//!
+//! The text is assembled at compile time by `export_model!` and `export_device!`; a C plugin writes it with
+//! one macro of the header. It survives `strip` and the linker's garbage collection.
+
+use super::{ABI_MAJOR, ABI_MINOR, PluginKind};
+
+/// Name of the ELF section.
+pub const SECTION: &str = ".flotor";
+
+/// The facts the text is made of.
+#[derive(Clone, Copy)]
+pub struct Facts {
+    /// Model or device.
+    pub kind: PluginKind,
+    /// What scenes and commands call it.
+    pub id: &'static str,
+    /// What people call it.
+    pub name: &'static str,
+    /// One sentence for people.
+    pub doc: &'static str,
+    /// Version of the plugin.
+    pub version: &'static str,
+    /// Name of the exported entry.
+    pub entry: &'static str,
+}
+
+/// Appends to a fixed buffer, or only counts when there is none. Const: runs in the compiler.
+struct Writer<const N: usize> {
+    bytes: [u8; N],
+    len: usize,
+}
+
+impl<const N: usize> Writer<N> {
+    const fn text(mut self, text: &str) -> Self {
+        let text = text.as_bytes();
+        let mut i = 0;
+        while i < text.len() {
+            if self.len < N {
+                self.bytes[self.len] = text[i];
+            }
+            self.len += 1;
+            i += 1;
+        }
+        self
+    }
+
+    const fn digit(self, value: u16) -> Self {
+        assert!(value < 10, "extend this when a version reaches 10");
+        const DIGITS: [&str; 10] = ["0", "1", "2", "3", "4", "5", "6", "7", "8", "9"];
+        self.text(DIGITS[value as usize])
+    }
+
+    const fn line(self, key: &str, value: &str) -> Self {
+        let bytes = value.as_bytes();
+        let mut i = 0;
+        while i < bytes.len() {
+            let plain = bytes[i] >= b' ' && bytes[i] != b'"' && bytes[i] != b'\\';
+            assert!(plain, "id, name and doc of a plugin are single lines without quotes or backslashes");
+            i += 1;
+        }
+        self.text(key).text(" = \"").text(value).text("\"\n")
+    }
+}
+
+const fn write<const N: usize>(facts: &Facts) -> Writer<N> {
+    Writer { bytes: [0; N], len: 0 }
+        .line("kind", facts.kind.word())
+        .line("id", facts.id)
+        .line("name", facts.name)
+        .line("doc", facts.doc)
+        .line("version", facts.version)
+        .text("abi = \"")
+        .digit(ABI_MAJOR)
+        .text(".")
+        .digit(ABI_MINOR)
+        .text("\"\n")
+        .line("entry", facts.entry)
+}
+
+/// Bytes the text needs.
+#[must_use]
+pub const fn length(facts: &Facts) -> usize {
+    write::<0>(facts).len
+}
+
+/// The text.
+#[must_use]
+pub const fn render<const N: usize>(facts: &Facts) -> [u8; N] {
+    write::<N>(facts).bytes
+}
+
+/// What both export macros share: the entry static and the metadata section.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! export_entry {
+    ($entry:expr, $kind:expr, $id:expr, $name:expr, $doc:expr) => {
+        /// The plugin's entry: found by name in the shared library, or linked directly into a test.
+        // One symbol per crate, so that several plugins can be linked into one binary.
+        #[unsafe(export_name = concat!("flotor_entry_", env!("CARGO_CRATE_NAME")))]
+        pub static FLOTOR_ENTRY: $crate::abi::Entry = $entry;
+
+        const _: () = {
+            const FACTS: $crate::abi::metadata::Facts = $crate::abi::metadata::Facts {
+                kind: $kind,
+                id: $id,
+                name: $name,
+                doc: $doc,
+                version: env!("CARGO_PKG_VERSION"),
+                entry: concat!("flotor_entry_", env!("CARGO_CRATE_NAME")),
+            };
+            #[used]
+            #[cfg_attr(not(target_vendor = "apple"), unsafe(link_section = ".flotor"))]
+            #[cfg_attr(target_vendor = "apple", unsafe(link_section = "__DATA,__flotor"))]
+            static METADATA: [u8; $crate::abi::metadata::length(&FACTS)] =
+                $crate::abi::metadata::render(&FACTS);
+        };
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_complete_and_exact() {
+        const FACTS: Facts = Facts {
+            kind: PluginKind::Model,
+            id: "floor",
+            name: "Floor",
+            doc: "A flat floor",
+            version: "1.2.3",
+            entry: "flotor_entry_floor",
+        };
+        const TEXT: [u8; length(&FACTS)] = render(&FACTS);
+        let expected = "kind = \"model\"\nid = \"floor\"\nname = \"Floor\"\ndoc = \"A flat floor\"\n\
+                        version = \"1.2.3\"\nabi = \"0.1\"\nentry = \"flotor_entry_floor\"\n";
+        assert_eq!(std::str::from_utf8(&TEXT), Ok(expected));
+    }
+}

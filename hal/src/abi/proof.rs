@@ -1,0 +1,65 @@
+//! Layout proof: a Rust plugin carries the layout of every contract type as its compiler saw it, and the host
+//! compares each with its own, field by field and through function signatures.
+//!
+//! abi_stable makes and compares the layouts; it is not the call path, so C plugins, which carry none, load
+//! too (they are held to [`super::ContractSizes`] and to the assertions in the header).
+
+use super::{
+    CenterlineTable, ContractSizes, DeviceTable, EnergyLedgerTable, ForceTable, Host, LayoutProof, Message,
+    Str,
+};
+use crate::{
+    Capabilities, CenterlineInfo, DeviceState, EnergyLedger, Input, LoopConfig, Output, Parameter,
+    ParameterValue, Pose, Tick, Twist, Wrench,
+};
+use abi_stable::StableAbi;
+use abi_stable::library::AbiHeader;
+use abi_stable::type_layout::TypeLayout;
+use std::ffi::c_void;
+
+/// The layout type behind the pointers of [`LayoutProof::layout_of`].
+pub type Layout = TypeLayout;
+
+/// The header behind [`LayoutProof::abi_stable_header`].
+pub static HEADER: AbiHeader = AbiHeader::VALUE;
+
+/// Every type of the contract, by name; data first, so that a report names the struct and not a table using it.
+pub const CONTRACT: [(&str, &TypeLayout); 19] = [
+    ("Pose", Pose::LAYOUT),
+    ("Twist", Twist::LAYOUT),
+    ("Wrench", Wrench::LAYOUT),
+    ("Input", Input::LAYOUT),
+    ("Output", Output::LAYOUT),
+    ("LoopConfig", LoopConfig::LAYOUT),
+    ("Tick", Tick::LAYOUT),
+    ("DeviceState", DeviceState::LAYOUT),
+    ("Capabilities", Capabilities::LAYOUT),
+    ("EnergyLedger", EnergyLedger::LAYOUT),
+    ("CenterlineInfo", CenterlineInfo::LAYOUT),
+    ("Parameter", Parameter::LAYOUT),
+    ("ParameterValue", ParameterValue::LAYOUT),
+    ("Message", Message::LAYOUT),
+    ("Host", Host::LAYOUT),
+    ("ContractSizes", ContractSizes::LAYOUT),
+    ("ForceTable", ForceTable::LAYOUT),
+    ("CenterlineTable", CenterlineTable::LAYOUT),
+    ("DeviceTable", DeviceTable::LAYOUT),
+];
+
+/// Layout of the one table that is an extension of devices; kept apart because not every device offers it.
+pub const ENERGY_LEDGER_TABLE: (&str, &TypeLayout) = ("EnergyLedgerTable", EnergyLedgerTable::LAYOUT);
+
+unsafe extern "C" fn layout_of(name: Str) -> *const c_void {
+    let known = CONTRACT.iter().chain(std::iter::once(&ENERGY_LEDGER_TABLE));
+    let found = known.into_iter().find(|(known, _)| *known == name.as_str());
+    found.map_or(std::ptr::null(), |(_, layout)| std::ptr::from_ref::<TypeLayout>(layout).cast())
+}
+
+/// The proof every Rust plugin of this build carries.
+#[allow(clippy::cast_possible_truncation)] // 24 bytes
+pub static PROOF: LayoutProof = LayoutProof {
+    size: size_of::<LayoutProof>() as u32,
+    reserved: 0,
+    abi_stable_header: (&raw const HEADER).cast(),
+    layout_of: Some(layout_of),
+};

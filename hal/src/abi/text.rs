@@ -1,0 +1,166 @@
+//! Text across the boundary: pointer and length, never null-terminated, never owned by the receiver.
+
+use std::fmt;
+
+/// Borrowed UTF-8 text. In a schema or an info struct it lives as long as the process (plugins are never
+/// unloaded); as an argument it lives for the call.
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct Str {
+    ptr: *const u8,
+    len: usize,
+}
+
+// SAFETY: a `Str` is a shared borrow of immutable bytes; its makers are `new` (a `&'static str`), `borrowed`
+// (whose caller vouches for the lifetime) and a plugin's own read-only data, which is never unmapped.
+unsafe impl Sync for Str {}
+// SAFETY: as for `Sync`: it owns nothing.
+unsafe impl Send for Str {}
+
+impl Str {
+    /// No text.
+    pub const EMPTY: Str = Str::new("");
+
+    /// Text that lives as long as the process.
+    #[must_use]
+    pub const fn new(text: &'static str) -> Self {
+        Self { ptr: text.as_ptr(), len: text.len() }
+    }
+
+    /// Text lent for the duration of a call.
+    ///
+    /// # Safety
+    /// The caller lets no copy of the result outlive `text`.
+    #[must_use]
+    pub unsafe fn borrowed(text: &str) -> Self {
+        Self { ptr: text.as_ptr(), len: text.len() }
+    }
+
+    /// The text; empty if a foreign plugin left null or bytes that are not UTF-8.
+    #[must_use]
+    pub const fn as_str(&self) -> &str {
+        if self.ptr.is_null() || self.len > isize::MAX as usize {
+            return "";
+        }
+        // SAFETY: not null, and the maker of this value vouched for `len` readable bytes (see `Sync`).
+        let bytes = unsafe { std::slice::from_raw_parts(self.ptr, self.len) };
+        match std::str::from_utf8(bytes) {
+            Ok(text) => text,
+            Err(_) => "",
+        }
+    }
+}
+
+impl fmt::Debug for Str {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Debug::fmt(self.as_str(), f)
+    }
+}
+
+/// A constant list of texts.
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct StrList {
+    ptr: *const Str,
+    len: usize,
+}
+
+// SAFETY: like `Str`, a shared borrow of immutable static data.
+unsafe impl Sync for StrList {}
+// SAFETY: as for `Sync`: it owns nothing.
+unsafe impl Send for StrList {}
+
+impl StrList {
+    /// No texts.
+    pub const EMPTY: StrList = StrList { ptr: std::ptr::null(), len: 0 };
+
+    /// A list that lives as long as the process.
+    #[must_use]
+    pub const fn new(texts: &'static [Str]) -> Self {
+        Self { ptr: texts.as_ptr(), len: texts.len() }
+    }
+
+    /// The texts.
+    #[must_use]
+    pub const fn as_slice(&self) -> &[Str] {
+        if self.ptr.is_null() {
+            return &[];
+        }
+        // SAFETY: not null; `new` stored pointer and length of one static slice, a plugin's own data likewise.
+        unsafe { std::slice::from_raw_parts(self.ptr, self.len) }
+    }
+}
+
+/// Bytes a [`Message`] holds.
+pub const MESSAGE_BYTES: usize = 508;
+
+/// A sentence for people, written by the callee into memory of the caller: nothing to allocate or to free.
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct Message {
+    len: u32,
+    text: [u8; MESSAGE_BYTES],
+}
+
+impl Default for Message {
+    fn default() -> Self {
+        Self { len: 0, text: [0; MESSAGE_BYTES] }
+    }
+}
+
+impl Message {
+    /// Stores as much of `text` as fits, cut at a character. Real-time: bounded, no allocation.
+    #[allow(clippy::cast_possible_truncation)] // at most MESSAGE_BYTES
+    pub fn set(&mut self, text: &str) {
+        let mut len = text.len().min(MESSAGE_BYTES);
+        while !text.is_char_boundary(len) {
+            len -= 1;
+        }
+        if let (Some(to), Some(from)) = (self.text.get_mut(..len), text.as_bytes().get(..len)) {
+            to.copy_from_slice(from);
+            self.len = len as u32;
+        }
+    }
+
+    /// The sentence; whatever a foreign plugin wrote, the longest valid start of it.
+    #[must_use]
+    pub fn as_str(&self) -> &str {
+        let bytes = self.text.get(..self.len as usize).unwrap_or(&self.text);
+        match std::str::from_utf8(bytes) {
+            Ok(text) => text,
+            Err(error) => std::str::from_utf8(bytes.get(..error.valid_up_to()).unwrap_or(&[])).unwrap_or(""),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_is_cut_at_a_character() {
+        let mut message = Message::default();
+        message.set(&"µ".repeat(MESSAGE_BYTES)); // two bytes each, 508 is even: 254 whole characters
+        assert_eq!(message.as_str().chars().count(), MESSAGE_BYTES / 2);
+        message.set(&format!("a{}", "µ".repeat(MESSAGE_BYTES)));
+        assert_eq!(message.as_str().len(), MESSAGE_BYTES - 1);
+    }
+
+    #[test]
+    fn garbage_from_a_plugin_reads_as_its_valid_start() {
+        let mut message = Message::default();
+        message.set("ok");
+        message.text[2] = 0xff;
+        message.len = u32::MAX;
+        assert_eq!(message.as_str(), "ok");
+    }
+
+    #[test]
+    fn null_text_reads_as_empty() {
+        let text = Str { ptr: std::ptr::null(), len: 7 };
+        assert_eq!(text.as_str(), "");
+    }
+}

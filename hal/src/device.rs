@@ -1,0 +1,353 @@
+//! Devices: what an author implements, and the data that goes in and out each tick.
+//!
+//! A device is *opened* (it answers questions, it gives no force), then *active* (energised, real-time), then
+//! opened again. The two are different types, so that a real-time call before activation does not compile.
+
+use crate::abi::Str;
+use crate::{LoopConfig, OutOfRange, Parameter, Pose, Refusal, Settings, Twist, Wrench};
+
+/// One tick as a device and a host see it. 24 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct Tick {
+    /// Number of the tick, from 0.
+    pub index: u64,
+    /// Scheduled time since the loop started, ns: free of jitter, so that runs can be repeated.
+    pub time_ns: u64,
+    /// Scheduled time since the previous tick, ns; more than a period after missed ticks; 0 on the first.
+    pub dt_ns: u64,
+}
+
+/// What is wrong with a device, as a closed set that says what to do.
+#[repr(u32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// The handle left the sensor's range: move it back, then re-arm.
+    SensorOutOfRange = 1,
+    /// A coil is too hot: let it cool.
+    OverTemperature = 2,
+    /// A coil carried too much current for too long: reduce the load.
+    OverCurrent = 3,
+    /// The handle moved faster than the device allows.
+    OverSpeed = 4,
+    /// The device is gone: check cable and power.
+    Disconnected = 5,
+    /// The device did not answer in time.
+    Timeout = 6,
+    /// The device answered something that makes no sense.
+    Protocol = 7,
+    /// Somebody pressed the emergency stop of the device.
+    EmergencyStop = 8,
+    /// The plugin broke (panic, or a code outside the contract).
+    Broken = 9,
+}
+
+impl Fault {
+    /// Reads a fault from the boundary: 0 is none, anything unknown means the plugin broke the contract.
+    #[inline]
+    #[must_use]
+    pub const fn from_code(code: u32) -> Option<Self> {
+        Some(match code {
+            0 => return None,
+            1 => Self::SensorOutOfRange,
+            2 => Self::OverTemperature,
+            3 => Self::OverCurrent,
+            4 => Self::OverSpeed,
+            5 => Self::Disconnected,
+            6 => Self::Timeout,
+            7 => Self::Protocol,
+            8 => Self::EmergencyStop,
+            _ => Self::Broken,
+        })
+    }
+
+    /// What happened and what to do, for people.
+    #[must_use]
+    pub const fn advice(self) -> &'static str {
+        match self {
+            Self::SensorOutOfRange => "the handle left the sensor's range; move it back and start again",
+            Self::OverTemperature => "a coil is too hot; let the device cool",
+            Self::OverCurrent => "a coil carried too much current for too long; reduce stiffness or load",
+            Self::OverSpeed => "the handle moved faster than the device allows",
+            Self::Disconnected => "the device is gone; check cable and power",
+            Self::Timeout => "the device did not answer in time; check cable, hub and machine load",
+            Self::Protocol => "the device answered something that makes no sense; check its firmware version",
+            Self::EmergencyStop => "the emergency stop of the device is pressed; release it to go on",
+            Self::Broken => "the device plugin broke the contract; report it to its author",
+        }
+    }
+}
+
+/// Verdict of one real-time call on a device.
+#[must_use]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cycle {
+    /// A new sample is in the state.
+    Fresh,
+    /// No new sample since the last call; the state is the old one.
+    Stale,
+    /// The device is faulted and gives no force.
+    Fault(Fault),
+}
+
+impl Cycle {
+    /// Bit that marks a fault in the code that crosses the boundary.
+    const FAULT_BIT: u32 = 0x100;
+
+    pub(crate) const fn code(self) -> u32 {
+        match self {
+            Self::Fresh => 0,
+            Self::Stale => 1,
+            Self::Fault(fault) => Self::FAULT_BIT | fault as u32,
+        }
+    }
+
+    /// Reads a verdict from the boundary; anything unknown means the plugin broke the contract.
+    #[inline]
+    pub const fn from_code(code: u32) -> Self {
+        match code {
+            0 => Self::Fresh,
+            1 => Self::Stale,
+            _ => Self::Fault(match Fault::from_code(code & !Self::FAULT_BIT) {
+                Some(fault) if code & Self::FAULT_BIT != 0 => fault,
+                _ => Fault::Broken,
+            }),
+        }
+    }
+}
+
+/// What a device reports each tick. 168 bytes, in the device frame.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct DeviceState {
+    /// Pose of the handle, m and unit quaternion.
+    pub pose: Pose,
+    /// Velocity of the handle, m/s and rad/s.
+    pub twist: Twist,
+    /// Wrench the device says it delivered to the hand since the previous tick, N and N·m.
+    pub delivered: Wrench,
+    /// When the sample was taken, ns on the loop's clock.
+    pub sampled_ns: u64,
+    /// Buttons, one bit each.
+    pub buttons: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
+}
+
+impl DeviceState {
+    /// At home, at rest.
+    pub const HOME: DeviceState = DeviceState {
+        pose: Pose::HOME,
+        twist: Twist::ZERO,
+        delivered: Wrench::ZERO,
+        sampled_ns: 0,
+        buttons: 0,
+        reserved: 0,
+    };
+
+    /// True if every number is finite. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.pose.is_finite() && self.twist.is_finite()
+    }
+}
+
+/// Which of the six axes a device senses or actuates: x, y, z, then rotation about x, y, z.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct Axes {
+    bits: u32,
+}
+
+impl Axes {
+    /// None.
+    pub const NONE: Axes = Axes { bits: 0 };
+    /// The three translations.
+    pub const TRANSLATION: Axes = Axes { bits: 0b00_0111 };
+    /// The three rotations.
+    pub const ROTATION: Axes = Axes { bits: 0b11_1000 };
+    /// All six.
+    pub const ALL: Axes = Axes { bits: 0b11_1111 };
+
+    /// True if all of `other` is among them.
+    #[must_use]
+    pub const fn contains(self, other: Axes) -> bool {
+        self.bits & other.bits == other.bits
+    }
+}
+
+/// What a device can do, as numbers a host compares with a model and enforces. 200 bytes, device frame.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct Capabilities {
+    /// Axes whose position is measured.
+    pub sensed: Axes,
+    /// Axes that can be driven.
+    pub actuated: Axes,
+    /// Largest displacement from the origin along each axis, m.
+    pub range_m: [f64; 3],
+    /// Largest rotation about each axis, rad.
+    pub range_rad: [f64; 3],
+    /// Smallest position step that is resolved, m.
+    pub resolution_m: f64,
+    /// Largest force along each axis, N.
+    pub max_force_n: [f64; 3],
+    /// Largest torque about each axis, N·m.
+    pub max_torque_nm: [f64; 3],
+    /// Fastest change of force the device accepts, N/s.
+    pub max_force_slew_n_per_s: f64,
+    /// Fastest change of torque the device accepts, N·m/s.
+    pub max_torque_slew_nm_per_s: f64,
+    /// Largest stiffness the device renders stably at its nominal rate, N/m.
+    pub max_stiffness_n_per_m: f64,
+    /// Slowest and fastest loop the device runs at, Hz.
+    pub rate_hz: [f64; 2],
+    /// Time from taking a sample to the force that answers it, beyond one period, s.
+    pub latency_s: f64,
+}
+
+/// Account of the mechanical energy of a device with a known plant (a simulation), J since activation. 56 bytes.
+///
+/// Extension `flotor.energy-ledger/1`. Every term is integrated on its own, none is the difference of others:
+/// `stored_j - initial_j = actuators_j + feedforward_j + hand_j - dissipated_j` is a check, not a definition.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct EnergyLedger {
+    /// Kinetic and potential energy now.
+    pub stored_j: f64,
+    /// Kinetic and potential energy at activation.
+    pub initial_j: f64,
+    /// Work done by the actuators for the commanded wrench.
+    pub actuators_j: f64,
+    /// Work done by the actuators for gravity compensation.
+    pub feedforward_j: f64,
+    /// Work done by the hand.
+    pub hand_j: f64,
+    /// Energy turned into heat by damping.
+    pub dissipated_j: f64,
+    /// Largest mechanical energy (kinetic plus potential above its lowest point) so far: the scale of an error.
+    pub peak_j: f64,
+}
+
+impl EnergyLedger {
+    /// What the account fails to explain, J.
+    #[must_use]
+    pub fn residual_j(&self) -> f64 {
+        let explained = self.actuators_j + self.feedforward_j + self.hand_j - self.dissipated_j;
+        self.stored_j - self.initial_j - explained
+    }
+}
+
+/// What a device says about itself; constant, readable without opening it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct DeviceInfo {
+    pub(crate) id: Str,
+    pub(crate) name: Str,
+    pub(crate) doc: Str,
+}
+
+impl DeviceInfo {
+    /// `id` is what scenes and commands say ("simulated"); `name` and `doc` are for people.
+    #[must_use]
+    pub const fn new(id: &'static str, name: &'static str, doc: &'static str) -> Self {
+        Self { id: Str::new(id), name: Str::new(name), doc: Str::new(doc) }
+    }
+
+    /// What scenes and commands call it.
+    #[must_use]
+    pub const fn id(&self) -> &str {
+        self.id.as_str()
+    }
+
+    /// What people call it.
+    #[must_use]
+    pub const fn name(&self) -> &str {
+        self.name.as_str()
+    }
+
+    /// One sentence for people.
+    #[must_use]
+    pub const fn doc(&self) -> &str {
+        self.doc.as_str()
+    }
+}
+
+/// Makes a device safe from any thread at any time, without its cooperation.
+pub trait SafeStop: Send + Sync + 'static {
+    /// Actuators to zero (or to a controlled landing) and stay there until the next activation.
+    /// Bounded, no allocation, no lock; may be called twice and while another thread is inside `read` or `write`.
+    fn safe_stop(&self);
+}
+
+/// A device that is opened: known, not energised. Not real-time.
+pub trait Device: Sized + Send + 'static {
+    /// What the device says about itself.
+    const INFO: DeviceInfo;
+    /// What the device can be told.
+    const PARAMETERS: &'static [Parameter] = &[];
+    /// The same device, energised.
+    type Active: ActiveDevice<Opened = Self>;
+    /// How another thread stops it.
+    type Stop: SafeStop;
+
+    /// Opens the device. The settings are already checked against the schema. May block.
+    ///
+    /// # Errors
+    /// A [`Refusal`] if it is missing, busy, forbidden or told nonsense.
+    fn open(settings: &Settings<'_>) -> Result<Self, Refusal>;
+
+    /// What it can do, now that it is open.
+    fn capabilities(&self) -> Capabilities;
+
+    /// The handle by which another thread stops it; asked once, right after opening.
+    fn stopper(&self) -> Self::Stop;
+
+    /// Energises the device; it starts at zero wrench.
+    ///
+    /// # Errors
+    /// The device itself, still open, and a [`Refusal`]: nothing is lost, the caller may retry.
+    fn activate(self, config: &LoopConfig) -> Result<Self::Active, (Self, Refusal)>;
+
+    /// The value in force, presets resolved (by index into [`Self::PARAMETERS`]).
+    fn parameter(&self, index: usize) -> f64 {
+        Self::PARAMETERS.get(index).map_or(f64::NAN, Parameter::default)
+    }
+}
+
+/// A device that is energised. Every method is real-time: bounded, no allocation, no lock, no unwinding.
+/// Dropping it must leave the actuators at zero.
+pub trait ActiveDevice: Send + 'static {
+    /// What it becomes when deactivated.
+    type Opened;
+
+    /// Takes the newest sample into `state`. Real-time.
+    fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle;
+
+    /// Commands the wrench on the hand until the next write. Real-time.
+    fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle;
+
+    /// Changes a live parameter at a tick boundary; range already checked. Real-time.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] if the value does not fit the others; the old value stays.
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+        let _ = index;
+        Err(OutOfRange { min: f64::NAN, max: f64::NAN, value })
+    }
+
+    /// Energy account of the plant, where there is one to know. Real-time.
+    fn energy_ledger(&self) -> Option<EnergyLedger> {
+        None
+    }
+
+    /// Zero wrench, then opened again. Not real-time; cannot fail.
+    fn deactivate(self) -> Self::Opened;
+}

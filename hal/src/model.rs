@@ -1,0 +1,328 @@
+//! Force models: what an author implements, and the data of one step.
+
+use crate::abi::Str;
+use crate::{OutOfRange, Parameter, Pose, Refusal, Settings, Twist, Wrench};
+
+/// Which outputs a scene needs from a step; what is not demanded need not be computed.
+///
+/// Shape is not among them: it is an extension ([`crate::CenterlineModel`]) that observers call off the loop.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct Demand {
+    bits: u32,
+}
+
+impl Demand {
+    /// Force only.
+    pub const FORCE: Demand = Demand { bits: 1 };
+    /// Torque.
+    pub const TORQUE: Demand = Demand { bits: 2 };
+    /// Stored elastic energy.
+    pub const ENERGY: Demand = Demand { bits: 4 };
+    /// Force and torque.
+    pub const WRENCH: Demand = Demand { bits: 3 };
+    /// Everything a step can give.
+    pub const ALL: Demand = Demand { bits: 7 };
+
+    /// Both. Real-time: bounded, no allocation.
+    #[must_use]
+    pub const fn with(self, other: Demand) -> Demand {
+        Demand { bits: self.bits | other.bits }
+    }
+
+    /// What is in both. Real-time: bounded, no allocation.
+    #[must_use]
+    pub const fn limited_to(self, other: Demand) -> Demand {
+        Demand { bits: self.bits & other.bits }
+    }
+
+    /// True if all of `other` is demanded. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub const fn contains(self, other: Demand) -> bool {
+        self.bits & other.bits == other.bits
+    }
+}
+
+/// Everything a force model gets for one step. 136 bytes, in the **model frame**.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct Input {
+    /// Pose of the handle relative to the model's home, m and unit quaternion.
+    pub pose: Pose,
+    /// Velocity of the handle, m/s and rad/s; the linear part is scaled like the position.
+    pub twist: Twist,
+    /// Time since the loop started, ns.
+    pub time_ns: u64,
+    /// Time since the previous step, ns (0 on the first).
+    pub dt_ns: u64,
+    /// Which tick this is.
+    pub tick: u64,
+    /// Buttons of the device, one bit each.
+    pub buttons: u32,
+    /// Which outputs are needed.
+    pub demand: Demand,
+}
+
+impl Input {
+    /// A step at a pose, at rest, at time zero, with everything demanded: for tests and off-line evaluation.
+    #[must_use]
+    pub const fn at_rest(pose: Pose) -> Self {
+        Self { pose, twist: Twist::ZERO, time_ns: 0, dt_ns: 0, tick: 0, buttons: 0, demand: Demand::ALL }
+    }
+
+    /// Step length, s. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
+    pub fn dt_s(&self) -> f64 {
+        self.dt_ns as f64 * 1.0e-9
+    }
+}
+
+/// What a model says about the answer it gave.
+#[repr(u32)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StepStatus {
+    /// The law holds here.
+    #[default]
+    Ok = 0,
+    /// The answer was saturated to stay finite and safe.
+    Clamped = 1,
+    /// The pose is outside the model's domain; the wrench is the best safe continuation.
+    OutOfDomain = 2,
+    /// An iteration has not reached its tolerance yet.
+    NotConverged = 3,
+    /// The input was not finite; the wrench is zero.
+    InvalidInput = 4,
+}
+
+impl StepStatus {
+    /// Reads a status from the boundary; `None` if the plugin wrote something unknown.
+    #[inline]
+    #[must_use]
+    pub const fn from_code(code: u32) -> Option<Self> {
+        match code {
+            0 => Some(Self::Ok),
+            1 => Some(Self::Clamped),
+            2 => Some(Self::OutOfDomain),
+            3 => Some(Self::NotConverged),
+            4 => Some(Self::InvalidInput),
+            _ => None,
+        }
+    }
+
+    /// The word `flotor eval` prints.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::Clamped => "clamped",
+            Self::OutOfDomain => "out_of_domain",
+            Self::NotConverged => "not_converged",
+            Self::InvalidInput => "invalid_input",
+        }
+    }
+}
+
+/// The answer of one step. 64 bytes, in the model frame.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct Output {
+    /// Force and torque on the hand, N and N·m.
+    pub wrench: Wrench,
+    /// Stored energy, J; meaningful if demanded and served.
+    pub energy_j: f64,
+    pub(crate) status: u32,
+    pub(crate) reserved: u32,
+}
+
+impl Output {
+    /// An answer with its status. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub const fn new(wrench: Wrench, energy_j: f64, status: StepStatus) -> Self {
+        Self { wrench, energy_j, status: status as u32, reserved: 0 }
+    }
+
+    /// What the model says about this answer; `None` if a foreign plugin wrote an unknown code.
+    #[inline]
+    #[must_use]
+    pub const fn status(&self) -> Option<StepStatus> {
+        StepStatus::from_code(self.status)
+    }
+}
+
+impl From<Wrench> for Output {
+    #[inline]
+    fn from(wrench: Wrench) -> Self {
+        Self::new(wrench, 0.0, StepStatus::Ok)
+    }
+}
+
+/// Whether the answer depends on the way to the pose.
+#[repr(u32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Memory {
+    /// Same pose, same wrench: may be evaluated anywhere, in any order.
+    Stateless = 0,
+    /// The path matters (iteration, friction, contact, branches).
+    PathDependent = 1,
+}
+
+/// What a force model says about itself; constant, readable without creating it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct ModelInfo {
+    pub(crate) id: Str,
+    pub(crate) name: Str,
+    pub(crate) doc: Str,
+    pub(crate) serves: Demand,
+    pub(crate) memory: u32,
+}
+
+impl ModelInfo {
+    /// `id` is what scenes and commands say ("spring"); `name` and `doc` are for people.
+    #[must_use]
+    pub const fn new(id: &'static str, name: &'static str, doc: &'static str) -> Self {
+        Self {
+            id: Str::new(id),
+            name: Str::new(name),
+            doc: Str::new(doc),
+            serves: Demand::WRENCH,
+            memory: Memory::Stateless as u32,
+        }
+    }
+
+    /// Which demands the model can serve (default: force and torque).
+    #[must_use]
+    pub const fn serving(mut self, demand: Demand) -> Self {
+        self.serves = demand;
+        self
+    }
+
+    /// Declares that the answer depends on the path.
+    #[must_use]
+    pub const fn with_memory(mut self, memory: Memory) -> Self {
+        self.memory = memory as u32;
+        self
+    }
+
+    /// What scenes and commands call it.
+    #[must_use]
+    pub const fn id(&self) -> &str {
+        self.id.as_str()
+    }
+
+    /// What people call it.
+    #[must_use]
+    pub const fn name(&self) -> &str {
+        self.name.as_str()
+    }
+
+    /// One sentence for people.
+    #[must_use]
+    pub const fn doc(&self) -> &str {
+        self.doc.as_str()
+    }
+
+    /// Which demands the model can serve.
+    #[must_use]
+    pub const fn serves(&self) -> Demand {
+        self.serves
+    }
+
+    /// Whether the answer depends on the path; anything unknown is taken as path-dependent, the safe reading.
+    #[must_use]
+    pub const fn memory(&self) -> Memory {
+        if self.memory == Memory::Stateless as u32 { Memory::Stateless } else { Memory::PathDependent }
+    }
+}
+
+/// What the loop promises a plugin before it starts. 16 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct LoopConfig {
+    /// Nominal time between ticks, ns.
+    pub period_ns: u64,
+    /// Seed of everything random in this run.
+    pub seed: u64,
+}
+
+/// A force model: gives the wrench for a pose. Implement it, then write [`crate::export_model!`].
+///
+/// ```
+/// use flotor_hal::{DVec3, ForceModel, Input, ModelInfo, Output, Parameter, Refusal, Settings, Wrench};
+///
+/// /// A floor: pushes up where the handle is below home.
+/// struct Floor { stiffness_n_per_m: f64 }
+///
+/// impl ForceModel for Floor {
+///     const INFO: ModelInfo = ModelInfo::new("floor", "Floor", "A flat elastic floor");
+///     const PARAMETERS: &'static [Parameter] =
+///         &[Parameter::real("stiffness_n_per_m", "N/m", 0.0, 5000.0, 500.0, "Stiffness of the floor")];
+///
+///     fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {
+///         Ok(Floor { stiffness_n_per_m: settings.number_or_default("stiffness_n_per_m") })
+///     }
+///
+///     fn step(&mut self, input: &Input) -> Output {
+///         let depth_m = (-input.pose.position().z).max(0.0);
+///         Wrench::from_force(DVec3::Z * self.stiffness_n_per_m * depth_m).into()
+///     }
+/// }
+/// flotor_hal::export_model!(Floor);
+/// ```
+pub trait ForceModel: Sized + Send + 'static {
+    /// What the model says about itself.
+    const INFO: ModelInfo;
+    /// What the model can be told.
+    const PARAMETERS: &'static [Parameter] = &[];
+
+    /// Makes an instance. The settings are already checked against the schema. Not real-time.
+    ///
+    /// # Errors
+    /// A [`Refusal`] if the values do not fit together.
+    fn create(settings: &Settings<'_>) -> Result<Self, Refusal>;
+
+    /// Last chance to allocate before the loop starts. Not real-time.
+    ///
+    /// # Errors
+    /// A [`Refusal`] if the model cannot run at this rate.
+    fn prepare(&mut self, _config: &LoopConfig) -> Result<(), Refusal> {
+        Ok(())
+    }
+
+    /// The wrench for a pose. Real-time: bounded, no allocation, lock, system call or unwinding.
+    fn step(&mut self, input: &Input) -> Output;
+
+    /// Many independent poses of one handle, in order. Real-time per pose; override it to go faster.
+    fn step_batch(&mut self, inputs: &[Input], outputs: &mut [Output]) {
+        for (input, output) in inputs.iter().zip(outputs) {
+            *output = self.step(input);
+        }
+    }
+
+    /// Changes a live parameter (by index into [`Self::PARAMETERS`]) at a tick boundary; range already checked.
+    /// Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] if the value does not fit the others; the old value stays.
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+        let _ = index;
+        Err(OutOfRange { min: f64::NAN, max: f64::NAN, value })
+    }
+
+    /// The value in force, presets resolved (by index into [`Self::PARAMETERS`]). Real-time: bounded, no allocation.
+    fn parameter(&self, index: usize) -> f64 {
+        Self::PARAMETERS.get(index).map_or(f64::NAN, Parameter::default)
+    }
+
+    /// Back to the state after `create`: history forgotten, parameters kept. Real-time: bounded, no allocation.
+    fn reset(&mut self) {}
+}

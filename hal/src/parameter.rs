@@ -1,0 +1,294 @@
+//! Parameters: what a plugin can be told, as data that panels, scenes and checks are generated from.
+//!
+//! A plugin declares a schema (`&'static [Parameter]`). A host checks values against it before the plugin
+//! sees them, so an author only checks what a range cannot say (that values fit together). Values travel by
+//! index into the schema, not by name: setting one in a running loop costs no string comparison.
+
+use crate::abi::{Str, StrList};
+use std::fmt;
+
+/// How a parameter's number is to be read.
+#[repr(u32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ParameterKind {
+    /// A real number between `min` and `max`, in `unit`.
+    Real = 1,
+    /// One of `choices`; the number is its index.
+    Choice = 2,
+    /// Free text (a path, a serial number); only at creation.
+    Text = 3,
+}
+
+/// When a parameter may change.
+#[repr(u32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mutability {
+    /// Only when the instance is created.
+    Fixed = 0,
+    /// At any tick boundary while the loop runs.
+    Live = 1,
+}
+
+/// One entry of a plugin's schema. Built with [`Parameter::real`], [`Parameter::choice`], [`Parameter::text`].
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct Parameter {
+    pub(crate) id: Str,
+    pub(crate) unit: Str,
+    pub(crate) doc: Str,
+    pub(crate) choices: StrList,
+    pub(crate) kind: u32,
+    pub(crate) mutability: u32,
+    pub(crate) min: f64,
+    pub(crate) max: f64,
+    pub(crate) default: f64,
+}
+
+impl Parameter {
+    /// A real number. `unit` is what a person reads beside the slider ("mm", "N", "1" for none).
+    #[must_use]
+    pub const fn real(
+        id: &'static str,
+        unit: &'static str,
+        min: f64,
+        max: f64,
+        default: f64,
+        doc: &'static str,
+    ) -> Self {
+        Self {
+            id: Str::new(id),
+            unit: Str::new(unit),
+            doc: Str::new(doc),
+            choices: StrList::EMPTY,
+            kind: ParameterKind::Real as u32,
+            mutability: Mutability::Fixed as u32,
+            min,
+            max,
+            default,
+        }
+    }
+
+    /// One of a fixed list of names; `default` is an index into it.
+    ///
+    /// # Panics
+    /// In the compiler (schemas are constants), if `default` is not an index.
+    #[must_use]
+    pub const fn choice(
+        id: &'static str,
+        choices: &'static [Str],
+        default: usize,
+        doc: &'static str,
+    ) -> Self {
+        assert!(default < choices.len(), "the default must be one of the choices");
+        let mut parameter = Self::real(id, "", 0.0, (choices.len() - 1) as f64, default as f64, doc);
+        parameter.choices = StrList::new(choices);
+        parameter.kind = ParameterKind::Choice as u32;
+        parameter
+    }
+
+    /// Free text, empty by default.
+    #[must_use]
+    pub const fn text(id: &'static str, doc: &'static str) -> Self {
+        let mut parameter = Self::real(id, "", 0.0, 0.0, 0.0, doc);
+        parameter.kind = ParameterKind::Text as u32;
+        parameter
+    }
+
+    /// The same parameter, changeable at tick boundaries.
+    #[must_use]
+    pub const fn live(mut self) -> Self {
+        self.mutability = Mutability::Live as u32;
+        self
+    }
+
+    /// Name in scenes and on the command line.
+    #[must_use]
+    pub const fn id(&self) -> &str {
+        self.id.as_str()
+    }
+
+    /// Unit for people; empty where a number has none.
+    #[must_use]
+    pub const fn unit(&self) -> &str {
+        self.unit.as_str()
+    }
+
+    /// One sentence for people.
+    #[must_use]
+    pub const fn doc(&self) -> &str {
+        self.doc.as_str()
+    }
+
+    /// Names of a choice, in index order; empty for the other kinds.
+    #[must_use]
+    pub const fn choices(&self) -> &[Str] {
+        self.choices.as_slice()
+    }
+
+    /// How the number is to be read.
+    #[must_use]
+    pub const fn kind(&self) -> ParameterKind {
+        match self.kind {
+            2 => ParameterKind::Choice,
+            3 => ParameterKind::Text,
+            _ => ParameterKind::Real,
+        }
+    }
+
+    /// When it may change.
+    #[must_use]
+    pub const fn mutability(&self) -> Mutability {
+        if self.mutability == Mutability::Live as u32 { Mutability::Live } else { Mutability::Fixed }
+    }
+
+    /// Smallest legal number.
+    #[must_use]
+    pub const fn min(&self) -> f64 {
+        self.min
+    }
+
+    /// Largest legal number.
+    #[must_use]
+    pub const fn max(&self) -> f64 {
+        self.max
+    }
+
+    /// Number used when nothing is set (a preset may say otherwise).
+    #[must_use]
+    pub const fn default(&self) -> f64 {
+        self.default
+    }
+
+    /// Checks a number against kind and range. Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] with the range, if the number is not finite, outside it, or no index of a choice.
+    pub fn check(&self, value: f64) -> Result<(), OutOfRange> {
+        let in_range = value >= self.min && value <= self.max; // false for NaN
+        let is_index = !matches!(self.kind(), ParameterKind::Choice) || value.fract() == 0.0;
+        if in_range && is_index { Ok(()) } else { Err(OutOfRange { min: self.min, max: self.max, value }) }
+    }
+}
+
+impl fmt::Debug for Parameter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} [{}] {}..{} = {}", self.id(), self.unit(), self.min, self.max, self.default)
+    }
+}
+
+/// A number outside the range its schema gives. `Copy`: nothing to allocate in a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OutOfRange {
+    /// Smallest legal number.
+    pub min: f64,
+    /// Largest legal number.
+    pub max: f64,
+    /// The number refused.
+    pub value: f64,
+}
+
+impl fmt::Display for OutOfRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} is outside {} to {}", self.value, self.min, self.max)
+    }
+}
+
+impl std::error::Error for OutOfRange {}
+
+/// One value as it crosses the boundary: index into the schema, number, text (empty unless of kind text).
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct ParameterValue {
+    pub(crate) index: u32,
+    pub(crate) reserved: u32,
+    pub(crate) number: f64,
+    pub(crate) text: Str,
+}
+
+/// What was explicitly set for one instance: nothing in it is a default.
+///
+/// A plugin resolves the rest itself, because what a default is may depend on another parameter (a preset).
+#[derive(Clone, Copy)]
+pub struct Settings<'a> {
+    schema: &'static [Parameter],
+    values: &'a [ParameterValue],
+}
+
+impl<'a> Settings<'a> {
+    pub(crate) fn new(schema: &'static [Parameter], values: &'a [ParameterValue]) -> Self {
+        Self { schema, values }
+    }
+
+    fn explicit(&self, id: &str) -> Option<&'a ParameterValue> {
+        let index = self.schema.iter().position(|parameter| parameter.id() == id)?;
+        self.values.iter().rev().find(|value| value.index as usize == index)
+    }
+
+    /// The number explicitly set for a real parameter or a choice, if any.
+    #[must_use]
+    pub fn number(&self, id: &str) -> Option<f64> {
+        self.explicit(id).map(|value| value.number)
+    }
+
+    /// The number set, else the schema's default, else NaN for an id the schema does not have.
+    #[must_use]
+    pub fn number_or_default(&self, id: &str) -> f64 {
+        let default = || self.schema.iter().find(|p| p.id() == id).map_or(f64::NAN, Parameter::default);
+        self.number(id).unwrap_or_else(default)
+    }
+
+    /// The index chosen for a choice, else the schema's default.
+    #[must_use]
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked indices, small and whole
+    pub fn choice_or_default(&self, id: &str) -> usize {
+        self.number_or_default(id) as usize
+    }
+
+    /// The text set for a text parameter, if any.
+    #[must_use]
+    pub fn text(&self, id: &str) -> Option<&'a str> {
+        self.explicit(id).map(|value| value.text.as_str()).filter(|text| !text.is_empty())
+    }
+
+    /// Ids of everything that was set, in the order it was set.
+    pub fn ids(&self) -> impl Iterator<Item = &'static str> + 'a {
+        let schema = self.schema;
+        self.values.iter().filter_map(move |v| schema.get(v.index as usize).map(Parameter::id))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VARIANTS: [Str; 2] = [Str::new("fast"), Str::new("exact")];
+    const SCHEMA: &[Parameter] = &[
+        Parameter::real("stiffness_n_per_m", "N/m", 0.0, 100.0, 10.0, "Stiffness").live(),
+        Parameter::choice("variant", &VARIANTS, 1, "Law"),
+        Parameter::text("file", "Mesh"),
+    ];
+
+    #[test]
+    fn range_and_index_are_checked() {
+        assert!(SCHEMA[0].check(100.0).is_ok());
+        assert!(SCHEMA[0].check(100.1).is_err());
+        assert!(SCHEMA[0].check(f64::NAN).is_err());
+        assert!(SCHEMA[1].check(1.0).is_ok());
+        assert!(SCHEMA[1].check(0.5).is_err());
+        assert!(SCHEMA[1].check(2.0).is_err());
+    }
+
+    #[test]
+    fn settings_give_what_was_set_and_the_last_word_wins() {
+        let value = |index, number| ParameterValue { index, reserved: 0, number, text: Str::new("") };
+        let values = [value(0, 3.0), value(0, 4.0)];
+        let settings = Settings::new(SCHEMA, &values);
+        assert_eq!(settings.number("stiffness_n_per_m"), Some(4.0));
+        assert_eq!(settings.number("variant"), None);
+        assert_eq!(settings.choice_or_default("variant"), 1);
+        assert!(settings.number_or_default("no such id").is_nan());
+        assert_eq!(settings.text("file"), None);
+    }
+}
