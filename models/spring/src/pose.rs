@@ -1,0 +1,156 @@
+//! Where the upper plate is, and the geometry every law starts with.
+//!
+//! Model frame: right-handed, z up, origin at the centre of the upper plate of the unloaded spring; the lower
+//! plate is fixed at z = -L0. A rotation turns the upper plate from its rest orientation.
+
+use flotor_hal::glam::{DQuat, DVec3};
+
+use crate::validity::Validity;
+
+/// Shortest distance of the plates, as a fraction of the free length, for which a direction between them makes
+/// sense. Far below any solid length.
+const SHORTEST_CHORD: f64 = 1e-3;
+
+/// Longest distance of the plates in free lengths. No spring gets there; it keeps every product of the laws far
+/// from overflow.
+const LONGEST_CHORD: f64 = 1e6;
+
+/// How far the squared norm of the orientation may be from one. Rounding makes 1e-15; more is not a rotation.
+const UNIT_NORM_TOLERANCE: f64 = 1e-6;
+
+/// Pose of the upper plate in the model frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Centre of the upper plate relative to home (m).
+    pub position_m: DVec3,
+    /// Rotation of the upper plate from rest, unit quaternion.
+    pub orientation: DQuat,
+}
+
+impl Pose {
+    /// The pose without load.
+    pub const HOME: Self = Self { position_m: DVec3::ZERO, orientation: DQuat::IDENTITY };
+
+    /// Pose from a rotation vector (rad; axis times angle). Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn from_rotation_vector(position_m: DVec3, rotation_rad: DVec3) -> Self {
+        Self { position_m, orientation: quaternion(rotation_rad) }
+    }
+
+    /// Rotation vector of the orientation (rad), of length 0 to pi. Real-time: bounded, no allocation.
+    ///
+    /// Accurate to rounding at every angle: neither the arc cosine near zero nor the arc sine near pi is used.
+    #[must_use]
+    pub fn rotation_vector_rad(&self) -> DVec3 {
+        let q = if self.orientation.w < 0.0 { -self.orientation } else { self.orientation };
+        let axis = DVec3::new(q.x, q.y, q.z);
+        let sine = axis.length();
+        if sine > 0.0 { axis * (2.0 * sine.atan2(q.w) / sine) } else { 2.0 * axis }
+    }
+
+    /// Vector from the lower to the upper plate.
+    ///
+    /// # Errors
+    /// [`Validity::InvalidInput`] or [`Validity::OutOfDomain`] if no law can be evaluated here.
+    #[inline]
+    pub(crate) fn chord(&self, free_length_m: f64) -> Result<Chord, Validity> {
+        let vector_m = self.position_m + DVec3::new(0.0, 0.0, free_length_m);
+        let length_squared = vector_m.length_squared();
+        let free_squared = free_length_m * free_length_m;
+        let norm_error = self.orientation.length_squared() - 1.0;
+        // Written so that NaN fails.
+        let usable = length_squared >= SHORTEST_CHORD * SHORTEST_CHORD * free_squared
+            && length_squared <= LONGEST_CHORD * LONGEST_CHORD * free_squared
+            && norm_error.abs() <= UNIT_NORM_TOLERANCE;
+        if !usable {
+            return Err(self.why_unusable());
+        }
+        let length_m = length_squared.sqrt();
+        // L0 - L without the cancellation of the difference: (L0² - L²) / (L0 + L).
+        let Self { position_m: p, .. } = self;
+        let beyond = p.z * (2.0 * free_length_m + p.z) + (p.x * p.x + p.y * p.y);
+        Ok(Chord { vector_m, length_m, shortening_m: -beyond / (free_length_m + length_m) })
+    }
+
+    #[cold]
+    fn why_unusable(&self) -> Validity {
+        let rotation_is_unit = (self.orientation.length_squared() - 1.0).abs() <= UNIT_NORM_TOLERANCE;
+        if self.position_m.is_finite() && rotation_is_unit {
+            Validity::OutOfDomain
+        } else {
+            Validity::InvalidInput
+        }
+    }
+}
+
+/// Unit quaternion of a rotation vector.
+pub(crate) fn quaternion(rotation_rad: DVec3) -> DQuat {
+    let angle = rotation_rad.length();
+    let (sine, cosine) = (0.5 * angle).sin_cos();
+    let scale = if angle > 0.0 { sine / angle } else { 0.5 };
+    let axis = rotation_rad * scale;
+    DQuat::from_xyzw(axis.x, axis.y, axis.z, cosine)
+}
+
+/// Straight line between the plate centres.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Chord {
+    /// From the lower to the upper plate (m).
+    pub(crate) vector_m: DVec3,
+    /// Distance of the plate centres (m), `L`.
+    pub(crate) length_m: f64,
+    /// `L0 - L` (m), positive in compression.
+    pub(crate) shortening_m: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rotation_vectors_survive_the_quaternion() {
+        let axis = DVec3::new(0.36, -0.48, 0.8);
+        for angle in [0.0, 1e-300, 1e-12, 1e-6, 0.01, 0.5, 1.0, 2.0, 3.0, 3.14159] {
+            let rotation = axis * angle;
+            let pose = Pose::from_rotation_vector(DVec3::ZERO, rotation);
+            let error = (pose.rotation_vector_rad() - rotation).length();
+            // Each conversion rounds to a few units in the last place of the angle.
+            assert!(error <= 2e-15 * angle, "{angle}: {error:e}");
+            let opposite = Pose { orientation: -pose.orientation, ..pose };
+            assert_eq!(
+                opposite.rotation_vector_rad(),
+                pose.rotation_vector_rad(),
+                "q and -q are one rotation"
+            );
+        }
+    }
+
+    #[test]
+    fn shortening_keeps_its_digits_near_rest() {
+        let free_length_m = 0.025;
+        // Straight down by 1 fm: L0 - L computed as a difference would be zero.
+        let pose = Pose { position_m: DVec3::new(0.0, 0.0, -1e-18), ..Pose::HOME };
+        let chord = pose.chord(free_length_m).unwrap();
+        assert!((chord.shortening_m / 1e-18 - 1.0).abs() < 1e-15);
+        // A pure shear x lengthens the chord by x²/(2 L0) to leading order.
+        let sheared = Pose { position_m: DVec3::new(1e-9, 0.0, 0.0), ..Pose::HOME };
+        let lengthening = -sheared.chord(free_length_m).unwrap().shortening_m;
+        assert!((lengthening / (1e-18 / (2.0 * free_length_m)) - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn unusable_poses_say_why() {
+        let verdict = |position_m, orientation| Pose { position_m, orientation }.chord(0.025).err();
+        let invalid = Some(Validity::InvalidInput);
+        let outside = Some(Validity::OutOfDomain);
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert_eq!(verdict(DVec3::new(0.0, bad, 0.0), DQuat::IDENTITY), invalid);
+            assert_eq!(verdict(DVec3::ZERO, DQuat::from_xyzw(0.0, bad, 0.0, 1.0)), invalid);
+        }
+        assert_eq!(verdict(DVec3::ZERO, DQuat::from_xyzw(0.0, 0.0, 0.0, 2.0)), invalid);
+        assert_eq!(verdict(DVec3::new(0.0, 0.0, -0.025), DQuat::IDENTITY), outside);
+        assert_eq!(verdict(DVec3::new(1e9, 0.0, 0.0), DQuat::IDENTITY), outside);
+        assert_eq!(verdict(DVec3::splat(1e300), DQuat::IDENTITY), outside);
+        assert_eq!(verdict(DVec3::ZERO, DQuat::IDENTITY), None);
+    }
+}

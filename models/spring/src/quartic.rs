@@ -1,0 +1,334 @@
+//! Bending energy of fourth order in the angles, from the exact rod.
+//!
+//! Stiffnesses that do not depend on the angles are right for small angles only. The next term follows without
+//! solving anything new: the shape of the linear column makes the energy of second order stationary, so the
+//! energy of fourth order is the exact rod's energy *evaluated on that shape* (a shape correction would enter
+//! with order six).
+//!
+//! **Derivation.** Of the rod's sections, let `n` be the normals. Eliminating strains and end force exactly, the
+//! rod of free length `L0` with ends a chord `L e` apart stores
+//!
+//! ```text
+//! W = 1/2 ∫ alpha |n'|² + L0/2 g.(1/beta + rho <n n>)⁻¹ g,   g = (L / L0) e - <n>,   rho = 1/gamma - 1/beta
+//! ```
+//!
+//! (`<>` is the mean along the rod). With `n = e cos|theta| + theta sin|theta| / |theta|`, `p = 1 - L/L0`,
+//! `c = 1 - gamma/beta`, `sigma = 1 - c p`, and a bar for `|theta|²`, fourth order collects to
+//!
+//! ```text
+//! W4 = L0/2 ( gamma (sigma - 1/2)² <bar>² + gamma p (1/12 - (1 - sigma)/3) <bar²>
+//!           - 2 beta sigma (2 sigma/3 - 1/2) <theta>.<bar theta> + 2 beta sigma c (sigma - 1/2) <bar> <theta>²
+//!           - beta² rho sigma² (<theta>.<theta theta>.<theta> - c <theta>⁴) )
+//!      - alpha/6 ∫ (theta x theta')² - 2 b/3 (S x D)²
+//! ```
+//!
+//! The last term is due to the angle between the plates, which [`crate::energy`] measures on the sphere. With
+//! `theta = S sway(u) + D bow(u)` of [`crate::shape`] this is a form in two vectors with four coefficients,
+//!
+//! ```text
+//! W4 = c0 S⁴ + c1 S² D² + c2 (S.D)² + c3 D⁴
+//! ```
+//!
+//! functions of the length alone. They are fitted once per spring by polynomials in `L`; `D` is scaled with a
+//! *magnification* that takes the buckling pole out of them. Twist at fourth order (`w² S²`, `w² D²`) is left
+//! out: it is the softening of a twisted column (Greenhill), below 1e-3 of the stiffness within a tenth of a
+//! radian.
+//!
+//! The series means nothing once the magnified angles are of order one; there the term fades out.
+
+use std::f64::consts::PI;
+
+use flotor_hal::glam::DVec4;
+
+use crate::beam_column::EndStiffness;
+use crate::bending::{KNEE, REACH};
+use crate::entire::EntireFunctions;
+use crate::level::{Levelled, level_above, level_below};
+use crate::rigidity::Rigidities;
+use crate::shape::Shape;
+
+/// Length of the fit: relative error below 2e-4 of the coefficients of short springs, 1e-2 of the slender one.
+const TERMS: usize = 12;
+
+/// Relative lengths the fit covers unless the argument ends it sooner: from below the solid length of common
+/// springs to nearly twice the free length.
+const SHORTEST: f64 = 0.2;
+const LONGEST: f64 = 1.8;
+
+/// Relative length at either end within which the coefficients level off, if there is room for it.
+const MARGIN: f64 = 0.05;
+
+/// Squared magnified angle (rad²) at which the term has faded to one half.
+const FADING_SQUARE: f64 = 1.0;
+
+/// First buckling of the column.
+const POLE: f64 = PI * PI;
+
+/// Five-point Gauss-Legendre rule on -1..1 (Abramowitz and Stegun, table 25.4): nodes and weights.
+const GAUSS: [(f64, f64); 5] = [
+    (-0.906_179_845_938_664, 0.236_926_885_056_189_08),
+    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
+    (0.0, 0.568_888_888_888_888_9),
+    (0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
+    (0.906_179_845_938_664, 0.236_926_885_056_189_08),
+];
+
+/// Panels of the rule on half the rod: resolves the end layers of a rod in tension (`z = -60`) to 1e-6.
+const PANELS: u32 = 4;
+
+/// The term and its partial derivatives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct QuarticEnergy {
+    pub(crate) energy_j: f64,
+    /// By the squared angles lower normal to chord, upper normal to chord, lower to upper normal.
+    pub(crate) by_squares: [f64; 3],
+    /// By the length of the chord.
+    pub(crate) by_length: f64,
+}
+
+/// The four coefficients of one spring as functions of the length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Quartic {
+    /// Powers of the length mapped to -1..1, for `(c0, c1, c2, c3)`.
+    powers: [DVec4; TERMS],
+    shortest: Limit,
+    longest: Limit,
+    middle_m: f64,
+    mapping_per_m: f64,
+}
+
+/// A length at which the fit ends, and where the levelling before it begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Limit {
+    knee_m: f64,
+    reach_m: f64,
+}
+
+impl Quartic {
+    /// Fits the coefficients. Real-time: bounded (tens of microseconds), no allocation.
+    pub(crate) fn new(rigidities: &Rigidities, free_length_m: f64) -> Self {
+        let at_argument = |z| relative_length(rigidities, free_length_m, z);
+        let shortest = at_argument(KNEE + REACH).unwrap_or(0.0).max(SHORTEST);
+        let knee = at_argument(KNEE).unwrap_or(0.0).max(SHORTEST + MARGIN);
+        let longest = at_argument(EntireFunctions::MIN_ARGUMENT).unwrap_or(LONGEST);
+        let longest = longest.min(LONGEST).min(longest_with_shape(rigidities));
+        let margin = MARGIN.min(0.5 * (longest - 1.0));
+        let (middle, half_width) = (0.5 * (longest + shortest), 0.5 * (longest - shortest));
+        Self {
+            powers: fit(|mapped| coefficients(rigidities, free_length_m, middle + half_width * mapped)),
+            shortest: Limit { knee_m: knee * free_length_m, reach_m: (knee - shortest) * free_length_m },
+            longest: Limit { knee_m: (longest - margin) * free_length_m, reach_m: margin * free_length_m },
+            middle_m: middle * free_length_m,
+            mapping_per_m: 1.0 / (half_width * free_length_m),
+        }
+    }
+
+    /// The term at a length, its argument `z` (levelled, with `dz/dL`) and the squared angles.
+    #[inline]
+    pub(crate) fn at(&self, length_m: f64, z: f64, z_by_length: f64, squares: [f64; 3]) -> QuarticEnergy {
+        let (form, form_by_length) = self.coefficients_at(length_m);
+        let magnification = 1.0 + POLE / (POLE - z);
+        let by_argument = (magnification - 1.0) * (magnification - 1.0) / POLE;
+
+        let [lower, upper, plates] = squares;
+        let (across, along) = (0.25 * plates, 0.25 * (upper - lower));
+        let sway = 0.5 * (lower + upper) - across;
+        let bow = magnification * magnification * across;
+        let mixed = magnification * along;
+
+        let monomials = DVec4::new(sway * sway, sway * bow, mixed * mixed, bow * bow);
+        let value = form.dot(monomials);
+        // Fades with the square of the magnified amplitude: the error it makes is of order eight.
+        let amplitude = (sway + bow) / FADING_SQUARE;
+        let fading = 1.0 / (1.0 + amplitude * amplitude);
+        let by_amplitude = -2.0 / FADING_SQUARE * amplitude * fading * fading * value;
+
+        let by_sway = fading * (2.0 * form.x * sway + form.y * bow) + by_amplitude;
+        let by_bow = fading * (form.y * sway + 2.0 * form.w * bow) + by_amplitude;
+        let by_mixed = fading * (2.0 * form.z * mixed);
+        let by_magnification = by_bow * (2.0 * magnification * across) + by_mixed * along;
+        let (half, quarter) = (0.5 * by_sway, 0.25 * magnification * by_mixed);
+        QuarticEnergy {
+            energy_j: fading * value,
+            by_squares: [
+                half - quarter,
+                half + quarter,
+                0.25 * (magnification * magnification * by_bow - by_sway),
+            ],
+            by_length: fading * form_by_length.dot(monomials) + by_magnification * by_argument * z_by_length,
+        }
+    }
+
+    /// Coefficients and their derivative by the length.
+    #[inline]
+    fn coefficients_at(&self, length_m: f64) -> (DVec4, DVec4) {
+        let Self { shortest, longest, .. } = *self;
+        let Levelled { value, slope, .. } = if length_m < shortest.knee_m {
+            level_below(length_m, shortest.knee_m, shortest.reach_m)
+        } else {
+            level_above(length_m, longest.knee_m, longest.reach_m)
+        };
+        let mapped = (value - self.middle_m) * self.mapping_per_m;
+        let square = mapped * mapped;
+        // Even and odd powers apart: short dependency chains.
+        let [mut even, mut odd, mut even_slope, mut odd_slope] = [DVec4::ZERO; 4];
+        for pair in self.powers.as_chunks::<2>().0.iter().rev() {
+            even_slope = even_slope * square + even;
+            odd_slope = odd_slope * square + odd;
+            even = even * square + pair[0];
+            odd = odd * square + pair[1];
+        }
+        let derivative = (even_slope + mapped * odd_slope) * (2.0 * mapped) + odd;
+        (even + mapped * odd, derivative * (slope * self.mapping_per_m))
+    }
+}
+
+/// Relative length at which the argument is `z`, the longer one of two; `None` if it is never reached.
+fn relative_length(rigidities: &Rigidities, free_length_m: f64, z: f64) -> Option<f64> {
+    // z = load p (1 - excess p) with p = 1 - L / L0, solved for the smaller p without cancellation.
+    let load = rigidities.gamma_n * free_length_m * free_length_m / (4.0 * rigidities.alpha_n_m2);
+    let excess = 1.0 - rigidities.gamma_n / rigidities.beta_n;
+    let discriminant = load * (load - 4.0 * excess * z);
+    (discriminant >= 0.0).then(|| 1.0 - 2.0 * z / (load + discriminant.sqrt()))
+}
+
+/// Relative length half way to the one at which a rod of `G > E` has no shear stiffness left; others have it
+/// at all lengths.
+fn longest_with_shape(rigidities: &Rigidities) -> f64 {
+    let excess = 1.0 - rigidities.gamma_n / rigidities.beta_n;
+    if excess < 0.0 { 1.0 - 0.5 / excess } else { f64::INFINITY }
+}
+
+/// Interpolates at the Chebyshev nodes and converts to powers, on -1..1.
+#[allow(clippy::cast_precision_loss)] // integers below twenty
+fn fit(function: impl Fn(f64) -> DVec4) -> [DVec4; TERMS] {
+    let terms = TERMS as f64;
+    let mut chebyshev = [DVec4::ZERO; TERMS];
+    for node in 0..TERMS {
+        let angle = PI * (node as f64 + 0.5) / terms;
+        let value = function(angle.cos()) * (2.0 / terms);
+        for (order, coefficient) in chebyshev.iter_mut().enumerate() {
+            *coefficient += value * (order as f64 * angle).cos();
+        }
+    }
+    chebyshev[0] *= 0.5;
+
+    // T(n+1) = 2 x T(n) - T(n-1), carried along as powers.
+    let mut powers = [DVec4::ZERO; TERMS];
+    let (mut current, mut next) = ([0.0; TERMS], [0.0; TERMS]);
+    current[0] = 1.0;
+    next[1] = 1.0;
+    for coefficient in chebyshev {
+        for (power, weight) in powers.iter_mut().zip(current) {
+            *power += coefficient * weight;
+        }
+        let mut after = [0.0; TERMS];
+        for (i, weight) in next.iter().enumerate().take(TERMS - 1) {
+            after[i + 1] = 2.0 * weight;
+        }
+        for (weight, previous) in after.iter_mut().zip(current) {
+            *weight -= previous;
+        }
+        (current, next) = (next, after);
+    }
+    powers
+}
+
+/// Means of products of the two shapes along the rod. Mixed means of odd order in the bow vanish.
+#[derive(Clone, Copy, Default)]
+struct Means {
+    sway: f64,
+    sway2: f64,
+    sway3: f64,
+    sway4: f64,
+    bow2: f64,
+    bow4: f64,
+    sway_bow2: f64,
+    sway2_bow2: f64,
+    /// Of `(sway bow' - bow sway')²`.
+    sweep2: f64,
+}
+
+impl Means {
+    fn of(shape: &Shape) -> Self {
+        let mut means = Self::default();
+        let half_panel = 0.25 / f64::from(PANELS);
+        for panel in 0..PANELS {
+            for (node, weight) in GAUSS {
+                let u = half_panel * (f64::from(2 * panel + 1) + node);
+                // Both halves of the rod count the same.
+                means.add(shape, u, 2.0 * half_panel * weight);
+            }
+        }
+        means
+    }
+
+    fn add(&mut self, shape: &Shape, u: f64, weight: f64) {
+        let [sway, bow] = shape.lean(u);
+        let (s, b) = (sway.value, bow.value);
+        let sweep = s * bow.slope - b * sway.slope;
+        self.sway += weight * s;
+        self.sway2 += weight * (s * s);
+        self.sway3 += weight * (s * s * s);
+        self.sway4 += weight * (s * s * s * s);
+        self.bow2 += weight * (b * b);
+        self.bow4 += weight * (b * b * b * b);
+        self.sway_bow2 += weight * (s * b * b);
+        self.sway2_bow2 += weight * (s * s * b * b);
+        self.sweep2 += weight * (sweep * sweep);
+    }
+}
+
+/// `(c0, c1, c2, c3)` at a relative length, with the pole taken out; zero where there is no shape.
+fn coefficients(rigidities: &Rigidities, free_length_m: f64, relative: f64) -> DVec4 {
+    let Rigidities { alpha_n_m2: alpha, beta_n: beta, gamma_n: gamma, .. } = *rigidities;
+    let length_m = relative * free_length_m;
+    let Some((z, shape)) = Shape::argument(rigidities, free_length_m, length_m)
+        .and_then(|z| Some((z, Shape::new(rigidities, free_length_m, length_m, z)?)))
+    else {
+        return DVec4::ZERO;
+    };
+    let m = Means::of(&shape);
+    let p = 1.0 - relative;
+    let c = 1.0 - gamma / beta;
+    let sigma = 1.0 - c * p;
+
+    let squared_mean = gamma * (sigma - 0.5) * (sigma - 0.5);
+    let mean_square = gamma * p * (1.0 / 12.0 - (1.0 - sigma) / 3.0);
+    let cubic = -2.0 * beta * sigma * (2.0 / 3.0 * sigma - 0.5);
+    let shortening = 2.0 * beta * sigma * c * (sigma - 0.5);
+    let tilting = -beta * (beta / gamma - 1.0) * sigma * sigma;
+
+    let mean2 = m.sway * m.sway;
+    let sway = squared_mean * m.sway2 * m.sway2
+        + mean_square * m.sway4
+        + cubic * m.sway * m.sway3
+        + (shortening + tilting) * mean2 * m.sway2
+        - c * tilting * mean2 * mean2;
+    let both = 2.0 * squared_mean * m.sway2 * m.bow2
+        + 2.0 * mean_square * m.sway2_bow2
+        + cubic * m.sway * m.sway_bow2
+        + shortening * mean2 * m.bow2;
+    let mixed =
+        4.0 * mean_square * m.sway2_bow2 + 2.0 * cubic * m.sway * m.sway_bow2 + tilting * mean2 * m.bow2;
+    let bow = squared_mean * m.bow2 * m.bow2 + mean_square * m.bow4;
+
+    // (S x D)² = S² D² - (S.D)²
+    let axial_force_n = gamma * p;
+    let column = EndStiffness::current_length(rigidities, axial_force_n, length_m, free_length_m);
+    let carry = 0.5 * (column.sway_n_per_rad * length_m - column.bow_nm_per_rad);
+    let out_of_plane = -alpha / (6.0 * free_length_m) * m.sweep2 - 2.0 / 3.0 * carry;
+
+    let half_length = 0.5 * free_length_m;
+    let shrink = (POLE - z) / (2.0 * POLE - z);
+    let shrink2 = shrink * shrink;
+    DVec4::new(
+        half_length * sway,
+        (half_length * both + out_of_plane) * shrink2,
+        (half_length * mixed - out_of_plane) * shrink2,
+        half_length * bow * (shrink2 * shrink2),
+    )
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,389 @@
+//! What the spring is made of, and how stiff that makes it.
+//!
+//! A helical spring of many coils behaves like an elastic rod along its axis. Four *rigidities* describe the
+//! rod, each per unit of reference length: bending `alpha`, shear `beta`, compression `gamma` and torsion
+//! `tau`. They follow from wire and coil (thesis CMU-RI-TR-07-21, equations 7-9, after Haringx), or from one of
+//! them and the coil diameter (appendix A, `switch (change)`): the thesis measured one constant and derived the
+//! others. [`Spring`] holds a checked set of all of them; every law of this crate starts from it.
+
+use std::fmt;
+
+/// Shape of the unloaded spring.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Geometry {
+    /// Distance of the end plates without load (m), `L0`.
+    pub free_length_m: f64,
+    /// Diameter of the wire (m), `d`.
+    pub wire_diameter_m: f64,
+    /// Diameter of the coil, from wire centre to wire centre (m), `D`.
+    pub coil_diameter_m: f64,
+    /// Number of coils that deform, `n`.
+    pub active_coils: f64,
+}
+
+impl Geometry {
+    /// Length at which all coils touch (m), `n d`. The laws of this crate go on below it: they know no contact.
+    #[must_use]
+    pub fn solid_length_m(&self) -> f64 {
+        self.active_coils * self.wire_diameter_m
+    }
+}
+
+/// Elastic constants of the wire.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    /// Young's modulus (Pa), `E`.
+    pub youngs_modulus_pa: f64,
+    /// Shear modulus (Pa), `G`.
+    pub shear_modulus_pa: f64,
+}
+
+impl Material {
+    /// Poisson's ratio of an isotropic wire, `E / (2 G) - 1`.
+    #[must_use]
+    pub fn poisson_ratio(&self) -> f64 {
+        self.youngs_modulus_pa / (2.0 * self.shear_modulus_pa) - 1.0
+    }
+}
+
+/// Which constant is given; the others follow. The thesis calls these the modes 0 to 3 of `change`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stiffness {
+    /// Mode 0: compression rigidity `gamma` (N).
+    Gamma(f64),
+    /// Mode 1: bending rigidity `alpha` (N·m²).
+    Alpha(f64),
+    /// Mode 2: shear rigidity `beta` (N).
+    Beta(f64),
+    /// Mode 3: all of them from wire, coil and material.
+    Physical,
+}
+
+/// Rigidities of the equivalent rod, per unit of reference (unloaded) length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rigidities {
+    /// Bending: moment per curvature (N·m²).
+    pub alpha_n_m2: f64,
+    /// Shear: transverse force per shear angle (N).
+    pub beta_n: f64,
+    /// Compression: axial force per relative shortening (N). The axial stiffness is `gamma / L0`.
+    pub gamma_n: f64,
+    /// Torsion: torque per twist rate (N·m²).
+    pub tau_n_m2: f64,
+}
+
+impl Rigidities {
+    /// Derives all four from `stiffness` without checking anything; [`Spring::new`] is the checked way.
+    ///
+    /// Modes 0-2 use `beta = gamma E / G` and `alpha = gamma D² / (4 G / E + 2)`, mode 3 equations 7-9. Torsion
+    /// is not in the thesis: a coil of wire turned about the spring axis bends, so `tau` has the form of `beta`,
+    /// `L0 E d⁴ / (64 n D) = beta D² / 8`.
+    fn derive(stiffness: Stiffness, geometry: &Geometry, material: &Material) -> Self {
+        let coil = geometry.coil_diameter_m;
+        let (e, g) = (material.youngs_modulus_pa, material.shear_modulus_pa);
+        let (alpha_n_m2, beta_n, gamma_n) = match stiffness {
+            Stiffness::Gamma(gamma) => (gamma * coil * coil / (4.0 * g / e + 2.0), gamma * e / g, gamma),
+            Stiffness::Alpha(alpha) => {
+                let per_coil = alpha / (coil * coil);
+                (alpha, per_coil * (4.0 + 2.0 * e / g), per_coil * (4.0 * g / e + 2.0))
+            }
+            Stiffness::Beta(beta) => (beta * coil * coil / (4.0 + 2.0 * e / g), beta, beta * g / e),
+            Stiffness::Physical => {
+                let wire_squared = geometry.wire_diameter_m * geometry.wire_diameter_m;
+                let common =
+                    geometry.free_length_m * wire_squared * wire_squared / (geometry.active_coils * coil);
+                (
+                    common * e / (32.0 * (1.0 + e / (2.0 * g))),
+                    common * e / (8.0 * coil * coil),
+                    common * g / (8.0 * coil * coil),
+                )
+            }
+        };
+        Self { alpha_n_m2, beta_n, gamma_n, tau_n_m2: beta_n * coil * coil / 8.0 }
+    }
+}
+
+/// A spring whose numbers have been checked. Immutable: change a parameter by making a new one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spring {
+    geometry: Geometry,
+    material: Material,
+    rigidities: Rigidities,
+}
+
+impl Spring {
+    /// Checks the parameters and derives the rigidities. Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// The first parameter found wrong, see [`ParameterError`].
+    pub fn new(geometry: Geometry, material: Material, stiffness: Stiffness) -> Result<Self, ParameterError> {
+        positive(Quantity::FreeLength, geometry.free_length_m)?;
+        positive(Quantity::WireDiameter, geometry.wire_diameter_m)?;
+        positive(Quantity::CoilDiameter, geometry.coil_diameter_m)?;
+        positive(Quantity::ActiveCoils, geometry.active_coils)?;
+        positive(Quantity::YoungsModulus, material.youngs_modulus_pa)?;
+        positive(Quantity::ShearModulus, material.shear_modulus_pa)?;
+        match stiffness {
+            Stiffness::Gamma(value) => positive(Quantity::Gamma, value)?,
+            Stiffness::Alpha(value) => positive(Quantity::Alpha, value)?,
+            Stiffness::Beta(value) => positive(Quantity::Beta, value)?,
+            Stiffness::Physical => {}
+        }
+        check_shape(&geometry)?;
+        let poisson_ratio = material.poisson_ratio();
+        // The lower end needs no test: E > 0 and G > 0 put the ratio above -1.
+        if poisson_ratio >= 0.5 {
+            return Err(ParameterError::ImpossiblePoissonRatio { poisson_ratio });
+        }
+        let spring = Self::unchecked(geometry, material, stiffness);
+        // Extreme but positive parameters can still overflow or underflow in the products of the rigidities.
+        positive(Quantity::Alpha, spring.rigidities.alpha_n_m2)?;
+        positive(Quantity::Beta, spring.rigidities.beta_n)?;
+        positive(Quantity::Gamma, spring.rigidities.gamma_n)?;
+        positive(Quantity::Tau, spring.rigidities.tau_n_m2)?;
+        Ok(spring)
+    }
+
+    /// For parameters known to be good: the presets, which a test compares with [`Spring::new`].
+    pub(crate) fn unchecked(geometry: Geometry, material: Material, stiffness: Stiffness) -> Self {
+        Self { geometry, material, rigidities: Rigidities::derive(stiffness, &geometry, &material) }
+    }
+
+    /// Shape of the unloaded spring.
+    #[must_use]
+    pub fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    /// Elastic constants of the wire.
+    #[must_use]
+    pub fn material(&self) -> &Material {
+        &self.material
+    }
+
+    /// Rigidities of the equivalent rod.
+    #[must_use]
+    pub fn rigidities(&self) -> &Rigidities {
+        &self.rigidities
+    }
+
+    /// Stiffness along the axis at rest (N/m), `gamma / L0` (Hooke's `k`).
+    #[must_use]
+    pub fn axial_stiffness_n_per_m(&self) -> f64 {
+        self.rigidities.gamma_n / self.geometry.free_length_m
+    }
+}
+
+/// # Errors
+/// The value is not a positive, finite number.
+fn positive(quantity: Quantity, value: f64) -> Result<(), ParameterError> {
+    if !value.is_finite() {
+        Err(ParameterError::NotFinite { quantity })
+    } else if value <= 0.0 {
+        Err(ParameterError::NotPositive { quantity, value })
+    } else {
+        Ok(())
+    }
+}
+
+/// # Errors
+/// The parts of the spring do not fit into each other.
+fn check_shape(geometry: &Geometry) -> Result<(), ParameterError> {
+    let Geometry { free_length_m, wire_diameter_m, coil_diameter_m, .. } = *geometry;
+    if coil_diameter_m <= wire_diameter_m {
+        return Err(ParameterError::CoilNotWiderThanWire { coil_diameter_m, wire_diameter_m });
+    }
+    let solid_length_m = geometry.solid_length_m();
+    if solid_length_m >= free_length_m {
+        return Err(ParameterError::SolidAtRest { solid_length_m, free_length_m });
+    }
+    Ok(())
+}
+
+/// A number of the spring, named in errors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// `L0`
+    FreeLength,
+    /// `d`
+    WireDiameter,
+    /// `D`
+    CoilDiameter,
+    /// `n`
+    ActiveCoils,
+    /// `E`
+    YoungsModulus,
+    /// `G`
+    ShearModulus,
+    /// Bending rigidity.
+    Alpha,
+    /// Shear rigidity.
+    Beta,
+    /// Compression rigidity.
+    Gamma,
+    /// Torsion rigidity.
+    Tau,
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::FreeLength => "free length",
+            Self::WireDiameter => "wire diameter",
+            Self::CoilDiameter => "coil diameter",
+            Self::ActiveCoils => "number of active coils",
+            Self::YoungsModulus => "Young's modulus",
+            Self::ShearModulus => "shear modulus",
+            Self::Alpha => "bending rigidity alpha",
+            Self::Beta => "shear rigidity beta",
+            Self::Gamma => "compression rigidity gamma",
+            Self::Tau => "torsion rigidity tau",
+        })
+    }
+}
+
+/// Why a set of parameters is no spring.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ParameterError {
+    /// NaN or infinite, as given or as derived.
+    NotFinite {
+        /// The number in question.
+        quantity: Quantity,
+    },
+    /// Zero or negative, as given or as derived.
+    NotPositive {
+        /// The number in question.
+        quantity: Quantity,
+        /// Its value in SI units.
+        value: f64,
+    },
+    /// The wire would fill the coil: `D <= d`.
+    CoilNotWiderThanWire {
+        /// `D` (m).
+        coil_diameter_m: f64,
+        /// `d` (m).
+        wire_diameter_m: f64,
+    },
+    /// The coils touch without load: `n d >= L0`.
+    SolidAtRest {
+        /// `n d` (m).
+        solid_length_m: f64,
+        /// `L0` (m).
+        free_length_m: f64,
+    },
+    /// No stable isotropic material has this ratio of `E` to `G`: `E / (2 G) - 1` must lie between -1 and 0.5.
+    ImpossiblePoissonRatio {
+        /// `E / (2 G) - 1`.
+        poisson_ratio: f64,
+    },
+}
+
+impl fmt::Display for ParameterError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotFinite { quantity } => write!(f, "the {quantity} is not a finite number"),
+            Self::NotPositive { quantity, value } => {
+                write!(f, "the {quantity} must be positive, it is {value:e} in SI units")
+            }
+            Self::CoilNotWiderThanWire { coil_diameter_m, wire_diameter_m } => write!(
+                f,
+                "the coil diameter ({:.4} mm) must be larger than the wire diameter ({:.4} mm)",
+                coil_diameter_m * 1e3,
+                wire_diameter_m * 1e3
+            ),
+            Self::SolidAtRest { solid_length_m, free_length_m } => write!(
+                f,
+                "the coils would touch without load: coils times wire is {:.4} mm, the free length {:.4} mm",
+                solid_length_m * 1e3,
+                free_length_m * 1e3
+            ),
+            Self::ImpossiblePoissonRatio { poisson_ratio } => write!(
+                f,
+                "Young's and shear modulus give a Poisson ratio of {poisson_ratio:.4}, it must lie between -1 and 0.5"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for ParameterError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::preset::Preset;
+
+    fn relative(a: f64, b: f64) -> f64 {
+        ((a - b) / b).abs()
+    }
+
+    /// Rounding of a dozen products and quotients.
+    const ROUNDING: f64 = 4e-15;
+
+    #[test]
+    fn one_constant_determines_the_others_in_every_mode() {
+        for preset in Preset::ALL {
+            let spring = preset.spring();
+            let known = spring.rigidities();
+            for stiffness in [
+                Stiffness::Gamma(known.gamma_n),
+                Stiffness::Alpha(known.alpha_n_m2),
+                Stiffness::Beta(known.beta_n),
+            ] {
+                let again = Spring::new(*spring.geometry(), *spring.material(), stiffness).unwrap();
+                let found = again.rigidities();
+                assert!(relative(found.alpha_n_m2, known.alpha_n_m2) < ROUNDING, "{preset:?} {stiffness:?}");
+                assert!(relative(found.beta_n, known.beta_n) < ROUNDING, "{preset:?} {stiffness:?}");
+                assert!(relative(found.gamma_n, known.gamma_n) < ROUNDING, "{preset:?} {stiffness:?}");
+                assert!(relative(found.tau_n_m2, known.tau_n_m2) < ROUNDING, "{preset:?} {stiffness:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn physical_stiffness_scales_as_the_textbook_says() {
+        // k = G d^4 / (8 n D^3): doubling the wire gives 16 times, doubling the coil one eighth.
+        let base = Preset::Slender.spring();
+        let (geometry, material) = (*base.geometry(), *base.material());
+        let with = |geometry| Spring::new(geometry, material, Stiffness::Physical).unwrap();
+        let thick = with(Geometry { wire_diameter_m: 2.0 * geometry.wire_diameter_m, ..geometry });
+        assert!(relative(thick.axial_stiffness_n_per_m(), 16.0 * base.axial_stiffness_n_per_m()) < ROUNDING);
+        let wide = with(Geometry { coil_diameter_m: 2.0 * geometry.coil_diameter_m, ..geometry });
+        assert!(relative(wide.axial_stiffness_n_per_m(), base.axial_stiffness_n_per_m() / 8.0) < ROUNDING);
+        let short = with(Geometry { free_length_m: 0.5 * geometry.free_length_m, ..geometry });
+        assert!(relative(short.axial_stiffness_n_per_m(), base.axial_stiffness_n_per_m()) < ROUNDING);
+    }
+
+    #[test]
+    fn every_reason_is_reported() {
+        let (geometry, material, stiffness) = Preset::Thesis1.parameters();
+        let refuse = |geometry, material, stiffness| Spring::new(geometry, material, stiffness).unwrap_err();
+        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert_eq!(
+                refuse(Geometry { free_length_m: value, ..geometry }, material, stiffness),
+                ParameterError::NotFinite { quantity: Quantity::FreeLength }
+            );
+        }
+        for value in [0.0, -0.0, -1.0] {
+            assert_eq!(
+                refuse(Geometry { active_coils: value, ..geometry }, material, stiffness),
+                ParameterError::NotPositive { quantity: Quantity::ActiveCoils, value }
+            );
+            assert_eq!(
+                refuse(geometry, material, Stiffness::Beta(value)),
+                ParameterError::NotPositive { quantity: Quantity::Beta, value }
+            );
+        }
+        let thin = Geometry { coil_diameter_m: geometry.wire_diameter_m, ..geometry };
+        assert!(matches!(refuse(thin, material, stiffness), ParameterError::CoilNotWiderThanWire { .. }));
+        let dense = Geometry { active_coils: 40.0, ..geometry };
+        assert!(matches!(refuse(dense, material, stiffness), ParameterError::SolidAtRest { .. }));
+        let rubbery = Material { shear_modulus_pa: material.youngs_modulus_pa / 3.0, ..material };
+        assert!(matches!(
+            refuse(geometry, rubbery, stiffness),
+            ParameterError::ImpossiblePoissonRatio { .. }
+        ));
+        // Positive and finite, yet the products of equations 7-9 leave the range of f64.
+        let soft = Material { youngs_modulus_pa: 1e-320, shear_modulus_pa: 1e-320 };
+        assert!(matches!(refuse(geometry, soft, Stiffness::Physical), ParameterError::NotPositive { .. }));
+    }
+}

@@ -1,0 +1,16 @@
+//! How far the answer of a law can be trusted at a pose.
+
+/// Verdict on one evaluation. The wrench beside it is finite in every case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[must_use]
+pub enum Validity {
+    /// The law holds as documented.
+    Ok,
+    /// The pose lies beyond the law's own range. The wrench is a smooth continuation, good for staying safe on
+    /// the way back, not for numbers.
+    Clamped,
+    /// The law says nothing about this pose (plates in one point, lengths beyond reason). The wrench is zero.
+    OutOfDomain,
+    /// The pose holds NaN, infinity or no unit quaternion. The wrench is zero.
+    InvalidInput,
+}
