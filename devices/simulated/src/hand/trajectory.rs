@@ -1,0 +1,240 @@
+//! What the hand means to do: its intended motion as a function of time, and when it holds the handle at all.
+//!
+//! Voluntary movements start and stop smoothly; [`minimum_jerk`] (Flash and Hogan 1985, J. Neurosci. 5:1688)
+//! is the usual curve, and every motion here is built from it and from sines.
+
+use crate::validation::{Check, Domain, InvalidParameter, number, vector};
+use flotor_hal::glam::{DQuat, DVec3};
+use std::f64::consts::TAU;
+
+/// A position and an orientation in the device frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Position of the flotor frame's origin, m.
+    pub position_m: DVec3,
+    /// Unit quaternion, flotor to device frame.
+    pub orientation: DQuat,
+}
+
+impl Pose {
+    /// Origin of the device frame, upright.
+    pub const HOME: Self = Self { position_m: DVec3::ZERO, orientation: DQuat::IDENTITY };
+
+    /// Largest deviation of a unit quaternion's length that rounding of user input explains.
+    const LENGTH_TOLERANCE: f64 = 1.0e-6;
+
+    /// Refuses non-finite numbers and quaternions that are no rotation. Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// Names the first offending number.
+    pub(crate) fn check(&self) -> Check {
+        vector("position_m", self.position_m, Domain::Finite)?;
+        let length = self.orientation.length();
+        // Written so that NaN is refused too.
+        if (length - 1.0).abs() <= Self::LENGTH_TOLERANCE {
+            Ok(())
+        } else {
+            Err(InvalidParameter::NotARotation { name: "orientation", length })
+        }
+    }
+}
+
+/// Where the person means the handle to be at one instant, device frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Intention {
+    /// Intended position of the handle, m.
+    pub position_m: DVec3,
+    /// Its derivative, m/s.
+    pub velocity_m_per_s: DVec3,
+    /// Intended orientation of the handle; no trajectory turns it.
+    pub orientation: DQuat,
+}
+
+/// The intended motion of the hand. Times count from the start of the run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Trajectory {
+    /// The hand is off the handle.
+    Open,
+    /// The hand keeps the handle at a pose.
+    Hold(Pose),
+    /// From home straight down along a minimum-jerk curve, then held there.
+    Press {
+        /// Depth below home, m; negative pulls up.
+        depth_m: f64,
+        /// Start of the movement, s.
+        start_s: f64,
+        /// Duration of the movement, s.
+        rise_s: f64,
+    },
+    /// The handle is kept at a pose, then let go.
+    Release {
+        /// Pose before the release.
+        from: Pose,
+        /// When the hand opens, ns.
+        at_ns: u64,
+    },
+    /// Up and down along a sine, first downwards, faded in by a minimum-jerk envelope, as the subjects of the
+    /// thesis explored their springs.
+    Oscillate {
+        /// Middle of the movement, z in m; negative is below home.
+        centre_m: f64,
+        /// Half the distance between the turning points, m.
+        amplitude_m: f64,
+        /// Cycles per second, Hz.
+        frequency_hz: f64,
+        /// Time until the full amplitude, s.
+        onset_s: f64,
+    },
+}
+
+impl Trajectory {
+    /// The demo's exploration. With [`Impedance::FIRM`](super::Impedance::FIRM) against spring 1 of the
+    /// thesis (1.13 N/mm at the handle) two thirds of it reach the handle: 4 mm about a middle 2.5 mm below
+    /// home, 1.5 times a second. Rate: most people explore softness at 1 to 2 Hz in 3 or more cycles
+    /// (Macfadyen 1998).
+    pub const EXPLORE: Self =
+        Self::Oscillate { centre_m: -4.0e-3, amplitude_m: 6.0e-3, frequency_hz: 1.5, onset_s: 1.0 };
+
+    /// The intention at a time since the start of the run, or nothing while the hand is off the handle.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn intention(&self, time_ns: u64) -> Option<Intention> {
+        let time_s = seconds(time_ns);
+        match *self {
+            Self::Open => None,
+            Self::Hold(pose) => Some(Intention::resting(pose)),
+            Self::Press { depth_m, start_s, rise_s } => {
+                let (share, rate_per_s) = minimum_jerk(time_s - start_s, rise_s);
+                Some(Intention::vertical(-depth_m * share, -depth_m * rate_per_s))
+            }
+            Self::Release { from, at_ns } => (time_ns < at_ns).then_some(Intention::resting(from)),
+            Self::Oscillate { centre_m, amplitude_m, frequency_hz, onset_s } => {
+                let (share, rate_per_s) = minimum_jerk(time_s, onset_s);
+                let (sin, cos) = (TAU * frequency_hz * time_s).sin_cos();
+                let full_m = centre_m - amplitude_m * sin;
+                let full_m_per_s = -amplitude_m * TAU * frequency_hz * cos;
+                Some(Intention::vertical(share * full_m, rate_per_s * full_m + share * full_m_per_s))
+            }
+        }
+    }
+
+    /// When the hand lets go, if that is planned, ns. Real-time: bounded, no allocation.
+    pub(crate) fn release_ns(&self) -> Option<u64> {
+        match *self {
+            Self::Release { at_ns, .. } => Some(at_ns),
+            _ => None,
+        }
+    }
+
+    /// Refuses numbers that describe no motion. Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// Names the first offending number.
+    pub(super) fn check(&self) -> Check {
+        match *self {
+            Self::Open => Ok(()),
+            Self::Hold(pose) | Self::Release { from: pose, .. } => pose.check(),
+            Self::Press { depth_m, start_s, rise_s } => {
+                number("press depth_m", depth_m, Domain::Finite)?;
+                number("press start_s", start_s, Domain::Finite)?;
+                number("press rise_s", rise_s, Domain::Positive)
+            }
+            Self::Oscillate { centre_m, amplitude_m, frequency_hz, onset_s } => {
+                number("oscillate centre_m", centre_m, Domain::Finite)?;
+                number("oscillate amplitude_m", amplitude_m, Domain::NotNegative)?;
+                number("oscillate frequency_hz", frequency_hz, Domain::NotNegative)?;
+                number("oscillate onset_s", onset_s, Domain::Positive)
+            }
+        }
+    }
+}
+
+impl Intention {
+    fn resting(pose: Pose) -> Self {
+        Self { position_m: pose.position_m, velocity_m_per_s: DVec3::ZERO, orientation: pose.orientation }
+    }
+
+    fn vertical(z_m: f64, z_m_per_s: f64) -> Self {
+        Self {
+            position_m: DVec3::new(0.0, 0.0, z_m),
+            velocity_m_per_s: DVec3::new(0.0, 0.0, z_m_per_s),
+            orientation: DQuat::IDENTITY,
+        }
+    }
+}
+
+/// Share (0 to 1) of a minimum-jerk movement done `elapsed_s` after its start, and its rate in 1/s.
+///
+/// `10 u^3 - 15 u^4 + 6 u^5` with `u = elapsed / duration` (Flash and Hogan 1985); 0 before and 1 after.
+/// Real-time: bounded, no allocation.
+#[must_use]
+pub fn minimum_jerk(elapsed_s: f64, duration_s: f64) -> (f64, f64) {
+    let u = (elapsed_s / duration_s).clamp(0.0, 1.0);
+    let share = u * u * u * (10.0 + u * (-15.0 + 6.0 * u));
+    let rate_per_s = 30.0 * u * u * (1.0 - u) * (1.0 - u) / duration_s;
+    (share, rate_per_s)
+}
+
+fn seconds(time_ns: u64) -> f64 {
+    time_ns as f64 * 1.0e-9
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PRESS: Trajectory = Trajectory::Press { depth_m: 4.0e-3, start_s: 0.1, rise_s: 0.5 };
+
+    #[test]
+    fn velocity_is_the_derivative_of_position() {
+        let step_ns = 100_000;
+        for trajectory in [PRESS, Trajectory::EXPLORE] {
+            for time_ns in (step_ns..2_000_000_000).step_by(7_700_000) {
+                let at = |t: u64| trajectory.intention(t).expect("held").position_m.z;
+                let central = (at(time_ns + step_ns) - at(time_ns - step_ns)) / (2.0 * seconds(step_ns));
+                let analytic = trajectory.intention(time_ns).expect("held").velocity_m_per_s.z;
+                // Central difference: h^2/6 times the third derivative (at most 60 * 10 mm / (0.5 s)^3 = 5
+                // m/s^3).
+                assert!((central - analytic).abs() < 1.0e-8, "{time_ns}: {central} {analytic}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_press_starts_at_home_and_ends_at_its_depth_at_rest() {
+        let at = |t| PRESS.intention(t).expect("held");
+        assert_eq!(at(0).position_m.z, 0.0);
+        assert_eq!(at(100_000_000).velocity_m_per_s.z, 0.0);
+        assert_eq!(at(5_000_000_000).position_m.z, -4.0e-3);
+        assert_eq!(at(5_000_000_000).velocity_m_per_s.z, 0.0);
+    }
+
+    #[test]
+    fn an_oscillation_starts_at_rest_and_turns_where_it_says() {
+        let z = |t| Trajectory::EXPLORE.intention(t).expect("held").position_m.z;
+        assert_eq!(z(0), 0.0);
+        let turning: Vec<f64> = (3_000_000_000..5_000_000_000).step_by(100_000).map(z).collect();
+        let lowest = turning.iter().copied().fold(f64::INFINITY, f64::min);
+        let highest = turning.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        // Sampling 0.1 ms from the turning point costs A (w t)^2 / 2 = 3e-9 m.
+        assert!((lowest + 10.0e-3).abs() < 1.0e-8 && (highest - 2.0e-3).abs() < 1.0e-8, "{lowest} {highest}");
+    }
+
+    #[test]
+    fn a_release_holds_until_its_time_and_not_at_it() {
+        let release = Trajectory::Release { from: Pose::HOME, at_ns: 1_000 };
+        assert!(release.intention(999).is_some() && release.intention(1_000).is_none());
+    }
+
+    #[test]
+    fn bad_numbers_are_named() {
+        let bad = Trajectory::Press { depth_m: f64::NAN, start_s: 0.0, rise_s: 1.0 };
+        assert_eq!(bad.check(), Err(InvalidParameter::NotFinite { name: "press depth_m" }));
+        let bad = Trajectory::Press { depth_m: 0.0, start_s: 0.0, rise_s: 0.0 };
+        assert_eq!(bad.check(), Err(InvalidParameter::NotPositive { name: "press rise_s", value: 0.0 }));
+        let bad =
+            Trajectory::Hold(Pose { orientation: DQuat::from_xyzw(0.0, 0.0, 0.0, f64::NAN), ..Pose::HOME });
+        assert!(matches!(bad.check(), Err(InvalidParameter::NotARotation { .. })));
+    }
+}

@@ -1,0 +1,133 @@
+//! Energy accounts of the flotor: where every joule came from and where it went.
+//!
+//! Over any stretch of time
+//!
+//! ```text
+//! change of (kinetic + potential) = coils + feed-forward + hand - dissipated
+//! ```
+//!
+//! Each of the six terms is computed on its own: kinetic and potential energy from the state, the four works
+//! as integrals of force times velocity along the motion (see `plant::step`). None is the remainder of the
+//! others, so an imbalance is a real error of the integration, not of the book-keeping. The host compares it
+//! with the peak of the mechanical energy; a closed loop that gains energy out of nothing cannot hide here.
+
+use std::ops::AddAssign;
+
+/// Mechanical energy of the flotor (the mass of a gripping hand not included).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MechanicalEnergy {
+    /// Of translation and rotation, J.
+    pub kinetic_j: f64,
+    /// Of gravity, J; zero at home (origin of the device frame, upright).
+    pub potential_j: f64,
+}
+
+impl MechanicalEnergy {
+    /// Kinetic plus potential energy, J. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn total_j(&self) -> f64 {
+        self.kinetic_j + self.potential_j
+    }
+}
+
+/// Work done on the flotor during some time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Work {
+    /// By the coils' wrench, J.
+    pub coils_j: f64,
+    /// By the gravity compensation, J.
+    pub feed_forward_j: f64,
+    /// By the hand on the handle, J: its spring, its damper and the inertia of its own mass.
+    pub hand_j: f64,
+    /// Taken out by eddy-current drag, J; never negative but for rounding.
+    pub dissipated_j: f64,
+}
+
+impl Work {
+    /// Work that changes the mechanical energy, J. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn net_j(&self) -> f64 {
+        self.coils_j + self.feed_forward_j + self.hand_j - self.dissipated_j
+    }
+
+    /// True if every term is finite. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        [self.coils_j, self.feed_forward_j, self.hand_j, self.dissipated_j]
+            .iter()
+            .all(|term| term.is_finite())
+    }
+}
+
+impl AddAssign for Work {
+    fn add_assign(&mut self, more: Self) {
+        self.coils_j += more.coils_j;
+        self.feed_forward_j += more.feed_forward_j;
+        self.hand_j += more.hand_j;
+        self.dissipated_j += more.dissipated_j;
+    }
+}
+
+/// Running accounts since the start of a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ledger {
+    start: MechanicalEnergy,
+    now: MechanicalEnergy,
+    work: Work,
+    peak_j: f64,
+}
+
+impl Ledger {
+    /// Opens the accounts on a flotor with the given energy. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn open(start: MechanicalEnergy) -> Self {
+        Self { start, now: start, work: Work::default(), peak_j: start.total_j().abs() }
+    }
+
+    /// Books the work of a stretch of time and the energy at its end. Real-time: bounded, no allocation.
+    pub fn book(&mut self, work: Work, now: MechanicalEnergy) {
+        self.work += work;
+        self.now = now;
+        self.peak_j = self.peak_j.max(now.total_j().abs());
+    }
+
+    /// Mechanical energy when the accounts were opened. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn start(&self) -> MechanicalEnergy {
+        self.start
+    }
+
+    /// Mechanical energy now. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn energy(&self) -> MechanicalEnergy {
+        self.now
+    }
+
+    /// Works since the start. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn work(&self) -> Work {
+        self.work
+    }
+
+    /// Largest magnitude of the mechanical energy since the start, J. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn peak_j(&self) -> f64 {
+        self.peak_j
+    }
+
+    /// Energy that appeared from nowhere (positive) or vanished (negative) since the start, J.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn imbalance_j(&self) -> f64 {
+        (self.now.total_j() - self.start.total_j()) - self.work.net_j()
+    }
+
+    /// Magnitude of [`Self::imbalance_j`] relative to [`Self::peak_j`]; 0 for a flotor that never had energy.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn relative_imbalance(&self) -> f64 {
+        if self.peak_j > 0.0 { self.imbalance_j().abs() / self.peak_j } else { 0.0 }
+    }
+}

@@ -1,0 +1,179 @@
+//! From pieces of time to steps: how many, how long, and what each length needs computed once.
+//!
+//! A flotor that neither turns nor is turned moves exactly however long the step. One that turns is followed
+//! in finer steps, by the fastest rate of its rotation and of what pulls on it off its centre of mass.
+
+use super::body::Body;
+use super::motion::{Contact, Motion};
+use super::step::Step;
+use super::translation::{Gramian, MAX_STEP_TIMES_RATE, Response};
+use super::{MAX_PIECE_NS, Wrench};
+use crate::ledger::Work;
+use crate::validation::InvalidParameter;
+use flotor_hal::glam::DVec3;
+
+/// Longest step of a turning flotor times the fastest rate of rotation (pure number). The energy books of a
+/// hand that grips the flotor askew then close to 3e-10 of what the hand's spring held.
+const MAX_ROTATION_STEP: f64 = 0.025;
+
+/// Longest step of a turning flotor times the fastest rate of translation, where the two are coupled (pure
+/// number). The energy books of a firm hand that grips the flotor askew then close to 1e-9 of what the hand's
+/// springs held.
+const MAX_COUPLED_STEP: f64 = 0.017;
+
+/// Most steps a piece is cut into.
+const MAX_STEPS: u32 = 128;
+
+/// A body with the tables of two piece lengths: the nominal one and the latest other one.
+#[derive(Clone, Debug)]
+pub(super) struct Scheme {
+    body: Body,
+    nominal: Table,
+    other: Table,
+}
+
+/// The two ways to cut a piece of some length into steps.
+#[derive(Clone, Copy, Debug)]
+struct Table {
+    piece_ns: u64,
+    /// For a flotor that does not turn.
+    straight: Grid,
+    /// For one that turns.
+    turning: Grid,
+}
+
+/// Equal steps, and the oscillator's response over half a step and a step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grid {
+    steps: u32,
+    /// Length of a step, s.
+    pub(super) step_s: f64,
+    /// Response after half a step.
+    pub(super) half: Response,
+    /// Response after a step.
+    pub(super) full: Response,
+    /// Integral of velocity squared over a step.
+    pub(super) gramian: Gramian,
+}
+
+impl Scheme {
+    /// Prepares a body. Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// If the longest piece would need more than [`MAX_STEPS`] steps.
+    pub(super) fn new(body: Body, nominal_ns: u64) -> Result<Self, InvalidParameter> {
+        let most_steps = f64::from(MAX_STEPS);
+        let steps = straight_steps(&body, MAX_PIECE_NS).max(turning_steps(&body, MAX_PIECE_NS));
+        // Parameters near the largest float can overflow to NaN.
+        if steps.is_nan() || steps > most_steps {
+            return Err(InvalidParameter::TooStiff { steps_per_ms: steps, limit: most_steps });
+        }
+        let nominal = Table::new(&body, nominal_ns.clamp(1, MAX_PIECE_NS));
+        Ok(Self { body, nominal, other: nominal })
+    }
+
+    /// The body. Real-time: bounded, no allocation.
+    pub(super) fn body(&self) -> &Body {
+        &self.body
+    }
+
+    /// Moves on by `piece_ns`; gives the new motion and the work done. Real-time: bounded, no allocation.
+    pub(super) fn advance(
+        &mut self,
+        from: &Motion,
+        piece_ns: u64,
+        coils: &Wrench,
+        contact: Contact,
+    ) -> (Motion, Work) {
+        if piece_ns == 0 {
+            return (*from, Work::default());
+        }
+        let (body, table) = self.prepared(piece_ns);
+        let (motion, work) = table
+            .straight
+            .march(from, contact, |contact, motion| {
+                Step::new(body, &table.straight, coils, contact, motion).straight()
+            })
+            .or_else(|| {
+                table.turning.march(from, contact, |contact, motion| {
+                    Some(Step::new(body, &table.turning, coils, contact, motion).turning())
+                })
+            })
+            .unwrap_or((*from, Work::default()));
+        (motion.settled(), work)
+    }
+
+    /// The body and the table for a piece of `piece_ns`, computed unless it is at hand.
+    fn prepared(&mut self, piece_ns: u64) -> (&Body, &Table) {
+        if piece_ns == self.nominal.piece_ns {
+            return (&self.body, &self.nominal);
+        }
+        if piece_ns != self.other.piece_ns {
+            self.other = Table::new(&self.body, piece_ns);
+        }
+        (&self.body, &self.other)
+    }
+}
+
+impl Table {
+    fn new(body: &Body, piece_ns: u64) -> Self {
+        let straight = straight_steps(body, piece_ns);
+        let turning = turning_steps(body, piece_ns).max(straight);
+        let straight = Grid::new(body, piece_ns, straight);
+        let turning =
+            if turning <= f64::from(straight.steps) { straight } else { Grid::new(body, piece_ns, turning) };
+        Self { piece_ns, straight, turning }
+    }
+}
+
+impl Grid {
+    fn new(body: &Body, piece_ns: u64, at_least: f64) -> Self {
+        let mut steps = 1;
+        while f64::from(steps) < at_least && steps < MAX_STEPS {
+            steps += 1;
+        }
+        let step_s = seconds(piece_ns) / f64::from(steps);
+        Self {
+            steps,
+            step_s,
+            half: body.oscillator.response(0.5 * step_s),
+            full: body.oscillator.response(step_s),
+            gramian: body.oscillator.gramian(step_s),
+        }
+    }
+
+    /// Takes all steps of the grid, or gives up where `step` does. Real-time: bounded, no allocation.
+    #[inline]
+    fn march(
+        &self,
+        from: &Motion,
+        mut contact: Contact,
+        step: impl Fn(&Contact, &Motion) -> Option<(Motion, Work)>,
+    ) -> Option<(Motion, Work)> {
+        let (mut motion, mut work) = (*from, Work::default());
+        for _ in 0..self.steps {
+            let (next, done) = step(&contact, &motion)?;
+            motion = next;
+            work += done;
+            contact = contact.later(self.step_s);
+        }
+        Some((motion, work))
+    }
+}
+
+/// Steps a piece needs for the series of the oscillator, not rounded up. Real-time: bounded, no allocation.
+fn straight_steps(body: &Body, piece_ns: u64) -> f64 {
+    body.oscillator.rate_per_s() * seconds(piece_ns) / MAX_STEP_TIMES_RATE
+}
+
+/// Steps a piece needs for the accuracy of rotation, not rounded up. Real-time: bounded, no allocation.
+fn turning_steps(body: &Body, piece_ns: u64) -> f64 {
+    let coupled = body.centre_of_mass_m != DVec3::ZERO;
+    let coupled_rate_per_s = if coupled { body.oscillator.rate_per_s() } else { 0.0 };
+    let rotation = body.rotation_rate_per_s / MAX_ROTATION_STEP;
+    rotation.max(coupled_rate_per_s / MAX_COUPLED_STEP) * seconds(piece_ns)
+}
+
+fn seconds(time_ns: u64) -> f64 {
+    time_ns as f64 * 1.0e-9
+}

@@ -1,0 +1,160 @@
+//! The simulation as a device plugin.
+
+use crate::parameters::{SCHEMA, in_force, setup};
+use crate::plant::Wrench;
+use crate::simulation::{Setup, Simulation};
+use crate::workspace::{
+    FORCE_LIMIT_N, ROTATION_RANGE_RAD, STIFFNESS_LIMIT_N_PER_M, SensorRange, TORQUE_LIMIT_NM,
+    TRANSLATION_RANGE_M,
+};
+use flotor_hal::{
+    ActiveDevice, Axes, Capabilities, Cycle, Device, DeviceInfo, DeviceState, EnergyLedger, Fault,
+    LoopConfig, Parameter, Pose, Refusal, SafeStop, Settings, Tick, Twist, export_device,
+};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// The simulated flotor, opened: the numbers are checked, nothing moves.
+pub struct SimulatedFlotor {
+    setup: Setup,
+    /// Every parameter as set or by default, in the order of the schema.
+    values: Vec<f64>,
+    stopped: Arc<AtomicBool>,
+}
+
+/// The simulated flotor, running.
+pub struct RunningFlotor {
+    simulation: Simulation,
+    opened: SimulatedFlotor,
+    /// Acts from the last write to the next.
+    held: Wrench,
+}
+
+/// Cuts the coils from any thread.
+pub struct CoilSwitch(Arc<AtomicBool>);
+
+impl SafeStop for CoilSwitch {
+    fn safe_stop(&self) {
+        self.0.store(true, Ordering::Release);
+    }
+}
+
+/// Fastest change of force, N/s: full scale in a millisecond. An estimate; no figure is published.
+const FORCE_SLEW_N_PER_S: f64 = 55.0e3;
+/// Fastest change of torque, N·m/s: full scale in a millisecond. An estimate; no figure is published.
+const TORQUE_SLEW_NM_PER_S: f64 = 6.3e3;
+/// Rates the device's controller accepts, Hz (public client of the device's interface).
+const RATE_HZ: [f64; 2] = [100.0, 10_000.0];
+
+impl Device for SimulatedFlotor {
+    const INFO: DeviceInfo =
+        DeviceInfo::new("simulated", "Simulated flotor", "A 580 g levitated flotor held by a simulated hand");
+    const PARAMETERS: &'static [Parameter] = SCHEMA;
+    type Active = RunningFlotor;
+    type Stop = CoilSwitch;
+
+    fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        let setup = setup(settings);
+        // Everything that depends on the tick length is checked again at activation.
+        Simulation::new(&setup).map_err(Refusal::parameter)?;
+        let values = SCHEMA.iter().map(|parameter| settings.number_or_default(parameter.id())).collect();
+        Ok(Self { setup, values, stopped: Arc::new(AtomicBool::new(false)) })
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            sensed: Axes::ALL,
+            actuated: Axes::ALL,
+            range_m: [TRANSLATION_RANGE_M; 3],
+            range_rad: [ROTATION_RANGE_RAD; 3],
+            resolution_m: 0.0,
+            max_force_n: FORCE_LIMIT_N.to_array(),
+            max_torque_nm: TORQUE_LIMIT_NM.to_array(),
+            max_force_slew_n_per_s: FORCE_SLEW_N_PER_S,
+            max_torque_slew_nm_per_s: TORQUE_SLEW_NM_PER_S,
+            max_stiffness_n_per_m: STIFFNESS_LIMIT_N_PER_M,
+            rate_hz: RATE_HZ,
+            latency_s: 0.0,
+        }
+    }
+
+    fn stopper(&self) -> CoilSwitch {
+        CoilSwitch(Arc::clone(&self.stopped))
+    }
+
+    fn activate(self, config: &LoopConfig) -> Result<RunningFlotor, (Self, Refusal)> {
+        let setup = Setup { tick_ns: config.period_ns, ..self.setup };
+        match Simulation::new(&setup) {
+            Ok(simulation) => {
+                self.stopped.store(false, Ordering::Release);
+                Ok(RunningFlotor { simulation, opened: self, held: Wrench::ZERO })
+            }
+            Err(error) => Err((self, Refusal::parameter(error))),
+        }
+    }
+
+    fn parameter(&self, index: usize) -> f64 {
+        in_force(&self.setup, &self.values, index)
+    }
+}
+
+impl ActiveDevice for RunningFlotor {
+    type Opened = SimulatedFlotor;
+
+    fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
+        let coils = if self.is_stopped() { Wrench::ZERO } else { self.held };
+        let incidents = self.simulation.advance(tick.dt_ns, coils);
+        let flotor = self.simulation.state();
+        *state = DeviceState {
+            pose: Pose::new(flotor.position_m, flotor.orientation),
+            twist: Twist::new(flotor.velocity_m_per_s, flotor.angular_velocity_rad_per_s),
+            delivered: flotor_hal::Wrench::new(coils.force_n, coils.torque_nm),
+            sampled_ns: tick.time_ns,
+            ..DeviceState::HOME
+        };
+        if incidents.stopped || self.simulation.sensor_range() == SensorRange::Outside {
+            return Cycle::Fault(Fault::SensorOutOfRange);
+        }
+        Cycle::Fresh
+    }
+
+    fn write(&mut self, _tick: &Tick, wrench: &flotor_hal::Wrench) -> Cycle {
+        let asked = Wrench { force_n: wrench.force(), torque_nm: wrench.torque() };
+        // The coils give what they can: the host has limited the wrench already, another caller may not have.
+        self.held = if asked.is_finite() {
+            Wrench {
+                force_n: asked.force_n.clamp(-FORCE_LIMIT_N, FORCE_LIMIT_N),
+                torque_nm: asked.torque_nm.clamp(-TORQUE_LIMIT_NM, TORQUE_LIMIT_NM),
+            }
+        } else {
+            Wrench::ZERO
+        };
+        Cycle::Fresh
+    }
+
+    fn energy_ledger(&self) -> Option<EnergyLedger> {
+        let ledger = self.simulation.ledger();
+        let work = ledger.work();
+        Some(EnergyLedger {
+            stored_j: ledger.energy().total_j(),
+            initial_j: ledger.start().total_j(),
+            actuators_j: work.coils_j,
+            feedforward_j: work.feed_forward_j,
+            hand_j: work.hand_j,
+            dissipated_j: work.dissipated_j,
+            peak_j: ledger.peak_j(),
+        })
+    }
+
+    fn deactivate(self) -> SimulatedFlotor {
+        self.opened
+    }
+}
+
+impl RunningFlotor {
+    fn is_stopped(&self) -> bool {
+        self.opened.stopped.load(Ordering::Acquire)
+    }
+}
+
+export_device!(SimulatedFlotor);

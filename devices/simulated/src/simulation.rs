@@ -1,0 +1,236 @@
+//! Flotor, hand and energy accounts on one clock: what a device needs to stand in for the machine.
+//!
+//! The clock counts integer nanoseconds, so a run can be cut at any of them and goes on bit for bit the same
+//! way. The hand's intention is a smooth curve sampled once a millisecond and drawn straight in between, on a
+//! grid that belongs to the clock and not to the servo: ticks of any length, regular or not, meet the same
+//! hand. Each tick is cut at the grid and at the moment the hand lets go; within a piece the plant is exact
+//! (see `plant`).
+
+use crate::hand::{Hand, Intention, Trajectory};
+use crate::ledger::Ledger;
+use crate::plant::{FlotorParameters, MAX_PIECE_NS, Outcome, Plant, State, Wrench};
+use crate::validation::InvalidParameter;
+use crate::workspace::SensorRange;
+
+/// Longest time one call of [`Simulation::advance`] simulates, ns: ten ticks of the slowest servo (100 Hz).
+/// It bounds what a tick may cost after the host was held up.
+pub const MAX_ADVANCE_NS: u64 = 100_000_000;
+
+/// Distance of the samples of the hand's intention, ns.
+const GRID_NS: u64 = MAX_PIECE_NS;
+
+/// What a simulation is built from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setup {
+    /// The flotor.
+    pub flotor: FlotorParameters,
+    /// The hand.
+    pub hand: Hand,
+    /// Where the flotor starts.
+    pub start: State,
+    /// Time between two ticks if all goes well, ns. Any other works too, and costs a little more.
+    pub tick_ns: u64,
+}
+
+impl Setup {
+    /// The demo: the thesis's flotor at home in an exploring hand, at 1 kHz.
+    pub const DEMO: Self = Self {
+        flotor: FlotorParameters::THESIS,
+        hand: Hand::EXPLORING,
+        start: State::HOME,
+        tick_ns: 1_000_000,
+    };
+}
+
+/// What went wrong during a tick. Nothing here stops the simulation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Incidents {
+    /// The wrench held a NaN or an infinity; the coils gave nothing instead.
+    pub wrench_rejected: bool,
+    /// The motion left every physical range; the flotor was stopped where it was and the accounts were opened
+    /// anew.
+    pub stopped: bool,
+    /// The tick was longer than [`MAX_ADVANCE_NS`]; only that much was simulated.
+    pub cut_short: bool,
+}
+
+impl Incidents {
+    /// True if nothing went wrong. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// A running simulation.
+#[derive(Clone, Debug)]
+pub struct Simulation {
+    setup: Setup,
+    plant: Plant,
+    ledger: Ledger,
+    time_ns: u64,
+    stroke: Stroke,
+}
+
+impl Simulation {
+    /// A simulation at time 0. Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// If a parameter is not physical; the error names it.
+    pub fn new(setup: &Setup) -> Result<Self, InvalidParameter> {
+        setup.hand.check()?;
+        let plant = Plant::new(&setup.flotor, &setup.hand.impedance, &setup.start, setup.tick_ns)?;
+        let ledger = Ledger::open(plant.energy());
+        Ok(Self { setup: *setup, plant, ledger, time_ns: 0, stroke: Stroke::default() })
+    }
+
+    /// Back to the start: time 0, first state, fresh accounts. Real-time: bounded, no allocation.
+    pub fn reset(&mut self) {
+        self.plant.place(&self.setup.start);
+        self.ledger = Ledger::open(self.plant.energy());
+        self.time_ns = 0;
+        self.stroke = Stroke::default();
+    }
+
+    /// Replaces the hand from now on; its trajectory keeps counting from the start of the run.
+    ///
+    /// Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// If a parameter is not physical; the hand then stays as it was.
+    pub fn set_hand(&mut self, hand: Hand) -> Result<(), InvalidParameter> {
+        hand.check()?;
+        self.plant =
+            Plant::new(&self.setup.flotor, &hand.impedance, &self.plant.state(), self.setup.tick_ns)?;
+        self.setup.hand = hand;
+        self.stroke = Stroke::default();
+        Ok(())
+    }
+
+    /// Moves on by `dt_ns` under a coil wrench that is constant over that time (zero-order hold).
+    ///
+    /// Splitting a tick changes nothing but rounding in translation and the Runge-Kutta error in rotation.
+    /// Total: a wrench that is not finite counts as none. Real-time: bounded, no allocation.
+    pub fn advance(&mut self, dt_ns: u64, coils: Wrench) -> Incidents {
+        let mut incidents = Incidents {
+            wrench_rejected: !coils.is_finite(),
+            cut_short: dt_ns > MAX_ADVANCE_NS,
+            ..Incidents::default()
+        };
+        let coils = if incidents.wrench_rejected { Wrench::ZERO } else { coils };
+        let end_ns = self.time_ns.saturating_add(dt_ns.min(MAX_ADVANCE_NS));
+        while self.time_ns < end_ns {
+            let piece_ns = self.piece_end_ns(end_ns) - self.time_ns;
+            let intention = self.drawn_intention();
+            match self.plant.advance(piece_ns, &coils, intention.as_ref()) {
+                Outcome::Moved(work) => self.ledger.book(work, self.plant.energy()),
+                Outcome::Stopped => {
+                    incidents.stopped = true;
+                    self.ledger = Ledger::open(self.plant.energy());
+                }
+            }
+            self.time_ns += piece_ns;
+        }
+        incidents
+    }
+
+    /// Time since the start, ns. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn time_ns(&self) -> u64 {
+        self.time_ns
+    }
+
+    /// Pose and velocity of the flotor now. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn state(&self) -> State {
+        self.plant.state()
+    }
+
+    /// Whether the sensors see the flotor now. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn sensor_range(&self) -> SensorRange {
+        let state = self.plant.state();
+        SensorRange::of(state.position_m, state.orientation)
+    }
+
+    /// What the hand means to do now; nothing while it is off the handle. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn intention(&self) -> Option<Intention> {
+        self.setup.hand.trajectory.intention(self.time_ns)
+    }
+
+    /// Energy accounts since the start. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn ledger(&self) -> &Ledger {
+        &self.ledger
+    }
+
+    /// What the simulation was built from, with the hand of the latest [`Self::set_hand`]. Real-time:
+    /// bounded, no allocation.
+    #[must_use]
+    pub fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
+    /// End of the piece that starts now: the tick's end, the next grid point, or the moment the hand lets go.
+    fn piece_end_ns(&self, tick_end_ns: u64) -> u64 {
+        let grid_ns = (self.time_ns / GRID_NS + 1).saturating_mul(GRID_NS);
+        let end_ns = tick_end_ns.min(grid_ns);
+        match self.setup.hand.trajectory.release_ns() {
+            Some(release_ns) if release_ns > self.time_ns => end_ns.min(release_ns),
+            _ => end_ns,
+        }
+    }
+
+    /// The intention now as drawn through the grid; nothing while the hand is off the handle.
+    fn drawn_intention(&mut self) -> Option<Intention> {
+        let trajectory = &self.setup.hand.trajectory;
+        if trajectory.release_ns().is_some_and(|release_ns| self.time_ns >= release_ns) {
+            return None;
+        }
+        let index = self.time_ns / GRID_NS;
+        if self.stroke.index != Some(index) {
+            self.stroke = Stroke::after(&self.stroke, index, trajectory);
+        }
+        self.stroke.drawn(self.time_ns % GRID_NS)
+    }
+}
+
+/// The intention between two grid points of the clock.
+#[derive(Clone, Copy, Debug, Default)]
+struct Stroke {
+    /// Number of the stroke that starts at `start`; none before the first.
+    index: Option<u64>,
+    start: Option<Intention>,
+    end: Option<Intention>,
+}
+
+impl Stroke {
+    /// Stroke number `index`. Consecutive strokes share a grid point, which is evaluated once.
+    fn after(previous: &Self, index: u64, trajectory: &Trajectory) -> Self {
+        let at = |index: u64| trajectory.intention(index.saturating_mul(GRID_NS));
+        let follows = previous.index.is_some_and(|before| before.checked_add(1) == Some(index));
+        Self {
+            index: Some(index),
+            start: if follows { previous.end } else { at(index) },
+            end: at(index.saturating_add(1)),
+        }
+    }
+
+    /// The intention `elapsed_ns` after the start of the stroke, drawn straight to its end: position on the
+    /// chord, velocity its slope. Where the hand lets go before the end it stays.
+    fn drawn(&self, elapsed_ns: u64) -> Option<Intention> {
+        let start = self.start?;
+        let end = self.end.unwrap_or(start);
+        let velocity_m_per_s = (end.position_m - start.position_m) / seconds(GRID_NS);
+        let position_m = start.position_m + velocity_m_per_s * seconds(elapsed_ns);
+        Some(Intention { position_m, velocity_m_per_s, ..start })
+    }
+}
+
+fn seconds(time_ns: u64) -> f64 {
+    time_ns as f64 * 1.0e-9
+}
+
+#[cfg(test)]
+mod tests;

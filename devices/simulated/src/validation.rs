@@ -1,0 +1,138 @@
+//! Checks of physical parameters, before anything moves.
+//!
+//! A mass that is negative or a stiffness that is NaN is refused by name when the device is opened, so that
+//! the equations of motion never meet one.
+
+use flotor_hal::glam::DVec3;
+use std::fmt;
+
+/// Why a parameter was refused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum InvalidParameter {
+    /// NaN or infinite.
+    NotFinite {
+        /// Name of the parameter, unit included.
+        name: &'static str,
+    },
+    /// Zero or negative where only a positive number makes sense.
+    NotPositive {
+        /// Name of the parameter, unit included.
+        name: &'static str,
+        /// The value given.
+        value: f64,
+    },
+    /// Negative where zero is the least.
+    Negative {
+        /// Name of the parameter, unit included.
+        name: &'static str,
+        /// The value given.
+        value: f64,
+    },
+    /// One principal moment of inertia exceeds the sum of the other two: no body has that.
+    ImpossibleInertia {
+        /// The principal moments given, kg m^2.
+        principal_kg_m2: DVec3,
+    },
+    /// A quaternion that is not of unit length.
+    NotARotation {
+        /// Name of the parameter.
+        name: &'static str,
+        /// Its length.
+        length: f64,
+    },
+    /// Flotor and hand would move faster than the integrator resolves.
+    TooStiff {
+        /// Steps per millisecond the mechanism would need.
+        steps_per_ms: f64,
+        /// The most that are taken.
+        limit: f64,
+    },
+}
+
+impl fmt::Display for InvalidParameter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotFinite { name } => write!(f, "{name} is not a finite number"),
+            Self::NotPositive { name, value } => write!(f, "{name} is {value}, it must be above zero"),
+            Self::Negative { name, value } => write!(f, "{name} is {value}, it must not be negative"),
+            Self::ImpossibleInertia { principal_kg_m2: i } => {
+                write!(f, "no body has the moments of inertia {}, {}, {} kg m^2: ", i.x, i.y, i.z)?;
+                write!(f, "each may be at most the sum of the other two")
+            }
+            Self::NotARotation { name, length } => {
+                write!(f, "{name} has length {length}, a rotation is a quaternion of length 1")
+            }
+            Self::TooStiff { steps_per_ms, limit } => {
+                write!(
+                    f,
+                    "flotor and hand would need {steps_per_ms:.0} steps a millisecond, at most {limit:.0} "
+                )?;
+                write!(f, "are taken: lower stiffness or damping, or raise mass and inertia")
+            }
+        }
+    }
+}
+
+impl std::error::Error for InvalidParameter {}
+
+/// Verdict on one parameter.
+pub(crate) type Check = Result<(), InvalidParameter>;
+
+/// What numbers a parameter may take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Domain {
+    /// Any finite number.
+    Finite,
+    /// Finite and at least zero.
+    NotNegative,
+    /// Finite and above zero.
+    Positive,
+}
+
+/// Checks one number against its domain. Real-time: bounded, no allocation.
+///
+/// # Errors
+/// Names the parameter and what is wrong with it.
+pub(crate) fn number(name: &'static str, value: f64, domain: Domain) -> Check {
+    match domain {
+        _ if !value.is_finite() => Err(InvalidParameter::NotFinite { name }),
+        Domain::NotNegative if value < 0.0 => Err(InvalidParameter::Negative { name, value }),
+        Domain::Positive if value <= 0.0 => Err(InvalidParameter::NotPositive { name, value }),
+        _ => Ok(()),
+    }
+}
+
+/// Checks every component of a vector against one domain. Real-time: bounded, no allocation.
+///
+/// # Errors
+/// Names the parameter and what is wrong with it.
+pub(crate) fn vector(name: &'static str, value: DVec3, domain: Domain) -> Check {
+    value.to_array().into_iter().try_for_each(|component| number(name, component, domain))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_domain_refuses_what_lies_outside_and_nothing_else() {
+        for (domain, smallest) in
+            [(Domain::Finite, -1.0), (Domain::NotNegative, 0.0), (Domain::Positive, f64::MIN_POSITIVE)]
+        {
+            assert_eq!(number("x", smallest, domain), Ok(()));
+            assert_eq!(number("x", f64::NAN, domain), Err(InvalidParameter::NotFinite { name: "x" }));
+            assert_eq!(number("x", f64::INFINITY, domain), Err(InvalidParameter::NotFinite { name: "x" }));
+        }
+        let negative = InvalidParameter::Negative { name: "x", value: -1.0 };
+        assert_eq!(number("x", -1.0, Domain::NotNegative), Err(negative));
+        let zero = InvalidParameter::NotPositive { name: "x", value: 0.0 };
+        assert_eq!(number("x", 0.0, Domain::Positive), Err(zero));
+        assert_eq!(vector("x", DVec3::new(1.0, 0.0, 1.0), Domain::Positive), Err(zero));
+    }
+
+    #[test]
+    fn a_refusal_names_the_parameter_and_the_value() {
+        let text = InvalidParameter::NotPositive { name: "mass_kg", value: -0.58 }.to_string();
+        assert!(text.contains("mass_kg") && text.contains("-0.58"), "{text}");
+    }
+}
