@@ -1,0 +1,137 @@
+//! `flotor doctor`: what this machine lets a real-time loop hope for, and how to allow more.
+
+use super::{CommandError, style};
+use crate::registry::Registry;
+use crate::servo::{Privilege, RealTimeReport, probe_real_time};
+use clap::Args;
+use serde::Serialize;
+use std::fs::read_to_string;
+
+/// Look at this machine.
+#[derive(Args)]
+#[command(after_help = "Example:\n  flotor doctor\n\nChanges nothing; every finding says how to improve it.")]
+pub(crate) struct DoctorArguments {
+    /// For machines
+    #[arg(long)]
+    json: bool,
+}
+
+/// How serious a finding is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Grade {
+    Good,
+    Note,
+    Bad,
+}
+
+/// One thing looked at.
+#[derive(Debug, Serialize)]
+struct Diagnosis {
+    what: &'static str,
+    grade: Grade,
+    found: String,
+    remedy: Option<String>,
+}
+
+impl Diagnosis {
+    fn good(what: &'static str, found: impl Into<String>) -> Self {
+        Self { what, grade: Grade::Good, found: found.into(), remedy: None }
+    }
+
+    fn note(what: &'static str, found: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { what, grade: Grade::Note, found: found.into(), remedy: Some(remedy.into()) }
+    }
+
+    fn bad(what: &'static str, found: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { what, grade: Grade::Bad, found: found.into(), remedy: Some(remedy.into()) }
+    }
+}
+
+pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
+    let mut diagnoses = vec![cores(), kernel(), governor()];
+    diagnoses.extend(privileges(&probe_real_time()));
+    diagnoses.push(plugins());
+    if arguments.json {
+        let json =
+            serde_json::to_string_pretty(&diagnoses).map_err(|e| CommandError::Failed(e.to_string()))?;
+        println!("{json}");
+        return Ok(());
+    }
+    for diagnosis in &diagnoses {
+        let grade = match diagnosis.grade {
+            Grade::Good => "good",
+            Grade::Note => "note",
+            Grade::Bad => "bad",
+        };
+        println!("  {grade:<5} {:<18} {}", diagnosis.what, diagnosis.found);
+        if let Some(remedy) = &diagnosis.remedy {
+            println!("  {:<5} {:<18} -> {remedy}", "", "");
+        }
+    }
+    let bad = diagnoses.iter().filter(|diagnosis| diagnosis.grade == Grade::Bad).count();
+    let verdict = if bad == 0 { "ready".to_owned() } else { format!("{bad} things to mend first") };
+    println!("{}", style::title(&verdict));
+    Ok(())
+}
+
+fn cores() -> Diagnosis {
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    match cores {
+        1 => Diagnosis::note(
+            "cores",
+            "1",
+            "the loop shares its core with everything else; give the machine two",
+        ),
+        _ => Diagnosis::good("cores", cores.to_string()),
+    }
+}
+
+fn kernel() -> Diagnosis {
+    let version = read_to_string("/proc/version").unwrap_or_default();
+    let version = version.split_whitespace().nth(2).unwrap_or("unknown").to_owned();
+    if read_to_string("/sys/kernel/realtime").is_ok_and(|flag| flag.trim() == "1") {
+        return Diagnosis::good("kernel", format!("{version}, PREEMPT_RT"));
+    }
+    let remedy =
+        "fine for trying things out; for bounded lateness install a PREEMPT_RT kernel (linux-image-rt)";
+    Diagnosis::note("kernel", format!("{version}, not PREEMPT_RT"), remedy)
+}
+
+fn governor() -> Diagnosis {
+    match read_to_string("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor") {
+        Ok(governor) if governor.trim() == "performance" => Diagnosis::good("clock governor", "performance"),
+        Ok(governor) => Diagnosis::note(
+            "clock governor",
+            governor.trim(),
+            "frequency changes delay ticks: `cpupower frequency-set -g performance`",
+        ),
+        Err(_) => Diagnosis::good("clock governor", "none (virtual machine or fixed clock)"),
+    }
+}
+
+fn privileges(report: &RealTimeReport) -> [Diagnosis; 2] {
+    let diagnose = |what, privilege: &Privilege, remedy: &'static str| match privilege {
+        Privilege::Granted => Diagnosis::good(what, "granted"),
+        Privilege::Refused(reason) => Diagnosis::bad(what, reason.clone(), remedy),
+        Privilege::NotAsked => Diagnosis::note(what, "not asked for", remedy),
+    };
+    let fifo = "`@realtime - rtprio 99` in /etc/security/limits.conf, then log in again";
+    let lock = "`@realtime - memlock unlimited` in /etc/security/limits.conf, then log in again";
+    [diagnose("SCHED_FIFO", &report.fifo, fifo), diagnose("memory lock", &report.memory_lock, lock)]
+}
+
+fn plugins() -> Diagnosis {
+    let registry = Registry::search(&[]);
+    let ids: Vec<&str> = registry.found().iter().map(|plugin| plugin.id.as_str()).collect();
+    let broken = registry.broken().len();
+    match (ids.is_empty(), broken) {
+        (true, _) => Diagnosis::bad("plugins", "none found", "build with `cargo build --release`"),
+        (false, 0) => Diagnosis::good("plugins", ids.join(", ")),
+        (false, _) => Diagnosis::note(
+            "plugins",
+            format!("{}; {broken} files cannot be read", ids.join(", ")),
+            "`flotor plugins` says why",
+        ),
+    }
+}

@@ -1,0 +1,147 @@
+//! `flotor eval`: poses in, wrenches out, as CSV.
+
+use super::options::KeyValue;
+use super::{CommandError, style};
+use crate::evaluate::{Answer, Evaluator, Handle, Travel};
+use crate::registry::Registry;
+use crate::scene::nearest;
+use clap::Args;
+use flotor_hal::DVec3;
+use flotor_hal::abi::PluginKind;
+use flotor_hal::abi::loader::{Plugin, Setting};
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+
+/// Evaluate a force model at poses from a CSV file.
+#[derive(Args)]
+#[command(
+    after_help = "Poses: a header [id,]x_m,y_m,z_m,rx_rad,ry_rad,rz_rad and one row a pose, in the model frame (home is\n\
+    the origin, z up; rx, ry, rz is a rotation vector). nan and inf are legal. Result: id, force, torque, energy, status.\n\n\
+    Examples:\n  \
+    flotor eval --model spring --poses poses.csv --out wrenches.csv\n  \
+    echo 'x_m,y_m,z_m,rx_rad,ry_rad,rz_rad\n0,0,-0.005,0,0,0' | flotor eval --model spring --poses - --out -"
+)]
+pub(crate) struct EvalArguments {
+    /// Id of the model, or path to its plugin file
+    #[arg(long, value_name = "ID")]
+    model: String,
+    /// Set a parameter of the model (repeatable)
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<KeyValue>,
+    /// Poses (- for standard input)
+    #[arg(long, value_name = "IN.csv")]
+    poses: PathBuf,
+    /// Wrenches (- for standard output)
+    #[arg(long, value_name = "OUT.csv")]
+    out: PathBuf,
+    /// Rows are successive poses of one handle, instead of each being reached from home
+    #[arg(long)]
+    path: bool,
+}
+
+/// Columns of a pose, in order.
+const POSE_COLUMNS: [&str; 6] = ["x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"];
+/// Optional first column.
+const ID_COLUMN: &str = "id";
+
+pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
+    let plugin = Registry::search(&[]).load(&arguments.model, PluginKind::Model)?;
+    let model = plugin.create_model(&settings(&plugin, &arguments.sets)?)?;
+    let (ids, handles) = read_poses(&arguments.poses)?;
+    let travel = if arguments.path { Travel::Successive } else { Travel::FromHome };
+    let answers = Evaluator::new(model, travel).evaluate(&handles).map_err(|broke| {
+        CommandError::PluginRefused(format!("{}: {broke}", plugin.metadata().path.display()))
+    })?;
+    write_answers(&arguments.out, &ids, &answers)
+        .map_err(|cause| CommandError::file(&arguments.out, "cannot write the wrenches", cause))
+}
+
+/// Checks `--set KEY=VALUE` against the schema of a plugin.
+pub(super) fn settings(plugin: &Plugin, sets: &[KeyValue]) -> Result<Vec<Setting>, CommandError> {
+    let check = |set: &KeyValue| {
+        let parameter = set.parameter();
+        Setting::parse(plugin.parameters(), &parameter.key, &parameter.value)
+            .map_err(|error| CommandError::Usage(format!("{}: {error}", parameter.location)))
+    };
+    sets.iter().map(check).collect()
+}
+
+fn read_poses(path: &Path) -> Result<(Vec<String>, Vec<Handle>), CommandError> {
+    let cannot_read = |cause| CommandError::file(path, "cannot read the poses", cause);
+    let input: Box<dyn Read> = if path.as_os_str() == "-" {
+        if std::io::IsTerminal::is_terminal(&std::io::stdin()) {
+            eprintln!("{} reading poses from the terminal; end with Ctrl-D", style::warning("note:"));
+        }
+        Box::new(std::io::stdin().lock())
+    } else {
+        Box::new(std::fs::File::open(path).map_err(cannot_read)?)
+    };
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(input);
+    let malformed = |error: csv::Error| match error.position() {
+        Some(at) => CommandError::Usage(format!("{}:{}: {error}", path.display(), at.line())),
+        None => CommandError::Usage(format!("{}: {error}", path.display())),
+    };
+    let header = reader.headers().map_err(malformed)?.clone();
+    let columns = columns(path, &header)?;
+    let id_column = header.iter().position(|name| name == ID_COLUMN);
+
+    let (mut ids, mut handles) = (Vec::new(), Vec::new());
+    for record in reader.into_records() {
+        let record = record.map_err(malformed)?;
+        let mut numbers = [0.0; 6];
+        for ((number, column), name) in numbers.iter_mut().zip(columns).zip(POSE_COLUMNS) {
+            let text = record.get(column).unwrap_or_default();
+            *number = text.parse().map_err(|_| {
+                let line = record.position().map_or(0, csv::Position::line);
+                CommandError::Usage(format!("{}:{line}: {name} is a number, not `{text}`", path.display()))
+            })?;
+        }
+        let id = id_column.and_then(|column| record.get(column)).map(str::to_owned);
+        ids.push(id.unwrap_or_else(|| handles.len().to_string()));
+        let [x, y, z, rx, ry, rz] = numbers;
+        handles.push(Handle { position_m: DVec3::new(x, y, z), rotation_rad: DVec3::new(rx, ry, rz) });
+    }
+    Ok((ids, handles))
+}
+
+/// Where each pose column is; anything missing or unknown is an error that says what would be right.
+fn columns(path: &Path, header: &csv::StringRecord) -> Result<[usize; 6], CommandError> {
+    let problem = |text: String| CommandError::Usage(format!("{}:1: {text}", path.display()));
+    let known = || POSE_COLUMNS.iter().copied().chain([ID_COLUMN]);
+    if let Some(unknown) = header.iter().find(|name| !known().any(|column| column == *name)) {
+        let hint =
+            nearest(unknown, known()).map_or(String::new(), |column| format!("; did you mean `{column}`?"));
+        let expected = format!("[{ID_COLUMN},]{}", POSE_COLUMNS.join(","));
+        return Err(problem(format!("unknown column `{unknown}`{hint} (the header is {expected})")));
+    }
+    let mut columns = [0; 6];
+    for (column, name) in columns.iter_mut().zip(POSE_COLUMNS) {
+        *column = header
+            .iter()
+            .position(|found| found == name)
+            .ok_or_else(|| problem(format!("column `{name}` is missing")))?;
+    }
+    Ok(columns)
+}
+
+fn write_answers(path: &Path, ids: &[String], answers: &[Answer]) -> std::io::Result<()> {
+    let output: Box<dyn Write> = if path.as_os_str() == "-" {
+        Box::new(std::io::stdout().lock())
+    } else {
+        Box::new(std::fs::File::create(path)?)
+    };
+    let mut writer = csv::Writer::from_writer(output);
+    writer.write_record(["id", "fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm", "energy_j", "status"])?;
+    for (id, answer) in ids.iter().zip(answers) {
+        let [fx, fy, fz] = answer.wrench.force_n.map(shortest);
+        let [tx, ty, tz] = answer.wrench.torque_nm.map(shortest);
+        let energy = answer.energy_j.map(shortest).unwrap_or_default();
+        writer.write_record([id, &fx, &fy, &fz, &tx, &ty, &tz, &energy, answer.status.word()])?;
+    }
+    writer.flush()
+}
+
+/// The shortest text that reads back as the same number.
+fn shortest(number: f64) -> String {
+    format!("{number:?}")
+}

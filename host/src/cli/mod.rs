@@ -1,0 +1,178 @@
+//! The `flotor` command: arguments in, exit code out.
+//!
+//! Exit codes are a contract: 0 ok, 2 usage or configuration, 3 a plugin was refused, 4 device fault, 1 else.
+
+mod doctor;
+mod eval;
+mod options;
+mod plugins;
+mod run;
+mod validate;
+
+use crate::registry::LookupError;
+use crate::session::RunError;
+use clap::{CommandFactory, Parser, Subcommand};
+use flotor_hal::Fault;
+use flotor_hal::abi::loader::LoadError;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Haptics from plugins: force models and devices in a safe servo loop.
+#[derive(Parser)]
+#[command(name = "flotor", version, about, propagate_version = true, max_term_width = 110)]
+#[command(after_help = "Examples:\n  \
+    flotor                                            feel spring 1 on the simulated flotor for 10 s\n  \
+    flotor run --clock virtual --seed 1 --plot run.svg    the same, repeatable, as a picture\n  \
+    flotor run scene.toml --set spring.variant=closed-form --record run.mcap\n  \
+    flotor eval --model spring --set preset=thesis-2 --poses poses.csv --out -\n\n\
+    Exit codes: 0 ok, 2 usage or configuration, 3 a plugin was refused, 4 device fault, 1 anything else.")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Run a scene in the servo loop (without SCENE: the built-in demo)
+    Run(run::RunArguments),
+    /// Evaluate a force model at poses from a CSV file
+    Eval(eval::EvalArguments),
+    /// List the plugins that are found, without running any of them
+    Plugins(plugins::PluginsArguments),
+    /// Check a plugin file: does it load, answer, and survive bad input
+    Validate(validate::ValidateArguments),
+    /// Look at this machine: what a real-time loop may hope for, and how to improve it
+    Doctor(doctor::DoctorArguments),
+    /// Print a completion script for a shell
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+}
+
+/// Why a command failed, with its exit code.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub(crate) enum CommandError {
+    /// The command line or a configuration says something that cannot be.
+    #[error("{0}")]
+    Usage(String),
+    /// A run could not start.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// A device faulted.
+    #[error("device fault: {}", .0.advice())]
+    DeviceFault(Fault),
+    /// A plugin was refused.
+    #[error("{0}")]
+    PluginRefused(String),
+    /// A file could not be written or read.
+    #[error("{}: {action}: {cause}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What was attempted.
+        action: &'static str,
+        /// What the system said.
+        cause: std::io::Error,
+    },
+    /// A recording could not be written or read.
+    #[error(transparent)]
+    Record(#[from] crate::record::RecordError),
+    /// Something found wrong that the output has already told.
+    #[error("{0}")]
+    Failed(String),
+}
+
+impl From<LookupError> for CommandError {
+    fn from(error: LookupError) -> Self {
+        Self::Run(error.into())
+    }
+}
+
+impl From<LoadError> for CommandError {
+    fn from(error: LoadError) -> Self {
+        Self::Run(error.into())
+    }
+}
+
+impl CommandError {
+    fn file(path: &std::path::Path, action: &'static str, cause: std::io::Error) -> Self {
+        Self::File { path: path.into(), action, cause }
+    }
+
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Usage(_) => 2,
+            Self::Run(error) => match error {
+                RunError::Scene(_) | RunError::Mismatch { .. } => 2,
+                RunError::Lookup(LookupError::Unknown { .. }) => 2,
+                RunError::Lookup(LookupError::Refused(error)) | RunError::Plugin(error) => {
+                    refusal_code(error)
+                }
+                RunError::Thread(_) => 1,
+            },
+            Self::PluginRefused(_) => 3,
+            Self::DeviceFault(_) => 4,
+            Self::File { .. } | Self::Record(_) | Self::Failed(_) => 1,
+        }
+    }
+}
+
+/// A plugin that says its parameters do not fit is a configuration error; everything else is a refused plugin.
+fn refusal_code(error: &LoadError) -> u8 {
+    match error {
+        LoadError::Refused { refusal, .. } if refusal.kind == flotor_hal::RefusalKind::Parameter => 2,
+        _ => 3,
+    }
+}
+
+/// Runs the command of this process.
+#[must_use]
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let result = match arguments.command {
+        None => run::run(run::RunArguments::default()),
+        Some(Command::Run(arguments)) => run::run(arguments),
+        Some(Command::Eval(arguments)) => eval::run(&arguments),
+        Some(Command::Plugins(arguments)) => plugins::run(&arguments),
+        Some(Command::Validate(arguments)) => validate::run(&arguments),
+        Some(Command::Doctor(arguments)) => doctor::run(&arguments),
+        Some(Command::Completions { shell }) => {
+            clap_complete::generate(shell, &mut Arguments::command(), "flotor", &mut std::io::stdout());
+            Ok(())
+        }
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{} {error}", style::error("error:"));
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// Colours, on terminals only.
+mod style {
+    use std::io::IsTerminal;
+
+    fn painted(code: &str, text: &str, terminal: bool) -> String {
+        let wanted = terminal && std::env::var_os("NO_COLOR").is_none();
+        if wanted { format!("\x1b[{code}m{text}\x1b[0m") } else { text.to_owned() }
+    }
+
+    /// Red and bold, for the first word of an error.
+    pub(super) fn error(text: &str) -> String {
+        painted("1;31", text, std::io::stderr().is_terminal())
+    }
+
+    /// Yellow, for the first word of a warning.
+    pub(super) fn warning(text: &str) -> String {
+        painted("33", text, std::io::stderr().is_terminal())
+    }
+
+    /// Bold, for titles.
+    pub(super) fn title(text: &str) -> String {
+        painted("1", text, std::io::stdout().is_terminal())
+    }
+}

@@ -1,0 +1,173 @@
+//! `flotor plugins`: what is there, read from the files without running any of them.
+
+use super::{CommandError, style};
+use crate::registry::{PATH_VARIABLE, Registry};
+use clap::Args;
+use flotor_hal::abi::PluginKind;
+use flotor_hal::abi::loader::Plugin;
+use flotor_hal::{Mutability, Parameter, ParameterKind};
+use serde::Serialize;
+
+/// List the plugins that are found.
+#[derive(Args)]
+#[command(
+    after_help = "Examples:\n  flotor plugins\n  flotor plugins spring        its parameters, with units and ranges\n  \
+    flotor plugins --json | python3 -m json.tool"
+)]
+pub(crate) struct PluginsArguments {
+    /// Id of a plugin: show its parameters (this loads it)
+    id: Option<String>,
+    /// For machines
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Listed<'a> {
+    id: &'a str,
+    kind: &'static str,
+    name: &'a str,
+    doc: &'a str,
+    version: &'a str,
+    abi: &'a str,
+    file: String,
+}
+
+pub(crate) fn run(arguments: &PluginsArguments) -> Result<(), CommandError> {
+    let registry = Registry::search(&[]);
+    match &arguments.id {
+        Some(id) => describe(&registry, id, arguments.json),
+        None => list(&registry, arguments.json),
+    }
+}
+
+fn list(registry: &Registry, json: bool) -> Result<(), CommandError> {
+    let listed: Vec<Listed<'_>> = registry
+        .found()
+        .iter()
+        .map(|plugin| Listed {
+            id: &plugin.id,
+            kind: plugin.kind.word(),
+            name: &plugin.name,
+            doc: &plugin.doc,
+            version: &plugin.version,
+            abi: &plugin.abi,
+            file: plugin.path.display().to_string(),
+        })
+        .collect();
+    if json {
+        return print_json(&listed);
+    }
+    for kind in [PluginKind::Device, PluginKind::Model] {
+        println!("{}", style::title(&format!("{}s", kind.word())));
+        for plugin in listed.iter().filter(|plugin| plugin.kind == kind.word()) {
+            println!("  {:<12} {:<8} {}", plugin.id, plugin.version, plugin.doc);
+            println!("  {:<12} {:<8} {}", "", "", plugin.file);
+        }
+    }
+    for shadowed in registry.shadowed() {
+        let note = style::warning("note:");
+        println!(
+            "{note} {} has the id `{}` too and is hidden by the one above",
+            shadowed.path.display(),
+            shadowed.id
+        );
+    }
+    for broken in registry.broken() {
+        println!("{} {broken}", style::warning("note:"));
+    }
+    for skipped in registry.skipped() {
+        println!(
+            "{} {}: not searched: {}",
+            style::warning("note:"),
+            skipped.folder.display(),
+            skipped.reason
+        );
+    }
+    if listed.is_empty() {
+        let folders: Vec<String> =
+            registry.folders().iter().map(|folder| folder.display().to_string()).collect();
+        println!("no plugins found in {}; {PATH_VARIABLE} adds folders", folders.join(", "));
+    }
+    Ok(())
+}
+
+#[derive(Serialize)]
+struct Described<'a> {
+    id: &'a str,
+    kind: &'static str,
+    unit: &'a str,
+    min: f64,
+    max: f64,
+    default: String,
+    choices: Vec<&'a str>,
+    live: bool,
+    doc: &'a str,
+}
+
+fn describe(registry: &Registry, id: &str, json: bool) -> Result<(), CommandError> {
+    let kind = registry
+        .found()
+        .iter()
+        .find(|plugin| plugin.id == id)
+        .map_or(PluginKind::Model, |plugin| plugin.kind);
+    let plugin = registry.load(id, kind)?;
+    let parameters: Vec<Described<'_>> = plugin.parameters().iter().map(described).collect();
+    if json {
+        return print_json(&parameters);
+    }
+    print_description(&plugin, &parameters);
+    Ok(())
+}
+
+fn described(parameter: &Parameter) -> Described<'_> {
+    let choices: Vec<&str> = parameter.choices().iter().map(flotor_hal::abi::Str::as_str).collect();
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // an index of a few choices
+    let default = match parameter.kind() {
+        ParameterKind::Real => parameter.default().to_string(),
+        ParameterKind::Choice => {
+            choices.get(parameter.default() as usize).copied().unwrap_or_default().to_owned()
+        }
+        ParameterKind::Text => String::new(),
+    };
+    Described {
+        id: parameter.id(),
+        kind: match parameter.kind() {
+            ParameterKind::Real => "real",
+            ParameterKind::Choice => "choice",
+            ParameterKind::Text => "text",
+        },
+        unit: parameter.unit(),
+        min: parameter.min(),
+        max: parameter.max(),
+        default,
+        choices,
+        live: parameter.mutability() == Mutability::Live,
+        doc: parameter.doc(),
+    }
+}
+
+fn print_description(plugin: &Plugin, parameters: &[Described<'_>]) {
+    let metadata = plugin.metadata();
+    println!("{} {} - {}", style::title(&metadata.id), metadata.version, metadata.doc);
+    println!("{}, contract {}, layouts {}", metadata.path.display(), metadata.abi, {
+        if plugin.layouts_proven() { "proven" } else { "checked by size only" }
+    });
+    for parameter in parameters {
+        let range = match parameter.kind {
+            "choice" => parameter.choices.join(" | "),
+            "text" => "text".to_owned(),
+            _ => format!("{} to {} {}", parameter.min, parameter.max, parameter.unit),
+        };
+        let live = if parameter.live { ", live" } else { "" };
+        println!("  {:<28} {range} (default {}{live})", parameter.id, parameter.default);
+        println!("  {:<28} {}", "", parameter.doc);
+    }
+}
+
+fn print_json<T: Serialize>(value: &T) -> Result<(), CommandError> {
+    let json =
+        serde_json::to_string_pretty(value).map_err(|error| CommandError::Failed(error.to_string()))?;
+    println!("{json}");
+    Ok(())
+}

@@ -1,0 +1,237 @@
+//! `flotor run`: a scene in the servo loop, watched by whoever is asked for.
+
+use super::options::{ClockOption, PluginKeyValue, duration_s, rate_hz};
+use super::{CommandError, style};
+use crate::record::{Recorder, TraceDigest};
+use crate::registry::Registry;
+use crate::report::{RunFacts, RunSummary, Tally};
+use crate::run_picture::RunPicture;
+use crate::scene::Scene;
+use crate::servo::Clock;
+use crate::session::{Observer, RunEnd, RunError, RunOptions, Session};
+use crate::trace::TickRecord;
+use clap::Args;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Run a scene in the servo loop.
+#[derive(Args, Default)]
+#[command(after_help = "Examples:\n  \
+    flotor run --duration 5s --plot run.svg\n  \
+    flotor run scene.toml --clock virtual --seed 7 --record run.mcap --json run.json\n  \
+    flotor run --set spring.variant=closed-form --set device.hand=press")]
+pub(crate) struct RunArguments {
+    /// Scene file (TOML); without it, the built-in demo
+    scene: Option<PathBuf>,
+    /// How long to run: 10s, 500ms, 2min (default: what the scene says)
+    #[arg(long, value_parser = duration_s, value_name = "TIME")]
+    duration: Option<f64>,
+    /// Loop rate in Hz, 100 to 10000 (default: what the scene says)
+    #[arg(long, value_parser = rate_hz, value_name = "HZ")]
+    rate: Option<f64>,
+    /// Keep real time, or run as fast as it goes, bit-exact
+    #[arg(long, value_enum, default_value_t)]
+    clock: ClockOption,
+    /// Seed of everything random
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    seed: u64,
+    /// Record every tick to an MCAP file (opens in Foxglove, Rerun, Python)
+    #[arg(long, value_name = "FILE.mcap")]
+    record: Option<PathBuf>,
+    /// Draw the run as a picture
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Write the summary as JSON (- for standard output)
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Set a parameter of a plugin of the scene (repeatable)
+    #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
+    sets: Vec<PluginKeyValue>,
+}
+
+pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
+    let scene = scene(&arguments)?;
+    let clock = match arguments.clock {
+        ClockOption::Real => Clock::Real,
+        ClockOption::Virtual => Clock::Virtual,
+    };
+    let options = RunOptions { clock, seed: arguments.seed };
+    let registry = Registry::search(&scene.plugin_folders);
+    let session = Session::prepare(&scene, &registry, &options)?;
+    let plugins = session.plugins().to_vec();
+
+    let clock_word = if clock == Clock::Real { "real" } else { "virtual" };
+    let mut watchers = Watchers {
+        tally: Tally::default(),
+        digest: TraceDigest::new(),
+        recorder: arguments
+            .record
+            .as_deref()
+            .map(|path| Recorder::create(path, &crate::record::describe(&scene, &options, &plugins)))
+            .transpose()?,
+        failure: None,
+        plot: arguments.plot.as_ref().map(|_| RunPicture::new(&scene.title)),
+        progress: progress(&scene),
+    };
+    let stop = stop_on_interrupt();
+    let outcome = session.run(&mut watchers, &stop)?;
+    watchers.progress.finish_and_clear();
+
+    let Watchers { tally, digest, recorder, failure, plot, .. } = watchers;
+    let facts = RunFacts {
+        title: &scene.title,
+        clock: clock_word,
+        seed: arguments.seed,
+        rate_hz: scene.rate_hz,
+        plugins: &plugins,
+        trace_digest: digest.finish(),
+    };
+    let summary = RunSummary::new(facts, &outcome, &tally);
+    tell(&arguments, &summary, &outcome.real_time.advice())?;
+
+    // Files last, so that a full disk costs the file and not the report.
+    if let (Some(path), Some(plot)) = (&arguments.plot, plot) {
+        std::fs::write(path, plot.to_svg(&summary.one_line()))
+            .map_err(|cause| CommandError::file(path, "cannot write the plot", cause))?;
+    }
+    match (recorder, failure) {
+        (_, Some(failure)) => return Err(failure.into()),
+        (Some(recorder), None) => recorder.finish()?,
+        (None, None) => {}
+    }
+    match outcome.end {
+        RunEnd::DeviceFault(fault) => Err(CommandError::DeviceFault(fault)),
+        RunEnd::Finished | RunEnd::Stopped => broken_models(&summary),
+    }
+}
+
+/// The scene with everything the command line says on top.
+fn scene(arguments: &RunArguments) -> Result<Scene, CommandError> {
+    let scene = match &arguments.scene {
+        Some(path) => Scene::load(path),
+        None => Scene::demo(),
+    };
+    let mut scene = scene.map_err(RunError::Scene)?;
+    if let Some(duration_s) = arguments.duration {
+        scene.duration_s = duration_s;
+    }
+    if let Some(rate_hz) = arguments.rate {
+        scene.rate_hz = rate_hz;
+    }
+    for set in &arguments.sets {
+        set.apply(&mut scene).map_err(CommandError::Usage)?;
+    }
+    Ok(scene)
+}
+
+/// A model that broke is a refused plugin, told once more where scripts look: in the exit code.
+fn broken_models(summary: &RunSummary) -> Result<(), CommandError> {
+    let broken = summary.plugins.iter().find(|plugin| plugin.health != "ok");
+    broken.map_or(Ok(()), |plugin| {
+        let problem =
+            format!("{}: `{}` {}; `flotor validate` tells more", plugin.file, plugin.name, plugin.health);
+        Err(CommandError::PluginRefused(problem))
+    })
+}
+
+fn tell(arguments: &RunArguments, summary: &RunSummary, advice: &[String]) -> Result<(), CommandError> {
+    let json_on_stdout = arguments.json.as_ref().is_some_and(|path| path.as_os_str() == "-");
+    if !json_on_stdout {
+        println!("{}\n{}", style::title(&summary.title), summary.to_text());
+    }
+    for line in advice {
+        eprintln!("{} {line}", style::warning("note:"));
+    }
+    let Some(path) = &arguments.json else { return Ok(()) };
+    let json =
+        serde_json::to_string_pretty(summary).map_err(|error| CommandError::Failed(error.to_string()))?;
+    if json_on_stdout {
+        println!("{json}");
+        return Ok(());
+    }
+    std::fs::write(path, json + "\n")
+        .map_err(|cause| CommandError::file(path, "cannot write the summary", cause))
+}
+
+/// Everybody who looks at every tick of a run.
+struct Watchers {
+    tally: Tally,
+    digest: TraceDigest,
+    recorder: Option<Recorder>,
+    failure: Option<crate::record::RecordError>,
+    plot: Option<RunPicture>,
+    progress: ProgressBar,
+}
+
+/// How many ticks pass between two updates of the progress line, at 1 kHz thirty a second.
+const PROGRESS_TICKS: u64 = 33;
+
+impl Observer for Watchers {
+    fn observe(&mut self, record: &TickRecord) {
+        self.tally.observe(record);
+        self.digest.update(record);
+        // A failing disk ends the recording, not the run; the command says so at the end.
+        if self.failure.is_none()
+            && let Some(recorder) = &mut self.recorder
+        {
+            self.failure = recorder.record(record).err();
+        }
+        if let Some(plot) = &mut self.plot {
+            plot.observe(record);
+        }
+        if record.tick.is_multiple_of(PROGRESS_TICKS) {
+            self.progress.set_position(record.time_ns / 1_000_000);
+            if !self.progress.is_hidden() {
+                self.progress.set_message(live_line(record));
+            }
+        }
+    }
+}
+
+/// Height of the handle as a bar, and the force on the hand.
+fn live_line(record: &TickRecord) -> String {
+    const COLUMNS: usize = 21;
+    let z_mm = record.pose.position().z * 1.0e3;
+    let force_n = record.commanded.force().z;
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped to a few columns
+    let column = ((z_mm + 10.0) / 20.0 * COLUMNS as f64).clamp(0.0, (COLUMNS - 1) as f64) as usize;
+    let bar: String = (0..COLUMNS)
+        .map(|i| {
+            if i == column {
+                '█'
+            } else if i == COLUMNS / 2 {
+                '┊'
+            } else {
+                '·'
+            }
+        })
+        .collect();
+    format!("-10 mm {bar} +10   z {z_mm:+6.2} mm   Fz {force_n:+6.2} N")
+}
+
+/// A progress line on a terminal, nothing in a pipe.
+fn progress(scene: &Scene) -> ProgressBar {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
+    let bar =
+        ProgressBar::with_draw_target(Some((scene.duration_s * 1.0e3) as u64), ProgressDrawTarget::stderr());
+    let style = ProgressStyle::with_template("{percent:>3} %  {msg}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar
+}
+
+/// Ctrl-C ends the run in order: device to safe stop, files closed. A second one is the system's.
+fn stop_on_interrupt() -> Arc<AtomicBool> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stop);
+    let handler = ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    });
+    if let Err(error) = handler {
+        eprintln!("{} Ctrl-C will not stop the run in order: {error}", style::warning("note:"));
+    }
+    stop
+}

@@ -1,0 +1,43 @@
+//! `flotor validate`: a plugin file against the rules of the contract.
+
+use super::{CommandError, style};
+use crate::validate::{Finding, validate};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Check a plugin file.
+#[derive(Args)]
+#[command(after_help = "Example:\n  flotor validate target/release/libmy_model.so\n\n\
+    Runs the plugin's code in this process: validate only files you would load.")]
+pub(crate) struct ValidateArguments {
+    /// The plugin's shared library
+    plugin: PathBuf,
+    /// For machines
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
+    let findings = validate(&arguments.plugin);
+    let violated = findings.iter().filter(|finding| finding.violation.is_some()).count();
+    if arguments.json {
+        let json =
+            serde_json::to_string_pretty(&findings).map_err(|e| CommandError::Failed(e.to_string()))?;
+        println!("{json}");
+    } else {
+        println!("{}", style::title(&arguments.plugin.display().to_string()));
+        findings.iter().for_each(print);
+    }
+    if violated == 0 {
+        return Ok(());
+    }
+    let problem = format!("{}: {violated} of {} rules violated", arguments.plugin.display(), findings.len());
+    Err(CommandError::PluginRefused(problem))
+}
+
+fn print(finding: &Finding) {
+    match &finding.violation {
+        None => println!("  ok      {:<20} {}", finding.rule, finding.text),
+        Some(seen) => println!("  FAILED  {:<20} {}\n          {seen}", finding.rule, finding.text),
+    }
+}

@@ -1,0 +1,29 @@
+//! Flotor's host: finds and loads plugins, runs them in a servo loop inside an envelope they cannot bypass,
+//! records what happened and reports how time was kept.
+//!
+//! One tick, in one direction:
+//!
+//! ```text
+//! device.read -> mapping -> models -> mapping -> envelope -> device.write -> record
+//! ```
+//!
+//! - [`scene`]: what is to be run, read from TOML.
+//! - [`registry`]: where plugins are.
+//! - [`session`]: from a scene to a run.
+//! - [`servo`]: the tick, the clock, the envelope; the only real-time module.
+//! - [`trace`]: what a tick leaves behind; [`record`] writes it down, [`plot`] draws it.
+//! - [`cli`]: the `flotor` command.
+
+pub mod cli;
+pub mod evaluate;
+pub mod mapping;
+pub mod plot;
+pub mod record;
+pub mod registry;
+pub mod report;
+pub mod run_picture;
+pub mod scene;
+pub mod servo;
+pub mod session;
+pub mod trace;
+pub mod validate;

@@ -1,0 +1,118 @@
+//! Between the device frame and a model's frame: the one place where motion, force and torque are scaled.
+//!
+//! With `x_model = m R x_device`, scaling the energy by `f / m` gives the device the force `f R^T F` and the
+//! torque `(f / m) R^T M`: gradients of one energy, so a conservative model stays conservative at the hand
+//! (PHYSICS D6). The stiffness the hand feels is `f m k`.
+
+use crate::scene::MappingConfig;
+use flotor_hal::{DQuat, DVec3, Pose, Twist, Wrench};
+
+/// Frames and scales of one model on one device.
+#[derive(Clone, Copy, Debug)]
+pub struct Mapping {
+    model_from_device: DQuat,
+    motion_scale: f64,
+    force_scale: f64,
+    torque_scale: f64,
+}
+
+impl Mapping {
+    /// A mapping from its checked configuration. Not real-time.
+    #[must_use]
+    pub fn new(config: &MappingConfig) -> Self {
+        let conservative = config.force_scale / config.motion_scale;
+        Self {
+            model_from_device: DQuat::from_array(config.rotation_xyzw),
+            motion_scale: config.motion_scale,
+            force_scale: config.force_scale,
+            torque_scale: config.torque_scale.unwrap_or(conservative),
+        }
+    }
+
+    /// Factor from the model's stiffness to the stiffness at the hand.
+    #[must_use]
+    pub fn stiffness_scale(&self) -> f64 {
+        self.force_scale * self.motion_scale
+    }
+
+    /// Factor from the model's energy to energy at the device.
+    #[must_use]
+    pub fn energy_scale(&self) -> f64 {
+        self.force_scale / self.motion_scale
+    }
+
+    /// True if forces and torques at the hand are gradients of one energy (when the model's are).
+    #[must_use]
+    pub fn is_conservative(&self) -> bool {
+        let conservative = self.energy_scale();
+        (self.torque_scale - conservative).abs() <= 4.0 * f64::EPSILON * conservative
+    }
+
+    /// Pose in the model frame. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn pose_to_model(&self, pose: &Pose) -> Pose {
+        let rotation = self.model_from_device;
+        let orientation = rotation * pose.orientation() * rotation.conjugate();
+        Pose::new(rotation * pose.position() * self.motion_scale, orientation)
+    }
+
+    /// Twist in the model frame. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn twist_to_model(&self, twist: &Twist) -> Twist {
+        let rotation = self.model_from_device;
+        Twist::new(rotation * twist.linear() * self.motion_scale, rotation * twist.angular())
+    }
+
+    /// Wrench in the device frame. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn wrench_to_device(&self, wrench: &Wrench) -> Wrench {
+        let back = self.model_from_device.conjugate();
+        let force: DVec3 = back * wrench.force() * self.force_scale;
+        Wrench::new(force, back * wrench.torque() * self.torque_scale)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn thesis() -> MappingConfig {
+        // A turned device, so that a missing conjugate cannot hide.
+        let turned = DQuat::from_rotation_x(0.4) * DQuat::from_rotation_z(-1.1);
+        MappingConfig {
+            rotation_xyzw: turned.to_array(),
+            motion_scale: 25.0 / 15.0,
+            ..MappingConfig::default()
+        }
+    }
+
+    #[test]
+    fn power_at_the_device_is_the_scaled_power_of_the_model() {
+        let mapping = Mapping::new(&thesis());
+        let twist = Twist::new(DVec3::new(0.01, -0.02, 0.03), DVec3::new(0.4, 0.5, -0.6));
+        let wrench = Wrench::new(DVec3::new(1.0, 2.0, -3.0), DVec3::new(0.04, -0.05, 0.06));
+        let at_model = mapping.twist_to_model(&twist);
+        let model_w = wrench.force().dot(at_model.linear()) + wrench.torque().dot(at_model.angular());
+        let at_device = mapping.wrench_to_device(&wrench);
+        let device_w = at_device.force().dot(twist.linear()) + at_device.torque().dot(twist.angular());
+        assert!((device_w - mapping.energy_scale() * model_w).abs() < 1.0e-15);
+        assert!(mapping.is_conservative());
+    }
+
+    #[test]
+    fn the_thesis_spring_feels_like_gamma_over_v() {
+        // gamma / L0 = 16.97 N / 25 mm in the model is gamma / V = 16.97 N / 15 mm at the hand (PHYSICS D6).
+        let mapping = Mapping::new(&thesis());
+        let felt = 16.97 / 0.025 * mapping.stiffness_scale();
+        assert!((felt - 16.97 / 0.015).abs() < 1.0e-9);
+    }
+
+    #[test]
+    fn a_torque_scale_of_its_own_is_reported_as_not_conservative() {
+        let config = MappingConfig { torque_scale: Some(1.0), ..thesis() };
+        assert!(!Mapping::new(&config).is_conservative());
+    }
+}

@@ -1,0 +1,210 @@
+//! Axes: what they measure, and the range ([`Domain`]) they end up covering.
+//!
+//! Every value enters the picture through [`Scale::forward`], which refuses what cannot be drawn. Behind it,
+//! all geometry is linear: a log axis is a linear axis of decimal logarithms.
+
+use super::{text, ticks};
+
+/// Larger magnitudes are treated like infinity, so that the difference of two values never overflows.
+const LARGEST_DRAWABLE: f64 = 1e300;
+
+/// A range narrower than this fraction of its values is a constant plus rounding: it is widened as one.
+const NARROWEST_RELATIVE_SPAN: f64 = 1e-9;
+
+/// Room between the data and the ends of a padded axis, as a fraction of the data's span.
+const PADDING: f64 = 0.06;
+
+/// How far a tight axis reaches for a round end, as a fraction of the data's span.
+const ROUNDING_REACH: f64 = 0.015;
+
+/// Room under the lowest bar of a histogram on a log axis, so that a single count is seen as a bar.
+const LOG_FLOOR_DECADES: f64 = 0.3;
+
+/// Data of one sign are shown down to zero when they come nearer to it than this fraction of their far end.
+const SNAP_TO_ZERO: f64 = 0.25;
+
+/// A quantity with its unit, a linear or logarithmic scale, and an optional fixed range.
+#[derive(Debug, Clone)]
+pub struct Axis {
+    pub(super) label: String,
+    pub(super) unit: String,
+    pub(super) scale: Scale,
+    pub(super) fixed: Option<(f64, f64)>,
+}
+
+impl Axis {
+    /// A linear axis; `unit` is empty for a pure number.
+    pub fn linear(label: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self { label: label.into(), unit: unit.into(), scale: Scale::Linear, fixed: None }
+    }
+
+    /// A decimal-logarithmic axis; `unit` is empty for a pure number.
+    pub fn log(label: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self { scale: Scale::Log, ..Self::linear(label, unit) }
+    }
+
+    /// Fixes the range, in the unit of the axis; the order of the ends does not matter. A range that cannot
+    /// be drawn (not finite, empty, not positive on a log axis) leaves the automatic one.
+    #[must_use]
+    pub fn range(mut self, low: f64, high: f64) -> Self {
+        self.fixed = Some((low.min(high), low.max(high)));
+        self
+    }
+
+    /// The unit in parentheses, scaled by the power of ten the tick labels leave out: `(10⁻⁶ N)`.
+    pub(super) fn unit_label(&self, exponent: i32) -> String {
+        let power = if exponent == 0 { String::new() } else { format!("10{}", text::superscript(exponent)) };
+        match (power.is_empty(), self.unit.is_empty()) {
+            (true, true) => String::new(),
+            (true, false) => format!("({})", self.unit),
+            (false, true) => format!("({power})"),
+            (false, false) => format!("({power} {})", self.unit),
+        }
+    }
+
+    /// The range the axis covers for data within `extent`.
+    pub(super) fn domain(&self, extent: Extent, fit: Fit) -> Domain {
+        let fixed = self.fixed.and_then(|(low, high)| {
+            let ends = (self.scale.forward(low)?, self.scale.forward(high)?);
+            (!is_narrow(ends.0, ends.1)).then_some(ends)
+        });
+        let (low, high) = fixed.unwrap_or_else(|| fit.apply(self.scale, extent));
+        Domain { scale: self.scale, low, high }
+    }
+}
+
+/// How values become distances along an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Scale {
+    Linear,
+    Log,
+}
+
+impl Scale {
+    /// The coordinate of `value` along the axis (the value, or its decimal logarithm), or nothing when it
+    /// cannot be drawn.
+    pub(super) fn forward(self, value: f64) -> Option<f64> {
+        match self {
+            Self::Linear => (value.abs() <= LARGEST_DRAWABLE).then_some(value),
+            Self::Log => (value > 0.0 && value <= LARGEST_DRAWABLE).then(|| value.log10()),
+        }
+    }
+
+    /// The value at a coordinate.
+    pub(super) fn backward(self, coordinate: f64) -> f64 {
+        match self {
+            Self::Linear => coordinate,
+            Self::Log => 10.0_f64.powf(coordinate),
+        }
+    }
+}
+
+/// The least and greatest coordinate met so far; `low > high` as long as there was none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Extent {
+    pub(super) low: f64,
+    pub(super) high: f64,
+}
+
+impl Extent {
+    pub(super) const EMPTY: Self = Self { low: f64::INFINITY, high: f64::NEG_INFINITY };
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.low > self.high
+    }
+
+    pub(super) fn include(&mut self, coordinate: f64) {
+        self.low = self.low.min(coordinate);
+        self.high = self.high.max(coordinate);
+    }
+
+    pub(super) fn merge(&mut self, other: Self) {
+        self.low = self.low.min(other.low);
+        self.high = self.high.max(other.high);
+    }
+}
+
+/// How an automatic range surrounds the data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Fit {
+    /// Ends where the data end, or at a round value just beyond: the x axis of lines.
+    Tight,
+    /// Room at both ends, but stops at a zero that is near: the y axis of lines, both axes of markers.
+    Padded,
+    /// Stands on zero, or below the least value on a log axis: the y axis of bars.
+    OnZero,
+}
+
+impl Fit {
+    fn apply(self, scale: Scale, extent: Extent) -> (f64, f64) {
+        let Extent { mut low, mut high } = extent;
+        if extent.is_empty() {
+            return (0.0, 1.0);
+        }
+        if self == Self::OnZero && scale == Scale::Linear {
+            (low, high) = (low.min(0.0), high.max(0.0));
+        }
+        if is_narrow(low, high) {
+            return around_constant(scale, low, high);
+        }
+        let room = PADDING * (high - low);
+        let (padded_low, padded_high) = (low - room, high + room);
+        match (self, scale) {
+            (Self::Tight, Scale::Log) => (low, high),
+            (Self::Tight, Scale::Linear) => rounded_outward(low, high),
+            (Self::Padded, Scale::Log) => (padded_low, padded_high),
+            (Self::OnZero, Scale::Log) => (low - LOG_FLOOR_DECADES, padded_high),
+            (Self::Padded | Self::OnZero, Scale::Linear) => (
+                if low >= 0.0 && low <= SNAP_TO_ZERO * high { 0.0 } else { padded_low },
+                if high <= 0.0 && high >= SNAP_TO_ZERO * low { 0.0 } else { padded_high },
+            ),
+        }
+    }
+}
+
+/// Each end moved to the round value just beyond it, if one is that near: 0 to 9.999 s is shown as 0 to 10 s.
+fn rounded_outward(low: f64, high: f64) -> (f64, f64) {
+    let reach = ROUNDING_REACH * (high - low);
+    let step = ticks::nice_step((high - low) / 10.0);
+    let (round_low, round_high) = ((low / step).floor() * step, (high / step).ceil() * step);
+    (
+        if low - round_low <= reach { round_low } else { low },
+        if round_high - high <= reach { round_high } else { high },
+    )
+}
+
+/// Whether two ends are too close to tell apart, in particular equal.
+fn is_narrow(low: f64, high: f64) -> bool {
+    high - low <= NARROWEST_RELATIVE_SPAN * low.abs().max(high.abs()) || high - low < 1.0 / LARGEST_DRAWABLE
+}
+
+/// A range with a constant in its middle: a tenth of its magnitude to either side, one unit around zero, a
+/// third of a decade on a log axis.
+fn around_constant(scale: Scale, low: f64, high: f64) -> (f64, f64) {
+    let middle = 0.5 * low + 0.5 * high;
+    let room = match scale {
+        Scale::Log => 1.0 / 3.0,
+        Scale::Linear if middle.abs() < 1.0 / LARGEST_DRAWABLE => 1.0,
+        Scale::Linear => 0.1 * middle.abs(),
+    };
+    (middle - room, middle + room)
+}
+
+/// The range an axis covers, in scale coordinates. `low < high`, both finite.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Domain {
+    pub(super) scale: Scale,
+    pub(super) low: f64,
+    pub(super) high: f64,
+}
+
+impl Domain {
+    pub(super) fn span(&self) -> f64 {
+        self.high - self.low
+    }
+
+    /// Where a coordinate lies: 0 at the low end, 1 at the high end, beyond outside.
+    pub(super) fn fraction(&self, coordinate: f64) -> f64 {
+        (coordinate - self.low) / self.span()
+    }
+}

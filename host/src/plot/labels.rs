@@ -1,0 +1,255 @@
+//! Labels outside the plotting area: headings, legends, names of marks.
+//!
+//! No label lies on data. The y axis' name stands over its panel with the legend beside it (or below, when
+//! they do not fit one row); names of horizontal marks stand in a gutter at the right, names of vertical
+//! marks in rows above the plotting area, both kept apart where they would overlap.
+
+use super::Panel;
+use super::axis::Domain;
+use super::mark::{Direction, Mark};
+use super::path::Projection;
+use super::series::{Series, Shape};
+use super::text;
+use super::theme::font_px;
+
+/// Height of the heading row.
+pub(super) const HEADING_ROW_PX: f64 = 20.0;
+/// Height of a legend row of its own.
+pub(super) const LEGEND_ROW_PX: f64 = 18.0;
+/// Height of a row of names of vertical marks.
+pub(super) const MARK_ROW_PX: f64 = 15.0;
+
+/// Length of the line sample in a legend.
+pub(super) const SWATCH_PX: f64 = 24.0;
+/// Length of the marker or bar sample in a legend.
+const SHORT_SWATCH_PX: f64 = 10.0;
+/// From the sample in a legend to its text.
+const SWATCH_TO_TEXT_PX: f64 = 6.0;
+const LEGEND_GAP_PX: f64 = 18.0;
+/// Longest text in a legend; longer ones end in an ellipsis.
+const LEGEND_TEXT_LIMIT_PX: f64 = 260.0;
+
+/// From the plotting area to the names of horizontal marks: room for the leader.
+pub(super) const SIDE_LABEL_GAP_PX: f64 = 12.0;
+/// Longest name of a horizontal mark.
+const SIDE_LABEL_LIMIT_PX: f64 = 150.0;
+const SIDE_LABEL_PITCH_PX: f64 = 14.0;
+/// From the pole of a vertical mark to its name.
+const FLAG_GAP_PX: f64 = 4.0;
+/// How far the name of a vertical mark may pass the frame's right end: within margin and column gap.
+const FLAG_OVERHANG_PX: f64 = 20.0;
+
+/// From the middle of lower-case letters to the baseline, as a fraction of the font size.
+const BASELINE_BELOW_MIDDLE_EM: f64 = 0.34;
+
+/// The panel's title and the y axis' name and unit, the first in semi-bold.
+#[derive(Debug)]
+pub(super) struct Heading {
+    pub(super) strong: String,
+    pub(super) light: String,
+}
+
+impl Heading {
+    /// The heading of `panel`, whose y tick labels leave out `exponent`, cut to `limit_px`.
+    pub(super) fn new(panel: &Panel, exponent: i32, limit_px: f64) -> Self {
+        let unit = panel.y.unit_label(exponent);
+        let (strong, light) = match panel.title.is_empty() {
+            true => (panel.y.label.clone(), unit),
+            false => (panel.title.clone(), format!("{} {unit}", panel.y.label).trim().to_owned()),
+        };
+        let strong = text::shorten(&strong, limit_px, font_px::HEADING);
+        let room_px = (limit_px - text::width_px(&strong, font_px::HEADING)).max(0.0);
+        Self { light: text::shorten(&light, room_px, font_px::HEADING), strong }
+    }
+
+    fn width_px(&self) -> f64 {
+        // Semi-bold runs about a tenth wider than regular, and a space lies between the two.
+        1.1 * text::width_px(&self.strong, font_px::HEADING)
+            + text::width_px(&self.light, font_px::HEADING)
+            + 0.5 * font_px::HEADING
+    }
+}
+
+/// One legend entry, placed relative to the top left corner of its legend.
+#[derive(Debug)]
+pub(super) struct LegendEntry<'a> {
+    pub(super) series: &'a Series,
+    /// Number of the series in its panel.
+    pub(super) index: usize,
+    pub(super) text: String,
+    /// Left end of the sample.
+    pub(super) x: f64,
+    pub(super) row: usize,
+    width_px: f64,
+}
+
+impl LegendEntry<'_> {
+    pub(super) fn swatch_px(&self) -> f64 {
+        match self.series.shape {
+            Shape::Line(_) | Shape::Steps(_) => SWATCH_PX,
+            Shape::Points(_) | Shape::Histogram(_) => SHORT_SWATCH_PX,
+        }
+    }
+
+    pub(super) fn text_x(&self) -> f64 {
+        self.x + self.swatch_px() + SWATCH_TO_TEXT_PX
+    }
+}
+
+/// The legend of a panel: beside the heading, ending at the frame's right, or in rows of its own below.
+#[derive(Debug)]
+pub(super) struct Legend<'a> {
+    pub(super) entries: Vec<LegendEntry<'a>>,
+    /// Rows that the legend takes below the heading; 0 beside it.
+    pub(super) own_rows: usize,
+}
+
+impl<'a> Legend<'a> {
+    /// Places the entries between `left` and `right`, where the heading takes the first `heading` of the row.
+    /// Series without a label have no entry.
+    pub(super) fn new(panel: &'a Panel, x: &Domain, heading: &Heading, left: f64, right: f64) -> Self {
+        let mut entries: Vec<LegendEntry<'a>> = panel
+            .series
+            .iter()
+            .enumerate()
+            .filter(|(_, series)| !series.label.is_empty())
+            .map(|(index, series)| {
+                LegendEntry::new(series, index, series.extent_y(x, panel.y.scale).is_empty())
+            })
+            .collect();
+        let all_px: f64 =
+            entries.iter().map(|entry| entry.width_px + LEGEND_GAP_PX).sum::<f64>() - LEGEND_GAP_PX;
+        if entries.is_empty() || left + heading.width_px() + LEGEND_GAP_PX + all_px <= right {
+            flow(&mut entries, right - all_px, f64::INFINITY);
+            return Self { entries, own_rows: 0 };
+        }
+        let own_rows = flow(&mut entries, left, right);
+        Self { entries, own_rows }
+    }
+}
+
+impl<'a> LegendEntry<'a> {
+    fn new(series: &'a Series, index: usize, is_empty: bool) -> Self {
+        let mut text = text::shorten(&series.label, LEGEND_TEXT_LIMIT_PX, font_px::LABEL);
+        if is_empty {
+            text.push_str(" (no data)");
+        }
+        let mut entry = Self { series, index, text, x: 0.0, row: 0, width_px: 0.0 };
+        entry.width_px = entry.text_x() + text::width_px(&entry.text, font_px::LABEL);
+        entry
+    }
+}
+
+/// Places entries from `left` on, in a new row where one would pass `right`; returns the number of rows.
+fn flow(entries: &mut [LegendEntry<'_>], left: f64, right: f64) -> usize {
+    let (mut x, mut row) = (left, 0);
+    for entry in entries {
+        if x > left && x + entry.width_px > right {
+            (x, row) = (left, row + 1);
+        }
+        (entry.x, entry.row) = (x, row);
+        x += entry.width_px + LEGEND_GAP_PX;
+    }
+    row + 1
+}
+
+/// The name of a mark.
+#[derive(Debug)]
+pub(super) struct MarkLabel {
+    pub(super) text: String,
+    /// Where the mark meets the frame, in pixels along the mark's axis.
+    pub(super) anchor: f64,
+    /// Where the middle of the name lies along that axis.
+    pub(super) middle: f64,
+    /// Half the length of the name.
+    half_px: f64,
+    /// Names of vertical marks: the row above the frame, 0 the nearest.
+    pub(super) row: usize,
+}
+
+impl MarkLabel {
+    /// Left end of a name of a vertical mark.
+    pub(super) fn start(&self) -> f64 {
+        self.middle - self.half_px
+    }
+}
+
+/// The baseline of text whose middle is at `middle`.
+pub(super) fn baseline(middle: f64, font_px: f64) -> f64 {
+    middle + BASELINE_BELOW_MIDDLE_EM * font_px
+}
+
+/// Width of the gutter that the names of horizontal marks take right of the frame.
+pub(super) fn side_gutter_px(marks: &[Mark], y: &Domain) -> f64 {
+    visible_parts(marks, Direction::Y, y)
+        .map(|(label, _)| text::width_px(&side_text(label), font_px::LABEL) + SIDE_LABEL_GAP_PX)
+        .fold(0.0, f64::max)
+}
+
+/// Names of horizontal marks, top to bottom, none over another.
+pub(super) fn side_labels(marks: &[Mark], projection: &Projection) -> Vec<MarkLabel> {
+    let mut labels: Vec<MarkLabel> = visible_parts(marks, Direction::Y, &projection.y)
+        .map(|(label, (from, to))| (side_text(label), projection.y_px(0.5 * (from + to))))
+        .map(|(text, anchor)| MarkLabel { text, anchor, middle: anchor, half_px: 0.0, row: 0 })
+        .collect();
+    labels.sort_by(|one, other| one.anchor.total_cmp(&other.anchor));
+    spread(&mut labels, projection.frame.top, projection.frame.bottom());
+    labels
+}
+
+/// Names of vertical marks: flags that fly to the right of their mark, or to the left where the picture ends.
+/// Rows fill from the right, so that no pole crosses a name: what stands in a lower row begins further right.
+pub(super) fn top_labels(marks: &[Mark], x: &Domain, left: f64, right: f64) -> Vec<MarkLabel> {
+    let mut labels: Vec<MarkLabel> = visible_parts(marks, Direction::X, x)
+        .map(|(label, (from, _))| {
+            let text = text::shorten(label, right - left, font_px::LABEL);
+            let width_px = text::width_px(&text, font_px::LABEL);
+            let anchor = left + (right - left) * x.fraction(from);
+            let start = anchor + FLAG_GAP_PX;
+            let fits = start + width_px <= right + FLAG_OVERHANG_PX;
+            let start = if fits { start } else { anchor - FLAG_GAP_PX - width_px };
+            MarkLabel { text, anchor, middle: start + 0.5 * width_px, half_px: 0.5 * width_px, row: 0 }
+        })
+        .collect();
+    labels.sort_by(|one, other| other.anchor.total_cmp(&one.anchor));
+    let mut row_starts: Vec<f64> = Vec::new();
+    for label in &mut labels {
+        let (start, end) = (label.start().min(label.anchor), label.middle + label.half_px + FLAG_GAP_PX);
+        label.row = row_starts.iter().position(|&row_start| end <= row_start).unwrap_or(row_starts.len());
+        match row_starts.get_mut(label.row) {
+            Some(row_start) => *row_start = start,
+            None => row_starts.push(start),
+        }
+    }
+    labels
+}
+
+fn side_text(label: &str) -> String {
+    text::shorten(label, SIDE_LABEL_LIMIT_PX, font_px::LABEL)
+}
+
+/// Labels of the marks on one axis that are seen, with the part of the domain they cover.
+fn visible_parts<'a>(
+    marks: &'a [Mark],
+    direction: Direction,
+    domain: &Domain,
+) -> impl Iterator<Item = (&'a str, (f64, f64))> {
+    marks
+        .iter()
+        .filter(move |mark| mark.direction == direction && !mark.label.is_empty())
+        .filter_map(|mark| mark.visible(domain).map(|part| (mark.label.as_str(), part)))
+}
+
+/// Moves sorted labels apart to their pitch: down from `top` first, then up from `bottom`.
+fn spread(labels: &mut [MarkLabel], top: f64, bottom: f64) {
+    let mut least = top;
+    for label in labels.iter_mut() {
+        label.middle = label.middle.max(least);
+        least = label.middle + SIDE_LABEL_PITCH_PX;
+    }
+    let mut most = bottom;
+    for label in labels.iter_mut().rev() {
+        label.middle = label.middle.min(most);
+        most = label.middle - SIDE_LABEL_PITCH_PX;
+    }
+}

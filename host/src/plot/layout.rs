@@ -1,0 +1,260 @@
+//! Where everything goes: from the model to rectangles, ticks and placed labels.
+//!
+//! Three passes, each needing the one before: ranges and y ticks ([`drafts`]), then gutters, which fix the
+//! width of each column ([`columns`]; panels of one column share them, so that their x axes line up), then
+//! rows from top to bottom ([`place_row`]).
+
+use super::axis::{Axis, Domain, Extent, Fit};
+use super::labels::{
+    HEADING_ROW_PX, Heading, LEGEND_ROW_PX, Legend, MARK_ROW_PX, MarkLabel, side_gutter_px, side_labels,
+    top_labels,
+};
+use super::mark::Direction;
+use super::path::{Projection, Rect};
+use super::series::Shape;
+use super::text;
+use super::theme::font_px;
+use super::ticks::{Spacing, Ticks};
+use super::{Figure, Panel};
+
+pub(super) const MARGIN_PX: f64 = 24.0;
+pub(super) const TITLE_LINE_PX: f64 = 24.0;
+pub(super) const SUBTITLE_LINE_PX: f64 = 18.0;
+/// From the frame to the tick labels left of it.
+pub(super) const FRAME_TO_Y_LABEL_PX: f64 = 8.0;
+/// From the frame down to the baseline of the tick labels below it.
+pub(super) const FRAME_TO_X_LABEL_PX: f64 = 17.0;
+/// From the frame down to the baseline of the x axis' name.
+pub(super) const FRAME_TO_X_NAME_PX: f64 = 35.0;
+
+const COLUMN_GAP_PX: f64 = 36.0;
+const ROW_GAP_PX: f64 = 14.0;
+const HEADING_TO_FRAME_PX: f64 = 5.0;
+const DESCENDER_PX: f64 = 5.0;
+const Y_LABEL_PITCH_PX: f64 = 21.0;
+const X_LABEL_GAP_PX: f64 = 26.0;
+/// The narrowest plotting area that gutters may leave.
+const LEAST_FRAME_WIDTH_PX: f64 = 40.0;
+
+/// The arranged figure.
+#[derive(Debug)]
+pub(super) struct Layout<'a> {
+    pub(super) height: f64,
+    pub(super) title: Vec<String>,
+    pub(super) subtitle: Vec<String>,
+    pub(super) cells: Vec<Cell<'a>>,
+}
+
+/// One arranged panel.
+#[derive(Debug)]
+pub(super) struct Cell<'a> {
+    pub(super) panel: &'a Panel,
+    pub(super) x_axis: &'a Axis,
+    pub(super) projection: Projection,
+    pub(super) x_ticks: Ticks,
+    pub(super) y_ticks: Ticks,
+    /// Whether the x tick labels and the x axis' name stand under this panel.
+    pub(super) has_x_labels: bool,
+    /// Whether any sample is seen.
+    pub(super) has_data: bool,
+    pub(super) heading: Heading,
+    /// Left end of the heading, and of a legend in rows of its own.
+    pub(super) left: f64,
+    /// Top of the heading row.
+    pub(super) top: f64,
+    pub(super) legend: Legend<'a>,
+    pub(super) side_labels: Vec<MarkLabel>,
+    pub(super) top_labels: Vec<MarkLabel>,
+}
+
+/// Arranges the whole figure.
+pub(super) fn arrange(figure: &Figure) -> Layout<'_> {
+    let inner_px = figure.width_px - 2.0 * MARGIN_PX;
+    // Semi-bold runs about a tenth wider than regular.
+    let title = text::wrap(&figure.title, inner_px / 1.1, font_px::TITLE);
+    let subtitle = text::wrap(&figure.subtitle, inner_px, font_px::SUBTITLE);
+    let mut y = MARGIN_PX + TITLE_LINE_PX * title.len() as f64 + SUBTITLE_LINE_PX * subtitle.len() as f64;
+
+    let drafts = drafts(figure);
+    let columns = columns(figure, &drafts);
+    let mut cells = Vec::with_capacity(drafts.len());
+    for row in drafts.chunks(columns.len().max(1)) {
+        y = place_row(row, &columns, figure.panel_height_px, y + ROW_GAP_PX, &mut cells);
+    }
+    Layout { height: y + MARGIN_PX, title, subtitle, cells }
+}
+
+/// A panel with its ranges, before it has a place.
+struct Draft<'a> {
+    panel: &'a Panel,
+    x_axis: &'a Axis,
+    x: Domain,
+    y: Domain,
+    y_ticks: Ticks,
+    has_x_labels: bool,
+    has_data: bool,
+}
+
+fn drafts(figure: &Figure) -> Vec<Draft<'_>> {
+    let shared_x = x_domain(&figure.shared_x, figure.panels.iter().filter(|panel| panel.own_x.is_none()));
+    figure
+        .panels
+        .iter()
+        .enumerate()
+        .map(|(index, panel)| {
+            let (x_axis, x) = match &panel.own_x {
+                Some(own) => (own, x_domain(own, [panel])),
+                None => (&figure.shared_x, shared_x),
+            };
+            Draft::new(panel, x_axis, x, figure.panel_height_px, has_x_labels(figure, index))
+        })
+        .collect()
+}
+
+/// Whether panel `index` carries its x labels: it has an axis of its own, or is the last of its column that
+/// shares the figure's.
+fn has_x_labels(figure: &Figure, index: usize) -> bool {
+    let mut from_here_down = figure.panels.iter().skip(index).step_by(figure.columns);
+    let is_shared = from_here_down.next().is_some_and(|panel| panel.own_x.is_none());
+    !is_shared || from_here_down.all(|panel| panel.own_x.is_some())
+}
+
+/// The x range that covers the series and marks of `panels`.
+fn x_domain<'a>(axis: &Axis, panels: impl IntoIterator<Item = &'a Panel>) -> Domain {
+    let mut extent = Extent::EMPTY;
+    let mut fit = Fit::Tight;
+    for panel in panels {
+        for series in &panel.series {
+            extent.merge(series.extent_x(axis.scale, panel.y.scale));
+            if matches!(series.shape, Shape::Points(_)) {
+                fit = Fit::Padded;
+            }
+        }
+        for mark in panel.marks.iter().filter(|mark| mark.direction == Direction::X) {
+            mark.include_in(&mut extent, axis.scale);
+        }
+    }
+    axis.domain(extent, fit)
+}
+
+impl<'a> Draft<'a> {
+    fn new(panel: &'a Panel, x_axis: &'a Axis, x: Domain, height_px: f64, has_x_labels: bool) -> Self {
+        let mut extent = Extent::EMPTY;
+        for series in &panel.series {
+            extent.merge(series.extent_y(&x, panel.y.scale));
+        }
+        let has_data = !extent.is_empty();
+        for mark in panel.marks.iter().filter(|mark| mark.direction == Direction::Y) {
+            mark.include_in(&mut extent, panel.y.scale);
+        }
+        let has_bars = panel.series.iter().any(|series| matches!(series.shape, Shape::Histogram(_)));
+        let y = panel.y.domain(extent, if has_bars { Fit::OnZero } else { Fit::Padded });
+        // Numbers beside an axis that nothing was measured on would mislead.
+        let y_ticks = match extent.is_empty() && panel.y.fixed.is_none() {
+            true => Ticks::none(),
+            false => Ticks::fit(&y, height_px, Spacing::Vertical { pitch_px: Y_LABEL_PITCH_PX }),
+        };
+        Self { panel, x_axis, x, y, y_ticks, has_x_labels, has_data }
+    }
+
+    fn y_label_width_px(&self) -> f64 {
+        self.y_ticks.major.iter().map(|tick| text::width_px(&tick.label, font_px::TICK)).fold(0.0, f64::max)
+    }
+}
+
+/// Horizontal place of a column: its left edge, and its plotting area between the gutters.
+#[derive(Debug, Clone, Copy)]
+struct Column {
+    left: f64,
+    frame_left: f64,
+    frame_width: f64,
+}
+
+fn columns(figure: &Figure, drafts: &[Draft<'_>]) -> Vec<Column> {
+    let count = figure.columns.min(drafts.len());
+    let all_px = figure.width_px - 2.0 * MARGIN_PX + COLUMN_GAP_PX;
+    let pitch_px = all_px / count.max(1) as f64;
+    (0..count)
+        .map(|index| {
+            let mine = || drafts.iter().skip(index).step_by(count);
+            let left_px = mine().map(Draft::y_label_width_px).fold(0.0, f64::max) + FRAME_TO_Y_LABEL_PX;
+            let right_px =
+                mine().map(|draft| side_gutter_px(&draft.panel.marks, &draft.y)).fold(0.0, f64::max);
+            let left = MARGIN_PX + pitch_px * index as f64;
+            let frame_width = (pitch_px - COLUMN_GAP_PX - left_px - right_px).max(LEAST_FRAME_WIDTH_PX);
+            Column { left, frame_left: left + left_px, frame_width }
+        })
+        .collect()
+}
+
+/// A panel with its x ticks and the labels above it, before its height in the figure is known.
+struct Head<'a> {
+    x_ticks: Ticks,
+    heading: Heading,
+    legend: Legend<'a>,
+    top_labels: Vec<MarkLabel>,
+    height_px: f64,
+}
+
+impl<'a> Head<'a> {
+    fn new(draft: &Draft<'a>, column: &Column) -> Self {
+        let Column { left, frame_left, frame_width } = *column;
+        let right = frame_left + frame_width;
+        let spacing = Spacing::Horizontal { gap_px: X_LABEL_GAP_PX, font_px: font_px::TICK };
+        let heading = Heading::new(draft.panel, draft.y_ticks.exponent, right - left);
+        let legend = Legend::new(draft.panel, &draft.x, &heading, left, right);
+        let top_labels = top_labels(&draft.panel.marks, &draft.x, frame_left, right);
+        let mark_rows = top_labels.iter().map(|label| label.row + 1).max().unwrap_or(0);
+        let height_px = HEADING_ROW_PX
+            + LEGEND_ROW_PX * legend.own_rows as f64
+            + MARK_ROW_PX * mark_rows as f64
+            + HEADING_TO_FRAME_PX;
+        Self { x_ticks: Ticks::fit(&draft.x, frame_width, spacing), heading, legend, top_labels, height_px }
+    }
+}
+
+/// Places one row of panels below `top`, headings on one line and frames on another; returns the bottom of
+/// the row.
+fn place_row<'a>(
+    row: &[Draft<'a>],
+    columns: &[Column],
+    height_px: f64,
+    top: f64,
+    cells: &mut Vec<Cell<'a>>,
+) -> f64 {
+    let heads: Vec<Head<'a>> =
+        row.iter().zip(columns).map(|(draft, column)| Head::new(draft, column)).collect();
+    let frame_top = top + heads.iter().map(|head| head.height_px).fold(0.0, f64::max);
+    // Where one panel of a row carries x labels there is room for all to.
+    let has_x_labels = row.iter().any(|draft| draft.has_x_labels);
+    for ((draft, column), head) in row.iter().zip(columns).zip(heads) {
+        let frame =
+            Rect { left: column.frame_left, top: frame_top, width: column.frame_width, height: height_px };
+        let projection = Projection { x: draft.x, y: draft.y, frame };
+        cells.push(Cell {
+            panel: draft.panel,
+            x_axis: draft.x_axis,
+            projection,
+            x_ticks: head.x_ticks,
+            y_ticks: draft.y_ticks.clone(),
+            has_x_labels,
+            has_data: draft.has_data,
+            heading: head.heading,
+            left: column.left,
+            top,
+            legend: head.legend,
+            side_labels: side_labels(&draft.panel.marks, &projection),
+            top_labels: head.top_labels,
+        });
+    }
+    let foot_px = if has_x_labels { row.iter().map(Draft::foot_px).fold(0.0, f64::max) } else { 0.0 };
+    frame_top + height_px + foot_px
+}
+
+impl Draft<'_> {
+    /// Height of x tick labels and the axis' name below the frame.
+    fn foot_px(&self) -> f64 {
+        let is_nameless = self.x_axis.label.is_empty() && self.x_axis.unit.is_empty();
+        DESCENDER_PX + if is_nameless { FRAME_TO_X_LABEL_PX } else { FRAME_TO_X_NAME_PX }
+    }
+}

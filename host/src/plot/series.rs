@@ -1,0 +1,145 @@
+//! Series: the samples of one curve, how they are drawn, and the range they cover.
+
+use super::axis::{Domain, Extent, Scale};
+use super::theme::Slot;
+
+/// A bin that starts at zero has no left edge on a log axis; it is drawn this wide.
+const OPEN_BIN_DECADES: f64 = 0.5;
+
+/// Named samples and the way to draw them. Colour, dash and marker follow from the series' place in its
+/// panel unless [`Series::slot`] sets them.
+#[derive(Debug, Clone)]
+pub struct Series {
+    pub(super) label: String,
+    slot: Option<usize>,
+    pub(super) shape: Shape,
+}
+
+/// How the samples are drawn.
+#[derive(Debug, Clone)]
+pub(super) enum Shape {
+    Line(Vec<(f64, f64)>),
+    Steps(Vec<(f64, f64)>),
+    Points(Vec<(f64, f64)>),
+    Histogram(Vec<Bin>),
+}
+
+/// One bar of a histogram: `height` over `from..to`, in the units of the panel's axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bin {
+    /// Left edge, unit of the x axis.
+    pub from: f64,
+    /// Right edge, unit of the x axis; a bin that is not wider than nothing is left out.
+    pub to: f64,
+    /// Height, unit of the y axis.
+    pub height: f64,
+}
+
+impl Bin {
+    /// Left and right edge in the coordinates of `scale`, or nothing when the bin cannot be drawn.
+    pub(super) fn edges(&self, scale: Scale) -> Option<(f64, f64)> {
+        let right = scale.forward(self.to)?;
+        let left = match scale {
+            Scale::Log if self.from == 0.0 => right - OPEN_BIN_DECADES,
+            _ => scale.forward(self.from)?,
+        };
+        (left < right).then_some((left, right))
+    }
+}
+
+impl Series {
+    /// Samples `(x, y)` joined by straight lines in the order given; x need not grow. A sample that is not
+    /// finite breaks the line; one that stands alone is drawn as a dot.
+    pub fn line(label: impl Into<String>, samples: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self::new(label, Shape::Line(samples.into_iter().collect()))
+    }
+
+    /// Samples `(x, y)` whose y holds until the next x (zero-order hold).
+    pub fn steps(label: impl Into<String>, samples: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self::new(label, Shape::Steps(samples.into_iter().collect()))
+    }
+
+    /// A marker at each sample `(x, y)`; those that would cover one another within a pixel are drawn once.
+    pub fn points(label: impl Into<String>, samples: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self::new(label, Shape::Points(samples.into_iter().collect()))
+    }
+
+    /// Filled bars in order of x. On a log y axis the bars stand on the axis' lower end.
+    pub fn histogram(label: impl Into<String>, bins: impl IntoIterator<Item = Bin>) -> Self {
+        Self::new(label, Shape::Histogram(bins.into_iter().collect()))
+    }
+
+    fn new(label: impl Into<String>, shape: Shape) -> Self {
+        Self { label: label.into(), slot: None, shape }
+    }
+
+    /// Draws with the palette entry `slot` (counted from 0), so that the same thing looks the same in every
+    /// panel, or a theory line matches its measured points.
+    #[must_use]
+    pub fn slot(mut self, slot: usize) -> Self {
+        self.slot = Some(slot);
+        self
+    }
+
+    /// Colour, dash and marker of the series when it is number `index` of its panel.
+    pub(super) fn look(&self, index: usize) -> Slot {
+        Slot::new(self.slot.unwrap_or(index))
+    }
+
+    /// The x range of what can be drawn, in the coordinates of the x scale.
+    pub(super) fn extent_x(&self, x_scale: Scale, y_scale: Scale) -> Extent {
+        let mut extent = Extent::EMPTY;
+        match &self.shape {
+            Shape::Line(samples) | Shape::Steps(samples) | Shape::Points(samples) => {
+                for &(x, y) in samples {
+                    if let (Some(x), Some(_)) = (x_scale.forward(x), y_scale.forward(y)) {
+                        extent.include(x);
+                    }
+                }
+            }
+            Shape::Histogram(bins) => {
+                for (left, right) in bins.iter().filter_map(|bin| bin.edges(x_scale)) {
+                    extent.include(left);
+                    extent.include(right);
+                }
+            }
+        }
+        extent
+    }
+
+    /// The y range of what is seen within the x domain, in the coordinates of the y scale.
+    pub(super) fn extent_y(&self, x_domain: &Domain, y_scale: Scale) -> Extent {
+        let mut extent = Extent::EMPTY;
+        match &self.shape {
+            Shape::Line(samples) | Shape::Steps(samples) | Shape::Points(samples) => {
+                for &(x, y) in samples {
+                    if let (Some(x), Some(y)) = (x_domain.scale.forward(x), y_scale.forward(y))
+                        && (x_domain.low..=x_domain.high).contains(&x)
+                    {
+                        extent.include(y);
+                    }
+                }
+            }
+            Shape::Histogram(bins) => {
+                for bin in bins {
+                    if let (Some((left, right)), Some(y)) =
+                        (bin.edges(x_domain.scale), y_scale.forward(bin.height))
+                        && right > x_domain.low
+                        && left < x_domain.high
+                    {
+                        extent.include(y);
+                    }
+                }
+            }
+        }
+        extent
+    }
+
+    /// Number of samples or bins given, drawable or not.
+    pub(super) fn len(&self) -> usize {
+        match &self.shape {
+            Shape::Line(samples) | Shape::Steps(samples) | Shape::Points(samples) => samples.len(),
+            Shape::Histogram(bins) => bins.len(),
+        }
+    }
+}

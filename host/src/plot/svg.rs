@@ -1,0 +1,360 @@
+//! The document: an arranged figure written as SVG.
+//!
+//! Within a panel, from back to front: bands, grid, reference lines, data (clipped to the frame), axis. The
+//! document has no ids and its style is confined to `.plot`, so that several pictures fit in one page.
+
+use super::Figure;
+use super::axis::{Domain, Scale};
+use super::labels::{
+    HEADING_ROW_PX, LEGEND_ROW_PX, Legend, LegendEntry, MARK_ROW_PX, SIDE_LABEL_GAP_PX, baseline,
+};
+use super::layout::{
+    Cell, FRAME_TO_X_LABEL_PX, FRAME_TO_X_NAME_PX, FRAME_TO_Y_LABEL_PX, Layout, MARGIN_PX, SUBTITLE_LINE_PX,
+    TITLE_LINE_PX,
+};
+use super::mark::Direction;
+use super::path::{Drawing, Path, Projection, Rect, draw};
+use super::series::Shape;
+use super::text::{self, escape, px};
+use super::theme::{Slot, font_px, style_sheet};
+
+/// Lines may pass the frame by half their width before they are cut, markers by half their size.
+const LINE_SLACK_PX: f64 = 0.8;
+const MARKER_SLACK_PX: f64 = 5.0;
+
+const MAJOR_TICK_PX: f64 = 5.0;
+const MINOR_TICK_PX: f64 = 3.0;
+
+/// Decades shorter than this have no room for lines between 1 and 10.
+const MINOR_GRID_DECADE_PX: f64 = 60.0;
+
+/// Writes the figure.
+pub(super) fn document(figure: &Figure, layout: &Layout<'_>) -> String {
+    let mut writer = Writer::default();
+    let (width, height) = (px(figure.width_px), px(layout.height));
+    writer.raw(&format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"plot\" role=\"img\" width=\"{width}\" \
+         height=\"{height}\" viewBox=\"0 0 {width} {height}\">\n"
+    ));
+    writer.element("title", &figure.title);
+    writer.element("desc", &description(figure, layout));
+    writer.raw(&format!("<style>\n{}</style>\n", style_sheet()));
+    writer.raw(&format!("<rect class=\"paper\" width=\"{width}\" height=\"{height}\"/>\n"));
+    let mut y = MARGIN_PX;
+    for line in &layout.title {
+        writer.text("title", MARGIN_PX, y + 0.7 * TITLE_LINE_PX, line);
+        y += TITLE_LINE_PX;
+    }
+    for line in &layout.subtitle {
+        writer.text("subtitle muted", MARGIN_PX, y + 0.7 * SUBTITLE_LINE_PX, line);
+        y += SUBTITLE_LINE_PX;
+    }
+    for cell in &layout.cells {
+        writer.cell(cell);
+    }
+    writer.raw("</svg>\n");
+    writer.out
+}
+
+/// What the picture shows, for those who do not see it.
+fn description(figure: &Figure, layout: &Layout<'_>) -> String {
+    let mut description = figure.subtitle.clone();
+    for cell in &layout.cells {
+        let panel = cell.panel;
+        let name = |label: &str, unit: String| format!("{label} {unit}").trim().to_owned();
+        let sentence = format!(
+            " {}{} against {}:",
+            if panel.title.is_empty() { String::new() } else { format!("{}: ", panel.title) },
+            name(&panel.y.label, panel.y.unit_label(0)),
+            name(&cell.x_axis.label, cell.x_axis.unit_label(0)),
+        );
+        description.push_str(&sentence);
+        let clauses: Vec<String> = panel
+            .series
+            .iter()
+            .map(|series| {
+                let extent = series.extent_y(&cell.projection.x, panel.y.scale);
+                let label =
+                    if series.label.is_empty() { String::new() } else { format!("{}, ", series.label) };
+                let kind = if matches!(series.shape, Shape::Histogram(_)) { "bins" } else { "samples" };
+                let range = match extent.is_empty() {
+                    true => "none to show".to_owned(),
+                    false => {
+                        let value = |coordinate| text::significant(panel.y.scale.backward(coordinate));
+                        format!("{} to {}", value(extent.low), value(extent.high))
+                    }
+                };
+                format!(" {label}{} {kind}, {range}", series.len())
+            })
+            .collect();
+        description.push_str(if clauses.is_empty() { " no data" } else { "" });
+        description.push_str(&clauses.join(";"));
+        description.push('.');
+    }
+    description.trim().to_owned()
+}
+
+/// The document under construction.
+#[derive(Default)]
+struct Writer {
+    out: String,
+}
+
+impl Writer {
+    fn raw(&mut self, markup: &str) {
+        self.out.push_str(markup);
+    }
+
+    fn element(&mut self, name: &str, content: &str) {
+        self.raw(&format!("<{name}>{}</{name}>\n", escape(content)));
+    }
+
+    /// A line of text with its baseline at `y`; the class decides which end `x` names.
+    fn text(&mut self, class: &str, x: f64, y: f64, content: &str) {
+        self.raw(&format!(
+            "<text class=\"{class}\" x=\"{}\" y=\"{}\">{}</text>\n",
+            px(x),
+            px(y),
+            escape(content)
+        ));
+    }
+
+    fn path(&mut self, class: &str, path: &Path) {
+        self.dashed_path(class, "", path);
+    }
+
+    fn dashed_path(&mut self, class: &str, dash: &str, path: &Path) {
+        if path.is_empty() {
+            return;
+        }
+        let dash = if dash.is_empty() { String::new() } else { format!(" stroke-dasharray=\"{dash}\"") };
+        self.raw(&format!("<path class=\"{class}\"{dash} d=\"{}\"/>\n", path.data()));
+    }
+
+    fn cell(&mut self, cell: &Cell<'_>) {
+        let series = cell.panel.series.iter().enumerate();
+        let drawings: Vec<Option<Drawing>> =
+            series.map(|(index, series)| draw(series, series.look(index), &cell.projection)).collect();
+        self.raw("<g>\n");
+        self.bands(cell);
+        self.grid(cell);
+        self.reference_lines(cell);
+        self.data(cell, &drawings);
+        if cell.has_x_labels {
+            self.x_axis(cell);
+        }
+        self.y_labels(cell);
+        self.head(cell, &drawings);
+        self.mark_labels(cell);
+        self.raw("</g>\n");
+    }
+
+    fn bands(&mut self, cell: &Cell<'_>) {
+        for (direction, from, to) in visible_marks(cell).filter(|(_, from, to)| from != to) {
+            let frame = &cell.projection.frame;
+            let band = match direction {
+                Direction::X => Rect { left: from, width: to - from, ..*frame },
+                Direction::Y => Rect { top: to, height: from - to, ..*frame },
+            };
+            self.raw(&format!(
+                "<rect class=\"band\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>\n",
+                px(band.left),
+                px(band.top),
+                px(band.width),
+                px(band.height)
+            ));
+        }
+    }
+
+    fn reference_lines(&mut self, cell: &Cell<'_>) {
+        let mut path = Path::default();
+        for (direction, at, _) in visible_marks(cell).filter(|(_, from, to)| from == to) {
+            let frame = &cell.projection.frame;
+            match direction {
+                Direction::X => path.polyline(frame.upright(at)),
+                Direction::Y => path.polyline(frame.level(at)),
+            }
+        }
+        self.path("reference", &path);
+    }
+
+    fn grid(&mut self, cell: &Cell<'_>) {
+        let Projection { x, y, frame } = &cell.projection;
+        let (mut minor, mut major, mut zero_line) = (Path::default(), Path::default(), Path::default());
+        if has_minor_grid(x, frame.width) {
+            cell.x_ticks.minor.iter().for_each(|&at| minor.polyline(frame.upright(frame.x_at(at))));
+        }
+        if has_minor_grid(y, frame.height) {
+            cell.y_ticks.minor.iter().for_each(|&at| minor.polyline(frame.level(frame.y_at(at))));
+        }
+        cell.x_ticks.major.iter().for_each(|tick| major.polyline(frame.upright(frame.x_at(tick.position))));
+        cell.y_ticks.major.iter().for_each(|tick| major.polyline(frame.level(frame.y_at(tick.position))));
+        if !cell.has_x_labels {
+            major.polyline(frame.level(frame.bottom()));
+        }
+        let zero = y.scale.forward(0.0).map(|zero| y.fraction(zero)).filter(|zero| (0.0..1.0).contains(zero));
+        if let Some(zero) = zero
+            && !cell.y_ticks.major.is_empty()
+        {
+            zero_line.polyline(frame.level(frame.y_at(zero)));
+        }
+        self.path("hair grid minor", &minor);
+        self.path("hair grid", &major);
+        self.path("hair axis", &zero_line);
+    }
+
+    fn data(&mut self, cell: &Cell<'_>, drawings: &[Option<Drawing>]) {
+        let frame = &cell.projection.frame;
+        if !cell.has_data {
+            let y = baseline(frame.y_at(0.5), font_px::LABEL);
+            self.text("label muted middle", frame.x_at(0.5), y, "no data");
+            return;
+        }
+        let has_markers = cell.panel.series.iter().any(|series| matches!(series.shape, Shape::Points(_)));
+        let slack = if has_markers { MARKER_SLACK_PX } else { LINE_SLACK_PX };
+        // A nested document clips without an id, unlike <clipPath>.
+        let (x, y) = (px(frame.left - slack), px(frame.top - slack));
+        let (width, height) = (px(frame.width + 2.0 * slack), px(frame.height + 2.0 * slack));
+        self.raw(&format!(
+            "<svg x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" \
+             viewBox=\"{x} {y} {width} {height}\" overflow=\"hidden\">\n"
+        ));
+        for (index, (series, drawing)) in cell.panel.series.iter().zip(drawings).enumerate() {
+            if let Some(drawing) = drawing {
+                self.drawing(drawing, series.look(index));
+            }
+        }
+        self.raw("</svg>\n");
+    }
+
+    fn drawing(&mut self, drawing: &Drawing, slot: Slot) {
+        let color = slot.class();
+        match drawing {
+            Drawing::Line { path, dots, busy } => {
+                match (busy, slot.dash()) {
+                    (true, _) => self.path(&format!("line busy round {color}"), path),
+                    (false, "") => self.path(&format!("line round {color}"), path),
+                    (false, dash) => self.dashed_path(&format!("line {color}"), dash, path),
+                }
+                self.path(&format!("line round {color}"), dots);
+            }
+            Drawing::Markers(path) => self.path(&format!("points {color}"), path),
+            Drawing::Bars(path) => self.path(&format!("bars {color}"), path),
+        }
+    }
+
+    fn x_axis(&mut self, cell: &Cell<'_>) {
+        let frame = &cell.projection.frame;
+        let mut axis = Path::default();
+        axis.polyline(frame.level(frame.bottom()));
+        let major = cell.x_ticks.major.iter().map(|tick| (tick.position, MAJOR_TICK_PX));
+        let minor = cell.x_ticks.minor.iter().map(|&position| (position, MINOR_TICK_PX));
+        for (position, length) in major.chain(minor) {
+            let x = frame.x_at(position);
+            axis.polyline([(x, frame.bottom()), (x, frame.bottom() + length)]);
+        }
+        self.path("hair axis", &axis);
+        for tick in &cell.x_ticks.major {
+            let y = frame.bottom() + FRAME_TO_X_LABEL_PX;
+            self.text("muted middle", frame.x_at(tick.position), y, &tick.label);
+        }
+        let name = format!("{} {}", cell.x_axis.label, cell.x_axis.unit_label(cell.x_ticks.exponent));
+        if !name.trim().is_empty() {
+            self.text("label middle", frame.x_at(0.5), frame.bottom() + FRAME_TO_X_NAME_PX, name.trim());
+        }
+    }
+
+    fn y_labels(&mut self, cell: &Cell<'_>) {
+        let frame = &cell.projection.frame;
+        for tick in &cell.y_ticks.major {
+            let y = baseline(frame.y_at(tick.position), font_px::TICK);
+            self.text("muted end", frame.left - FRAME_TO_Y_LABEL_PX, y, &tick.label);
+        }
+    }
+
+    /// Heading and legend.
+    fn head(&mut self, cell: &Cell<'_>, drawings: &[Option<Drawing>]) {
+        let y = baseline(cell.top + 0.5 * HEADING_ROW_PX, font_px::HEADING);
+        let light = match cell.heading.light.is_empty() {
+            true => String::new(),
+            false => format!(" <tspan class=\"unit muted\">{}</tspan>", escape(&cell.heading.light)),
+        };
+        self.raw(&format!(
+            "<text class=\"heading\" x=\"{}\" y=\"{}\">{}{light}</text>\n",
+            px(cell.left),
+            px(y),
+            escape(&cell.heading.strong)
+        ));
+        let Legend { entries, own_rows } = &cell.legend;
+        let first_row = match own_rows {
+            0 => cell.top + 0.5 * HEADING_ROW_PX,
+            _ => cell.top + HEADING_ROW_PX + 0.5 * LEGEND_ROW_PX,
+        };
+        for entry in entries {
+            let drawing = drawings.get(entry.index).and_then(Option::as_ref);
+            self.legend_entry(entry, drawing, first_row + LEGEND_ROW_PX * entry.row as f64);
+        }
+    }
+
+    /// One entry, with a sample of what the series is drawn as in this panel.
+    fn legend_entry(&mut self, entry: &LegendEntry<'_>, drawing: Option<&Drawing>, middle: f64) {
+        let (left, right) = (entry.x, entry.x + entry.swatch_px());
+        let center = 0.5 * (left + right);
+        let slot = entry.series.look(entry.index);
+        let mut path = Path::default();
+        match drawing {
+            Some(Drawing::Markers(_)) => {
+                slot.add_marker(&mut path, center, middle);
+                self.drawing(&Drawing::Markers(path), slot);
+            }
+            Some(Drawing::Bars(_)) => {
+                path.polygon(center, middle, &[(-5.0, -5.0), (5.0, -5.0), (5.0, 5.0), (-5.0, 5.0)]);
+                self.drawing(&Drawing::Bars(path), slot);
+            }
+            Some(Drawing::Line { busy, .. }) => {
+                path.polyline([(left, middle), (right, middle)]);
+                let dash = if *busy { "" } else { slot.dash() };
+                self.dashed_path(&format!("line {}", slot.class()), dash, &path);
+            }
+            // Nothing is drawn, so there is nothing to show a sample of.
+            None => {}
+        }
+        self.text("label", entry.text_x(), baseline(middle, font_px::LABEL), &entry.text);
+    }
+
+    fn mark_labels(&mut self, cell: &Cell<'_>) {
+        let frame = &cell.projection.frame;
+        let mut leaders = Path::default();
+        for label in &cell.side_labels {
+            let x = frame.right() + SIDE_LABEL_GAP_PX;
+            leaders.polyline([(frame.right(), label.anchor), (x - 4.0, label.middle)]);
+            self.text("label muted", x, baseline(label.middle, font_px::LABEL), &label.text);
+        }
+        for label in &cell.top_labels {
+            let row_bottom = frame.top - MARK_ROW_PX * label.row as f64;
+            leaders.polyline([(label.anchor, frame.top), (label.anchor, row_bottom - MARK_ROW_PX + 2.0)]);
+            self.text("label muted", label.start(), row_bottom - 0.3 * MARK_ROW_PX, &label.text);
+        }
+        self.path("hair axis", &leaders);
+    }
+}
+
+/// Whether a log axis gets thin lines between its labelled ones: they show that it is one.
+fn has_minor_grid(domain: &Domain, length_px: f64) -> bool {
+    domain.scale == Scale::Log && length_px >= MINOR_GRID_DECADE_PX * domain.span()
+}
+
+/// Marks that are seen, with their ends in pixels along their axis.
+fn visible_marks(cell: &Cell<'_>) -> impl Iterator<Item = (Direction, f64, f64)> {
+    let projection = cell.projection;
+    cell.panel.marks.iter().filter_map(move |mark| match mark.direction {
+        Direction::X => {
+            let (from, to) = mark.visible(&projection.x)?;
+            Some((Direction::X, projection.x_px(from), projection.x_px(to)))
+        }
+        Direction::Y => {
+            let (from, to) = mark.visible(&projection.y)?;
+            Some((Direction::Y, projection.y_px(from), projection.y_px(to)))
+        }
+    })
+}

@@ -1,0 +1,159 @@
+//! How pictures look: colours, dash patterns, markers, type sizes and the style sheet.
+//!
+//! Series colours are the colour-blind-safe palette of Okabe and Ito ("Color Universal Design", 2008), in an
+//! order that puts strong contrast first. Its yellow is left out (unreadable on white) for the neutral grey
+//! that many tools add to the palette; its black follows the text colour and so turns light on a dark page.
+//! Dash patterns and marker shapes repeat what the colour says.
+
+use super::path::Path;
+
+/// Series colours on a light and on a dark page.
+const PALETTE: [(&str, &str); 8] = [
+    ("#0072b2", "#3a9bdc"), // blue, lightened on dark for contrast
+    ("#d55e00", "#e8702a"), // vermillion
+    ("#009e73", "#18b98c"), // bluish green
+    ("#cc79a7", "#d98bb6"), // reddish purple
+    ("#e69f00", "#e69f00"), // orange
+    ("#56b4e9", "#8fd0f5"), // sky blue
+    ("#1f2328", "#e6edf3"), // black: the text colour
+    ("#8a8f98", "#8a8f98"), // grey
+];
+
+/// Dash patterns in pixels, drawn and left out in turn; the first is solid.
+const DASHES: [&str; 8] = ["", "8 3", "3 2", "9 3 2 3", "15 4", "6 2 1.5 2 1.5 2", "1.5 2", "11 3 4 3"];
+
+/// Colour, dash and marker of a series.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Slot {
+    color: usize,
+    cue: usize,
+}
+
+impl Slot {
+    /// The look of series number `index`. After one round of colours the dashes and markers shift by one, so
+    /// that 64 series differ.
+    pub(super) fn new(index: usize) -> Self {
+        let color = index % PALETTE.len();
+        Self { color, cue: (color + index / PALETTE.len()) % DASHES.len() }
+    }
+
+    /// The style class that sets the colour.
+    pub(super) fn class(self) -> String {
+        format!("c{}", self.color)
+    }
+
+    /// The dash pattern; empty for a solid line.
+    pub(super) fn dash(self) -> &'static str {
+        DASHES.get(self.cue).copied().unwrap_or_default()
+    }
+
+    /// Adds the marker to `path`, centred on (x, y): eight shapes of like area.
+    pub(super) fn add_marker(self, path: &mut Path, x: f64, y: f64) {
+        match self.cue {
+            0 => path.circle(x, y, 3.0),
+            1 => path.polygon(x, y, &[(-2.7, -2.7), (2.7, -2.7), (2.7, 2.7), (-2.7, 2.7)]),
+            2 => path.polygon(x, y, &[(0.0, -3.8), (3.7, 2.8), (-3.7, 2.8)]),
+            3 => path.polygon(x, y, &[(0.0, -4.0), (3.4, 0.0), (0.0, 4.0), (-3.4, 0.0)]),
+            4 => path.polygon(x, y, &[(0.0, 3.8), (3.7, -2.8), (-3.7, -2.8)]),
+            5 => path.polygon(x, y, &plus_outline(3.6, 1.1)),
+            6 => path.polygon(x, y, &cross_outline(3.3, 1.2)),
+            _ => path.ring(x, y, 3.7, 2.2),
+        }
+    }
+}
+
+/// A plus sign with arms of the given reach and half width.
+fn plus_outline(reach: f64, half: f64) -> [(f64, f64); 12] {
+    [
+        (-half, -reach),
+        (half, -reach),
+        (half, -half),
+        (reach, -half),
+        (reach, half),
+        (half, half),
+        (half, reach),
+        (-half, reach),
+        (-half, half),
+        (-reach, half),
+        (-reach, -half),
+        (-half, -half),
+    ]
+}
+
+/// The plus sign turned by an eighth.
+fn cross_outline(reach: f64, half: f64) -> [(f64, f64); 12] {
+    use std::f64::consts::FRAC_1_SQRT_2;
+    plus_outline(reach * 1.2, half).map(|(x, y)| (FRAC_1_SQRT_2 * (x - y), FRAC_1_SQRT_2 * (x + y)))
+}
+
+/// Type sizes in pixels. The style sheet repeats them; layout measures with them.
+pub(super) mod font_px {
+    pub(in super::super) const TITLE: f64 = 18.0;
+    pub(in super::super) const SUBTITLE: f64 = 12.5;
+    pub(in super::super) const HEADING: f64 = 12.5;
+    pub(in super::super) const LABEL: f64 = 11.5;
+    pub(in super::super) const TICK: f64 = 11.0;
+}
+
+/// The style sheet: everything under `.plot`, so that a picture placed inside a page leaves the page alone.
+/// Colours are given twice, the second time for pages in dark mode.
+pub(super) fn style_sheet() -> String {
+    let light = Page { paper: "#ffffff", ink: "#1f2328", muted: "#59636e", axis: "#8c959f", grid: "#e7eaee" };
+    let dark = Page { paper: "#0d1117", ink: "#e6edf3", muted: "#9198a1", axis: "#656c76", grid: "#232a33" };
+    format!(
+        ".plot{{max-width:100%;height:auto;font-family:system-ui,-apple-system,'Segoe UI',Roboto,\
+         'Helvetica Neue',sans-serif;font-size:{tick}px;font-variant-numeric:tabular-nums}}\n\
+         .plot .title{{font-size:{title}px;font-weight:600}}\n\
+         .plot .subtitle{{font-size:{subtitle}px}}\n\
+         .plot .heading{{font-size:{heading}px;font-weight:600}}\n\
+         .plot .unit{{font-weight:400}}\n\
+         .plot .label{{font-size:{label}px}}\n\
+         .plot .middle{{text-anchor:middle}}\n\
+         .plot .end{{text-anchor:end}}\n\
+         .plot .hair{{fill:none;stroke-width:1}}\n\
+         .plot .minor{{stroke-opacity:.5}}\n\
+         .plot .reference{{fill:none;stroke-width:1;stroke-dasharray:5 3}}\n\
+         .plot .band{{fill-opacity:.13}}\n\
+         .plot .line{{fill:none;stroke:currentColor;stroke-width:1.6;stroke-linejoin:round}}\n\
+         .plot .busy{{stroke-width:1}}\n\
+         .plot .round{{stroke-linecap:round}}\n\
+         .plot .points{{fill:currentColor;fill-opacity:.85}}\n\
+         .plot .bars{{fill:currentColor;fill-opacity:.16;stroke:currentColor;stroke-width:1.2}}\n\
+         {}@media (prefers-color-scheme:dark){{\n{}}}\n",
+        light.rules(|(light, _)| light),
+        dark.rules(|(_, dark)| dark),
+        title = font_px::TITLE,
+        subtitle = font_px::SUBTITLE,
+        heading = font_px::HEADING,
+        label = font_px::LABEL,
+        tick = font_px::TICK,
+    )
+}
+
+/// Colours of everything that is not a series.
+struct Page {
+    paper: &'static str,
+    ink: &'static str,
+    muted: &'static str,
+    axis: &'static str,
+    grid: &'static str,
+}
+
+impl Page {
+    fn rules(&self, series_color: impl Fn((&'static str, &'static str)) -> &'static str) -> String {
+        let Self { paper, ink, muted, axis, grid } = self;
+        let mut rules = format!(
+            ".plot .paper{{fill:{paper}}}\n\
+             .plot text{{fill:{ink}}}\n\
+             .plot .muted{{fill:{muted}}}\n\
+             .plot .grid{{stroke:{grid}}}\n\
+             .plot .axis{{stroke:{axis}}}\n\
+             .plot .reference{{stroke:{muted}}}\n\
+             .plot .band{{fill:{muted}}}\n"
+        );
+        for (index, colors) in PALETTE.into_iter().enumerate() {
+            rules.push_str(&format!(".plot .c{index}{{color:{}}}\n", series_color(colors)));
+        }
+        rules
+    }
+}

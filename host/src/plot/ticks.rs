@@ -1,0 +1,231 @@
+//! Ticks: round values along an axis, with labels that agree in their decimals.
+//!
+//! Linear steps are 1, 2 or 5 times a power of ten (the classic nice numbers: Heckbert, "Nice numbers for
+//! graph labels", Graphics Gems, 1990). Log axes are labelled at decades, at 1-2-5 where there is room, and
+//! like a linear axis when they cover too little for either.
+
+use super::axis::{Domain, Scale};
+use super::text;
+
+/// Magnitudes from which on tick labels leave out a power of ten and the axis label states it.
+const LARGEST_PLAIN: f64 = 1e5;
+/// Magnitudes below which tick labels leave out a power of ten and the axis label states it.
+const SMALLEST_PLAIN: f64 = 1e-2;
+
+/// Decades labelled in plain digits (0.001 to 10 000); beyond, all labels of the axis are powers.
+const PLAIN_DECADES: std::ops::RangeInclusive<i32> = -3..=4;
+
+/// Ticks within this fraction of the span beyond an end still count as on it (rounding of `k * step`).
+const END_TOLERANCE: f64 = 1e-9;
+
+/// Ticks of one axis; positions are fractions of its domain.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Ticks {
+    pub(super) major: Vec<Tick>,
+    pub(super) minor: Vec<f64>,
+    /// Power of ten that the labels leave out.
+    pub(super) exponent: i32,
+}
+
+/// A labelled tick.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Tick {
+    pub(super) position: f64,
+    pub(super) label: String,
+}
+
+/// How much room a label takes along its axis.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Spacing {
+    /// Labels one below the other, at least this far apart.
+    Vertical { pitch_px: f64 },
+    /// Labels side by side, with at least this gap between their texts.
+    Horizontal { gap_px: f64, font_px: f64 },
+}
+
+impl Spacing {
+    fn pitch_px(self, ticks: &Ticks) -> f64 {
+        match self {
+            Self::Vertical { pitch_px } => pitch_px,
+            Self::Horizontal { gap_px, font_px } => {
+                ticks.major.iter().map(|tick| text::width_px(&tick.label, font_px)).fold(0.0, f64::max)
+                    + gap_px
+            }
+        }
+    }
+}
+
+impl Ticks {
+    /// An axis without numbers.
+    pub(super) fn none() -> Self {
+        Self { major: Vec::new(), minor: Vec::new(), exponent: 0 }
+    }
+
+    /// The densest ticks whose labels keep their distance on an axis of `length_px`.
+    pub(super) fn fit(domain: &Domain, length_px: f64, spacing: Spacing) -> Self {
+        let most = match spacing {
+            Spacing::Vertical { pitch_px } => length_px / pitch_px,
+            Spacing::Horizontal { gap_px, .. } => length_px / (2.0 * gap_px),
+        };
+        let mut most = most.clamp(2.0, 20.0);
+        loop {
+            let ticks = Self::at_most(domain, most);
+            if most <= 2.0 || ticks.closest() * length_px >= spacing.pitch_px(&ticks) {
+                return ticks;
+            }
+            most = (most - 1.0).max(2.0);
+        }
+    }
+
+    /// About `most` ticks or fewer.
+    fn at_most(domain: &Domain, most: f64) -> Self {
+        match domain.scale {
+            Scale::Linear => linear(domain.low, domain.high, most, |value| domain.fraction(value)),
+            Scale::Log => log(domain, most),
+        }
+    }
+
+    /// Distance of the two closest labelled ticks, as a fraction of the axis.
+    fn closest(&self) -> f64 {
+        self.major
+            .windows(2)
+            .filter_map(|pair| Some((pair.last()?.position - pair.first()?.position).abs()))
+            .fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Multiples of a nice step within `low..=high`, placed by `fraction`.
+fn linear(low: f64, high: f64, most: f64, fraction: impl Fn(f64) -> f64) -> Ticks {
+    let step = NiceStep::at_least((high - low) / most);
+    let exponent = left_out_exponent(low.abs().max(high.abs()));
+    let decimals = usize::try_from(exponent - step.exponent).unwrap_or(0);
+    let unit = power_of_ten(exponent);
+    let major = multiples(low, high, step.size())
+        .map(|value| Tick { position: fraction(value), label: text::decimal(value / unit, decimals) })
+        .collect();
+    let minor = multiples(low, high, step.size() / step.subdivisions()).map(fraction).collect();
+    Ticks { major, minor, exponent }
+}
+
+/// The smallest of 1, 2 and 5 times a power of ten that is not below `least`.
+pub(super) fn nice_step(least: f64) -> f64 {
+    NiceStep::at_least(least).size()
+}
+
+/// A step of 1, 2 or 5 times a power of ten.
+#[derive(Debug, Clone, Copy)]
+struct NiceStep {
+    mantissa: f64,
+    exponent: i32,
+}
+
+impl NiceStep {
+    /// The smallest nice step that is not below `least`.
+    fn at_least(least: f64) -> Self {
+        let exponent = exponent_of(least);
+        let leading = least / power_of_ten(exponent);
+        let fits = |mantissa: &f64| leading <= mantissa * (1.0 + END_TOLERANCE);
+        match [1.0, 2.0, 5.0].into_iter().find(fits) {
+            Some(mantissa) => Self { mantissa, exponent },
+            None => Self { mantissa: 1.0, exponent: exponent + 1 },
+        }
+    }
+
+    fn size(self) -> f64 {
+        self.mantissa * power_of_ten(self.exponent)
+    }
+
+    /// Minor steps per step, so that minor ticks are nice as well: 0.2 of 1, 0.5 of 2, 1 of 5.
+    fn subdivisions(self) -> f64 {
+        if self.mantissa == 2.0 { 4.0 } else { 5.0 }
+    }
+}
+
+/// Multiples of `step` from `low` to `high`.
+fn multiples(low: f64, high: f64, step: f64) -> impl Iterator<Item = f64> {
+    let tolerance = END_TOLERANCE * (high - low);
+    let first = ((low - tolerance) / step).ceil();
+    std::iter::successors(Some(first), |index| Some(index + 1.0))
+        .map(move |index| index * step)
+        .take_while(move |&value| value <= high + tolerance)
+}
+
+/// The power of ten, a multiple of three, that labels of values up to `magnitude` leave out.
+fn left_out_exponent(magnitude: f64) -> i32 {
+    if (SMALLEST_PLAIN..LARGEST_PLAIN).contains(&magnitude) {
+        0
+    } else {
+        exponent_of(magnitude).div_euclid(3) * 3
+    }
+}
+
+/// Ticks of a log axis: decades, or 1-2-5 in each decade, or linear steps, whichever gives enough labels.
+fn log(domain: &Domain, most: f64) -> Ticks {
+    const DIGITS_1_2_5: [f64; 3] = [1.0, 2.0, 5.0];
+    let minor = log_positions(domain, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], 1);
+    let dense = log_positions(domain, &DIGITS_1_2_5, 1);
+    if dense.len() < 2 {
+        let place = |value: f64| domain.fraction(value.max(f64::MIN_POSITIVE).log10());
+        return linear(domain.scale.backward(domain.low), domain.scale.backward(domain.high), most, place);
+    }
+    // 2 and 5 split a decade unevenly, so room for the closest pair (1-2, 0.30 decade) is what counts.
+    let fits_dense = domain.span() / 0.30 <= most;
+    let stride = (1..).find(|&stride| domain.span() / f64::from(stride) <= most).unwrap_or(1);
+    let decades = log_positions(domain, &[1.0], stride);
+    let is_plain = |ticks: &[LogTick]| ticks.iter().all(|tick| PLAIN_DECADES.contains(&tick.decade));
+    // Beyond plain digits, `2×10⁵` between decades says less than it clutters.
+    let wants_dense = fits_dense && (is_plain(&dense) || decades.len() < 3);
+    let chosen = if wants_dense || decades.len() < 2 { dense } else { decades };
+    let plain = is_plain(&chosen);
+    let major =
+        chosen.iter().map(|tick| Tick { position: tick.position, label: tick.label(plain) }).collect();
+    Ticks { major, minor: minor.iter().map(|tick| tick.position).collect(), exponent: 0 }
+}
+
+/// A tick `digit * 10^decade` of a log axis.
+struct LogTick {
+    digit: f64,
+    decade: i32,
+    position: f64,
+}
+
+impl LogTick {
+    fn label(&self, plain: bool) -> String {
+        let decimals = usize::try_from(-self.decade).unwrap_or(0);
+        match (plain, self.digit == 1.0) {
+            (true, _) => text::decimal(self.digit * power_of_ten(self.decade), decimals),
+            (false, true) => format!("10{}", text::superscript(self.decade)),
+            (false, false) => format!("{}×10{}", self.digit, text::superscript(self.decade)),
+        }
+    }
+}
+
+/// The given digits in every `stride`-th decade of the domain.
+fn log_positions(domain: &Domain, digits: &[f64], stride: i32) -> Vec<LogTick> {
+    let tolerance = END_TOLERANCE * domain.span();
+    let inside = domain.low - tolerance..=domain.high + tolerance;
+    (to_integer(domain.low.floor())..=to_integer(domain.high.ceil()))
+        .filter(|decade| decade.rem_euclid(stride) == 0)
+        .flat_map(|decade| digits.iter().map(move |&digit| (digit, decade)))
+        .map(|(digit, decade)| (digit, decade, f64::from(decade) + digit.log10()))
+        .filter(|(_, _, coordinate)| inside.contains(coordinate))
+        .map(|(digit, decade, coordinate)| LogTick { digit, decade, position: domain.fraction(coordinate) })
+        .collect()
+}
+
+/// The decimal exponent of a positive number: 2 for 100 and for 999.
+fn exponent_of(value: f64) -> i32 {
+    let estimate = to_integer(value.max(f64::MIN_POSITIVE).log10().floor());
+    // log10 of a number just below a power of ten may round up to it.
+    if power_of_ten(estimate) > value { estimate - 1 } else { estimate }
+}
+
+fn power_of_ten(exponent: i32) -> f64 {
+    10.0_f64.powi(exponent)
+}
+
+/// An integral `f64` as `i32`, held within the exponents of `f64`.
+#[expect(clippy::cast_possible_truncation, reason = "held within ±400 first")]
+fn to_integer(value: f64) -> i32 {
+    value.clamp(-400.0, 400.0) as i32
+}

@@ -1,0 +1,43 @@
+//! A run in one line: equal digests, equal runs.
+
+use crate::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
+use flotor_sync::Words;
+use xxhash_rust::xxh3::Xxh3;
+
+/// Words of a record that depend on the run alone, not on the machine.
+const DIGEST_WORDS: usize = RECORD_WORDS - TIMING_WORDS;
+
+/// Streaming xxh3-64 over what every tick left behind, measured times left out.
+///
+/// The hash runs over the 64-bit words of each record, little endian, in the order of [`TickRecord`], so it
+/// depends on neither machine nor on how records arrive. It tells runs apart; it is no protection against malice.
+#[derive(Clone, Default)]
+pub struct TraceDigest {
+    hash: Xxh3,
+    ticks: u64,
+}
+
+impl TraceDigest {
+    /// The digest of no ticks.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds the next tick. Not real-time by place, but bounded and without allocation.
+    pub fn update(&mut self, record: &TickRecord) {
+        let mut bytes = [0; DIGEST_WORDS * size_of::<u64>()];
+        // The shorter side ends the walk: the timing words at the end find no place.
+        for (place, word) in bytes.chunks_exact_mut(size_of::<u64>()).zip(record.to_words()) {
+            place.copy_from_slice(&word.to_le_bytes());
+        }
+        self.hash.update(&bytes);
+        self.ticks += 1;
+    }
+
+    /// The digest as text: `xxh3:`, sixteen hexadecimal digits, `-`, number of ticks.
+    #[must_use]
+    pub fn finish(&self) -> String {
+        format!("xxh3:{:016x}-{}", self.hash.digest(), self.ticks)
+    }
+}

@@ -1,0 +1,260 @@
+//! Reads a recording back: how the run was set up, then tick by tick, bit for bit.
+
+use super::container::{Damage, Messages, TopicMessage};
+use super::schema::{FORMAT, FrameTransform, Log, Missing, Run, Tick, Topic};
+use super::{Note, RunDescription};
+use crate::trace::TickRecord;
+use flotor_hal::Pose;
+use mcap::{MAGIC, McapError};
+use prost::Message;
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// Why a recording cannot be read, or not any further.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// The file cannot be opened.
+    #[error("cannot open the recording `{}`: {cause}", path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        #[source]
+        cause: io::Error,
+    },
+    /// It is some other kind of file.
+    #[error("`{}` is not an MCAP file; `flotor run --record FILE.mcap` makes recordings", path.display())]
+    NotMcap {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It is MCAP, but not ours.
+    #[error(
+        "`{}` is an MCAP file, but no recording of a run: `/flotor/run` does not come first; \
+         `flotor run --record FILE.mcap` makes recordings",
+        path.display()
+    )]
+    NotARecording {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It breaks off before anything of use.
+    #[error("`{}` was cut off before it says what was run, nothing in it can be used; record again", path.display())]
+    CutOffAtStart {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A later version wrote it.
+    #[error(
+        "`{}` has format {format}, written by flotor {flotor_version}; this one reads up to {FORMAT}: update flotor",
+        path.display()
+    )]
+    TooNew {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        format: u32,
+        /// Version of the program that wrote it.
+        flotor_version: String,
+    },
+    /// Somebody compressed it.
+    #[error(
+        "`{}` is compressed with `{compression}`; `mcap decompress` makes a copy that can be read",
+        path.display()
+    )]
+    Compressed {
+        /// The file.
+        path: PathBuf,
+        /// With what.
+        compression: String,
+    },
+    /// It cannot be read any further.
+    #[error("`{}` is damaged {}: {cause}; ticks before that are good, `mcap recover` may save later ones",
+        path.display(),
+        after_tick.map_or_else(|| "before its first tick".to_owned(), |tick| format!("after tick {tick}")))]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// The last good tick.
+        after_tick: Option<u64>,
+        /// What is wrong.
+        #[source]
+        cause: Damage,
+    },
+}
+
+/// How a file ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// The recorder finished it: the whole run is there.
+    Finished,
+    /// It breaks off (a killed process, a full disk): the last ticks of the run are missing, up to 250 ms before
+    /// the process died.
+    CutOff,
+}
+
+/// A recording being read: an iterator over its ticks.
+pub struct Recording {
+    path: PathBuf,
+    messages: Messages<File>,
+    run: RunDescription,
+    ending: Ending,
+    notes: Vec<Note>,
+    /// The pose that came last, and its time.
+    pose: Option<(u64, Pose)>,
+    /// Number in the file that the next tick must have.
+    sequence: u32,
+    last_tick: Option<u64>,
+    is_over: bool,
+}
+
+impl Recording {
+    /// Opens a recording and reads how the run was set up. Not real-time.
+    ///
+    /// # Errors
+    /// [`ReadError`]: not a recording, or nothing of it can be read.
+    pub fn open(path: &Path) -> Result<Self, ReadError> {
+        let unreadable = |cause| ReadError::Open { path: path.into(), cause };
+        let mut file = File::open(path).map_err(unreadable)?;
+        if !begins_as_mcap(&mut file).map_err(unreadable)? {
+            return Err(ReadError::NotMcap { path: path.into() });
+        }
+        let ending = ending(&mut file).map_err(unreadable)?;
+        file.rewind().map_err(unreadable)?;
+        let mut messages = Messages::new(file, ending == Ending::CutOff);
+        let run = match messages.next().map_err(|cause| damaged(path, None, cause))? {
+            Some(first) if first.topic == Topic::Run => read_run(path, &first)?,
+            None if ending == Ending::CutOff => return Err(ReadError::CutOffAtStart { path: path.into() }),
+            _ => return Err(ReadError::NotARecording { path: path.into() }),
+        };
+        Ok(Self {
+            path: path.into(),
+            messages,
+            run,
+            ending,
+            notes: Vec::new(),
+            pose: None,
+            sequence: 0,
+            last_tick: None,
+            is_over: false,
+        })
+    }
+
+    /// How the run was set up.
+    #[must_use]
+    pub fn run(&self) -> &RunDescription {
+        &self.run
+    }
+
+    /// Whether the end of the run is there; known from the start.
+    #[must_use]
+    pub fn ending(&self) -> Ending {
+        self.ending
+    }
+
+    /// What happened, in words, up to the tick read last.
+    #[must_use]
+    pub fn notes(&self) -> &[Note] {
+        &self.notes
+    }
+
+    fn next_tick(&mut self) -> Result<Option<TickRecord>, Damage> {
+        while let Some(message) = self.messages.next()? {
+            match message.topic {
+                Topic::Run => {} // another recording appended to this one; its first tick is a gap
+                Topic::Pose => {
+                    let pose = decode::<FrameTransform>(&message)?.pose();
+                    self.pose = Some((message.time_ns, pose.map_err(|part| lacks(&message, part))?));
+                }
+                Topic::Tick => return self.tick(&message).map(Some),
+                Topic::Log => self.notes.push(decode::<Log>(&message)?.note(message.time_ns)),
+            }
+        }
+        Ok(None)
+    }
+
+    fn tick(&mut self, message: &TopicMessage) -> Result<TickRecord, Damage> {
+        match message.sequence.wrapping_sub(self.sequence) {
+            0 => self.sequence = self.sequence.wrapping_add(1),
+            missing => return Err(Damage::Gap { missing }),
+        }
+        let pose = self.pose.take().filter(|(time_ns, _)| *time_ns == message.time_ns);
+        let (_, pose) = pose.ok_or(Damage::NoPose)?;
+        decode::<Tick>(message)?.record(pose).map_err(|part| lacks(message, part))
+    }
+}
+
+impl Iterator for Recording {
+    type Item = Result<TickRecord, ReadError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.is_over {
+            return None;
+        }
+        match self.next_tick() {
+            Ok(Some(record)) => {
+                self.last_tick = Some(record.tick);
+                Some(Ok(record))
+            }
+            Ok(None) => {
+                self.is_over = true;
+                None
+            }
+            Err(cause) => {
+                self.is_over = true;
+                Some(Err(damaged(&self.path, self.last_tick, cause)))
+            }
+        }
+    }
+}
+
+impl std::iter::FusedIterator for Recording {}
+
+/// True if the file begins as MCAP does, as far as it goes.
+fn begins_as_mcap(file: &mut File) -> io::Result<bool> {
+    let mut head = Vec::with_capacity(MAGIC.len());
+    file.take(MAGIC.len() as u64).read_to_end(&mut head)?;
+    Ok(MAGIC.starts_with(&head))
+}
+
+/// A finished file ends with the magic bytes it begins with.
+fn ending(file: &mut File) -> io::Result<Ending> {
+    let length = file.seek(SeekFrom::End(0))?;
+    let magic_length = MAGIC.len() as u64;
+    if length < 2 * magic_length {
+        return Ok(Ending::CutOff);
+    }
+    file.seek(SeekFrom::Start(length - magic_length))?;
+    let mut tail = Vec::with_capacity(MAGIC.len());
+    file.take(magic_length).read_to_end(&mut tail)?;
+    Ok(if tail == MAGIC { Ending::Finished } else { Ending::CutOff })
+}
+
+fn read_run(path: &Path, message: &TopicMessage) -> Result<RunDescription, ReadError> {
+    let run = decode::<Run>(message).map_err(|cause| damaged(path, None, cause))?;
+    if run.format > FORMAT {
+        let Run { format, flotor_version, .. } = run;
+        return Err(ReadError::TooNew { path: path.into(), format, flotor_version });
+    }
+    RunDescription::from_message(run).map_err(|part| damaged(path, None, lacks(message, part)))
+}
+
+fn decode<M: Message + Default>(message: &TopicMessage) -> Result<M, Damage> {
+    let topic = message.topic.name();
+    M::decode(message.data.as_slice()).map_err(|cause| Damage::Message { topic, cause })
+}
+
+fn lacks(message: &TopicMessage, Missing(field): Missing) -> Damage {
+    Damage::Missing { topic: message.topic.name(), field }
+}
+
+fn damaged(path: &Path, after_tick: Option<u64>, cause: Damage) -> ReadError {
+    match cause {
+        Damage::Container(McapError::UnsupportedCompression(compression)) => {
+            ReadError::Compressed { path: path.into(), compression }
+        }
+        cause => ReadError::Damaged { path: path.into(), after_tick, cause },
+    }
+}

@@ -1,0 +1,220 @@
+//! What is known before a run begins, in a form that can be kept: enough to repeat it.
+
+use super::schema::{self, FORMAT, Mapping, Missing, Plugin, Quaternion, Run, Setting};
+use crate::scene::{MappingConfig, PluginUse, Scene};
+use crate::servo::Clock;
+use crate::session::{PluginReport, RunOptions};
+use std::collections::BTreeMap;
+
+/// How a run was set up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunDescription {
+    /// Version of the program that ran it.
+    pub flotor_version: String,
+    /// Rate asked for, Hz.
+    pub rate_hz: f64,
+    /// How long it was to run, s.
+    pub duration_s: f64,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Real or virtual time.
+    pub clock: Clock,
+    /// The scene as it was written (TOML); the command line may have overruled rate, duration and settings.
+    pub scene_toml: String,
+    /// Device first, then the models in the order of the scene.
+    pub plugins: Vec<PluginDescription>,
+}
+
+/// A plugin of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PluginDescription {
+    /// What the scene calls it.
+    pub name: String,
+    /// Id.
+    pub id: String,
+    /// Version.
+    pub version: String,
+    /// Name of the library's file, without folders: recordings travel.
+    pub file: String,
+    /// What it was there for.
+    pub role: Role,
+    /// What scene and command line set, as written, in order: to repeat the run, set these.
+    pub settings: Vec<(String, String)>,
+    /// Every parameter with the value in force: to know what they were.
+    pub parameters: Vec<(String, String)>,
+}
+
+/// What a plugin was there for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Role {
+    /// Gave the pose and took the wrench.
+    Device,
+    /// Gave a wrench, by way of this mapping.
+    Model(MappingConfig),
+}
+
+/// Puts together what is known of a run before it begins. Not real-time.
+///
+/// `plugins` are those of the prepared scene: the device, then the models in the scene's order.
+#[must_use]
+pub fn describe(scene: &Scene, options: &RunOptions, plugins: &[PluginReport]) -> RunDescription {
+    let device = std::iter::once((&scene.device, Role::Device));
+    let models = scene.models.iter().map(|model| (&model.plugin, Role::Model(model.mapping)));
+    let plugins = device.chain(models).zip(plugins);
+    RunDescription {
+        flotor_version: env!("CARGO_PKG_VERSION").to_owned(),
+        rate_hz: scene.rate_hz,
+        duration_s: scene.duration_s,
+        seed: options.seed,
+        clock: options.clock,
+        scene_toml: scene.text.clone(),
+        plugins: plugins.map(|((used, role), report)| describe_plugin(used, role, report)).collect(),
+    }
+}
+
+fn describe_plugin(used: &PluginUse, role: Role, report: &PluginReport) -> PluginDescription {
+    let file = report.metadata.path.file_name().unwrap_or_default();
+    let settings = used.parameters.iter().map(|parameter| (parameter.key.clone(), parameter.value.clone()));
+    PluginDescription {
+        name: report.name.clone(),
+        id: report.metadata.id.clone(),
+        version: report.metadata.version.clone(),
+        file: file.to_string_lossy().into_owned(),
+        role,
+        settings: settings.collect(),
+        parameters: report.parameters.clone(),
+    }
+}
+
+impl RunDescription {
+    pub(super) fn to_message(&self) -> Run {
+        let clock = match self.clock {
+            Clock::Real => schema::Clock::Real,
+            Clock::Virtual => schema::Clock::Virtual,
+        };
+        Run {
+            format: FORMAT,
+            flotor_version: self.flotor_version.clone(),
+            rate_hz: Some(self.rate_hz),
+            duration_s: Some(self.duration_s),
+            seed: self.seed,
+            clock: clock.into(),
+            scene_toml: self.scene_toml.clone(),
+            plugins: self.plugins.iter().map(PluginDescription::to_message).collect(),
+        }
+    }
+
+    pub(super) fn from_message(run: Run) -> Result<Self, Missing> {
+        let clock = match run.clock() {
+            schema::Clock::Real => Clock::Real,
+            schema::Clock::Virtual => Clock::Virtual,
+            schema::Clock::Unspecified => return Err(Missing("clock")),
+        };
+        Ok(Self {
+            rate_hz: run.rate_hz(),
+            duration_s: run.duration_s(),
+            seed: run.seed,
+            clock,
+            flotor_version: run.flotor_version,
+            scene_toml: run.scene_toml,
+            plugins: run
+                .plugins
+                .into_iter()
+                .map(PluginDescription::from_message)
+                .collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// The same in flat text, for tools that show an MCAP file's metadata.
+    pub(super) fn to_metadata(&self) -> BTreeMap<String, String> {
+        let clock = match self.clock {
+            Clock::Real => "real",
+            Clock::Virtual => "virtual",
+        };
+        let mut texts = BTreeMap::from([
+            ("format".to_owned(), FORMAT.to_string()),
+            ("flotor_version".to_owned(), self.flotor_version.clone()),
+            ("rate_hz".to_owned(), self.rate_hz.to_string()),
+            ("duration_s".to_owned(), self.duration_s.to_string()),
+            ("seed".to_owned(), self.seed.to_string()),
+            ("clock".to_owned(), clock.to_owned()),
+            ("scene_toml".to_owned(), self.scene_toml.clone()),
+        ]);
+        for plugin in &self.plugins {
+            let facts = plugin.to_metadata();
+            texts.extend(facts.into_iter().map(|(key, value)| (format!("{}.{key}", plugin.name), value)));
+        }
+        texts
+    }
+}
+
+impl PluginDescription {
+    fn to_message(&self) -> Plugin {
+        let mapping = match &self.role {
+            Role::Device => None,
+            Role::Model(mapping) => Some(Mapping {
+                rotation: Some(Quaternion::new(mapping.rotation_xyzw)),
+                motion_scale: Some(mapping.motion_scale),
+                force_scale: Some(mapping.force_scale),
+                torque_scale: mapping.torque_scale,
+            }),
+        };
+        Plugin {
+            name: self.name.clone(),
+            id: self.id.clone(),
+            version: self.version.clone(),
+            file: self.file.clone(),
+            settings: to_settings(&self.settings),
+            parameters: to_settings(&self.parameters),
+            mapping,
+        }
+    }
+
+    fn from_message(plugin: Plugin) -> Result<Self, Missing> {
+        let role = match plugin.mapping {
+            None => Role::Device,
+            Some(mapping) => Role::Model(MappingConfig {
+                rotation_xyzw: mapping.rotation.ok_or(Missing("mapping.rotation"))?.to_array(),
+                motion_scale: mapping.motion_scale.ok_or(Missing("mapping.motion_scale"))?,
+                force_scale: mapping.force_scale.ok_or(Missing("mapping.force_scale"))?,
+                torque_scale: mapping.torque_scale,
+            }),
+        };
+        Ok(Self {
+            name: plugin.name,
+            id: plugin.id,
+            version: plugin.version,
+            file: plugin.file,
+            role,
+            settings: from_settings(plugin.settings),
+            parameters: from_settings(plugin.parameters),
+        })
+    }
+
+    fn to_metadata(&self) -> Vec<(String, String)> {
+        let mut texts = vec![
+            ("id".to_owned(), self.id.clone()),
+            ("version".to_owned(), self.version.clone()),
+            ("file".to_owned(), self.file.clone()),
+        ];
+        if let Role::Model(mapping) = &self.role {
+            texts.push(("mapping.rotation_xyzw".to_owned(), format!("{:?}", mapping.rotation_xyzw)));
+            texts.push(("mapping.motion_scale".to_owned(), mapping.motion_scale.to_string()));
+            texts.push(("mapping.force_scale".to_owned(), mapping.force_scale.to_string()));
+            texts.extend(
+                mapping.torque_scale.map(|scale| ("mapping.torque_scale".to_owned(), scale.to_string())),
+            );
+        }
+        texts.extend(self.settings.iter().map(|(key, value)| (format!("settings.{key}"), value.clone())));
+        texts.extend(self.parameters.iter().map(|(key, value)| (format!("parameters.{key}"), value.clone())));
+        texts
+    }
+}
+
+fn to_settings(pairs: &[(String, String)]) -> Vec<Setting> {
+    pairs.iter().cloned().map(|(key, value)| Setting { key, value }).collect()
+}
+
+fn from_settings(settings: Vec<Setting>) -> Vec<(String, String)> {
+    settings.into_iter().map(|setting| (setting.key, setting.value)).collect()
+}

@@ -1,0 +1,383 @@
+//! The messages of a recording, as `host/proto` defines them, and their way from and to a [`TickRecord`].
+//!
+//! Numbers and types are repeated here by hand; a test reads a recording by the schema inside it and compares
+//! every field. Every `f64` is an `Option` that is always filled: protobuf leaves out a plain field that equals its
+//! default, -0.0 equals 0.0, and a recording is bit-exact. On the wire it is the plain field of the schema.
+
+use super::{Note, Severity};
+use crate::trace::{Events, TickRecord};
+use flotor_hal::{Pose, Twist as TwistValue, Wrench as WrenchValue};
+use prost::{Enumeration, Message};
+use prost_types::Timestamp;
+
+/// `host/proto` compiled (a `google.protobuf.FileDescriptorSet`): what a stranger needs to read the messages.
+pub(super) const DESCRIPTOR_SET: &[u8] = include_bytes!("../../proto/flotor.binpb");
+
+/// The encoding of messages and schemas, as MCAP's registry names it.
+pub(super) const ENCODING: &str = "protobuf";
+
+/// Format this program writes, and the highest it reads.
+pub(super) const FORMAT: u32 = 1;
+
+/// Frame of all numbers; its axes are those of the device frame.
+const DEVICE_FRAME: &str = "device";
+/// Frame that moves with the handle.
+const HANDLE_FRAME: &str = "handle";
+
+/// What a channel is about. The number is the id of channel and schema in files written here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u16)]
+pub(super) enum Topic {
+    Run = 1,
+    Pose = 2,
+    Tick = 3,
+    Log = 4,
+}
+
+impl Topic {
+    pub(super) const ALL: [Topic; 4] = [Topic::Run, Topic::Pose, Topic::Tick, Topic::Log];
+
+    pub(super) const fn id(self) -> u16 {
+        self as u16
+    }
+
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Topic::Run => "/flotor/run",
+            Topic::Pose => "/tf",
+            Topic::Tick => "/flotor/tick",
+            Topic::Log => "/flotor/log",
+        }
+    }
+
+    pub(super) const fn schema(self) -> &'static str {
+        match self {
+            Topic::Run => "flotor.Run",
+            Topic::Pose => "foxglove.FrameTransform",
+            Topic::Tick => "flotor.Tick",
+            Topic::Log => "foxglove.Log",
+        }
+    }
+}
+
+/// A message lacks a part that every recording has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Missing(pub(super) &'static str);
+
+#[derive(Clone, Copy, PartialEq, Message)]
+pub(super) struct Vector3 {
+    #[prost(double, optional, tag = "1")]
+    x: Option<f64>,
+    #[prost(double, optional, tag = "2")]
+    y: Option<f64>,
+    #[prost(double, optional, tag = "3")]
+    z: Option<f64>,
+}
+
+#[derive(Clone, Copy, PartialEq, Message)]
+pub(super) struct Quaternion {
+    #[prost(double, optional, tag = "1")]
+    x: Option<f64>,
+    #[prost(double, optional, tag = "2")]
+    y: Option<f64>,
+    #[prost(double, optional, tag = "3")]
+    z: Option<f64>,
+    #[prost(double, optional, tag = "4")]
+    w: Option<f64>,
+}
+
+#[derive(Clone, PartialEq, Message)]
+pub(super) struct FrameTransform {
+    #[prost(message, optional, tag = "1")]
+    timestamp: Option<Timestamp>,
+    #[prost(string, tag = "2")]
+    parent_frame_id: String,
+    #[prost(string, tag = "3")]
+    child_frame_id: String,
+    #[prost(message, optional, tag = "4")]
+    translation: Option<Vector3>,
+    #[prost(message, optional, tag = "5")]
+    rotation: Option<Quaternion>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
+#[repr(i32)]
+enum Level {
+    Unknown = 0,
+    Debug = 1,
+    Info = 2,
+    Warning = 3,
+    Error = 4,
+    Fatal = 5,
+}
+
+#[derive(Clone, PartialEq, Message)]
+pub(super) struct Log {
+    #[prost(message, optional, tag = "1")]
+    timestamp: Option<Timestamp>,
+    #[prost(enumeration = "Level", tag = "2")]
+    level: i32,
+    #[prost(string, tag = "3")]
+    message: String,
+    #[prost(string, tag = "4")]
+    name: String,
+    #[prost(string, tag = "5")]
+    file: String,
+    #[prost(fixed32, tag = "6")]
+    line: u32,
+}
+
+#[derive(Clone, Copy, PartialEq, Message)]
+struct Twist {
+    #[prost(message, optional, tag = "1")]
+    linear_m_per_s: Option<Vector3>,
+    #[prost(message, optional, tag = "2")]
+    angular_rad_per_s: Option<Vector3>,
+}
+
+#[derive(Clone, Copy, PartialEq, Message)]
+struct Wrench {
+    #[prost(message, optional, tag = "1")]
+    force_n: Option<Vector3>,
+    #[prost(message, optional, tag = "2")]
+    torque_nm: Option<Vector3>,
+}
+
+#[derive(Clone, Copy, PartialEq, Message)]
+pub(super) struct Tick {
+    #[prost(uint64, tag = "1")]
+    tick: u64,
+    #[prost(uint64, tag = "2")]
+    time_ns: u64,
+    #[prost(uint64, tag = "3")]
+    dt_ns: u64,
+    #[prost(message, optional, tag = "4")]
+    twist: Option<Twist>,
+    #[prost(message, optional, tag = "5")]
+    model: Option<Wrench>,
+    #[prost(message, optional, tag = "6")]
+    commanded: Option<Wrench>,
+    #[prost(message, optional, tag = "7")]
+    delivered: Option<Wrench>,
+    #[prost(double, optional, tag = "8")]
+    energy_j: Option<f64>,
+    #[prost(uint32, tag = "9")]
+    events: u32,
+    #[prost(uint32, tag = "10")]
+    buttons: u32,
+    #[prost(uint64, tag = "11")]
+    lateness_ns: u64,
+    #[prost(uint64, tag = "12")]
+    compute_ns: u64,
+}
+
+#[derive(Clone, PartialEq, Message)]
+pub(super) struct Run {
+    #[prost(uint32, tag = "1")]
+    pub(super) format: u32,
+    #[prost(string, tag = "2")]
+    pub(super) flotor_version: String,
+    #[prost(double, optional, tag = "3")]
+    pub(super) rate_hz: Option<f64>,
+    #[prost(double, optional, tag = "4")]
+    pub(super) duration_s: Option<f64>,
+    #[prost(uint64, tag = "5")]
+    pub(super) seed: u64,
+    #[prost(enumeration = "Clock", tag = "6")]
+    pub(super) clock: i32,
+    #[prost(string, tag = "7")]
+    pub(super) scene_toml: String,
+    #[prost(message, repeated, tag = "8")]
+    pub(super) plugins: Vec<Plugin>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
+#[repr(i32)]
+pub(super) enum Clock {
+    Unspecified = 0,
+    Real = 1,
+    Virtual = 2,
+}
+
+#[derive(Clone, PartialEq, Message)]
+pub(super) struct Plugin {
+    #[prost(string, tag = "1")]
+    pub(super) name: String,
+    #[prost(string, tag = "2")]
+    pub(super) id: String,
+    #[prost(string, tag = "3")]
+    pub(super) version: String,
+    #[prost(string, tag = "4")]
+    pub(super) file: String,
+    #[prost(message, repeated, tag = "5")]
+    pub(super) settings: Vec<Setting>,
+    #[prost(message, repeated, tag = "6")]
+    pub(super) parameters: Vec<Setting>,
+    #[prost(message, optional, tag = "7")]
+    pub(super) mapping: Option<Mapping>,
+}
+
+#[derive(Clone, PartialEq, Eq, Message)]
+pub(super) struct Setting {
+    #[prost(string, tag = "1")]
+    pub(super) key: String,
+    #[prost(string, tag = "2")]
+    pub(super) value: String,
+}
+
+#[derive(Clone, Copy, PartialEq, Message)]
+pub(super) struct Mapping {
+    #[prost(message, optional, tag = "1")]
+    pub(super) rotation: Option<Quaternion>,
+    #[prost(double, optional, tag = "2")]
+    pub(super) motion_scale: Option<f64>,
+    #[prost(double, optional, tag = "3")]
+    pub(super) force_scale: Option<f64>,
+    #[prost(double, optional, tag = "4")]
+    pub(super) torque_scale: Option<f64>,
+}
+
+impl Vector3 {
+    fn new([x, y, z]: [f64; 3]) -> Self {
+        Self { x: Some(x), y: Some(y), z: Some(z) }
+    }
+
+    fn to_array(self) -> [f64; 3] {
+        [self.x(), self.y(), self.z()]
+    }
+}
+
+impl Quaternion {
+    pub(super) fn new([x, y, z, w]: [f64; 4]) -> Self {
+        Self { x: Some(x), y: Some(y), z: Some(z), w: Some(w) }
+    }
+
+    pub(super) fn to_array(self) -> [f64; 4] {
+        [self.x(), self.y(), self.z(), self.w()]
+    }
+}
+
+impl FrameTransform {
+    /// A message to be filled tick by tick: the names of the frames are allocated once.
+    pub(super) fn of_handle() -> Self {
+        Self {
+            parent_frame_id: DEVICE_FRAME.to_owned(),
+            child_frame_id: HANDLE_FRAME.to_owned(),
+            ..Self::default()
+        }
+    }
+
+    pub(super) fn set(&mut self, record: &TickRecord) {
+        self.timestamp = Some(timestamp(record.time_ns));
+        self.translation = Some(Vector3::new(record.pose.position_m));
+        self.rotation = Some(Quaternion::new(record.pose.orientation_xyzw));
+    }
+
+    pub(super) fn pose(&self) -> Result<Pose, Missing> {
+        Ok(Pose {
+            position_m: self.translation.ok_or(Missing("translation"))?.to_array(),
+            orientation_xyzw: self.rotation.ok_or(Missing("rotation"))?.to_array(),
+        })
+    }
+}
+
+impl Twist {
+    fn new(twist: &TwistValue) -> Self {
+        let [linear, angular] = [twist.linear_m_per_s, twist.angular_rad_per_s].map(Vector3::new);
+        Self { linear_m_per_s: Some(linear), angular_rad_per_s: Some(angular) }
+    }
+
+    fn value(self) -> Result<TwistValue, Missing> {
+        Ok(TwistValue {
+            linear_m_per_s: self.linear_m_per_s.ok_or(Missing("linear_m_per_s"))?.to_array(),
+            angular_rad_per_s: self.angular_rad_per_s.ok_or(Missing("angular_rad_per_s"))?.to_array(),
+        })
+    }
+}
+
+impl Wrench {
+    fn new(wrench: &WrenchValue) -> Self {
+        let [force, torque] = [wrench.force_n, wrench.torque_nm].map(Vector3::new);
+        Self { force_n: Some(force), torque_nm: Some(torque) }
+    }
+
+    fn value(self) -> Result<WrenchValue, Missing> {
+        Ok(WrenchValue {
+            force_n: self.force_n.ok_or(Missing("force_n"))?.to_array(),
+            torque_nm: self.torque_nm.ok_or(Missing("torque_nm"))?.to_array(),
+        })
+    }
+}
+
+impl Tick {
+    pub(super) fn new(record: &TickRecord) -> Self {
+        Self {
+            tick: record.tick,
+            time_ns: record.time_ns,
+            dt_ns: record.dt_ns,
+            twist: Some(Twist::new(&record.twist)),
+            model: Some(Wrench::new(&record.model)),
+            commanded: Some(Wrench::new(&record.commanded)),
+            delivered: Some(Wrench::new(&record.delivered)),
+            energy_j: Some(record.energy_j),
+            events: record.events.bits(),
+            buttons: record.buttons,
+            lateness_ns: record.lateness_ns,
+            compute_ns: record.compute_ns,
+        }
+    }
+
+    /// Together with the pose of the same time, what the tick left behind.
+    pub(super) fn record(&self, pose: Pose) -> Result<TickRecord, Missing> {
+        Ok(TickRecord {
+            tick: self.tick,
+            time_ns: self.time_ns,
+            dt_ns: self.dt_ns,
+            pose,
+            twist: self.twist.ok_or(Missing("twist"))?.value()?,
+            model: self.model.ok_or(Missing("model"))?.value()?,
+            commanded: self.commanded.ok_or(Missing("commanded"))?.value()?,
+            delivered: self.delivered.ok_or(Missing("delivered"))?.value()?,
+            energy_j: self.energy_j(),
+            events: Events::from_bits(self.events),
+            buttons: self.buttons,
+            lateness_ns: self.lateness_ns,
+            compute_ns: self.compute_ns,
+        })
+    }
+}
+
+impl Log {
+    pub(super) fn new(note: &Note) -> Self {
+        let level = match note.severity {
+            Severity::Info => Level::Info,
+            Severity::Warning => Level::Warning,
+            Severity::Error => Level::Error,
+        };
+        Self {
+            timestamp: Some(timestamp(note.time_ns)),
+            level: level.into(),
+            message: note.text.clone(),
+            name: note.source.clone(),
+            ..Self::default()
+        }
+    }
+
+    pub(super) fn note(self, time_ns: u64) -> Note {
+        let severity = match self.level() {
+            Level::Unknown | Level::Debug | Level::Info => Severity::Info,
+            Level::Warning => Severity::Warning,
+            Level::Error | Level::Fatal => Severity::Error,
+        };
+        Note { time_ns, severity, source: self.name, text: self.message }
+    }
+}
+
+/// Protobuf's time for nanoseconds since the loop started.
+fn timestamp(time_ns: u64) -> Timestamp {
+    const NS_PER_S: u64 = 1_000_000_000;
+    // Neither can saturate: 2^64 / 10^9 fits in an i64, a remainder below 10^9 in an i32.
+    let seconds = i64::try_from(time_ns / NS_PER_S).unwrap_or(i64::MAX);
+    let nanos = i32::try_from(time_ns % NS_PER_S).unwrap_or(i32::MAX);
+    Timestamp { seconds, nanos }
+}

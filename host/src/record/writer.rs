@@ -1,0 +1,186 @@
+//! Writes a recording: a chunk at a time, whole, at least every quarter of a second.
+
+use super::schema::{DESCRIPTOR_SET, ENCODING, FrameTransform, Log, Tick, Topic};
+use super::{Note, RunDescription};
+use crate::trace::{Events, TickRecord};
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{McapError, McapResult, WriteOptions};
+use prost::Message;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// Recorded time that a killed process may lose, ns.
+const CHUNK_NS: u64 = 250_000_000;
+
+/// Name of the metadata record with the run's description.
+const RUN_METADATA: &str = "flotor.run";
+
+/// Key of the tick channel's metadata that names the bits of `events`, lowest first.
+const EVENT_BITS: &str = "events";
+
+/// Why a recording was not begun or does not go on.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordError {
+    /// The file could not be made.
+    #[error("cannot make the recording `{}`: {cause}; name a file in a folder you may write to", path.display())]
+    Create {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        #[source]
+        cause: io::Error,
+    },
+    /// The file could not be written to.
+    #[error(
+        "cannot go on writing the recording `{}`: {cause}; what was written before can be read, but make room or \
+         name another file and record again",
+        path.display()
+    )]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        #[source]
+        cause: io::Error,
+    },
+}
+
+/// A recording being written.
+///
+/// Dropped without [`Recorder::finish`] it still closes the file properly, but errors are lost.
+pub struct Recorder {
+    path: PathBuf,
+    file: mcap::Writer<BufWriter<File>>,
+    /// Filled anew for each tick.
+    pose: FrameTransform,
+    /// One encoded message; keeps its memory.
+    buffer: Vec<u8>,
+    /// Number of the next tick in the file: a reader that finds a gap knows that something is missing.
+    sequence: u32,
+    /// Time of the first tick that is not yet in the file.
+    chunk_start_ns: Option<u64>,
+}
+
+impl Recorder {
+    /// Makes the file, replacing one of that name, and puts the description of the run in it. Not real-time.
+    ///
+    /// # Errors
+    /// [`RecordError`]: the file cannot be made or written to.
+    pub fn create(path: &Path, run: &RunDescription) -> Result<Self, RecordError> {
+        let file = File::create(path).map_err(|cause| RecordError::Create { path: path.into(), cause })?;
+        let file = begin(file, run).map_err(|cause| write_error(path, cause))?;
+        let mut recorder = Self {
+            path: path.into(),
+            file,
+            pose: FrameTransform::of_handle(),
+            buffer: Vec::new(),
+            sequence: 0,
+            chunk_start_ns: None,
+        };
+        recorder.write_now(Topic::Run, &run.to_message(), 0).map_err(|cause| write_error(path, cause))?;
+        Ok(recorder)
+    }
+
+    /// Appends a tick. Not real-time: every quarter of a second it writes a chunk to the file.
+    ///
+    /// # Errors
+    /// [`RecordError::Write`]. The recording is over then: later calls fail too.
+    pub fn record(&mut self, record: &TickRecord) -> Result<(), RecordError> {
+        self.try_record(record).map_err(|cause| write_error(&self.path, cause))
+    }
+
+    /// Appends something that happened, in words. Not real-time.
+    ///
+    /// # Errors
+    /// [`RecordError::Write`]. The recording is over then: later calls fail too.
+    pub fn note(&mut self, note: &Note) -> Result<(), RecordError> {
+        // Words are rare and explain why a run ended: they do not wait for the chunk to fill.
+        self.write_now(Topic::Log, &Log::new(note), note.time_ns)
+            .map_err(|cause| write_error(&self.path, cause))
+    }
+
+    /// Writes what is left and the index, and closes the file. Not real-time.
+    ///
+    /// # Errors
+    /// [`RecordError::Write`]: the index may be missing, what was flushed before can be read.
+    pub fn finish(self) -> Result<(), RecordError> {
+        let Self { path, mut file, .. } = self;
+        let finished = file.finish().and_then(|_| Ok(file.into_inner().flush()?));
+        finished.map_err(|cause| write_error(&path, cause))
+    }
+
+    fn try_record(&mut self, record: &TickRecord) -> McapResult<()> {
+        self.pose.set(record);
+        encode(&self.pose, &mut self.buffer)?;
+        self.write(Topic::Pose, record.time_ns)?;
+        encode(&Tick::new(record), &mut self.buffer)?;
+        self.write(Topic::Tick, record.time_ns)?;
+        self.sequence = self.sequence.wrapping_add(1);
+
+        let start_ns = *self.chunk_start_ns.get_or_insert(record.time_ns);
+        // This tick lasts until the next: a chunk closed one tick later would hold more than it may lose.
+        let end_ns = record.time_ns.saturating_add(record.dt_ns);
+        if end_ns.saturating_sub(start_ns) >= CHUNK_NS { self.flush() } else { Ok(()) }
+    }
+
+    fn write_now(&mut self, topic: Topic, message: &impl Message, time_ns: u64) -> McapResult<()> {
+        encode(message, &mut self.buffer)?;
+        self.write(topic, time_ns)?;
+        self.flush()
+    }
+
+    /// Appends the message in the buffer to the chunk in memory.
+    fn write(&mut self, topic: Topic, time_ns: u64) -> McapResult<()> {
+        let header = MessageHeader {
+            channel_id: topic.id(),
+            sequence: self.sequence,
+            log_time: time_ns,
+            publish_time: time_ns,
+        };
+        self.file.write_to_known_channel(&header, &self.buffer)
+    }
+
+    /// Hands the chunk to the system, whole.
+    fn flush(&mut self) -> McapResult<()> {
+        self.chunk_start_ns = None;
+        self.file.flush()
+    }
+}
+
+/// Writes what a file begins with: who wrote it, how, and the schemas and channels of all messages.
+fn begin(file: File, run: &RunDescription) -> McapResult<mcap::Writer<BufWriter<File>>> {
+    let options = WriteOptions::new()
+        .library(format!("flotor/{}", run.flotor_version))
+        .compression(None)
+        // Chunks close when a quarter of a second is full, not by size.
+        .chunk_size(None)
+        // Gathers a chunk in memory: the file never holds one whose length is yet to be filled in.
+        .disable_seeking(true);
+    let mut file = options.create(BufWriter::new(file))?;
+    file.write_metadata(&Metadata { name: RUN_METADATA.to_owned(), metadata: run.to_metadata() })?;
+    let event_bits = BTreeMap::from([(EVENT_BITS.to_owned(), Events::NAMES.join(" "))]);
+    let nothing = BTreeMap::new();
+    for topic in Topic::ALL {
+        let metadata = if topic == Topic::Tick { &event_bits } else { &nothing };
+        file.add_schema_with_id(topic.id(), topic.schema(), ENCODING, DESCRIPTOR_SET)?;
+        file.add_channel_with_id(topic.id(), topic.id(), topic.name(), ENCODING, metadata)?;
+    }
+    Ok(file)
+}
+
+/// Puts an encoded message in place of what the buffer held.
+fn encode(message: &impl Message, buffer: &mut Vec<u8>) -> McapResult<()> {
+    buffer.clear();
+    Ok(message.encode(buffer).map_err(io::Error::from)?)
+}
+
+fn write_error(path: &Path, cause: McapError) -> RecordError {
+    let cause = match cause {
+        McapError::Io(cause) => cause,
+        other => io::Error::other(other),
+    };
+    RecordError::Write { path: path.into(), cause }
+}

@@ -1,0 +1,164 @@
+//! Where plugins are, and which one an id means. Files are read, not run, until a scene needs one.
+
+use crate::scene::nearest;
+use flotor_hal::abi::PluginKind;
+use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, read_metadata};
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+
+/// Environment variable with further plugin folders, separated like `PATH`.
+pub const PATH_VARIABLE: &str = "FLOTOR_PLUGIN_PATH";
+
+/// A folder that was not searched, and why.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SkippedFolder {
+    /// The folder.
+    pub folder: PathBuf,
+    /// Why, and what to do.
+    pub reason: String,
+}
+
+/// Plugins found, in search order; of two with one id the first wins.
+pub struct Registry {
+    found: Vec<Metadata>,
+    shadowed: Vec<Metadata>,
+    broken: Vec<LoadError>,
+    skipped: Vec<SkippedFolder>,
+    folders: Vec<PathBuf>,
+}
+
+/// Why no plugin answers to an id.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LookupError {
+    /// No plugin has the id.
+    #[error("no {} plugin `{id}`{}{}; `flotor plugins` lists what there is, {PATH_VARIABLE} adds folders",
+        kind.word(),
+        nearest.as_ref().map_or(String::new(), |n| format!("; did you mean `{n}`?")),
+        broken.as_ref().map_or(String::new(), |b| format!(" ({b})")))]
+    Unknown {
+        /// The id.
+        id: String,
+        /// Model or device.
+        kind: PluginKind,
+        /// The most similar id of that kind.
+        nearest: Option<String>,
+        /// A file of that name that could not be read as a plugin.
+        broken: Option<String>,
+    },
+    /// The plugin was found and refused.
+    #[error(transparent)]
+    Refused(#[from] LoadError),
+}
+
+impl Registry {
+    /// Searches the folders of a scene, of the environment and beside the executable. Not real-time.
+    #[must_use]
+    pub fn search(scene_folders: &[PathBuf]) -> Self {
+        let mut folders = scene_folders.to_vec();
+        if let Some(path) = std::env::var_os(PATH_VARIABLE) {
+            folders.extend(std::env::split_paths(&path).filter(|folder| !folder.as_os_str().is_empty()));
+        }
+        if let Some(own) = std::env::current_exe().ok().as_deref().and_then(Path::parent) {
+            // `deps` before the folder itself: `cargo run` refreshes only `deps`, and an older copy may lie above it.
+            folders.extend([own.join("deps"), own.to_path_buf(), own.join("plugins")]);
+        }
+        let mut registry = Self {
+            found: Vec::new(),
+            shadowed: Vec::new(),
+            broken: Vec::new(),
+            skipped: Vec::new(),
+            folders,
+        };
+        for folder in registry.folders.clone() {
+            registry.scan(&folder);
+        }
+        registry
+    }
+
+    fn scan(&mut self, folder: &Path) {
+        let Ok(attributes) = std::fs::metadata(folder) else { return };
+        if attributes.permissions().mode() & 0o002 != 0 {
+            let reason = format!(
+                "anybody may write into it, and loading a plugin runs its code; `chmod o-w {}`",
+                folder.display()
+            );
+            self.skipped.push(SkippedFolder { folder: folder.into(), reason });
+            return;
+        }
+        let Ok(entries) = std::fs::read_dir(folder) else { return };
+        let mut files: Vec<PathBuf> = entries.filter_map(Result::ok).map(|entry| entry.path()).collect();
+        files.retain(|file| {
+            file.extension().is_some_and(|extension| extension == std::env::consts::DLL_EXTENSION)
+        });
+        files.sort();
+        for file in files {
+            match read_metadata(&file) {
+                Ok(metadata) => match self.found.iter().any(|known| known.id == metadata.id) {
+                    true => self.shadowed.push(metadata),
+                    false => self.found.push(metadata),
+                },
+                // Other libraries may lie beside plugins; only files that claim to be one are worth a word.
+                Err(LoadError::NotAPlugin { .. }) => {}
+                Err(error) => self.broken.push(error),
+            }
+        }
+    }
+
+    /// Plugins found, in search order.
+    #[must_use]
+    pub fn found(&self) -> &[Metadata] {
+        &self.found
+    }
+
+    /// Plugins hidden by one with the same id found earlier.
+    #[must_use]
+    pub fn shadowed(&self) -> &[Metadata] {
+        &self.shadowed
+    }
+
+    /// Files that look like plugins and cannot be read as one.
+    #[must_use]
+    pub fn broken(&self) -> &[LoadError] {
+        &self.broken
+    }
+
+    /// Folders that were not searched, and why.
+    #[must_use]
+    pub fn skipped(&self) -> &[SkippedFolder] {
+        &self.skipped
+    }
+
+    /// Folders in search order, whether they exist or not.
+    #[must_use]
+    pub fn folders(&self) -> &[PathBuf] {
+        &self.folders
+    }
+
+    /// Loads the plugin an id (or a path to a file) means. Not real-time; runs the plugin's code.
+    ///
+    /// # Errors
+    /// [`LookupError`]: unknown, with the nearest known id, or refused, with the reason.
+    pub fn load(&self, id: &str, kind: PluginKind) -> Result<Plugin, LookupError> {
+        if id.contains(std::path::MAIN_SEPARATOR) {
+            return Ok(Plugin::load(Path::new(id))?);
+        }
+        if let Some(metadata) = self.found.iter().find(|known| known.id == id) {
+            if metadata.kind != kind {
+                let Metadata { path, id, kind: found, .. } = metadata.clone();
+                return Err(
+                    LoadError::OtherKind { path, id, found: found.word(), wanted: kind.word() }.into()
+                );
+            }
+            return Ok(Plugin::load(&metadata.path)?);
+        }
+        let same_kind = self.found.iter().filter(|known| known.kind == kind).map(|known| known.id.as_str());
+        let broken = self.broken.iter().map(ToString::to_string).find(|text| text.contains(id));
+        Err(LookupError::Unknown {
+            id: id.to_owned(),
+            kind,
+            nearest: nearest(id, same_kind).map(str::to_owned),
+            broken,
+        })
+    }
+}

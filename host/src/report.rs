@@ -1,0 +1,282 @@
+//! What a run says about itself: numbers for machines, a page for people.
+
+use crate::servo::{Percentiles, Stage, Timing};
+use crate::session::{Observer, Outcome, PluginReport, RunEnd};
+use crate::trace::{Events, TickRecord};
+use flotor_hal::DVec3;
+use serde::Serialize;
+
+/// Collects over a run what can only be seen tick by tick.
+#[derive(Default)]
+pub struct Tally {
+    peak_force_n: f64,
+    peak_torque_nm: f64,
+    event_ticks: [u64; Events::NAMES.len()],
+    last: Option<(TickRecord, f64)>,
+    work_j: f64,
+    generated_peak_j: f64,
+}
+
+impl Observer for Tally {
+    fn observe(&mut self, record: &TickRecord) {
+        self.peak_force_n = self.peak_force_n.max(record.commanded.force().length());
+        self.peak_torque_nm = self.peak_torque_nm.max(record.commanded.torque().length());
+        for (bit, count) in self.event_ticks.iter_mut().enumerate() {
+            *count += u64::from(record.events.bits() >> bit & 1);
+        }
+        // Work of the models on the hand, with the wrench held over the tick as the device holds it.
+        let first_energy_j = match &self.last {
+            None => record.energy_j,
+            Some((last, first_energy_j)) => {
+                let moved = record.pose.position() - last.pose.position();
+                let turn = record.pose.orientation() * last.pose.orientation().conjugate();
+                let turned: DVec3 = flotor_hal::rotation_vector(turn);
+                self.work_j += last.model.force().dot(moved) + last.model.torque().dot(turned);
+                *first_energy_j
+            }
+        };
+        let generated_j = self.work_j - (first_energy_j - record.energy_j);
+        self.generated_peak_j = self.generated_peak_j.max(generated_j);
+        self.last = Some((*record, first_energy_j));
+    }
+}
+
+/// A run in numbers. The names are a contract: scripts rely on them.
+#[derive(Clone, Debug, Serialize)]
+pub struct RunSummary {
+    /// Title of the scene.
+    pub title: String,
+    /// "finished", "stopped" or "device_fault".
+    pub end: &'static str,
+    /// "real" or "virtual".
+    pub clock: &'static str,
+    /// Seed of the run.
+    pub seed: u64,
+    /// Rate asked for, Hz.
+    pub rate_hz: f64,
+    /// Ticks run.
+    pub ticks: u64,
+    /// Ticks that started later than a tenth of the period.
+    pub late_ticks: u64,
+    /// Ticks skipped.
+    pub missed_ticks: u64,
+    /// Time from the first deadline to the end of the last period, s.
+    pub elapsed_s: f64,
+    /// Start of a tick after its deadline.
+    pub lateness_ns: Percentiles,
+    /// A whole tick.
+    pub compute_ns: Percentiles,
+    /// Parts of a tick, sampled.
+    pub stages_ns: StageSummary,
+    /// Largest force sent, N.
+    pub peak_force_n: f64,
+    /// Largest torque sent, N·m.
+    pub peak_torque_nm: f64,
+    /// Energy accounts.
+    pub energy: EnergySummary,
+    /// Ticks in which each event happened, only those that did.
+    pub events: std::collections::BTreeMap<&'static str, u64>,
+    /// Digest of the trace without measured times: equal digests, equal runs.
+    pub trace_digest: String,
+    /// Records lost because an observer was too slow.
+    pub dropped_records: u64,
+    /// Wall-clock time, s.
+    pub wall_s: f64,
+    /// The plugins and every parameter in force.
+    pub plugins: Vec<PluginSummary>,
+}
+
+/// Parts of a tick.
+#[derive(Clone, Debug, Serialize)]
+pub struct StageSummary {
+    /// Reading the device.
+    pub read: Percentiles,
+    /// Mapping and models.
+    pub models: Percentiles,
+    /// Limiting.
+    pub envelope: Percentiles,
+    /// Writing the device.
+    pub write: Percentiles,
+}
+
+/// Energy accounts of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct EnergySummary {
+    /// What the device's own account fails to explain, over its peak energy; absent without an account.
+    pub device_residual_relative: Option<f64>,
+    /// Largest mechanical energy of the device, J; absent without an account.
+    pub device_peak_j: Option<f64>,
+    /// Largest energy the sampled loop has put out beyond what the models had stored, J: a hold leaks.
+    pub loop_generated_j: f64,
+}
+
+/// A plugin of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct PluginSummary {
+    /// Name in the scene.
+    pub name: String,
+    /// Id.
+    pub id: String,
+    /// "model" or "device".
+    pub kind: &'static str,
+    /// Version.
+    pub version: String,
+    /// File it was loaded from.
+    pub file: String,
+    /// "ok", or what happened to it.
+    pub health: String,
+    /// Every parameter with the value in force.
+    pub parameters: std::collections::BTreeMap<String, String>,
+}
+
+/// What a summary is made of, beyond the outcome.
+pub struct RunFacts<'a> {
+    /// Title of the scene.
+    pub title: &'a str,
+    /// "real" or "virtual".
+    pub clock: &'static str,
+    /// Seed.
+    pub seed: u64,
+    /// Rate asked for, Hz.
+    pub rate_hz: f64,
+    /// Plugins.
+    pub plugins: &'a [PluginReport],
+    /// Digest of the trace.
+    pub trace_digest: String,
+}
+
+impl RunSummary {
+    /// Puts together everything known after a run.
+    #[must_use]
+    pub fn new(facts: RunFacts<'_>, outcome: &Outcome, tally: &Tally) -> Self {
+        let Timing { ticks, late, missed, lateness, compute, stages: [read, models, envelope, write] } =
+            &outcome.timing;
+        let _ = Stage::Read; // the array above is in the order of `Stage`
+        let events = Events::NAMES.iter().copied().zip(tally.event_ticks);
+        #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
+        let elapsed_s = outcome.elapsed_ns as f64 * 1.0e-9;
+        Self {
+            title: facts.title.to_owned(),
+            end: match outcome.end {
+                RunEnd::Finished => "finished",
+                RunEnd::Stopped => "stopped",
+                RunEnd::DeviceFault(_) => "device_fault",
+            },
+            clock: facts.clock,
+            seed: facts.seed,
+            rate_hz: facts.rate_hz,
+            ticks: *ticks,
+            late_ticks: *late,
+            missed_ticks: *missed,
+            elapsed_s,
+            lateness_ns: lateness.percentiles(),
+            compute_ns: compute.percentiles(),
+            stages_ns: StageSummary {
+                read: read.percentiles(),
+                models: models.percentiles(),
+                envelope: envelope.percentiles(),
+                write: write.percentiles(),
+            },
+            peak_force_n: tally.peak_force_n,
+            peak_torque_nm: tally.peak_torque_nm,
+            energy: EnergySummary {
+                device_residual_relative: outcome.ledger.map(|ledger| {
+                    if ledger.peak_j > 0.0 {
+                        ledger.residual_j() / ledger.peak_j
+                    } else {
+                        ledger.residual_j()
+                    }
+                }),
+                device_peak_j: outcome.ledger.map(|ledger| ledger.peak_j),
+                loop_generated_j: tally.generated_peak_j,
+            },
+            events: events.filter(|(_, count)| *count > 0).collect(),
+            trace_digest: facts.trace_digest,
+            dropped_records: outcome.dropped_records,
+            wall_s: outcome.wall_s,
+            plugins: facts.plugins.iter().map(|plugin| plugin_summary(plugin, outcome)).collect(),
+        }
+    }
+
+    /// The run in one line, under the title of a picture.
+    #[must_use]
+    pub fn one_line(&self) -> String {
+        let plugins: Vec<&str> = self.plugins.iter().map(|plugin| plugin.id.as_str()).collect();
+        let (plugins, rate_hz, clock) = (plugins.join(" + "), self.rate_hz, self.clock);
+        format!(
+            "{plugins}, {rate_hz} Hz, {clock} clock, peak {:.2} N, digest {}",
+            self.peak_force_n, self.trace_digest
+        )
+    }
+
+    /// The page for people.
+    #[must_use]
+    pub fn to_text(&self) -> String {
+        let mut lines = Vec::new();
+        let clock = format!("{:.3} s at {} Hz, {} clock", self.elapsed_s, self.rate_hz, self.clock);
+        lines.push(format!("  {:<11}{clock}, {:.2} s wall", "ran", self.wall_s));
+        let counts = format!("{}   late {}   missed {}", self.ticks, self.late_ticks, self.missed_ticks);
+        lines.push(format!("  {:<11}{counts}", "ticks"));
+        if self.clock == "real" {
+            lines.push(format!("  {:<11}{}", "lateness", percentiles(&self.lateness_ns)));
+        }
+        lines.push(format!("  {:<11}{}", "compute", percentiles(&self.compute_ns)));
+        let peaks = format!("{:.3} N   {:.4} N·m", self.peak_force_n, self.peak_torque_nm);
+        lines.push(format!("  {:<11}{peaks}", "peak"));
+        if let (Some(residual), Some(peak_j)) =
+            (self.energy.device_residual_relative, self.energy.device_peak_j)
+        {
+            let account = format!("peak {:.3} mJ, balanced to {:.1e} of it", peak_j * 1.0e3, residual.abs());
+            lines.push(format!("  {:<11}{account}", "energy"));
+        }
+        if !self.events.is_empty() {
+            let events: Vec<String> =
+                self.events.iter().map(|(name, count)| format!("{name} {count}")).collect();
+            lines.push(format!("  {:<11}{}", "events", events.join("   ")));
+        }
+        for plugin in &self.plugins {
+            let health = if plugin.health == "ok" { String::new() } else { format!("  {}", plugin.health) };
+            lines.push(format!(
+                "  {:<11}{} {} ({}){health}",
+                plugin.kind, plugin.id, plugin.version, plugin.file
+            ));
+        }
+        lines.push(format!("  {:<11}{}", "digest", self.trace_digest));
+        lines.join("\n")
+    }
+}
+
+fn plugin_summary(plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
+    let model = outcome.models.iter().find(|(name, ..)| *name == plugin.name && plugin.name != "device");
+    let health = match model {
+        Some((_, health, words)) => match (health.panicked_at, health.first_rejected) {
+            (Some(tick), _) => format!("panicked at tick {tick}, no force since: {words}"),
+            (None, Some(tick)) => format!(
+                "{} answers were not finite, the first at tick {tick}; each counted as no force",
+                health.rejected_ticks
+            ),
+            (None, None) => "ok".to_owned(),
+        },
+        None => "ok".to_owned(),
+    };
+    PluginSummary {
+        name: plugin.name.clone(),
+        id: plugin.metadata.id.clone(),
+        kind: plugin.metadata.kind.word(),
+        version: plugin.metadata.version.clone(),
+        file: plugin.metadata.path.display().to_string(),
+        health,
+        parameters: plugin.parameters.iter().cloned().collect(),
+    }
+}
+
+fn percentiles(p: &Percentiles) -> String {
+    let show = |ns: u64| match ns {
+        0..1_000 => format!("{ns} ns"),
+        #[allow(clippy::cast_precision_loss)] // for people
+        1_000..1_000_000 => format!("{:.1} µs", ns as f64 * 1.0e-3),
+        #[allow(clippy::cast_precision_loss)]
+        _ => format!("{:.2} ms", ns as f64 * 1.0e-6),
+    };
+    format!("p50 {}   p99 {}   p99.9 {}   max {}", show(p.p50), show(p.p99), show(p.p999), show(p.max))
+}

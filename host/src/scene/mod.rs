@@ -1,0 +1,283 @@
+//! A scene: which device, which models, how they are mapped and limited. A TOML file; unknown keys are errors.
+
+mod reader;
+
+pub use reader::{Location, SceneError};
+
+pub(crate) use reader::nearest;
+use reader::{Section, Source};
+use std::path::{Path, PathBuf};
+
+/// The scene `flotor` runs when none is named: spring 1 on the simulated flotor, held by a hand.
+pub const DEMO: &str = include_str!("../../scenes/demo.toml");
+
+/// A scene as read: complete, checked against itself, not yet against the plugins it names.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// What stands in the title of a report.
+    pub title: String,
+    /// The text it was read from, for recordings.
+    pub text: String,
+    /// Loop rate, Hz.
+    pub rate_hz: f64,
+    /// How long to run, s.
+    pub duration_s: f64,
+    /// Folders with plugins, searched first; relative to the scene's file.
+    pub plugin_folders: Vec<PathBuf>,
+    /// The device.
+    pub device: PluginUse,
+    /// The force models; their wrenches add up.
+    pub models: Vec<ModelUse>,
+    /// Limits, tighter than or equal to what the device declares.
+    pub limits: Limits,
+    /// Where the handle is pushed back.
+    pub boundary: Boundary,
+}
+
+/// A plugin and what it is told.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PluginUse {
+    /// Id of the plugin.
+    pub plugin: String,
+    /// Where it was named.
+    pub location: Location,
+    /// Parameters as written, checked later against the plugin's schema.
+    pub parameters: Vec<ParameterText>,
+}
+
+/// One parameter as written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParameterText {
+    /// Id of the parameter.
+    pub key: String,
+    /// Its value, as text.
+    pub value: String,
+    /// Where it was written.
+    pub location: Location,
+}
+
+/// A force model in a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelUse {
+    /// What `--set NAME.KEY=VALUE` and reports call it; the plugin's id unless said otherwise.
+    pub name: String,
+    /// The plugin.
+    pub plugin: PluginUse,
+    /// From device to model and back.
+    pub mapping: MappingConfig,
+}
+
+/// Scales and rotation between the device frame and a model's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MappingConfig {
+    /// Rotation from the device frame to the model frame, unit quaternion.
+    pub rotation_xyzw: [f64; 4],
+    /// Model displacement per device displacement.
+    pub motion_scale: f64,
+    /// Device force per model force.
+    pub force_scale: f64,
+    /// Device torque per model torque; `None`: force scale over motion scale, which keeps the field conservative.
+    pub torque_scale: Option<f64>,
+}
+
+impl Default for MappingConfig {
+    fn default() -> Self {
+        Self { rotation_xyzw: [0.0, 0.0, 0.0, 1.0], motion_scale: 1.0, force_scale: 1.0, torque_scale: None }
+    }
+}
+
+/// What a scene allows; the device's declaration applies too, whichever is tighter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Largest force along each axis, N.
+    pub force_n: [f64; 3],
+    /// Largest torque about each axis, N·m.
+    pub torque_nm: [f64; 3],
+    /// Fastest change of force, N/s.
+    pub force_slew_n_per_s: f64,
+    /// Fastest change of torque, N·m/s.
+    pub torque_slew_nm_per_s: f64,
+    /// Time over which the force fades in at the start, s.
+    pub ramp_s: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            force_n: [f64::INFINITY; 3],
+            torque_nm: [f64::INFINITY; 3],
+            force_slew_n_per_s: f64::INFINITY,
+            torque_slew_nm_per_s: f64::INFINITY,
+            // Long enough not to startle a hand, short enough not to be waited for.
+            ramp_s: 0.2,
+        }
+    }
+}
+
+/// A spring-damper wall a little inside the device's range.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Boundary {
+    /// How far inside the device's range the wall begins, m.
+    pub margin_m: f64,
+    /// How far inside the device's rotation range the wall begins, rad.
+    pub margin_rad: f64,
+    /// Stiffness of the wall, N/m.
+    pub stiffness_n_per_m: f64,
+    /// Damping inside the wall, N·s/m.
+    pub damping_ns_per_m: f64,
+    /// Rotational stiffness, N·m/rad.
+    pub stiffness_nm_per_rad: f64,
+    /// Rotational damping, N·m·s/rad.
+    pub damping_nms_per_rad: f64,
+}
+
+impl Default for Boundary {
+    fn default() -> Self {
+        // Half of (b + B) / (T / 2) at 1 kHz without plant damping (Gil et al. 2009): 15 / 0.0005 = 30 kN/m. The
+        // gains 15 N s/m, 50 N m/rad and 0.15 N m s/rad are those of the device's own boundary mode (Utah client).
+        Self {
+            margin_m: 0.5e-3,
+            margin_rad: 0.005,
+            stiffness_n_per_m: 10_000.0,
+            damping_ns_per_m: 15.0,
+            stiffness_nm_per_rad: 50.0,
+            damping_nms_per_rad: 0.15,
+        }
+    }
+}
+
+impl Scene {
+    /// The built-in demo.
+    ///
+    /// # Errors
+    /// None in practice: a test reads it.
+    pub fn demo() -> Result<Self, SceneError> {
+        Self::parse(Path::new("built-in demo"), DEMO)
+    }
+
+    /// Reads a scene file. Not real-time.
+    ///
+    /// # Errors
+    /// [`SceneError`] with file, line, key and remedy.
+    pub fn load(path: &Path) -> Result<Self, SceneError> {
+        let text = std::fs::read_to_string(path).map_err(|error| SceneError {
+            location: Location { file: path.into(), line: 0 },
+            problem: format!("cannot read the scene: {error}"),
+        })?;
+        let mut scene = Self::parse(path, &text)?;
+        let base = path.parent().unwrap_or(Path::new(""));
+        for folder in &mut scene.plugin_folders {
+            *folder = base.join(&*folder);
+        }
+        Ok(scene)
+    }
+
+    /// Reads a scene from text; `file` is what complaints call it.
+    ///
+    /// # Errors
+    /// [`SceneError`] with file, line, key and remedy.
+    pub fn parse(file: &Path, text: &str) -> Result<Self, SceneError> {
+        let source = Source { file, text };
+        let mut root = source.parse()?;
+        let title = root.take("title").map(|value| value.text()).transpose()?.unwrap_or_default();
+        let rate_hz = root.number("rate_hz", 100.0..=10_000.0)?.unwrap_or(1000.0);
+        let duration_s = root.number("duration_s", 0.0..=31_536_000.0)?.unwrap_or(10.0);
+        let folders = root.take("plugin_folders").map(|value| value.texts()).transpose()?.unwrap_or_default();
+        let scene = Self {
+            title,
+            text: text.to_owned(),
+            rate_hz,
+            duration_s,
+            plugin_folders: folders.into_iter().map(PathBuf::from).collect(),
+            device: device(root.require_section("device")?)?,
+            models: root.sections("model")?.into_iter().map(model).collect::<Result<_, _>>()?,
+            limits: root.section("limits")?.map_or_else(|| Ok(Limits::default()), limits)?,
+            boundary: root.section("boundary")?.map_or_else(|| Ok(Boundary::default()), boundary)?,
+        };
+        root.finish()?;
+        Ok(scene)
+    }
+}
+
+fn device(mut section: Section<'_>) -> Result<PluginUse, SceneError> {
+    let plugin = plugin_use(&mut section)?;
+    section.finish()?;
+    Ok(plugin)
+}
+
+fn model(mut section: Section<'_>) -> Result<ModelUse, SceneError> {
+    let plugin = plugin_use(&mut section)?;
+    let name = section.take("name").map(|value| value.text()).transpose()?;
+    let mapping = section.section("mapping")?.map_or_else(|| Ok(MappingConfig::default()), mapping)?;
+    section.finish()?;
+    Ok(ModelUse { name: name.unwrap_or_else(|| plugin.plugin.clone()), plugin, mapping })
+}
+
+fn plugin_use(section: &mut Section<'_>) -> Result<PluginUse, SceneError> {
+    let plugin = section.require("plugin")?;
+    let location = plugin.location.clone();
+    let parameters = section.section("parameters")?.map_or_else(|| Ok(Vec::new()), Section::into_texts)?;
+    let parameters =
+        parameters.into_iter().map(|(key, value, location)| ParameterText { key, value, location }).collect();
+    Ok(PluginUse { plugin: plugin.text()?, location, parameters })
+}
+
+fn mapping(mut section: Section<'_>) -> Result<MappingConfig, SceneError> {
+    let default = MappingConfig::default();
+    let rotation =
+        section.take("rotation_xyzw").map(|value| (value.numbers::<4>(), value)).map(|(numbers, value)| {
+            let numbers = numbers?;
+            let norm = numbers.iter().map(|x| x * x).sum::<f64>().sqrt();
+            if (norm - 1.0).abs() > 1.0e-6 {
+                return Err(value.problem(format!(
+                    "a rotation is a unit quaternion [x, y, z, w]; this one has length {norm}"
+                )));
+            }
+            Ok(numbers.map(|x| x / norm))
+        });
+    let mapping = MappingConfig {
+        rotation_xyzw: rotation.transpose()?.unwrap_or(default.rotation_xyzw),
+        motion_scale: section.number("motion_scale", SCALE)?.unwrap_or(default.motion_scale),
+        force_scale: section.number("force_scale", SCALE)?.unwrap_or(default.force_scale),
+        torque_scale: section.number("torque_scale", SCALE)?,
+    };
+    section.finish()?;
+    Ok(mapping)
+}
+
+/// A scale of zero would make a device move nothing or feel nothing; a million is a unit mistaken.
+const SCALE: std::ops::RangeInclusive<f64> = 1.0e-6..=1.0e6;
+
+fn limits(mut section: Section<'_>) -> Result<Limits, SceneError> {
+    let default = Limits::default();
+    let limits = Limits {
+        force_n: section.three("force_n", 0.0..=f64::INFINITY)?.unwrap_or(default.force_n),
+        torque_nm: section.three("torque_nm", 0.0..=f64::INFINITY)?.unwrap_or(default.torque_nm),
+        force_slew_n_per_s: section
+            .number("force_slew_n_per_s", 1.0..=f64::INFINITY)?
+            .unwrap_or(default.force_slew_n_per_s),
+        torque_slew_nm_per_s: section
+            .number("torque_slew_nm_per_s", 0.01..=f64::INFINITY)?
+            .unwrap_or(default.torque_slew_nm_per_s),
+        ramp_s: section.number("ramp_s", 0.0..=60.0)?.unwrap_or(default.ramp_s),
+    };
+    section.finish()?;
+    Ok(limits)
+}
+
+fn boundary(mut section: Section<'_>) -> Result<Boundary, SceneError> {
+    let default = Boundary::default();
+    let millimetres = section.number("margin_mm", 0.0..=100.0)?;
+    let degrees = section.number("margin_deg", 0.0..=90.0)?;
+    let mut gain = |key, range, default| section.number(key, range).map(|value| value.unwrap_or(default));
+    let boundary = Boundary {
+        margin_m: millimetres.map_or(default.margin_m, |mm| mm * 1.0e-3),
+        margin_rad: degrees.map_or(default.margin_rad, f64::to_radians),
+        stiffness_n_per_m: gain("stiffness_n_per_m", 0.0..=1.0e5, default.stiffness_n_per_m)?,
+        damping_ns_per_m: gain("damping_ns_per_m", 0.0..=1.0e3, default.damping_ns_per_m)?,
+        stiffness_nm_per_rad: gain("stiffness_nm_per_rad", 0.0..=1.0e3, default.stiffness_nm_per_rad)?,
+        damping_nms_per_rad: gain("damping_nms_per_rad", 0.0..=10.0, default.damping_nms_per_rad)?,
+    };
+    section.finish()?;
+    Ok(boundary)
+}

@@ -1,0 +1,285 @@
+//! Reads TOML tables key by key, so that every complaint has a file, a line, a key and a way out.
+//!
+//! serde would know the line of an unknown key but not the nearest right one; here each key is taken by name
+//! and what is left over at the end is unknown.
+
+use std::ops::{Range, RangeInclusive};
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// Where in which file something was said.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Location {
+    /// The file, or what stands for it ("built-in demo", "--set").
+    pub file: PathBuf,
+    /// Line, from 1; 0 where lines mean nothing.
+    pub line: usize,
+}
+
+impl std::fmt::Display for Location {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.line {
+            0 => write!(f, "{}", self.file.display()),
+            line => write!(f, "{}:{line}", self.file.display()),
+        }
+    }
+}
+
+/// What is wrong with a scene: where, which key, what, and what would be right. One line.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{location}: {problem}")]
+pub struct SceneError {
+    /// Where.
+    pub location: Location,
+    /// Which key, what is wrong, and what would be right.
+    pub problem: String,
+}
+
+/// The text of a scene, with what is needed to name a line in it.
+pub(super) struct Source<'t> {
+    pub(super) file: &'t Path,
+    pub(super) text: &'t str,
+}
+
+impl<'t> Source<'t> {
+    fn location(&self, span: &Range<usize>) -> Location {
+        let before = self.text.get(..span.start).unwrap_or(self.text);
+        Location { file: self.file.into(), line: before.matches('\n').count() + 1 }
+    }
+
+    pub(super) fn parse(&'t self) -> Result<Section<'t>, SceneError> {
+        let root = DeTable::parse(self.text).map_err(|error| SceneError {
+            location: self.location(&error.span().unwrap_or(0..0)),
+            problem: format!("not valid TOML: {}", error.message().lines().next().unwrap_or_default()),
+        })?;
+        Ok(Section {
+            source: self,
+            name: String::new(),
+            span: root.span(),
+            table: root.into_inner(),
+            known: Vec::new(),
+        })
+    }
+}
+
+/// One table of a scene; keys are taken out of it until none is left.
+pub(super) struct Section<'t> {
+    source: &'t Source<'t>,
+    name: String,
+    span: Range<usize>,
+    table: DeTable<'t>,
+    known: Vec<&'static str>,
+}
+
+/// A value taken from a section, with the place it came from.
+pub(super) struct Value<'t> {
+    pub(super) location: Location,
+    key: String,
+    value: DeValue<'t>,
+}
+
+impl<'t> Section<'t> {
+    /// Takes a key, if it is there.
+    pub(super) fn take(&mut self, key: &'static str) -> Option<Value<'t>> {
+        self.known.push(key);
+        let (_, value) = self.table.remove_entry(key)?;
+        let location = self.source.location(&value.span());
+        Some(Value { location, key: self.path(key), value: value.into_inner() })
+    }
+
+    /// Takes a key that must be there.
+    pub(super) fn require(&mut self, key: &'static str) -> Result<Value<'t>, SceneError> {
+        let missing = self.missing(key);
+        self.take(key).ok_or(missing)
+    }
+
+    /// Takes a sub-table that must be there.
+    pub(super) fn require_section(&mut self, key: &'static str) -> Result<Section<'t>, SceneError> {
+        let missing = self.missing(key);
+        self.section(key)?.ok_or(missing)
+    }
+
+    fn missing(&self, key: &str) -> SceneError {
+        let location = self.source.location(&self.span);
+        SceneError { location, problem: format!("`{}` is missing", self.path(key)) }
+    }
+
+    /// Takes a number, if it is there, and checks that it lies in `range`.
+    pub(super) fn number(
+        &mut self,
+        key: &'static str,
+        range: RangeInclusive<f64>,
+    ) -> Result<Option<f64>, SceneError> {
+        self.take(key).map(|value| value.number(range)).transpose()
+    }
+
+    /// Takes three numbers (or one for all three), if there, and checks that they lie in `range`.
+    pub(super) fn three(
+        &mut self,
+        key: &'static str,
+        range: RangeInclusive<f64>,
+    ) -> Result<Option<[f64; 3]>, SceneError> {
+        self.take(key).map(|value| value.three(range)).transpose()
+    }
+
+    /// Takes a sub-table, if it is there.
+    pub(super) fn section(&mut self, key: &'static str) -> Result<Option<Section<'t>>, SceneError> {
+        let source = self.source;
+        self.known.push(key);
+        let Some((_, value)) = self.table.remove_entry(key) else { return Ok(None) };
+        Section::from_value(source, self.path(key), value).map(Some)
+    }
+
+    /// Takes a list of tables (`[[key]]`); none is an empty list.
+    pub(super) fn sections(&mut self, key: &'static str) -> Result<Vec<Section<'t>>, SceneError> {
+        let source = self.source;
+        self.known.push(key);
+        let Some((_, value)) = self.table.remove_entry(key) else { return Ok(Vec::new()) };
+        let (name, span) = (self.path(key), value.span());
+        match value.into_inner() {
+            DeValue::Array(list) => {
+                list.into_iter().map(|value| Section::from_value(source, name.clone(), value)).collect()
+            }
+            table @ DeValue::Table(_) => {
+                Ok(vec![Section::from_value(source, name, Spanned::new(span, table))?])
+            }
+            other => Err(SceneError {
+                location: source.location(&span),
+                problem: format!("`{name}` is a table like [[{name}]], not {}", other.type_str()),
+            }),
+        }
+    }
+
+    /// All keys with their values as text: for parameters, whose keys only the plugin knows.
+    pub(super) fn into_texts(self) -> Result<Vec<(String, String, Location)>, SceneError> {
+        let source = self.source;
+        let mut entries: Vec<_> = self.table.into_iter().collect();
+        entries.sort_by_key(|(key, _)| key.span().start); // as written: the order plugins see
+        let text = |(key, value): (Spanned<std::borrow::Cow<'t, str>>, Spanned<DeValue<'t>>)| {
+            let location = source.location(&value.span());
+            let text = match value.into_inner() {
+                DeValue::String(text) => text.into_owned(),
+                DeValue::Integer(number) => number.as_str().replace('_', ""),
+                DeValue::Float(number) => number.as_str().replace('_', ""),
+                DeValue::Boolean(flag) => if flag { "on" } else { "off" }.to_owned(),
+                other => {
+                    let problem = format!(
+                        "`{}` is a number, a word or true/false, not {}",
+                        key.get_ref(),
+                        other.type_str()
+                    );
+                    return Err(SceneError { location, problem });
+                }
+            };
+            Ok((key.into_inner().into_owned(), text, location))
+        };
+        entries.into_iter().map(text).collect()
+    }
+
+    /// Complains about the first key nobody took.
+    pub(super) fn finish(self) -> Result<(), SceneError> {
+        let Some(key) = self.table.keys().min_by_key(|key| key.span().start) else { return Ok(()) };
+        let nearest = nearest(key.get_ref(), self.known.iter().copied());
+        let nearest = nearest.map_or(String::new(), |known| format!("; did you mean `{known}`?"));
+        Err(SceneError {
+            location: self.source.location(&key.span()),
+            problem: format!("unknown key `{}`{nearest}", self.path(key.get_ref())),
+        })
+    }
+
+    fn from_value(
+        source: &'t Source<'t>,
+        name: String,
+        value: Spanned<DeValue<'t>>,
+    ) -> Result<Self, SceneError> {
+        let span = value.span();
+        match value.into_inner() {
+            DeValue::Table(table) => Ok(Section { source, name, span, table, known: Vec::new() }),
+            other => Err(SceneError {
+                location: source.location(&span),
+                problem: format!("`{name}` is a table like [{name}], not {}", other.type_str()),
+            }),
+        }
+    }
+
+    fn path(&self, key: &str) -> String {
+        if self.name.is_empty() { key.to_owned() } else { format!("{}.{key}", self.name) }
+    }
+}
+
+impl Value<'_> {
+    pub(super) fn problem(&self, problem: String) -> SceneError {
+        SceneError { location: self.location.clone(), problem }
+    }
+
+    pub(super) fn text(self) -> Result<String, SceneError> {
+        match self.value {
+            DeValue::String(text) => Ok(text.into_owned()),
+            ref other => {
+                Err(self.problem(format!("`{}` is text in quotes, not {}", self.key, other.type_str())))
+            }
+        }
+    }
+
+    pub(super) fn texts(self) -> Result<Vec<String>, SceneError> {
+        let wrong = self.problem(format!("`{}` is a list of texts in quotes", self.key));
+        let DeValue::Array(list) = self.value else { return Err(wrong) };
+        let texts = list.into_iter().map(|value| match value.into_inner() {
+            DeValue::String(text) => Ok(text.into_owned()),
+            _ => Err(wrong.clone()),
+        });
+        texts.collect()
+    }
+
+    pub(super) fn number(self, range: RangeInclusive<f64>) -> Result<f64, SceneError> {
+        let number = parse_number(&self.value);
+        let number = number.ok_or_else(|| {
+            self.problem(format!("`{}` is a number, not {}", self.key, self.value.type_str()))
+        })?;
+        self.in_range(number, &range)
+    }
+
+    pub(super) fn three(self, range: RangeInclusive<f64>) -> Result<[f64; 3], SceneError> {
+        if let Some(number) = parse_number(&self.value) {
+            return self.in_range(number, &range).map(|number| [number; 3]);
+        }
+        let numbers = self.numbers::<3>()?;
+        for number in numbers {
+            self.in_range(number, &range)?;
+        }
+        Ok(numbers)
+    }
+
+    pub(super) fn numbers<const N: usize>(&self) -> Result<[f64; N], SceneError> {
+        let wrong = || self.problem(format!("`{}` is a list of {N} numbers", self.key));
+        let DeValue::Array(list) = &self.value else { return Err(wrong()) };
+        let numbers: Option<Vec<f64>> = list.iter().map(|value| parse_number(value.get_ref())).collect();
+        numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(wrong)
+    }
+
+    fn in_range(&self, number: f64, range: &RangeInclusive<f64>) -> Result<f64, SceneError> {
+        if range.contains(&number) {
+            return Ok(number);
+        }
+        Err(self.problem(format!("`{}` = {number}: legal is {} to {}", self.key, range.start(), range.end())))
+    }
+}
+
+fn parse_number(value: &DeValue<'_>) -> Option<f64> {
+    match value {
+        DeValue::Integer(number) if number.radix() == 10 => number.as_str().replace('_', "").parse().ok(),
+        DeValue::Float(number) => number.as_str().replace('_', "").parse().ok(),
+        _ => None,
+    }
+}
+
+/// The known word most like `word`, if any is like it at all.
+pub(crate) fn nearest<'k>(word: &str, known: impl Iterator<Item = &'k str>) -> Option<&'k str> {
+    const ALIKE: f64 = 0.6; // Jaro-Winkler: below this, suggestions read as noise
+    let scored = known.map(|candidate| (strsim::jaro_winkler(word, candidate), candidate));
+    scored
+        .filter(|(score, _)| *score > ALIKE)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, candidate)| candidate)
+}

@@ -1,0 +1,149 @@
+//! When ticks happen: on the machine's clock at absolute deadlines, or on a virtual clock without waiting.
+//!
+//! The schedule is the same for both: tick `k` belongs to time `k T`, and a tick whose whole period has
+//! passed is missed, counted and skipped, never caught up in a burst.
+
+use flotor_hal::Tick;
+use rustix::thread::{ClockId, clock_nanosleep_absolute};
+use rustix::time::{Timespec, clock_gettime};
+
+/// Which clock drives the loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Clock {
+    /// The machine's monotonic clock.
+    Real,
+    /// No waiting: the next tick is due when the last one is done. Bit-exact.
+    Virtual,
+}
+
+/// The final stretch before a deadline is spun, not slept: a sleeping thread wakes tens of microseconds late.
+const SPIN_NS: u64 = 100_000;
+
+/// Nanoseconds of the monotonic clock. Real-time: bounded, no allocation (a vDSO call).
+#[inline]
+#[must_use]
+#[allow(clippy::cast_sign_loss)] // the monotonic clock starts at boot
+pub(crate) fn monotonic_ns() -> u64 {
+    let now = clock_gettime(ClockId::Monotonic);
+    now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
+}
+
+/// Gives one tick after the other, each when it is due.
+pub(crate) struct Schedule {
+    clock: Clock,
+    period_ns: u64,
+    start_ns: u64,
+    /// Number of periods since the start that the next tick belongs to.
+    slot: u64,
+    next_index: u64,
+    last_slot: u64,
+}
+
+/// A tick that is due, and how the machine kept to it.
+pub(crate) struct Due {
+    pub(crate) tick: Tick,
+    /// How long after its deadline it starts, ns.
+    pub(crate) lateness_ns: u64,
+    /// Ticks skipped just before it.
+    pub(crate) missed: u64,
+}
+
+impl Schedule {
+    /// A schedule whose first tick is due now (real clock: one period from now).
+    pub(crate) fn start(clock: Clock, period_ns: u64) -> Self {
+        let start_ns = match clock {
+            Clock::Real => monotonic_ns() + period_ns,
+            Clock::Virtual => 0,
+        };
+        Self { clock, period_ns, start_ns, slot: 0, next_index: 0, last_slot: 0 }
+    }
+
+    /// Waits for the next tick. Real-time: sleeps, then spins; no allocation.
+    pub(crate) fn wait(&mut self) -> Due {
+        let (lateness_ns, missed) = match self.clock {
+            Clock::Virtual => (0, 0),
+            Clock::Real => self.wait_real(),
+        };
+        let tick = Tick {
+            index: self.next_index,
+            time_ns: self.slot * self.period_ns,
+            dt_ns: (self.slot - self.last_slot) * self.period_ns,
+        };
+        self.last_slot = self.slot;
+        self.slot += 1;
+        self.next_index += 1;
+        Due { tick, lateness_ns, missed }
+    }
+
+    fn wait_real(&mut self) -> (u64, u64) {
+        let deadline = self.start_ns + self.slot * self.period_ns;
+        let mut now = monotonic_ns();
+        if now + SPIN_NS < deadline {
+            sleep_until(deadline - SPIN_NS);
+            now = monotonic_ns();
+        }
+        while now < deadline {
+            std::hint::spin_loop();
+            now = monotonic_ns();
+        }
+        let late = now - deadline;
+        // Whole periods that have passed belong to ticks that nobody can use any more.
+        let missed = late / self.period_ns;
+        self.slot += missed;
+        (late - missed * self.period_ns, missed)
+    }
+
+    /// Waits for the end of the last tick's period; time since the start, ns.
+    pub(crate) fn finish(mut self) -> u64 {
+        match self.clock {
+            Clock::Virtual => self.next_time_ns(),
+            Clock::Real => {
+                let start_ns = self.start_ns;
+                self.wait_real();
+                monotonic_ns() - start_ns
+            }
+        }
+    }
+
+    /// Scheduled time of the next tick, ns.
+    pub(crate) fn next_time_ns(&self) -> u64 {
+        self.slot * self.period_ns
+    }
+}
+
+#[allow(clippy::cast_possible_wrap)] // seconds since boot
+fn sleep_until(deadline_ns: u64) {
+    let request = Timespec {
+        tv_sec: (deadline_ns / 1_000_000_000) as i64,
+        tv_nsec: (deadline_ns % 1_000_000_000) as i64,
+    };
+    // An interrupted sleep is as good as a short one: the spin afterwards looks at the clock.
+    let _ = clock_nanosleep_absolute(ClockId::Monotonic, &request);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn virtual_ticks_are_evenly_spaced_from_zero() {
+        let mut schedule = Schedule::start(Clock::Virtual, 250_000);
+        let ticks: Vec<Tick> = (0..3).map(|_| schedule.wait().tick).collect();
+        assert_eq!(ticks[0], Tick { index: 0, time_ns: 0, dt_ns: 0 });
+        assert_eq!(ticks[2], Tick { index: 2, time_ns: 500_000, dt_ns: 250_000 });
+    }
+
+    #[test]
+    fn a_loop_that_was_held_up_skips_what_is_past_and_counts_it() {
+        let period_ns = 1_000_000;
+        let mut schedule = Schedule::start(Clock::Real, period_ns);
+        let _ = schedule.wait();
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        let due = schedule.wait();
+        assert!(due.missed >= 15, "{}", due.missed); // 20 periods passed; a loaded machine only adds to them
+        assert!(due.lateness_ns < period_ns);
+        assert_eq!(due.tick.index, 1);
+        assert_eq!(due.tick.dt_ns, (due.missed + 1) * period_ns);
+        assert_eq!(due.tick.time_ns, due.tick.dt_ns);
+    }
+}

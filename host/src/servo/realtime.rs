@@ -1,0 +1,88 @@
+//! Asks the system for a quiet place for the loop, and says aloud what it refused.
+
+use rustix::mm::{MlockAllFlags, mlockall};
+use thread_priority::unix::{
+    RealtimeThreadSchedulePolicy, ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
+};
+use thread_priority::{ThreadPriority, ThreadPriorityValue};
+
+/// Priority asked for: below the kernel's own threads (99), above everything ordinary.
+const FIFO_PRIORITY: u8 = 80;
+
+/// Whether the system granted something.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Privilege {
+    /// Granted.
+    Granted,
+    /// Refused: the system's reason.
+    Refused(String),
+    /// Not asked for.
+    NotAsked,
+}
+
+impl Privilege {
+    fn of<E: std::fmt::Display>(result: Result<(), E>) -> Self {
+        match result {
+            Ok(()) => Self::Granted,
+            Err(error) => Self::Refused(error.to_string()),
+        }
+    }
+}
+
+/// What the loop runs with.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RealTimeReport {
+    /// Real-time scheduling (`SCHED_FIFO`).
+    pub fifo: Privilege,
+    /// Memory locked against paging.
+    pub memory_lock: Privilege,
+}
+
+impl RealTimeReport {
+    /// A loop that asks for nothing: on the virtual clock there is no time to keep.
+    #[must_use]
+    pub fn not_asked() -> Self {
+        Self { fifo: Privilege::NotAsked, memory_lock: Privilege::NotAsked }
+    }
+
+    /// One line per refusal: what, why, and how to allow it.
+    #[must_use]
+    pub fn advice(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        if let Privilege::Refused(reason) = &self.fifo {
+            lines.push(format!(
+                "no real-time priority ({reason}): expect late ticks; allow it with `@realtime - rtprio 99` in \
+                 /etc/security/limits.conf, or `setcap cap_sys_nice+ep` on the executable"
+            ));
+        }
+        if let Privilege::Refused(reason) = &self.memory_lock {
+            lines.push(format!(
+                "memory is not locked ({reason}): paging may delay a tick; allow it with \
+                 `@realtime - memlock unlimited` in /etc/security/limits.conf"
+            ));
+        }
+        lines
+    }
+}
+
+/// Asks for real-time priority for the calling thread and locks the process's memory. Not real-time.
+pub(crate) fn enter_real_time() -> RealTimeReport {
+    let memory_lock = Privilege::of(mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE));
+    let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
+    let fifo =
+        ThreadPriorityValue::try_from(FIFO_PRIORITY).map_err(|error| error.to_string()).and_then(|value| {
+            set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Crossplatform(value), policy)
+                .map_err(|error| error.to_string())
+        });
+    RealTimeReport { fifo: Privilege::of(fifo), memory_lock }
+}
+
+/// Asks on a thread of its own, so that the caller's priority stays what it is. Not real-time.
+pub(crate) fn probe_real_time() -> RealTimeReport {
+    let asked = std::thread::spawn(|| {
+        let report = enter_real_time();
+        let _ = rustix::mm::munlockall();
+        report
+    });
+    asked.join().unwrap_or_else(|_| RealTimeReport::not_asked())
+}

@@ -1,0 +1,102 @@
+//! How the loop keeps time: histograms of lateness and compute time, in fixed memory, always on.
+
+use hdrhistogram::Histogram;
+use serde::Serialize;
+
+/// Longest time a histogram tells apart, ns; longer ones count as this.
+const LONGEST_NS: u64 = 100_000_000_000;
+
+/// Two significant digits: a bin is at most 1 % wide, and the whole histogram is some 60 kB.
+const DIGITS: u8 = 2;
+
+/// Percentiles of one histogram, ns.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Percentiles {
+    /// Half of the ticks are below this.
+    pub p50: u64,
+    /// 99 %.
+    pub p99: u64,
+    /// 99.9 %.
+    pub p999: u64,
+    /// The worst.
+    pub max: u64,
+}
+
+/// A histogram of durations.
+pub struct Durations(Histogram<u32>);
+
+impl Durations {
+    /// Allocates all it will ever need. Not real-time.
+    #[must_use]
+    pub fn new() -> Self {
+        // The arguments are constants that satisfy the constructor's conditions (low >= 1, high >= 2 low, digits <= 5).
+        let histogram = Histogram::new_with_bounds(1, LONGEST_NS, DIGITS);
+        Self(histogram.unwrap_or_else(|_| unreachable!("constant, legal bounds")))
+    }
+
+    /// Counts one duration. Real-time: bounded, no allocation.
+    #[inline]
+    pub fn record(&mut self, duration_ns: u64) {
+        self.0.saturating_record(duration_ns);
+    }
+
+    /// The percentiles so far. Not real-time.
+    #[must_use]
+    pub fn percentiles(&self) -> Percentiles {
+        Percentiles {
+            p50: self.0.value_at_quantile(0.5),
+            p99: self.0.value_at_quantile(0.99),
+            p999: self.0.value_at_quantile(0.999),
+            max: self.0.max(),
+        }
+    }
+}
+
+impl Default for Durations {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Where the time of a tick goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Reading the device.
+    Read,
+    /// Mapping and stepping the models.
+    Models,
+    /// Limiting.
+    Envelope,
+    /// Writing the device.
+    Write,
+}
+
+/// Every how many ticks the stages are timed: four clock reads cost as much as a stage.
+pub(super) const STAGE_SAMPLING: u64 = 16;
+
+/// All that is measured of a loop.
+#[derive(Default)]
+pub struct Timing {
+    /// Start of a tick after its deadline.
+    pub lateness: Durations,
+    /// A whole tick.
+    pub compute: Durations,
+    /// Stages, in the order of [`Stage`].
+    pub stages: [Durations; 4],
+    /// Ticks run.
+    pub ticks: u64,
+    /// Ticks that started later than a tenth of the period.
+    pub late: u64,
+    /// Ticks that were skipped because their whole period had passed.
+    pub missed: u64,
+}
+
+impl Timing {
+    /// Counts a stage. Real-time: bounded, no allocation.
+    #[inline]
+    pub fn stage(&mut self, stage: Stage, duration_ns: u64) {
+        if let Some(durations) = self.stages.get_mut(stage as usize) {
+            durations.record(duration_ns);
+        }
+    }
+}

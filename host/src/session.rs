@@ -1,0 +1,355 @@
+//! From a scene to a run: loads what the scene names, pairs it, runs the loop, lets others watch.
+
+use crate::mapping::Mapping;
+use crate::registry::{LookupError, Registry};
+use crate::scene::{ModelUse, ParameterText, PluginUse, Scene, SceneError};
+use crate::servo::{
+    Clock, Envelope, ModelHealth, ModelSlot, RealTimeReport, Schedule, Servo, TickEnd, Timing,
+    enter_real_time,
+};
+use crate::trace::{RECORD_WORDS, TickRecord};
+use flotor_hal::abi::PluginKind;
+use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, Setting, Stopper};
+use flotor_hal::{Capabilities, Demand, EnergyLedger, Fault, LoopConfig, Refusal};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// How a scene is to be run.
+#[derive(Clone, Debug)]
+pub struct RunOptions {
+    /// Real or virtual time.
+    pub clock: Clock,
+    /// Seed of everything random.
+    pub seed: u64,
+}
+
+/// Why a run did not start or did not end well.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RunError {
+    /// The scene says something that cannot be.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A plugin is unknown or was refused.
+    #[error(transparent)]
+    Lookup(#[from] LookupError),
+    /// A plugin said no.
+    #[error(transparent)]
+    Plugin(#[from] LoadError),
+    /// Device and scene do not fit; all mismatches at once.
+    #[error("the scene does not fit the device `{device}`: {}", mismatches.join("; "))]
+    Mismatch {
+        /// Id of the device.
+        device: String,
+        /// What does not fit, each with a remedy.
+        mismatches: Vec<String>,
+    },
+    /// The servo's thread could not be started or died.
+    #[error("the servo thread {0}; nothing was moved")]
+    Thread(&'static str),
+}
+
+/// A plugin in a run, for reports and recordings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PluginReport {
+    /// Name in the scene ("device", or the model's name).
+    pub name: String,
+    /// What the plugin says about itself.
+    pub metadata: Metadata,
+    /// Every parameter with the value in force, as text.
+    pub parameters: Vec<(String, String)>,
+}
+
+/// Looks at every tick, off the loop.
+pub trait Observer {
+    /// One tick, in order. Not real-time.
+    fn observe(&mut self, record: &TickRecord);
+}
+
+/// A scene ready to run: everything loaded, paired and opened, nothing energised.
+pub struct Session {
+    servo: Servo,
+    stopper: Stopper,
+    clock: Clock,
+    period_ns: u64,
+    duration_ns: u64,
+    plugins: Vec<PluginReport>,
+}
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RunEnd {
+    /// The duration is over.
+    Finished,
+    /// Somebody asked it to stop.
+    Stopped,
+    /// The device faulted.
+    DeviceFault(Fault),
+}
+
+/// What is known after a run.
+pub struct Outcome {
+    /// How it ended.
+    pub end: RunEnd,
+    /// How time was kept.
+    pub timing: Timing,
+    /// Time from the first deadline to the end of the last period, ns (virtual clock: virtual time).
+    pub elapsed_ns: u64,
+    /// Wall-clock time, s.
+    pub wall_s: f64,
+    /// Ticks whose records were dropped because an observer was too slow (real clock only).
+    pub dropped_records: u64,
+    /// What the system granted.
+    pub real_time: RealTimeReport,
+    /// Energy account of the device, where there is one.
+    pub ledger: Option<EnergyLedger>,
+    /// Name, health and last words of each model.
+    pub models: Vec<(String, ModelHealth, String)>,
+}
+
+/// Records that fit between loop and observers: four seconds at 1 kHz.
+const RING_RECORDS: usize = 4096;
+/// Ticks run between two looks of the observers on the virtual clock.
+const VIRTUAL_BATCH: usize = 1024;
+/// How often observers look at a loop in real time.
+const OBSERVER_PERIOD: Duration = Duration::from_millis(5);
+
+impl Session {
+    /// Loads, checks and opens everything a scene names, and nothing else. Not real-time.
+    ///
+    /// # Errors
+    /// [`RunError`]; nothing is energised before this has succeeded.
+    pub fn prepare(scene: &Scene, registry: &Registry, options: &RunOptions) -> Result<Self, RunError> {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 100 Hz to 10 kHz
+        let period_ns = (1.0e9 / scene.rate_hz).round() as u64;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
+        let duration_ns = (scene.duration_s * 1.0e9).round() as u64;
+        let config = LoopConfig { period_ns, seed: options.seed };
+
+        let device_plugin = load(registry, &scene.device, PluginKind::Device)?;
+        let settings = settings(&device_plugin, "device", &scene.device.parameters)?;
+        let mut device = device_plugin.open_device(&settings)?;
+        let refused = |plugin: &Plugin, refusal: Refusal| {
+            let Metadata { path, id, .. } = plugin.metadata().clone();
+            RunError::Plugin(LoadError::Refused { path, id, refusal })
+        };
+        let capabilities = device.capabilities().map_err(|refusal| refused(&device_plugin, refusal))?;
+        let mut plugins = vec![PluginReport {
+            name: "device".to_owned(),
+            metadata: device_plugin.metadata().clone(),
+            parameters: in_force(&device_plugin, |index| device.parameter(index)),
+        }];
+
+        let mut models = Vec::new();
+        for model in &scene.models {
+            let (slot, report) = prepare_model(registry, model, &config)?;
+            models.push(slot);
+            plugins.push(report);
+        }
+        let mismatches = pair(scene, &capabilities);
+        if !mismatches.is_empty() {
+            return Err(RunError::Mismatch { device: scene.device.plugin.clone(), mismatches });
+        }
+
+        let envelope = Envelope::new(&scene.limits, &scene.boundary, &capabilities, period_ns);
+        let stopper = device.stopper();
+        let active = device.activate(&config).map_err(|(_, refusal)| refused(&device_plugin, refusal))?;
+        let servo = Servo::new(active, models, envelope, period_ns);
+        Ok(Self { servo, stopper, clock: options.clock, period_ns, duration_ns, plugins })
+    }
+
+    /// The plugins of this run with every parameter in force.
+    #[must_use]
+    pub fn plugins(&self) -> &[PluginReport] {
+        &self.plugins
+    }
+
+    /// Runs until the duration is over, `stop` is set, or the device faults.
+    ///
+    /// # Errors
+    /// [`RunError::Thread`] if the servo's thread cannot be had.
+    pub fn run(self, observer: &mut dyn Observer, stop: &AtomicBool) -> Result<Outcome, RunError> {
+        let started = Instant::now();
+        let stopper = self.stopper.clone();
+        let names: Vec<String> = self.plugins.iter().skip(1).map(|plugin| plugin.name.clone()).collect();
+        let finished = match self.clock {
+            Clock::Virtual => self.run_virtual(observer, stop),
+            Clock::Real => self.run_real(observer, stop)?,
+        };
+        stopper.safe_stop();
+        let Finished { mut servo, end, elapsed_ns, dropped_records, real_time } = finished;
+        let ledger = servo.device().energy_ledger();
+        let models = names.into_iter().zip(servo.models());
+        let models = models.map(|(name, slot)| (name, slot.health, slot.model.last_message())).collect();
+        let timing = servo.into_timing();
+        let wall_s = started.elapsed().as_secs_f64();
+        Ok(Outcome { end, timing, elapsed_ns, wall_s, dropped_records, real_time, ledger, models })
+    }
+
+    /// Same tick, no waiting: observers look between batches, so that a slow one slows the run and loses nothing.
+    fn run_virtual(self, observer: &mut dyn Observer, stop: &AtomicBool) -> Finished {
+        let mut runner =
+            Runner::new(self.servo, Schedule::start(Clock::Virtual, self.period_ns), self.duration_ns);
+        let mut batch = Vec::with_capacity(VIRTUAL_BATCH);
+        while runner.end.is_none() {
+            while batch.len() < VIRTUAL_BATCH && runner.end.is_none() {
+                if let Some(record) = runner.next(stop) {
+                    batch.push(record);
+                }
+            }
+            batch.iter().for_each(|record| observer.observe(record));
+            batch.clear();
+        }
+        runner.finish(0, RealTimeReport::not_asked())
+    }
+
+    /// The loop on a thread of its own; this one lets the observers look.
+    fn run_real(self, observer: &mut dyn Observer, stop: &AtomicBool) -> Result<Finished, RunError> {
+        let (mut sender, mut receiver) = flotor_sync::ring::<TickRecord, RECORD_WORDS>(RING_RECORDS);
+        let Session { servo, period_ns, duration_ns, .. } = self;
+        std::thread::scope(|scope| {
+            let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
+            let servo_thread = thread.spawn_scoped(scope, move || {
+                let real_time = enter_real_time();
+                let schedule = Schedule::start(Clock::Real, period_ns);
+                let mut runner = Runner::new(servo, schedule, duration_ns);
+                while runner.end.is_none() {
+                    if let Some(record) = runner.next(stop) {
+                        // A full ring is counted by the ring itself: observers never hold up the loop.
+                        let _ = sender.push(&record);
+                    }
+                }
+                runner.finish(0, real_time)
+            });
+            let servo_thread = servo_thread.map_err(|_| RunError::Thread("could not be started"))?;
+            while !servo_thread.is_finished() {
+                receiver.drain(|record| observer.observe(&record));
+                std::thread::sleep(OBSERVER_PERIOD);
+            }
+            let finished = servo_thread.join().map_err(|_| RunError::Thread("panicked"))?;
+            receiver.drain(|record| observer.observe(&record));
+            Ok(Finished { dropped_records: receiver.dropped(), ..finished })
+        })
+    }
+}
+
+/// The loop proper, the same for both clocks.
+struct Runner {
+    servo: Servo,
+    schedule: Schedule,
+    duration_ns: u64,
+    end: Option<RunEnd>,
+}
+
+struct Finished {
+    servo: Servo,
+    end: RunEnd,
+    elapsed_ns: u64,
+    dropped_records: u64,
+    real_time: RealTimeReport,
+}
+
+impl Runner {
+    fn new(servo: Servo, schedule: Schedule, duration_ns: u64) -> Self {
+        Self { servo, schedule, duration_ns, end: None }
+    }
+
+    /// Waits for and runs the next tick, or sets `end`. Real-time: bounded, no allocation.
+    #[inline]
+    fn next(&mut self, stop: &AtomicBool) -> Option<TickRecord> {
+        if self.schedule.next_time_ns() >= self.duration_ns {
+            self.end = Some(RunEnd::Finished);
+            return None;
+        }
+        if stop.load(Ordering::Relaxed) {
+            self.end = Some(RunEnd::Stopped);
+            return None;
+        }
+        let due = self.schedule.wait();
+        let (record, end) = self.servo.tick(&due.tick, due.lateness_ns, due.missed);
+        if let TickEnd::DeviceFault(fault) = end {
+            self.end = Some(RunEnd::DeviceFault(fault));
+        }
+        Some(record)
+    }
+
+    fn finish(self, dropped_records: u64, real_time: RealTimeReport) -> Finished {
+        let end = self.end.unwrap_or(RunEnd::Stopped);
+        let elapsed_ns = self.schedule.finish();
+        Finished { servo: self.servo, end, elapsed_ns, dropped_records, real_time }
+    }
+}
+
+fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
+    registry.load(&plugin.plugin, kind).map_err(|error| match error {
+        LookupError::Unknown { .. } => {
+            SceneError { location: plugin.location.clone(), problem: error.to_string() }.into()
+        }
+        refused => refused.into(),
+    })
+}
+
+fn prepare_model(
+    registry: &Registry,
+    model: &ModelUse,
+    config: &LoopConfig,
+) -> Result<(ModelSlot, PluginReport), RunError> {
+    let plugin = load(registry, &model.plugin, PluginKind::Model)?;
+    let settings = settings(&plugin, &model.name, &model.plugin.parameters)?;
+    let mut instance = plugin.create_model(&settings)?;
+    instance.prepare(config).map_err(|refusal| {
+        let Metadata { path, id, .. } = plugin.metadata().clone();
+        LoadError::Refused { path, id, refusal }
+    })?;
+    let report = PluginReport {
+        name: model.name.clone(),
+        metadata: plugin.metadata().clone(),
+        parameters: in_force(&plugin, |index| instance.parameter(index)),
+    };
+    let demand = Demand::ALL.limited_to(instance.serves());
+    let slot = ModelSlot {
+        model: instance,
+        mapping: Mapping::new(&model.mapping),
+        demand,
+        health: ModelHealth::default(),
+    };
+    Ok((slot, report))
+}
+
+/// Checks what was written against what the plugin understands; complaints name file and line.
+fn settings(plugin: &Plugin, name: &str, parameters: &[ParameterText]) -> Result<Vec<Setting>, SceneError> {
+    let check = |parameter: &ParameterText| {
+        Setting::parse(plugin.parameters(), &parameter.key, &parameter.value).map_err(|error| SceneError {
+            location: parameter.location.clone(),
+            problem: format!("[{name}] {error}"),
+        })
+    };
+    parameters.iter().map(check).collect()
+}
+
+/// Every parameter with its value in force, as text.
+fn in_force(plugin: &Plugin, mut value: impl FnMut(usize) -> f64) -> Vec<(String, String)> {
+    let schema = plugin.parameters();
+    let show = |(index, parameter): (usize, &flotor_hal::Parameter)| {
+        let setting = Setting::number(schema, parameter.id(), value(index));
+        (parameter.id().to_owned(), setting.map_or_else(|_| String::new(), |setting| setting.display(schema)))
+    };
+    schema.iter().enumerate().map(show).collect()
+}
+
+/// What of a scene the device cannot do; all at once, before anything is energised.
+fn pair(scene: &Scene, device: &Capabilities) -> Vec<String> {
+    let mut mismatches = Vec::new();
+    let [slowest, fastest] = device.rate_hz;
+    if scene.rate_hz < slowest || scene.rate_hz > fastest {
+        mismatches.push(format!(
+            "rate {} Hz, the device runs at {slowest} to {fastest} Hz; change `rate_hz`",
+            scene.rate_hz
+        ));
+    }
+    if !scene.models.is_empty() && !device.actuated.contains(flotor_hal::Axes::TRANSLATION) {
+        mismatches
+            .push("the device gives no force, so no model can be felt; use it for input only".to_owned());
+    }
+    mismatches
+}

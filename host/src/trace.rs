@@ -1,0 +1,191 @@
+//! What one tick leaves behind, for everybody who watches: recorder, plot, digest, viewer.
+
+use flotor_hal::{Pose, Twist, Wrench};
+use flotor_sync::Words;
+
+/// Things that happened in a tick, as a bit set.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Events {
+    bits: u32,
+}
+
+impl Events {
+    /// Nothing happened.
+    pub const NONE: Events = Events { bits: 0 };
+    /// The device had no new sample.
+    pub const STALE_SAMPLE: Events = Events { bits: 1 << 0 };
+    /// A device or model number was not finite and was replaced by zero.
+    pub const NOT_FINITE: Events = Events { bits: 1 << 1 };
+    /// The force was limited.
+    pub const FORCE_LIMITED: Events = Events { bits: 1 << 2 };
+    /// The torque was limited.
+    pub const TORQUE_LIMITED: Events = Events { bits: 1 << 3 };
+    /// The change since the last tick was limited.
+    pub const SLEW_LIMITED: Events = Events { bits: 1 << 4 };
+    /// The handle was outside the boundary and was pushed back.
+    pub const BOUNDARY: Events = Events { bits: 1 << 5 };
+    /// A model failed and contributes nothing any more.
+    pub const MODEL_FAULT: Events = Events { bits: 1 << 6 };
+    /// The device reported a fault.
+    pub const DEVICE_FAULT: Events = Events { bits: 1 << 7 };
+    /// The start-up ramp was still rising.
+    pub const RAMPING: Events = Events { bits: 1 << 8 };
+    /// The model left its domain, clamped, or did not converge.
+    pub const MODEL_DEGRADED: Events = Events { bits: 1 << 9 };
+    /// One or more ticks were missed before this one.
+    pub const MISSED: Events = Events { bits: 1 << 10 };
+
+    /// Names of the bits, lowest first: for reports and recordings.
+    pub const NAMES: [&'static str; 11] = [
+        "stale_sample",
+        "not_finite",
+        "force_limited",
+        "torque_limited",
+        "slew_limited",
+        "boundary",
+        "model_fault",
+        "device_fault",
+        "ramping",
+        "model_degraded",
+        "missed",
+    ];
+
+    /// Adds events. Real-time: bounded, no allocation.
+    #[inline]
+    pub fn insert(&mut self, other: Events) {
+        self.bits |= other.bits;
+    }
+
+    /// True if any of `other` happened. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub const fn intersects(self, other: Events) -> bool {
+        self.bits & other.bits != 0
+    }
+
+    /// The set as a number.
+    #[inline]
+    #[must_use]
+    pub const fn bits(self) -> u32 {
+        self.bits
+    }
+
+    /// The set from a number.
+    #[inline]
+    #[must_use]
+    pub const fn from_bits(bits: u32) -> Self {
+        Self { bits }
+    }
+}
+
+/// Everything one tick leaves behind, in the device frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TickRecord {
+    /// Number of the tick.
+    pub tick: u64,
+    /// Scheduled time since the loop started, ns.
+    pub time_ns: u64,
+    /// Scheduled time since the previous tick, ns.
+    pub dt_ns: u64,
+    /// Pose of the handle, m and unit quaternion.
+    pub pose: Pose,
+    /// Velocity of the handle, m/s and rad/s.
+    pub twist: Twist,
+    /// What the models asked for, mapped to the device frame, N and N·m.
+    pub model: Wrench,
+    /// What was sent to the device after the envelope, N and N·m.
+    pub commanded: Wrench,
+    /// What the device says it delivered since the previous tick, N and N·m.
+    pub delivered: Wrench,
+    /// Energy stored in the models, scaled to the device, J.
+    pub energy_j: f64,
+    /// What happened.
+    pub events: Events,
+    /// Buttons of the device.
+    pub buttons: u32,
+    /// How late the tick started, ns; 0 on the virtual clock. Not part of the digest.
+    pub lateness_ns: u64,
+    /// How long the tick took, ns. Not part of the digest.
+    pub compute_ns: u64,
+}
+
+/// 64-bit words of a record; the last [`TIMING_WORDS`] depend on the machine and are left out of digests.
+pub const RECORD_WORDS: usize = 38;
+/// Words at the end of a record that hold measured times.
+pub const TIMING_WORDS: usize = 2;
+
+impl Words<RECORD_WORDS> for TickRecord {
+    #[inline]
+    fn to_words(&self) -> [u64; RECORD_WORDS] {
+        let mut words = [0; RECORD_WORDS];
+        let mut rest = words.iter_mut();
+        let mut put = |word: u64| {
+            if let Some(slot) = rest.next() {
+                *slot = word;
+            }
+        };
+        put(self.tick);
+        put(self.time_ns);
+        put(self.dt_ns);
+        self.pose.position_m.iter().for_each(|v| put(v.to_bits()));
+        self.pose.orientation_xyzw.iter().for_each(|v| put(v.to_bits()));
+        self.twist.linear_m_per_s.iter().for_each(|v| put(v.to_bits()));
+        self.twist.angular_rad_per_s.iter().for_each(|v| put(v.to_bits()));
+        for wrench in [&self.model, &self.commanded, &self.delivered] {
+            wrench.force_n.iter().for_each(|v| put(v.to_bits()));
+            wrench.torque_nm.iter().for_each(|v| put(v.to_bits()));
+        }
+        put(self.energy_j.to_bits());
+        put(u64::from(self.events.bits) | u64::from(self.buttons) << 32);
+        put(self.lateness_ns);
+        put(self.compute_ns);
+        words
+    }
+
+    #[inline]
+    fn from_words(words: &[u64; RECORD_WORDS]) -> Self {
+        let mut rest = words.iter().copied();
+        let mut word = || rest.next().unwrap_or(0);
+        let (tick, time_ns, dt_ns) = (word(), word(), word());
+        let mut number = || f64::from_bits(word());
+        let mut three = || std::array::from_fn(|_| number());
+        let position_m = three();
+        let orientation_xyzw = [number(), number(), number(), number()];
+        let mut three = || std::array::from_fn(|_| number());
+        let twist = Twist { linear_m_per_s: three(), angular_rad_per_s: three() };
+        let mut wrench = || Wrench { force_n: three(), torque_nm: three() };
+        let (model, commanded, delivered) = (wrench(), wrench(), wrench());
+        let energy_j = number();
+        let flags = word();
+        #[allow(clippy::cast_possible_truncation)] // two halves of one word
+        let (events, buttons) = (Events::from_bits(flags as u32), (flags >> 32) as u32);
+        let (lateness_ns, compute_ns) = (word(), word());
+        let pose = Pose { position_m, orientation_xyzw };
+        Self {
+            tick,
+            time_ns,
+            dt_ns,
+            pose,
+            twist,
+            model,
+            commanded,
+            delivered,
+            energy_j,
+            events,
+            buttons,
+            lateness_ns,
+            compute_ns,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_word_of_a_record_survives_the_ring() {
+        let words: [u64; RECORD_WORDS] = std::array::from_fn(|i| 0x3ff0_0000_0000_0000 + i as u64 * 0x101);
+        assert_eq!(TickRecord::from_words(&words).to_words(), words);
+    }
+}
