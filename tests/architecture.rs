@@ -1,0 +1,276 @@
+//! The shape of the workspace, held by tests: who may depend on whom, where `unsafe` may stand, and that every
+//! dependency has a reason.
+//!
+//! Each rule is a function from facts to complaints, so that it is tested twice: on the workspace, where it
+//! must find nothing, and on a made-up offence, which it must find.
+
+use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
+use flotor_tests::{files_under, workspace_root};
+use proc_macro2::{TokenStream, TokenTree};
+use std::path::Path;
+
+// ---------------------------------------------------------------- dependencies point one way
+
+/// What a crate is for, told by the folder it lives in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Role {
+    Contract,
+    Plugin,
+    Sync,
+    Host,
+    Viewer,
+    Tests,
+}
+
+impl Role {
+    fn of_folder(folder: &str) -> Option<Self> {
+        Some(match folder {
+            "hal" => Self::Contract,
+            "host" => Self::Host,
+            "host/sync" => Self::Sync,
+            "viewer" => Self::Viewer,
+            "tests" => Self::Tests,
+            _ if folder.starts_with("devices/") || folder.starts_with("models/") => Self::Plugin,
+            _ => return None,
+        })
+    }
+
+    /// The roles a crate of this role may depend on.
+    fn may_use(self) -> &'static [Role] {
+        match self {
+            Self::Contract | Self::Sync => &[],
+            Self::Plugin => &[Self::Contract],
+            // The plugins only as paths, so that one `cargo run` builds them; no line of the host names them.
+            Self::Host => &[Self::Contract, Self::Sync, Self::Plugin],
+            Self::Viewer => &[Self::Contract],
+            Self::Tests => &[Self::Contract, Self::Sync, Self::Plugin, Self::Host, Self::Viewer],
+        }
+    }
+}
+
+/// One crate of the workspace, as far as the rules look at it.
+struct Member {
+    name: String,
+    role: Role,
+    uses: Vec<Use>,
+}
+
+/// One dependency of a member on another member.
+struct Use {
+    name: String,
+    role: Role,
+    kind: DependencyKind,
+    features: Vec<String>,
+}
+
+fn workspace_members(metadata: &Metadata) -> Vec<Member> {
+    let folder = |manifest_folder: &Path| {
+        let relative = manifest_folder.strip_prefix(metadata.workspace_root.as_std_path());
+        relative.unwrap_or(manifest_folder).display().to_string()
+    };
+    let role = |name: &str, manifest_folder: &Path| {
+        let folder = folder(manifest_folder);
+        Role::of_folder(&folder)
+            .unwrap_or_else(|| panic!("{name} lives in `{folder}`: give that folder a role"))
+    };
+    let member = |package: &cargo_metadata::Package| {
+        let own_folder = package.manifest_path.as_std_path().parent().unwrap_or(Path::new(""));
+        let uses = package.dependencies.iter().filter_map(|dependency| {
+            let folder = dependency.path.as_ref()?.as_std_path();
+            Some(Use {
+                name: dependency.name.clone(),
+                role: role(&dependency.name, folder),
+                kind: dependency.kind,
+                features: dependency.features.clone(),
+            })
+        });
+        Member { name: package.name.to_string(), role: role(&package.name, own_folder), uses: uses.collect() }
+    };
+    metadata.workspace_packages().into_iter().map(member).collect()
+}
+
+/// Dependencies that point the wrong way, and plugins that would carry the loader.
+fn wrong_dependencies(members: &[Member]) -> Vec<String> {
+    let mut complaints = Vec::new();
+    for member in members {
+        for used in &member.uses {
+            if !member.role.may_use().contains(&used.role) {
+                complaints.push(format!(
+                    "{} ({:?}) depends on {} ({:?})",
+                    member.name, member.role, used.name, used.role
+                ));
+            }
+            let loads = used.features.iter().any(|feature| feature == "loader");
+            if member.role == Role::Plugin && used.kind == DependencyKind::Normal && loads {
+                complaints.push(format!("{} pulls the loader; it belongs to hosts and tests", member.name));
+            }
+        }
+    }
+    complaints
+}
+
+fn metadata() -> Metadata {
+    let mut command = MetadataCommand::new();
+    command.manifest_path(workspace_root().join("Cargo.toml")).no_deps();
+    command.other_options(vec!["--offline".to_owned()]);
+    command.exec().expect("cargo metadata reads the workspace")
+}
+
+#[test]
+fn dependencies_point_one_way() {
+    let members = workspace_members(&metadata());
+    let with_role = |role| members.iter().filter(move |member| member.role == role).count();
+    assert_eq!(with_role(Role::Contract), 1);
+    assert_eq!(with_role(Role::Host), 1);
+    assert!(with_role(Role::Plugin) >= 3);
+    assert_eq!(wrong_dependencies(&members), Vec::<String>::new());
+}
+
+#[test]
+fn a_plugin_that_uses_the_host_is_noticed() {
+    let used = |name: &str, role, features: &[&str]| Use {
+        name: name.to_owned(),
+        role,
+        kind: DependencyKind::Normal,
+        features: features.iter().map(ToString::to_string).collect(),
+    };
+    let plugin = |uses| [Member { name: "flotor-wall".to_owned(), role: Role::Plugin, uses }];
+    assert_eq!(wrong_dependencies(&plugin(vec![used("flotor-hal", Role::Contract, &[])])).len(), 0);
+    assert_eq!(wrong_dependencies(&plugin(vec![used("flotor-hal", Role::Contract, &["loader"])])).len(), 1);
+    assert_eq!(wrong_dependencies(&plugin(vec![used("flotor", Role::Host, &[])])).len(), 1);
+    assert_eq!(wrong_dependencies(&plugin(vec![used("flotor-spring", Role::Plugin, &[])])).len(), 1);
+}
+
+// ---------------------------------------------------------------- code, as tokens
+
+/// All identifiers of a source text: code only, no comments, no text in quotes.
+fn identifiers(source: &str) -> Vec<String> {
+    fn collect(tokens: TokenStream, found: &mut Vec<String>) {
+        for token in tokens {
+            match token {
+                TokenTree::Ident(identifier) => found.push(identifier.to_string()),
+                TokenTree::Group(group) => collect(group.stream(), found),
+                TokenTree::Punct(_) | TokenTree::Literal(_) => {}
+            }
+        }
+    }
+    let mut found = Vec::new();
+    let tokens: TokenStream = source.parse().expect("the compiler reads this file, so it is made of tokens");
+    collect(tokens, &mut found);
+    found
+}
+
+fn identifiers_of(file: &Path) -> Vec<String> {
+    identifiers(&std::fs::read_to_string(workspace_root().join(file)).expect("a source file is text"))
+}
+
+#[test]
+fn comments_and_text_are_not_code() {
+    let harmless = "//! unsafe\n/* unsafe */ /// unsafe\nfn f<'a>() -> &'a str { r#\"unsafe \" unsafe\"# }";
+    assert!(!identifiers(harmless).contains(&"unsafe".to_owned()));
+    assert!(identifiers("macro_rules! m { () => { unsafe { f() } } }").contains(&"unsafe".to_owned()));
+    assert!(identifiers("#[unsafe(no_mangle)] fn f() {}").contains(&"unsafe".to_owned()));
+}
+
+#[test]
+fn the_host_names_no_plugin() {
+    let members = workspace_members(&metadata());
+    let plugins = members.iter().filter(|member| member.role == Role::Plugin);
+    let plugins: Vec<String> = plugins.map(|member| member.name.replace('-', "_")).collect();
+    let sources = files_under("host", "rs").expect("the host has sources");
+    assert!(sources.len() > 10, "{} sources of the host", sources.len());
+    for file in sources {
+        let named = identifiers_of(&file).into_iter().find(|identifier| plugins.contains(identifier));
+        assert_eq!(named, None, "{} names a plugin's crate: load it instead", file.display());
+    }
+}
+
+// ---------------------------------------------------------------- unsafe
+
+/// Where `unsafe` may stand, and why it has to. A folder ends in a slash. Whoever adds a line says why no safe
+/// way exists; a line whose file no longer needs it fails the test, too.
+const UNSAFE: &[(&str, &str)] = &[(
+    "hal/src/abi/",
+    "the binary contract: function tables across shared libraries, the export macros, the loader",
+)];
+
+/// Files that may not hold `unsafe` and do, then entries of the list that nothing needs.
+fn unsafe_complaints(files_with_unsafe: &[String], allowed: &[(&str, &str)]) -> Vec<String> {
+    let covers =
+        |entry: &str, file: &str| if entry.ends_with('/') { file.starts_with(entry) } else { file == entry };
+    let unlisted = files_with_unsafe
+        .iter()
+        .filter(|file| !allowed.iter().any(|(entry, _)| covers(entry, file)))
+        .map(|file| format!("{file} holds `unsafe` and is not listed in tests/architecture.rs"));
+    let unneeded = allowed
+        .iter()
+        .filter(|(entry, _)| !files_with_unsafe.iter().any(|file| covers(entry, file)))
+        .map(|(entry, _)| format!("tests/architecture.rs lists {entry}, which holds no `unsafe`"));
+    unlisted.chain(unneeded).collect()
+}
+
+#[test]
+fn unsafe_code_stands_only_where_it_is_listed() {
+    let sources = files_under("", "rs").expect("the workspace can be read");
+    let with_unsafe = sources.iter().filter(|file| identifiers_of(file).iter().any(|word| word == "unsafe"));
+    let with_unsafe: Vec<String> = with_unsafe.map(|file| file.display().to_string()).collect();
+    assert_eq!(unsafe_complaints(&with_unsafe, UNSAFE), Vec::<String>::new());
+}
+
+#[test]
+fn unlisted_unsafe_and_stale_entries_are_noticed() {
+    let files = ["hal/src/abi/text.rs".to_owned(), "host/src/servo/mod.rs".to_owned()];
+    let complaints =
+        unsafe_complaints(&files, &[("hal/src/abi/", "contract"), ("tests/alloc.rs", "allocator")]);
+    assert_eq!(complaints.len(), 2);
+    assert!(complaints[0].starts_with("host/src/servo/mod.rs"));
+    assert!(complaints[1].contains("tests/alloc.rs"));
+}
+
+// ---------------------------------------------------------------- manifests
+
+/// Dependencies of `[workspace.dependencies]` that nobody gives a reason for: in a comment at the end of the
+/// line, or in the lines just above. Crates of the workspace itself need none.
+fn dependencies_without_reason(manifest: &str) -> Vec<&str> {
+    let lines = manifest.lines().skip_while(|line| *line != "[workspace.dependencies]").skip(1);
+    let mut explained_above = false;
+    let mut unexplained = Vec::new();
+    for line in lines.take_while(|line| !line.starts_with('[')) {
+        let line = line.trim();
+        // A headline groups lines, it gives no reason.
+        if let Some(comment) = line.strip_prefix('#') {
+            explained_above |= !comment.trim_start().starts_with("--");
+            continue;
+        }
+        if let Some((name, rest)) = line.split_once('=') {
+            let own = rest.contains("path =");
+            let explained =
+                explained_above || rest.rsplit_once('#').is_some_and(|(_, reason)| reason.len() > 5);
+            unexplained.extend((!own && !explained).then(|| name.trim()));
+        }
+        explained_above = false;
+    }
+    unexplained
+}
+
+#[test]
+fn every_dependency_has_a_reason() {
+    let manifest = std::fs::read_to_string(workspace_root().join("Cargo.toml")).expect("there is a manifest");
+    assert!(manifest.contains("[workspace.dependencies]"));
+    assert_eq!(dependencies_without_reason(&manifest), Vec::<&str>::new());
+}
+
+#[test]
+fn a_dependency_without_reason_is_noticed() {
+    let manifest = "[workspace.dependencies]\n# -- tests\na = \"1\"\n# Reads poses.\nb = \"1\"\nc = \"2\"\n\
+                    d = \"3\" # draws pictures\ne = { path = \"e\" }\n[profile.dev]\nopt-level = 1\n";
+    assert_eq!(dependencies_without_reason(manifest), ["a", "c"]);
+}
+
+#[test]
+fn every_crate_takes_the_lints_of_the_workspace() {
+    for member in metadata().workspace_packages() {
+        let manifest = std::fs::read_to_string(&member.manifest_path).expect("a manifest is text");
+        assert!(manifest.contains("[lints]\nworkspace = true"), "{} has lints of its own", member.name);
+    }
+}

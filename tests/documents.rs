@@ -1,0 +1,160 @@
+//! What the documents say about the repository, held by tests: paths, links, chapters, and the rules and
+//! refusals of the contract.
+//!
+//! (That the Rust code in them compiles and runs is seen to by the doctests of this crate.)
+
+use flotor_hal::conformance::Rule;
+use flotor_tests::{files_under, workspace_root};
+use std::path::{Path, PathBuf};
+
+/// Documents outside the book.
+const DOCUMENTS: [&str; 4] = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"];
+/// Where the book's chapters lie.
+const BOOK: &str = "docs/src";
+
+fn read(file: impl AsRef<Path>) -> String {
+    let path = workspace_root().join(file);
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn chapters() -> Vec<PathBuf> {
+    files_under(BOOK, "md").expect("the book has chapters")
+}
+
+/// The text without its fenced code blocks.
+fn prose(markdown: &str) -> String {
+    let mut inside = false;
+    let outside = |line: &&str| {
+        let fence = line.trim_start().starts_with("```");
+        inside ^= fence;
+        !inside && !fence
+    };
+    markdown.lines().filter(outside).flat_map(|line| [line, "\n"]).collect()
+}
+
+// ---------------------------------------------------------------- paths
+
+/// What stands in backticks and looks like a path: with a slash or the ending of a file, made of characters of
+/// paths only. Interface ids (`flotor.force/1`) end in a revision; commands and code have other characters.
+fn named_paths(markdown: &str) -> Vec<String> {
+    let quoted = prose(markdown);
+    let quoted = quoted.split('`').skip(1).step_by(2);
+    let is_path = |text: &&str| {
+        let characters = text.chars().all(|c| c.is_ascii_alphanumeric() || "._-/".contains(c));
+        let ending = [".md", ".rs", ".toml", ".h", ".svg"].iter().any(|ending| text.ends_with(ending));
+        let revision = text.rsplit_once('/').is_some_and(|(_, last)| last.parse::<u32>().is_ok());
+        characters && (text.contains('/') || ending) && !revision
+    };
+    quoted.filter(is_path).map(str::to_owned).collect()
+}
+
+#[test]
+fn every_path_in_the_architecture_exists() {
+    let paths = named_paths(&read("ARCHITECTURE.md"));
+    assert!(
+        paths.len() >= 20,
+        "only {} paths found: is the document still about this repository?",
+        paths.len()
+    );
+    for path in paths {
+        let found = workspace_root().join(&path);
+        let right = if path.ends_with('/') { found.is_dir() } else { found.exists() };
+        assert!(right, "ARCHITECTURE.md names `{path}`, which does not exist");
+    }
+}
+
+#[test]
+fn paths_are_told_from_other_things_in_backticks() {
+    let text = "`hal/src/abi/` and `Cargo.toml`, not `flotor.force/1`, `cargo run --release`, `Vec<f64>`\n\
+                ```text\n`not/this`\n```\nbut `tests/`.";
+    assert_eq!(named_paths(text), ["hal/src/abi/", "Cargo.toml", "tests/"]);
+}
+
+// ---------------------------------------------------------------- links
+
+/// Targets of the links and pictures of a document, without those that leave the repository.
+fn relative_links(markdown: &str) -> Vec<String> {
+    let prose = prose(markdown);
+    let targets = prose.split("](").skip(1).filter_map(|rest| rest.split_once(')')).map(|(target, _)| target);
+    let targets = targets.map(|target| target.split('#').next().unwrap_or_default());
+    targets.filter(|target| !target.is_empty() && !target.contains(':')).map(str::to_owned).collect()
+}
+
+#[test]
+fn every_link_leads_somewhere() {
+    let documents = DOCUMENTS.iter().map(PathBuf::from).chain(chapters());
+    for document in documents {
+        let folder = workspace_root().join(&document);
+        let folder = folder.parent().expect("a document lies in a folder");
+        for link in relative_links(&read(&document)) {
+            assert!(
+                folder.join(&link).exists(),
+                "{} links to {link}, which does not exist",
+                document.display()
+            );
+        }
+    }
+}
+
+#[test]
+fn links_are_found_and_the_web_is_left_alone() {
+    let text = "[a](b.md#c), ![p](images/p.svg), [w](https://example.org), [here](#top)";
+    assert_eq!(relative_links(text), ["b.md", "images/p.svg"]);
+}
+
+// ---------------------------------------------------------------- the book
+
+#[test]
+fn the_summary_lists_every_chapter_once() {
+    let mut listed = relative_links(&read("docs/src/SUMMARY.md"));
+    listed.sort();
+    let written = chapters();
+    let written =
+        written.iter().filter_map(|file| file.strip_prefix(BOOK).ok()).map(|file| file.display().to_string());
+    let mut written: Vec<String> = written.filter(|file| file != "SUMMARY.md").collect();
+    written.sort();
+    assert_eq!(listed, written);
+}
+
+#[test]
+fn rust_in_the_documents_is_compiled() {
+    let doctests = read("tests/src/lib.rs");
+    let documents = DOCUMENTS.iter().map(PathBuf::from).chain(chapters());
+    for document in documents.filter(|document| read(document).contains("```rust")) {
+        let included = format!("include_str!(\"../../{}\")", document.display());
+        assert!(doctests.contains(&included), "{} holds Rust that no doctest compiles", document.display());
+    }
+}
+
+/// Rows of the table under a headline, as cells.
+fn table_under(markdown: &str, headline: &str) -> Vec<Vec<String>> {
+    let lines = markdown.lines().skip_while(|line| *line != headline).skip(1);
+    let lines = lines.take_while(|line| !line.starts_with('#')).filter(|line| line.starts_with('|'));
+    let cells = |line: &str| line.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect();
+    lines.skip(2).map(cells).collect()
+}
+
+#[test]
+fn the_book_prints_the_rules_of_the_contract() {
+    let printed = table_under(&read("docs/src/plugin-contract.md"), "## What `flotor validate` checks");
+    let rules = Rule::ALL.iter().map(|rule| vec![format!("`{}`", rule.id()), rule.text().to_owned()]);
+    assert_eq!(printed, rules.collect::<Vec<_>>());
+}
+
+/// Names of the variants of an enum in a source text, read off its one-per-line layout.
+fn variants(source: &str, name: &str) -> Vec<String> {
+    let body = source.lines().skip_while(|line| *line != format!("pub enum {name} {{")).skip(1);
+    let body = body.take_while(|line| *line != "}");
+    let names =
+        body.filter_map(|line| line.strip_prefix("    ")).filter(|line| line.starts_with(char::is_uppercase));
+    names.map(|line| line.split([' ', ',', '(', '=']).next().unwrap_or_default().to_owned()).collect()
+}
+
+#[test]
+fn the_book_prints_every_refusal_of_the_loader() {
+    let refusals = variants(&read("hal/src/abi/loader/error.rs"), "LoadError");
+    assert!(refusals.len() >= 10 && refusals.contains(&"Truncated".to_owned()), "{refusals:?}");
+    let printed = table_under(&read("docs/src/plugin-contract.md"), "## Refusals");
+    let printed: Vec<String> = printed.iter().map(|row| row[0].trim_matches('`').to_owned()).collect();
+    assert_eq!(printed, refusals);
+}

@@ -1,0 +1,123 @@
+//! What the cross-crate tests share: where the workspace is, what lies in it, and how long tests may take.
+//!
+//! The documents whose Rust code is compiled and run as doctests are listed at the end of this file.
+
+use std::path::{Path, PathBuf};
+
+/// The root of the workspace: the folder with the README.
+#[must_use]
+pub fn workspace_root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().map(Path::to_path_buf).unwrap_or_default()
+}
+
+/// All files under a folder of the workspace whose name ends in `.extension`, as paths relative to the root,
+/// sorted. Build output and hidden folders are left out.
+///
+/// # Errors
+/// What the file system says about a folder that cannot be read.
+pub fn files_under(folder: &str, extension: &str) -> std::io::Result<Vec<PathBuf>> {
+    let root = workspace_root();
+    let mut found = Vec::new();
+    let mut folders = vec![root.join(folder)];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder)? {
+            let (entry, root) = (entry?, &root);
+            let (path, name) = (entry.path(), entry.file_name());
+            if entry.file_type()?.is_dir() {
+                let skipped = name == "target" || name.to_string_lossy().starts_with('.');
+                folders.extend((!skipped).then_some(path));
+            } else if path.extension().is_some_and(|found| found == extension) {
+                found.push(path.strip_prefix(root).unwrap_or(&path).to_path_buf());
+            }
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+/// How much work tests that scale may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TestSize {
+    /// Seconds: what every change runs.
+    Quick,
+    /// Minutes: what `.ci/full` runs.
+    Full,
+}
+
+impl TestSize {
+    /// Environment variable that chooses the size: `quick` (also when unset) or `full`.
+    pub const VARIABLE: &str = "FLOTOR_TEST_SIZE";
+
+    /// The size this run asks for.
+    ///
+    /// # Panics
+    /// If the variable holds another word: a typing error must not turn a long test into a short one.
+    #[must_use]
+    pub fn of_this_run() -> Self {
+        match std::env::var(Self::VARIABLE) {
+            Err(_) => Self::Quick,
+            Ok(word) => match Self::from_word(&word) {
+                Some(size) => size,
+                None => panic!("{}={word}: legal is quick or full", Self::VARIABLE),
+            },
+        }
+    }
+
+    /// The number of cases (poses, ticks, seeds) for this size.
+    #[must_use]
+    pub const fn pick(self, quick: usize, full: usize) -> usize {
+        match self {
+            Self::Quick => quick,
+            Self::Full => full,
+        }
+    }
+
+    fn from_word(word: &str) -> Option<Self> {
+        match word {
+            "quick" => Some(Self::Quick),
+            "full" => Some(Self::Full),
+            _ => None,
+        }
+    }
+}
+
+/// Documents with Rust code in them: compiled and run by `cargo test`, so that no example in them can rot.
+#[cfg(doctest)]
+mod documents {
+    #[doc = include_str!("../../README.md")]
+    struct Readme;
+
+    #[doc = include_str!("../../docs/src/write-a-model.md")]
+    struct WriteAModel;
+
+    #[doc = include_str!("../../docs/src/write-a-device.md")]
+    struct WriteADevice;
+
+    #[doc = include_str!("../../docs/src/concepts.md")]
+    struct Concepts;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_root_is_found() {
+        assert!(workspace_root().join("README.md").is_file());
+        assert!(files_under("tests", "rs").unwrap().contains(&PathBuf::from("tests/src/lib.rs")));
+    }
+
+    #[test]
+    fn build_output_is_not_ours() {
+        let sources = files_under("", "rs").unwrap();
+        assert!(!sources.iter().any(|file| file.components().any(|part| part.as_os_str() == "target")));
+    }
+
+    #[test]
+    fn a_mistyped_size_is_no_size() {
+        assert_eq!(TestSize::from_word("full"), Some(TestSize::Full));
+        assert_eq!(TestSize::from_word("ful"), None);
+        assert_eq!(TestSize::Quick.pick(10, 1000), 10);
+        assert_eq!(TestSize::Full.pick(10, 1000), 1000);
+    }
+}
