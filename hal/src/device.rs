@@ -189,9 +189,9 @@ pub struct Capabilities {
     pub sensed: Axes,
     /// Axes that can be driven.
     pub actuated: Axes,
-    /// Largest displacement from the origin along each axis, m.
+    /// Largest displacement from the origin along each axis, m; together the semi-axes of an ellipsoid.
     pub range_m: [f64; 3],
-    /// Largest rotation about each axis, rad.
+    /// Largest rotation about each axis, rad; together the semi-axes of an ellipsoid of rotation vectors.
     pub range_rad: [f64; 3],
     /// Smallest position step that is resolved, m.
     pub resolution_m: f64,

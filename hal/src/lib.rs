@@ -27,6 +27,7 @@
 //! see the binary contract; it is in [`abi`], and C authors get it as `include/flotor.h`.
 
 pub mod abi;
+pub mod conformance;
 mod device;
 mod frame;
 mod model;

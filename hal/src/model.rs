@@ -134,7 +134,7 @@ impl StepStatus {
 pub struct Output {
     /// Force and torque on the hand, N and N·m.
     pub wrench: Wrench,
-    /// Stored energy, J; meaningful if demanded and served.
+    /// Stored energy, J, if demanded and served; NaN where the model has none.
     pub energy_j: f64,
     pub(crate) status: u32,
     pub(crate) reserved: u32,
@@ -159,7 +159,7 @@ impl Output {
 impl From<Wrench> for Output {
     #[inline]
     fn from(wrench: Wrench) -> Self {
-        Self::new(wrench, 0.0, StepStatus::Ok)
+        Self::new(wrench, f64::NAN, StepStatus::Ok)
     }
 }
 

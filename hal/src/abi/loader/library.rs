@@ -201,8 +201,9 @@ fn open_private_copy(path: &Path, metadata: &Metadata, bytes: &[u8]) -> Result<&
     // SAFETY: the symbol is only used as an address here; it is checked to be an `Entry` before it is trusted.
     let found = unsafe { library.get::<*const Entry>(symbol.as_bytes()) }.map(|entry| entry.as_raw_ptr());
     let address = found.unwrap_or(std::ptr::null_mut()).cast::<Entry>();
-    // Thread-local destructors make unloading unsound: a library stays for the life of the process.
-    std::mem::forget(library);
+    // Thread-local destructors make unloading unsound: a library stays for the life of the process. Its file
+    // stays open too: the linker knows a library by its path, and a reused descriptor would be the same path.
+    std::mem::forget((library, file));
     // SAFETY: null, or a static of at least the magic's size in a library that is never unloaded; its content is
     // compared with the magic first, and `from_entry` checks its size and version before any pointer is followed.
     let entry = unsafe { address.as_ref() };

@@ -1,0 +1,98 @@
+//! What every plugin must do, as data: `flotor validate`, the tests and the book print this one list.
+
+use crate::abi::PluginKind;
+
+/// One rule of the contract that can be checked from outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Rule {
+    /// The metadata section can be read and names kind, id, version, contract and entry.
+    Metadata,
+    /// The library links, its entry is right, and its layouts are the host's.
+    Loads,
+    /// Every parameter has id, doc and a default inside its range, and no id occurs twice.
+    Schema,
+    /// An instance can be made from nothing but defaults.
+    Defaults,
+    /// At home and near it a model answers with finite numbers.
+    FiniteNearHome,
+    /// NaN and infinity in the pose give a status, not NaN, and no panic.
+    SurvivesNotFinite,
+    /// Poses far outside any workspace give finite numbers and no panic.
+    SurvivesFarPoses,
+    /// After `reset` the same poses give the same bits.
+    ResetRepeats,
+    /// A device's declared limits, ranges and rates are numbers a host can enforce.
+    Capabilities,
+    /// Activate, read, write, deactivate and activate again all work.
+    Lifecycle,
+    /// After `safe_stop` from another thread the device gives no wrench and still answers.
+    SafeStop,
+}
+
+impl Rule {
+    /// All rules, in the order they are checked.
+    pub const ALL: [Rule; 11] = [
+        Rule::Metadata,
+        Rule::Loads,
+        Rule::Schema,
+        Rule::Defaults,
+        Rule::FiniteNearHome,
+        Rule::SurvivesNotFinite,
+        Rule::SurvivesFarPoses,
+        Rule::ResetRepeats,
+        Rule::Capabilities,
+        Rule::Lifecycle,
+        Rule::SafeStop,
+    ];
+
+    /// Short name in reports.
+    #[must_use]
+    pub const fn id(self) -> &'static str {
+        match self {
+            Rule::Metadata => "metadata",
+            Rule::Loads => "loads",
+            Rule::Schema => "schema",
+            Rule::Defaults => "defaults",
+            Rule::FiniteNearHome => "finite-near-home",
+            Rule::SurvivesNotFinite => "survives-not-finite",
+            Rule::SurvivesFarPoses => "survives-far-poses",
+            Rule::ResetRepeats => "reset-repeats",
+            Rule::Capabilities => "capabilities",
+            Rule::Lifecycle => "lifecycle",
+            Rule::SafeStop => "safe-stop",
+        }
+    }
+
+    /// What is demanded, for people.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
+            Rule::Metadata => "the metadata section names kind, id, version, contract and entry",
+            Rule::Loads => "the library links and means the same structs as the host",
+            Rule::Schema => "every parameter has an id of its own, a doc and a default inside its range",
+            Rule::Defaults => "an instance can be made from nothing but defaults",
+            Rule::FiniteNearHome => "at home and near it the wrench is finite",
+            Rule::SurvivesNotFinite => "NaN and infinity in the pose give a status, not NaN, and no panic",
+            Rule::SurvivesFarPoses => "poses far outside any workspace give finite numbers and no panic",
+            Rule::ResetRepeats => "after reset the same poses give the same bits",
+            Rule::Capabilities => "declared limits, ranges and rates are numbers a host can enforce",
+            Rule::Lifecycle => "activate, read, write, deactivate and activate again all work",
+            Rule::SafeStop => {
+                "after safe_stop from another thread the device gives no wrench and still answers"
+            }
+        }
+    }
+
+    /// Whether the rule is about plugins of this kind.
+    #[must_use]
+    pub const fn applies_to(self, kind: PluginKind) -> bool {
+        match self {
+            Rule::Metadata | Rule::Loads | Rule::Schema | Rule::Defaults => true,
+            Rule::FiniteNearHome | Rule::SurvivesNotFinite | Rule::SurvivesFarPoses | Rule::ResetRepeats => {
+                matches!(kind, PluginKind::Model)
+            }
+            Rule::Capabilities | Rule::Lifecycle | Rule::SafeStop => matches!(kind, PluginKind::Device),
+        }
+    }
+}
