@@ -129,8 +129,8 @@ impl Envelope {
 /// boundary, section 3.2); `None` inside. Damping acts outwards only: the wall never pulls.
 fn wall(at: DVec3, velocity: DVec3, semi_axes: DVec3, stiffness: f64, damping: f64) -> Option<DVec3> {
     let beyond = (at / semi_axes).length();
-    // Written so that a range of zero (0/0 at the centre) is inside: an axis that cannot move needs no wall.
-    if !(beyond > 1.0) {
+    // A range of zero gives 0/0 at the centre, which is inside: an axis that cannot move needs no wall.
+    if beyond.is_nan() || beyond <= 1.0 {
         return None;
     }
     let distance = at.length();

@@ -5,7 +5,9 @@
 //! - [`pose`]: where the upper plate is; [`response`], [`validity`]: what a law answers.
 //! - [`entire`] and [`beam_column`]: the functions of the compressed rod, without branches or poles of their own.
 //! - [`closed_form`]: the thesis's printed law, regularised, and its current-length correction.
-//! - [`energy`]: the conservative law in three dimensions, the default.
+//! - [`energy`]: the conservative law in three dimensions, the default. Its bending part is in [`bending`], to
+//!   fourth order in the angles by [`shape`] and [`quartic`]; [`angle`] gives angles without `acos`, and [`level`]
+//!   keeps the law smooth close to buckling.
 //! - [`centerline`]: the shape, for people to look at.
 //!
 //! Derivations and sources are in the book, chapter "The spring".

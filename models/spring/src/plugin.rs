@@ -18,6 +18,7 @@ pub struct SpringModel {
     law: Law,
 }
 
+#[allow(clippy::large_enum_variant)] // one per model, made once: a box would add a load to every tick
 enum Law {
     ClosedForm(ClosedForm),
     Energy(EnergyForm),

@@ -31,8 +31,8 @@
 //!
 //! functions of the length alone. They are fitted once per spring by polynomials in `L`; `D` is scaled with a
 //! *magnification* that takes the buckling pole out of them. Twist at fourth order (`w² S²`, `w² D²`) is left
-//! out: it is the softening of a twisted column (Greenhill), below 1e-3 of the stiffness within a tenth of a
-//! radian.
+//! out: it is the softening of a twisted column (Greenhill), about 1e-3 of the stiffness for a twist of a tenth of
+//! a radian and more close to buckling.
 //!
 //! The series means nothing once the magnified angles are of order one; there the term fades out.
 

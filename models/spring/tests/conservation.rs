@@ -1,8 +1,6 @@
 //! The energy form is one energy: its wrench is the gradient, closed paths cost nothing, and nothing depends on
 //! how the axes are laid. The printed law serves as the counter-example.
 
-#![allow(clippy::missing_panics_doc)] // tests panic to fail
-
 mod sample;
 
 use std::f64::consts::TAU;

@@ -1,8 +1,6 @@
 //! The spring against reference tables computed elsewhere: parameters, the thesis's closed form in 50-digit
 //! arithmetic, and the exact spatial rod. The tables are in `tests/data/cases`.
 
-#![allow(clippy::missing_panics_doc)] // tests panic to fail
-
 mod table;
 
 use flotor_hal::glam::{DQuat, DVec3};

@@ -42,7 +42,7 @@ impl Plugin {
     pub fn load(path: &Path) -> Result<Self, LoadError> {
         let bytes =
             std::fs::read(path).map_err(|cause| LoadError::Unreadable { path: path.into(), cause })?;
-        let metadata = metadata_file::parse(path, &bytes)?;
+        let metadata = metadata_file::parse(path, bytes.as_slice(), bytes.len() as u64)?;
         metadata.check_contract()?;
         let entry = open_private_copy(path, &metadata, &bytes)?;
         Self::from_entry(metadata, entry, Runtime::Own)

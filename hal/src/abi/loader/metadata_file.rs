@@ -3,7 +3,7 @@
 use super::LoadError;
 use crate::abi::{ABI_MAJOR, ABI_MINOR, PluginKind, metadata};
 use object::read::elf::{ElfFile64, FileHeader, ProgramHeader, SectionHeader};
-use object::{Endianness, Object, ObjectSection};
+use object::{Endianness, Object, ObjectSection, ReadCache, ReadRef};
 use std::path::{Path, PathBuf};
 
 /// What a plugin says about itself.
@@ -33,8 +33,12 @@ pub struct Metadata {
 /// Everything of [`LoadError`] that can be known without `dlopen`, except the contract version, which a list
 /// may want to show: see [`Metadata::check_contract`].
 pub fn read_metadata(path: &Path) -> Result<Metadata, LoadError> {
-    let bytes = std::fs::read(path).map_err(|cause| LoadError::Unreadable { path: path.into(), cause })?;
-    parse(path, &bytes)
+    let unreadable = |cause| LoadError::Unreadable { path: path.into(), cause };
+    let file = std::fs::File::open(path).map_err(unreadable)?;
+    let length = file.metadata().map_err(unreadable)?.len();
+    // Reads headers and one section: a folder of large libraries is listed in a millisecond.
+    let cache = ReadCache::new(file);
+    parse(path, &cache, length)
 }
 
 impl Metadata {
@@ -52,10 +56,10 @@ impl Metadata {
 }
 
 /// Finds and reads the metadata section of the bytes of a library.
-pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Metadata, LoadError> {
+pub(super) fn parse<'d>(path: &Path, data: impl ReadRef<'d>, length: u64) -> Result<Metadata, LoadError> {
     let not_a_library = |cause| LoadError::NotALibrary { path: path.into(), cause };
-    let elf = ElfFile64::<Endianness>::parse(bytes).map_err(not_a_library)?;
-    check_extent(path, &elf, bytes.len() as u64)?;
+    let elf = ElfFile64::<Endianness, _>::parse(data).map_err(not_a_library)?;
+    check_extent(path, &elf, length)?;
     let section = elf.section_by_name(metadata::SECTION);
     let section = section.ok_or_else(|| LoadError::NotAPlugin { path: path.into() })?;
     let text = section.data().map_err(not_a_library)?;
@@ -87,7 +91,11 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Metadata, LoadError> {
 }
 
 /// Refuses a file shorter than its own headers say: `dlopen` would map it and die of SIGBUS.
-fn check_extent(path: &Path, elf: &ElfFile64<'_, Endianness>, have: u64) -> Result<(), LoadError> {
+fn check_extent<'d>(
+    path: &Path,
+    elf: &ElfFile64<'d, Endianness, impl ReadRef<'d>>,
+    have: u64,
+) -> Result<(), LoadError> {
     let endian = elf.endian();
     let header = elf.elf_header();
     let section_headers = u64::from(header.e_shnum(endian)) * u64::from(header.e_shentsize(endian));
