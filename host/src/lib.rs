@@ -11,11 +11,13 @@
 //! - [`registry`]: where plugins are.
 //! - [`session`]: from a scene to a run.
 //! - [`servo`]: the tick, the clock, the envelope; the only real-time module.
+//! - [`stability`]: how stiff a spring the servo can render.
 //! - [`trace`]: what a tick leaves behind; [`record`] writes it down, [`plot`] draws it.
 //! - [`cli`]: the `flotor` command.
 
 pub mod cli;
 pub mod evaluate;
+pub mod jitter;
 pub mod mapping;
 pub mod plot;
 pub mod record;
@@ -25,5 +27,6 @@ pub mod run_picture;
 pub mod scene;
 pub mod servo;
 pub mod session;
+pub mod stability;
 pub mod trace;
 pub mod validate;

@@ -4,7 +4,7 @@ use crate::mapping::Mapping;
 use crate::registry::{LookupError, Registry};
 use crate::scene::{ModelUse, ParameterText, PluginUse, Scene, SceneError};
 use crate::servo::{
-    Clock, Envelope, ModelHealth, ModelSlot, RealTimeReport, Schedule, Servo, TickEnd, Timing,
+    Clock, Envelope, ModelHealth, ModelSlot, RealTimeReport, Schedule, Servo, SpinWindow, TickEnd, Timing,
     enter_real_time,
 };
 use crate::trace::{RECORD_WORDS, TickRecord};
@@ -158,6 +158,11 @@ impl Session {
         Ok(Self { servo, stopper, clock: options.clock, period_ns, duration_ns, plugins })
     }
 
+    /// The loop itself, for whoever paces it differently; the stopper must be used before it is dropped.
+    pub(crate) fn into_loop(self) -> (Servo, Stopper, u64) {
+        (self.servo, self.stopper, self.period_ns)
+    }
+
     /// The plugins of this run with every parameter in force.
     #[must_use]
     pub fn plugins(&self) -> &[PluginReport] {
@@ -188,8 +193,7 @@ impl Session {
 
     /// Same tick, no waiting: observers look between batches, so that a slow one slows the run and loses nothing.
     fn run_virtual(self, observer: &mut dyn Observer, stop: &AtomicBool) -> Finished {
-        let mut runner =
-            Runner::new(self.servo, Schedule::start(Clock::Virtual, self.period_ns), self.duration_ns);
+        let mut runner = Runner::new(self.servo, Schedule::start_virtual(self.period_ns), self.duration_ns);
         let mut batch = Vec::with_capacity(VIRTUAL_BATCH);
         while runner.end.is_none() {
             while batch.len() < VIRTUAL_BATCH && runner.end.is_none() {
@@ -211,7 +215,7 @@ impl Session {
             let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
             let servo_thread = thread.spawn_scoped(scope, move || {
                 let real_time = enter_real_time();
-                let schedule = Schedule::start(Clock::Real, period_ns);
+                let schedule = Schedule::start_real(period_ns, SpinWindow::measure(period_ns));
                 let mut runner = Runner::new(servo, schedule, duration_ns);
                 while runner.end.is_none() {
                     if let Some(record) = runner.next(stop) {

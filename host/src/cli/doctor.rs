@@ -1,11 +1,12 @@
 //! `flotor doctor`: what this machine lets a real-time loop hope for, and how to allow more.
 
-use super::{CommandError, style};
+use super::{CommandError, style, write_json};
 use crate::registry::Registry;
 use crate::servo::{Privilege, RealTimeReport, probe_real_time};
 use clap::Args;
 use serde::Serialize;
 use std::fs::read_to_string;
+use std::path::Path;
 
 /// Look at this machine.
 #[derive(Args)]
@@ -53,10 +54,7 @@ pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
     diagnoses.extend(privileges(&probe_real_time()));
     diagnoses.push(plugins());
     if arguments.json {
-        let json =
-            serde_json::to_string_pretty(&diagnoses).map_err(|e| CommandError::Failed(e.to_string()))?;
-        println!("{json}");
-        return Ok(());
+        return write_json(Path::new("-"), &diagnoses);
     }
     for diagnosis in &diagnoses {
         let grade = match diagnosis.grade {

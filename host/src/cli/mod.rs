@@ -4,9 +4,11 @@
 
 mod doctor;
 mod eval;
+mod jitter;
 mod options;
 mod plugins;
 mod run;
+mod stability;
 mod validate;
 
 use crate::registry::LookupError;
@@ -41,6 +43,10 @@ enum Command {
     Plugins(plugins::PluginsArguments),
     /// Check a plugin file: does it load, answer, and survive bad input
     Validate(validate::ValidateArguments),
+    /// Measure how well the servo keeps time here, next to a bare loop
+    Jitter(jitter::JitterArguments),
+    /// Find the stiffest virtual spring that stays stable, next to theory
+    Stability(stability::StabilityArguments),
     /// Look at this machine: what a real-time loop may hope for, and how to improve it
     Doctor(doctor::DoctorArguments),
     /// Print a completion script for a shell
@@ -137,6 +143,8 @@ pub fn main() -> ExitCode {
         Some(Command::Eval(arguments)) => eval::run(&arguments),
         Some(Command::Plugins(arguments)) => plugins::run(&arguments),
         Some(Command::Validate(arguments)) => validate::run(&arguments),
+        Some(Command::Jitter(arguments)) => jitter::run(&arguments),
+        Some(Command::Stability(arguments)) => stability::run(&arguments),
         Some(Command::Doctor(arguments)) => doctor::run(&arguments),
         Some(Command::Completions { shell }) => {
             clap_complete::generate(shell, &mut Arguments::command(), "flotor", &mut std::io::stdout());
@@ -150,6 +158,18 @@ pub fn main() -> ExitCode {
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// Writes a result for machines, `-` being standard output.
+fn write_json<T: serde::Serialize>(path: &std::path::Path, value: &T) -> Result<(), CommandError> {
+    let json =
+        serde_json::to_string_pretty(value).map_err(|error| CommandError::Failed(error.to_string()))?;
+    if path.as_os_str() == "-" {
+        println!("{json}");
+        return Ok(());
+    }
+    std::fs::write(path, json + "\n")
+        .map_err(|cause| CommandError::file(path, "cannot write the JSON", cause))
 }
 
 /// Colours, on terminals only.

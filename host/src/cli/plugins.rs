@@ -1,12 +1,13 @@
 //! `flotor plugins`: what is there, read from the files without running any of them.
 
-use super::{CommandError, style};
+use super::{CommandError, style, write_json};
 use crate::registry::{PATH_VARIABLE, Registry};
 use clap::Args;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{Mutability, Parameter, ParameterKind};
 use serde::Serialize;
+use std::path::Path;
 
 /// List the plugins that are found.
 #[derive(Args)]
@@ -56,7 +57,7 @@ fn list(registry: &Registry, json: bool) -> Result<(), CommandError> {
         })
         .collect();
     if json {
-        return print_json(&listed);
+        return write_json(Path::new("-"), &listed);
     }
     for kind in [PluginKind::Device, PluginKind::Model] {
         println!("{}", style::title(&format!("{}s", kind.word())));
@@ -114,7 +115,7 @@ fn describe(registry: &Registry, id: &str, json: bool) -> Result<(), CommandErro
     let plugin = registry.load(id, kind)?;
     let parameters: Vec<Described<'_>> = plugin.parameters().iter().map(described).collect();
     if json {
-        return print_json(&parameters);
+        return write_json(Path::new("-"), &parameters);
     }
     print_description(&plugin, &parameters);
     Ok(())
@@ -163,11 +164,4 @@ fn print_description(plugin: &Plugin, parameters: &[Described<'_>]) {
         println!("  {:<28} {range} (default {}{live})", parameter.id, parameter.default);
         println!("  {:<28} {}", "", parameter.doc);
     }
-}
-
-fn print_json<T: Serialize>(value: &T) -> Result<(), CommandError> {
-    let json =
-        serde_json::to_string_pretty(value).map_err(|error| CommandError::Failed(error.to_string()))?;
-    println!("{json}");
-    Ok(())
 }

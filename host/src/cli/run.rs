@@ -63,6 +63,8 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let plugins = session.plugins().to_vec();
 
     let clock_word = if clock == Clock::Real { "real" } else { "virtual" };
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
+    let length_ms = (scene.duration_s * 1.0e3) as u64;
     let mut watchers = Watchers {
         tally: Tally::default(),
         digest: TraceDigest::new(),
@@ -73,7 +75,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
             .transpose()?,
         failure: None,
         plot: arguments.plot.as_ref().map(|_| RunPicture::new(&scene.title)),
-        progress: progress(&scene),
+        progress: progress_bar(length_ms, "{percent:>3} %  {msg}"),
     };
     let stop = stop_on_interrupt();
     let outcome = session.run(&mut watchers, &stop)?;
@@ -144,15 +146,7 @@ fn tell(arguments: &RunArguments, summary: &RunSummary, advice: &[String]) -> Re
     for line in advice {
         eprintln!("{} {line}", style::warning("note:"));
     }
-    let Some(path) = &arguments.json else { return Ok(()) };
-    let json =
-        serde_json::to_string_pretty(summary).map_err(|error| CommandError::Failed(error.to_string()))?;
-    if json_on_stdout {
-        println!("{json}");
-        return Ok(());
-    }
-    std::fs::write(path, json + "\n")
-        .map_err(|cause| CommandError::file(path, "cannot write the summary", cause))
+    arguments.json.as_ref().map_or(Ok(()), |path| super::write_json(path, summary))
 }
 
 /// Everybody who looks at every tick of a run.
@@ -212,17 +206,14 @@ fn live_line(record: &TickRecord) -> String {
 }
 
 /// A progress line on a terminal, nothing in a pipe.
-fn progress(scene: &Scene) -> ProgressBar {
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
-    let bar =
-        ProgressBar::with_draw_target(Some((scene.duration_s * 1.0e3) as u64), ProgressDrawTarget::stderr());
-    let style = ProgressStyle::with_template("{percent:>3} %  {msg}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+pub(super) fn progress_bar(length: u64, template: &str) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
+    bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
     bar
 }
 
 /// Ctrl-C ends the run in order: device to safe stop, files closed. A second one is the system's.
-fn stop_on_interrupt() -> Arc<AtomicBool> {
+pub(super) fn stop_on_interrupt() -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
     let handler = ctrlc::set_handler(move || {

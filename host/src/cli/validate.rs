@@ -1,9 +1,9 @@
 //! `flotor validate`: a plugin file against the rules of the contract.
 
-use super::{CommandError, style};
+use super::{CommandError, style, write_json};
 use crate::validate::{Finding, validate};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Check a plugin file.
 #[derive(Args)]
@@ -21,9 +21,7 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     let findings = validate(&arguments.plugin);
     let violated = findings.iter().filter(|finding| finding.violation.is_some()).count();
     if arguments.json {
-        let json =
-            serde_json::to_string_pretty(&findings).map_err(|e| CommandError::Failed(e.to_string()))?;
-        println!("{json}");
+        write_json(Path::new("-"), &findings)?;
     } else {
         println!("{}", style::title(&arguments.plugin.display().to_string()));
         findings.iter().for_each(print);

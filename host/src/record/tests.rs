@@ -1,1 +1,436 @@
+use super::schema::{DESCRIPTOR_SET, ENCODING, FORMAT, Topic};
+use super::*;
+use crate::scene::MappingConfig;
+use crate::servo::Clock;
+use crate::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
+use flotor_sync::Words;
+use mcap::records::op;
+use prost::Message;
+use std::fs::{self, File, OpenOptions};
+use std::io::{Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
 
+/// A file of its own for a test, gone afterwards.
+struct TestFile(PathBuf);
+
+impl TestFile {
+    fn new(test: &str) -> Self {
+        Self(std::env::temp_dir().join(format!("flotor-record-{}-{test}.mcap", std::process::id())))
+    }
+
+    fn with(test: &str, bytes: &[u8]) -> Self {
+        let file = Self::new(test);
+        fs::write(&file.0, bytes).unwrap();
+        file
+    }
+
+    fn length(&self) -> u64 {
+        fs::metadata(&self.0).unwrap().len()
+    }
+}
+
+impl Drop for TestFile {
+    fn drop(&mut self) {
+        let _ = fs::remove_file(&self.0);
+    }
+}
+
+fn run() -> RunDescription {
+    let pair = |key: &str, value: &str| (key.to_owned(), value.to_owned());
+    let turned = MappingConfig { rotation_xyzw: [0.6, 0.0, -0.0, 0.8], ..MappingConfig::default() };
+    let scaled = MappingConfig { motion_scale: 25.0 / 15.0, torque_scale: Some(0.1), ..turned };
+    let plugin = |name: &str, role, settings| PluginDescription {
+        name: name.to_owned(),
+        id: format!("{name}-id"),
+        version: "1.2.3".to_owned(),
+        file: format!("lib{name}.so"),
+        role,
+        settings,
+        parameters: vec![pair("preset", "plain"), pair("mass_kg", "0.58")],
+    };
+    RunDescription {
+        flotor_version: "9.8.7".to_owned(),
+        rate_hz: 1000.0 / 3.0,
+        duration_s: 0.1,
+        seed: u64::MAX,
+        clock: Clock::Real,
+        scene_toml: "title = \"ü\"\n".to_owned(),
+        plugins: vec![
+            plugin("device", Role::Device, vec![pair("preset", "full")]),
+            plugin("left", Role::Model(turned), vec![]),
+            plugin("right", Role::Model(scaled), vec![pair("variant", "rod"), pair("variant", "energy")]),
+        ],
+    }
+}
+
+/// A tick with a number of its own in every field; `dt_ns` after the one before.
+fn tick(index: u64, dt_ns: u64) -> TickRecord {
+    #[allow(clippy::cast_precision_loss)] // small
+    let mut words: [u64; RECORD_WORDS] = std::array::from_fn(|i| (index as f64 + i as f64 / 64.0).to_bits());
+    [words[0], words[1], words[2]] = [index, index * dt_ns, dt_ns];
+    let [.., flags, lateness_ns, compute_ns] = &mut words;
+    [*flags, *lateness_ns, *compute_ns] = [index | (index + 1) << 32, 10 * index, 20 * index];
+    TickRecord::from_words(&words)
+}
+
+fn write(path: &Path, ticks: &[TickRecord]) {
+    let mut recorder = Recorder::create(path, &run()).unwrap();
+    ticks.iter().for_each(|tick| recorder.record(tick).unwrap());
+    recorder.finish().unwrap();
+}
+
+/// Everything that can be read, and what ended it.
+fn read(path: &Path) -> (Vec<TickRecord>, Result<Ending, ReadError>) {
+    let mut recording = match Recording::open(path) {
+        Ok(recording) => recording,
+        Err(error) => return (Vec::new(), Err(error)),
+    };
+    let mut ticks = Vec::new();
+    for tick in &mut recording {
+        match tick {
+            Ok(tick) => ticks.push(tick),
+            Err(error) => return (ticks, Err(error)),
+        }
+    }
+    (ticks, Ok(recording.ending()))
+}
+
+fn words(ticks: &[TickRecord]) -> Vec<[u64; RECORD_WORDS]> {
+    ticks.iter().map(Words::to_words).collect()
+}
+
+/// Ticks of 100 ms: a chunk holds three of them.
+fn three_chunks() -> Vec<TickRecord> {
+    (0..9).map(|index| tick(index, 100_000_000)).collect()
+}
+
+/// SplitMix64 (Steele, Lea, Flood 2014): every bit pattern, in no order.
+fn random_words(state: &mut u64) -> [u64; RECORD_WORDS] {
+    std::array::from_fn(|_| {
+        *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = *state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    })
+}
+
+#[test]
+fn ticks_come_back_bit_for_bit() {
+    let signaling_nan = 0x7ff0_0000_dead_beef;
+    let specials = [
+        0,
+        (-0.0_f64).to_bits(),
+        1,
+        u64::MAX,
+        f64::INFINITY.to_bits(),
+        signaling_nan,
+        f64::MIN_POSITIVE.to_bits(),
+    ];
+    let mut ticks: Vec<TickRecord> =
+        specials.iter().map(|&word| TickRecord::from_words(&[word; RECORD_WORDS])).collect();
+    let mut state = 1;
+    ticks.extend((0..2000).map(|_| TickRecord::from_words(&random_words(&mut state))));
+
+    let file = TestFile::new("bits");
+    write(&file.0, &ticks);
+    let (back, end) = read(&file.0);
+    assert_eq!(end.unwrap(), Ending::Finished);
+    assert!(words(&back) == words(&ticks));
+}
+
+#[test]
+fn the_description_of_a_run_comes_back() {
+    let file = TestFile::new("description");
+    write(&file.0, &[]);
+    let mut recording = Recording::open(&file.0).unwrap();
+    assert_eq!(recording.run(), &run());
+    assert!(recording.next().is_none());
+
+    // The same in the metadata record, as flat text.
+    let bytes = fs::read(&file.0).unwrap();
+    let is_metadata = |record| match record {
+        mcap::records::Record::Metadata(metadata) => Some(metadata),
+        _ => None,
+    };
+    let records = mcap::read::LinearReader::new(&bytes).unwrap().map(Result::unwrap);
+    let metadata = records.filter_map(is_metadata).next().unwrap();
+    assert_eq!(metadata.name, "flotor.run");
+    for (key, value) in [
+        ("rate_hz", "333.3333333333333"),
+        ("clock", "real"),
+        ("scene_toml", "title = \"ü\"\n"),
+        ("right.mapping.motion_scale", "1.6666666666666667"),
+        ("device.settings.preset", "full"),
+        ("left.parameters.mass_kg", "0.58"),
+    ] {
+        assert_eq!(metadata.metadata.get(key).map(String::as_str), Some(value), "{key}");
+    }
+}
+
+#[test]
+fn notes_are_there_once_the_ticks_before_them_are_read() {
+    let note = |time_ns, severity, text: &str| Note {
+        time_ns,
+        severity,
+        source: "spring".into(),
+        text: text.into(),
+    };
+    let notes = [note(5, Severity::Warning, "left its domain"), note(9, Severity::Error, "panicked")];
+    let file = TestFile::new("notes");
+    let mut recorder = Recorder::create(&file.0, &run()).unwrap();
+    recorder.record(&tick(0, 1)).unwrap();
+    recorder.note(&notes[0]).unwrap();
+    recorder.record(&tick(1, 1)).unwrap();
+    recorder.note(&notes[1]).unwrap();
+    recorder.finish().unwrap();
+
+    let mut recording = Recording::open(&file.0).unwrap();
+    assert_eq!(recording.next().unwrap().unwrap().tick, 0);
+    assert_eq!(recording.notes(), []);
+    assert_eq!(recording.next().unwrap().unwrap().tick, 1);
+    assert_eq!(recording.notes(), &notes[..1]);
+    assert!(recording.next().is_none());
+    assert_eq!(recording.notes(), notes);
+}
+
+#[test]
+fn a_file_cut_off_at_any_byte_gives_its_whole_chunks_and_says_so() {
+    let ticks = three_chunks();
+    let file = TestFile::new("cut");
+    let mut recorder = Recorder::create(&file.0, &run()).unwrap();
+    // Where the description ends, and each chunk after it.
+    let mut flushed = vec![file.length()];
+    for tick in &ticks {
+        recorder.record(tick).unwrap();
+        if file.length() > flushed[flushed.len() - 1] {
+            flushed.push(file.length());
+        }
+    }
+    recorder.finish().unwrap();
+    assert_eq!(flushed.len(), 4, "three chunks");
+
+    let handle = OpenOptions::new().write(true).open(&file.0).unwrap();
+    for length in (0..file.length()).rev() {
+        handle.set_len(length).unwrap();
+        let (back, end) = read(&file.0);
+        assert!(words(&back) == words(&ticks[..back.len()]), "cut at {length}");
+        assert_eq!(back.len() % 3, 0, "cut at {length}: {} ticks", back.len());
+        let whole_chunks = flushed.iter().skip(1).filter(|&&end| end <= length).count();
+        assert!(back.len() >= 3 * whole_chunks, "cut at {length}: {} ticks", back.len());
+        match end {
+            Ok(ending) => assert_eq!(ending, Ending::CutOff, "cut at {length}"),
+            Err(ReadError::CutOffAtStart { .. }) => assert!(length < flushed[0]),
+            Err(other) => panic!("cut at {length}: {other}"),
+        }
+    }
+}
+
+#[test]
+fn a_killed_process_loses_at_most_250_ms() {
+    for (rate_hz, count) in [(1_000, 1_234), (100, 123), (10_000, 12_345)] {
+        let dt_ns = 1_000_000_000 / rate_hz;
+        let file = TestFile::new(&format!("killed-{rate_hz}"));
+        let mut recorder = Recorder::create(&file.0, &run()).unwrap();
+        (0..count).for_each(|index| recorder.record(&tick(index, dt_ns)).unwrap());
+        // What is in the process's own buffers never reaches the file, no destructor runs.
+        std::mem::forget(recorder);
+
+        let (back, end) = read(&file.0);
+        assert_eq!(end.unwrap(), Ending::CutOff);
+        let lost_ns = (count - back.len() as u64) * dt_ns;
+        assert!(lost_ns < 250_000_000, "{lost_ns} ns lost at {rate_hz} Hz");
+    }
+}
+
+#[test]
+fn room_a_file_system_never_filled_is_the_end() {
+    let file = TestFile::new("zeros");
+    let mut recorder = Recorder::create(&file.0, &run()).unwrap();
+    three_chunks().iter().for_each(|tick| recorder.record(tick).unwrap());
+    std::mem::forget(recorder);
+    OpenOptions::new().append(true).open(&file.0).unwrap().write_all(&[0; 5000]).unwrap();
+    let (back, end) = read(&file.0);
+    assert_eq!((back.len(), end.unwrap()), (9, Ending::CutOff));
+}
+
+/// Offsets of the file's own records (not those in chunks) with their opcode.
+fn records(bytes: &[u8]) -> Vec<(usize, u8)> {
+    let mut at = mcap::MAGIC.len();
+    let mut found = Vec::new();
+    while let Some((&opcode, rest)) = bytes[at..].split_first().filter(|(_, rest)| rest.len() > 8) {
+        found.push((at, opcode));
+        at += 9 + usize::try_from(u64::from_le_bytes(rest[..8].try_into().unwrap())).unwrap();
+    }
+    found
+}
+
+/// Reads the file once for every byte of it, that byte turned to something else.
+fn for_every_wrong_byte(
+    file: &TestFile,
+    mut check: impl FnMut(usize, Vec<TickRecord>, Result<Ending, ReadError>),
+) {
+    let bytes = fs::read(&file.0).unwrap();
+    let mut handle = OpenOptions::new().write(true).open(&file.0).unwrap();
+    let mut put = |at: usize, byte: u8| {
+        handle.seek(SeekFrom::Start(at as u64)).unwrap();
+        handle.write_all(&[byte]).unwrap();
+    };
+    for (at, &byte) in bytes.iter().enumerate() {
+        for wrong in [byte ^ 0xff, byte ^ 0x01] {
+            put(at, wrong);
+            let (ticks, end) = read(&file.0);
+            check(at, ticks, end);
+        }
+        put(at, byte);
+    }
+}
+
+#[test]
+fn a_wrong_byte_is_told_or_does_no_harm() {
+    let ticks = three_chunks();
+    let file = TestFile::new("wrong-byte");
+    write(&file.0, &ticks);
+    let data_end =
+        records(&fs::read(&file.0).unwrap()).into_iter().find(|(_, opcode)| *opcode == op::DATA_END);
+    let (data_end, _) = data_end.unwrap();
+    for_every_wrong_byte(&file, |at, back, end| {
+        assert!(words(&back) == words(&ticks[..back.len()]), "byte {at}");
+        match end {
+            Ok(_) => assert_eq!(back.len(), ticks.len(), "byte {at}"),
+            Err(_) => assert!(at < data_end + 9 + 4, "byte {at} of the index is not needed"),
+        }
+    });
+}
+
+#[test]
+fn nonsense_without_checksums_never_panics() {
+    let file = TestFile::new("nonsense");
+    write(&file.0, &three_chunks()[..4]);
+    let mut bytes = fs::read(&file.0).unwrap();
+    for (at, opcode) in records(&bytes) {
+        // MCAP: a checksum of zero is none. Chunk: after two times and a size; data end: its only field.
+        let checksum = match opcode {
+            op::CHUNK => at + 9 + 24,
+            op::DATA_END => at + 9,
+            _ => continue,
+        };
+        bytes[checksum..checksum + 4].fill(0);
+    }
+    fs::write(&file.0, &bytes).unwrap();
+    let mut refused = 0;
+    for_every_wrong_byte(&file, |_, _, end| refused += usize::from(end.is_err()));
+    assert!(refused > 1000, "{refused}");
+}
+
+#[test]
+fn a_record_longer_than_its_chunk_is_damage() {
+    let file = TestFile::new("long-record");
+    write(&file.0, &[]);
+    let mut bytes = fs::read(&file.0).unwrap();
+    let chunk = records(&bytes).into_iter().find(|(_, opcode)| *opcode == op::CHUNK);
+    let (chunk, _) = chunk.unwrap();
+    bytes[chunk + 9 + 24..][..4].fill(0);
+    // After the chunk's header (40 bytes, compression "") and the opcode of its first record.
+    bytes[chunk + 9 + 40 + 1..][..8].copy_from_slice(&100_000_u64.to_le_bytes());
+    fs::write(&file.0, &bytes).unwrap();
+    let end = read(&file.0).1;
+    assert!(matches!(end, Err(ReadError::Damaged { cause: Damage::Chunk, .. })), "{end:?}");
+}
+
+#[test]
+fn missing_ticks_are_damage() {
+    let file = TestFile::new("gap");
+    let chunks = three_chunks();
+    write(&file.0, &chunks);
+    let mut bytes = fs::read(&file.0).unwrap();
+    // The second chunk of ticks (the first of all is the description's) becomes a record nobody knows.
+    let (chunk, _) = records(&bytes).into_iter().filter(|(_, opcode)| *opcode == op::CHUNK).nth(2).unwrap();
+    bytes[chunk] = 0x80;
+    fs::write(&file.0, &bytes).unwrap();
+    let (back, end) = read(&file.0);
+    assert_eq!(back.len(), 3);
+    let text = end.unwrap_err().to_string();
+    assert!(text.contains("after tick 2: 3 ticks are missing"), "{text}");
+}
+
+#[test]
+fn other_files_are_refused_with_name_reason_and_remedy() {
+    let refusal = |path: &Path| read(path).1.unwrap_err().to_string();
+    let holds =
+        |text: &str, parts: &[&str]| parts.iter().for_each(|part| assert!(text.contains(part), "{text}"));
+
+    holds(&refusal(Path::new("/nowhere/run.mcap")), &["/nowhere/run.mcap", "No such file"]);
+    holds(&refusal(&std::env::temp_dir()), &["directory"]);
+    let text = TestFile::with("text", b"time,force\n0,1\n");
+    holds(&refusal(&text.0), &["flotor-record", "not an MCAP file", "--record"]);
+    let empty = TestFile::with("empty", b"");
+    holds(&refusal(&empty.0), &["cut off", "record again"]);
+
+    let foreign = TestFile::new("foreign");
+    let mut writer = mcap::Writer::new(File::create(&foreign.0).unwrap()).unwrap();
+    let channel = writer.add_channel(0, "/flotor/tick", "json", &Default::default()).unwrap();
+    let header =
+        mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
+    writer.write_to_known_channel(&header, b"{}").unwrap();
+    writer.finish().unwrap();
+    holds(&refusal(&foreign.0), &["no recording of a run", "--record"]);
+
+    let newer = TestFile::new("newer");
+    let mut writer = mcap::Writer::new(File::create(&newer.0).unwrap()).unwrap();
+    let topic = Topic::Run;
+    let schema = writer.add_schema(topic.schema(), ENCODING, DESCRIPTOR_SET).unwrap();
+    let channel = writer.add_channel(schema, topic.name(), ENCODING, &Default::default()).unwrap();
+    let message = super::schema::Run { format: FORMAT + 1, ..run().to_message() };
+    let header =
+        mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
+    writer.write_to_known_channel(&header, &message.encode_to_vec()).unwrap();
+    writer.finish().unwrap();
+    holds(&refusal(&newer.0), &["format 2", "9.8.7", "update flotor"]);
+}
+
+#[test]
+fn a_full_disk_is_told_with_the_name_of_the_file() {
+    let Err(error) = Recorder::create(Path::new("/dev/full"), &run()) else { panic!("the disk is full") };
+    let text = error.to_string();
+    assert!(text.contains("`/dev/full`") && text.contains("No space left"), "{text}");
+    let Err(error) = Recorder::create(Path::new("/nowhere/run.mcap"), &run()) else {
+        panic!("no such folder")
+    };
+    assert!(error.to_string().contains("`/nowhere/run.mcap`"), "{error}");
+}
+
+#[test]
+fn the_digest_is_xxh3_of_the_words_little_endian() {
+    // From the reference implementation: Python's xxhash, xxh3_64 over struct.pack("<36Q", *range(36)), once and
+    // twice in a row.
+    let record = TickRecord::from_words(&std::array::from_fn(|i| i as u64));
+    let mut digest = TraceDigest::new();
+    assert_eq!(digest.finish(), "xxh3:2d06800538d394c2-0");
+    digest.update(&record);
+    assert_eq!(digest.finish(), "xxh3:c9bff3c3a0a3c3e7-1");
+    digest.update(&record);
+    assert_eq!(digest.finish(), "xxh3:1d2d427b30135e6b-2");
+}
+
+#[test]
+fn the_digest_sees_every_bit_but_measured_times() {
+    let digest = |words: &[u64; RECORD_WORDS]| {
+        let mut digest = TraceDigest::new();
+        digest.update(&TickRecord::from_words(words));
+        digest.finish()
+    };
+    let words = tick(3, 1_000_000).to_words();
+    let plain = digest(&words);
+    for word in 0..RECORD_WORDS {
+        for bit in 0..u64::BITS {
+            let mut other = words;
+            other[word] ^= 1 << bit;
+            assert_eq!(
+                digest(&other) == plain,
+                word >= RECORD_WORDS - TIMING_WORDS,
+                "word {word}, bit {bit}"
+            );
+        }
+    }
+}

@@ -16,8 +16,38 @@ pub enum Clock {
     Virtual,
 }
 
-/// The final stretch before a deadline is spun, not slept: a sleeping thread wakes tens of microseconds late.
-const SPIN_NS: u64 = 100_000;
+/// The final stretch before a deadline, which is spun and not slept: a sleeping thread wakes late.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SpinWindow {
+    /// Length of the stretch, ns.
+    pub spin_ns: u64,
+}
+
+impl SpinWindow {
+    /// Sleeps measured to find the window.
+    const SAMPLES: usize = 64;
+    /// Length of a measured sleep, ns: long enough for the core to go idle, as between ticks.
+    const SAMPLE_SLEEP_NS: u64 = 400_000;
+    /// Narrowest and widest window, ns: below, the spin could not absorb anything; above, it would burn the core.
+    const BOUNDS_NS: [u64; 2] = [20_000, 250_000];
+
+    /// Measures how late this thread wakes and takes the lateness of 19 in 20 wake-ups, plus a quarter; at most
+    /// half the period. Not real-time: some 30 ms. Call it on the loop's own thread, with its priority.
+    #[must_use]
+    pub fn measure(period_ns: u64) -> Self {
+        let mut lateness_ns = [0; Self::SAMPLES];
+        for sample in &mut lateness_ns {
+            let deadline = monotonic_ns() + Self::SAMPLE_SLEEP_NS;
+            sleep_until(deadline);
+            *sample = monotonic_ns().saturating_sub(deadline);
+        }
+        lateness_ns.sort_unstable();
+        let usual_ns = lateness_ns.get(Self::SAMPLES * 19 / 20).copied().unwrap_or_default();
+        let [narrowest, widest] = Self::BOUNDS_NS;
+        let spin_ns = (usual_ns + usual_ns / 4).clamp(narrowest, widest).min(period_ns / 2);
+        Self { spin_ns }
+    }
+}
 
 /// Nanoseconds of the monotonic clock. Real-time: bounded, no allocation (a vDSO call).
 #[inline]
@@ -32,6 +62,7 @@ pub(crate) fn monotonic_ns() -> u64 {
 pub(crate) struct Schedule {
     clock: Clock,
     period_ns: u64,
+    window: SpinWindow,
     start_ns: u64,
     /// Number of periods since the start that the next tick belongs to.
     slot: u64,
@@ -49,13 +80,16 @@ pub(crate) struct Due {
 }
 
 impl Schedule {
-    /// A schedule whose first tick is due now (real clock: one period from now).
-    pub(crate) fn start(clock: Clock, period_ns: u64) -> Self {
-        let start_ns = match clock {
-            Clock::Real => monotonic_ns() + period_ns,
-            Clock::Virtual => 0,
-        };
-        Self { clock, period_ns, start_ns, slot: 0, next_index: 0, last_slot: 0 }
+    /// A schedule on the machine's clock, whose first tick is due one period from now.
+    pub(crate) fn start_real(period_ns: u64, window: SpinWindow) -> Self {
+        let start_ns = monotonic_ns() + period_ns;
+        Self { clock: Clock::Real, period_ns, window, start_ns, slot: 0, next_index: 0, last_slot: 0 }
+    }
+
+    /// A schedule without waiting, whose first tick is at time 0.
+    pub(crate) fn start_virtual(period_ns: u64) -> Self {
+        let window = SpinWindow { spin_ns: 0 };
+        Self { clock: Clock::Virtual, period_ns, window, start_ns: 0, slot: 0, next_index: 0, last_slot: 0 }
     }
 
     /// Waits for the next tick. Real-time: sleeps, then spins; no allocation.
@@ -78,8 +112,8 @@ impl Schedule {
     fn wait_real(&mut self) -> (u64, u64) {
         let deadline = self.start_ns + self.slot * self.period_ns;
         let mut now = monotonic_ns();
-        if now + SPIN_NS < deadline {
-            sleep_until(deadline - SPIN_NS);
+        if now + self.window.spin_ns < deadline {
+            sleep_until(deadline - self.window.spin_ns);
             now = monotonic_ns();
         }
         while now < deadline {
@@ -111,8 +145,9 @@ impl Schedule {
     }
 }
 
+/// Sleeps until a time of the monotonic clock. Real-time: one system call.
 #[allow(clippy::cast_possible_wrap)] // seconds since boot
-fn sleep_until(deadline_ns: u64) {
+pub(crate) fn sleep_until(deadline_ns: u64) {
     let request = Timespec {
         tv_sec: (deadline_ns / 1_000_000_000) as i64,
         tv_nsec: (deadline_ns % 1_000_000_000) as i64,
@@ -127,7 +162,7 @@ mod tests {
 
     #[test]
     fn virtual_ticks_are_evenly_spaced_from_zero() {
-        let mut schedule = Schedule::start(Clock::Virtual, 250_000);
+        let mut schedule = Schedule::start_virtual(250_000);
         let ticks: Vec<Tick> = (0..3).map(|_| schedule.wait().tick).collect();
         assert_eq!(ticks[0], Tick { index: 0, time_ns: 0, dt_ns: 0 });
         assert_eq!(ticks[2], Tick { index: 2, time_ns: 500_000, dt_ns: 250_000 });
@@ -136,7 +171,7 @@ mod tests {
     #[test]
     fn a_loop_that_was_held_up_skips_what_is_past_and_counts_it() {
         let period_ns = 1_000_000;
-        let mut schedule = Schedule::start(Clock::Real, period_ns);
+        let mut schedule = Schedule::start_real(period_ns, SpinWindow { spin_ns: 50_000 });
         let _ = schedule.wait();
         std::thread::sleep(std::time::Duration::from_millis(20));
         let due = schedule.wait();

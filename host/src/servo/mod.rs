@@ -8,8 +8,8 @@ mod envelope;
 mod realtime;
 mod timing;
 
-pub use clock::Clock;
-pub(crate) use clock::{Schedule, monotonic_ns};
+pub use clock::{Clock, SpinWindow};
+pub(crate) use clock::{Schedule, monotonic_ns, sleep_until};
 pub use envelope::Envelope;
 pub use realtime::{Privilege, RealTimeReport};
 pub(crate) use realtime::{enter_real_time, probe_real_time};

@@ -40,6 +40,15 @@ impl Durations {
         self.0.saturating_record(duration_ns);
     }
 
+    /// Every bin that counted something: its duration, ns, and how often. Not real-time.
+    #[must_use]
+    pub fn bins(&self) -> Vec<(u64, u64)> {
+        self.0
+            .iter_recorded()
+            .map(|bin| (bin.value_iterated_to(), bin.count_since_last_iteration()))
+            .collect()
+    }
+
     /// The percentiles so far. Not real-time.
     #[must_use]
     pub fn percentiles(&self) -> Percentiles {

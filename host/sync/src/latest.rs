@@ -5,8 +5,8 @@
 //! that no write ran in between, so the copy is whole. The writer never looks at the readers and so never
 //! waits for them; a reader that was overtaken tries again, a few times.
 //!
-//! Source: H.-J. Boehm, "Can seqlocks get along with programming language memory models?", MSPC 2012, section
-//! 4 (atomic payload, fences instead of stronger accesses).
+//! Source: H.-J. Boehm, "Can seqlocks get along with programming language memory models?", MSPC 2012
+//! (the variant with atomic data and fences).
 
 use std::marker::PhantomData;
 
@@ -15,12 +15,12 @@ use crate::words::{AtomicWords, Words};
 
 /// Attempts of one read, a count. A copy takes tens of nanoseconds and the servo publishes at most every
 /// 100 µs, so a second attempt is rare and a third means that the writer was suspended in the middle of a
-/// publish: more would be spinning. Loom takes one: its models read several times, and each attempt multiplies the
-/// interleavings without adding a new kind.
+/// publish: more would be spinning. Under loom one: its models read several times themselves, and each
+/// attempt multiplies the interleavings without adding a new kind.
 const READ_ATTEMPTS: usize = if cfg!(loom) { 1 } else { 3 };
 
-/// What both ends share. Aligned to two 64-byte cache lines, which x86 prefetches as a pair (and which are one
-/// line on some aarch64 cores), so that no neighbour on the heap shares a line with it.
+/// What both ends share. Aligned to two 64-byte cache lines, which x86 prefetches as a pair (and which are
+/// one line on some aarch64 cores), so that no neighbour on the heap shares a line with it.
 #[derive(Debug)]
 #[repr(align(128))]
 struct Cell<const N: usize> {
@@ -59,9 +59,9 @@ impl<T: Words<N>, const N: usize> Publisher<T, N> {
         self.sequence = self.sequence.wrapping_add(2);
 
         self.cell.sequence.store(writing, Ordering::Relaxed);
-        // Release fence, pairs with the reader's acquire fence: whoever sees one of the new words also sees the
-        // odd sequence. Without it the new words could show before it, and a reader that took some of them
-        // would find the sequence unchanged.
+        // Release fence, pairs with the reader's acquire fence: whoever sees one of the new words also sees
+        // the odd sequence. Without it the new words could show before it, and a reader that took some of
+        // them would find the sequence unchanged.
         fence(Ordering::Release);
         self.cell.words.store(&words);
         // Release, pairs with the reader's acquire load: whoever sees the even sequence sees all new words.
@@ -100,8 +100,9 @@ impl<T: Words<N>, const N: usize> Observer<T, N> {
             return None;
         }
         let words = self.cell.words.load();
-        // Acquire fence, pairs with the writer's release fence: if any word above came from a later publish, the
-        // load below sees that the sequence has moved on. Without it this load could be served early, or stale.
+        // Acquire fence, pairs with the writer's release fence: if any word above came from a later publish,
+        // the load below sees that the sequence has moved on. Without it this load could be served early, or
+        // stale.
         fence(Ordering::Acquire);
         let after = self.cell.sequence.load(Ordering::Relaxed);
         (after == before).then(|| (before / 2, T::from_words(&words)))

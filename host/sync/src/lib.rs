@@ -5,14 +5,18 @@
 //!
 //! | from -> to | carried by | if the reader is slow |
 //! |---|---|---|
-//! | servo -> viewer: the state now | [`latest`], the latest-value cell | it misses values, never the newest |
-//! | servo -> recorder, plot, digest: every tick | [`ring`], the trace ring | the ring fills, further records are dropped and counted |
-//! | panel, experiment -> servo: commands | [`ring`], drained at tick boundaries | the sender is told that the ring is full |
+//! | servo -> viewer: the state now | [`latest`] | it misses values, never the newest |
+//! | servo -> recorder, plot, digest: every tick | [`ring`] | records that find no room are counted |
+//! | panel, experiment -> servo: commands | [`ring`] | the sender is told that there is no room |
+//!
+//! [`latest`] makes a latest-value cell, [`ring`] a first-in-first-out queue of fixed size. The servo drains
+//! its commands at tick boundaries, which is bounded by the number of slots.
 //!
 //! A *record* is any plain value that can be written as a fixed number of 64-bit words: see [`Words`].
 //!
 //! ```
 //! use flotor_sync::{Words, latest, ring};
+//! use std::time::Duration;
 //!
 //! #[derive(Clone, Copy, Debug, PartialEq)]
 //! struct Sample {
@@ -44,6 +48,7 @@
 //! let mut recorded = Vec::new();
 //! while !recorder.is_abandoned() {
 //!     recorder.drain(|sample| recorded.push(sample));
+//!     std::thread::sleep(Duration::from_millis(1)); // polling would take cache lines from the servo
 //! }
 //! recorder.drain(|sample| recorded.push(sample)); // what came in just before the sender went
 //! servo.join().expect("the servo ends in order");
@@ -64,18 +69,19 @@
 //! - A release or acquire **fence** does the same for all relaxed accesses on its far side, not for one word.
 //!
 //! Everything else is *relaxed*: atomic, and free. Each place where order matters says in a comment what
-//! would go wrong without it. On x86-64 all of these are ordinary moves; on aarch64 they are `ldar`, `stlr`
-//! and `dmb`. Nothing is sequentially consistent, because nothing here compares two unrelated words.
+//! would go wrong without it. On x86-64 all of these are ordinary moves; on aarch64 they cost an acquire
+//! load, a release store or a barrier. Nothing is sequentially consistent: no decision here rests on the
+//! order of two words that different threads write.
 //!
 //! That the comments are true is not left to reading: `tests/loom.rs` runs both primitives under [loom],
-//! which tries every interleaving and every stale value the memory model allows. Each ordering was weakened
-//! in turn, and loom objected each time. Run it with
+//! which tries every interleaving, and every stale value a core may still see in each. Each ordering was
+//! weakened in turn, and loom objected each time. Run it with
 //!
 //! ```text
 //! RUSTFLAGS="--cfg loom" cargo test -p flotor-sync --release --test loom --target-dir target/loom
 //! ```
 //!
-//! [loom]: https://docs.rs/loom
+//! [loom]: https://github.com/tokio-rs/loom
 
 #![forbid(unsafe_code)]
 

@@ -14,8 +14,8 @@ pub(crate) use loom::sync::{
 
 /// Tells loom that a place belongs to one side at a time. In a normal build it is nothing.
 ///
-/// The words of a ring slot are atomic only so that this crate needs no `unsafe`: the protocol gives a slot to
-/// one side at a time, and it would be as right with plain memory. Loom could not see a breach of that,
+/// The words of a ring slot are atomic only so that this crate needs no `unsafe`: the protocol gives a slot
+/// to one side at a time, and it would be as right with plain memory. Loom could not see a breach of that,
 /// because it never lets an atomic load return a store that runs later, as real hardware may. It does watch
 /// its own `UnsafeCell`: two accesses, one of them a write, with nothing that orders them, fail the model.
 #[cfg(not(loom))]
@@ -35,8 +35,8 @@ impl Exclusive {
     pub(crate) fn assert_writable(&self) {}
 }
 
-/// The watched place. The standard mutex is only there to make the cell `Sync` without `unsafe`: loom does not
-/// know it, so it orders nothing in the model, and it is never held across a switch of threads.
+/// The watched place. The standard mutex is only there to make the cell `Sync` without `unsafe`: loom does
+/// not know it, so it orders nothing in the model, and it is never held across a switch of threads.
 #[cfg(loom)]
 #[derive(Debug)]
 pub(crate) struct Exclusive(std::sync::Mutex<loom::cell::UnsafeCell<()>>);

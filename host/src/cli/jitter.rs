@@ -1,0 +1,123 @@
+//! `flotor jitter`: lateness of the servo next to that of a bare loop.
+
+use super::options::{duration_s, rate_hz};
+use super::{CommandError, run, style};
+use crate::jitter::{JitterReport, LoopTiming, measure};
+use crate::plot::{Axis, Bin, Figure, Panel, Series};
+use crate::registry::Registry;
+use crate::scene::Scene;
+use crate::servo::Clock;
+use crate::session::{RunError, RunOptions, Session};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Measure how well the servo keeps time here.
+#[derive(Args)]
+#[command(
+    after_help = "Servo and bare loop take turns of a second each: same spin window, priority and core, same neighbours.\n\n\
+    Example:\n  flotor jitter --duration 20s --plot jitter.svg"
+)]
+pub(crate) struct JitterArguments {
+    /// How long to measure in all
+    #[arg(long, value_parser = duration_s, value_name = "TIME", default_value = "20s")]
+    duration: f64,
+    /// Loop rate in Hz, 100 to 10000
+    #[arg(long, value_parser = rate_hz, value_name = "HZ", default_value = "1000")]
+    rate: f64,
+    /// Write the result as JSON (- for standard output)
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Draw both histograms
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+}
+
+pub(crate) fn run(arguments: &JitterArguments) -> Result<(), CommandError> {
+    let mut scene = Scene::demo().map_err(RunError::Scene)?;
+    scene.rate_hz = arguments.rate;
+    let options = RunOptions { clock: Clock::Real, seed: 0 };
+    let session = Session::prepare(&scene, &Registry::search(&scene.plugin_folders), &options)?;
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
+    let slices = ((arguments.duration / 2.0).ceil() as u64).max(1);
+    let progress = run::progress_bar(slices, "{percent:>3} %  pair {pos} of {len}");
+    let stop = run::stop_on_interrupt();
+    let report = measure(session, slices, &stop, |done| progress.set_position(done))?;
+    progress.finish_and_clear();
+
+    if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
+        println!("{}", to_text(&report));
+    }
+    for line in report.real_time.advice() {
+        eprintln!("{} {line}", style::warning("note:"));
+    }
+    if let Some(path) = &arguments.json {
+        super::write_json(path, &report)?;
+    }
+    if let Some(path) = &arguments.plot {
+        let written = std::fs::write(path, picture(&report));
+        written.map_err(|cause| CommandError::file(path, "cannot write the plot", cause))?;
+    }
+    Ok(())
+}
+
+fn to_text(report: &JitterReport) -> String {
+    #[allow(clippy::cast_precision_loss)] // for people
+    let us = |ns: u64| format!("{:.2}", ns as f64 * 1.0e-3);
+    let row = |name: &str, timing: &LoopTiming| {
+        let LoopTiming { lateness_ns: l, ticks, late_ticks, missed_ticks } = timing;
+        let (p50, p99, p999, max) = (us(l.p50), us(l.p99), us(l.p999), us(l.max));
+        format!("  {name:<6}{p50:>10}{p99:>10}{p999:>10}{max:>11}{ticks:>10}{late_ticks:>8}{missed_ticks:>8}")
+    };
+    let title = format!(
+        "lateness in µs at {} Hz, {} s each in turns, the last {} µs spun",
+        report.rate_hz,
+        report.slices,
+        us(report.spin_window_ns)
+    );
+    let head = format!(
+        "  {:<6}{:>10}{:>10}{:>10}{:>11}{:>10}{:>8}{:>8}",
+        "", "p50", "p99", "p99.9", "max", "ticks", "late", "missed"
+    );
+    [style::title(&title), head, row("servo", &report.servo), row("bare", &report.bare)].join("\n")
+}
+
+fn picture(report: &JitterReport) -> String {
+    let mut panel = Panel::new(Axis::log("Ticks", "1"));
+    for (name, bins) in ["servo", "bare loop"].iter().zip(&report.bins) {
+        panel = panel.series(Series::histogram(*name, octaves(bins)));
+    }
+    let subtitle = format!("{} Hz, {} s each in turns of a second", report.rate_hz, report.slices);
+    Figure::new("Lateness of the servo and of a bare loop", Axis::log("Lateness", "µs"))
+        .subtitle(subtitle)
+        .panel_height_px(260.0)
+        .panel(panel)
+        .to_svg()
+}
+
+/// Bins of a quarter octave from 10 ns up: what is less late than that is on time.
+fn octaves(bins: &[(u64, u64)]) -> Vec<Bin> {
+    const FIRST_US: f64 = 0.01;
+    const STEP: f64 = 1.189_207_115_002_721; // 2^(1/4)
+    let mut heights = Vec::new();
+    for (ns, count) in bins {
+        #[allow(clippy::cast_precision_loss)] // for a picture
+        let us = *ns as f64 * 1.0e-3;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most some two hundred bins
+        let index = (4.0 * (us / FIRST_US).max(1.0).log2()).floor() as usize;
+        if heights.len() <= index {
+            heights.resize(index + 1, 0.0);
+        }
+        if let Some(height) = heights.get_mut(index) {
+            #[allow(clippy::cast_precision_loss)] // for a picture
+            let count = *count as f64;
+            *height += count;
+        }
+    }
+    let mut from = FIRST_US;
+    let bin = |height| {
+        let bin = Bin { from, to: from * STEP, height };
+        from *= STEP;
+        bin
+    };
+    heights.into_iter().map(bin).collect()
+}

@@ -1,0 +1,267 @@
+//! `flotor stability`: the stiffest spring that stays stable on the simulated device, next to theory.
+
+use super::options::rate_hz;
+use super::{CommandError, run, style, write_json};
+use crate::plot::{Axis, Figure, Panel, Series};
+use crate::registry::Registry;
+use crate::stability::theory::{Plant, Rendering, exact_limit_n_per_m, gil_limit_n_per_m};
+use crate::stability::{Case, Grip, LoopError, Row, default_cases, measure};
+use clap::Args;
+use flotor_hal::abi::PluginKind;
+use flotor_hal::abi::loader::Plugin;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Find the stiffest virtual spring that stays stable.
+#[derive(Args)]
+#[command(
+    after_help = "Each case is bisected on the simulated flotor's own dynamics, in virtual time, until the \
+    vibration of a released\nhandle neither grows nor fades. Lists multiply: without any, a default grid is measured.\n\n\
+    Examples:\n  \
+    flotor stability --plot stability.svg --csv stability.csv\n  \
+    flotor stability --rate 1000,4000 --delay 0,1 --virtual-damping 0,15\n  \
+    flotor stability --virtual-damping 15 --quantum-um 10 --hand relaxed"
+)]
+pub(crate) struct StabilityArguments {
+    /// Servo rates in Hz, 100 to 10000
+    #[arg(long, value_parser = rate_hz, value_name = "HZ", value_delimiter = ',')]
+    rate: Vec<f64>,
+    /// Whole periods between a sample and the force that answers it, 0 to 100
+    #[arg(long, value_parser = clap::value_parser!(u32).range(0..=100), value_name = "TICKS", value_delimiter = ',')]
+    delay: Vec<u32>,
+    /// Drag of the device in N s/m
+    #[arg(long, value_parser = damping, value_name = "B", value_delimiter = ',')]
+    damping: Vec<f64>,
+    /// Virtual damping (backward difference) in N s/m
+    #[arg(long, value_parser = damping, value_name = "B", value_delimiter = ',')]
+    virtual_damping: Vec<f64>,
+    /// Step of the position sensor in µm, 0 to 100
+    #[arg(long, value_parser = quantum_um, value_name = "UM", default_value = "0")]
+    quantum_um: f64,
+    /// How the handle is held
+    #[arg(long, value_enum, default_value_t)]
+    hand: Grip,
+    /// Write the rows as JSON (- for standard output)
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write the rows as CSV (- for standard output)
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Draw stiffness against virtual damping: theory as lines, simulation as points
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+}
+
+/// The device whose dynamics are simulated.
+const DEVICE: &str = "simulated";
+
+/// What machines read.
+#[derive(Serialize)]
+struct Report<'a> {
+    device: &'a str,
+    version: &'a str,
+    rows: &'a [Row],
+    worst_deviation: f64,
+}
+
+pub(crate) fn run(arguments: &StabilityArguments) -> Result<(), CommandError> {
+    let cases = cases(arguments);
+    let plugin = Registry::search(&[]).load(DEVICE, PluginKind::Device)?;
+    let progress = run::progress_bar(cases.len() as u64, "{percent:>3} %  case {pos} of {len}");
+    let rows = measure(&plugin, &cases, || progress.inc(1)).map_err(refused)?;
+    progress.finish_and_clear();
+
+    let worst_deviation = rows.iter().map(|row| row.deviation().abs()).fold(0.0, f64::max);
+    let to_stdout = [&arguments.json, &arguments.csv]
+        .iter()
+        .any(|path| path.as_ref().is_some_and(|p| p.as_os_str() == "-"));
+    if !to_stdout {
+        println!("{}", to_text(&rows, worst_deviation));
+    }
+    if let Some(path) = &arguments.json {
+        let version = &plugin.metadata().version;
+        write_json(path, &Report { device: DEVICE, version, rows: &rows, worst_deviation })?;
+    }
+    if let Some(path) = &arguments.csv {
+        write_csv(path, &rows).map_err(|error| {
+            CommandError::file(path, "cannot write the rows", std::io::Error::other(error))
+        })?;
+    }
+    if let Some(path) = &arguments.plot {
+        let picture = picture(&plugin, &cases, &rows)?;
+        std::fs::write(path, picture)
+            .map_err(|cause| CommandError::file(path, "cannot write the plot", cause))?;
+    }
+    Ok(())
+}
+
+/// The product of all lists given, or the default grid.
+fn cases(arguments: &StabilityArguments) -> Vec<Case> {
+    let StabilityArguments { rate, delay, damping, virtual_damping, quantum_um, hand: grip, .. } = arguments;
+    let quantum_m = quantum_um * 1.0e-6;
+    if rate.is_empty() && delay.is_empty() && damping.is_empty() && virtual_damping.is_empty() {
+        return default_cases().into_iter().map(|case| Case { quantum_m, grip: *grip, ..case }).collect();
+    }
+    let mut cases = Vec::new();
+    for rate_hz in given_or(rate, 1000.0) {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 100 Hz to 10 kHz
+        let period_ns = (1.0e9 / rate_hz).round() as u64;
+        for delay_ticks in given_or(delay, 0) {
+            for plant_damping_ns_per_m in given_or(damping, 0.5) {
+                for virtual_damping_ns_per_m in given_or(virtual_damping, 0.0) {
+                    cases.push(Case {
+                        period_ns,
+                        delay_ticks,
+                        plant_damping_ns_per_m,
+                        virtual_damping_ns_per_m,
+                        quantum_m,
+                        grip: *grip,
+                    });
+                }
+            }
+        }
+    }
+    cases
+}
+
+fn given_or<T: Copy>(list: &[T], default: T) -> Vec<T> {
+    if list.is_empty() { vec![default] } else { list.to_vec() }
+}
+
+fn refused(error: LoopError) -> CommandError {
+    match error {
+        LoopError::Plugin(error) => error.into(),
+        LoopError::Fault(fault) => CommandError::DeviceFault(fault),
+        other => CommandError::PluginRefused(other.to_string()),
+    }
+}
+
+fn to_text(rows: &[Row], worst_deviation: f64) -> String {
+    let title = style::title("largest stable stiffness in N/m");
+    let head = format!(
+        "  {:>8}{:>7}{:>9}{:>9}{:>12}{:>12}{:>10}{:>12}{:>12}",
+        "T in ms", "delay", "b", "B", "simulated", "exact", "differ", "Gil", "passive"
+    );
+    let line = |row: &Row| {
+        format!(
+            "  {:>8}{:>7}{:>9}{:>9}{:>12.1}{:>12.1}{:>9.3}%{:>12.1}{:>12.1}",
+            row.period_s * 1.0e3,
+            row.delay_ticks,
+            row.plant_damping_ns_per_m,
+            row.virtual_damping_ns_per_m,
+            row.k_max_n_per_m,
+            row.exact_n_per_m,
+            row.deviation() * 100.0,
+            row.gil_n_per_m,
+            row.passive_n_per_m
+        )
+    };
+    let foot =
+        format!("worst difference between simulated and exact limit: {:.3} %", worst_deviation * 100.0);
+    let lines = rows.iter().map(line);
+    [title, head].into_iter().chain(lines).chain([foot]).collect::<Vec<_>>().join("\n")
+}
+
+fn write_csv(path: &Path, rows: &[Row]) -> Result<(), csv::Error> {
+    let output: Box<dyn std::io::Write> = if path.as_os_str() == "-" {
+        Box::new(std::io::stdout().lock())
+    } else {
+        Box::new(std::fs::File::create(path)?)
+    };
+    let mut writer = csv::Writer::from_writer(output);
+    rows.iter().try_for_each(|row| writer.serialize(row))?;
+    Ok(writer.flush()?)
+}
+
+/// A panel for each combination of period and drag, a line and points for each delay in it.
+fn picture(plugin: &Plugin, cases: &[Case], rows: &[Row]) -> Result<String, CommandError> {
+    let mut figure = Figure::new("Largest stable stiffness", Axis::linear("Virtual damping", "N s/m"))
+        .subtitle(
+            "points: simulated flotor; lines: exact sampled-data limit; dashed where Gil's rule differs",
+        )
+        .panel_height_px(320.0);
+    for panel in groups(cases, |case| (case.period_ns, case.plant_damping_ns_per_m.to_bits())) {
+        // A panel needs something to vary; single cases are in the table.
+        if panel.len() < 2 && cases.len() > 1 {
+            continue;
+        }
+        figure = figure.panel(stiffness_panel(plugin, cases, rows, &panel)?);
+    }
+    Ok(figure.to_svg())
+}
+
+fn stiffness_panel(
+    plugin: &Plugin,
+    cases: &[Case],
+    rows: &[Row],
+    members: &[usize],
+) -> Result<Panel, CommandError> {
+    const CURVE_POINTS: u32 = 120;
+    let within: Vec<(&Case, &Row)> =
+        members.iter().filter_map(|index| Some((cases.get(*index)?, rows.get(*index)?))).collect();
+    let Some((first, _)) = within.first() else { return Ok(Panel::new(Axis::log("Stiffness", "N/m"))) };
+    let plant = first.plant(plugin).map_err(refused)?;
+    #[allow(clippy::cast_precision_loss)] // at most 10 ms
+    let period_s = first.period_ns as f64 * 1.0e-9;
+    let title = format!("T = {} ms, b = {} N s/m", period_s * 1.0e3, first.plant_damping_ns_per_m);
+    let most = within.iter().map(|(case, _)| case.virtual_damping_ns_per_m).fold(0.0, f64::max);
+
+    let mut panel = Panel::new(Axis::log("Stiffness", "N/m")).title(title);
+    let mut delays: Vec<u32> = within.iter().map(|(case, _)| case.delay_ticks).collect();
+    delays.sort_unstable();
+    delays.dedup();
+    for (slot, delay_ticks) in delays.iter().copied().enumerate() {
+        let theory = |limit: fn(&Plant, &Rendering) -> f64| {
+            let rendering =
+                move |virtual_damping_ns_per_m| Rendering { period_s, delay_ticks, virtual_damping_ns_per_m };
+            (0..=CURVE_POINTS).map(move |index| {
+                let damping = most * f64::from(index) / f64::from(CURVE_POINTS);
+                (damping, limit(&plant, &rendering(damping)))
+            })
+        };
+        let measured = within
+            .iter()
+            .filter(|(case, _)| case.delay_ticks == delay_ticks)
+            .map(|(case, row)| (case.virtual_damping_ns_per_m, row.k_max_n_per_m));
+        panel = panel
+            .series(
+                Series::line(format!("exact, {delay_ticks} ticks"), theory(exact_limit_n_per_m)).slot(slot),
+            )
+            .series(Series::points("", measured).slot(slot))
+            .series(
+                Series::line(format!("Gil, {delay_ticks} ticks"), theory(gil_limit_n_per_m))
+                    .slot(slot + delays.len()),
+            );
+    }
+    Ok(panel)
+}
+
+/// Indices of the cases that share a key, in the order the keys first appear.
+fn groups<K: PartialEq>(cases: &[Case], key: impl Fn(&Case) -> K) -> Vec<Vec<usize>> {
+    let mut groups: Vec<(K, Vec<usize>)> = Vec::new();
+    for (index, case) in cases.iter().enumerate() {
+        let key = key(case);
+        match groups.iter_mut().find(|(known, _)| *known == key) {
+            Some((_, members)) => members.push(index),
+            None => groups.push((key, vec![index])),
+        }
+    }
+    groups.into_iter().map(|(_, members)| members).collect()
+}
+
+fn damping(text: &str) -> Result<f64, String> {
+    number_within(text, 0.0, 100_000.0, "N s/m")
+}
+
+fn quantum_um(text: &str) -> Result<f64, String> {
+    number_within(text, 0.0, 100.0, "µm")
+}
+
+fn number_within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> {
+    let number: f64 = text.trim().parse().map_err(|_| format!("`{text}` is no number"))?;
+    if (least..=most).contains(&number) {
+        Ok(number)
+    } else {
+        Err(format!("legal is {least} to {most} {unit}"))
+    }
+}

@@ -1,0 +1,124 @@
+//! The cases that are measured, side by side on all processors, and what is reported of each.
+
+use super::closed_loop::{Grip, LoopError, LoopSetup};
+use super::theory::{Rendering, exact_limit_n_per_m, gil_limit_n_per_m, passive_limit_n_per_m};
+use flotor_hal::abi::loader::Plugin;
+use serde::Serialize;
+use std::num::NonZero;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// One point of the grid.
+pub type Case = LoopSetup;
+
+/// A case with its measured limit and what theory says.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Row {
+    /// Time between two samples, s.
+    pub period_s: f64,
+    /// Whole periods a force waits.
+    pub delay_ticks: u32,
+    /// Drag of the device, N s/m.
+    pub plant_damping_ns_per_m: f64,
+    /// Virtual damping, N s/m.
+    pub virtual_damping_ns_per_m: f64,
+    /// Step of the position sensor, m.
+    pub quantum_m: f64,
+    /// How the device is held.
+    pub hand: Grip,
+    /// Largest stable stiffness of the simulated loop, N/m; 0 if there is none.
+    pub k_max_n_per_m: f64,
+    /// Of the exact sampled-data system with an ideal sensor, N/m.
+    pub exact_n_per_m: f64,
+    /// By Gil's rule, N/m.
+    pub gil_n_per_m: f64,
+    /// Largest stiffness that is passive in any hand (Colgate and Schenkel), N/m.
+    pub passive_n_per_m: f64,
+}
+
+impl Row {
+    /// Deviation of the measured from the exact limit, as a share of it; 0 where neither is stable.
+    #[must_use]
+    pub fn deviation(&self) -> f64 {
+        if self.exact_n_per_m > 0.0 {
+            self.k_max_n_per_m / self.exact_n_per_m - 1.0
+        } else if self.k_max_n_per_m > 0.0 {
+            f64::INFINITY
+        } else {
+            0.0
+        }
+    }
+}
+
+/// The default grid: virtual damping from none to beyond its best at three delays, and single cases with more
+/// drag and a faster servo.
+#[must_use]
+pub fn default_cases() -> Vec<Case> {
+    const VIRTUAL_DAMPING_NS_PER_M: [f64; 13] =
+        [0.0, 5.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0, 150.0, 200.0, 300.0, 400.0, 500.0];
+    let case = |period_ns, delay_ticks, plant_damping_ns_per_m, virtual_damping_ns_per_m| Case {
+        period_ns,
+        delay_ticks,
+        plant_damping_ns_per_m,
+        virtual_damping_ns_per_m,
+        quantum_m: 0.0,
+        grip: Grip::Open,
+    };
+    let sweep = (0..=2)
+        .flat_map(|delay| VIRTUAL_DAMPING_NS_PER_M.map(|damping| case(1_000_000, delay, 0.5, damping)));
+    let single = [case(1_000_000, 0, 2.0, 0.0), case(250_000, 0, 0.5, 0.0), case(250_000, 1, 0.5, 15.0)];
+    sweep.chain(single).collect()
+}
+
+/// Measures every case on the device of `plugin`, as many at a time as there are processors; `done` is told
+/// after each. The rows come in the order of the cases, whatever the processors did. Not real-time.
+///
+/// # Errors
+/// [`LoopError`] of the first case that has one.
+pub fn measure(plugin: &Plugin, cases: &[Case], done: impl Fn() + Sync) -> Result<Vec<Row>, LoopError> {
+    let next = AtomicUsize::new(0);
+    let rows = Mutex::new(Vec::with_capacity(cases.len()));
+    let work = || {
+        while let Some((index, case)) = next_of(&next, cases) {
+            let row = row(plugin, case);
+            done();
+            // A poisoned lock still holds whole rows: a panic elsewhere cannot have left half of one.
+            rows.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((index, row));
+        }
+    };
+    let workers = std::thread::available_parallelism().map_or(1, NonZero::get).min(cases.len());
+    std::thread::scope(|scope| {
+        (1..workers).for_each(|_| {
+            scope.spawn(work);
+        });
+        work();
+    });
+    let mut rows = rows.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    rows.sort_by_key(|(index, _)| *index);
+    rows.into_iter().map(|(_, row)| row).collect()
+}
+
+fn next_of<'a>(next: &AtomicUsize, cases: &'a [Case]) -> Option<(usize, &'a Case)> {
+    let index = next.fetch_add(1, Ordering::Relaxed);
+    cases.get(index).map(|case| (index, case))
+}
+
+fn row(plugin: &Plugin, case: &Case) -> Result<Row, LoopError> {
+    #[allow(clippy::cast_precision_loss)] // at most 10 ms
+    let period_s = case.period_ns as f64 * 1.0e-9;
+    let Case { delay_ticks, plant_damping_ns_per_m, virtual_damping_ns_per_m, quantum_m, grip, .. } = *case;
+    let rendering = Rendering { period_s, delay_ticks, virtual_damping_ns_per_m };
+    let plant = case.plant(plugin)?;
+    Ok(Row {
+        period_s,
+        delay_ticks,
+        plant_damping_ns_per_m,
+        virtual_damping_ns_per_m,
+        quantum_m,
+        hand: grip,
+        k_max_n_per_m: case.limit_n_per_m(plugin)?,
+        exact_n_per_m: exact_limit_n_per_m(&plant, &rendering),
+        gil_n_per_m: gil_limit_n_per_m(&plant, &rendering),
+        passive_n_per_m: passive_limit_n_per_m(plant_damping_ns_per_m, &rendering),
+    })
+}

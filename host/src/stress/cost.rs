@@ -1,0 +1,141 @@
+//! M7, cost: how long a call takes, and which pose takes longest.
+//!
+//! One thread, one call at a time, cold and warm poses of the whole workspace and of the manifolds. A shared
+//! machine interrupts: some calls in a hundred thousand take milliseconds that are not the model's. So each
+//! pose of a model without history is timed three times and the shortest counts against the bound, while
+//! percentiles and the worst are reported as they were seen. That a call allocates nothing cannot be seen from
+//! outside the plugin; the plugin's own tests have to say it.
+
+use super::measure::{Decades, Measure, Verdict, Worst};
+use super::poses::{Manifold, Random, Sobol};
+use super::subject::Subject;
+use super::{Setup, WIDER};
+use flotor_hal::abi::loader::LoadError;
+use flotor_hal::{Demand, Input, Memory, Output, Pose};
+use hdrhistogram::Histogram;
+use std::time::Instant;
+
+const NAME: &str = "cost of a call";
+/// A tenth of a 1 kHz tick, ns: what `flotor run` calls late, and room for everything else in a tick.
+const TENTH_OF_A_TICK_NS: f64 = 100_000.0;
+/// Times each pose is asked.
+const REPEATS: usize = 3;
+/// Every how many poses one is taken from a manifold.
+const MANIFOLD_EVERY: u64 = 8;
+/// Poses between two updates of the progress line.
+const CHUNK: u64 = 1024;
+
+/// Times calls; with the distribution for the picture, ns.
+pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Decades), LoadError> {
+    let chunks = setup.effort.timed_poses.div_ceil(CHUNK);
+    setup.progress.begin(NAME, chunks);
+    let mut subject = Subject::new(setup)?;
+    let mut stopwatch = Stopwatch::new();
+    let sobol = Sobol::new(setup.options.seed);
+    let mut random = Random::new(setup.options.seed, 0);
+    let reach = setup.options.reach.scaled(WIDER);
+    for chunk in 0..chunks {
+        for index in chunk * CHUNK..(chunk + 1) * CHUNK {
+            let pose = if index.is_multiple_of(MANIFOLD_EVERY) {
+                let number = index / MANIFOLD_EVERY;
+                let manifold = usize::try_from(number).unwrap_or(0) % Manifold::ALL.len();
+                Manifold::ALL[manifold].sample(reach, &mut random, number).0
+            } else {
+                reach.pose(sobol.point(index))
+            };
+            stopwatch.time(&mut subject, pose);
+        }
+        setup.progress.advance(1);
+    }
+    Ok((stopwatch.judge(), stopwatch.spread))
+}
+
+struct Stopwatch {
+    overhead_ns: u64,
+    calls: Histogram<u64>,
+    spread: Decades,
+    slowest_pose: Worst,
+    has_memory: bool,
+}
+
+impl Stopwatch {
+    fn new() -> Self {
+        // Constants that satisfy the constructor's conditions (low >= 1, high >= 2 low, digits <= 5).
+        let calls = Histogram::new_with_bounds(1, 100_000_000_000, 3);
+        Self {
+            overhead_ns: overhead_ns(),
+            calls: calls.unwrap_or_else(|_| unreachable!("constant, legal bounds")),
+            spread: Decades::default(),
+            slowest_pose: Worst::NONE,
+            has_memory: false,
+        }
+    }
+
+    fn time(&mut self, subject: &mut Subject<'_>, pose: Pose) {
+        if subject.memory() == Memory::PathDependent {
+            self.has_memory = true;
+            // Each tick of the walk is a call; they are timed together and shared out evenly.
+            let mut ticks = 0_u64;
+            let begin = Instant::now();
+            let _ = subject.walk(pose, &mut |_| ticks += 1);
+            let total_ns = nanoseconds(begin);
+            if let Some(each_ns) = total_ns.checked_div(ticks) {
+                self.calls.saturating_record_n(each_ns.max(1), ticks);
+                #[allow(clippy::cast_precision_loss)] // for people
+                self.spread.count(each_ns as f64);
+                #[allow(clippy::cast_precision_loss)]
+                self.slowest_pose.offer(each_ns as f64, pose);
+            }
+            return;
+        }
+        let demand = Demand::ALL.limited_to(subject.model().serves());
+        let input = Input { demand, ..Input::at_rest(pose) };
+        let mut shortest_ns = u64::MAX;
+        for _ in 0..REPEATS {
+            let mut output = Output::default();
+            let begin = Instant::now();
+            let _ = subject.model().step(std::hint::black_box(&input), std::hint::black_box(&mut output));
+            let call_ns = nanoseconds(begin).saturating_sub(self.overhead_ns).max(1);
+            self.calls.saturating_record(call_ns);
+            shortest_ns = shortest_ns.min(call_ns);
+        }
+        #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
+        let shortest_ns = shortest_ns as f64;
+        self.spread.count(shortest_ns);
+        self.slowest_pose.offer(shortest_ns, pose);
+    }
+
+    #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
+    fn judge(&self) -> Measure {
+        let judged_ns = self.slowest_pose.value;
+        let how = if self.has_memory { "mean over a walk" } else { "best of three at its slowest pose" };
+        Measure {
+            id: "M7",
+            name: NAME,
+            value: judged_ns,
+            unit: "ns",
+            bound: Some(TENTH_OF_A_TICK_NS),
+            verdict: Verdict::of(judged_ns, TENTH_OF_A_TICK_NS, TENTH_OF_A_TICK_NS),
+            pose: self.slowest_pose.record(),
+            remark: format!("{how}; whether a call allocates cannot be seen from outside"),
+            values: Vec::new(),
+        }
+        .with("p50", self.calls.value_at_quantile(0.5) as f64, "ns")
+        .with("p99.9", self.calls.value_at_quantile(0.999) as f64, "ns")
+        .with("p99.999", self.calls.value_at_quantile(0.99999) as f64, "ns")
+        .with("max, interruptions included", self.calls.max() as f64, "ns")
+        .with("calls", self.calls.len() as f64, "")
+        .with("clock, taken off", self.overhead_ns as f64, "ns")
+    }
+}
+
+fn nanoseconds(begin: Instant) -> u64 {
+    u64::try_from(begin.elapsed().as_nanos()).unwrap_or(u64::MAX)
+}
+
+/// What reading the clock twice costs: the median of many.
+fn overhead_ns() -> u64 {
+    let mut samples: Vec<u64> = (0..1001).map(|_| nanoseconds(Instant::now())).collect();
+    samples.sort_unstable();
+    samples.get(500).copied().unwrap_or(0)
+}

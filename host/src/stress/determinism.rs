@@ -1,0 +1,165 @@
+//! M8, determinism: the same poses give the same bits.
+//!
+//! From a second instance, after a reset, and through the batch call. The digest of all answers is printed, so
+//! that runs on two machines or of two builds can be compared by eye.
+
+use super::measure::{Measure, PoseRecord, Verdict};
+use super::poses::{Manifold, Random, Sobol};
+use super::subject::{PERIOD_NS, Subject};
+use super::sweep::sweep;
+use super::{Setup, WIDER};
+use flotor_hal::abi::CallStatus;
+use flotor_hal::abi::loader::{LoadError, Model};
+use flotor_hal::{Input, Memory, Output, Pose, Twist};
+use xxhash_rust::xxh3::Xxh3;
+
+const NAME: &str = "determinism";
+/// Poses of one block.
+const BLOCK: u64 = 256;
+/// Every how many poses one is taken from a manifold.
+const MANIFOLD_EVERY: u64 = 8;
+
+/// Bits of an answer.
+type Bits = [u64; 8];
+
+/// Ways to ask again, in the order of [`Tally::differing`].
+const AGAIN: [&str; 3] = ["second instance", "after reset", "batch"];
+
+struct Tally {
+    compared: u64,
+    differing: [u64; AGAIN.len()],
+    first: Option<(Pose, &'static str)>,
+    digest: u64,
+}
+
+/// Asks the same poses four ways.
+pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
+    let sobol = Sobol::new(setup.options.seed);
+    let blocks = setup.effort.compared_poses.div_ceil(BLOCK);
+    let tallies = sweep(setup, NAME, blocks, |subject, block| -> Result<Tally, LoadError> {
+        let inputs = inputs(setup, &sobol, subject, block);
+        // A new instance for every block would be too slow for models that take long to make.
+        let mut other = Subject::new(setup)?;
+        let reference = singly(subject.model(), &inputs);
+        let second = singly(other.model(), &inputs);
+        subject.model().reset();
+        let reset = singly(subject.model(), &inputs);
+        other.model().reset();
+        let batch = batch(other.model(), &inputs);
+        Ok(compare(&inputs, &reference, [&second, &reset, &batch]))
+    })?;
+    let mut total = Tally { compared: 0, differing: [0; AGAIN.len()], first: None, digest: 0 };
+    let mut digest = Xxh3::new();
+    for tally in tallies {
+        let tally = tally?;
+        total.compared += tally.compared;
+        for (sum, count) in total.differing.iter_mut().zip(tally.differing) {
+            *sum += count;
+        }
+        total.first = total.first.or(tally.first);
+        digest.update(&tally.digest.to_le_bytes());
+    }
+    total.digest = digest.digest();
+    Ok(judge(&total))
+}
+
+/// Evenly spread poses and some of the manifolds; a walk from home for a model with memory.
+fn inputs(setup: &Setup<'_>, sobol: &Sobol, subject: &mut Subject<'_>, block: u64) -> Vec<Input> {
+    let reach = setup.options.reach.scaled(WIDER);
+    let mut random = Random::new(setup.options.seed, block);
+    let mut input = |index: u64| {
+        if subject.memory() == Memory::PathDependent {
+            // Straight out to a pose of the block's own, in as many ticks as the block has.
+            #[allow(clippy::cast_precision_loss)]
+            let part = (index % BLOCK) as f64 / BLOCK as f64;
+            let outward = sobol.point(block).map(|unit| 0.5 + (unit - 0.5) * part);
+            return subject.input(reach.pose(outward), Twist::ZERO, PERIOD_NS);
+        }
+        let pose = if index.is_multiple_of(MANIFOLD_EVERY) {
+            let number = index / MANIFOLD_EVERY;
+            Manifold::ALL[usize::try_from(number).unwrap_or(0) % Manifold::ALL.len()]
+                .sample(reach, &mut random, number)
+                .0
+        } else {
+            reach.pose(sobol.point(index))
+        };
+        subject.input(pose, Twist::ZERO, PERIOD_NS)
+    };
+    (block * BLOCK..(block + 1) * BLOCK).map(&mut input).collect()
+}
+
+/// Not a pattern a model writes: stands for "no answer".
+const UNANSWERED: Bits = [0x0bad_0bad_0bad_0bad; 8];
+
+fn singly(model: &mut Model, inputs: &[Input]) -> Vec<Bits> {
+    let ask = |input: &Input| {
+        let mut output = Output::default();
+        if model.step(input, &mut output) == CallStatus::Ok { bits(&output) } else { UNANSWERED }
+    };
+    inputs.iter().map(ask).collect()
+}
+
+fn batch(model: &mut Model, inputs: &[Input]) -> Vec<Bits> {
+    let mut outputs = vec![Output::default(); inputs.len()];
+    match model.step_batch(inputs, &mut outputs) {
+        CallStatus::Ok => outputs.iter().map(bits).collect(),
+        _ => vec![UNANSWERED; inputs.len()],
+    }
+}
+
+fn bits(output: &Output) -> Bits {
+    let mut bits = [0; 8];
+    let numbers = output.wrench.force_n.iter().chain(&output.wrench.torque_nm).chain([&output.energy_j]);
+    for (to, number) in bits.iter_mut().zip(numbers) {
+        // Which of its many bit patterns a NaN has means nothing.
+        *to = if number.is_nan() { f64::NAN.to_bits() } else { number.to_bits() };
+    }
+    bits[7] = output.status().map_or(u64::MAX, |status| status as u64);
+    bits
+}
+
+fn compare(inputs: &[Input], reference: &[Bits], again: [&[Bits]; AGAIN.len()]) -> Tally {
+    let mut tally = Tally { compared: 0, differing: [0; AGAIN.len()], first: None, digest: 0 };
+    let mut digest = Xxh3::new();
+    for (index, (input, expected)) in inputs.iter().zip(reference).enumerate() {
+        // A model that broke answers nothing from there on, to anybody; M0 tells that story.
+        if *expected == UNANSWERED {
+            break;
+        }
+        tally.compared += 1;
+        expected.iter().for_each(|word| digest.update(&word.to_le_bytes()));
+        for (way, (count, answers)) in tally.differing.iter_mut().zip(again).enumerate() {
+            if answers.get(index) != Some(expected) && answers.get(index) != Some(&UNANSWERED) {
+                *count += 1;
+                tally.first.get_or_insert((input.pose, AGAIN[way]));
+            }
+        }
+    }
+    tally.digest = digest.digest();
+    tally
+}
+
+#[allow(clippy::cast_precision_loss)] // counts below 2^53
+fn judge(total: &Tally) -> Measure {
+    let differing = total.differing.iter().sum::<u64>() as f64;
+    let mut remark = format!("digest {:016x}", total.digest);
+    if let Some((_, way)) = total.first {
+        remark = format!("first by {way}; {remark}");
+    }
+    let mut measure = Measure {
+        id: "M8",
+        name: NAME,
+        value: differing,
+        unit: "",
+        bound: Some(0.0),
+        verdict: Verdict::of(differing, 0.0, 0.0),
+        pose: total.first.map(|(pose, _)| PoseRecord::from(pose)),
+        remark,
+        values: Vec::new(),
+    }
+    .with("poses compared", total.compared as f64, "");
+    for (way, count) in AGAIN.iter().zip(total.differing) {
+        measure = measure.with(format!("differing, {way}"), count as f64, "");
+    }
+    measure
+}

@@ -1,0 +1,370 @@
+//! Where a model is asked: evenly through the workspace, and on the sets of measure zero where formulas break.
+//!
+//! Even coverage is Sobol's sequence (I. M. Sobol, USSR Comput. Math. 7(4), 1967) with the direction numbers of
+//! S. Joe and F. Y. Kuo (SIAM J. Sci. Comput. 30, 2008), its points shifted by the seed: any first part of it
+//! covers the space evenly, so a short run asks the first poses of a full one. No sequence ever hits home
+//! exactly, or a coordinate plane, or a number that is not finite: those are [`Manifold`]s with names.
+
+use flotor_hal::{DQuat, DVec3, Pose, Twist, orientation_from_rotation_vector};
+use serde::Serialize;
+use std::f64::consts::PI;
+
+/// How far a handle gets from home in the model frame.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Reach {
+    /// Along each axis, m.
+    pub position_m: f64,
+    /// Along each component of the rotation vector, rad.
+    pub rotation_rad: f64,
+}
+
+impl Default for Reach {
+    /// 12 mm and 7 degrees of the thesis's device (section 2.1), seen through its motion scale L0/V = 25/15.
+    fn default() -> Self {
+        Self { position_m: 12.0e-3 * 25.0 / 15.0, rotation_rad: 7.0 * PI / 180.0 }
+    }
+}
+
+impl Reach {
+    /// A larger or smaller workspace of the same shape.
+    pub(super) fn scaled(self, factor: f64) -> Self {
+        Self { position_m: self.position_m * factor, rotation_rad: self.rotation_rad * factor }
+    }
+
+    /// The pose at six coordinates in 0..1 across the workspace.
+    pub(super) fn pose(self, unit: [f64; 6]) -> Pose {
+        let [x, y, z, rx, ry, rz] = unit.map(|u| 2.0 * u - 1.0);
+        at(DVec3::new(x, y, z) * self.position_m, DVec3::new(rx, ry, rz) * self.rotation_rad)
+    }
+}
+
+/// The pose at a position and a rotation vector, m and rad.
+pub(super) fn at(position_m: DVec3, rotation_rad: DVec3) -> Pose {
+    Pose::new(position_m, orientation_from_rotation_vector(rotation_rad))
+}
+
+/// Dimensions of the sequence: one per degree of freedom.
+const DIMENSIONS: usize = 6;
+/// Binary digits of a coordinate; the sequence has as many points as fit.
+const DIGITS: usize = 32;
+/// Degree and inner coefficients of a primitive polynomial, and the first direction numbers, for dimensions 2
+/// to 6 (Joe and Kuo, file new-joe-kuo-6.21201).
+const POLYNOMIALS: [(usize, u32, [u32; 4]); DIMENSIONS - 1] =
+    [(1, 0, [1, 0, 0, 0]), (2, 1, [1, 3, 0, 0]), (3, 1, [1, 3, 1, 0]), (3, 2, [1, 1, 1, 0]), (4, 1, [1, 1, 3, 3])];
+
+/// Sobol's sequence in six dimensions, digitally shifted.
+pub(super) struct Sobol {
+    directions: [[u32; DIGITS]; DIMENSIONS],
+    shift: [u32; DIMENSIONS],
+}
+
+impl Sobol {
+    pub(super) fn new(seed: u64) -> Self {
+        let mut directions = [[0; DIGITS]; DIMENSIONS];
+        directions[0] = std::array::from_fn(|digit| 1 << (DIGITS - 1 - digit));
+        for (row, (degree, coefficients, first)) in directions.iter_mut().skip(1).zip(POLYNOMIALS) {
+            for digit in 0..DIGITS {
+                row[digit] = if digit < degree {
+                    first[digit] << (DIGITS - 1 - digit)
+                } else {
+                    let oldest = row[digit - degree];
+                    let inner = (1..degree).filter(|k| coefficients >> (degree - 1 - k) & 1 == 1);
+                    inner.fold(oldest ^ oldest >> degree, |sum, k| sum ^ row[digit - k])
+                };
+            }
+        }
+        let mut random = Random::new(seed, 0);
+        #[allow(clippy::cast_possible_truncation)] // the upper half of the bits, on purpose
+        let shift = std::array::from_fn(|_| (random.bits() >> 32) as u32);
+        Self { directions, shift }
+    }
+
+    /// Point number `index`, strictly inside the unit cube. Any order, no state.
+    pub(super) fn point(&self, index: u64) -> [f64; DIMENSIONS] {
+        std::array::from_fn(|dimension| {
+            let digits = self.directions[dimension].iter().enumerate();
+            let set = digits.filter(|(digit, _)| index >> digit & 1 == 1);
+            let bits = set.fold(self.shift[dimension], |sum, (_, direction)| sum ^ direction);
+            (f64::from(bits) + 0.5) / 4_294_967_296.0
+        })
+    }
+}
+
+/// Random numbers for what has more dimensions than the sequence: SplitMix64 (Steele, Lea and Flood, OOPSLA
+/// 2014). Each `stream` of a seed is independent of the others, so work can be done in any order.
+pub(super) struct Random {
+    state: u64,
+}
+
+impl Random {
+    pub(super) fn new(seed: u64, stream: u64) -> Self {
+        let mut random = Self { state: seed ^ 0x6a09_e667_f3bc_c908 };
+        random.state = random.bits() ^ stream.wrapping_mul(0xd134_2543_de82_ef95);
+        random.bits();
+        random
+    }
+
+    fn bits(&mut self) -> u64 {
+        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (self.state ^ self.state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        mixed ^ mixed >> 31
+    }
+
+    /// Uniform in 0..1.
+    #[allow(clippy::cast_precision_loss)] // 53 bits fit
+    pub(super) fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / 9_007_199_254_740_992.0
+    }
+
+    /// Uniform in -1..1.
+    pub(super) fn symmetric(&mut self) -> f64 {
+        2.0 * self.unit() - 1.0
+    }
+
+    /// A vector in the cube -1..1.
+    pub(super) fn vector(&mut self) -> DVec3 {
+        DVec3::new(self.symmetric(), self.symmetric(), self.symmetric())
+    }
+
+    /// A unit vector.
+    pub(super) fn direction(&mut self) -> DVec3 {
+        loop {
+            let inside = self.vector();
+            if (1.0e-3..=1.0).contains(&inside.length_squared()) {
+                return inside.normalize();
+            }
+        }
+    }
+}
+
+/// Sets of poses where a formula may break and no even coverage would find it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Manifold {
+    /// Home itself, with every sign of zero and both quaternions.
+    Home,
+    /// 1e-15 to 1e-3 m and rad from home, logarithmically even.
+    Tiny,
+    /// On spheres of exactly 10^-k m around home, and a rounding beside them.
+    Shell,
+    /// One coordinate of six, the others exactly zero.
+    Axis,
+    /// One or two coordinates exactly zero.
+    Plane,
+    /// Any rotation up to half a turn, and exactly that.
+    LargeRotation,
+    /// Coordinates too small for full precision.
+    Denormal,
+    /// Coordinates up to 1e300.
+    Huge,
+    /// NaN and infinity in pose or twist, quaternions that are not of unit length.
+    Malformed,
+}
+
+impl Manifold {
+    pub(super) const ALL: [Manifold; 9] = [
+        Manifold::Home,
+        Manifold::Tiny,
+        Manifold::Shell,
+        Manifold::Axis,
+        Manifold::Plane,
+        Manifold::LargeRotation,
+        Manifold::Denormal,
+        Manifold::Huge,
+        Manifold::Malformed,
+    ];
+
+    /// The words of a report.
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Manifold::Home => "home",
+            Manifold::Tiny => "tiny displacements",
+            Manifold::Shell => "shells around home",
+            Manifold::Axis => "axes",
+            Manifold::Plane => "coordinate planes",
+            Manifold::LargeRotation => "large rotations",
+            Manifold::Denormal => "denormals",
+            Manifold::Huge => "huge coordinates",
+            Manifold::Malformed => "malformed input",
+        }
+    }
+
+    /// Sample number `index`: a pose and a twist.
+    pub(super) fn sample(self, reach: Reach, random: &mut Random, index: u64) -> (Pose, Twist) {
+        let pose = match self {
+            Manifold::Home => home(index),
+            Manifold::Tiny => tiny(random, index),
+            Manifold::Shell => shell(random, index),
+            Manifold::Axis => axis(reach, random, index),
+            Manifold::Plane => plane(reach, random, index),
+            Manifold::LargeRotation => large_rotation(reach, random, index),
+            Manifold::Denormal => denormal(random),
+            Manifold::Huge => huge(random),
+            Manifold::Malformed => return malformed(reach, random, index),
+        };
+        (pose, Twist::ZERO)
+    }
+}
+
+fn anywhere(reach: Reach, random: &mut Random) -> Pose {
+    at(random.vector() * reach.position_m, random.vector() * reach.rotation_rad)
+}
+
+/// Uniform in the exponent.
+fn decades(random: &mut Random, from: f64, to: f64) -> f64 {
+    10.0_f64.powf(from + (to - from) * random.unit())
+}
+
+fn home(index: u64) -> Pose {
+    let sign = |bit: u32| if index >> bit & 1 == 1 { -1.0 } else { 1.0 };
+    Pose {
+        position_m: [0.0 * sign(0), 0.0 * sign(1), 0.0 * sign(2)],
+        orientation_xyzw: [0.0 * sign(3), 0.0 * sign(4), 0.0 * sign(5), sign(6)],
+    }
+}
+
+fn tiny(random: &mut Random, index: u64) -> Pose {
+    let position_m = random.direction() * decades(random, -15.0, -3.0);
+    let rotation_rad = random.direction() * decades(random, -15.0, -3.0);
+    match index % 3 {
+        0 => at(position_m, DVec3::ZERO),
+        1 => at(DVec3::ZERO, rotation_rad),
+        _ => at(position_m, rotation_rad),
+    }
+}
+
+fn shell(random: &mut Random, index: u64) -> Pose {
+    #[allow(clippy::cast_possible_truncation)] // 1..=15
+    let exponent = 1 + (index % 15) as i32;
+    let rounding = [0.0, f64::EPSILON, -f64::EPSILON][(index / 15 % 3) as usize];
+    let radius_m = 10.0_f64.powi(-exponent) * (1.0 + rounding);
+    let position_m = match index / 45 % 3 {
+        0 => random.direction(),
+        1 => DVec3::Z,
+        _ => DVec3::NEG_Z,
+    } * radius_m;
+    let rotation_rad = if index.is_multiple_of(2) { DVec3::ZERO } else { random.vector() * radius_m };
+    at(position_m, rotation_rad)
+}
+
+fn axis(reach: Reach, random: &mut Random, index: u64) -> Pose {
+    let only = [DVec3::X, DVec3::Y, DVec3::Z][(index % 3) as usize] * random.symmetric();
+    match index / 3 % 2 {
+        0 => at(only * reach.position_m, DVec3::ZERO),
+        _ => at(DVec3::ZERO, only * reach.rotation_rad),
+    }
+}
+
+fn plane(reach: Reach, random: &mut Random, index: u64) -> Pose {
+    let (mut position_m, mut rotation_rad) =
+        (random.vector() * reach.position_m, random.vector() * reach.rotation_rad);
+    for zeroed in [index % 6, index / 6 % 6] {
+        match zeroed {
+            0 => position_m.x = 0.0,
+            1 => position_m.y = 0.0,
+            2 => position_m.z = 0.0,
+            3 => rotation_rad.x = 0.0,
+            4 => rotation_rad.y = 0.0,
+            _ => rotation_rad.z = 0.0,
+        }
+    }
+    at(position_m, rotation_rad)
+}
+
+fn large_rotation(reach: Reach, random: &mut Random, index: u64) -> Pose {
+    let axis = match index / 4 % 4 {
+        0 => DVec3::X,
+        1 => DVec3::Y,
+        2 => DVec3::Z,
+        _ => random.direction(),
+    };
+    let angle_rad = match index % 4 {
+        0 => PI,
+        1 => PI - decades(random, -15.0, -1.0),
+        2 => 0.5 * PI + 1.0e-3 * random.symmetric(),
+        _ => PI * random.unit(),
+    };
+    at(random.vector() * reach.position_m, axis * angle_rad)
+}
+
+fn denormal(random: &mut Random) -> Pose {
+    // The smallest normal number is 2.2e-308.
+    let mut number = || random.symmetric() * f64::MIN_POSITIVE * if random.unit() < 0.5 { 1.0e-12 } else { 1.0 };
+    Pose { position_m: [number(), number(), number()], orientation_xyzw: [number(), number(), number(), 1.0] }
+}
+
+fn huge(random: &mut Random) -> Pose {
+    let mut number = || random.symmetric() * decades(random, 0.0, 300.0);
+    let position_m = DVec3::new(number(), number(), number());
+    at(position_m, random.direction() * PI * random.unit())
+}
+
+fn malformed(reach: Reach, random: &mut Random, index: u64) -> (Pose, Twist) {
+    let bad = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -f64::NAN][(index % 4) as usize];
+    let mut pose = anywhere(reach, random);
+    let mut twist = Twist::ZERO;
+    let kind = index / 4 % 15;
+    match kind {
+        0..3 => pose.position_m[kind as usize] = bad,
+        3..7 => pose.orientation_xyzw[kind as usize - 3] = bad,
+        7 => pose.position_m = [bad; 3],
+        8 => pose.orientation_xyzw = [bad; 4],
+        9 => pose.orientation_xyzw = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0).to_array(),
+        10 => pose.orientation_xyzw = pose.orientation_xyzw.map(|number| number * 2.0),
+        11 => pose.orientation_xyzw = pose.orientation_xyzw.map(|number| number * 1.0e-200),
+        12 => twist.linear_m_per_s = [bad; 3],
+        13 => twist.angular_rad_per_s = [bad; 3],
+        _ => pose.orientation_xyzw = pose.orientation_xyzw.map(|number| number * 1.0e200),
+    }
+    (pose, twist)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sequence_fills_every_elementary_interval() {
+        // A (t, m, s)-net property that even coverage means: of the first 2^m points each of 2^m equal slices
+        // of every single coordinate holds exactly one.
+        let sobol = Sobol::new(7);
+        for dimension in 0..DIMENSIONS {
+            let mut slices = [0; 1024];
+            for index in 0..1024 {
+                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+                let slice = (sobol.point(index)[dimension] * 1024.0) as usize;
+                slices[slice] += 1;
+            }
+            assert!(slices.iter().all(|count| *count == 1), "dimension {dimension}");
+        }
+    }
+
+    #[test]
+    fn the_sequence_integrates_better_than_random_points() {
+        // Integral of prod(1 + (u - 1/2)) is 1. Random points would be off by 0.7 / sqrt(65536) = 3e-3; a tenth
+        // of that is out of their reach and far above what the sequence leaves.
+        let sobol = Sobol::new(3);
+        let product = |index| sobol.point(index).iter().map(|u| 0.5 + u).product::<f64>();
+        let mean = (0..65536).map(product).sum::<f64>() / 65536.0;
+        assert!((mean - 1.0).abs() < 3.0e-4, "{mean}");
+    }
+
+    #[test]
+    fn manifolds_are_where_they_say() {
+        let reach = Reach::default();
+        let mut random = Random::new(1, 1);
+        for index in 0..1000 {
+            let mut pose = |manifold: Manifold| manifold.sample(reach, &mut random, index).0;
+            assert_eq!(pose(Manifold::Home).position(), DVec3::ZERO);
+            assert!(pose(Manifold::Tiny).position().length() <= 1.001e-3);
+            let plane = pose(Manifold::Plane);
+            let zeros = plane.position_m.iter().chain(&plane.orientation_xyzw).filter(|n| **n == 0.0);
+            assert!(zeros.count() >= 1);
+            assert!(pose(Manifold::Denormal).position().length() < 4.0e-308);
+            assert!(pose(Manifold::Huge).is_finite());
+            let (pose, twist) = Manifold::Malformed.sample(reach, &mut random, index);
+            let unit = (pose.orientation().length() - 1.0).abs() < 1.0e-6;
+            assert!(!(pose.is_finite() && twist.is_finite() && unit));
+        }
+    }
+}

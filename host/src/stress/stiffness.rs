@@ -1,0 +1,165 @@
+//! M2 and M3: what the derivative of the wrench by the pose says.
+//!
+//! **M2, Lipschitz constant.** A sampled loop of period `T` stays passive on a device with damping `b` as long as
+//! the stiffness does not exceed `2 b / T` (Colgate and Schenkel, J. Robotic Systems 14, 1997, without virtual
+//! damping; Abbott and Okamura, IEEE T-RO 21, 2005). The share of the workspace where the largest gain of the
+//! derivative, in all six degrees of freedom at the device's lever arm, keeps to that is the renderable share.
+//!
+//! **M3, reciprocity.** Force and torque that come from one energy have a symmetric derivative (Maxwell's
+//! reciprocity); `|J - J^T| / |J|` measures how far a model is from that. Only what the differences leave no
+//! doubt about counts.
+
+use super::measure::{Decades, Measure, Verdict, Worst};
+use super::jacobian::Jacobian;
+use super::poses::Sobol;
+use super::sweep::sweep;
+use super::{DAMPINGS_NS_PER_M, LEVER_M, PERIOD_S, Setup};
+use flotor_hal::abi::loader::LoadError;
+
+const NAME: &str = "Lipschitz constant and reciprocity";
+/// Poses of one block.
+const BLOCK: u64 = 32;
+/// Largest asymmetry that passes. Differences resolve 1e-9; a real coupling that is forgotten makes percents.
+const RECIPROCAL: f64 = 1.0e-6;
+
+struct Tally {
+    poses: u64,
+    unanswered: u64,
+    /// Gains of the whole and of the blocks force-shift, force-turn, torque-shift, torque-turn, N/m.
+    gain: Worst,
+    blocks: [f64; 4],
+    renderable: [u64; DAMPINGS_NS_PER_M.len()],
+    gains: Decades,
+    asymmetry: Worst,
+    unresolved: u64,
+}
+
+impl Tally {
+    fn new() -> Self {
+        Self {
+            poses: 0,
+            unanswered: 0,
+            gain: Worst::NONE,
+            blocks: [0.0; 4],
+            renderable: [0; DAMPINGS_NS_PER_M.len()],
+            gains: Decades::default(),
+            asymmetry: Worst::NONE,
+            unresolved: 0,
+        }
+    }
+
+    fn merge(&mut self, later: &Self) {
+        self.poses += later.poses;
+        self.unanswered += later.unanswered;
+        self.gain.merge(later.gain);
+        for (here, there) in self.blocks.iter_mut().zip(later.blocks) {
+            *here = here.max(there);
+        }
+        for (here, there) in self.renderable.iter_mut().zip(later.renderable) {
+            *here += there;
+        }
+        self.gains.merge(&later.gains);
+        self.asymmetry.merge(later.asymmetry);
+        self.unresolved += later.unresolved;
+    }
+
+    fn take(&mut self, jacobian: &Jacobian, pose: flotor_hal::Pose) {
+        let gain = jacobian.stiffness();
+        self.gain.offer(gain, pose);
+        self.gains.count(gain);
+        for (index, block) in self.blocks.iter_mut().enumerate() {
+            *block = block.max(jacobian.block_stiffness(index / 2, index % 2));
+        }
+        for (count, damping) in self.renderable.iter_mut().zip(DAMPINGS_NS_PER_M) {
+            *count += u64::from(gain <= stiffest_n_per_m(damping));
+        }
+        let norm = jacobian.norm();
+        if norm > 0.0 {
+            let uncertain = 2.0 * jacobian.error;
+            self.unresolved += u64::from(uncertain > RECIPROCAL * norm);
+            self.asymmetry.offer((jacobian.asymmetry() - uncertain).max(0.0) / norm, pose);
+        }
+    }
+}
+
+/// `2 b / T`.
+fn stiffest_n_per_m(damping_ns_per_m: f64) -> f64 {
+    2.0 * damping_ns_per_m / PERIOD_S
+}
+
+/// Both measures, and the gains over the workspace for the picture.
+pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Measure, Decades), LoadError> {
+    let sobol = Sobol::new(setup.options.seed);
+    let blocks = setup.effort.jacobians.div_ceil(BLOCK);
+    let parts = sweep(setup, NAME, blocks, |subject, block| {
+        let mut tally = Tally::new();
+        for index in block * BLOCK..(block + 1) * BLOCK {
+            let pose = setup.options.reach.pose(sobol.point(index));
+            tally.poses += 1;
+            match Jacobian::at(subject, pose) {
+                Some(jacobian) => tally.take(&jacobian, pose),
+                None => tally.unanswered += 1,
+            }
+        }
+        tally
+    })?;
+    let mut total = Tally::new();
+    parts.iter().for_each(|part| total.merge(part));
+    Ok((lipschitz(&total), reciprocity(&total), total.gains))
+}
+
+#[allow(clippy::cast_precision_loss)] // counts below 2^53
+fn lipschitz(total: &Tally) -> Measure {
+    let answered = (total.poses - total.unanswered).max(1) as f64;
+    let share = |index: usize| total.renderable[index] as f64 / answered;
+    let [lightly, heavily] = DAMPINGS_NS_PER_M;
+    let remark = format!(
+        "renderable at 1 kHz: {:.4} of the workspace with b = {lightly} N s/m, {:.4} with {heavily}",
+        share(0),
+        share(1)
+    );
+    Measure {
+        id: "M2",
+        name: "Lipschitz constant",
+        value: total.gain.value,
+        unit: "N/m",
+        bound: Some(stiffest_n_per_m(lightly)),
+        verdict: Verdict::of(total.gain.value, stiffest_n_per_m(lightly), stiffest_n_per_m(heavily)),
+        pose: total.gain.record(),
+        remark,
+        values: Vec::new(),
+    }
+    .with("force by shift", total.blocks[0], "N/m")
+    .with("force by turn", total.blocks[1] * LEVER_M, "N/rad")
+    .with("torque by shift", total.blocks[2] * LEVER_M, "N·m/m")
+    .with("torque by turn", total.blocks[3] * LEVER_M * LEVER_M, "N·m/rad")
+    .with(format!("renderable share, b = {lightly} N s/m"), share(0), "")
+    .with(format!("renderable share, b = {heavily} N s/m"), share(1), "")
+    .with("poses", total.poses as f64, "")
+    .with("poses without answer", total.unanswered as f64, "")
+}
+
+#[allow(clippy::cast_precision_loss)] // counts below 2^53
+fn reciprocity(total: &Tally) -> Measure {
+    let answered = total.poses - total.unanswered;
+    let mut verdict = Verdict::of(total.asymmetry.value, RECIPROCAL, RECIPROCAL);
+    let mut remark = String::new();
+    // A measure that could see nothing has shown nothing.
+    if verdict == Verdict::Pass && 2 * total.unresolved > answered {
+        verdict = Verdict::Note;
+        "too rough to tell: differences do not settle at most poses".clone_into(&mut remark);
+    }
+    Measure {
+        id: "M3",
+        name: "reciprocity",
+        value: total.asymmetry.value,
+        unit: "",
+        bound: Some(RECIPROCAL),
+        verdict,
+        pose: total.asymmetry.record(),
+        remark,
+        values: Vec::new(),
+    }
+    .with("poses", answered as f64, "")
+    .with("poses where differences do not settle", total.unresolved as f64, "")
+}
