@@ -22,6 +22,7 @@ pub mod mapping;
 pub mod plot;
 pub mod record;
 pub mod registry;
+pub mod replay;
 pub mod report;
 pub mod run_picture;
 pub mod scene;

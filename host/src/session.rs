@@ -4,8 +4,8 @@ use crate::mapping::Mapping;
 use crate::registry::{LookupError, Registry};
 use crate::scene::{ModelUse, ParameterText, PluginUse, Scene, SceneError};
 use crate::servo::{
-    Clock, Envelope, ModelHealth, ModelSlot, RealTimeReport, Schedule, Servo, SpinWindow, TickEnd, Timing,
-    enter_real_time,
+    Clock, Envelope, ModelHealth, ModelSlot, ModelStack, RealTimeReport, Schedule, Servo, SpinWindow,
+    TickEnd, Timing, enter_real_time,
 };
 use crate::trace::{RECORD_WORDS, TickRecord};
 use flotor_hal::abi::PluginKind;
@@ -105,6 +105,8 @@ pub struct Outcome {
     pub ledger: Option<EnergyLedger>,
     /// Name, health and last words of each model.
     pub models: Vec<(String, ModelHealth, String)>,
+    /// Last words of the device; empty if it had no reason to say any.
+    pub device_words: String,
 }
 
 /// Records that fit between loop and observers: four seconds at 1 kHz.
@@ -154,7 +156,7 @@ impl Session {
         let envelope = Envelope::new(&scene.limits, &scene.boundary, &capabilities, period_ns);
         let stopper = device.stopper();
         let active = device.activate(&config).map_err(|(_, refusal)| refused(&device_plugin, refusal))?;
-        let servo = Servo::new(active, models, envelope, period_ns);
+        let servo = Servo::new(active, ModelStack::new(models), envelope, period_ns);
         Ok(Self { servo, stopper, clock: options.clock, period_ns, duration_ns, plugins })
     }
 
@@ -184,11 +186,22 @@ impl Session {
         stopper.safe_stop();
         let Finished { mut servo, end, elapsed_ns, dropped_records, real_time } = finished;
         let ledger = servo.device().energy_ledger();
-        let models = names.into_iter().zip(servo.models());
-        let models = models.map(|(name, slot)| (name, slot.health, slot.model.last_message())).collect();
+        let device_words = servo.device().last_message();
+        let models = names.into_iter().zip(servo.models().health());
+        let models = models.map(|(name, (health, words))| (name, health, words)).collect();
         let timing = servo.into_timing();
         let wall_s = started.elapsed().as_secs_f64();
-        Ok(Outcome { end, timing, elapsed_ns, wall_s, dropped_records, real_time, ledger, models })
+        Ok(Outcome {
+            end,
+            timing,
+            elapsed_ns,
+            wall_s,
+            dropped_records,
+            real_time,
+            ledger,
+            models,
+            device_words,
+        })
     }
 
     /// Same tick, no waiting: observers look between batches, so that a slow one slows the run and loses nothing.
@@ -293,7 +306,8 @@ fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plu
     })
 }
 
-fn prepare_model(
+/// Loads and creates one model of a scene. Not real-time.
+pub(crate) fn prepare_model(
     registry: &Registry,
     model: &ModelUse,
     config: &LoopConfig,

@@ -7,6 +7,7 @@ mod eval;
 mod jitter;
 mod options;
 mod plugins;
+mod replay;
 mod run;
 mod stability;
 mod validate;
@@ -37,6 +38,8 @@ struct Arguments {
 enum Command {
     /// Run a scene in the servo loop (without SCENE: the built-in demo)
     Run(run::RunArguments),
+    /// Ask the models of a recording again: bit for bit, or with other parameters
+    Replay(replay::ReplayArguments),
     /// Evaluate a force model at poses from a CSV file
     Eval(eval::EvalArguments),
     /// List the plugins that are found, without running any of them
@@ -69,6 +72,16 @@ pub(crate) enum CommandError {
     /// A device faulted.
     #[error("device fault: {}", .0.advice())]
     DeviceFault(Fault),
+    /// A device faulted in a run.
+    #[error("{}: device fault: {}{}", path.display(), before_advice(words), fault.advice())]
+    RunFault {
+        /// The plugin's file.
+        path: PathBuf,
+        /// What is wrong, and what to do.
+        fault: Fault,
+        /// What the device itself said; may be empty.
+        words: String,
+    },
     /// A plugin was refused.
     #[error("{0}")]
     PluginRefused(String),
@@ -85,6 +98,9 @@ pub(crate) enum CommandError {
     /// A recording could not be written or read.
     #[error(transparent)]
     Record(#[from] crate::record::RecordError),
+    /// A recording could not be replayed.
+    #[error(transparent)]
+    Read(#[from] crate::record::ReadError),
     /// Something found wrong that the output has already told.
     #[error("{0}")]
     Failed(String),
@@ -102,6 +118,15 @@ impl From<LoadError> for CommandError {
     }
 }
 
+impl From<crate::replay::ReplayError> for CommandError {
+    fn from(error: crate::replay::ReplayError) -> Self {
+        match error {
+            crate::replay::ReplayError::Read(error) => Self::Read(error),
+            crate::replay::ReplayError::Run(error) => Self::Run(error),
+        }
+    }
+}
+
 impl CommandError {
     fn file(path: &std::path::Path, action: &'static str, cause: std::io::Error) -> Self {
         Self::File { path: path.into(), action, cause }
@@ -109,7 +134,7 @@ impl CommandError {
 
     fn exit_code(&self) -> u8 {
         match self {
-            Self::Usage(_) => 2,
+            Self::Usage(_) | Self::Read(_) => 2,
             Self::Run(error) => match error {
                 RunError::Scene(_) | RunError::Mismatch { .. } => 2,
                 RunError::Lookup(LookupError::Unknown { .. }) => 2,
@@ -119,10 +144,15 @@ impl CommandError {
                 RunError::Thread(_) => 1,
             },
             Self::PluginRefused(_) => 3,
-            Self::DeviceFault(_) => 4,
+            Self::DeviceFault(_) | Self::RunFault { .. } => 4,
             Self::File { .. } | Self::Record(_) | Self::Failed(_) => 1,
         }
     }
+}
+
+/// What a device said, in front of the advice for its fault.
+fn before_advice(words: &str) -> String {
+    if words.is_empty() { String::new() } else { format!("{words}; ") }
 }
 
 /// A plugin that says its parameters do not fit is a configuration error; everything else is a refused plugin.
@@ -140,6 +170,7 @@ pub fn main() -> ExitCode {
     let result = match arguments.command {
         None => run::run(run::RunArguments::default()),
         Some(Command::Run(arguments)) => run::run(arguments),
+        Some(Command::Replay(arguments)) => replay::run(&arguments),
         Some(Command::Eval(arguments)) => eval::run(&arguments),
         Some(Command::Plugins(arguments)) => plugins::run(&arguments),
         Some(Command::Validate(arguments)) => validate::run(&arguments),

@@ -1,6 +1,6 @@
 //! Options several commands share, and how they are read.
 
-use crate::scene::{Location, ParameterText, nearest};
+use crate::scene::{Location, ModelUse, ParameterText, Scene, nearest};
 use clap::ValueEnum;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -69,32 +69,44 @@ impl FromStr for PluginKeyValue {
 
 impl PluginKeyValue {
     /// Adds the setting to the plugin of a scene it names: `device`, a model's name, or a plugin's id.
-    pub(crate) fn apply(&self, scene: &mut crate::scene::Scene) -> Result<(), String> {
-        let mut parameter = self.setting.parameter();
-        parameter.location.file = PathBuf::from(format!("--set {}.{}", self.plugin, self.setting.key));
+    pub(crate) fn apply(&self, scene: &mut Scene) -> Result<(), String> {
         if self.plugin == "device" || self.plugin == scene.device.plugin {
-            scene.device.parameters.push(parameter);
+            scene.device.parameters.push(self.parameter());
             return Ok(());
         }
-        let named = |model: &&mut crate::scene::ModelUse| {
-            model.name == self.plugin || model.plugin.plugin == self.plugin
-        };
-        if let Some(model) = scene.models.iter_mut().find(named) {
-            model.plugin.parameters.push(parameter);
+        let device = scene.device.plugin.clone();
+        self.apply_among(&mut scene.models, &["device", &device])
+    }
+
+    /// Adds the setting to the model it names: by its name in the scene, or by its plugin's id.
+    pub(crate) fn apply_to_models(&self, models: &mut [ModelUse]) -> Result<(), String> {
+        self.apply_among(models, &[])
+    }
+
+    fn apply_among(&self, models: &mut [ModelUse], others: &[&str]) -> Result<(), String> {
+        let named = |model: &&mut ModelUse| model.name == self.plugin || model.plugin.plugin == self.plugin;
+        if let Some(model) = models.iter_mut().find(named) {
+            model.plugin.parameters.push(self.parameter());
             return Ok(());
         }
-        let names = scene.models.iter().map(|model| model.name.as_str());
-        let names: Vec<&str> = names.chain(["device", scene.device.plugin.as_str()]).collect();
+        let names: Vec<&str> =
+            models.iter().map(|model| model.name.as_str()).chain(others.iter().copied()).collect();
         let hint =
             nearest(&self.plugin, names.iter().copied()).map(|name| format!("; did you mean `{name}`?"));
         Err(format!(
-            "--set {}.{}: the scene has no plugin `{}`{} (it has {})",
+            "--set {}.{}: there is no plugin `{}`{} (there are {})",
             self.plugin,
             self.setting.key,
             self.plugin,
             hint.unwrap_or_default(),
             names.join(", ")
         ))
+    }
+
+    fn parameter(&self) -> ParameterText {
+        let mut parameter = self.setting.parameter();
+        parameter.location.file = PathBuf::from(format!("--set {}.{}", self.plugin, self.setting.key));
+        parameter
     }
 }
 

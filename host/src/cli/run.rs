@@ -104,7 +104,10 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         (None, None) => {}
     }
     match outcome.end {
-        RunEnd::DeviceFault(fault) => Err(CommandError::DeviceFault(fault)),
+        RunEnd::DeviceFault(fault) => {
+            let path = plugins.first().map(|device| device.metadata.path.clone()).unwrap_or_default();
+            Err(CommandError::RunFault { path, fault, words: outcome.device_words })
+        }
         RunEnd::Finished | RunEnd::Stopped => broken_models(&summary),
     }
 }

@@ -5,52 +5,27 @@
 
 mod clock;
 mod envelope;
+mod models;
 mod realtime;
 mod timing;
 
 pub use clock::{Clock, SpinWindow};
 pub(crate) use clock::{Schedule, monotonic_ns, sleep_until};
 pub use envelope::Envelope;
+pub use models::ModelHealth;
+pub(crate) use models::{ModelSlot, ModelStack};
 pub use realtime::{Privilege, RealTimeReport};
 pub(crate) use realtime::{enter_real_time, probe_real_time};
 pub use timing::{Durations, Percentiles, Stage, Timing};
 
-use crate::mapping::Mapping;
 use crate::trace::{Events, TickRecord};
-use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{ActiveDevice, Model};
-use flotor_hal::{Cycle, Demand, DeviceState, Fault, Input, Output, StepStatus, Tick, Wrench};
+use flotor_hal::abi::loader::ActiveDevice;
+use flotor_hal::{Cycle, DeviceState, Fault, Tick, Wrench};
 use timing::STAGE_SAMPLING;
 
 /// Ticks without a new sample after which the force fades to zero: what is older than this is not where the
 /// hand is. At 1 kHz, 10 ms of a 10 Hz movement of 5 mm are 3 mm.
 const STALE_TICKS_LIMIT: u32 = 10;
-
-/// A model in the loop.
-pub(crate) struct ModelSlot {
-    pub(crate) model: Model,
-    pub(crate) mapping: Mapping,
-    pub(crate) demand: Demand,
-    pub(crate) health: ModelHealth,
-}
-
-/// How a model has behaved so far.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ModelHealth {
-    /// The tick at which it panicked; from then on it is out.
-    pub panicked_at: Option<u64>,
-    /// Ticks whose answer was not finite or outside the contract; each counted as no force.
-    pub rejected_ticks: u64,
-    /// The first of them.
-    pub first_rejected: Option<u64>,
-}
-
-impl ModelHealth {
-    fn reject(&mut self, tick: u64) {
-        self.rejected_ticks += 1;
-        self.first_rejected.get_or_insert(tick);
-    }
-}
 
 /// How a tick ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,7 +39,7 @@ pub(crate) enum TickEnd {
 /// The loop's state: a device, its models, the envelope.
 pub(crate) struct Servo {
     device: ActiveDevice,
-    models: Box<[ModelSlot]>,
+    models: ModelStack,
     envelope: Envelope,
     state: DeviceState,
     stale_ticks: u32,
@@ -74,15 +49,10 @@ pub(crate) struct Servo {
 
 impl Servo {
     /// Not real-time.
-    pub(crate) fn new(
-        device: ActiveDevice,
-        models: Vec<ModelSlot>,
-        envelope: Envelope,
-        period_ns: u64,
-    ) -> Self {
+    pub(crate) fn new(device: ActiveDevice, models: ModelStack, envelope: Envelope, period_ns: u64) -> Self {
         Self {
             device,
-            models: models.into_boxed_slice(),
+            models,
             envelope,
             state: DeviceState::HOME,
             stale_ticks: 0,
@@ -100,7 +70,7 @@ impl Servo {
         let mut end = self.read(tick, &mut events);
         watch.lap(&mut self.timing, Stage::Read);
 
-        let (model, energy_j) = self.step_models(tick, &mut events);
+        let (model, energy_j) = self.models.step(tick, &self.state, &mut events);
         watch.lap(&mut self.timing, Stage::Models);
 
         let stale = self.stale_ticks > STALE_TICKS_LIMIT || end != TickEnd::Continue;
@@ -156,49 +126,6 @@ impl Servo {
         TickEnd::Continue
     }
 
-    /// Sum of what the models ask for, in the device frame, and of the energy they store.
-    #[inline]
-    fn step_models(&mut self, tick: &Tick, events: &mut Events) -> (Wrench, f64) {
-        let mut sum = Wrench::ZERO;
-        let mut energy_j = 0.0;
-        for slot in &mut self.models {
-            if slot.health.panicked_at.is_some() {
-                events.insert(Events::MODEL_FAULT);
-                continue;
-            }
-            let input = Input {
-                pose: slot.mapping.pose_to_model(&self.state.pose),
-                twist: slot.mapping.twist_to_model(&self.state.twist),
-                time_ns: tick.time_ns,
-                dt_ns: tick.dt_ns,
-                tick: tick.index,
-                buttons: self.state.buttons,
-                demand: slot.demand,
-            };
-            let mut output = Output::default();
-            match slot.model.step(&input, &mut output) {
-                CallStatus::Ok if output.wrench.is_finite() && output.status().is_some() => {
-                    sum = sum + slot.mapping.wrench_to_device(&output.wrench);
-                    if output.energy_j.is_finite() {
-                        energy_j += output.energy_j * slot.mapping.energy_scale();
-                    }
-                    if output.status() != Some(StepStatus::Ok) {
-                        events.insert(Events::MODEL_DEGRADED);
-                    }
-                }
-                CallStatus::Ok => {
-                    slot.health.reject(tick.index);
-                    events.insert(Events::MODEL_FAULT);
-                }
-                _ => {
-                    slot.health.panicked_at = Some(tick.index);
-                    events.insert(Events::MODEL_FAULT);
-                }
-            }
-        }
-        (sum, energy_j)
-    }
-
     #[inline]
     fn account(&mut self, lateness_ns: u64, compute_ns: u64, missed: u64) {
         self.timing.lateness.record(lateness_ns);
@@ -220,7 +147,7 @@ impl Servo {
         &mut self.device
     }
 
-    pub(crate) fn models(&mut self) -> &mut [ModelSlot] {
+    pub(crate) fn models(&mut self) -> &mut ModelStack {
         &mut self.models
     }
 }

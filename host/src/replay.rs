@@ -1,0 +1,181 @@
+//! A recorded run once more, without its device: the models are asked again at the recorded poses.
+//!
+//! With nothing changed the wrench must come out bit for bit; with another parameter the difference shows what
+//! the change does to the same hand movement.
+
+use crate::record::{ReadError, Recording, Role, RunDescription};
+use crate::registry::Registry;
+use crate::scene::{Location, ModelUse, ParameterText, PluginUse};
+use crate::servo::{ModelHealth, ModelStack};
+use crate::session::{PluginReport, RunError, prepare_model};
+use crate::trace::{Events, TickRecord};
+use flotor_hal::{DeviceState, LoopConfig, Tick, Wrench};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Why a replay failed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReplayError {
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A model cannot be had.
+    #[error(transparent)]
+    Run(#[from] RunError),
+}
+
+/// How the replayed wrench differs from the recorded one.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Difference {
+    /// Ticks compared.
+    pub ticks: u64,
+    /// Ticks in which some bit of the wrench differs.
+    pub differing_ticks: u64,
+    /// The first of them.
+    pub first_tick: Option<u64>,
+    /// Largest difference of force, N.
+    pub max_force_n: f64,
+    /// Largest difference of torque, N·m.
+    pub max_torque_nm: f64,
+    /// Root mean square of the difference of force, N.
+    pub rms_force_n: f64,
+    /// Root mean square of the difference of torque, N·m.
+    pub rms_torque_nm: f64,
+}
+
+/// The models of a recording, ready to be asked again.
+pub struct Replay {
+    recording: Recording,
+    models: ModelStack,
+    plugins: Vec<PluginReport>,
+}
+
+impl Replay {
+    /// Opens a recording and creates its models as they were set, with changes on top. Not real-time.
+    ///
+    /// # Errors
+    /// [`ReplayError`]: the recording cannot be read, a plugin is missing or refuses the settings.
+    pub fn open(
+        path: &Path,
+        registry: &Registry,
+        change: impl FnMut(&mut [ModelUse]),
+    ) -> Result<Self, ReplayError> {
+        let recording = Recording::open(path)?;
+        let mut uses = models_of(path, recording.run());
+        let mut change = change;
+        change(&mut uses);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 100 Hz to 10 kHz
+        let period_ns = (1.0e9 / recording.run().rate_hz).round() as u64;
+        let config = LoopConfig { period_ns, seed: recording.run().seed };
+        let mut slots = Vec::new();
+        let mut plugins = Vec::new();
+        for model in &uses {
+            let (slot, report) = prepare_model(registry, model, &config)?;
+            slots.push(slot);
+            plugins.push(report);
+        }
+        Ok(Self { recording, models: ModelStack::new(slots), plugins })
+    }
+
+    /// How the run was set up.
+    #[must_use]
+    pub fn run(&self) -> &RunDescription {
+        self.recording.run()
+    }
+
+    /// The models with every parameter now in force.
+    #[must_use]
+    pub fn plugins(&self) -> &[PluginReport] {
+        &self.plugins
+    }
+
+    /// Asks the models at every recorded pose. `look` gets the recorded tick and the wrench that came out now.
+    ///
+    /// # Errors
+    /// [`ReadError`] at a damaged place; what was compared before is lost with it.
+    pub fn compare(
+        mut self,
+        mut look: impl FnMut(&TickRecord, &Wrench),
+    ) -> Result<(Difference, Vec<(ModelHealth, String)>), ReadError> {
+        let mut difference = Difference::default();
+        for record in &mut self.recording {
+            let record = record?;
+            let tick = Tick { index: record.tick, time_ns: record.time_ns, dt_ns: record.dt_ns };
+            let state = DeviceState {
+                pose: record.pose,
+                twist: record.twist,
+                buttons: record.buttons,
+                ..DeviceState::HOME
+            };
+            let (wrench, _) = self.models.step(&tick, &state, &mut Events::default());
+            difference.add(&record, &wrench);
+            look(&record, &wrench);
+        }
+        difference.finish();
+        Ok((difference, self.models.health()))
+    }
+}
+
+impl Difference {
+    /// Adds one tick; the root mean squares hold sums until [`Self::finish`].
+    fn add(&mut self, record: &TickRecord, wrench: &Wrench) {
+        self.ticks += 1;
+        if bits(wrench) == bits(&record.model) {
+            return;
+        }
+        self.differing_ticks += 1;
+        self.first_tick.get_or_insert(record.tick);
+        let force_n = (wrench.force() - record.model.force()).length();
+        let torque_nm = (wrench.torque() - record.model.torque()).length();
+        self.max_force_n = self.max_force_n.max(force_n);
+        self.max_torque_nm = self.max_torque_nm.max(torque_nm);
+        self.rms_force_n += force_n * force_n;
+        self.rms_torque_nm += torque_nm * torque_nm;
+    }
+
+    fn finish(&mut self) {
+        #[allow(clippy::cast_precision_loss)] // 2^53 ticks are 285 000 years
+        let ticks = self.ticks.max(1) as f64;
+        self.rms_force_n = (self.rms_force_n / ticks).sqrt();
+        self.rms_torque_nm = (self.rms_torque_nm / ticks).sqrt();
+    }
+
+    /// True if every bit of every tick came out again.
+    #[must_use]
+    pub fn is_bit_exact(&self) -> bool {
+        self.differing_ticks == 0
+    }
+}
+
+fn bits(wrench: &Wrench) -> [u64; 6] {
+    let [fx, fy, fz] = wrench.force_n;
+    let [tx, ty, tz] = wrench.torque_nm;
+    [fx, fy, fz, tx, ty, tz].map(f64::to_bits)
+}
+
+/// The models of a recorded run as a scene would name them.
+fn models_of(path: &Path, run: &RunDescription) -> Vec<ModelUse> {
+    let location = Location { file: PathBuf::from(path), line: 0 };
+    let model = |plugin: &crate::record::PluginDescription| match plugin.role {
+        Role::Device => None,
+        Role::Model(mapping) => Some(ModelUse {
+            name: plugin.name.clone(),
+            plugin: PluginUse {
+                plugin: plugin.id.clone(),
+                location: location.clone(),
+                parameters: plugin
+                    .settings
+                    .iter()
+                    .map(|(key, value)| ParameterText {
+                        key: key.clone(),
+                        value: value.clone(),
+                        location: location.clone(),
+                    })
+                    .collect(),
+            },
+            mapping,
+        }),
+    };
+    run.plugins.iter().filter_map(model).collect()
+}
