@@ -153,3 +153,131 @@ fn move_towards(from: DVec3, to: DVec3, step: f64) -> DVec3 {
     let length = way.length();
     if length <= step { to } else { from + way * (step / length) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_hal::{Axes, Pose};
+
+    const PERIOD_NS: u64 = 1_000_000;
+    const DEVICE: Capabilities = Capabilities {
+        sensed: Axes::ALL,
+        actuated: Axes::ALL,
+        range_m: [0.012; 3],
+        range_rad: [0.12; 3],
+        resolution_m: 0.0,
+        max_force_n: [40.0, 40.0, 100.0],
+        max_torque_nm: [5.0, 5.0, 10.0],
+        max_force_slew_n_per_s: 20_000.0,
+        max_torque_slew_nm_per_s: 2_000.0,
+        max_stiffness_n_per_m: 25_000.0,
+        rate_hz: [100.0, 10_000.0],
+        latency_s: 0.0,
+    };
+
+    fn envelope(limits: &Limits) -> Envelope {
+        Envelope::new(limits, &Boundary::default(), &DEVICE, PERIOD_NS)
+    }
+
+    fn tick(index: u64) -> Tick {
+        Tick { index, time_ns: index * PERIOD_NS, dt_ns: if index == 0 { 0 } else { PERIOD_NS } }
+    }
+
+    fn no_ramp() -> Limits {
+        Limits { ramp_s: 0.0, ..Limits::default() }
+    }
+
+    /// Runs one tick at home; the wrench and the events.
+    fn apply(envelope: &mut Envelope, request: Wrench, index: u64) -> (Wrench, Events) {
+        let mut events = Events::NONE;
+        let sent = envelope.apply(&request, &DeviceState::HOME, &tick(index), &mut events);
+        (sent, events)
+    }
+
+    #[test]
+    fn what_is_within_all_limits_passes_unchanged() {
+        let request = Wrench::new(DVec3::new(1.0, -2.0, 3.0), DVec3::new(0.1, 0.2, -0.3));
+        let (sent, events) = apply(&mut envelope(&no_ramp()), request, 0);
+        assert_eq!(sent, request);
+        assert_eq!(events, Events::NONE);
+    }
+
+    #[test]
+    fn nothing_gets_past_limits_and_slew_whatever_a_model_asks() {
+        let limits = Limits { force_n: [30.0, 50.0, 50.0], torque_slew_nm_per_s: 500.0, ..no_ramp() };
+        let mut envelope = envelope(&limits);
+        // The tighter of scene and device.
+        let (most_n, most_nm) = (DVec3::new(30.0, 40.0, 50.0), DVec3::new(5.0, 5.0, 10.0));
+        let (slew_n, slew_nm) = (20.0, 0.5);
+        let wild = [0.0, 1.0, -1.0, 1.0e3, -1.0e3, 1.0e300, -1.0e300, 5.0e-324, f64::NAN, f64::INFINITY];
+        let mut last = Wrench::ZERO;
+        let mut state: u64 = 1; // a linear congruential generator (Knuth's MMIX) is random enough to pick wild values
+        for index in 0..100_000 {
+            let mut pick = || {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                wild[(state >> 33) as usize % wild.len()]
+            };
+            let request = Wrench { force_n: [pick(), pick(), pick()], torque_nm: [pick(), pick(), pick()] };
+            let (sent, _) = apply(&mut envelope, request, index);
+            // One rounding of the largest number involved.
+            let slack = 1.0 + 4.0 * f64::EPSILON;
+            assert!(sent.is_finite());
+            assert!(sent.force().abs().cmple(most_n * slack).all(), "{sent:?}");
+            assert!(sent.torque().abs().cmple(most_nm * slack).all(), "{sent:?}");
+            assert!((sent.force() - last.force()).length() <= slew_n * slack + 1.0e-13, "{sent:?} {last:?}");
+            assert!((sent.torque() - last.torque()).length() <= slew_nm * slack + 1.0e-14, "{sent:?} {last:?}");
+            last = sent;
+        }
+    }
+
+    #[test]
+    fn a_force_that_is_too_large_keeps_its_direction() {
+        let asked = DVec3::new(100.0, 50.0, 0.0);
+        let limits = Limits { force_n: [20.0; 3], ..no_ramp() };
+        let (sent, events) = apply(&mut envelope(&limits), Wrench::from_force(asked), 0);
+        assert!(sent.force().cross(asked).length() < 1.0e-12);
+        assert!(events.intersects(Events::FORCE_LIMITED));
+    }
+
+    #[test]
+    fn not_a_number_becomes_no_force_and_is_told() {
+        let request = Wrench { force_n: [0.0, f64::NAN, 1.0], torque_nm: [0.0; 3] };
+        let (sent, events) = apply(&mut envelope(&no_ramp()), request, 0);
+        assert_eq!(sent, Wrench::ZERO);
+        assert!(events.intersects(Events::NOT_FINITE));
+    }
+
+    #[test]
+    fn force_fades_in_over_the_ramp() {
+        let mut envelope = envelope(&Limits { ramp_s: 0.1, ..Limits::default() });
+        let request = Wrench::from_force(DVec3::Z);
+        let at = |envelope: &mut Envelope, index| apply(envelope, request, index).0.force().z;
+        assert_eq!(at(&mut envelope, 0), 0.0);
+        assert!((at(&mut envelope, 50) - 0.5).abs() < 1.0e-12);
+        assert_eq!(at(&mut envelope, 100), 1.0);
+    }
+
+    #[test]
+    fn the_wall_pushes_inwards_only_and_only_outside() {
+        let mut envelope = envelope(&no_ramp());
+        let mut push = |position_m: DVec3, velocity: DVec3| {
+            let mut state = DeviceState::HOME;
+            state.pose = Pose::new(position_m, flotor_hal::DQuat::IDENTITY);
+            state.twist.linear_m_per_s = velocity.to_array();
+            let mut events = Events::NONE;
+            envelope.last = Wrench::ZERO;
+            envelope.apply(&Wrench::ZERO, &state, &tick(1), &mut events).force()
+        };
+        let inside = push(DVec3::new(0.0, 0.0, 0.0114), DVec3::Z);
+        assert_eq!(inside, DVec3::ZERO);
+        // 0.2 mm beyond the wall at 11.5 mm, 10 kN/m.
+        let outside = push(DVec3::new(0.0, 0.0, 0.0117), DVec3::ZERO);
+        assert!((outside - DVec3::new(0.0, 0.0, -2.0)).length() < 1.0e-9, "{outside}");
+        let leaving = push(DVec3::new(0.0, 0.0, 0.0117), DVec3::Z * 0.1);
+        assert!((leaving.z + 3.5).abs() < 1.0e-9, "damping resists going out: {leaving}");
+        let returning = push(DVec3::new(0.0, 0.0, 0.0117), DVec3::Z * -10.0);
+        assert!((returning.z + 2.0).abs() < 1.0e-9, "and does not pull a handle out that comes back: {returning}");
+        let sideways = push(DVec3::new(0.00936, 0.0, 0.00702), DVec3::ZERO); // 11.7 mm at 3:4
+        assert!(sideways.cross(DVec3::new(4.0, 0.0, 3.0)).length() < 1.0e-9, "a sphere, not a box: {sideways}");
+    }
+}
