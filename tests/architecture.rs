@@ -20,6 +20,8 @@ enum Role {
     Host,
     Viewer,
     Tests,
+    /// A plugin that is wrong on purpose, for the tests.
+    Fixture,
 }
 
 impl Role {
@@ -30,6 +32,7 @@ impl Role {
             "host/sync" => Self::Sync,
             "viewer" => Self::Viewer,
             "tests" => Self::Tests,
+            _ if folder.starts_with("tests/fixtures/") => Self::Fixture,
             _ if folder.starts_with("devices/") || folder.starts_with("models/") => Self::Plugin,
             _ => return None,
         })
@@ -39,11 +42,13 @@ impl Role {
     fn may_use(self) -> &'static [Role] {
         match self {
             Self::Contract | Self::Sync => &[],
-            Self::Plugin => &[Self::Contract],
+            Self::Plugin | Self::Fixture => &[Self::Contract],
             // The plugins only as paths, so that one `cargo run` builds them; no line of the host names them.
             Self::Host => &[Self::Contract, Self::Sync, Self::Plugin],
             Self::Viewer => &[Self::Contract],
-            Self::Tests => &[Self::Contract, Self::Sync, Self::Plugin, Self::Host, Self::Viewer],
+            Self::Tests => {
+                &[Self::Contract, Self::Sync, Self::Plugin, Self::Host, Self::Viewer, Self::Fixture]
+            }
         }
     }
 }
@@ -101,7 +106,8 @@ fn wrong_dependencies(members: &[Member]) -> Vec<String> {
                 ));
             }
             let loads = used.features.iter().any(|feature| feature == "loader");
-            if member.role == Role::Plugin && used.kind == DependencyKind::Normal && loads {
+            let is_plugin = matches!(member.role, Role::Plugin | Role::Fixture);
+            if is_plugin && used.kind == DependencyKind::Normal && loads {
                 complaints.push(format!("{} pulls the loader; it belongs to hosts and tests", member.name));
             }
         }

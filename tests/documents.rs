@@ -4,6 +4,7 @@
 //! (That the Rust code in them compiles and runs is seen to by the doctests of this crate.)
 
 use flotor_hal::conformance::Rule;
+use flotor_tests::program::Flotor;
 use flotor_tests::{files_under, workspace_root};
 use std::path::{Path, PathBuf};
 
@@ -139,6 +140,18 @@ fn the_book_prints_the_rules_of_the_contract() {
     let printed = table_under(&read("docs/src/plugin-contract.md"), "## What `flotor validate` checks");
     let rules = Rule::ALL.iter().map(|rule| vec![format!("`{}`", rule.id()), rule.text().to_owned()]);
     assert_eq!(printed, rules.collect::<Vec<_>>());
+}
+
+#[test]
+fn the_book_lists_every_command() {
+    let help = Flotor::with(["--help"]).run().stdout;
+    let (_, commands) = help.split_once("Commands:\n").expect("the help lists commands");
+    let commands = commands.lines().take_while(|line| !line.is_empty());
+    let offered = commands.filter_map(|line| line.strip_prefix("  ")?.split(' ').next());
+    let offered = offered.filter(|word| !word.is_empty() && *word != "help");
+    let listed = table_under(&read("docs/src/command-line.md"), "# Command line");
+    let listed = listed.iter().map(|row| row[0].trim_matches('`').split(' ').next().unwrap_or_default());
+    assert_eq!(listed.collect::<Vec<_>>(), offered.collect::<Vec<_>>());
 }
 
 /// Names of the variants of an enum in a source text, read off its one-per-line layout.

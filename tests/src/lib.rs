@@ -2,6 +2,11 @@
 //!
 //! The documents whose Rust code is compiled and run as doctests are listed at the end of this file.
 
+pub mod library;
+pub mod program;
+pub mod scratch;
+pub mod watched;
+
 use std::path::{Path, PathBuf};
 
 /// The root of the workspace: the folder with the README.

@@ -10,7 +10,7 @@ const DIGEST_WORDS: usize = RECORD_WORDS - TIMING_WORDS;
 /// Streaming xxh3-64 over what every tick left behind, measured times left out.
 ///
 /// The hash runs over the 64-bit words of each record, little endian, in the order of [`TickRecord`], so it
-/// depends on neither machine nor on how records arrive. It tells runs apart; it is no protection against malice.
+/// depends neither on the machine nor on how records arrive. It tells runs apart; it is no protection against malice.
 #[derive(Clone, Default)]
 pub struct TraceDigest {
     hash: Xxh3,
@@ -24,7 +24,7 @@ impl TraceDigest {
         Self::default()
     }
 
-    /// Adds the next tick. Not real-time by place, but bounded and without allocation.
+    /// Adds the next tick. Real-time: bounded, no allocation.
     pub fn update(&mut self, record: &TickRecord) {
         let mut bytes = [0; DIGEST_WORDS * size_of::<u64>()];
         // The shorter side ends the walk: the timing words at the end find no place.

@@ -24,7 +24,7 @@
 //! build needs a protobuf compiler. After a change of `host/proto`, one command compiles them again:
 //!
 //! ```text
-//! FLOTOR_WRITE_SCHEMA=1 cargo test -p flotor-tests --test tests_recording_schema committed
+//! FLOTOR_WRITE_SCHEMA=1 cargo test -p flotor-tests --test recording_schema committed
 //! ```
 //!
 //! Not real-time, all of it: records reach this module through the trace ring.

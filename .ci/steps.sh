@@ -1,0 +1,39 @@
+# Sourced by `run` and `full`: how a step is run and reported, and the steps every change must pass.
+# Stops at the first step that fails. Needs a Rust toolchain with rustfmt and clippy, and a C compiler; installs nothing.
+
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+report=()
+
+# step NAME COMMAND...: says what runs, runs it, says how long it took.
+step() {
+    local name=$1 started=$SECONDS
+    shift
+    printf '\n[%s] %s\n' "$name" "$*"
+    if "$@"; then
+        report+=("$(printf '%-8s ok %6d s' "$name" $((SECONDS - started)))")
+    else
+        local code=$?
+        report+=("$(printf '%-8s FAILED after %d s (exit code %d): %s' "$name" $((SECONDS - started)) "$code" "$*")")
+        summary
+        exit "$code"
+    fi
+}
+
+# Prints what ran so far, a line a step.
+summary() {
+    printf '\n'
+    printf '%s\n' "${report[@]}"
+}
+
+# The checks of every change, cheapest first.
+every_change() {
+    step format cargo fmt --all --check
+    # The README's test command, word for word.
+    step test cargo test
+    step lint cargo clippy --workspace --all-targets -- -D warnings
+    step docs env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
+    # Every interleaving of the lock-free cells. A target folder of its own: the flag changes every crate.
+    step loom env RUSTFLAGS="--cfg loom" cargo test -p flotor-sync --release --test loom --target-dir target/loom
+}
