@@ -118,15 +118,18 @@ pub struct ContractSizes {
 
 impl ContractSizes {
     /// The sizes of this build.
+    #[must_use]
     #[allow(clippy::cast_possible_truncation)] // a few hundred bytes
-    pub const HERE: ContractSizes = ContractSizes {
-        input: size_of::<crate::Input>() as u32,
-        output: size_of::<crate::Output>() as u32,
-        device_state: size_of::<crate::DeviceState>() as u32,
-        capabilities: size_of::<crate::Capabilities>() as u32,
-        parameter: size_of::<crate::Parameter>() as u32,
-        parameter_value: size_of::<crate::ParameterValue>() as u32,
-    };
+    pub const fn of_this_build() -> Self {
+        Self {
+            input: size_of::<crate::Input>() as u32,
+            output: size_of::<crate::Output>() as u32,
+            device_state: size_of::<crate::DeviceState>() as u32,
+            capabilities: size_of::<crate::Capabilities>() as u32,
+            parameter: size_of::<crate::Parameter>() as u32,
+            parameter_value: size_of::<crate::ParameterValue>() as u32,
+        }
+    }
 }
 
 /// Lets a host compare layouts field by field; absent (null) in C plugins.
@@ -188,7 +191,7 @@ impl Entry {
             abi_minor: ABI_MINOR,
             kind: kind as u32,
             reserved: 0,
-            sizes: ContractSizes::HERE,
+            sizes: ContractSizes::of_this_build(),
             init: Some(super::panics::init),
             get_interface: Some(get_interface),
             #[cfg(feature = "layout-proof")]

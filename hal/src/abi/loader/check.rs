@@ -44,7 +44,7 @@ pub(super) unsafe fn contract(entry: &'static Entry) -> Result<Proof, String> {
 }
 
 fn sizes(theirs: &ContractSizes) -> Result<(), String> {
-    let ours = ContractSizes::HERE;
+    let ours = ContractSizes::of_this_build();
     let pairs = [
         ("Input", ours.input, theirs.input),
         ("Output", ours.output, theirs.output),

@@ -1,6 +1,6 @@
 //! Why a plugin was refused: one readable line with file, cause and remedy.
 
-use crate::Refusal;
+use crate::{Refusal, RefusalKind};
 use std::path::PathBuf;
 
 /// Why a plugin was not loaded. Every variant prints one line: file, cause, what to do.
@@ -118,7 +118,7 @@ pub enum LoadError {
         wanted: &'static str,
     },
     /// The plugin itself said no.
-    #[error("{}: `{id}` refused: {refusal}", path.display())]
+    #[error("{}: `{id}` refused: {refusal}{}", path.display(), advice(refusal.kind))]
     Refused {
         /// The file.
         path: PathBuf,
@@ -127,4 +127,12 @@ pub enum LoadError {
         /// Its reason.
         refusal: Refusal,
     },
+}
+
+/// What to do about a refusal whose reason does not say it: a plugin that broke did not choose its words.
+const fn advice(kind: RefusalKind) -> &'static str {
+    match kind {
+        RefusalKind::Broken => "; report this to the author of the plugin",
+        RefusalKind::Parameter | RefusalKind::Unsupported | RefusalKind::Resource => "",
+    }
 }

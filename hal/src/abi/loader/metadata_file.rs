@@ -2,6 +2,7 @@
 
 use super::LoadError;
 use crate::abi::{ABI_MAJOR, ABI_MINOR, PluginKind, metadata};
+use object::elf::FileHeader64;
 use object::read::elf::{ElfFile64, FileHeader, ProgramHeader, SectionHeader};
 use object::{Endianness, Object, ObjectSection, ReadCache, ReadRef};
 use std::path::{Path, PathBuf};
@@ -58,8 +59,18 @@ impl Metadata {
 /// Finds and reads the metadata section of the bytes of a library.
 pub(super) fn parse<'d>(path: &Path, data: impl ReadRef<'d>, length: u64) -> Result<Metadata, LoadError> {
     let not_a_library = |cause| LoadError::NotALibrary { path: path.into(), cause };
+    // The header first: the table it points at is at the end of the file, the first thing a cut takes away.
+    let header = FileHeader64::<Endianness>::parse(data).map_err(not_a_library)?;
+    let truncated = |need| LoadError::Truncated { path: path.into(), have: length, need };
+    let need = end_of_section_headers(header).map_err(not_a_library)?;
+    if need > length {
+        return Err(truncated(need));
+    }
     let elf = ElfFile64::<Endianness, _>::parse(data).map_err(not_a_library)?;
-    check_extent(path, &elf, length)?;
+    let need = end_of_content(&elf);
+    if need > length {
+        return Err(truncated(need));
+    }
     let section = elf.section_by_name(metadata::SECTION);
     let section = section.ok_or_else(|| LoadError::NotAPlugin { path: path.into() })?;
     let text = section.data().map_err(not_a_library)?;
@@ -90,23 +101,20 @@ pub(super) fn parse<'d>(path: &Path, data: impl ReadRef<'d>, length: u64) -> Res
     })
 }
 
-/// Refuses a file shorter than its own headers say: `dlopen` would map it and die of SIGBUS.
-fn check_extent<'d>(
-    path: &Path,
-    elf: &ElfFile64<'d, Endianness, impl ReadRef<'d>>,
-    have: u64,
-) -> Result<(), LoadError> {
+/// Bytes a file needs to hold its section headers.
+fn end_of_section_headers(header: &FileHeader64<Endianness>) -> object::Result<u64> {
+    let endian = header.endian()?;
+    let size = u64::from(header.e_shnum(endian)) * u64::from(header.e_shentsize(endian));
+    Ok(header.e_shoff(endian).saturating_add(size))
+}
+
+/// Bytes a file needs to hold its segments and sections: `dlopen` maps them all and dies of SIGBUS in a file that
+/// is shorter.
+fn end_of_content<'d>(elf: &ElfFile64<'d, Endianness, impl ReadRef<'d>>) -> u64 {
     let endian = elf.endian();
-    let header = elf.elf_header();
-    let section_headers = u64::from(header.e_shnum(endian)) * u64::from(header.e_shentsize(endian));
-    let mut need = header.e_shoff(endian).saturating_add(section_headers);
-    for segment in elf.elf_program_headers() {
-        need = need.max(segment.p_offset(endian).saturating_add(segment.p_filesz(endian)));
-    }
-    for section in elf.elf_section_table().iter() {
-        if let Some((offset, size)) = section.file_range(endian) {
-            need = need.max(offset.saturating_add(size));
-        }
-    }
-    if need > have { Err(LoadError::Truncated { path: path.into(), have, need }) } else { Ok(()) }
+    let segments = elf.elf_program_headers().iter();
+    let segments = segments.map(|s| s.p_offset(endian).saturating_add(s.p_filesz(endian)));
+    let sections = elf.elf_section_table().iter().filter_map(|section| section.file_range(endian));
+    let sections = sections.map(|(offset, size)| offset.saturating_add(size));
+    segments.chain(sections).max().unwrap_or(0)
 }

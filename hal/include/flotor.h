@@ -1,0 +1,651 @@
+/* Flotor's plugin contract for C and C++ authors. Generated from the Rust sources: do not edit.
+ *
+ * SI units everywhere: m, rad, s, N, N m, J; time in integer nanoseconds. Right-handed frames, z up.
+ * A wrench is the force and torque on the hand. Orientation is a unit quaternion [x, y, z, w].
+ * A plugin exports one FlotorEntry and one FLOTOR_METADATA text; see the book, "Plugin contract".
+ */
+
+
+#ifndef FLOTOR_H
+#define FLOTOR_H
+
+#include <stdint.h>
+#include <stddef.h>
+
+// Bytes a [`Message`] holds.
+#define FlotorMESSAGE_BYTES 508
+
+// Major version of the contract. 0: the interfaces are drafts, and every minor may break.
+#define FlotorABI_MAJOR 0
+
+// Minor version of the contract.
+#define FlotorABI_MINOR 1
+
+// [`Host::flags`] bit: the plugin has its own Rust runtime and may silence its panic hook.
+#define FlotorHOST_QUIET_PANICS 1
+
+// Status of one call through a table.
+enum FlotorCallStatus
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // Done.
+    FlotorCallStatus_Ok = 0,
+    // The plugin panicked, now or earlier; the instance answers nothing any more.
+    FlotorCallStatus_Panicked = 1,
+    // The call is not allowed in this phase (real-time call on a device that is not active).
+    FlotorCallStatus_WrongPhase = 2,
+    // A value is out of range.
+    FlotorCallStatus_OutOfRange = 3,
+    // The plugin does not offer this.
+    FlotorCallStatus_Unsupported = 4,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum FlotorCallStatus FlotorCallStatus;
+#else
+typedef uint32_t FlotorCallStatus;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// What a plugin mainly is.
+enum FlotorPluginKind
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // Offers [`interface_ids::FORCE`].
+    FlotorPluginKind_Model = 1,
+    // Offers [`interface_ids::DEVICE`].
+    FlotorPluginKind_Device = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum FlotorPluginKind FlotorPluginKind;
+#else
+typedef uint32_t FlotorPluginKind;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// What to do about a refusal: the closed set a host maps to exit codes and advice.
+enum FlotorRefusalKind
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // A parameter has a value that cannot be used: change it.
+    FlotorRefusalKind_Parameter = 1,
+    // The request is outside what this plugin can do (rate, demand, capability): choose another plugin or scene.
+    FlotorRefusalKind_Unsupported = 2,
+    // Hardware or a file is missing, busy or not permitted: fix the machine, then retry.
+    FlotorRefusalKind_Resource = 3,
+    // The plugin broke (it panicked, or it answered outside the contract): report it to its author.
+    FlotorRefusalKind_Broken = 4,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum FlotorRefusalKind FlotorRefusalKind;
+#else
+typedef uint32_t FlotorRefusalKind;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// How a parameter's number is to be read.
+enum FlotorParameterKind
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // A real number between `min` and `max`, in `unit`.
+    FlotorParameterKind_Real = 1,
+    // One of `choices`; the number is its index.
+    FlotorParameterKind_Choice = 2,
+    // Free text (a path, a serial number); only at creation.
+    FlotorParameterKind_Text = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum FlotorParameterKind FlotorParameterKind;
+#else
+typedef uint32_t FlotorParameterKind;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// When a parameter may change.
+enum FlotorMutability
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // Only when the instance is created.
+    FlotorMutability_Fixed = 0,
+    // At any tick boundary while the loop runs.
+    FlotorMutability_Live = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum FlotorMutability FlotorMutability;
+#else
+typedef uint32_t FlotorMutability;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// What a model says about the answer it gave.
+enum FlotorStepStatus
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // The law holds here.
+    FlotorStepStatus_Ok = 0,
+    // The answer was saturated to stay finite and safe.
+    FlotorStepStatus_Clamped = 1,
+    // The pose is outside the model's domain; the wrench is the best safe continuation.
+    FlotorStepStatus_OutOfDomain = 2,
+    // An iteration has not reached its tolerance yet.
+    FlotorStepStatus_NotConverged = 3,
+    // The input was not finite; the wrench is zero.
+    FlotorStepStatus_InvalidInput = 4,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum FlotorStepStatus FlotorStepStatus;
+#else
+typedef uint32_t FlotorStepStatus;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// Whether the answer depends on the way to the pose.
+enum FlotorMemory
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // Same pose, same wrench: may be evaluated anywhere, in any order.
+    FlotorMemory_Stateless = 0,
+    // The path matters (iteration, friction, contact, branches).
+    FlotorMemory_PathDependent = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum FlotorMemory FlotorMemory;
+#else
+typedef uint32_t FlotorMemory;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// What is wrong with a device, as a closed set that says what to do.
+enum FlotorFault
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // The handle left the sensor's range: move it back, then re-arm.
+    FlotorFault_SensorOutOfRange = 1,
+    // A coil is too hot: let it cool.
+    FlotorFault_OverTemperature = 2,
+    // A coil carried too much current for too long: reduce the load.
+    FlotorFault_OverCurrent = 3,
+    // The handle moved faster than the device allows.
+    FlotorFault_OverSpeed = 4,
+    // The device is gone: check cable and power.
+    FlotorFault_Disconnected = 5,
+    // The device did not answer in time.
+    FlotorFault_Timeout = 6,
+    // The device answered something that makes no sense.
+    FlotorFault_Protocol = 7,
+    // Somebody pressed the emergency stop of the device.
+    FlotorFault_EmergencyStop = 8,
+    // The plugin broke (panic, or a code outside the contract).
+    FlotorFault_Broken = 9,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum FlotorFault FlotorFault;
+#else
+typedef uint32_t FlotorFault;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// Sizes of the data structs as the plugin was compiled: the cheapest check, and the one C plugins have too.
+typedef struct FlotorContractSizes {
+    // Bytes of [`crate::Input`].
+    uint32_t input;
+    // Bytes of [`crate::Output`].
+    uint32_t output;
+    // Bytes of [`crate::DeviceState`].
+    uint32_t device_state;
+    // Bytes of [`crate::Capabilities`].
+    uint32_t capabilities;
+    // Bytes of [`crate::Parameter`].
+    uint32_t parameter;
+    // Bytes of [`crate::ParameterValue`].
+    uint32_t parameter_value;
+} FlotorContractSizes;
+
+// What a host tells a plugin once, before anything else.
+typedef struct FlotorHost {
+    // Bytes of this struct as the host knows it.
+    uint32_t size;
+    // Contract the host speaks.
+    uint16_t abi_major;
+    // Contract the host speaks.
+    uint16_t abi_minor;
+    // [`HOST_QUIET_PANICS`] or 0.
+    uint32_t flags;
+    // Reserved, 0.
+    uint32_t reserved;
+} FlotorHost;
+
+// Borrowed UTF-8 text. In a schema or an info struct it lives as long as the process (plugins are never
+typedef struct FlotorStr {
+    const uint8_t *ptr;
+    size_t len;
+} FlotorStr;
+
+// Lets a host compare layouts field by field; absent (null) in C plugins.
+typedef struct FlotorLayoutProof {
+    // Bytes of this struct.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // `abi_stable::library::AbiHeader`: says whether the layouts below can be read at all.
+    const void *abi_stable_header;
+    // Name of a contract type to its `abi_stable::type_layout::TypeLayout`, or null.
+    const void *(*layout_of)(struct FlotorStr name);
+} FlotorLayoutProof;
+
+// The exported static `flotor_entry_<crate>`: plain data, readable before any plugin code runs.
+typedef struct FlotorEntry {
+    // [`MAGIC`].
+    uint8_t magic[8];
+    // Bytes of this struct as the plugin knows it.
+    uint32_t size;
+    // Contract the plugin was built for.
+    uint16_t abi_major;
+    // Contract the plugin was built for.
+    uint16_t abi_minor;
+    // [`PluginKind`].
+    uint32_t kind;
+    // Reserved, 0.
+    uint32_t reserved;
+    // Sizes of the data structs in the plugin's build.
+    struct FlotorContractSizes sizes;
+    // Called once after loading. May be null.
+    void (*init)(const struct FlotorHost *host);
+    // Interface id to its table, or null if not offered.
+    const void *(*get_interface)(struct FlotorStr id);
+    // Layouts for the host to check, or null.
+    const struct FlotorLayoutProof *layout_proof;
+} FlotorEntry;
+
+// A constant list of texts.
+typedef struct FlotorStrList {
+    const struct FlotorStr *ptr;
+    size_t len;
+} FlotorStrList;
+
+// One entry of a plugin's schema. Built with [`Parameter::real`], [`Parameter::choice`], [`Parameter::text`].
+typedef struct FlotorParameter {
+    struct FlotorStr id;
+    struct FlotorStr unit;
+    struct FlotorStr doc;
+    struct FlotorStrList choices;
+    uint32_t kind;
+    uint32_t mutability;
+    double min;
+    double max;
+    double default_;
+} FlotorParameter;
+
+// Which outputs a scene needs from a step; what is not demanded need not be computed.
+typedef struct FlotorDemand {
+    uint32_t bits;
+} FlotorDemand;
+// Force only.
+#define FlotorDemand_FORCE (FlotorDemand){ .bits = 1 }
+// Torque.
+#define FlotorDemand_TORQUE (FlotorDemand){ .bits = 2 }
+// Stored elastic energy.
+#define FlotorDemand_ENERGY (FlotorDemand){ .bits = 4 }
+// Force and torque.
+#define FlotorDemand_WRENCH (FlotorDemand){ .bits = 3 }
+// Everything a step can give.
+#define FlotorDemand_ALL (FlotorDemand){ .bits = 7 }
+
+// What a force model says about itself; constant, readable without creating it.
+typedef struct FlotorModelInfo {
+    struct FlotorStr id;
+    struct FlotorStr name;
+    struct FlotorStr doc;
+    struct FlotorDemand serves;
+    uint32_t memory;
+} FlotorModelInfo;
+
+// One value as it crosses the boundary: index into the schema, number, text (empty unless of kind text).
+typedef struct FlotorParameterValue {
+    uint32_t index;
+    uint32_t reserved;
+    double number;
+    struct FlotorStr text;
+} FlotorParameterValue;
+
+// A sentence for people, written by the callee into memory of the caller: nothing to allocate or to free.
+typedef struct FlotorMessage {
+    uint32_t len;
+    uint8_t text[FlotorMESSAGE_BYTES];
+} FlotorMessage;
+
+// An opaque instance made and owned by a plugin.
+typedef void *FlotorInstance;
+
+// What the loop promises a plugin before it starts. 16 bytes.
+typedef struct FlotorLoopConfig {
+    // Nominal time between ticks, ns.
+    uint64_t period_ns;
+    // Seed of everything random in this run.
+    uint64_t seed;
+} FlotorLoopConfig;
+
+// Position and orientation of the handle. 56 bytes.
+typedef struct FlotorPose {
+    // Position of the handle, m.
+    double position_m[3];
+    // Unit quaternion `[x, y, z, w]`, handle frame to the frame the pose is given in.
+    double orientation_xyzw[4];
+} FlotorPose;
+
+// Linear and angular velocity of the handle. 48 bytes.
+typedef struct FlotorTwist {
+    // Velocity of the handle, m/s.
+    double linear_m_per_s[3];
+    // Angular velocity, rad/s.
+    double angular_rad_per_s[3];
+} FlotorTwist;
+
+// Everything a force model gets for one step. 136 bytes, in the **model frame**.
+typedef struct FlotorInput {
+    // Pose of the handle relative to the model's home, m and unit quaternion.
+    struct FlotorPose pose;
+    // Velocity of the handle, m/s and rad/s; the linear part is scaled like the position.
+    struct FlotorTwist twist;
+    // Time since the loop started, ns.
+    uint64_t time_ns;
+    // Time since the previous step, ns (0 on the first).
+    uint64_t dt_ns;
+    // Which tick this is.
+    uint64_t tick;
+    // Buttons of the device, one bit each.
+    uint32_t buttons;
+    // Which outputs are needed.
+    struct FlotorDemand demand;
+} FlotorInput;
+
+// Force and torque **on the hand**, at the handle. 48 bytes.
+typedef struct FlotorWrench {
+    // Force, N.
+    double force_n[3];
+    // Torque, N·m.
+    double torque_nm[3];
+} FlotorWrench;
+
+// The answer of one step. 64 bytes, in the model frame.
+typedef struct FlotorOutput {
+    // Force and torque on the hand, N and N·m.
+    struct FlotorWrench wrench;
+    // Stored energy, J, if demanded and served; NaN where the model has none.
+    double energy_j;
+    uint32_t status;
+    uint32_t reserved;
+} FlotorOutput;
+
+// `flotor.force/1`. Statuses are [`super::CallStatus`] codes; `create` and `prepare` return 0 or a
+typedef struct FlotorForceTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Number of parameters.
+    uint32_t parameter_count;
+    // The schema, constant.
+    const struct FlotorParameter *parameters;
+    // What the model says about itself.
+    struct FlotorModelInfo info;
+    // Makes an instance from explicitly set values. Not real-time.
+    uint32_t (*create)(const struct FlotorParameterValue *values,
+                       uint32_t count,
+                       struct FlotorMessage *message,
+                       FlotorInstance *out);
+    // Frees an instance. Not real-time.
+    void (*destroy)(FlotorInstance instance);
+    // Last chance to allocate. Not real-time. May be null.
+    uint32_t (*prepare)(FlotorInstance instance,
+                        const struct FlotorLoopConfig *config,
+                        struct FlotorMessage *message);
+    // The wrench for a pose. Real-time: no allocation, lock, system call or unwinding.
+    uint32_t (*step)(FlotorInstance instance, const struct FlotorInput *input, struct FlotorOutput *output);
+    // `count` poses in order. Real-time per pose. May be null: the host then calls `step`.
+    uint32_t (*step_batch)(FlotorInstance instance,
+                           uint64_t count,
+                           const struct FlotorInput *inputs,
+                           struct FlotorOutput *outputs);
+    // Changes a live parameter at a tick boundary. Real-time. May be null.
+    uint32_t (*set_parameter)(FlotorInstance instance, uint32_t index, double value);
+    // The value in force. Real-time. May be null.
+    double (*parameter)(FlotorInstance instance, uint32_t index);
+    // Forgets history. Real-time. May be null.
+    uint32_t (*reset)(FlotorInstance instance);
+    // Why the last call failed. Not real-time. May be null.
+    void (*last_message)(FlotorInstance instance, struct FlotorMessage *message);
+} FlotorForceTable;
+
+// How to draw the body around its centreline: a tube, or a wire wound about it. 40 bytes.
+typedef struct FlotorCenterlineInfo {
+    // Radius of the drawn tube or wire, m.
+    double tube_radius_m;
+    // Radius of the helix the wire follows about the centreline, m; 0 draws a plain tube.
+    double helix_radius_m;
+    // Turns of the helix over the whole length; 0 for a plain tube.
+    double helix_turns;
+    // Radius of the end plates, m; 0 for none.
+    double plate_radius_m;
+    // How many points describe the centreline well.
+    uint32_t suggested_points;
+    uint32_t reserved;
+} FlotorCenterlineInfo;
+
+// `flotor.centerline/1`: see [`crate::CenterlineModel`]. Not real-time.
+typedef struct FlotorCenterlineTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // How to draw the body.
+    uint32_t (*info)(FlotorInstance instance, struct FlotorCenterlineInfo *out);
+    // Fills up to `capacity` points; how many are valid goes to `count`.
+    uint32_t (*centerline)(FlotorInstance instance,
+                           const struct FlotorInput *input,
+                           struct FlotorPose *points,
+                           uint32_t capacity,
+                           uint32_t *count);
+} FlotorCenterlineTable;
+
+// What a device says about itself; constant, readable without opening it.
+typedef struct FlotorDeviceInfo {
+    struct FlotorStr id;
+    struct FlotorStr name;
+    struct FlotorStr doc;
+} FlotorDeviceInfo;
+
+// Which of the six axes a device senses or actuates: x, y, z, then rotation about x, y, z.
+typedef struct FlotorAxes {
+    uint32_t bits;
+} FlotorAxes;
+// None.
+#define FlotorAxes_NONE (FlotorAxes){ .bits = 0 }
+// The three translations.
+#define FlotorAxes_TRANSLATION (FlotorAxes){ .bits = 7 }
+// The three rotations.
+#define FlotorAxes_ROTATION (FlotorAxes){ .bits = 56 }
+// All six.
+#define FlotorAxes_ALL (FlotorAxes){ .bits = 63 }
+
+// What a device can do, as numbers a host compares with a model and enforces. 200 bytes, device frame.
+typedef struct FlotorCapabilities {
+    // Axes whose position is measured.
+    struct FlotorAxes sensed;
+    // Axes that can be driven.
+    struct FlotorAxes actuated;
+    // Largest displacement from the origin along each axis, m; together the semi-axes of an ellipsoid.
+    double range_m[3];
+    // Largest rotation about each axis, rad; together the semi-axes of an ellipsoid of rotation vectors.
+    double range_rad[3];
+    // Smallest position step that is resolved, m.
+    double resolution_m;
+    // Largest force along each axis, N.
+    double max_force_n[3];
+    // Largest torque about each axis, N·m.
+    double max_torque_nm[3];
+    // Fastest change of force the device accepts, N/s.
+    double max_force_slew_n_per_s;
+    // Fastest change of torque the device accepts, N·m/s.
+    double max_torque_slew_nm_per_s;
+    // Largest stiffness the device renders stably at its nominal rate, N/m.
+    double max_stiffness_n_per_m;
+    // Slowest and fastest loop the device runs at, Hz.
+    double rate_hz[2];
+    // Time from taking a sample to the force that answers it, beyond one period, s.
+    double latency_s;
+} FlotorCapabilities;
+
+// One tick as a device and a host see it. 24 bytes.
+typedef struct FlotorTick {
+    // Number of the tick, from 0.
+    uint64_t index;
+    // Scheduled time since the loop started, ns: free of jitter, so that runs can be repeated.
+    uint64_t time_ns;
+    // Scheduled time since the previous tick, ns; more than a period after missed ticks; 0 on the first.
+    uint64_t dt_ns;
+} FlotorTick;
+
+// What a device reports each tick. 168 bytes, in the device frame.
+typedef struct FlotorDeviceState {
+    // Pose of the handle, m and unit quaternion.
+    struct FlotorPose pose;
+    // Velocity of the handle, m/s and rad/s.
+    struct FlotorTwist twist;
+    // Wrench the device says it delivered to the hand since the previous tick, N and N·m.
+    struct FlotorWrench delivered;
+    // When the sample was taken, ns on the loop's clock.
+    uint64_t sampled_ns;
+    // Buttons, one bit each.
+    uint32_t buttons;
+    // Reserved, 0.
+    uint32_t reserved;
+} FlotorDeviceState;
+// At home, at rest.
+#define FlotorDeviceState_HOME (FlotorDeviceState){ .pose = FlotorPose_HOME, .twist = FlotorTwist_ZERO, .delivered = FlotorWrench_ZERO, .sampled_ns = 0, .buttons = 0, .reserved = 0 }
+
+// `flotor.device/1`. `open` and `activate` return 0 or a [`crate::RefusalKind`] and say why in the message;
+typedef struct FlotorDeviceTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Number of parameters.
+    uint32_t parameter_count;
+    // The schema, constant.
+    const struct FlotorParameter *parameters;
+    // What the device says about itself.
+    struct FlotorDeviceInfo info;
+    // Opens a device. May block. Not real-time.
+    uint32_t (*open)(const struct FlotorParameterValue *values,
+                     uint32_t count,
+                     struct FlotorMessage *message,
+                     FlotorInstance *out);
+    // Closes it; deactivates first if needed. Not real-time.
+    void (*close)(FlotorInstance instance);
+    // What it can do. Not real-time.
+    uint32_t (*capabilities)(FlotorInstance instance, struct FlotorCapabilities *out);
+    // Energises it at zero wrench. Not real-time.
+    uint32_t (*activate)(FlotorInstance instance,
+                         const struct FlotorLoopConfig *config,
+                         struct FlotorMessage *message);
+    // Zero wrench, then opened again. Not real-time.
+    uint32_t (*deactivate)(FlotorInstance instance);
+    // Newest sample. Real-time.
+    uint32_t (*read)(FlotorInstance instance, const struct FlotorTick *tick, struct FlotorDeviceState *state);
+    // Wrench on the hand until the next write. Real-time.
+    uint32_t (*write)(FlotorInstance instance,
+                      const struct FlotorTick *tick,
+                      const struct FlotorWrench *wrench);
+    // Actuators safe, now. Any thread, any time, also during `read` and `write`.
+    void (*safe_stop)(FlotorInstance instance);
+    // Changes a live parameter at a tick boundary. Real-time. May be null.
+    uint32_t (*set_parameter)(FlotorInstance instance, uint32_t index, double value);
+    // The value in force. May be null.
+    double (*parameter)(FlotorInstance instance, uint32_t index);
+    // Why the last call failed. Not real-time. May be null.
+    void (*last_message)(FlotorInstance instance, struct FlotorMessage *message);
+} FlotorDeviceTable;
+
+// Account of the mechanical energy of a device with a known plant (a simulation), J since activation. 56 bytes.
+typedef struct FlotorEnergyLedger {
+    // Kinetic and potential energy now.
+    double stored_j;
+    // Kinetic and potential energy at activation.
+    double initial_j;
+    // Work done by the actuators for the commanded wrench.
+    double actuators_j;
+    // Work done by the actuators for gravity compensation.
+    double feedforward_j;
+    // Work done by the hand.
+    double hand_j;
+    // Energy turned into heat by damping.
+    double dissipated_j;
+    // Largest mechanical energy (kinetic plus potential above its lowest point) so far: the scale of an error.
+    double peak_j;
+} FlotorEnergyLedger;
+
+// `flotor.energy-ledger/1`: see [`EnergyLedger`].
+typedef struct FlotorEnergyLedgerTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // The account since activation. Real-time.
+    uint32_t (*ledger)(FlotorInstance instance, struct FlotorEnergyLedger *out);
+} FlotorEnergyLedgerTable;
+
+#endif  /* FLOTOR_H */
+
+/* Names of interfaces and extensions. */
+#define FLOTOR_INTERFACE_FORCE "flotor.force/1"
+#define FLOTOR_INTERFACE_DEVICE "flotor.device/1"
+#define FLOTOR_INTERFACE_CENTERLINE "flotor.centerline/1"
+#define FLOTOR_INTERFACE_ENERGY_LEDGER "flotor.energy-ledger/1"
+
+#if defined(__cplusplus)
+#define FLOTOR_STATIC_ASSERT static_assert
+#define FLOTOR_EXPORT extern "C" __attribute__((visibility("default")))
+#else
+#define FLOTOR_STATIC_ASSERT _Static_assert
+#define FLOTOR_EXPORT __attribute__((visibility("default")))
+#endif
+
+/* First eight bytes of an entry. */
+#define FLOTOR_MAGIC_BYTES { 'F', 'L', 'O', 'T', 'O', 'R', '\r', '\n' }
+/* Sizes of the data structs as this header sees them: the host compares them with its own. */
+#define FLOTOR_CONTRACT_SIZES \
+    { sizeof(FlotorInput), sizeof(FlotorOutput), sizeof(FlotorDeviceState), sizeof(FlotorCapabilities), \
+      sizeof(FlotorParameter), sizeof(FlotorParameterValue) }
+/* Text from a string literal. */
+#define FLOTOR_STR(literal) { (const uint8_t *)(literal), sizeof(literal) - 1 }
+/* What a host reads of the file without running it, in TOML: kind ("model" or "device"), id, name, doc, version,
+ * abi ("0.1") and entry (the name of the exported FlotorEntry). */
+#define FLOTOR_METADATA(text) \
+    __attribute__((used, section(".flotor"))) static const char flotor_metadata[] = text
+
+/* The layouts both sides agreed on. */
+FLOTOR_STATIC_ASSERT(sizeof(FlotorInput) == 136 && offsetof(FlotorInput, time_ns) == 104, "FlotorInput");
+FLOTOR_STATIC_ASSERT(sizeof(FlotorOutput) == 64 && offsetof(FlotorOutput, status) == 56, "FlotorOutput");
+FLOTOR_STATIC_ASSERT(sizeof(FlotorDeviceState) == 168 && offsetof(FlotorDeviceState, sampled_ns) == 152, "FlotorDeviceState");
+FLOTOR_STATIC_ASSERT(sizeof(FlotorMessage) == 512, "FlotorMessage");
+FLOTOR_STATIC_ASSERT(sizeof(FlotorTick) == 24, "FlotorTick");

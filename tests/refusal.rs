@@ -1,0 +1,510 @@
+//! Every wrong plugin costs one readable line that names file, cause and remedy, and the right exit code; never
+//! the process.
+//!
+//! What is wrong with the file is met by three ways into the host: the loader, `flotor validate` and
+//! `flotor run`. What goes wrong later, in a call, is met by a run: on the virtual clock through the library, to
+//! look at every tick, and through the program, to look at the line and the exit code. A line on standard error
+//! is compared whole, so that no backtrace and no panic message of a plugin slips through.
+
+use flotor::servo::ModelHealth;
+use flotor::session::{Outcome, RunEnd};
+use flotor::trace::Events;
+use flotor_hal::abi::loader::{LoadError, Plugin, Setting, read_metadata};
+use flotor_hal::abi::{ABI_MAJOR, ABI_MINOR, CallStatus, MAGIC};
+use flotor_hal::{Input, Output, Pose, Wrench};
+use flotor_tests::library::{compile_c, patched, plugin_bytes, plugin_file};
+use flotor_tests::program::{Flotor, Ran, exit_code};
+use flotor_tests::scratch::Scratch;
+use flotor_tests::watched::{Watched, watch};
+use std::path::{Path, PathBuf};
+
+const MODEL: &str = "fixture-faulty-model";
+const DEVICE: &str = "fixture-faulty-device";
+
+// ---------------------------------------------------------------- files that are no plugin of this contract
+
+/// A file that must be refused, what the line must say, and what it must advise.
+struct WrongFile {
+    name: &'static str,
+    make: fn(&Scratch) -> PathBuf,
+    cause: &'static str,
+    remedy: &'static str,
+}
+
+const WRONG_FILES: &[WrongFile] = &[
+    WrongFile {
+        name: "a text file",
+        make: |scratch| scratch.file("text.so", "I am no library.\n"),
+        cause: "not a shared library",
+        remedy: "build the plugin again",
+    },
+    WrongFile {
+        name: "an empty file",
+        make: |scratch| scratch.file("empty.so", ""),
+        cause: "not a shared library",
+        remedy: "build the plugin again",
+    },
+    WrongFile {
+        name: "half a plugin",
+        make: |scratch| {
+            let bytes = plugin_bytes("flotor-spring");
+            scratch.file("half.so", &bytes[..bytes.len() / 2])
+        },
+        cause: "the file is truncated",
+        remedy: "copy or build it again",
+    },
+    WrongFile {
+        name: "no file",
+        make: |scratch| scratch.path().join("missing.so"),
+        cause: "cannot read the plugin: No such file or directory",
+        remedy: "check the path",
+    },
+    WrongFile {
+        name: "a folder",
+        make: |scratch| scratch.folder("folder.so"),
+        cause: "cannot read the plugin: Is a directory",
+        remedy: "check the path",
+    },
+    WrongFile {
+        name: "a C library without an entry",
+        make: |scratch| {
+            let library = scratch.path().join("stranger.so");
+            compile_c("int answer(void);\nint answer(void) { return 42; }\n", &library);
+            library
+        },
+        cause: "a shared library, but not a Flotor plugin (no `.flotor` section)",
+        remedy: "FLOTOR_METADATA",
+    },
+    WrongFile {
+        name: "a C library that lacks another one",
+        make: |scratch| {
+            let library = scratch.path().join("lacking.so");
+            let source = format!(
+                "{METADATA_IN_C}int not_to_be_found(void);\n\
+                 int flotor_entry_wall(void);\nint flotor_entry_wall(void) {{ return not_to_be_found(); }}\n"
+            );
+            compile_c(&source, &library);
+            library
+        },
+        cause: "undefined symbol: not_to_be_found",
+        remedy: "install what is missing or rebuild the plugin",
+    },
+    WrongFile {
+        name: "metadata that are no TOML",
+        make: |scratch| {
+            let bytes = patched(plugin_bytes(MODEL), b"kind = \"model\"", b"kind : \"model\"");
+            scratch.file("yaml.so", bytes)
+        },
+        cause: "unreadable plugin metadata",
+        remedy: "build it with the export macros or the current header",
+    },
+    WrongFile {
+        name: "a kind nobody knows",
+        make: |scratch| {
+            let bytes = patched(plugin_bytes(MODEL), b"kind = \"model\"", b"kind = \"muddl\"");
+            scratch.file("muddl.so", bytes)
+        },
+        cause: "kind `muddl` is neither model nor device",
+        remedy: "build it with the export macros or the current header",
+    },
+    WrongFile {
+        name: "another contract, said by the metadata",
+        make: |scratch| {
+            let ours = format!("abi = \"{ABI_MAJOR}.{ABI_MINOR}\"");
+            let theirs = format!("abi = \"{}.{ABI_MINOR}\"", ABI_MAJOR + 9);
+            let bytes = patched(plugin_bytes(MODEL), ours.as_bytes(), theirs.as_bytes());
+            scratch.file("other_contract.so", bytes)
+        },
+        cause: "built for plugin contract 9.1, this host speaks 0.1",
+        remedy: "rebuild the plugin against this version",
+    },
+    WrongFile {
+        name: "another contract, said by the entry alone",
+        make: |scratch| {
+            let bytes = patched(plugin_bytes(MODEL), &entry_head(ABI_MAJOR), &entry_head(ABI_MAJOR + 9));
+            scratch.file("other_entry.so", bytes)
+        },
+        cause: "built for plugin contract 9.1, this host speaks 0.1",
+        remedy: "rebuild the plugin against this version",
+    },
+    WrongFile {
+        name: "an entry that is none",
+        make: |scratch| {
+            let mut head = entry_head(ABI_MAJOR);
+            head[0] ^= 0xff;
+            let bytes = patched(plugin_bytes(MODEL), &entry_head(ABI_MAJOR), &head);
+            scratch.file("no_magic.so", bytes)
+        },
+        cause: "no plugin entry `flotor_entry_fixture_faulty_model`",
+        remedy: "export it with default visibility",
+    },
+    WrongFile {
+        name: "an entry that is not exported",
+        make: |scratch| {
+            let named = b"entry = \"flotor_entry_fixture_faulty_model\"";
+            let absent = b"entry = \"flotor_entry_fixture_absent_model\"";
+            scratch.file("no_entry.so", patched(plugin_bytes(MODEL), named, absent))
+        },
+        cause: "no plugin entry `flotor_entry_fixture_absent_model`",
+        remedy: "export it with default visibility",
+    },
+    WrongFile {
+        name: "a struct with two fields exchanged",
+        make: |_| plugin_file("fixture-changed-struct"),
+        cause: "`Input` has `time_ns: u64` in the host where the plugin has `tick: u64`",
+        remedy: "rebuild the plugin against this host's flotor-hal",
+    },
+];
+
+/// The metadata section of a plugin, written by hand.
+const METADATA_IN_C: &str = "__attribute__((section(\".flotor\"), used))\n\
+    static const char metadata[] = \"kind = \\\"model\\\"\\nid = \\\"wall\\\"\\nversion = \\\"1.0\\\"\\n\"\n\
+    \"abi = \\\"0.1\\\"\\nentry = \\\"flotor_entry_wall\\\"\\n\";\n";
+
+/// The first bytes of an entry: magic, size, contract version.
+fn entry_head(abi_major: u16) -> Vec<u8> {
+    let size = u32::try_from(size_of::<flotor_hal::abi::Entry>()).expect("a hundred bytes");
+    let version = [abi_major.to_ne_bytes(), ABI_MINOR.to_ne_bytes()].concat();
+    [&MAGIC[..], &size.to_ne_bytes(), &version].concat()
+}
+
+/// Runs a check on every wrong file and says which one it failed on.
+fn for_every_wrong_file(check: impl Fn(&WrongFile, &Path)) {
+    for wrong in WRONG_FILES {
+        eprintln!("{}", wrong.name); // shown if the check fails
+        let scratch = Scratch::default();
+        check(wrong, &(wrong.make)(&scratch));
+    }
+}
+
+/// One line that starts with the file and holds cause and remedy.
+fn assert_tells(line: &str, file: &Path, wrong: &WrongFile) {
+    assert!(line.starts_with(&format!("{}: ", file.display())), "the file is not named: {line}");
+    assert!(line.contains(wrong.cause), "the cause is not named: {line}");
+    assert!(line.contains(wrong.remedy), "no remedy is named: {line}");
+    assert_eq!(line.lines().count(), 1, "{line}");
+}
+
+fn refused(file: &Path) -> LoadError {
+    match Plugin::load(file) {
+        Err(error) => error,
+        Ok(plugin) => panic!("{:?} was loaded", plugin.metadata()),
+    }
+}
+
+#[test]
+fn the_loader_refuses_every_wrong_file_in_one_line() {
+    for_every_wrong_file(|wrong, file| assert_tells(&refused(file).to_string(), file, wrong));
+}
+
+#[test]
+fn validate_says_what_is_wrong_with_every_file() {
+    for_every_wrong_file(|wrong, file| {
+        let ran = Flotor::with(["validate".as_ref(), file.as_os_str()]).run();
+        assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
+        assert!(ran.error().starts_with(&format!("{}: 1 of ", file.display())), "{ran:#?}");
+        let violation = ran.stdout.lines().find(|line| line.contains(wrong.cause));
+        assert_tells(violation.expect("the violation is told").trim_start(), file, wrong);
+    });
+}
+
+#[test]
+fn a_scene_that_names_a_wrong_file_does_not_run() {
+    for_every_wrong_file(|wrong, file| {
+        let ran = run_scene(&model_scene(file));
+        assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
+        assert_tells(ran.error(), file, wrong);
+        assert_eq!(ran.stdout, "");
+    });
+}
+
+#[test]
+fn a_plugin_cut_off_anywhere_is_refused_before_any_of_it_is_mapped() {
+    let whole = plugin_bytes(MODEL);
+    let file = Scratch::default();
+    let path = file.file("cut.so", &whole);
+    assert!(Plugin::load(&path).is_ok(), "the file is a good one before it is cut");
+    // Every page, because that is how a file is mapped; every byte of the tables at both ends.
+    let pages = (0..whole.len()).step_by(4096).flat_map(|page| [page, page + 1, page + 2048]);
+    let ends = (0..128).flat_map(|byte| [byte, whole.len() - 1 - byte]);
+    let mut lengths: Vec<usize> = pages.chain(ends).filter(|length| *length < whole.len()).collect();
+    lengths.sort_unstable();
+    let handle = std::fs::OpenOptions::new().write(true).open(&path).expect("a file of ours");
+    for length in lengths.into_iter().rev() {
+        handle.set_len(length as u64).expect("a file can be cut");
+        for error in [refused(&path), read_metadata(&path).expect_err("half a plugin has no metadata")] {
+            let refused = matches!(error, LoadError::Truncated { .. } | LoadError::NotALibrary { .. });
+            assert!(refused, "cut at {length}: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_device_is_no_model_and_a_model_no_device() {
+    let (spring, flotor) = (plugin_file("flotor-spring"), plugin_file("flotor-simulated"));
+    let wrong = [
+        (model_scene(&flotor), "`simulated` is a device, a model is needed here; name another plugin"),
+        (scene(&spring, &spring, ""), "`spring` is a model, a device is needed here; name another plugin"),
+        (model_scene(Path::new("simulated")), "`simulated` is a device, a model is needed here"),
+    ];
+    for (scene, cause) in wrong {
+        let ran = run_scene(&scene);
+        assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
+        assert!(ran.error().contains(cause), "{ran:#?}");
+    }
+}
+
+#[test]
+fn a_plugin_nobody_has_is_a_mistake_in_the_scene() {
+    let ran = run_scene(&model_scene(Path::new("sprang")));
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+    let error = ran.error();
+    assert!(error.contains("scene.toml:5: no model plugin `sprang`; did you mean `spring`?"), "{error}");
+}
+
+// ---------------------------------------------------------------- plugins that fail in a call
+
+/// A scene of 50 ticks: one device, one model called `model`.
+fn scene(device: &Path, model: &Path, parameters: &str) -> String {
+    format!(
+        "duration_s = 0.05\n[device]\nplugin = {device:?}\n[[model]]\nplugin = {model:?}\nname = \"model\"\n\
+         {parameters}\n[limits]\nramp_s = 0\n"
+    )
+}
+
+/// A model on a healthy device.
+fn model_scene(model: &Path) -> String {
+    scene(Path::new("simulated"), model, "")
+}
+
+/// The faulty model on the faulty device, with parameters of the model.
+fn faulty_scene(parameters: &str) -> String {
+    scene(&plugin_file(DEVICE), &plugin_file(MODEL), parameters)
+}
+
+fn run_scene(scene: &str) -> Ran {
+    run_scene_with(scene, &[])
+}
+
+fn run_scene_with(scene: &str, sets: &[&str]) -> Ran {
+    let scratch = Scratch::default();
+    let file = scratch.file("scene.toml", scene);
+    let sets = sets.iter().flat_map(|set| ["--set".as_ref(), std::ffi::OsStr::new(*set)]);
+    let arguments = ["run".as_ref(), file.as_os_str(), "--clock".as_ref(), "virtual".as_ref()];
+    Flotor::with(arguments.into_iter().chain(sets)).run()
+}
+
+/// Name, health and last words of the one model of a scene.
+fn the_model(outcome: &Outcome) -> &(String, ModelHealth, String) {
+    let [model] = &outcome.models[..] else { panic!("one model was named") };
+    model
+}
+
+/// What the honest model asks for on the faulty device, which rests a millimetre below home: 100 N/m up.
+fn honest() -> Wrench {
+    Wrench { force_n: [0.0, 0.0, 0.1], torque_nm: [0.0; 3] }
+}
+
+#[test]
+fn a_model_that_says_no_or_panics_before_the_start_is_a_refused_plugin() {
+    let file = plugin_file(MODEL);
+    let wrong = [
+        ("refuses-to-create", "the table of forces is on another machine"),
+        ("panics-in-create", ": create gave up; report this to the author of the plugin"),
+        ("panics-in-prepare", ": prepare gave up; report this to the author of the plugin"),
+    ];
+    for (fault, cause) in wrong {
+        let ran = run_scene_with(&model_scene(&file), &[&format!("model.fault={fault}")]);
+        assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
+        let error = ran.error();
+        assert!(error.starts_with(&format!("{}: `{MODEL}` refused: ", file.display())), "{error}");
+        assert!(error.ends_with(cause), "{error}");
+    }
+}
+
+#[test]
+fn a_panic_names_file_and_line_of_the_plugins_source() {
+    let ran = run_scene_with(&model_scene(&plugin_file(MODEL)), &["model.fault=panics-in-create"]);
+    assert!(ran.error().contains("panicked at tests/fixtures/faulty-model/src/lib.rs:"), "{ran:#?}");
+}
+
+#[test]
+fn a_model_that_panics_in_a_step_is_out_and_the_run_goes_on_without_it() {
+    let Watched { records, outcome } =
+        watch(&faulty_scene("parameters = { fault = \"panics-in-step\", at_tick = 7 }"));
+    let (_, health, words) = the_model(&outcome);
+    assert_eq!(outcome.end, RunEnd::Finished);
+    assert_eq!(records.len(), 50);
+    for record in &records {
+        let (model, failed) = if record.tick < 7 { (honest(), false) } else { (Wrench::ZERO, true) };
+        assert_eq!(record.model, model, "tick {}", record.tick);
+        assert_eq!(record.events.intersects(Events::MODEL_FAULT), failed, "tick {}", record.tick);
+        assert!(record.commanded.is_finite());
+    }
+    assert_eq!(health.panicked_at, Some(7));
+    assert!(words.ends_with("step gave up at tick 7"), "{words}");
+}
+
+#[test]
+fn a_model_that_panicked_is_told_in_one_line_with_its_words() {
+    let file = plugin_file(MODEL);
+    let ran = run_scene_with(&model_scene(&file), &["model.fault=panics-in-step", "model.at_tick=7"]);
+    assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
+    let error = ran.error();
+    let start = format!("{}: `model` panicked at tick 7, no force since: panicked at ", file.display());
+    assert!(error.starts_with(&start), "{error}");
+    assert!(error.ends_with("step gave up at tick 7; `flotor validate` tells more"), "{error}");
+    assert!(ran.stdout.contains("ticks      50   late 0   missed 0"), "the run went on: {ran:#?}");
+}
+
+#[test]
+fn nan_from_a_model_is_no_force_for_that_tick_alone() {
+    let Watched { records, outcome } =
+        watch(&faulty_scene("parameters = { fault = \"nan-once\", at_tick = 7 }"));
+    let (_, health, _) = the_model(&outcome);
+    assert_eq!(outcome.end, RunEnd::Finished);
+    for record in &records {
+        let (model, failed) = if record.tick == 7 { (Wrench::ZERO, true) } else { (honest(), false) };
+        assert_eq!(record.model, model, "tick {}", record.tick);
+        assert_eq!(record.events.intersects(Events::MODEL_FAULT), failed, "tick {}", record.tick);
+    }
+    assert_eq!((health.rejected_ticks, health.first_rejected, health.panicked_at), (1, Some(7), None));
+}
+
+#[test]
+fn nan_from_a_model_is_counted_and_told_in_one_line() {
+    let file = plugin_file(MODEL);
+    for (fault, count) in [("nan-once", 1), ("nan", 43)] {
+        let ran = run_scene_with(
+            &model_scene(&file),
+            &[&format!("model.fault={fault}"), "model.at_tick=7"],
+        );
+        assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
+        let told = format!(
+            "{}: `model` {count} answers were not finite, the first at tick 7; each counted as no force; \
+             `flotor validate` tells more",
+            file.display()
+        );
+        assert_eq!(ran.error(), told);
+    }
+}
+
+/// The run is over and was good when the model is freed: there is nobody left to tell, and nothing is lost.
+#[test]
+fn a_model_that_panics_when_it_is_freed_harms_nobody() {
+    let ran = run_scene_with(&model_scene(&plugin_file(MODEL)), &["model.fault=panics-in-drop"]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(exit_code::OK), ""), "{ran:#?}");
+}
+
+#[test]
+fn a_dead_model_never_answers_again() {
+    let plugin = Plugin::load(&plugin_file(MODEL)).expect("a good file");
+    let setting =
+        |key, value| Setting::parse(plugin.parameters(), key, value).expect("a legal setting");
+    let settings = [setting("fault", "panics-in-step"), setting("at_tick", "1")];
+    let mut model = plugin.create_model(&settings).expect("it is made");
+    let mut step = |tick| {
+        let mut output = Output::default();
+        let status = model.step(&Input { tick, ..Input::at_rest(Pose::HOME) }, &mut output);
+        (status, output.wrench)
+    };
+    assert_eq!(step(0), (CallStatus::Ok, Wrench::ZERO));
+    assert_eq!(step(1).0, CallStatus::Panicked);
+    assert_eq!(step(0).0, CallStatus::Panicked, "what it would have answered before it panicked");
+}
+
+#[test]
+fn a_device_that_fails_before_the_start_is_a_refused_plugin() {
+    let file = plugin_file(DEVICE);
+    let wrong = [
+        ("panics-in-open", ": open gave up; report this to the author of the plugin"),
+        ("refuses-to-activate", "the power supply is off; switch it on"),
+        ("nan-limit", "its capability `max_force_n` is [NaN, NaN, NaN]; report this to the author of the plugin"),
+    ];
+    for (fault, cause) in wrong {
+        let ran = run_scene_with(&faulty_scene(""), &[&format!("device.fault={fault}")]);
+        assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
+        let error = ran.error();
+        assert!(error.starts_with(&format!("{}: `{DEVICE}` refused: ", file.display())), "{error}");
+        assert!(error.ends_with(cause), "{error}");
+    }
+}
+
+#[test]
+fn a_device_that_fails_in_the_loop_ends_the_run_in_one_line() {
+    let file = plugin_file(DEVICE);
+    let wrong = [
+        ("panics-in-read", ": read gave up", "report it to its author"),
+        ("panics-in-write", ": write gave up", "report it to its author"),
+        ("over-temperature", "a coil is too hot", "let the device cool"),
+    ];
+    for (fault, cause, remedy) in wrong {
+        let ran =
+            run_scene_with(&faulty_scene(""), &[&format!("device.fault={fault}"), "device.at_tick=7"]);
+        assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:#?}");
+        let error = ran.error();
+        assert!(error.starts_with(&format!("{}: device fault: ", file.display())), "{error}");
+        assert!(error.contains(cause) && error.contains(remedy), "{error}");
+        assert!(ran.stdout.contains("ticks      8 "), "the fault came at tick 7: {ran:#?}");
+    }
+}
+
+#[test]
+fn a_device_without_a_sample_gets_no_force_once_the_last_one_is_old() {
+    let device = "[device.parameters]\nfault = \"nan-sample\"\nat_tick = 7\n[[model]]";
+    let records = watch(&faulty_scene("").replacen("[[model]]", device, 1)).records;
+    assert_eq!(records.len(), 50);
+    for record in &records {
+        // Ten ticks of the last pose, then nothing: what is older is not where the hand is.
+        let force = if record.tick < 7 + 10 { honest() } else { Wrench::ZERO };
+        assert_eq!(record.commanded, force, "tick {}", record.tick);
+        assert_eq!(record.events.intersects(Events::NOT_FINITE), record.tick >= 7, "tick {}", record.tick);
+    }
+}
+
+#[test]
+fn validate_finds_what_a_model_does_wrong() {
+    let wrong = [
+        ("panics-in-create", "defaults", "create gave up"),
+        ("panics-in-step", "finite-near-home", "step gave up at tick 0"),
+        ("nan", "finite-near-home", "NaN"),
+    ];
+    for (fault, rule, cause) in wrong {
+        assert_validate_finds(MODEL, fixture_faulty_model::FAULT_VARIABLE, fault, rule, cause);
+    }
+}
+
+#[test]
+fn validate_finds_what_a_device_does_wrong() {
+    let wrong = [
+        ("panics-in-open", "defaults", "open gave up"),
+        ("nan-limit", "capabilities", "max_force_n"),
+        ("refuses-to-activate", "lifecycle", "the power supply is off"),
+        ("panics-in-read", "lifecycle", "read at tick 0"),
+        ("panics-in-write", "lifecycle", "write at tick 0"),
+        ("nan-sample", "lifecycle", "NaN"),
+        ("over-temperature", "lifecycle", "a coil is too hot"),
+    ];
+    for (fault, rule, cause) in wrong {
+        assert_validate_finds(DEVICE, fixture_faulty_device::FAULT_VARIABLE, fault, rule, cause);
+    }
+}
+
+fn assert_validate_finds(package: &str, variable: &str, fault: &str, rule: &str, cause: &str) {
+    let file = plugin_file(package);
+    let ran = Flotor::with(["validate".as_ref(), file.as_os_str()]).env(variable, fault).run();
+    assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{fault}: {ran:#?}");
+    let error = ran.error();
+    assert!(error.starts_with(&format!("{}: ", file.display())), "{error}");
+    assert!(error.ends_with("rules violated"), "{error}");
+    let failed = ran.stdout.split("  FAILED  ").find(|failed| failed.starts_with(rule));
+    assert!(failed.is_some_and(|failed| failed.contains(cause)), "{fault}: {ran:#?}");
+}
+
+#[test]
+fn validate_finds_nothing_wrong_with_honest_plugins() {
+    for package in ["flotor-spring", "flotor-simulated", MODEL, DEVICE] {
+        let ran = Flotor::with(["validate".as_ref(), plugin_file(package).as_os_str()]).run();
+        assert_eq!((ran.code, ran.stderr.as_str()), (Some(exit_code::OK), ""), "{ran:#?}");
+    }
+}

@@ -1,0 +1,137 @@
+//! The `flotor` program as a user meets it: arguments in; exit code, standard output and standard error out.
+
+use crate::library::build_folder;
+use std::ffi::OsStr;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::SystemTime;
+
+/// Exit codes of the command line, a contract with scripts.
+pub mod exit_code {
+    /// All went well.
+    pub const OK: i32 = 0;
+    /// Anything that is none of the others.
+    pub const OTHER: i32 = 1;
+    /// Usage or configuration.
+    pub const CONFIGURATION: i32 = 2;
+    /// A plugin was refused.
+    pub const PLUGIN_REFUSED: i32 = 3;
+    /// The device faulted.
+    pub const DEVICE_FAULT: i32 = 4;
+}
+
+/// One call of the program, being put together.
+pub struct Flotor {
+    command: Command,
+    input: String,
+}
+
+/// What came of a call.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Ran {
+    /// Exit code; `None` if a signal ended the program.
+    pub code: Option<i32>,
+    /// Everything on standard output.
+    pub stdout: String,
+    /// Everything on standard error.
+    pub stderr: String,
+}
+
+impl Flotor {
+    /// The program with these arguments, no plugin folders but its own, and no colours.
+    ///
+    /// # Panics
+    /// If the program is not built, or older than the library it is made of.
+    #[must_use]
+    pub fn with<I: AsRef<OsStr>>(arguments: impl IntoIterator<Item = I>) -> Self {
+        let mut command = Command::new(program());
+        command.args(arguments).env_remove(flotor::registry::PATH_VARIABLE).env("NO_COLOR", "1");
+        // What a plugin's panic would do to a terminal must not depend on how the tests were started.
+        command.env("RUST_BACKTRACE", "1");
+        Self { command, input: String::new() }
+    }
+
+    /// Searches these folders for plugins, first to last, before the program's own.
+    ///
+    /// # Panics
+    /// If a folder's name holds the separator of paths.
+    #[must_use]
+    pub fn searching(mut self, folders: &[&Path]) -> Self {
+        let path = std::env::join_paths(folders).expect("a scratch folder has a plain name");
+        self.command.env(flotor::registry::PATH_VARIABLE, path);
+        self
+    }
+
+    /// Sets an environment variable.
+    #[must_use]
+    pub fn env(mut self, name: &str, value: &str) -> Self {
+        self.command.env(name, value);
+        self
+    }
+
+    /// Text for standard input.
+    #[must_use]
+    pub fn reading(mut self, input: impl Into<String>) -> Self {
+        self.input = input.into();
+        self
+    }
+
+    /// Runs the program to its end.
+    ///
+    /// # Panics
+    /// If it cannot be started, or its output is not text.
+    #[must_use]
+    pub fn run(mut self) -> Ran {
+        self.command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = self.command.spawn().expect("the program starts");
+        let (mut pipe, input) = (child.stdin.take().expect("a pipe was asked for"), self.input);
+        // On a thread of its own: neither side waits for the other to empty a full pipe.
+        let writer = std::thread::spawn(move || pipe.write_all(input.as_bytes()));
+        let output = child.wait_with_output().expect("the program ends");
+        // A program that stops reading because its arguments are wrong closes the pipe: its business.
+        let _ = writer.join().expect("the writer only writes");
+        let text = |bytes| String::from_utf8(bytes).expect("the program writes text");
+        Ran { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+    }
+}
+
+impl Ran {
+    /// The one line on standard error, after `error: `.
+    ///
+    /// # Panics
+    /// If there is more or less than that one line.
+    #[must_use]
+    pub fn error(&self) -> &str {
+        let mut lines = self.stderr.lines();
+        match (lines.next().and_then(|line| line.strip_prefix("error: ")), lines.next()) {
+            (Some(error), None) => error,
+            _ => panic!("one line `error: ...` was expected on standard error: {self:#?}"),
+        }
+    }
+}
+
+/// The program beside the tests. Built by the same `cargo test`, because the host has an integration test.
+fn program() -> PathBuf {
+    let file = build_folder().join(format!("flotor{}", std::env::consts::EXE_SUFFIX));
+    let build = if cfg!(debug_assertions) { "cargo build" } else { "cargo build --release" };
+    let Ok(built) = std::fs::metadata(&file).and_then(|attributes| attributes.modified()) else {
+        panic!("{} is missing: run `{build} -p flotor`, or all tests with `cargo test`", file.display());
+    };
+    assert!(
+        newest_library().is_none_or(|library| library <= built),
+        "{} is older than the library it is made of: run `{build} -p flotor`, or all tests with `cargo test`",
+        file.display()
+    );
+    file
+}
+
+/// When the host's library was last built: `cargo test -p flotor-tests` builds it, but not the program.
+fn newest_library() -> Option<SystemTime> {
+    let files = std::fs::read_dir(build_folder().join("deps")).ok()?.filter_map(Result::ok);
+    let libraries = files.filter(|file| {
+        let name = file.file_name().to_string_lossy().into_owned();
+        name.starts_with("libflotor-") && name.ends_with(".rlib")
+    });
+    libraries.filter_map(|file| file.metadata().ok()?.modified().ok()).max()
+}
