@@ -1,0 +1,147 @@
+//! What is wrong with a scene is said in one line: file, line, key, and the nearest right one.
+
+use flotor::scene::Scene;
+use flotor_tests::program::{Flotor, exit_code};
+use flotor_tests::scratch::Scratch;
+use std::path::Path;
+
+/// A scene that is right; tests spoil it.
+const RIGHT: &str = r#"title = "A spring"
+rate_hz = 1000
+
+[device]
+plugin = "simulated"
+
+[[model]]
+plugin = "spring"
+
+[model.mapping]
+motion_scale = 1.6666666666666667
+
+[limits]
+force_n = [30, 30, 60]
+
+[boundary]
+margin_mm = 0.5
+"#;
+
+/// The complaint about a scene.
+fn complaint(scene: &str) -> String {
+    Scene::parse(Path::new("scene.toml"), scene).expect_err("something is wrong with it").to_string()
+}
+
+/// The complaint about [`RIGHT`] with one piece of text replaced.
+fn spoiled(piece: &str, wrong: &str) -> String {
+    assert!(RIGHT.contains(piece), "{piece}");
+    complaint(&RIGHT.replace(piece, wrong))
+}
+
+#[test]
+fn the_right_scene_is_read_whole() {
+    let scene = Scene::parse(Path::new("scene.toml"), RIGHT).expect("nothing is wrong with it");
+    assert_eq!(scene.title, "A spring");
+    assert_eq!(scene.limits.force_n, [30.0, 30.0, 60.0]);
+    assert_eq!(scene.models.len(), 1);
+    assert!((scene.boundary.margin_m - 0.5e-3).abs() < 1.0e-18);
+}
+
+#[test]
+fn the_built_in_demo_is_right() {
+    assert!(Scene::demo().is_ok());
+}
+
+#[test]
+fn an_unknown_key_is_named_with_its_line_and_the_nearest_right_one() {
+    for (piece, wrong, expected) in [
+        ("rate_hz", "rate_hs", "scene.toml:2: unknown key `rate_hs`; did you mean `rate_hz`?"),
+        (
+            "plugin = \"simulated\"",
+            "plugin = \"simulated\"\npreset = \"plain\"",
+            "scene.toml:6: unknown key `device.preset`",
+        ),
+        (
+            "motion_scale",
+            "motion_scael",
+            "unknown key `model.mapping.motion_scael`; did you mean `motion_scale`?",
+        ),
+        ("force_n", "forcen", "unknown key `limits.forcen`; did you mean `force_n`?"),
+        ("margin_mm", "margin_m", "unknown key `boundary.margin_m`; did you mean `margin_mm`?"),
+        ("[limits]", "[limit]", "unknown key `limit`; did you mean `limits`?"),
+    ] {
+        let complaint = spoiled(piece, wrong);
+        assert!(complaint.contains(expected), "{complaint}");
+    }
+}
+
+#[test]
+fn wrong_types_and_ranges_say_what_would_be_right() {
+    for (piece, wrong, expected) in [
+        ("rate_hz = 1000", "rate_hz = \"fast\"", "scene.toml:2: `rate_hz` is a number"),
+        ("rate_hz = 1000", "rate_hz = 5", "`rate_hz` = 5: legal is 100 to 10000"),
+        ("rate_hz = 1000", "rate_hz = nan", "`rate_hz` = NaN: legal is 100 to 10000"),
+        ("[30, 30, 60]", "[30, 30]", "`limits.force_n` is a list of 3 numbers"),
+        ("[30, 30, 60]", "-1", "`limits.force_n` = -1"),
+        ("[device]\nplugin = \"simulated\"", "", "scene.toml:1: `device` is missing"),
+        ("plugin = \"spring\"", "", "`model.plugin` is missing"),
+        ("plugin = \"spring\"", "plugin = 3", "`model.plugin` is text in quotes"),
+        (
+            "motion_scale = 1.6666666666666667",
+            "rotation_xyzw = [0, 0, 0, 2]",
+            "a rotation is a unit quaternion",
+        ),
+        ("motion_scale = 1.6666666666666667", "motion_scale = 0", "`model.mapping.motion_scale` = 0"),
+        ("title = ", "title ", "scene.toml:1: not valid TOML"),
+    ] {
+        let complaint = spoiled(piece, wrong);
+        assert!(complaint.contains(expected), "{complaint}");
+        assert_eq!(complaint.lines().count(), 1, "{complaint}");
+    }
+}
+
+#[test]
+fn parameters_are_checked_against_the_plugin_and_complain_with_file_and_line() {
+    let scratch = Scratch::default();
+    let with_parameters = |text: &str| format!("{RIGHT}\n[device.parameters]\n{text}\n");
+    for (parameters, expected) in [
+        ("mass_gk = 1", "scene.toml:20: [device] no parameter `mass_gk`; did you mean `mass_kg`?"),
+        ("mass_kg = -1", "scene.toml:20: [device] `mass_kg` = -1: legal is 0.01 to 10 kg"),
+        ("hand = \"squeeze\"", "legal is oscillate | press | release | hold | open"),
+        ("mass_kg = \"heavy\"", "`mass_kg` is a number in kg, not `heavy`"),
+    ] {
+        let scene = scratch.file("scene.toml", with_parameters(parameters));
+        let ran = Flotor::with(["run", "--clock", "virtual", &scene.display().to_string()]).run();
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+        assert!(ran.error().contains(expected), "{ran:?}");
+    }
+}
+
+#[test]
+fn what_the_command_line_gets_wrong_is_said_there() {
+    for (arguments, expected) in [
+        (&["run", "--set", "sprng.gamma_n=17"][..], "there is no plugin `sprng`; did you mean `spring`?"),
+        (&["run", "--set", "spring.gama_n=17"], "no parameter `gama_n`; did you mean `gamma_n`?"),
+        (&["run", "--set", "spring.alpha_n_mm2=170"], "set `mode` to `alpha` as well"),
+        (&["run", "no-such-scene.toml"], "no-such-scene.toml: cannot read the scene"),
+    ] {
+        let ran = Flotor::with(arguments).run();
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+        assert!(ran.error().contains(expected), "{ran:?}");
+    }
+    for arguments in
+        [&["run", "--rate", "5"][..], &["run", "--duration", "long"], &["run", "--set", "novalue"], &["rum"]]
+    {
+        assert_eq!(Flotor::with(arguments).run().code, Some(exit_code::CONFIGURATION), "{arguments:?}");
+    }
+}
+
+#[test]
+fn an_unknown_plugin_is_named_with_the_nearest_one() {
+    let scratch = Scratch::default();
+    let scene = scratch.file("scene.toml", RIGHT.replace("\"spring\"", "\"sprnig\""));
+    let ran = Flotor::with(["run", &scene.display().to_string()]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    assert!(
+        ran.error().contains("scene.toml:8: no model plugin `sprnig`; did you mean `spring`?"),
+        "{ran:?}"
+    );
+}
