@@ -12,6 +12,7 @@
 //! - [`session`]: from a scene to a run.
 //! - [`servo`]: the tick, the clock, the envelope; the only real-time module.
 //! - [`stability`]: how stiff a spring the servo can render.
+//! - [`stress`]: how far a force model can be trusted with a hand.
 //! - [`trace`]: what a tick leaves behind; [`record`] writes it down, [`plot`] draws it.
 //! - [`cli`]: the `flotor` command.
 
@@ -29,5 +30,6 @@ pub mod scene;
 pub mod servo;
 pub mod session;
 pub mod stability;
+pub mod stress;
 pub mod trace;
 pub mod validate;

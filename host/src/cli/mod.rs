@@ -10,6 +10,7 @@ mod plugins;
 mod replay;
 mod run;
 mod stability;
+mod stress;
 mod validate;
 
 use crate::registry::LookupError;
@@ -50,6 +51,8 @@ enum Command {
     Jitter(jitter::JitterArguments),
     /// Find the stiffest virtual spring that stays stable, next to theory
     Stability(stability::StabilityArguments),
+    /// Score the numerical stability of a force model
+    Stress(stress::StressArguments),
     /// Look at this machine: what a real-time loop may hope for, and how to improve it
     Doctor(doctor::DoctorArguments),
     /// Print a completion script for a shell
@@ -176,6 +179,7 @@ pub fn main() -> ExitCode {
         Some(Command::Validate(arguments)) => validate::run(&arguments),
         Some(Command::Jitter(arguments)) => jitter::run(&arguments),
         Some(Command::Stability(arguments)) => stability::run(&arguments),
+        Some(Command::Stress(arguments)) => stress::run(&arguments),
         Some(Command::Doctor(arguments)) => doctor::run(&arguments),
         Some(Command::Completions { shell }) => {
             clap_complete::generate(shell, &mut Arguments::command(), "flotor", &mut std::io::stdout());

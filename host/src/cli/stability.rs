@@ -181,8 +181,8 @@ fn picture(plugin: &Plugin, cases: &[Case], rows: &[Row]) -> Result<String, Comm
         )
         .panel_height_px(320.0);
     for panel in groups(cases, |case| (case.period_ns, case.plant_damping_ns_per_m.to_bits())) {
-        // A panel needs something to vary; single cases are in the table.
-        if panel.len() < 2 && cases.len() > 1 {
+        // A curve needs points; single cases are in the table.
+        if panel.len() < 3 && cases.len() > panel.len() {
             continue;
         }
         figure = figure.panel(stiffness_panel(plugin, cases, rows, &panel)?);
@@ -215,7 +215,9 @@ fn stiffness_panel(
             let rendering =
                 move |virtual_damping_ns_per_m| Rendering { period_s, delay_ticks, virtual_damping_ns_per_m };
             (0..=CURVE_POINTS).map(move |index| {
-                let damping = most * f64::from(index) / f64::from(CURVE_POINTS);
+                // Closer where the curves are steep, at little damping.
+                let share = f64::from(index) / f64::from(CURVE_POINTS);
+                let damping = most * share * share;
                 (damping, limit(&plant, &rendering(damping)))
             })
         };

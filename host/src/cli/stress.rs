@@ -21,8 +21,9 @@ enum SizeOption {
 
 /// Score the numerical stability of a force model.
 #[derive(Args)]
-#[command(after_help = "Nine measures: M0 totality, M1 continuity, M2 Lipschitz constant, M3 reciprocity, M4 loop energy,\n\
-    M5 sampled energy, M6 closed loop, M7 cost, M8 determinism. `score` is the share that passed.\n\n\
+#[command(after_help = "Nine measures: M0 totality, M1 continuity, M2 Lipschitz constant, M3 reciprocity,\n\
+    M4 loop energy, M5 sampled energy, M6 closed loop, M7 cost, M8 determinism.\n\
+    `score` is the share that passed.\n\n\
     Examples:\n  \
     flotor stress --model spring\n  \
     flotor stress --model spring --set variant=closed-form --json score.json --plot score.svg\n  \

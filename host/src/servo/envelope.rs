@@ -225,7 +225,10 @@ mod tests {
             assert!(sent.force().abs().cmple(most_n * slack).all(), "{sent:?}");
             assert!(sent.torque().abs().cmple(most_nm * slack).all(), "{sent:?}");
             assert!((sent.force() - last.force()).length() <= slew_n * slack + 1.0e-13, "{sent:?} {last:?}");
-            assert!((sent.torque() - last.torque()).length() <= slew_nm * slack + 1.0e-14, "{sent:?} {last:?}");
+            assert!(
+                (sent.torque() - last.torque()).length() <= slew_nm * slack + 1.0e-14,
+                "{sent:?} {last:?}"
+            );
             last = sent;
         }
     }
@@ -276,8 +279,14 @@ mod tests {
         let leaving = push(DVec3::new(0.0, 0.0, 0.0117), DVec3::Z * 0.1);
         assert!((leaving.z + 3.5).abs() < 1.0e-9, "damping resists going out: {leaving}");
         let returning = push(DVec3::new(0.0, 0.0, 0.0117), DVec3::Z * -10.0);
-        assert!((returning.z + 2.0).abs() < 1.0e-9, "and does not pull a handle out that comes back: {returning}");
+        assert!(
+            (returning.z + 2.0).abs() < 1.0e-9,
+            "and does not pull a handle out that comes back: {returning}"
+        );
         let sideways = push(DVec3::new(0.00936, 0.0, 0.00702), DVec3::ZERO); // 11.7 mm at 3:4
-        assert!(sideways.cross(DVec3::new(4.0, 0.0, 3.0)).length() < 1.0e-9, "a sphere, not a box: {sideways}");
+        assert!(
+            sideways.cross(DVec3::new(4.0, 0.0, 3.0)).length() < 1.0e-9,
+            "a sphere, not a box: {sideways}"
+        );
     }
 }

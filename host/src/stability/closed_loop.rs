@@ -163,8 +163,7 @@ impl LoopSetup {
                 Cycle::Stale => return Err(LoopError::Fault(Fault::Timeout)),
             }
             let height_m = state.pose.position().z;
-            // NaN counts as grown.
-            if !(height_m.abs() <= GROWN * start_m) {
+            if height_m.abs() > GROWN * start_m || height_m.is_nan() {
                 return Ok(false);
             }
             if index >= settle + length {

@@ -168,8 +168,7 @@ fn is_schur_stable(mut polynomial: Vec<f64>) -> bool {
         (polynomial.last(), polynomial.first(), polynomial.len() > 1)
     {
         let reflection = first / last;
-        // NaN is not stable either.
-        if !(reflection.abs() < 1.0) {
+        if reflection.abs() >= 1.0 || reflection.is_nan() {
             return false;
         }
         let reversed = polynomial.iter().rev();

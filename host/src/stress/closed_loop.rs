@@ -1,19 +1,19 @@
 //! M6, closed loop: the model on a device that is let go.
 //!
-//! The plainest device (a mass on a damper per axis, [`super::plant`]) is released away from home and left to the
-//! model: with light and heavy damping, 0 to 3 ticks of delay, quantised sensing and ticks whose wrench is lost.
-//! What comes out are settling time, peak force and buzz (force between 50 and 500 Hz), and whether it settles at
-//! all.
+//! The plainest device (a mass on a damper per axis, [`super::plant`]) is released away from home and left to
+//! the model: with light and heavy damping, 0 to 3 ticks of delay, quantised sensing and ticks whose wrench
+//! is lost. What comes out are settling time, peak force and buzz (force between 50 and 500 Hz), and whether
+//! it settles at all.
 //!
-//! Not every loop can: a spring of stiffness `K` is stable only up to `K < b / (T/2 + t_d)` (Gil, Sanchez, Hulin,
-//! Preusche and Hirzinger, J. Comput. Inf. Sci. Eng. 9, 2009; without virtual damping). So a release that diverges
-//! although the model was nowhere steeper than that is the model's fault and fails; where the rule says so too,
-//! it is what the stiffness costs. The rule itself is checked near home: the model's wrench is scaled until the
-//! loop tips over, and the stiffness at which it does is reported beside the rule's.
+//! Not every loop can: a spring of stiffness `K` is stable only up to `K < b / (T/2 + t_d)` (Gil, Sanchez,
+//! Hulin, Preusche and Hirzinger, J. Comput. Inf. Sci. Eng. 9, 2009; without virtual damping). So a release
+//! that diverges although the model was nowhere steeper than that is the model's fault and fails; where the
+//! rule says so too, it is what the stiffness costs. The rule itself is checked near home: the model's wrench
+//! is scaled until the loop tips over, and the stiffness at which it does is reported beside the rule's.
 
-use super::measure::{Measure, Verdict, Worst};
-use super::plant::Plant;
 use super::jacobian::Jacobian;
+use super::measure::{Measure, Verdict};
+use super::plant::Plant;
 use super::poses::{Random, at};
 use super::subject::{PERIOD_NS, Subject};
 use super::sweep::sweep;
@@ -24,7 +24,7 @@ use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 const NAME: &str = "closed loop";
-/// Delays of the loop, ticks (the project's stability score, M6).
+/// Delays of the loop, ticks.
 const DELAYS_TICKS: [usize; 4] = [0, 1, 2, 3];
 /// Quantisation of the sensed position, m: none, Maglev 200, prototype.
 const QUANTA_M: [f64; 3] = [0.0, 2.0e-6, 10.0e-6];
@@ -163,25 +163,27 @@ fn buzz_n(forces_n: &[DVec3]) -> f64 {
     };
     let count = BUZZ_WINDOW as f64;
     let mean = last.iter().copied().sum::<DVec3>() / count;
-    let windowed: Vec<DVec3> = last
-        .iter()
-        .enumerate()
-        .map(|(index, force)| (*force - mean) * (0.5 - 0.5 * (TAU * index as f64 / count).cos()))
-        .collect();
+    let circle: Vec<(f64, f64)> =
+        (0..BUZZ_WINDOW).map(|step| (TAU * step as f64 / count).sin_cos()).collect();
+    let windowed: Vec<DVec3> =
+        last.iter().zip(&circle).map(|(force, (_, cosine))| (*force - mean) * (0.5 - 0.5 * cosine)).collect();
     let whole = windowed.iter().map(|force| force.length_squared()).sum::<f64>() / count;
-    let mut slow = 0.0;
-    let mut bin = 0_u32;
-    while f64::from(bin) / (count * PERIOD_S) < BUZZ_FROM_HZ {
-        let (turning, doubled) = (TAU * f64::from(bin) / count, if bin == 0 { 1.0 } else { 2.0 });
-        let (mut real, mut imaginary) = (DVec3::ZERO, DVec3::ZERO);
-        for (index, force) in windowed.iter().enumerate() {
-            let (sine, cosine) = (turning * index as f64).sin_cos();
-            real += *force * cosine;
-            imaginary += *force * sine;
-        }
-        slow += doubled * (real.length_squared() + imaginary.length_squared()) / (count * count);
-        bin += 1;
-    }
+    let slow_bins = (0..BUZZ_WINDOW).take_while(|bin| *bin as f64 / (count * PERIOD_S) < BUZZ_FROM_HZ);
+    let slow: f64 = slow_bins
+        .map(|bin| {
+            let turning = circle.iter().cycle().step_by(bin.max(1));
+            let turning = turning.map(|(sine, cosine)| if bin == 0 { (0.0, 1.0) } else { (*sine, *cosine) });
+            let (real, imaginary) = windowed.iter().zip(turning).fold(
+                (DVec3::ZERO, DVec3::ZERO),
+                |(real, imaginary), (force, (sine, cosine))| {
+                    (real + *force * cosine, imaginary + *force * sine)
+                },
+            );
+            // Every frequency but zero stands for itself and its mirror image.
+            let images = if bin == 0 { 1.0 } else { 2.0 };
+            images * (real.length_squared() + imaginary.length_squared()) / (count * count)
+        })
+        .sum();
     // A Hann window takes 3/8 of the power.
     ((whole - slow).max(0.0) * 8.0 / 3.0).sqrt()
 }
@@ -234,9 +236,11 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     let rows: Vec<Row> = rows.into_iter().flatten().collect();
     let mut measure = judge(&rows);
     for limit in limits(setup)? {
-        measure = measure
-            .with(format!("stiffness limit, {}", limit.name), limit.seen_n_per_m, "N/m")
-            .with(format!("stiffness limit by the rule, {}", limit.name), limit.rule_n_per_m, "N/m");
+        measure = measure.with(format!("stiffness limit, {}", limit.name), limit.seen_n_per_m, "N/m").with(
+            format!("stiffness limit by the rule, {}", limit.name),
+            limit.rule_n_per_m,
+            "N/m",
+        );
     }
     Ok(measure)
 }
@@ -294,6 +298,7 @@ fn limit(subject: &mut Subject<'_>, clean: Loop, start: Pose) -> Option<f64> {
 #[allow(clippy::cast_precision_loss)] // a few thousand releases
 fn judge(rows: &[Row]) -> Measure {
     let surprises: Vec<&Row> = rows.iter().filter(|row| row.diverged() && row.must_settle()).collect();
+    let answered = rows.iter().filter(|row| row.release.is_some()).count();
     let foretold = rows.iter().filter(|row| row.must_settle()).count();
     let verdict = match (surprises.is_empty(), foretold) {
         (false, _) => Verdict::Fail,
@@ -318,16 +323,22 @@ fn judge(rows: &[Row]) -> Measure {
         values: Vec::new(),
     }
     .with("releases", rows.len() as f64, "")
-    .with("releases without answer", rows.iter().filter(|row| row.release.is_none()).count() as f64, "");
+    .with("releases without answer", (rows.len() - answered) as f64, "")
+    .unless_unanswered(answered as u64);
     for damping in DAMPINGS_NS_PER_M {
         let here = || rows.iter().filter(clean).filter(|row| row.conditions.damping_ns_per_m == damping);
         let of = |pick: fn(&Release) -> f64| here().filter_map(|row| row.release.as_ref()).map(pick);
         let name = |what: &str| format!("{what}, b = {damping} N s/m");
-        let settle_s = of(|release| release.settle_s).fold(0.0, |a, b| if b.is_nan() { b } else { f64::max(a, b) });
+        let settle_s =
+            of(|release| release.settle_s).fold(0.0, |a, b| if b.is_nan() { b } else { f64::max(a, b) });
         measure = measure
             .with(name("longest settling"), settle_s, "s")
             .with(name("peak force"), of(|release| release.peak_force_n).fold(0.0, f64::max), "N")
-            .with(name("steepest on the way"), of(|release| release.steepest_n_per_m).fold(0.0, f64::max), "N/m");
+            .with(
+                name("steepest on the way"),
+                of(|release| release.steepest_n_per_m).fold(0.0, f64::max),
+                "N/m",
+            );
     }
     for delay in DELAYS_TICKS {
         let here = || rows.iter().filter(|row| row.conditions.delay_ticks == delay);
@@ -335,7 +346,8 @@ fn judge(rows: &[Row]) -> Measure {
         measure = measure.with(format!("share diverged, delay {delay}"), share, "");
     }
     for quantum_m in QUANTA_M {
-        let calm = rows.iter().filter(|row| row.conditions.quantum_m == quantum_m && !row.diverged());
+        let here = |row: &&Row| row.conditions.quantum_m == quantum_m && row.conditions.dropped == 0.0;
+        let calm = rows.iter().filter(here).filter(|row| !row.diverged());
         let buzz = calm.filter_map(|row| row.release.as_ref()).map(|release| release.buzz_n);
         let quantum_um = quantum_m * 1.0e6;
         measure = measure.with(format!("buzz, {quantum_um} µm"), buzz.fold(0.0, f64::max), "N");

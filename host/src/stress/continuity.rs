@@ -2,15 +2,16 @@
 //!
 //! Straight lines cross the workspace in pieces of 0.01 mm. Along each line the pieces whose change of wrench
 //! stands out most against their neighbours' are cut into ten, the piece that stands out among those into ten
-//! again, down to 1e-8 mm: bisection, by tens. What stands out is the second difference of the changes, in which a
-//! smooth slope and curvature vanish and a step does not. `J(h)` is the largest change seen over pieces of length
-//! `h`: for a continuous law it falls in proportion to `h`, at a jump it stays on a plateau.
-//! Source: the project's stability score, M1 (the thesis's code jumps by 8.6 N at its buckling rule).
+//! again, down to 1e-8 mm: bisection, by tens. What stands out is the second difference of the changes, in
+//! which a smooth slope and curvature vanish and a step does not. `J(h)` is the largest change seen over
+//! pieces of length `h`: for a continuous law it falls in proportion to `h`, at a jump it stays on a plateau.
+//! The thesis's code jumps by 8.6 N at its buckling rule.
 //!
-//! Length of a piece: that of the motion with angles as lengths at the device's lever arm ([`super::LEVER_M`]).
+//! Length of a piece: that of the motion with angles as lengths at the device's lever arm
+//! ([`super::LEVER_M`]).
 
 use super::measure::{Measure, Quantity, Verdict, Worst};
-use super::poses::{Random, Sobol, at};
+use super::poses::{Random, Reach, Sobol, at};
 use super::subject::Subject;
 use super::sweep::sweep;
 use super::{LEVER_M, Setup, WIDER};
@@ -28,7 +29,8 @@ const SUSPECTS: usize = 3;
 /// Parts a suspect is cut into; one more on either side gives the outermost neighbours to stand out against.
 const CUTS: usize = 10;
 
-/// Step of force nobody feels, N: below 1 mN more accuracy is not physical (device 5 to 10 um times stiffness).
+/// Step of force nobody feels, N: below 1 mN more accuracy is not physical (device 5 to 10 um times
+/// stiffness).
 const FELT_N: f64 = 1.0e-3;
 /// The same for torque, N·m.
 const FELT_NM: f64 = 2.0e-5;
@@ -50,17 +52,31 @@ pub struct Jump {
 struct Jumps {
     force: [Worst; PIECES_MM.len()],
     torque: [Worst; PIECES_MM.len()],
+    /// Largest force over the shortest piece inside the workspace itself, without the margin around it.
+    inside: Worst,
+    pieces: u64,
 }
 
 impl Jumps {
-    const NONE: Self = Self { force: [Worst::NONE; PIECES_MM.len()], torque: [Worst::NONE; PIECES_MM.len()] };
+    const NONE: Self = Self {
+        force: [Worst::NONE; PIECES_MM.len()],
+        torque: [Worst::NONE; PIECES_MM.len()],
+        inside: Worst::NONE,
+        pieces: 0,
+    };
 
-    fn offer(&mut self, level: usize, change: Wrench, pose: Pose) {
+    fn offer(&mut self, reach: Reach, level: usize, change: Wrench, pose: Pose) {
+        if level == PIECES_MM.len() - 1 && reach.holds(pose) {
+            self.inside.offer(change.force().length(), pose);
+        }
+        self.pieces += 1;
         self.force[level].offer(change.force().length(), pose);
         self.torque[level].offer(change.torque().length(), pose);
     }
 
     fn merge(&mut self, later: &Self) {
+        self.inside.merge(later.inside);
+        self.pieces += later.pieces;
         for level in 0..PIECES_MM.len() {
             self.force[level].merge(later.force[level]);
             self.torque[level].merge(later.torque[level]);
@@ -93,11 +109,11 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Vec<Jump>), LoadErr
         let changes = changes(subject, &line, start_m, first_m, PIECES_PER_LINE);
         for (index, change) in changes.iter().enumerate() {
             if let Some(change) = change {
-                jumps.offer(0, *change, line.pose(start_m + first_m * index as f64));
+                jumps.offer(setup.options.reach, 0, *change, line.pose(start_m + first_m * index as f64));
             }
         }
         for suspect in suspects(&changes) {
-            close_in(subject, &line, start_m + first_m * suspect as f64, &mut jumps);
+            close_in(subject, setup.options.reach, &line, start_m + first_m * suspect as f64, &mut jumps);
         }
         jumps
     })?;
@@ -106,8 +122,8 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Vec<Jump>), LoadErr
     Ok((judge(&total), curve(&total)))
 }
 
-/// Lines through evenly spread poses, every fourth one through home; along all axes at once, or only shifting,
-/// or only turning, or along one axis.
+/// Lines through evenly spread poses, every fourth one through home; along all axes at once, or only
+/// shifting, or only turning, or along one axis.
 fn line(setup: &Setup<'_>, sobol: &Sobol, block: u64) -> Line {
     let reach = setup.options.reach.scaled(WIDER);
     let mut random = Random::new(setup.options.seed, block);
@@ -178,7 +194,7 @@ fn suspects(changes: &[Option<Wrench>]) -> Vec<usize> {
 }
 
 /// From a piece of the first length down to the last, into the tenth that stands out each time.
-fn close_in(subject: &mut Subject<'_>, line: &Line, from_m: f64, jumps: &mut Jumps) {
+fn close_in(subject: &mut Subject<'_>, reach: Reach, line: &Line, from_m: f64, jumps: &mut Jumps) {
     let mut from_m = from_m;
     for (level, length_mm) in PIECES_MM.iter().enumerate().skip(1) {
         let piece_m = length_mm * 1.0e-3;
@@ -187,7 +203,7 @@ fn close_in(subject: &mut Subject<'_>, line: &Line, from_m: f64, jumps: &mut Jum
         let mut chosen = (0.0, CUTS / 2);
         for index in 1..=CUTS {
             if let Some(Some(change)) = changes.get(index) {
-                jumps.offer(level, *change, line.pose(start_m(index)));
+                jumps.offer(reach, level, *change, line.pose(start_m(index)));
             }
             let rank = standing_out(&changes, index);
             if rank > chosen.0 {
@@ -220,7 +236,10 @@ fn judge(total: &Jumps) -> Measure {
     let (worst, unit, felt) = if torque_is_graver { (torque, "N·m", FELT_NM) } else { (force, "N", FELT_N) };
     let remark = match verdict {
         Verdict::Pass => String::new(),
-        _ => format!("plateau over the last {:.0e} mm; felt from {felt:.0e} {unit} on", PIECES_MM[last]),
+        _ => format!(
+            "plateau over {:.0e} mm ({:.1e} N in the workspace itself); felt from {felt:.0e} {unit} on",
+            PIECES_MM[last], total.inside.value
+        ),
     };
     let mut measure = Measure {
         id: "M1",
@@ -242,5 +261,7 @@ fn judge(total: &Jumps) -> Measure {
         measure.values.push(named("force jump", jump.length_mm, jump.force_n, "N"));
         measure.values.push(named("torque jump", jump.length_mm, jump.torque_nm, "N·m"));
     }
-    measure
+    let measure = measure.with("force jump over 1e-8 mm inside the workspace", total.inside.value, "N");
+    #[allow(clippy::cast_precision_loss)] // a count below 2^53
+    measure.with("pieces", total.pieces as f64, "").unless_unanswered(total.pieces)
 }

@@ -1,15 +1,16 @@
 //! M4 and M5: whether the model makes energy out of nothing.
 //!
-//! **M4, loop energy.** The hand takes the handle around random closed motions in all six dimensions. The work of
-//! the model's force on the hand over a lap, relative to all work exchanged, is zero for a force that comes from
-//! an energy; what is not zero can be pumped. The rectangle rule on a closed smooth motion converges faster than
-//! any power of the step, so 1e-9 can be told from zero; what it leaves uncertain is taken off.
+//! **M4, loop energy.** The hand takes the handle around random closed motions in all six dimensions. The
+//! work of the model's force on the hand over a lap, relative to all work exchanged, is zero for a force that
+//! comes from an energy; what is not zero can be pumped. The rectangle rule on a closed smooth motion
+//! converges faster than any power of the step, so 1e-9 can be told from zero; what it leaves uncertain is
+//! taken off.
 //!
-//! **M5, sampled energy.** A loop holds each force for a period, so even an honest spring gives back a little more
-//! than it took: along a hand-driven motion from home, the passivity observer of a zero-order hold,
-//! `E_n = E_(n-1) - f_(n-1) . (x_n - x_(n-1))` (Ryu, Kim and Hannaford, IEEE T-RA 20, 2004), ends below zero. How
-//! much device damping would eat that energy up tells what the model asks of a device; Colgate and Schenkel
-//! (1997) bound it by `K T / 2` for a spring, a model that pumps needs more.
+//! **M5, sampled energy.** A loop holds each force for a period, so even an honest spring gives back a little
+//! more than it took: along a hand-driven motion from home, the passivity observer of a zero-order hold, `E_n
+//! = E_(n-1) - f_(n-1) . (x_n - x_(n-1))` (Ryu, Kim and Hannaford, IEEE T-RA 20, 2004), ends every lap below
+//! zero. How much device damping would eat that energy up tells what the model asks of a device; Colgate and
+//! Schenkel (1997) bound it by `K T / 2` for a spring, a model that pumps needs more.
 
 use super::measure::{Decades, Measure, Verdict, Worst};
 use super::paths::ClosedPath;
@@ -21,7 +22,7 @@ use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{DVec3, Memory, Pose, Twist, rotation_vector};
 
 const LOOPS: &str = "loop energy";
-/// Relative work that counts as none (the project's stability score, M4).
+/// Relative work that counts as none.
 const CONSERVATIVE: f64 = 1.0e-9;
 /// Samples of a lap: doubled from the first to the last until the work has settled.
 const SAMPLES: [usize; 7] = [256, 512, 1024, 2048, 4096, 8192, 16384];
@@ -43,7 +44,8 @@ struct Lap {
 impl Lap {
     /// From the power at evenly spaced samples, J per lap.
     fn from_powers(powers: &[f64]) -> Self {
-        let mean = |numbers: &mut dyn Iterator<Item = f64>, count: usize| numbers.sum::<f64>() / count.max(1) as f64;
+        let mean =
+            |numbers: &mut dyn Iterator<Item = f64>, count: usize| numbers.sum::<f64>() / count.max(1) as f64;
         let net_j = mean(&mut powers.iter().copied(), powers.len());
         let gross_j = mean(&mut powers.iter().map(|power| power.abs()), powers.len());
         let every_other_j = mean(&mut powers.iter().step_by(2).copied(), powers.len() / 2);
@@ -117,7 +119,8 @@ pub(super) fn measure_loops(setup: &Setup<'_>) -> Result<(Measure, Decades), Loa
             Memory::Stateless => lap.net_j.abs(),
             Memory::PathDependent => lap.net_j,
         };
-        let relative = if lap.gross_j > 0.0 { (made_j - lap.uncertain_j).max(0.0) / lap.gross_j } else { 0.0 };
+        let relative =
+            if lap.gross_j > 0.0 { (made_j - lap.uncertain_j).max(0.0) / lap.gross_j } else { 0.0 };
         tally.relative.count(relative);
         tally.beyond = u64::from(relative > CONSERVATIVE);
         tally.rough = u64::from(!lap.is_settled());
@@ -151,7 +154,7 @@ fn judge_loops(total: &LoopTally, worst: &Worst) -> Measure {
             total.laps,
             total.most_j * 1.0e3
         ),
-        _ => String::new(),
+        _ => format!("{} loops", total.laps),
     };
     Measure {
         id: "M4",
@@ -169,10 +172,11 @@ fn judge_loops(total: &LoopTally, worst: &Worst) -> Measure {
     .with("loops where the work does not settle", total.rough as f64, "")
     .with("loops without answer", total.unanswered as f64, "")
     .with("largest work of a lap", total.most_j, "J")
+    .unless_unanswered(total.laps - total.unanswered)
 }
 
 const OBSERVER: &str = "sampled energy";
-/// Periods of the loop, ns: 4, 2 and 1 kHz (the project's stability score, M5).
+/// Periods of the loop, ns: 4, 2 and 1 kHz.
 const PERIODS_NS: [u64; 3] = [250_000, 500_000, 1_000_000];
 /// A lap of the hand takes a second; with three harmonics it moves at 1 to 3 Hz, as hands do.
 const LAP_NS: u64 = 1_000_000_000;
@@ -184,28 +188,37 @@ const LAPS: u64 = 2;
 struct Seen {
     /// Least energy taken from the hand since the start, J.
     least_j: f64,
-    /// Damping that would have kept the observer at zero, N s/m, and the pose it was needed at.
+    /// Damping that would have eaten up what whole laps gave away, N s/m, and where the observer was lowest.
     damping: Worst,
 }
 
+impl Seen {
+    const NOTHING: Self = Self { least_j: 0.0, damping: Worst::NONE };
+}
+
 /// Takes the handle along a motion and keeps the account of a zero-order hold.
+///
+/// The account may be below zero on the way and mean nothing: what was stored at home was the model's to
+/// give. Only whole laps, which end where they started, tell what was made.
 fn observe(subject: &mut Subject<'_>, path: &ClosedPath, period_ns: u64) -> Option<Seen> {
     subject.restart();
-    let ticks = LAPS * LAP_NS / period_ns;
     let period_s = period_ns as f64 * 1.0e-9;
-    let pose_at = |tick: u64| path.pose((tick * period_ns % LAP_NS) as f64 / LAP_NS as f64);
+    let ticks_per_lap = LAP_NS / period_ns;
+    let pose_at = |tick: u64| path.pose((tick % ticks_per_lap) as f64 / ticks_per_lap as f64);
     let mut before = pose_at(0);
     let mut held = subject.advance(before, Twist::ZERO, 0).ok()?.wrench;
-    let mut seen = Seen { least_j: 0.0, damping: Worst::NONE };
-    let (mut taken_j, mut motion) = (0.0, 0.0);
-    for tick in 1..=ticks {
+    let mut seen = Seen::NOTHING;
+    let (mut taken_j, mut motion, mut lowest) = (0.0, 0.0, before);
+    for tick in 1..=LAPS * ticks_per_lap {
         let here = pose_at(tick);
         let (shift_m, turn_rad) = moved(before, here);
         taken_j -= held.force().dot(shift_m) + held.torque().dot(turn_rad);
         motion += (shift_m.length_squared() + (turn_rad * LEVER_M).length_squared()) / period_s;
-        seen.least_j = f64::min(seen.least_j, taken_j);
-        if motion > 0.0 {
-            seen.damping.offer(-taken_j / motion, here);
+        if taken_j < seen.least_j {
+            (seen.least_j, lowest) = (taken_j, here);
+        }
+        if tick.is_multiple_of(ticks_per_lap) {
+            seen.damping.offer(-taken_j / motion, lowest);
         }
         let twist = Twist::new(shift_m / period_s, turn_rad / period_s);
         held = subject.advance(here, twist, period_ns).ok()?.wrench;
@@ -223,10 +236,10 @@ fn moved(from: Pose, to: Pose) -> (DVec3, DVec3) {
 pub(super) fn measure_observer(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     let parts = sweep(setup, OBSERVER, setup.effort.hand_paths, |subject, block| {
         let mut random = Random::new(setup.options.seed, block);
-        let path = ClosedPath::random(&mut random, setup.options.reach).from_home();
+        let path = ClosedPath::random(&mut random, setup.options.reach).starting_at_home();
         PERIODS_NS.map(|period_ns| observe(subject, &path, period_ns))
     })?;
-    let mut total = [Seen { least_j: 0.0, damping: Worst::NONE }; PERIODS_NS.len()];
+    let mut total = [Seen::NOTHING; PERIODS_NS.len()];
     let mut unanswered = 0;
     for part in &parts {
         for (sum, seen) in total.iter_mut().zip(part) {
@@ -254,16 +267,22 @@ fn judge_observer(total: &[Seen; PERIODS_NS.len()], paths: usize, unanswered: u6
         bound: Some(lightly),
         verdict: Verdict::of(slowest.damping.value, lightly, heavily),
         pose: slowest.damping.record(),
-        remark: "device damping that keeps the passivity observer at zero, 1 kHz".to_owned(),
+        remark: "device damping that eats up what holding the force gives away, 1 kHz".to_owned(),
         values: Vec::new(),
     };
     for (period_ns, seen) in PERIODS_NS.iter().zip(total) {
         let period_ms = *period_ns as f64 * 1.0e-6;
-        measure = measure
-            .with(format!("least observed energy, T = {period_ms} ms"), seen.least_j, "J")
-            .with(format!("damping needed, T = {period_ms} ms"), seen.damping.value, "N s/m");
+        measure = measure.with(format!("least observed energy, T = {period_ms} ms"), seen.least_j, "J").with(
+            format!("damping needed, T = {period_ms} ms"),
+            seen.damping.value,
+            "N s/m",
+        );
     }
-    measure.with("motions", paths as f64, "").with("motions without answer", unanswered as f64, "")
+    let observed = (paths * PERIODS_NS.len()) as u64;
+    measure
+        .with("motions", observed as f64, "")
+        .with("motions without answer", unanswered as f64, "")
+        .unless_unanswered(observed - unanswered)
 }
 
 #[cfg(test)]
@@ -273,11 +292,15 @@ mod tests {
 
     #[test]
     fn a_smooth_lap_is_settled_and_a_step_is_not_mistaken_for_work() {
-        let powers = |f: &dyn Fn(f64) -> f64| -> Vec<f64> { (0..1024).map(|i| f(f64::from(i) / 1024.0)).collect() };
+        let powers =
+            |f: &dyn Fn(f64) -> f64| -> Vec<f64> { (0..1024).map(|i| f(f64::from(i) / 1024.0)).collect() };
         let smooth = Lap::from_powers(&powers(&|part| (TAU * part).sin() * (1.0 + (TAU * part).cos())));
         assert!(smooth.is_settled() && smooth.net_j.abs() < 1.0e-15);
-        // Plus one over part of the way, minus one over as much: no net work, but no grid hits both edges alike.
-        let steps = |part: f64| f64::from((0.1234..0.3456).contains(&part)) - f64::from((0.5..0.7222).contains(&part));
+        // Plus one over part of the way, minus one over as much: no net work, but no grid hits both edges
+        // alike.
+        let steps = |part: f64| {
+            f64::from((0.1234..0.3456).contains(&part)) - f64::from((0.5..0.7222).contains(&part))
+        };
         let stepped = Lap::from_powers(&powers(&steps));
         assert!(!stepped.is_settled() && stepped.net_j.abs() <= stepped.uncertain_j, "{}", stepped.net_j);
     }

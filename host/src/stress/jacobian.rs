@@ -1,7 +1,8 @@
 //! Derivative of the wrench by the pose, from differences, with what the differences leave uncertain.
 //!
-//! Coordinates are shifts of the handle and small turns in the model frame (from the left, as angular velocity
-//! is), angles as lengths and torques as forces at the device's lever arm: every entry is a stiffness in N/m.
+//! Coordinates are shifts of the handle and small turns in the model frame (from the left, as angular
+//! velocity is), angles as lengths and torques as forces at the device's lever arm: every entry is a
+//! stiffness in N/m.
 
 use super::LEVER_M;
 use super::subject::Subject;
@@ -10,8 +11,8 @@ use flotor_hal::{DVec3, Pose, Wrench, orientation_from_rotation_vector};
 /// A 6 x 6 matrix, rows first.
 pub(super) type Matrix = [[f64; 6]; 6];
 
-/// Half steps to try, m: short ones lose to rounding, long ones to curvature, and which loses less depends on the
-/// model and on the pose.
+/// Half steps to try, m: short ones lose to rounding, long ones to curvature, and which loses less depends on
+/// the model and on the pose.
 const STEPS_M: [f64; 3] = [1.0e-4, 1.0e-5, 1.0e-6];
 
 /// The derivative at a pose.
@@ -25,8 +26,8 @@ pub(super) struct Jacobian {
 }
 
 impl Jacobian {
-    /// By central differences of fourth order, with the step of least uncertainty; nothing if the model gives no
-    /// answer around the pose.
+    /// By central differences of fourth order, with the step of least uncertainty; nothing if the model gives
+    /// no answer around the pose.
     pub(super) fn at(subject: &mut Subject<'_>, pose: Pose) -> Option<Self> {
         let wrench = subject.ask(pose).ok()?.wrench;
         let mut best: Option<Self> = None;
@@ -43,9 +44,10 @@ impl Jacobian {
         best
     }
 
-    /// What is left of `J - J^T` when `J` is taken in coordinates: turns do not commute, so even the derivative
-    /// of an energy's torque by turns is only symmetric after half the torque's cross product is taken off.
-    /// (With the turn `d` from this pose the generalised torque is `M(d) - d x M / 2` to first order.)
+    /// What is left of `J - J^T` when `J` is taken in coordinates: turns do not commute, so even the
+    /// derivative of an energy's torque by turns is only symmetric after half the torque's cross product is
+    /// taken off. (With the turn `d` from this pose the generalised torque is `M(d) - d x M / 2` to first
+    /// order.)
     pub(super) fn asymmetry(&self) -> f64 {
         let half_torque = self.wrench.torque() * (0.5 / (LEVER_M * LEVER_M));
         let mut entries = self.entries;
@@ -55,8 +57,7 @@ impl Jacobian {
                 entries[3 + row][3 + axis] -= value;
             }
         }
-        let transposed: Matrix = std::array::from_fn(|row| std::array::from_fn(|column| entries[column][row]));
-        norm(&combine(&entries, 1.0, &transposed, -1.0))
+        norm(&combine(&entries, 1.0, &transposed(&entries), -1.0))
     }
 
     /// Frobenius norm, N/m.
@@ -80,17 +81,17 @@ impl Jacobian {
 }
 
 fn central(subject: &mut Subject<'_>, pose: Pose, step_m: f64) -> Option<Matrix> {
-    let mut entries = [[0.0; 6]; 6];
-    for column in 0..6 {
+    let mut by_column = [[0.0; 6]; 6];
+    for (column, slopes) in by_column.iter_mut().enumerate() {
         let mut ask = |step_m: f64| subject.ask(moved(pose, column, step_m)).ok().map(|answer| answer.wrench);
         let (up, down) = (ask(step_m)?, ask(-step_m)?);
         let slope = (up + down * -1.0) * (0.5 / step_m);
-        let forces = slope.force().to_array().into_iter().chain((slope.torque() / LEVER_M).to_array());
-        for (row, value) in forces.enumerate() {
-            entries[row][column] = value;
+        let components = slope.force().to_array().into_iter().chain((slope.torque() / LEVER_M).to_array());
+        for (to, component) in slopes.iter_mut().zip(components) {
+            *to = component;
         }
     }
-    Some(entries)
+    Some(transposed(&by_column))
 }
 
 fn moved(pose: Pose, column: usize, step_m: f64) -> Pose {
@@ -104,6 +105,10 @@ fn moved(pose: Pose, column: usize, step_m: f64) -> Pose {
 
 fn combine(a: &Matrix, by: f64, b: &Matrix, and_by: f64) -> Matrix {
     std::array::from_fn(|row| std::array::from_fn(|column| a[row][column] * by + b[row][column] * and_by))
+}
+
+fn transposed(matrix: &Matrix) -> Matrix {
+    std::array::from_fn(|row| std::array::from_fn(|column| matrix[column][row]))
 }
 
 fn norm(matrix: &Matrix) -> f64 {
@@ -134,16 +139,12 @@ fn rotate(matrix: &mut Matrix, p: usize, q: usize) {
     let tangent = theta.signum() / (theta.abs() + (1.0 + theta * theta).sqrt());
     let cosine = 1.0 / (1.0 + tangent * tangent).sqrt();
     let sine = tangent * cosine;
-    for k in 0..6 {
-        let (kp, kq) = (matrix[k][p], matrix[k][q]);
-        matrix[k][p] = cosine * kp - sine * kq;
-        matrix[k][q] = sine * kp + cosine * kq;
+    for row in matrix.iter_mut() {
+        (row[p], row[q]) = (cosine * row[p] - sine * row[q], sine * row[p] + cosine * row[q]);
     }
-    for k in 0..6 {
-        let (pk, qk) = (matrix[p][k], matrix[q][k]);
-        matrix[p][k] = cosine * pk - sine * qk;
-        matrix[q][k] = sine * pk + cosine * qk;
-    }
+    let (row_p, row_q) = (matrix[p], matrix[q]);
+    matrix[p] = std::array::from_fn(|k| cosine * row_p[k] - sine * row_q[k]);
+    matrix[q] = std::array::from_fn(|k| sine * row_p[k] + cosine * row_q[k]);
 }
 
 #[cfg(test)]

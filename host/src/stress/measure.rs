@@ -74,10 +74,7 @@ pub struct PoseRecord {
 
 impl From<Pose> for PoseRecord {
     fn from(pose: Pose) -> Self {
-        Self {
-            position_m: pose.position_m,
-            rotation_rad: rotation_vector(pose.orientation()).to_array(),
-        }
+        Self { position_m: pose.position_m, rotation_rad: rotation_vector(pose.orientation()).to_array() }
     }
 }
 
@@ -111,10 +108,21 @@ impl Measure {
         self.values.push(Quantity { name: name.into(), value, unit });
         self
     }
+
+    /// A measure that got no answer from the model has shown nothing: a note, whatever the number.
+    #[must_use]
+    pub(super) fn unless_unanswered(mut self, answered: u64) -> Self {
+        if answered == 0 {
+            self.value = f64::NAN;
+            self.verdict = Verdict::Note;
+            "the model gave no answer to judge".clone_into(&mut self.remark);
+        }
+        self
+    }
 }
 
-/// The largest value so far, and the pose it was seen at. Of equals the first stays, so results do not depend on
-/// how work was split.
+/// The largest value so far, and the pose it was seen at. Of equals the first stays, so results do not depend
+/// on how work was split.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Worst {
     pub(super) value: f64,
@@ -141,12 +149,12 @@ impl Worst {
     }
 }
 
-/// How often a positive quantity fell into each tenth of a decade.
+/// How often a positive quantity fell into each twentieth of a decade.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Decades(BTreeMap<i32, u64>);
 
 /// Bins per decade.
-const BINS_PER_DECADE: f64 = 10.0;
+const BINS_PER_DECADE: f64 = 20.0;
 /// What is smaller counts as this: below rounding of anything that is measured here.
 const SMALLEST: f64 = 1.0e-18;
 

@@ -59,7 +59,7 @@ impl ClosedPath {
     }
 
     /// The same motion, moved so that it starts and ends at home. It keeps to the same reach.
-    pub(super) fn from_home(mut self) -> Self {
+    pub(super) fn starting_at_home(mut self) -> Self {
         for series in [&mut self.position_m, &mut self.rotation_rad] {
             series.mean = DVec3::ZERO;
             series.mean = -series.value(0.0);
@@ -78,17 +78,14 @@ impl ClosedPath {
     }
 }
 
-/// Angular velocity of an orientation given by a rotation vector `r` that changes by `r'`: the left Jacobian of
-/// the rotations, `r' + (1 - cos a)/a² r x r' + (a - sin a)/a³ r x (r x r')`.
+/// Angular velocity of an orientation given by a rotation vector `r` that changes by `r'`: the left Jacobian
+/// of the rotations, `r' + (1 - cos a)/a² r x r' + (a - sin a)/a³ r x (r x r')`.
 fn turning(rotation_rad: DVec3, slope_rad: DVec3) -> DVec3 {
     let angle = rotation_rad.length();
     let square = angle * angle;
     // Below 1e-2 the closed forms cancel; the next terms of the series are under one rounding there.
     let (first, second) = if angle < 1.0e-2 {
-        (
-            0.5 - square / 24.0 * (1.0 - square / 30.0),
-            1.0 / 6.0 - square / 120.0 * (1.0 - square / 42.0),
-        )
+        (0.5 - square / 24.0 * (1.0 - square / 30.0), 1.0 / 6.0 - square / 120.0 * (1.0 - square / 42.0))
     } else {
         ((1.0 - angle.cos()) / square, (angle - angle.sin()) / (square * angle))
     };
@@ -109,7 +106,8 @@ mod tests {
             for index in 0..50 {
                 let (part, step) = (f64::from(index) / 50.0, 1.0e-4);
                 let turn = |half: f64| {
-                    let later = path.pose(part + half).orientation() * path.pose(part - half).orientation().conjugate();
+                    let later = path.pose(part + half).orientation()
+                        * path.pose(part - half).orientation().conjugate();
                     rotation_vector(later) / (2.0 * half)
                 };
                 // Richardson: what is left is of fourth order in a step of 1e-3 rad.
@@ -128,9 +126,11 @@ mod tests {
             for index in 0..100 {
                 let pose = path.pose(f64::from(index) / 100.0);
                 assert!(pose.position().abs().max_element() <= reach.position_m);
-                assert!(rotation_vector(pose.orientation()).abs().max_element() <= reach.rotation_rad + 1e-15);
+                assert!(
+                    rotation_vector(pose.orientation()).abs().max_element() <= reach.rotation_rad + 1e-15
+                );
             }
-            assert!(path.from_home().pose(1.0).position().length() < 1.0e-16);
+            assert!(path.starting_at_home().pose(1.0).position().length() < 1.0e-16);
         }
     }
 }

@@ -1,5 +1,6 @@
-//! The plainest device there is: a mass on a damper along each axis, an inertia on a damper about each, solved
-//! exactly while a wrench is held. In the model frame, without gravity: what is left is the loop alone.
+//! The plainest device there is: a mass on a damper along each axis, an inertia on a damper about each,
+//! solved exactly while a wrench is held. In the model frame, without gravity: what is left is the loop
+//! alone.
 
 use super::LEVER_M;
 use flotor_hal::{DVec3, Pose, Twist, Wrench, orientation_from_rotation_vector};
@@ -38,7 +39,12 @@ impl Hold {
         let rate = damping / inertia;
         let lost = -(-rate * period_s).exp_m1();
         let coast_s = lost / rate;
-        Self { decay: 1.0 - lost, mobility: lost / damping, coast_s, compliance: (period_s - coast_s) / damping }
+        Self {
+            decay: 1.0 - lost,
+            mobility: lost / damping,
+            coast_s,
+            compliance: (period_s - coast_s) / damping,
+        }
     }
 
     fn advance(self, velocity: f64, force: f64) -> (f64, f64) {

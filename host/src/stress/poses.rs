@@ -1,11 +1,12 @@
-//! Where a model is asked: evenly through the workspace, and on the sets of measure zero where formulas break.
+//! Where a model is asked: evenly through the workspace, and on the sets of measure zero where formulas
+//! break.
 //!
-//! Even coverage is Sobol's sequence (I. M. Sobol, USSR Comput. Math. 7(4), 1967) with the direction numbers of
-//! S. Joe and F. Y. Kuo (SIAM J. Sci. Comput. 30, 2008), its points shifted by the seed: any first part of it
-//! covers the space evenly, so a short run asks the first poses of a full one. No sequence ever hits home
+//! Even coverage is Sobol's sequence (I. M. Sobol, USSR Comput. Math. 7(4), 1967) with the direction numbers
+//! of S. Joe and F. Y. Kuo (SIAM J. Sci. Comput. 30, 2008), its points shifted by the seed: any first part of
+//! it covers the space evenly, so a short run asks the first poses of a full one. No sequence ever hits home
 //! exactly, or a coordinate plane, or a number that is not finite: those are [`Manifold`]s with names.
 
-use flotor_hal::{DQuat, DVec3, Pose, Twist, orientation_from_rotation_vector};
+use flotor_hal::{DQuat, DVec3, Pose, Twist, orientation_from_rotation_vector, rotation_vector};
 use serde::Serialize;
 use std::f64::consts::PI;
 
@@ -31,6 +32,13 @@ impl Reach {
         Self { position_m: self.position_m * factor, rotation_rad: self.rotation_rad * factor }
     }
 
+    /// True if a pose lies in the workspace.
+    pub(super) fn holds(self, pose: Pose) -> bool {
+        let rotation_rad = rotation_vector(pose.orientation());
+        pose.position().abs().max_element() <= self.position_m
+            && rotation_rad.abs().max_element() <= self.rotation_rad
+    }
+
     /// The pose at six coordinates in 0..1 across the workspace.
     pub(super) fn pose(self, unit: [f64; 6]) -> Pose {
         let [x, y, z, rx, ry, rz] = unit.map(|u| 2.0 * u - 1.0);
@@ -49,8 +57,13 @@ const DIMENSIONS: usize = 6;
 const DIGITS: usize = 32;
 /// Degree and inner coefficients of a primitive polynomial, and the first direction numbers, for dimensions 2
 /// to 6 (Joe and Kuo, file new-joe-kuo-6.21201).
-const POLYNOMIALS: [(usize, u32, [u32; 4]); DIMENSIONS - 1] =
-    [(1, 0, [1, 0, 0, 0]), (2, 1, [1, 3, 0, 0]), (3, 1, [1, 3, 1, 0]), (3, 2, [1, 1, 1, 0]), (4, 1, [1, 1, 3, 3])];
+const POLYNOMIALS: [(usize, u32, [u32; 4]); DIMENSIONS - 1] = [
+    (1, 0, [1, 0, 0, 0]),
+    (2, 1, [1, 3, 0, 0]),
+    (3, 1, [1, 3, 1, 0]),
+    (3, 2, [1, 1, 1, 0]),
+    (4, 1, [1, 1, 3, 3]),
+];
 
 /// Sobol's sequence in six dimensions, digitally shifted.
 pub(super) struct Sobol {
@@ -289,7 +302,8 @@ fn large_rotation(reach: Reach, random: &mut Random, index: u64) -> Pose {
 
 fn denormal(random: &mut Random) -> Pose {
     // The smallest normal number is 2.2e-308.
-    let mut number = || random.symmetric() * f64::MIN_POSITIVE * if random.unit() < 0.5 { 1.0e-12 } else { 1.0 };
+    let mut number =
+        || random.symmetric() * f64::MIN_POSITIVE * if random.unit() < 0.5 { 1.0e-12 } else { 1.0 };
     Pose { position_m: [number(), number(), number()], orientation_xyzw: [number(), number(), number(), 1.0] }
 }
 
@@ -341,8 +355,8 @@ mod tests {
 
     #[test]
     fn the_sequence_integrates_better_than_random_points() {
-        // Integral of prod(1 + (u - 1/2)) is 1. Random points would be off by 0.7 / sqrt(65536) = 3e-3; a tenth
-        // of that is out of their reach and far above what the sequence leaves.
+        // Integral of prod(1 + (u - 1/2)) is 1. Random points would be off by 0.7 / sqrt(65536) = 3e-3; a
+        // tenth of that is out of their reach and far above what the sequence leaves.
         let sobol = Sobol::new(3);
         let product = |index| sobol.point(index).iter().map(|u| 0.5 + u).product::<f64>();
         let mean = (0..65536).map(product).sum::<f64>() / 65536.0;

@@ -1,16 +1,17 @@
 //! M2 and M3: what the derivative of the wrench by the pose says.
 //!
-//! **M2, Lipschitz constant.** A sampled loop of period `T` stays passive on a device with damping `b` as long as
-//! the stiffness does not exceed `2 b / T` (Colgate and Schenkel, J. Robotic Systems 14, 1997, without virtual
-//! damping; Abbott and Okamura, IEEE T-RO 21, 2005). The share of the workspace where the largest gain of the
-//! derivative, in all six degrees of freedom at the device's lever arm, keeps to that is the renderable share.
+//! **M2, Lipschitz constant.** A sampled loop of period `T` stays passive on a device with damping `b` as
+//! long as the stiffness does not exceed `2 b / T` (Colgate and Schenkel, J. Robotic Systems 14, 1997,
+//! without virtual damping; Abbott and Okamura, IEEE T-RO 21, 2005). The share of the workspace where the
+//! largest gain of the derivative, in all six degrees of freedom at the device's lever arm, keeps to that is
+//! the renderable share.
 //!
 //! **M3, reciprocity.** Force and torque that come from one energy have a symmetric derivative (Maxwell's
 //! reciprocity); `|J - J^T| / |J|` measures how far a model is from that. Only what the differences leave no
 //! doubt about counts.
 
-use super::measure::{Decades, Measure, Verdict, Worst};
 use super::jacobian::Jacobian;
+use super::measure::{Decades, Measure, Verdict, Worst};
 use super::poses::Sobol;
 use super::sweep::sweep;
 use super::{DAMPINGS_NS_PER_M, LEVER_M, PERIOD_S, Setup};
@@ -21,6 +22,9 @@ const NAME: &str = "Lipschitz constant and reciprocity";
 const BLOCK: u64 = 32;
 /// Largest asymmetry that passes. Differences resolve 1e-9; a real coupling that is forgotten makes percents.
 const RECIPROCAL: f64 = 1.0e-6;
+/// Relative uncertainty from which on there is no derivative to speak of: a step or a bend lies within the
+/// shortest difference, and M1 is the one to tell.
+const ROUGH: f64 = 0.1;
 
 struct Tally {
     poses: u64,
@@ -31,7 +35,10 @@ struct Tally {
     renderable: [u64; DAMPINGS_NS_PER_M.len()],
     gains: Decades,
     asymmetry: Worst,
-    unresolved: u64,
+    /// Largest relative uncertainty of a derivative.
+    uncertain: f64,
+    /// Poses where the differences do not settle: no derivative there.
+    rough: u64,
 }
 
 impl Tally {
@@ -44,7 +51,8 @@ impl Tally {
             renderable: [0; DAMPINGS_NS_PER_M.len()],
             gains: Decades::default(),
             asymmetry: Worst::NONE,
-            unresolved: 0,
+            uncertain: 0.0,
+            rough: 0,
         }
     }
 
@@ -60,10 +68,18 @@ impl Tally {
         }
         self.gains.merge(&later.gains);
         self.asymmetry.merge(later.asymmetry);
-        self.unresolved += later.unresolved;
+        self.uncertain = self.uncertain.max(later.uncertain);
+        self.rough += later.rough;
     }
 
     fn take(&mut self, jacobian: &Jacobian, pose: flotor_hal::Pose) {
+        let norm = jacobian.norm();
+        // Both the derivative and its transpose are that uncertain.
+        let uncertain = 2.0 * jacobian.error;
+        if uncertain > ROUGH * norm {
+            self.rough += 1;
+            return;
+        }
         let gain = jacobian.stiffness();
         self.gain.offer(gain, pose);
         self.gains.count(gain);
@@ -73,12 +89,15 @@ impl Tally {
         for (count, damping) in self.renderable.iter_mut().zip(DAMPINGS_NS_PER_M) {
             *count += u64::from(gain <= stiffest_n_per_m(damping));
         }
-        let norm = jacobian.norm();
         if norm > 0.0 {
-            let uncertain = 2.0 * jacobian.error;
-            self.unresolved += u64::from(uncertain > RECIPROCAL * norm);
+            self.uncertain = self.uncertain.max(uncertain / norm);
             self.asymmetry.offer((jacobian.asymmetry() - uncertain).max(0.0) / norm, pose);
         }
+    }
+
+    /// Poses with a derivative.
+    fn judged(&self) -> u64 {
+        self.poses - self.unanswered - self.rough
     }
 }
 
@@ -110,8 +129,7 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Measure, Decades), 
 
 #[allow(clippy::cast_precision_loss)] // counts below 2^53
 fn lipschitz(total: &Tally) -> Measure {
-    let answered = (total.poses - total.unanswered).max(1) as f64;
-    let share = |index: usize| total.renderable[index] as f64 / answered;
+    let share = |index: usize| total.renderable[index] as f64 / total.judged().max(1) as f64;
     let [lightly, heavily] = DAMPINGS_NS_PER_M;
     let remark = format!(
         "renderable at 1 kHz: {:.4} of the workspace with b = {lightly} N s/m, {:.4} with {heavily}",
@@ -137,29 +155,24 @@ fn lipschitz(total: &Tally) -> Measure {
     .with(format!("renderable share, b = {heavily} N s/m"), share(1), "")
     .with("poses", total.poses as f64, "")
     .with("poses without answer", total.unanswered as f64, "")
+    .with("poses without derivative", total.rough as f64, "")
+    .unless_unanswered(total.judged())
 }
 
 #[allow(clippy::cast_precision_loss)] // counts below 2^53
 fn reciprocity(total: &Tally) -> Measure {
-    let answered = total.poses - total.unanswered;
-    let mut verdict = Verdict::of(total.asymmetry.value, RECIPROCAL, RECIPROCAL);
-    let mut remark = String::new();
-    // A measure that could see nothing has shown nothing.
-    if verdict == Verdict::Pass && 2 * total.unresolved > answered {
-        verdict = Verdict::Note;
-        "too rough to tell: differences do not settle at most poses".clone_into(&mut remark);
-    }
     Measure {
         id: "M3",
         name: "reciprocity",
         value: total.asymmetry.value,
         unit: "",
         bound: Some(RECIPROCAL),
-        verdict,
+        verdict: Verdict::of(total.asymmetry.value, RECIPROCAL, RECIPROCAL),
         pose: total.asymmetry.record(),
-        remark,
+        remark: format!("beyond the {:.0e} that differences leave uncertain", total.uncertain),
         values: Vec::new(),
     }
-    .with("poses", answered as f64, "")
-    .with("poses where differences do not settle", total.unresolved as f64, "")
+    .with("poses", total.judged() as f64, "")
+    .with("uncertainty taken off, at most", total.uncertain, "")
+    .unless_unanswered(total.judged())
 }

@@ -1,14 +1,14 @@
 //! The model under test: one instance that is asked for wrenches, and replaced when it breaks.
 //!
-//! A model without history is asked directly. One with history is walked to each pose in small steps, the way a
-//! hand would take it there, and held until it has converged.
+//! A model without history is asked directly. One with history is walked to each pose in small steps, the way
+//! a hand would take it there, and held until it has converged.
 
 use super::Setup;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{LoadError, Model};
 use flotor_hal::{
-    Demand, Input, LoopConfig, Memory, Output, Pose, StepStatus, Twist, Wrench, orientation_from_rotation_vector,
-    rotation_vector,
+    Demand, Input, LoopConfig, Memory, Output, Pose, StepStatus, Twist, Wrench,
+    orientation_from_rotation_vector, rotation_vector,
 };
 
 /// Largest step of a walk, m: what `flotor eval` takes.
@@ -70,10 +70,12 @@ impl<'a> Subject<'a> {
         Ok(Self { setup, model, demand, memory, at: Pose::HOME, tick: 0, time_ns: 0 })
     }
 
-    /// Back to home, history forgotten.
+    /// Back to home, history forgotten; a new instance if the old one is broken.
     pub(super) fn restart(&mut self) {
-        self.model.reset();
-        self.forget_way();
+        match self.model.reset() {
+            CallStatus::Panicked => self.replace(),
+            _ => self.forget_way(),
+        }
     }
 
     fn forget_way(&mut self) {
@@ -133,8 +135,15 @@ impl<'a> Subject<'a> {
 
     /// The input of the next tick.
     pub(super) fn input(&mut self, pose: Pose, twist: Twist, dt_ns: u64) -> Input {
-        let input =
-            Input { pose, twist, time_ns: self.time_ns, dt_ns, tick: self.tick, buttons: 0, demand: self.demand };
+        let input = Input {
+            pose,
+            twist,
+            time_ns: self.time_ns,
+            dt_ns,
+            tick: self.tick,
+            buttons: 0,
+            demand: self.demand,
+        };
         self.tick += 1;
         self.time_ns += dt_ns;
         input
@@ -168,12 +177,8 @@ impl<'a> Subject<'a> {
             refused => return trouble(TroubleKind::Refused(refused)),
         }
         let Some(status) = output.status() else { return trouble(TroubleKind::UnknownStatus) };
-        // A model that serves energy may have none outside its domain, where NaN says so.
-        let energy_is_due = input.demand.contains(Demand::ENERGY)
-            && matches!(status, StepStatus::Ok | StepStatus::Clamped | StepStatus::NotConverged);
-        let energy_is_sound =
-            if energy_is_due { output.energy_j.is_finite() } else { !output.energy_j.is_infinite() };
-        if !output.wrench.is_finite() || !energy_is_sound {
+        // NaN is how a model says that it has no energy here.
+        if !output.wrench.is_finite() || output.energy_j.is_infinite() {
             return trouble(TroubleKind::NotFinite);
         }
         if status == StepStatus::Ok && !input.pose.is_finite() {

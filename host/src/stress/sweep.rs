@@ -1,7 +1,7 @@
 //! Work in blocks on two threads, with a result that does not depend on who did what.
 //!
-//! Every block starts with the model at home and its history forgotten, draws its poses from its own number, and
-//! results are put together in the order of the blocks.
+//! Every block starts with the model at home and its history forgotten, draws its poses from its own number,
+//! and results are put together in the order of the blocks.
 
 use super::Setup;
 use super::subject::Subject;

@@ -1,9 +1,9 @@
 //! M0, totality: an answer for every input.
 //!
-//! A model is called thousands of times a second with whatever the sensors say. At each pose of an even coverage
-//! and of the named manifolds it must give a finite wrench with a status the contract knows, and say so where
-//! the input was not finite. A model that panics is named with the pose and replaced.
-//! Source: the project's stability score, M0 (thesis: NaN at the exact rest pose, 0/0 in its moments).
+//! A model is called thousands of times a second with whatever the sensors say. At each pose of an even
+//! coverage and of the named manifolds it must give a finite wrench with a status the contract knows, and say
+//! so where the input was not finite. A model that panics is named with the pose and replaced. The thesis's
+//! code gives NaN at the exact rest pose, 0/0 in its moments.
 
 use super::measure::{Measure, Verdict};
 use super::poses::{Manifold, Random, Sobol};
@@ -116,7 +116,8 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
 #[allow(clippy::cast_precision_loss)] // counts below 2^53
 fn judge(total: Tally) -> Measure {
     let troubles = total.troubles() as f64;
-    let remark = total.first.as_ref().map_or(String::new(), |(trouble, place)| {
+    let asked = format!("{} poses, {} of them out of the model's domain", total.asked, total.out_of_domain);
+    let remark = total.first.as_ref().map_or(asked, |(trouble, place)| {
         let what = match &trouble.kind {
             TroubleKind::Panicked(words) => words.clone(),
             TroubleKind::NotFinite => "answered a number that is not finite".to_owned(),

@@ -1,0 +1,201 @@
+//! The numerical stability score of a force model: nine measures that tell whether a law may be let loose on
+//! a hand a thousand times a second.
+//!
+//! | measure | question | source |
+//! |---|---|---|
+//! | M0 [`totality`] | does it answer everywhere, finite, without panic? | |
+//! | M1 [`continuity`] | does the wrench jump? | bisection down to 1e-8 mm |
+//! | M2 [`stiffness`] | how steep is it, where may a loop render it? | `K <= 2 b / T`, Colgate and Schenkel 1997 |
+//! | M3 [`stiffness`] | is its derivative symmetric? | Maxwell's reciprocity |
+//! | M4 [`energy`] | do closed motions cost nothing? | |
+//! | M5 [`energy`] | what does holding a force for a period give away? | passivity observer, Ryu et al. 2004 |
+//! | M6 [`closed_loop`] | does a released device settle where theory says it must? | Gil et al. 2009 |
+//! | M7 [`cost`] | how long does a call take? | a tenth of a 1 kHz tick |
+//! | M8 [`determinism`] | same poses, same bits? | |
+//!
+//! Each measure is made on instances of its own through the plugin contract, with nothing known about the
+//! model but what the contract says. Data flows one way: [`poses`] and [`paths`] say where, [`subject`] asks,
+//! [`sweep`] shares the work between two threads, each measure's module judges, [`report`] and [`picture`]
+//! show.
+//!
+//! Not real-time: everything here allocates and takes its time.
+
+mod closed_loop;
+mod continuity;
+mod cost;
+mod determinism;
+mod energy;
+mod jacobian;
+mod measure;
+mod paths;
+mod picture;
+mod plant;
+mod poses;
+mod report;
+mod stiffness;
+mod subject;
+mod sweep;
+mod totality;
+
+#[cfg(test)]
+mod tests;
+
+pub use continuity::Jump;
+pub use measure::{Decades, Measure, PoseRecord, Quantity, Verdict};
+pub use poses::Reach;
+pub use report::{Distributions, StressReport};
+
+use flotor_hal::Memory;
+use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
+use serde::Serialize;
+
+/// Period of the loop the score has in mind, s.
+const PERIOD_S: f64 = 1.0e-3;
+/// Damping of the device, N s/m: light eddy-current drag, and the simulated flotor's.
+const DAMPINGS_NS_PER_M: [f64; 2] = [0.5, 2.0];
+/// Lever arm at which the device resists rotation as it resists translation, m: drag spread evenly over a
+/// hemisphere of 115 mm radius, `sqrt(2/3) R`. Angles times this are lengths, torques over this are forces.
+const LEVER_M: f64 = 0.0939;
+/// How much wider than the workspace the model is asked: a hand overshoots, a sensor lies.
+const WIDER: f64 = 1.5;
+
+/// How much is asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Size {
+    /// A hundredth, for a daily check: the first poses of a full run.
+    Short,
+    /// Ten million poses and more.
+    Full,
+}
+
+/// What to ask for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StressOptions {
+    /// How much is asked.
+    pub size: Size,
+    /// Seed of poses and motions.
+    pub seed: u64,
+    /// The workspace in the model frame.
+    pub reach: Reach,
+}
+
+impl Default for StressOptions {
+    fn default() -> Self {
+        Self { size: Size::Short, seed: 1, reach: Reach::default() }
+    }
+}
+
+/// Told how the score comes along, from two threads. `()` does not listen.
+pub trait Progress: Sync {
+    /// A measure of so many steps begins.
+    fn begin(&self, name: &str, steps: u64);
+    /// So many more steps are done.
+    fn advance(&self, steps: u64);
+}
+
+impl Progress for () {
+    fn begin(&self, _name: &str, _steps: u64) {}
+    fn advance(&self, _steps: u64) {}
+}
+
+/// Everything the measures share.
+struct Setup<'a> {
+    plugin: &'a Plugin,
+    settings: &'a [Setting],
+    options: StressOptions,
+    effort: Effort,
+    progress: &'a dyn Progress,
+}
+
+/// How often each measure asks.
+#[derive(Clone, Copy, Debug)]
+struct Effort {
+    sobol_poses: u64,
+    poses_per_manifold: u64,
+    lines: u64,
+    jacobians: u64,
+    loops: u64,
+    hand_paths: u64,
+    releases: u64,
+    timed_poses: u64,
+    compared_poses: u64,
+}
+
+impl Effort {
+    /// For a model without history about 2e8 calls in full. One with history is walked, some hundred calls
+    /// between two poses, and gets a hundredth of the poses.
+    const fn of(size: Size, memory: Memory) -> Self {
+        let full = Self {
+            sobol_poses: 10_000_000,
+            poses_per_manifold: 160_000,
+            lines: 40_000,
+            jacobians: 400_000,
+            loops: 20_000,
+            hand_paths: 4_000,
+            releases: 100,
+            timed_poses: 4_000_000,
+            compared_poses: 1_000_000,
+        };
+        let walked = match memory {
+            Memory::Stateless => full,
+            Memory::PathDependent => full.divided_by(100),
+        };
+        match size {
+            Size::Full => walked,
+            Size::Short => walked.divided_by(100),
+        }
+    }
+
+    const fn divided_by(self, by: u64) -> Self {
+        Self {
+            sobol_poses: self.sobol_poses / by,
+            poses_per_manifold: self.poses_per_manifold / by,
+            lines: at_least(self.lines / by, 16),
+            jacobians: at_least(self.jacobians / by, 32),
+            loops: at_least(self.loops / by, 10),
+            hand_paths: at_least(self.hand_paths / by, 4),
+            releases: at_least(self.releases / by, 2),
+            timed_poses: self.timed_poses / by,
+            compared_poses: self.compared_poses / by,
+        }
+    }
+}
+
+/// Fewer would be no measurement.
+const fn at_least(count: u64, least: u64) -> u64 {
+    if count < least { least } else { count }
+}
+
+/// Scores a model with these settings. Not real-time; takes seconds (short) to minutes (full), on two
+/// threads.
+///
+/// # Errors
+/// [`LoadError`] if the plugin is no model or refuses the settings. A model that breaks while it is measured
+/// is no error: it is what M0 reports.
+pub fn score(
+    plugin: &Plugin,
+    settings: &[Setting],
+    options: &StressOptions,
+    progress: &dyn Progress,
+) -> Result<StressReport, LoadError> {
+    let memory = plugin.create_model(settings)?.memory();
+    let effort = Effort::of(options.size, memory);
+    measure_all(&Setup { plugin, settings, options: *options, effort, progress })
+}
+
+fn measure_all(setup: &Setup<'_>) -> Result<StressReport, LoadError> {
+    let totality = totality::measure(setup)?;
+    let (continuity, jumps) = continuity::measure(setup)?;
+    let (lipschitz, reciprocity, gains_n_per_m) = stiffness::measure(setup)?;
+    let (loops, loop_energies) = energy::measure_loops(setup)?;
+    let observer = energy::measure_observer(setup)?;
+    let closed_loop = closed_loop::measure(setup)?;
+    let (cost, calls_ns) = cost::measure(setup)?;
+    let determinism = determinism::measure(setup)?;
+
+    let measures =
+        vec![totality, continuity, lipschitz, reciprocity, loops, observer, closed_loop, cost, determinism];
+    let distributions = Distributions { jumps, gains_n_per_m, loop_energies, calls_ns };
+    Ok(StressReport::new(setup, measures, distributions))
+}
