@@ -26,7 +26,8 @@ fn hal() -> PathBuf {
 }
 
 fn generate() -> String {
-    let config = cbindgen::Config::from_file(hal().join("cbindgen.toml")).expect("hal/cbindgen.toml is a configuration");
+    let config = cbindgen::Config::from_file(hal().join("cbindgen.toml"))
+        .expect("hal/cbindgen.toml is a configuration");
     let sources = SOURCES.iter().fold(cbindgen::Builder::new().with_config(config), |builder, source| {
         builder.with_src(hal().join("src").join(source))
     });
@@ -53,8 +54,11 @@ fn the_committed_header_is_what_the_sources_say() {
 fn compiles(compiler: &str, standard: &str, file_name: &str) {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let source = folder.path().join(file_name);
-    std::fs::write(&source, "#include \"flotor.h\"\nint main(void) { return (int)sizeof(FlotorEntry) == 0; }\n")
-        .expect("the source can be written");
+    std::fs::write(
+        &source,
+        "#include \"flotor.h\"\nint main(void) { return (int)sizeof(FlotorEntry) == 0; }\n",
+    )
+    .expect("the source can be written");
     let output = Command::new(compiler)
         .args([standard, "-Wall", "-Wextra", "-Werror", "-pedantic", "-c", "-o"])
         .arg(folder.path().join("out.o"))

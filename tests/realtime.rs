@@ -1,0 +1,126 @@
+//! Nothing in a tick allocates: not the host, not the plugins.
+//!
+//! The allocator of this test counts per thread. A plugin in a library of its own has an allocator of its own, so
+//! the plugins are counted linked into this test; the host is counted with the libraries it really loads.
+#![allow(unsafe_code)] // an allocator cannot be written without; tests/architecture.rs lists it
+
+use flotor::registry::Registry;
+use flotor::scene::Scene;
+use flotor::servo::Clock;
+use flotor::session::{Observer, RunOptions, Session};
+use flotor::trace::TickRecord;
+use flotor_hal::abi::CallStatus;
+use flotor_hal::abi::loader::Plugin;
+use flotor_hal::{Cycle, Demand, DeviceState, Input, LoopConfig, Output, Pose, Tick};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::atomic::AtomicBool;
+
+thread_local! {
+    /// Allocations and releases of this thread so far. Constant start value: using it never allocates.
+    static CALLS: Cell<u64> = const { Cell::new(0) };
+}
+
+/// The system's allocator, counting.
+struct Counting;
+
+// SAFETY: every call goes unchanged to the system's allocator, whose contract is the same; counting touches only
+// a thread-local number that needs no memory of its own.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        CALLS.set(CALLS.get() + 1);
+        // SAFETY: the caller keeps the contract of `GlobalAlloc::alloc`.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        CALLS.set(CALLS.get() + 1);
+        // SAFETY: the caller keeps the contract of `GlobalAlloc::dealloc`.
+        unsafe { System.dealloc(at, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Calls of the allocator while `body` runs.
+fn counted(body: impl FnOnce()) -> u64 {
+    let before = CALLS.get();
+    body();
+    CALLS.get() - before
+}
+
+#[test]
+fn the_counter_counts() {
+    assert_eq!(counted(|| drop(std::hint::black_box(Box::new(1)))), 2);
+    assert_eq!(counted(|| ()), 0);
+}
+
+/// Notes how often the allocator was called when it sees a tick; keeps nothing that grows.
+#[derive(Default)]
+struct Watch {
+    first: Option<u64>,
+    last: u64,
+    ticks: u64,
+}
+
+impl Observer for Watch {
+    fn observe(&mut self, _: &TickRecord) {
+        self.first.get_or_insert(CALLS.get());
+        self.last = CALLS.get();
+        self.ticks += 1;
+    }
+}
+
+#[test]
+fn the_host_allocates_nothing_in_ten_thousand_ticks() {
+    let scene = Scene::demo().expect("the demo is right");
+    let options = RunOptions { clock: Clock::Virtual, seed: 1 };
+    let session = Session::prepare(&scene, &Registry::search(&[]), &options).expect("the demo starts");
+    let mut watch = Watch::default();
+    let outcome = session.run(&mut watch, &AtomicBool::new(false));
+    assert!(outcome.is_ok() && watch.ticks == 10_000);
+    // Between the first and the last tick seen lie ten batches of ticks, run on this thread.
+    assert_eq!(watch.first, Some(watch.last));
+}
+
+#[test]
+fn the_spring_allocates_nothing_in_a_step() {
+    let plugin = Plugin::in_process(&flotor_spring::FLOTOR_ENTRY).expect("the spring is a plugin");
+    for variant in ["energy", "closed-form", "current-length"] {
+        let setting = flotor_hal::abi::loader::Setting::parse(plugin.parameters(), "variant", variant);
+        let mut model = plugin.create_model(&[setting.expect("a variant")]).expect("a spring");
+        let mut output = Output::default();
+        let mut input = Input { demand: Demand::ALL, ..Input::at_rest(Pose::HOME) };
+        let calls = counted(|| {
+            for step in 0..1000 {
+                input.pose.position_m = [1.0e-6 * f64::from(step), 0.0, -1.0e-5 * f64::from(step)];
+                assert_eq!(model.step(&input, &mut output), CallStatus::Ok);
+            }
+            input.pose.position_m[0] = f64::NAN;
+            assert_eq!(model.step(&input, &mut output), CallStatus::Ok);
+        });
+        assert_eq!(calls, 0, "{variant}");
+    }
+}
+
+#[test]
+fn the_simulated_flotor_allocates_nothing_in_a_tick() {
+    let plugin = Plugin::in_process(&flotor_simulated::FLOTOR_ENTRY).expect("the flotor is a plugin");
+    let device = plugin.open_device(&[]).expect("a flotor");
+    let config = LoopConfig { period_ns: 1_000_000, seed: 1 };
+    let Ok(mut device) = device.activate(&config) else { panic!("it can be activated") };
+    let mut state = DeviceState::HOME;
+    let wrench = flotor_hal::Wrench::from_force(flotor_hal::DVec3::new(0.1, 0.0, 0.2));
+    let calls = counted(|| {
+        for index in 0..1000 {
+            // Every tenth tick comes late: an odd step length must not cost memory either.
+            let dt_ns = if index % 10 == 9 { 1_234_567 } else { 1_000_000 };
+            let tick = Tick { index, time_ns: index * 1_000_000, dt_ns };
+            assert_eq!(device.read(&tick, &mut state), Cycle::Fresh);
+            assert_eq!(device.write(&tick, &wrench), Cycle::Fresh);
+        }
+        assert!(device.energy_ledger().is_some());
+    });
+    assert_eq!(calls, 0);
+}
