@@ -1,152 +1,18 @@
 //! What the simulated flotor can be told, and how a set of values becomes a [`Setup`].
 
+mod machine;
+mod schema;
+
+pub(crate) use machine::machine;
+pub(crate) use schema::SCHEMA;
+
 use crate::hand::{Hand, Impedance, Pose, Trajectory};
 use crate::plant::{FeedForward, FlotorParameters, State};
 use crate::simulation::Setup;
-use flotor_hal::abi::Str;
+use flotor_hal::Settings;
 use flotor_hal::glam::{DQuat, DVec3};
-use flotor_hal::{Parameter, Settings};
-
-/// How much of the machine is simulated.
-const PRESETS: [Str; 1] = [Str::new("plain")];
-
-/// Whose flotor.
-const FLOTORS: [Str; 2] = [Str::new("thesis"), Str::new("utah")];
-
-/// What the hand does.
-const HANDS: [Str; 5] =
-    [Str::new("oscillate"), Str::new("press"), Str::new("release"), Str::new("hold"), Str::new("open")];
-
-/// How the hand holds.
-const GRIPS: [Str; 2] = [Str::new("firm"), Str::new("relaxed")];
 
 const MM: f64 = 1.0e-3;
-const DEMO: FlotorParameters = FlotorParameters::THESIS;
-
-/// The schema. Defaults are those of preset `plain`, flotor `thesis`, an oscillating firm hand.
-pub(crate) const SCHEMA: &[Parameter] = &[
-    Parameter::choice(
-        "preset",
-        &PRESETS,
-        0,
-        "How much of the machine is simulated: rigid body, gravity, drag, hand",
-    ),
-    Parameter::choice(
-        "flotor",
-        &FLOTORS,
-        0,
-        "Whose flotor: mass and centre of mass of the thesis or of the Utah device",
-    ),
-    Parameter::real("mass_kg", "kg", 0.01, 10.0, DEMO.mass_kg, "Mass of the flotor"),
-    Parameter::real(
-        "inertia_x_kg_m2",
-        "kg m²",
-        1.0e-6,
-        1.0,
-        DEMO.inertia_kg_m2.x,
-        "Moment of inertia about the centre of mass, x",
-    ),
-    Parameter::real(
-        "inertia_y_kg_m2",
-        "kg m²",
-        1.0e-6,
-        1.0,
-        DEMO.inertia_kg_m2.y,
-        "Moment of inertia about the centre of mass, y",
-    ),
-    Parameter::real(
-        "inertia_z_kg_m2",
-        "kg m²",
-        1.0e-6,
-        1.0,
-        DEMO.inertia_kg_m2.z,
-        "Moment of inertia about the centre of mass, z",
-    ),
-    Parameter::real("com_x_mm", "mm", -100.0, 100.0, 0.0, "Centre of mass in the flotor frame, x"),
-    Parameter::real("com_y_mm", "mm", -100.0, 100.0, 0.0, "Centre of mass in the flotor frame, y"),
-    Parameter::real("com_z_mm", "mm", -100.0, 100.0, -31.7, "Centre of mass in the flotor frame, z"),
-    Parameter::real("gravity_m_per_s2", "m/s²", 0.0, 30.0, DEMO.gravity_m_per_s2, "Gravity, downwards"),
-    Parameter::real(
-        "feedforward_n",
-        "N",
-        -50.0,
-        50.0,
-        0.58 * DEMO.gravity_m_per_s2,
-        "Upward force at the centre of mass that compensates gravity; unless set, exactly the weight",
-    ),
-    Parameter::real(
-        "damping_ns_per_m",
-        "N s/m",
-        0.0,
-        100.0,
-        DEMO.drag.translational_ns_per_m,
-        "Eddy-current drag on translation",
-    ),
-    Parameter::real(
-        "damping_nms_per_rad",
-        "N m s/rad",
-        0.0,
-        10.0,
-        DEMO.drag.rotational_nms_per_rad,
-        "Eddy-current drag on rotation",
-    ),
-    Parameter::choice("hand", &HANDS, 0, "What the hand does"),
-    Parameter::choice("hand_grip", &GRIPS, 0, "How the hand holds: impedance from the literature"),
-    Parameter::real(
-        "hand_stiffness_n_per_m",
-        "N/m",
-        0.0,
-        20_000.0,
-        2000.0,
-        "Stiffness of the hand; unless set, that of the grip",
-    ),
-    Parameter::real(
-        "hand_damping_ns_per_m",
-        "N s/m",
-        0.0,
-        1000.0,
-        70.0,
-        "Damping of the hand; unless set, that of the grip",
-    ),
-    Parameter::real(
-        "hand_mass_kg",
-        "kg",
-        0.0,
-        5.0,
-        0.5,
-        "Mass of the hand that moves with the handle; unless set, that of the grip",
-    ),
-    Parameter::real(
-        "hand_centre_mm",
-        "mm",
-        -12.0,
-        12.0,
-        -4.0,
-        "Oscillate: middle of the intended movement (negative is down)",
-    ),
-    Parameter::real(
-        "hand_amplitude_mm",
-        "mm",
-        0.0,
-        12.0,
-        6.0,
-        "Oscillate: half the distance between the intended turning points",
-    ),
-    Parameter::real("hand_frequency_hz", "Hz", 0.0, 20.0, 1.5, "Oscillate: cycles per second"),
-    Parameter::real(
-        "hand_depth_mm",
-        "mm",
-        -12.0,
-        12.0,
-        4.0,
-        "Press, hold, release: intended depth below home",
-    ),
-    Parameter::real("hand_rise_s", "s", 0.01, 60.0, 1.0, "Oscillate, press: time until the full movement"),
-    Parameter::real("hand_release_s", "s", 0.0, 3600.0, 1.0, "Release: when the hand opens"),
-    Parameter::real("start_x_mm", "mm", -12.0, 12.0, 0.0, "Where the flotor starts, x"),
-    Parameter::real("start_y_mm", "mm", -12.0, 12.0, 0.0, "Where the flotor starts, y"),
-    Parameter::real("start_z_mm", "mm", -12.0, 12.0, 0.0, "Where the flotor starts, z"),
-];
 
 /// The setup a set of values means; the tick length is filled in at activation.
 pub(crate) fn setup(settings: &Settings<'_>) -> Setup {

@@ -14,9 +14,9 @@
 //!
 //! **Time.** A coil wrench holds from one tick to the next, so during a step the translation is a linear
 //! oscillator under constant or linearly growing force, and `plant::translation` solves it exactly. The
-//! rotation is nonlinear; it is integrated by the classical Runge-Kutta method. Where the centre of mass is
+//! rotation is nonlinear; it is integrated by a Runge-Kutta method of order six. Where the centre of mass is
 //! off the origin the two pull on each other, and `plant::step` integrates that pull in the Runge-Kutta
-//! method while it carries the oscillator exactly (an integrating factor): fourth order in general, exact to
+//! method while it carries the oscillator exactly (an integrating factor): sixth order in general, exact to
 //! rounding when nothing rotates or the centre of mass is at the origin.
 //!
 //! **A hand with mass** moves its mass with the handle: the plant then integrates flotor and hand as one
@@ -28,6 +28,7 @@ mod motion;
 mod rotation;
 mod scheme;
 mod step;
+mod tableau;
 mod translation;
 
 use crate::hand::{Impedance, Intention, Pose};
@@ -253,7 +254,7 @@ impl Plant {
     /// wrench, held by a hand whose intention starts as given and moves on at its velocity, or by none.
     ///
     /// Cutting a piece into smaller ones gives the same motion: to rounding in translation, to the error of
-    /// the Runge-Kutta method (order 4) in rotation.
+    /// the Runge-Kutta method (order 6) in rotation.
     ///
     /// Real-time: bounded, no allocation. A piece other than the nominal one and its predecessor costs a new
     /// set of response functions.

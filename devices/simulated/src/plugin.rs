@@ -1,8 +1,10 @@
 //! The simulation as a device plugin.
 
-use crate::parameters::{SCHEMA, in_force, setup};
+use crate::machine::{Machine, MachineParameters};
+use crate::parameters::{SCHEMA, in_force, machine, setup};
 use crate::plant::Wrench;
 use crate::simulation::{Setup, Simulation};
+use crate::validation::InvalidParameter;
 use crate::workspace::{
     FORCE_LIMIT_N, ROTATION_RANGE_RAD, STIFFNESS_LIMIT_N_PER_M, SensorRange, TORQUE_LIMIT_NM,
     TRANSLATION_RANGE_M,
@@ -17,6 +19,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// The simulated flotor, opened: the numbers are checked, nothing moves.
 pub struct SimulatedFlotor {
     setup: Setup,
+    /// What stands between controller and flotor; nothing with preset `plain`.
+    machine: Option<MachineParameters>,
     /// Every parameter as set or by default, in the order of the schema.
     values: Vec<f64>,
     stopped: Arc<AtomicBool>,
@@ -25,6 +29,7 @@ pub struct SimulatedFlotor {
 /// The simulated flotor, running.
 pub struct RunningFlotor {
     simulation: Simulation,
+    machine: Option<Box<Machine>>,
     opened: SimulatedFlotor,
     /// Acts from the last write to the next.
     held: Wrench,
@@ -43,6 +48,8 @@ impl SafeStop for CoilSwitch {
 const FORCE_SLEW_N_PER_S: f64 = 55.0e3;
 /// Fastest change of torque, N·m/s: full scale in a millisecond. An estimate; no figure is published.
 const TORQUE_SLEW_NM_PER_S: f64 = 6.3e3;
+/// Tick that the latency in seconds is told for, s; the rate is not known yet when a device is asked.
+const NOMINAL_TICK_S: f64 = 1.0e-3;
 /// Rates the device's controller accepts, Hz (public client of the device's interface).
 const RATE_HZ: [f64; 2] = [100.0, 10_000.0];
 
@@ -54,15 +61,20 @@ impl Device for SimulatedFlotor {
     type Stop = CoilSwitch;
 
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
-        let setup = setup(settings);
-        // Everything that depends on the tick length is checked again at activation.
-        Simulation::new(&setup).map_err(Refusal::parameter)?;
         let values = SCHEMA.iter().map(|parameter| settings.number_or_default(parameter.id())).collect();
-        Ok(Self { setup, values, stopped: Arc::new(AtomicBool::new(false)) })
+        let opened = Self {
+            setup: setup(settings),
+            machine: machine(settings),
+            values,
+            stopped: Arc::new(AtomicBool::new(false)),
+        };
+        // Everything that depends on the tick length is checked again at activation.
+        opened.start(opened.setup.tick_ns, 0).map_err(Refusal::parameter)?;
+        Ok(opened)
     }
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
+        let plain = Capabilities {
             sensed: Axes::ALL,
             actuated: Axes::ALL,
             range_m: [TRANSLATION_RANGE_M; 3],
@@ -75,6 +87,17 @@ impl Device for SimulatedFlotor {
             max_stiffness_n_per_m: STIFFNESS_LIMIT_N_PER_M,
             rate_hz: RATE_HZ,
             latency_s: 0.0,
+        };
+        let Some((machine, Ok(limits))) = self.machine.as_ref().map(|machine| (machine, machine.limits()))
+        else {
+            return plain;
+        };
+        Capabilities {
+            resolution_m: machine.sensing.step_m,
+            max_force_n: limits.force_n.to_array(),
+            max_torque_nm: limits.torque_nm.to_array(),
+            latency_s: machine.sensing.latency_ticks as f64 * NOMINAL_TICK_S,
+            ..plain
         }
     }
 
@@ -83,11 +106,10 @@ impl Device for SimulatedFlotor {
     }
 
     fn activate(self, config: &LoopConfig) -> Result<RunningFlotor, (Self, Refusal)> {
-        let setup = Setup { tick_ns: config.period_ns, ..self.setup };
-        match Simulation::new(&setup) {
-            Ok(simulation) => {
+        match self.start(config.period_ns, config.seed) {
+            Ok((simulation, machine)) => {
                 self.stopped.store(false, Ordering::Release);
-                Ok(RunningFlotor { simulation, opened: self, held: Wrench::ZERO })
+                Ok(RunningFlotor { simulation, machine, opened: self, held: Wrench::ZERO })
             }
             Err(error) => Err((self, Refusal::parameter(error))),
         }
@@ -98,11 +120,23 @@ impl Device for SimulatedFlotor {
     }
 }
 
+impl SimulatedFlotor {
+    /// Flotor, hand and machine at time 0.
+    fn start(&self, tick_ns: u64, seed: u64) -> Result<(Simulation, Option<Box<Machine>>), InvalidParameter> {
+        let setup = Setup { tick_ns, ..self.setup };
+        let machine = |parameters| Machine::new(parameters, &setup.start, seed).map(Box::new);
+        Ok((Simulation::new(&setup)?, self.machine.as_ref().map(machine).transpose()?))
+    }
+}
+
 impl ActiveDevice for RunningFlotor {
     type Opened = SimulatedFlotor;
 
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
         let coils = if self.is_stopped() { Wrench::ZERO } else { self.held };
+        if let Some(machine) = &mut self.machine {
+            return machine.cycle(&mut self.simulation, tick, &coils, state);
+        }
         let incidents = self.simulation.advance(tick.dt_ns, coils);
         let flotor = self.simulation.state();
         *state = DeviceState {
@@ -112,7 +146,8 @@ impl ActiveDevice for RunningFlotor {
             sampled_ns: tick.time_ns,
             ..DeviceState::HOME
         };
-        if incidents.stopped || self.simulation.sensor_range() == SensorRange::Outside {
+        let range = SensorRange::of(flotor.position_m, flotor.orientation);
+        if incidents.stopped || range == SensorRange::Outside {
             return Cycle::Fault(Fault::SensorOutOfRange);
         }
         Cycle::Fresh
@@ -121,13 +156,13 @@ impl ActiveDevice for RunningFlotor {
     fn write(&mut self, _tick: &Tick, wrench: &flotor_hal::Wrench) -> Cycle {
         let asked = Wrench { force_n: wrench.force(), torque_nm: wrench.torque() };
         // The coils give what they can: the host has limited the wrench already, another caller may not have.
-        self.held = if asked.is_finite() {
-            Wrench {
+        self.held = match (&self.machine, asked.is_finite()) {
+            (_, false) => Wrench::ZERO,
+            (Some(_), true) => asked,
+            (None, true) => Wrench {
                 force_n: asked.force_n.clamp(-FORCE_LIMIT_N, FORCE_LIMIT_N),
                 torque_nm: asked.torque_nm.clamp(-TORQUE_LIMIT_NM, TORQUE_LIMIT_NM),
-            }
-        } else {
-            Wrench::ZERO
+            },
         };
         Cycle::Fresh
     }

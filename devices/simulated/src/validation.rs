@@ -40,6 +40,10 @@ pub enum InvalidParameter {
         /// Its length.
         length: f64,
     },
+    /// Six coils that cannot push in all six directions.
+    DependentCoils,
+    /// Three diodes that do not show all six coordinates of a pose.
+    DiodesInALine,
     /// Flotor and hand would move faster than the integrator resolves.
     TooStiff {
         /// Steps per millisecond the mechanism would need.
@@ -61,6 +65,23 @@ impl fmt::Display for InvalidParameter {
             }
             Self::NotARotation { name, length } => {
                 write!(f, "{name} has length {length}, a rotation is a quaternion of length 1")
+            }
+            Self::DependentCoils => {
+                write!(
+                    f,
+                    "the six coils cannot push and turn in all directions: their wrenches depend on each "
+                )?;
+                write!(
+                    f,
+                    "other; set coil_ring_a_deg and coil_ring_b_deg apart from each other and off the pole"
+                )
+            }
+            Self::DiodesInALine => {
+                write!(
+                    f,
+                    "the three LEDs stand in a line, so the cells cannot see all six coordinates; set "
+                )?;
+                write!(f, "led_2_deg and led_3_deg apart from each other and from 0")
             }
             Self::TooStiff { steps_per_ms, limit } => {
                 write!(

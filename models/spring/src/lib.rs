@@ -27,6 +27,8 @@ pub mod preset;
 pub mod quartic;
 pub mod response;
 pub mod rigidity;
+pub mod rod;
+pub mod seat;
 pub mod shape;
 pub mod validity;
 

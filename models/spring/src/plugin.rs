@@ -97,6 +97,7 @@ fn output(response: &Response) -> Output {
     let status = match response.validity {
         Validity::Ok => StepStatus::Ok,
         Validity::Clamped => StepStatus::Clamped,
+        Validity::NotConverged => StepStatus::NotConverged,
         Validity::OutOfDomain => StepStatus::OutOfDomain,
         Validity::InvalidInput => StepStatus::InvalidInput,
     };

@@ -9,6 +9,9 @@ pub enum Validity {
     /// The pose lies beyond the law's own range. The wrench is a smooth continuation, good for staying safe on
     /// the way back, not for numbers.
     Clamped,
+    /// A law that follows an equilibrium from tick to tick is on its way to a new one, over several ticks. The
+    /// wrench is that of the way.
+    NotConverged,
     /// The law says nothing about this pose (plates in one point, lengths beyond reason). The wrench is zero.
     OutOfDomain,
     /// The pose holds NaN, infinity or no unit quaternion. The wrench is zero.

@@ -108,9 +108,11 @@ impl Body {
     /// Kinetic energy of the flotor and its potential energy above home. Real-time: bounded, no allocation.
     pub(super) fn energy(&self, motion: &Motion) -> MechanicalEnergy {
         let (centre_m, spin) = (self.flotor.centre_of_mass_m, motion.spin_rad_per_s);
-        let attitude = DMat3::from_quat(motion.orientation);
-        let velocity = motion.velocity_m_per_s + attitude * spin.cross(centre_m);
-        let height_m = motion.position_m.z + (attitude * centre_m - centre_m).z;
+        let mut velocity = motion.velocity_m_per_s;
+        if spin != DVec3::ZERO {
+            velocity += motion.orientation * spin.cross(centre_m);
+        }
+        let height_m = motion.position_m.z + (motion.orientation * centre_m - centre_m).z;
         MechanicalEnergy {
             kinetic_j: 0.5 * self.flotor.mass_kg * velocity.length_squared()
                 + 0.5 * spin.dot(self.flotor.inertia_kg_m2 * spin),

@@ -6,20 +6,17 @@
 use super::body::Body;
 use super::motion::{Contact, Motion};
 use super::step::Step;
-use super::translation::{Gramian, MAX_STEP_TIMES_RATE, Response};
+use super::tableau::{END, NODES};
+use super::translation::{Gramian, MAX_STEP_TIMES_RATE, Oscillator, Response};
 use super::{MAX_PIECE_NS, Wrench};
 use crate::ledger::Work;
 use crate::validation::InvalidParameter;
 use flotor_hal::glam::DVec3;
 
-/// Longest step of a turning flotor times the fastest rate of rotation (pure number). The energy books of a
-/// hand that grips the flotor askew then close to 3e-10 of what the hand's spring held.
-const MAX_ROTATION_STEP: f64 = 0.025;
-
-/// Longest step of a turning flotor times the fastest rate of translation, where the two are coupled (pure
-/// number). The energy books of a firm hand that grips the flotor askew then close to 1e-9 of what the hand's
-/// springs held.
-const MAX_COUPLED_STEP: f64 = 0.017;
+/// Longest step of a turning flotor times the fastest rate of its rotation and, where the two are coupled, of
+/// its translation (pure number). The energy books of a firm hand that grips the flotor askew then close to
+/// 1e-10 of what the hand's springs held.
+const MAX_TURNING_STEP: f64 = 0.1;
 
 /// Most steps a piece is cut into.
 const MAX_STEPS: u32 = 128;
@@ -42,18 +39,27 @@ struct Table {
     turning: Grid,
 }
 
-/// Equal steps, and the oscillator's response over half a step and a step.
+/// Equal steps, and what the oscillator does in one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
     steps: u32,
     /// Length of a step, s.
     pub(super) step_s: f64,
-    /// Response after half a step.
-    pub(super) half: Response,
-    /// Response after a step.
-    pub(super) full: Response,
+    /// When the Runge-Kutta method looks.
+    nodes: [Node; NODES.len()],
     /// Integral of velocity squared over a step.
     pub(super) gramian: Gramian,
+}
+
+/// A time during a step, with the response of the oscillator from the start to it and back.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    /// Time since the start of the step, s.
+    pub(super) time_s: f64,
+    /// Response after that time.
+    pub(super) later: Response,
+    /// Response after the opposite of that time.
+    pub(super) earlier: Response,
 }
 
 impl Scheme {
@@ -89,17 +95,18 @@ impl Scheme {
             return (*from, Work::default());
         }
         let (body, table) = self.prepared(piece_ns);
-        let (motion, work) = table
-            .straight
-            .march(from, contact, |contact, motion| {
-                Step::new(body, &table.straight, coils, contact, motion).straight()
-            })
-            .or_else(|| {
-                table.turning.march(from, contact, |contact, motion| {
+        let straight = table.straight.march(from, contact, |contact, motion| {
+            Step::new(body, &table.straight, coils, contact, motion).straight()
+        });
+        let (motion, work) = match straight {
+            Some(done) => done,
+            None => table
+                .turning
+                .march(from, contact, |contact, motion| {
                     Some(Step::new(body, &table.turning, coils, contact, motion).turning())
                 })
-            })
-            .unwrap_or((*from, Work::default()));
+                .unwrap_or((*from, Work::default())),
+        };
         (motion.settled(), work)
     }
 
@@ -136,10 +143,21 @@ impl Grid {
         Self {
             steps,
             step_s,
-            half: body.oscillator.response(0.5 * step_s),
-            full: body.oscillator.response(step_s),
+            nodes: NODES.map(|share| Node::new(&body.oscillator, share * step_s)),
             gramian: body.oscillator.gramian(step_s),
         }
+    }
+
+    /// Number `index` of the nodes; the end of the step beyond them.
+    #[inline]
+    pub(super) fn node(&self, index: usize) -> &Node {
+        &self.nodes[index.min(END)]
+    }
+
+    /// The end of the step.
+    #[inline]
+    pub(super) fn end(&self) -> &Node {
+        &self.nodes[END]
     }
 
     /// Takes all steps of the grid, or gives up where `step` does. Real-time: bounded, no allocation.
@@ -150,14 +168,20 @@ impl Grid {
         mut contact: Contact,
         step: impl Fn(&Contact, &Motion) -> Option<(Motion, Work)>,
     ) -> Option<(Motion, Work)> {
-        let (mut motion, mut work) = (*from, Work::default());
-        for _ in 0..self.steps {
+        let (mut motion, mut work) = step(&contact, from)?;
+        for _ in 1..self.steps {
+            contact = contact.later(self.step_s);
             let (next, done) = step(&contact, &motion)?;
             motion = next;
             work += done;
-            contact = contact.later(self.step_s);
         }
         Some((motion, work))
+    }
+}
+
+impl Node {
+    fn new(oscillator: &Oscillator, time_s: f64) -> Self {
+        Self { time_s, later: oscillator.response(time_s), earlier: oscillator.response(-time_s) }
     }
 }
 
@@ -170,8 +194,7 @@ fn straight_steps(body: &Body, piece_ns: u64) -> f64 {
 fn turning_steps(body: &Body, piece_ns: u64) -> f64 {
     let coupled = body.centre_of_mass_m != DVec3::ZERO;
     let coupled_rate_per_s = if coupled { body.oscillator.rate_per_s() } else { 0.0 };
-    let rotation = body.rotation_rate_per_s / MAX_ROTATION_STEP;
-    rotation.max(coupled_rate_per_s / MAX_COUPLED_STEP) * seconds(piece_ns)
+    body.rotation_rate_per_s.max(coupled_rate_per_s) * seconds(piece_ns) / MAX_TURNING_STEP
 }
 
 fn seconds(time_ns: u64) -> f64 {

@@ -36,10 +36,13 @@ pub struct Metadata {
 pub fn read_metadata(path: &Path) -> Result<Metadata, LoadError> {
     let unreadable = |cause| LoadError::Unreadable { path: path.into(), cause };
     let file = std::fs::File::open(path).map_err(unreadable)?;
-    let length = file.metadata().map_err(unreadable)?.len();
+    let attributes = file.metadata().map_err(unreadable)?;
+    if attributes.is_dir() {
+        return Err(unreadable(std::io::ErrorKind::IsADirectory.into()));
+    }
     // Reads headers and one section: a folder of large libraries is listed in a millisecond.
     let cache = ReadCache::new(file);
-    parse(path, &cache, length)
+    parse(path, &cache, attributes.len())
 }
 
 impl Metadata {

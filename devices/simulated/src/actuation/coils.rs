@@ -1,0 +1,143 @@
+//! The six coils: where they sit, which wrench a set of currents makes, which currents a wrench needs.
+//!
+//! The published descriptions give force limits per axis but no coil positions. This geometry is synthetic
+//! and meets those limits (55 to 140 N, 6.3 to 12.2 N·m): on a hemisphere of 115 mm radius, ring A holds three
+//! coils 65 degrees from the bottom pole that push along the meridian, ring B three at 45 degrees that push
+//! along the parallel, each ring every 120 degrees. A current of 3.5 A pushes with 51.5 N. The coils move by a
+//! tenth of the radius at most, so their directions are taken as at home.
+
+use crate::linear::{Matrix6, Vector6, inverse, product};
+use crate::plant::Wrench;
+use crate::validation::{Domain, InvalidParameter, number};
+use flotor_hal::glam::DVec3;
+use std::f64::consts::PI;
+
+/// Number of coils.
+pub const COILS: usize = 6;
+
+/// Currents of all coils, A; ring A first.
+pub type Currents = [f64; COILS];
+
+/// Most a coil carries, A (public interface of the device: current limits of ±3.5 A).
+pub const CURRENT_LIMIT_A: f64 = 3.5;
+
+/// Where the coils sit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CoilGeometry {
+    /// Radius of the hemisphere, m.
+    pub radius_m: f64,
+    /// Angle of ring A from the bottom pole, rad.
+    pub meridian_ring_rad: f64,
+    /// Angle of ring B from the bottom pole, rad.
+    pub parallel_ring_rad: f64,
+    /// Force of a coil at [`CURRENT_LIMIT_A`], N.
+    pub coil_force_n: f64,
+}
+
+impl CoilGeometry {
+    /// The geometry of the module's description.
+    pub const MAGLEV: Self = Self {
+        radius_m: 0.115,
+        meridian_ring_rad: 65.0 * PI / 180.0,
+        parallel_ring_rad: 45.0 * PI / 180.0,
+        coil_force_n: 51.5,
+    };
+
+    /// Position from the origin of the flotor frame (m) and direction of the force of each coil.
+    fn places(&self) -> [(DVec3, DVec3); COILS] {
+        let place = |index: usize| {
+            let azimuth = (index % 3) as f64 * (2.0 * PI / 3.0);
+            let (sin_azimuth, cos_azimuth) = azimuth.sin_cos();
+            let along_meridian = index < 3;
+            let angle = if along_meridian { self.meridian_ring_rad } else { self.parallel_ring_rad };
+            let (sin, cos) = angle.sin_cos();
+            let position = self.radius_m * DVec3::new(sin * cos_azimuth, sin * sin_azimuth, -cos);
+            let direction = if along_meridian {
+                DVec3::new(cos * cos_azimuth, cos * sin_azimuth, sin)
+            } else {
+                DVec3::new(-sin_azimuth, cos_azimuth, 0.0)
+            };
+            (position, direction)
+        };
+        [0, 1, 2, 3, 4, 5].map(place)
+    }
+}
+
+/// The coils as two matrices between currents and wrenches about the origin of the flotor frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Coils {
+    /// N and N·m per A: a column per coil.
+    wrench_of: Matrix6,
+    /// A per N and N·m.
+    currents_of: Matrix6,
+}
+
+impl Coils {
+    /// Prepares both matrices. Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// If a number is not physical, or the six coils cannot push in all six directions.
+    pub fn new(geometry: &CoilGeometry) -> Result<Self, InvalidParameter> {
+        number("coil_radius_mm", geometry.radius_m, Domain::Positive)?;
+        number("coil_force_n", geometry.coil_force_n, Domain::Positive)?;
+        number("coil_ring_a_deg", geometry.meridian_ring_rad, Domain::Finite)?;
+        number("coil_ring_b_deg", geometry.parallel_ring_rad, Domain::Finite)?;
+        let force_n_per_a = geometry.coil_force_n / CURRENT_LIMIT_A;
+        let mut wrench_of = [[0.0; COILS]; 6];
+        // Torques over the radius are forces: rows of one size, so that dependence is told from smallness.
+        let mut scaled = wrench_of;
+        for (coil, (position, direction)) in geometry.places().into_iter().enumerate() {
+            let force = direction * force_n_per_a;
+            let torque = position.cross(force);
+            let column = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
+            for (row, entry) in column.into_iter().enumerate() {
+                wrench_of[row][coil] = entry;
+                scaled[row][coil] = if row < 3 { entry } else { entry / geometry.radius_m };
+            }
+        }
+        let mut currents_of = inverse(&scaled).ok_or(InvalidParameter::DependentCoils)?;
+        for row in &mut currents_of {
+            row.iter_mut().skip(3).for_each(|entry| *entry /= geometry.radius_m);
+        }
+        Ok(Self { wrench_of, currents_of })
+    }
+
+    /// The currents for a wrench, scaled down together to [`CURRENT_LIMIT_A`], and the share of the wrench that
+    /// leaves (1 within the limit). Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn currents(&self, wrench: &Wrench) -> (Currents, f64) {
+        let asked_a = product(&self.currents_of, &six(wrench));
+        let largest_a = asked_a.iter().fold(0.0_f64, |largest, current| largest.max(current.abs()));
+        if largest_a <= CURRENT_LIMIT_A {
+            (asked_a, 1.0)
+        } else {
+            let share = CURRENT_LIMIT_A / largest_a;
+            (asked_a.map(|current| current * share), share)
+        }
+    }
+
+    /// The wrench a set of currents (A) makes in an even field. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn wrench(&self, currents_a: &Currents) -> Wrench {
+        let [fx, fy, fz, tx, ty, tz] = product(&self.wrench_of, currents_a);
+        Wrench { force_n: DVec3::new(fx, fy, fz), torque_nm: DVec3::new(tx, ty, tz) }
+    }
+
+    /// Largest force and torque along one axis alone, N and N·m. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn pure_axis_limits(&self) -> Wrench {
+        let limit = |axis: usize| {
+            let largest = self.currents_of.iter().fold(0.0_f64, |largest, row| largest.max(row[axis].abs()));
+            CURRENT_LIMIT_A / largest
+        };
+        Wrench {
+            force_n: DVec3::new(limit(0), limit(1), limit(2)),
+            torque_nm: DVec3::new(limit(3), limit(4), limit(5)),
+        }
+    }
+}
+
+fn six(wrench: &Wrench) -> Vector6 {
+    let Wrench { force_n: f, torque_nm: t } = wrench;
+    [f.x, f.y, f.z, t.x, t.y, t.z]
+}

@@ -1,0 +1,134 @@
+//! Faults on purpose: what breaks on a real machine, at a set time or at random.
+//!
+//! Code that drives a device is good if it survives these. One kind of fault is chosen per run; it strikes in
+//! *episodes*, one at a set time, or any number at random with a set rate, each of a set length. The random
+//! ones come from the run's seed: the same run has the same faults.
+
+use crate::noise::{Noise, Stream};
+use crate::validation::{Check, Domain, InvalidParameter, number};
+
+/// What breaks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FaultKind {
+    /// The cells lose the light spots.
+    SensorLoss,
+    /// Samples arrive a tick late.
+    LateSample,
+    /// The last sample comes again, called new.
+    DuplicateSample,
+    /// No sample comes; the old one stays and is called old.
+    DroppedSample,
+    /// One coordinate (0 to 5: x, y, z and the rotations) stays where it was.
+    StuckAxis(usize),
+    /// One coil (0 to 5) does not conduct.
+    CoilOpen(usize),
+    /// The device says that a coil is too hot.
+    OverTemperature,
+    /// Somebody pulls the cable: no sample, no force.
+    CablePull,
+    /// The device's clock stutters: samples are taken up to half a period early.
+    ClockJitter,
+}
+
+/// What breaks, and when.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FaultPlan {
+    /// What breaks.
+    pub kind: FaultKind,
+    /// Start of the one planned episode, ns.
+    pub start_ns: u64,
+    /// Length of every episode, ns.
+    pub duration_ns: u64,
+    /// Mean number of random episodes a second; the planned one is left out if it is not zero.
+    pub rate_per_s: f64,
+}
+
+impl FaultPlan {
+    fn check(&self) -> Check {
+        number("fault_rate_per_s", self.rate_per_s, Domain::NotNegative)
+    }
+}
+
+/// Says tick by tick what is broken.
+#[derive(Clone, Debug)]
+pub struct Faults {
+    plan: Option<FaultPlan>,
+    noise: Noise,
+    /// End of the random episode under way, ns.
+    until_ns: u64,
+}
+
+impl Faults {
+    /// At the start of a run. Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// If the plan holds a number that is not physical.
+    pub fn new(plan: Option<FaultPlan>, seed: u64) -> Result<Self, InvalidParameter> {
+        plan.map_or(Ok(()), |plan| plan.check())?;
+        Ok(Self { plan, noise: Noise::new(seed, Stream::Faults), until_ns: 0 })
+    }
+
+    /// What is broken now, `dt_s` (s) after the last time this was asked. Real-time: bounded, no allocation.
+    pub fn at(&mut self, time_ns: u64, dt_s: f64) -> Option<FaultKind> {
+        let FaultPlan { kind, start_ns, duration_ns, rate_per_s } = self.plan?;
+        let active = if rate_per_s > 0.0 {
+            // At least one episode in dt_s, if they come independently of each other.
+            let chance = -(-rate_per_s * dt_s).exp_m1();
+            if self.noise.uniform() < chance {
+                self.until_ns = time_ns.saturating_add(duration_ns);
+            }
+            time_ns < self.until_ns
+        } else {
+            time_ns >= start_ns && time_ns - start_ns < duration_ns
+        };
+        active.then_some(kind)
+    }
+
+    /// How early a stuttering clock takes this sample, as a share (0 to 1/2) of the period. Real-time: bounded,
+    /// no allocation.
+    pub fn jitter(&mut self) -> f64 {
+        0.5 * self.noise.uniform()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TICK_NS: u64 = 1_000_000;
+
+    fn broken_ticks(plan: FaultPlan, seed: u64, ticks: u64) -> Vec<u64> {
+        let mut faults = Faults::new(Some(plan), seed).expect("a sound plan");
+        (0..ticks).filter(|tick| faults.at(tick * TICK_NS, 1.0e-3).is_some()).collect()
+    }
+
+    #[test]
+    fn a_planned_episode_starts_and_ends_on_time() {
+        let plan = FaultPlan {
+            kind: FaultKind::SensorLoss,
+            start_ns: 5 * TICK_NS,
+            duration_ns: 3 * TICK_NS,
+            rate_per_s: 0.0,
+        };
+        assert_eq!(broken_ticks(plan, 0, 20), [5, 6, 7]);
+    }
+
+    #[test]
+    fn random_episodes_come_at_their_rate_and_repeat_with_the_seed() {
+        let plan =
+            FaultPlan { kind: FaultKind::DroppedSample, start_ns: 0, duration_ns: TICK_NS, rate_per_s: 20.0 };
+        let ticks = 100_000;
+        let broken = broken_ticks(plan, 1, ticks);
+        // 1 - e^-0.02 of the ticks, four standard errors.
+        let expected = 0.0198 * ticks as f64;
+        assert!((broken.len() as f64 - expected).abs() < 4.0 * expected.sqrt(), "{}", broken.len());
+        assert_eq!(broken, broken_ticks(plan, 1, ticks));
+        assert_ne!(broken, broken_ticks(plan, 2, ticks));
+    }
+
+    #[test]
+    fn without_a_plan_nothing_breaks() {
+        let mut faults = Faults::new(None, 1).expect("no plan");
+        assert!((0..1000).all(|tick| faults.at(tick * TICK_NS, 1.0e-3).is_none()));
+    }
+}

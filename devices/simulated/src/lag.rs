@@ -1,0 +1,56 @@
+//! First-order lags: what is left of a difference after a while.
+
+/// Anything that closes a gap at a rate in proportion to it: an amplifier, a warming coil, a low-pass.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lag {
+    lag_s: f64,
+    /// The last stretch of time, s, and the share of a gap closed in it: ticks are mostly alike.
+    dt_s: f64,
+    closed: f64,
+}
+
+impl Lag {
+    /// Closes two thirds of a gap in `lag_s` (s, above zero). Real-time: bounded, no allocation.
+    pub(crate) fn new(lag_s: f64) -> Self {
+        Self { lag_s, dt_s: 0.0, closed: 0.0 }
+    }
+
+    /// A low-pass whose corner is at `bandwidth_hz` (Hz, above zero). Real-time: bounded, no allocation.
+    pub(crate) fn of_bandwidth(bandwidth_hz: f64) -> Self {
+        Self::new(1.0 / (std::f64::consts::TAU * bandwidth_hz))
+    }
+
+    /// Share of a gap that is closed after `dt_s` (s), `1 - e^(-dt / lag)`, without cancellation for short times.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[inline]
+    pub(crate) fn closed(&mut self, dt_s: f64) -> f64 {
+        if dt_s != self.dt_s {
+            (self.dt_s, self.closed) = (dt_s, -(-dt_s / self.lag_s).exp_m1());
+        }
+        self.closed
+    }
+
+    /// Share of a gap that is open on average during `dt_s` (s). Real-time: bounded, no allocation.
+    #[inline]
+    pub(crate) fn mean_open(&mut self, dt_s: f64) -> f64 {
+        if dt_s > 0.0 { self.lag_s / dt_s * self.closed(dt_s) } else { 1.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gap_closes_exponentially_whatever_time_was_asked_before() {
+        let mut lag = Lag::new(2.0e-3);
+        for dt_s in [1.0e-3, 2.0e-3, 1.0e-3, 0.0, 1.0e-3] {
+            assert_eq!(lag.closed(dt_s), -(-dt_s / 2.0e-3_f64).exp_m1());
+        }
+        // The integral of e^(-t / lag) over dt, per dt.
+        let expected = 2.0 * (1.0 - (-0.5_f64).exp());
+        assert!((lag.mean_open(1.0e-3) - expected).abs() < 1.0e-15);
+        assert_eq!(lag.mean_open(0.0), 1.0);
+    }
+}

@@ -1,0 +1,163 @@
+//! Preset `full`: the machine between the controller and the simulated flotor.
+//!
+//! One cycle: the wrench of the last write goes through amplifiers, coils and field and moves the flotor for the
+//! time of the tick; then the cells take a sample, and the one that has come through the latency is handed out.
+//! Faults reach in where they would on the real thing. The flotor goes on moving whatever the controller is
+//! told.
+
+use crate::actuation::coils::Coils;
+use crate::actuation::{Actuation, ActuationParameters, Wiring};
+use crate::faults::{FaultKind, FaultPlan, Faults};
+use crate::hand::Pose;
+use crate::plant::{State, Wrench};
+use crate::sensing::{Sample, Sensing, SensingParameters};
+use crate::simulation::Simulation;
+use crate::validation::InvalidParameter;
+use crate::workspace::SensorRange;
+use flotor_hal::{Cycle, DeviceState, Fault, Tick, Twist, orientation_from_rotation_vector, rotation_vector};
+
+/// What a machine is built from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MachineParameters {
+    /// Amplifiers, coils, field, heat.
+    pub actuation: ActuationParameters,
+    /// Light spots, cells, pose finder, velocity.
+    pub sensing: SensingParameters,
+    /// What breaks, if anything.
+    pub fault: Option<FaultPlan>,
+}
+
+impl MachineParameters {
+    /// The machine as far as it is published, with nothing broken.
+    pub const MAGLEV: Self =
+        Self { actuation: ActuationParameters::MAGLEV, sensing: SensingParameters::MAGLEV, fault: None };
+
+    /// Largest force and torque along one axis alone, N and N·m. Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// If the coils cannot push in all six directions.
+    pub fn limits(&self) -> Result<Wrench, InvalidParameter> {
+        Ok(Coils::new(&self.actuation.geometry)?.pure_axis_limits())
+    }
+}
+
+/// A machine in operation.
+#[derive(Clone, Debug)]
+pub struct Machine {
+    actuation: Actuation,
+    sensing: Sensing,
+    faults: Faults,
+    /// Where the stuck coordinate stays.
+    stuck_at: Option<f64>,
+}
+
+impl Machine {
+    /// A cold machine that sees the flotor in `start`. Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// If a number is not physical, the coils depend on each other, or the diodes stand in a line.
+    pub fn new(parameters: &MachineParameters, start: &State, seed: u64) -> Result<Self, InvalidParameter> {
+        let pose = Pose { position_m: start.position_m, orientation: start.orientation };
+        Ok(Self {
+            actuation: Actuation::new(&parameters.actuation)?,
+            sensing: Sensing::new(&parameters.sensing, seed, &pose)?,
+            faults: Faults::new(parameters.fault, seed)?,
+            stuck_at: None,
+        })
+    }
+
+    /// Moves the flotor for the time of `tick` under the `commanded` wrench (finite) and takes a sample into
+    /// `state`. Real-time: bounded, no allocation.
+    pub fn cycle(
+        &mut self,
+        simulation: &mut Simulation,
+        tick: &Tick,
+        commanded: &Wrench,
+        state: &mut DeviceState,
+    ) -> Cycle {
+        let dt_s = tick.dt_ns as f64 * 1.0e-9;
+        let fault = self.faults.at(tick.time_ns, dt_s);
+        let commanded = if fault == Some(FaultKind::CablePull) { &Wrench::ZERO } else { commanded };
+        let wiring = match fault {
+            Some(FaultKind::CoilOpen(coil)) => Wiring::Open(coil),
+            _ => Wiring::Intact,
+        };
+        let delivered = self.actuation.drive(commanded, wiring, simulation.state().position_m.z, dt_s);
+        let stopped = self.move_and_sample(simulation, tick, delivered, fault);
+        state.delivered = flotor_hal::Wrench::new(delivered.force_n, delivered.torque_nm);
+
+        match fault {
+            Some(FaultKind::CablePull) => return Cycle::Fault(Fault::Disconnected),
+            Some(FaultKind::OverTemperature) => return Cycle::Fault(Fault::OverTemperature),
+            Some(FaultKind::SensorLoss) => return Cycle::Fault(Fault::SensorOutOfRange),
+            Some(FaultKind::DroppedSample) => return Cycle::Stale,
+            Some(FaultKind::DuplicateSample) => return Cycle::Fresh,
+            _ if stopped => return Cycle::Fault(Fault::SensorOutOfRange),
+            _ => {}
+        }
+        if let Some(fault) = self.actuation.fault() {
+            return Cycle::Fault(fault);
+        }
+        let late_ticks = usize::from(fault == Some(FaultKind::LateSample));
+        let Sample { taken_ns, pose, velocity } = self.sensing.arrived(late_ticks);
+        let Some(mut pose) = pose else { return Cycle::Fault(Fault::SensorOutOfRange) };
+        match fault {
+            Some(FaultKind::StuckAxis(axis)) => self.hold(axis, &mut pose),
+            _ => self.stuck_at = None,
+        }
+        state.pose = flotor_hal::Pose::new(pose.position_m, pose.orientation);
+        state.twist = Twist::new(velocity.linear_m_per_s, velocity.angular_rad_per_s);
+        state.sampled_ns = taken_ns;
+        match SensorRange::of(pose.position_m, pose.orientation) {
+            SensorRange::Inside => Cycle::Fresh,
+            SensorRange::Outside => Cycle::Fault(Fault::SensorOutOfRange),
+        }
+    }
+
+    /// Advances the simulation by the tick and samples at its end, or earlier if the clock stutters; true if the
+    /// motion left every physical range.
+    fn move_and_sample(
+        &mut self,
+        simulation: &mut Simulation,
+        tick: &Tick,
+        delivered: Wrench,
+        fault: Option<FaultKind>,
+    ) -> bool {
+        let early_ns = match fault {
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a share of the tick
+            Some(FaultKind::ClockJitter) => (self.faults.jitter() * tick.dt_ns as f64) as u64,
+            _ => 0,
+        };
+        let before = simulation.advance(tick.dt_ns - early_ns, delivered);
+        let taken_ns = tick.time_ns.saturating_sub(early_ns);
+        self.sensing.sample(&simulation.state(), taken_ns, tick.dt_ns as f64 * 1.0e-9);
+        let after = simulation.advance(early_ns, delivered);
+        before.stopped || after.stopped
+    }
+
+    /// Sets one coordinate of a pose to what it was when it got stuck.
+    fn hold(&mut self, axis: usize, pose: &mut Pose) {
+        let mut rotation_rad = rotation_vector(pose.orientation);
+        let coordinate = match axis {
+            0 => &mut pose.position_m.x,
+            1 => &mut pose.position_m.y,
+            2 => &mut pose.position_m.z,
+            3 => &mut rotation_rad.x,
+            4 => &mut rotation_rad.y,
+            _ => &mut rotation_rad.z,
+        };
+        *coordinate = *self.stuck_at.get_or_insert(*coordinate);
+        if axis >= 3 {
+            pose.orientation = orientation_from_rotation_vector(rotation_rad);
+        }
+    }
+
+    /// Amplifiers and coils. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn actuation(&self) -> &Actuation {
+        &self.actuation
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,285 @@
+//! The schema: every parameter with unit, range, default and a sentence.
+
+use crate::plant::FlotorParameters;
+use flotor_hal::Parameter;
+use flotor_hal::abi::Str;
+
+/// How much of the machine is simulated.
+const PRESETS: [Str; 2] = [Str::new("plain"), Str::new("full")];
+
+/// Whose flotor.
+const FLOTORS: [Str; 2] = [Str::new("thesis"), Str::new("utah")];
+
+/// What the hand does.
+const HANDS: [Str; 5] =
+    [Str::new("oscillate"), Str::new("press"), Str::new("release"), Str::new("hold"), Str::new("open")];
+
+/// How the hand holds.
+const GRIPS: [Str; 2] = [Str::new("firm"), Str::new("relaxed")];
+
+/// How velocity is estimated.
+const ESTIMATORS: [Str; 3] = [Str::new("low-pass"), Str::new("difference"), Str::new("kalman")];
+
+/// What breaks.
+const FAULTS: [Str; 10] = [
+    Str::new("none"),
+    Str::new("sensor-loss"),
+    Str::new("late-sample"),
+    Str::new("duplicate-sample"),
+    Str::new("dropped-sample"),
+    Str::new("stuck-axis"),
+    Str::new("coil-open"),
+    Str::new("over-temperature"),
+    Str::new("cable-pull"),
+    Str::new("clock-jitter"),
+];
+
+const DEMO: FlotorParameters = FlotorParameters::THESIS;
+
+/// The schema. Defaults are those of preset `plain`, flotor `thesis`, an oscillating firm hand.
+pub(crate) const SCHEMA: &[Parameter] = &[
+    Parameter::choice(
+        "preset",
+        &PRESETS,
+        0,
+        "How much of the machine is simulated: plain is rigid body, gravity, drag and hand; full adds coils and sensors",
+    ),
+    Parameter::choice(
+        "flotor",
+        &FLOTORS,
+        0,
+        "Whose flotor: mass and centre of mass of the thesis or of the Utah device",
+    ),
+    Parameter::real("mass_kg", "kg", 0.01, 10.0, DEMO.mass_kg, "Mass of the flotor"),
+    Parameter::real(
+        "inertia_x_kg_m2",
+        "kg m²",
+        1.0e-6,
+        1.0,
+        DEMO.inertia_kg_m2.x,
+        "Moment of inertia about the centre of mass, x",
+    ),
+    Parameter::real(
+        "inertia_y_kg_m2",
+        "kg m²",
+        1.0e-6,
+        1.0,
+        DEMO.inertia_kg_m2.y,
+        "Moment of inertia about the centre of mass, y",
+    ),
+    Parameter::real(
+        "inertia_z_kg_m2",
+        "kg m²",
+        1.0e-6,
+        1.0,
+        DEMO.inertia_kg_m2.z,
+        "Moment of inertia about the centre of mass, z",
+    ),
+    Parameter::real("com_x_mm", "mm", -100.0, 100.0, 0.0, "Centre of mass in the flotor frame, x"),
+    Parameter::real("com_y_mm", "mm", -100.0, 100.0, 0.0, "Centre of mass in the flotor frame, y"),
+    Parameter::real("com_z_mm", "mm", -100.0, 100.0, -31.7, "Centre of mass in the flotor frame, z"),
+    Parameter::real("gravity_m_per_s2", "m/s²", 0.0, 30.0, DEMO.gravity_m_per_s2, "Gravity, downwards"),
+    Parameter::real(
+        "feedforward_n",
+        "N",
+        -50.0,
+        50.0,
+        0.58 * DEMO.gravity_m_per_s2,
+        "Upward force at the centre of mass that compensates gravity; unless set, exactly the weight",
+    ),
+    Parameter::real(
+        "damping_ns_per_m",
+        "N s/m",
+        0.0,
+        100.0,
+        DEMO.drag.translational_ns_per_m,
+        "Eddy-current drag on translation",
+    ),
+    Parameter::real(
+        "damping_nms_per_rad",
+        "N m s/rad",
+        0.0,
+        10.0,
+        DEMO.drag.rotational_nms_per_rad,
+        "Eddy-current drag on rotation",
+    ),
+    Parameter::choice("hand", &HANDS, 0, "What the hand does"),
+    Parameter::choice("hand_grip", &GRIPS, 0, "How the hand holds: impedance from the literature"),
+    Parameter::real(
+        "hand_stiffness_n_per_m",
+        "N/m",
+        0.0,
+        20_000.0,
+        2000.0,
+        "Stiffness of the hand; unless set, that of the grip",
+    ),
+    Parameter::real(
+        "hand_damping_ns_per_m",
+        "N s/m",
+        0.0,
+        1000.0,
+        70.0,
+        "Damping of the hand; unless set, that of the grip",
+    ),
+    Parameter::real(
+        "hand_mass_kg",
+        "kg",
+        0.0,
+        5.0,
+        0.5,
+        "Mass of the hand that moves with the handle; unless set, that of the grip",
+    ),
+    Parameter::real(
+        "hand_centre_mm",
+        "mm",
+        -12.0,
+        12.0,
+        -4.0,
+        "Oscillate: middle of the intended movement (negative is down)",
+    ),
+    Parameter::real(
+        "hand_amplitude_mm",
+        "mm",
+        0.0,
+        12.0,
+        6.0,
+        "Oscillate: half the distance between the intended turning points",
+    ),
+    Parameter::real("hand_frequency_hz", "Hz", 0.0, 20.0, 1.5, "Oscillate: cycles per second"),
+    Parameter::real(
+        "hand_depth_mm",
+        "mm",
+        -12.0,
+        12.0,
+        4.0,
+        "Press, hold, release: intended depth below home",
+    ),
+    Parameter::real("hand_rise_s", "s", 0.01, 60.0, 1.0, "Oscillate, press: time until the full movement"),
+    Parameter::real("hand_release_s", "s", 0.0, 3600.0, 1.0, "Release: when the hand opens"),
+    Parameter::real("start_x_mm", "mm", -12.0, 12.0, 0.0, "Where the flotor starts, x"),
+    Parameter::real("start_y_mm", "mm", -12.0, 12.0, 0.0, "Where the flotor starts, y"),
+    Parameter::real("start_z_mm", "mm", -12.0, 12.0, 0.0, "Where the flotor starts, z"),
+    Parameter::real("coil_radius_mm", "mm", 10.0, 500.0, 115.0, "Full: radius of the hemisphere of coils"),
+    Parameter::real(
+        "coil_ring_a_deg",
+        "°",
+        0.0,
+        90.0,
+        65.0,
+        "Full: ring A (force along the meridian) from the bottom",
+    ),
+    Parameter::real(
+        "coil_ring_b_deg",
+        "°",
+        0.0,
+        90.0,
+        45.0,
+        "Full: ring B (force along the parallel) from the bottom",
+    ),
+    Parameter::real(
+        "coil_force_n",
+        "N",
+        1.0,
+        1000.0,
+        51.5,
+        "Full: force of a coil at its largest current, 3.5 A",
+    ),
+    Parameter::real("amplifier_bandwidth_hz", "Hz", 1.0, 1.0e6, 2000.0, "Full: bandwidth of the amplifiers"),
+    Parameter::real(
+        "field_error_percent",
+        "%",
+        0.0,
+        50.0,
+        10.87,
+        "Full: delivered over commanded vertical force, peak to peak over ±7 mm",
+    ),
+    Parameter::real("coil_ambient_c", "°C", -40.0, 300.0, 20.0, "Full: temperature around the coils"),
+    Parameter::real(
+        "coil_rise_k_per_a2",
+        "K/A²",
+        0.0,
+        1000.0,
+        40.0,
+        "Full: how much a coil heats up in the end",
+    ),
+    Parameter::real("coil_lag_s", "s", 0.1, 3600.0, 120.0, "Full: how slowly it does"),
+    Parameter::real("led_radius_mm", "mm", 1.0, 120.0, 60.0, "Full: radius of the circle of LEDs"),
+    Parameter::real(
+        "led_2_deg",
+        "°",
+        -360.0,
+        360.0,
+        120.0,
+        "Full: second LED on its circle, seen from the first",
+    ),
+    Parameter::real(
+        "led_3_deg",
+        "°",
+        -360.0,
+        360.0,
+        240.0,
+        "Full: third LED on its circle, seen from the first",
+    ),
+    Parameter::real(
+        "sensor_noise_um",
+        "µm",
+        0.0,
+        100.0,
+        1.0,
+        "Full: noise of each coordinate at the LED, rms",
+    ),
+    Parameter::real(
+        "sensor_resolution_um",
+        "µm",
+        0.0,
+        100.0,
+        2.0,
+        "Full: step of each coordinate at the LED (devices had 2, 5, 10; 0: none)",
+    ),
+    Parameter::real("sensor_edge_percent", "%", 0.0, 20.0, 1.0, "Full: error of a cell at its edge"),
+    Parameter::real(
+        "sensor_bandwidth_hz",
+        "Hz",
+        0.0,
+        1.0e5,
+        0.0,
+        "Full: bandwidth of the cells (0: no limit; the device as a whole has 125)",
+    ),
+    Parameter::real("sensor_latency_ticks", "1", 0.0, 32.0, 1.0, "Full: ticks from a sample to its arrival"),
+    Parameter::choice("velocity", &ESTIMATORS, 0, "Full: how velocity is estimated from the poses"),
+    Parameter::real(
+        "velocity_bandwidth_hz",
+        "Hz",
+        0.1,
+        1.0e4,
+        200.0,
+        "Full: corner of the low-pass estimate",
+    ),
+    Parameter::real(
+        "velocity_acceleration_m_per_s2",
+        "m/s²",
+        1.0e-3,
+        1.0e3,
+        2.0,
+        "Full: acceleration the Kalman estimate expects",
+    ),
+    Parameter::choice("fault", &FAULTS, 0, "Full: what breaks"),
+    Parameter::real("fault_time_s", "s", 0.0, 3600.0, 1.0, "Full: when it breaks"),
+    Parameter::real("fault_duration_s", "s", 0.0, 3600.0, 0.01, "Full: for how long"),
+    Parameter::real(
+        "fault_rate_per_s",
+        "1/s",
+        0.0,
+        1000.0,
+        0.0,
+        "Full: mean number of times a second, at random (0: once, at fault_time_s)",
+    ),
+    Parameter::real(
+        "fault_index",
+        "1",
+        0.0,
+        5.0,
+        0.0,
+        "Full: which axis is stuck (x, y, z, rotations) or coil open",
+    ),
+];

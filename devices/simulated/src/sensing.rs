@@ -1,0 +1,196 @@
+//! From the true motion to the sample the controller sees: light spots, noise, steps, delay, velocity.
+//!
+//! Three light-emitting diodes on the flotor are imaged on three position cells of the frame. Two coordinates
+//! each make six numbers, from which the pose is found by iteration:
+//!
+//! ```text
+//! pose -> light spots -> bandwidth -> edge nonlinearity -> noise -> steps -> pose found -> delay -> velocity
+//! ```
+//!
+//! - [`optics`]: where the diodes are, where their spots fall, and the pose back from six numbers.
+//! - [`velocity`]: three estimates of velocity from a row of poses.
+//!
+//! Nothing of the errors is known to the pose finder, as nothing of them is to the machine's. Positions of
+//! noise and steps are meant at the diode; the lens shrinks them for the cell.
+
+pub mod optics;
+pub mod velocity;
+
+use crate::hand::Pose;
+use crate::lag::Lag;
+use crate::noise::{Noise, Stream};
+use crate::plant::State;
+use crate::validation::{Check, Domain, InvalidParameter, number};
+use flotor_hal::glam::DVec3;
+use optics::{Optics, OpticsGeometry, Spots};
+use velocity::{Estimator, EstimatorKind, Velocity};
+
+/// Longest delay of a sample, ticks.
+pub const MAX_LATENCY_TICKS: usize = 32;
+
+/// What the sensing is built from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensingParameters {
+    /// Where diodes, lenses and cells are.
+    pub geometry: OpticsGeometry,
+    /// Noise of each coordinate, root mean square at the diode, m.
+    pub noise_m: f64,
+    /// Step of the converters, at the diode, m; 0 for none.
+    pub step_m: f64,
+    /// Error of a cell at its edge, as a share of its half width: it grows with the cube of the distance.
+    pub edge_nonlinearity: f64,
+    /// Bandwidth of cells and amplifiers, Hz; 0 for no limit.
+    pub bandwidth_hz: f64,
+    /// Ticks between a sample and its arrival, at most [`MAX_LATENCY_TICKS`].
+    pub latency_ticks: usize,
+    /// How velocity is estimated.
+    pub estimator: EstimatorKind,
+}
+
+impl SensingParameters {
+    /// The commercial device: steps of 2 µm (brochure); noise of 1 µm, edge error of 1 % and one tick of delay
+    /// are usual for lateral-effect cells and a bus, not published. Velocity as the University of Utah's
+    /// control program: a low-pass of 200 Hz.
+    pub const MAGLEV: Self = Self {
+        geometry: OpticsGeometry::MAGLEV,
+        noise_m: 1.0e-6,
+        step_m: 2.0e-6,
+        edge_nonlinearity: 0.01,
+        bandwidth_hz: 0.0,
+        latency_ticks: 1,
+        estimator: EstimatorKind::UTAH,
+    };
+
+    fn check(&self) -> Check {
+        number("sensor_noise_um", self.noise_m, Domain::NotNegative)?;
+        number("sensor_resolution_um", self.step_m, Domain::NotNegative)?;
+        number("sensor_edge_percent", self.edge_nonlinearity, Domain::NotNegative)?;
+        number("sensor_bandwidth_hz", self.bandwidth_hz, Domain::NotNegative)?;
+        self.estimator.check()
+    }
+}
+
+/// What arrives at the controller.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// When it was taken, ns.
+    pub taken_ns: u64,
+    /// The pose found, or nothing if a spot left its cell or the iteration found none.
+    pub pose: Option<Pose>,
+    /// Estimated velocity.
+    pub velocity: Velocity,
+}
+
+/// Cells, converters and pose finder in operation.
+#[derive(Clone, Debug)]
+pub struct Sensing {
+    parameters: SensingParameters,
+    optics: Optics,
+    noise: Noise,
+    estimator: Estimator,
+    /// Where the last pose was found: the next one is near.
+    found: Pose,
+    bandwidth: Option<Lag>,
+    /// Spots after the bandwidth limit; none before the first sample.
+    slow_spots: Option<Spots>,
+    /// The last samples, a ring.
+    samples: [Sample; MAX_LATENCY_TICKS + 1],
+    newest: usize,
+}
+
+impl Sensing {
+    /// Before the first sample, at a pose to start looking from. Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// If a number is not physical or the diodes do not show the pose (they stand in a line).
+    pub fn new(parameters: &SensingParameters, seed: u64, start: &Pose) -> Result<Self, InvalidParameter> {
+        parameters.check()?;
+        let empty = Sample { taken_ns: 0, pose: Some(*start), velocity: Velocity::ZERO };
+        Ok(Self {
+            parameters: *parameters,
+            optics: Optics::new(&parameters.geometry)?,
+            noise: Noise::new(seed, Stream::Sensor),
+            estimator: Estimator::new(parameters.estimator),
+            bandwidth: (parameters.bandwidth_hz > 0.0).then(|| Lag::of_bandwidth(parameters.bandwidth_hz)),
+            found: *start,
+            slow_spots: None,
+            samples: [empty; MAX_LATENCY_TICKS + 1],
+            newest: 0,
+        })
+    }
+
+    /// Takes a sample of the true state, `dt_s` (s) after the previous one. Real-time: bounded, no allocation.
+    pub fn sample(&mut self, state: &State, taken_ns: u64, dt_s: f64) {
+        let truth = Pose { position_m: state.position_m, orientation: state.orientation };
+        let pose = self.measured_spots(&truth, dt_s).and_then(|spots| self.optics.find(&spots, &self.found));
+        let velocity = match &pose {
+            Some(pose) => {
+                self.found = *pose;
+                self.estimator.update(pose, dt_s)
+            }
+            None => self.estimator.restart(),
+        };
+        self.newest = (self.newest + 1) % self.samples.len();
+        if let Some(slot) = self.samples.get_mut(self.newest) {
+            *slot = Sample { taken_ns, pose, velocity };
+        }
+    }
+
+    /// The sample that arrives now: the newest but the latency, and `late_ticks` more. Real-time: bounded, no
+    /// allocation.
+    #[must_use]
+    pub fn arrived(&self, late_ticks: usize) -> Sample {
+        let length = self.samples.len();
+        let age = (self.parameters.latency_ticks + late_ticks).min(length - 1);
+        let index = (self.newest + length - age) % length;
+        self.samples.get(index).copied().unwrap_or(Sample {
+            taken_ns: 0,
+            pose: None,
+            velocity: Velocity::ZERO,
+        })
+    }
+
+    /// The six coordinates as the converters give them; nothing if a spot is beside its cell.
+    fn measured_spots(&mut self, truth: &Pose, dt_s: f64) -> Option<Spots> {
+        let mut spots = self.optics.spots(truth)?;
+        if let Some(bandwidth) = &mut self.bandwidth {
+            let (slow, share) = (self.slow_spots.get_or_insert(spots), bandwidth.closed(dt_s));
+            slow.across_m += (spots.across_m - slow.across_m) * share;
+            slow.up_m += (spots.up_m - slow.up_m) * share;
+            spots = *slow;
+        }
+        if self.parameters.edge_nonlinearity > 0.0 {
+            spots = self.optics.bent(&spots, self.parameters.edge_nonlinearity);
+        }
+        let magnification = self.optics.magnification();
+        if self.parameters.noise_m > 0.0 {
+            let deviation_m = self.parameters.noise_m * magnification;
+            let [[a, b], [c, d], [e, f]] = [0; 3].map(|_| self.noise.normal_pair());
+            spots.across_m += DVec3::new(a, c, e) * deviation_m;
+            spots.up_m += DVec3::new(b, d, f) * deviation_m;
+        }
+        if self.parameters.step_m > 0.0 {
+            let step_m = self.parameters.step_m * magnification;
+            let rounded = |spots: DVec3| (spots / step_m).map(nearest_whole) * step_m;
+            spots = Spots { across_m: rounded(spots.across_m), up_m: rounded(spots.up_m) };
+        }
+        Some(spots)
+    }
+}
+
+/// The nearest whole number, for sizes below 2^51: adding and taking away a number so large that its own steps
+/// are ones rounds in two instructions, where the processor's rounding is not at hand in every build.
+fn nearest_whole(number: f64) -> f64 {
+    const STEPS_OF_ONE: f64 = 1.5 * (1_u64 << 52) as f64;
+    (number + STEPS_OF_ONE) - STEPS_OF_ONE
+}
+
+impl Pose {
+    /// Small rotation from this orientation to `other`, rad, device frame.
+    pub(crate) fn rotation_to(&self, other: &Self) -> DVec3 {
+        flotor_hal::rotation_vector(other.orientation * self.orientation.conjugate())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,287 @@
+//! Diodes, lenses and cells: from a pose to six coordinates of light, and back.
+//!
+//! The published descriptions name three diodes, three lateral-effect cells and an iterative solution, no
+//! dimensions. This layout is synthetic: the diodes stand on a circle of 60 mm radius about the origin of the
+//! flotor frame, each faced by a lens 90 mm farther out that looks inwards along the radius and images it on a
+//! cell 30 mm behind. A diode at `q` (device frame) in front of a lens with radius `e`, tangent `t` and depth
+//! `D = L - q e` makes a spot at
+//!
+//! ```text
+//! u = f (q t) / D,      v = f (q z) / D
+//! ```
+//!
+//! **Back**: Gauss-Newton from the last pose. A small motion (`dx`, rotation `dr` in the device frame) moves a
+//! diode by `dx + dr x (R p)`; the six linearised equations are solved, and again from there. As long as each
+//! step is much shorter than the one before, the equations of an earlier round still do: from one tick to the
+//! next the flotor moves so little that one set serves all rounds. What a step of length `s` after one of
+//! length `r` leaves is about `s s / r`, which says when to end. The iteration cannot run away: it is given a
+//! fixed number of rounds and a region, and says that there is no pose where either ends.
+
+use crate::hand::Pose;
+use crate::validation::{Domain, InvalidParameter, number};
+use flotor_hal::glam::{DMat3, DQuat, DVec3};
+use std::f64::consts::PI;
+
+/// Most rounds of the iteration: from home six find any pose the cells can see.
+const MAX_ROUNDS: usize = 12;
+
+/// Error that is left in the end, m and rad alike.
+const LEFT: f64 = 3.0e-11;
+
+/// The first step counts as if one of this length (m and rad alike) had gone before: the size of the layout.
+const LAYOUT_SIZE: f64 = 60.0e-3;
+
+/// Equations serve as long as each step is shorter than this share of the one before.
+const SHRINKAGE: f64 = 0.02;
+
+/// Farther from home than this (m) there is no flotor: twice the range of motion.
+const REGION_M: f64 = 24.0e-3;
+
+/// More turned than this (half the sine of the angle, 20 degrees) there is none either.
+const REGION_SIN_HALF: f64 = 0.174;
+
+/// Where diodes, lenses and cells are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OpticsGeometry {
+    /// Azimuths of the diodes in the flotor frame, rad.
+    pub diode_azimuths_rad: [f64; 3],
+    /// Radius of the circle they stand on, m.
+    pub diode_radius_m: f64,
+    /// Radius of the circle of the lenses, m.
+    pub lens_radius_m: f64,
+    /// From a lens to its cell, m.
+    pub image_distance_m: f64,
+    /// Half the width of a cell, m.
+    pub cell_half_width_m: f64,
+}
+
+impl OpticsGeometry {
+    /// The layout of the module's description. Cells of 18 mm see every pose of ±12 mm and ±8 degrees.
+    pub const MAGLEV: Self = Self {
+        diode_azimuths_rad: [0.0, 2.0 * PI / 3.0, 4.0 * PI / 3.0],
+        diode_radius_m: 60.0e-3,
+        lens_radius_m: 150.0e-3,
+        image_distance_m: 30.0e-3,
+        cell_half_width_m: 9.0e-3,
+    };
+}
+
+/// Where the spots fall, m: a component of each vector per diode.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spots {
+    /// Along the parallel, `u`.
+    pub across_m: DVec3,
+    /// Upwards, `v`.
+    pub up_m: DVec3,
+}
+
+/// One diode with its lens.
+#[derive(Clone, Copy, Debug)]
+struct Eye {
+    /// Of the diode in the flotor frame, m.
+    diode: DVec3,
+    /// Outwards, and along the parallel; device frame.
+    radius: DVec3,
+    tangent: DVec3,
+}
+
+/// The three of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Optics {
+    geometry: OpticsGeometry,
+    eyes: [Eye; 3],
+}
+
+impl Optics {
+    /// Prepares a layout. Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// If a length is not positive, or the diodes stand in a line: they show no rotation about it.
+    pub fn new(geometry: &OpticsGeometry) -> Result<Self, InvalidParameter> {
+        number("led_radius_mm", geometry.diode_radius_m, Domain::Positive)?;
+        let gap_m = geometry.lens_radius_m - geometry.diode_radius_m - REGION_M;
+        number("gap between LED and lens, m", gap_m, Domain::Positive)?;
+        number("image_distance_m", geometry.image_distance_m, Domain::Positive)?;
+        number("cell_half_width_m", geometry.cell_half_width_m, Domain::Positive)?;
+        for azimuth in geometry.diode_azimuths_rad {
+            number("led_2_deg and led_3_deg", azimuth, Domain::Finite)?;
+        }
+        let eyes = geometry.diode_azimuths_rad.map(|azimuth| {
+            let (sin, cos) = azimuth.sin_cos();
+            let radius = DVec3::new(cos, sin, 0.0);
+            Eye { diode: radius * geometry.diode_radius_m, radius, tangent: DVec3::new(-sin, cos, 0.0) }
+        });
+        let optics = Self { geometry: *geometry, eyes };
+        optics.equations(&Pose::HOME).map(|_| optics).ok_or(InvalidParameter::DiodesInALine)
+    }
+
+    /// Where the spots fall; nothing if one is beside its cell. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn spots(&self, pose: &Pose) -> Option<Spots> {
+        let spots = self.images(pose);
+        let largest_m = spots.across_m.abs().max(spots.up_m.abs()).max_element();
+        let finite = spots.across_m.is_finite() && spots.up_m.is_finite();
+        // Behind its lens a diode would make a spot as well, upside down.
+        let in_front = pose.position_m.length_squared() <= REGION_M * REGION_M;
+        (finite && in_front && largest_m <= self.geometry.cell_half_width_m).then_some(spots)
+    }
+
+    /// Spots as bent cells report them: outwards by `edge` (a share of the half width) at the edge.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn bent(&self, spots: &Spots, edge: f64) -> Spots {
+        let half_m = self.geometry.cell_half_width_m;
+        let square = spots.across_m * spots.across_m + spots.up_m * spots.up_m;
+        let factor = 1.0 + square * (edge / (half_m * half_m));
+        Spots { across_m: spots.across_m * factor, up_m: spots.up_m * factor }
+    }
+
+    /// Spot over diode displacement at home (pure number). Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn magnification(&self) -> f64 {
+        self.geometry.image_distance_m / (self.geometry.lens_radius_m - self.geometry.diode_radius_m)
+    }
+
+    /// The pose that makes these spots (m), looked for from `near`; nothing if there is none in reach.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn find(&self, spots: &Spots, near: &Pose) -> Option<Pose> {
+        let mut pose = *near;
+        let mut previous = LAYOUT_SIZE;
+        let mut known = None;
+        for _ in 0..MAX_ROUNDS {
+            let images = self.images(&pose);
+            let equations = match known {
+                Some(equations) => equations,
+                None => self.equations(&pose)?,
+            };
+            let missing =
+                Spots { across_m: spots.across_m - images.across_m, up_m: spots.up_m - images.up_m };
+            let step = move_by(&mut pose, equations.motion(&missing));
+            // Written so that NaN leaves the region.
+            let inside = pose.position_m.length_squared() <= REGION_M * REGION_M
+                && pose.orientation.xyz().length_squared() <= REGION_SIN_HALF * REGION_SIN_HALF;
+            if !inside {
+                return None;
+            }
+            if step * step <= LEFT * previous {
+                return Some(pose);
+            }
+            known = (step <= SHRINKAGE * previous).then_some(equations);
+            previous = step;
+        }
+        None
+    }
+
+    /// Where lenses of any width would put the spots of a pose.
+    #[inline]
+    fn images(&self, pose: &Pose) -> Spots {
+        let [first, second, third] = self.eyes.map(|eye| {
+            let at = pose.position_m + pose.orientation * eye.diode;
+            let scale = self.scale(&eye, at);
+            (scale * at.dot(eye.tangent), scale * at.z)
+        });
+        Spots {
+            across_m: DVec3::new(first.0, second.0, third.0),
+            up_m: DVec3::new(first.1, second.1, third.1),
+        }
+    }
+
+    /// Image over object size for a diode at `at`.
+    #[inline]
+    fn scale(&self, eye: &Eye, at: DVec3) -> f64 {
+        self.geometry.image_distance_m / (self.geometry.lens_radius_m - at.dot(eye.radius))
+    }
+
+    /// How the spots of a pose move with it; nothing if they do not show all of its motion.
+    #[inline]
+    fn equations(&self, pose: &Pose) -> Option<Equations> {
+        let per_image_m = 1.0 / self.geometry.image_distance_m;
+        // Rows of one eye against (x, y, yaw) and (z, pitch, roll).
+        let rows = self.eyes.map(|eye| {
+            let arm = pose.orientation * eye.diode;
+            let at = pose.position_m + arm;
+            let scale = self.scale(&eye, at);
+            [eye.tangent, DVec3::Z].map(|direction| {
+                // d(f q t / D) = f (t + (q t / D) e) dq / D.
+                let along = scale * (direction + eye.radius * (scale * at.dot(direction) * per_image_m));
+                // (dr x arm) along = dr (arm x along).
+                let turned = arm.cross(along);
+                (DVec3::new(along.x, along.y, turned.z), DVec3::new(along.z, turned.x, turned.y))
+            })
+        });
+        let [[u1, v1], [u2, v2], [u3, v3]] = rows;
+        let matrix = |a, b, c| DMat3::from_cols(a, b, c).transpose();
+        let size = self.magnification().powi(3) * self.geometry.diode_radius_m;
+        Equations::new(
+            [matrix(u1.0, u2.0, u3.0), matrix(u1.1, u2.1, u3.1)],
+            [matrix(v1.0, v2.0, v3.0), matrix(v1.1, v2.1, v3.1)],
+            [size, size * self.geometry.diode_radius_m],
+        )
+    }
+}
+
+/// The six linearised equations in two halves: the spots' motion across their cells shows mostly `x, y` and yaw,
+/// their motion up mostly `z`, pitch and roll. What each shows of the other is small, so that the halves can be
+/// solved one after the other without choosing pivots.
+#[derive(Clone, Copy)]
+struct Equations {
+    /// `across = A (x, y, yaw) + B (z, pitch, roll)`, `up = C (x, y, yaw) + D (z, pitch, roll)`.
+    inverse_a: DMat3,
+    b: DMat3,
+    c: DMat3,
+    /// Of what is left of D when the first half is solved, `D - C A^-1 B`.
+    inverse_rest: DMat3,
+}
+
+impl Equations {
+    /// Smallest determinant, as a share of what the size of the layout lets expect (pure number; three diodes
+    /// evenly around a circle have 2.6).
+    const LEAST_DETERMINANT: f64 = 1.0e-3;
+
+    /// `across` is `[A, B]`, `up` is `[C, D]`, `sizes` what determinants of A and D should be about.
+    #[inline]
+    fn new([a, b]: [DMat3; 2], [c, d]: [DMat3; 2], sizes: [f64; 2]) -> Option<Self> {
+        let invertible = |matrix: &DMat3, size: f64| {
+            let determinant = matrix.determinant().abs();
+            // Infinite entries are as useless as dependent ones.
+            determinant > Self::LEAST_DETERMINANT * size && determinant.is_finite()
+        };
+        if !invertible(&a, sizes[0]) {
+            return None;
+        }
+        let inverse_a = a.inverse();
+        let rest = d - c * (inverse_a * b);
+        invertible(&rest, sizes[1]).then(|| Self { inverse_a, b, c, inverse_rest: rest.inverse() })
+    }
+
+    /// The small motion (m, rad) that moves the spots by this much.
+    #[inline]
+    fn motion(&self, spots: &Spots) -> Motion {
+        let first = self.inverse_a * spots.across_m;
+        let second = self.inverse_rest * (spots.up_m - self.c * first);
+        let first = first - self.inverse_a * (self.b * second);
+        Motion {
+            shift_m: DVec3::new(first.x, first.y, second.x),
+            turn_rad: DVec3::new(second.y, second.z, first.z),
+        }
+    }
+}
+
+/// A small motion, device frame.
+struct Motion {
+    shift_m: DVec3,
+    turn_rad: DVec3,
+}
+
+/// Moves a pose and gives the length of the motion, m and rad alike.
+#[inline]
+fn move_by(pose: &mut Pose, Motion { shift_m, turn_rad }: Motion) -> f64 {
+    pose.position_m += shift_m;
+    // A rotation to second order in the step, which vanishes as the iteration ends.
+    let half = turn_rad * 0.5;
+    pose.orientation = (DQuat::from_xyzw(half.x, half.y, half.z, 1.0) * pose.orientation).normalize();
+    (shift_m.length_squared() + turn_rad.length_squared()).sqrt()
+}

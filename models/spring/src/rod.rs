@@ -1,0 +1,236 @@
+//! Variant `rod`: the spring as a geometrically exact rod, in space and past buckling.
+//!
+//! Between its plates the spring is an elastic line whose sections can turn by any angle: it bends, twists,
+//! shears and shortens, with one rigidity for each (Haringx's rod; Reissner and Simo's in space). Nothing is
+//! linearised, so there are several equilibria where a real spring has several, and the one that is felt is
+//! the one that is stable. [`Rod`] finds it by energy: among all shapes that meet the plates, a minimum of
+//! the stored energy.
+//!
+//! One idea a module:
+//! - `plate`: the upper plate in coordinates free of trigonometry; `section`: the energy of a section in
+//!   them.
+//! - `basis`: the polynomials the shape is made of; `functional`: the energy as a function of their
+//!   coefficients, with all that is quadratic eliminated; its derivatives by the pose are force and torque.
+//! - `matrix`: solves, and counts unstable directions; `predictor`, `equilibrium`: follow the minimum in
+//!   time.
+//!
+//! Shear, stretch and twist follow in closed form from the directions of the sections, two numbers each. So
+//! ten polynomials leave an error below a micronewton before buckling, twenty-eight leave rounding, and the
+//! matrix that Newton's method needs anyway tells a stable equilibrium from an unstable one. The answer
+//! depends on the past only where the rod has a choice.
+//!
+//! Sources: Haringx, *On highly compressible helical springs and rubber rods* (1948); Simo, *A finite strain
+//! beam formulation* (1985); the elimination and the coordinates are this project's, in the book's chapter
+//! "The spring".
+
+use std::f64::consts::PI;
+
+use flotor_hal::glam::DVec3;
+
+use crate::pose::Pose;
+use crate::response::{Demand, Response};
+use crate::rigidity::Spring;
+use crate::validity::Validity;
+use equilibrium::{Effort, Equilibrium, Outcome, Reading};
+use functional::Ratios;
+use plate::Plate;
+
+mod basis;
+mod equilibrium;
+mod functional;
+mod matrix;
+mod plate;
+mod predictor;
+mod section;
+
+/// How accurate the rod is, and how much a tick costs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Accuracy {
+    /// For the servo: force to a micronewton before buckling and to a millinewton past it, in about a
+    /// microsecond and a half per tick.
+    Servo,
+    /// For reference: force to 1e-13 N before buckling and to 1e-10 N past it, in about a hundred
+    /// microseconds.
+    Tight,
+}
+
+/// Which equilibrium the rod is in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Branch {
+    /// The plates are farther apart than where a straight rod buckles.
+    Unbuckled,
+    /// Closer than that: a stable shape bulges.
+    Buckled,
+}
+
+/// What the rod knows about itself after a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct State {
+    /// Which equilibrium it is in or moves to.
+    pub branch: Branch,
+    /// Directions in which the energy of the shape falls, the Morse index; counted where the matrix was last
+    /// renewed.
+    pub unstable_directions: usize,
+}
+
+impl State {
+    /// Whether the shape is a minimum of the energy.
+    #[must_use]
+    pub fn is_stable(&self) -> bool {
+        self.unstable_directions == 0
+    }
+}
+
+/// The exact rod of one spring, following the pose from tick to tick.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rod {
+    solver: Solver,
+    constants: Constants,
+    branch: Branch,
+    /// Answer of the last tick that had one.
+    last: Response,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Solver {
+    Servo(Box<Equilibrium<10, 20, 14>>),
+    Tight(Box<Equilibrium<28, 56, 30>>),
+}
+
+/// Does the same with either setting's solver.
+macro_rules! either {
+    ($solver:expr, $equilibrium:ident => $body:expr) => {
+        match $solver {
+            Solver::Servo($equilibrium) => $body,
+            Solver::Tight($equilibrium) => $body,
+        }
+    };
+}
+
+impl Rod {
+    /// The rod at rest. Not real-time: allocates.
+    #[must_use]
+    pub fn new(spring: &Spring, accuracy: Accuracy) -> Self {
+        let ratios = Ratios::new(spring);
+        let solver = match accuracy {
+            Accuracy::Servo => {
+                let effort = Effort { most_steps: 4, matrix_life: 32, tolerance: 1e-8 };
+                Solver::Servo(Box::new(Equilibrium::new(ratios, effort)))
+            }
+            Accuracy::Tight => {
+                let effort = Effort { most_steps: 8, matrix_life: 1, tolerance: 1e-14 };
+                Solver::Tight(Box::new(Equilibrium::new(ratios, effort)))
+            }
+        };
+        let constants = Constants::new(spring);
+        Self { solver, constants, branch: Branch::Unbuckled, last: Response::none(Validity::NotConverged) }
+    }
+
+    /// Forgets the past: at rest. Real-time: bounded, no allocation.
+    pub fn reset(&mut self) {
+        either!(&mut self.solver, equilibrium => equilibrium.reset());
+        self.branch = Branch::Unbuckled;
+        self.last = Response::none(Validity::NotConverged);
+    }
+
+    /// Takes other parameters at a tick boundary and keeps the shape. Real-time: bounded, no allocation.
+    pub fn set_spring(&mut self, spring: &Spring) {
+        self.constants = Constants::new(spring);
+        either!(&mut self.solver, equilibrium => equilibrium.set_ratios(Ratios::new(spring)));
+    }
+
+    /// What is known about the equilibrium of the last tick. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn state(&self) -> State {
+        let unstable_directions = either!(&self.solver, equilibrium => equilibrium.unstable_directions());
+        State { branch: self.branch, unstable_directions }
+    }
+
+    /// Wrench on the hand and stored energy at the pose of this tick.
+    ///
+    /// Total over all poses and histories:
+    /// - in stable equilibrium: [`Validity::Ok`];
+    /// - on the way to one (after a jump of the pose, or where the last equilibrium ceased to be stable):
+    ///   [`Validity::NotConverged`], with the wrench of the shape on its way, a bounded way per tick. Call
+    ///   again, at the same pose or another. Where not even that is a finite number, the last wrench that
+    ///   was;
+    /// - upper plate upside down to within 2.6 degrees, plates closer than a thousandth or farther than a
+    ///   million free lengths: no wrench, [`Validity::OutOfDomain`];
+    /// - NaN, infinity or a quaternion that is not of unit length: no wrench, [`Validity::InvalidInput`].
+    ///
+    /// Real-time: bounded, no allocation.
+    pub fn step(&mut self, pose: &Pose, demand: Demand) -> Response {
+        let chord = match pose.chord(self.constants.free_length_m) {
+            Ok(chord) => chord,
+            Err(validity) => return Response::none(validity),
+        };
+        let Some(plate) = Plate::new(pose, self.constants.free_length_m) else {
+            return Response::none(Validity::OutOfDomain);
+        };
+        self.branch = self.constants.branch(chord.shortening_m);
+        let outcome = either!(&mut self.solver, equilibrium => equilibrium.advance(&plate, demand));
+        let response = match outcome {
+            Outcome::Settled(reading) => self.constants.response(&plate, &reading, demand, Validity::Ok),
+            Outcome::Moving(reading) => {
+                self.constants.response(&plate, &reading, demand, Validity::NotConverged)
+            }
+            Outcome::Failed => return Response { validity: Validity::NotConverged, ..self.last },
+        };
+        if response.if_finite().validity != response.validity {
+            return Response { validity: Validity::NotConverged, ..self.last };
+        }
+        self.last = response;
+        response
+    }
+}
+
+/// The spring in SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Constants {
+    free_length_m: f64,
+    /// `alpha / L0²`
+    force_unit_n: f64,
+    /// `alpha / L0`
+    energy_unit_j: f64,
+    /// `gamma L0² / alpha`
+    slenderness: f64,
+    /// `1 - gamma / beta`
+    shear: f64,
+}
+
+impl Constants {
+    fn new(spring: &Spring) -> Self {
+        let rigidities = spring.rigidities();
+        let free_length_m = spring.geometry().free_length_m;
+        let energy_unit_j = rigidities.alpha_n_m2 / free_length_m;
+        let force_unit_n = energy_unit_j / free_length_m;
+        Self {
+            free_length_m,
+            force_unit_n,
+            energy_unit_j,
+            slenderness: rigidities.gamma_n / force_unit_n,
+            shear: 1.0 - rigidities.gamma_n / rigidities.beta_n,
+        }
+    }
+
+    /// Haringx's condition for clamped plates: `(gamma L0²/alpha) p (1 - (1 - gamma/beta) p) = 4 pi²`.
+    fn branch(&self, shortening_m: f64) -> Branch {
+        let compression = shortening_m / self.free_length_m;
+        let load = self.slenderness * compression * (1.0 - self.shear * compression);
+        if load > 4.0 * PI * PI { Branch::Buckled } else { Branch::Unbuckled }
+    }
+
+    #[inline]
+    fn response(&self, plate: &Plate, reading: &Reading, demand: Demand, validity: Validity) -> Response {
+        let torque = match demand {
+            Demand::Force => DVec3::ZERO,
+            Demand::Wrench | Demand::WrenchAndEnergy => plate.torque(reading.by_lean, reading.torsion),
+        };
+        Response {
+            force_n: -reading.force * self.force_unit_n,
+            torque_nm: torque * self.energy_unit_j,
+            energy_j: (demand >= Demand::WrenchAndEnergy).then_some(reading.energy * self.energy_unit_j),
+            validity,
+        }
+    }
+}

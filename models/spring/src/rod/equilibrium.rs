@@ -1,0 +1,329 @@
+//! Follows the stable equilibrium from tick to tick.
+//!
+//! Newton's method on the slope of the energy. Its matrix is kept for some ticks; what that costs in accuracy
+//! is estimated at every step, see [`Effort`]. Where the matrix has a negative eigenvalue the shape is no
+//! minimum: the rod has buckled, or its branch has ended. From there it slides down the energy in a damped
+//! flow, a bounded way per tick, so that the force changes fast but never jumps. An equilibrium is reported
+//! only where it is stable.
+//!
+//! Sources: Deuflhard, *Newton Methods for Nonlinear Problems* (2011), 2.1 (kept matrix) and 6.4
+//! (pseudo-transient continuation, the damped flow); Morse index by inertia, see [`super::matrix`].
+
+use flotor_hal::glam::{DVec2, DVec3};
+
+use super::functional::{Curvature, Functional, Ratios, Reaction, Shape, Value};
+use super::matrix::{Factored, added, dot, length, product};
+use super::plate::Plate;
+use super::predictor::History;
+use crate::response::Demand;
+
+/// Longest change of shape in a tick, as the root mean square slope of `p`. A full bulge has about 3.
+const LONGEST_STEP: f64 = 0.1;
+/// Curvature that counts as none. Bending has 4; the softest stable directions have 1e-5; rounding makes
+/// 1e-14.
+const NEUTRAL: f64 = 1.0e-9;
+/// Curvature taken for none that still allows an equilibrium to be called stable: below the softest of
+/// interest.
+const SETTLED: f64 = 1.0e-6;
+/// Least damping of the flow.
+const LEAST_DAMPING: f64 = 1.0e-3;
+/// By how much the damping grows until the damped matrix is definite.
+const DAMPING_FACTOR: f64 = 5.0;
+/// Times it may grow in a tick. Where that is not enough the next tick goes on from there.
+const MOST_DAMPINGS: u32 = 3;
+/// How far a shape that rests on a saddle is pushed off it.
+const PUSH: f64 = 0.02;
+/// A step that is not at least this much shorter than the one before was taken with a matrix too old.
+const CONTRACTION: f64 = 0.3;
+
+/// How hard a tick tries.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Effort {
+    /// Newton steps per tick at most.
+    pub(crate) most_steps: u32,
+    /// Steps a matrix is good for.
+    pub(crate) matrix_life: u32,
+    /// Accepted error of the shape after a step, estimated as the length of the step times the way from where
+    /// the matrix was computed (Deuflhard 2.1.1, with the Lipschitz constant of a rod, about one).
+    pub(crate) tolerance: f64,
+}
+
+/// What the plates feel, in units of the bending rigidity and the free length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Reading {
+    pub(crate) energy: f64,
+    /// Derivative of the energy by the displacement of the upper plate.
+    pub(crate) force: DVec3,
+    /// By its lean.
+    pub(crate) by_lean: DVec2,
+    /// By its turn.
+    pub(crate) torsion: f64,
+}
+
+/// How a tick ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Outcome {
+    /// In stable equilibrium.
+    Settled(Reading),
+    /// On the way to one; what is felt now.
+    Moving(Reading),
+    /// Without a number. The shape is as before.
+    Failed,
+}
+
+/// The rod between its plates, and its past.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Equilibrium<const K: usize, const N: usize, const Q: usize> {
+    functional: Functional<K, N, Q>,
+    effort: Effort,
+    shape: Shape<N>,
+    history: History<N>,
+    matrix: KeptMatrix<N>,
+    damping: f64,
+    unstable_directions: usize,
+}
+
+/// Factored second derivatives and where they were computed.
+#[derive(Clone, Debug, PartialEq)]
+struct KeptMatrix<const N: usize> {
+    factored: Factored<N>,
+    reaction: Reaction<N>,
+    shape: Shape<N>,
+    plate: Plate,
+    /// Smallest pivot, at least the smallest eigenvalue.
+    softest: f64,
+    /// Curvature taken for none.
+    neutral: f64,
+    steps_left: u32,
+}
+
+impl<const N: usize> KeptMatrix<N> {
+    /// None yet: good for no step.
+    fn none() -> Self {
+        let reaction = Reaction { force: [[0.0; N]; 3], by_lean: [[0.0; N]; 2], torsion: [0.0; N] };
+        Self {
+            factored: Factored::unit(),
+            reaction,
+            shape: [0.0; N],
+            plate: Plate::HOME,
+            softest: 0.0,
+            neutral: NEUTRAL,
+            steps_left: 0,
+        }
+    }
+}
+
+impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
+    /// At rest.
+    pub(crate) fn new(ratios: Ratios, effort: Effort) -> Self {
+        Self {
+            functional: Functional::new(ratios),
+            effort,
+            shape: [0.0; N],
+            history: History::new(Plate::HOME, [0.0; N]),
+            matrix: KeptMatrix::none(),
+            damping: LEAST_DAMPING,
+            unstable_directions: 0,
+        }
+    }
+
+    /// Back to rest. Real-time: bounded, no allocation.
+    pub(crate) fn reset(&mut self) {
+        self.shape = [0.0; N];
+        self.history = History::new(Plate::HOME, self.shape);
+        self.matrix.steps_left = 0;
+        self.damping = LEAST_DAMPING;
+        self.unstable_directions = 0;
+    }
+
+    /// Another rod in the same shape. Real-time: bounded, no allocation.
+    pub(crate) fn set_ratios(&mut self, ratios: Ratios) {
+        self.functional.set_ratios(ratios);
+        self.matrix.steps_left = 0;
+    }
+
+    /// Morse index where the matrix was computed last: zero where the shape is stable.
+    pub(crate) fn unstable_directions(&self) -> usize {
+        self.unstable_directions
+    }
+
+    /// One tick. Real-time: bounded, no allocation.
+    pub(crate) fn advance(&mut self, plate: &Plate, demand: Demand) -> Outcome {
+        let before = self.shape;
+        self.shape = self.history.predict(plate);
+        let outcome = self.search(plate, demand);
+        match outcome {
+            Outcome::Settled(_) => self.history.push(*plate, &self.shape),
+            Outcome::Moving(_) => self.history = History::new(*plate, self.shape),
+            Outcome::Failed => {
+                self.shape = before;
+                self.history = History::new(*plate, before);
+                self.matrix.steps_left = 0;
+            }
+        }
+        outcome
+    }
+
+    /// Newton's method from the predicted shape.
+    #[inline]
+    fn search(&mut self, plate: &Plate, demand: Demand) -> Outcome {
+        let mut last_size = f64::INFINITY;
+        let mut outcome = Outcome::Failed;
+        for _ in 0..self.effort.most_steps {
+            let value = self.functional.value(&self.shape, plate);
+            let bent = distance(&self.shape, &self.matrix.shape);
+            let fall = self.functional.eigenvalue_fall(plate.distance(&self.matrix.plate), bent);
+            if self.matrix.steps_left == 0 || fall > self.matrix.softest {
+                let curvature = self.functional.curvature(&value);
+                if self.keep(&curvature, plate, &value.slope) > 0 {
+                    return self.slide(&value, &curvature, demand);
+                }
+            }
+            let step = self.matrix.factored.step_down(&value.slope);
+            let size = length(&step);
+            if !size.is_finite() {
+                return Outcome::Failed;
+            }
+            let error = size * (size + distance(&self.shape, &self.matrix.shape));
+            let step = capped(step, size);
+            self.shape = added(&self.shape, 1.0, &step);
+            self.matrix.steps_left = self.matrix.steps_left.saturating_sub(1);
+            let reading = read(&value, &self.matrix.reaction, &step, demand);
+            if error <= self.effort.tolerance && size <= LONGEST_STEP && self.matrix.neutral <= SETTLED {
+                self.damping = LEAST_DAMPING;
+                return Outcome::Settled(reading);
+            }
+            outcome = Outcome::Moving(reading);
+            if size > LONGEST_STEP || size > CONTRACTION * last_size || error > 10.0 * self.effort.tolerance {
+                self.matrix.steps_left = 0;
+            }
+            if size > LONGEST_STEP {
+                break;
+            }
+            last_size = size;
+        }
+        outcome
+    }
+
+    /// Factors the matrix for the coming steps; returns its number of negative eigenvalues.
+    fn keep(&mut self, curvature: &Curvature<N>, plate: &Plate, slope: &Shape<N>) -> usize {
+        self.matrix.neutral = NEUTRAL;
+        self.matrix.steps_left = self.effort.matrix_life;
+        self.matrix.factored = Factored::new(&curvature.matrix, NEUTRAL);
+        if self.matrix.factored.negative() > 0 {
+            self.matrix.neutral = neutral(slope);
+            self.matrix.steps_left = 1;
+            self.matrix.factored = Factored::new(&curvature.matrix, self.matrix.neutral);
+        }
+        self.unstable_directions = self.matrix.factored.negative();
+        if self.unstable_directions == 0 {
+            self.matrix.reaction = curvature.reaction.clone();
+            self.matrix.shape = self.shape;
+            self.matrix.plate = *plate;
+            self.matrix.softest = self.matrix.factored.smallest_pivot();
+        } else {
+            self.matrix.steps_left = 0;
+        }
+        self.unstable_directions
+    }
+
+    /// One step of the damped flow, from a shape that is no minimum: an implicit Euler step down the slope of
+    /// the energy, of duration `1 / damping`.
+    #[cold]
+    fn slide(&mut self, value: &Value<N, Q>, curvature: &Curvature<N>, demand: Demand) -> Outcome {
+        let mut damping = self.damping;
+        let mut damped = Factored::new(&curvature.matrix, damping);
+        for _ in 0..MOST_DAMPINGS {
+            if damped.negative() == 0 {
+                break;
+            }
+            damping *= DAMPING_FACTOR;
+            damped = Factored::new(&curvature.matrix, damping);
+        }
+        if damped.negative() > 0 {
+            self.damping = damping * DAMPING_FACTOR;
+            return Outcome::Moving(read(value, &curvature.reaction, &[0.0; N], demand));
+        }
+        self.damping = (damping / DAMPING_FACTOR).max(LEAST_DAMPING);
+        let mut step = damped.step_down(&value.slope);
+        if let Some((down, curvature)) = falling(&curvature.matrix, &damped, K, neutral(&value.slope)) {
+            // On a saddle, not on a slope: nothing else would start the motion.
+            if length(&value.slope) < 0.5 * PUSH * -curvature {
+                let push = if dot(&down, &value.slope) > 0.0 { -PUSH } else { PUSH };
+                step = added(&step, push, &down);
+            }
+        }
+        let size = length(&step);
+        if !size.is_finite() {
+            return Outcome::Failed;
+        }
+        let step = capped(step, size);
+        self.shape = added(&self.shape, 1.0, &step);
+        Outcome::Moving(read(value, &curvature.reaction, &step, demand))
+    }
+}
+
+/// Curvature that counts as none, off equilibrium: a direction without stiffness, such as the turning of a
+/// straight rod's bulge about its axis, there has one as large as the slope, of either sign.
+fn neutral<const N: usize>(slope: &Shape<N>) -> f64 {
+    NEUTRAL + 4.0 * length(slope)
+}
+
+/// A direction of length one in which the energy curves down, and that curvature: by inverse iteration.
+///
+/// It starts from the direction a perfect rod bulges in, where nothing else decides: towards -x, which stands
+/// for the side to which the ends of a real coil are off its axis; then, where that is stable, towards -y.
+fn falling<const N: usize>(
+    matrix: &[[f64; N]; N],
+    damped: &Factored<N>,
+    bubbles: usize,
+    neutral: f64,
+) -> Option<([f64; N], f64)> {
+    for component in [0, bubbles] {
+        let mut direction = [0.0; N];
+        // The second bubble leans one way below the middle and the other way above: a bulge. A little of the
+        // first, for rods whose plates allow no bulge alone.
+        direction[component] = -0.1;
+        direction[component + 1] = -1.0;
+        for _ in 0..4 {
+            direction = damped.solve(&direction);
+            let size = length(&direction);
+            direction = direction.map(|entry| entry / size);
+        }
+        let curvature = dot(&direction, &product(matrix, &direction));
+        if curvature < -neutral {
+            return Some((direction, curvature));
+        }
+    }
+    None
+}
+
+/// What the plates feel after a step, to second order in it: no further evaluation is needed.
+#[inline]
+fn read<const N: usize, const Q: usize>(
+    value: &Value<N, Q>,
+    reaction: &Reaction<N>,
+    step: &Shape<N>,
+    demand: Demand,
+) -> Reading {
+    let force = value.load.force + DVec3::from_array(product(&reaction.force, step));
+    let (mut by_lean, mut torsion) = (DVec2::ZERO, 0.0);
+    if demand >= Demand::Wrench {
+        by_lean = value.by_lean + DVec2::from_array(product(&reaction.by_lean, step));
+        torsion = value.load.torsion + dot(&reaction.torsion, step);
+    }
+    Reading { energy: value.energy + 0.5 * dot(&value.slope, step), force, by_lean, torsion }
+}
+
+#[inline]
+fn capped<const N: usize>(step: Shape<N>, size: f64) -> Shape<N> {
+    if size > LONGEST_STEP { step.map(|entry| entry * (LONGEST_STEP / size)) } else { step }
+}
+
+#[inline]
+fn distance<const N: usize>(a: &Shape<N>, b: &Shape<N>) -> f64 {
+    length(&added(a, -1.0, b))
+}
+
+#[cfg(test)]
+mod tests;

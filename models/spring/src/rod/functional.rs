@@ -1,0 +1,257 @@
+//! The energy of the rod at given plates, as a function of a few coefficients.
+//!
+//! The shape of the rod is the direction of its sections, a polynomial in stereographic coordinates
+//! ([`super::basis`]). Stretch, shear and twist need no unknowns of their own: for given directions their
+//! energy is a quadratic, and the best of them is in closed form,
+//!
+//! ```text
+//! W = integral of w² p'²/2 + (tau/2) Phi² + b.n/2,     n = A⁻¹ b,
+//! Phi = psi - integral of w (p x p'),                  twist to be distributed
+//! b = chord - integral of d,                           length to be made up by stretch and shear
+//! A = 1/beta + delta integral of d dᵀ                  compliance to it
+//! ```
+//!
+//! (lengths in `L0`, energies in `alpha/L0`). An equilibrium is a stationary point of `W`, a stable one a
+//! minimum: the eliminated parts are minima always, so the negative eigenvalues of the matrix of `W` are
+//! those of the whole rod. Force and torque on the plates are the derivatives of `W` at held coefficients
+//! (envelope theorem), exact derivatives of the minimised `W` at any order of the polynomial, and their error
+//! is the square of the shape's.
+
+use std::f64::consts::PI;
+
+use flotor_hal::glam::{DMat3, DVec2, DVec3};
+
+use super::basis::Basis;
+use super::matrix::dot;
+use super::plate::Plate;
+use super::section::{Along, Curvatures, Load, Sections};
+use crate::rigidity::Spring;
+
+/// Coefficients of the bubbles: first those of `p_x`, then those of `p_y`; `N = 2 K`.
+pub(crate) type Shape<const N: usize> = [f64; N];
+
+/// Rigidities in units of the bending rigidity and the free length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Ratios {
+    /// `alpha / (beta L0²)`
+    shear_compliance: f64,
+    /// `(1/gamma - 1/beta) alpha / L0²`
+    softening: f64,
+    /// `tau / alpha`
+    torsion: f64,
+}
+
+impl Ratios {
+    pub(crate) fn new(spring: &Spring) -> Self {
+        let rigidities = spring.rigidities();
+        let free_length_m = spring.geometry().free_length_m;
+        let unit_n = rigidities.alpha_n_m2 / (free_length_m * free_length_m);
+        Self {
+            shear_compliance: unit_n / rigidities.beta_n,
+            softening: unit_n / rigidities.gamma_n - unit_n / rigidities.beta_n,
+            torsion: rigidities.tau_n_m2 / rigidities.alpha_n_m2,
+        }
+    }
+}
+
+/// The energy with `K` bubbles in each direction, summed at `Q` stations.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Functional<const K: usize, const N: usize, const Q: usize> {
+    basis: Basis<K, Q>,
+    ratios: Ratios,
+}
+
+/// Energy of a shape between plates and its first derivatives.
+pub(crate) struct Value<const N: usize, const Q: usize> {
+    pub(crate) energy: f64,
+    /// By the coefficients.
+    pub(crate) slope: Shape<N>,
+    /// By the lean of the upper plate.
+    pub(crate) by_lean: DVec2,
+    /// The derivatives by the upper plate's displacement and by its turn are force and torsion.
+    pub(crate) load: Load,
+    compliance: DMat3,
+    sections: Sections<Q>,
+}
+
+/// Second derivatives of the energy.
+pub(crate) struct Curvature<const N: usize> {
+    /// By the coefficients twice.
+    pub(crate) matrix: [[f64; N]; N],
+    /// How the derivatives by the plate change with the coefficients.
+    pub(crate) reaction: Reaction<N>,
+}
+
+/// Change of what the plate feels with each coefficient, the plate being held.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Reaction<const N: usize> {
+    pub(crate) force: [[f64; N]; 3],
+    pub(crate) by_lean: [[f64; N]; 2],
+    pub(crate) torsion: [f64; N],
+}
+
+impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
+    const TWO_COMPONENTS: () = assert!(N == 2 * K);
+
+    pub(crate) fn new(ratios: Ratios) -> Self {
+        let () = Self::TWO_COMPONENTS;
+        Self { basis: Basis::new(), ratios }
+    }
+
+    /// Another rod. Real-time: bounded, no allocation.
+    pub(crate) fn set_ratios(&mut self, ratios: Ratios) {
+        self.ratios = ratios;
+    }
+
+    /// Upper estimate of how far the eigenvalues of the matrix fall when the plate and the shape move so far.
+    ///
+    /// The lowest eigenvalue of the straight rod falls from 4 to 0 over the compression `4 pi² alpha/(gamma
+    /// L0²)` at which it buckles; twice that slope covers other shapes.
+    pub(crate) fn eigenvalue_fall(&self, plate_moved: f64, shape_moved: f64) -> f64 {
+        let axial_compliance = self.ratios.shear_compliance + self.ratios.softening;
+        2.0 * plate_moved / (PI * PI * axial_compliance) + 4.0 * shape_moved
+    }
+
+    /// Energy, load and slope. Real-time: bounded, no allocation.
+    #[inline(always)]
+    pub(crate) fn value(&self, shape: &Shape<N>, plate: &Plate) -> Value<N, Q> {
+        let sections = self.sections(shape, plate);
+        let integrals = sections.integrate(&self.basis.weight);
+        let Ratios { shear_compliance, softening, torsion } = self.ratios;
+        let compliance = DMat3::from_diagonal(DVec3::splat(shear_compliance)) + softening * integrals.second;
+        let missing = plate.displacement - integrals.lean;
+        let twist_rad = plate.turn_rad - integrals.winding_rad;
+        let load =
+            Load { force: solve_symmetric(&compliance, missing), torsion: torsion * twist_rad, softening };
+        let [by_lean, by_rate] = sections.slopes(&load, &self.basis.weight);
+        let slope =
+            joined(&self.projected(&by_lean[0], &by_rate[0]), &self.projected(&by_lean[1], &by_rate[1]));
+        let by_end = [0, 1].map(|c| dot(&self.basis.station, &by_lean[c]) + by_rate[c].iter().sum::<f64>());
+        Value {
+            energy: integrals.bending + 0.5 * load.torsion * twist_rad + 0.5 * missing.dot(load.force),
+            slope,
+            by_lean: DVec2::from_array(by_end),
+            load,
+            compliance,
+            sections,
+        }
+    }
+
+    #[inline(always)]
+    fn sections(&self, shape: &Shape<N>, plate: &Plate) -> Sections<Q> {
+        let (mut lean, mut rate) = ([[0.0; Q]; 2], [[0.0; Q]; 2]);
+        let (x, y) = shape.split_at(K);
+        for (c, (coefficients, end)) in [(x, plate.lean.x), (y, plate.lean.y)].into_iter().enumerate() {
+            add_products(&mut lean[c], &self.basis.station, end);
+            rate[c] = [end; Q];
+            for (k, coefficient) in coefficients.iter().enumerate() {
+                add_products(&mut lean[c], &self.basis.bubble[k], *coefficient);
+                add_products(&mut rate[c], &self.basis.slope[k], *coefficient);
+            }
+        }
+        Sections::new(lean, rate)
+    }
+
+    /// Second derivatives at a shape. Real-time: bounded, no allocation.
+    pub(crate) fn curvature(&self, value: &Value<N, Q>) -> Curvature<N> {
+        let local = value.sections.curvatures(&value.load, &self.basis.weight);
+        let mut matrix = [[0.0; N]; N];
+        let mut reaction = Reaction { force: [[0.0; N]; 3], by_lean: [[0.0; N]; 2], torsion: [0.0; N] };
+        let mut strain = [[0.0; N]; 3];
+        let mut strain_by_end = [DVec3::ZERO; 2];
+        let mut winding_by_end = [0.0; 2];
+        for c in 0..2 {
+            for k in 0..K {
+                matrix[c * K + k] = self.row(&local, c, &self.basis.bubble[k], &self.basis.slope[k]);
+                for (strain, local) in strain.iter_mut().zip(&local.strain_by_lean) {
+                    strain[c * K + k] = dot(&self.basis.bubble[k], &local[c]);
+                }
+                // Twist is what the winding leaves over.
+                reaction.torsion[c * K + k] = -(dot(&self.basis.bubble[k], &local.winding_by_lean[c])
+                    + dot(&self.basis.slope[k], &local.winding_by_rate[c]));
+            }
+            reaction.by_lean[c] = self.row(&local, c, &self.basis.station, &[1.0; Q]);
+            strain_by_end[c] =
+                DVec3::from_array([0, 1, 2].map(|r| dot(&self.basis.station, &local.strain_by_lean[r][c])));
+            winding_by_end[c] = -(dot(&self.basis.station, &local.winding_by_lean[c])
+                + local.winding_by_rate[c].iter().sum::<f64>());
+        }
+        let stiffness = value.compliance.inverse();
+        for j in 0..N {
+            let strain = DVec3::new(strain[0][j], strain[1][j], strain[2][j]);
+            let force = stiffness * strain;
+            reaction.force[0][j] = -force.x;
+            reaction.force[1][j] = -force.y;
+            reaction.force[2][j] = -force.z;
+            for c in 0..2 {
+                reaction.by_lean[c][j] += strain_by_end[c].dot(force)
+                    + self.ratios.torsion * winding_by_end[c] * reaction.torsion[j];
+            }
+        }
+        let [force_x, force_y, force_z] = &reaction.force;
+        for (i, row) in matrix.iter_mut().enumerate() {
+            let [sx, sy, sz] = [0, 1, 2].map(|r| strain[r][i]);
+            let twist = self.ratios.torsion * reaction.torsion[i];
+            for (j, entry) in row.iter_mut().enumerate() {
+                *entry += twist * reaction.torsion[j] - (sx * force_x[j] + sy * force_y[j] + sz * force_z[j]);
+            }
+        }
+        reaction.torsion = reaction.torsion.map(|winding| self.ratios.torsion * winding);
+        Curvature { matrix, reaction }
+    }
+
+    /// Row of the local part of the matrix: component `c` of a field against all bubbles of both components.
+    #[inline]
+    fn row(&self, local: &Curvatures<Q>, c: usize, field: &Along<Q>, rate: &Along<Q>) -> [f64; N] {
+        let mut parts = [[0.0; K]; 2];
+        for (e, part) in parts.iter_mut().enumerate() {
+            let (mut by_lean, mut by_rate) = ([0.0; Q], [0.0; Q]);
+            for i in 0..Q {
+                // The derivative by p_e and p'_c is that by p'_c and p_e.
+                by_lean[i] =
+                    field[i] * local.by_lean_twice[c][e][i] + rate[i] * local.by_lean_and_rate[e][c][i];
+                let bending = if c == e { rate[i] * local.by_rate_twice[i] } else { 0.0 };
+                by_rate[i] = field[i] * local.by_lean_and_rate[c][e][i] + bending;
+            }
+            *part = self.projected(&by_lean, &by_rate);
+        }
+        joined(&parts[0], &parts[1])
+    }
+
+    /// Sums over the stations of a field times each bubble and another times its slope.
+    #[inline(always)]
+    fn projected(&self, by_lean: &Along<Q>, by_rate: &Along<Q>) -> [f64; K] {
+        let mut sums = [0.0; K];
+        for i in 0..Q {
+            add_products(&mut sums, &self.basis.bubble_at[i], by_lean[i]);
+            add_products(&mut sums, &self.basis.slope_at[i], by_rate[i]);
+        }
+        sums
+    }
+}
+
+/// `sum += factor * vector`
+#[inline(always)]
+fn add_products<const M: usize>(sum: &mut [f64; M], vector: &[f64; M], factor: f64) {
+    for i in 0..M {
+        sum[i] += factor * vector[i];
+    }
+}
+
+/// Both components one after the other.
+#[inline(always)]
+fn joined<const K: usize, const N: usize>(x: &[f64; K], y: &[f64; K]) -> Shape<N> {
+    let mut shape = [0.0; N];
+    for (entry, value) in shape.iter_mut().zip(x.iter().chain(y)) {
+        *entry = *value;
+    }
+    shape
+}
+
+/// Solves a definite 3x3 system by cofactors.
+#[inline]
+fn solve_symmetric(matrix: &DMat3, right: DVec3) -> DVec3 {
+    let (a, b, c) = (matrix.x_axis, matrix.y_axis, matrix.z_axis);
+    let (bc, ca, ab) = (b.cross(c), c.cross(a), a.cross(b));
+    DVec3::new(bc.dot(right), ca.dot(right), ab.dot(right)) / a.dot(bc)
+}

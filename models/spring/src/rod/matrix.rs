@@ -1,0 +1,173 @@
+//! A small symmetric matrix as a product `L D Lᵀ`, which also counts its negative eigenvalues.
+//!
+//! By Sylvester's law of inertia the signs of the pivots `D` are those of the eigenvalues. The number of
+//! negative ones of a second variation is the Morse index of the equilibrium: zero where it is stable.
+//!
+//! Source: Golub and Van Loan, *Matrix Computations*, 4.1 and 8.1.5. Without pivoting: for a definite matrix
+//! none is needed, and an indefinite one is only counted, then shifted until it is definite.
+
+/// Factors of a symmetric matrix of order `N`.
+///
+/// The triangle is kept by columns and by rows, each filled up with zeros: both substitutions then run over
+/// neighbours in memory and over a length known to the compiler.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Factored<const N: usize> {
+    column: [[f64; N]; N],
+    row: [[f64; N]; N],
+    inverse_pivot: [f64; N],
+    negative: usize,
+}
+
+impl<const N: usize> Factored<N> {
+    /// The factors of the unit matrix.
+    pub(crate) fn unit() -> Self {
+        Self { column: [[0.0; N]; N], row: [[0.0; N]; N], inverse_pivot: [1.0; N], negative: 0 }
+    }
+
+    /// Factors `matrix + shift * unit`, of which the lower triangle is read. Real-time: bounded, no
+    /// allocation.
+    pub(crate) fn new(matrix: &[[f64; N]; N], shift: f64) -> Self {
+        let mut rest = *matrix;
+        let mut factored = Self::unit();
+        for j in 0..N {
+            let pivot = rest[j][j] + shift;
+            factored.negative += usize::from(pivot < 0.0);
+            let inverse = 1.0 / pivot;
+            factored.inverse_pivot[j] = inverse;
+            let mut column = [0.0; N];
+            for i in j + 1..N {
+                column[i] = rest[i][j];
+            }
+            for i in j + 1..N {
+                let factor = column[i] * inverse;
+                factored.column[j][i] = factor;
+                factored.row[i][j] = factor;
+                // Zeros up to j keep what is finished as it is; beyond i nothing is read again.
+                for (entry, above) in rest[i].iter_mut().zip(&column) {
+                    *entry -= factor * above;
+                }
+            }
+        }
+        factored
+    }
+
+    /// Smallest pivot of a definite matrix; its smallest eigenvalue is at most that, and not much smaller.
+    pub(crate) fn smallest_pivot(&self) -> f64 {
+        1.0 / self.inverse_pivot.iter().fold(0.0, |largest: f64, inverse| largest.max(*inverse))
+    }
+
+    /// Number of negative eigenvalues.
+    pub(crate) fn negative(&self) -> usize {
+        self.negative
+    }
+
+    /// Newton's step against a slope: minus the solution. Real-time: bounded, no allocation.
+    #[inline]
+    pub(crate) fn step_down(&self, slope: &[f64; N]) -> [f64; N] {
+        let mut step = self.solve(slope);
+        for entry in &mut step {
+            *entry = -*entry;
+        }
+        step
+    }
+
+    /// Solves the system. Real-time: bounded, no allocation.
+    #[inline]
+    pub(crate) fn solve(&self, right: &[f64; N]) -> [f64; N] {
+        let mut x = *right;
+        for j in 0..N {
+            let known = x[j];
+            for (entry, factor) in x.iter_mut().zip(&self.column[j]) {
+                *entry -= factor * known;
+            }
+        }
+        for (entry, inverse) in x.iter_mut().zip(&self.inverse_pivot) {
+            *entry *= inverse;
+        }
+        for i in (0..N).rev() {
+            let known = x[i];
+            for (entry, factor) in x.iter_mut().zip(&self.row[i]) {
+                *entry -= factor * known;
+            }
+        }
+        x
+    }
+}
+
+/// Matrix times vector.
+#[inline]
+pub(crate) fn product<const N: usize, const R: usize>(matrix: &[[f64; N]; R], vector: &[f64; N]) -> [f64; R] {
+    std::array::from_fn(|row| dot(&matrix[row], vector))
+}
+
+/// Sum of the products of entries, summed in two lanes.
+#[inline]
+pub(crate) fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    let mut lanes = [0.0; 2];
+    let (pairs_a, rest_a) = a.as_chunks::<2>();
+    let (pairs_b, rest_b) = b.as_chunks::<2>();
+    for (a, b) in pairs_a.iter().zip(pairs_b) {
+        lanes[0] += a[0] * b[0];
+        lanes[1] += a[1] * b[1];
+    }
+    let mut sum = lanes[0] + lanes[1];
+    for (a, b) in rest_a.iter().zip(rest_b) {
+        sum += a * b;
+    }
+    sum
+}
+
+/// Euclidean length.
+#[inline]
+pub(crate) fn length<const N: usize>(vector: &[f64; N]) -> f64 {
+    dot(vector, vector).sqrt()
+}
+
+/// `sum + factor * vector`.
+#[inline]
+pub(crate) fn added<const N: usize>(sum: &[f64; N], factor: f64, vector: &[f64; N]) -> [f64; N] {
+    let mut result = *sum;
+    for (entry, addend) in result.iter_mut().zip(vector) {
+        *entry += factor * addend;
+    }
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Diagonal turned by a Householder reflection: eigenvalues known, nothing sparse.
+    fn turned(eigenvalues: [f64; 5]) -> [[f64; 5]; 5] {
+        let v = [0.5, -0.3, 0.2, 0.7, 0.1];
+        let scale = 2.0 / dot(&v, &v);
+        let reflect = |i: usize, j: usize| f64::from(i == j) - scale * v[i] * v[j];
+        let mut matrix = [[0.0; 5]; 5];
+        for (i, row) in matrix.iter_mut().enumerate() {
+            for (j, entry) in row.iter_mut().enumerate() {
+                *entry = (0..5).map(|k| reflect(i, k) * eigenvalues[k] * reflect(j, k)).sum();
+            }
+        }
+        matrix
+    }
+
+    #[test]
+    fn solves_and_counts() {
+        for (eigenvalues, negative) in [
+            ([1.0, 2.0, 3.0, 4.0, 5.0], 0),
+            ([-1.0, 2.0, 3.0, 4.0, 5.0], 1),
+            ([-1.0, -1.0, 3.0, 4.0, -1e-6], 3),
+        ] {
+            let matrix = turned(eigenvalues);
+            let factored = Factored::new(&matrix, 0.0);
+            assert_eq!(factored.negative(), negative);
+            let x = [0.3, -1.0, 0.7, 2.0, -0.1];
+            let found = factored.solve(&product(&matrix, &x));
+            for i in 0..5 {
+                // Rounding times the condition number, 5e6 at worst.
+                assert!((found[i] - x[i]).abs() < 1e-8);
+            }
+            assert_eq!(Factored::new(&matrix, 1.5).negative(), 0, "shifted past the lowest eigenvalue");
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! Where the shape will be, from where it was.
+//!
+//! A hand moves smoothly, so the next shape is close to the polynomial through the last ones, sampled at the
+//! tick. But a hand also stops, starts and is read through a noisy sensor, where a polynomial overshoots. The
+//! poses tell which it was: the order that would have predicted the *pose* best is used for the shape.
+
+use super::functional::Shape;
+use super::plate::Plate;
+
+/// Highest order plus one.
+const DEPTH: usize = 4;
+
+/// Weights of the last ticks, newest first: binomial coefficients with alternating signs.
+const WEIGHTS: [[f64; DEPTH]; DEPTH] =
+    [[1.0, 0.0, 0.0, 0.0], [2.0, -1.0, 0.0, 0.0], [3.0, -3.0, 1.0, 0.0], [4.0, -6.0, 4.0, -1.0]];
+
+/// The last equilibria of successive ticks, newest first.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct History<const N: usize> {
+    plates: [Plate; DEPTH],
+    shapes: [Shape<N>; DEPTH],
+    length: usize,
+}
+
+impl<const N: usize> History<N> {
+    pub(crate) fn new(plate: Plate, shape: Shape<N>) -> Self {
+        Self { plates: [plate; DEPTH], shapes: [shape; DEPTH], length: 1 }
+    }
+
+    /// The equilibrium of this tick.
+    #[inline]
+    pub(crate) fn push(&mut self, plate: Plate, shape: &Shape<N>) {
+        let [a, b, c, _] = self.plates;
+        self.plates = [plate, a, b, c];
+        let [a, b, c, _] = self.shapes;
+        self.shapes = [*shape, a, b, c];
+        self.length = DEPTH.min(self.length + 1);
+    }
+
+    /// Expected shape at a pose. Real-time: bounded, no allocation.
+    #[inline]
+    pub(crate) fn predict(&self, plate: &Plate) -> Shape<N> {
+        let (mut best, mut least) = (&WEIGHTS[0], plate.distance(&self.plates[0]));
+        for weights in WEIGHTS.iter().take(self.length).skip(1) {
+            let miss = plate.distance(&Plate::combination(&self.plates, weights));
+            if miss < least {
+                (best, least) = (weights, miss);
+            }
+        }
+        let mut shape = [0.0; N];
+        for (past, weight) in self.shapes.iter().zip(best) {
+            for (coefficient, past) in shape.iter_mut().zip(past) {
+                *coefficient += weight * past;
+            }
+        }
+        shape
+    }
+}
