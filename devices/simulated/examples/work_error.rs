@@ -35,10 +35,13 @@ struct Body {
     spin: DVec3,
 }
 
+/// Final orientation of a run with steps of a length in ns.
+type Method = fn(u64) -> DQuat;
+
 fn main() {
     let exact = with_plant(62_500);
     println!("method,step_s,error_rad,ns_per_ms");
-    let methods: [(&str, fn(u64) -> DQuat); 4] = [
+    let methods: [(&str, Method); 4] = [
         ("explicit Euler", |step_ns| stepped(step_ns, euler)),
         ("implicit midpoint (geometric)", |step_ns| stepped(step_ns, midpoint)),
         ("classical Runge-Kutta", |step_ns| stepped(step_ns, runge_kutta_4)),

@@ -62,14 +62,14 @@ pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
             Grade::Note => "note",
             Grade::Bad => "bad",
         };
-        println!("  {grade:<5} {:<18} {}", diagnosis.what, diagnosis.found);
+        say!("  {grade:<5} {:<18} {}", diagnosis.what, diagnosis.found);
         if let Some(remedy) = &diagnosis.remedy {
-            println!("  {:<5} {:<18} -> {remedy}", "", "");
+            say!("  {:<5} {:<18} -> {remedy}", "", "");
         }
     }
     let bad = diagnoses.iter().filter(|diagnosis| diagnosis.grade == Grade::Bad).count();
     let verdict = if bad == 0 { "ready".to_owned() } else { format!("{bad} things to mend first") };
-    println!("{}", style::title(&verdict));
+    say!("{}", style::title(&verdict));
     Ok(())
 }
 

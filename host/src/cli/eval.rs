@@ -9,7 +9,7 @@ use clap::Args;
 use flotor_hal::DVec3;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Plugin, Setting};
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Evaluate a force model at poses from a CSV file.
@@ -52,8 +52,13 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
     let answers = Evaluator::new(model, travel).evaluate(&handles).map_err(|broke| {
         CommandError::PluginRefused(format!("{}: {broke}", plugin.metadata().path.display()))
     })?;
-    write_answers(&arguments.out, &ids, &answers)
-        .map_err(|cause| CommandError::file(&arguments.out, "cannot write the wrenches", cause))
+    match write_answers(&arguments.out, &ids, &answers) {
+        // A reader that has enough closes the pipe.
+        Err(cause) if cause.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        written => {
+            written.map_err(|cause| CommandError::file(&arguments.out, "cannot write the wrenches", cause))
+        }
+    }
 }
 
 /// Checks `--set KEY=VALUE` against the schema of a plugin.
@@ -67,19 +72,12 @@ pub(super) fn settings(plugin: &Plugin, sets: &[KeyValue]) -> Result<Vec<Setting
 }
 
 fn read_poses(path: &Path) -> Result<(Vec<String>, Vec<Handle>), CommandError> {
-    let cannot_read = |cause| CommandError::file(path, "cannot read the poses", cause);
-    let input: Box<dyn Read> = if path.as_os_str() == "-" {
-        if std::io::IsTerminal::is_terminal(&std::io::stdin()) {
-            eprintln!("{} reading poses from the terminal; end with Ctrl-D", style::warning("note:"));
-        }
-        Box::new(std::io::stdin().lock())
-    } else {
-        Box::new(std::fs::File::open(path).map_err(cannot_read)?)
-    };
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(input);
-    let malformed = |error: csv::Error| match error.position() {
-        Some(at) => CommandError::Usage(format!("{}:{}: {error}", path.display(), at.line())),
-        None => CommandError::Usage(format!("{}: {error}", path.display())),
+    let text = read_text(path).map_err(|cause| CommandError::file(path, "cannot read the poses", cause))?;
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+    let line = |at: Option<&csv::Position>| at.map_or(1, |at| line_of(&text, at));
+    let malformed = |error: csv::Error| {
+        let line = line(error.position());
+        CommandError::Usage(format!("{}:{line}: {error}", path.display()))
     };
     let header = reader.headers().map_err(malformed)?.clone();
     let columns = columns(path, &header)?;
@@ -92,7 +90,7 @@ fn read_poses(path: &Path) -> Result<(Vec<String>, Vec<Handle>), CommandError> {
         for ((number, column), name) in numbers.iter_mut().zip(columns).zip(POSE_COLUMNS) {
             let text = record.get(column).unwrap_or_default();
             *number = text.parse().map_err(|_| {
-                let line = record.position().map_or(0, csv::Position::line);
+                let line = line(record.position());
                 CommandError::Usage(format!("{}:{line}: {name} is a number, not `{text}`", path.display()))
             })?;
         }
@@ -102,6 +100,25 @@ fn read_poses(path: &Path) -> Result<(Vec<String>, Vec<Handle>), CommandError> {
         handles.push(Handle { position_m: DVec3::new(x, y, z), rotation_rad: DVec3::new(rx, ry, rz) });
     }
     Ok((ids, handles))
+}
+
+fn read_text(path: &Path) -> std::io::Result<String> {
+    if path.as_os_str() != "-" {
+        return std::fs::read_to_string(path);
+    }
+    if std::io::IsTerminal::is_terminal(&std::io::stdin()) {
+        eprintln!("{} reading poses from the terminal; end with Ctrl-D", style::warning("note:"));
+    }
+    std::io::read_to_string(std::io::stdin().lock())
+}
+
+/// Line, from 1, on which a record stands. The reader's own count ends before blank lines it is about to skip.
+fn line_of(text: &str, at: &csv::Position) -> usize {
+    let start = usize::try_from(at.byte()).unwrap_or(usize::MAX).min(text.len());
+    let (before, from_here) = text.split_at_checked(start).unwrap_or((text, ""));
+    let blank = from_here.len() - from_here.trim_start_matches(['\n', '\r']).len();
+    let skipped = from_here.get(..blank).unwrap_or_default();
+    1 + before.matches('\n').count() + skipped.matches('\n').count()
 }
 
 /// Where each pose column is; anything missing or unknown is an error that says what would be right.

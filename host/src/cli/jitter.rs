@@ -45,7 +45,7 @@ pub(crate) fn run(arguments: &JitterArguments) -> Result<(), CommandError> {
     progress.finish_and_clear();
 
     if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
-        println!("{}", to_text(&report));
+        say!("{}", to_text(&report));
     }
     for line in report.real_time.advice() {
         eprintln!("{} {line}", style::warning("note:"));

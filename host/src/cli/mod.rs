@@ -2,6 +2,11 @@
 //!
 //! Exit codes are a contract: 0 ok, 2 usage or configuration, 3 a plugin was refused, 4 device fault, 1 else.
 
+/// Prints a line; a reader that has gone away (`flotor plugins | head`) ends the program without a word.
+macro_rules! say {
+    ($($text:tt)*) => { $crate::cli::print_line(format_args!($($text)*)) };
+}
+
 mod doctor;
 mod eval;
 mod jitter;
@@ -195,12 +200,21 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// What `say!` does.
+fn print_line(line: std::fmt::Arguments<'_>) {
+    use std::io::Write;
+    if let Err(error) = writeln!(std::io::stdout(), "{line}") {
+        let gone = error.kind() == std::io::ErrorKind::BrokenPipe;
+        std::process::exit(if gone { 0 } else { 1 });
+    }
+}
+
 /// Writes a result for machines, `-` being standard output.
 fn write_json<T: serde::Serialize>(path: &std::path::Path, value: &T) -> Result<(), CommandError> {
     let json =
         serde_json::to_string_pretty(value).map_err(|error| CommandError::Failed(error.to_string()))?;
     if path.as_os_str() == "-" {
-        println!("{json}");
+        say!("{json}");
         return Ok(());
     }
     std::fs::write(path, json + "\n")

@@ -60,35 +60,30 @@ fn list(registry: &Registry, json: bool) -> Result<(), CommandError> {
         return write_json(Path::new("-"), &listed);
     }
     for kind in [PluginKind::Device, PluginKind::Model] {
-        println!("{}", style::title(&format!("{}s", kind.word())));
+        say!("{}", style::title(&format!("{}s", kind.word())));
         for plugin in listed.iter().filter(|plugin| plugin.kind == kind.word()) {
-            println!("  {:<12} {:<8} {}", plugin.id, plugin.version, plugin.doc);
-            println!("  {:<12} {:<8} {}", "", "", plugin.file);
+            say!("  {:<12} {:<8} {}", plugin.id, plugin.version, plugin.doc);
+            say!("  {:<12} {:<8} {}", "", "", plugin.file);
         }
     }
     for shadowed in registry.shadowed() {
         let note = style::warning("note:");
-        println!(
+        say!(
             "{note} {} has the id `{}` too and is hidden by the one above",
             shadowed.path.display(),
             shadowed.id
         );
     }
     for broken in registry.broken() {
-        println!("{} {broken}", style::warning("note:"));
+        say!("{} {broken}", style::warning("note:"));
     }
     for skipped in registry.skipped() {
-        println!(
-            "{} {}: not searched: {}",
-            style::warning("note:"),
-            skipped.folder.display(),
-            skipped.reason
-        );
+        say!("{} {}: not searched: {}", style::warning("note:"), skipped.folder.display(), skipped.reason);
     }
     if listed.is_empty() {
         let folders: Vec<String> =
             registry.folders().iter().map(|folder| folder.display().to_string()).collect();
-        println!("no plugins found in {}; {PATH_VARIABLE} adds folders", folders.join(", "));
+        say!("no plugins found in {}; {PATH_VARIABLE} adds folders", folders.join(", "));
     }
     Ok(())
 }
@@ -150,8 +145,8 @@ fn described(parameter: &Parameter) -> Described<'_> {
 
 fn print_description(plugin: &Plugin, parameters: &[Described<'_>]) {
     let metadata = plugin.metadata();
-    println!("{} {} - {}", style::title(&metadata.id), metadata.version, metadata.doc);
-    println!("{}, contract {}, layouts {}", metadata.path.display(), metadata.abi, {
+    say!("{} {} - {}", style::title(&metadata.id), metadata.version, metadata.doc);
+    say!("{}, contract {}, layouts {}", metadata.path.display(), metadata.abi, {
         if plugin.layouts_proven() { "proven" } else { "checked by size only" }
     });
     for parameter in parameters {
@@ -161,7 +156,7 @@ fn print_description(plugin: &Plugin, parameters: &[Described<'_>]) {
             _ => format!("{} to {} {}", parameter.min, parameter.max, parameter.unit),
         };
         let live = if parameter.live { ", live" } else { "" };
-        println!("  {:<28} {range} (default {}{live})", parameter.id, parameter.default);
-        println!("  {:<28} {}", "", parameter.doc);
+        say!("  {:<28} {range} (default {}{live})", parameter.id, parameter.default);
+        say!("  {:<28} {}", "", parameter.doc);
     }
 }

@@ -96,7 +96,7 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
 fn tell(arguments: &ReplayArguments, report: &Report) -> Result<(), CommandError> {
     if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
         let verdict = if report.bit_exact { "bit for bit the recorded wrench" } else { "the wrench differs" };
-        println!("{}", style::title(&format!("{}: {verdict}", arguments.recording.display())));
+        say!("{}", style::title(&format!("{}: {verdict}", arguments.recording.display())));
         let Difference {
             ticks,
             differing_ticks,
@@ -106,14 +106,14 @@ fn tell(arguments: &ReplayArguments, report: &Report) -> Result<(), CommandError
             rms_force_n,
             rms_torque_nm,
         } = &report.difference;
-        println!("  {:<11}{ticks} ({:.3} s) in {:.3} s", "ticks", report.recorded_s, report.wall_s);
+        say!("  {:<11}{ticks} ({:.3} s) in {:.3} s", "ticks", report.recorded_s, report.wall_s);
         if let Some(first) = first_tick {
-            println!("  {:<11}{differing_ticks} ticks, the first is {first}", "differ");
-            println!("  {:<11}max {max_force_n:.3e} N, rms {rms_force_n:.3e} N", "force");
-            println!("  {:<11}max {max_torque_nm:.3e} N·m, rms {rms_torque_nm:.3e} N·m", "torque");
+            say!("  {:<11}{differing_ticks} ticks, the first is {first}", "differ");
+            say!("  {:<11}max {max_force_n:.3e} N, rms {rms_force_n:.3e} N", "force");
+            say!("  {:<11}max {max_torque_nm:.3e} N·m, rms {rms_torque_nm:.3e} N·m", "torque");
         }
         if !report.complete {
-            println!("  {:<11}the recording breaks off: its process was killed or its disk full", "note");
+            say!("  {:<11}the recording breaks off: its process was killed or its disk full", "note");
         }
     }
     arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, report))

@@ -144,7 +144,7 @@ fn broken_models(summary: &RunSummary) -> Result<(), CommandError> {
 fn tell(arguments: &RunArguments, summary: &RunSummary, advice: &[String]) -> Result<(), CommandError> {
     let json_on_stdout = arguments.json.as_ref().is_some_and(|path| path.as_os_str() == "-");
     if !json_on_stdout {
-        println!("{}\n{}", style::title(&summary.title), summary.to_text());
+        say!("{}\n{}", style::title(&summary.title), summary.to_text());
     }
     for line in advice {
         eprintln!("{} {line}", style::warning("note:"));

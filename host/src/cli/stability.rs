@@ -76,7 +76,7 @@ pub(crate) fn run(arguments: &StabilityArguments) -> Result<(), CommandError> {
         .iter()
         .any(|path| path.as_ref().is_some_and(|p| p.as_os_str() == "-"));
     if !to_stdout {
-        println!("{}", to_text(&rows, worst_deviation));
+        say!("{}", to_text(&rows, worst_deviation));
     }
     if let Some(path) = &arguments.json {
         let version = &plugin.metadata().version;
@@ -176,9 +176,7 @@ fn write_csv(path: &Path, rows: &[Row]) -> Result<(), csv::Error> {
 /// A panel for each combination of period and drag, a line and points for each delay in it.
 fn picture(plugin: &Plugin, cases: &[Case], rows: &[Row]) -> Result<String, CommandError> {
     let mut figure = Figure::new("Largest stable stiffness", Axis::linear("Virtual damping", "N s/m"))
-        .subtitle(
-            "points: simulated flotor; lines: exact sampled-data limit; dashed where Gil's rule differs",
-        )
+        .subtitle("points: simulated flotor; lines: exact limit of the sampled loop, and Gil's rule")
         .panel_height_px(320.0);
     for panel in groups(cases, |case| (case.period_ns, case.plant_damping_ns_per_m.to_bits())) {
         // A curve needs points; single cases are in the table.

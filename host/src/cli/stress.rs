@@ -69,7 +69,7 @@ pub(crate) fn run(arguments: &StressArguments) -> Result<(), CommandError> {
 fn tell(arguments: &StressArguments, report: &StressReport) -> Result<(), CommandError> {
     let json_on_stdout = arguments.json.as_ref().is_some_and(|path| path.as_os_str() == "-");
     if !json_on_stdout {
-        println!("{}\n{}", style::title(&report.subject()), report.to_text());
+        say!("{}\n{}", style::title(&report.subject()), report.to_text());
     }
     arguments.json.as_ref().map_or(Ok(()), |path| super::write_json(path, report))
 }

@@ -23,7 +23,7 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     if arguments.json {
         write_json(Path::new("-"), &findings)?;
     } else {
-        println!("{}", style::title(&arguments.plugin.display().to_string()));
+        say!("{}", style::title(&arguments.plugin.display().to_string()));
         findings.iter().for_each(print);
     }
     if violated == 0 {
@@ -35,7 +35,7 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
 
 fn print(finding: &Finding) {
     match &finding.violation {
-        None => println!("  ok      {:<20} {}", finding.rule, finding.text),
-        Some(seen) => println!("  FAILED  {:<20} {}\n          {seen}", finding.rule, finding.text),
+        None => say!("  ok      {:<20} {}", finding.rule, finding.text),
+        Some(seen) => say!("  FAILED  {:<20} {}\n          {seen}", finding.rule, finding.text),
     }
 }

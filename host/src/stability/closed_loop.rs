@@ -73,12 +73,13 @@ const SETTLE_S: f64 = 4.0;
 const WINDOW_S: f64 = 8.0;
 /// First displacement with an ideal sensor, m: at 1e6 N/m a millinewton.
 const IDEAL_START_M: f64 = 1.0e-9;
-/// First displacement with a real one, in its steps: well above the limit cycles a quantised loop lives in.
-const QUANTISED_START_STEPS: f64 = 100.0;
+/// First displacement with a real one, in its steps: above the limit cycles a quantised loop lives in, and small
+/// enough that a stiff spring does not meet the limits of the coils (10 µm, 60 kN/m: 12 N).
+const QUANTISED_START_STEPS: f64 = 20.0;
 /// Limit cycles below this many steps of the sensor are not called unstable.
 const LIMIT_CYCLE_STEPS: f64 = 10.0;
-/// Beyond this many times the first displacement nobody needs to wait for the end.
-const GROWN: f64 = 50.0;
+/// Beyond this many times the first displacement nobody needs to wait for the end: a release overshoots less.
+const GROWN: f64 = 5.0;
 /// Mean square below this many times the first displacement squared: gone.
 const VANISHED: f64 = 1.0e-12;
 

@@ -122,3 +122,55 @@ fn row(plugin: &Plugin, case: &Case) -> Result<Row, LoopError> {
         passive_n_per_m: passive_limit_n_per_m(plant_damping_ns_per_m, &rendering),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stability::theory::Plant;
+
+    /// Limits of a free 580 g flotor to five digits, computed with other software from the definition: period in
+    /// ns, delay, drag, virtual damping, stiffness.
+    const PUBLISHED: [(u64, u32, f64, f64, f64); 8] = [
+        (1_000_000, 0, 0.5, 0.0, 1000.1),
+        (1_000_000, 0, 2.0, 0.0, 4002.3),
+        (1_000_000, 1, 0.5, 0.0, 333.4),
+        (1_000_000, 0, 0.5, 15.0, 30_213.0),
+        (1_000_000, 1, 0.5, 15.0, 10_038.0),
+        (1_000_000, 1, 0.5, 30.0, 19_166.0),
+        (250_000, 0, 0.5, 0.0, 4000.1),
+        (250_000, 1, 0.5, 15.0, 41_039.0),
+    ];
+
+    #[test]
+    fn the_default_grid_holds_the_published_cases_and_theory_meets_them() {
+        let cases = default_cases();
+        for (period_ns, delay_ticks, damping, virtual_damping, limit) in PUBLISHED {
+            let wanted = Case {
+                period_ns,
+                delay_ticks,
+                plant_damping_ns_per_m: damping,
+                virtual_damping_ns_per_m: virtual_damping,
+                quantum_m: 0.0,
+                grip: Grip::Open,
+            };
+            assert!(cases.contains(&wanted), "{wanted:?}");
+            let rendering = Rendering {
+                period_s: period_ns as f64 * 1.0e-9,
+                delay_ticks,
+                virtual_damping_ns_per_m: virtual_damping,
+            };
+            let plant = Plant { mass_kg: 0.58, damping_ns_per_m: damping, stiffness_n_per_m: 0.0 };
+            let exact = exact_limit_n_per_m(&plant, &rendering);
+            // Half a unit of the last digit given.
+            assert!((exact / limit - 1.0).abs() < 2.0e-4, "{wanted:?}: {exact} {limit}");
+        }
+    }
+
+    #[test]
+    fn no_case_is_measured_twice() {
+        let cases = default_cases();
+        for (index, case) in cases.iter().enumerate() {
+            assert!(!cases[..index].contains(case), "{case:?}");
+        }
+    }
+}
