@@ -3,19 +3,19 @@
 //!
 //! | measure | question | source |
 //! |---|---|---|
-//! | M0 [`totality`] | does it answer everywhere, finite, without panic? | |
-//! | M1 [`continuity`] | does the wrench jump? | bisection down to 1e-8 mm |
-//! | M2 [`stiffness`] | how steep is it, where may a loop render it? | `K <= 2 b / T`, Colgate and Schenkel 1997 |
-//! | M3 [`stiffness`] | is its derivative symmetric? | Maxwell's reciprocity |
-//! | M4 [`energy`] | do closed motions cost nothing? | |
-//! | M5 [`energy`] | what does holding a force for a period give away? | passivity observer, Ryu et al. 2004 |
-//! | M6 [`closed_loop`] | does a released device settle where theory says it must? | Gil et al. 2009 |
-//! | M7 [`cost`] | how long does a call take? | a tenth of a 1 kHz tick |
-//! | M8 [`determinism`] | same poses, same bits? | |
+//! | M0 `totality` | does it answer everywhere, finite, without panic? | |
+//! | M1 `continuity` | does the wrench jump? | bisection down to 1e-8 mm |
+//! | M2 `stiffness` | how steep is it, where may a loop render it? | `K <= 2 b / T`, Colgate and Schenkel 1997 |
+//! | M3 `stiffness` | is its derivative symmetric? | Maxwell's reciprocity |
+//! | M4 `energy` | do closed motions cost nothing? | |
+//! | M5 `energy` | what does holding a force for a period give away? | passivity observer, Ryu et al. 2004 |
+//! | M6 `closed_loop` | does a released device settle where theory says it must? | Gil et al. 2009 |
+//! | M7 `cost` | how long does a call take? | a tenth of a 1 kHz tick |
+//! | M8 `determinism` | same poses, same bits? | |
 //!
 //! Each measure is made on instances of its own through the plugin contract, with nothing known about the
-//! model but what the contract says. Data flows one way: [`poses`] and [`paths`] say where, [`subject`] asks,
-//! [`sweep`] shares the work between two threads, each measure's module judges, [`report`] and [`picture`]
+//! model but what the contract says. Data flows one way: `poses` and `paths` say where, `subject` asks,
+//! `sweep` shares the work between two threads, each measure's module judges, `report` and `picture`
 //! show.
 //!
 //! Not real-time: everything here allocates and takes its time.
