@@ -15,7 +15,7 @@ use flotor_hal::glam::DVec3;
 
 /// Longest step of a turning flotor times the fastest rate of its rotation and, where the two are coupled, of
 /// its translation (pure number). The energy books of a firm hand that grips the flotor askew then close to
-/// 1e-10 of what the hand's springs held.
+/// 1e-11 of what the hand's springs held.
 const MAX_TURNING_STEP: f64 = 0.1;
 
 /// Most steps a piece is cut into.
@@ -161,7 +161,7 @@ impl Grid {
     }
 
     /// Takes all steps of the grid, or gives up where `step` does. Real-time: bounded, no allocation.
-    #[inline]
+    #[inline(always)]
     fn march(
         &self,
         from: &Motion,

@@ -62,7 +62,7 @@ struct Power {
 
 impl<'a> Step<'a> {
     /// Prepares a step. Real-time: bounded, no allocation.
-    #[inline]
+    #[inline(always)]
     pub(super) fn new(
         body: &'a Body,
         grid: &'a Grid,
@@ -82,7 +82,7 @@ impl<'a> Step<'a> {
     /// however long the step.
     ///
     /// Real-time: bounded, no allocation.
-    #[inline]
+    #[inline(always)]
     pub(super) fn straight(&self) -> Option<(Motion, Work)> {
         let drive = self.drive(self.start.velocity_m_per_s);
         if !self.is_balanced(&drive) {
@@ -233,7 +233,7 @@ impl<'a> Step<'a> {
     }
 
     /// Work of a step in which the origin was displaced by `moved` and the centre of mass by `swung` more, m.
-    #[inline]
+    #[inline(always)]
     fn work(&self, drive: &Drive, end: &Motion, moved: DVec3, swung: DVec3, mean: &Power) -> Work {
         let (body, h) = (self.body, self.grid.step_s);
         // Of the oscillator alone; what rotation adds is in `mean`.
@@ -249,7 +249,7 @@ impl<'a> Step<'a> {
     }
 
     /// Work of the hand's spring, damper and mass on a translation, J.
-    #[inline]
+    #[inline(always)]
     fn hand_work_j(&self, drive: &Drive, end: &Motion, moved: DVec3, velocity2: DVec3) -> f64 {
         let (hand, h) = (&self.body.hand, self.grid.step_s);
         let displacement_integral = self.grid.end().later.displacement_integral(drive);

@@ -1,0 +1,368 @@
+//! `flotor eval` against tables computed elsewhere with higher precision, and its contract as a command: what it
+//! answers to poses nobody can be in, and what it says to wrong files and wrong parameters.
+//!
+//! The tables in `data/cases` hold a quarter of the rows their authors computed; nothing is tuned on them.
+
+use flotor_tests::program::{Flotor, Ran, exit_code};
+use flotor_tests::scratch::Scratch;
+use flotor_tests::workspace_root;
+use std::collections::BTreeMap;
+
+const POSE_HEADER: &str = "id,x_m,y_m,z_m,rx_rad,ry_rad,rz_rad";
+const WRENCH_HEADER: &str = "id,fx_n,fy_n,fz_n,tx_nm,ty_nm,tz_nm,energy_j,status";
+const MM: f64 = 1.0e-3;
+
+// ---------------------------------------------------------------- tables
+
+/// One row of a table, by column.
+type Row = BTreeMap<String, String>;
+
+fn number(row: &Row, column: &str) -> f64 {
+    let text = row.get(column).unwrap_or_else(|| panic!("no column {column}"));
+    text.parse().unwrap_or_else(|_| panic!("{column} = {text}"))
+}
+
+fn rows_of(text: &str) -> Vec<Row> {
+    let mut lines = text.lines();
+    let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    let row = |line: &str| {
+        let fields: Vec<&str> = line.split(',').collect();
+        assert_eq!(fields.len(), header.len(), "{line}");
+        header.iter().zip(fields).map(|(name, field)| ((*name).to_owned(), field.to_owned())).collect()
+    };
+    lines.map(row).collect()
+}
+
+fn table(name: &str) -> Vec<Row> {
+    let file = workspace_root().join("tests/data/cases").join(name);
+    rows_of(&std::fs::read_to_string(file).expect("the table is there"))
+}
+
+/// Preset and free length, m, of a spring of the tables.
+fn spring(number_in_table: &str) -> (&'static str, f64) {
+    let preset = match number_in_table {
+        "1" => "thesis-1",
+        "2" => "thesis-2",
+        "3" => "thesis-3",
+        _ => "slender",
+    };
+    let constants = table("springs.csv").into_iter().find(|row| row["spring"] == number_in_table);
+    (preset, number(&constants.expect("its constants are in the table"), "L0_mm") * MM)
+}
+
+// ---------------------------------------------------------------- the command
+
+/// Runs `flotor eval --model spring` from standard input to standard output.
+fn eval(poses: &str, arguments: &[&str]) -> Ran {
+    let always = ["eval", "--model", "spring", "--poses", "-", "--out", "-"];
+    Flotor::with(always.iter().chain(arguments)).reading(poses).run()
+}
+
+/// One line of an answer.
+#[derive(Clone, Debug, PartialEq)]
+struct Answer {
+    id: String,
+    wrench: [f64; 6],
+    energy_j: Option<f64>,
+    status: String,
+}
+
+impl Answer {
+    /// Distance of force, N, and torque, N m, from those of a table.
+    fn distance(&self, force_n: [f64; 3], torque_nm: [f64; 3]) -> (f64, f64) {
+        let [fx, fy, fz, tx, ty, tz] = self.wrench;
+        (distance([fx, fy, fz], force_n), distance([tx, ty, tz], torque_nm))
+    }
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
+}
+
+fn answers(text: &str) -> Vec<Answer> {
+    assert_eq!(text.lines().next(), Some(WRENCH_HEADER));
+    let answer = |row: Row| Answer {
+        id: row["id"].clone(),
+        wrench: ["fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm"].map(|column| number(&row, column)),
+        energy_j: (!row["energy_j"].is_empty()).then(|| number(&row, "energy_j")),
+        status: row["status"].clone(),
+    };
+    rows_of(text).into_iter().map(answer).collect()
+}
+
+/// Answers to poses `(id, position m, rotation vector rad)`, which the command must give.
+fn evaluate(poses: &[(String, [f64; 6])], arguments: &[&str]) -> Vec<Answer> {
+    let line = |(id, numbers): &(String, [f64; 6])| {
+        let numbers: Vec<String> = numbers.iter().map(|number| format!("{number:?}")).collect();
+        format!("{id},{}\n", numbers.join(","))
+    };
+    let poses: String = std::iter::once(format!("{POSE_HEADER}\n")).chain(poses.iter().map(line)).collect();
+    let ran = eval(&poses, arguments);
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(exit_code::OK), ""), "{ran:#?}");
+    answers(&ran.stdout)
+}
+
+/// Rows of a table with the command's answer to each.
+fn compared(rows: Vec<Row>, pose: fn(&Row, f64) -> [f64; 6], variant: &str) -> Vec<(Row, Answer)> {
+    let springs: std::collections::BTreeSet<String> = rows.iter().map(|row| row["spring"].clone()).collect();
+    let one_spring = |name: String| {
+        let (preset, free_length_m) = spring(&name);
+        let rows: Vec<Row> = rows.iter().filter(|row| row["spring"] == name).cloned().collect();
+        let poses: Vec<_> = rows.iter().map(|row| (row["id"].clone(), pose(row, free_length_m))).collect();
+        let preset = format!("preset={preset}");
+        let answers = evaluate(&poses, &["--set", &preset, "--set", &format!("variant={variant}")]);
+        assert_eq!(answers.len(), rows.len());
+        rows.into_iter().zip(answers)
+    };
+    springs
+        .into_iter()
+        .flat_map(one_spring)
+        .inspect(|(row, answer)| assert_eq!(row["id"], answer.id))
+        .collect()
+}
+
+// ---------------------------------------------------------------- accuracy
+
+/// Pose of a row of the thesis's law: device millimetres on a 15 mm range, left-handed angles.
+fn thesis_pose(row: &Row, free_length_m: f64) -> [f64; 6] {
+    let scale = free_length_m / 15.0;
+    let input = |axis: usize| number(row, &format!("fwpos{axis}_{}", if axis < 3 { "mm" } else { "rad" }));
+    [scale * input(0), scale * input(1), scale * input(2), -input(3), -input(4), input(5)]
+}
+
+/// Table a is the printed law in 50 digits; the command must be it to rounding, in every branch of the printed code.
+#[test]
+fn closed_form_is_the_printed_law_to_rounding() {
+    let compared = compared(table("a_thesis_closed_form.csv"), thesis_pose, "closed-form");
+    assert!(compared.len() > 100, "{} rows", compared.len());
+    for (row, answer) in compared {
+        let number = |column| number(&row, column);
+        let [fx, fy, fz, tx, ty, _] = answer.wrench;
+        let force_n = [number("forceX_N"), number("forceZ_N"), number("forceY_N")];
+        let torque_nm = [-number("force3_Nmm") * MM, -number("force4_Nmm") * MM, 0.0];
+        let off_n = distance([fx, fy, fz], force_n);
+        let off_nm = distance([tx, ty, 0.0], torque_nm); // the table has no torque about the axis
+        // The bounds of the requirement.
+        assert!(off_n <= 1.0e-12, "{}: {off_n} N", row["id"]);
+        assert!(off_nm <= 1.0e-15, "{}: {off_nm} N m", row["id"]);
+    }
+}
+
+/// Pose of a row of the rod tables: position of the upper plate over the lower one.
+fn rod_pose(row: &Row, free_length_m: f64) -> [f64; 6] {
+    let number = |column| number(row, column);
+    let (x_m, y_m) = (number("rx_mm") * MM, number("ry_mm") * MM);
+    [x_m, y_m, number("rz_mm") * MM - free_length_m, number("vx_rad"), number("vy_rad"), number("vz_rad")]
+}
+
+/// Table b is the exact rod; the energy law must be near it, spring by spring, in the root mean square.
+#[test]
+fn energy_is_near_the_exact_rod() {
+    const CATEGORIES: [&str; 5] = ["axial", "shear", "tilt", "shear_tilt", "yaw"];
+    let mut rows = table("b_exact_rod_prebuckling.csv");
+    rows.retain(|row| CATEGORIES.contains(&row["category"].as_str()));
+    let compared = compared(rows, rod_pose, "energy");
+    // The bounds of the requirement, N.
+    for (spring, bound_n) in [("1", 2.0e-3), ("2", 8.0e-3), ("3", 15.0e-3)] {
+        let squares = compared.iter().filter(|(row, _)| row["spring"] == spring).map(|(row, answer)| {
+            let force_n = ["FX_N", "FY_N", "FZ_N"].map(|column| number(row, column));
+            answer.distance(force_n, [0.0; 3]).0.powi(2)
+        });
+        let squares: Vec<f64> = squares.collect();
+        assert!(squares.len() > 10, "spring {spring}: {} rows", squares.len());
+        let rms_n = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        assert!(rms_n <= bound_n, "spring {spring}: {rms_n} N");
+    }
+}
+
+/// The energy that is reported is that of the table where the law is good: its gradient cannot be near and it not.
+#[test]
+fn the_energy_column_is_the_stored_energy() {
+    let mut rows = table("b_exact_rod_prebuckling.csv");
+    rows.retain(|row| row["category"] == "axial");
+    for (row, answer) in compared(rows, rod_pose, "energy") {
+        let (stored_j, reported_j) = (number(&row, "W_Nmm") * MM, answer.energy_j.expect("it has one"));
+        // Axially the law is exact; the lengths, some 0.04 m, are rounded to 1e-17 m at forces of some 10 N.
+        assert!((stored_j - reported_j).abs() < 1.0e-15, "{}: {reported_j} J", row["id"]);
+    }
+}
+
+// ---------------------------------------------------------------- poses nobody can be in
+
+const VARIANTS: [&str; 3] = ["energy", "closed-form", "current-length"];
+
+fn pose(id: &str, numbers: [f64; 6]) -> (String, [f64; 6]) {
+    (id.to_owned(), numbers)
+}
+
+#[test]
+fn every_pose_has_finite_columns_and_a_status() {
+    let (nan, inf) = (f64::NAN, f64::INFINITY);
+    let mut poses = vec![
+        pose("home", [0.0; 6]),
+        // Length of the chord equal to the free length, sheared: 0.015^2 + 0.02^2 = 0.025^2.
+        pose("at free length", [0.015, 0.0, -0.005, 0.0, 0.0, 0.0]),
+        pose("past solid", [0.0, 0.0, -0.02, 0.0, 0.0, 0.0]),
+        pose("flat", [0.0, 0.0, -0.025, 0.0, 0.0, 0.0]),
+        pose("below the base", [0.0, 0.0, -0.03, 0.0, 0.0, 0.0]),
+        pose("upside down", [0.0, 0.0, -0.001, std::f64::consts::PI, 0.0, 0.0]),
+        pose("a million kilometres off", [1.0e9; 6]),
+        pose("beyond all numbers", [1.0e300, -1.0e300, 1.0e300, 0.0, 0.0, 0.0]),
+        pose("hardly anywhere", [1.0e-300; 6]),
+    ];
+    for axis in 0..6 {
+        for (name, bad) in [("nan", nan), ("inf", inf), ("-inf", -inf)] {
+            let mut numbers = [0.0; 6];
+            numbers[axis] = bad;
+            poses.push(pose(&format!("{name} in {axis}"), numbers));
+        }
+    }
+    for variant in VARIANTS {
+        let answers = evaluate(&poses, &["--set", &format!("variant={variant}")]);
+        assert_eq!(answers.len(), poses.len());
+        for ((id, numbers), answer) in poses.iter().zip(&answers) {
+            assert_eq!(id, &answer.id);
+            assert!(answer.wrench.iter().all(|column| column.is_finite()), "{variant}: {answer:?}");
+            assert!(answer.energy_j.is_none_or(f64::is_finite), "{variant}: {answer:?}");
+            let legal = ["ok", "clamped", "out_of_domain", "not_converged", "invalid_input"];
+            assert!(legal.contains(&answer.status.as_str()), "{variant}: {answer:?}");
+            let invalid = numbers.iter().any(|number| !number.is_finite());
+            assert_eq!(answer.status == "invalid_input", invalid, "{variant}: {answer:?}");
+            if invalid {
+                assert_eq!(answer.wrench, [0.0; 6], "{variant}: {answer:?}");
+            }
+        }
+        let home = &answers[0];
+        assert_eq!((home.wrench, home.status.as_str()), ([0.0; 6], "ok"), "{variant}");
+        assert_eq!(answers[1].status, "ok", "{variant}: nothing is special about the free length");
+    }
+}
+
+// ---------------------------------------------------------------- files
+
+#[test]
+fn ids_go_through_and_are_counted_where_there_are_none() {
+    let row = "0,0,-0.005,0,0,0\n";
+    let with = format!("{POSE_HEADER}\nfirst,{row}\"a, b\",{row}");
+    let ran = eval(&with, &[]);
+    let ids: Vec<&str> = ran.stdout.lines().skip(1).filter_map(|line| line.split(",0").next()).collect();
+    assert_eq!(ids, ["first", "\"a, b\""], "{ran:#?}");
+    let without = format!("{}\n{row}{row}", POSE_HEADER.trim_start_matches("id,"));
+    let ran = eval(&without, &[]);
+    let ids: Vec<String> = answers(&ran.stdout).into_iter().map(|answer| answer.id).collect();
+    assert_eq!(ids, ["0", "1"]);
+}
+
+#[test]
+fn columns_may_stand_in_any_order() {
+    let usual = format!("{POSE_HEADER}\na,0.001,0,-0.005,0,0.01,0\n");
+    let other = "ry_rad,z_m,id,x_m,y_m,rz_rad,rx_rad\n0.01,-0.005,a,0.001,0,0,0\n";
+    assert_eq!(eval(&usual, &[]), eval(other, &[]));
+}
+
+#[test]
+fn files_and_pipes_carry_the_same() {
+    let poses = format!("{POSE_HEADER}\na,0.001,0,-0.005,0,0.01,0\n");
+    let scratch = Scratch::default();
+    let (input, output) = (scratch.file("poses.csv", &poses), scratch.path().join("wrenches.csv"));
+    let arguments = ["eval".as_ref(), "--model".as_ref(), "spring".as_ref()];
+    let files = ["--poses".as_ref(), input.as_os_str(), "--out".as_ref(), output.as_os_str()];
+    let ran = Flotor::with(arguments.into_iter().chain(files)).run();
+    assert_eq!(ran, Ran { code: Some(exit_code::OK), stdout: String::new(), stderr: String::new() });
+    assert_eq!(std::fs::read_to_string(output).expect("it was written"), eval(&poses, &[]).stdout);
+}
+
+/// A spring has no history: the way to a pose does not matter.
+#[test]
+fn successive_poses_of_one_handle_are_the_same_poses() {
+    let poses =
+        format!("{POSE_HEADER}\na,0.001,0,-0.005,0,0.01,0\nb,0,0.002,-0.003,0,0,0.1\nc,0,0,0,0,0,0\n");
+    assert_eq!(eval(&poses, &[]), eval(&poses, &["--path"]));
+}
+
+#[test]
+fn a_wrong_file_is_told_with_file_and_line() {
+    let good = "a,0,0,0,0,0,0";
+    let expected = "[id,]x_m,y_m,z_m,rx_rad,ry_rad,rz_rad";
+    let wrong = [
+        (
+            "id,x_m,y_m,z_m,rx_rad,ry_rad,rz_deg\n".to_owned() + good,
+            format!("1: unknown column `rz_deg`; did you mean `rz_rad`? (the header is {expected})"),
+        ),
+        ("x_m,y_m,z_m,rx_rad,ry_rad\n0,0,0,0,0\n".to_owned(), "1: column `rz_rad` is missing".to_owned()),
+        (String::new(), "1: column `x_m` is missing".to_owned()),
+        (format!("{POSE_HEADER}\n{good}\nb,0,0,zero,0,0,0\n"), "3: z_m is a number, not `zero`".to_owned()),
+        (format!("{POSE_HEADER}\n{good}\n\nb,0,0,,0,0,0\n"), "4: z_m is a number, not ``".to_owned()),
+    ];
+    for (poses, cause) in wrong {
+        let scratch = Scratch::default();
+        let file = scratch.file("poses.csv", &poses);
+        let always = ["eval".as_ref(), "--model".as_ref(), "spring".as_ref(), "--out".as_ref(), "-".as_ref()];
+        let ran = Flotor::with(always.into_iter().chain(["--poses".as_ref(), file.as_os_str()])).run();
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+        assert_eq!(ran.error(), format!("{}:{cause}", file.display()));
+        assert_eq!(ran.stdout, "", "nothing is written before all is read");
+    }
+    let ran = eval(&format!("{POSE_HEADER}\n{good},0\n"), &[]);
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+    assert!(ran.error().starts_with("-:2: "), "a row that is too long: {ran:#?}");
+}
+
+#[test]
+fn a_file_that_is_not_there_is_named() {
+    let ran = Flotor::with(["eval", "--model", "spring", "--poses", "no/such.csv", "--out", "-"]).run();
+    assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
+    assert!(ran.error().starts_with("no/such.csv: cannot read the poses: "), "{ran:#?}");
+}
+
+// ---------------------------------------------------------------- parameters
+
+#[test]
+fn wrong_parameters_are_told_with_what_would_be_right() {
+    let wrong = [
+        (&["variant=energie"][..], "--set variant: `variant` = `energie`: legal is energy | closed-form | "),
+        (&["gama_n=17"], "--set gama_n: no parameter `gama_n`; did you mean `gamma_n`?"),
+        (&["gamma_n=many"], "--set gamma_n: `gamma_n` is a number in N, not `many`"),
+        (&["free_length_mm=0"], "--set free_length_mm: `free_length_mm` = 0: legal is 1 to 1000 mm"),
+        (&["gamma_n=nan"], "--set gamma_n: `gamma_n` = NaN: legal is 0.01 to 10000 N"),
+        (
+            &["alpha_n_mm2=180"],
+            "`alpha_n_mm2` has no say in mode `gamma`, where it follows from the others; set `mode` to `alpha`",
+        ),
+        (
+            &["mode=physical", "gamma_n=17"],
+            "`gamma_n` has no say in mode `physical`, where it follows from the others; set `mode` to `gamma`",
+        ),
+    ];
+    for (sets, cause) in wrong {
+        let arguments: Vec<&str> = sets.iter().flat_map(|set| ["--set", *set]).collect();
+        let ran = eval(&format!("{POSE_HEADER}\na,0,0,0,0,0,0\n"), &arguments);
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+        assert!(ran.error().contains(cause), "{ran:#?}");
+        assert_eq!(ran.stdout, "");
+    }
+}
+
+/// Each mode takes its own constant; `gamma = 2 x` is twice the axial force.
+#[test]
+fn each_mode_takes_its_own_constant() {
+    let axial_n = |sets: &[&str]| {
+        let arguments: Vec<&str> = sets.iter().flat_map(|set| ["--set", *set]).collect();
+        evaluate(&[pose("a", [0.0, 0.0, -0.005, 0.0, 0.0, 0.0])], &arguments)[0].wrench[2]
+    };
+    // F = gamma (L0 - L) / L0; a handful of roundings.
+    let near = |force_n: f64, expected_n: f64| (force_n / expected_n - 1.0).abs() < 1.0e-14;
+    assert!(near(axial_n(&[]), 16.97 * 0.2));
+    assert!(near(axial_n(&["gamma_n=33.94"]), 2.0 * 16.97 * 0.2));
+    assert!(near(axial_n(&["mode=alpha", "alpha_n_mm2=358.1578785296652"]), 2.0 * 16.97 * 0.2));
+    assert!(near(axial_n(&["mode=beta", "beta_n=91.02115318688852"]), 2.0 * 16.97 * 0.2));
+    // The wire's own rigidity, from the constants of springs.csv.
+    assert!(near(axial_n(&["mode=physical"]), 14.147_311_499_554_837 * 0.2));
+}
+
+#[test]
+fn a_model_nobody_has_is_a_mistake() {
+    let ran = Flotor::with(["eval", "--model", "sprang", "--poses", "-", "--out", "-"]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+    assert!(ran.error().starts_with("no model plugin `sprang`; did you mean `spring`?"), "{ran:#?}");
+}
