@@ -9,6 +9,8 @@
 //!
 //! Source: series of `asin² s` and `asin s / sqrt(1 - s²)` at `s = sin(angle / 2)`, NIST DLMF 4.24.
 
+use crate::real::Real;
+
 /// `1 - cos` of 60 degrees: beyond it the measures are a continuation.
 pub const TRUSTED_VERSINE: f64 = 0.5;
 
@@ -45,30 +47,30 @@ const fn twist_series() -> [f64; TWIST_TERMS] {
 }
 
 /// A polynomial and its derivative.
-#[inline]
-fn polynomial<const N: usize>(coefficients: &[f64; N], x: f64) -> (f64, f64) {
-    let (mut value, mut slope) = (0.0, 0.0);
+#[inline(always)]
+fn polynomial<R: Real, const N: usize>(coefficients: &[f64; N], x: R) -> (R, R) {
+    let (mut value, mut slope) = (x.like(0.0), x.like(0.0));
     for coefficient in coefficients.iter().rev() {
         slope = slope * x + value;
-        value = value * x + coefficient;
+        value = value * x + *coefficient;
     }
     (value, slope)
 }
 
 /// Square of the angle between two directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SquaredAngle {
+pub struct SquaredAngle<R = f64> {
     /// `angle²` (rad²).
-    pub value: f64,
+    pub value: R,
     /// Its derivative by `1 - cos angle`, two at zero.
-    pub slope: f64,
+    pub slope: R,
 }
 
-impl SquaredAngle {
+impl<R: Real> SquaredAngle<R> {
     /// From the versine `1 - cos angle`, 0 to 2. Real-time: bounded, no allocation, no branch.
-    #[inline]
+    #[inline(always)]
     #[must_use]
-    pub fn from_versine(versine: f64) -> Self {
+    pub fn from_versine(versine: R) -> Self {
         let (quotient, quotient_slope) = polynomial(&SQUARE_SERIES, versine);
         Self { value: versine * quotient, slope: quotient + versine * quotient_slope }
     }
@@ -76,20 +78,21 @@ impl SquaredAngle {
 
 /// A signed angle of rotation about a known axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Twist {
+pub struct Twist<R = f64> {
     /// The angle (rad); odd, and zero again at half a turn.
-    pub value: f64,
+    pub value: R,
     /// Its derivative by the true angle, one at zero.
-    pub slope: f64,
+    pub slope: R,
 }
 
-impl Twist {
+impl<R: Real> Twist<R> {
     /// From sine and versine `1 - cos` of the angle. Real-time: bounded, no allocation, no branch.
-    #[inline]
+    #[inline(always)]
     #[must_use]
-    pub fn from_sine(sine: f64, versine: f64) -> Self {
+    pub fn from_sine(sine: R, versine: R) -> Self {
         let (quotient, quotient_slope) = polynomial(&TWIST_SERIES, versine);
-        Self { value: sine * quotient, slope: (1.0 - versine) * quotient + sine * sine * quotient_slope }
+        let cosine = versine.like(1.0) - versine;
+        Self { value: sine * quotient, slope: cosine * quotient + sine * sine * quotient_slope }
     }
 }
 

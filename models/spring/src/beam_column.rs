@@ -11,111 +11,158 @@
 //! `z = (q L)² / 4`, with the thesis's buckling factor `q` (equation 19).
 
 use crate::entire::EntireFunctions;
+use crate::real::Real;
 use crate::rigidity::Rigidities;
 
 /// Quotients of entire functions at one argument, with `x = sqrt z`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StabilityFunctions {
+pub struct StabilityFunctions<R = f64> {
     /// `C0 / G0 = x cot x`: bow stiffness relative to the unloaded rod.
-    pub bow: f64,
+    pub bow: R,
     /// `G1 / G0 = 3 (1 - x cot x) / x²`: bending share of the sway flexibility, relative to the unloaded rod.
-    pub sway: f64,
+    pub sway: R,
     /// `h / G0²`, the share of writhe in a bow and a sway at right angles.
-    pub writhe: f64,
+    pub writhe: R,
     /// `d(sway)/dz`.
-    pub sway_slope: f64,
+    pub sway_slope: R,
 }
 
-impl StabilityFunctions {
+impl<R: Real> StabilityFunctions<R> {
     /// At argument `z`; poles at `z = pi², 4 pi², ...`. Real-time: bounded, no allocation.
     ///
     /// Accurate for every `z <= 60`, however negative; above, see [`EntireFunctions::at`].
-    #[inline]
+    #[inline(always)]
     #[must_use]
-    pub fn at(z: f64) -> Self {
-        if z < EntireFunctions::MIN_ARGUMENT {
-            return Self::in_strong_tension(z);
-        }
+    pub fn at(z: R) -> Self {
         let f = EntireFunctions::at(z);
-        let inverse = 1.0 / f.g0;
+        let inverse = f.g0.inverse();
         let (bow, sway) = (f.c0 * inverse, f.g1 * inverse);
-        let sway_slope = sway * sway * (1.0 / 6.0) - 0.1 * (f.g2 * inverse);
-        Self { bow, sway, writhe: 0.5 * (3.0 - bow * sway), sway_slope }
+        let sway_slope = sway * sway * (1.0 / 6.0) - f.g2 * inverse * 0.1;
+        let regular = Self { bow, sway, writhe: writhe(bow, sway), sway_slope };
+        let strong = z.below(EntireFunctions::MIN_ARGUMENT);
+        if R::any(strong) { Self::in_strong_tension(z).or_where_not(strong, regular) } else { regular }
     }
 
     /// `d(bow)/dz`.
-    #[inline]
+    #[inline(always)]
     #[must_use]
-    pub fn bow_slope(&self) -> f64 {
+    pub fn bow_slope(&self) -> R {
         self.writhe * (-1.0 / 3.0)
     }
 
     /// `d(writhe)/dz`, from `writhe = (3 - bow sway) / 2`.
-    #[inline]
+    #[inline(always)]
     #[must_use]
-    pub fn writhe_slope(&self) -> f64 {
-        -0.5 * (self.bow_slope() * self.sway + self.bow * self.sway_slope)
+    pub fn writhe_slope(&self) -> R {
+        (self.bow_slope() * self.sway + self.bow * self.sway_slope) * -0.5
     }
 
     /// The same by `x coth x`, which does not overflow where its parts would. The differences cancel nothing
     /// once `x coth x` is far from one.
-    #[cold]
-    fn in_strong_tension(z: f64) -> Self {
+    #[inline(always)]
+    fn in_strong_tension(z: R) -> Self {
+        // Lanes that are not in tension have no root; their numbers are not used.
         let x = (-z).sqrt();
-        let bow = x / x.tanh();
-        let sway = 3.0 * (1.0 - bow) / z;
-        let writhe = 0.5 * (3.0 - bow * sway);
+        let bow = x / x.map(f64::tanh);
+        let sway = (z.like(1.0) - bow) * 3.0 / z;
+        let writhe = writhe(bow, sway);
         Self { bow, sway, writhe, sway_slope: (writhe - sway) / z }
     }
-}
 
-/// End stiffnesses of the printed law and of its correction, per chord length.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EndStiffness {
-    /// `a - b` (N·m/rad).
-    pub bow_nm_per_rad: f64,
-    /// `(a + b) / L` (N/rad): transverse force per sum of the end angles.
-    pub sway_n_per_rad: f64,
-    /// The argument `z = (q L)² / 4` they belong to; `pi²` is the first pole of the bow.
-    pub argument: f64,
-}
-
-impl EndStiffness {
-    /// The thesis's law (equations 19, 48, 49, 71, 72, 76 in one): rigidities per *unloaded* length, although
-    /// the rod has become `length_m` long. Real-time: bounded, no allocation.
-    #[inline]
-    #[must_use]
-    pub fn printed(rigidities: &Rigidities, axial_force_n: f64, length_m: f64) -> Self {
-        Self::of_column(rigidities.alpha_n_m2, rigidities.beta_n, axial_force_n, length_m)
-    }
-
-    /// The same with rigidities per *current* length: the coils that filled `L0` now fill `L`, so `alpha` and
-    /// `beta` shrink by `L / L0` (Haringx). Exact linearisation of the exact rod. Real-time: bounded, no
-    /// allocation.
-    #[inline]
-    #[must_use]
-    pub fn current_length(
-        rigidities: &Rigidities,
-        axial_force_n: f64,
-        length_m: f64,
-        free_length_m: f64,
-    ) -> Self {
-        let scale = length_m / free_length_m;
-        Self::of_column(rigidities.alpha_n_m2 * scale, rigidities.beta_n * scale, axial_force_n, length_m)
-    }
-
-    #[inline]
-    fn of_column(alpha_n_m2: f64, beta_n: f64, axial_force_n: f64, length_m: f64) -> Self {
-        let softening = 1.0 + axial_force_n / beta_n;
-        let bending = softening * length_m * length_m / alpha_n_m2;
-        let argument = 0.25 * axial_force_n * bending;
-        let stability = StabilityFunctions::at(argument);
+    #[inline(always)]
+    fn or_where_not(self, mask: R::Mask, other: Self) -> Self {
         Self {
-            bow_nm_per_rad: 2.0 * alpha_n_m2 / length_m * stability.bow,
-            sway_n_per_rad: 0.5 * softening / (1.0 / beta_n + bending * stability.sway / 12.0),
+            bow: R::select(mask, self.bow, other.bow),
+            sway: R::select(mask, self.sway, other.sway),
+            writhe: R::select(mask, self.writhe, other.writhe),
+            sway_slope: R::select(mask, self.sway_slope, other.sway_slope),
+        }
+    }
+}
+
+#[inline(always)]
+fn writhe<R: Real>(bow: R, sway: R) -> R {
+    (bow.like(3.0) - bow * sway) * 0.5
+}
+
+/// The closed form's rod, its constants prepared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Column {
+    /// `2 alpha`
+    bow_n_m2: f64,
+    /// `1 / (4 alpha)`
+    load_per_n_m2: f64,
+    /// `1 / (12 alpha)`
+    bending_per_n_m2: f64,
+    /// `1 / beta`
+    shear_per_n: f64,
+}
+
+impl Column {
+    /// Prepares the rod. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn new(rigidities: &Rigidities) -> Self {
+        Self {
+            bow_n_m2: 2.0 * rigidities.alpha_n_m2,
+            load_per_n_m2: 1.0 / (4.0 * rigidities.alpha_n_m2),
+            bending_per_n_m2: 1.0 / (12.0 * rigidities.alpha_n_m2),
+            shear_per_n: 1.0 / rigidities.beta_n,
+        }
+    }
+
+    /// End stiffnesses under an axial force, at a length. Real-time: bounded, no allocation.
+    ///
+    /// `reference_m` is the length that `alpha` and `beta` are counted per:
+    /// - the current length itself gives the thesis's law (equations 19, 48, 49, 71, 72, 76 in one), which takes
+    ///   the rigidities of the unloaded rod although the rod has become `length_m` long;
+    /// - the free length gives the law per *current* length: the coils that filled `L0` now fill `L`, so `alpha`
+    ///   and `beta` shrink by `L / L0` (Haringx). It is the exact linearisation of the exact rod.
+    ///
+    /// With `l` for it and `Lam = L + l P / beta`:
+    ///
+    /// ```text
+    /// z = P Lam l / (4 alpha)      a - b = (2 alpha / l) C0 / G0
+    /// (a + b) / L = Lam / (2 l) G0 / (G0 / beta + Lam L G1 / (12 alpha))
+    /// ```
+    #[inline(always)]
+    #[must_use]
+    pub fn ends<R: Real>(&self, axial_force_n: R, length_m: R, reference_m: R) -> EndStiffness<R> {
+        let load_nm = axial_force_n * reference_m;
+        let sheared_m = length_m + load_nm * self.shear_per_n;
+        let argument = load_nm * self.load_per_n_m2 * sheared_m;
+        let bending = length_m * self.bending_per_n_m2 * sheared_m;
+        let EntireFunctions { c0, g0, g1, .. } = EntireFunctions::at(argument);
+        let flexibility = g0 * self.shear_per_n + bending * g1;
+        // One division for all three denominators.
+        let inverse = (reference_m * g0 * flexibility).inverse();
+        let bow_nm_per_rad = c0 * self.bow_n_m2 * flexibility * inverse;
+        let sway_n_per_rad = sheared_m * 0.5 * (g0 * g0) * inverse;
+        let strong = argument.below(EntireFunctions::MIN_ARGUMENT);
+        if !R::any(strong) {
+            return EndStiffness { bow_nm_per_rad, sway_n_per_rad, argument };
+        }
+        let StabilityFunctions { bow, sway, .. } = StabilityFunctions::in_strong_tension(argument);
+        let [strong_bow, strong_sway] = [
+            bow * self.bow_n_m2 / reference_m,
+            sheared_m * 0.5 / (reference_m * (bending * sway + self.shear_per_n)),
+        ];
+        EndStiffness {
+            bow_nm_per_rad: R::select(strong, strong_bow, bow_nm_per_rad),
+            sway_n_per_rad: R::select(strong, strong_sway, sway_n_per_rad),
             argument,
         }
     }
+}
+
+/// End stiffnesses of the printed law or of its correction, see [`Column::ends`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EndStiffness<R = f64> {
+    /// `a - b` (N·m/rad).
+    pub bow_nm_per_rad: R,
+    /// `(a + b) / L` (N/rad): transverse force per sum of the end angles.
+    pub sway_n_per_rad: R,
+    /// The argument `z = (q L)² / 4` they belong to; `pi²` is the first pole of the bow.
+    pub argument: R,
 }
 
 #[cfg(test)]
@@ -163,7 +210,7 @@ mod tests {
     fn unloaded_rod_has_the_textbook_stiffness() {
         let rigidities = *Preset::Thesis1.spring().rigidities();
         let length_m = 0.025;
-        let rest = EndStiffness::printed(&rigidities, 0.0, length_m);
+        let rest = Column::new(&rigidities).ends(0.0, length_m, length_m);
         let bow = 2.0 * rigidities.alpha_n_m2 / length_m;
         assert!((rest.bow_nm_per_rad - bow).abs() < 1e-15 * bow);
         // Timoshenko beam: equation 76.
@@ -180,7 +227,7 @@ mod tests {
         let compression = 0.545_366_315_224_712_4;
         let length_m = free_length_m * (1.0 - compression);
         let load_n = rigidities.gamma_n * compression;
-        let column = EndStiffness::current_length(rigidities, load_n, length_m, free_length_m);
+        let column = Column::new(rigidities).ends(load_n, length_m, free_length_m);
         // Rounding of a dozen operations on a value near ten.
         assert!((column.argument - std::f64::consts::PI.powi(2)).abs() < 1e-13);
     }

@@ -18,8 +18,8 @@
 use crate::angle::SquaredAngle;
 use crate::beam_column::StabilityFunctions;
 use crate::level::{Levelled, level_above};
-use crate::pose::Chord;
 use crate::quartic::{Quartic, QuarticEnergy};
+use crate::real::Real;
 use crate::rigidity::Spring;
 
 /// Argument `z` from which on it is bent off its course to the pole at 9.87, where the column buckles. Here
@@ -30,8 +30,8 @@ pub const KNEE: f64 = 8.75;
 pub const REACH: f64 = 0.5;
 
 /// The argument kept short of the pole.
-#[inline]
-pub(crate) fn levelled_argument(z: f64) -> Levelled {
+#[inline(always)]
+pub(crate) fn levelled_argument<R: Real>(z: R) -> Levelled<R> {
     level_above(z, KNEE, REACH)
 }
 
@@ -53,6 +53,15 @@ pub(crate) struct Bending {
 
 impl Bending {
     pub(crate) fn new(spring: &Spring) -> Self {
+        Self::with_quartic(spring, Quartic::new(spring))
+    }
+
+    /// The bending of a spring of other stiffness but equal proportions. Real-time: bounded, no allocation.
+    pub(crate) fn restiffened(&self, spring: &Spring) -> Self {
+        Self::with_quartic(spring, self.quartic.with_gamma(spring.rigidities().gamma_n))
+    }
+
+    fn with_quartic(spring: &Spring, quartic: Quartic) -> Self {
         let rigidities = spring.rigidities();
         let free_length_m = spring.geometry().free_length_m;
         Self {
@@ -61,67 +70,75 @@ impl Bending {
             slenderness_per_m2: rigidities.beta_n / (12.0 * rigidities.alpha_n_m2),
             shear_compliance: rigidities.gamma_n / rigidities.beta_n,
             load_per_m2: rigidities.gamma_n / (4.0 * rigidities.alpha_n_m2),
-            quartic: Quartic::new(rigidities, free_length_m),
+            quartic,
         }
     }
 
-    /// Energy and derivatives; `None` where the rod has no shear stiffness left, possible only for `G > E`.
-    /// Real-time: bounded, no allocation.
-    #[inline]
-    pub(crate) fn at(&self, chord: &Chord, angles: &[SquaredAngle; 3]) -> Option<BendingEnergy> {
-        let sheared_length_m = chord.length_m + self.shear_compliance * chord.shortening_m;
-        if sheared_length_m <= 0.0 {
-            return None;
-        }
+    /// Energy and derivatives at a chord length and shortening, and at the three squared angles. Real-time:
+    /// bounded, no allocation.
+    #[inline(always)]
+    pub(crate) fn at<R: Real>(
+        &self,
+        length_m: R,
+        shortening_m: R,
+        angles: &[SquaredAngle<R>; 3],
+    ) -> BendingEnergy<R> {
+        let sheared_length_m = length_m + shortening_m * self.shear_compliance;
         let sheared_slope = 1.0 - self.shear_compliance;
-        let argument = levelled_argument(self.load_per_m2 * chord.shortening_m * sheared_length_m);
+        let argument = levelled_argument(shortening_m * sheared_length_m * self.load_per_m2);
         let z_by_length =
-            argument.slope * self.load_per_m2 * (chord.shortening_m * sheared_slope - sheared_length_m);
+            argument.slope * (shortening_m * sheared_slope - sheared_length_m) * self.load_per_m2;
         let stability = StabilityFunctions::at(argument.value);
 
-        let area_m2 = sheared_length_m * chord.length_m;
-        let area_slope = sheared_length_m + chord.length_m * sheared_slope;
+        let area_m2 = sheared_length_m * length_m;
+        let area_slope = sheared_length_m + length_m * sheared_slope;
         let slenderness = self.slenderness_per_m2;
-        let inverse = 1.0 / (1.0 + slenderness * area_m2 * stability.sway);
+        let inverse = (area_m2 * stability.sway * slenderness + 1.0).inverse();
         let denominator_slope =
-            slenderness * (area_slope * stability.sway + area_m2 * stability.sway_slope * z_by_length);
+            (area_slope * stability.sway + area_m2 * stability.sway_slope * z_by_length) * slenderness;
 
-        let sway = self.shear_n_per_m * area_m2 * inverse;
-        let sway_slope = (self.shear_n_per_m * area_slope - sway * denominator_slope) * inverse;
-        let bow = self.bow_nm_per_rad * stability.bow;
-        let bow_slope = self.bow_nm_per_rad * stability.bow_slope() * z_by_length;
-        let writhe = slenderness * area_m2 * stability.writhe * inverse;
+        let sway = area_m2 * inverse * self.shear_n_per_m;
+        let sway_slope = (area_slope * self.shear_n_per_m - sway * denominator_slope) * inverse;
+        let bow = stability.bow * self.bow_nm_per_rad;
+        let bow_slope = stability.bow_slope() * z_by_length * self.bow_nm_per_rad;
+        let writhe = area_m2 * stability.writhe * inverse * slenderness;
         let writhe_numerator_slope =
-            slenderness * (area_slope * stability.writhe + area_m2 * stability.writhe_slope() * z_by_length);
+            (area_slope * stability.writhe + area_m2 * stability.writhe_slope() * z_by_length) * slenderness;
         let writhe_slope = (writhe_numerator_slope - writhe * denominator_slope) * inverse;
 
-        let squares = angles.map(|angle| angle.value);
+        let squares = [angles[0].value, angles[1].value, angles[2].value];
         let QuarticEnergy { energy_j, by_squares, by_length } =
-            self.quartic.at(chord.length_m, argument.value, z_by_length, squares);
-        let (ends, plates) = (0.5 * (squares[0] + squares[1]), 0.5 * squares[2]);
-        let (carry, carry_slope) = (0.5 * (sway - bow), 0.5 * (sway_slope - bow_slope));
-        Some(BendingEnergy {
+            self.quartic.at(length_m, argument.value, z_by_length, squares);
+        let (ends, plates) = ((squares[0] + squares[1]) * 0.5, squares[2] * 0.5);
+        let (half_sway, carry, carry_slope) =
+            (sway * 0.5, (sway - bow) * 0.5, (sway_slope - bow_slope) * 0.5);
+        BendingEnergy {
             energy_j: sway * ends - carry * plates + energy_j,
-            by_squares: [0.5 * sway + by_squares[0], 0.5 * sway + by_squares[1], by_squares[2] - 0.5 * carry],
+            by_squares: [half_sway + by_squares[0], half_sway + by_squares[1], by_squares[2] - carry * 0.5],
             by_length: sway_slope * ends - carry_slope * plates + by_length,
             writhe,
             writhe_slope,
+            sheared_length_m,
             levelled: argument.bent,
-        })
+        }
     }
 }
 
 /// The energy and its partial derivatives.
-pub(crate) struct BendingEnergy {
-    pub(crate) energy_j: f64,
+#[derive(Clone, Copy)]
+pub(crate) struct BendingEnergy<R: Real> {
+    pub(crate) energy_j: R,
     /// By the squared angles lower normal to chord, upper normal to chord, lower to upper normal.
-    pub(crate) by_squares: [f64; 3],
+    pub(crate) by_squares: [R; 3],
     /// By the length of the chord.
-    pub(crate) by_length: f64,
+    pub(crate) by_length: R,
     /// `kt`, see the module.
-    pub(crate) writhe: f64,
+    pub(crate) writhe: R,
     /// Its derivative by the length of the chord.
-    pub(crate) writhe_slope: f64,
-    /// Whether the argument was kept short of the pole.
-    pub(crate) levelled: bool,
+    pub(crate) writhe_slope: R,
+    /// `Lam` (m). Where it is not positive, possible only for `G > E`, the rod has no shear stiffness left and
+    /// the rest means nothing.
+    pub(crate) sheared_length_m: R,
+    /// Where the argument was kept short of the pole.
+    pub(crate) levelled: R::Mask,
 }

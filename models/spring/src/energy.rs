@@ -30,14 +30,12 @@
 //! Derivation: the end stiffnesses are those of Haringx; the invariant form and the fourth order are this
 //! project's, in the book's chapter "The spring".
 
-use flotor_hal::glam::{DQuat, DVec3};
-
 use crate::angle::{SquaredAngle, TRUSTED_VERSINE, Twist};
 use crate::bending::{Bending, BendingEnergy};
-use crate::pose::{Chord, Pose};
-use crate::response::{Demand, Response};
+use crate::pose::{Coordinates, Pose, Span};
+use crate::real::{Real, Vector};
+use crate::response::{Answer, Demand, Law, Response};
 use crate::rigidity::Spring;
-use crate::validity::Validity;
 
 /// Smallest `1 + k.t`. The twist has no meaning for a plate turned upside down; this is 177.4 degrees.
 const LEAST_OVERTURN: f64 = 1e-3;
@@ -58,12 +56,27 @@ impl EnergyForm {
     /// the fourth-order coefficients.
     #[must_use]
     pub fn new(spring: &Spring) -> Self {
+        Self::with_bending(spring, Bending::new(spring))
+    }
+
+    /// The law of `to`, made from this law, which must be that of `from`. The same as [`Self::new`], but where only
+    /// the stiffness has changed and not the proportions, in nanoseconds. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn retuned(&self, from: &Spring, to: &Spring) -> Self {
+        if to.is_proportional_to(from) {
+            Self::with_bending(to, self.bending.restiffened(to))
+        } else {
+            Self::new(to)
+        }
+    }
+
+    fn with_bending(spring: &Spring, bending: Bending) -> Self {
         let free_length_m = spring.geometry().free_length_m;
         Self {
             free_length_m,
             axial_n_per_m: spring.axial_stiffness_n_per_m(),
             torsion_nm_per_rad: spring.rigidities().tau_n_m2 / free_length_m,
-            bending: Bending::new(spring),
+            bending,
         }
     }
 
@@ -80,116 +93,132 @@ impl EnergyForm {
     /// - NaN, infinity or a quaternion that is not of unit length: no wrench, [`Validity::InvalidInput`].
     #[must_use]
     pub fn respond(&self, pose: &Pose, demand: Demand) -> Response {
-        let chord = match pose.chord(self.free_length_m) {
-            Ok(chord) => chord,
-            Err(validity) => return Response::none(validity),
-        };
-        let directions = Directions::new(&chord, pose.orientation);
-        let angles = directions.versines.map(SquaredAngle::from_versine);
-        match self.bending.at(&chord, &angles) {
-            Some(bending) if directions.overturn >= LEAST_OVERTURN => {
-                self.differentiate(&chord, &directions, &angles, &bending, demand)
-            }
-            _ => Response::none(Validity::OutOfDomain),
-        }
+        self.respond_at(pose, demand)
     }
+}
+
+impl Law for EnergyForm {
+    const HAS_ENERGY: bool = true;
 
     /// `F = -dW/dr`, `M = -dW/d(rotation)`, `W`.
-    #[inline]
-    fn differentiate(
-        &self,
-        chord: &Chord,
-        directions: &Directions,
-        angles: &[SquaredAngle; 3],
-        bending: &BendingEnergy,
-        demand: Demand,
-    ) -> Response {
-        let Directions { chord: e, upper: t, .. } = *directions;
+    #[inline(always)]
+    fn answer<R: Real>(&self, at: &Coordinates<R>, demand: Demand) -> Answer<R> {
+        let Span { vector_m, length_m, shortening_m, usable } = at.span(self.free_length_m);
+        let inverse_length = length_m.inverse();
+        let directions = Directions::new(vector_m, length_m, inverse_length, at.orientation);
+        let [lower, upper, plates] = directions.versines;
+        // No closures in here: the compiler would have to inline them before it may use wide registers.
+        let angles = [
+            SquaredAngle::from_versine(lower),
+            SquaredAngle::from_versine(upper),
+            SquaredAngle::from_versine(plates),
+        ];
+        let bending = self.bending.at(length_m, shortening_m, &angles);
+        let BendingEnergy { by_squares, writhe, writhe_slope, sheared_length_m, levelled, .. } = bending;
+
+        let Directions { chord: e, upper: t, .. } = directions;
         // Derivatives by the versines of lower normal to chord, upper normal to chord, lower to upper normal.
-        let [lower, upper, plates] = [0, 1, 2].map(|i| bending.by_squares[i] * angles[i].slope);
+        let by_lower = by_squares[0] * angles[0].slope;
+        let by_upper = by_squares[1] * angles[1].slope;
+        let by_plates = by_squares[2] * angles[2].slope;
 
         let twist = Twist::from_sine(directions.twist_sine, directions.twist_versine);
         // e.(k x t), with k = (0, 0, 1)
         let writhe_area = e.y * t.x - e.x * t.y;
-        let wound = twist.value + bending.writhe * writhe_area;
-        let torsion_nm = self.torsion_nm_per_rad * wound;
-        let coupling_nm = torsion_nm * bending.writhe;
+        let wound = twist.value + writhe * writhe_area;
+        let torsion_nm = wound * self.torsion_nm_per_rad;
+        let coupling_nm = torsion_nm * writhe;
 
-        let by_length = bending.by_length - self.axial_n_per_m * chord.shortening_m
-            + torsion_nm * bending.writhe_slope * writhe_area;
+        let by_length =
+            bending.by_length - shortening_m * self.axial_n_per_m + torsion_nm * writhe_slope * writhe_area;
         // Differences from e instead of k and t themselves: the projection removes e, and nothing is left to
         // cancel near rest.
-        let by_direction = lower * directions.chord_from_lower
-            + upper * directions.chord_from_upper
-            + coupling_nm * DVec3::new(-t.y, t.x, 0.0);
-        let tangential = by_direction - by_direction.dot(e) * e;
-        let force_n = -by_length * e - tangential / chord.length_m;
+        let zero = length_m.like(0.0);
+        let by_direction = directions.chord_from_lower * by_lower
+            + directions.chord_from_upper * by_upper
+            + Vector::new(-t.y, t.x, zero) * coupling_nm;
+        let tangential = by_direction - e * by_direction.dot(e);
+        let force_n = e * -by_length - tangential * inverse_length;
 
         let torque_nm = if demand >= Demand::Wrench {
-            let by_upper_normal =
-                coupling_nm * DVec3::new(e.y, -e.x, 0.0) - upper * e - DVec3::new(0.0, 0.0, plates);
+            let by_upper_normal = Vector::new(e.y, -e.x, zero) * coupling_nm
+                - e * by_upper
+                - Vector::new(zero, zero, by_plates);
             // A small rotation changes the twist by its component along (t + k) / (1 + k.t).
-            let twist_axis = DVec3::new(t.x, t.y, directions.overturn) / directions.overturn;
-            by_upper_normal.cross(t) - torsion_nm * twist.slope * twist_axis
+            let twist_axis = Vector::new(t.x, t.y, directions.overturn);
+            let twist_nm = torsion_nm * twist.slope * directions.inverse_overturn;
+            by_upper_normal.cross(t) - twist_axis * twist_nm
         } else {
-            DVec3::ZERO
+            Vector::new(zero, zero, zero)
         };
-
-        let axial_j = 0.5 * self.axial_n_per_m * (chord.shortening_m * chord.shortening_m);
-        let energy_j = axial_j + bending.energy_j + 0.5 * torsion_nm * wound;
-        let validity =
-            if bending.levelled || !directions.trusted() { Validity::Clamped } else { Validity::Ok };
-        let energy_j = (demand >= Demand::WrenchAndEnergy).then_some(energy_j);
-        Response { force_n, torque_nm, energy_j, validity }
+        let energy_j = if demand >= Demand::WrenchAndEnergy {
+            let axial_j = shortening_m * shortening_m * (0.5 * self.axial_n_per_m);
+            axial_j + bending.energy_j + torsion_nm * wound * 0.5
+        } else {
+            zero
+        };
+        let answered = usable & directions.overturn.above(LEAST_OVERTURN) & sheared_length_m.above(0.0);
+        Answer { force_n, torque_nm, energy_j, answered, trusted: directions.trusted(levelled) }
     }
 }
 
 /// Unit vectors of a pose and how far they are apart.
-struct Directions {
-    chord: DVec3,
-    upper: DVec3,
-    chord_from_lower: DVec3,
-    chord_from_upper: DVec3,
+struct Directions<R> {
+    chord: Vector<R>,
+    upper: Vector<R>,
+    chord_from_lower: Vector<R>,
+    chord_from_upper: Vector<R>,
     /// `1 - cos` of the angles lower normal to chord, upper normal to chord, lower to upper normal.
-    versines: [f64; 3],
+    versines: [R; 3],
     /// `1 + k.t`
-    overturn: f64,
-    twist_sine: f64,
-    twist_versine: f64,
+    overturn: R,
+    inverse_overturn: R,
+    twist_sine: R,
+    twist_versine: R,
 }
 
-impl Directions {
-    #[inline]
-    fn new(chord: &Chord, orientation: DQuat) -> Self {
-        let DQuat { x, y, z, w } = orientation;
-        // Divided, not multiplied by the inverse: e is then exactly (0, 0, 1) at rest.
-        let e = chord.vector_m / chord.length_m;
-        let tilt = 2.0 * (x * x + y * y);
-        let upper = DVec3::new(2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - tilt);
-        let chord_from_lower = DVec3::new(e.x, e.y, e.z - 1.0);
-        let chord_from_upper = e - upper;
-        let overturn = 2.0 - tilt;
+impl<R: Real> Directions<R> {
+    #[inline(always)]
+    fn new(chord_m: Vector<R>, length_m: R, inverse_length: R, orientation: [R; 4]) -> Self {
+        let [x, y, z, w] = orientation;
+        // The difference first: e is then exactly (0, 0, 1) at rest.
+        let rise = (chord_m.z - length_m) * inverse_length;
+        let (aside_x, aside_y) = (chord_m.x * inverse_length, chord_m.y * inverse_length);
+        let chord = Vector::new(aside_x, aside_y, rise + 1.0);
+        let tilt = (x * x + y * y) * 2.0;
+        let upper = Vector::new((x * z + w * y) * 2.0, (y * z - w * x) * 2.0, tilt.like(1.0) - tilt);
+        let chord_from_lower = Vector::new(aside_x, aside_y, rise);
+        let chord_from_upper = Vector::new(aside_x - upper.x, aside_y - upper.y, rise + tilt);
+        let overturn = tilt.like(2.0) - tilt;
+        let inverse_overturn = overturn.inverse();
         // The twist part of the quaternion is (z, w) of squared norm (1 + k.t) / 2; double-angle formulas.
-        let scale = 4.0 / overturn;
+        let scale = inverse_overturn * 4.0;
         Self {
-            chord: e,
+            chord,
             upper,
             chord_from_lower,
             chord_from_upper,
             versines: [
-                0.5 * chord_from_lower.length_squared(),
-                0.5 * chord_from_upper.length_squared(),
+                chord_from_lower.dot(chord_from_lower) * 0.5,
+                chord_from_upper.dot(chord_from_upper) * 0.5,
                 tilt,
             ],
             overturn,
+            inverse_overturn,
             twist_sine: scale * (w * z),
             twist_versine: scale * (z * z),
         }
     }
 
-    #[inline]
-    fn trusted(&self) -> bool {
+    /// Where no angle is beyond what its measure is trusted for, and the argument was not levelled.
+    #[inline(always)]
+    fn trusted(&self, levelled: R::Mask) -> R::Mask {
         let [lower, upper, plates] = self.versines;
-        lower.max(upper).max(plates).max(self.twist_versine) <= TRUSTED_VERSINE
+        // A levelled lane counts as an angle out of range: no complement of a mask is needed.
+        let beyond = R::select(levelled, lower.like(2.0), self.twist_versine);
+        lower.below(TRUSTED_VERSINE)
+            & upper.below(TRUSTED_VERSINE)
+            & plates.below(TRUSTED_VERSINE)
+            & beyond.below(TRUSTED_VERSINE)
     }
 }

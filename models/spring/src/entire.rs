@@ -18,6 +18,8 @@
 //!
 //! Evaluation: power series of `G1` and `G2` at `z / 16`, recurrences for the rest, then two angle doublings.
 
+use crate::real::Real;
+
 /// Terms of the power series: at `z / 16 = -3.75` the first one left out is below 1e-17 of the sum.
 const TERMS: usize = 12;
 
@@ -37,29 +39,29 @@ const fn power_series(n: usize) -> [f64; TERMS] {
     coefficients
 }
 
-/// Sum of a series, even and odd powers apart: two short dependency chains instead of one long.
-#[inline]
-fn sum(coefficients: &[f64; TERMS], w: f64) -> f64 {
+/// Sum of a series by Estrin's scheme, pairs of pairs: dependency chains a third as long as Horner's.
+#[inline(always)]
+fn sum<R: Real>(coefficients: &[f64; TERMS], w: R) -> R {
+    let [c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10, c11] = *coefficients;
     let w2 = w * w;
-    let (mut even, mut odd) = (0.0, 0.0);
-    for pair in coefficients.as_chunks::<2>().0.iter().rev() {
-        even = even * w2 + pair[0];
-        odd = odd * w2 + pair[1];
-    }
-    even + w * odd
+    let w4 = w2 * w2;
+    let low = (w * c1 + c0) + (w * c3 + c2) * w2;
+    let middle = (w * c5 + c4) + (w * c7 + c6) * w2;
+    let high = (w * c9 + c8) + (w * c11 + c10) * w2;
+    low + (middle + high * w4) * w4
 }
 
 /// `C0`, `G0`, `G1`, `G2` at one argument.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EntireFunctions {
+pub struct EntireFunctions<R = f64> {
     /// `cos x`
-    pub c0: f64,
+    pub c0: R,
     /// `sin x / x`
-    pub g0: f64,
+    pub g0: R,
     /// `3 (sin x - x cos x) / x³`
-    pub g1: f64,
+    pub g1: R,
     /// `15 ((3 - x²) sin x - 3 x cos x) / x⁵`
-    pub g2: f64,
+    pub g2: R,
 }
 
 impl EntireFunctions {
@@ -69,41 +71,44 @@ impl EntireFunctions {
 
     /// Largest argument: two and a half half-waves, past every pole a spring can reach.
     pub const MAX_ARGUMENT: f64 = 60.0;
+}
 
+impl<R: Real> EntireFunctions<R> {
     /// All four at `z`. Real-time: bounded, no allocation, no branch.
     ///
     /// Error below 5e-15 of the larger of 1 and the value for -60 <= z <= 9.5 (a half-wave is at 9.87), below
     /// 2e-14 up to 60. An argument outside -60..60 is moved to the nearer end and NaN to the lower one, so the
     /// result is always finite.
-    #[inline]
+    #[inline(always)]
     #[must_use]
-    pub fn at(z: f64) -> Self {
-        #[allow(clippy::manual_clamp)] // clamp would let NaN through
-        let z = z.max(Self::MIN_ARGUMENT).min(Self::MAX_ARGUMENT);
-        let w = z * 0.0625;
+    pub fn at(z: R) -> Self {
+        let w = z.at_least(EntireFunctions::MIN_ARGUMENT).at_most(EntireFunctions::MAX_ARGUMENT) * 0.0625;
         let (g1, g2) = (sum(&G1_SERIES, w), sum(&G2_SERIES, w));
-        let g0 = g1 - w * g2 * (1.0 / 15.0);
-        let c0 = g0 - w * g1 * (1.0 / 3.0);
-        Self { c0, g0, g1, g2 }.doubled(w).doubled(4.0 * w)
+        // G0 and C0 by the recurrences, side by side.
+        let (third, fifteenth) = (w * (1.0 / 3.0), w * (1.0 / 15.0));
+        let next = fifteenth * g2;
+        let (g0, c0) = (g1 - next, (g1 - third * g1) - next);
+        Self { c0, g0, g1, g2 }.doubled(w * 2.0).doubled(w * 8.0)
     }
 
-    /// From `z` to `4 z`, that is from `x` to `2 x`.
-    #[inline]
-    fn doubled(self, z: f64) -> Self {
+    /// From `z` to `4 z`, that is from `x` to `2 x`, given `2 z`.
+    #[inline(always)]
+    fn doubled(self, twice_z: R) -> Self {
         let Self { c0, g0, g1, g2 } = self;
+        let square = g0 * g0;
         Self {
-            c0: 1.0 - 2.0 * z * (g0 * g0),
+            c0: twice_z.like(1.0) - twice_z * square,
             g0: g0 * c0,
-            g1: 0.25 * (c0 * g1 + 3.0 * (g0 * g0)),
-            g2: 0.0625 * (c0 * g2 + 15.0 * (g0 * g1)),
+            g1: (c0 * g1 + square * 3.0) * 0.25,
+            g2: (c0 * g2 + g0 * g1 * 15.0) * 0.0625,
         }
     }
 
     /// `h = 6 (1 - G0(4 z)) / (4 z) = 6 (2x - sin 2x) / (2x)³`, one at zero and free of the cancellation there.
-    #[inline]
+    #[inline(always)]
     #[must_use]
-    pub fn h(&self) -> f64 {
-        0.5 * (3.0 * self.g0 * self.g0 - self.c0 * self.g1)
+    pub fn h(&self) -> R {
+        (self.g0 * self.g0 * 3.0 - self.c0 * self.g1) * 0.5
     }
 }
 

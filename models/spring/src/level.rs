@@ -3,33 +3,41 @@
 //! Near buckling, formulas run into poles. A hard limit would put a kink into the energy and a step into the
 //! stiffness; levelling off keeps it twice differentiable, so force *and* stiffness stay continuous.
 
+use crate::real::Real;
+
 /// A quantity after levelling.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Levelled {
-    pub(crate) value: f64,
+pub(crate) struct Levelled<R: Real = f64> {
+    pub(crate) value: R,
     /// Derivative by the quantity before levelling.
-    pub(crate) slope: f64,
+    pub(crate) slope: R,
     /// Whether it was bent off at all.
-    pub(crate) bent: bool,
+    pub(crate) bent: R::Mask,
 }
 
 /// The quantity itself up to `knee`; with the excess `d` beyond it, `knee + d / sqrt(1 + (d / reach)²)`, which
 /// stays below `knee + reach`. Real-time: bounded, no allocation.
-#[inline]
-pub(crate) fn level_above(quantity: f64, knee: f64, reach: f64) -> Levelled {
-    let excess = quantity - knee;
-    if excess <= 0.0 {
-        return Levelled { value: quantity, slope: 1.0, bent: false };
+#[inline(always)]
+pub(crate) fn level_above<R: Real>(quantity: R, knee: f64, reach: f64) -> Levelled<R> {
+    let bent = quantity.above(knee);
+    let unit = quantity.like(1.0);
+    if !R::any(bent) {
+        return Levelled { value: quantity, slope: unit, bent };
     }
-    let reached = excess / reach;
-    let square = 1.0 / (1.0 + reached * reached);
+    let excess = quantity - knee;
+    let reached = excess * (1.0 / reach);
+    let square = (reached * reached + 1.0).inverse();
     let root = square.sqrt();
-    Levelled { value: knee + excess * root, slope: square * root, bent: true }
+    Levelled {
+        value: R::select(bent, excess * root + knee, quantity),
+        slope: R::select(bent, square * root, unit),
+        bent,
+    }
 }
 
 /// The mirror image of [`level_above`]: never below `knee - reach`.
-#[inline]
-pub(crate) fn level_below(quantity: f64, knee: f64, reach: f64) -> Levelled {
+#[inline(always)]
+pub(crate) fn level_below<R: Real>(quantity: R, knee: f64, reach: f64) -> Levelled<R> {
     let mirrored = level_above(-quantity, -knee, reach);
     Levelled { value: -mirrored.value, ..mirrored }
 }

@@ -3,8 +3,11 @@
 //! One idea a module, from the wire to the wrench:
 //! - [`rigidity`]: wire and coil become the rigidities of an equivalent rod; [`preset`]: springs with names.
 //! - [`pose`]: where the upper plate is; [`response`], [`validity`]: what a law answers.
+//! - [`real`]: formulas written once, for one pose and for several side by side; [`batch`] runs them over many.
 //! - [`entire`] and [`beam_column`]: the functions of the compressed rod, without branches or poles of their own.
-//! - [`closed_form`]: the thesis's printed law, regularised, and its current-length correction.
+//! - [`thesis`]: the thesis's printed code with every branch, window and jump, for comparison.
+//! - [`closed_form`]: the thesis's printed law, regularised, and its current-length correction. [`arctangent`] gives
+//!   it angles from sides, [`precision`] says in which format its numbers are stored.
 //! - [`energy`]: the conservative law in three dimensions, the default. Its bending part is in [`bending`], to
 //!   fourth order in the angles by [`shape`] and [`quartic`]; [`angle`] gives angles without `acos`, and [`level`]
 //!   keeps the law smooth close to buckling.
@@ -13,23 +16,29 @@
 //! Derivations and sources are in the book, chapter "The spring".
 
 pub mod angle;
+pub mod arctangent;
+pub mod batch;
 pub mod beam_column;
 pub mod bending;
 pub mod centerline;
 pub mod closed_form;
+mod contract;
 pub mod energy;
 pub mod entire;
 pub mod level;
 mod parameters;
 mod plugin;
 pub mod pose;
+pub mod precision;
 pub mod preset;
 pub mod quartic;
+pub mod real;
 pub mod response;
 pub mod rigidity;
 pub mod rod;
 pub mod seat;
 pub mod shape;
+pub mod thesis;
 pub mod validity;
 
 pub use plugin::{FLOTOR_ENTRY, SpringModel};

@@ -3,21 +3,33 @@
 //! A preset gives every value; what is set explicitly replaces it. One constant rules the stiffness (`mode`, the
 //! thesis's modes 0 to 3): the others are derived from it, and setting a derived one is refused, because the
 //! answer to "which of the two did you mean" is not ours to give.
+//!
+//! The numbers are live: a running loop may change them between two ticks, one at a time, and each change must fit
+//! the others. Such a change is a step of the force at the pose where the hand happens to be. The model does not
+//! smooth it, because only the host knows what the device bears: its envelope limits the rate of the wrench, so
+//! that no step larger than the slew limit reaches the hand.
 
+use crate::precision::Precision;
 use crate::preset::Preset;
 use crate::rigidity::{Geometry, Material, Spring, Stiffness};
 use flotor_hal::abi::Str;
-use flotor_hal::{Parameter, Refusal, Settings};
+use flotor_hal::{OutOfRange, Parameter, Refusal, Settings};
 
 /// Which law answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Variant {
+    /// The thesis's printed code, with its branches and jumps.
+    Thesis,
     /// The thesis's printed law, regularised.
     ClosedForm,
     /// The same with rigidities per current length, and the upper moment only.
     CurrentLength,
     /// The conservative law in three dimensions.
     Energy,
+}
+
+impl Variant {
+    pub(crate) const ALL: [Self; 4] = [Self::Thesis, Self::ClosedForm, Self::CurrentLength, Self::Energy];
 }
 
 /// Which constant rules the stiffness.
@@ -29,31 +41,53 @@ enum Mode {
     Physical,
 }
 
-const VARIANTS: [Str; 3] = [Str::new("energy"), Str::new("closed-form"), Str::new("current-length")];
+impl Mode {
+    const ALL: [Self; 4] = [Self::Gamma, Self::Alpha, Self::Beta, Self::Physical];
+
+    fn of(stiffness: Stiffness) -> Self {
+        match stiffness {
+            Stiffness::Gamma(_) => Self::Gamma,
+            Stiffness::Alpha(_) => Self::Alpha,
+            Stiffness::Beta(_) => Self::Beta,
+            Stiffness::Physical => Self::Physical,
+        }
+    }
+}
+
 const PRESETS: [Str; 4] =
     [Str::new("thesis-1"), Str::new("thesis-2"), Str::new("thesis-3"), Str::new("slender")];
+/// Names of [`Variant::ALL`].
+const VARIANTS: [Str; 4] =
+    [Str::new("thesis"), Str::new("closed-form"), Str::new("current-length"), Str::new("energy")];
+const PRECISIONS: [Str; 2] = [Str::new("f64"), Str::new("f32")];
 const MODES: [Str; 4] = [Str::new("gamma"), Str::new("alpha"), Str::new("beta"), Str::new("physical")];
 
 const MM: f64 = 1.0e-3;
 const MPA: f64 = 1.0e6;
 const N_MM2: f64 = 1.0e-6;
 
-/// The schema. Defaults are those of preset `thesis-1`; another preset brings its own.
+/// The schema. Defaults are those of preset `thesis-1`; another preset brings its own. What kind of spring it is
+/// is fixed, its numbers are live.
 pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::choice("preset", &PRESETS, 0, "Spring of the thesis, or a slender one that buckles"),
     Parameter::choice(
         "variant",
         &VARIANTS,
-        0,
-        "Law: conservative in 3D, the thesis's printed law, or that corrected",
+        3,
+        "Law: the thesis's code, its law without jumps, that corrected, or conservative in 3D",
     ),
+    Parameter::choice("precision", &PRECISIONS, 0, "Storage of numbers (variants thesis and closed-form)"),
     Parameter::choice("mode", &MODES, 0, "Which constant rules the stiffness; the others follow from it"),
-    Parameter::real("free_length_mm", "mm", 1.0, 1000.0, 25.0, "Distance of the end plates without load"),
-    Parameter::real("coil_diameter_mm", "mm", 0.5, 200.0, 6.07, "Diameter of the coil between wire centres"),
-    Parameter::real("youngs_modulus_mpa", "MPa", 1.0, 1.0e6, 203_395.0, "Young's modulus of the wire"),
-    Parameter::real("shear_modulus_mpa", "MPa", 1.0, 1.0e6, 75_842.0, "Shear modulus of the wire"),
-    Parameter::real("wire_diameter_mm", "mm", 0.05, 50.0, 0.63, "Diameter of the wire (mode physical)"),
-    Parameter::real("active_coils", "1", 1.0, 500.0, 11.8, "Number of coils that deform (mode physical)"),
+    Parameter::real("free_length_mm", "mm", 1.0, 1000.0, 25.0, "Distance of the end plates without load")
+        .live(),
+    Parameter::real("coil_diameter_mm", "mm", 0.5, 200.0, 6.07, "Diameter of the coil between wire centres")
+        .live(),
+    Parameter::real("youngs_modulus_mpa", "MPa", 1.0, 1.0e6, 203_395.0, "Young's modulus of the wire").live(),
+    Parameter::real("shear_modulus_mpa", "MPa", 1.0, 1.0e6, 75_842.0, "Shear modulus of the wire").live(),
+    Parameter::real("wire_diameter_mm", "mm", 0.05, 50.0, 0.63, "Diameter of the wire (mode physical)")
+        .live(),
+    Parameter::real("active_coils", "1", 1.0, 500.0, 11.8, "Number of coils that deform (mode physical)")
+        .live(),
     Parameter::real(
         "gamma_n",
         "N",
@@ -61,7 +95,8 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         10_000.0,
         16.97,
         "Compression rigidity (mode gamma); stiffness is gamma / L0",
-    ),
+    )
+    .live(),
     Parameter::real(
         "alpha_n_mm2",
         "N mm²",
@@ -69,16 +104,20 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         1.0e7,
         179.078_939_264_832_6,
         "Bending rigidity (mode alpha)",
-    ),
-    Parameter::real("beta_n", "N", 0.01, 100_000.0, 45.510_576_593_444_26, "Shear rigidity (mode beta)"),
+    )
+    .live(),
+    Parameter::real("beta_n", "N", 0.01, 100_000.0, 45.510_576_593_444_26, "Shear rigidity (mode beta)")
+        .live(),
 ];
 
 /// What a set of values means.
+#[derive(Clone, Copy)]
 pub(crate) struct Choice {
     pub(crate) spring: Spring,
+    pub(crate) stiffness: Stiffness,
     pub(crate) variant: Variant,
+    pub(crate) precision: Precision,
     preset: Preset,
-    mode: Mode,
 }
 
 impl Choice {
@@ -86,11 +125,9 @@ impl Choice {
     pub(crate) fn resolve(settings: &Settings<'_>) -> Result<Self, Refusal> {
         let preset =
             Preset::ALL.get(settings.choice_or_default("preset")).copied().unwrap_or(Preset::Thesis1);
-        let variant = match settings.choice_or_default("variant") {
-            1 => Variant::ClosedForm,
-            2 => Variant::CurrentLength,
-            _ => Variant::Energy,
-        };
+        let variant =
+            Variant::ALL.get(settings.choice_or_default("variant")).copied().unwrap_or(Variant::Energy);
+        let precision = precision(settings, variant)?;
         let (geometry, material, stiffness) = preset.parameters();
         let mode = mode(settings, stiffness);
         refuse_derived(settings, mode)?;
@@ -116,7 +153,62 @@ impl Choice {
             Mode::Physical => Stiffness::Physical,
         };
         let spring = Spring::new(geometry, material, stiffness).map_err(Refusal::parameter)?;
-        Ok(Self { spring, variant, preset, mode })
+        Ok(Self { spring, stiffness, variant, precision, preset })
+    }
+
+    /// Preset `thesis-1` with another law, as no other setting would give.
+    #[cfg(test)]
+    pub(crate) fn default_with(variant: Variant) -> Self {
+        let preset = Preset::Thesis1;
+        let (_, _, stiffness) = preset.parameters();
+        Self { spring: preset.spring(), stiffness, variant, precision: Precision::Double, preset }
+    }
+
+    /// The same with one live number changed, as a person would set it. Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// The range that fits the other values; NaN to NaN for a number that follows from others in this mode.
+    pub(crate) fn with(&self, index: usize, value: f64) -> Result<Self, OutOfRange> {
+        let (mut geometry, mut material, mut stiffness) =
+            (*self.spring.geometry(), *self.spring.material(), self.stiffness);
+        let (own, unit) = match (SCHEMA.get(index).map_or("", Parameter::id), &mut stiffness) {
+            ("free_length_mm", _) => (&mut geometry.free_length_m, MM),
+            ("coil_diameter_mm", _) => (&mut geometry.coil_diameter_m, MM),
+            ("youngs_modulus_mpa", _) => (&mut material.youngs_modulus_pa, MPA),
+            ("shear_modulus_mpa", _) => (&mut material.shear_modulus_pa, MPA),
+            ("wire_diameter_mm", Stiffness::Physical) => (&mut geometry.wire_diameter_m, MM),
+            ("active_coils", Stiffness::Physical) => (&mut geometry.active_coils, 1.0),
+            ("gamma_n", Stiffness::Gamma(gamma_n)) => (gamma_n, 1.0),
+            ("alpha_n_mm2", Stiffness::Alpha(alpha_n_m2)) => (alpha_n_m2, N_MM2),
+            ("beta_n", Stiffness::Beta(beta_n)) => (beta_n, 1.0),
+            _ => return Err(OutOfRange { min: f64::NAN, max: f64::NAN, value }),
+        };
+        *own = value * unit;
+        let spring =
+            Spring::new(geometry, material, stiffness).map_err(|_| self.fitting_range(index, value))?;
+        Ok(Self { spring, stiffness, ..*self })
+    }
+
+    /// The range of a number that fits the other values in force, for the refusal of one that does not.
+    fn fitting_range(&self, index: usize, value: f64) -> OutOfRange {
+        let (geometry, material) = (self.spring.geometry(), self.spring.material());
+        let Some(parameter) = SCHEMA.get(index) else {
+            return OutOfRange { min: f64::NAN, max: f64::NAN, value };
+        };
+        // Coils must not touch at rest, the coil be wider than the wire, Poisson's ratio below one half.
+        let (min, max) = match parameter.id() {
+            "free_length_mm" => (geometry.solid_length_m() / MM, f64::INFINITY),
+            "coil_diameter_mm" => (geometry.wire_diameter_m / MM, f64::INFINITY),
+            "wire_diameter_mm" => {
+                let touching_m = geometry.free_length_m / geometry.active_coils;
+                (0.0, touching_m.min(geometry.coil_diameter_m) / MM)
+            }
+            "active_coils" => (0.0, geometry.free_length_m / geometry.wire_diameter_m),
+            "youngs_modulus_mpa" => (0.0, 3.0 * material.shear_modulus_pa / MPA),
+            "shear_modulus_mpa" => (material.youngs_modulus_pa / 3.0 / MPA, f64::INFINITY),
+            _ => (0.0, f64::INFINITY),
+        };
+        OutOfRange { min: min.max(parameter.min()), max: max.min(parameter.max()), value }
     }
 
     /// The value in force of the parameter at `index` of the schema, as a person would set it.
@@ -125,10 +217,9 @@ impl Choice {
             (self.spring.geometry(), self.spring.material(), self.spring.rigidities());
         match SCHEMA.get(index).map_or("", Parameter::id) {
             "preset" => position(&Preset::ALL, &self.preset),
-            "variant" => {
-                position(&[Variant::Energy, Variant::ClosedForm, Variant::CurrentLength], &self.variant)
-            }
-            "mode" => position(&[Mode::Gamma, Mode::Alpha, Mode::Beta, Mode::Physical], &self.mode),
+            "variant" => position(&Variant::ALL, &self.variant),
+            "precision" => position(&[Precision::Double, Precision::Single], &self.precision),
+            "mode" => position(&Mode::ALL, &Mode::of(self.stiffness)),
             "free_length_mm" => geometry.free_length_m / MM,
             "coil_diameter_mm" => geometry.coil_diameter_m / MM,
             "youngs_modulus_mpa" => material.youngs_modulus_pa / MPA,
@@ -143,14 +234,21 @@ impl Choice {
     }
 }
 
+/// The precision set; single is refused where a law has none.
+fn precision(settings: &Settings<'_>, variant: Variant) -> Result<Precision, Refusal> {
+    match (settings.choice_or_default("precision"), variant) {
+        (1, Variant::Thesis | Variant::ClosedForm) => Ok(Precision::Single),
+        (1, Variant::CurrentLength | Variant::Energy) => Err(Refusal::parameter(
+            "`precision` f32 is for comparing the variants `thesis` and `closed-form`; the others have f64 alone",
+        )),
+        _ => Ok(Precision::Double),
+    }
+}
+
 /// The mode set, else that of the preset.
 fn mode(settings: &Settings<'_>, preset: Stiffness) -> Mode {
-    match (settings.number("mode").map(|_| settings.choice_or_default("mode")), preset) {
-        (Some(1), _) | (None, Stiffness::Alpha(_)) => Mode::Alpha,
-        (Some(2), _) | (None, Stiffness::Beta(_)) => Mode::Beta,
-        (Some(3), _) | (None, Stiffness::Physical) => Mode::Physical,
-        (Some(_), _) | (None, Stiffness::Gamma(_)) => Mode::Gamma,
-    }
+    let set = settings.number("mode").and_then(|_| Mode::ALL.get(settings.choice_or_default("mode")));
+    set.copied().unwrap_or_else(|| Mode::of(preset))
 }
 
 /// Refuses a value that the mode derives from others.
@@ -179,3 +277,6 @@ fn refuse_derived(settings: &Settings<'_>, mode: Mode) -> Result<(), Refusal> {
 fn position<T: PartialEq>(choices: &[T], value: &T) -> f64 {
     choices.iter().position(|choice| choice == value).map_or(f64::NAN, |index| index as f64)
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,27 +1,58 @@
 //! The spring as a force-model plugin.
 
+use crate::batch::Batch;
 use crate::centerline::{Centerline, Helix};
 use crate::closed_form::{ClosedForm, Form};
+use crate::contract;
 use crate::energy::EnergyForm;
 use crate::parameters::{Choice, SCHEMA, Variant};
-use crate::pose::Pose;
-use crate::response::{Demand, Response};
-use crate::validity::Validity;
+use crate::thesis::Thesis;
 use flotor_hal::{
-    CenterlineInfo, CenterlineModel, ForceModel, Input, ModelInfo, Output, Parameter, Refusal, Settings,
-    StepStatus, Wrench, export_model,
+    CenterlineInfo, CenterlineModel, ForceModel, Input, ModelInfo, OutOfRange, Output, Parameter, Refusal,
+    Settings, export_model,
 };
 
 /// The spring: what it is, and the law that answers.
 pub struct SpringModel {
     choice: Choice,
-    law: Law,
+    law: Prepared,
+    batch: Batch,
 }
 
+impl SpringModel {
+    fn new(choice: Choice) -> Self {
+        Self { law: Prepared::new(&choice), choice, batch: Batch::new() }
+    }
+}
+
+/// A law, its constants prepared for the spring chosen.
 #[allow(clippy::large_enum_variant)] // one per model, made once: a box would add a load to every tick
-enum Law {
+enum Prepared {
+    Thesis(Thesis),
     ClosedForm(ClosedForm),
     Energy(EnergyForm),
+}
+
+impl Prepared {
+    fn new(choice: &Choice) -> Self {
+        let Choice { spring, stiffness, precision, variant, .. } = choice;
+        match variant {
+            Variant::Thesis => Self::Thesis(Thesis::new(spring, *stiffness, *precision)),
+            Variant::ClosedForm => {
+                Self::ClosedForm(ClosedForm::new(spring, Form::Printed).with_precision(*precision))
+            }
+            Variant::CurrentLength => Self::ClosedForm(ClosedForm::new(spring, Form::CurrentLength)),
+            Variant::Energy => Self::Energy(EnergyForm::new(spring)),
+        }
+    }
+
+    /// The law after a change of parameters. Real-time: bounded, no allocation.
+    fn retuned(&self, from: &Choice, to: &Choice) -> Self {
+        match self {
+            Self::Energy(law) => Self::Energy(law.retuned(&from.spring, &to.spring)),
+            Self::Thesis(_) | Self::ClosedForm(_) => Self::new(to),
+        }
+    }
 }
 
 impl ForceModel for SpringModel {
@@ -31,24 +62,36 @@ impl ForceModel for SpringModel {
     const PARAMETERS: &'static [Parameter] = SCHEMA;
 
     fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {
-        let choice = Choice::resolve(settings)?;
-        let law = match choice.variant {
-            Variant::ClosedForm => Law::ClosedForm(ClosedForm::new(&choice.spring, Form::Printed)),
-            Variant::CurrentLength => Law::ClosedForm(ClosedForm::new(&choice.spring, Form::CurrentLength)),
-            Variant::Energy => Law::Energy(EnergyForm::new(&choice.spring)),
-        };
-        Ok(Self { choice, law })
+        Choice::resolve(settings).map(Self::new)
     }
 
     #[inline]
     fn step(&mut self, input: &Input) -> Output {
-        let pose = pose(input);
-        let demand = demand(input.demand);
-        let response = match &self.law {
-            Law::ClosedForm(law) => law.respond(&pose, demand),
-            Law::Energy(law) => law.respond(&pose, demand),
-        };
-        output(&response)
+        let (pose, demand) = (contract::pose(input), contract::demand(input));
+        contract::output(&match &self.law {
+            Prepared::Thesis(law) => law.respond(&pose, demand),
+            Prepared::ClosedForm(law) => law.respond(&pose, demand),
+            Prepared::Energy(law) => law.respond(&pose, demand),
+        })
+    }
+
+    fn step_batch(&mut self, inputs: &[Input], outputs: &mut [Output]) {
+        match &self.law {
+            Prepared::ClosedForm(law) => self.batch.respond(law, inputs, outputs),
+            Prepared::Energy(law) => self.batch.respond(law, inputs, outputs),
+            Prepared::Thesis(_) => {
+                for (input, output) in inputs.iter().zip(outputs) {
+                    *output = self.step(input);
+                }
+            }
+        }
+    }
+
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+        let choice = self.choice.with(index, value)?;
+        self.law = self.law.retuned(&self.choice, &choice);
+        self.choice = choice;
+        Ok(())
     }
 
     fn parameter(&self, index: usize) -> f64 {
@@ -65,7 +108,7 @@ impl CenterlineModel for SpringModel {
     }
 
     fn centerline(&mut self, input: &Input, points: &mut [flotor_hal::Pose]) -> usize {
-        let Some(line) = Centerline::new(&self.choice.spring, &pose(input)) else { return 0 };
+        let Some(line) = Centerline::new(&self.choice.spring, &contract::pose(input)) else { return 0 };
         let last = points.len().saturating_sub(1).max(1);
         #[allow(clippy::cast_precision_loss)] // some tens of points
         for (index, point) in points.iter_mut().enumerate() {
@@ -76,33 +119,7 @@ impl CenterlineModel for SpringModel {
     }
 }
 
-#[inline]
-fn pose(input: &Input) -> Pose {
-    Pose { position_m: input.pose.position(), orientation: input.pose.orientation() }
-}
-
-#[inline]
-fn demand(demand: flotor_hal::Demand) -> Demand {
-    if demand.contains(flotor_hal::Demand::ENERGY) {
-        Demand::WrenchAndEnergy
-    } else if demand.contains(flotor_hal::Demand::TORQUE) {
-        Demand::Wrench
-    } else {
-        Demand::Force
-    }
-}
-
-#[inline]
-fn output(response: &Response) -> Output {
-    let status = match response.validity {
-        Validity::Ok => StepStatus::Ok,
-        Validity::Clamped => StepStatus::Clamped,
-        Validity::NotConverged => StepStatus::NotConverged,
-        Validity::OutOfDomain => StepStatus::OutOfDomain,
-        Validity::InvalidInput => StepStatus::InvalidInput,
-    };
-    let wrench = Wrench::new(response.force_n, response.torque_nm);
-    Output::new(wrench, response.energy_j.unwrap_or(f64::NAN), status)
-}
-
 export_model!(SpringModel, centerline);
+
+#[cfg(test)]
+mod tests;

@@ -5,6 +5,8 @@
 
 use flotor_hal::glam::{DQuat, DVec3};
 
+use crate::arctangent;
+use crate::real::{Real, Vector};
 use crate::validity::Validity;
 
 /// Shortest distance of the plates, as a fraction of the free length, for which a direction between them makes
@@ -40,12 +42,11 @@ impl Pose {
     /// Rotation vector of the orientation (rad), of length 0 to pi. Real-time: bounded, no allocation.
     ///
     /// Accurate to rounding at every angle: neither the arc cosine near zero nor the arc sine near pi is used.
+    #[inline]
     #[must_use]
     pub fn rotation_vector_rad(&self) -> DVec3 {
-        let q = if self.orientation.w < 0.0 { -self.orientation } else { self.orientation };
-        let axis = DVec3::new(q.x, q.y, q.z);
-        let sine = axis.length();
-        if sine > 0.0 { axis * (2.0 * sine.atan2(q.w) / sine) } else { 2.0 * axis }
+        let Vector { x, y, z } = self.coordinates().rotation_vector_rad();
+        DVec3::new(x, y, z)
     }
 
     /// Vector from the lower to the upper plate.
@@ -54,33 +55,97 @@ impl Pose {
     /// [`Validity::InvalidInput`] or [`Validity::OutOfDomain`] if no law can be evaluated here.
     #[inline]
     pub(crate) fn chord(&self, free_length_m: f64) -> Result<Chord, Validity> {
-        let vector_m = self.position_m + DVec3::new(0.0, 0.0, free_length_m);
-        let length_squared = vector_m.length_squared();
-        let free_squared = free_length_m * free_length_m;
-        let norm_error = self.orientation.length_squared() - 1.0;
-        // Written so that NaN fails.
-        let usable = length_squared >= SHORTEST_CHORD * SHORTEST_CHORD * free_squared
-            && length_squared <= LONGEST_CHORD * LONGEST_CHORD * free_squared
-            && norm_error.abs() <= UNIT_NORM_TOLERANCE;
-        if !usable {
-            return Err(self.why_unusable());
-        }
-        let length_m = length_squared.sqrt();
-        // L0 - L without the cancellation of the difference: (L0² - L²) / (L0 + L).
-        let Self { position_m: p, .. } = self;
-        let beyond = p.z * (2.0 * free_length_m + p.z) + (p.x * p.x + p.y * p.y);
-        Ok(Chord { vector_m, length_m, shortening_m: -beyond / (free_length_m + length_m) })
+        let Span { vector_m: Vector { x, y, z }, length_m, shortening_m, usable } =
+            self.coordinates().span(free_length_m);
+        let vector_m = DVec3::new(x, y, z);
+        if usable { Ok(Chord { vector_m, length_m, shortening_m }) } else { Err(self.why_unanswered()) }
     }
 
+    /// The numbers of the pose, for formulas that serve one pose and many.
+    #[inline(always)]
+    pub(crate) fn coordinates(&self) -> Coordinates<f64> {
+        let DVec3 { x, y, z } = self.position_m;
+        Coordinates { position_m: Vector { x, y, z }, orientation: self.orientation.to_array() }
+    }
+
+    /// Why there is no answer at this pose: it is no pose at all, or outside the domain of the law.
     #[cold]
-    fn why_unusable(&self) -> Validity {
-        let rotation_is_unit = (self.orientation.length_squared() - 1.0).abs() <= UNIT_NORM_TOLERANCE;
-        if self.position_m.is_finite() && rotation_is_unit {
-            Validity::OutOfDomain
-        } else {
-            Validity::InvalidInput
+    pub(crate) fn why_unanswered(&self) -> Validity {
+        if self.is_valid() { Validity::OutOfDomain } else { Validity::InvalidInput }
+    }
+
+    /// Whether it is a pose: finite, with an orientation of unit length. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        let norm_error = self.orientation.length_squared() - 1.0;
+        self.position_m.is_finite() && norm_error.abs() < UNIT_NORM_TOLERANCE
+    }
+}
+
+/// The seven numbers of a pose, or of one in each lane.
+#[derive(Clone, Copy, Debug)]
+pub struct Coordinates<R> {
+    /// Centre of the upper plate relative to home (m).
+    pub position_m: Vector<R>,
+    /// Rotation of the upper plate from rest, unit quaternion `[x, y, z, w]`.
+    pub orientation: [R; 4],
+}
+
+impl<R: Real> Coordinates<R> {
+    /// The straight line between the plate centres. Real-time: bounded, no allocation, no branch.
+    #[inline(always)]
+    pub(crate) fn span(&self, free_length_m: f64) -> Span<R> {
+        let Vector { x, y, z } = self.position_m;
+        let [qx, qy, qz, qw] = self.orientation;
+        let height_m = z + free_length_m;
+        let aside = x * x + y * y;
+        let length_squared = aside + height_m * height_m;
+        let norm_error = (qx * qx + qy * qy) + (qz * qz + qw * qw) - 1.0;
+        let free_squared = free_length_m * free_length_m;
+        // NaN fails each of them.
+        let usable = length_squared.above(SHORTEST_CHORD * SHORTEST_CHORD * free_squared)
+            & length_squared.below(LONGEST_CHORD * LONGEST_CHORD * free_squared)
+            & norm_error.abs().below(UNIT_NORM_TOLERANCE);
+        let length_m = length_squared.sqrt();
+        // L0 - L without the cancellation of the difference: (L0² - L²) / (L0 + L).
+        let beyond = z * (z + 2.0 * free_length_m) + aside;
+        Span {
+            vector_m: Vector { x, y, z: height_m },
+            length_m,
+            shortening_m: -beyond / (length_m + free_length_m),
+            usable,
         }
     }
+
+    /// Rotation vector (rad), of length 0 to pi. Real-time: bounded, no allocation, no branch.
+    ///
+    /// `2 atan(|v| / w) v / |v|` for the quaternion `(v, w)`, by the tangent of half that arc, `|v| / (1 + w)`: no
+    /// square root, and nothing to divide by zero at rest.
+    #[inline(always)]
+    pub(crate) fn rotation_vector_rad(&self) -> Vector<R> {
+        let [x, y, z, w] = self.orientation;
+        let axis = Vector { x, y, z };
+        let sine_squared = axis.dot(axis);
+        // The norm, from its square by the tangent at one: the error is the square of what rounding left.
+        let norm = (sine_squared + w * w) * 0.5 + 0.5;
+        let inverse = (norm + w.abs()).inverse();
+        let scale = arctangent::quotient(sine_squared * (inverse * inverse)) * (inverse * 4.0);
+        axis * R::select(w.below(0.0), -scale, scale)
+    }
+}
+
+/// Straight line between the plate centres, or one in each lane.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Span<R: Real> {
+    /// From the lower to the upper plate (m).
+    pub(crate) vector_m: Vector<R>,
+    /// Distance of the plate centres (m), `L`.
+    pub(crate) length_m: R,
+    /// `L0 - L` (m), positive in compression.
+    pub(crate) shortening_m: R,
+    /// Whether a law can be evaluated here. Where not, the numbers mean nothing and may be NaN.
+    pub(crate) usable: R::Mask,
 }
 
 /// Unit quaternion of a rotation vector.

@@ -40,11 +40,12 @@ use std::f64::consts::PI;
 
 use flotor_hal::glam::DVec4;
 
-use crate::beam_column::EndStiffness;
+use crate::beam_column::Column;
 use crate::bending::{KNEE, REACH};
 use crate::entire::EntireFunctions;
 use crate::level::{Levelled, level_above, level_below};
-use crate::rigidity::Rigidities;
+use crate::real::Real;
+use crate::rigidity::{Rigidities, Spring};
 use crate::shape::Shape;
 
 /// Length of the fit: relative error below 2e-4 of the coefficients of short springs, 1e-2 of the slender one.
@@ -78,19 +79,20 @@ const PANELS: u32 = 4;
 
 /// The term and its partial derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct QuarticEnergy {
-    pub(crate) energy_j: f64,
+pub(crate) struct QuarticEnergy<R = f64> {
+    pub(crate) energy_j: R,
     /// By the squared angles lower normal to chord, upper normal to chord, lower to upper normal.
-    pub(crate) by_squares: [f64; 3],
+    pub(crate) by_squares: [R; 3],
     /// By the length of the chord.
-    pub(crate) by_length: f64,
+    pub(crate) by_length: R,
 }
 
 /// The four coefficients of one spring as functions of the length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Quartic {
-    /// Powers of the length mapped to -1..1, for `(c0, c1, c2, c3)`.
-    powers: [DVec4; TERMS],
+    /// Powers of the length mapped to -1..1, for `(c0, c1, c2, c3)`, each per newton of `gamma`.
+    powers: [[f64; 4]; TERMS],
+    gamma_n: f64,
     shortest: Limit,
     longest: Limit,
     middle_m: f64,
@@ -105,8 +107,11 @@ struct Limit {
 }
 
 impl Quartic {
-    /// Fits the coefficients. Real-time: bounded (tens of microseconds), no allocation.
-    pub(crate) fn new(rigidities: &Rigidities, free_length_m: f64) -> Self {
+    /// Fits the coefficients. They are proportional to the rigidities, and are fitted for those of a spring with
+    /// `gamma` of one newton. Real-time: bounded (tens of microseconds), no allocation.
+    pub(crate) fn new(spring: &Spring) -> Self {
+        let free_length_m = spring.geometry().free_length_m;
+        let rigidities = &spring.rigidities_per_gamma();
         let at_argument = |z| relative_length(rigidities, free_length_m, z);
         let shortest = at_argument(KNEE + REACH).unwrap_or(0.0).max(SHORTEST);
         let knee = at_argument(KNEE).unwrap_or(0.0).max(SHORTEST + MARGIN);
@@ -115,7 +120,9 @@ impl Quartic {
         let margin = MARGIN.min(0.5 * (longest - 1.0));
         let (middle, half_width) = (0.5 * (longest + shortest), 0.5 * (longest - shortest));
         Self {
-            powers: fit(|mapped| coefficients(rigidities, free_length_m, middle + half_width * mapped)),
+            powers: fit(|mapped| coefficients(rigidities, free_length_m, middle + half_width * mapped))
+                .map(|powers| powers.to_array()),
+            gamma_n: spring.rigidities().gamma_n,
             shortest: Limit { knee_m: knee * free_length_m, reach_m: (knee - shortest) * free_length_m },
             longest: Limit { knee_m: (longest - margin) * free_length_m, reach_m: margin * free_length_m },
             middle_m: middle * free_length_m,
@@ -123,64 +130,82 @@ impl Quartic {
         }
     }
 
+    /// The same for a spring of other stiffness but equal proportions, see [`Spring::is_proportional_to`].
+    /// Real-time: bounded, no allocation; nanoseconds.
+    pub(crate) fn with_gamma(self, gamma_n: f64) -> Self {
+        Self { gamma_n, ..self }
+    }
+
     /// The term at a length, its argument `z` (levelled, with `dz/dL`) and the squared angles.
-    #[inline]
-    pub(crate) fn at(&self, length_m: f64, z: f64, z_by_length: f64, squares: [f64; 3]) -> QuarticEnergy {
+    #[inline(always)]
+    pub(crate) fn at<R: Real>(&self, length_m: R, z: R, z_by_length: R, squares: [R; 3]) -> QuarticEnergy<R> {
         let (form, form_by_length) = self.coefficients_at(length_m);
-        let magnification = 1.0 + POLE / (POLE - z);
-        let by_argument = (magnification - 1.0) * (magnification - 1.0) / POLE;
+        let pole = (z.like(POLE) - z).inverse() * POLE;
+        let magnification = pole + 1.0;
+        let by_argument = pole * pole * (1.0 / POLE);
 
         let [lower, upper, plates] = squares;
-        let (across, along) = (0.25 * plates, 0.25 * (upper - lower));
-        let sway = 0.5 * (lower + upper) - across;
-        let bow = magnification * magnification * across;
+        let (across, along) = (plates * 0.25, (upper - lower) * 0.25);
+        let sway = (lower + upper) * 0.5 - across;
+        let magnified = magnification * magnification;
+        let bow = magnified * across;
         let mixed = magnification * along;
 
-        let monomials = DVec4::new(sway * sway, sway * bow, mixed * mixed, bow * bow);
-        let value = form.dot(monomials);
+        let monomials = [sway * sway, sway * bow, mixed * mixed, bow * bow];
+        let value = inner_product(form, monomials);
         // Fades with the square of the magnified amplitude: the error it makes is of order eight.
-        let amplitude = (sway + bow) / FADING_SQUARE;
-        let fading = 1.0 / (1.0 + amplitude * amplitude);
-        let by_amplitude = -2.0 / FADING_SQUARE * amplitude * fading * fading * value;
+        let amplitude = (sway + bow) * (1.0 / FADING_SQUARE);
+        let fading = (amplitude * amplitude + 1.0).inverse();
+        let weight = fading * self.gamma_n;
+        let by_amplitude = amplitude * (fading * weight) * value * (-2.0 / FADING_SQUARE);
 
-        let by_sway = fading * (2.0 * form.x * sway + form.y * bow) + by_amplitude;
-        let by_bow = fading * (form.y * sway + 2.0 * form.w * bow) + by_amplitude;
-        let by_mixed = fading * (2.0 * form.z * mixed);
-        let by_magnification = by_bow * (2.0 * magnification * across) + by_mixed * along;
-        let (half, quarter) = (0.5 * by_sway, 0.25 * magnification * by_mixed);
+        let [sway2, sway_bow, mixed2, bow2] = form;
+        let by_sway = weight * (sway2 * sway * 2.0 + sway_bow * bow) + by_amplitude;
+        let by_bow = weight * (sway_bow * sway + bow2 * bow * 2.0) + by_amplitude;
+        let by_mixed = weight * (mixed2 * mixed) * 2.0;
+        let by_magnification = by_bow * (magnification * across) * 2.0 + by_mixed * along;
+        let (half, quarter) = (by_sway * 0.5, magnification * by_mixed * 0.25);
         QuarticEnergy {
-            energy_j: fading * value,
-            by_squares: [
-                half - quarter,
-                half + quarter,
-                0.25 * (magnification * magnification * by_bow - by_sway),
-            ],
-            by_length: fading * form_by_length.dot(monomials) + by_magnification * by_argument * z_by_length,
+            energy_j: weight * value,
+            by_squares: [half - quarter, half + quarter, (magnified * by_bow - by_sway) * 0.25],
+            by_length: weight * inner_product(form_by_length, monomials)
+                + by_magnification * by_argument * z_by_length,
         }
     }
 
     /// Coefficients and their derivative by the length.
-    #[inline]
-    fn coefficients_at(&self, length_m: f64) -> (DVec4, DVec4) {
+    #[inline(always)]
+    fn coefficients_at<R: Real>(&self, length_m: R) -> ([R; 4], [R; 4]) {
         let Self { shortest, longest, .. } = *self;
-        let Levelled { value, slope, .. } = if length_m < shortest.knee_m {
-            level_below(length_m, shortest.knee_m, shortest.reach_m)
-        } else {
-            level_above(length_m, longest.knee_m, longest.reach_m)
-        };
+        let below = level_below(length_m, shortest.knee_m, shortest.reach_m);
+        let Levelled { value, slope, .. } = level_above(below.value, longest.knee_m, longest.reach_m);
+        let slope = slope * below.slope * self.mapping_per_m;
         let mapped = (value - self.middle_m) * self.mapping_per_m;
         let square = mapped * mapped;
+        let zero = mapped.like(0.0);
         // Even and odd powers apart: short dependency chains.
-        let [mut even, mut odd, mut even_slope, mut odd_slope] = [DVec4::ZERO; 4];
-        for pair in self.powers.as_chunks::<2>().0.iter().rev() {
-            even_slope = even_slope * square + even;
-            odd_slope = odd_slope * square + odd;
-            even = even * square + pair[0];
-            odd = odd * square + pair[1];
+        let [mut even, mut odd, mut even_slope, mut odd_slope] = [[zero; 4]; 4];
+        for [even_powers, odd_powers] in self.powers.as_chunks::<2>().0.iter().rev() {
+            for i in 0..4 {
+                even_slope[i] = even_slope[i] * square + even[i];
+                odd_slope[i] = odd_slope[i] * square + odd[i];
+                even[i] = even[i] * square + even_powers[i];
+                odd[i] = odd[i] * square + odd_powers[i];
+            }
         }
-        let derivative = (even_slope + mapped * odd_slope) * (2.0 * mapped) + odd;
-        (even + mapped * odd, derivative * (slope * self.mapping_per_m))
+        let twice = mapped * 2.0;
+        let (mut form, mut form_by_length) = ([zero; 4], [zero; 4]);
+        for i in 0..4 {
+            form[i] = even[i] + mapped * odd[i];
+            form_by_length[i] = ((even_slope[i] + mapped * odd_slope[i]) * twice + odd[i]) * slope;
+        }
+        (form, form_by_length)
     }
+}
+
+#[inline(always)]
+fn inner_product<R: Real>(a: [R; 4], b: [R; 4]) -> R {
+    (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])
 }
 
 /// Relative length at which the argument is `z`, the longer one of two; `None` if it is never reached.
@@ -206,14 +231,18 @@ fn fit(function: impl Fn(f64) -> DVec4) -> [DVec4; TERMS] {
     let mut chebyshev = [DVec4::ZERO; TERMS];
     for node in 0..TERMS {
         let angle = PI * (node as f64 + 0.5) / terms;
-        let value = function(angle.cos()) * (2.0 / terms);
-        for (order, coefficient) in chebyshev.iter_mut().enumerate() {
-            *coefficient += value * (order as f64 * angle).cos();
+        let mapped = angle.cos();
+        let value = function(mapped) * (2.0 / terms);
+        // T(n+1) = 2 x T(n) - T(n-1)
+        let (mut current, mut next) = (1.0, mapped);
+        for coefficient in &mut chebyshev {
+            *coefficient += value * current;
+            (current, next) = (next, 2.0 * mapped * next - current);
         }
     }
     chebyshev[0] *= 0.5;
 
-    // T(n+1) = 2 x T(n) - T(n-1), carried along as powers.
+    // The same recurrence, carried along as powers.
     let mut powers = [DVec4::ZERO; TERMS];
     let (mut current, mut next) = ([0.0; TERMS], [0.0; TERMS]);
     current[0] = 1.0;
@@ -315,7 +344,7 @@ fn coefficients(rigidities: &Rigidities, free_length_m: f64, relative: f64) -> D
 
     // (S x D)² = S² D² - (S.D)²
     let axial_force_n = gamma * p;
-    let column = EndStiffness::current_length(rigidities, axial_force_n, length_m, free_length_m);
+    let column = Column::new(rigidities).ends(axial_force_n, length_m, free_length_m);
     let carry = 0.5 * (column.sway_n_per_rad * length_m - column.bow_nm_per_rad);
     let out_of_plane = -alpha / (6.0 * free_length_m) * m.sweep2 - 2.0 / 3.0 * carry;
 

@@ -2,6 +2,8 @@
 
 use flotor_hal::glam::DVec3;
 
+use crate::pose::{Coordinates, Pose};
+use crate::real::{Real, Vector};
 use crate::validity::Validity;
 
 /// Outputs the caller needs; each level includes those before it. What is not demanded is not computed.
@@ -41,6 +43,49 @@ impl Response {
         let sum = self.force_n.element_sum() + self.torque_nm.element_sum() + self.energy_j.unwrap_or(0.0);
         if sum.is_finite() { self } else { Self::none(Validity::OutOfDomain) }
     }
+}
+
+/// A law that answers from the pose alone, written once for one pose and for several side by side.
+pub trait Law {
+    /// Whether it has a stored energy.
+    const HAS_ENERGY: bool;
+
+    /// The answer at a pose, or at one in each lane. Real-time: bounded, no allocation.
+    ///
+    /// Where a lane is not answered its numbers mean nothing. What is not demanded is not computed and zero.
+    fn answer<R: Real>(&self, at: &Coordinates<R>, demand: Demand) -> Answer<R>;
+
+    /// The response at one pose. Real-time: bounded, no allocation.
+    #[inline]
+    fn respond_at(&self, pose: &Pose, demand: Demand) -> Response {
+        let Answer { force_n, torque_nm, energy_j, answered, trusted } =
+            self.answer(&pose.coordinates(), demand);
+        if !answered {
+            return Response::none(pose.why_unanswered());
+        }
+        let has_energy = Self::HAS_ENERGY && demand >= Demand::WrenchAndEnergy;
+        Response {
+            force_n: DVec3::new(force_n.x, force_n.y, force_n.z),
+            torque_nm: DVec3::new(torque_nm.x, torque_nm.y, torque_nm.z),
+            energy_j: has_energy.then_some(energy_j),
+            validity: if trusted { Validity::Ok } else { Validity::Clamped },
+        }
+    }
+}
+
+/// Answer of a [`Law`] before it is packed into a [`Response`].
+#[derive(Clone, Copy, Debug)]
+pub struct Answer<R: Real> {
+    /// Force on the hand (N).
+    pub force_n: Vector<R>,
+    /// Torque on the hand (N·m).
+    pub torque_nm: Vector<R>,
+    /// Stored energy (J).
+    pub energy_j: R,
+    /// Lanes that have an answer.
+    pub answered: R::Mask,
+    /// Of these, the lanes within the range of the law.
+    pub trusted: R::Mask,
 }
 
 #[cfg(test)]

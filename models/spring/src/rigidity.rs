@@ -167,6 +167,20 @@ impl Spring {
         &self.rigidities
     }
 
+    /// Rigidities of a spring of the same proportions with `gamma` of one newton: ratios of coil and material alone.
+    pub(crate) fn rigidities_per_gamma(&self) -> Rigidities {
+        Rigidities::derive(Stiffness::Gamma(1.0), &self.geometry, &self.material)
+    }
+
+    /// Whether the rigidities of the two springs differ by one common factor, and their free lengths not at all.
+    /// Wire and number of coils scale all rigidities alike, free length, coil and material do not.
+    #[must_use]
+    pub fn is_proportional_to(&self, other: &Self) -> bool {
+        self.material == other.material
+            && self.geometry.free_length_m == other.geometry.free_length_m
+            && self.geometry.coil_diameter_m == other.geometry.coil_diameter_m
+    }
+
     /// Stiffness along the axis at rest (N/m), `gamma / L0` (Hooke's `k`).
     #[must_use]
     pub fn axial_stiffness_n_per_m(&self) -> f64 {

@@ -1,9 +1,8 @@
-use flotor_hal::glam::{DMat3, DVec2, DVec3};
+use flotor_hal::glam::{DMat3, DVec2, DVec3, DVec4};
 
 use super::{Quartic, coefficients, relative_length};
 use crate::angle::SquaredAngle;
 use crate::bending::{Bending, levelled_argument};
-use crate::pose::Chord;
 use crate::preset::Preset;
 use crate::rigidity::Spring;
 use crate::shape::Shape;
@@ -56,8 +55,7 @@ fn energy(spring: &Spring, length_m: f64, sway_rad: DVec2, bow_rad: DVec2) -> f6
     let versine = |a: DVec3, b: DVec3| 0.5 * (a - b).length_squared();
     let angles = [versine(lower, DVec3::Z), versine(upper, DVec3::Z), versine(lower, upper)];
     let shortening_m = free_length_m - length_m;
-    let chord = Chord { vector_m: DVec3::new(0.0, 0.0, length_m), length_m, shortening_m };
-    let bending = Bending::new(spring).at(&chord, &angles.map(SquaredAngle::from_versine)).unwrap();
+    let bending = Bending::new(spring).at(length_m, shortening_m, &angles.map(SquaredAngle::from_versine));
     bending.energy_j + 0.5 * spring.axial_stiffness_n_per_m() * shortening_m * shortening_m
 }
 
@@ -97,7 +95,7 @@ fn fit_follows_the_coefficients() {
     for preset in Preset::ALL {
         let spring = preset.spring();
         let (rigidities, free_length_m) = (spring.rigidities(), spring.geometry().free_length_m);
-        let quartic = Quartic::new(rigidities, free_length_m);
+        let quartic = Quartic::new(&spring);
         // Relative to the largest coefficient; documented: the slender spring's run to its pole is harder.
         let tolerance = if preset == Preset::Slender { 1e-2 } else { 2e-4 };
         let (shortest, longest) = (quartic.shortest.knee_m, quartic.longest.knee_m);
@@ -105,6 +103,7 @@ fn fit_follows_the_coefficients() {
             let length_m = shortest + (longest - shortest) * f64::from(step) / 100.0;
             let exact = coefficients(rigidities, free_length_m, length_m / free_length_m);
             let (found, _) = quartic.coefficients_at(length_m);
+            let found = DVec4::from_array(found) * rigidities.gamma_n;
             let error = (found - exact).abs().max_element() / exact.abs().max_element();
             assert!(error < tolerance, "{preset:?} at {length_m}: {error:e}");
         }
@@ -117,7 +116,7 @@ fn derivatives_agree_with_differences() {
     for preset in Preset::ALL {
         let spring = preset.spring();
         let (rigidities, free_length_m) = (spring.rigidities(), spring.geometry().free_length_m);
-        let quartic = Quartic::new(rigidities, free_length_m);
+        let quartic = Quartic::new(&spring);
         // Inside the fit, in both levelled ends and far outside.
         for relative in [0.1, 0.22, 0.5, 0.8, 0.97, 1.0, 1.4, 1.78, 3.0] {
             let length_m = relative * free_length_m;

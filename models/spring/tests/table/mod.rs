@@ -1,13 +1,14 @@
 //! Reads the reference tables: comma-separated, one header row, no quotes.
 
 use std::fs;
+use std::rc::Rc;
 
 use flotor_hal::glam::DVec3;
 use flotor_spring::preset::Preset;
 
 /// One row, its cells found by column name.
 pub(crate) struct Row {
-    header: Vec<String>,
+    header: Rc<[String]>,
     cells: Vec<String>,
 }
 
@@ -29,14 +30,19 @@ impl Row {
     }
 }
 
-/// The rows of a table in `tests/data/cases` of the workspace.
+/// The rows of a reference table, in `tests/data/cases` of the workspace.
 pub(crate) fn rows(file: &str) -> Vec<Row> {
-    let path = format!("{}/../../tests/data/cases/{file}", env!("CARGO_MANIFEST_DIR"));
+    read(&format!("cases/{file}"))
+}
+
+/// The rows of a file in `tests/data` of the workspace.
+pub(crate) fn read(file: &str) -> Vec<Row> {
+    let path = format!("{}/../../tests/data/{file}", env!("CARGO_MANIFEST_DIR"));
     let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
     let split = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
     let mut lines = text.lines();
-    let header = split(lines.next().unwrap_or_default());
-    lines.map(|line| Row { header: header.clone(), cells: split(line) }).collect()
+    let header: Rc<[String]> = split(lines.next().unwrap_or_default()).into();
+    lines.map(|line| Row { header: Rc::clone(&header), cells: split(line) }).collect()
 }
 
 /// The preset a row is about.

@@ -1,0 +1,441 @@
+//! One formula for one pose and for several side by side.
+//!
+//! The laws of this crate are written once, over any [`Real`]: `f64` for the servo's one pose, [`Wide`] for a
+//! batch, several poses in the lanes of one vector register. Every operation rounds as IEEE 754 says, in the order
+//! written and without fused multiply-add, so a lane of a batch holds *the same bits* as the scalar law.
+//!
+//! A comparison gives a mask, a truth value per lane. What is rare (strong tension, levelling, a plate below the
+//! other) stands behind `if R::any(mask)`: for one pose an ordinary branch, for several a branch taken when one of
+//! them needs it, with [`Real::select`] keeping the others as they were.
+//!
+//! The lanes come from the crate `pulp`, which finds the instruction set of the machine at run time.
+
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Sub};
+
+use pulp::Simd;
+
+/// A real number, or one in each lane. Everything on it is real-time: bounded, no allocation.
+pub trait Real:
+    Copy
+    + Neg<Output = Self>
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Add<f64, Output = Self>
+    + Sub<f64, Output = Self>
+    + Mul<f64, Output = Self>
+{
+    /// A truth value per lane.
+    type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask>;
+
+    /// The same value in as many lanes as `self` has.
+    #[must_use]
+    fn like(self, value: f64) -> Self;
+
+    /// Square root, correctly rounded.
+    #[must_use]
+    fn sqrt(self) -> Self;
+
+    /// Magnitude.
+    #[must_use]
+    fn abs(self) -> Self;
+
+    /// Lanes below; false for NaN.
+    #[must_use]
+    fn below(self, bound: f64) -> Self::Mask;
+
+    /// Lanes above; false for NaN.
+    #[must_use]
+    fn above(self, bound: f64) -> Self::Mask;
+
+    /// Lane by lane one or the other.
+    #[must_use]
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+
+    /// True if any lane is.
+    #[must_use]
+    fn any(mask: Self::Mask) -> bool;
+
+    /// A scalar function in every lane, one after the other: for what is too rare to be written in lanes.
+    #[must_use]
+    fn map(self, function: impl Fn(f64) -> f64) -> Self;
+
+    /// One over it.
+    #[inline(always)]
+    #[must_use]
+    fn inverse(self) -> Self {
+        self.like(1.0) / self
+    }
+
+    /// The number or the floor, whichever is larger; the floor for NaN.
+    #[inline(always)]
+    #[must_use]
+    fn at_least(self, floor: f64) -> Self {
+        Self::select(self.above(floor), self, self.like(floor))
+    }
+
+    /// The number or the ceiling, whichever is smaller; the ceiling for NaN.
+    #[inline(always)]
+    #[must_use]
+    fn at_most(self, ceiling: f64) -> Self {
+        Self::select(self.below(ceiling), self, self.like(ceiling))
+    }
+
+    /// Lanes that are neither infinite nor NaN.
+    #[inline(always)]
+    #[must_use]
+    fn finite(self) -> Self::Mask {
+        self.abs().below(f64::INFINITY)
+    }
+}
+
+impl Real for f64 {
+    type Mask = bool;
+
+    #[inline(always)]
+    fn like(self, value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.sqrt()
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.abs()
+    }
+
+    #[inline(always)]
+    fn below(self, bound: f64) -> bool {
+        self < bound
+    }
+
+    #[inline(always)]
+    fn above(self, bound: f64) -> bool {
+        self > bound
+    }
+
+    #[inline(always)]
+    fn select(mask: bool, yes: Self, no: Self) -> Self {
+        if mask { yes } else { no }
+    }
+
+    #[inline(always)]
+    fn any(mask: bool) -> bool {
+        mask
+    }
+
+    #[inline(always)]
+    fn map(self, function: impl Fn(f64) -> f64) -> Self {
+        function(self)
+    }
+}
+
+/// As many numbers as a vector register of the instruction set `S` holds.
+#[derive(Clone, Copy, Debug)]
+pub struct Wide<S: Simd> {
+    simd: S,
+    lanes: S::f64s,
+}
+
+impl<S: Simd> Wide<S> {
+    /// Numbers as they lie in a register.
+    #[inline(always)]
+    #[must_use]
+    pub fn new(simd: S, lanes: S::f64s) -> Self {
+        Self { simd, lanes }
+    }
+
+    /// The register.
+    #[inline(always)]
+    #[must_use]
+    pub fn lanes(self) -> S::f64s {
+        self.lanes
+    }
+}
+
+/// A truth value per lane of a [`Wide`].
+#[derive(Clone, Copy, Debug)]
+pub struct WideMask<S: Simd> {
+    simd: S,
+    lanes: S::m64s,
+}
+
+impl<S: Simd> BitAnd for WideMask<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn bitand(self, other: Self) -> Self {
+        Self { lanes: self.simd.and_m64s(self.lanes, other.lanes), ..self }
+    }
+}
+
+impl<S: Simd> BitOr for WideMask<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn bitor(self, other: Self) -> Self {
+        Self { lanes: self.simd.or_m64s(self.lanes, other.lanes), ..self }
+    }
+}
+
+impl<S: Simd> Neg for Wide<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self { lanes: self.simd.neg_f64s(self.lanes), ..self }
+    }
+}
+
+/// An arithmetic operator between lanes, and between lanes and one number for all of them.
+macro_rules! lane_operator {
+    ($($trait:ident $method:ident $instruction:ident),*) => {$(
+        impl<S: Simd> $trait for Wide<S> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self { lanes: self.simd.$instruction(self.lanes, other.lanes), ..self }
+            }
+        }
+
+        impl<S: Simd> $trait<f64> for Wide<S> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: f64) -> Self {
+                self.$method(self.like(other))
+            }
+        }
+    )*};
+}
+
+lane_operator!(Add add add_f64s, Sub sub sub_f64s, Mul mul mul_f64s, Div div div_f64s);
+
+impl<S: Simd> Real for Wide<S> {
+    type Mask = WideMask<S>;
+
+    #[inline(always)]
+    fn like(self, value: f64) -> Self {
+        Self { lanes: self.simd.splat_f64s(value), ..self }
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self { lanes: self.simd.sqrt_f64s(self.lanes), ..self }
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self { lanes: self.simd.abs_f64s(self.lanes), ..self }
+    }
+
+    #[inline(always)]
+    fn below(self, bound: f64) -> WideMask<S> {
+        let lanes = self.simd.less_than_f64s(self.lanes, self.simd.splat_f64s(bound));
+        WideMask { simd: self.simd, lanes }
+    }
+
+    #[inline(always)]
+    fn above(self, bound: f64) -> WideMask<S> {
+        let lanes = self.simd.less_than_f64s(self.simd.splat_f64s(bound), self.lanes);
+        WideMask { simd: self.simd, lanes }
+    }
+
+    #[inline(always)]
+    fn select(mask: WideMask<S>, yes: Self, no: Self) -> Self {
+        Self { lanes: mask.simd.select_f64s(mask.lanes, yes.lanes, no.lanes), ..yes }
+    }
+
+    #[inline(always)]
+    fn any(mask: WideMask<S>) -> bool {
+        pulp::bytemuck::bytes_of(&mask.lanes).iter().fold(0, |any, byte| any | byte) != 0
+    }
+
+    #[inline(always)]
+    fn map(self, function: impl Fn(f64) -> f64) -> Self {
+        let mut lanes = self.lanes;
+        for lane in pulp::bytemuck::cast_slice_mut::<S::f64s, f64>(std::slice::from_mut(&mut lanes)) {
+            *lane = function(*lane);
+        }
+        Self { lanes, ..self }
+    }
+}
+
+/// Two numbers, or two registers of them, in step: while one waits for a division the other computes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pair<R>(pub R, pub R);
+
+impl<R: BitAnd<Output = R>> BitAnd for Pair<R> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn bitand(self, other: Self) -> Self {
+        Self(self.0 & other.0, self.1 & other.1)
+    }
+}
+
+impl<R: BitOr<Output = R>> BitOr for Pair<R> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0, self.1 | other.1)
+    }
+}
+
+impl<R: Real> Neg for Pair<R> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(-self.0, -self.1)
+    }
+}
+
+/// The operators of a pair, from those of its parts.
+macro_rules! pair_operator {
+    ($($trait:ident $method:ident),*) => {$(
+        impl<R: Real> $trait for Pair<R> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(self.0.$method(other.0), self.1.$method(other.1))
+            }
+        }
+    )*};
+}
+
+/// The same with one number for both parts.
+macro_rules! pair_operator_by_number {
+    ($($trait:ident $method:ident),*) => {$(
+        impl<R: Real> $trait<f64> for Pair<R> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: f64) -> Self {
+                Self(self.0.$method(other), self.1.$method(other))
+            }
+        }
+    )*};
+}
+
+pair_operator!(Add add, Sub sub, Mul mul, Div div);
+pair_operator_by_number!(Add add, Sub sub, Mul mul);
+
+impl<R: Real> Real for Pair<R> {
+    type Mask = Pair<R::Mask>;
+
+    #[inline(always)]
+    fn like(self, value: f64) -> Self {
+        Self(self.0.like(value), self.1.like(value))
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.sqrt(), self.1.sqrt())
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.abs(), self.1.abs())
+    }
+
+    #[inline(always)]
+    fn below(self, bound: f64) -> Self::Mask {
+        Pair(self.0.below(bound), self.1.below(bound))
+    }
+
+    #[inline(always)]
+    fn above(self, bound: f64) -> Self::Mask {
+        Pair(self.0.above(bound), self.1.above(bound))
+    }
+
+    #[inline(always)]
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
+        Self(R::select(mask.0, yes.0, no.0), R::select(mask.1, yes.1, no.1))
+    }
+
+    #[inline(always)]
+    fn any(mask: Self::Mask) -> bool {
+        R::any(mask.0 | mask.1)
+    }
+
+    #[inline(always)]
+    fn map(self, function: impl Fn(f64) -> f64) -> Self {
+        Self(self.0.map(&function), self.1.map(&function))
+    }
+}
+
+/// Three components, a [`Real`] each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vector<R> {
+    /// Along x.
+    pub x: R,
+    /// Along y.
+    pub y: R,
+    /// Along z.
+    pub z: R,
+}
+
+impl<R: Real> Vector<R> {
+    /// From its components.
+    #[inline(always)]
+    #[must_use]
+    pub fn new(x: R, y: R, z: R) -> Self {
+        Self { x, y, z }
+    }
+
+    /// Inner product.
+    #[inline(always)]
+    #[must_use]
+    pub fn dot(self, other: Self) -> R {
+        self.x * other.x + self.y * other.y + self.z * other.z
+    }
+
+    /// Outer product.
+    #[inline(always)]
+    #[must_use]
+    pub fn cross(self, other: Self) -> Self {
+        Self {
+            x: self.y * other.z - other.y * self.z,
+            y: self.z * other.x - other.z * self.x,
+            z: self.x * other.y - other.x * self.y,
+        }
+    }
+}
+
+impl<R: Real> Add for Vector<R> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self { x: self.x + other.x, y: self.y + other.y, z: self.z + other.z }
+    }
+}
+
+impl<R: Real> Sub for Vector<R> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self { x: self.x - other.x, y: self.y - other.y, z: self.z - other.z }
+    }
+}
+
+impl<R: Real> Mul<R> for Vector<R> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, factor: R) -> Self {
+        Self { x: self.x * factor, y: self.y * factor, z: self.z * factor }
+    }
+}
+
+#[cfg(test)]
+mod tests;
