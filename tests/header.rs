@@ -33,7 +33,24 @@ fn generate() -> String {
     });
     let mut header = Vec::new();
     sources.generate().expect("the contract can be said in C").write(&mut header);
-    String::from_utf8(header).expect("a header is text")
+    without_struct_constants(&String::from_utf8(header).expect("a header is text"))
+}
+
+/// cbindgen makes compound literals of the associated constants of structs. No static table of a C plugin may hold
+/// one, and some name constants that C does not get: they are left out, with the comments above them. What C needs
+/// of them is in the trailer, as numbers.
+fn without_struct_constants(header: &str) -> String {
+    let mut kept: Vec<&str> = Vec::new();
+    for line in header.lines() {
+        if line.starts_with("#define Flotor") && line.contains(" (Flotor") {
+            while kept.last().is_some_and(|line| line.starts_with("//")) {
+                kept.pop();
+            }
+        } else {
+            kept.push(line);
+        }
+    }
+    kept.join("\n") + "\n"
 }
 
 #[test]

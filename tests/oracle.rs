@@ -320,7 +320,7 @@ fn a_file_that_is_not_there_is_named() {
 #[test]
 fn wrong_parameters_are_told_with_what_would_be_right() {
     let wrong = [
-        (&["variant=energie"][..], "--set variant: `variant` = `energie`: legal is energy | closed-form | "),
+        (&["variant=energie"][..], "--set variant: `variant` = `energie`: legal is thesis | closed-form | "),
         (&["gama_n=17"], "--set gama_n: no parameter `gama_n`; did you mean `gamma_n`?"),
         (&["gamma_n=many"], "--set gamma_n: `gamma_n` is a number in N, not `many`"),
         (&["free_length_mm=0"], "--set free_length_mm: `free_length_mm` = 0: legal is 1 to 1000 mm"),

@@ -87,7 +87,7 @@ fn the_host_allocates_nothing_in_ten_thousand_ticks() {
 #[test]
 fn the_spring_allocates_nothing_in_a_step() {
     let plugin = Plugin::in_process(&flotor_spring::FLOTOR_ENTRY).expect("the spring is a plugin");
-    for variant in ["energy", "closed-form", "current-length"] {
+    for variant in ["energy", "closed-form", "current-length", "thesis"] {
         let setting = flotor_hal::abi::loader::Setting::parse(plugin.parameters(), "variant", variant);
         let mut model = plugin.create_model(&[setting.expect("a variant")]).expect("a spring");
         let mut output = Output::default();

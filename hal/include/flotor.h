@@ -4,8 +4,6 @@
  * A wrench is the force and torque on the hand. Orientation is a unit quaternion [x, y, z, w].
  * A plugin exports one FlotorEntry and one FLOTOR_METADATA text; see the book, "Plugin contract".
  */
-
-
 #ifndef FLOTOR_H
 #define FLOTOR_H
 
@@ -13,16 +11,16 @@
 #include <stddef.h>
 
 // Bytes a [`Message`] holds.
-#define FlotorMESSAGE_BYTES 508
+#define FLOTOR_MESSAGE_BYTES 508
 
 // Major version of the contract. 0: the interfaces are drafts, and every minor may break.
-#define FlotorABI_MAJOR 0
+#define FLOTOR_ABI_MAJOR 0
 
 // Minor version of the contract.
-#define FlotorABI_MINOR 1
+#define FLOTOR_ABI_MINOR 1
 
 // [`Host::flags`] bit: the plugin has its own Rust runtime and may silence its panic hook.
-#define FlotorHOST_QUIET_PANICS 1
+#define FLOTOR_HOST_QUIET_PANICS 1
 
 // Status of one call through a table.
 enum FlotorCallStatus
@@ -239,6 +237,7 @@ typedef struct FlotorHost {
 } FlotorHost;
 
 // Borrowed UTF-8 text. In a schema or an info struct it lives as long as the process (plugins are never
+// unloaded); as an argument it lives for the call.
 typedef struct FlotorStr {
     const uint8_t *ptr;
     size_t len;
@@ -300,19 +299,11 @@ typedef struct FlotorParameter {
 } FlotorParameter;
 
 // Which outputs a scene needs from a step; what is not demanded need not be computed.
+//
+// Shape is not among them: it is an extension ([`crate::CenterlineModel`]) that observers call off the loop.
 typedef struct FlotorDemand {
     uint32_t bits;
 } FlotorDemand;
-// Force only.
-#define FlotorDemand_FORCE (FlotorDemand){ .bits = 1 }
-// Torque.
-#define FlotorDemand_TORQUE (FlotorDemand){ .bits = 2 }
-// Stored elastic energy.
-#define FlotorDemand_ENERGY (FlotorDemand){ .bits = 4 }
-// Force and torque.
-#define FlotorDemand_WRENCH (FlotorDemand){ .bits = 3 }
-// Everything a step can give.
-#define FlotorDemand_ALL (FlotorDemand){ .bits = 7 }
 
 // What a force model says about itself; constant, readable without creating it.
 typedef struct FlotorModelInfo {
@@ -334,7 +325,7 @@ typedef struct FlotorParameterValue {
 // A sentence for people, written by the callee into memory of the caller: nothing to allocate or to free.
 typedef struct FlotorMessage {
     uint32_t len;
-    uint8_t text[FlotorMESSAGE_BYTES];
+    uint8_t text[FLOTOR_MESSAGE_BYTES];
 } FlotorMessage;
 
 // An opaque instance made and owned by a plugin.
@@ -383,6 +374,8 @@ typedef struct FlotorInput {
 } FlotorInput;
 
 // Force and torque **on the hand**, at the handle. 48 bytes.
+//
+// A compressed spring pushes the hand up: positive compression, positive z force.
 typedef struct FlotorWrench {
     // Force, N.
     double force_n[3];
@@ -401,6 +394,7 @@ typedef struct FlotorOutput {
 } FlotorOutput;
 
 // `flotor.force/1`. Statuses are [`super::CallStatus`] codes; `create` and `prepare` return 0 or a
+// [`crate::RefusalKind`] and say why in the message.
 typedef struct FlotorForceTable {
     // Bytes of this table as the plugin knows it.
     uint32_t size;
@@ -480,14 +474,6 @@ typedef struct FlotorDeviceInfo {
 typedef struct FlotorAxes {
     uint32_t bits;
 } FlotorAxes;
-// None.
-#define FlotorAxes_NONE (FlotorAxes){ .bits = 0 }
-// The three translations.
-#define FlotorAxes_TRANSLATION (FlotorAxes){ .bits = 7 }
-// The three rotations.
-#define FlotorAxes_ROTATION (FlotorAxes){ .bits = 56 }
-// All six.
-#define FlotorAxes_ALL (FlotorAxes){ .bits = 63 }
 
 // What a device can do, as numbers a host compares with a model and enforces. 200 bytes, device frame.
 typedef struct FlotorCapabilities {
@@ -542,10 +528,9 @@ typedef struct FlotorDeviceState {
     // Reserved, 0.
     uint32_t reserved;
 } FlotorDeviceState;
-// At home, at rest.
-#define FlotorDeviceState_HOME (FlotorDeviceState){ .pose = FlotorPose_HOME, .twist = FlotorTwist_ZERO, .delivered = FlotorWrench_ZERO, .sampled_ns = 0, .buttons = 0, .reserved = 0 }
 
 // `flotor.device/1`. `open` and `activate` return 0 or a [`crate::RefusalKind`] and say why in the message;
+// `read` and `write` return the code of a [`crate::Cycle`]; the others a [`super::CallStatus`] code.
 typedef struct FlotorDeviceTable {
     // Bytes of this table as the plugin knows it.
     uint32_t size;
@@ -587,6 +572,9 @@ typedef struct FlotorDeviceTable {
 } FlotorDeviceTable;
 
 // Account of the mechanical energy of a device with a known plant (a simulation), J since activation. 56 bytes.
+//
+// Extension `flotor.energy-ledger/1`. Every term is integrated on its own, none is the difference of others:
+// `stored_j - initial_j = actuators_j + feedforward_j + hand_j - dissipated_j` is a check, not a definition.
 typedef struct FlotorEnergyLedger {
     // Kinetic and potential energy now.
     double stored_j;
@@ -614,8 +602,6 @@ typedef struct FlotorEnergyLedgerTable {
     uint32_t (*ledger)(FlotorInstance instance, struct FlotorEnergyLedger *out);
 } FlotorEnergyLedgerTable;
 
-#endif  /* FLOTOR_H */
-
 /* Names of interfaces and extensions. */
 #define FLOTOR_INTERFACE_FORCE "flotor.force/1"
 #define FLOTOR_INTERFACE_DEVICE "flotor.device/1"
@@ -629,6 +615,19 @@ typedef struct FlotorEnergyLedgerTable {
 #define FLOTOR_STATIC_ASSERT _Static_assert
 #define FLOTOR_EXPORT __attribute__((visibility("default")))
 #endif
+
+/* Sets of outputs: `{FLOTOR_DEMAND_FORCE | FLOTOR_DEMAND_ENERGY}` makes a FlotorDemand. */
+#define FLOTOR_DEMAND_FORCE 1u
+#define FLOTOR_DEMAND_TORQUE 2u
+#define FLOTOR_DEMAND_ENERGY 4u
+/* Sets of axes: `{FLOTOR_AXES_ALL}` makes a FlotorAxes. */
+#define FLOTOR_AXES_TRANSLATION 7u
+#define FLOTOR_AXES_ROTATION 56u
+#define FLOTOR_AXES_ALL 63u
+/* What `read` and `write` of a device return; a fault is one of FlotorFault. */
+#define FLOTOR_CYCLE_FRESH 0u
+#define FLOTOR_CYCLE_STALE 1u
+#define FLOTOR_CYCLE_FAULT(fault) (0x100u | (uint32_t)(fault))
 
 /* First eight bytes of an entry. */
 #define FLOTOR_MAGIC_BYTES { 'F', 'L', 'O', 'T', 'O', 'R', '\r', '\n' }
@@ -649,3 +648,5 @@ FLOTOR_STATIC_ASSERT(sizeof(FlotorOutput) == 64 && offsetof(FlotorOutput, status
 FLOTOR_STATIC_ASSERT(sizeof(FlotorDeviceState) == 168 && offsetof(FlotorDeviceState, sampled_ns) == 152, "FlotorDeviceState");
 FLOTOR_STATIC_ASSERT(sizeof(FlotorMessage) == 512, "FlotorMessage");
 FLOTOR_STATIC_ASSERT(sizeof(FlotorTick) == 24, "FlotorTick");
+
+#endif /* FLOTOR_H */

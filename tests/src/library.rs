@@ -62,9 +62,18 @@ pub fn patched(mut bytes: Vec<u8>, old: &[u8], new: &[u8]) -> Vec<u8> {
 pub fn compile_c(source: &str, library: &Path) {
     let file = library.with_extension("c");
     std::fs::write(&file, source).expect("a scratch folder can be written to");
+    compile_c_file(&file, &[], library);
+}
+
+/// Compiles a C file to a shared library, with macros defined.
+///
+/// # Panics
+/// As [`compile_c`].
+pub fn compile_c_file(file: &Path, macros: &[&str], library: &Path) {
     let mut compiler = Command::new("cc");
     compiler.args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O1", "-shared", "-fPIC"]);
-    compiler.arg("-I").arg(crate::workspace_root().join("hal/include")).arg("-o").arg(library).arg(&file);
+    compiler.arg("-I").arg(crate::workspace_root().join("hal/include")).arg("-o").arg(library).arg(file);
+    compiler.args(macros.iter().map(|name| format!("-D{name}")));
     let output = compiler.output().expect("a C compiler is installed; the README asks for one");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }

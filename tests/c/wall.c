@@ -1,0 +1,100 @@
+/* A force model in C: a wall that pushes the hand up where it is below home. All a plugin needs is the header.
+ *
+ * WITHOUT_STEP, WITHOUT_TABLE, OTHER_SIZES, HIDDEN_ENTRY and ODD_ANSWERS make the mistakes a C author can make;
+ * the tests expect each to be refused. */
+#include "flotor.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-c-wall\"\nname = \"Wall\"\ndoc = \"A flat wall, in C\"\n"
+                "version = \"0.1.0\"\nabi = \"0.1\"\nentry = \"flotor_entry_wall\"\n");
+
+typedef struct {
+    double stiffness_n_per_m;
+} Wall;
+
+static const FlotorParameter parameters[] = {
+    {.id = FLOTOR_STR("stiffness_n_per_m"), .unit = FLOTOR_STR("N/m"), .doc = FLOTOR_STR("Stiffness of the wall"),
+     .kind = FlotorParameterKind_Real, .min = 0.0, .max = 5000.0, .default_ = 500.0},
+};
+
+/* The host has checked the values against the schema: only what was set explicitly is among them. */
+static uint32_t create(const FlotorParameterValue *values, uint32_t count, FlotorMessage *message, FlotorInstance *out) {
+    Wall *wall = malloc(sizeof *wall);
+    if (wall == NULL) {
+        static const char reason[] = "no memory for a wall";
+        memcpy(message->text, reason, sizeof reason - 1);
+        message->len = sizeof reason - 1;
+        return FlotorRefusalKind_Resource;
+    }
+    wall->stiffness_n_per_m = count > 0 ? values[count - 1].number : parameters[0].default_;
+    *out = wall;
+    return 0;
+}
+
+static void destroy(FlotorInstance instance) {
+    free(instance);
+}
+
+#ifndef WITHOUT_STEP
+static uint32_t step(FlotorInstance instance, const FlotorInput *input, FlotorOutput *output) {
+    const Wall *wall = instance;
+    const FlotorPose *pose = &input->pose;
+    memset(output, 0, sizeof *output);
+    output->energy_j = NAN;
+    for (int axis = 0; axis < 7; axis++) {
+        double number = axis < 3 ? pose->position_m[axis] : pose->orientation_xyzw[axis - 3];
+        if (!isfinite(number)) {
+            output->status = FlotorStepStatus_InvalidInput;
+            return FlotorCallStatus_Ok;
+        }
+    }
+    double depth_m = fmax(-pose->position_m[2], 0.0);
+    output->wrench.force_n[2] = wall->stiffness_n_per_m * fmin(depth_m, 1.0);
+#ifdef ODD_ANSWERS
+    output->status = 99; /* no status of the contract */
+#endif
+    return FlotorCallStatus_Ok;
+}
+#endif
+
+static const FlotorForceTable table = {
+    .size = sizeof(FlotorForceTable),
+    .parameter_count = 1,
+    .parameters = parameters,
+    .info = {.id = FLOTOR_STR("fixture-c-wall"), .name = FLOTOR_STR("Wall"), .doc = FLOTOR_STR("A flat wall, in C"),
+             .serves = {FLOTOR_DEMAND_FORCE | FLOTOR_DEMAND_TORQUE}, .memory = FlotorMemory_Stateless},
+    .create = create,
+    .destroy = destroy,
+#ifndef WITHOUT_STEP
+    .step = step,
+#endif
+};
+
+static const void *get_interface(FlotorStr id) {
+    static const char force[] = FLOTOR_INTERFACE_FORCE;
+#ifdef WITHOUT_TABLE
+    id.len = 0;
+#endif
+    return id.len == sizeof force - 1 && memcmp(id.ptr, force, id.len) == 0 ? &table : NULL;
+}
+
+#ifdef HIDDEN_ENTRY
+__attribute__((visibility("hidden"))) extern const FlotorEntry flotor_entry_wall;
+#else
+FLOTOR_EXPORT extern const FlotorEntry flotor_entry_wall;
+#endif
+const FlotorEntry flotor_entry_wall = {
+    .magic = FLOTOR_MAGIC_BYTES,
+    .size = sizeof(FlotorEntry),
+    .abi_major = FLOTOR_ABI_MAJOR,
+    .abi_minor = FLOTOR_ABI_MINOR,
+    .kind = FlotorPluginKind_Model,
+#ifdef OTHER_SIZES
+    .sizes = {.input = sizeof(FlotorInput) + 8, .output = sizeof(FlotorOutput)},
+#else
+    .sizes = FLOTOR_CONTRACT_SIZES,
+#endif
+    .get_interface = get_interface,
+};

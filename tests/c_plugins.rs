@@ -1,0 +1,88 @@
+//! Plugins written in C: compiled here from `c/` with the committed header, found by id, run in a scene, and refused
+//! in one line where their author made a mistake. They carry no layouts, so only sizes stand between a C author's
+//! old header and the host.
+
+use flotor::session::RunEnd;
+use flotor::trace::Events;
+use flotor_hal::Wrench;
+use flotor_hal::abi::loader::Plugin;
+use flotor_tests::library::compile_c_file;
+use flotor_tests::program::{Flotor, exit_code};
+use flotor_tests::scratch::Scratch;
+use flotor_tests::watched::{Watched, watch};
+use flotor_tests::workspace_root;
+use std::path::PathBuf;
+
+/// Compiles `c/NAME.c` with the mistakes asked for.
+fn compiled(scratch: &Scratch, name: &str, mistakes: &[&str]) -> PathBuf {
+    let library = scratch.path().join(format!("lib{name}.so"));
+    compile_c_file(&workspace_root().join("tests/c").join(name).with_extension("c"), mistakes, &library);
+    library
+}
+
+/// A scene of 20 ticks with the post and the wall of these files.
+fn scene(scratch: &Scratch, mistakes: &[&str]) -> String {
+    let (post, wall) = (compiled(scratch, "post", &[]), compiled(scratch, "wall", mistakes));
+    format!(
+        "duration_s = 0.02\n[device]\nplugin = {post:?}\n[[model]]\nplugin = {wall:?}\nname = \"wall\"\n\
+         [model.parameters]\nstiffness_n_per_m = 700\n[limits]\nramp_s = 0\n"
+    )
+}
+
+#[test]
+fn device_and_model_in_c_run_a_scene() {
+    let Watched { records, outcome } = watch(&scene(&Scratch::default(), &[]));
+    assert_eq!((outcome.end, records.len()), (RunEnd::Finished, 20));
+    // A millimetre below home: 0.7 N up, felt from the tick after the first.
+    let expected = Wrench { force_n: [0.0, 0.0, 700.0 * 0.001], torque_nm: [0.0; 3] };
+    for record in &records {
+        assert_eq!((record.model, record.commanded, record.events), (expected, expected, Events::NONE));
+        assert_eq!(record.delivered, if record.tick == 0 { Wrench::ZERO } else { expected });
+    }
+}
+
+#[test]
+fn plugins_in_c_pass_validation_and_are_found_by_id() {
+    let scratch = Scratch::default();
+    for (name, id) in [("wall", "fixture-c-wall"), ("post", "fixture-c-post")] {
+        let library = compiled(&scratch, name, &[]);
+        let plugin = Plugin::load(&library).unwrap_or_else(|error| panic!("{error}"));
+        assert!(!plugin.layouts_proven(), "C carries no layouts to compare");
+        let ran = Flotor::with(["validate".as_ref(), library.as_os_str()]).run();
+        assert_eq!((ran.code, ran.stderr.as_str()), (Some(exit_code::OK), ""), "{ran:#?}");
+        let ran = Flotor::with(["plugins", id]).searching(&[scratch.path()]).run();
+        assert!(ran.stdout.contains("layouts checked by size only"), "{ran:#?}");
+    }
+}
+
+#[test]
+fn a_mistake_in_c_is_told_in_one_line() {
+    let wrong = [
+        ("WITHOUT_STEP", "`flotor.force/1` lacks `step`; a plugin must offer it"),
+        ("WITHOUT_TABLE", "`flotor.force/1` lacks its function table; a plugin must offer it"),
+        ("OTHER_SIZES", "`Input` has 136 bytes in the host and 144 in the plugin; rebuild the plugin"),
+        (
+            "HIDDEN_ENTRY",
+            "no plugin entry `flotor_entry_wall` in the library; export it with default visibility",
+        ),
+    ];
+    for (mistake, cause) in wrong {
+        let scratch = Scratch::default();
+        let file = scratch.file("scene.toml", scene(&scratch, &[mistake]));
+        let ran =
+            Flotor::with(["run".as_ref(), file.as_os_str(), "--clock".as_ref(), "virtual".as_ref()]).run();
+        assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{mistake}: {ran:#?}");
+        let library = scratch.path().join("libwall.so");
+        assert!(ran.error().starts_with(&format!("{}: ", library.display())), "{mistake}: {ran:#?}");
+        assert!(ran.error().contains(cause), "{mistake}: {ran:#?}");
+    }
+}
+
+/// A status outside the contract may mean anything, so the force beside it counts for nothing.
+#[test]
+fn an_answer_outside_the_contract_is_no_force() {
+    let Watched { records, outcome } = watch(&scene(&Scratch::default(), &["ODD_ANSWERS"]));
+    assert!(records.iter().all(|record| record.commanded == Wrench::ZERO));
+    assert!(records.iter().all(|record| record.events.intersects(Events::MODEL_FAULT)));
+    assert_eq!(outcome.models[0].1.rejected_ticks, 20);
+}
