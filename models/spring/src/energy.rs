@@ -86,11 +86,11 @@ impl EnergyForm {
     /// - past the solid length the law goes on, it knows no coil contact;
     /// - beyond [`KNEE`](crate::bending::KNEE) (close to buckling and past it), or where an angle between normals
     ///   and chord or the twist exceeds 60 degrees, up to an upper plate below the lower one: still the
-    ///   derivative of the same smooth `W`, but `W` is a continuation, [`Validity::Clamped`];
+    ///   derivative of the same smooth `W`, but `W` is a continuation, [`Validity::Clamped`](crate::validity::Validity::Clamped);
     /// - upper plate upside down to within 2.6 degrees, plates closer than a thousandth or farther than a
     ///   million free lengths, for a wire with `G > E` also any length at which the rod has no shear stiffness
-    ///   left: no wrench, [`Validity::OutOfDomain`];
-    /// - NaN, infinity or a quaternion that is not of unit length: no wrench, [`Validity::InvalidInput`].
+    ///   left: no wrench, [`Validity::OutOfDomain`](crate::validity::Validity::OutOfDomain);
+    /// - NaN, infinity or a quaternion that is not of unit length: no wrench, [`Validity::InvalidInput`](crate::validity::Validity::InvalidInput).
     #[must_use]
     pub fn respond(&self, pose: &Pose, demand: Demand) -> Response {
         self.respond_at(pose, demand)

@@ -1,8 +1,8 @@
 //! In which format numbers are kept between operations.
 //!
 //! The thesis's C source declares every variable `float` and calls the double functions of the math library: an
-//! expression is evaluated in double and rounded to binary32 where it is *stored*. [`Binary32`] repeats that, to
-//! measure what it costs; [`Binary64`] is for everything else.
+//! expression is evaluated in double and rounded to binary32 where it is *stored*. `Binary32` repeats that, to
+//! measure what it costs; `Binary64` is for everything else.
 
 use crate::real::Real;
 

@@ -23,7 +23,7 @@
 //! A pose that is none (NaN, infinity, no unit quaternion) gives zero with [`Validity::InvalidInput`].
 //!
 //! **Precision.** In C, `float` operands are combined in `float`, a `double` operand or a function of the math
-//! library makes the expression double, and an assignment rounds to `float`. [`CFloat`] reproduces these usual
+//! library makes the expression double, and an assignment rounds to `float`. `CFloat` reproduces these usual
 //! conversions (FLT_EVAL_METHOD 0, no contraction); with `f64` for the type all of it is double.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
