@@ -17,6 +17,7 @@ enum Role {
     Contract,
     Plugin,
     Sync,
+    Record,
     Host,
     Viewer,
     Tests,
@@ -29,6 +30,7 @@ impl Role {
         Some(match folder {
             "hal" => Self::Contract,
             "host" => Self::Host,
+            "host/record" => Self::Record,
             "host/sync" => Self::Sync,
             "viewer" => Self::Viewer,
             "tests" => Self::Tests,
@@ -44,11 +46,18 @@ impl Role {
             Self::Contract | Self::Sync => &[],
             Self::Plugin | Self::Fixture => &[Self::Contract],
             // The plugins only as paths, so that one `cargo run` builds them; no line of the host names them.
-            Self::Host => &[Self::Contract, Self::Sync, Self::Plugin],
-            Self::Viewer => &[Self::Contract],
-            Self::Tests => {
-                &[Self::Contract, Self::Sync, Self::Plugin, Self::Host, Self::Viewer, Self::Fixture]
-            }
+            Self::Host => &[Self::Contract, Self::Sync, Self::Record, Self::Plugin],
+            Self::Record => &[Self::Contract, Self::Sync],
+            Self::Viewer => &[Self::Contract, Self::Record],
+            Self::Tests => &[
+                Self::Contract,
+                Self::Sync,
+                Self::Record,
+                Self::Plugin,
+                Self::Host,
+                Self::Viewer,
+                Self::Fixture,
+            ],
         }
     }
 }

@@ -13,23 +13,23 @@
 //! - [`servo`]: the tick, the clock, the envelope; the only real-time module.
 //! - [`stability`]: how stiff a spring the servo can render.
 //! - [`stress`]: how far a force model can be trusted with a hand.
-//! - [`trace`]: what a tick leaves behind; [`record`] writes it down, [`plot`] draws it.
+//! - [`trace`]: what a tick leaves behind; [`mod@record`] writes it down, [`plot`] draws it.
 //! - [`cli`]: the `flotor` command.
 
 pub mod cli;
 pub mod evaluate;
 pub mod jitter;
-pub mod mapping;
 pub mod plot;
-pub mod record;
 pub mod registry;
 pub mod replay;
 pub mod report;
+pub mod run_description;
 pub mod run_picture;
 pub mod scene;
 pub mod servo;
 pub mod session;
 pub mod stability;
 pub mod stress;
-pub mod trace;
 pub mod validate;
+
+pub use flotor_record::{self as record, mapping, trace};

@@ -71,7 +71,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         recorder: arguments
             .record
             .as_deref()
-            .map(|path| Recorder::create(path, &crate::record::describe(&scene, &options, &plugins)))
+            .map(|path| Recorder::create(path, &crate::run_description::describe(&scene, &options, &plugins)))
             .transpose()?,
         failure: None,
         plot: arguments.plot.as_ref().map(|_| RunPicture::new(&scene.title)),

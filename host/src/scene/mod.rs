@@ -2,6 +2,7 @@
 
 mod reader;
 
+pub use flotor_record::mapping::MappingConfig;
 pub use reader::{Location, SceneError};
 
 pub(crate) use reader::nearest;
@@ -65,25 +66,6 @@ pub struct ModelUse {
     pub plugin: PluginUse,
     /// From device to model and back.
     pub mapping: MappingConfig,
-}
-
-/// Scales and rotation between the device frame and a model's frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MappingConfig {
-    /// Rotation from the device frame to the model frame, unit quaternion.
-    pub rotation_xyzw: [f64; 4],
-    /// Model displacement per device displacement.
-    pub motion_scale: f64,
-    /// Device force per model force.
-    pub force_scale: f64,
-    /// Device torque per model torque; `None`: force scale over motion scale, which keeps the field conservative.
-    pub torque_scale: Option<f64>,
-}
-
-impl Default for MappingConfig {
-    fn default() -> Self {
-        Self { rotation_xyzw: [0.0, 0.0, 0.0, 1.0], motion_scale: 1.0, force_scale: 1.0, torque_scale: None }
-    }
 }
 
 /// What a scene allows; the device's declaration applies too, whichever is tighter.

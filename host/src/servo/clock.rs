@@ -4,17 +4,9 @@
 //! passed is missed, counted and skipped, never caught up in a burst.
 
 use flotor_hal::Tick;
+pub use flotor_record::Clock;
 use rustix::thread::{ClockId, clock_nanosleep_absolute};
 use rustix::time::{Timespec, clock_gettime};
-
-/// Which clock drives the loop.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Clock {
-    /// The machine's monotonic clock.
-    Real,
-    /// No waiting: the next tick is due when the last one is done. Bit-exact.
-    Virtual,
-}
 
 /// The final stretch before a deadline, which is spun and not slept: a sleeping thread wakes late.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,6 @@
 use super::schema::{DESCRIPTOR_SET, ENCODING, FORMAT, Topic};
 use super::*;
-use crate::scene::MappingConfig;
-use crate::servo::Clock;
+use crate::mapping::MappingConfig;
 use crate::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
 use flotor_sync::Words;
 use mcap::records::op;

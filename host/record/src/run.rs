@@ -1,10 +1,17 @@
 //! What is known before a run begins, in a form that can be kept: enough to repeat it.
 
-use super::schema::{self, FORMAT, Mapping, Missing, Plugin, Quaternion, Run, Setting};
-use crate::scene::{MappingConfig, PluginUse, Scene};
-use crate::servo::Clock;
-use crate::session::{PluginReport, RunOptions};
+use crate::mapping::MappingConfig;
+use crate::schema::{self, FORMAT, Mapping, Missing, Plugin, Quaternion, Run, Setting};
 use std::collections::BTreeMap;
+
+/// Which clock drives the loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Clock {
+    /// The machine's monotonic clock.
+    Real,
+    /// No waiting: the next tick is due when the last one is done. Bit-exact.
+    Virtual,
+}
 
 /// How a run was set up.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,41 +60,8 @@ pub enum Role {
     Model(MappingConfig),
 }
 
-/// Puts together what is known of a run before it begins. Not real-time.
-///
-/// `plugins` are those of the prepared scene: the device, then the models in the scene's order.
-#[must_use]
-pub fn describe(scene: &Scene, options: &RunOptions, plugins: &[PluginReport]) -> RunDescription {
-    let device = std::iter::once((&scene.device, Role::Device));
-    let models = scene.models.iter().map(|model| (&model.plugin, Role::Model(model.mapping)));
-    let plugins = device.chain(models).zip(plugins);
-    RunDescription {
-        flotor_version: env!("CARGO_PKG_VERSION").to_owned(),
-        rate_hz: scene.rate_hz,
-        duration_s: scene.duration_s,
-        seed: options.seed,
-        clock: options.clock,
-        scene_toml: scene.text.clone(),
-        plugins: plugins.map(|((used, role), report)| describe_plugin(used, role, report)).collect(),
-    }
-}
-
-fn describe_plugin(used: &PluginUse, role: Role, report: &PluginReport) -> PluginDescription {
-    let file = report.metadata.path.file_name().unwrap_or_default();
-    let settings = used.parameters.iter().map(|parameter| (parameter.key.clone(), parameter.value.clone()));
-    PluginDescription {
-        name: report.name.clone(),
-        id: report.metadata.id.clone(),
-        version: report.metadata.version.clone(),
-        file: file.to_string_lossy().into_owned(),
-        role,
-        settings: settings.collect(),
-        parameters: report.parameters.clone(),
-    }
-}
-
 impl RunDescription {
-    pub(super) fn to_message(&self) -> Run {
+    pub(crate) fn to_message(&self) -> Run {
         let clock = match self.clock {
             Clock::Real => schema::Clock::Real,
             Clock::Virtual => schema::Clock::Virtual,
@@ -104,7 +78,7 @@ impl RunDescription {
         }
     }
 
-    pub(super) fn from_message(run: Run) -> Result<Self, Missing> {
+    pub(crate) fn from_message(run: Run) -> Result<Self, Missing> {
         let clock = match run.clock() {
             schema::Clock::Real => Clock::Real,
             schema::Clock::Virtual => Clock::Virtual,
@@ -126,7 +100,7 @@ impl RunDescription {
     }
 
     /// The same in flat text, for tools that show an MCAP file's metadata.
-    pub(super) fn to_metadata(&self) -> BTreeMap<String, String> {
+    pub(crate) fn to_metadata(&self) -> BTreeMap<String, String> {
         let clock = match self.clock {
             Clock::Real => "real",
             Clock::Virtual => "virtual",

@@ -1,8 +1,8 @@
 //! Writes a recording: a chunk at a time, whole, at least every quarter of a second.
 
-use super::schema::{DESCRIPTOR_SET, ENCODING, FrameTransform, Log, Tick, Topic};
-use super::{Note, RunDescription};
+use crate::schema::{DESCRIPTOR_SET, ENCODING, FrameTransform, Log, Tick, Topic};
 use crate::trace::{Events, TickRecord};
+use crate::{Note, RunDescription};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{McapError, McapResult, WriteOptions};
 use prost::Message;

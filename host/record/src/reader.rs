@@ -1,9 +1,9 @@
 //! Reads a recording back: how the run was set up, then tick by tick, bit for bit.
 
-use super::container::{Damage, Messages, TopicMessage};
-use super::schema::{FORMAT, FrameTransform, Log, Missing, Run, Tick, Topic};
-use super::{Note, RunDescription};
+use crate::container::{Damage, Messages, TopicMessage};
+use crate::schema::{FORMAT, FrameTransform, Log, Missing, Run, Tick, Topic};
 use crate::trace::TickRecord;
+use crate::{Note, RunDescription};
 use flotor_hal::Pose;
 use mcap::{MAGIC, McapError};
 use prost::Message;

@@ -4,20 +4,20 @@
 //! every field. Every `f64` is an `Option` that is always filled: protobuf leaves out a plain field that equals its
 //! default, -0.0 equals 0.0, and a recording is bit-exact. On the wire it is the plain field of the schema.
 
-use super::{Note, Severity};
 use crate::trace::{Events, TickRecord};
+use crate::{Note, Severity};
 use flotor_hal::{Pose, Twist as TwistValue, Wrench as WrenchValue};
 use prost::{Enumeration, Message};
 use prost_types::Timestamp;
 
 /// `host/proto` compiled (a `google.protobuf.FileDescriptorSet`): what a stranger needs to read the messages.
-pub(super) const DESCRIPTOR_SET: &[u8] = include_bytes!("../../proto/flotor.binpb");
+pub(crate) const DESCRIPTOR_SET: &[u8] = include_bytes!("../../proto/flotor.binpb");
 
 /// The encoding of messages and schemas, as MCAP's registry names it.
-pub(super) const ENCODING: &str = "protobuf";
+pub(crate) const ENCODING: &str = "protobuf";
 
 /// Format this program writes, and the highest it reads.
-pub(super) const FORMAT: u32 = 1;
+pub(crate) const FORMAT: u32 = 1;
 
 /// Frame of all numbers; its axes are those of the device frame.
 const DEVICE_FRAME: &str = "device";
@@ -27,7 +27,7 @@ const HANDLE_FRAME: &str = "handle";
 /// What a channel is about. The number is the id of channel and schema in files written here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u16)]
-pub(super) enum Topic {
+pub(crate) enum Topic {
     Run = 1,
     Pose = 2,
     Tick = 3,
@@ -35,13 +35,13 @@ pub(super) enum Topic {
 }
 
 impl Topic {
-    pub(super) const ALL: [Topic; 4] = [Topic::Run, Topic::Pose, Topic::Tick, Topic::Log];
+    pub(crate) const ALL: [Topic; 4] = [Topic::Run, Topic::Pose, Topic::Tick, Topic::Log];
 
-    pub(super) const fn id(self) -> u16 {
+    pub(crate) const fn id(self) -> u16 {
         self as u16
     }
 
-    pub(super) const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Topic::Run => "/flotor/run",
             Topic::Pose => "/tf",
@@ -50,7 +50,7 @@ impl Topic {
         }
     }
 
-    pub(super) const fn schema(self) -> &'static str {
+    pub(crate) const fn schema(self) -> &'static str {
         match self {
             Topic::Run => "flotor.Run",
             Topic::Pose => "foxglove.FrameTransform",
@@ -62,10 +62,10 @@ impl Topic {
 
 /// A message lacks a part that every recording has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Missing(pub(super) &'static str);
+pub(crate) struct Missing(pub(crate) &'static str);
 
 #[derive(Clone, Copy, PartialEq, Message)]
-pub(super) struct Vector3 {
+pub(crate) struct Vector3 {
     #[prost(double, optional, tag = "1")]
     x: Option<f64>,
     #[prost(double, optional, tag = "2")]
@@ -75,7 +75,7 @@ pub(super) struct Vector3 {
 }
 
 #[derive(Clone, Copy, PartialEq, Message)]
-pub(super) struct Quaternion {
+pub(crate) struct Quaternion {
     #[prost(double, optional, tag = "1")]
     x: Option<f64>,
     #[prost(double, optional, tag = "2")]
@@ -87,7 +87,7 @@ pub(super) struct Quaternion {
 }
 
 #[derive(Clone, PartialEq, Message)]
-pub(super) struct FrameTransform {
+pub(crate) struct FrameTransform {
     #[prost(message, optional, tag = "1")]
     timestamp: Option<Timestamp>,
     #[prost(string, tag = "2")]
@@ -112,7 +112,7 @@ enum Level {
 }
 
 #[derive(Clone, PartialEq, Message)]
-pub(super) struct Log {
+pub(crate) struct Log {
     #[prost(message, optional, tag = "1")]
     timestamp: Option<Timestamp>,
     #[prost(enumeration = "Level", tag = "2")]
@@ -144,7 +144,7 @@ struct Wrench {
 }
 
 #[derive(Clone, Copy, PartialEq, Message)]
-pub(super) struct Tick {
+pub(crate) struct Tick {
     #[prost(uint64, tag = "1")]
     tick: u64,
     #[prost(uint64, tag = "2")]
@@ -172,69 +172,69 @@ pub(super) struct Tick {
 }
 
 #[derive(Clone, PartialEq, Message)]
-pub(super) struct Run {
+pub(crate) struct Run {
     #[prost(uint32, tag = "1")]
-    pub(super) format: u32,
+    pub(crate) format: u32,
     #[prost(string, tag = "2")]
-    pub(super) flotor_version: String,
+    pub(crate) flotor_version: String,
     #[prost(double, optional, tag = "3")]
-    pub(super) rate_hz: Option<f64>,
+    pub(crate) rate_hz: Option<f64>,
     #[prost(double, optional, tag = "4")]
-    pub(super) duration_s: Option<f64>,
+    pub(crate) duration_s: Option<f64>,
     #[prost(uint64, tag = "5")]
-    pub(super) seed: u64,
+    pub(crate) seed: u64,
     #[prost(enumeration = "Clock", tag = "6")]
-    pub(super) clock: i32,
+    pub(crate) clock: i32,
     #[prost(string, tag = "7")]
-    pub(super) scene_toml: String,
+    pub(crate) scene_toml: String,
     #[prost(message, repeated, tag = "8")]
-    pub(super) plugins: Vec<Plugin>,
+    pub(crate) plugins: Vec<Plugin>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
 #[repr(i32)]
-pub(super) enum Clock {
+pub(crate) enum Clock {
     Unspecified = 0,
     Real = 1,
     Virtual = 2,
 }
 
 #[derive(Clone, PartialEq, Message)]
-pub(super) struct Plugin {
+pub(crate) struct Plugin {
     #[prost(string, tag = "1")]
-    pub(super) name: String,
+    pub(crate) name: String,
     #[prost(string, tag = "2")]
-    pub(super) id: String,
+    pub(crate) id: String,
     #[prost(string, tag = "3")]
-    pub(super) version: String,
+    pub(crate) version: String,
     #[prost(string, tag = "4")]
-    pub(super) file: String,
+    pub(crate) file: String,
     #[prost(message, repeated, tag = "5")]
-    pub(super) settings: Vec<Setting>,
+    pub(crate) settings: Vec<Setting>,
     #[prost(message, repeated, tag = "6")]
-    pub(super) parameters: Vec<Setting>,
+    pub(crate) parameters: Vec<Setting>,
     #[prost(message, optional, tag = "7")]
-    pub(super) mapping: Option<Mapping>,
+    pub(crate) mapping: Option<Mapping>,
 }
 
 #[derive(Clone, PartialEq, Eq, Message)]
-pub(super) struct Setting {
+pub(crate) struct Setting {
     #[prost(string, tag = "1")]
-    pub(super) key: String,
+    pub(crate) key: String,
     #[prost(string, tag = "2")]
-    pub(super) value: String,
+    pub(crate) value: String,
 }
 
 #[derive(Clone, Copy, PartialEq, Message)]
-pub(super) struct Mapping {
+pub(crate) struct Mapping {
     #[prost(message, optional, tag = "1")]
-    pub(super) rotation: Option<Quaternion>,
+    pub(crate) rotation: Option<Quaternion>,
     #[prost(double, optional, tag = "2")]
-    pub(super) motion_scale: Option<f64>,
+    pub(crate) motion_scale: Option<f64>,
     #[prost(double, optional, tag = "3")]
-    pub(super) force_scale: Option<f64>,
+    pub(crate) force_scale: Option<f64>,
     #[prost(double, optional, tag = "4")]
-    pub(super) torque_scale: Option<f64>,
+    pub(crate) torque_scale: Option<f64>,
 }
 
 impl Vector3 {
@@ -248,18 +248,18 @@ impl Vector3 {
 }
 
 impl Quaternion {
-    pub(super) fn new([x, y, z, w]: [f64; 4]) -> Self {
+    pub(crate) fn new([x, y, z, w]: [f64; 4]) -> Self {
         Self { x: Some(x), y: Some(y), z: Some(z), w: Some(w) }
     }
 
-    pub(super) fn to_array(self) -> [f64; 4] {
+    pub(crate) fn to_array(self) -> [f64; 4] {
         [self.x(), self.y(), self.z(), self.w()]
     }
 }
 
 impl FrameTransform {
     /// A message to be filled tick by tick: the names of the frames are allocated once.
-    pub(super) fn of_handle() -> Self {
+    pub(crate) fn of_handle() -> Self {
         Self {
             parent_frame_id: DEVICE_FRAME.to_owned(),
             child_frame_id: HANDLE_FRAME.to_owned(),
@@ -267,13 +267,13 @@ impl FrameTransform {
         }
     }
 
-    pub(super) fn set(&mut self, record: &TickRecord) {
+    pub(crate) fn set(&mut self, record: &TickRecord) {
         self.timestamp = Some(timestamp(record.time_ns));
         self.translation = Some(Vector3::new(record.pose.position_m));
         self.rotation = Some(Quaternion::new(record.pose.orientation_xyzw));
     }
 
-    pub(super) fn pose(&self) -> Result<Pose, Missing> {
+    pub(crate) fn pose(&self) -> Result<Pose, Missing> {
         Ok(Pose {
             position_m: self.translation.ok_or(Missing("translation"))?.to_array(),
             orientation_xyzw: self.rotation.ok_or(Missing("rotation"))?.to_array(),
@@ -310,7 +310,7 @@ impl Wrench {
 }
 
 impl Tick {
-    pub(super) fn new(record: &TickRecord) -> Self {
+    pub(crate) fn new(record: &TickRecord) -> Self {
         Self {
             tick: record.tick,
             time_ns: record.time_ns,
@@ -328,7 +328,7 @@ impl Tick {
     }
 
     /// Together with the pose of the same time, what the tick left behind.
-    pub(super) fn record(&self, pose: Pose) -> Result<TickRecord, Missing> {
+    pub(crate) fn record(&self, pose: Pose) -> Result<TickRecord, Missing> {
         Ok(TickRecord {
             tick: self.tick,
             time_ns: self.time_ns,
@@ -348,7 +348,7 @@ impl Tick {
 }
 
 impl Log {
-    pub(super) fn new(note: &Note) -> Self {
+    pub(crate) fn new(note: &Note) -> Self {
         let level = match note.severity {
             Severity::Info => Level::Info,
             Severity::Warning => Level::Warning,
@@ -363,7 +363,7 @@ impl Log {
         }
     }
 
-    pub(super) fn note(self, time_ns: u64) -> Note {
+    pub(crate) fn note(self, time_ns: u64) -> Note {
         let severity = match self.level() {
             Level::Unknown | Level::Debug | Level::Info => Severity::Info,
             Level::Warning => Severity::Warning,

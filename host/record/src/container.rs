@@ -4,7 +4,7 @@
 //! case. A chunk counts only whole and with the right checksum. Nothing in a file can make it panic or allocate
 //! without bound: a length is believed only as far as there are bytes.
 
-use super::schema::{ENCODING, Topic};
+use crate::schema::{ENCODING, Topic};
 use mcap::McapError;
 use mcap::read::ChunkReader;
 use mcap::records::{MessageHeader, Record, op};
@@ -63,15 +63,15 @@ pub enum Damage {
 }
 
 /// A message on one of our topics.
-pub(super) struct TopicMessage {
-    pub(super) topic: Topic,
-    pub(super) sequence: u32,
-    pub(super) time_ns: u64,
-    pub(super) data: Vec<u8>,
+pub(crate) struct TopicMessage {
+    pub(crate) topic: Topic,
+    pub(crate) sequence: u32,
+    pub(crate) time_ns: u64,
+    pub(crate) data: Vec<u8>,
 }
 
 /// The messages on our topics, in the order of the file.
-pub(super) struct Messages<R> {
+pub(crate) struct Messages<R> {
     source: R,
     reader: LinearReader,
     /// Records read and not yet looked at.
@@ -83,7 +83,7 @@ pub(super) struct Messages<R> {
 }
 
 impl<R: Read> Messages<R> {
-    pub(super) fn new(source: R, may_be_cut_off: bool) -> Self {
+    pub(crate) fn new(source: R, may_be_cut_off: bool) -> Self {
         let options = LinearReaderOptions::default()
             .with_emit_chunks(true)
             .with_validate_data_section_crc(true)
@@ -99,7 +99,7 @@ impl<R: Read> Messages<R> {
     }
 
     /// The next message, or none at the end. After an error there is no more to be had.
-    pub(super) fn next(&mut self) -> Result<Option<TopicMessage>, Damage> {
+    pub(crate) fn next(&mut self) -> Result<Option<TopicMessage>, Damage> {
         loop {
             for record in self.records.by_ref() {
                 match record {

@@ -4,8 +4,26 @@
 //! torque `(f / m) R^T M`: gradients of one energy, so a conservative model stays conservative at the hand
 //! (PHYSICS D6). The stiffness the hand feels is `f m k`.
 
-use crate::scene::MappingConfig;
 use flotor_hal::{DQuat, DVec3, Pose, Twist, Wrench};
+
+/// Scales and rotation between the device frame and a model's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MappingConfig {
+    /// Rotation from the device frame to the model frame, unit quaternion.
+    pub rotation_xyzw: [f64; 4],
+    /// Model displacement per device displacement.
+    pub motion_scale: f64,
+    /// Device force per model force.
+    pub force_scale: f64,
+    /// Device torque per model torque; `None`: force scale over motion scale, which keeps the field conservative.
+    pub torque_scale: Option<f64>,
+}
+
+impl Default for MappingConfig {
+    fn default() -> Self {
+        Self { rotation_xyzw: [0.0, 0.0, 0.0, 1.0], motion_scale: 1.0, force_scale: 1.0, torque_scale: None }
+    }
+}
 
 /// Frames and scales of one model on one device.
 #[derive(Clone, Copy, Debug)]

@@ -1,5 +1,9 @@
 //! Recordings: everything a run leaves behind, in one file that other people's tools open.
 //!
+//! A crate of its own because two programs need it: the host writes it, the viewer reads it. With it come the
+//! record of a tick ([`trace`]) and the way from the device's frame to a model's ([`mapping`]), without which
+//! nobody can read a recording.
+//!
 //! A recording is an [MCAP](https://mcap.dev/spec) file of protobuf messages. It carries its own schemas, so
 //! Foxglove and Rerun draw it, Python's `mcap-protobuf-support` decodes it, and none of them needs this program:
 //!
@@ -27,13 +31,15 @@
 //! FLOTOR_WRITE_SCHEMA=1 cargo test -p flotor-tests --test recording_schema committed
 //! ```
 //!
-//! Not real-time, all of it: records reach this module through the trace ring.
+//! Not real-time, but for [`trace`] and [`mapping`]: records reach the rest through the trace ring.
 
 mod container;
 mod digest;
+pub mod mapping;
 mod reader;
 mod run;
 mod schema;
+pub mod trace;
 mod writer;
 
 #[cfg(test)]
@@ -42,7 +48,7 @@ mod tests;
 pub use container::Damage;
 pub use digest::TraceDigest;
 pub use reader::{Ending, ReadError, Recording};
-pub use run::{PluginDescription, Role, RunDescription, describe};
+pub use run::{Clock, PluginDescription, Role, RunDescription};
 pub use writer::{RecordError, Recorder};
 
 /// How bad it is, what a [`Note`] tells.

@@ -1,0 +1,38 @@
+//! What a prepared scene says about itself before it runs: the first message of a recording and of a live view.
+
+use crate::record::{PluginDescription, Role, RunDescription};
+use crate::scene::{PluginUse, Scene};
+use crate::session::{PluginReport, RunOptions};
+
+/// Puts together what is known of a run before it begins. Not real-time.
+///
+/// `plugins` are those of the prepared scene: the device, then the models in the scene's order.
+#[must_use]
+pub fn describe(scene: &Scene, options: &RunOptions, plugins: &[PluginReport]) -> RunDescription {
+    let device = std::iter::once((&scene.device, Role::Device));
+    let models = scene.models.iter().map(|model| (&model.plugin, Role::Model(model.mapping)));
+    let plugins = device.chain(models).zip(plugins);
+    RunDescription {
+        flotor_version: env!("CARGO_PKG_VERSION").to_owned(),
+        rate_hz: scene.rate_hz,
+        duration_s: scene.duration_s,
+        seed: options.seed,
+        clock: options.clock,
+        scene_toml: scene.text.clone(),
+        plugins: plugins.map(|((used, role), report)| describe_plugin(used, role, report)).collect(),
+    }
+}
+
+fn describe_plugin(used: &PluginUse, role: Role, report: &PluginReport) -> PluginDescription {
+    let file = report.metadata.path.file_name().unwrap_or_default();
+    let settings = used.parameters.iter().map(|parameter| (parameter.key.clone(), parameter.value.clone()));
+    PluginDescription {
+        name: report.name.clone(),
+        id: report.metadata.id.clone(),
+        version: report.metadata.version.clone(),
+        file: file.to_string_lossy().into_owned(),
+        role,
+        settings: settings.collect(),
+        parameters: report.parameters.clone(),
+    }
+}
