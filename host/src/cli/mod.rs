@@ -171,6 +171,12 @@ fn refusal_code(error: &LoadError) -> u8 {
     }
 }
 
+/// Names of the commands, in the order of the help. Not real-time.
+#[must_use]
+pub fn command_names() -> Vec<String> {
+    Arguments::command().get_subcommands().map(|command| command.get_name().to_owned()).collect()
+}
+
 /// Runs the command of this process.
 #[must_use]
 pub fn main() -> ExitCode {
