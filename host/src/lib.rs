@@ -13,11 +13,13 @@
 //! - [`servo`]: the tick, the clock, the envelope; the only real-time module.
 //! - [`stability`]: how stiff a spring the servo can render.
 //! - [`stress`]: how far a force model can be trusted with a hand.
+//! - [`headless`]: a whole run in virtual time for other programs.
 //! - [`trace`]: what a tick leaves behind; [`mod@record`] writes it down, [`plot`] draws it.
 //! - [`cli`]: the `flotor` command.
 
 pub mod cli;
 pub mod evaluate;
+pub mod headless;
 pub mod jitter;
 pub mod plot;
 pub mod registry;

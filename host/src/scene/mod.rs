@@ -1,9 +1,11 @@
 //! A scene: which device, which models, how they are mapped and limited. A TOML file; unknown keys are errors.
 
 mod reader;
+mod setting;
 
 pub use flotor_record::mapping::MappingConfig;
 pub use reader::{Location, SceneError};
+pub use setting::{KeyValue, PluginKeyValue};
 
 pub(crate) use reader::nearest;
 use reader::{Section, Source};
