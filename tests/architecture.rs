@@ -209,6 +209,10 @@ const UNSAFE: &[(&str, &str)] = &[
         "hal/src/abi/",
         "the binary contract: function tables across shared libraries, the export macros, the loader",
     ),
+    (
+        "host/python/src/rows.rs",
+        "NumPy records that are the contract's structs: the layout promise, and arrays used where they lie",
+    ),
     ("tests/realtime.rs", "an allocator that counts, to see that a tick does not allocate"),
 ];
 

@@ -1,0 +1,246 @@
+"""Flotor for Python: force models on NumPy arrays, scenes in virtual time, recordings as tables.
+
+Everything is SI: metres, radians, seconds, newtons, newton metres, joules; time in integer nanoseconds. Poses are
+given in the model frame: right-handed, z up, origin at the handle's home.
+
+    >>> import flotor, numpy as np
+    >>> spring = flotor.Model("spring", preset="thesis-1")
+    >>> result = spring.evaluate(np.array([[0, 0, -0.005, 0, 0, 0]]))
+    >>> result.force_n.shape
+    (1, 3)
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from . import _flotor
+from ._flotor import FlotorError, Parameter, __version__
+
+__all__ = [
+    "DEMAND_ALL",
+    "DEMAND_ENERGY",
+    "DEMAND_FORCE",
+    "DEMAND_TORQUE",
+    "INPUT",
+    "OUTPUT",
+    "STATUS",
+    "Evaluation",
+    "FlotorError",
+    "Model",
+    "Parameter",
+    "PluginInfo",
+    "Recording",
+    "__version__",
+    "plugins",
+    "read_recording",
+    "run",
+]
+
+#: NumPy record of one model input, 136 bytes: pose, twist, time, buttons, demand.
+INPUT = _flotor.input_dtype()
+#: NumPy record of one model output, 64 bytes: force, torque, energy, status.
+OUTPUT = _flotor.output_dtype()
+#: Words of the status codes in an output, by code.
+STATUS = ("ok", "clamped", "out_of_domain", "not_converged", "invalid_input")
+#: Bits of an input's ``demand``: what is not demanded need not be computed.
+DEMAND_FORCE, DEMAND_TORQUE, DEMAND_ENERGY, DEMAND_ALL = 1, 2, 4, 7
+
+
+def _folders() -> list[Path]:
+    """Plugin folders in search order: those of the environment, then the ones packed into this package."""
+    listed = os.environ.get("FLOTOR_PLUGIN_PATH", "").split(os.pathsep)
+    return [Path(folder) for folder in listed if folder] + [Path(__file__).parent / "plugins"]
+
+
+def _text(value: object) -> str:
+    """A parameter's value as it is typed in a scene; floats keep every bit."""
+    if isinstance(value, bool):
+        raise FlotorError(f"{value!r} is no value of a parameter; choices are words, like 'on' or 'off'")
+    if isinstance(value, str):
+        return value
+    return repr(float(value))
+
+
+class PluginInfo(NamedTuple):
+    """A plugin that was found; it has not been opened."""
+
+    id: str
+    kind: str  #: "model" or "device"
+    version: str
+    path: Path
+
+
+class Evaluation(NamedTuple):
+    """Answers of a model at ``n`` poses."""
+
+    force_n: np.ndarray  #: force on the hand, (n, 3), N
+    torque_nm: np.ndarray  #: torque on the hand, (n, 3), N m
+    energy_j: np.ndarray  #: stored energy, (n,), J; NaN where the model has none
+    status: list[str]  #: n words of :data:`STATUS`
+
+
+class Model:
+    """A force model, loaded from a plugin.
+
+    ``id`` is what scenes say ("spring") or a path to a plugin file; keyword arguments are its parameters, by the ids
+    its schema has (:attr:`parameters`). May be shared between threads; calls wait for each other.
+
+    Raises :class:`FlotorError` for an unknown id, a refused plugin, an unknown or illegal parameter.
+    """
+
+    def __init__(self, id: str, **parameters: object) -> None:
+        self._model = _flotor.Model(id, [(key, _text(value)) for key, value in parameters.items()], _folders())
+
+    @property
+    def id(self) -> str:
+        """What scenes call it."""
+        return self._model.id
+
+    @property
+    def version(self) -> str:
+        """Version of the plugin."""
+        return self._model.version
+
+    @property
+    def path(self) -> Path:
+        """File it was loaded from."""
+        return Path(self._model.path)
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """The schema: id, unit, range, default, choices and doc of every parameter."""
+        return {parameter.id: parameter for parameter in self._model.parameters}
+
+    def __getitem__(self, id: str) -> float:
+        """The value in force of a parameter, presets resolved (for a choice, its index)."""
+        return self._model.parameter(id)
+
+    def __setitem__(self, id: str, value: object) -> None:
+        """Changes a live parameter of the instance that :meth:`step_batch` steps."""
+        self._model.set_parameter(id, _text(value))
+
+    def reset(self) -> None:
+        """Forgets history, for models that have one."""
+        self._model.reset()
+
+    def inputs(self, poses: np.ndarray, demand: int = DEMAND_ALL) -> np.ndarray:
+        """Inputs at rest for :meth:`step_batch` from poses (n, 6): m and rotation vector, rad."""
+        poses = _poses(poses)
+        rows = np.zeros(len(poses), INPUT)
+        rows["position_m"] = poses[:, :3]
+        angle = np.linalg.norm(poses[:, 3:], axis=1)
+        with np.errstate(invalid="ignore"):
+            scale = 0.5 * np.sinc(angle / (2.0 * np.pi))
+        rows["orientation_xyzw"][:, :3] = poses[:, 3:] * scale[:, None]
+        rows["orientation_xyzw"][:, 3] = np.cos(0.5 * angle)
+        rows["demand"] = demand
+        return rows
+
+    def step_batch(self, inputs: np.ndarray, outputs: np.ndarray | None = None) -> np.ndarray:
+        """Steps through ``inputs`` (n,) of :data:`INPUT`, in order, into ``outputs`` (n,) of :data:`OUTPUT`.
+
+        Both arrays are used where they lie, nothing is copied; pass ``outputs`` to reuse its memory.
+        """
+        if outputs is None:
+            outputs = np.empty(len(inputs), OUTPUT)
+        self._model.step_batch(inputs, outputs)
+        return outputs
+
+    def evaluate(self, poses: np.ndarray, *, path: bool = False) -> Evaluation:
+        """Answers at poses (n, 6) in m and rad (rotation vector), bit for bit what ``flotor eval`` prints.
+
+        Each pose is reached from home and held until converged; with ``path`` the rows are successive poses of one
+        handle. NaN and infinity are legal and answered with zero force and a status.
+        """
+        force_n, torque_nm, energy_j, status = self._model.evaluate(_poses(poses), path)
+        return Evaluation(force_n, torque_nm, energy_j, status)
+
+    def __repr__(self) -> str:
+        return repr(self._model)
+
+
+def _poses(poses: object) -> np.ndarray:
+    poses = np.ascontiguousarray(poses, dtype=np.float64)
+    if poses.ndim != 2 or poses.shape[1] != 6:
+        raise FlotorError(f"poses have shape {poses.shape}; it is (n, 6): x_m, y_m, z_m, rx_rad, ry_rad, rz_rad")
+    return poses
+
+
+def plugins() -> list[PluginInfo]:
+    """Every plugin that is found, without opening any."""
+    return [PluginInfo(id, kind, version, Path(path)) for id, kind, version, path in _flotor.plugins(_folders())]
+
+
+def run(
+    scene: str | os.PathLike[str] | None = None,
+    *,
+    duration_s: float | None = None,
+    rate_hz: float | None = None,
+    seed: int = 0,
+    settings: dict[str, object] | None = None,
+    record: str | os.PathLike[str] | None = None,
+) -> dict[str, object]:
+    """Runs a scene (the demo if None) in virtual time; the summary, with the keys of ``flotor run --json``.
+
+    ``settings`` are parameters by plugin and id: ``{"spring.variant": "closed-form", "device.preset": "full"}``.
+    Equal arguments give an equal ``trace_digest``.
+    """
+    summary = _flotor.run_scene(
+        None if scene is None else Path(scene),
+        folders=_folders(),
+        duration_s=duration_s,
+        rate_hz=rate_hz,
+        seed=seed,
+        settings=[f"{key}={_text(value)}" for key, value in (settings or {}).items()],
+        recording=None if record is None else Path(record),
+    )
+    return json.loads(summary)
+
+
+class Recording:
+    """A recording as columns, one row a tick: ``recording["position_m"]`` is an array (n, 3)."""
+
+    def __init__(self, columns: dict[str, np.ndarray], finished: bool) -> None:
+        self.columns = columns
+        #: False if the file breaks off (a killed process, a full disk).
+        self.finished = finished
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.columns[name]
+
+    def __len__(self) -> int:
+        return len(self.columns["tick"])
+
+    def flat(self) -> dict[str, np.ndarray]:
+        """Columns of one number each: ``position_m`` becomes ``position_m_x``, ``_y``, ``_z``."""
+        flat = {}
+        for name, column in self.columns.items():
+            if column.ndim == 1:
+                flat[name] = column
+                continue
+            for index, axis in enumerate("xyzw"[: column.shape[1]]):
+                flat[f"{name.removesuffix('_xyzw')}_{axis}"] = column[:, index]
+        return flat
+
+    def to_pandas(self):
+        """A ``pandas.DataFrame``, indexed by tick."""
+        import pandas
+
+        return pandas.DataFrame(self.flat()).set_index("tick")
+
+    def to_polars(self):
+        """A ``polars.DataFrame``."""
+        import polars
+
+        return polars.DataFrame(self.flat())
+
+
+def read_recording(path: str | os.PathLike[str]) -> Recording:
+    """Reads a recording made with ``flotor run --record`` or :func:`run`."""
+    return Recording(*_flotor.read_recording(Path(path)))

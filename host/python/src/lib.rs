@@ -1,0 +1,35 @@
+//! The native half of the Python package `flotor`: `python/flotor` gives it its public face.
+//!
+//! - [`rows`]: the contract's structs as NumPy records, so that arrays cross without copying.
+//! - [`model`]: a force model, in batches or at single poses as `flotor eval` does.
+//! - [`run`]: scenes in virtual time.
+//! - [`recording`]: recordings as columns.
+
+mod error;
+mod model;
+mod recording;
+mod rows;
+mod run;
+
+use pyo3::prelude::*;
+
+/// Filled by the functions above; documented in `_flotor.pyi`.
+#[pymodule]
+mod _flotor {
+    #[pymodule_export]
+    use crate::error::FlotorError;
+    #[pymodule_export]
+    use crate::model::{Model, Parameter};
+    #[pymodule_export]
+    use crate::recording::read_recording;
+    #[pymodule_export]
+    use crate::rows::{input_dtype, output_dtype};
+    #[pymodule_export]
+    use crate::run::{plugins, run_scene};
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

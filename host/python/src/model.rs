@@ -1,0 +1,194 @@
+//! A force model in Python's hands.
+
+use crate::error::refuse;
+use crate::rows::{InputRow, OutputRow};
+use flotor::evaluate::{Answer, Evaluator, Handle, Travel};
+use flotor::registry::Registry;
+use flotor_hal::abi::loader::{Plugin, Setting};
+use flotor_hal::abi::{CallStatus, PluginKind};
+use flotor_hal::{DVec3, ParameterKind};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use std::sync::{Mutex, MutexGuard};
+
+/// One parameter of a plugin's schema.
+#[pyclass(frozen, get_all, module = "flotor")]
+pub(crate) struct Parameter {
+    /// What it is called in scenes and commands.
+    id: String,
+    /// Unit of its number.
+    unit: String,
+    /// What it means.
+    doc: String,
+    /// Smallest legal number (None for choices and text).
+    min: Option<f64>,
+    /// Largest legal number.
+    max: Option<f64>,
+    /// Number or word used when nothing is set.
+    default: String,
+    /// Legal words of a choice.
+    choices: Vec<String>,
+}
+
+/// Positions, rotations, forces, torques, energies and statuses of many poses.
+type Evaluation<'py> =
+    (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Vec<&'static str>);
+
+/// A force model. Safe to share between threads: calls wait for each other.
+#[pyclass(frozen, module = "flotor")]
+pub(crate) struct Model {
+    plugin: Plugin,
+    settings: Vec<Setting>,
+    instance: Mutex<flotor_hal::abi::loader::Model>,
+}
+
+#[pymethods]
+impl Model {
+    #[new]
+    fn new(id: &str, settings: Vec<(String, String)>, folders: Vec<PathBuf>) -> PyResult<Self> {
+        let plugin = Registry::search(&folders).load(id, PluginKind::Model).map_err(refuse)?;
+        let settings: Result<Vec<Setting>, _> =
+            settings.iter().map(|(key, value)| Setting::parse(plugin.parameters(), key, value)).collect();
+        let settings = settings.map_err(refuse)?;
+        let instance = Mutex::new(plugin.create_model(&settings).map_err(refuse)?);
+        Ok(Self { plugin, settings, instance })
+    }
+
+    #[getter]
+    fn id(&self) -> &str {
+        &self.plugin.metadata().id
+    }
+
+    #[getter]
+    fn version(&self) -> &str {
+        &self.plugin.metadata().version
+    }
+
+    #[getter]
+    fn path(&self) -> PathBuf {
+        self.plugin.metadata().path.clone()
+    }
+
+    #[getter]
+    fn parameters(&self) -> Vec<Parameter> {
+        self.plugin.parameters().iter().map(describe).collect()
+    }
+
+    /// The value in force of a parameter, presets resolved.
+    fn parameter(&self, id: &str) -> PyResult<f64> {
+        let index = self.plugin.parameters().iter().position(|parameter| parameter.id() == id);
+        let index = index.ok_or_else(|| refuse(format!("`{}` has no parameter `{id}`", self.id())))?;
+        Ok(self.lock().parameter(index))
+    }
+
+    fn set_parameter(&self, id: &str, value: &str) -> PyResult<()> {
+        let setting = Setting::parse(self.plugin.parameters(), id, value).map_err(refuse)?;
+        let mut instance = self.lock();
+        match instance.set_parameter(&setting) {
+            CallStatus::Ok => Ok(()),
+            CallStatus::Unsupported => Err(refuse(format!("`{id}` cannot change while the model lives"))),
+            _ => Err(refuse(format!("`{id}`: {}", instance.last_message()))),
+        }
+    }
+
+    fn reset(&self) {
+        self.lock().reset();
+    }
+
+    /// Steps through rows in order, in place; the model's own batch code, without copies, without the GIL.
+    fn step_batch(
+        &self,
+        py: Python<'_>,
+        inputs: PyReadonlyArray1<'_, InputRow>,
+        mut outputs: PyReadwriteArray1<'_, OutputRow>,
+    ) -> PyResult<()> {
+        let inputs = InputRow::peel(inputs.as_slice()?);
+        let outputs = OutputRow::peel_mut(outputs.as_slice_mut()?);
+        if inputs.len() != outputs.len() {
+            let (rows, room) = (inputs.len(), outputs.len());
+            return Err(refuse(format!("{rows} inputs and room for {room} outputs; give as many")));
+        }
+        py.detach(|| {
+            let mut instance = self.lock();
+            match instance.step_batch(inputs, outputs) {
+                CallStatus::Ok => Ok(()),
+                _ => Err(refuse(format!("the model stopped answering: {}", instance.last_message()))),
+            }
+        })
+    }
+
+    /// What `flotor eval` answers: forces, torques, energies (NaN where there is none), statuses.
+    fn evaluate<'py>(
+        &self,
+        py: Python<'py>,
+        poses: PyReadonlyArray2<'py, f64>,
+        successive: bool,
+    ) -> PyResult<Evaluation<'py>> {
+        let poses = poses.as_array();
+        if poses.ncols() != 6 {
+            return Err(refuse(format!(
+                "poses have {} columns; they are x_m, y_m, z_m, rx_rad, ry_rad, rz_rad",
+                poses.ncols()
+            )));
+        }
+        let handles: Vec<Handle> = poses
+            .rows()
+            .into_iter()
+            .map(|row| Handle {
+                position_m: DVec3::new(row[0], row[1], row[2]),
+                rotation_rad: DVec3::new(row[3], row[4], row[5]),
+            })
+            .collect();
+        let travel = if successive { Travel::Successive } else { Travel::FromHome };
+        // An instance of its own: the answer is the command's, whatever was stepped before.
+        let model = self.plugin.create_model(&self.settings).map_err(refuse)?;
+        let answers = py.detach(|| Evaluator::new(model, travel).evaluate(&handles)).map_err(refuse)?;
+        Ok(columns(py, &answers))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Model({:?}, version {}, {})", self.id(), self.version(), self.path().display())
+    }
+}
+
+impl Model {
+    /// A panic of the model does not poison it: the contract reports panics as a status.
+    fn lock(&self) -> MutexGuard<'_, flotor_hal::abi::loader::Model> {
+        self.instance.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}
+
+fn columns<'py>(py: Python<'py>, answers: &[Answer]) -> Evaluation<'py> {
+    let count = answers.len();
+    let three = |of: fn(&Answer) -> [f64; 3]| {
+        let flat: Vec<f64> = answers.iter().flat_map(of).collect();
+        numpy::ndarray::Array2::from_shape_vec((count, 3), flat)
+            .unwrap_or_else(|_| numpy::ndarray::Array2::zeros((0, 3)))
+            .into_pyarray(py)
+    };
+    let energies: Vec<f64> = answers.iter().map(|answer| answer.energy_j.unwrap_or(f64::NAN)).collect();
+    let statuses = answers.iter().map(|answer| answer.status.word()).collect();
+    let (forces, torques) = (three(|a| a.wrench.force_n), three(|a| a.wrench.torque_nm));
+    (forces, torques, energies.into_pyarray(py), statuses)
+}
+
+fn describe(parameter: &flotor_hal::Parameter) -> Parameter {
+    let choices: Vec<String> = parameter.choices().iter().map(|c| c.as_str().to_owned()).collect();
+    let is_number = matches!(parameter.kind(), ParameterKind::Real);
+    let default = match parameter.kind() {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a checked index of a few choices
+        ParameterKind::Choice => choices.get(parameter.default() as usize).cloned().unwrap_or_default(),
+        ParameterKind::Real => parameter.default().to_string(),
+        ParameterKind::Text => String::new(),
+    };
+    Parameter {
+        id: parameter.id().to_owned(),
+        unit: parameter.unit().to_owned(),
+        doc: parameter.doc().to_owned(),
+        min: is_number.then(|| parameter.min()),
+        max: is_number.then(|| parameter.max()),
+        default,
+        choices,
+    }
+}

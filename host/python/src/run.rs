@@ -1,0 +1,58 @@
+//! Scenes in virtual time, and what plugins there are.
+
+use crate::error::refuse;
+use flotor::registry::Registry;
+use flotor::scene::{PluginKeyValue, Scene};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+
+/// Id, kind, version and file of every plugin found; none of them is opened.
+#[pyfunction]
+pub(crate) fn plugins(folders: Vec<PathBuf>) -> Vec<(String, &'static str, String, PathBuf)> {
+    let registry = Registry::search(&folders);
+    let found = registry.found().iter();
+    found.map(|found| (found.id.clone(), found.kind.word(), found.version.clone(), found.path.clone())).collect()
+}
+
+/// Runs a scene (the demo if there is none) in virtual time; the summary of `flotor run --json` as JSON text.
+#[pyfunction]
+#[pyo3(signature = (scene, *, folders, duration_s, rate_hz, seed, settings, recording))]
+#[allow(clippy::too_many_arguments)] // keyword arguments of Python
+pub(crate) fn run_scene(
+    py: Python<'_>,
+    scene: Option<PathBuf>,
+    folders: Vec<PathBuf>,
+    duration_s: Option<f64>,
+    rate_hz: Option<f64>,
+    seed: u64,
+    settings: Vec<String>,
+    recording: Option<PathBuf>,
+) -> PyResult<String> {
+    let mut scene = match scene {
+        Some(path) => Scene::load(&path),
+        None => Scene::demo(),
+    }
+    .map_err(refuse)?;
+    if let Some(duration_s) = duration_s {
+        scene.duration_s = legal("duration_s", duration_s, 0.0, 31_536_000.0)?;
+    }
+    if let Some(rate_hz) = rate_hz {
+        scene.rate_hz = legal("rate_hz", rate_hz, 100.0, 10_000.0)?;
+    }
+    for setting in settings {
+        let setting: PluginKeyValue = setting.parse().map_err(refuse)?;
+        setting.apply(&mut scene).map_err(refuse)?;
+    }
+    let mut folders = folders;
+    folders.splice(0..0, scene.plugin_folders.iter().cloned());
+    let registry = Registry::search(&folders);
+    let summary = py.detach(|| flotor::headless::run(&scene, &registry, seed, recording.as_deref()));
+    serde_json::to_string(&summary.map_err(refuse)?).map_err(refuse)
+}
+
+fn legal(name: &str, value: f64, min: f64, max: f64) -> PyResult<f64> {
+    if (min..=max).contains(&value) {
+        return Ok(value);
+    }
+    Err(refuse(format!("{name} = {value}: legal is {min} to {max}")))
+}
