@@ -99,8 +99,11 @@ enum FlotorParameterKind
     FlotorParameterKind_Real = 1,
     // One of `choices`; the number is its index.
     FlotorParameterKind_Choice = 2,
-    // Free text (a path, a serial number); only at creation.
+    // Free text (a serial number); only at creation.
     FlotorParameterKind_Text = 3,
+    // A file, or one of `choices`, which are built in; only at creation. A host gives the path of a file that can
+    // be opened from where it runs: what a scene calls `tap.toml` lies beside the scene.
+    FlotorParameterKind_File = 4,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -314,7 +317,7 @@ typedef struct FlotorModelInfo {
     uint32_t memory;
 } FlotorModelInfo;
 
-// One value as it crosses the boundary: index into the schema, number, text (empty unless of kind text).
+// One value as it crosses the boundary: index into the schema, number, text (of texts and files).
 typedef struct FlotorParameterValue {
     uint32_t index;
     uint32_t reserved;
@@ -513,6 +516,11 @@ typedef struct FlotorTick {
     uint64_t dt_ns;
 } FlotorTick;
 
+// What a device says of a sample beside pose and faults, as a bit set: nothing that ends a run.
+typedef struct FlotorConditions {
+    uint32_t bits;
+} FlotorConditions;
+
 // What a device reports each tick. 168 bytes, in the device frame.
 typedef struct FlotorDeviceState {
     // Pose of the handle, m and unit quaternion.
@@ -525,8 +533,8 @@ typedef struct FlotorDeviceState {
     uint64_t sampled_ns;
     // Buttons, one bit each.
     uint32_t buttons;
-    // Reserved, 0.
-    uint32_t reserved;
+    // What else is to be known of this sample.
+    struct FlotorConditions conditions;
 } FlotorDeviceState;
 
 // `flotor.device/1`. `open` and `activate` return 0 or a [`crate::RefusalKind`] and say why in the message;
@@ -624,6 +632,8 @@ typedef struct FlotorEnergyLedgerTable {
 #define FLOTOR_AXES_TRANSLATION 7u
 #define FLOTOR_AXES_ROTATION 56u
 #define FLOTOR_AXES_ALL 63u
+/* Sets of conditions: `{FLOTOR_CONDITIONS_SATURATED}` makes a FlotorConditions. */
+#define FLOTOR_CONDITIONS_SATURATED 1u
 /* What `read` and `write` of a device return; a fault is one of FlotorFault. */
 #define FLOTOR_CYCLE_FRESH 0u
 #define FLOTOR_CYCLE_STALE 1u

@@ -132,8 +132,30 @@ pub struct DeviceState {
     pub sampled_ns: u64,
     /// Buttons, one bit each.
     pub buttons: u32,
-    /// Reserved, 0.
-    pub reserved: u32,
+    /// What else is to be known of this sample.
+    pub conditions: Conditions,
+}
+
+/// What a device says of a sample beside pose and faults, as a bit set: nothing that ends a run.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct Conditions {
+    bits: u32,
+}
+
+impl Conditions {
+    /// Nothing.
+    pub const NONE: Conditions = Conditions { bits: 0 };
+    /// The actuators are at their limit: since the previous tick they gave less than was commanded.
+    pub const SATURATED: Conditions = Conditions { bits: 1 << 0 };
+
+    /// True if all of `other` is among them. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub const fn contains(self, other: Conditions) -> bool {
+        self.bits & other.bits == other.bits
+    }
 }
 
 impl DeviceState {
@@ -144,7 +166,7 @@ impl DeviceState {
         delivered: Wrench::ZERO,
         sampled_ns: 0,
         buttons: 0,
-        reserved: 0,
+        conditions: Conditions::NONE,
     };
 
     /// True if every number is finite. Real-time: bounded, no allocation.

@@ -36,8 +36,8 @@ mod refusal;
 mod shape;
 
 pub use device::{
-    ActiveDevice, Axes, Capabilities, Cycle, Device, DeviceInfo, DeviceState, EnergyLedger, Fault, SafeStop,
-    Tick,
+    ActiveDevice, Axes, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState, EnergyLedger,
+    Fault, SafeStop, Tick,
 };
 pub use frame::{Pose, Twist, Wrench, orientation_from_rotation_vector, rotation_vector};
 pub use glam;

@@ -15,8 +15,11 @@ pub enum ParameterKind {
     Real = 1,
     /// One of `choices`; the number is its index.
     Choice = 2,
-    /// Free text (a path, a serial number); only at creation.
+    /// Free text (a serial number); only at creation.
     Text = 3,
+    /// A file, or one of `choices`, which are built in; only at creation. A host gives the path of a file that can
+    /// be opened from where it runs: what a scene calls `tap.toml` lies beside the scene.
+    File = 4,
 }
 
 /// When a parameter may change.
@@ -87,6 +90,15 @@ impl Parameter {
         parameter
     }
 
+    /// A file, or one of `built_in` by its name; none by default.
+    #[must_use]
+    pub const fn file(id: &'static str, built_in: &'static [Str], doc: &'static str) -> Self {
+        let mut parameter = Self::text(id, doc);
+        parameter.kind = ParameterKind::File as u32;
+        parameter.choices = StrList::new(built_in);
+        parameter
+    }
+
     /// Free text, empty by default.
     #[must_use]
     pub const fn text(id: &'static str, doc: &'static str) -> Self {
@@ -120,7 +132,7 @@ impl Parameter {
         self.doc.as_str()
     }
 
-    /// Names of a choice, in index order; empty for the other kinds.
+    /// Names of a choice in index order, or what is built in beside files; empty for the other kinds.
     #[must_use]
     pub const fn choices(&self) -> &[Str] {
         self.choices.as_slice()
@@ -132,6 +144,7 @@ impl Parameter {
         match self.kind {
             2 => ParameterKind::Choice,
             3 => ParameterKind::Text,
+            4 => ParameterKind::File,
             _ => ParameterKind::Real,
         }
     }
@@ -196,7 +209,7 @@ impl fmt::Display for OutOfRange {
 
 impl std::error::Error for OutOfRange {}
 
-/// One value as it crosses the boundary: index into the schema, number, text (empty unless of kind text).
+/// One value as it crosses the boundary: index into the schema, number, text (of texts and files).
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -246,7 +259,7 @@ impl<'a> Settings<'a> {
         self.number_or_default(id) as usize
     }
 
-    /// The text set for a text parameter, if any.
+    /// The text set for a text or the path set for a file, if any.
     #[must_use]
     pub fn text(&self, id: &str) -> Option<&'a str> {
         self.explicit(id).map(|value| value.text.as_str()).filter(|text| !text.is_empty())

@@ -10,7 +10,8 @@ use crate::servo::{
 use crate::trace::{RECORD_WORDS, TickRecord};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, Setting, Stopper};
-use flotor_hal::{Capabilities, Demand, EnergyLedger, Fault, LoopConfig, Refusal};
+use flotor_hal::{Capabilities, Demand, EnergyLedger, Fault, LoopConfig, Parameter, ParameterKind, Refusal};
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -139,7 +140,7 @@ impl Session {
         let mut plugins = vec![PluginReport {
             name: "device".to_owned(),
             metadata: device_plugin.metadata().clone(),
-            parameters: in_force(&device_plugin, |index| device.parameter(index)),
+            parameters: in_force(&device_plugin, &settings, |index| device.parameter(index)),
         }];
 
         let mut models = Vec::new();
@@ -322,7 +323,7 @@ pub(crate) fn prepare_model(
     let report = PluginReport {
         name: model.name.clone(),
         metadata: plugin.metadata().clone(),
-        parameters: in_force(&plugin, |index| instance.parameter(index)),
+        parameters: in_force(&plugin, &settings, |index| instance.parameter(index)),
     };
     let demand = Demand::ALL.limited_to(instance.serves());
     let slot = ModelSlot {
@@ -336,8 +337,10 @@ pub(crate) fn prepare_model(
 
 /// Checks what was written against what the plugin understands; complaints name file and line.
 fn settings(plugin: &Plugin, name: &str, parameters: &[ParameterText]) -> Result<Vec<Setting>, SceneError> {
+    let schema = plugin.parameters();
     let check = |parameter: &ParameterText| {
-        Setting::parse(plugin.parameters(), &parameter.key, &parameter.value).map_err(|error| SceneError {
+        let value = from_the_scene(schema, parameter);
+        Setting::parse(schema, &parameter.key, &value).map_err(|error| SceneError {
             location: parameter.location.clone(),
             problem: format!("[{name}] {error}"),
         })
@@ -345,12 +348,43 @@ fn settings(plugin: &Plugin, name: &str, parameters: &[ParameterText]) -> Result
     parameters.iter().map(check).collect()
 }
 
+/// The value as the plugin is to get it: files a scene names lie beside the scene, those of a command line where
+/// the command runs.
+fn from_the_scene<'t>(schema: &[Parameter], text: &'t ParameterText) -> Cow<'t, str> {
+    let ParameterText { key, value, location } = text;
+    let parameter = schema.iter().find(|parameter| parameter.id() == key);
+    let is_file = parameter.is_some_and(|parameter| {
+        let built_in = parameter.choices().iter().any(|name| name.as_str() == value);
+        parameter.kind() == ParameterKind::File && !built_in && !value.is_empty()
+    });
+    match location.file.parent() {
+        Some(folder) if is_file && location.is_in_a_file() => {
+            Cow::Owned(folder.join(value).to_string_lossy().into_owned())
+        }
+        _ => Cow::Borrowed(value),
+    }
+}
+
 /// Every parameter with its value in force, as text.
-fn in_force(plugin: &Plugin, mut value: impl FnMut(usize) -> f64) -> Vec<(String, String)> {
+fn in_force(
+    plugin: &Plugin,
+    settings: &[Setting],
+    mut value: impl FnMut(usize) -> f64,
+) -> Vec<(String, String)> {
     let schema = plugin.parameters();
-    let show = |(index, parameter): (usize, &flotor_hal::Parameter)| {
-        let setting = Setting::number(schema, parameter.id(), value(index));
-        (parameter.id().to_owned(), setting.map_or_else(|_| String::new(), |setting| setting.display(schema)))
+    let show = |(index, parameter): (usize, &Parameter)| {
+        let text = match parameter.kind() {
+            // Plugins answer with numbers: a text is in force if it was set.
+            ParameterKind::Text | ParameterKind::File => {
+                let set = settings.iter().rev().find(|setting| setting.index() == index);
+                set.map_or_else(String::new, |setting| setting.display(schema))
+            }
+            ParameterKind::Real | ParameterKind::Choice => {
+                let setting = Setting::number(schema, parameter.id(), value(index));
+                setting.map_or_else(|_| String::new(), |setting| setting.display(schema))
+            }
+        };
+        (parameter.id().to_owned(), text)
     };
     schema.iter().enumerate().map(show).collect()
 }

@@ -94,7 +94,7 @@ fn schema(parameters: &[Parameter]) -> Result<(), String> {
         if parameters.iter().take(index).any(|earlier| earlier.id() == id) {
             return Err(format!("`{id}` occurs twice"));
         }
-        if parameter.kind() != ParameterKind::Text
+        if !matches!(parameter.kind(), ParameterKind::Text | ParameterKind::File)
             && let Err(range) = parameter.check(parameter.default())
         {
             return Err(format!("the default of `{id}`: {range}"));

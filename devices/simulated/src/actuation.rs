@@ -77,6 +77,7 @@ pub struct Actuation {
     field: FieldError,
     thermal: Thermal,
     currents_a: Currents,
+    is_saturated: bool,
     saturated_ticks: u64,
 }
 
@@ -93,6 +94,7 @@ impl Actuation {
             field: parameters.field,
             thermal: Thermal::new(parameters.thermal),
             currents_a: [0.0; COILS],
+            is_saturated: false,
             saturated_ticks: 0,
         })
     }
@@ -103,7 +105,8 @@ impl Actuation {
     /// Real-time: bounded, no allocation.
     pub fn drive(&mut self, commanded: &Wrench, wiring: Wiring, z_m: f64, dt_s: f64) -> Wrench {
         let (mut asked_a, share) = self.coils.currents(commanded);
-        self.saturated_ticks += u64::from(share < 1.0);
+        self.is_saturated = share < 1.0;
+        self.saturated_ticks += u64::from(self.is_saturated);
         if let Wiring::Open(coil) = wiring
             && let Some(current) = asked_a.get_mut(coil)
         {
@@ -138,6 +141,12 @@ impl Actuation {
     #[must_use]
     pub fn thermal(&self) -> &Thermal {
         &self.thermal
+    }
+
+    /// True if the last wrench was scaled down to the current limit. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn is_saturated(&self) -> bool {
+        self.is_saturated
     }
 
     /// Ticks so far in which the wrench was scaled down to the current limit. Real-time: bounded, no

@@ -4,36 +4,57 @@
 //! the object lets it. The usual model of that (for instance van Beek et al. 2015) is an impedance
 //!
 //! ```text
-//! F = K (x_intended - x) + B (v_intended - v) - m a
+//! F = F_intended + K (x_intended - x) + B (v_intended - v) - m a
 //! ```
 //!
-//! per axis, and the same in rotation. [`Impedance`] holds K, B and m with published values, [`Trajectory`]
-//! the intended motion. The hand grips at the origin of the flotor frame, and it can let go. The mass moves
-//! rigidly with the handle (the plant adds it to the flotor); the person carries its weight.
+//! per axis, and the same in rotation. The hand grips at the origin of the flotor frame, and it can let go. The
+//! mass moves rigidly with the handle (the plant adds it to the flotor); the person carries its weight. A hand
+//! that means a force rather than a place has no stiffness along that force.
+//!
+//! - [`Impedance`]: K, B and m with published values.
+//! - [`Trajectory`]: what the hand aims at, as a few numbers, a [`Script`] or a [`Recording`].
+//! - [`Unsteadiness`]: tremor, and forces that are never quite what was meant.
 
 mod impedance;
+mod recording;
+mod script;
 mod trajectory;
+mod unsteadiness;
 
-pub use impedance::Impedance;
-pub use trajectory::{Intention, Pose, Trajectory, minimum_jerk};
+pub use impedance::{Grip, Impedance};
+pub use recording::{Recording, RecordingError};
+pub use script::{Script, ScriptError};
+pub use trajectory::{Aim, Intention, Pose, Trajectory, minimum_jerk};
+pub use unsteadiness::Unsteadiness;
 
 use crate::validation::InvalidParameter;
+pub(crate) use unsteadiness::Wavering;
 
-/// A hand: how stiff it is and what it means to do.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A hand: how stiff it is, what it means to do, and how well it does.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Hand {
     /// Mechanical impedance at the handle.
     pub impedance: Impedance,
     /// Intended motion, and when the hand holds the handle.
     pub trajectory: Trajectory,
+    /// Tremor and noise of force.
+    pub unsteadiness: Unsteadiness,
 }
 
 impl Hand {
     /// Nobody there: the flotor floats freely.
-    pub const AWAY: Self = Self { impedance: Impedance::RELAXED, trajectory: Trajectory::Open };
+    pub const AWAY: Self = Self {
+        impedance: Impedance::RELAXED,
+        trajectory: Trajectory::Open,
+        unsteadiness: Unsteadiness::NONE,
+    };
 
     /// The demo: a firm hand that presses and releases 1.5 times a second.
-    pub const EXPLORING: Self = Self { impedance: Impedance::FIRM, trajectory: Trajectory::EXPLORE };
+    pub const EXPLORING: Self = Self {
+        impedance: Impedance::FIRM,
+        trajectory: Trajectory::EXPLORE,
+        unsteadiness: Unsteadiness::NONE,
+    };
 
     /// Refuses numbers that are not physical. Real-time: bounded, no allocation.
     ///
@@ -41,6 +62,7 @@ impl Hand {
     /// Names the first parameter that is not finite, negative, or no rotation.
     pub fn check(&self) -> Result<(), InvalidParameter> {
         self.impedance.check()?;
-        self.trajectory.check()
+        self.trajectory.check()?;
+        self.unsteadiness.check()
     }
 }

@@ -14,7 +14,9 @@ use crate::sensing::{Sample, Sensing, SensingParameters};
 use crate::simulation::Simulation;
 use crate::validation::InvalidParameter;
 use crate::workspace::SensorRange;
-use flotor_hal::{Cycle, DeviceState, Fault, Tick, Twist, orientation_from_rotation_vector, rotation_vector};
+use flotor_hal::{
+    Conditions, Cycle, DeviceState, Fault, Tick, Twist, orientation_from_rotation_vector, rotation_vector,
+};
 
 /// What a machine is built from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,6 +87,8 @@ impl Machine {
         let delivered = self.actuation.drive(commanded, wiring, simulation.state().position_m.z, dt_s);
         let stopped = self.move_and_sample(simulation, tick, delivered, fault);
         state.delivered = flotor_hal::Wrench::new(delivered.force_n, delivered.torque_nm);
+        state.conditions =
+            if self.actuation.is_saturated() { Conditions::SATURATED } else { Conditions::NONE };
 
         match fault {
             Some(FaultKind::CablePull) => return Cycle::Fault(Fault::Disconnected),

@@ -15,6 +15,8 @@ pub(crate) enum Stream {
     Sensor = 1,
     /// When faults strike.
     Faults = 2,
+    /// Tremor and noise of force of the hand.
+    Hand = 3,
 }
 
 /// A stream of random numbers.

@@ -6,23 +6,34 @@ mod schema;
 pub(crate) use machine::machine;
 pub(crate) use schema::SCHEMA;
 
-use crate::hand::{Hand, Impedance, Pose, Trajectory};
+use crate::hand::{Grip, Hand, Impedance, Pose, Recording, Script, Trajectory, Unsteadiness};
 use crate::plant::{FeedForward, FlotorParameters, State};
 use crate::simulation::Setup;
-use flotor_hal::Settings;
 use flotor_hal::glam::{DQuat, DVec3};
+use flotor_hal::{Refusal, Settings};
+use std::path::Path;
 
 const MM: f64 = 1.0e-3;
+const UM: f64 = 1.0e-6;
+const PERCENT: f64 = 1.0e-2;
 
-/// The setup a set of values means; the tick length is filled in at activation.
-pub(crate) fn setup(settings: &Settings<'_>) -> Setup {
+/// The setup a set of values means; tick length and seed are filled in at activation. Not real-time.
+///
+/// # Errors
+/// If a file that is to drive the hand cannot be used.
+pub(crate) fn setup(settings: &Settings<'_>) -> Result<Setup, Refusal> {
     let flotor = flotor(settings);
-    let impedance = impedance(settings);
+    let trajectory = trajectory(settings)?;
+    let impedance = impedance(settings, &trajectory);
+    let unsteadiness = Unsteadiness {
+        tremor_m: settings.number_or_default("hand_tremor_um") * UM,
+        force_share: settings.number_or_default("hand_force_noise_percent") * PERCENT,
+    };
     let start = State {
         position_m: three(settings, ["start_x_mm", "start_y_mm", "start_z_mm"], DVec3::ZERO, MM),
         ..State::HOME
     };
-    Setup { flotor, hand: Hand { impedance, trajectory: trajectory(settings) }, start, ..Setup::DEMO }
+    Ok(Setup { flotor, hand: Hand { impedance, trajectory, unsteadiness }, start, ..Setup::DEMO })
 }
 
 fn flotor(settings: &Settings<'_>) -> FlotorParameters {
@@ -52,11 +63,17 @@ fn flotor(settings: &Settings<'_>) -> FlotorParameters {
     flotor
 }
 
-fn impedance(settings: &Settings<'_>) -> Impedance {
-    let grip = match settings.choice_or_default("hand_grip") {
-        1 => Impedance::RELAXED,
-        _ => Impedance::FIRM,
+/// The impedance of the grip that is set, else of the one the script names, else of a firm one; single numbers
+/// come before either.
+fn impedance(settings: &Settings<'_>, trajectory: &Trajectory) -> Impedance {
+    let of_script = match trajectory {
+        Trajectory::Scripted(script) => script.grip(),
+        _ => None,
     };
+    let of_settings = settings
+        .number("hand_grip")
+        .map(|_| if settings.choice_or_default("hand_grip") == 1 { Grip::Relaxed } else { Grip::Firm });
+    let grip = of_settings.or(of_script).unwrap_or(Grip::Firm).impedance();
     let splat = |id, value: DVec3| settings.number(id).map_or(value, DVec3::splat);
     Impedance {
         stiffness_n_per_m: splat("hand_stiffness_n_per_m", grip.stiffness_n_per_m),
@@ -66,7 +83,21 @@ fn impedance(settings: &Settings<'_>) -> Impedance {
     }
 }
 
-fn trajectory(settings: &Settings<'_>) -> Trajectory {
+fn trajectory(settings: &Settings<'_>) -> Result<Trajectory, Refusal> {
+    match (settings.text("hand_script"), settings.text("hand_recording")) {
+        (Some(_), Some(_)) => {
+            Err(Refusal::parameter("one hand cannot follow both hand_script and hand_recording: set one"))
+        }
+        (Some(script), None) => Script::load(script).map(Trajectory::Scripted).map_err(Refusal::parameter),
+        (None, Some(file)) => {
+            Recording::load(Path::new(file)).map(Trajectory::Recorded).map_err(Refusal::parameter)
+        }
+        (None, None) => Ok(simple_trajectory(settings)),
+    }
+}
+
+/// What the parameter `hand` names.
+fn simple_trajectory(settings: &Settings<'_>) -> Trajectory {
     let value = |id| settings.number_or_default(id);
     let depth_m = value("hand_depth_mm") * MM;
     let below = Pose { position_m: DVec3::new(0.0, 0.0, -depth_m), orientation: DQuat::IDENTITY };

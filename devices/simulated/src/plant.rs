@@ -7,7 +7,7 @@
 //! `x = y - R c` that of the origin and `w` the angular velocity in the flotor frame:
 //!
 //! ```text
-//! m y'' = F_coils - b x' + F_hand + (f - m g) z          F_hand = K (x_h - x) + B (x_h' - x')
+//! m y'' = F_coils - b x' + F_hand + (f - m g) z          F_hand = F_h + K (x_h - x) + B (x_h' - x')
 //! I w' + w x I w = R^T T_coils - c x R^T (F_coils - b x' + F_hand) - d w + T_hand
 //! q' = q w / 2
 //! ```
@@ -35,7 +35,7 @@ use crate::hand::{Impedance, Intention, Pose};
 use crate::ledger::{MechanicalEnergy, Work};
 use crate::validation::{Domain, InvalidParameter, number, vector};
 use body::Body;
-use flotor_hal::glam::{DQuat, DVec3};
+use flotor_hal::glam::{BVec3, DQuat, DVec3};
 use motion::{Contact, Motion};
 use scheme::Scheme;
 
@@ -207,14 +207,22 @@ pub enum Outcome {
 pub struct Plant {
     motion: Motion,
     free: Scheme,
-    held: Scheme,
+    /// One for each way the hand may hold it.
+    held: Vec<Held>,
+}
+
+/// The flotor in a hand that yields along some axes.
+#[derive(Clone, Debug)]
+struct Held {
+    yielding: BVec3,
+    scheme: Scheme,
 }
 
 impl Plant {
     /// A flotor in `state`, for a hand of `impedance` that may grip it. `nominal_ns` is the piece that comes
     /// most often: what it needs is computed once.
     ///
-    /// Real-time: bounded, no allocation.
+    /// Not real-time.
     ///
     /// # Errors
     /// If a parameter is not physical, or flotor and hand together are stiffer than the integrator resolves.
@@ -224,12 +232,30 @@ impl Plant {
         state: &State,
         nominal_ns: u64,
     ) -> Result<Self, InvalidParameter> {
+        Self::yielding(flotor, impedance, &[BVec3::FALSE], state, nominal_ns)
+    }
+
+    /// The same for a hand that at times yields along one of these sets of axes. Not real-time.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`].
+    pub fn yielding(
+        flotor: &FlotorParameters,
+        impedance: &Impedance,
+        yieldings: &[BVec3],
+        state: &State,
+        nominal_ns: u64,
+    ) -> Result<Self, InvalidParameter> {
         flotor.check()?;
         state.check()?;
+        let held = yieldings.iter().map(|&yielding| {
+            let body = Body::held(flotor, &impedance.yielding(yielding));
+            Ok(Held { yielding, scheme: Scheme::new(body, nominal_ns)? })
+        });
         Ok(Self {
             motion: Motion::of(state),
             free: Scheme::new(Body::free(flotor), nominal_ns)?,
-            held: Scheme::new(Body::held(flotor, impedance), nominal_ns)?,
+            held: held.collect::<Result<_, _>>()?,
         })
     }
 
@@ -261,7 +287,13 @@ impl Plant {
     pub fn advance(&mut self, piece_ns: u64, coils: &Wrench, hand: Option<&Intention>) -> Outcome {
         let piece_ns = piece_ns.min(MAX_PIECE_NS);
         let contact = hand.map_or(Contact::NONE, Contact::with);
-        let scheme = if hand.is_some() { &mut self.held } else { &mut self.free };
+        let scheme = match hand {
+            Some(hand) => {
+                let fits = |held: &&mut Held| held.yielding == hand.yielding;
+                self.held.iter_mut().find(fits).map_or(&mut self.free, |held| &mut held.scheme)
+            }
+            None => &mut self.free,
+        };
         let (motion, work) = scheme.advance(&self.motion, piece_ns, coils, contact);
         if motion.is_physical() && work.is_finite() {
             self.motion = motion;

@@ -10,8 +10,8 @@ use crate::workspace::{
     TRANSLATION_RANGE_M,
 };
 use flotor_hal::{
-    ActiveDevice, Axes, Capabilities, Cycle, Device, DeviceInfo, DeviceState, EnergyLedger, Fault,
-    LoopConfig, Parameter, Pose, Refusal, SafeStop, Settings, Tick, Twist, export_device,
+    ActiveDevice, Axes, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState, EnergyLedger,
+    Fault, LoopConfig, Parameter, Pose, Refusal, SafeStop, Settings, Tick, Twist, export_device,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -33,6 +33,8 @@ pub struct RunningFlotor {
     opened: SimulatedFlotor,
     /// Acts from the last write to the next.
     held: Wrench,
+    /// It is less than was asked for.
+    is_limited: bool,
 }
 
 /// Cuts the coils from any thread.
@@ -63,7 +65,7 @@ impl Device for SimulatedFlotor {
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
         let values = SCHEMA.iter().map(|parameter| settings.number_or_default(parameter.id())).collect();
         let opened = Self {
-            setup: setup(settings),
+            setup: setup(settings)?,
             machine: machine(settings),
             values,
             stopped: Arc::new(AtomicBool::new(false)),
@@ -109,7 +111,7 @@ impl Device for SimulatedFlotor {
         match self.start(config.period_ns, config.seed) {
             Ok((simulation, machine)) => {
                 self.stopped.store(false, Ordering::Release);
-                Ok(RunningFlotor { simulation, machine, opened: self, held: Wrench::ZERO })
+                Ok(RunningFlotor { simulation, machine, opened: self, held: Wrench::ZERO, is_limited: false })
             }
             Err(error) => Err((self, Refusal::parameter(error))),
         }
@@ -123,7 +125,7 @@ impl Device for SimulatedFlotor {
 impl SimulatedFlotor {
     /// Flotor, hand and machine at time 0.
     fn start(&self, tick_ns: u64, seed: u64) -> Result<(Simulation, Option<Box<Machine>>), InvalidParameter> {
-        let setup = Setup { tick_ns, ..self.setup };
+        let setup = Setup { tick_ns, seed, ..self.setup.clone() };
         let machine = |parameters| Machine::new(parameters, &setup.start, seed).map(Box::new);
         Ok((Simulation::new(&setup)?, self.machine.as_ref().map(machine).transpose()?))
     }
@@ -144,6 +146,7 @@ impl ActiveDevice for RunningFlotor {
             twist: Twist::new(flotor.velocity_m_per_s, flotor.angular_velocity_rad_per_s),
             delivered: flotor_hal::Wrench::new(coils.force_n, coils.torque_nm),
             sampled_ns: tick.time_ns,
+            conditions: if self.is_limited { Conditions::SATURATED } else { Conditions::NONE },
             ..DeviceState::HOME
         };
         let range = SensorRange::of(flotor.position_m, flotor.orientation);
@@ -164,6 +167,7 @@ impl ActiveDevice for RunningFlotor {
                 torque_nm: asked.torque_nm.clamp(-TORQUE_LIMIT_NM, TORQUE_LIMIT_NM),
             },
         };
+        self.is_limited = self.machine.is_none() && self.held != asked;
         Cycle::Fresh
     }
 

@@ -6,7 +6,7 @@
 //! hand. Each tick is cut at the grid and at the moment the hand lets go; within a piece the plant is exact
 //! (see `plant`).
 
-use crate::hand::{Hand, Intention, Trajectory};
+use crate::hand::{Aim, Hand, Intention, Pose, Trajectory, Wavering};
 use crate::ledger::Ledger;
 use crate::plant::{FlotorParameters, MAX_PIECE_NS, Outcome, Plant, State, Wrench};
 use crate::validation::InvalidParameter;
@@ -20,7 +20,7 @@ pub const MAX_ADVANCE_NS: u64 = 100_000_000;
 const GRID_NS: u64 = MAX_PIECE_NS;
 
 /// What a simulation is built from.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Setup {
     /// The flotor.
     pub flotor: FlotorParameters,
@@ -30,6 +30,8 @@ pub struct Setup {
     pub start: State,
     /// Time between two ticks if all goes well, ns. Any other works too, and costs a little more.
     pub tick_ns: u64,
+    /// Seed of what the hand does without meaning to.
+    pub seed: u64,
 }
 
 impl Setup {
@@ -39,6 +41,7 @@ impl Setup {
         hand: Hand::EXPLORING,
         start: State::HOME,
         tick_ns: 1_000_000,
+        seed: 0,
     };
 }
 
@@ -69,19 +72,25 @@ pub struct Simulation {
     plant: Plant,
     ledger: Ledger,
     time_ns: u64,
+    wavering: Wavering,
     stroke: Stroke,
 }
 
 impl Simulation {
-    /// A simulation at time 0. Real-time: bounded, no allocation.
+    /// A simulation at time 0. Not real-time.
     ///
     /// # Errors
     /// If a parameter is not physical; the error names it.
     pub fn new(setup: &Setup) -> Result<Self, InvalidParameter> {
-        setup.hand.check()?;
-        let plant = Plant::new(&setup.flotor, &setup.hand.impedance, &setup.start, setup.tick_ns)?;
-        let ledger = Ledger::open(plant.energy());
-        Ok(Self { setup: *setup, plant, ledger, time_ns: 0, stroke: Stroke::default() })
+        let plant = plant(setup, &setup.start)?;
+        Ok(Self {
+            ledger: Ledger::open(plant.energy()),
+            plant,
+            time_ns: 0,
+            wavering: Wavering::new(setup.hand.unsteadiness, setup.seed),
+            stroke: Stroke::default(),
+            setup: setup.clone(),
+        })
     }
 
     /// Back to the start: time 0, first state, fresh accounts. Real-time: bounded, no allocation.
@@ -94,16 +103,16 @@ impl Simulation {
 
     /// Replaces the hand from now on; its trajectory keeps counting from the start of the run.
     ///
-    /// Real-time: bounded, no allocation.
+    /// Not real-time.
     ///
     /// # Errors
     /// If a parameter is not physical; the hand then stays as it was.
     pub fn set_hand(&mut self, hand: Hand) -> Result<(), InvalidParameter> {
-        hand.check()?;
-        self.plant =
-            Plant::new(&self.setup.flotor, &hand.impedance, &self.plant.state(), self.setup.tick_ns)?;
-        self.setup.hand = hand;
+        let setup = Setup { hand, ..self.setup.clone() };
+        self.plant = plant(&setup, &self.plant.state())?;
+        self.wavering = Wavering::new(setup.hand.unsteadiness, setup.seed);
         self.stroke = Stroke::default();
+        self.setup = setup;
         Ok(())
     }
 
@@ -153,10 +162,10 @@ impl Simulation {
         SensorRange::of(state.position_m, state.orientation)
     }
 
-    /// What the hand means to do now; nothing while it is off the handle. Real-time: bounded, no allocation.
+    /// What the hand aims at now; nothing while it is off the handle. Real-time: bounded, no allocation.
     #[must_use]
-    pub fn intention(&self) -> Option<Intention> {
-        self.setup.hand.trajectory.intention(self.time_ns)
+    pub fn aim(&self) -> Option<Aim> {
+        self.setup.hand.trajectory.aim(self.time_ns)
     }
 
     /// Energy accounts since the start. Real-time: bounded, no allocation.
@@ -190,25 +199,35 @@ impl Simulation {
         }
         let index = self.time_ns / GRID_NS;
         if self.stroke.index != Some(index) {
-            self.stroke = Stroke::after(&self.stroke, index, trajectory);
+            self.stroke = Stroke::after(&self.stroke, index, trajectory, &self.wavering);
         }
         self.stroke.drawn(self.time_ns % GRID_NS)
     }
 }
 
-/// The intention between two grid points of the clock.
+/// Flotor and hand of a setup, the flotor in `state`.
+fn plant(setup: &Setup, state: &State) -> Result<Plant, InvalidParameter> {
+    let Setup { flotor, hand, tick_ns, .. } = setup;
+    hand.check()?;
+    Plant::yielding(flotor, &hand.impedance, &hand.trajectory.yieldings(), state, *tick_ns)
+}
+
+/// What the hand aims at between two grid points of the clock.
 #[derive(Clone, Copy, Debug, Default)]
 struct Stroke {
     /// Number of the stroke that starts at `start`; none before the first.
     index: Option<u64>,
-    start: Option<Intention>,
-    end: Option<Intention>,
+    start: Option<Aim>,
+    end: Option<Aim>,
 }
 
 impl Stroke {
     /// Stroke number `index`. Consecutive strokes share a grid point, which is evaluated once.
-    fn after(previous: &Self, index: u64, trajectory: &Trajectory) -> Self {
-        let at = |index: u64| trajectory.intention(index.saturating_mul(GRID_NS));
+    fn after(previous: &Self, index: u64, trajectory: &Trajectory, wavering: &Wavering) -> Self {
+        let at = |index: u64| {
+            let time_ns = index.saturating_mul(GRID_NS);
+            trajectory.aim(time_ns).map(|aim| wavered(&aim, wavering, seconds(time_ns)))
+        };
         let follows = previous.index.is_some_and(|before| before.checked_add(1) == Some(index));
         Self {
             index: Some(index),
@@ -217,15 +236,32 @@ impl Stroke {
         }
     }
 
-    /// The intention `elapsed_ns` after the start of the stroke, drawn straight to its end: position on the
-    /// chord, velocity its slope. Where the hand lets go before the end it stays.
+    /// The aim `elapsed_ns` after the start of the stroke, drawn straight to its end: position on the chord with
+    /// its slope as velocity; orientation and force, which the plant takes as constant, halfway. Where the hand
+    /// lets go before the end it stays.
     fn drawn(&self, elapsed_ns: u64) -> Option<Intention> {
         let start = self.start?;
         let end = self.end.unwrap_or(start);
-        let velocity_m_per_s = (end.position_m - start.position_m) / seconds(GRID_NS);
-        let position_m = start.position_m + velocity_m_per_s * seconds(elapsed_ns);
-        Some(Intention { position_m, velocity_m_per_s, ..start })
+        let velocity_m_per_s = (end.pose.position_m - start.pose.position_m) / seconds(GRID_NS);
+        let mut drawn = Intention {
+            position_m: start.pose.position_m + velocity_m_per_s * seconds(elapsed_ns),
+            velocity_m_per_s,
+            force_n: 0.5 * (start.force_n + end.force_n),
+            yielding: start.yielding,
+            ..Intention::resting(start.pose)
+        };
+        if end.pose.orientation != start.pose.orientation {
+            drawn.orientation = start.pose.orientation.lerp(end.pose.orientation, 0.5);
+            drawn.angular_velocity_rad_per_s = start.pose.rotation_to(&end.pose) / seconds(GRID_NS);
+        }
+        Some(drawn)
     }
+}
+
+/// An aim as an unsteady hand has it.
+fn wavered(aim: &Aim, wavering: &Wavering, time_s: f64) -> Aim {
+    let pose = Pose { position_m: aim.pose.position_m + wavering.offset_m(time_s), ..aim.pose };
+    Aim { pose, force_n: wavering.force_n(aim.force_n, time_s), ..*aim }
 }
 
 fn seconds(time_ns: u64) -> f64 {

@@ -34,9 +34,11 @@ impl Events {
     pub const MODEL_DEGRADED: Events = Events { bits: 1 << 9 };
     /// One or more ticks were missed before this one.
     pub const MISSED: Events = Events { bits: 1 << 10 };
+    /// The device's actuators were at their limit and gave less than was commanded.
+    pub const SATURATED: Events = Events { bits: 1 << 11 };
 
     /// Names of the bits, lowest first: for reports and recordings.
-    pub const NAMES: [&'static str; 11] = [
+    pub const NAMES: [&'static str; 12] = [
         "stale_sample",
         "not_finite",
         "force_limited",
@@ -48,6 +50,7 @@ impl Events {
         "ramping",
         "model_degraded",
         "missed",
+        "saturated",
     ];
 
     /// Adds events. Real-time: bounded, no allocation.

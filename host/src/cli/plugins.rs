@@ -124,7 +124,7 @@ fn described(parameter: &Parameter) -> Described<'_> {
         ParameterKind::Choice => {
             choices.get(parameter.default() as usize).copied().unwrap_or_default().to_owned()
         }
-        ParameterKind::Text => String::new(),
+        ParameterKind::Text | ParameterKind::File => String::new(),
     };
     Described {
         id: parameter.id(),
@@ -132,6 +132,7 @@ fn described(parameter: &Parameter) -> Described<'_> {
             ParameterKind::Real => "real",
             ParameterKind::Choice => "choice",
             ParameterKind::Text => "text",
+            ParameterKind::File => "file",
         },
         unit: parameter.unit(),
         min: parameter.min(),

@@ -17,6 +17,14 @@ pub struct Location {
     pub line: usize,
 }
 
+impl Location {
+    /// True if it was said in a line of a file, not on a command line. Not real-time.
+    #[must_use]
+    pub fn is_in_a_file(&self) -> bool {
+        self.line > 0
+    }
+}
+
 impl std::fmt::Display for Location {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.line {

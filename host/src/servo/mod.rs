@@ -20,7 +20,7 @@ pub use timing::{Durations, Percentiles, Stage, Timing};
 
 use crate::trace::{Events, TickRecord};
 use flotor_hal::abi::loader::ActiveDevice;
-use flotor_hal::{Cycle, DeviceState, Fault, Tick, Wrench};
+use flotor_hal::{Conditions, Cycle, DeviceState, Fault, Tick, Wrench};
 use timing::STAGE_SAMPLING;
 
 /// Ticks without a new sample after which the force fades to zero: what is older than this is not where the
@@ -111,6 +111,9 @@ impl Servo {
         match self.device.read(tick, &mut self.state) {
             Cycle::Fresh if self.state.is_finite() => {
                 self.stale_ticks = 0;
+                if self.state.conditions.contains(Conditions::SATURATED) {
+                    events.insert(Events::SATURATED);
+                }
                 return TickEnd::Continue;
             }
             Cycle::Fresh => events.insert(Events::NOT_FINITE),

@@ -1,7 +1,27 @@
 //! Mechanical impedance of the hand at the handle, with published values.
 
 use crate::validation::{Check, Domain, number, vector};
-use flotor_hal::glam::DVec3;
+use flotor_hal::glam::{BVec3, DVec3};
+
+/// How a hand holds, by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grip {
+    /// [`Impedance::FIRM`].
+    Firm,
+    /// [`Impedance::RELAXED`].
+    Relaxed,
+}
+
+impl Grip {
+    /// The published values behind the name. Real-time: bounded, no allocation.
+    #[must_use]
+    pub const fn impedance(self) -> Impedance {
+        match self {
+            Self::Firm => Impedance::FIRM,
+            Self::Relaxed => Impedance::RELAXED,
+        }
+    }
+}
 
 /// Spring, damper and mass the hand adds at the handle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +65,14 @@ impl Impedance {
         rotational_damping_nms_per_rad: 0.06,
         mass_kg: 0.5,
     };
+
+    /// The same hand where it means a force instead of a place: no stiffness along the axes of `yielding`.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn yielding(self, yielding: BVec3) -> Self {
+        Self { stiffness_n_per_m: DVec3::select(yielding, DVec3::ZERO, self.stiffness_n_per_m), ..self }
+    }
 
     /// The same hand without inertia. Real-time: bounded, no allocation.
     #[must_use]

@@ -3,8 +3,9 @@
 //! Voluntary movements start and stop smoothly; [`minimum_jerk`] (Flash and Hogan 1985, J. Neurosci. 5:1688)
 //! is the usual curve, and every motion here is built from it and from sines.
 
+use super::{Recording, Script};
 use crate::validation::{Check, Domain, InvalidParameter, number, vector};
-use flotor_hal::glam::{DQuat, DVec3};
+use flotor_hal::glam::{BVec3, DQuat, DVec3};
 use std::f64::consts::TAU;
 
 /// A position and an orientation in the device frame.
@@ -39,19 +40,63 @@ impl Pose {
     }
 }
 
-/// Where the person means the handle to be at one instant, device frame.
+/// What the person means at one instant, device frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aim {
+    /// Where the handle is meant to be.
+    pub pose: Pose,
+    /// Force that is meant beside that, N.
+    pub force_n: DVec3,
+    /// Axes along which a force is meant and no place: the hand has no stiffness there.
+    pub yielding: BVec3,
+}
+
+impl Aim {
+    /// A place and no force. Real-time: bounded, no allocation.
+    #[must_use]
+    pub const fn at(pose: Pose) -> Self {
+        Self { pose, force_n: DVec3::ZERO, yielding: BVec3::FALSE }
+    }
+
+    fn below_home(depth_m: f64) -> Self {
+        Self::at(Pose { position_m: DVec3::new(0.0, 0.0, -depth_m), orientation: DQuat::IDENTITY })
+    }
+}
+
+/// What the hand does to the plant during a piece of time, device frame: the aim drawn straight on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intention {
-    /// Intended position of the handle, m.
+    /// Intended position of the handle at the start, m.
     pub position_m: DVec3,
-    /// Its derivative, m/s.
+    /// Its constant rate, m/s.
     pub velocity_m_per_s: DVec3,
-    /// Intended orientation of the handle; no trajectory turns it.
+    /// Intended orientation of the handle, the same all the time.
     pub orientation: DQuat,
+    /// Rate at which it is meant to turn, which the damping of the hand goes by, rad/s.
+    pub angular_velocity_rad_per_s: DVec3,
+    /// Force that is meant beside that, constant, N.
+    pub force_n: DVec3,
+    /// Axes along which the hand has no stiffness.
+    pub yielding: BVec3,
+}
+
+impl Intention {
+    /// To keep the handle at a pose. Real-time: bounded, no allocation.
+    #[must_use]
+    pub const fn resting(pose: Pose) -> Self {
+        Self {
+            position_m: pose.position_m,
+            velocity_m_per_s: DVec3::ZERO,
+            orientation: pose.orientation,
+            angular_velocity_rad_per_s: DVec3::ZERO,
+            force_n: DVec3::ZERO,
+            yielding: BVec3::FALSE,
+        }
+    }
 }
 
 /// The intended motion of the hand. Times count from the start of the run.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Trajectory {
     /// The hand is off the handle.
     Open,
@@ -85,6 +130,10 @@ pub enum Trajectory {
         /// Time until the full amplitude, s.
         onset_s: f64,
     },
+    /// A sequence of movements from a file, or built in.
+    Scripted(Script),
+    /// What a handle did once, meant again.
+    Recorded(Recording),
 }
 
 impl Trajectory {
@@ -95,34 +144,41 @@ impl Trajectory {
     pub const EXPLORE: Self =
         Self::Oscillate { centre_m: -4.0e-3, amplitude_m: 6.0e-3, frequency_hz: 1.5, onset_s: 1.0 };
 
-    /// The intention at a time since the start of the run, or nothing while the hand is off the handle.
+    /// The aim at a time since the start of the run, or nothing while the hand is off the handle.
     ///
     /// Real-time: bounded, no allocation.
     #[must_use]
-    pub fn intention(&self, time_ns: u64) -> Option<Intention> {
+    pub fn aim(&self, time_ns: u64) -> Option<Aim> {
         let time_s = seconds(time_ns);
-        match *self {
+        match self {
             Self::Open => None,
-            Self::Hold(pose) => Some(Intention::resting(pose)),
+            Self::Hold(pose) => Some(Aim::at(*pose)),
             Self::Press { depth_m, start_s, rise_s } => {
-                let (share, rate_per_s) = minimum_jerk(time_s - start_s, rise_s);
-                Some(Intention::vertical(-depth_m * share, -depth_m * rate_per_s))
+                Some(Aim::below_home(depth_m * minimum_jerk(time_s - start_s, *rise_s)))
             }
-            Self::Release { from, at_ns } => (time_ns < at_ns).then_some(Intention::resting(from)),
+            Self::Release { from, at_ns } => (time_ns < *at_ns).then_some(Aim::at(*from)),
             Self::Oscillate { centre_m, amplitude_m, frequency_hz, onset_s } => {
-                let (share, rate_per_s) = minimum_jerk(time_s, onset_s);
-                let (sin, cos) = (TAU * frequency_hz * time_s).sin_cos();
-                let full_m = centre_m - amplitude_m * sin;
-                let full_m_per_s = -amplitude_m * TAU * frequency_hz * cos;
-                Some(Intention::vertical(share * full_m, rate_per_s * full_m + share * full_m_per_s))
+                let full_m = centre_m - amplitude_m * (TAU * frequency_hz * time_s).sin();
+                Some(Aim::below_home(-minimum_jerk(time_s, *onset_s) * full_m))
             }
+            Self::Scripted(script) => script.aim(time_ns),
+            Self::Recorded(recording) => Some(recording.aim(time_ns)),
+        }
+    }
+
+    /// Every set of axes along which the hand yields at some time. Not real-time.
+    pub(crate) fn yieldings(&self) -> Vec<BVec3> {
+        match self {
+            Self::Scripted(script) => script.yieldings(),
+            _ => vec![BVec3::FALSE],
         }
     }
 
     /// When the hand lets go, if that is planned, ns. Real-time: bounded, no allocation.
     pub(crate) fn release_ns(&self) -> Option<u64> {
-        match *self {
-            Self::Release { at_ns, .. } => Some(at_ns),
+        match self {
+            Self::Release { at_ns, .. } => Some(*at_ns),
+            Self::Scripted(script) => script.release_ns(),
             _ => None,
         }
     }
@@ -132,48 +188,33 @@ impl Trajectory {
     /// # Errors
     /// Names the first offending number.
     pub(super) fn check(&self) -> Check {
-        match *self {
-            Self::Open => Ok(()),
+        match self {
+            // Scripts and recordings were checked where they were read.
+            Self::Open | Self::Scripted(_) | Self::Recorded(_) => Ok(()),
             Self::Hold(pose) | Self::Release { from: pose, .. } => pose.check(),
             Self::Press { depth_m, start_s, rise_s } => {
-                number("press depth_m", depth_m, Domain::Finite)?;
-                number("press start_s", start_s, Domain::Finite)?;
-                number("press rise_s", rise_s, Domain::Positive)
+                number("press depth_m", *depth_m, Domain::Finite)?;
+                number("press start_s", *start_s, Domain::Finite)?;
+                number("press rise_s", *rise_s, Domain::Positive)
             }
             Self::Oscillate { centre_m, amplitude_m, frequency_hz, onset_s } => {
-                number("oscillate centre_m", centre_m, Domain::Finite)?;
-                number("oscillate amplitude_m", amplitude_m, Domain::NotNegative)?;
-                number("oscillate frequency_hz", frequency_hz, Domain::NotNegative)?;
-                number("oscillate onset_s", onset_s, Domain::Positive)
+                number("oscillate centre_m", *centre_m, Domain::Finite)?;
+                number("oscillate amplitude_m", *amplitude_m, Domain::NotNegative)?;
+                number("oscillate frequency_hz", *frequency_hz, Domain::NotNegative)?;
+                number("oscillate onset_s", *onset_s, Domain::Positive)
             }
         }
     }
 }
 
-impl Intention {
-    fn resting(pose: Pose) -> Self {
-        Self { position_m: pose.position_m, velocity_m_per_s: DVec3::ZERO, orientation: pose.orientation }
-    }
-
-    fn vertical(z_m: f64, z_m_per_s: f64) -> Self {
-        Self {
-            position_m: DVec3::new(0.0, 0.0, z_m),
-            velocity_m_per_s: DVec3::new(0.0, 0.0, z_m_per_s),
-            orientation: DQuat::IDENTITY,
-        }
-    }
-}
-
-/// Share (0 to 1) of a minimum-jerk movement done `elapsed_s` after its start, and its rate in 1/s.
+/// Share (0 to 1) of a minimum-jerk movement done `elapsed_s` after its start.
 ///
 /// `10 u^3 - 15 u^4 + 6 u^5` with `u = elapsed / duration` (Flash and Hogan 1985); 0 before and 1 after.
 /// Real-time: bounded, no allocation.
 #[must_use]
-pub fn minimum_jerk(elapsed_s: f64, duration_s: f64) -> (f64, f64) {
+pub fn minimum_jerk(elapsed_s: f64, duration_s: f64) -> f64 {
     let u = (elapsed_s / duration_s).clamp(0.0, 1.0);
-    let share = u * u * u * (10.0 + u * (-15.0 + 6.0 * u));
-    let rate_per_s = 30.0 * u * u * (1.0 - u) * (1.0 - u) / duration_s;
-    (share, rate_per_s)
+    u * u * u * (10.0 + u * (-15.0 + 6.0 * u))
 }
 
 fn seconds(time_ns: u64) -> f64 {
@@ -187,34 +228,21 @@ mod tests {
     const PRESS: Trajectory = Trajectory::Press { depth_m: 4.0e-3, start_s: 0.1, rise_s: 0.5 };
 
     #[test]
-    fn velocity_is_the_derivative_of_position() {
-        let step_ns = 100_000;
-        for trajectory in [PRESS, Trajectory::EXPLORE] {
-            for time_ns in (step_ns..2_000_000_000).step_by(7_700_000) {
-                let at = |t: u64| trajectory.intention(t).expect("held").position_m.z;
-                let central = (at(time_ns + step_ns) - at(time_ns - step_ns)) / (2.0 * seconds(step_ns));
-                let analytic = trajectory.intention(time_ns).expect("held").velocity_m_per_s.z;
-                // Central difference: h^2/6 times the third derivative (at most 60 * 10 mm / (0.5 s)^3 = 5
-                // m/s^3).
-                assert!((central - analytic).abs() < 1.0e-8, "{time_ns}: {central} {analytic}");
-            }
-        }
-    }
-
-    #[test]
     fn a_press_starts_at_home_and_ends_at_its_depth_at_rest() {
-        let at = |t| PRESS.intention(t).expect("held");
-        assert_eq!(at(0).position_m.z, 0.0);
-        assert_eq!(at(100_000_000).velocity_m_per_s.z, 0.0);
-        assert_eq!(at(5_000_000_000).position_m.z, -4.0e-3);
-        assert_eq!(at(5_000_000_000).velocity_m_per_s.z, 0.0);
+        let z_m = |t| PRESS.aim(t).expect("held").pose.position_m.z;
+        assert_eq!(z_m(0), 0.0);
+        assert_eq!(z_m(350_000_000), -2.0e-3, "half of it in half the time");
+        assert_eq!(z_m(5_000_000_000), -4.0e-3);
+        // A minimum-jerk movement starts and ends like the cube of time: 10 u^3 of it a millisecond from its ends.
+        let least_m = 10.0 * (1.0e-3_f64 / 0.5).powi(3) * 4.0e-3;
+        assert!(z_m(101_000_000).abs() <= least_m && (z_m(599_000_000) + 4.0e-3).abs() <= least_m);
     }
 
     #[test]
     fn an_oscillation_starts_at_rest_and_turns_where_it_says() {
-        let z = |t| Trajectory::EXPLORE.intention(t).expect("held").position_m.z;
-        assert_eq!(z(0), 0.0);
-        let turning: Vec<f64> = (3_000_000_000..5_000_000_000).step_by(100_000).map(z).collect();
+        let z_m = |t| Trajectory::EXPLORE.aim(t).expect("held").pose.position_m.z;
+        assert_eq!(z_m(0), 0.0);
+        let turning: Vec<f64> = (3_000_000_000..5_000_000_000).step_by(100_000).map(z_m).collect();
         let lowest = turning.iter().copied().fold(f64::INFINITY, f64::min);
         let highest = turning.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         // Sampling 0.1 ms from the turning point costs A (w t)^2 / 2 = 3e-9 m.
@@ -224,7 +252,7 @@ mod tests {
     #[test]
     fn a_release_holds_until_its_time_and_not_at_it() {
         let release = Trajectory::Release { from: Pose::HOME, at_ns: 1_000 };
-        assert!(release.intention(999).is_some() && release.intention(1_000).is_none());
+        assert!(release.aim(999).is_some() && release.aim(1_000).is_none());
     }
 
     #[test]

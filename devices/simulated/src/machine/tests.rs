@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::actuation::field::FieldError;
+use crate::hand::{Hand, Script, Trajectory};
 use crate::simulation::Setup;
 use flotor_hal::glam::DVec3;
 
@@ -26,7 +27,17 @@ const TRANSPARENT: MachineParameters = MachineParameters {
 
 /// A spring of 1 N/mm on the machine; what the controller saw, tick by tick.
 fn run(parameters: &MachineParameters, seed: u64, ticks: u64) -> (Vec<(Cycle, DeviceState)>, Simulation) {
-    let mut simulation = Simulation::new(&Setup::DEMO).expect("physical setup");
+    run_setup(&Setup::DEMO, parameters, seed, ticks)
+}
+
+/// The same with any flotor and hand.
+fn run_setup(
+    setup: &Setup,
+    parameters: &MachineParameters,
+    seed: u64,
+    ticks: u64,
+) -> (Vec<(Cycle, DeviceState)>, Simulation) {
+    let mut simulation = Simulation::new(setup).expect("physical setup");
     let mut machine = Machine::new(parameters, &State::HOME, seed).expect("physical machine");
     let mut state = DeviceState::HOME;
     let mut commanded = Wrench::ZERO;
@@ -72,6 +83,34 @@ fn the_books_of_energy_close_with_coils_and_cells_in_between() {
     let (_, simulation) = run(&MachineParameters::MAGLEV, 1, 3000);
     let ledger = simulation.ledger();
     assert!(ledger.relative_imbalance() <= 1.0e-9, "{:e}", ledger.relative_imbalance());
+}
+
+#[test]
+fn the_books_of_energy_close_in_every_script() {
+    for name in Script::NAMES {
+        let script = Script::load(name).expect("built in");
+        let ticks = script.end_ns() / TICK_NS + 500;
+        let hand = Hand { trajectory: Trajectory::Scripted(script), ..Hand::EXPLORING };
+        let setup = Setup { hand, ..Setup::DEMO };
+        let (_, simulation) = run_setup(&setup, &MachineParameters::MAGLEV, 1, ticks);
+        let imbalance = simulation.ledger().relative_imbalance();
+        assert!(imbalance <= 1.0e-9, "{name}: {imbalance:e}");
+    }
+}
+
+#[test]
+fn more_than_the_coils_can_give_is_told() {
+    let mut simulation = Simulation::new(&Setup::DEMO).expect("physical setup");
+    let mut machine = Machine::new(&MachineParameters::MAGLEV, &State::HOME, 1).expect("physical machine");
+    let mut state = DeviceState::HOME;
+    let tick = Tick { index: 1, time_ns: TICK_NS, dt_ns: TICK_NS };
+    for (force_n, conditions) in
+        [(10.0, Conditions::NONE), (1000.0, Conditions::SATURATED), (10.0, Conditions::NONE)]
+    {
+        let commanded = Wrench { force_n: DVec3::Z * force_n, torque_nm: DVec3::ZERO };
+        let _ = machine.cycle(&mut simulation, &tick, &commanded, &mut state);
+        assert_eq!(state.conditions, conditions, "{force_n} N");
+    }
 }
 
 #[test]

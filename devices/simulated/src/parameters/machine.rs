@@ -1,5 +1,6 @@
 //! Preset `full`: from values to coils, cells and faults.
 
+use super::{MM, PERCENT, UM};
 use crate::actuation::ActuationParameters;
 use crate::actuation::coils::CoilGeometry;
 use crate::actuation::field::FieldError;
@@ -10,10 +11,6 @@ use crate::sensing::SensingParameters;
 use crate::sensing::optics::OpticsGeometry;
 use crate::sensing::velocity::EstimatorKind;
 use flotor_hal::Settings;
-
-const MM: f64 = 1.0e-3;
-const UM: f64 = 1.0e-6;
-const PERCENT: f64 = 1.0e-2;
 
 /// What stands between controller and flotor; nothing with preset `plain`.
 pub(crate) fn machine(settings: &Settings<'_>) -> Option<MachineParameters> {

@@ -1,5 +1,6 @@
 //! The schema: every parameter with unit, range, default and a sentence.
 
+use crate::hand::Script;
 use crate::plant::FlotorParameters;
 use flotor_hal::Parameter;
 use flotor_hal::abi::Str;
@@ -13,6 +14,17 @@ const FLOTORS: [Str; 2] = [Str::new("thesis"), Str::new("utah")];
 /// What the hand does.
 const HANDS: [Str; 5] =
     [Str::new("oscillate"), Str::new("press"), Str::new("release"), Str::new("hold"), Str::new("open")];
+
+/// Scripts that need no file.
+const SCRIPTS: [Str; Script::NAMES.len()] = {
+    let mut names = [Str::new(""); Script::NAMES.len()];
+    let mut index = 0;
+    while index < names.len() {
+        names[index] = Str::new(Script::NAMES[index]);
+        index += 1;
+    }
+    names
+};
 
 /// How the hand holds.
 const GRIPS: [Str; 2] = [Str::new("firm"), Str::new("relaxed")];
@@ -104,7 +116,38 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "Eddy-current drag on rotation",
     ),
     Parameter::choice("hand", &HANDS, 0, "What the hand does"),
-    Parameter::choice("hand_grip", &GRIPS, 0, "How the hand holds: impedance from the literature"),
+    Parameter::file(
+        "hand_script",
+        &SCRIPTS,
+        "What the hand does, movement by movement: a TOML file or a built-in script; comes before hand",
+    ),
+    Parameter::file(
+        "hand_recording",
+        &[],
+        "What the hand means to do: the path of a handle in a recording (.mcap) or a table (.csv)",
+    ),
+    Parameter::real(
+        "hand_tremor_um",
+        "µm",
+        0.0,
+        1000.0,
+        0.0,
+        "Tremor of the hand along each axis at 8 to 12 Hz, rms (15 to 250 in a braced hand)",
+    ),
+    Parameter::real(
+        "hand_force_noise_percent",
+        "%",
+        0.0,
+        50.0,
+        0.0,
+        "Noise of the forces a script pushes with, rms (3 to 5 in people)",
+    ),
+    Parameter::choice(
+        "hand_grip",
+        &GRIPS,
+        0,
+        "How the hand holds: impedance from the literature; unless set, as the script says",
+    ),
     Parameter::real(
         "hand_stiffness_n_per_m",
         "N/m",

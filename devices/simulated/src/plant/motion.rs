@@ -107,12 +107,21 @@ pub(super) struct Contact {
     pub(super) pace_m_per_s: DVec3,
     /// Intended orientation.
     pub(super) intended_orientation: DQuat,
+    /// Its rate, device frame, rad/s.
+    pub(super) turning_rad_per_s: DVec3,
+    /// Intended force at the origin, device frame, N.
+    pub(super) force_n: DVec3,
 }
 
 impl Contact {
     /// Stands in where no hand holds the flotor (the impedance is zero then).
-    pub(super) const NONE: Self =
-        Self { intended_m: DVec3::ZERO, pace_m_per_s: DVec3::ZERO, intended_orientation: DQuat::IDENTITY };
+    pub(super) const NONE: Self = Self {
+        intended_m: DVec3::ZERO,
+        pace_m_per_s: DVec3::ZERO,
+        intended_orientation: DQuat::IDENTITY,
+        turning_rad_per_s: DVec3::ZERO,
+        force_n: DVec3::ZERO,
+    };
 
     /// Of a hand with an intention. Real-time: bounded, no allocation.
     pub(super) fn with(intention: &Intention) -> Self {
@@ -120,6 +129,8 @@ impl Contact {
             intended_m: intention.position_m,
             pace_m_per_s: intention.velocity_m_per_s,
             intended_orientation: intention.orientation,
+            turning_rad_per_s: intention.angular_velocity_rad_per_s,
+            force_n: intention.force_n,
         }
     }
 

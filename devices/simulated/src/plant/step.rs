@@ -72,6 +72,7 @@ impl<'a> Step<'a> {
     ) -> Self {
         let hand = &body.hand;
         let pull = coils.force_n
+            + contact.force_n
             + hand.stiffness_n_per_m * (contact.intended_m - start.position_m)
             + hand.damping_ns_per_m * contact.pace_m_per_s;
         let yank = hand.stiffness_n_per_m * contact.pace_m_per_s;
@@ -104,7 +105,8 @@ impl<'a> Step<'a> {
     fn is_balanced(&self, drive: &Drive) -> bool {
         let (body, start) = (self.body, self.start);
         let twisted = body.hand.rotational_stiffness_nm_per_rad != 0.0
-            && start.orientation != self.contact.intended_orientation;
+            && start.orientation != self.contact.intended_orientation
+            || self.contact.turning_rad_per_s != DVec3::ZERO;
         if start.spin_rad_per_s != DVec3::ZERO || self.coils.torque_nm != DVec3::ZERO || twisted {
             return false;
         }
@@ -185,7 +187,9 @@ impl<'a> Step<'a> {
             - body.hand.stiffness_n_per_m * moved
             - body.damping_ns_per_m * velocity;
         let back = rotation::misalignment_rad(at.orientation, self.contact.intended_orientation)
-            * body.hand.rotational_stiffness_nm_per_rad;
+            * body.hand.rotational_stiffness_nm_per_rad
+            + swing.attitude.transpose()
+                * (self.contact.turning_rad_per_s * body.hand.rotational_damping_nms_per_rad);
         let torque = swing.attitude.transpose() * (self.coils.torque_nm - swing.arm.cross(force)) + back
             - at.spin * body.rotational_damping_nms_per_rad;
         let remainder =
@@ -248,7 +252,7 @@ impl<'a> Step<'a> {
         }
     }
 
-    /// Work of the hand's spring, damper and mass on a translation, J.
+    /// Work of the hand's force, spring, damper and mass on a translation, J.
     #[inline(always)]
     fn hand_work_j(&self, drive: &Drive, end: &Motion, moved: DVec3, velocity2: DVec3) -> f64 {
         let (hand, h) = (&self.body.hand, self.grid.step_s);
@@ -264,7 +268,7 @@ impl<'a> Step<'a> {
         let inertia_j = 0.5
             * hand.mass_kg
             * (end.velocity_m_per_s.length_squared() - self.start.velocity_m_per_s.length_squared());
-        spring_j + damper_j - inertia_j
+        spring_j + damper_j - inertia_j + self.contact.force_n.dot(moved)
     }
 }
 

@@ -30,8 +30,7 @@ const NO_IMPEDANCE: Impedance = Impedance {
     mass_kg: 0.0,
 };
 
-const HOME_INTENTION: Intention =
-    Intention { position_m: DVec3::ZERO, velocity_m_per_s: DVec3::ZERO, orientation: DQuat::IDENTITY };
+const HOME_INTENTION: Intention = Intention::resting(Pose::HOME);
 
 fn plant(flotor: &FlotorParameters, impedance: &Impedance, state: &State) -> Plant {
     Plant::new(flotor, impedance, state, MILLISECOND_NS).expect("physical parameters")

@@ -1,7 +1,7 @@
 //! Whole runs: energy, splitting of ticks, release, totality.
 
 use super::*;
-use crate::hand::{Impedance, Pose};
+use crate::hand::{Impedance, Pose, Script, Unsteadiness};
 use crate::plant::FeedForward;
 use flotor_hal::glam::{DQuat, DVec3};
 
@@ -10,7 +10,9 @@ const MILLISECOND_NS: u64 = 1_000_000;
 /// Stiffness of spring 1 of the thesis at the handle, N/m (gamma / V = 16.97 N / 15 mm).
 const SPRING_1_N_PER_M: f64 = 16.97 / 15.0e-3;
 
-const FREE: Setup = Setup { hand: Hand::AWAY, ..Setup::DEMO };
+fn free() -> Setup {
+    Setup { hand: Hand::AWAY, ..Setup::DEMO }
+}
 
 const LOWERED: State = State { position_m: DVec3::new(0.0, 0.0, -2.0e-3), ..State::HOME };
 
@@ -38,29 +40,34 @@ fn simulation(setup: &Setup) -> Simulation {
 
 #[test]
 fn energy_balances_in_every_kind_of_run() {
-    let hand = |impedance, trajectory| Hand { impedance, trajectory };
+    let hand = |impedance, trajectory| Hand { impedance, trajectory, ..Hand::EXPLORING };
     let press = Trajectory::Press { depth_m: 6.0e-3, start_s: 0.2, rise_s: 0.4 };
     let hold = Trajectory::Hold(pose(&askew()));
     let release = Trajectory::Release { from: pose(&askew()), at_ns: 700_300_000 };
     let heavy = FlotorParameters { feed_forward: FeedForward::Force(5.0), ..FlotorParameters::UTAH };
-    let demo = Setup::DEMO;
     let runs = [
-        ("released from 2 mm", Setup { start: LOWERED, ..FREE }),
-        ("released askew", Setup { start: askew(), ..FREE }),
-        ("released askew, eccentric", Setup { start: askew(), flotor: FlotorParameters::UTAH, ..FREE }),
-        ("exploring", demo),
-        ("exploring, eccentric", Setup { flotor: FlotorParameters::UTAH, ..demo }),
-        ("exploring, not compensated", Setup { flotor: heavy, ..demo }),
-        ("exploring at 100 Hz", Setup { tick_ns: 10 * MILLISECOND_NS, ..demo }),
-        ("exploring at 3 kHz", Setup { tick_ns: 333_333, ..demo }),
-        ("pressed by a relaxed hand", Setup { hand: hand(Impedance::RELAXED, press), ..demo }),
-        ("pressed, gripped askew", Setup { hand: hand(Impedance::FIRM, press), start: askew(), ..demo }),
-        ("held askew", Setup { hand: hand(Impedance::FIRM, hold), ..demo }),
+        ("released from 2 mm", Setup { start: LOWERED, ..free() }),
+        ("released askew", Setup { start: askew(), ..free() }),
+        ("released askew, eccentric", Setup { start: askew(), flotor: FlotorParameters::UTAH, ..free() }),
+        ("exploring", Setup::DEMO),
+        ("exploring, eccentric", Setup { flotor: FlotorParameters::UTAH, ..Setup::DEMO }),
+        ("exploring, not compensated", Setup { flotor: heavy, ..Setup::DEMO }),
+        ("exploring at 100 Hz", Setup { tick_ns: 10 * MILLISECOND_NS, ..Setup::DEMO }),
+        ("exploring at 3 kHz", Setup { tick_ns: 333_333, ..Setup::DEMO }),
+        ("pressed by a relaxed hand", Setup { hand: hand(Impedance::RELAXED, press.clone()), ..Setup::DEMO }),
+        (
+            "pressed, gripped askew",
+            Setup { hand: hand(Impedance::FIRM, press), start: askew(), ..Setup::DEMO },
+        ),
+        ("held askew", Setup { hand: hand(Impedance::FIRM, hold), ..Setup::DEMO }),
         (
             "let go by a hand without mass",
-            Setup { hand: hand(Impedance::RELAXED.massless(), release), ..demo },
+            Setup { hand: hand(Impedance::RELAXED.massless(), release.clone()), ..Setup::DEMO },
         ),
-        ("let go by a hand with mass", Setup { hand: hand(Impedance::FIRM, release), flotor: heavy, ..demo }),
+        (
+            "let go by a hand with mass",
+            Setup { hand: hand(Impedance::FIRM, release), flotor: heavy, ..Setup::DEMO },
+        ),
     ];
     for (name, setup) in runs {
         let mut simulation = simulation(&setup);
@@ -76,9 +83,81 @@ fn energy_balances_in_every_kind_of_run() {
     }
 }
 
+/// A built-in script, done by a trembling hand.
+fn scripted(name: &str) -> Setup {
+    let script = Script::load(name).expect("built in");
+    let impedance = script.grip().expect("it says").impedance();
+    let unsteadiness = Unsteadiness { tremor_m: 50.0e-6, force_share: 0.04 };
+    let hand = Hand { impedance, trajectory: Trajectory::Scripted(script), unsteadiness };
+    Setup { hand, seed: 7, ..Setup::DEMO }
+}
+
+#[test]
+fn energy_balances_in_every_script() {
+    for name in Script::NAMES {
+        for flotor in [FlotorParameters::THESIS, FlotorParameters::UTAH] {
+            let setup = Setup { flotor, ..scripted(name) };
+            let mut simulation = simulation(&setup);
+            let mut worst_j: f64 = 0.0;
+            for _ in 0..9000 {
+                let coils = spring(&simulation.state(), SPRING_1_N_PER_M, 1.0);
+                assert!(simulation.advance(MILLISECOND_NS, coils).is_empty(), "{name}");
+                worst_j = worst_j.max(simulation.ledger().imbalance_j().abs());
+            }
+            let peak_j = simulation.ledger().peak_j();
+            assert!(worst_j <= 1.0e-9 * peak_j, "{name}: {worst_j:e} J of {peak_j:e} J");
+        }
+    }
+}
+
+#[test]
+fn scripts_do_to_the_handle_what_their_names_say() {
+    /// Largest displacement (mm) along and rotation (degrees) about each axis.
+    fn reach(name: &str) -> (DVec3, DVec3) {
+        let setup =
+            Setup { hand: Hand { unsteadiness: Unsteadiness::NONE, ..scripted(name).hand }, ..Setup::DEMO };
+        let mut simulation = simulation(&setup);
+        let (mut moved_m, mut turned_rad) = (DVec3::ZERO, DVec3::ZERO);
+        for _ in 0..8000 {
+            let coils = spring(&simulation.state(), SPRING_1_N_PER_M, 1.0);
+            simulation.advance(MILLISECOND_NS, coils);
+            assert_eq!(simulation.sensor_range(), SensorRange::Inside, "{name}");
+            moved_m = moved_m.max(simulation.state().position_m.abs());
+            turned_rad = turned_rad.max(Pose::HOME.rotation_to(&pose(&simulation.state())).abs());
+        }
+        (moved_m * 1.0e3, turned_rad.map(f64::to_degrees))
+    }
+    // A firm hand gets 64 % of the way against this spring (2000 of 2000 + 1131 N/m), and overshoots a little.
+    assert!((3.0..5.0).contains(&reach("press").0.z));
+    assert!(reach("hold").0.z < 0.7, "a relaxed hand of 135 N/m gets a ninth of the way");
+    assert!(reach("release").0.z > 2.0);
+    let (sheared_mm, _) = reach("shear");
+    assert!(sheared_mm.x > 1.5 && sheared_mm.y > 1.5 && sheared_mm.z > 1.0, "{sheared_mm}");
+    let (_, tilted_deg) = reach("tilt");
+    assert!(tilted_deg.x > 2.0 && tilted_deg.y > 2.0, "{tilted_deg}");
+    assert!((0.5..3.0).contains(&reach("tap").0.z));
+    // 5 N on 1131 N/m are 4.4 mm; the damping of the hand takes some.
+    assert!((2.0..6.0).contains(&reach("push").0.z), "{}", reach("push").0.z);
+}
+
+#[test]
+fn a_pushing_hand_gives_the_force_it_means() {
+    let script =
+        Script::parse("push", "[[step]]\npush = { force_n = [0, 0, -4], frequency_hz = 0.05, pulses = 1 }\n");
+    let hand = Hand { trajectory: Trajectory::Scripted(script.expect("a script")), ..Hand::EXPLORING };
+    let mut simulation = simulation(&Setup { hand, ..Setup::DEMO });
+    for _ in 0..10_000 {
+        let coils = spring(&simulation.state(), SPRING_1_N_PER_M, 0.0);
+        simulation.advance(MILLISECOND_NS, coils);
+    }
+    // At the peak of a pulse of twenty seconds: the spring holds the force; what inertia (w^2 m x) adds is 1e-4.
+    let held_n = -simulation.state().position_m.z * SPRING_1_N_PER_M;
+    assert!((held_n / 4.0 - 1.0).abs() < 1.0e-3, "{held_n} N");
+}
+
 #[test]
 fn energy_balances_to_rounding_when_nothing_turns() {
-    for setup in [Setup { start: LOWERED, ..FREE }, Setup::DEMO] {
+    for setup in [Setup { start: LOWERED, ..free() }, Setup::DEMO] {
         let mut simulation = simulation(&setup);
         for _ in 0..3000 {
             let coils = spring(&simulation.state(), SPRING_1_N_PER_M, 0.0);
@@ -93,7 +172,7 @@ fn energy_balances_to_rounding_when_nothing_turns() {
 
 #[test]
 fn released_from_two_millimetres_it_swings_at_the_damped_frequency() {
-    let mut simulation = simulation(&Setup { start: LOWERED, ..FREE });
+    let mut simulation = simulation(&Setup { start: LOWERED, ..free() });
     let FlotorParameters { mass_kg, drag, .. } = simulation.setup().flotor;
     let half_damping_per_s = 0.5 * drag.translational_ns_per_m / mass_kg;
     let expected_hz =
@@ -165,15 +244,17 @@ fn where_time_is_cut_makes_no_difference() {
         from: Pose { position_m: LOWERED.position_m, ..Pose::HOME },
         at_ns: 77_777_777,
     };
-    let let_go = Setup { hand: Hand { impedance: Impedance::FIRM, trajectory: release }, ..Setup::DEMO };
+    let let_go = Setup { hand: Hand { trajectory: release, ..Hand::EXPLORING }, ..Setup::DEMO };
     let millimetre_m = 1.0e-3;
     for (setup, coils, tolerance) in [
         // Translation: rounding of a few hundred steps.
         (Setup::DEMO, coils, 1.0e-13),
-        (let_go, coils, 1.0e-13),
+        (let_go.clone(), coils, 1.0e-13),
         // Rotation: the Runge-Kutta error of the coarser cuts.
         (Setup { flotor: FlotorParameters::UTAH, ..Setup::DEMO }, turning, 1.0e-8),
         (Setup { flotor: FlotorParameters::UTAH, ..let_go }, turning, 1.0e-8),
+        (scripted("tilt"), turning, 1.0e-8),
+        (scripted("tap"), coils, 1.0e-8),
     ] {
         let uniform: Vec<u64> = (1..=200).map(|tick| tick * MILLISECOND_NS).collect();
         let in_two = [99 * MILLISECOND_NS, 198 * MILLISECOND_NS, 200 * MILLISECOND_NS];
@@ -245,7 +326,7 @@ fn a_tick_as_long_as_time_itself_is_cut_short() {
 
 #[test]
 fn pushed_out_of_range_the_sensors_say_so() {
-    let mut simulation = simulation(&FREE);
+    let mut simulation = simulation(&free());
     assert_eq!(simulation.sensor_range(), SensorRange::Inside);
     let coils = Wrench { force_n: DVec3::new(5.0, 0.0, 0.0), torque_nm: DVec3::ZERO };
     for _ in 0..200 {
@@ -256,14 +337,14 @@ fn pushed_out_of_range_the_sensors_say_so() {
 
 #[test]
 fn a_new_hand_takes_over_without_a_jump() {
-    let mut simulation = simulation(&FREE);
+    let mut simulation = simulation(&free());
     for _ in 0..100 {
         simulation.advance(MILLISECOND_NS, Wrench { force_n: DVec3::Z, torque_nm: DVec3::ZERO });
     }
     let before = simulation.state();
     simulation.set_hand(Hand::EXPLORING).expect("a physical hand");
     assert_eq!((simulation.state(), simulation.time_ns()), (before, 100 * MILLISECOND_NS));
-    assert!(simulation.intention().is_some());
+    assert!(simulation.aim().is_some());
     let impossible = Impedance { mass_kg: -1.0, ..Impedance::FIRM };
     assert!(simulation.set_hand(Hand { impedance: impossible, ..Hand::EXPLORING }).is_err());
     assert_eq!(simulation.setup().hand, Hand::EXPLORING, "a refused hand changes nothing");

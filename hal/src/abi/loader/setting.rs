@@ -63,7 +63,9 @@ impl Setting {
     pub fn parse(schema: &'static [Parameter], id: &str, value: &str) -> Result<Self, SettingError> {
         let (index, parameter) = find(schema, id)?;
         match parameter.kind() {
-            ParameterKind::Text => Ok(Self { index, number: 0.0, text: value.to_owned() }),
+            ParameterKind::Text | ParameterKind::File => {
+                Ok(Self { index, number: 0.0, text: value.to_owned() })
+            }
             ParameterKind::Choice => {
                 let names = parameter.choices();
                 let choice = names.iter().position(|name| name.as_str() == value);
@@ -106,7 +108,7 @@ impl Setting {
         self.index as usize
     }
 
-    /// The number (for a choice, its index; 0 for text).
+    /// The number (for a choice, its index; 0 for texts and files).
     #[must_use]
     pub fn value(&self) -> f64 {
         self.number
@@ -118,7 +120,7 @@ impl Setting {
     pub fn display(&self, schema: &'static [Parameter]) -> String {
         let Some(parameter) = schema.get(self.index()) else { return String::new() };
         match parameter.kind() {
-            ParameterKind::Text => self.text.clone(),
+            ParameterKind::Text | ParameterKind::File => self.text.clone(),
             ParameterKind::Choice => {
                 parameter.choices().get(self.number as usize).map_or("", Str::as_str).to_owned()
             }

@@ -1,0 +1,139 @@
+//! A trajectory that was recorded once, meant again: what a real hand did drives the simulated one.
+//!
+//! Two kinds of file are read. A recording of a run (`.mcap`) holds the pose of the handle at every tick. Any other
+//! file is a table of comma-separated values with a header:
+//!
+//! ```text
+//! time_s,x_m,y_m,z_m                      or      time_s,x_m,y_m,z_m,rx_rad,ry_rad,rz_rad
+//! ```
+//!
+//! in the device frame, rotation as a rotation vector. Times grow from row to row and count from the first; in
+//! between, the hand aims along straight lines. Before the first and after the last row it stays.
+
+mod mcap_file;
+mod table;
+
+use super::{Aim, Pose};
+use flotor_hal::glam::{DQuat, DVec3};
+use std::fmt;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Largest file read, bytes: hours of a run.
+const MAX_BYTES: u64 = 1 << 30;
+/// Farthest position a handle can have had, m: ten times the range of the device.
+const FARTHEST_M: f64 = 0.12;
+
+/// A recorded trajectory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording(Arc<[Sample]>);
+
+/// Where the handle was.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Sample {
+    /// Since the first sample.
+    time_ns: u64,
+    pose: Pose,
+}
+
+/// What is wrong with a recorded trajectory. Prints file, place, and what would be right.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecordingError {
+    /// The file.
+    pub file: String,
+    /// Place in it (a line, a message) and problem.
+    pub problem: String,
+}
+
+impl fmt::Display for RecordingError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.file, self.problem)
+    }
+}
+
+impl std::error::Error for RecordingError {}
+
+impl Recording {
+    /// Reads a file. Not real-time.
+    ///
+    /// # Errors
+    /// [`RecordingError`] if it cannot be read or is no trajectory.
+    pub fn load(path: &Path) -> Result<Self, RecordingError> {
+        let wrong = |problem: String| RecordingError { file: path.display().to_string(), problem };
+        let size = std::fs::metadata(path).map_err(|error| wrong(format!("cannot be read: {error}")))?;
+        if !size.is_file() || size.len() > MAX_BYTES {
+            return Err(wrong(format!("is no recording: that is a file of at most {MAX_BYTES} bytes")));
+        }
+        let bytes = std::fs::read(path).map_err(|error| wrong(format!("cannot be read: {error}")))?;
+        let is_recording = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"));
+        let samples = if is_recording { mcap_file::read(&bytes) } else { table::read(&bytes) };
+        samples.and_then(Self::new).map_err(wrong)
+    }
+
+    /// Samples in order of time, of which there is at least one.
+    fn new(samples: Vec<Sample>) -> Result<Self, String> {
+        if samples.is_empty() {
+            return Err("holds no pose".to_owned());
+        }
+        Ok(Self(samples.into()))
+    }
+
+    /// When the last sample was taken, ns since the first. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn end_ns(&self) -> u64 {
+        self.0.last().map_or(0, |sample| sample.time_ns)
+    }
+
+    /// The aim at a time since the start of the run. Real-time: bounded, no allocation.
+    pub(super) fn aim(&self, time_ns: u64) -> Aim {
+        let passed = self.0.partition_point(|sample| sample.time_ns <= time_ns);
+        let (before, after) = (self.0.get(passed.saturating_sub(1)), self.0.get(passed));
+        Aim::at(match (before, after) {
+            (Some(before), Some(after)) => before.toward(after, time_ns),
+            (Some(only), None) | (None, Some(only)) => only.pose,
+            (None, None) => Pose::HOME,
+        })
+    }
+}
+
+impl Sample {
+    /// A sample `time_s` (s) after the first whose pose is one a handle can have.
+    fn new(time_s: f64, position_m: DVec3, orientation: DQuat) -> Result<Self, String> {
+        let pose = Pose { position_m, orientation };
+        // Written so that NaN is refused.
+        if !(0.0..=1.0e6).contains(&time_s) {
+            return Err(format!("time {time_s} s is outside 0 to 1000000 s after the first"));
+        }
+        pose.check().map_err(|error| error.to_string())?;
+        let inside = position_m.abs().max_element() <= FARTHEST_M;
+        let far = || format!("({position_m}) m is farther out than {FARTHEST_M} m; are these millimetres?");
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked above
+        inside.then_some(Self { time_ns: (time_s * 1.0e9).round() as u64, pose }).ok_or_else(far)
+    }
+
+    /// Appends a sample if it is later than the last.
+    fn append_to(self, samples: &mut Vec<Self>) -> Result<(), String> {
+        match samples.last() {
+            Some(last) if self.time_ns <= last.time_ns => {
+                Err(format!("time {} ns is not after {} ns", self.time_ns, last.time_ns))
+            }
+            _ => {
+                samples.push(self);
+                Ok(())
+            }
+        }
+    }
+
+    /// The pose on the way to a later sample.
+    fn toward(&self, later: &Self, time_ns: u64) -> Pose {
+        let whole_ns = (later.time_ns - self.time_ns) as f64;
+        let share = (time_ns.saturating_sub(self.time_ns) as f64 / whole_ns).min(1.0);
+        Pose {
+            position_m: self.pose.position_m + (later.pose.position_m - self.pose.position_m) * share,
+            orientation: self.pose.orientation.lerp(later.pose.orientation, share),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

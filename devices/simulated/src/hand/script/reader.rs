@@ -1,0 +1,355 @@
+//! From the text of a script to its legs: every number checked, every complaint with file, line and key.
+
+use super::{Grip, Leg, Movement, Place, Script};
+use flotor_hal::glam::DVec3;
+use serde::Deserialize;
+use std::fmt;
+use std::ops::Range;
+use std::path::Path;
+
+/// Largest script read, bytes: a person writes a few hundred.
+const MAX_BYTES: u64 = 1 << 20;
+/// Most movements of a script, repetitions included.
+const MAX_LEGS: usize = 10_000;
+/// Longest movement, s.
+const LONGEST_S: f64 = 3600.0;
+/// Shortest movement, s: below that it is a blow, not a movement.
+const SHORTEST_S: f64 = 0.01;
+/// Farthest place to aim at along each axis, mm. A relaxed hand aims deep into what it presses.
+const FARTHEST_MM: f64 = 100.0;
+/// Largest rotation to aim at about each axis, degrees.
+const MOST_TURNED_DEG: f64 = 45.0;
+/// Largest force to mean along each axis, N.
+const STRONGEST_N: f64 = 100.0;
+/// Most pulses of force in a row.
+const MOST_PULSES: u32 = 100;
+/// Slowest repetition, Hz.
+const SLOWEST_HZ: f64 = 0.05;
+/// Fastest repetition, Hz: twice what a hand can do (about 10 Hz).
+const FASTEST_HZ: f64 = 20.0;
+
+/// What is wrong with a script. Prints file, line, key, and what would be right.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ScriptError {
+    /// The file, or the name of a built-in script.
+    pub file: String,
+    /// Line, from 1; 0 where it is about the file as a whole.
+    pub line: usize,
+    /// Key and problem.
+    pub problem: String,
+}
+
+impl fmt::Display for ScriptError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.line {
+            0 => write!(f, "{}: {}", self.file, self.problem),
+            line => write!(f, "{}:{line}: {}", self.file, self.problem),
+        }
+    }
+}
+
+impl std::error::Error for ScriptError {}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ScriptText {
+    #[serde(default, rename = "title")]
+    _title: String,
+    grip: Option<GripText>,
+    #[serde(default)]
+    repeat: Repeat,
+    step: Vec<StepText>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum GripText {
+    Firm,
+    Relaxed,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum StepText {
+    Move(MoveText),
+    Hold(HoldText),
+    Oscillate(OscillateText),
+    Push(PushText),
+    Release(ReleaseText),
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MoveText {
+    to_mm: Option<Lengths>,
+    to_deg: Option<Angles>,
+    duration_s: Duration,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct HoldText {
+    duration_s: Duration,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OscillateText {
+    amplitude_mm: Option<Lengths>,
+    amplitude_deg: Option<Angles>,
+    frequency_hz: Frequency,
+    duration_s: Duration,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PushText {
+    force_n: Forces,
+    frequency_hz: Frequency,
+    pulses: Pulses,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ReleaseText {}
+
+/// How often the sequence is run through.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(try_from = "i64")]
+struct Repeat(usize);
+
+impl Default for Repeat {
+    fn default() -> Self {
+        Self(1)
+    }
+}
+
+impl TryFrom<i64> for Repeat {
+    type Error = String;
+
+    fn try_from(times: i64) -> Result<Self, String> {
+        let usable = usize::try_from(times).ok().filter(|times| (1..=MAX_LEGS).contains(times));
+        usable.map(Self).ok_or_else(|| format!("{times} is outside 1 to {MAX_LEGS}"))
+    }
+}
+
+/// A time, s.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(try_from = "f64")]
+struct Duration(f64);
+
+impl TryFrom<f64> for Duration {
+    type Error = String;
+
+    fn try_from(seconds: f64) -> Result<Self, String> {
+        within(seconds, SHORTEST_S, LONGEST_S, "s").map(Self)
+    }
+}
+
+impl Duration {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // between 10 ms and an hour
+    fn nanoseconds(self) -> u64 {
+        (self.0 * 1.0e9).round() as u64
+    }
+}
+
+/// Repetitions a second, Hz.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(try_from = "f64")]
+struct Frequency(f64);
+
+impl TryFrom<f64> for Frequency {
+    type Error = String;
+
+    fn try_from(hertz: f64) -> Result<Self, String> {
+        within(hertz, SLOWEST_HZ, FASTEST_HZ, "Hz").map(Self)
+    }
+}
+
+/// Number of pulses.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(try_from = "i64")]
+struct Pulses(u32);
+
+impl TryFrom<i64> for Pulses {
+    type Error = String;
+
+    fn try_from(count: i64) -> Result<Self, String> {
+        let usable = u32::try_from(count).ok().filter(|count| (1..=MOST_PULSES).contains(count));
+        usable.map(Self).ok_or_else(|| format!("{count} is outside 1 to {MOST_PULSES}"))
+    }
+}
+
+/// Lengths along x, y, z in mm.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(try_from = "[f64; 3]")]
+struct Lengths(DVec3);
+
+impl TryFrom<[f64; 3]> for Lengths {
+    type Error = String;
+
+    fn try_from(millimetres: [f64; 3]) -> Result<Self, String> {
+        three(millimetres, FARTHEST_MM, "mm").map(Self)
+    }
+}
+
+impl Lengths {
+    fn metres(self) -> DVec3 {
+        self.0 * 1.0e-3
+    }
+}
+
+/// A rotation vector in degrees.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(try_from = "[f64; 3]")]
+struct Angles(DVec3);
+
+impl TryFrom<[f64; 3]> for Angles {
+    type Error = String;
+
+    fn try_from(degrees: [f64; 3]) -> Result<Self, String> {
+        three(degrees, MOST_TURNED_DEG, "degrees").map(Self)
+    }
+}
+
+impl Angles {
+    fn radians(self) -> DVec3 {
+        self.0.map(f64::to_radians)
+    }
+}
+
+/// Forces along x, y, z in N.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(try_from = "[f64; 3]")]
+struct Forces(DVec3);
+
+impl TryFrom<[f64; 3]> for Forces {
+    type Error = String;
+
+    fn try_from(newtons: [f64; 3]) -> Result<Self, String> {
+        three(newtons, STRONGEST_N, "N").map(Self)
+    }
+}
+
+fn within(number: f64, least: f64, most: f64, unit: &str) -> Result<f64, String> {
+    // Written so that NaN is refused too.
+    if number >= least && number <= most {
+        Ok(number)
+    } else {
+        Err(format!("{number} is outside {least} to {most} {unit}"))
+    }
+}
+
+fn three(numbers: [f64; 3], most: f64, unit: &str) -> Result<DVec3, String> {
+    numbers.iter().try_for_each(|number| within(*number, -most, most, unit).map(|_| ()))?;
+    Ok(DVec3::from_array(numbers))
+}
+
+/// Reads a script file.
+pub(super) fn read_file(path: &Path) -> Result<Script, ScriptError> {
+    let file = path.display().to_string();
+    let wrong = |problem: String| ScriptError { file: file.clone(), line: 0, problem };
+    let names = Script::NAMES.join(", ");
+    let size = std::fs::metadata(path).map_err(|error| {
+        wrong(format!("cannot be read: {error}; a script is a TOML file or one of {names}"))
+    })?;
+    if !size.is_file() || size.len() > MAX_BYTES {
+        return Err(wrong(format!("is no script: that is a TOML file of at most {MAX_BYTES} bytes")));
+    }
+    let text = std::fs::read_to_string(path).map_err(|error| wrong(format!("cannot be read: {error}")))?;
+    read(&file, &text)
+}
+
+/// Reads a script from its text.
+pub(super) fn read(file: &str, text: &str) -> Result<Script, ScriptError> {
+    let script: ScriptText = toml::from_str(text).map_err(|error| {
+        let message = error.message().lines().next().unwrap_or("not valid TOML");
+        complaint(file, text, error.span(), message)
+    })?;
+    let whole = |problem: String| ScriptError { file: file.to_owned(), line: 0, problem };
+    let count = script.step.len().saturating_mul(script.repeat.0);
+    if script.step.is_empty() {
+        return Err(whole("`step` is empty: a script is at least one [[step]]".to_owned()));
+    }
+    if count > MAX_LEGS {
+        return Err(whole(format!("{count} movements, `repeat` included; at most {MAX_LEGS} are possible")));
+    }
+    let releases = script.step.iter().position(|step| matches!(step, StepText::Release(_)));
+    if let Some(index) = releases
+        && (index + 1 < script.step.len() || script.repeat.0 > 1)
+    {
+        return Err(whole(format!(
+            "[[step]] {} is `release`, which opens the hand for good: make it the last, without `repeat`",
+            index + 1
+        )));
+    }
+    Ok(laid_out(&script, count))
+}
+
+/// Puts one movement after the other.
+fn laid_out(script: &ScriptText, count: usize) -> Script {
+    let (mut from, mut start_ns) = (Place::HOME, 0);
+    let mut legs = Vec::with_capacity(count);
+    let mut release_ns = None;
+    for step in script.step.iter().cycle().take(count) {
+        let Some((movement, duration)) = movement(step, &from) else {
+            release_ns = Some(start_ns);
+            break;
+        };
+        let leg = Leg { start_ns, duration_ns: duration.nanoseconds(), from, movement };
+        (from, start_ns) = (leg.end(), leg.start_ns + leg.duration_ns);
+        legs.push(leg);
+    }
+    let grip = script.grip.map(|grip| match grip {
+        GripText::Firm => Grip::Firm,
+        GripText::Relaxed => Grip::Relaxed,
+    });
+    Script { grip, legs: legs.into(), release_ns }
+}
+
+/// What a step does from a place on, and for how long; nothing if it opens the hand.
+fn movement(step: &StepText, from: &Place) -> Option<(Movement, Duration)> {
+    let zero = DVec3::ZERO;
+    Some(match step {
+        StepText::Move(MoveText { to_mm, to_deg, duration_s }) => {
+            let to = Place {
+                position_m: to_mm.map_or(from.position_m, Lengths::metres),
+                rotation_rad: to_deg.map_or(from.rotation_rad, Angles::radians),
+            };
+            (Movement::Move { to }, *duration_s)
+        }
+        StepText::Hold(HoldText { duration_s }) => (Movement::Hold, *duration_s),
+        StepText::Oscillate(OscillateText { amplitude_mm, amplitude_deg, frequency_hz, duration_s }) => {
+            let amplitude = Place {
+                position_m: amplitude_mm.map_or(zero, Lengths::metres),
+                rotation_rad: amplitude_deg.map_or(zero, Angles::radians),
+            };
+            (Movement::Oscillate { amplitude, frequency_hz: frequency_hz.0 }, *duration_s)
+        }
+        StepText::Push(PushText { force_n, frequency_hz, pulses }) => {
+            // Whole pulses, so that the force ends as it began.
+            let duration = Duration(f64::from(pulses.0) / frequency_hz.0);
+            (Movement::Push { force_n: force_n.0, frequency_hz: frequency_hz.0 }, duration)
+        }
+        StepText::Release(ReleaseText {}) => return None,
+    })
+}
+
+/// A complaint about a place in the text: its line, and the key that stands before it.
+fn complaint(file: &str, text: &str, span: Option<Range<usize>>, message: &str) -> ScriptError {
+    let before = text.get(..span.map_or(0, |span| span.start)).unwrap_or(text);
+    let line = before.matches('\n').count() + 1;
+    let key = before.rsplit('\n').next().and_then(key_of_the_value);
+    let key = key.filter(|key| !message.contains(&format!("`{key}`")));
+    let problem = key.map_or_else(|| message.to_owned(), |key| format!("`{key}`: {message}"));
+    ScriptError { file: file.to_owned(), line, problem }
+}
+
+/// The key in front of a value, given the line up to the value: `step = { duration_s = ` has `duration_s`.
+fn key_of_the_value(line: &str) -> Option<&str> {
+    let (before, after) = line.rsplit_once('=')?;
+    // Behind the equals sign there may be the start of a list, but no other key.
+    let is_value = after.chars().all(|c| !c.is_alphabetic());
+    let key = before.trim_end().rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next()?;
+    (is_value && !key.is_empty()).then_some(key)
+}
