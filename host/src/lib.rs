@@ -13,6 +13,7 @@
 //! - [`servo`]: the tick, the clock, the envelope; the only real-time module.
 //! - [`stability`]: how stiff a spring the servo can render.
 //! - [`stress`]: how far a force model can be trusted with a hand.
+//! - [`sampling`]: points that cover a space evenly.
 //! - [`headless`]: a whole run in virtual time for other programs.
 //! - [`trace`]: what a tick leaves behind; [`mod@record`] writes it down, [`plot`] draws it.
 //! - [`cli`]: the `flotor` command.
@@ -27,6 +28,7 @@ pub mod replay;
 pub mod report;
 pub mod run_description;
 pub mod run_picture;
+pub mod sampling;
 pub mod scene;
 pub mod servo;
 pub mod session;

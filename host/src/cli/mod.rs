@@ -7,6 +7,7 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::cli::print_line(format_args!($($text)*)) };
 }
 
+mod companion;
 mod doctor;
 mod eval;
 mod jitter;
@@ -16,6 +17,7 @@ mod replay;
 mod run;
 mod stability;
 mod stress;
+mod sweep;
 mod validate;
 
 use crate::registry::LookupError;
@@ -58,6 +60,8 @@ enum Command {
     Stability(stability::StabilityArguments),
     /// Score the numerical stability of a force model
     Stress(stress::StressArguments),
+    /// Sweep a model or a scene over parameters, poses and seeds into a Parquet table
+    Sweep(sweep::SweepArguments),
     /// Look at this machine: what a real-time loop may hope for, and how to improve it
     Doctor(doctor::DoctorArguments),
     /// Print a completion script for a shell
@@ -191,6 +195,7 @@ pub fn main() -> ExitCode {
         Some(Command::Jitter(arguments)) => jitter::run(&arguments),
         Some(Command::Stability(arguments)) => stability::run(&arguments),
         Some(Command::Stress(arguments)) => stress::run(&arguments),
+        Some(Command::Sweep(arguments)) => sweep::run(&arguments),
         Some(Command::Doctor(arguments)) => doctor::run(&arguments),
         Some(Command::Completions { shell }) => {
             clap_complete::generate(shell, &mut Arguments::command(), "flotor", &mut std::io::stdout());

@@ -14,10 +14,11 @@
 use super::jacobian::Jacobian;
 use super::measure::{Measure, Verdict};
 use super::plant::Plant;
-use super::poses::{Random, at};
+use super::poses::at;
 use super::subject::{PERIOD_NS, Subject};
 use super::sweep::sweep;
 use super::{DAMPINGS_NS_PER_M, LEVER_M, PERIOD_S, Setup};
+use crate::sampling::Random;
 use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{DVec3, Memory, Pose, Wrench, rotation_vector};
 use std::collections::VecDeque;

@@ -11,10 +11,11 @@
 //! ([`super::LEVER_M`]).
 
 use super::measure::{Measure, Quantity, Verdict, Worst};
-use super::poses::{Random, Reach, Sobol, at};
+use super::poses::{Reach, at};
 use super::subject::Subject;
 use super::sweep::sweep;
 use super::{LEVER_M, Setup, WIDER};
+use crate::sampling::{Random, Sobol};
 use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{DVec3, Pose, Wrench};
 use serde::Serialize;

@@ -7,9 +7,10 @@
 //! allocates nothing cannot be seen from outside the plugin; the plugin's own tests have to say it.
 
 use super::measure::{Decades, Measure, Verdict, Worst};
-use super::poses::{Manifold, Random, Sobol};
+use super::poses::Manifold;
 use super::subject::Subject;
 use super::{Setup, WIDER};
+use crate::sampling::{Random, Sobol};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{Demand, Input, Memory, Output, Pose};

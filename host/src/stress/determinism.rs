@@ -4,10 +4,11 @@
 //! so that runs on two machines or of two builds can be compared by eye.
 
 use super::measure::{Measure, PoseRecord, Verdict};
-use super::poses::{Manifold, Random, Sobol};
+use super::poses::Manifold;
 use super::subject::{PERIOD_NS, Subject};
 use super::sweep::sweep;
 use super::{Setup, WIDER};
+use crate::sampling::{Random, Sobol};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{LoadError, Model};
 use flotor_hal::{Input, Memory, Output, Pose, Twist};

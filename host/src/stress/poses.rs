@@ -1,11 +1,11 @@
 //! Where a model is asked: evenly through the workspace, and on the sets of measure zero where formulas
 //! break.
 //!
-//! Even coverage is Sobol's sequence (I. M. Sobol, USSR Comput. Math. 7(4), 1967) with the direction numbers
-//! of S. Joe and F. Y. Kuo (SIAM J. Sci. Comput. 30, 2008), its points shifted by the seed: any first part of
-//! it covers the space evenly, so a short run asks the first poses of a full one. No sequence ever hits home
-//! exactly, or a coordinate plane, or a number that is not finite: those are [`Manifold`]s with names.
+//! Even coverage is [Sobol's sequence](crate::sampling): any first part of it covers the space evenly, so a short
+//! run asks the first poses of a full one. No sequence ever hits home exactly, or a coordinate plane, or a number
+//! that is not finite: those are [`Manifold`]s with names.
 
+use crate::sampling::Random;
 use flotor_hal::{DQuat, DVec3, Pose, Twist, orientation_from_rotation_vector, rotation_vector};
 use serde::Serialize;
 use std::f64::consts::PI;
@@ -49,106 +49,6 @@ impl Reach {
 /// The pose at a position and a rotation vector, m and rad.
 pub(super) fn at(position_m: DVec3, rotation_rad: DVec3) -> Pose {
     Pose::new(position_m, orientation_from_rotation_vector(rotation_rad))
-}
-
-/// Dimensions of the sequence: one per degree of freedom.
-const DIMENSIONS: usize = 6;
-/// Binary digits of a coordinate; the sequence has as many points as fit.
-const DIGITS: usize = 32;
-/// Degree and inner coefficients of a primitive polynomial, and the first direction numbers, for dimensions 2
-/// to 6 (Joe and Kuo, file new-joe-kuo-6.21201).
-const POLYNOMIALS: [(usize, u32, [u32; 4]); DIMENSIONS - 1] = [
-    (1, 0, [1, 0, 0, 0]),
-    (2, 1, [1, 3, 0, 0]),
-    (3, 1, [1, 3, 1, 0]),
-    (3, 2, [1, 1, 1, 0]),
-    (4, 1, [1, 1, 3, 3]),
-];
-
-/// Sobol's sequence in six dimensions, digitally shifted.
-pub(super) struct Sobol {
-    directions: [[u32; DIGITS]; DIMENSIONS],
-    shift: [u32; DIMENSIONS],
-}
-
-impl Sobol {
-    pub(super) fn new(seed: u64) -> Self {
-        let mut directions = [[0; DIGITS]; DIMENSIONS];
-        directions[0] = std::array::from_fn(|digit| 1 << (DIGITS - 1 - digit));
-        for (row, (degree, coefficients, first)) in directions.iter_mut().skip(1).zip(POLYNOMIALS) {
-            for digit in 0..DIGITS {
-                row[digit] = if digit < degree {
-                    first[digit] << (DIGITS - 1 - digit)
-                } else {
-                    let oldest = row[digit - degree];
-                    let inner = (1..degree).filter(|k| coefficients >> (degree - 1 - k) & 1 == 1);
-                    inner.fold(oldest ^ oldest >> degree, |sum, k| sum ^ row[digit - k])
-                };
-            }
-        }
-        let mut random = Random::new(seed, 0);
-        #[allow(clippy::cast_possible_truncation)] // the upper half of the bits, on purpose
-        let shift = std::array::from_fn(|_| (random.bits() >> 32) as u32);
-        Self { directions, shift }
-    }
-
-    /// Point number `index`, strictly inside the unit cube. Any order, no state.
-    pub(super) fn point(&self, index: u64) -> [f64; DIMENSIONS] {
-        std::array::from_fn(|dimension| {
-            let digits = self.directions[dimension].iter().enumerate();
-            let set = digits.filter(|(digit, _)| index >> digit & 1 == 1);
-            let bits = set.fold(self.shift[dimension], |sum, (_, direction)| sum ^ direction);
-            (f64::from(bits) + 0.5) / 4_294_967_296.0
-        })
-    }
-}
-
-/// Random numbers for what has more dimensions than the sequence: SplitMix64 (Steele, Lea and Flood, OOPSLA
-/// 2014). Each `stream` of a seed is independent of the others, so work can be done in any order.
-pub(super) struct Random {
-    state: u64,
-}
-
-impl Random {
-    pub(super) fn new(seed: u64, stream: u64) -> Self {
-        let mut random = Self { state: seed ^ 0x6a09_e667_f3bc_c908 };
-        random.state = random.bits() ^ stream.wrapping_mul(0xd134_2543_de82_ef95);
-        random.bits();
-        random
-    }
-
-    fn bits(&mut self) -> u64 {
-        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (self.state ^ self.state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        mixed ^ mixed >> 31
-    }
-
-    /// Uniform in 0..1.
-    #[allow(clippy::cast_precision_loss)] // 53 bits fit
-    pub(super) fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / 9_007_199_254_740_992.0
-    }
-
-    /// Uniform in -1..1.
-    pub(super) fn symmetric(&mut self) -> f64 {
-        2.0 * self.unit() - 1.0
-    }
-
-    /// A vector in the cube -1..1.
-    pub(super) fn vector(&mut self) -> DVec3 {
-        DVec3::new(self.symmetric(), self.symmetric(), self.symmetric())
-    }
-
-    /// A unit vector.
-    pub(super) fn direction(&mut self) -> DVec3 {
-        loop {
-            let inside = self.vector();
-            if (1.0e-3..=1.0).contains(&inside.length_squared()) {
-                return inside.normalize();
-            }
-        }
-    }
 }
 
 /// Sets of poses where a formula may break and no even coverage would find it.
@@ -336,32 +236,6 @@ fn malformed(reach: Reach, random: &mut Random, index: u64) -> (Pose, Twist) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_sequence_fills_every_elementary_interval() {
-        // A (t, m, s)-net property that even coverage means: of the first 2^m points each of 2^m equal slices
-        // of every single coordinate holds exactly one.
-        let sobol = Sobol::new(7);
-        for dimension in 0..DIMENSIONS {
-            let mut slices = [0; 1024];
-            for index in 0..1024 {
-                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-                let slice = (sobol.point(index)[dimension] * 1024.0) as usize;
-                slices[slice] += 1;
-            }
-            assert!(slices.iter().all(|count| *count == 1), "dimension {dimension}");
-        }
-    }
-
-    #[test]
-    fn the_sequence_integrates_better_than_random_points() {
-        // Integral of prod(1 + (u - 1/2)) is 1. Random points would be off by 0.7 / sqrt(65536) = 3e-3; a
-        // tenth of that is out of their reach and far above what the sequence leaves.
-        let sobol = Sobol::new(3);
-        let product = |index| sobol.point(index).iter().map(|u| 0.5 + u).product::<f64>();
-        let mean = (0..65536).map(product).sum::<f64>() / 65536.0;
-        assert!((mean - 1.0).abs() < 3.0e-4, "{mean}");
-    }
 
     #[test]
     fn manifolds_are_where_they_say() {

@@ -6,10 +6,11 @@
 //! code gives NaN at the exact rest pose, 0/0 in its moments.
 
 use super::measure::{Measure, Verdict};
-use super::poses::{Manifold, Random, Sobol};
+use super::poses::Manifold;
 use super::subject::{Subject, Trouble, TroubleKind};
 use super::sweep::sweep;
 use super::{Setup, WIDER};
+use crate::sampling::{Random, Sobol};
 use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{Demand, Input, Memory, Pose, StepStatus, Twist};
 

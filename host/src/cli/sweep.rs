@@ -1,0 +1,24 @@
+//! `flotor sweep`: starts the sweeper, which is a program of its own, because it writes Parquet.
+
+use super::CommandError;
+use super::companion::Companion;
+use clap::Args;
+use std::ffi::OsString;
+
+const SWEEPER: Companion = Companion {
+    program: "flotor-sweep",
+    build: "cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target",
+};
+
+/// Sweep a model or a scene over parameters, poses and seeds into a Parquet table.
+#[derive(Args)]
+#[command(disable_help_flag = true)]
+pub(crate) struct SweepArguments {
+    /// The plan (TOML), and options; `flotor sweep --help` lists them
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "PLAN.toml")]
+    arguments: Vec<OsString>,
+}
+
+pub(crate) fn run(arguments: &SweepArguments) -> Result<(), CommandError> {
+    SWEEPER.become_with(&arguments.arguments)
+}

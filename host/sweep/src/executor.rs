@@ -1,0 +1,53 @@
+//! Tasks on the cores of this machine.
+
+use crate::store::{Store, StoreError};
+use crate::task::{Sweep, Task};
+use std::num::NonZeroUsize;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// How a local execution went.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Tasks that were finished before.
+    pub found: usize,
+    /// Tasks finished now.
+    pub done: usize,
+    /// True if `stop` ended it early.
+    pub stopped: bool,
+}
+
+/// Does every task that is not in the store yet; `on_task` hears of each finished one (found ones first).
+///
+/// # Errors
+/// The first [`StoreError`]; what was finished stays finished.
+pub fn execute(
+    sweep: &Sweep,
+    store: &Store,
+    jobs: NonZeroUsize,
+    stop: &AtomicBool,
+    on_task: &(dyn Fn(&Task) + Sync),
+) -> Result<Progress, StoreError> {
+    let (found, open): (Vec<Task>, Vec<Task>) = sweep.tasks().into_iter().partition(|task| store.holds(task));
+    found.iter().for_each(on_task);
+    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let failed = AtomicBool::new(false);
+    let work = || -> Result<(), StoreError> {
+        while !stop.load(Ordering::Relaxed) && !failed.load(Ordering::Relaxed) {
+            let Some(task) = open.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
+            let finished = store.finish(task, sweep.answer(task));
+            finished.inspect_err(|_| failed.store(true, Ordering::Relaxed))?;
+            done.fetch_add(1, Ordering::Relaxed);
+            on_task(task);
+        }
+        Ok(())
+    };
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..jobs.get()).map(|_| scope.spawn(work)).collect();
+        let results = workers
+            .into_iter()
+            .map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        results.collect::<Result<Vec<()>, StoreError>>()
+    })?;
+    let done = done.into_inner();
+    Ok(Progress { found: found.len(), done, stopped: done < open.len() })
+}

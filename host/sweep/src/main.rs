@@ -1,0 +1,112 @@
+//! `flotor-sweep`, what `flotor sweep` starts.
+
+use clap::Parser;
+use flotor_sweep::executor::execute;
+use flotor_sweep::plan::Plan;
+use flotor_sweep::store::Store;
+use flotor_sweep::task::Sweep;
+use flotor_sweep::{picture, table};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::atomic::AtomicBool;
+
+/// Sweep a model or a scene over parameters, poses and seeds into a Parquet table.
+#[derive(Parser)]
+#[command(name = "flotor sweep", version, max_term_width = 110)]
+#[command(
+    after_help = "A sweep that was stopped or killed goes on where it was: finished tasks are kept in OUT/tasks.\n\n\
+    Examples:\n  \
+    flotor sweep plan.toml\n  \
+    flotor sweep plan.toml --out results --jobs 4 --plot force.svg --draw peak_force_n"
+)]
+struct Arguments {
+    /// The plan (TOML)
+    plan: PathBuf,
+    /// Where finished tasks and results.parquet go (default: the plan's name without .toml)
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Tasks at a time (default: one a core)
+    #[arg(long, value_name = "N")]
+    jobs: Option<NonZeroUsize>,
+    /// Draw the answers as SVG
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Answers to draw (default: the first four numbers)
+    #[arg(long, value_name = "COLUMN", value_delimiter = ',')]
+    draw: Vec<String>,
+    /// Write a summary as JSON (- for standard output)
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// Exit codes of the `flotor` commands: 2 is usage or configuration, 1 anything else.
+enum Failure {
+    Usage(String),
+    Other(String),
+}
+
+fn main() -> ExitCode {
+    let (code, message) = match run(&Arguments::parse()) {
+        Ok(()) => return ExitCode::SUCCESS,
+        Err(Failure::Usage(message)) => (2, message),
+        Err(Failure::Other(message)) => (1, message),
+    };
+    eprintln!("error: {message}");
+    ExitCode::from(code)
+}
+
+fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let usage = |error: &dyn std::fmt::Display| Failure::Usage(error.to_string());
+    let other = |error: &dyn std::fmt::Display| Failure::Other(error.to_string());
+    let plan = Plan::load(&arguments.plan).map_err(|error| usage(&error))?;
+    let sweep = Sweep::prepare(plan, &[]).map_err(|error| usage(&error))?;
+    let out = arguments.out.clone().unwrap_or_else(|| arguments.plan.with_extension(""));
+    let store = Store::open(&out).map_err(|error| other(&error))?;
+    let jobs =
+        arguments.jobs.or_else(|| std::thread::available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN);
+
+    let bar = progress_bar(sweep.plan().row_count().unwrap_or(0));
+    let started = std::time::Instant::now();
+    let stop = AtomicBool::new(false);
+    let progress = execute(&sweep, &store, jobs, &stop, &|task| bar.inc(task.count));
+    let progress = progress.map_err(|error| other(&error))?;
+    bar.finish_and_clear();
+
+    let (columns, rows) = (sweep.columns(), table::rows(&sweep, &store).map_err(|error| other(&error))?);
+    let results = out.join("results.parquet");
+    table::write(&results, &columns, &rows).map_err(|error| other(&error))?;
+    if let Some(path) = &arguments.plot {
+        let svg = picture::draw(sweep.plan(), &columns, &rows, &arguments.draw);
+        std::fs::write(path, svg).map_err(|cause| Failure::Other(format!("{}: {cause}", path.display())))?;
+    }
+    let summary = serde_json::json!({
+        "rows": rows.len(),
+        "tasks_found": progress.found,
+        "tasks_done": progress.done,
+        "wall_s": started.elapsed().as_secs_f64(),
+        "results": results,
+    });
+    match &arguments.json {
+        Some(path) if path.as_os_str() == "-" => println!("{summary:#}"),
+        Some(path) => std::fs::write(path, format!("{summary:#}\n"))
+            .map_err(|cause| Failure::Other(format!("{}: {cause}", path.display())))?,
+        None => println!(
+            "{} rows in {} ({} tasks done now, {} found finished, {:.1} s)",
+            rows.len(),
+            results.display(),
+            progress.done,
+            progress.found,
+            started.elapsed().as_secs_f64()
+        ),
+    }
+    Ok(())
+}
+
+fn progress_bar(rows: u64) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(rows), ProgressDrawTarget::stderr());
+    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} rows, {eta} left");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar
+}

@@ -1,0 +1,316 @@
+//! What is asked: axes, seeds, and the model or scene to ask, read from TOML and checked before anything runs.
+
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// A plan as read and checked.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// What stands over the picture.
+    pub title: String,
+    /// What is asked at every point.
+    pub question: Question,
+    /// How points are laid into the space of the axes.
+    pub layout: Layout,
+    /// What varies. The first axis varies slowest in a grid.
+    pub axes: Vec<Axis>,
+    /// Seeds at every point.
+    pub seeds: Vec<u64>,
+    /// Points (times seeds) a task holds.
+    pub block: usize,
+}
+
+/// What is asked at a point.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Question {
+    /// A whole run in virtual time; axes are settings `PLUGIN.KEY`.
+    Run {
+        /// Scene file; relative to the plan. None: the built-in demo.
+        scene: Option<PathBuf>,
+        /// How long each run takes, s of virtual time. None: what the scene says.
+        duration_s: Option<f64>,
+    },
+    /// A force model at a pose; axes are parameters of the model or the pose columns of `flotor eval`.
+    Eval {
+        /// Id of the model, or path to its plugin.
+        model: String,
+    },
+}
+
+/// How points are laid into the space of the axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// Every combination.
+    Grid,
+    /// The first points of Sobol's sequence, shifted by a seed; needs ranges, at most six of them.
+    Sobol {
+        /// How many.
+        points: u64,
+        /// Shift of the sequence.
+        seed: u64,
+    },
+}
+
+/// One thing that varies.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis {
+    /// Setting, parameter or pose column.
+    pub key: String,
+    /// The values.
+    pub values: Values,
+}
+
+/// The values along an axis.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Values {
+    /// Listed numbers.
+    Numbers(Vec<f64>),
+    /// Listed words of a choice.
+    Words(Vec<String>),
+    /// An interval, evenly or logarithmically.
+    Range {
+        /// First value.
+        from: f64,
+        /// Last value.
+        to: f64,
+        /// How many on a grid, ends included.
+        steps: u32,
+        /// Spacing.
+        scale: Scale,
+    },
+}
+
+/// Spacing of a range.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scale {
+    /// Equal differences.
+    #[default]
+    Linear,
+    /// Equal ratios; both ends positive.
+    Log,
+}
+
+/// Why a plan is refused.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlanError {
+    /// The file cannot be read.
+    #[error("{}: cannot read the plan: {cause}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        cause: std::io::Error,
+    },
+    /// It is not TOML, or a key is unknown or of the wrong type.
+    #[error("{}:{line}: {problem}", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The values do not make a plan.
+    #[error("{}: {problem}", path.display())]
+    Unfit {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and what would be right.
+        problem: String,
+    },
+}
+
+/// Largest number of rows: a table of this size still fits a machine of 16 GB while it is written.
+const MOST_ROWS: u64 = 100_000_000;
+/// Rows of a task when the plan does not say: model evaluations are cheap, runs are not.
+const EVAL_BLOCK: usize = 4096;
+/// Columns that are poses rather than parameters, in order.
+pub const POSE_COLUMNS: [&str; 6] = ["x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"];
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    title: Option<String>,
+    ask: Question,
+    #[serde(default)]
+    layout: LayoutText,
+    points: Option<u64>,
+    #[serde(default)]
+    layout_seed: u64,
+    #[serde(default)]
+    axis: Vec<AxisText>,
+    seeds: Option<Vec<u64>>,
+    block: Option<usize>,
+}
+
+#[derive(Clone, Copy, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum LayoutText {
+    #[default]
+    Grid,
+    Sobol,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AxisText {
+    key: String,
+    values: Option<Vec<f64>>,
+    words: Option<Vec<String>>,
+    from: Option<f64>,
+    to: Option<f64>,
+    steps: Option<u32>,
+    #[serde(default)]
+    scale: Scale,
+}
+
+impl Plan {
+    /// Reads a plan from its file.
+    ///
+    /// # Errors
+    /// [`PlanError`], with file and line or what would be right.
+    pub fn load(path: &Path) -> Result<Self, PlanError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|cause| PlanError::Unreadable { path: path.into(), cause })?;
+        Self::parse(&text, path)
+    }
+
+    /// Reads a plan from text; `path` is for messages, and what scene files are relative to.
+    ///
+    /// # Errors
+    /// [`PlanError`].
+    pub fn parse(text: &str, path: &Path) -> Result<Self, PlanError> {
+        let file: File = toml::from_str(text).map_err(|error| {
+            let start = error.span().map_or(0, |span| span.start);
+            let line = 1 + text.get(..start).unwrap_or_default().matches('\n').count();
+            PlanError::Malformed { path: path.into(), line, problem: error.message().to_owned() }
+        })?;
+        let unfit = |problem: String| PlanError::Unfit { path: path.into(), problem };
+        let axes: Result<Vec<Axis>, String> = file.axis.into_iter().map(AxisText::check).collect();
+        let question = match file.ask {
+            Question::Run { scene: Some(scene), duration_s } => {
+                let folder = path.parent().unwrap_or(Path::new(""));
+                Question::Run { scene: Some(folder.join(scene)), duration_s }
+            }
+            other => other,
+        };
+        let default_block = if matches!(question, Question::Eval { .. }) { EVAL_BLOCK } else { 1 };
+        let layout = match (file.layout, file.points) {
+            (LayoutText::Grid, None) => Layout::Grid,
+            (LayoutText::Grid, Some(_)) => {
+                return Err(unfit("`points` belongs to layout = \"sobol\"; a grid has steps".into()));
+            }
+            (LayoutText::Sobol, Some(points)) => Layout::Sobol { points, seed: file.layout_seed },
+            (LayoutText::Sobol, None) => {
+                return Err(unfit("layout = \"sobol\" needs `points = N`".into()));
+            }
+        };
+        let plan = Self {
+            title: file.title.unwrap_or_else(|| "Sweep".to_owned()),
+            question,
+            layout,
+            axes: axes.map_err(unfit)?,
+            seeds: file.seeds.unwrap_or_else(|| vec![0]),
+            block: file.block.unwrap_or(default_block),
+        };
+        plan.check().map_err(unfit)?;
+        Ok(plan)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        if self.axes.is_empty() {
+            return Err("nothing varies: add [[axis]] with key and values".into());
+        }
+        if let Some(repeated) =
+            self.axes.iter().enumerate().find(|(at, axis)| self.axes[..*at].iter().any(|a| a.key == axis.key))
+        {
+            return Err(format!("`{}` is an axis twice", repeated.1.key));
+        }
+        if self.seeds.is_empty() || self.block == 0 {
+            return Err("`seeds` needs one at least, and `block` is at least 1".into());
+        }
+        if let Question::Run { .. } = self.question
+            && let Some(axis) = self.axes.iter().find(|axis| !axis.key.contains('.'))
+        {
+            return Err(format!(
+                "`{}` is no setting of a scene; write PLUGIN.KEY, like spring.gamma_n",
+                axis.key
+            ));
+        }
+        if let Layout::Sobol { .. } = self.layout {
+            let most = flotor::sampling::DIMENSIONS;
+            if self.axes.len() > most {
+                return Err(format!("{} axes; Sobol's sequence here has {most} dimensions", self.axes.len()));
+            }
+            if let Some(axis) = self.axes.iter().find(|axis| !matches!(axis.values, Values::Range { .. })) {
+                return Err(format!("`{}` lists values; layout = \"sobol\" needs from and to", axis.key));
+            }
+        }
+        match self.row_count() {
+            Some(1..=MOST_ROWS) => Ok(()),
+            Some(0) => Err("the plan has no points".into()),
+            _ => Err(format!("the plan has more than {MOST_ROWS} rows; split it")),
+        }
+    }
+
+    /// Points times seeds; `None` beyond all bounds.
+    #[must_use]
+    pub fn row_count(&self) -> Option<u64> {
+        let points = match self.layout {
+            Layout::Sobol { points, .. } => points,
+            Layout::Grid => {
+                self.axes.iter().try_fold(1_u64, |product, axis| product.checked_mul(axis.values.len()))?
+            }
+        };
+        points.checked_mul(self.seeds.len() as u64)
+    }
+}
+
+impl Values {
+    /// How many values a grid takes.
+    #[must_use]
+    pub fn len(&self) -> u64 {
+        match self {
+            Self::Numbers(values) => values.len() as u64,
+            Self::Words(words) => words.len() as u64,
+            Self::Range { steps, .. } => u64::from(*steps),
+        }
+    }
+
+    /// True if there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl AxisText {
+    fn check(self) -> Result<Axis, String> {
+        let Self { key, values, words, from, to, steps, scale } = self;
+        let values = match (values, words, from, to) {
+            (Some(values), None, None, None) if values.iter().all(|v| v.is_finite()) => {
+                Values::Numbers(values)
+            }
+            (Some(_), None, None, None) => return Err(format!("axis `{key}`: a value is not finite")),
+            (None, Some(words), None, None) => Values::Words(words),
+            (None, None, Some(from), Some(to)) => {
+                if !(from.is_finite() && to.is_finite() && from < to) {
+                    return Err(format!("axis `{key}`: from {from} to {to} is no interval"));
+                }
+                if scale == Scale::Log && from <= 0.0 {
+                    return Err(format!("axis `{key}`: a logarithmic range starts above 0, not at {from}"));
+                }
+                Values::Range { from, to, steps: steps.unwrap_or(2).max(2), scale }
+            }
+            _ => return Err(format!("axis `{key}` needs one of: values = [..], words = [..], from and to")),
+        };
+        if values.is_empty() {
+            return Err(format!("axis `{key}` has no values"));
+        }
+        Ok(Axis { key, values })
+    }
+}

@@ -1,0 +1,360 @@
+//! A block of rows: its key, and how it is answered.
+
+use crate::design::{Cell, Design, Point};
+use crate::plan::{POSE_COLUMNS, Plan, PlanError, Question};
+use flotor::evaluate::{Answer, Evaluator, Handle, Travel};
+use flotor::headless;
+use flotor::registry::Registry;
+use flotor::scene::{PluginKeyValue, Scene};
+use flotor_hal::DVec3;
+use flotor_hal::abi::PluginKind;
+use flotor_hal::abi::loader::{Plugin, Setting};
+use std::path::{Path, PathBuf};
+use xxhash_rust::xxh3::Xxh3;
+
+/// A plan with everything loaded that its tasks need. May be shared between threads.
+pub struct Sweep {
+    plan: Plan,
+    subject: Subject,
+    /// Names of the answers, and whether they are numbers.
+    answers: Vec<Column>,
+    /// Digest of what is the same for all tasks: question, scene text, plugin files, axes.
+    context: u128,
+}
+
+enum Subject {
+    Run { scene: Box<Scene>, folders: Vec<PathBuf> },
+    Eval { plugin: Plugin },
+}
+
+/// One task: rows `first..first + count` of the plan.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Task {
+    /// Hash of everything the answer depends on, 32 hexadecimal digits.
+    pub key: String,
+    /// First row.
+    pub first: u64,
+    /// Number of rows.
+    pub count: u64,
+}
+
+/// A column of the table.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Column {
+    /// Its name.
+    pub name: String,
+    /// What it holds.
+    pub kind: ColumnKind,
+}
+
+/// What a column holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ColumnKind {
+    /// Double-precision numbers, NaN where there is none.
+    Number,
+    /// Words.
+    Word,
+}
+
+/// Why a sweep cannot start.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SweepError {
+    /// The plan is refused.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// A plugin is unknown or refused.
+    #[error(transparent)]
+    Lookup(#[from] flotor::registry::LookupError),
+    /// The scene is refused.
+    #[error(transparent)]
+    Scene(#[from] flotor::scene::SceneError),
+    /// An axis names nothing, or its first value is refused.
+    #[error("axis `{key}`: {problem}")]
+    Axis {
+        /// The axis.
+        key: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// A plugin file cannot be read for its digest.
+    #[error("cannot read `{}`: {cause}", path.display())]
+    Plugin {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        cause: std::io::Error,
+    },
+}
+
+/// Answers of a run, in order of their columns.
+const RUN_COLUMNS: [(&str, ColumnKind); 8] = [
+    ("ticks", ColumnKind::Number),
+    ("peak_force_n", ColumnKind::Number),
+    ("peak_torque_nm", ColumnKind::Number),
+    ("loop_generated_j", ColumnKind::Number),
+    ("device_peak_j", ColumnKind::Number),
+    ("end", ColumnKind::Word),
+    ("trace_digest", ColumnKind::Word),
+    ("error", ColumnKind::Word),
+];
+/// Answers of an evaluation.
+const EVAL_COLUMNS: [(&str, ColumnKind); 9] = [
+    ("fx_n", ColumnKind::Number),
+    ("fy_n", ColumnKind::Number),
+    ("fz_n", ColumnKind::Number),
+    ("tx_nm", ColumnKind::Number),
+    ("ty_nm", ColumnKind::Number),
+    ("tz_nm", ColumnKind::Number),
+    ("energy_j", ColumnKind::Number),
+    ("status", ColumnKind::Word),
+    ("error", ColumnKind::Word),
+];
+
+impl Sweep {
+    /// Loads what a plan names and checks its axes, before anything runs. `folders` are searched first.
+    ///
+    /// # Errors
+    /// [`SweepError`].
+    pub fn prepare(plan: Plan, folders: &[PathBuf]) -> Result<Self, SweepError> {
+        let registry = Registry::search(folders);
+        let mut context = Xxh3::new();
+        context.update(env!("CARGO_PKG_VERSION").as_bytes());
+        let (subject, answers) = match &plan.question {
+            Question::Eval { model } => {
+                let plugin = registry.load(model, PluginKind::Model)?;
+                check_model_axes(&plan, &plugin)?;
+                digest_file(&mut context, &plugin.metadata().path)?;
+                (Subject::Eval { plugin }, EVAL_COLUMNS.as_slice())
+            }
+            Question::Run { scene, duration_s } => {
+                let mut scene = match scene {
+                    Some(path) => Scene::load(path)?,
+                    None => Scene::demo()?,
+                };
+                scene.duration_s = duration_s.unwrap_or(scene.duration_s);
+                context.update(scene.text.as_bytes());
+                context.update(&scene.duration_s.to_bits().to_le_bytes());
+                let mut all_folders = scene.plugin_folders.clone();
+                all_folders.extend_from_slice(folders);
+                for metadata in used_plugins(&scene, &Registry::search(&all_folders))? {
+                    digest_file(&mut context, &metadata)?;
+                }
+                let subject = Subject::Run { scene: Box::new(scene), folders: all_folders };
+                (subject, RUN_COLUMNS.as_slice())
+            }
+        };
+        for axis in &plan.axes {
+            context.update(axis.key.as_bytes());
+            context.update(&[0]);
+        }
+        let answers =
+            answers.iter().map(|(name, kind)| Column { name: (*name).to_owned(), kind: *kind }).collect();
+        let sweep = Self { plan, subject, answers, context: context.digest128() };
+        sweep.check_first_row()?;
+        Ok(sweep)
+    }
+
+    /// The plan.
+    #[must_use]
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Columns of the table: axes, seed, answers.
+    #[must_use]
+    pub fn columns(&self) -> Vec<Column> {
+        let design = Design::new(&self.plan);
+        let axes = self.plan.axes.iter().zip(design.point(0).values).map(|(axis, value)| Column {
+            name: axis.key.clone(),
+            kind: if matches!(value, Cell::Word(_)) { ColumnKind::Word } else { ColumnKind::Number },
+        });
+        let seed = Column { name: "seed".to_owned(), kind: ColumnKind::Number };
+        axes.chain([seed]).chain(self.answers.iter().cloned()).collect()
+    }
+
+    /// All tasks, in order of their rows.
+    #[must_use]
+    pub fn tasks(&self) -> Vec<Task> {
+        let rows = self.plan.row_count().unwrap_or(0);
+        let block = self.plan.block as u64;
+        (0..rows.div_ceil(block))
+            .map(|number| {
+                let first = number * block;
+                let count = block.min(rows - first);
+                Task { key: self.key(first, count), first, count }
+            })
+            .collect()
+    }
+
+    /// Hash of the context and of every point: what the answer depends on, and nothing else.
+    fn key(&self, first: u64, count: u64) -> String {
+        let design = Design::new(&self.plan);
+        let mut hash = Xxh3::new();
+        hash.update(&self.context.to_le_bytes());
+        for row in first..first + count {
+            let Point { values, seed } = design.point(row);
+            for value in values {
+                hash.update(value.text().as_bytes());
+                hash.update(&[0]);
+            }
+            hash.update(&seed.to_le_bytes());
+        }
+        format!("{:032x}", hash.digest128())
+    }
+
+    /// Answers a task: a row of cells for every point, axes and seed first. A refused point is a row with its reason.
+    #[must_use]
+    pub fn answer(&self, task: &Task) -> Vec<Vec<Cell>> {
+        let design = Design::new(&self.plan);
+        let points: Vec<Point> = (task.first..task.first + task.count).map(|row| design.point(row)).collect();
+        let answers = match &self.subject {
+            Subject::Run { scene, folders } => points.iter().map(|p| self.run(p, scene, folders)).collect(),
+            Subject::Eval { plugin } => self.evaluate(&points, plugin),
+        };
+        let rows = points.into_iter().zip(answers);
+        rows.map(|(Point { values, seed }, answer)| {
+            #[allow(clippy::cast_precision_loss)] // seeds above 2^53 are for nobody
+            let seed = Cell::number(seed as f64);
+            values.into_iter().chain([seed]).chain(answer).collect()
+        })
+        .collect()
+    }
+
+    fn run(&self, point: &Point, scene: &Scene, folders: &[PathBuf]) -> Vec<Cell> {
+        let answer = self.scene_at(point, scene).and_then(|scene| {
+            headless::run(&scene, &Registry::search(folders), point.seed, None).map_err(|e| e.to_string())
+        });
+        let none = || Cell::Number(None);
+        match answer {
+            #[allow(clippy::cast_precision_loss)] // 2^53 ticks are 285 000 years
+            Ok(summary) => vec![
+                Cell::number(summary.ticks as f64),
+                Cell::number(summary.peak_force_n),
+                Cell::number(summary.peak_torque_nm),
+                Cell::number(summary.energy.loop_generated_j),
+                Cell::number(summary.energy.device_peak_j.unwrap_or(f64::NAN)),
+                Cell::Word(summary.end.to_owned()),
+                Cell::Word(summary.trace_digest),
+                Cell::Word(String::new()),
+            ],
+            Err(reason) => {
+                let words = [Cell::Word(String::new()), Cell::Word(String::new()), Cell::Word(reason)];
+                std::iter::repeat_with(none).take(RUN_COLUMNS.len() - words.len()).chain(words).collect()
+            }
+        }
+    }
+
+    /// The scene with the settings of a point on top.
+    fn scene_at(&self, point: &Point, scene: &Scene) -> Result<Scene, String> {
+        let mut scene = scene.clone();
+        for (axis, value) in self.plan.axes.iter().zip(&point.values) {
+            let setting: PluginKeyValue = format!("{}={}", axis.key, value.text()).parse()?;
+            setting.apply(&mut scene)?;
+        }
+        Ok(scene)
+    }
+
+    /// Consecutive points with the same parameters share a model, so that poses go through it in batches.
+    fn evaluate(&self, points: &[Point], plugin: &Plugin) -> Vec<Vec<Cell>> {
+        let mut answers = Vec::with_capacity(points.len());
+        for group in points.chunk_by(|a, b| self.parameters(a) == self.parameters(b)) {
+            let handles: Vec<Handle> = group.iter().map(|point| self.handle(point)).collect();
+            let evaluated = group.first().ok_or_else(String::new).and_then(|point| {
+                let settings = self.settings(point, plugin)?;
+                let model = plugin.create_model(&settings).map_err(|error| error.to_string())?;
+                Evaluator::new(model, Travel::FromHome).evaluate(&handles).map_err(|error| error.to_string())
+            });
+            match evaluated {
+                Ok(evaluated) => answers.extend(evaluated.iter().map(answered)),
+                Err(reason) => answers.extend(group.iter().map(|_| refused(&reason))),
+            }
+        }
+        answers
+    }
+
+    fn parameters(&self, point: &Point) -> Vec<(String, String)> {
+        let axes = self.plan.axes.iter().zip(&point.values);
+        let parameters = axes.filter(|(axis, _)| !is_pose(&axis.key));
+        parameters.map(|(axis, value)| (axis.key.clone(), value.text())).collect()
+    }
+
+    fn settings(&self, point: &Point, plugin: &Plugin) -> Result<Vec<Setting>, String> {
+        let parse = |(key, value): (String, String)| Setting::parse(plugin.parameters(), &key, &value);
+        self.parameters(point).into_iter().map(parse).collect::<Result<_, _>>().map_err(|e| e.to_string())
+    }
+
+    fn handle(&self, point: &Point) -> Handle {
+        let coordinate = |name: &str| {
+            let axes = self.plan.axes.iter().zip(&point.values);
+            let found = axes.filter(|(axis, _)| axis.key == name).map(|(_, value)| value).next();
+            match found {
+                Some(Cell::Number(value)) => value.unwrap_or(f64::NAN),
+                _ => 0.0,
+            }
+        };
+        let [x, y, z, rx, ry, rz] = POSE_COLUMNS.map(coordinate);
+        Handle { position_m: DVec3::new(x, y, z), rotation_rad: DVec3::new(rx, ry, rz) }
+    }
+
+    /// A plan whose first row is refused for a name it does not know is refused as a whole.
+    fn check_first_row(&self) -> Result<(), SweepError> {
+        let Subject::Run { scene, folders } = &self.subject else { return Ok(()) };
+        let point = Design::new(&self.plan).point(0);
+        let first = self.plan.axes.first().map(|axis| axis.key.clone()).unwrap_or_default();
+        let scene =
+            self.scene_at(&point, scene).map_err(|problem| SweepError::Axis { key: first, problem })?;
+        let options = flotor::session::RunOptions { clock: flotor::servo::Clock::Virtual, seed: point.seed };
+        match flotor::session::Session::prepare(&scene, &Registry::search(folders), &options) {
+            Ok(_) => Ok(()),
+            Err(flotor::session::RunError::Scene(error)) => Err(error.into()),
+            Err(flotor::session::RunError::Lookup(error)) => Err(error.into()),
+            // Anything else belongs to this point, and goes into its row.
+            Err(_) => Ok(()),
+        }
+    }
+}
+
+fn is_pose(key: &str) -> bool {
+    POSE_COLUMNS.contains(&key)
+}
+
+fn answered(answer: &Answer) -> Vec<Cell> {
+    let wrench = answer.wrench.force_n.into_iter().chain(answer.wrench.torque_nm).map(Cell::number);
+    let energy = Cell::number(answer.energy_j.unwrap_or(f64::NAN));
+    let words = [Cell::Word(answer.status.word().to_owned()), Cell::Word(String::new())];
+    wrench.chain([energy]).chain(words).collect()
+}
+
+fn refused(reason: &str) -> Vec<Cell> {
+    let words = [Cell::Word(String::new()), Cell::Word(reason.to_owned())];
+    std::iter::repeat_n(Cell::Number(None), EVAL_COLUMNS.len() - words.len()).chain(words).collect()
+}
+
+/// Every axis is a pose column or a parameter of the model.
+fn check_model_axes(plan: &Plan, plugin: &Plugin) -> Result<(), SweepError> {
+    let point = Design::new(plan).point(0);
+    for (axis, value) in plan.axes.iter().zip(point.values) {
+        if is_pose(&axis.key) {
+            continue;
+        }
+        Setting::parse(plugin.parameters(), &axis.key, &value.text())
+            .map_err(|error| SweepError::Axis { key: axis.key.clone(), problem: error.to_string() })?;
+    }
+    Ok(())
+}
+
+/// Files of the plugins a scene names.
+fn used_plugins(scene: &Scene, registry: &Registry) -> Result<Vec<PathBuf>, SweepError> {
+    let mut files = vec![registry.load(&scene.device.plugin, PluginKind::Device)?.metadata().path.clone()];
+    for model in &scene.models {
+        files.push(registry.load(&model.plugin.plugin, PluginKind::Model)?.metadata().path.clone());
+    }
+    Ok(files)
+}
+
+fn digest_file(hash: &mut Xxh3, path: &Path) -> Result<(), SweepError> {
+    let bytes = std::fs::read(path).map_err(|cause| SweepError::Plugin { path: path.into(), cause })?;
+    hash.update(&bytes);
+    Ok(())
+}
