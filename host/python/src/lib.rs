@@ -4,12 +4,14 @@
 //! - [`model`]: a force model, in batches or at single poses as `flotor eval` does.
 //! - [`run`]: scenes in virtual time.
 //! - [`recording`]: recordings as columns.
+//! - [`sweep`]: tasks of a sweep, for any executor.
 
 mod error;
 mod model;
 mod recording;
 mod rows;
 mod run;
+mod sweep;
 
 use pyo3::prelude::*;
 
@@ -26,6 +28,8 @@ mod _flotor {
     use crate::rows::{input_dtype, output_dtype};
     #[pymodule_export]
     use crate::run::{plugins, run_scene};
+    #[pymodule_export]
+    use crate::sweep::Sweep;
     use pyo3::prelude::*;
 
     #[pymodule_init]

@@ -11,7 +11,9 @@ use std::path::PathBuf;
 pub(crate) fn plugins(folders: Vec<PathBuf>) -> Vec<(String, &'static str, String, PathBuf)> {
     let registry = Registry::search(&folders);
     let found = registry.found().iter();
-    found.map(|found| (found.id.clone(), found.kind.word(), found.version.clone(), found.path.clone())).collect()
+    found
+        .map(|found| (found.id.clone(), found.kind.word(), found.version.clone(), found.path.clone()))
+        .collect()
 }
 
 /// Runs a scene (the demo if there is none) in virtual time; the summary of `flotor run --json` as JSON text.

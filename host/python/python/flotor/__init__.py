@@ -40,6 +40,7 @@ __all__ = [
     "plugins",
     "read_recording",
     "run",
+    "sweep",
 ]
 
 #: NumPy record of one model input, 136 bytes: pose, twist, time, buttons, demand.
@@ -244,3 +245,6 @@ class Recording:
 def read_recording(path: str | os.PathLike[str]) -> Recording:
     """Reads a recording made with ``flotor run --record`` or :func:`run`."""
     return Recording(*_flotor.read_recording(Path(path)))
+
+
+from . import sweep  # noqa: E402  (needs the names above)
