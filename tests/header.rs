@@ -6,12 +6,14 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Sources of the contract, those that hold structs first used first.
-const SOURCES: [&str; 12] = [
+const SOURCES: [&str; 14] = [
     "frame.rs",
     "refusal.rs",
     "parameter.rs",
     "model.rs",
     "shape.rs",
+    "variant.rs",
+    "detail.rs",
     "device.rs",
     "abi/text.rs",
     "abi/entry.rs",

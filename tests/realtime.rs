@@ -10,7 +10,7 @@ use flotor::servo::Clock;
 use flotor::session::{Observer, RunOptions, Session};
 use flotor::trace::TickRecord;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Plugin;
+use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{Cycle, Demand, DeviceState, Input, LoopConfig, Output, Pose, Tick};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -87,9 +87,24 @@ fn the_host_allocates_nothing_in_ten_thousand_ticks() {
 #[test]
 fn the_spring_allocates_nothing_in_a_step() {
     let plugin = Plugin::in_process(&flotor_spring::FLOTOR_ENTRY).expect("the spring is a plugin");
-    for variant in ["energy", "closed-form", "current-length", "thesis"] {
-        let setting = flotor_hal::abi::loader::Setting::parse(plugin.parameters(), "variant", variant);
-        let mut model = plugin.create_model(&[setting.expect("a variant")]).expect("a spring");
+    let kinds: [&[(&str, &str)]; 8] = [
+        &[("variant", "energy")],
+        &[("variant", "closed-form")],
+        &[("variant", "current-length")],
+        &[("variant", "thesis")],
+        &[("variant", "rod")],
+        &[("variant", "rod"), ("accuracy", "tight")],
+        &[("variant", "rod"), ("seat", "free")],
+        &[("variant", "energy"), ("seat", "free")],
+    ];
+    for kind in kinds {
+        let settings: Vec<_> = kind
+            .iter()
+            .map(|(id, value)| Setting::parse(plugin.parameters(), id, value).expect("a setting"))
+            .collect();
+        let gamma = Setting::parse(plugin.parameters(), "gamma_n", "12").expect("a setting");
+        let mut model = plugin.create_model(&settings).expect("a spring");
+        let mut details = vec![0.0; model.details().len()];
         let mut output = Output::default();
         let mut input = Input { demand: Demand::ALL, ..Input::at_rest(Pose::HOME) };
         let calls = counted(|| {
@@ -99,8 +114,16 @@ fn the_spring_allocates_nothing_in_a_step() {
             }
             input.pose.position_m[0] = f64::NAN;
             assert_eq!(model.step(&input, &mut output), CallStatus::Ok);
+            assert_eq!(model.read_details(&mut details), CallStatus::Ok);
+            assert_eq!(model.set_parameter(&gamma), CallStatus::Ok);
+            // A jump: the rod slides to its equilibrium over several ticks.
+            input.pose.position_m = [4.0e-3, 0.0, -12.0e-3];
+            for _ in 0..100 {
+                assert_eq!(model.step(&input, &mut output), CallStatus::Ok);
+            }
+            assert_eq!(model.reset(), CallStatus::Ok);
         });
-        assert_eq!(calls, 0, "{variant}");
+        assert_eq!(calls, 0, "{kind:?}");
     }
 }
 

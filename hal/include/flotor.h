@@ -466,6 +466,43 @@ typedef struct FlotorCenterlineTable {
                            uint32_t *count);
 } FlotorCenterlineTable;
 
+// What one instance serves and whether it remembers; the same for its whole life. 8 bytes.
+typedef struct FlotorVariantInfo {
+    struct FlotorDemand serves;
+    uint32_t memory;
+} FlotorVariantInfo;
+
+// `flotor.variant/1`: see [`crate::VariantModel`]. Not real-time.
+typedef struct FlotorVariantTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // About an instance, with the settings it was created with.
+    uint32_t (*info)(FlotorInstance instance, struct FlotorVariantInfo *out);
+} FlotorVariantTable;
+
+// One number about an answer. Built with [`Detail::number`], [`Detail::word`] or [`Detail::flag`].
+typedef struct FlotorDetail {
+    struct FlotorStr id;
+    struct FlotorStr unit;
+    struct FlotorStr doc;
+    struct FlotorStrList words;
+} FlotorDetail;
+
+// `flotor.details/1`: see [`crate::DetailedModel`].
+typedef struct FlotorDetailsTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Number of details.
+    uint32_t detail_count;
+    // What there is to know, constant.
+    const struct FlotorDetail *details;
+    // Writes the numbers of the last step into `capacity` places, `detail_count` at most; NaN where there is none.
+    // Real-time: no allocation, lock, system call or unwinding.
+    uint32_t (*values)(FlotorInstance instance, double *values, uint32_t capacity);
+} FlotorDetailsTable;
+
 // What a device says about itself; constant, readable without opening it.
 typedef struct FlotorDeviceInfo {
     struct FlotorStr id;
@@ -614,6 +651,8 @@ typedef struct FlotorEnergyLedgerTable {
 #define FLOTOR_INTERFACE_FORCE "flotor.force/1"
 #define FLOTOR_INTERFACE_DEVICE "flotor.device/1"
 #define FLOTOR_INTERFACE_CENTERLINE "flotor.centerline/1"
+#define FLOTOR_INTERFACE_VARIANT "flotor.variant/1"
+#define FLOTOR_INTERFACE_DETAILS "flotor.details/1"
 #define FLOTOR_INTERFACE_ENERGY_LEDGER "flotor.energy-ledger/1"
 
 #if defined(__cplusplus)

@@ -28,13 +28,16 @@
 
 pub mod abi;
 pub mod conformance;
+mod detail;
 mod device;
 mod frame;
 mod model;
 mod parameter;
 mod refusal;
 mod shape;
+mod variant;
 
+pub use detail::{Detail, DetailedModel};
 pub use device::{
     ActiveDevice, Axes, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState, EnergyLedger,
     Fault, SafeStop, Tick,
@@ -46,3 +49,4 @@ pub use model::{Demand, ForceModel, Input, LoopConfig, Memory, ModelInfo, Output
 pub use parameter::{Mutability, OutOfRange, Parameter, ParameterKind, ParameterValue, Settings};
 pub use refusal::{Refusal, RefusalKind};
 pub use shape::{CenterlineInfo, CenterlineModel};
+pub use variant::{VariantInfo, VariantModel};

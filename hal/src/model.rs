@@ -173,6 +173,14 @@ pub enum Memory {
     PathDependent = 1,
 }
 
+impl Memory {
+    /// Reads a value from the boundary; anything unknown is taken as path-dependent, the safe reading.
+    #[must_use]
+    pub(crate) const fn from_code(code: u32) -> Self {
+        if code == Self::Stateless as u32 { Self::Stateless } else { Self::PathDependent }
+    }
+}
+
 /// What a force model says about itself; constant, readable without creating it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
@@ -205,7 +213,8 @@ impl ModelInfo {
         self
     }
 
-    /// Declares that the answer depends on the path.
+    /// Declares that the answer depends on the path. Where that depends on settings, declare the safe reading here and
+    /// the exact one with [`crate::VariantModel`].
     #[must_use]
     pub const fn with_memory(mut self, memory: Memory) -> Self {
         self.memory = memory as u32;
@@ -239,7 +248,7 @@ impl ModelInfo {
     /// Whether the answer depends on the path; anything unknown is taken as path-dependent, the safe reading.
     #[must_use]
     pub const fn memory(&self) -> Memory {
-        if self.memory == Memory::Stateless as u32 { Memory::Stateless } else { Memory::PathDependent }
+        Memory::from_code(self.memory)
     }
 }
 

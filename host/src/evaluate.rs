@@ -2,13 +2,16 @@
 //!
 //! A model without history is asked directly, in batches. One with history is taken to each pose the way a
 //! hand would: along a straight line in position and rotation vector, in small steps, then held until it has
-//! converged.
+//! converged. Where every pose is reached from home the ways are independent, and all processors walk them.
 
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Model;
+use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
 use flotor_hal::{
     DVec3, Demand, Input, Memory, Output, Pose, StepStatus, Wrench, orientation_from_rotation_vector,
 };
+use std::num::NonZeroUsize;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Position and rotation vector of a handle in the model frame, m and rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +36,7 @@ impl Handle {
 }
 
 /// What a model answers at a pose. All numbers are finite.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
     /// Force and torque on the hand, N and N·m; zero where there is no answer.
     pub wrench: Wrench,
@@ -41,6 +44,8 @@ pub struct Answer {
     pub energy_j: Option<f64>,
     /// What the model says about the answer.
     pub status: StepStatus,
+    /// What else it knows, in the order of its [`flotor_hal::Detail`]s; empty where nobody asked.
+    pub details: Vec<Option<f64>>,
 }
 
 /// Whether poses are independent or successive.
@@ -52,12 +57,27 @@ pub enum Travel {
     Successive,
 }
 
-/// A model that panicked; nothing more can be asked of it.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the model stopped answering: {words}")]
-pub struct ModelBroke {
-    /// What it said.
-    pub words: String,
+/// Whether a model is asked for what it knows beside the wrench.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Details {
+    /// Wrench, energy and status only.
+    Omitted,
+    /// Its details as well.
+    Asked,
+}
+
+/// Why there are no answers.
+#[derive(Debug, thiserror::Error)]
+pub enum EvaluateError {
+    /// The model could not be made.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// It panicked; nothing more can be asked of it.
+    #[error("the model stopped answering: {words}")]
+    Broke {
+        /// What it said.
+        words: String,
+    },
 }
 
 /// Largest step of a handle on its way, m.
@@ -73,35 +93,110 @@ const PERIOD_NS: u64 = 1_000_000;
 /// Poses evaluated per call of a model without history.
 const BATCH: usize = 1024;
 
-/// Evaluates a model at poses, in order. Not real-time.
-pub struct Evaluator {
+/// A model to be asked, and how.
+pub struct Evaluation<'a> {
+    /// The plugin.
+    pub plugin: &'a Plugin,
+    /// Its settings.
+    pub settings: &'a [Setting],
+    /// Whether poses are independent or successive.
+    pub travel: Travel,
+    /// Whether it is asked for more than the wrench.
+    pub details: Details,
+}
+
+impl Evaluation<'_> {
+    /// Answers for all handles, in order, the same however many processors walk. `on_answer` is called once for each
+    /// answer, in no particular order and from any of them. Not real-time.
+    ///
+    /// # Errors
+    /// [`EvaluateError`] if the model refuses its settings or panics.
+    pub fn answers(
+        &self,
+        handles: &[Handle],
+        on_answer: &(dyn Fn() + Sync),
+    ) -> Result<Vec<Answer>, EvaluateError> {
+        let mut walker = self.walker()?;
+        match (walker.model.memory(), self.travel) {
+            (Memory::Stateless, _) => walker.evaluate_directly(handles, on_answer),
+            (Memory::PathDependent, Travel::Successive) => {
+                let walk = |handle: &Handle| walker.walk_to(*handle).inspect(|_| on_answer());
+                handles.iter().map(walk).collect()
+            }
+            (Memory::PathDependent, Travel::FromHome) => self.walk_all(handles, on_answer),
+        }
+    }
+
+    fn walker(&self) -> Result<Walker, EvaluateError> {
+        let model = self.plugin.create_model(self.settings)?;
+        let demand = Demand::ALL.limited_to(model.serves());
+        Ok(Walker { model, demand, details: self.details, at: Handle::HOME, tick: 0 })
+    }
+
+    /// Each processor takes the next handle nobody has taken yet, with a model of its own.
+    fn walk_all(
+        &self,
+        handles: &[Handle],
+        on_answer: &(dyn Fn() + Sync),
+    ) -> Result<Vec<Answer>, EvaluateError> {
+        let (next, answered) = (AtomicUsize::new(0), Mutex::new(Vec::with_capacity(handles.len())));
+        let work = || {
+            let mut walker = self.walker()?;
+            loop {
+                let index = next.fetch_add(1, Ordering::Relaxed);
+                let Some(handle) = handles.get(index) else { return Ok(()) };
+                walker.go_home();
+                let answer = walker.walk_to(*handle)?;
+                if let Ok(mut answered) = answered.lock() {
+                    answered.push((index, answer));
+                }
+                on_answer();
+            }
+        };
+        let processors = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        std::thread::scope(|scope| {
+            let workers: Vec<_> = (0..processors.min(handles.len())).map(|_| scope.spawn(work)).collect();
+            workers.into_iter().try_for_each(|worker| {
+                let died = || Err(EvaluateError::Broke { words: "its thread died".to_owned() });
+                worker.join().unwrap_or_else(|_| died())
+            })
+        })?;
+        let mut answered = answered.into_inner().unwrap_or_default();
+        answered.sort_unstable_by_key(|(index, _)| *index);
+        Ok(answered.into_iter().map(|(_, answer)| answer).collect())
+    }
+}
+
+/// One handle, and the model that is asked where it is.
+struct Walker {
     model: Model,
     demand: Demand,
-    travel: Travel,
+    details: Details,
     at: Handle,
     tick: u64,
 }
 
-impl Evaluator {
-    /// Takes a model that was just created.
-    #[must_use]
-    pub fn new(model: Model, travel: Travel) -> Self {
-        let demand = Demand::ALL.limited_to(model.serves());
-        Self { model, demand, travel, at: Handle::HOME, tick: 0 }
+impl Walker {
+    /// As if it had never moved.
+    fn go_home(&mut self) {
+        self.model.reset();
+        (self.at, self.tick) = (Handle::HOME, 0);
     }
 
-    /// Answers for all handles, in order.
-    ///
-    /// # Errors
-    /// [`ModelBroke`] if the model panics.
-    pub fn evaluate(&mut self, handles: &[Handle]) -> Result<Vec<Answer>, ModelBroke> {
-        match self.model.memory() {
-            Memory::Stateless => self.evaluate_directly(handles),
-            Memory::PathDependent => handles.iter().map(|handle| self.walk_to(*handle)).collect(),
+    fn evaluate_directly(
+        &mut self,
+        handles: &[Handle],
+        on_answer: &(dyn Fn() + Sync),
+    ) -> Result<Vec<Answer>, EvaluateError> {
+        if self.details == Details::Asked {
+            // They are about the last step: one pose at a time.
+            let ask = |handle: &Handle| {
+                let output = self.step(*handle)?;
+                on_answer();
+                self.answer(*handle, &output)
+            };
+            return handles.iter().map(ask).collect();
         }
-    }
-
-    fn evaluate_directly(&mut self, handles: &[Handle]) -> Result<Vec<Answer>, ModelBroke> {
         let mut answers = Vec::with_capacity(handles.len());
         let mut outputs = vec![Output::default(); BATCH];
         for batch in handles.chunks(BATCH) {
@@ -111,19 +206,20 @@ impl Evaluator {
                 .collect();
             let status = self.model.step_batch(&inputs, &mut outputs);
             self.check(status)?;
-            answers.extend(batch.iter().zip(&outputs).map(|(handle, output)| self.answer(*handle, output)));
+            for (handle, output) in batch.iter().zip(&outputs) {
+                answers.push(self.answer(*handle, output)?);
+                on_answer();
+            }
         }
         Ok(answers)
     }
 
-    fn walk_to(&mut self, target: Handle) -> Result<Answer, ModelBroke> {
-        if self.travel == Travel::FromHome {
-            self.model.reset();
-            self.at = Handle::HOME;
-        }
+    /// Takes the handle from where it is to a pose and holds it there until the model has converged.
+    fn walk_to(&mut self, target: Handle) -> Result<Answer, EvaluateError> {
         if !target.is_finite() {
             // Nowhere to walk to: the model gets to see the pose once and says what it thinks of it.
-            return self.step(target).map(|output| self.answer(target, &output));
+            let output = self.step(target)?;
+            return self.answer(target, &output);
         }
         let (from, way_m) = (self.at, target.position_m - self.at.position_m);
         let way_rad = target.rotation_rad - from.rotation_rad;
@@ -146,10 +242,10 @@ impl Evaluator {
             }
             output = self.step(target)?;
         }
-        Ok(self.answer(target, &output))
+        self.answer(target, &output)
     }
 
-    fn step(&mut self, handle: Handle) -> Result<Output, ModelBroke> {
+    fn step(&mut self, handle: Handle) -> Result<Output, EvaluateError> {
         let input = Input {
             time_ns: self.tick * PERIOD_NS,
             dt_ns: PERIOD_NS,
@@ -164,23 +260,35 @@ impl Evaluator {
         Ok(output)
     }
 
-    fn check(&mut self, status: CallStatus) -> Result<(), ModelBroke> {
+    fn check(&mut self, status: CallStatus) -> Result<(), EvaluateError> {
         match status {
             CallStatus::Ok => Ok(()),
-            _ => Err(ModelBroke { words: self.model.last_message() }),
+            _ => Err(EvaluateError::Broke { words: self.model.last_message() }),
         }
     }
 
-    fn answer(&self, handle: Handle, output: &Output) -> Answer {
+    fn answer(&mut self, handle: Handle, output: &Output) -> Result<Answer, EvaluateError> {
+        let details = self.read_details()?;
         let no_answer = if handle.is_finite() { StepStatus::OutOfDomain } else { StepStatus::InvalidInput };
         let serves_energy = self.demand.contains(Demand::ENERGY);
-        match output.status() {
+        Ok(match output.status() {
             Some(status) if output.wrench.is_finite() => Answer {
                 wrench: output.wrench,
                 energy_j: (serves_energy && output.energy_j.is_finite()).then_some(output.energy_j),
                 status,
+                details,
             },
-            _ => Answer { wrench: Wrench::ZERO, energy_j: None, status: no_answer },
+            _ => Answer { wrench: Wrench::ZERO, energy_j: None, status: no_answer, details },
+        })
+    }
+
+    fn read_details(&mut self) -> Result<Vec<Option<f64>>, EvaluateError> {
+        if self.details == Details::Omitted || self.model.details().is_empty() {
+            return Ok(Vec::new());
         }
+        let mut values = vec![f64::NAN; self.model.details().len()];
+        let status = self.model.read_details(&mut values);
+        self.check(status)?;
+        Ok(values.into_iter().map(|value| value.is_finite().then_some(value)).collect())
     }
 }

@@ -18,6 +18,10 @@ pub mod interface_ids {
     pub const DEVICE: &str = "flotor.device/1";
     /// Shape of a slender body: [`crate::abi::CenterlineTable`].
     pub const CENTERLINE: &str = "flotor.centerline/1";
+    /// What an instance serves and remembers: [`crate::abi::VariantTable`].
+    pub const VARIANT: &str = "flotor.variant/1";
+    /// Numbers about an answer: [`crate::abi::DetailsTable`].
+    pub const DETAILS: &str = "flotor.details/1";
     /// Energy account of a plant: [`crate::abi::EnergyLedgerTable`].
     pub const ENERGY_LEDGER: &str = "flotor.energy-ledger/1";
 }

@@ -1,10 +1,10 @@
 //! From a [`ForceModel`] to its function table: the trampolines that keep panics inside the plugin.
 
 use super::entry::{CallStatus, Entry, Instance, PluginKind, interface_ids};
-use super::{CenterlineTable, ForceTable, Message, Str, panics};
+use super::{CenterlineTable, DetailsTable, ForceTable, Message, Str, VariantTable, panics};
 use crate::{
-    CenterlineInfo, CenterlineModel, ForceModel, Input, LoopConfig, Output, ParameterValue, Pose,
-    RefusalKind, Settings,
+    CenterlineInfo, CenterlineModel, DetailedModel, ForceModel, Input, LoopConfig, Output, ParameterValue,
+    Pose, RefusalKind, Settings, VariantInfo, VariantModel,
 };
 use std::ffi::c_void;
 use std::marker::PhantomData;
@@ -226,6 +226,31 @@ unsafe extern "C" fn centerline<M: CenterlineModel>(
     })
 }
 
+unsafe extern "C" fn variant_info<M: VariantModel>(instance: Instance, out: *mut VariantInfo) -> u32 {
+    // SAFETY: as in `prepare`.
+    let (slot, out) = unsafe { (slot::<M>(instance), &mut *out) };
+    slot.guard(|model| {
+        *out = model.variant_info();
+        CallStatus::Ok
+    })
+}
+
+unsafe extern "C" fn details<M: DetailedModel>(instance: Instance, values: *mut f64, capacity: u32) -> u32 {
+    if (capacity as usize) < M::DETAILS.len() {
+        return CallStatus::OutOfRange as u32;
+    }
+    if M::DETAILS.is_empty() {
+        return CallStatus::Ok as u32;
+    }
+    // SAFETY: as in `prepare`; `values` has room for `capacity` numbers, of which there are enough.
+    let (slot, values) =
+        unsafe { (slot::<M>(instance), std::slice::from_raw_parts_mut(values, M::DETAILS.len())) };
+    slot.guard(|model| {
+        model.details(values);
+        CallStatus::Ok
+    })
+}
+
 /// The tables of one model type, as constants that are promoted to statics.
 struct Tables<M>(PhantomData<M>);
 
@@ -258,46 +283,106 @@ impl<M: CenterlineModel> Tables<M> {
     };
 }
 
-unsafe extern "C" fn interface<M: ForceModel>(id: Str) -> *const c_void {
-    match id.as_str() {
-        interface_ids::FORCE => std::ptr::from_ref(&Tables::<M>::FORCE).cast(),
-        _ => std::ptr::null(),
+#[allow(clippy::cast_possible_truncation)] // table sizes are small
+impl<M: VariantModel> Tables<M> {
+    const VARIANT: VariantTable =
+        VariantTable { size: size_of::<VariantTable>() as u32, reserved: 0, info: Some(variant_info::<M>) };
+}
+
+#[allow(clippy::cast_possible_truncation)] // table sizes and counts are small
+impl<M: DetailedModel> Tables<M> {
+    const DETAILS: DetailsTable = DetailsTable {
+        size: size_of::<DetailsTable>() as u32,
+        detail_count: M::DETAILS.len() as u32,
+        details: M::DETAILS.as_ptr(),
+        values: Some(details::<M>),
+    };
+}
+
+/// The extensions a model offers, as a list of types: `(WithCenterline, (WithVariant, ()))`. What
+/// [`crate::export_model!`] makes of its words.
+pub trait Extensions<M> {
+    /// The table of an extension of this list, null if it is not in it.
+    fn table(id: &str) -> *const c_void;
+}
+
+/// The model is a [`CenterlineModel`].
+pub struct WithCenterline;
+/// The model is a [`VariantModel`].
+pub struct WithVariant;
+/// The model is a [`DetailedModel`].
+pub struct WithDetails;
+
+impl<M> Extensions<M> for () {
+    fn table(_: &str) -> *const c_void {
+        std::ptr::null()
     }
 }
 
-unsafe extern "C" fn interface_with_centerline<M: CenterlineModel>(id: Str) -> *const c_void {
-    match id.as_str() {
-        interface_ids::FORCE => std::ptr::from_ref(&Tables::<M>::FORCE).cast(),
-        interface_ids::CENTERLINE => std::ptr::from_ref(&Tables::<M>::CENTERLINE).cast(),
-        _ => std::ptr::null(),
+impl<M: CenterlineModel, Rest: Extensions<M>> Extensions<M> for (WithCenterline, Rest) {
+    fn table(id: &str) -> *const c_void {
+        match id {
+            interface_ids::CENTERLINE => std::ptr::from_ref(&Tables::<M>::CENTERLINE).cast(),
+            _ => Rest::table(id),
+        }
     }
 }
 
-/// The entry of a model plugin; [`crate::export_model!`] makes a static of it.
+impl<M: VariantModel, Rest: Extensions<M>> Extensions<M> for (WithVariant, Rest) {
+    fn table(id: &str) -> *const c_void {
+        match id {
+            interface_ids::VARIANT => std::ptr::from_ref(&Tables::<M>::VARIANT).cast(),
+            _ => Rest::table(id),
+        }
+    }
+}
+
+impl<M: DetailedModel, Rest: Extensions<M>> Extensions<M> for (WithDetails, Rest) {
+    fn table(id: &str) -> *const c_void {
+        match id {
+            interface_ids::DETAILS => std::ptr::from_ref(&Tables::<M>::DETAILS).cast(),
+            _ => Rest::table(id),
+        }
+    }
+}
+
+unsafe extern "C" fn interface<M: ForceModel, E: Extensions<M>>(id: Str) -> *const c_void {
+    match id.as_str() {
+        interface_ids::FORCE => std::ptr::from_ref(&Tables::<M>::FORCE).cast(),
+        extension => E::table(extension),
+    }
+}
+
+/// The entry of a model plugin without extensions.
 #[must_use]
 pub const fn model_entry<M: ForceModel>() -> Entry {
-    Entry::of(PluginKind::Model, interface::<M>)
+    model_entry_with::<M, ()>()
 }
 
-/// The entry of a model plugin with a shape; [`crate::export_model!`] makes a static of it.
+/// The entry of a model plugin with extensions; [`crate::export_model!`] makes a static of it.
 #[must_use]
-pub const fn model_entry_with_centerline<M: CenterlineModel>() -> Entry {
-    Entry::of(PluginKind::Model, interface_with_centerline::<M>)
+pub const fn model_entry_with<M: ForceModel, E: Extensions<M>>() -> Entry {
+    Entry::of(PluginKind::Model, interface::<M, E>)
 }
 
-/// Makes a [`crate::ForceModel`] a plugin: `export_model!(Spring);`, or `export_model!(Spring, centerline);`
-/// for a type that is a [`crate::CenterlineModel`] too. One per crate.
+/// Makes a [`crate::ForceModel`] a plugin: `export_model!(Spring);`. Extensions the type implements too are listed
+/// behind it: `export_model!(Spring, centerline, variant, details);` for a [`crate::CenterlineModel`],
+/// [`crate::VariantModel`] and [`crate::DetailedModel`]. One per crate.
 #[macro_export]
 macro_rules! export_model {
-    ($model:ty) => {
-        $crate::export_model!(@entry $model, $crate::abi::model_entry::<$model>());
+    (@extensions) => { () };
+    (@extensions centerline $($rest:ident)*) => {
+        ($crate::abi::WithCenterline, $crate::export_model!(@extensions $($rest)*))
     };
-    ($model:ty, centerline) => {
-        $crate::export_model!(@entry $model, $crate::abi::model_entry_with_centerline::<$model>());
+    (@extensions variant $($rest:ident)*) => {
+        ($crate::abi::WithVariant, $crate::export_model!(@extensions $($rest)*))
     };
-    (@entry $model:ty, $entry:expr) => {
+    (@extensions details $($rest:ident)*) => {
+        ($crate::abi::WithDetails, $crate::export_model!(@extensions $($rest)*))
+    };
+    ($model:ty $(, $extension:ident)* $(,)?) => {
         $crate::export_entry!(
-            $entry,
+            $crate::abi::model_entry_with::<$model, $crate::export_model!(@extensions $($extension)*)>(),
             $crate::abi::PluginKind::Model,
             <$model as $crate::ForceModel>::INFO.id(),
             <$model as $crate::ForceModel>::INFO.name(),

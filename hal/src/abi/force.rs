@@ -1,7 +1,11 @@
-//! Function tables of force models: `flotor.force/1` and `flotor.centerline/1`.
+//! Function tables of force models: `flotor.force/1` and its extensions `flotor.centerline/1`, `flotor.variant/1`
+//! and `flotor.details/1`.
 
 use super::{Instance, Message};
-use crate::{CenterlineInfo, Input, LoopConfig, ModelInfo, Output, Parameter, ParameterValue, Pose};
+use crate::{
+    CenterlineInfo, Detail, Input, LoopConfig, ModelInfo, Output, Parameter, ParameterValue, Pose,
+    VariantInfo,
+};
 
 /// `flotor.force/1`. Statuses are [`super::CallStatus`] codes; `create` and `prepare` return 0 or a
 /// [`crate::RefusalKind`] and say why in the message.
@@ -81,3 +85,37 @@ pub struct CenterlineTable {
         ) -> u32,
     >,
 }
+
+/// `flotor.variant/1`: see [`crate::VariantModel`]. Not real-time.
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct VariantTable {
+    /// Bytes of this table as the plugin knows it.
+    pub size: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
+    /// About an instance, with the settings it was created with.
+    pub info: Option<unsafe extern "C" fn(instance: Instance, out: *mut VariantInfo) -> u32>,
+}
+
+/// `flotor.details/1`: see [`crate::DetailedModel`].
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct DetailsTable {
+    /// Bytes of this table as the plugin knows it.
+    pub size: u32,
+    /// Number of details.
+    pub detail_count: u32,
+    /// What there is to know, constant.
+    pub details: *const Detail,
+    /// Writes the numbers of the last step into `capacity` places, `detail_count` at most; NaN where there is none.
+    /// Real-time: no allocation, lock, system call or unwinding.
+    pub values: Option<unsafe extern "C" fn(instance: Instance, values: *mut f64, capacity: u32) -> u32>,
+}
+
+// SAFETY: an immutable static table; its pointers lead to immutable statics and code.
+unsafe impl Sync for DetailsTable {}
+// SAFETY: as for `Sync`.
+unsafe impl Send for DetailsTable {}

@@ -34,6 +34,6 @@ pub use entry::{
     MAGIC, PluginKind, interface_ids,
 };
 pub use export_device::device_entry;
-pub use export_model::{model_entry, model_entry_with_centerline};
-pub use force::{CenterlineTable, ForceTable};
+pub use export_model::{Extensions, WithCenterline, WithDetails, WithVariant, model_entry, model_entry_with};
+pub use force::{CenterlineTable, DetailsTable, ForceTable, VariantTable};
 pub use text::{MESSAGE_BYTES, Message, Str, StrList};

@@ -5,12 +5,12 @@
 //! too (they are held to [`super::ContractSizes`] and to the assertions in the header).
 
 use super::{
-    CenterlineTable, ContractSizes, DeviceTable, EnergyLedgerTable, ForceTable, Host, LayoutProof, Message,
-    Str,
+    CenterlineTable, ContractSizes, DetailsTable, DeviceTable, EnergyLedgerTable, ForceTable, Host,
+    LayoutProof, Message, Str, VariantTable,
 };
 use crate::{
-    Capabilities, CenterlineInfo, DeviceState, EnergyLedger, Input, LoopConfig, Output, Parameter,
-    ParameterValue, Pose, Tick, Twist, Wrench,
+    Capabilities, CenterlineInfo, Detail, DeviceState, EnergyLedger, Input, LoopConfig, Output, Parameter,
+    ParameterValue, Pose, Tick, Twist, VariantInfo, Wrench,
 };
 use abi_stable::StableAbi;
 use abi_stable::library::AbiHeader;
@@ -23,8 +23,8 @@ pub type Layout = TypeLayout;
 /// The header behind [`LayoutProof::abi_stable_header`].
 pub static HEADER: AbiHeader = AbiHeader::VALUE;
 
-/// Every type of the contract, by name; data first, so that a report names the struct and not a table using it.
-pub const CONTRACT: [(&str, &TypeLayout); 19] = [
+/// Every type a plugin of this contract knows, by name; data first, so that a report names the struct and not a table using it.
+pub const CONTRACT: [(&str, &TypeLayout); 16] = [
     ("Pose", Pose::LAYOUT),
     ("Twist", Twist::LAYOUT),
     ("Wrench", Wrench::LAYOUT),
@@ -34,24 +34,30 @@ pub const CONTRACT: [(&str, &TypeLayout); 19] = [
     ("Tick", Tick::LAYOUT),
     ("DeviceState", DeviceState::LAYOUT),
     ("Capabilities", Capabilities::LAYOUT),
-    ("EnergyLedger", EnergyLedger::LAYOUT),
-    ("CenterlineInfo", CenterlineInfo::LAYOUT),
     ("Parameter", Parameter::LAYOUT),
     ("ParameterValue", ParameterValue::LAYOUT),
     ("Message", Message::LAYOUT),
     ("Host", Host::LAYOUT),
     ("ContractSizes", ContractSizes::LAYOUT),
     ("ForceTable", ForceTable::LAYOUT),
-    ("CenterlineTable", CenterlineTable::LAYOUT),
     ("DeviceTable", DeviceTable::LAYOUT),
 ];
 
-/// Layout of the one table that is an extension of devices; kept apart because not every device offers it.
-pub const ENERGY_LEDGER_TABLE: (&str, &TypeLayout) = ("EnergyLedgerTable", EnergyLedgerTable::LAYOUT);
+/// The types of the extensions. A plugin that knows one means what the host means; an older plugin knows fewer and
+/// offers fewer.
+pub const EXTENSIONS: [(&str, &TypeLayout); 8] = [
+    ("CenterlineInfo", CenterlineInfo::LAYOUT),
+    ("CenterlineTable", CenterlineTable::LAYOUT),
+    ("VariantInfo", VariantInfo::LAYOUT),
+    ("VariantTable", VariantTable::LAYOUT),
+    ("Detail", Detail::LAYOUT),
+    ("DetailsTable", DetailsTable::LAYOUT),
+    ("EnergyLedger", EnergyLedger::LAYOUT),
+    ("EnergyLedgerTable", EnergyLedgerTable::LAYOUT),
+];
 
 unsafe extern "C" fn layout_of(name: Str) -> *const c_void {
-    let known = CONTRACT.iter().chain(std::iter::once(&ENERGY_LEDGER_TABLE));
-    let found = known.into_iter().find(|(known, _)| *known == name.as_str());
+    let found = CONTRACT.iter().chain(&EXTENSIONS).find(|(known, _)| *known == name.as_str());
     found.map_or(std::ptr::null(), |(_, layout)| std::ptr::from_ref::<TypeLayout>(layout).cast())
 }
 

@@ -93,6 +93,12 @@ impl StrList {
     }
 }
 
+impl fmt::Debug for StrList {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Debug::fmt(self.as_slice(), f)
+    }
+}
+
 /// Bytes a [`Message`] holds.
 pub const MESSAGE_BYTES: usize = 508;
 

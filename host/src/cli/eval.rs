@@ -2,13 +2,13 @@
 
 use super::options::KeyValue;
 use super::{CommandError, style};
-use crate::evaluate::{Answer, Evaluator, Handle, Travel};
+use crate::evaluate::{Answer, Details, EvaluateError, Evaluation, Handle, Travel};
 use crate::registry::Registry;
 use crate::scene::nearest;
 use clap::Args;
-use flotor_hal::DVec3;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Plugin, Setting};
+use flotor_hal::{DVec3, Detail};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -16,9 +16,11 @@ use std::path::{Path, PathBuf};
 #[derive(Args)]
 #[command(
     after_help = "Poses: a header [id,]x_m,y_m,z_m,rx_rad,ry_rad,rz_rad and one row a pose, in the model frame (home is\n\
-    the origin, z up; rx, ry, rz is a rotation vector). nan and inf are legal. Result: id, force, torque, energy, status.\n\n\
+    the origin, z up; rx, ry, rz is a rotation vector). nan and inf are legal. Result: id, force, torque, energy, status;\n\
+    with --details also what the model knows beside them (the spring: branch, stable, seat_roll_rad).\n\n\
     Examples:\n  \
     flotor eval --model spring --poses poses.csv --out wrenches.csv\n  \
+    flotor eval --model spring --set variant=rod --set accuracy=tight --details --poses poses.csv --out -\n  \
     echo 'x_m,y_m,z_m,rx_rad,ry_rad,rz_rad\n0,0,-0.005,0,0,0' | flotor eval --model spring --poses - --out -"
 )]
 pub(crate) struct EvalArguments {
@@ -37,6 +39,9 @@ pub(crate) struct EvalArguments {
     /// Rows are successive poses of one handle, instead of each being reached from home
     #[arg(long)]
     path: bool,
+    /// Append what the model knows beside the wrench, a column each
+    #[arg(long)]
+    details: bool,
 }
 
 /// Columns of a pose, in order.
@@ -46,13 +51,25 @@ const ID_COLUMN: &str = "id";
 
 pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
     let plugin = Registry::search(&[]).load(&arguments.model, PluginKind::Model)?;
-    let model = plugin.create_model(&settings(&plugin, &arguments.sets)?)?;
+    let settings = settings(&plugin, &arguments.sets)?;
+    // A refused setting is told before a long file is read.
+    let details = if arguments.details { plugin.create_model(&settings)?.details() } else { &[] };
     let (ids, handles) = read_poses(&arguments.poses)?;
-    let travel = if arguments.path { Travel::Successive } else { Travel::FromHome };
-    let answers = Evaluator::new(model, travel).evaluate(&handles).map_err(|broke| {
-        CommandError::PluginRefused(format!("{}: {broke}", plugin.metadata().path.display()))
+    let evaluation = Evaluation {
+        plugin: &plugin,
+        settings: &settings,
+        travel: if arguments.path { Travel::Successive } else { Travel::FromHome },
+        details: if arguments.details { Details::Asked } else { Details::Omitted },
+    };
+    let bar = super::run::progress_bar(handles.len() as u64, "{wide_bar} {pos}/{len} poses  {elapsed}");
+    let answers = evaluation.answers(&handles, &|| bar.inc(1)).map_err(|error| match error {
+        EvaluateError::Load(error) => CommandError::from(error),
+        broke @ EvaluateError::Broke { .. } => {
+            CommandError::PluginRefused(format!("{}: {broke}", plugin.metadata().path.display()))
+        }
     })?;
-    match write_answers(&arguments.out, &ids, &answers) {
+    bar.finish_and_clear();
+    match write_answers(&arguments.out, &ids, &answers, details) {
         // A reader that has enough closes the pipe.
         Err(cause) if cause.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         written => {
@@ -141,21 +158,33 @@ fn columns(path: &Path, header: &csv::StringRecord) -> Result<[usize; 6], Comman
     Ok(columns)
 }
 
-fn write_answers(path: &Path, ids: &[String], answers: &[Answer]) -> std::io::Result<()> {
+fn write_answers(path: &Path, ids: &[String], answers: &[Answer], details: &[Detail]) -> std::io::Result<()> {
     let output: Box<dyn Write> = if path.as_os_str() == "-" {
         Box::new(std::io::stdout().lock())
     } else {
         Box::new(std::fs::File::create(path)?)
     };
     let mut writer = csv::Writer::from_writer(output);
-    writer.write_record(["id", "fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm", "energy_j", "status"])?;
+    let always = ["id", "fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm", "energy_j", "status"];
+    writer.write_record(always.into_iter().chain(details.iter().map(Detail::id)))?;
     for (id, answer) in ids.iter().zip(answers) {
         let [fx, fy, fz] = answer.wrench.force_n.map(shortest);
         let [tx, ty, tz] = answer.wrench.torque_nm.map(shortest);
         let energy = answer.energy_j.map(shortest).unwrap_or_default();
-        writer.write_record([id, &fx, &fy, &fz, &tx, &ty, &tz, &energy, answer.status.word()])?;
+        let always = [id, &fx, &fy, &fz, &tx, &ty, &tz, &energy, answer.status.word()];
+        let known = details.iter().zip(&answer.details).map(|(detail, value)| written(detail, *value));
+        writer.write_record(always.into_iter().map(str::to_owned).chain(known))?;
     }
     writer.flush()
+}
+
+/// A detail as its column says it.
+fn written(detail: &Detail, value: Option<f64>) -> String {
+    let Some(value) = value else { return String::new() };
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    // saturates: then there is no such word
+    let word = detail.words().get(value as usize);
+    word.map_or_else(|| shortest(value), |word| word.as_str().to_owned())
 }
 
 /// The shortest text that reads back as the same number.

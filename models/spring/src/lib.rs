@@ -11,6 +11,8 @@
 //! - [`energy`]: the conservative law in three dimensions, the default. Its bending part is in [`bending`], to
 //!   fourth order in the angles by [`shape`] and [`quartic`]; [`angle`] gives angles without `acos`, and [`level`]
 //!   keeps the law smooth close to buckling.
+//! - [`rod`]: the exact rod, past buckling too, with a memory of where it was.
+//! - [`seat`]: a lower plate that may roll up on its rim and lift off.
 //! - [`centerline`]: the shape, for people to look at.
 //!
 //! Derivations and sources are in the book, chapter "The spring".
@@ -30,6 +32,7 @@ mod parameters;
 mod plugin;
 pub mod pose;
 pub mod precision;
+mod prepared;
 pub mod preset;
 pub mod quartic;
 pub mod real;

@@ -12,6 +12,7 @@
 use crate::precision::Precision;
 use crate::preset::Preset;
 use crate::rigidity::{Geometry, Material, Spring, Stiffness};
+use crate::rod::Accuracy;
 use flotor_hal::abi::Str;
 use flotor_hal::{OutOfRange, Parameter, Refusal, Settings};
 
@@ -26,10 +27,22 @@ pub(crate) enum Variant {
     CurrentLength,
     /// The conservative law in three dimensions.
     Energy,
+    /// The exact rod, past buckling too.
+    Rod,
 }
 
 impl Variant {
-    pub(crate) const ALL: [Self; 4] = [Self::Thesis, Self::ClosedForm, Self::CurrentLength, Self::Energy];
+    pub(crate) const ALL: [Self; 5] =
+        [Self::Thesis, Self::ClosedForm, Self::CurrentLength, Self::Energy, Self::Rod];
+}
+
+/// Whether the lower plate may leave its seat.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum SeatChoice {
+    /// It is held.
+    Fixed,
+    /// It merely stands there.
+    Free,
 }
 
 /// Which constant rules the stiffness.
@@ -57,9 +70,16 @@ impl Mode {
 const PRESETS: [Str; 4] =
     [Str::new("thesis-1"), Str::new("thesis-2"), Str::new("thesis-3"), Str::new("slender")];
 /// Names of [`Variant::ALL`].
-const VARIANTS: [Str; 4] =
-    [Str::new("thesis"), Str::new("closed-form"), Str::new("current-length"), Str::new("energy")];
+const VARIANTS: [Str; 5] = [
+    Str::new("thesis"),
+    Str::new("closed-form"),
+    Str::new("current-length"),
+    Str::new("energy"),
+    Str::new("rod"),
+];
 const PRECISIONS: [Str; 2] = [Str::new("f64"), Str::new("f32")];
+const ACCURACIES: [Str; 2] = [Str::new("servo"), Str::new("tight")];
+const SEATS: [Str; 2] = [Str::new("fixed"), Str::new("free")];
 const MODES: [Str; 4] = [Str::new("gamma"), Str::new("alpha"), Str::new("beta"), Str::new("physical")];
 
 const MM: f64 = 1.0e-3;
@@ -74,9 +94,11 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "variant",
         &VARIANTS,
         3,
-        "Law: the thesis's code, its law without jumps, that corrected, or conservative in 3D",
+        "Law: the thesis's code, its law without jumps, that corrected, conservative in 3D, or the exact rod",
     ),
     Parameter::choice("precision", &PRECISIONS, 0, "Storage of numbers (variants thesis and closed-form)"),
+    Parameter::choice("accuracy", &ACCURACIES, 0, "For the servo, or for reference (variant rod)"),
+    Parameter::choice("seat", &SEATS, 0, "Lower plate held, or free to roll up and lift off (energy, rod)"),
     Parameter::choice("mode", &MODES, 0, "Which constant rules the stiffness; the others follow from it"),
     Parameter::real("free_length_mm", "mm", 1.0, 1000.0, 25.0, "Distance of the end plates without load")
         .live(),
@@ -117,7 +139,9 @@ pub(crate) struct Choice {
     pub(crate) stiffness: Stiffness,
     pub(crate) variant: Variant,
     pub(crate) precision: Precision,
-    preset: Preset,
+    pub(crate) accuracy: Accuracy,
+    pub(crate) seat: SeatChoice,
+    pub(crate) preset: Preset,
 }
 
 impl Choice {
@@ -128,6 +152,8 @@ impl Choice {
         let variant =
             Variant::ALL.get(settings.choice_or_default("variant")).copied().unwrap_or(Variant::Energy);
         let precision = precision(settings, variant)?;
+        let accuracy = accuracy(settings, variant)?;
+        let seat = seat(settings, variant)?;
         let (geometry, material, stiffness) = preset.parameters();
         let mode = mode(settings, stiffness);
         refuse_derived(settings, mode)?;
@@ -153,7 +179,7 @@ impl Choice {
             Mode::Physical => Stiffness::Physical,
         };
         let spring = Spring::new(geometry, material, stiffness).map_err(Refusal::parameter)?;
-        Ok(Self { spring, stiffness, variant, precision, preset })
+        Ok(Self { spring, stiffness, variant, precision, accuracy, seat, preset })
     }
 
     /// Preset `thesis-1` with another law, as no other setting would give.
@@ -161,7 +187,15 @@ impl Choice {
     pub(crate) fn default_with(variant: Variant) -> Self {
         let preset = Preset::Thesis1;
         let (_, _, stiffness) = preset.parameters();
-        Self { spring: preset.spring(), stiffness, variant, precision: Precision::Double, preset }
+        Self {
+            spring: preset.spring(),
+            stiffness,
+            variant,
+            precision: Precision::Double,
+            accuracy: Accuracy::Servo,
+            seat: SeatChoice::Fixed,
+            preset,
+        }
     }
 
     /// The same with one live number changed, as a person would set it. Real-time: bounded, no allocation.
@@ -219,6 +253,8 @@ impl Choice {
             "preset" => position(&Preset::ALL, &self.preset),
             "variant" => position(&Variant::ALL, &self.variant),
             "precision" => position(&[Precision::Double, Precision::Single], &self.precision),
+            "accuracy" => position(&[Accuracy::Servo, Accuracy::Tight], &self.accuracy),
+            "seat" => position(&[SeatChoice::Fixed, SeatChoice::Free], &self.seat),
             "mode" => position(&Mode::ALL, &Mode::of(self.stiffness)),
             "free_length_mm" => geometry.free_length_m / MM,
             "coil_diameter_mm" => geometry.coil_diameter_m / MM,
@@ -238,10 +274,32 @@ impl Choice {
 fn precision(settings: &Settings<'_>, variant: Variant) -> Result<Precision, Refusal> {
     match (settings.choice_or_default("precision"), variant) {
         (1, Variant::Thesis | Variant::ClosedForm) => Ok(Precision::Single),
-        (1, Variant::CurrentLength | Variant::Energy) => Err(Refusal::parameter(
+        (1, Variant::CurrentLength | Variant::Energy | Variant::Rod) => Err(Refusal::parameter(
             "`precision` f32 is for comparing the variants `thesis` and `closed-form`; the others have f64 alone",
         )),
         _ => Ok(Precision::Double),
+    }
+}
+
+/// The accuracy set; only the rod has two.
+fn accuracy(settings: &Settings<'_>, variant: Variant) -> Result<Accuracy, Refusal> {
+    match (settings.choice_or_default("accuracy"), variant) {
+        (1, Variant::Rod) => Ok(Accuracy::Tight),
+        (1, Variant::Thesis | Variant::ClosedForm | Variant::CurrentLength | Variant::Energy) => {
+            Err(Refusal::parameter("`accuracy` tight is for variant `rod`; the other laws are formulas"))
+        }
+        _ => Ok(Accuracy::Servo),
+    }
+}
+
+/// The seat set; a plate that leaves it by least energy needs a law that has one.
+fn seat(settings: &Settings<'_>, variant: Variant) -> Result<SeatChoice, Refusal> {
+    match (settings.choice_or_default("seat"), variant) {
+        (1, Variant::Energy | Variant::Rod) => Ok(SeatChoice::Free),
+        (1, Variant::Thesis | Variant::ClosedForm | Variant::CurrentLength) => Err(Refusal::parameter(
+            "`seat` free needs a law with a stored energy; set `variant` to `energy` or `rod`",
+        )),
+        _ => Ok(SeatChoice::Fixed),
     }
 }
 

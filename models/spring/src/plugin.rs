@@ -1,15 +1,16 @@
 //! The spring as a force-model plugin.
 
 use crate::batch::Batch;
-use crate::centerline::{Centerline, Helix};
-use crate::closed_form::{ClosedForm, Form};
+use crate::centerline::{Helix, Section};
 use crate::contract;
-use crate::energy::EnergyForm;
-use crate::parameters::{Choice, SCHEMA, Variant};
-use crate::thesis::Thesis;
+use crate::parameters::{Choice, SCHEMA};
+use crate::prepared::{Insight, Prepared};
+use crate::rod::Branch;
+use flotor_hal::abi::Str;
+use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::{
-    CenterlineInfo, CenterlineModel, ForceModel, Input, ModelInfo, OutOfRange, Output, Parameter, Refusal,
-    Settings, export_model,
+    CenterlineInfo, CenterlineModel, Demand, Detail, DetailedModel, ForceModel, Input, Memory, ModelInfo,
+    OutOfRange, Output, Parameter, Refusal, Settings, VariantInfo, VariantModel, export_model,
 };
 
 /// The spring: what it is, and the law that answers.
@@ -25,40 +26,12 @@ impl SpringModel {
     }
 }
 
-/// A law, its constants prepared for the spring chosen.
-#[allow(clippy::large_enum_variant)] // one per model, made once: a box would add a load to every tick
-enum Prepared {
-    Thesis(Thesis),
-    ClosedForm(ClosedForm),
-    Energy(EnergyForm),
-}
-
-impl Prepared {
-    fn new(choice: &Choice) -> Self {
-        let Choice { spring, stiffness, precision, variant, .. } = choice;
-        match variant {
-            Variant::Thesis => Self::Thesis(Thesis::new(spring, *stiffness, *precision)),
-            Variant::ClosedForm => {
-                Self::ClosedForm(ClosedForm::new(spring, Form::Printed).with_precision(*precision))
-            }
-            Variant::CurrentLength => Self::ClosedForm(ClosedForm::new(spring, Form::CurrentLength)),
-            Variant::Energy => Self::Energy(EnergyForm::new(spring)),
-        }
-    }
-
-    /// The law after a change of parameters. Real-time: bounded, no allocation.
-    fn retuned(&self, from: &Choice, to: &Choice) -> Self {
-        match self {
-            Self::Energy(law) => Self::Energy(law.retuned(&from.spring, &to.spring)),
-            Self::Thesis(_) | Self::ClosedForm(_) => Self::new(to),
-        }
-    }
-}
-
 impl ForceModel for SpringModel {
+    // For all variants together; `VariantModel` says it for the one chosen.
     const INFO: ModelInfo =
         ModelInfo::new("spring", "Helical spring", "A helical spring with end plates in three dimensions")
-            .serving(flotor_hal::Demand::ALL);
+            .serving(Demand::ALL)
+            .with_memory(Memory::PathDependent);
     const PARAMETERS: &'static [Parameter] = SCHEMA;
 
     fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {
@@ -67,35 +40,66 @@ impl ForceModel for SpringModel {
 
     #[inline]
     fn step(&mut self, input: &Input) -> Output {
-        let (pose, demand) = (contract::pose(input), contract::demand(input));
-        contract::output(&match &self.law {
-            Prepared::Thesis(law) => law.respond(&pose, demand),
-            Prepared::ClosedForm(law) => law.respond(&pose, demand),
-            Prepared::Energy(law) => law.respond(&pose, demand),
-        })
+        contract::output(&self.law.respond(&contract::pose(input), contract::demand(input)))
     }
 
     fn step_batch(&mut self, inputs: &[Input], outputs: &mut [Output]) {
-        match &self.law {
-            Prepared::ClosedForm(law) => self.batch.respond(law, inputs, outputs),
-            Prepared::Energy(law) => self.batch.respond(law, inputs, outputs),
-            Prepared::Thesis(_) => {
-                for (input, output) in inputs.iter().zip(outputs) {
-                    *output = self.step(input);
-                }
+        if !self.law.respond_side_by_side(&self.batch, inputs, outputs) {
+            for (input, output) in inputs.iter().zip(outputs) {
+                *output = self.step(input);
             }
         }
     }
 
     fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
         let choice = self.choice.with(index, value)?;
-        self.law = self.law.retuned(&self.choice, &choice);
+        self.law.retune(&self.choice, &choice);
         self.choice = choice;
         Ok(())
     }
 
     fn parameter(&self, index: usize) -> f64 {
         self.choice.in_force(index)
+    }
+
+    fn reset(&mut self) {
+        self.law.reset();
+    }
+}
+
+impl VariantModel for SpringModel {
+    fn variant_info(&self) -> VariantInfo {
+        self.law.info()
+    }
+}
+
+const BRANCHES: [Str; 2] = [Str::new("unbuckled"), Str::new("buckled")];
+
+impl DetailedModel for SpringModel {
+    const DETAILS: &'static [Detail] = &[
+        Detail::word(
+            "branch",
+            &BRANCHES,
+            "Whether the plates are closer than where a straight rod buckles (rod)",
+        ),
+        Detail::flag("stable", "Whether the shape is a minimum of the stored energy (rod)"),
+        Detail::number(
+            "seat_roll_rad",
+            "rad",
+            "Roll of the lower plate about y; none for a spring in the air",
+        ),
+    ];
+
+    fn details(&self, values: &mut [f64]) {
+        let Insight { branch, is_stable, seat_roll_rad } = self.law.insight();
+        let branch = branch.map(|branch| match branch {
+            Branch::Unbuckled => 0.0,
+            Branch::Buckled => 1.0,
+        });
+        let is_stable = is_stable.map(|is_stable| f64::from(u8::from(is_stable)));
+        for (value, known) in values.iter_mut().zip([branch, is_stable, seat_roll_rad]) {
+            *value = known.unwrap_or(f64::NAN);
+        }
     }
 }
 
@@ -108,18 +112,19 @@ impl CenterlineModel for SpringModel {
     }
 
     fn centerline(&mut self, input: &Input, points: &mut [flotor_hal::Pose]) -> usize {
-        let Some(line) = Centerline::new(&self.choice.spring, &contract::pose(input)) else { return 0 };
-        let last = points.len().saturating_sub(1).max(1);
-        #[allow(clippy::cast_precision_loss)] // some tens of points
-        for (index, point) in points.iter_mut().enumerate() {
-            let section = line.section(index as f64 / last as f64);
+        let mut sections =
+            vec![Section { center_m: DVec3::ZERO, orientation: DQuat::IDENTITY }; points.len()];
+        if !self.law.draw(&self.choice.spring, &contract::pose(input), &mut sections) {
+            return 0;
+        }
+        for (point, section) in points.iter_mut().zip(&sections) {
             *point = flotor_hal::Pose::new(section.center_m, section.orientation);
         }
         points.len()
     }
 }
 
-export_model!(SpringModel, centerline);
+export_model!(SpringModel, centerline, variant, details);
 
 #[cfg(test)]
 mod tests;

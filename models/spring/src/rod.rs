@@ -11,6 +11,7 @@
 //!   them.
 //! - `basis`: the polynomials the shape is made of; `functional`: the energy as a function of their
 //!   coefficients, with all that is quadratic eliminated; its derivatives by the pose are force and torque.
+//! - `curve`: where the sections are, for drawing.
 //! - `matrix`: solves, and counts unstable directions; `predictor`, `equilibrium`: follow the minimum in
 //!   time.
 //!
@@ -27,6 +28,7 @@ use std::f64::consts::PI;
 
 use flotor_hal::glam::DVec3;
 
+use crate::centerline::Section;
 use crate::pose::Pose;
 use crate::response::{Demand, Response};
 use crate::rigidity::Spring;
@@ -36,6 +38,7 @@ use functional::Ratios;
 use plate::Plate;
 
 mod basis;
+mod curve;
 mod equilibrium;
 mod functional;
 mod matrix;
@@ -144,6 +147,13 @@ impl Rod {
     pub fn state(&self) -> State {
         let unstable_directions = either!(&self.solver, equilibrium => equilibrium.unstable_directions());
         State { branch: self.branch, unstable_directions }
+    }
+
+    /// The sections of the rod as it is after the last tick, from plate to plate, evenly in arc length of the
+    /// unloaded spring. Not real-time: an integration.
+    pub fn sections(&self, sections: &mut [Section]) {
+        let free_length_m = self.constants.free_length_m;
+        either!(&self.solver, equilibrium => equilibrium.curve().draw(free_length_m, sections));
     }
 
     /// Wrench on the hand and stored energy at the pose of this tick.

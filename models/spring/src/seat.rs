@@ -19,6 +19,7 @@
 
 use flotor_hal::glam::{DMat2, DQuat, DVec2, DVec3};
 
+use crate::centerline::Section;
 use crate::energy::EnergyForm;
 use crate::pose::{Pose, quaternion};
 use crate::response::{Demand, Response};
@@ -95,6 +96,11 @@ impl Seat {
         }
     }
 
+    /// Takes other parameters at a tick boundary and keeps the tilt. Real-time: bounded, no allocation.
+    pub fn set_spring(&mut self, spring: &Spring) {
+        *self = Self { tilt_rad: self.tilt_rad, lifted: self.lifted, ..Self::new(spring) };
+    }
+
     /// Seated again. Real-time: bounded, no allocation.
     pub fn reset(&mut self) {
         self.tilt_rad = DVec2::ZERO;
@@ -150,18 +156,48 @@ impl Seat {
         only(Response { validity: Validity::NotConverged, ..response }, demand)
     }
 
+    /// The sections of the spring where its base is now: `draw` gives those of the held spring at a pose. Not
+    /// real-time.
+    pub(crate) fn draw(
+        &self,
+        pose: &Pose,
+        sections: &mut [Section],
+        draw: impl FnOnce(&Pose, &mut [Section]) -> bool,
+    ) -> bool {
+        let rise = DVec3::new(0.0, 0.0, self.free_length_m);
+        let (rotation, origin_m, relative) = if self.lifted {
+            // It hangs from the upper plate, unloaded.
+            (pose.orientation, pose.position_m, Pose::HOME)
+        } else {
+            let base = Base::new(self.tilt_rad, self.rim_radius_m);
+            (base.rotation, base.rotation * rise + base.center_m - rise, self.relative(pose, &base))
+        };
+        if !draw(&relative, sections) {
+            return false;
+        }
+        for section in sections {
+            section.center_m = rotation * section.center_m + origin_m;
+            section.orientation = rotation * section.orientation;
+        }
+        true
+    }
+
+    /// A pose as the base sees it.
+    fn relative(&self, pose: &Pose, base: &Base) -> Pose {
+        let rise = DVec3::new(0.0, 0.0, self.free_length_m);
+        let back = base.rotation.conjugate();
+        Pose {
+            position_m: back * (pose.position_m + rise - base.center_m) - rise,
+            orientation: back * pose.orientation,
+        }
+    }
+
     /// The law's answer with the base at a tilt, in the model frame.
     fn held<S: HeldSpring>(&self, spring: &mut S, pose: &Pose, base: &Base, demand: Demand) -> Response {
         if base.angle_rad == 0.0 {
             return spring.respond(pose, demand);
         }
-        let rise = DVec3::new(0.0, 0.0, self.free_length_m);
-        let back = base.rotation.conjugate();
-        let relative = Pose {
-            position_m: back * (pose.position_m + rise - base.center_m) - rise,
-            orientation: back * pose.orientation,
-        };
-        let response = spring.respond(&relative, demand);
+        let response = spring.respond(&self.relative(pose, base), demand);
         Response {
             force_n: base.rotation * response.force_n,
             torque_nm: base.rotation * response.torque_nm,

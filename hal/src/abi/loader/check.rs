@@ -1,6 +1,6 @@
 //! Compares the contract as host and plugin were compiled, and says in one line what differs.
 
-use crate::abi::proof::{CONTRACT, ENERGY_LEDGER_TABLE, Layout};
+use crate::abi::proof::{CONTRACT, EXTENSIONS, Layout};
 use crate::abi::{ContractSizes, Entry, Str};
 use abi_stable::abi_stability::abi_checking::check_layout_compatibility;
 use abi_stable::library::AbiHeader;
@@ -29,18 +29,24 @@ pub(super) unsafe fn contract(entry: &'static Entry) -> Result<Proof, String> {
         return Err("the plugin's layout proof was made by another abi_stable".to_owned());
     }
     let Some(layout_of) = proof.layout_of else { return Err("the layout proof has no layouts".to_owned()) };
-    for (name, ours) in CONTRACT.iter().chain(std::iter::once(&ENERGY_LEDGER_TABLE)) {
-        // SAFETY: a plugin's `layout_of` takes a name and gives null or a static of the abi_stable just checked.
-        let theirs = unsafe { layout_of(Str::new(name)).cast::<Layout>().as_ref() };
-        let theirs = theirs.ok_or_else(|| format!("the plugin knows no `{name}`"))?;
-        if let Some(difference) = field_difference(name, ours, theirs) {
-            return Err(difference);
-        }
-        if check_layout_compatibility(ours, theirs).is_err() {
-            return Err(format!("`{name}` has another layout or other function signatures in the plugin"));
-        }
+    // SAFETY: a plugin's `layout_of` takes a name and gives null or a static of the abi_stable just checked.
+    let theirs = |name| unsafe { layout_of(Str::new(name)).cast::<Layout>().as_ref() };
+    for (name, ours) in CONTRACT {
+        let theirs = theirs(name).ok_or_else(|| format!("the plugin knows no `{name}`"))?;
+        same(name, ours, theirs)?;
+    }
+    for (name, ours) in EXTENSIONS {
+        theirs(name).map_or(Ok(()), |theirs| same(name, ours, theirs))?;
     }
     Ok(Proof::Checked)
+}
+
+fn same(name: &str, ours: &'static Layout, theirs: &'static Layout) -> Result<(), String> {
+    if let Some(difference) = field_difference(name, ours, theirs) {
+        return Err(difference);
+    }
+    check_layout_compatibility(ours, theirs)
+        .map_err(|_| format!("`{name}` has another layout or other function signatures in the plugin"))
 }
 
 fn sizes(theirs: &ContractSizes) -> Result<(), String> {

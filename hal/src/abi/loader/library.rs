@@ -1,9 +1,10 @@
 //! A loaded plugin: a private copy of its file, opened once, never unloaded.
 
-use super::{LoadError, Metadata, OpenedDevice, Setting, check, metadata_file, model::Model};
+use super::model::{Model, ModelTables};
+use super::{LoadError, Metadata, OpenedDevice, Setting, check, metadata_file};
 use crate::abi::{
-    ABI_MAJOR, ABI_MINOR, CenterlineTable, DeviceTable, EnergyLedgerTable, Entry, ForceTable,
-    HOST_QUIET_PANICS, Host, MAGIC, PluginKind, Str, interface_ids,
+    ABI_MAJOR, ABI_MINOR, CenterlineTable, DetailsTable, DeviceTable, EnergyLedgerTable, Entry, ForceTable,
+    HOST_QUIET_PANICS, Host, MAGIC, PluginKind, Str, VariantTable, interface_ids,
 };
 use crate::{DeviceInfo, ModelInfo, Parameter};
 use std::ffi::CString;
@@ -30,7 +31,7 @@ pub struct Plugin {
 
 #[derive(Clone, Copy)]
 enum Interface {
-    Model { force: &'static ForceTable, centerline: Option<&'static CenterlineTable> },
+    Model(ModelTables),
     Device { device: &'static DeviceTable, ledger: Option<&'static EnergyLedgerTable> },
 }
 
@@ -65,7 +66,7 @@ impl Plugin {
         };
         let mut plugin = Self::from_entry(metadata, entry, Runtime::Shared)?;
         let (kind, id, name, doc) = match plugin.interface {
-            Interface::Model { force, .. } => {
+            Interface::Model(ModelTables { force, .. }) => {
                 (PluginKind::Model, force.info.id(), force.info.name(), force.info.doc())
             }
             Interface::Device { device, .. } => {
@@ -120,7 +121,7 @@ impl Plugin {
     #[must_use]
     pub fn parameters(&self) -> &'static [Parameter] {
         let (parameters, count) = match self.interface {
-            Interface::Model { force, .. } => (force.parameters, force.parameter_count),
+            Interface::Model(ModelTables { force, .. }) => (force.parameters, force.parameter_count),
             Interface::Device { device, .. } => (device.parameters, device.parameter_count),
         };
         if parameters.is_null() || count == 0 {
@@ -134,7 +135,7 @@ impl Plugin {
     #[must_use]
     pub fn model_info(&self) -> Option<ModelInfo> {
         match self.interface {
-            Interface::Model { force, .. } => Some(force.info),
+            Interface::Model(ModelTables { force, .. }) => Some(force.info),
             Interface::Device { .. } => None,
         }
     }
@@ -144,7 +145,7 @@ impl Plugin {
     pub fn device_info(&self) -> Option<DeviceInfo> {
         match self.interface {
             Interface::Device { device, .. } => Some(device.info),
-            Interface::Model { .. } => None,
+            Interface::Model(_) => None,
         }
     }
 
@@ -153,10 +154,10 @@ impl Plugin {
     /// # Errors
     /// [`LoadError::OtherKind`] for a device, [`LoadError::Refused`] if the plugin says no.
     pub fn create_model(&self, settings: &[Setting]) -> Result<Model, LoadError> {
-        let Interface::Model { force, centerline } = self.interface else {
+        let Interface::Model(tables) = self.interface else {
             return Err(self.other_kind(PluginKind::Model));
         };
-        Model::create(force, centerline, self.parameters(), settings).map_err(|refusal| self.refused(refusal))
+        Model::create(tables, self.parameters(), settings).map_err(|refusal| self.refused(refusal))
     }
 
     /// Opens a device. Not real-time; may block.
@@ -264,8 +265,14 @@ fn find_interface(metadata: &Metadata, entry: &'static Entry) -> Result<Interfac
         if let Some((name, _)) = required.iter().find(|(_, present)| !present) {
             return Err(missing(id, name));
         }
-        // SAFETY: as above, for the extension's table.
-        let centerline = unsafe { table(interface_ids::CENTERLINE).cast::<CenterlineTable>().as_ref() };
-        Ok(Interface::Model { force, centerline })
+        // SAFETY: as above, for the tables of the extensions.
+        let (centerline, variant, details) = unsafe {
+            (
+                table(interface_ids::CENTERLINE).cast::<CenterlineTable>().as_ref(),
+                table(interface_ids::VARIANT).cast::<VariantTable>().as_ref(),
+                table(interface_ids::DETAILS).cast::<DetailsTable>().as_ref(),
+            )
+        };
+        Ok(Interface::Model(ModelTables { force, centerline, variant, details }))
     }
 }

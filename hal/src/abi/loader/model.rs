@@ -1,13 +1,22 @@
 //! A force model a host may call: an instance and its function table.
 
 use super::Setting;
-use crate::abi::{CallStatus, CenterlineTable, ForceTable, Instance, Message};
+use crate::abi::{CallStatus, CenterlineTable, DetailsTable, ForceTable, Instance, Message, VariantTable};
 use crate::{
-    CenterlineInfo, Demand, Input, LoopConfig, Memory, ModelInfo, Output, Parameter, ParameterValue, Pose,
-    Refusal, RefusalKind,
+    CenterlineInfo, Demand, Detail, Input, LoopConfig, Memory, ModelInfo, Output, Parameter, ParameterValue,
+    Pose, Refusal, RefusalKind, VariantInfo,
 };
 
 type StepFn = unsafe extern "C" fn(Instance, *const Input, *mut Output) -> u32;
+
+/// The function tables of a model plugin.
+#[derive(Clone, Copy)]
+pub(super) struct ModelTables {
+    pub(super) force: &'static ForceTable,
+    pub(super) centerline: Option<&'static CenterlineTable>,
+    pub(super) variant: Option<&'static VariantTable>,
+    pub(super) details: Option<&'static DetailsTable>,
+}
 
 /// One instance of a force model. Used by one thread at a time.
 pub struct Model {
@@ -15,7 +24,8 @@ pub struct Model {
     /// Copied out of the table: one load less in every tick.
     step: StepFn,
     table: &'static ForceTable,
-    centerline: Option<&'static CenterlineTable>,
+    extensions: ModelTables,
+    variant: VariantInfo,
     parameters: &'static [Parameter],
 }
 
@@ -24,14 +34,14 @@ unsafe impl Send for Model {}
 
 impl Model {
     pub(super) fn create(
-        table: &'static ForceTable,
-        centerline: Option<&'static CenterlineTable>,
+        tables: ModelTables,
         parameters: &'static [Parameter],
         settings: &[Setting],
     ) -> Result<Self, Refusal> {
         // SAFETY: `settings` outlives the call, and the plugin keeps no copy past it (contract).
         let values: Vec<ParameterValue> =
             settings.iter().map(|setting| unsafe { setting.to_raw() }).collect();
+        let table = tables.force;
         let (Some(create), Some(step)) = (table.create, table.step) else {
             return Err(Refusal::broken("its table has lost a function"));
         };
@@ -44,10 +54,24 @@ impl Model {
         if instance.is_null() {
             return Err(Refusal::broken("it reported success but made nothing"));
         }
-        Ok(Self { instance, step, table, centerline, parameters })
+        let variant = VariantInfo::new(table.info.serves(), table.info.memory());
+        let mut model = Self { instance, step, table, extensions: tables, variant, parameters };
+        model.variant = model.ask_variant();
+        Ok(model)
     }
 
-    /// What the model says about itself.
+    /// What the instance says about itself, else what its type says.
+    fn ask_variant(&mut self) -> VariantInfo {
+        let of_type = self.variant;
+        let Some(info) = self.extensions.variant.and_then(|table| table.info) else { return of_type };
+        let mut variant = of_type;
+        // SAFETY: a live instance used by this thread only (`&mut`), an out pointer valid for the call.
+        let code = unsafe { info(self.instance, &raw mut variant) };
+        let served = variant.serves().limited_to(of_type.serves());
+        if code == CallStatus::Ok as u32 { VariantInfo::new(served, variant.memory()) } else { of_type }
+    }
+
+    /// What the model says about itself, whatever its settings.
     #[must_use]
     pub fn info(&self) -> &ModelInfo {
         &self.table.info
@@ -59,16 +83,16 @@ impl Model {
         self.parameters
     }
 
-    /// Which demands it can serve.
+    /// Which demands it can serve, with the settings it was created with.
     #[must_use]
     pub fn serves(&self) -> Demand {
-        self.table.info.serves()
+        self.variant.serves()
     }
 
-    /// Whether the answer depends on the path.
+    /// Whether the answer depends on the path, with the settings it was created with.
     #[must_use]
     pub fn memory(&self) -> Memory {
-        self.table.info.memory()
+        self.variant.memory()
     }
 
     /// Last chance for the model to allocate before the loop starts. Not real-time.
@@ -146,8 +170,31 @@ impl Model {
     /// The model's shape, if it has one. Not real-time: for observers with an instance of their own.
     #[must_use]
     pub fn centerline(&mut self) -> Option<Centerline<'_>> {
-        let table = self.centerline?;
+        let table = self.extensions.centerline?;
         Some(Centerline { model: self, table })
+    }
+
+    /// Which numbers there are about an answer; empty for a model without details.
+    #[must_use]
+    pub fn details(&self) -> &'static [Detail] {
+        match self.extensions.details {
+            Some(table) if !table.details.is_null() && table.detail_count > 0 => {
+                // SAFETY: a table's list is a static array of `detail_count` details of the checked layout.
+                unsafe { std::slice::from_raw_parts(table.details, table.detail_count as usize) }
+            }
+            _ => &[],
+        }
+    }
+
+    /// Writes the numbers of the last step, one for each of [`Self::details`]; NaN where there is none.
+    /// Real-time: bounded by the model, no allocation.
+    pub fn read_details(&mut self, values: &mut [f64]) -> CallStatus {
+        let Some(read) = self.extensions.details.and_then(|table| table.values) else {
+            return CallStatus::Unsupported;
+        };
+        let capacity = u32::try_from(values.len()).unwrap_or(u32::MAX);
+        // SAFETY: a live instance used by this thread only (`&mut`), room for `capacity` numbers.
+        CallStatus::from_code(unsafe { read(self.instance, values.as_mut_ptr(), capacity) })
     }
 }
 

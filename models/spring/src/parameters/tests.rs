@@ -11,7 +11,7 @@ fn choice(preset: Preset, mode: Mode) -> Choice {
         Mode::Physical => Stiffness::Physical,
     };
     let spring = Spring::new(geometry, material, stiffness).unwrap();
-    Choice { spring, stiffness, variant: Variant::Energy, precision: Precision::Double, preset }
+    Choice { spring, stiffness, preset, ..Choice::default_with(Variant::Energy) }
 }
 
 fn index(id: &str) -> usize {

@@ -46,22 +46,31 @@ impl<const K: usize, const Q: usize> Basis<K, Q> {
             let (t, weight) = gauss_legendre(Q, i);
             basis.weight[i] = 0.5 * weight;
             basis.station[i] = 0.5 * (1.0 + t);
-            let mut legendre = Legendre::at(t);
+            (basis.bubble_at[i], basis.slope_at[i]) = bubbles(t);
             for k in 0..K {
-                let below = legendre.value;
-                legendre.advance();
-                // Degree k + 1; the integral of P_n from -1 is (P_(n+1) - P_(n-1)) / (2 n + 1).
-                let norm = (2.0 * legendre.degree + 1.0).sqrt();
-                let mut above = legendre;
-                above.advance();
-                basis.slope[k][i] = norm * legendre.value;
-                basis.bubble[k][i] = 0.5 * (above.value - below) / norm;
-                basis.slope_at[i][k] = basis.slope[k][i];
-                basis.bubble_at[i][k] = basis.bubble[k][i];
+                basis.bubble[k][i] = basis.bubble_at[i][k];
+                basis.slope[k][i] = basis.slope_at[i][k];
             }
         }
         basis
     }
+}
+
+/// The first `K` bubbles and their slopes per scaled arc length, at scaled arc length `(1 + t) / 2`.
+pub(crate) fn bubbles<const K: usize>(t: f64) -> ([f64; K], [f64; K]) {
+    let (mut bubble, mut slope) = ([0.0; K], [0.0; K]);
+    let mut legendre = Legendre::at(t);
+    for (bubble, slope) in bubble.iter_mut().zip(&mut slope) {
+        let below = legendre.value;
+        legendre.advance();
+        // Degree k + 1; the integral of P_n from -1 is (P_(n+1) - P_(n-1)) / (2 n + 1).
+        let norm = (2.0 * legendre.degree + 1.0).sqrt();
+        let mut above = legendre;
+        above.advance();
+        *slope = norm * legendre.value;
+        *bubble = 0.5 * (above.value - below) / norm;
+    }
+    (bubble, slope)
 }
 
 /// Legendre polynomial of a degree at a point, by the three-term recurrence.
@@ -92,7 +101,7 @@ impl Legendre {
 
 /// Node `i` in ascending order of the rule with `count` nodes on -1..1, and its weight.
 #[allow(clippy::cast_precision_loss)] // some tens of nodes
-fn gauss_legendre(count: usize, i: usize) -> (f64, f64) {
+pub(crate) fn gauss_legendre(count: usize, i: usize) -> (f64, f64) {
     let legendre = |t| {
         let mut polynomial = Legendre::at(t);
         (0..count).for_each(|_| polynomial.advance());

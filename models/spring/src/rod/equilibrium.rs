@@ -11,6 +11,7 @@
 
 use flotor_hal::glam::{DVec2, DVec3};
 
+use super::curve::Curve;
 use super::functional::{Curvature, Functional, Ratios, Reaction, Shape, Value};
 use super::matrix::{Factored, added, dot, length, product};
 use super::plate::Plate;
@@ -145,6 +146,11 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
     /// Morse index where the matrix was computed last: zero where the shape is stable.
     pub(crate) fn unstable_directions(&self) -> usize {
         self.unstable_directions
+    }
+
+    /// The curve of the rod as it is now. Real-time: bounded, no allocation.
+    pub(crate) fn curve(&self) -> Curve<K> {
+        Curve::new(&self.functional, &self.shape, self.history.plate())
     }
 
     /// One tick. Real-time: bounded, no allocation.

@@ -34,11 +34,11 @@ pub(crate) type Shape<const N: usize> = [f64; N];
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Ratios {
     /// `alpha / (beta L0²)`
-    shear_compliance: f64,
+    pub(super) shear_compliance: f64,
     /// `(1/gamma - 1/beta) alpha / L0²`
-    softening: f64,
+    pub(super) softening: f64,
     /// `tau / alpha`
-    torsion: f64,
+    pub(super) torsion: f64,
 }
 
 impl Ratios {
@@ -58,7 +58,7 @@ impl Ratios {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Functional<const K: usize, const N: usize, const Q: usize> {
     basis: Basis<K, Q>,
-    ratios: Ratios,
+    pub(super) ratios: Ratios,
 }
 
 /// Energy of a shape between plates and its first derivatives.

@@ -27,6 +27,11 @@ impl<const N: usize> History<N> {
         Self { plates: [plate; DEPTH], shapes: [shape; DEPTH], length: 1 }
     }
 
+    /// Where the plates were last.
+    pub(crate) fn plate(&self) -> &Plate {
+        &self.plates[0]
+    }
+
     /// The equilibrium of this tick.
     #[inline]
     pub(crate) fn push(&mut self, plate: Plate, shape: &Shape<N>) {

@@ -1,0 +1,102 @@
+//! Where the sections of the rod are: from their directions back to a curve in space.
+//!
+//! The directions are the polynomials of the shape; the rest of each section follows from what all sections share
+//! (lengths in `L0`): `psi' = Phi + w (p x p')`, the twist evenly distributed beside the winding, and
+//! `r' = d + n/beta + delta (n.d) d`, stretched and sheared by the force.
+
+use flotor_hal::glam::{DQuat, DVec2, DVec3};
+
+use super::basis::{bubbles, gauss_legendre};
+use super::functional::{Functional, Shape};
+use super::plate::Plate;
+use crate::centerline::Section;
+
+/// Fewest panels over the whole rod, and nodes in each: together far more degrees than the polynomials have.
+const LEAST_PANELS: usize = 64;
+const NODES: usize = 4;
+
+/// The shape of a rod and what its sections share.
+pub(crate) struct Curve<const K: usize> {
+    lean: [[f64; K]; 2],
+    end: DVec2,
+    /// Internal force.
+    force: DVec3,
+    shear_compliance: f64,
+    softening: f64,
+    /// Evenly distributed twist (rad).
+    twist_rad: f64,
+}
+
+/// Direction of a section, and how the curve goes on from it.
+struct Step {
+    lean: DVec2,
+    tangent: DVec3,
+    turn_rate_rad: f64,
+}
+
+impl<const K: usize> Curve<K> {
+    pub(crate) fn new<const N: usize, const Q: usize>(
+        functional: &Functional<K, N, Q>,
+        shape: &Shape<N>,
+        plate: &Plate,
+    ) -> Self {
+        let load = functional.value(shape, plate).load;
+        let mut lean = [[0.0; K]; 2];
+        for (coefficient, value) in lean.as_flattened_mut().iter_mut().zip(shape) {
+            *coefficient = *value;
+        }
+        let ratios = functional.ratios;
+        Self {
+            lean,
+            end: plate.lean,
+            force: load.force,
+            shear_compliance: ratios.shear_compliance,
+            softening: ratios.softening,
+            twist_rad: load.torsion / ratios.torsion,
+        }
+    }
+
+    /// Sections evenly in arc length, the first in the lower plate, the last in the upper. Not real-time.
+    #[allow(clippy::cast_precision_loss)] // some hundreds of panels
+    pub(crate) fn draw(&self, free_length_m: f64, sections: &mut [Section]) {
+        let gaps = sections.len().saturating_sub(1).max(1);
+        let panels = LEAST_PANELS.div_ceil(gaps);
+        let width = 1.0 / (gaps * panels) as f64;
+        let (mut center, mut turn_rad) = (DVec3::new(0.0, 0.0, -1.0), 0.0);
+        for (index, section) in sections.iter_mut().enumerate() {
+            let lean = self.step(index as f64 / gaps as f64).lean;
+            let shortest = DQuat::from_xyzw(-lean.y, lean.x, 0.0, 1.0).normalize();
+            *section = Section {
+                center_m: center * free_length_m,
+                orientation: shortest * DQuat::from_rotation_z(turn_rad),
+            };
+            for panel in 0..panels {
+                let start = (index * panels + panel) as f64 * width;
+                for node in 0..NODES {
+                    let (t, weight) = gauss_legendre(NODES, node);
+                    let step = self.step(start + 0.5 * (1.0 + t) * width);
+                    center += 0.5 * weight * width * step.tangent;
+                    turn_rad += 0.5 * weight * width * step.turn_rate_rad;
+                }
+            }
+        }
+    }
+
+    /// At scaled arc length `s`.
+    fn step(&self, s: f64) -> Step {
+        let (bubble, slope) = bubbles::<K>(2.0 * s - 1.0);
+        let along = |field: &[f64; K], c: usize| -> f64 {
+            field.iter().zip(&self.lean[c]).map(|(value, coefficient)| value * coefficient).sum()
+        };
+        let lean = self.end * s + DVec2::new(along(&bubble, 0), along(&bubble, 1));
+        let rate = self.end + DVec2::new(along(&slope, 0), along(&slope, 1));
+        let scale = 2.0 / (1.0 + lean.length_squared());
+        let normal = (scale * lean).extend(scale - 1.0);
+        let stretch = 1.0 + self.softening * self.force.dot(normal);
+        Step {
+            lean,
+            tangent: stretch * normal + self.shear_compliance * self.force,
+            turn_rate_rad: self.twist_rad + scale * lean.perp_dot(rate),
+        }
+    }
+}
