@@ -12,6 +12,7 @@
 //! - [`session`]: from a scene to a run.
 //! - [`servo`]: the tick, the clock, the envelope; the only real-time module.
 //! - [`stability`]: how stiff a spring the servo can render.
+//! - [`scaffold`]: the start of somebody's own plugin.
 //! - [`stress`]: how far a force model can be trusted with a hand.
 //! - [`sampling`]: points that cover a space evenly.
 //! - [`headless`]: a whole run in virtual time for other programs.
@@ -29,6 +30,7 @@ pub mod report;
 pub mod run_description;
 pub mod run_picture;
 pub mod sampling;
+pub mod scaffold;
 pub mod scene;
 pub mod servo;
 pub mod session;

@@ -70,6 +70,13 @@ impl Flotor {
         self
     }
 
+    /// Runs it in this folder.
+    #[must_use]
+    pub fn inside(mut self, folder: &Path) -> Self {
+        self.command.current_dir(folder);
+        self
+    }
+
     /// Text for standard input.
     #[must_use]
     pub fn reading(mut self, input: impl Into<String>) -> Self {

@@ -11,6 +11,7 @@ mod companion;
 mod doctor;
 mod eval;
 mod jitter;
+mod new;
 mod options;
 mod plugins;
 mod replay;
@@ -54,6 +55,8 @@ enum Command {
     Plugins(plugins::PluginsArguments),
     /// Check a plugin file: does it load, answer, and survive bad input
     Validate(validate::ValidateArguments),
+    /// Start a plugin of your own: a folder that builds, validates and runs
+    New(new::NewArguments),
     /// Measure how well the servo keeps time here, next to a bare loop
     Jitter(jitter::JitterArguments),
     /// Find the stiffest virtual spring that stays stable, next to theory
@@ -192,6 +195,7 @@ pub fn main() -> ExitCode {
         Some(Command::Eval(arguments)) => eval::run(&arguments),
         Some(Command::Plugins(arguments)) => plugins::run(&arguments),
         Some(Command::Validate(arguments)) => validate::run(&arguments),
+        Some(Command::New(arguments)) => new::run(&arguments),
         Some(Command::Jitter(arguments)) => jitter::run(&arguments),
         Some(Command::Stability(arguments)) => stability::run(&arguments),
         Some(Command::Stress(arguments)) => stress::run(&arguments),

@@ -1,0 +1,96 @@
+//! `flotor new`: the start of a plugin of one's own.
+
+use super::{CommandError, style};
+use crate::registry::Registry;
+use crate::scaffold::{ContractFolder, Language, PluginName, Scaffold, ScaffoldError, scaffold};
+use clap::{Args, ValueEnum};
+use flotor_hal::abi::PluginKind;
+use std::path::{Path, PathBuf};
+
+/// Start a plugin.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  flotor new model jelly\n  flotor new device crank\n  \
+    flotor new model jelly --language c\n\nMakes the folder ./NAME with a plugin that builds, passes \
+    `flotor validate` and runs in the scene beside it.\nNothing is ever overwritten.")]
+pub(crate) struct NewArguments {
+    /// What it is to be
+    #[arg(value_enum)]
+    kind: Kind,
+    /// Its id: lower-case letters, digits and hyphens
+    name: String,
+    /// What it is to be written in
+    #[arg(long, value_enum, default_value_t = Written::Rust)]
+    language: Written,
+    /// Folder of the contract's sources (default: those this program was built from)
+    #[arg(long, value_name = "PATH")]
+    hal: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Kind {
+    /// Gives the wrench for a pose
+    Model,
+    /// Gives the pose and takes a wrench
+    Device,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Written {
+    Rust,
+    C,
+}
+
+pub(crate) fn run(arguments: &NewArguments) -> Result<(), CommandError> {
+    let kind = match arguments.kind {
+        Kind::Model => PluginKind::Model,
+        Kind::Device => PluginKind::Device,
+    };
+    let language = match arguments.language {
+        Written::Rust => Language::Rust,
+        Written::C => Language::C,
+    };
+    let name = PluginName::new(&arguments.name).map_err(ScaffoldError::from)?;
+    refuse_an_id_in_use(&name)?;
+    let contract = ContractFolder::found_by(arguments.hal.as_deref())?;
+    let made = scaffold(Path::new("."), &name, kind, language, &contract)?;
+    tell(&name, &made);
+    Ok(())
+}
+
+/// Of two plugins with one id only the first found is used: the new one would be hidden, or hide the other.
+fn refuse_an_id_in_use(name: &PluginName) -> Result<(), CommandError> {
+    let registry = Registry::search(&[]);
+    let Some(known) = registry.found().iter().find(|known| known.id == name.id()) else { return Ok(()) };
+    Err(CommandError::Usage(format!(
+        "`{0}` is the id of {1} already; `my-{0}` would do",
+        name.id(),
+        known.path.display()
+    )))
+}
+
+fn tell(name: &PluginName, made: &Scaffold) {
+    say!("{} in {}:", style::title(&name.title()), made.folder.display());
+    let first = made.files.first().copied().unwrap_or_default();
+    say!("  {first:<16} the plugin: change this");
+    for file in made.files.iter().skip(1) {
+        say!("  {file}");
+    }
+    say!("\nNext:");
+    for command in [
+        &format!("cd {}", made.folder.display()),
+        made.build,
+        &format!("flotor validate {}", made.library),
+        "flotor run scene.toml --plot run.svg",
+    ] {
+        say!("  {command}");
+    }
+}
+
+impl From<ScaffoldError> for CommandError {
+    fn from(error: ScaffoldError) -> Self {
+        match error {
+            ScaffoldError::Write { path, cause } => Self::file(&path, "cannot write", cause),
+            other => Self::Usage(other.to_string()),
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! `flotor new`: a plugin crate of its own that builds, validates and runs as it is.
+//!
+//! The templates are whole files that compile once `your-name` (the id), `your_name` (in symbols), `YourName` (the
+//! type) and `Your name` (for people) are replaced. A crate that is made lies anywhere: it has the path of the
+//! contract (`hal`) and a workspace of its own.
+
+mod contract;
+mod name;
+
+pub use contract::ContractFolder;
+pub use name::{NameError, PluginName};
+
+use flotor_hal::abi::{ABI_MAJOR, ABI_MINOR, PluginKind};
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// What a plugin is written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Language {
+    /// A cargo crate.
+    Rust,
+    /// One C file and a Makefile.
+    C,
+}
+
+/// Why no plugin was made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ScaffoldError {
+    /// The name cannot be used.
+    #[error(transparent)]
+    Name(#[from] NameError),
+    /// The type would be called like something the template uses.
+    #[error(
+        "a plugin `{id}` would have a type `{type_name}`, and the contract has one, too; `my-{id}` would do"
+    )]
+    Clash {
+        /// The name.
+        id: String,
+        /// What the type would be called.
+        type_name: String,
+    },
+    /// There is something of this name already.
+    #[error("{} exists already, and nothing is ever overwritten; move it or choose another name", .0.display())]
+    Exists(PathBuf),
+    /// The folder belongs to a cargo workspace that takes every folder in it as a member.
+    #[error(
+        "{} belongs to Flotor's own workspace, where a plugin is a folder with `flotor-hal.workspace = true` (see \
+         ARCHITECTURE.md, Adding a plugin); for one of its own, go to another folder",
+        .0.display()
+    )]
+    InsideWorkspace(PathBuf),
+    /// The contract's sources are not where this program was built.
+    #[error(
+        "the sources of the contract (`hal/`) are not found beside this program, nor at {}; say where they are: \
+         --hal PATH",
+        .0.display()
+    )]
+    NoContract(PathBuf),
+    /// A path that cannot be written into a manifest.
+    #[error("{}: a manifest holds text, and this path is not text", .0.display())]
+    NotText(PathBuf),
+    /// The system said no.
+    #[error("{}: cannot write: {cause}", path.display())]
+    Write {
+        /// What was to be written.
+        path: PathBuf,
+        /// What the system said.
+        cause: std::io::Error,
+    },
+}
+
+/// A plugin that was made.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Scaffold {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// Its files, relative to the folder, the one to edit first.
+    pub files: Vec<&'static str>,
+    /// What builds it, in its folder.
+    pub build: &'static str,
+    /// The library that comes out, relative to the folder.
+    pub library: String,
+}
+
+/// Makes the plugin `parent/NAME`. Not real-time.
+///
+/// # Errors
+/// [`ScaffoldError`]; where there is something already, nothing is touched.
+pub fn scaffold(
+    parent: &Path,
+    name: &PluginName,
+    kind: PluginKind,
+    language: Language,
+    contract: &ContractFolder,
+) -> Result<Scaffold, ScaffoldError> {
+    let text = Placeholders::new(name, contract)?;
+    let files = files(kind, language);
+    if files.iter().any(|(path, source)| path.ends_with(".rs") && text.clashes_with(source)) {
+        return Err(ScaffoldError::Clash { id: name.id().to_owned(), type_name: name.type_name() });
+    }
+    if contract.has_as_member(parent) {
+        return Err(ScaffoldError::InsideWorkspace(parent.into()));
+    }
+    let folder = parent.join(name.id());
+    make_folder(&folder)?;
+    if language == Language::Rust {
+        make_folder(&folder.join("src"))?;
+    }
+    for (path, template) in files {
+        write(&folder.join(text.fill(path)), &text.fill(template))?;
+    }
+    if language == Language::Rust
+        && let Some(lock) = contract.lock_file()
+    {
+        write(&folder.join("Cargo.lock"), &lock)?;
+    }
+    Ok(Scaffold {
+        folder,
+        files: files.iter().map(|(path, _)| *path).collect(),
+        build: match language {
+            Language::Rust => "cargo build --release",
+            Language::C => "make",
+        },
+        library: format!("target/release/lib{}{}", name.symbol(), std::env::consts::DLL_SUFFIX),
+    })
+}
+
+/// The files of a plugin: path and template, the one to edit first.
+fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'static str)] {
+    const IGNORE: (&str, &str) = (".gitignore", "/target\n");
+    const MODEL_SCENE: (&str, &str) = ("scene.toml", include_str!("templates/model-scene.toml"));
+    const DEVICE_SCENE: (&str, &str) = ("scene.toml", include_str!("templates/device-scene.toml"));
+    const MANIFEST: (&str, &str) = ("Cargo.toml", include_str!("templates/rust/manifest.toml"));
+    const MAKEFILE: (&str, &str) = ("Makefile", include_str!("templates/c/Makefile"));
+    match (kind, language) {
+        (PluginKind::Model, Language::Rust) => {
+            &[("src/lib.rs", include_str!("templates/rust/model.rs")), MODEL_SCENE, MANIFEST, IGNORE]
+        }
+        (PluginKind::Device, Language::Rust) => {
+            &[("src/lib.rs", include_str!("templates/rust/device.rs")), DEVICE_SCENE, MANIFEST, IGNORE]
+        }
+        (PluginKind::Model, Language::C) => {
+            &[("plugin.c", include_str!("templates/c/model.c")), MODEL_SCENE, MAKEFILE, IGNORE]
+        }
+        (PluginKind::Device, Language::C) => {
+            &[("plugin.c", include_str!("templates/c/device.c")), DEVICE_SCENE, MAKEFILE, IGNORE]
+        }
+    }
+}
+
+/// What stands in the templates, and what comes instead.
+struct Placeholders([(&'static str, String); 6]);
+
+impl Placeholders {
+    fn new(name: &PluginName, contract: &ContractFolder) -> Result<Self, ScaffoldError> {
+        Ok(Self([
+            ("your-name", name.id().to_owned()),
+            ("your_name", name.symbol()),
+            ("YourName", name.type_name()),
+            ("Your name", name.title()),
+            ("path/to/hal", contract.as_text()?),
+            ("MAJOR.MINOR", format!("{ABI_MAJOR}.{ABI_MINOR}")),
+        ]))
+    }
+
+    fn fill(&self, template: &str) -> String {
+        self.0.iter().fold(template.to_owned(), |text, (placeholder, value)| text.replace(placeholder, value))
+    }
+
+    /// Whether the Rust template uses a type that the plugin's own would hide.
+    fn clashes_with(&self, template: &str) -> bool {
+        let [_, _, (_, type_name), ..] = &self.0;
+        let code = template.lines().filter(|line| !line.trim_start().starts_with("//"));
+        let mut words = code.flat_map(|line| line.split(|c: char| !c.is_alphanumeric() && c != '_'));
+        words.any(|word| word == type_name)
+    }
+}
+
+fn make_folder(folder: &Path) -> Result<(), ScaffoldError> {
+    std::fs::create_dir(folder).map_err(|cause| match cause.kind() {
+        std::io::ErrorKind::AlreadyExists => ScaffoldError::Exists(folder.into()),
+        _ => ScaffoldError::Write { path: folder.into(), cause },
+    })
+}
+
+fn write(path: &Path, text: &str) -> Result<(), ScaffoldError> {
+    let written = File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes()));
+    written.map_err(|cause| ScaffoldError::Write { path: path.into(), cause })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Lines a newcomer has to read: no comments, no blank lines, nothing after the export.
+    fn useful_lines(template: &str) -> usize {
+        let code = template.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("//"));
+        code.take_while(|line| *line != "#[cfg(test)]").count()
+    }
+
+    #[test]
+    fn a_useful_model_takes_forty_lines() {
+        let lines = useful_lines(include_str!("templates/rust/model.rs"));
+        assert!((10..=40).contains(&lines), "{lines} lines");
+    }
+
+    #[test]
+    fn no_placeholder_is_left() {
+        let contract = ContractFolder::found_by(None).expect("a test runs beside its sources");
+        let text = Placeholders::new(&PluginName::new("soft-wall").unwrap(), &contract).unwrap();
+        for kind in [PluginKind::Model, PluginKind::Device] {
+            for (path, template) in [Language::Rust, Language::C].into_iter().flat_map(|l| files(kind, l)) {
+                let filled = text.fill(template);
+                for placeholder in text.0.iter().map(|(placeholder, _)| placeholder) {
+                    assert!(!filled.contains(placeholder), "{path} still says {placeholder}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_type_of_the_contract_is_no_name() {
+        let contract = ContractFolder::found_by(None).expect("a test runs beside its sources");
+        let clashes = |name: &str, template: &str| {
+            Placeholders::new(&PluginName::new(name).unwrap(), &contract).unwrap().clashes_with(template)
+        };
+        assert!(clashes("wrench", include_str!("templates/rust/model.rs")));
+        assert!(clashes("model-info", include_str!("templates/rust/model.rs")));
+        assert!(clashes("device", include_str!("templates/rust/device.rs")));
+        assert!(!clashes("wall", include_str!("templates/rust/model.rs")));
+    }
+}

@@ -1,0 +1,158 @@
+//! The name of a new plugin: checked once, then written in the ways a crate, a type and a person need it.
+
+/// Names cargo or the compiler keep for themselves (Rust reference, "Keywords"; `cargo new` refuses the rest).
+const TAKEN: [&str; 47] = [
+    "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate", "do", "dyn",
+    "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in", "let", "loop",
+    "macro", "match", "mod", "move", "mut", "override", "priv", "pub", "ref", "return", "self", "static",
+    "struct", "super", "trait", "true", "try", "type", "unsafe", "use", "where", "while",
+];
+/// Crates every build has, and what cargo builds beside a crate.
+const CRATES: [&str; 7] = ["alloc", "core", "proc-macro", "std", "test", "build", "deps"];
+/// Longer names make unreadable lists.
+const LONGEST: usize = 32;
+
+/// A name that is good for a folder, a crate, a type and an id.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PluginName(String);
+
+/// Why a name is not good.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NameError {
+    /// It has characters that cannot stand in a crate's name, or stands them wrongly.
+    #[error("`{name}` cannot be the name of a plugin: lower-case letters, digits and single hyphens between \
+        them, a letter first, at most {LONGEST} characters{}",
+        nearest.as_ref().map_or(String::new(), |nearest| format!("; `{nearest}` would do")))]
+    Form {
+        /// The name.
+        name: String,
+        /// A good name made of the same letters.
+        nearest: Option<String>,
+    },
+    /// It means something else already.
+    #[error("`{name}` means something else to {owner}; `my-{name}` would do")]
+    Taken {
+        /// The name.
+        name: String,
+        /// To whom.
+        owner: &'static str,
+    },
+}
+
+impl PluginName {
+    /// Checks a name. Not real-time.
+    ///
+    /// # Errors
+    /// [`NameError`] with a name that would do.
+    pub fn new(name: &str) -> Result<Self, NameError> {
+        if !well_formed(name) {
+            let nearest = Some(tidied(name)).filter(|tidied| well_formed(tidied));
+            return Err(NameError::Form { name: name.to_owned(), nearest });
+        }
+        let taken = |owner| NameError::Taken { name: name.to_owned(), owner };
+        match name {
+            _ if TAKEN.contains(&name) => Err(taken("the compiler")),
+            _ if CRATES.contains(&name) => Err(taken("cargo")),
+            _ if name.starts_with("flotor") => Err(taken("Flotor, whose crates begin with it")),
+            _ => Ok(Self(name.to_owned())),
+        }
+    }
+
+    /// `soft-wall`: the id in scenes, the folder, the crate.
+    #[must_use]
+    pub fn id(&self) -> &str {
+        &self.0
+    }
+
+    /// `soft_wall`: in file names and symbols.
+    #[must_use]
+    pub fn symbol(&self) -> String {
+        self.0.replace('-', "_")
+    }
+
+    /// `SoftWall`: the type.
+    #[must_use]
+    pub fn type_name(&self) -> String {
+        self.0.split('-').map(capitalised).collect()
+    }
+
+    /// `Soft wall`: for people.
+    #[must_use]
+    pub fn title(&self) -> String {
+        capitalised(&self.0.replace('-', " "))
+    }
+}
+
+fn well_formed(name: &str) -> bool {
+    let characters = name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-');
+    let hyphens = !name.contains("--") && !name.ends_with('-');
+    characters && hyphens && name.starts_with(|c: char| c.is_ascii_lowercase()) && name.len() <= LONGEST
+}
+
+/// The letters and digits of a name, in lower case, with one hyphen where there was anything else.
+fn tidied(name: &str) -> String {
+    let mut words: Vec<String> = vec![String::new()];
+    let mut after_lower = false;
+    for c in name.chars() {
+        let boundary = !c.is_ascii_alphanumeric() || (c.is_ascii_uppercase() && after_lower);
+        if boundary {
+            words.push(String::new());
+        }
+        if let Some(word) = words.last_mut().filter(|_| c.is_ascii_alphanumeric()) {
+            word.push(c.to_ascii_lowercase());
+        }
+        after_lower = c.is_ascii_lowercase();
+    }
+    words.retain(|word| !word.is_empty());
+    words.join("-")
+}
+
+fn capitalised(word: &str) -> String {
+    let mut characters = word.chars();
+    characters
+        .next()
+        .map_or(String::new(), |first| first.to_ascii_uppercase().to_string() + characters.as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_name_is_written_in_four_ways() {
+        let name = PluginName::new("soft-wall-2").unwrap();
+        assert_eq!(
+            (name.id(), name.symbol(), name.type_name(), name.title()),
+            ("soft-wall-2", "soft_wall_2".to_owned(), "SoftWall2".to_owned(), "Soft wall 2".to_owned())
+        );
+    }
+
+    #[test]
+    fn a_wrong_name_comes_back_right() {
+        let nearest = |name: &str| match PluginName::new(name) {
+            Err(NameError::Form { nearest, .. }) => nearest,
+            other => panic!("{name}: {other:?}"),
+        };
+        for (wrong, right) in [
+            ("SoftWall", "soft-wall"),
+            ("soft_wall", "soft-wall"),
+            ("soft wall", "soft-wall"),
+            ("-soft--wall-", "soft-wall"),
+            ("../wall", "wall"),
+            ("MLHD", "mlhd"),
+        ] {
+            assert_eq!(nearest(wrong).as_deref(), Some(right), "{wrong}");
+        }
+        for hopeless in ["", "--", "2-walls", "ü", "a-name-of-more-than-thirty-two-characters"] {
+            assert_eq!(nearest(hopeless), None, "{hopeless}");
+        }
+    }
+
+    #[test]
+    fn names_that_mean_something_else_are_refused() {
+        for name in ["fn", "self", "test", "std", "flotor-hal", "flotor"] {
+            assert!(matches!(PluginName::new(name), Err(NameError::Taken { .. })), "{name}");
+        }
+    }
+}

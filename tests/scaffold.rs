@@ -1,0 +1,130 @@
+//! `flotor new` as a newcomer meets it: what it makes builds with the commands it prints, validates, and runs in
+//! its scene; a wrong name costs one line, and nothing is ever overwritten.
+
+use flotor_tests::library::build_folder;
+use flotor_tests::program::{Flotor, Ran, exit_code};
+use flotor_tests::scratch::Scratch;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn new(folder: &Path, arguments: &[&str]) -> Ran {
+    Flotor::with(["new"].iter().chain(arguments)).inside(folder).run()
+}
+
+/// Makes a plugin in an empty folder and builds it as told. Its build output is kept from one test run to the next:
+/// the dependencies of the contract are compiled once.
+fn made(scratch: &Scratch, kind: &str, name: &str, language: &str) -> PathBuf {
+    let ran = new(scratch.path(), &[kind, name, "--language", language]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(exit_code::OK), ""), "{ran:?}");
+    let folder = scratch.path().join(name);
+    let output = build_folder().join("scaffold");
+    std::fs::create_dir_all(&output).expect("a build folder can be written to");
+    symlink(&output, folder.join("target")).expect("a new plugin has no output yet");
+    let commands = match language {
+        "rust" => vec![
+            vec!["cargo", "build", "--release", "--offline"],
+            vec!["cargo", "test", "--release", "--offline"],
+        ],
+        _ => vec![vec!["make", "--always-make", "CFLAGS=-Werror -pedantic"]],
+    };
+    for command in commands {
+        let mut process = Command::new(command[0]);
+        process.args(&command[1..]).current_dir(&folder).env_remove("CARGO_TARGET_DIR");
+        // The product is the same; its dependencies compile in a third of the time.
+        process.env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "0").env("CARGO_INCREMENTAL", "0");
+        let output = process.output().unwrap_or_else(|error| panic!("{command:?}: {error}"));
+        assert!(output.status.success(), "{command:?}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    folder
+}
+
+/// Validates it, runs its scene on the virtual clock and returns the peak force on the hand, N.
+fn peak_force_n(folder: &Path, name: &str) -> f64 {
+    let library = format!("target/release/lib{}.so", name.replace('-', "_"));
+    let ran = Flotor::with(["validate", &library]).inside(folder).run();
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(exit_code::OK), ""), "{ran:?}");
+    let ran =
+        Flotor::with(["run", "scene.toml", "--clock", "virtual", "--duration", "2s", "--json", "run.json"]);
+    let ran = ran.inside(folder).run();
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(exit_code::OK), ""), "{ran:?}");
+    let json = std::fs::read_to_string(folder.join("run.json")).expect("the summary was asked for");
+    let json: serde_json::Value = serde_json::from_str(&json).expect("a summary is JSON");
+    json["peak_force_n"].as_f64().expect("the summary has the peak force")
+}
+
+#[test]
+fn a_new_model_builds_validates_and_pushes() {
+    for language in ["rust", "c"] {
+        let (scratch, name) = (Scratch::default(), format!("jelly-in-{language}"));
+        let folder = made(&scratch, "model", &name, language);
+        // The hand means to go 4 mm down against 800 N/m and is itself soft: more than nothing, less than 3.2 N.
+        let peak = peak_force_n(&folder, &name);
+        assert!(peak > 0.5 && peak < 3.2, "{language}: {peak} N");
+        let poses = scratch
+            .file("poses.csv", "id,x_m,y_m,z_m,rx_rad,ry_rad,rz_rad\nq,0,0,-0.001,0,0,0\nn,nan,0,0,0,0,0\n");
+        let ran = Flotor::with(
+            ["eval", "--model", &name, "--out", "-", "--poses"]
+                .iter()
+                .map(AsRef::as_ref)
+                .chain([poses.as_os_str()]),
+        );
+        let ran = ran.searching(&[&folder.join("target/release")]).run();
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+        assert!(ran.stdout.contains("q,0.0,0.0,0.5,0.0,0.0,0.0,,ok"), "{}", ran.stdout); // 500 N/m times 1 mm
+        assert!(ran.stdout.contains("n,0.0,0.0,0.0,0.0,0.0,0.0,,invalid_input"), "{}", ran.stdout);
+    }
+}
+
+#[test]
+fn a_new_device_builds_validates_and_moves() {
+    for language in ["rust", "c"] {
+        let (scratch, name) = (Scratch::default(), format!("crank-in-{language}"));
+        let folder = made(&scratch, "device", &name, language);
+        // Spring 1 at 4 mm: k_hand is gamma / L0 = 679 N/m without the demo's scale; the energy form adds little.
+        let peak = peak_force_n(&folder, &name);
+        assert!((peak - 2.7).abs() < 0.3, "{language}: {peak} N");
+    }
+}
+
+#[test]
+fn nothing_is_overwritten() {
+    let scratch = Scratch::default();
+    let own = scratch.folder("jelly");
+    std::fs::write(own.join("notes.txt"), "mine").expect("a scratch folder can be written to");
+    let ran = new(scratch.path(), &["model", "jelly"]);
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION));
+    assert!(ran.error().contains("jelly exists already"), "{ran:?}");
+    let left: Vec<_> = std::fs::read_dir(&own).expect("it is still there").collect();
+    assert_eq!(left.len(), 1);
+}
+
+#[test]
+fn a_name_that_cannot_be_costs_one_line_with_one_that_can() {
+    let scratch = Scratch::default();
+    for (name, says) in [
+        ("SoftWall", "`soft-wall` would do"),
+        ("../wall", "`wall` would do"),
+        ("fn", "means something else to the compiler"),
+        ("test", "means something else to cargo"),
+        ("flotor-hal", "Flotor, whose crates begin with it"),
+        ("wrench", "would have a type `Wrench`"),
+        ("spring", "is the id of"),
+    ] {
+        let ran = new(scratch.path(), &["model", name]);
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{name}: {ran:?}");
+        assert!(ran.error().contains(says), "{name}: {ran:?}");
+        assert_eq!(ran.stderr.lines().count(), 1, "{name}: {ran:?}");
+    }
+    let left = std::fs::read_dir(scratch.path()).expect("it is still there");
+    assert_eq!(left.count(), 0, "a refused name leaves nothing behind");
+}
+
+#[test]
+fn without_the_contract_there_is_no_plugin() {
+    let scratch = Scratch::default();
+    let ran = new(scratch.path(), &["model", "jelly", "--hal", "/nowhere"]);
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION));
+    assert!(ran.error().contains("nor at /nowhere") && ran.error().contains("--hal PATH"), "{ran:?}");
+    assert!(!scratch.path().join("jelly").exists());
+}
