@@ -1,0 +1,22 @@
+//! A stiff wall: the textbook model of haptics, and the smallest real example of a force model.
+//!
+//! A *proxy* stays on the surface while the handle is inside; a spring draws the handle to it. Without friction the
+//! proxy is where the handle would be if it could not get in (the god-object of Zilles and Salisbury 1995, IROS,
+//! 146-151); with friction it sticks until the pull along the surface leaves Coulomb's cone, and then slides until it
+//! is back on it.
+//!
+//! ```text
+//! F = max(K d - B v_n, 0) n + K t,    |t| <= mu d
+//! ```
+//!
+//! with depth `d` and displacement `t` of the proxy from the handle, along and across the outward normal `n`.
+//!
+//! - [`shape`]: plane, sphere, box: normals, and sliding on the surface.
+//! - [`proxy`]: contact, stick and slip.
+//! - `plugin`: parameters and the contract.
+
+mod plugin;
+pub mod proxy;
+pub mod shape;
+
+pub use plugin::{FLOTOR_ENTRY, Wall};

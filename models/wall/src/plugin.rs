@@ -1,0 +1,111 @@
+//! The wall as a plugin: parameters, and one handle's history.
+
+use crate::proxy::{Proxy, Surface};
+use crate::shape::Shape;
+use flotor_hal::abi::Str;
+use flotor_hal::{
+    DVec3, Demand, ForceModel, Input, Memory, ModelInfo, OutOfRange, Output, Parameter, Refusal, Settings,
+    StepStatus, Wrench,
+};
+
+/// Farther from home than this there is no handle, m: the answer is that at the edge, and says so.
+const REACH_M: f64 = 1.0;
+
+const SHAPES: [Str; 3] = [Str::new("plane"), Str::new("sphere"), Str::new("box")];
+
+/// A stiff wall, sphere or box; the handle is a point.
+pub struct Wall {
+    shape: Shape,
+    size_mm: f64,
+    height_m: f64,
+    surface: Surface,
+    proxy: Proxy,
+}
+
+impl ForceModel for Wall {
+    const INFO: ModelInfo = ModelInfo::new("wall", "Wall", "A stiff wall, sphere or box with friction")
+        .serving(Demand::ALL)
+        .with_memory(Memory::PathDependent);
+
+    const PARAMETERS: &'static [Parameter] = &[
+        Parameter::real("stiffness_n_per_m", "N/m", 0.0, 1.0e6, 2000.0, "Stiffness of the surface").live(),
+        Parameter::real(
+            "damping_ns_per_m",
+            "N s/m",
+            0.0,
+            1000.0,
+            0.0,
+            "Damping along the normal, in contact",
+        )
+        .live(),
+        Parameter::real("friction", "1", 0.0, 10.0, 0.0, "Coefficient of friction").live(),
+        Parameter::choice("shape", &SHAPES, 0, "Which solid: below a plane, a ball, or a cube"),
+        Parameter::real("size_mm", "mm", 0.1, 1000.0, 10.0, "Radius of the ball, half the edge of the cube"),
+        Parameter::real("height_mm", "mm", -100.0, 100.0, 0.0, "Top of the solid above home"),
+    ];
+
+    fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        let size_mm = settings.number_or_default("size_mm");
+        let half_m = size_mm * 1.0e-3;
+        Ok(Self {
+            shape: match settings.choice_or_default("shape") {
+                1 => Shape::Sphere { radius_m: half_m },
+                2 => Shape::Cube { half_m },
+                _ => Shape::Plane,
+            },
+            size_mm,
+            height_m: settings.number_or_default("height_mm") * 1.0e-3,
+            surface: Surface {
+                stiffness_n_per_m: settings.number_or_default("stiffness_n_per_m"),
+                damping_ns_per_m: settings.number_or_default("damping_ns_per_m"),
+                friction: settings.number_or_default("friction"),
+            },
+            proxy: Proxy::default(),
+        })
+    }
+
+    fn step(&mut self, input: &Input) -> Output {
+        let velocity_m_per_s = input.twist.linear();
+        if !input.pose.is_finite() || !velocity_m_per_s.is_finite() {
+            return Output::new(Wrench::ZERO, 0.0, StepStatus::InvalidInput);
+        }
+        let position_m = input.pose.position();
+        let reached_m = position_m.clamp(DVec3::splat(-REACH_M), DVec3::splat(REACH_M));
+        let above_top_m = reached_m - DVec3::Z * self.height_m;
+        let pull = self.proxy.follow(&self.shape, &self.surface, above_top_m, velocity_m_per_s);
+        let status = if reached_m == position_m { StepStatus::Ok } else { StepStatus::Clamped };
+        Output::new(Wrench::from_force(pull.force_n), pull.energy_j, status)
+    }
+
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+        match index {
+            0 => self.surface.stiffness_n_per_m = value,
+            1 => self.surface.damping_ns_per_m = value,
+            2 => self.surface.friction = value,
+            _ => return Err(OutOfRange { min: f64::NAN, max: f64::NAN, value }),
+        }
+        Ok(())
+    }
+
+    fn parameter(&self, index: usize) -> f64 {
+        match index {
+            0 => self.surface.stiffness_n_per_m,
+            1 => self.surface.damping_ns_per_m,
+            2 => self.surface.friction,
+            3 => match self.shape {
+                Shape::Plane => 0.0,
+                Shape::Sphere { .. } => 1.0,
+                Shape::Cube { .. } => 2.0,
+            },
+            4 => self.size_mm,
+            5 => self.height_m * 1.0e3,
+            _ => f64::NAN,
+        }
+    }
+
+    fn reset(&mut self) {
+        self.proxy = Proxy::default();
+    }
+}
+
+flotor_hal::export_model!(Wall);

@@ -1,0 +1,151 @@
+//! The solids: convex, with their top at the origin and the rest below.
+
+use flotor_hal::DVec3;
+
+/// A solid whose highest point is the origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// All below `z = 0`.
+    Plane,
+    /// A ball.
+    Sphere {
+        /// Radius, m.
+        radius_m: f64,
+    },
+    /// A cube with edges along the axes.
+    Cube {
+        /// Half the length of an edge, m.
+        half_m: f64,
+    },
+}
+
+/// A place on a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// The point, m.
+    pub point_m: DVec3,
+    /// Outward unit normal.
+    pub normal: DVec3,
+}
+
+impl Shape {
+    /// True inside the solid. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn contains(&self, point_m: DVec3) -> bool {
+        let from_centre_m = point_m - self.centre_m();
+        match *self {
+            Self::Plane => point_m.z < 0.0,
+            Self::Sphere { radius_m } => from_centre_m.length_squared() < radius_m * radius_m,
+            Self::Cube { half_m } => from_centre_m.abs().max_element() < half_m,
+        }
+    }
+
+    /// Where a way from `outside_m` straight to `inside_m` touches first, or rather the place of that face nearest to
+    /// where it ends. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn entry(&self, outside_m: DVec3, inside_m: DVec3) -> Place {
+        let normal = match *self {
+            Self::Plane | Self::Sphere { .. } => DVec3::Z,
+            Self::Cube { half_m } => self.face_crossed(outside_m, inside_m, half_m),
+        };
+        self.nearest(inside_m, normal)
+    }
+
+    /// The place on the surface nearest to a point inside. A cube keeps the face it was entered by, whose normal
+    /// `entered` is: the handle does not pop out at the back. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn nearest(&self, inside_m: DVec3, entered: DVec3) -> Place {
+        let from_centre_m = inside_m - self.centre_m();
+        match *self {
+            Self::Plane => Place { point_m: inside_m.with_z(0.0), normal: DVec3::Z },
+            Self::Sphere { radius_m } => {
+                // At the very centre all directions are alike; the one it came from is the steady choice.
+                let normal = from_centre_m.try_normalize().unwrap_or(entered);
+                Place { point_m: self.centre_m() + normal * radius_m, normal }
+            }
+            Self::Cube { half_m } => {
+                let depth_m = half_m - from_centre_m.dot(entered);
+                Place { point_m: inside_m + entered * depth_m, normal: entered }
+            }
+        }
+    }
+
+    /// Slides a proxy on the surface towards the place nearest to the handle, just as far as friction `mu` lets it:
+    /// to where the pull of the handle lies on Coulomb's cone, `|t| = mu d`. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn slide(&self, proxy: &Place, handle_m: DVec3, mu: f64) -> Place {
+        let nearest = self.nearest(handle_m, proxy.normal);
+        match *self {
+            Self::Plane | Self::Cube { .. } => {
+                let depth_m = (nearest.point_m - handle_m).dot(nearest.normal);
+                let lag_m = (proxy.point_m - nearest.point_m).clamp_length_max(mu * depth_m);
+                Place { point_m: nearest.point_m + lag_m, normal: nearest.normal }
+            }
+            Self::Sphere { radius_m } => {
+                // r sin(a) = mu (R - r cos(a)) for the angle a between proxy and handle, seen from the centre.
+                let share = (handle_m - self.centre_m()).length() / radius_m;
+                let sine = mu / (share * mu.hypot(1.0));
+                let sticks_up_to_rad = if sine < 1.0 { sine.asin() - mu.atan() } else { f64::INFINITY };
+                let angle_rad = proxy.normal.angle_between(nearest.normal);
+                if angle_rad <= sticks_up_to_rad {
+                    return *proxy;
+                }
+                let normal = nearest.normal.slerp(proxy.normal, sticks_up_to_rad / angle_rad).normalize();
+                Place { point_m: self.centre_m() + normal * radius_m, normal }
+            }
+        }
+    }
+
+    /// Centre of the solid, m; of a plane, the origin.
+    fn centre_m(&self) -> DVec3 {
+        match *self {
+            Self::Plane => DVec3::ZERO,
+            Self::Sphere { radius_m: half_m } | Self::Cube { half_m } => -DVec3::Z * half_m,
+        }
+    }
+
+    /// Normal of the face of a cube a straight way crosses: of the slabs it enters, the last.
+    fn face_crossed(&self, outside_m: DVec3, inside_m: DVec3, half_m: f64) -> DVec3 {
+        let (from, to) = (outside_m - self.centre_m(), inside_m - self.centre_m());
+        let mut crossed = (DVec3::Z, f64::NEG_INFINITY);
+        for axis in [DVec3::Z, DVec3::Y, DVec3::X] {
+            let side = axis.dot(from).signum();
+            let (beyond_m, moved_m) = (side * axis.dot(from) - half_m, side * axis.dot(from - to));
+            let entered_at =
+                if beyond_m >= 0.0 && moved_m > 0.0 { beyond_m / moved_m } else { f64::NEG_INFINITY };
+            if entered_at > crossed.1 {
+                crossed = (axis * side, entered_at);
+            }
+        }
+        crossed.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CUBE: Shape = Shape::Cube { half_m: 0.01 };
+
+    #[test]
+    fn the_top_of_every_solid_is_the_origin() {
+        for shape in [Shape::Plane, Shape::Sphere { radius_m: 0.02 }, CUBE] {
+            assert!(shape.contains(DVec3::Z * -1.0e-9) && !shape.contains(DVec3::Z * 1.0e-9), "{shape:?}");
+            assert_eq!(shape.entry(DVec3::Z, DVec3::Z * -1.0e-3).normal, DVec3::Z);
+        }
+    }
+
+    #[test]
+    fn a_cube_is_entered_by_the_face_the_way_crosses_and_left_by_none() {
+        let inside = DVec3::new(0.0099, 0.0, -0.0005); // as near to the top as to the side, and nearer to the side
+        for (outside, normal) in [
+            (DVec3::new(0.0099, 0.0, 0.001), DVec3::Z),
+            (DVec3::new(0.02, 0.0, -0.0005), DVec3::X),
+            (DVec3::new(0.02, 0.0, 0.0001), DVec3::X), // above the top at first, below it when it reaches the side
+        ] {
+            assert_eq!(CUBE.entry(outside, inside).normal, normal, "{outside}");
+        }
+        let deep = CUBE.nearest(DVec3::Z * -0.019, DVec3::Z); // a millimetre before the bottom
+        assert_eq!((deep.normal, deep.point_m), (DVec3::Z, DVec3::ZERO));
+    }
+}
