@@ -34,6 +34,17 @@ every_change() {
     step test cargo test
     step lint cargo clippy --workspace --all-targets -- -D warnings
     step docs env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
+    # Workspaces of their own: that they still compile against the host.
+    step beside cargo check --release --manifest-path host/python/Cargo.toml --target-dir target/beside
     # Every interleaving of the lock-free cells. A target folder of its own: the flag changes every crate.
     step loom env RUSTFLAGS="--cfg loom" cargo test -p flotor-sync --release --test loom --target-dir target/loom
+}
+
+# The Python wheel as a user installs it, and its tests against the command: models, runs, sweeps on threads and Dask.
+wheel() {
+    python3 -m venv target/venv
+    target/venv/bin/pip install --quiet 'host/python[test]'
+    cargo build --release
+    cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target
+    FLOTOR=target/release/flotor FLOTOR_SWEEP=target/release/flotor-sweep target/venv/bin/python -m pytest -q host/python
 }
