@@ -7,6 +7,7 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::cli::print_line(format_args!($($text)*)) };
 }
 
+mod bench;
 mod companion;
 mod doctor;
 mod eval;
@@ -61,6 +62,8 @@ enum Command {
     Jitter(jitter::JitterArguments),
     /// Find the stiffest virtual spring that stays stable, next to theory
     Stability(stability::StabilityArguments),
+    /// Measure what an evaluation costs and how wrong it is, for many settings of a force model
+    Bench(bench::BenchArguments),
     /// Score the numerical stability of a force model
     Stress(stress::StressArguments),
     /// Sweep a model or a scene over parameters, poses and seeds into a Parquet table
@@ -198,6 +201,7 @@ pub fn main() -> ExitCode {
         Some(Command::New(arguments)) => new::run(&arguments),
         Some(Command::Jitter(arguments)) => jitter::run(&arguments),
         Some(Command::Stability(arguments)) => stability::run(&arguments),
+        Some(Command::Bench(arguments)) => bench::run(&arguments),
         Some(Command::Stress(arguments)) => stress::run(&arguments),
         Some(Command::Sweep(arguments)) => sweep::run(&arguments),
         Some(Command::Doctor(arguments)) => doctor::run(&arguments),

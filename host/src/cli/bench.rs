@@ -1,0 +1,129 @@
+//! `flotor bench`: work against precision of a force model's settings.
+
+use super::options::KeyValue;
+use super::{CommandError, style, write_json};
+use crate::bench::{Case, Effort, Progress, measure};
+use crate::registry::Registry;
+use clap::{Args, ValueEnum};
+use flotor_hal::abi::PluginKind;
+use flotor_hal::abi::loader::{Plugin, Setting};
+use indicatif::ProgressBar;
+use std::path::PathBuf;
+
+/// `--size`
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SizeOption {
+    /// Seconds
+    Short,
+    /// Minutes: p99.9 means something
+    Full,
+}
+
+/// Measure what an evaluation costs and how wrong it is, for many settings of a force model.
+#[derive(Args)]
+#[command(
+    after_help = "Without --case, the spring's variants and settings are compared with its exact rod; another model's\n\
+    defaults alone. Times are wall clock: compare within one run.\n\n\
+    Examples:\n  \
+    flotor bench --csv bench.csv --plot bench.svg\n  \
+    flotor bench --case variant=energy --case variant=rod,accuracy=servo --size full\n  \
+    flotor bench --model ./libmy_model.so --case steps=8 --case steps=64 --reference steps=1024"
+)]
+pub(crate) struct BenchArguments {
+    /// Id of the model, or path to its plugin file
+    #[arg(long, value_name = "ID", default_value = "spring")]
+    model: String,
+    /// A case: its settings (repeatable)
+    #[arg(long = "case", value_name = "KEY=VALUE,...")]
+    cases: Vec<String>,
+    /// Settings every case starts from (repeatable)
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<KeyValue>,
+    /// The case errors are measured against
+    #[arg(long, value_name = "KEY=VALUE,...")]
+    reference: Option<String>,
+    /// How much to time
+    #[arg(long, value_enum, default_value = "short")]
+    size: SizeOption,
+    /// Write every measurement as CSV
+    #[arg(long, value_name = "FILE.csv")]
+    csv: Option<PathBuf>,
+    /// Draw error over time
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Write the measurements as JSON (- for standard output)
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// Cases of the spring that ships with Flotor: every variant and setting of it.
+const SPRING_CASES: [&str; 8] = [
+    "variant=thesis",
+    "variant=thesis,precision=f32",
+    "variant=closed-form",
+    "variant=closed-form,precision=f32",
+    "variant=current-length",
+    "variant=energy",
+    "variant=rod,accuracy=servo",
+    "variant=rod,accuracy=tight",
+];
+/// What they are measured against.
+const SPRING_REFERENCE: &str = "variant=rod,accuracy=tight";
+
+pub(crate) fn run(arguments: &BenchArguments) -> Result<(), CommandError> {
+    let plugin = Registry::search(&[]).load(&arguments.model, PluginKind::Model)?;
+    let is_spring = plugin.metadata().id == "spring" && arguments.cases.is_empty();
+    let cases: Vec<&str> = match (arguments.cases.is_empty(), is_spring) {
+        (false, _) => arguments.cases.iter().map(String::as_str).collect(),
+        (true, true) => SPRING_CASES.to_vec(),
+        (true, false) => vec![""],
+    };
+    let reference = arguments.reference.as_deref().or(is_spring.then_some(SPRING_REFERENCE));
+    let case = |text: &str| case(&plugin, &arguments.sets, text);
+    let cases = cases.into_iter().map(case).collect::<Result<Vec<_>, _>>()?;
+    let reference = reference.map(case).transpose()?;
+    let effort = match arguments.size {
+        SizeOption::Short => Effort::Short,
+        SizeOption::Full => Effort::Full,
+    };
+    let line = ProgressLine(super::run::progress_bar(cases.len() as u64, "{msg:<44} {wide_bar} {elapsed}"));
+    let report = measure(&plugin, &cases, reference.as_ref(), effort, &line)?;
+    line.0.finish_and_clear();
+
+    let json_on_stdout = arguments.json.as_ref().is_some_and(|path| path.as_os_str() == "-");
+    if !json_on_stdout {
+        say!("{}\n{}", style::title(&format!("{} {}", report.model, report.version)), report.to_text());
+    }
+    for (path, text) in [(&arguments.csv, report.to_csv()), (&arguments.plot, report.to_svg())] {
+        if let Some(path) = path {
+            std::fs::write(path, text)
+                .map_err(|cause| CommandError::file(path, "cannot write the measurements", cause))?;
+        }
+    }
+    arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &report))
+}
+
+/// A case from `KEY=VALUE,KEY=VALUE` on top of what every case starts from.
+fn case(plugin: &Plugin, sets: &[KeyValue], text: &str) -> Result<Case, CommandError> {
+    let usage = |problem: String| CommandError::Usage(format!("case `{text}`: {problem}"));
+    let own = text.split(',').filter(|part| !part.trim().is_empty()).map(str::parse::<KeyValue>);
+    let own = own.collect::<Result<Vec<_>, _>>().map_err(usage)?;
+    let settings = sets.iter().chain(&own).map(|set| {
+        let parameter = set.parameter();
+        Setting::parse(plugin.parameters(), &parameter.key, &parameter.value)
+            .map_err(|error| usage(error.to_string()))
+    });
+    let values: Vec<String> = own.iter().map(|set| set.parameter().value).collect();
+    let name = if values.is_empty() { "defaults".to_owned() } else { values.join(" ") };
+    Ok(Case { name, settings: settings.collect::<Result<_, _>>()? })
+}
+
+/// A progress line on a terminal, nothing in a pipe.
+struct ProgressLine(ProgressBar);
+
+impl Progress for ProgressLine {
+    fn begin(&self, name: &str, number: usize, _all: usize) {
+        self.0.set_position(number as u64);
+        self.0.set_message(name.to_owned());
+    }
+}
