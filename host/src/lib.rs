@@ -13,7 +13,7 @@
 //! - [`servo`]: the tick, the clock, the envelope; the only real-time module.
 //! - [`stability`]: how stiff a spring the servo can render.
 //! - [`scaffold`]: the start of somebody's own plugin.
-//! - [`bench`]: what an evaluation costs, and how wrong it is.
+//! - [`mod@bench`]: what an evaluation costs, and how wrong it is.
 //! - [`stress`]: how far a force model can be trusted with a hand.
 //! - [`sampling`]: points that cover a space evenly.
 //! - [`headless`]: a whole run in virtual time for other programs.

@@ -5,9 +5,9 @@
 //! pose). Its error is the distance from a reference that walks the same path: another setting of the same model,
 //! computed in this run, not a table.
 //!
-//! - [`path`]: the motion. [`stopwatch`]: the times. [`error`]: the distance from the reference.
-//! - [`reach_hand`]: the whole loop: what of the reference's force reaches a hand, through sampling and delay.
-//! - [`report`]: table, CSV and picture.
+//! - `path`: the motion. `stopwatch`: the times. `error`: the distance from the reference.
+//! - `reach_hand`: the whole loop: what of the reference's force reaches a hand, through sampling and delay.
+//! - `report`: table, CSV and picture.
 //!
 //! Not real-time.
 
