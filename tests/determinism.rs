@@ -66,7 +66,7 @@ fn speed(more: &[&str]) -> f64 {
 }
 
 #[test]
-fn the_virtual_clock_is_200_times_real_time_and_10_times_with_a_recording() {
+fn the_virtual_clock_is_200_times_real_time_100_with_preset_full_and_10_with_a_recording() {
     if cfg!(debug_assertions) {
         eprintln!("skipped: this is a promise of optimised builds; `cargo test --release` checks it");
         return;
@@ -74,7 +74,11 @@ fn the_virtual_clock_is_200_times_real_time_and_10_times_with_a_recording() {
     let scratch = Scratch::default();
     let (bare, recorded) =
         (speed(&[]), speed(&["--record", &scratch.path().join("run.mcap").display().to_string()]));
-    println!("{bare:.0} times real time, {recorded:.0} times with a recording");
+    let full = speed(&["--set", "device.preset=full"]);
+    println!(
+        "{bare:.0} times real time, {recorded:.0} times with a recording, {full:.0} times with preset full"
+    );
+    assert!(full >= 100.0, "{full:.0} times real time with preset full");
     assert!(bare >= 200.0, "{bare:.0} times real time");
     assert!(recorded >= 10.0, "{recorded:.0} times real time with a recording");
 }

@@ -3,10 +3,8 @@
 use super::closed_loop::{Grip, LoopError, LoopSetup};
 use super::theory::{Rendering, exact_limit_n_per_m, gil_limit_n_per_m, passive_limit_n_per_m};
 use flotor_hal::abi::loader::Plugin;
+use rayon::prelude::*;
 use serde::Serialize;
-use std::num::NonZero;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// One point of the grid.
 pub type Case = LoopSetup;
@@ -76,31 +74,15 @@ pub fn default_cases() -> Vec<Case> {
 /// # Errors
 /// [`LoopError`] of the first case that has one.
 pub fn measure(plugin: &Plugin, cases: &[Case], done: impl Fn() + Sync) -> Result<Vec<Row>, LoopError> {
-    let next = AtomicUsize::new(0);
-    let rows = Mutex::new(Vec::with_capacity(cases.len()));
-    let work = || {
-        while let Some((index, case)) = next_of(&next, cases) {
+    let rows: Vec<Result<Row, LoopError>> = cases
+        .par_iter()
+        .map(|case| {
             let row = row(plugin, case);
             done();
-            // A poisoned lock still holds whole rows: a panic elsewhere cannot have left half of one.
-            rows.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((index, row));
-        }
-    };
-    let workers = std::thread::available_parallelism().map_or(1, NonZero::get).min(cases.len());
-    std::thread::scope(|scope| {
-        (1..workers).for_each(|_| {
-            scope.spawn(work);
-        });
-        work();
-    });
-    let mut rows = rows.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-    rows.sort_by_key(|(index, _)| *index);
-    rows.into_iter().map(|(_, row)| row).collect()
-}
-
-fn next_of<'a>(next: &AtomicUsize, cases: &'a [Case]) -> Option<(usize, &'a Case)> {
-    let index = next.fetch_add(1, Ordering::Relaxed);
-    cases.get(index).map(|case| (index, case))
+            row
+        })
+        .collect();
+    rows.into_iter().collect()
 }
 
 fn row(plugin: &Plugin, case: &Case) -> Result<Row, LoopError> {
