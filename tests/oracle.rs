@@ -5,131 +5,11 @@
 
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
-use flotor_tests::workspace_root;
-use std::collections::BTreeMap;
-
-const POSE_HEADER: &str = "id,x_m,y_m,z_m,rx_rad,ry_rad,rz_rad";
-const WRENCH_HEADER: &str = "id,fx_n,fy_n,fz_n,tx_nm,ty_nm,tz_nm,energy_j,status";
-const MM: f64 = 1.0e-3;
-
-// ---------------------------------------------------------------- tables
-
-/// One row of a table, by column.
-type Row = BTreeMap<String, String>;
-
-fn number(row: &Row, column: &str) -> f64 {
-    let text = row.get(column).unwrap_or_else(|| panic!("no column {column}"));
-    text.parse().unwrap_or_else(|_| panic!("{column} = {text}"))
-}
-
-fn rows_of(text: &str) -> Vec<Row> {
-    let mut lines = text.lines();
-    let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
-    let row = |line: &str| {
-        let fields: Vec<&str> = line.split(',').collect();
-        assert_eq!(fields.len(), header.len(), "{line}");
-        header.iter().zip(fields).map(|(name, field)| ((*name).to_owned(), field.to_owned())).collect()
-    };
-    lines.map(row).collect()
-}
-
-fn table(name: &str) -> Vec<Row> {
-    let file = workspace_root().join("tests/data/cases").join(name);
-    rows_of(&std::fs::read_to_string(file).expect("the table is there"))
-}
-
-/// Preset and free length, m, of a spring of the tables.
-fn spring(number_in_table: &str) -> (&'static str, f64) {
-    let preset = match number_in_table {
-        "1" => "thesis-1",
-        "2" => "thesis-2",
-        "3" => "thesis-3",
-        _ => "slender",
-    };
-    let constants = table("springs.csv").into_iter().find(|row| row["spring"] == number_in_table);
-    (preset, number(&constants.expect("its constants are in the table"), "L0_mm") * MM)
-}
-
-// ---------------------------------------------------------------- the command
-
-/// Runs `flotor eval --model spring` from standard input to standard output.
-fn eval(poses: &str, arguments: &[&str]) -> Ran {
-    let always = ["eval", "--model", "spring", "--poses", "-", "--out", "-"];
-    Flotor::with(always.iter().chain(arguments)).reading(poses).run()
-}
-
-/// One line of an answer.
-#[derive(Clone, Debug, PartialEq)]
-struct Answer {
-    id: String,
-    wrench: [f64; 6],
-    energy_j: Option<f64>,
-    status: String,
-}
-
-impl Answer {
-    /// Distance of force, N, and torque, N m, from those of a table.
-    fn distance(&self, force_n: [f64; 3], torque_nm: [f64; 3]) -> (f64, f64) {
-        let [fx, fy, fz, tx, ty, tz] = self.wrench;
-        (distance([fx, fy, fz], force_n), distance([tx, ty, tz], torque_nm))
-    }
-}
-
-fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
-}
-
-fn answers(text: &str) -> Vec<Answer> {
-    assert_eq!(text.lines().next(), Some(WRENCH_HEADER));
-    let answer = |row: Row| Answer {
-        id: row["id"].clone(),
-        wrench: ["fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm"].map(|column| number(&row, column)),
-        energy_j: (!row["energy_j"].is_empty()).then(|| number(&row, "energy_j")),
-        status: row["status"].clone(),
-    };
-    rows_of(text).into_iter().map(answer).collect()
-}
-
-/// Answers to poses `(id, position m, rotation vector rad)`, which the command must give.
-fn evaluate(poses: &[(String, [f64; 6])], arguments: &[&str]) -> Vec<Answer> {
-    let line = |(id, numbers): &(String, [f64; 6])| {
-        let numbers: Vec<String> = numbers.iter().map(|number| format!("{number:?}")).collect();
-        format!("{id},{}\n", numbers.join(","))
-    };
-    let poses: String = std::iter::once(format!("{POSE_HEADER}\n")).chain(poses.iter().map(line)).collect();
-    let ran = eval(&poses, arguments);
-    assert_eq!((ran.code, ran.stderr.as_str()), (Some(exit_code::OK), ""), "{ran:#?}");
-    answers(&ran.stdout)
-}
-
-/// Rows of a table with the command's answer to each.
-fn compared(rows: Vec<Row>, pose: fn(&Row, f64) -> [f64; 6], sets: &[&str]) -> Vec<(Row, Answer)> {
-    let springs: std::collections::BTreeSet<String> = rows.iter().map(|row| row["spring"].clone()).collect();
-    let one_spring = |name: String| {
-        let (preset, free_length_m) = spring(&name);
-        let rows: Vec<Row> = rows.iter().filter(|row| row["spring"] == name).cloned().collect();
-        let poses: Vec<_> = rows.iter().map(|row| (row["id"].clone(), pose(row, free_length_m))).collect();
-        let preset = format!("preset={preset}");
-        let sets = sets.iter().copied().chain([preset.as_str()]).flat_map(|set| ["--set", set]);
-        let answers = evaluate(&poses, &sets.collect::<Vec<_>>());
-        assert_eq!(answers.len(), rows.len());
-        rows.into_iter().zip(answers)
-    };
-    springs
-        .into_iter()
-        .flat_map(one_spring)
-        .inspect(|(row, answer)| assert_eq!(row["id"], answer.id))
-        .collect()
-}
+use flotor_tests::tables::{
+    MM, POSE_HEADER, answers, compared, distance, eval, evaluate, number, rod_pose, table, thesis_pose,
+};
 
 // ---------------------------------------------------------------- accuracy
-
-/// Pose of a row of the thesis's law: device millimetres on a 15 mm range, left-handed angles.
-fn thesis_pose(row: &Row, free_length_m: f64) -> [f64; 6] {
-    let scale = free_length_m / 15.0;
-    let input = |axis: usize| number(row, &format!("fwpos{axis}_{}", if axis < 3 { "mm" } else { "rad" }));
-    [scale * input(0), scale * input(1), scale * input(2), -input(3), -input(4), input(5)]
-}
 
 /// Table a is the printed law in 50 digits; the command must be it to rounding, in every branch of the printed code.
 #[test]
@@ -147,13 +27,6 @@ fn closed_form_is_the_printed_law_to_rounding() {
         assert!(off_n <= 1.0e-12, "{}: {off_n} N", row["id"]);
         assert!(off_nm <= 1.0e-15, "{}: {off_nm} N m", row["id"]);
     }
-}
-
-/// Pose of a row of the rod tables: position of the upper plate over the lower one.
-fn rod_pose(row: &Row, free_length_m: f64) -> [f64; 6] {
-    let number = |column| number(row, column);
-    let (x_m, y_m) = (number("rx_mm") * MM, number("ry_mm") * MM);
-    [x_m, y_m, number("rz_mm") * MM - free_length_m, number("vx_rad"), number("vy_rad"), number("vz_rad")]
 }
 
 /// Table b is the exact rod; the energy law must be near it, spring by spring, in the root mean square.

@@ -5,6 +5,7 @@
 pub mod library;
 pub mod program;
 pub mod scratch;
+pub mod tables;
 pub mod watched;
 
 use std::path::{Path, PathBuf};

@@ -12,6 +12,8 @@
 //!   fourth order in the angles by [`shape`] and [`quartic`]; [`angle`] gives angles without `acos`, and [`level`]
 //!   keeps the law smooth close to buckling.
 //! - [`rod`]: the exact rod, past buckling too, with a memory of where it was.
+//! - [`held`]: a law with what a real coil adds to it: [`contact`] of its coils, and the twist and the off-axis ends of
+//!   its [`wire`].
 //! - [`seat`]: a lower plate that may roll up on its rim and lift off.
 //! - [`centerline`]: the shape, for people to look at.
 //!
@@ -24,9 +26,11 @@ pub mod beam_column;
 pub mod bending;
 pub mod centerline;
 pub mod closed_form;
+pub mod contact;
 mod contract;
 pub mod energy;
 pub mod entire;
+pub mod held;
 pub mod level;
 mod parameters;
 mod plugin;
@@ -43,5 +47,6 @@ pub mod seat;
 pub mod shape;
 pub mod thesis;
 pub mod validity;
+pub mod wire;
 
 pub use plugin::{FLOTOR_ENTRY, SpringModel};

@@ -45,6 +45,15 @@ pub(crate) enum SeatChoice {
     Free,
 }
 
+/// Whether something only a real coil does is part of the law.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Coil {
+    /// Left out: the spring is a rod.
+    Ignored,
+    /// Part of it.
+    Counted,
+}
+
 /// Which constant rules the stiffness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
@@ -80,6 +89,7 @@ const VARIANTS: [Str; 5] = [
 const PRECISIONS: [Str; 2] = [Str::new("f64"), Str::new("f32")];
 const ACCURACIES: [Str; 2] = [Str::new("servo"), Str::new("tight")];
 const SEATS: [Str; 2] = [Str::new("fixed"), Str::new("free")];
+const OFF_ON: [Str; 2] = [Str::new("off"), Str::new("on")];
 const MODES: [Str; 4] = [Str::new("gamma"), Str::new("alpha"), Str::new("beta"), Str::new("physical")];
 
 const MM: f64 = 1.0e-3;
@@ -99,6 +109,13 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::choice("precision", &PRECISIONS, 0, "Storage of numbers (variants thesis and closed-form)"),
     Parameter::choice("accuracy", &ACCURACIES, 0, "For the servo, or for reference (variant rod)"),
     Parameter::choice("seat", &SEATS, 0, "Lower plate held, or free to roll up and lift off (energy, rod)"),
+    Parameter::choice("coil_contact", &OFF_ON, 0, "Coils that meet press on each other (energy, rod)"),
+    Parameter::choice(
+        "wire",
+        &OFF_ON,
+        0,
+        "Twist under compression and off-axis ends of the wire (energy, rod)",
+    ),
     Parameter::choice("mode", &MODES, 0, "Which constant rules the stiffness; the others follow from it"),
     Parameter::real("free_length_mm", "mm", 1.0, 1000.0, 25.0, "Distance of the end plates without load")
         .live(),
@@ -141,6 +158,8 @@ pub(crate) struct Choice {
     pub(crate) precision: Precision,
     pub(crate) accuracy: Accuracy,
     pub(crate) seat: SeatChoice,
+    pub(crate) coil_contact: Coil,
+    pub(crate) wire: Coil,
     pub(crate) preset: Preset,
 }
 
@@ -154,6 +173,8 @@ impl Choice {
         let precision = precision(settings, variant)?;
         let accuracy = accuracy(settings, variant)?;
         let seat = seat(settings, variant)?;
+        let coil_contact = coil("coil_contact", settings, variant)?;
+        let wire = coil("wire", settings, variant)?;
         let (geometry, material, stiffness) = preset.parameters();
         let mode = mode(settings, stiffness);
         refuse_derived(settings, mode)?;
@@ -179,7 +200,7 @@ impl Choice {
             Mode::Physical => Stiffness::Physical,
         };
         let spring = Spring::new(geometry, material, stiffness).map_err(Refusal::parameter)?;
-        Ok(Self { spring, stiffness, variant, precision, accuracy, seat, preset })
+        Ok(Self { spring, stiffness, variant, precision, accuracy, seat, coil_contact, wire, preset })
     }
 
     /// Preset `thesis-1` with another law, as no other setting would give.
@@ -194,6 +215,8 @@ impl Choice {
             precision: Precision::Double,
             accuracy: Accuracy::Servo,
             seat: SeatChoice::Fixed,
+            coil_contact: Coil::Ignored,
+            wire: Coil::Ignored,
             preset,
         }
     }
@@ -255,6 +278,8 @@ impl Choice {
             "precision" => position(&[Precision::Double, Precision::Single], &self.precision),
             "accuracy" => position(&[Accuracy::Servo, Accuracy::Tight], &self.accuracy),
             "seat" => position(&[SeatChoice::Fixed, SeatChoice::Free], &self.seat),
+            "coil_contact" => position(&[Coil::Ignored, Coil::Counted], &self.coil_contact),
+            "wire" => position(&[Coil::Ignored, Coil::Counted], &self.wire),
             "mode" => position(&Mode::ALL, &Mode::of(self.stiffness)),
             "free_length_mm" => geometry.free_length_m / MM,
             "coil_diameter_mm" => geometry.coil_diameter_m / MM,
@@ -300,6 +325,17 @@ fn seat(settings: &Settings<'_>, variant: Variant) -> Result<SeatChoice, Refusal
             "`seat` free needs a law with a stored energy; set `variant` to `energy` or `rod`",
         )),
         _ => Ok(SeatChoice::Fixed),
+    }
+}
+
+/// Whether a property of real coils is counted; it is an energy, added to a law that has one.
+fn coil(id: &'static str, settings: &Settings<'_>, variant: Variant) -> Result<Coil, Refusal> {
+    match (settings.choice_or_default(id), variant) {
+        (1, Variant::Energy | Variant::Rod) => Ok(Coil::Counted),
+        (1, Variant::Thesis | Variant::ClosedForm | Variant::CurrentLength) => Err(Refusal::parameter(
+            format!("`{id}` on needs a law with a stored energy; set `variant` to `energy` or `rod`"),
+        )),
+        _ => Ok(Coil::Ignored),
     }
 }
 

@@ -5,15 +5,18 @@ use flotor_hal::{Demand as Served, Input, Memory, Output, VariantInfo};
 use crate::batch::Batch;
 use crate::centerline::{Centerline, Section};
 use crate::closed_form::{ClosedForm, Form};
+use crate::contact::AxialContact;
 use crate::energy::EnergyForm;
-use crate::parameters::{Choice, SeatChoice, Variant};
+use crate::held::{Held, HeldSpring};
+use crate::parameters::{Choice, Coil, SeatChoice, Variant};
 use crate::pose::Pose;
 use crate::response::{Demand, Response};
 use crate::rigidity::Spring;
-use crate::rod::{Branch, Rod};
-use crate::seat::{HeldSpring, Seat};
+use crate::rod::{Branch, Coils, Rod};
+use crate::seat::Seat;
 use crate::thesis::Thesis;
 use crate::validity::Validity;
+use crate::wire::Wire;
 
 /// Ticks a shape is waited for before it is drawn. A model that is drawn is asked far less often than one that is
 /// felt, so the rod has a longer way between two poses.
@@ -24,10 +27,10 @@ const MOST_TICKS_TO_DRAW: u32 = 500;
 pub(crate) enum Prepared {
     Thesis(Thesis),
     ClosedForm(ClosedForm),
-    Energy(EnergyForm),
-    Rod(Rod),
-    FreeEnergy(EnergyForm, Seat),
-    FreeRod(Rod, Seat),
+    Energy(Held<EnergyForm>),
+    Rod(Held<Rod>),
+    FreeEnergy(Held<EnergyForm>, Seat),
+    FreeRod(Held<Rod>, Seat),
 }
 
 /// What is known about an answer beside the wrench; `None` where a law has no notion of it.
@@ -41,19 +44,17 @@ pub(crate) struct Insight {
 impl Prepared {
     /// Not real-time: the rod allocates.
     pub(crate) fn new(choice: &Choice) -> Self {
-        let Choice { spring, stiffness, precision, variant, accuracy, seat, .. } = choice;
+        let Choice { spring, stiffness, precision, variant, seat, .. } = choice;
         match (variant, seat) {
             (Variant::Thesis, _) => Self::Thesis(Thesis::new(spring, *stiffness, *precision)),
             (Variant::ClosedForm, _) => {
                 Self::ClosedForm(ClosedForm::new(spring, Form::Printed).with_precision(*precision))
             }
             (Variant::CurrentLength, _) => Self::ClosedForm(ClosedForm::new(spring, Form::CurrentLength)),
-            (Variant::Energy, SeatChoice::Fixed) => Self::Energy(EnergyForm::new(spring)),
-            (Variant::Energy, SeatChoice::Free) => {
-                Self::FreeEnergy(EnergyForm::new(spring), Seat::new(spring))
-            }
-            (Variant::Rod, SeatChoice::Fixed) => Self::Rod(Rod::new(spring, *accuracy)),
-            (Variant::Rod, SeatChoice::Free) => Self::FreeRod(Rod::new(spring, *accuracy), Seat::new(spring)),
+            (Variant::Energy, SeatChoice::Fixed) => Self::Energy(energy(choice)),
+            (Variant::Energy, SeatChoice::Free) => Self::FreeEnergy(energy(choice), Seat::new(spring)),
+            (Variant::Rod, SeatChoice::Fixed) => Self::Rod(rod(choice)),
+            (Variant::Rod, SeatChoice::Free) => Self::FreeRod(rod(choice), Seat::new(spring)),
         }
     }
 
@@ -61,14 +62,14 @@ impl Prepared {
     pub(crate) fn retune(&mut self, from: &Choice, to: &Choice) {
         match self {
             Self::Thesis(_) | Self::ClosedForm(_) => *self = Self::new(to),
-            Self::Energy(law) => *law = law.retuned(&from.spring, &to.spring),
-            Self::Rod(rod) => rod.set_spring(&to.spring),
-            Self::FreeEnergy(law, seat) => {
-                *law = law.retuned(&from.spring, &to.spring);
+            Self::Energy(held) => retune_energy(held, from, to),
+            Self::Rod(held) => retune_rod(held, to),
+            Self::FreeEnergy(held, seat) => {
+                retune_energy(held, from, to);
                 seat.set_spring(&to.spring);
             }
-            Self::FreeRod(rod, seat) => {
-                rod.set_spring(&to.spring);
+            Self::FreeRod(held, seat) => {
+                retune_rod(held, to);
                 seat.set_spring(&to.spring);
             }
         }
@@ -78,10 +79,10 @@ impl Prepared {
     pub(crate) fn reset(&mut self) {
         match self {
             Self::Thesis(_) | Self::ClosedForm(_) | Self::Energy(_) => {}
-            Self::Rod(rod) => rod.reset(),
+            Self::Rod(held) => held.law.reset(),
             Self::FreeEnergy(_, seat) => seat.reset(),
-            Self::FreeRod(rod, seat) => {
-                rod.reset();
+            Self::FreeRod(held, seat) => {
+                held.law.reset();
                 seat.reset();
             }
         }
@@ -93,10 +94,10 @@ impl Prepared {
         match self {
             Self::Thesis(law) => law.respond(pose, demand),
             Self::ClosedForm(law) => law.respond(pose, demand),
-            Self::Energy(law) => law.respond(pose, demand),
-            Self::Rod(rod) => rod.step(pose, demand),
-            Self::FreeEnergy(law, seat) => seat.step(law, pose, demand),
-            Self::FreeRod(rod, seat) => seat.step(rod, pose, demand),
+            Self::Energy(held) => held.respond(pose, demand),
+            Self::Rod(held) => held.respond(pose, demand),
+            Self::FreeEnergy(held, seat) => seat.step(held, pose, demand),
+            Self::FreeRod(held, seat) => seat.step(held, pose, demand),
         }
     }
 
@@ -110,8 +111,10 @@ impl Prepared {
     ) -> bool {
         match self {
             Self::ClosedForm(law) => batch.respond(law, inputs, outputs),
-            Self::Energy(law) => batch.respond(law, inputs, outputs),
-            Self::Thesis(_) | Self::Rod(_) | Self::FreeEnergy(..) | Self::FreeRod(..) => return false,
+            Self::Energy(held) if held.is_plain() => batch.respond(&held.law, inputs, outputs),
+            Self::Thesis(_) | Self::Energy(_) | Self::Rod(_) | Self::FreeEnergy(..) | Self::FreeRod(..) => {
+                return false;
+            }
         }
         true
     }
@@ -131,9 +134,9 @@ impl Prepared {
     pub(crate) fn insight(&self) -> Insight {
         let (rod, seat) = match self {
             Self::Thesis(_) | Self::ClosedForm(_) | Self::Energy(_) => (None, None),
-            Self::Rod(rod) => (Some(rod), None),
+            Self::Rod(held) => (Some(&held.law), None),
             Self::FreeEnergy(_, seat) => (None, Some(seat)),
-            Self::FreeRod(rod, seat) => (Some(rod), Some(seat)),
+            Self::FreeRod(held, seat) => (Some(&held.law), Some(seat)),
         };
         let state = rod.map(Rod::state);
         Insight {
@@ -152,17 +155,47 @@ impl Prepared {
     pub(crate) fn draw(&mut self, spring: &Spring, pose: &Pose, sections: &mut [Section]) -> bool {
         match self {
             Self::Thesis(_) | Self::ClosedForm(_) | Self::Energy(_) => draw_law(spring, pose, sections),
-            Self::Rod(rod) => draw_rod(rod, pose, sections),
-            Self::FreeEnergy(law, seat) => {
-                let arrived = arrive(|| seat.step(law, pose, Demand::Wrench));
+            Self::Rod(held) => draw_rod(held, pose, sections),
+            Self::FreeEnergy(held, seat) => {
+                let arrived = arrive(|| seat.step(held, pose, Demand::Wrench));
                 arrived && seat.draw(pose, sections, |pose, sections| draw_law(spring, pose, sections))
             }
-            Self::FreeRod(rod, seat) => {
-                let arrived = arrive(|| seat.step(rod, pose, Demand::Wrench));
-                arrived && seat.draw(pose, sections, |pose, sections| draw_rod(rod, pose, sections))
+            Self::FreeRod(held, seat) => {
+                let arrived = arrive(|| seat.step(held, pose, Demand::Wrench));
+                arrived && seat.draw(pose, sections, |pose, sections| draw_rod(held, pose, sections))
             }
         }
     }
+}
+
+fn wire(choice: &Choice) -> Option<Wire> {
+    (choice.wire == Coil::Counted).then(|| Wire::new(&choice.spring))
+}
+
+fn energy(choice: &Choice) -> Held<EnergyForm> {
+    let touches = choice.coil_contact == Coil::Counted;
+    let contact = touches.then(|| AxialContact::new(&choice.spring));
+    Held { law: EnergyForm::new(&choice.spring), contact, wire: wire(choice) }
+}
+
+/// Its coils touch along the bulge, inside the law.
+fn rod(choice: &Choice) -> Held<Rod> {
+    let coils = match choice.coil_contact {
+        Coil::Ignored => Coils::Pass,
+        Coil::Counted => Coils::Touch,
+    };
+    Held { law: Rod::with_coils(&choice.spring, choice.accuracy, coils), contact: None, wire: wire(choice) }
+}
+
+fn retune_energy(held: &mut Held<EnergyForm>, from: &Choice, to: &Choice) {
+    held.law = held.law.retuned(&from.spring, &to.spring);
+    held.contact = held.contact.map(|_| AxialContact::new(&to.spring));
+    held.wire = held.wire.map(|_| Wire::new(&to.spring));
+}
+
+fn retune_rod(held: &mut Held<Rod>, to: &Choice) {
+    held.law.set_spring(&to.spring);
+    held.wire = held.wire.map(|_| Wire::new(&to.spring));
 }
 
 /// Repeats a tick until it has an answer that stays; `false` if the pose has none.
@@ -174,14 +207,13 @@ fn arrive(mut tick: impl FnMut() -> Response) -> bool {
         }
         validity = tick().validity;
     }
-    // A shape on its way is a shape.
-    matches!(validity, Validity::Ok | Validity::Clamped | Validity::NotConverged)
+    validity.has_answer()
 }
 
-fn draw_rod(rod: &mut Rod, pose: &Pose, sections: &mut [Section]) -> bool {
-    let arrived = arrive(|| rod.respond(pose, Demand::Force));
+fn draw_rod(held: &mut Held<Rod>, pose: &Pose, sections: &mut [Section]) -> bool {
+    let arrived = arrive(|| held.law.step(pose, Demand::Force));
     if arrived {
-        rod.sections(sections);
+        held.law.sections(sections);
     }
     arrived
 }

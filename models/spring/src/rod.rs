@@ -11,6 +11,7 @@
 //!   them.
 //! - `basis`: the polynomials the shape is made of; `functional`: the energy as a function of their
 //!   coefficients, with all that is quadratic eliminated; its derivatives by the pose are force and torque.
+//! - `contact`: coils that touch.
 //! - `curve`: where the sections are, for drawing.
 //! - `matrix`: solves, and counts unstable directions; `predictor`, `equilibrium`: follow the minimum in
 //!   time.
@@ -37,11 +38,12 @@ use equilibrium::{Effort, Equilibrium, Outcome, Reading};
 use functional::Ratios;
 use plate::Plate;
 
-mod basis;
+pub(crate) mod basis;
+pub(crate) mod contact;
 mod curve;
 mod equilibrium;
 mod functional;
-mod matrix;
+pub(crate) mod matrix;
 mod plate;
 mod predictor;
 mod section;
@@ -55,6 +57,15 @@ pub enum Accuracy {
     /// For reference: force to 1e-13 N before buckling and to 1e-10 N past it, in about a hundred
     /// microseconds.
     Tight,
+}
+
+/// Whether coils that meet press on each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Coils {
+    /// They pass through each other.
+    Pass,
+    /// They touch.
+    Touch,
 }
 
 /// Which equilibrium the rod is in.
@@ -88,6 +99,7 @@ impl State {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rod {
     solver: Solver,
+    coils: Coils,
     constants: Constants,
     branch: Branch,
     /// Answer of the last tick that had one.
@@ -114,7 +126,13 @@ impl Rod {
     /// The rod at rest. Not real-time: allocates.
     #[must_use]
     pub fn new(spring: &Spring, accuracy: Accuracy) -> Self {
-        let ratios = Ratios::new(spring);
+        Self::with_coils(spring, accuracy, Coils::Pass)
+    }
+
+    /// The rod at rest, with coils that touch or not. Not real-time: allocates.
+    #[must_use]
+    pub fn with_coils(spring: &Spring, accuracy: Accuracy, coils: Coils) -> Self {
+        let ratios = Ratios::new(spring, coils);
         let solver = match accuracy {
             Accuracy::Servo => {
                 let effort = Effort { most_steps: 4, matrix_life: 32, tolerance: 1e-8 };
@@ -126,7 +144,13 @@ impl Rod {
             }
         };
         let constants = Constants::new(spring);
-        Self { solver, constants, branch: Branch::Unbuckled, last: Response::none(Validity::NotConverged) }
+        Self {
+            solver,
+            coils,
+            constants,
+            branch: Branch::Unbuckled,
+            last: Response::none(Validity::NotConverged),
+        }
     }
 
     /// Forgets the past: at rest. Real-time: bounded, no allocation.
@@ -139,7 +163,7 @@ impl Rod {
     /// Takes other parameters at a tick boundary and keeps the shape. Real-time: bounded, no allocation.
     pub fn set_spring(&mut self, spring: &Spring) {
         self.constants = Constants::new(spring);
-        either!(&mut self.solver, equilibrium => equilibrium.set_ratios(Ratios::new(spring)));
+        either!(&mut self.solver, equilibrium => equilibrium.set_ratios(Ratios::new(spring, self.coils)));
     }
 
     /// What is known about the equilibrium of the last tick. Real-time: bounded, no allocation.
@@ -170,14 +194,13 @@ impl Rod {
     ///
     /// Real-time: bounded, no allocation.
     pub fn step(&mut self, pose: &Pose, demand: Demand) -> Response {
-        let chord = match pose.chord(self.constants.free_length_m) {
-            Ok(chord) => chord,
-            Err(validity) => return Response::none(validity),
-        };
+        if let Err(validity) = pose.chord(self.constants.free_length_m) {
+            return Response::none(validity);
+        }
         let Some(plate) = Plate::new(pose, self.constants.free_length_m) else {
             return Response::none(Validity::OutOfDomain);
         };
-        self.branch = self.constants.branch(chord.shortening_m);
+        self.branch = self.constants.branch(-pose.position_m.z);
         let outcome = either!(&mut self.solver, equilibrium => equilibrium.advance(&plate, demand));
         let response = match outcome {
             Outcome::Settled(reading) => self.constants.response(&plate, &reading, demand, Validity::Ok),

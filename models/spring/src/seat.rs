@@ -20,11 +20,10 @@
 use flotor_hal::glam::{DMat2, DQuat, DVec2, DVec3};
 
 use crate::centerline::Section;
-use crate::energy::EnergyForm;
+use crate::held::HeldSpring;
 use crate::pose::{Pose, quaternion};
 use crate::response::{Demand, Response};
 use crate::rigidity::Spring;
-use crate::rod::Rod;
 use crate::validity::Validity;
 
 /// Evaluations of the law per tick at most.
@@ -39,24 +38,6 @@ const LARGEST_TILT_RAD: f64 = 1.2;
 const SECULAR_STEPS: u32 = 8;
 /// Least curvature assumed, of that of the spring at rest: a flatter model would take wild steps.
 const LEAST_CURVATURE: f64 = 1e-3;
-
-/// A law for a spring whose lower plate is held, asked from tick to tick.
-pub trait HeldSpring {
-    /// Answer at a pose relative to the lower plate. Real-time: bounded, no allocation.
-    fn respond(&mut self, pose: &Pose, demand: Demand) -> Response;
-}
-
-impl HeldSpring for EnergyForm {
-    fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
-        EnergyForm::respond(self, pose, demand)
-    }
-}
-
-impl HeldSpring for Rod {
-    fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
-        self.step(pose, demand)
-    }
-}
 
 /// The base of one spring, free to tip and lift.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -17,3 +17,14 @@ pub enum Validity {
     /// The pose holds NaN, infinity or no unit quaternion. The wrench is zero.
     InvalidInput,
 }
+
+impl Validity {
+    /// Whether the wrench is that of a spring, be it on its way or beyond the law's range.
+    #[must_use]
+    pub const fn has_answer(self) -> bool {
+        match self {
+            Self::Ok | Self::Clamped | Self::NotConverged => true,
+            Self::OutOfDomain | Self::InvalidInput => false,
+        }
+    }
+}

@@ -2,13 +2,15 @@
 //!
 //! The directions are the polynomials of the shape; the rest of each section follows from what all sections share
 //! (lengths in `L0`): `psi' = Phi + w (p x p')`, the twist evenly distributed beside the winding, and
-//! `r' = d + n/beta + delta (n.d) d`, stretched and sheared by the force.
+//! `r' = d + n/beta + delta (n.d) d`, stretched and sheared by the force, and held apart where coils touch.
 
 use flotor_hal::glam::{DQuat, DVec2, DVec3};
 
 use super::basis::{bubbles, gauss_legendre};
+use super::contact::Contact;
 use super::functional::{Functional, Shape};
 use super::plate::Plate;
+use super::section::{Load, Sections};
 use crate::centerline::Section;
 
 /// Fewest panels over the whole rod, and nodes in each: together far more degrees than the polynomials have.
@@ -23,6 +25,7 @@ pub(crate) struct Curve<const K: usize> {
     force: DVec3,
     shear_compliance: f64,
     softening: f64,
+    contact: Option<Contact>,
     /// Evenly distributed twist (rad).
     twist_rad: f64,
 }
@@ -52,6 +55,7 @@ impl<const K: usize> Curve<K> {
             force: load.force,
             shear_compliance: ratios.shear_compliance,
             softening: ratios.softening,
+            contact: ratios.contact,
             twist_rad: load.torsion / ratios.torsion,
         }
     }
@@ -90,9 +94,12 @@ impl<const K: usize> Curve<K> {
         };
         let lean = self.end * s + DVec2::new(along(&bubble, 0), along(&bubble, 1));
         let rate = self.end + DVec2::new(along(&slope, 0), along(&slope, 1));
+        let section = Sections::<1>::new([[lean.x], [lean.y]], [[rate.x], [rate.y]]);
         let scale = 2.0 / (1.0 + lean.length_squared());
         let normal = (scale * lean).extend(scale - 1.0);
-        let stretch = 1.0 + self.softening * self.force.dot(normal);
+        let load = Load { force: self.force, torsion: 0.0, softening: self.softening };
+        let pressed = self.contact.map_or(0.0, |contact| section.pressed(&contact, &load, 0));
+        let stretch = 1.0 + self.softening * self.force.dot(normal) + pressed;
         Step {
             lean,
             tangent: stretch * normal + self.shear_compliance * self.force,

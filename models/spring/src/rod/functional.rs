@@ -21,7 +21,9 @@ use std::f64::consts::PI;
 
 use flotor_hal::glam::{DMat3, DVec2, DVec3};
 
+use super::Coils;
 use super::basis::Basis;
+use super::contact::{self, Contact};
 use super::matrix::dot;
 use super::plate::Plate;
 use super::section::{Along, Curvatures, Load, Sections};
@@ -39,10 +41,12 @@ pub(crate) struct Ratios {
     pub(super) softening: f64,
     /// `tau / alpha`
     pub(super) torsion: f64,
+    /// Of coils that touch; `None` lets them pass through each other.
+    pub(super) contact: Option<Contact>,
 }
 
 impl Ratios {
-    pub(crate) fn new(spring: &Spring) -> Self {
+    pub(crate) fn new(spring: &Spring, coils: Coils) -> Self {
         let rigidities = spring.rigidities();
         let free_length_m = spring.geometry().free_length_m;
         let unit_n = rigidities.alpha_n_m2 / (free_length_m * free_length_m);
@@ -50,6 +54,10 @@ impl Ratios {
             shear_compliance: unit_n / rigidities.beta_n,
             softening: unit_n / rigidities.gamma_n - unit_n / rigidities.beta_n,
             torsion: rigidities.tau_n_m2 / rigidities.alpha_n_m2,
+            contact: match coils {
+                Coils::Pass => None,
+                Coils::Touch => Some(Contact::new(spring, unit_n)),
+            },
         }
     }
 }
@@ -71,6 +79,8 @@ pub(crate) struct Value<const N: usize, const Q: usize> {
     /// The derivatives by the upper plate's displacement and by its turn are force and torsion.
     pub(crate) load: Load,
     compliance: DMat3,
+    /// The contact, where coils touch.
+    contact: Option<Contact>,
     sections: Sections<Q>,
 }
 
@@ -117,22 +127,39 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
     pub(crate) fn value(&self, shape: &Shape<N>, plate: &Plate) -> Value<N, Q> {
         let sections = self.sections(shape, plate);
         let integrals = sections.integrate(&self.basis.weight);
-        let Ratios { shear_compliance, softening, torsion } = self.ratios;
-        let compliance = DMat3::from_diagonal(DVec3::splat(shear_compliance)) + softening * integrals.second;
+        let Ratios { shear_compliance, softening, torsion, contact } = self.ratios;
+        let mut compliance =
+            DMat3::from_diagonal(DVec3::splat(shear_compliance)) + softening * integrals.second;
         let missing = plate.displacement - integrals.lean;
         let twist_rad = plate.turn_rad - integrals.winding_rad;
-        let load =
-            Load { force: solve_symmetric(&compliance, missing), torsion: torsion * twist_rad, softening };
-        let [by_lean, by_rate] = sections.slopes(&load, &self.basis.weight);
+        let mut force = solve_symmetric(&compliance, missing);
+        let mut stretching = 0.5 * missing.dot(force);
+        let mut touching = None;
+        if let Some(contact) = &contact {
+            let solved = contact::solve(contact, &sections, &self.basis.weight, force, missing, compliance);
+            if solved.touches {
+                force = solved.force;
+                stretching = missing.dot(force) - 0.5 * force.dot(compliance * force) + solved.energy;
+                compliance = solved.compliance;
+                touching = Some(*contact);
+            }
+        }
+        let load = Load { force, torsion: torsion * twist_rad, softening };
+        let mut slopes = sections.slopes(&load, &self.basis.weight);
+        if let Some(contact) = &touching {
+            sections.add_contact_slopes(contact, &load, &self.basis.weight, &mut slopes);
+        }
+        let [by_lean, by_rate] = slopes;
         let slope =
             joined(&self.projected(&by_lean[0], &by_rate[0]), &self.projected(&by_lean[1], &by_rate[1]));
         let by_end = [0, 1].map(|c| dot(&self.basis.station, &by_lean[c]) + by_rate[c].iter().sum::<f64>());
         Value {
-            energy: integrals.bending + 0.5 * load.torsion * twist_rad + 0.5 * missing.dot(load.force),
+            energy: integrals.bending + 0.5 * load.torsion * twist_rad + stretching,
             slope,
             by_lean: DVec2::from_array(by_end),
             load,
             compliance,
+            contact: touching,
             sections,
         }
     }
@@ -154,7 +181,10 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
 
     /// Second derivatives at a shape. Real-time: bounded, no allocation.
     pub(crate) fn curvature(&self, value: &Value<N, Q>) -> Curvature<N> {
-        let local = value.sections.curvatures(&value.load, &self.basis.weight);
+        let mut local = value.sections.curvatures(&value.load, &self.basis.weight);
+        if let Some(contact) = &value.contact {
+            value.sections.add_contact_curvatures(contact, &value.load, &self.basis.weight, &mut local);
+        }
         let mut matrix = [[0.0; N]; N];
         let mut reaction = Reaction { force: [[0.0; N]; 3], by_lean: [[0.0; N]; 2], torsion: [0.0; N] };
         let mut strain = [[0.0; N]; 3];
@@ -163,16 +193,21 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
         for c in 0..2 {
             for k in 0..K {
                 matrix[c * K + k] = self.row(&local, c, &self.basis.bubble[k], &self.basis.slope[k]);
-                for (strain, local) in strain.iter_mut().zip(&local.strain_by_lean) {
-                    strain[c * K + k] = dot(&self.basis.bubble[k], &local[c]);
+                for (axis, strain) in strain.iter_mut().enumerate() {
+                    strain[c * K + k] = dot(&self.basis.bubble[k], &local.strain_by_lean[axis][c]);
+                    if value.contact.is_some() {
+                        strain[c * K + k] += dot(&self.basis.slope[k], &local.strain_by_rate[axis][c]);
+                    }
                 }
                 // Twist is what the winding leaves over.
                 reaction.torsion[c * K + k] = -(dot(&self.basis.bubble[k], &local.winding_by_lean[c])
                     + dot(&self.basis.slope[k], &local.winding_by_rate[c]));
             }
             reaction.by_lean[c] = self.row(&local, c, &self.basis.station, &[1.0; Q]);
-            strain_by_end[c] =
-                DVec3::from_array([0, 1, 2].map(|r| dot(&self.basis.station, &local.strain_by_lean[r][c])));
+            strain_by_end[c] = DVec3::from_array([0, 1, 2].map(|r| {
+                let by_rate: f64 = local.strain_by_rate[r][c].iter().sum();
+                dot(&self.basis.station, &local.strain_by_lean[r][c]) + by_rate
+            }));
             winding_by_end[c] = -(dot(&self.basis.station, &local.winding_by_lean[c])
                 + local.winding_by_rate[c].iter().sum::<f64>());
         }
@@ -210,8 +245,8 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
                 // The derivative by p_e and p'_c is that by p'_c and p_e.
                 by_lean[i] =
                     field[i] * local.by_lean_twice[c][e][i] + rate[i] * local.by_lean_and_rate[e][c][i];
-                let bending = if c == e { rate[i] * local.by_rate_twice[i] } else { 0.0 };
-                by_rate[i] = field[i] * local.by_lean_and_rate[c][e][i] + bending;
+                by_rate[i] =
+                    field[i] * local.by_lean_and_rate[c][e][i] + rate[i] * local.by_rate_twice[c][e][i];
             }
             *part = self.projected(&by_lean, &by_rate);
         }

@@ -32,9 +32,9 @@ pub(crate) struct Sections<const Q: usize> {
     pub(crate) lean: [Along<Q>; 2],
     pub(crate) lean_rate: [Along<Q>; 2],
     /// `w`
-    scale: Along<Q>,
+    pub(crate) scale: Along<Q>,
     /// `d`
-    normal: [Along<Q>; 3],
+    pub(crate) normal: [Along<Q>; 3],
     /// `p x p'`
     area_rate: Along<Q>,
 }
@@ -125,9 +125,37 @@ impl<const Q: usize> Sections<Q> {
         [by_lean, by_rate]
     }
 
+    /// Second derivative of `n.d` by `p`.
+    #[inline(always)]
+    pub(crate) fn level_curvature(
+        &self,
+        load: &Load,
+        potential: &Potential,
+        c: usize,
+        e: usize,
+        i: usize,
+    ) -> f64 {
+        let (p, force) = ([self.lean[0][i], self.lean[1][i]], [load.force.x, load.force.y]);
+        let w2 = self.scale[i] * self.scale[i];
+        let same = if c == e { 1.0 } else { 0.0 };
+        let scale_curvature = 2.0 * w2 * self.scale[i] * p[c] * p[e] - same * w2;
+        -w2 * (force[c] * p[e] + p[c] * force[e]) + potential.level * scale_curvature
+    }
+
+    /// Derivative of component `axis` of `d` by `p_c`.
+    #[inline(always)]
+    pub(crate) fn normal_slope(&self, axis: usize, c: usize, i: usize) -> f64 {
+        let (w, p) = (self.scale[i], [self.lean[0][i], self.lean[1][i]]);
+        let scale_slope = -w * w * p[c];
+        match axis {
+            2 => scale_slope,
+            _ => p[axis] * scale_slope + if axis == c { w } else { 0.0 },
+        }
+    }
+
     /// `n.d`, its slope by `p`, and `1 + delta n.d`.
     #[inline(always)]
-    fn potential(&self, load: &Load, i: usize) -> Potential {
+    pub(crate) fn potential(&self, load: &Load, i: usize) -> Potential {
         let (x, y, w, n) = (self.lean[0][i], self.lean[1][i], self.scale[i], load.force);
         let level = n.x * x + n.y * y + n.z;
         let value = w * level - n.z;
@@ -143,8 +171,9 @@ impl<const Q: usize> Sections<Q> {
         let mut all = Curvatures {
             by_lean_twice: [[[0.0; Q]; 2]; 2],
             by_lean_and_rate: [[[0.0; Q]; 2]; 2],
-            by_rate_twice: [0.0; Q],
+            by_rate_twice: [[[0.0; Q]; 2]; 2],
             strain_by_lean: [[[0.0; Q]; 2]; 3],
+            strain_by_rate: [[[0.0; Q]; 2]; 3],
             winding_by_lean: [[0.0; Q]; 2],
             winding_by_rate: [[0.0; Q]; 2],
         };
@@ -152,9 +181,9 @@ impl<const Q: usize> Sections<Q> {
             let (p, rate) =
                 ([self.lean[0][i], self.lean[1][i]], [self.lean_rate[0][i], self.lean_rate[1][i]]);
             let (w, area, t) = (self.scale[i], self.area_rate[i], load.torsion);
-            let force = [load.force.x, load.force.y];
             let rate_squared = rate[0] * rate[0] + rate[1] * rate[1];
-            let Potential { level, slope, stress } = self.potential(load, i);
+            let potential = self.potential(load, i);
+            let Potential { slope, stress, .. } = potential;
             let (w2, w3) = (w * w, w * w * w);
             let scale_slope = [-w2 * p[0], -w2 * p[1]];
             // Derivatives of p x p' by p and by p'.
@@ -167,8 +196,7 @@ impl<const Q: usize> Sections<Q> {
                     let winding = area_by_lean[c] * scale_slope[e]
                         + scale_slope[c] * area_by_lean[e]
                         + area * scale_curvature;
-                    let height =
-                        force[c] * scale_slope[e] + scale_slope[c] * force[e] + level * scale_curvature;
+                    let height = self.level_curvature(load, &potential, c, e, i);
                     all.by_lean_twice[c][e][i] =
                         a * (bending - t * winding - stress * height - load.softening * slope[c] * slope[e]);
                     // p_c p'_e: the unit antisymmetric matrix has +1 at (0, 1).
@@ -184,23 +212,23 @@ impl<const Q: usize> Sections<Q> {
                 }
                 all.winding_by_lean[c][i] = a * (w * area_by_lean[c] + area * scale_slope[c]);
                 all.winding_by_rate[c][i] = a * (w * area_by_rate[c]);
-                let [x, y] = [0, 1].map(|r| p[r] * scale_slope[c] + if r == c { w } else { 0.0 });
-                let normal_slope = [x, y, scale_slope[c]];
                 for (r, strain) in all.strain_by_lean.iter_mut().enumerate() {
                     let stretch = load.softening * self.normal[r][i] * slope[c];
-                    strain[c][i] = a * (stress * normal_slope[r] + stretch);
+                    strain[c][i] = a * (stress * self.normal_slope(r, c, i) + stretch);
                 }
             }
-            all.by_rate_twice[i] = a * w2;
+            for c in 0..2 {
+                all.by_rate_twice[c][c][i] = a * w2;
+            }
         }
         all
     }
 }
 
-struct Potential {
+pub(crate) struct Potential {
     /// `n.d = w level - n_z`
     level: f64,
-    slope: [f64; 2],
+    pub(crate) slope: [f64; 2],
     stress: f64,
 }
 
@@ -208,10 +236,10 @@ struct Potential {
 pub(crate) struct Curvatures<const Q: usize> {
     pub(crate) by_lean_twice: [[Along<Q>; 2]; 2],
     pub(crate) by_lean_and_rate: [[Along<Q>; 2]; 2],
-    /// Times the unit matrix.
-    pub(crate) by_rate_twice: Along<Q>,
+    pub(crate) by_rate_twice: [[Along<Q>; 2]; 2],
     /// Of `d + delta (n.d) d`, the change of the centreline's direction at held force.
     pub(crate) strain_by_lean: [[Along<Q>; 2]; 3],
+    pub(crate) strain_by_rate: [[Along<Q>; 2]; 3],
     pub(crate) winding_by_lean: [Along<Q>; 2],
     pub(crate) winding_by_rate: [Along<Q>; 2],
 }

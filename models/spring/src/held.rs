@@ -1,0 +1,61 @@
+//! A law for a spring whose plates are held, with what a real coil adds to it.
+
+use crate::contact::AxialContact;
+use crate::energy::EnergyForm;
+use crate::pose::Pose;
+use crate::response::{Demand, Response};
+use crate::rod::Rod;
+use crate::wire::Wire;
+
+/// A law for a spring whose lower plate is held, asked from tick to tick.
+pub trait HeldSpring {
+    /// Answer at a pose relative to the lower plate. Real-time: bounded, no allocation.
+    fn respond(&mut self, pose: &Pose, demand: Demand) -> Response;
+}
+
+impl HeldSpring for EnergyForm {
+    fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
+        EnergyForm::respond(self, pose, demand)
+    }
+}
+
+impl HeldSpring for Rod {
+    fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
+        self.step(pose, demand)
+    }
+}
+
+/// A law and what it leaves out of the coil, where that is wanted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Held<L> {
+    /// The law.
+    pub law: L,
+    /// Touching coils, for a law that does not know them itself.
+    pub contact: Option<AxialContact>,
+    /// What the wire adds.
+    pub wire: Option<Wire>,
+}
+
+impl<L> Held<L> {
+    /// Whether the law is left as it is.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.contact.is_none() && self.wire.is_none()
+    }
+}
+
+impl<L: HeldSpring> HeldSpring for Held<L> {
+    #[inline]
+    fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
+        let mut response = self.law.respond(pose, demand);
+        if self.is_plain() || !response.validity.has_answer() {
+            return response;
+        }
+        if let Some(contact) = &self.contact {
+            response = contact.added_to(&response, pose);
+        }
+        match &self.wire {
+            Some(wire) => wire.added_to(&response, pose, demand),
+            None => response,
+        }
+    }
+}
