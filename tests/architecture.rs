@@ -18,6 +18,10 @@ enum Role {
     Plugin,
     Sync,
     Record,
+    /// Knows numbers only.
+    Statistics,
+    /// Knows trials, and neither contract nor device.
+    Study,
     Host,
     Viewer,
     Tests,
@@ -31,6 +35,8 @@ impl Role {
             "hal" => Self::Contract,
             "host" => Self::Host,
             "host/record" => Self::Record,
+            "host/statistics" => Self::Statistics,
+            "host/study" => Self::Study,
             "host/sync" => Self::Sync,
             "viewer" => Self::Viewer,
             "tests" => Self::Tests,
@@ -43,16 +49,21 @@ impl Role {
     /// The roles a crate of this role may depend on.
     fn may_use(self) -> &'static [Role] {
         match self {
-            Self::Contract | Self::Sync => &[],
+            Self::Contract | Self::Sync | Self::Statistics => &[],
+            Self::Study => &[Self::Statistics],
             Self::Plugin | Self::Fixture => &[Self::Contract],
             // The plugins only as paths, so that one `cargo run` builds them; no line of the host names them.
-            Self::Host => &[Self::Contract, Self::Sync, Self::Record, Self::Plugin],
+            Self::Host => {
+                &[Self::Contract, Self::Sync, Self::Record, Self::Statistics, Self::Study, Self::Plugin]
+            }
             Self::Record => &[Self::Contract, Self::Sync],
-            Self::Viewer => &[Self::Contract, Self::Record],
+            Self::Viewer => &[Self::Contract, Self::Record, Self::Study],
             Self::Tests => &[
                 Self::Contract,
                 Self::Sync,
                 Self::Record,
+                Self::Statistics,
+                Self::Study,
                 Self::Plugin,
                 Self::Host,
                 Self::Viewer,

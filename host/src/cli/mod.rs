@@ -7,6 +7,7 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::cli::print_line(format_args!($($text)*)) };
 }
 
+mod analyse;
 mod bench;
 mod companion;
 mod doctor;
@@ -19,6 +20,7 @@ mod replay;
 mod run;
 mod stability;
 mod stress;
+mod study;
 mod sweep;
 mod validate;
 
@@ -68,6 +70,10 @@ enum Command {
     Stress(stress::StressArguments),
     /// Sweep a model or a scene over parameters, poses and seeds into a Parquet table
     Sweep(sweep::SweepArguments),
+    /// Carry out a perception experiment
+    Study(study::StudyArguments),
+    /// Analyse the data of a perception experiment
+    Analyse(analyse::AnalyseArguments),
     /// Look at this machine: what a real-time loop may hope for, and how to improve it
     Doctor(doctor::DoctorArguments),
     /// Print a completion script for a shell
@@ -204,6 +210,8 @@ pub fn main() -> ExitCode {
         Some(Command::Bench(arguments)) => bench::run(&arguments),
         Some(Command::Stress(arguments)) => stress::run(&arguments),
         Some(Command::Sweep(arguments)) => sweep::run(&arguments),
+        Some(Command::Study(arguments)) => study::run(&arguments),
+        Some(Command::Analyse(arguments)) => analyse::run(&arguments),
         Some(Command::Doctor(arguments)) => doctor::run(&arguments),
         Some(Command::Completions { shell }) => {
             clap_complete::generate(shell, &mut Arguments::command(), "flotor", &mut std::io::stdout());

@@ -1,0 +1,144 @@
+//! Choices of a protocol as words of the command line.
+
+use clap::ValueEnum;
+use flotor_study::procedure::{Averaging, StepAtReversal};
+use flotor_study::protocol::{AtBoundary, ComparisonSide, FirstModality, PresentationOrder};
+use flotor_study::trial::Modality;
+
+/// `--first`
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(super) enum FirstChoice {
+    /// Odd subject numbers vision and haptics, even ones haptics alone
+    #[default]
+    ByNumber,
+    /// Vision and haptics
+    Vh,
+    /// Haptics alone
+    H,
+}
+
+impl From<FirstChoice> for FirstModality {
+    fn from(choice: FirstChoice) -> Self {
+        match choice {
+            FirstChoice::ByNumber => Self::BySubjectNumber,
+            FirstChoice::Vh => Self::Always(Modality::Vh),
+            FirstChoice::H => Self::Always(Modality::H),
+        }
+    }
+}
+
+/// `--boundary`
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(super) enum BoundaryChoice {
+    /// The trial comes again, at most three times
+    #[default]
+    Repeat,
+    /// The answer counts, the hit is noted
+    Keep,
+}
+
+impl From<BoundaryChoice> for AtBoundary {
+    fn from(choice: BoundaryChoice) -> Self {
+        match choice {
+            BoundaryChoice::Repeat => Self::default(),
+            BoundaryChoice::Keep => Self::Keep,
+        }
+    }
+}
+
+/// `--averaging`
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(super) enum AveragingChoice {
+    /// Both count
+    #[default]
+    BothEnds,
+    /// The trial of the first does not
+    AfterFirst,
+    /// The trial of the last does not
+    BeforeLast,
+}
+
+impl From<AveragingChoice> for Averaging {
+    fn from(choice: AveragingChoice) -> Self {
+        match choice {
+            AveragingChoice::BothEnds => Self::BothEnds,
+            AveragingChoice::AfterFirst => Self::AfterFirst,
+            AveragingChoice::BeforeLast => Self::BeforeLast,
+        }
+    }
+}
+
+/// `--step-at-reversal`
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(super) enum StepChoice {
+    /// The halved one, at once
+    #[default]
+    New,
+    /// The old one
+    Old,
+}
+
+impl From<StepChoice> for StepAtReversal {
+    fn from(choice: StepChoice) -> Self {
+        match choice {
+            StepChoice::New => Self::New,
+            StepChoice::Old => Self::Old,
+        }
+    }
+}
+
+/// `--side`
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(super) enum SideChoice {
+    /// Above the base
+    #[default]
+    Above,
+    /// Below the base
+    Below,
+    /// Drawn for each trial
+    Random,
+}
+
+impl From<SideChoice> for ComparisonSide {
+    fn from(choice: SideChoice) -> Self {
+        match choice {
+            SideChoice::Above => Self::Above,
+            SideChoice::Below => Self::Below,
+            SideChoice::Random => Self::Random,
+        }
+    }
+}
+
+/// `--order`
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(super) enum OrderChoice {
+    /// Drawn for each trial
+    #[default]
+    Random,
+    /// The base
+    BaseFirst,
+    /// The comparison
+    ComparisonFirst,
+}
+
+impl From<OrderChoice> for PresentationOrder {
+    fn from(choice: OrderChoice) -> Self {
+        match choice {
+            OrderChoice::Random => Self::Random,
+            OrderChoice::BaseFirst => Self::BaseFirst,
+            OrderChoice::ComparisonFirst => Self::ComparisonFirst,
+        }
+    }
+}
+
+/// `LEAST-MOST`, of which the first is smaller.
+pub(super) fn range(text: &str) -> Result<(f64, f64), String> {
+    let number = |text: &str| text.trim().parse::<f64>().map_err(|_| format!("`{text}` is no number"));
+    let (least, most) = text.split_once('-').ok_or("write LEAST-MOST, like 12-48")?;
+    let (least, most) = (number(least)?, number(most)?);
+    if least < most {
+        Ok((least, most))
+    } else {
+        Err(format!("{least}-{most} is empty: the first must be smaller"))
+    }
+}

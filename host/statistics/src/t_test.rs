@@ -1,0 +1,95 @@
+//! Student's t: one sample, pairs, two groups.
+
+use crate::describe::{deviation, mean, sum_of_squares};
+use crate::distribution::{student_two_sided, student_two_sided_quantile};
+use crate::{StatisticsError, check, count};
+use serde::Serialize;
+
+/// Result of a t-test, two-sided.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct TTest {
+    /// Degrees of freedom; not whole for groups of unequal variance.
+    pub df: f64,
+    /// t.
+    pub value: f64,
+    /// Probability of a larger |t| if there is no difference.
+    pub p: f64,
+    /// The difference of the means.
+    pub difference: f64,
+    /// Its 95 % confidence interval.
+    pub interval: [f64; 2],
+}
+
+impl TTest {
+    fn new(what: &'static str, difference: f64, se: f64, df: f64) -> Result<Self, StatisticsError> {
+        if se == 0.0 {
+            return Err(StatisticsError::Constant { what });
+        }
+        let value = difference / se;
+        let half = se * student_two_sided_quantile(0.05, df);
+        let interval = [difference - half, difference + half];
+        Ok(Self { df, value, p: student_two_sided(value, df), difference, interval })
+    }
+}
+
+/// Do these values differ from `expected` in the mean?
+///
+/// # Errors
+/// Fewer than two values, none that vary, or one that is not finite.
+pub fn one_sample(values: &[f64], expected: f64) -> Result<TTest, StatisticsError> {
+    const WHAT: &str = "a t-test";
+    check(WHAT, values, 2)?;
+    let n = count(values.len());
+    TTest::new(WHAT, mean(values) - expected, deviation(values) / n.sqrt(), n - 1.0)
+}
+
+/// Do pairs differ in the mean? Positive where the first of a pair is larger.
+///
+/// # Errors
+/// As [`one_sample`], or lists of different length.
+pub fn paired(first: &[f64], second: &[f64]) -> Result<TTest, StatisticsError> {
+    if first.len() != second.len() {
+        return Err(StatisticsError::Lengths {
+            what: "a paired t-test",
+            left: first.len(),
+            right: second.len(),
+        });
+    }
+    let differences: Vec<f64> = first.iter().zip(second).map(|(first, second)| first - second).collect();
+    one_sample(&differences, 0.0)
+}
+
+/// How the spread of two groups is estimated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Variances {
+    /// One variance for both groups (Student).
+    Pooled,
+    /// Each group its own (Welch 1947), with Satterthwaite's degrees of freedom.
+    Separate,
+}
+
+/// Do two groups differ in the mean? Positive where the first is larger.
+///
+/// # Errors
+/// Fewer than two values in a group, none that vary, or one that is not finite.
+pub fn two_groups(first: &[f64], second: &[f64], variances: Variances) -> Result<TTest, StatisticsError> {
+    const WHAT: &str = "a t-test of two groups";
+    check(WHAT, first, 2)?;
+    check(WHAT, second, 2)?;
+    let (n1, n2) = (count(first.len()), count(second.len()));
+    let (squares1, squares2) = (sum_of_squares(first), sum_of_squares(second));
+    let difference = mean(first) - mean(second);
+    match variances {
+        Variances::Pooled => {
+            let df = n1 + n2 - 2.0;
+            let variance = (squares1 + squares2) / df;
+            TTest::new(WHAT, difference, (variance * (1.0 / n1 + 1.0 / n2)).sqrt(), df)
+        }
+        Variances::Separate => {
+            let (part1, part2) = (squares1 / (n1 - 1.0) / n1, squares2 / (n2 - 1.0) / n2);
+            let sum = part1 + part2;
+            let df = sum * sum / (part1 * part1 / (n1 - 1.0) + part2 * part2 / (n2 - 1.0));
+            TTest::new(WHAT, difference, sum.sqrt(), df)
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! The linear part of an effect within subjects.
+
+use crate::describe::mean;
+use crate::distribution::fisher_above;
+use crate::regression;
+use crate::t_test::one_sample;
+use crate::{StatisticsError, count};
+use serde::Serialize;
+
+/// How far the means of a within-subject factor lie on a line over its levels.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LinearTrend {
+    /// Rise of the mean response per unit of the factor.
+    pub slope: f64,
+    /// Height of the line at zero.
+    pub intercept: f64,
+    /// Share of the variation among the means that the line explains: the R² of the trend.
+    pub r_squared: f64,
+    /// F of the linear contrast, tested against its own variation between subjects.
+    pub f: f64,
+    /// Degrees of freedom of the contrast.
+    pub df: f64,
+    /// Degrees of freedom of its error.
+    pub error_df: f64,
+    /// Probability of a larger F without a trend.
+    pub p: f64,
+}
+
+/// The trend of responses over the levels of a factor: `responses[subject][level]`.
+///
+/// # Errors
+/// Fewer than two subjects or three levels, rows of the wrong length, a value that is not finite.
+pub fn linear(levels: &[f64], responses: &[Vec<f64>]) -> Result<LinearTrend, StatisticsError> {
+    const WHAT: &str = "a linear trend";
+    for row in responses {
+        if row.len() != levels.len() {
+            return Err(StatisticsError::Lengths { what: WHAT, left: levels.len(), right: row.len() });
+        }
+    }
+    let column =
+        |level: usize| responses.iter().filter_map(|row| row.get(level).copied()).collect::<Vec<_>>();
+    let means: Vec<f64> = (0..levels.len()).map(|level| mean(&column(level))).collect();
+    let line = regression::line(levels, &means)?;
+    let centre = mean(levels);
+    let contrast = |row: &Vec<f64>| levels.iter().zip(row).map(|(x, y)| (x - centre) * y).sum::<f64>();
+    let contrasts: Vec<f64> = responses.iter().map(contrast).collect();
+    let test = one_sample(&contrasts, 0.0)?;
+    let f = test.value * test.value;
+    let error_df = count(responses.len()) - 1.0;
+    Ok(LinearTrend {
+        slope: line.slope,
+        intercept: line.intercept,
+        r_squared: line.r_squared,
+        f,
+        df: 1.0,
+        error_df,
+        p: fisher_above(f, 1.0, error_df),
+    })
+}

@@ -1,0 +1,172 @@
+//! Every result against R on published data: relative 1e-9, p-values included.
+//!
+//! `tests/data/reference.R` made the numbers and says where the data come from.
+
+#![allow(clippy::unwrap_used, clippy::cast_possible_truncation, clippy::cast_sign_loss)] // tests may panic
+#![allow(clippy::cast_precision_loss)] // counts
+
+use flotor_statistics::anova::{BetweenFactor, Design, Effect, SumOfSquares, WithinFactor, analyse};
+use flotor_statistics::distribution::{
+    fisher_above, normal_below, student_two_sided, student_two_sided_quantile,
+};
+use flotor_statistics::t_test::{TTest, Variances, one_sample, paired, two_groups};
+use flotor_statistics::{regression, trend};
+use serde_json::Value;
+
+/// What the project promises.
+const RELATIVE_BOUND: f64 = 1.0e-9;
+
+fn reference() -> Value {
+    serde_json::from_str(include_str!("data/reference.json")).unwrap()
+}
+
+#[track_caller]
+fn near(what: &str, found: f64, expected: &Value) {
+    let expected = expected.as_f64().unwrap_or_else(|| panic!("{what}: no reference value"));
+    let error = if expected == 0.0 { found.abs() } else { (found / expected - 1.0).abs() };
+    assert!(error < RELATIVE_BOUND, "{what}: {found} for {expected}, relative error {error:e}");
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect()
+}
+
+fn rows(value: &Value) -> Vec<Vec<f64>> {
+    value.as_array().unwrap().iter().map(numbers).collect()
+}
+
+fn list(value: &Value) -> &[Value] {
+    value.as_array().unwrap()
+}
+
+fn index(value: &Value) -> usize {
+    value.as_f64().unwrap() as usize
+}
+
+#[test]
+fn t_tests() {
+    let sleep = &reference()["t_tests"];
+    let (first, second) = (numbers(&sleep["first"]), numbers(&sleep["second"]));
+    let check = |what: &str, found: TTest| {
+        let expected = &sleep[what];
+        near(what, found.df, &expected["df"]);
+        near(what, found.value, &expected["value"]);
+        near(what, found.p, &expected["p"]);
+        near(what, found.difference, &expected["difference"]);
+        near(what, found.interval[0], &expected["interval"][0]);
+        near(what, found.interval[1], &expected["interval"][1]);
+    };
+    check("paired", paired(&first, &second).unwrap());
+    check("one_sample", one_sample(&second, 0.0).unwrap());
+    check("welch", two_groups(&first, &second, Variances::Separate).unwrap());
+    check("pooled", two_groups(&first, &second, Variances::Pooled).unwrap());
+}
+
+fn design(set: &Value) -> Design {
+    let name = |factor: &Value| factor["name"].as_str().unwrap().to_owned();
+    let between = list(&set["between"]).iter().map(|factor| BetweenFactor {
+        name: name(factor),
+        groups: list(&factor["groups"]).iter().map(index).collect(),
+    });
+    let within = list(&set["within"])
+        .iter()
+        .map(|factor| WithinFactor { name: name(factor), levels: index(&factor["levels"]) });
+    Design::new(between.collect(), within.collect(), &rows(&set["responses"])).unwrap()
+}
+
+fn check_effect(what: &str, found: &Effect, expected: &Value) {
+    near(what, found.sum_of_squares, &expected["sum_of_squares"]);
+    near(what, found.df, &expected["df"]);
+    near(what, found.error_sum_of_squares, &expected["error_sum_of_squares"]);
+    near(what, found.error_df, &expected["error_df"]);
+    near(what, found.f, &expected["f"]);
+    near(what, found.p, &expected["p"]);
+    assert_eq!(found.sphericity.is_some(), expected["epsilon_gg"].is_number(), "{what}");
+    if let Some(sphericity) = found.sphericity {
+        near(what, sphericity.epsilon_gg, &expected["epsilon_gg"]);
+        near(what, sphericity.p_gg, &expected["p_gg"]);
+        near(what, sphericity.epsilon_hf, &expected["epsilon_hf"]);
+        near(what, sphericity.p_hf, &expected["p_hf"]);
+    }
+}
+
+/// Seven published data sets: mixed, within only, between only, groups of equal and unequal size.
+#[test]
+fn analyses_of_variance() {
+    let reference = reference();
+    let sets = list(&reference["anova"]);
+    assert_eq!(sets.len(), 7);
+    for set in sets {
+        let design = design(set);
+        for (kind, key) in [(SumOfSquares::Two, "type_2"), (SumOfSquares::Three, "type_3")] {
+            let found = analyse(&design, kind);
+            let expected = list(&set[key]);
+            assert_eq!(found.len(), expected.len(), "{}", set["name"]);
+            for expected in expected {
+                let name = expected["effect"].as_str().unwrap();
+                let effect = found.iter().find(|effect| effect.effect == name);
+                let effect = effect.unwrap_or_else(|| panic!("{}: no effect {name}", set["name"]));
+                check_effect(&format!("{} {key} {name}", set["name"]), effect, expected);
+            }
+        }
+    }
+}
+
+/// Where the groups are of unequal size the two kinds of sums of squares are different questions.
+#[test]
+fn the_kinds_differ_where_groups_are_unequal_and_only_there() {
+    let reference = reference();
+    for (name, differ) in [("Moore", true), ("ToothGrowth", false)] {
+        let set = list(&reference["anova"]).iter().find(|set| set["name"] == name).unwrap();
+        let design = design(set);
+        let (two, three) = (analyse(&design, SumOfSquares::Two), analyse(&design, SumOfSquares::Three));
+        assert_eq!((two[0].f / three[0].f - 1.0).abs() > 1.0e-3, differ, "{name}");
+    }
+}
+
+#[test]
+fn trend_and_line() {
+    let reference = reference();
+    let set = &reference["trend"];
+    let found = trend::linear(&numbers(&set["levels"]), &rows(&set["responses"])).unwrap();
+    near("slope", found.slope, &set["slope"]);
+    near("intercept", found.intercept, &set["intercept"]);
+    near("R squared", found.r_squared, &set["r_squared"]);
+    near("F", found.f, &set["f"]);
+    near("error df", found.error_df, &set["error_df"]);
+    near("p", found.p, &set["p"]);
+
+    let set = &reference["line"];
+    let found = regression::line(&numbers(&set["x"]), &numbers(&set["y"])).unwrap();
+    near("intercept", found.intercept, &set["intercept"]);
+    near("slope", found.slope, &set["slope"]);
+    near("intercept se", found.intercept_se, &set["intercept_se"]);
+    near("slope se", found.slope_se, &set["slope_se"]);
+    near("interval", found.slope_interval[0], &set["slope_interval"][0]);
+    near("interval", found.slope_interval[1], &set["slope_interval"][1]);
+    near("p", found.slope_p, &set["slope_p"]);
+    near("R squared", found.r_squared, &set["r_squared"]);
+    near("residual sd", found.residual_sd, &set["residual_sd"]);
+    near("F", found.f, &set["f"]);
+}
+
+#[test]
+fn tails_and_quantiles() {
+    let reference = reference();
+    for row in list(&reference["fisher_above"]) {
+        let [f, df, error_df] = ["f", "df", "error_df"].map(|key| row[key].as_f64().unwrap());
+        near(&format!("F {f} on {df} and {error_df}"), fisher_above(f, df, error_df), &row["p"]);
+    }
+    for row in list(&reference["student_two_sided"]) {
+        let [t, df] = ["t", "df"].map(|key| row[key].as_f64().unwrap());
+        near(&format!("t {t} on {df}"), student_two_sided(t, df), &row["p"]);
+    }
+    for row in list(&reference["student_quantile"]) {
+        let [p, df] = ["p", "df"].map(|key| row[key].as_f64().unwrap());
+        near(&format!("t quantile {p} on {df}"), student_two_sided_quantile(p, df), &row["t"]);
+    }
+    for row in list(&reference["normal_below"]) {
+        let z = row["z"].as_f64().unwrap();
+        near(&format!("normal {z}"), normal_below(z), &row["below"]);
+    }
+}

@@ -1,0 +1,193 @@
+//! Thresholds: Weber fractions, their difference between modalities, effects of base, modality and order.
+
+use super::{AnalysisError, AnalysisOptions, SubjectRecord, order_factor};
+use crate::protocol::JndProtocol;
+use crate::trial::Modality;
+use flotor_statistics::anova::{Design, Effect, WithinFactor, analyse};
+use flotor_statistics::describe::{MeanInterval, mean, mean_interval};
+use flotor_statistics::t_test::{TTest, paired};
+use flotor_statistics::trend;
+use serde::Serialize;
+
+/// Confidence of every interval.
+const CONFIDENCE: f64 = 0.95;
+
+/// A number for each modality.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct WeberFractions<T> {
+    /// Vision and haptics.
+    pub vh: T,
+    /// Haptics alone.
+    pub h: T,
+}
+
+impl<T> WeberFractions<T> {
+    fn try_each<E>(mut of: impl FnMut(Modality) -> Result<T, E>) -> Result<Self, E> {
+        Ok(Self { vh: of(Modality::Vh)?, h: of(Modality::H)? })
+    }
+
+    fn map<U>(&self, of: impl Fn(&T) -> U) -> WeberFractions<U> {
+        WeberFractions { vh: of(&self.vh), h: of(&self.h) }
+    }
+}
+
+/// Mean threshold under one condition: a bar of figure 18.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ThresholdCell {
+    /// Modality.
+    pub modality: Modality,
+    /// Base.
+    pub base: f64,
+    /// Threshold in the unit of the stimulus, over subjects.
+    pub threshold: MeanInterval,
+}
+
+/// The result of a difference experiment. The names of the fields are a contract: scripts rely on them.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct JndAnalysis {
+    /// "jnd".
+    pub task: &'static str,
+    /// Sittings analysed.
+    pub subjects: usize,
+    /// Mean threshold as a share of the base.
+    pub weber: WeberFractions<f64>,
+    /// The same with its variation and 95 % confidence interval.
+    pub weber_detail: WeberFractions<MeanInterval>,
+    /// Paired t-test between the modalities, positive if haptics alone is worse.
+    pub t: TTest,
+    /// Thresholds in the unit of the stimulus: order x modality x base.
+    pub anova: Vec<Effect>,
+    /// Thresholds as a share of the base, within each modality: is the Weber fraction constant over bases?
+    pub constancy: WeberFractions<Option<Effect>>,
+    /// R² of the linear trend of thresholds over bases (all modalities).
+    pub linear_r2: f64,
+    /// Thresholds by condition.
+    pub thresholds: Vec<ThresholdCell>,
+    /// Pairs presented for real, per subject.
+    pub pairs_per_subject: f64,
+    /// Tracks that never came to a threshold; they are left out.
+    pub unfinished_tracks: usize,
+}
+
+/// Analyses thresholds.
+///
+/// # Errors
+/// [`AnalysisError`], if a subject has no threshold in some condition or the statistics cannot be had.
+pub fn analyse_jnd(
+    protocol: &JndProtocol,
+    subjects: &[SubjectRecord],
+    options: &AnalysisOptions,
+) -> Result<JndAnalysis, AnalysisError> {
+    let fractions = subjects.iter().map(|subject| Fractions::of(protocol, subject));
+    let fractions = fractions.collect::<Result<Vec<_>, _>>()?;
+    let of = |modality| fractions.iter().map(|subject| subject.mean(modality)).collect::<Vec<_>>();
+    let weber_detail = WeberFractions::try_each(|modality| mean_interval(&of(modality), CONFIDENCE))?;
+
+    let mut within = vec![WithinFactor { name: "modality".to_owned(), levels: 2 }];
+    if protocol.bases.len() > 1 {
+        within.push(WithinFactor { name: "base".to_owned(), levels: protocol.bases.len() });
+    }
+    let responses: Vec<Vec<f64>> = fractions.iter().map(|subject| subject.thresholds(protocol)).collect();
+    let design = Design::new(order_factor(subjects), within, &responses)?;
+
+    let unfinished =
+        |subject: &SubjectRecord| subject.tracks.iter().filter(|t| t.threshold.is_none()).count();
+    #[allow(clippy::cast_precision_loss)] // a few hundred
+    let pairs = subjects.iter().map(|subject| subject.counted().count() as f64).collect::<Vec<_>>();
+    Ok(JndAnalysis {
+        task: "jnd",
+        subjects: subjects.len(),
+        weber: weber_detail.map(|detail| detail.mean),
+        weber_detail,
+        t: paired(&of(Modality::H), &of(Modality::Vh))?,
+        anova: analyse(&design, options.sums_of_squares),
+        constancy: WeberFractions::try_each(|modality| constancy(protocol, &fractions, modality, options))?,
+        linear_r2: linear_r2(protocol, &fractions)?,
+        thresholds: cells(protocol, &fractions)?,
+        pairs_per_subject: mean(&pairs),
+        unfinished_tracks: subjects.iter().map(unfinished).sum(),
+    })
+}
+
+/// A subject's thresholds as shares of the base, averaged over replications.
+struct Fractions {
+    vh: Vec<f64>,
+    h: Vec<f64>,
+}
+
+impl Fractions {
+    fn of(protocol: &JndProtocol, record: &SubjectRecord) -> Result<Self, AnalysisError> {
+        let mean_of = |modality: Modality, base: f64| {
+            let tracks =
+                record.tracks.iter().filter(|track| track.modality == modality && track.base == base);
+            let thresholds: Vec<f64> = tracks.filter_map(|track| track.threshold).collect();
+            if thresholds.is_empty() {
+                let (subject, modality) = (record.subject, modality.word());
+                return Err(AnalysisError::NoThreshold { subject, modality, base });
+            }
+            Ok(mean(&thresholds))
+        };
+        let each = |modality| {
+            protocol.bases.iter().map(|base| mean_of(modality, *base)).collect::<Result<Vec<_>, _>>()
+        };
+        Ok(Self { vh: each(Modality::Vh)?, h: each(Modality::H)? })
+    }
+
+    fn modality(&self, modality: Modality) -> &[f64] {
+        match modality {
+            Modality::Vh => &self.vh,
+            Modality::H => &self.h,
+        }
+    }
+
+    fn mean(&self, modality: Modality) -> f64 {
+        mean(self.modality(modality))
+    }
+
+    /// In the unit of the stimulus, modality by base.
+    fn thresholds(&self, protocol: &JndProtocol) -> Vec<f64> {
+        let each =
+            |modality| self.modality(modality).iter().zip(&protocol.bases).map(|(share, base)| share * base);
+        Modality::ALL.into_iter().flat_map(each).collect()
+    }
+}
+
+/// Does the Weber fraction change with the base? Nothing to ask of a single base.
+fn constancy(
+    protocol: &JndProtocol,
+    fractions: &[Fractions],
+    modality: Modality,
+    options: &AnalysisOptions,
+) -> Result<Option<Effect>, AnalysisError> {
+    if protocol.bases.len() < 2 {
+        return Ok(None);
+    }
+    let base = WithinFactor { name: "base".to_owned(), levels: protocol.bases.len() };
+    let rows: Vec<Vec<f64>> = fractions.iter().map(|subject| subject.modality(modality).to_vec()).collect();
+    let design = Design::new(Vec::new(), vec![base], &rows)?;
+    Ok(analyse(&design, options.sums_of_squares).into_iter().next())
+}
+
+fn linear_r2(protocol: &JndProtocol, fractions: &[Fractions]) -> Result<f64, AnalysisError> {
+    if protocol.bases.len() < 3 {
+        return Ok(f64::NAN);
+    }
+    let row = |subject: &Fractions| {
+        let both = subject.vh.iter().zip(&subject.h).zip(&protocol.bases);
+        both.map(|((vh, h), base)| 0.5 * (vh + h) * base).collect::<Vec<_>>()
+    };
+    let rows: Vec<Vec<f64>> = fractions.iter().map(row).collect();
+    Ok(trend::linear(&protocol.bases, &rows)?.r_squared)
+}
+
+fn cells(protocol: &JndProtocol, fractions: &[Fractions]) -> Result<Vec<ThresholdCell>, AnalysisError> {
+    let mut cells = Vec::new();
+    for modality in Modality::ALL {
+        for (index, base) in protocol.bases.iter().copied().enumerate() {
+            let share = |subject: &Fractions| subject.modality(modality).get(index).copied();
+            let values: Vec<f64> = fractions.iter().filter_map(share).map(|share| share * base).collect();
+            cells.push(ThresholdCell { modality, base, threshold: mean_interval(&values, CONFIDENCE)? });
+        }
+    }
+    Ok(cells)
+}

@@ -1,0 +1,134 @@
+//! Ratings: made comparable, their trend over the stimuli, effects of stimulus, modality and order.
+
+use super::{AnalysisError, AnalysisOptions, SubjectRecord, order_factor};
+use crate::protocol::{MagnitudeProtocol, RatingScale};
+use crate::trial::{Modality, Presented, Response};
+use flotor_statistics::anova::{Design, Effect, WithinFactor, analyse};
+use flotor_statistics::describe::{MeanInterval, mean, mean_interval};
+use flotor_statistics::trend::{self, LinearTrend};
+use serde::Serialize;
+
+/// Mean rating of a stimulus: a point of figure 17.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct RatingCell {
+    /// Modality.
+    pub modality: Modality,
+    /// Stimulus.
+    pub stimulus: f64,
+    /// Scaled rating, over subjects.
+    pub rating: MeanInterval,
+}
+
+/// The result of a magnitude experiment. The names of the fields are a contract: scripts rely on them.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MagnitudeAnalysis {
+    /// "magnitude".
+    pub task: &'static str,
+    /// Sittings analysed.
+    pub subjects: usize,
+    /// How ratings were made comparable.
+    pub rating_scale: RatingScale,
+    /// R² of the linear trend of the mean ratings over the stimuli.
+    pub linear_r2: f64,
+    /// The trend, all modalities together.
+    pub trend: LinearTrend,
+    /// Scaled ratings: order x modality x stimulus.
+    pub anova: Vec<Effect>,
+    /// Ratings by condition.
+    pub ratings: Vec<RatingCell>,
+    /// Ratings that count, per subject.
+    pub trials_per_subject: f64,
+    /// Presentations repeated because the handle left its range.
+    pub repeated: usize,
+}
+
+/// Analyses ratings.
+///
+/// # Errors
+/// [`AnalysisError`], if ratings cannot be scaled as asked for or the statistics cannot be had.
+pub fn analyse_magnitude(
+    protocol: &MagnitudeProtocol,
+    subjects: &[SubjectRecord],
+    options: &AnalysisOptions,
+) -> Result<MagnitudeAnalysis, AnalysisError> {
+    let rows = subjects.iter().map(|subject| scaled(protocol, subject, options.rating_scale));
+    let rows = rows.collect::<Result<Vec<_>, _>>()?;
+    let stimuli = &protocol.values;
+    let within = vec![
+        WithinFactor { name: "modality".to_owned(), levels: 2 },
+        WithinFactor { name: "stimulus".to_owned(), levels: stimuli.len() },
+    ];
+    let design = Design::new(order_factor(subjects), within, &rows)?;
+    let both = |row: &Vec<f64>| {
+        let (vh, h) = row.split_at(stimuli.len());
+        vh.iter().zip(h).map(|(vh, h)| 0.5 * (vh + h)).collect::<Vec<_>>()
+    };
+    let trend = trend::linear(stimuli, &rows.iter().map(both).collect::<Vec<_>>())?;
+    let mut ratings = Vec::new();
+    for (block, modality) in Modality::ALL.into_iter().enumerate() {
+        for (index, stimulus) in stimuli.iter().copied().enumerate() {
+            let cell = block * stimuli.len() + index;
+            let values: Vec<f64> = rows.iter().filter_map(|row| row.get(cell).copied()).collect();
+            ratings.push(RatingCell { modality, stimulus, rating: mean_interval(&values, 0.95)? });
+        }
+    }
+    #[allow(clippy::cast_precision_loss)] // a few dozen
+    let counted: Vec<f64> = subjects.iter().map(|subject| subject.counted().count() as f64).collect();
+    let repeats =
+        |subject: &SubjectRecord| subject.trials.iter().filter(|event| event.trial.repeat > 0).count();
+    Ok(MagnitudeAnalysis {
+        task: "magnitude",
+        subjects: subjects.len(),
+        rating_scale: options.rating_scale,
+        linear_r2: trend.r_squared,
+        trend,
+        anova: analyse(&design, options.sums_of_squares),
+        ratings,
+        trials_per_subject: mean(&counted),
+        repeated: subjects.iter().map(repeats).sum(),
+    })
+}
+
+/// A subject's mean scaled rating of each stimulus in each modality.
+fn scaled(
+    protocol: &MagnitudeProtocol,
+    record: &SubjectRecord,
+    scale: RatingScale,
+) -> Result<Vec<f64>, AnalysisError> {
+    let subject = record.subject;
+    let refuse = |problem| Err(AnalysisError::Ratings { subject, problem });
+    let rated = |event: &crate::log::TrialEvent| match (event.trial.presented, event.response) {
+        (Presented::One { value }, Response::Rating(rating)) => Some((event.trial.modality, value, rating)),
+        _ => None,
+    };
+    let ratings: Vec<(Modality, f64, f64)> = record.counted().filter_map(rated).collect();
+    let all: Vec<f64> = ratings.iter().map(|(_, _, rating)| *rating).collect();
+    let unit = match scale {
+        RatingScale::Raw => 1.0,
+        RatingScale::DividedByMean => {
+            let unit = mean(&all);
+            if unit.is_nan() || unit <= 0.0 {
+                return refuse("the mean of the ratings is not above 0, so nothing can be divided by it");
+            }
+            unit
+        }
+        RatingScale::DividedByGeometricMean => {
+            if all.iter().any(|rating| *rating <= 0.0) {
+                return refuse("a rating is not above 0, so there is no geometric mean");
+            }
+            libm::exp(mean(&all.iter().map(|rating| libm::log(*rating)).collect::<Vec<_>>()))
+        }
+    };
+    let mut cells = Vec::new();
+    for modality in Modality::ALL {
+        for stimulus in &protocol.values {
+            let same = ratings.iter().filter(|(m, value, _)| *m == modality && value == stimulus);
+            let values: Vec<f64> = same.map(|(_, _, rating)| rating / unit).collect();
+            if values.is_empty() {
+                return refuse("a stimulus was never rated");
+            }
+            cells.push(mean(&values));
+        }
+    }
+    Ok(cells)
+}

@@ -1,0 +1,145 @@
+//! From sittings to results: thresholds, Weber fractions, trends, effects, next to what was published.
+
+mod jnd;
+mod magnitude;
+mod text;
+
+pub use jnd::{JndAnalysis, ThresholdCell, WeberFractions, analyse_jnd};
+pub use magnitude::{MagnitudeAnalysis, RatingCell, analyse_magnitude};
+
+use crate::log::{SittingLog, TrialEvent};
+use crate::protocol::{Protocol, SubjectNumber};
+use crate::sitting::{TrackResult, Verdict};
+use crate::trial::{Modality, Phase};
+use flotor_statistics::StatisticsError;
+use flotor_statistics::anova::{BetweenFactor, SumOfSquares};
+use serde::Serialize;
+
+/// One subject's data.
+#[derive(Clone, Debug)]
+pub struct SubjectRecord {
+    /// Who.
+    pub subject: SubjectNumber,
+    /// The modality they started with.
+    pub first_modality: Modality,
+    /// Presentations with their answers.
+    pub trials: Vec<TrialEvent>,
+    /// Thresholds.
+    pub tracks: Vec<TrackResult>,
+}
+
+impl SubjectRecord {
+    /// The data of a log.
+    #[must_use]
+    pub fn of_log(log: &SittingLog) -> Self {
+        let subject = log.begin.subject;
+        Self {
+            subject,
+            first_modality: log.begin.protocol.first_modality().of(subject),
+            trials: log.trials.iter().map(|record| record.event.clone()).collect(),
+            tracks: log.tracks().to_vec(),
+        }
+    }
+
+    /// The answers that count.
+    pub fn counted(&self) -> impl Iterator<Item = &TrialEvent> {
+        let counts =
+            |event: &&TrialEvent| event.trial.phase == Phase::Main && event.verdict != Verdict::Repeated;
+        self.trials.iter().filter(counts)
+    }
+}
+
+/// How an analysis is done.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AnalysisOptions {
+    /// Sums of squares.
+    pub sums_of_squares: SumOfSquares,
+    /// How ratings are made comparable.
+    pub rating_scale: crate::protocol::RatingScale,
+}
+
+/// Why there is no result.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AnalysisError {
+    /// Too few complete sittings.
+    #[error("{complete} complete sittings; an analysis needs 2 or more")]
+    TooFewSubjects {
+        /// How many there are.
+        complete: usize,
+    },
+    /// A subject without a threshold in some condition.
+    #[error("{subject}: no track at base {base} in modality {modality} came to a threshold")]
+    NoThreshold {
+        /// Who.
+        subject: SubjectNumber,
+        /// Modality.
+        modality: &'static str,
+        /// Base.
+        base: f64,
+    },
+    /// Ratings that cannot be scaled as asked for.
+    #[error("{subject}: {problem}")]
+    Ratings {
+        /// Who.
+        subject: SubjectNumber,
+        /// Why.
+        problem: &'static str,
+    },
+    /// The statistics.
+    #[error(transparent)]
+    Statistics(#[from] StatisticsError),
+}
+
+/// The result of a study.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+pub enum Analysis {
+    /// Just noticeable difference.
+    Jnd(Box<JndAnalysis>),
+    /// Magnitude estimation.
+    Magnitude(Box<MagnitudeAnalysis>),
+}
+
+impl Analysis {
+    /// Analyses the complete sittings of a study.
+    ///
+    /// # Errors
+    /// [`AnalysisError`].
+    pub fn of(
+        protocol: &Protocol,
+        subjects: &[SubjectRecord],
+        options: &AnalysisOptions,
+    ) -> Result<Self, AnalysisError> {
+        if subjects.len() < 2 {
+            return Err(AnalysisError::TooFewSubjects { complete: subjects.len() });
+        }
+        Ok(match protocol {
+            Protocol::Jnd(jnd) => Self::Jnd(Box::new(analyse_jnd(jnd, subjects, options)?)),
+            Protocol::Magnitude(magnitude) => {
+                Self::Magnitude(Box::new(analyse_magnitude(magnitude, subjects, options)?))
+            }
+        })
+    }
+
+    /// The page for people.
+    #[must_use]
+    pub fn to_text(&self) -> String {
+        match self {
+            Self::Jnd(analysis) => text::jnd(analysis),
+            Self::Magnitude(analysis) => text::magnitude(analysis),
+        }
+    }
+}
+
+/// The factor "which modality came first", unless all subjects started with the same, or so few are in a group that
+/// nothing would be left to compare it with.
+fn order_factor(subjects: &[SubjectRecord]) -> Vec<BetweenFactor> {
+    let groups: Vec<usize> = subjects.iter().map(|subject| subject.first_modality as usize).collect();
+    let both = groups.contains(&0) && groups.contains(&1);
+    if both && subjects.len() > 2 {
+        vec![BetweenFactor { name: "order".to_owned(), groups }]
+    } else {
+        Vec::new()
+    }
+}

@@ -1,0 +1,137 @@
+//! How far each way to a threshold is off, and how much it scatters: many tracks of observers whose threshold is known.
+
+use crate::estimate::{Observation, Prior, most_likely};
+use crate::observer::TernaryObserver;
+use crate::procedure::{Procedure, QuestPlusRule, Track, WeightedUpDownRule};
+use crate::random::{Purpose, Stream};
+use crate::trial::{Judgement, Response};
+use flotor_statistics::describe::{deviation, mean};
+use serde::Serialize;
+
+/// Way to a threshold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Weighted up-down, mean of the differences from the 4th to the 8th reversal.
+    Thesis,
+    /// The same trials, most likely observer.
+    Map,
+    /// Trials placed by QUEST+.
+    QuestPlus,
+}
+
+impl Method {
+    /// In the order of the tables.
+    pub const ALL: [Self; 3] = [Self::Thesis, Self::Map, Self::QuestPlus];
+
+    /// As in tables.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Thesis => "thesis",
+            Self::Map => "map",
+            Self::QuestPlus => "questplus",
+        }
+    }
+}
+
+/// One method at one observer.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BiasRow {
+    /// Criterion of the observer, in deviations of the noise.
+    pub criterion: f64,
+    /// True threshold, as a share of the base.
+    pub threshold: f64,
+    /// Tracks whose trials make one estimate.
+    pub tracks: u32,
+    /// Method.
+    pub method: Method,
+    /// Estimates made.
+    pub runs: u32,
+    /// Mean estimate over the true threshold, less one.
+    pub bias: f64,
+    /// Deviation of the estimates, as a share of the true threshold.
+    pub deviation: f64,
+    /// Root mean square error, as a share of the true threshold.
+    pub rms_error: f64,
+    /// Mean number of trials per track.
+    pub trials: f64,
+}
+
+/// An observer whose threshold is this, at a target of 75 %.
+#[must_use]
+pub fn observer_of(threshold: f64, criterion: f64) -> TernaryObserver {
+    let unit = TernaryObserver { sigma: 1.0, criterion, bias: 0.0, lapse: 0.0 };
+    TernaryObserver { sigma: threshold / unit.threshold(0.75), ..unit }
+}
+
+/// Runs every method on an observer. `tracks` tracks make one estimate: means for `thesis` and `questplus`, all trials
+/// together for `map`.
+#[must_use]
+pub fn rows(observer: &TernaryObserver, tracks: u32, runs: u32, seed: u64) -> Vec<BiasRow> {
+    let threshold = observer.threshold(0.75);
+    let up_down = Procedure::WeightedUpDown(WeightedUpDownRule::default()).start();
+    let quest = Procedure::QuestPlus(QuestPlusRule::default()).start();
+    let prior = Prior::default();
+    let mut estimates: [Vec<f64>; 3] = Default::default();
+    let mut trials = [0.0; 2];
+    for run in 0..runs {
+        let (mut answers, mut thresholds) = (Vec::new(), Vec::new());
+        let mut placed = Vec::new();
+        for track in 0..tracks {
+            let mut stream = Stream::new(seed, Purpose::Answer, 1, run * tracks + track);
+            let (found, given) = walk(up_down.clone(), observer, &mut stream);
+            trials[0] += f64::from(u32::try_from(given.len()).unwrap_or(u32::MAX));
+            answers.extend(given);
+            thresholds.extend(found);
+            let (found, given) = walk(quest.clone(), observer, &mut stream);
+            trials[1] += f64::from(u32::try_from(given.len()).unwrap_or(u32::MAX));
+            placed.extend(found);
+        }
+        let map = most_likely(&answers, &prior, 0.75).threshold;
+        for (list, estimate) in estimates.iter_mut().zip([mean(&thresholds), map, mean(&placed)]) {
+            if estimate.is_finite() {
+                list.push(estimate);
+            }
+        }
+    }
+    let per_track = |sum: f64| sum / f64::from(runs * tracks);
+    let row = |(method, estimates): (Method, &Vec<f64>)| {
+        let relative: Vec<f64> = estimates.iter().map(|estimate| estimate / threshold - 1.0).collect();
+        let squares: Vec<f64> = relative.iter().map(|error| error * error).collect();
+        BiasRow {
+            criterion: observer.criterion,
+            threshold,
+            tracks,
+            method,
+            runs: u32::try_from(relative.len()).unwrap_or(u32::MAX),
+            bias: mean(&relative),
+            deviation: deviation(&relative),
+            rms_error: mean(&squares).sqrt(),
+            trials: per_track(if method == Method::QuestPlus { trials[1] } else { trials[0] }),
+        }
+    };
+    Method::ALL.into_iter().zip(&estimates).map(row).collect()
+}
+
+/// One track with one observer: its threshold, and the answers.
+fn walk(
+    mut track: Track,
+    observer: &TernaryObserver,
+    stream: &mut Stream,
+) -> (Option<f64>, Vec<Observation>) {
+    let mut answers = Vec::new();
+    while !track.is_done() {
+        let delta = track.delta();
+        let larger_second = stream.coin();
+        let judgement = match observer.respond(if larger_second { delta } else { -delta }, stream) {
+            Response::Second if larger_second => Judgement::Correct,
+            Response::First if !larger_second => Judgement::Correct,
+            Response::First | Response::Second => Judgement::Wrong,
+            Response::DontKnow | Response::Rating(_) | Response::Seen => Judgement::Unsure,
+        };
+        answers.push(Observation { delta, judgement });
+        track.answer(judgement);
+    }
+    (track.threshold(), answers)
+}

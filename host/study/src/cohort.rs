@@ -1,0 +1,211 @@
+//! Simulated subjects, all of them, several at a time.
+
+use crate::conduct::{ConductError, OutsideError, Presenter, conduct};
+use crate::dataset::{Dataset, DatasetError, Progress};
+use crate::log::{Begin, FORMAT, LogWriter};
+use crate::observer::{Population, SimulatedSubject};
+use crate::protocol::{Protocol, SubjectNumber};
+use crate::sitting::Sitting;
+use serde_json::json;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What to do about subjects who have begun before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Earlier {
+    /// Nobody may have.
+    Refuse,
+    /// Who is complete stays so, who broke off goes on.
+    Resume,
+}
+
+/// A study with simulated subjects.
+#[derive(Clone, Debug)]
+pub struct Cohort {
+    /// The experiment.
+    pub protocol: Protocol,
+    /// Seed.
+    pub seed: u64,
+    /// Who.
+    pub subjects: Vec<SubjectNumber>,
+    /// What kind of people.
+    pub population: Population,
+    /// What presents the stimuli, for the log.
+    pub apparatus: serde_json::Value,
+    /// Version of the program, for the log.
+    pub version: String,
+    /// What to do about subjects who have begun before.
+    pub earlier: Earlier,
+}
+
+/// Why a study was not carried out to its end.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CohortError {
+    /// The data.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// A sitting.
+    #[error("{subject}: {cause}")]
+    Sitting {
+        /// Whose.
+        subject: SubjectNumber,
+        /// Why.
+        cause: ConductError,
+    },
+}
+
+/// Makes what presents the stimuli to one subject.
+pub type PresenterFactory<'a> = dyn Fn(SubjectNumber) -> Result<Box<dyn Presenter>, OutsideError> + Sync + 'a;
+
+/// One subject's turn.
+struct Turn {
+    subject: SubjectNumber,
+    sitting: Sitting,
+    log: LogWriter,
+}
+
+impl Cohort {
+    /// The middle of the stimuli, which simulated ratings are relative to.
+    fn middle(&self) -> f64 {
+        let values = match &self.protocol {
+            Protocol::Jnd(jnd) => &jnd.bases,
+            Protocol::Magnitude(magnitude) => &magnitude.values,
+        };
+        flotor_statistics::describe::mean(values)
+    }
+
+    /// The subject of this number.
+    #[must_use]
+    pub fn subject(&self, subject: SubjectNumber) -> SimulatedSubject {
+        SimulatedSubject::new(&self.population, self.seed, subject, self.middle())
+    }
+
+    fn begin(&self, subject: SubjectNumber) -> Begin {
+        Begin {
+            format: FORMAT,
+            version: self.version.clone(),
+            subject,
+            seed: self.seed,
+            protocol: self.protocol.clone(),
+            observer: json!({ "simulated": self.population }),
+            apparatus: self.apparatus.clone(),
+        }
+    }
+
+    /// Carries the study out, `threads` subjects at a time, and makes the tables. `watch` is told of every trial that
+    /// is on disk; `stop` ends it after the trials under way.
+    ///
+    /// Nothing is presented before all subjects were found to be free, or what they did to be in order.
+    ///
+    /// # Errors
+    /// [`CohortError`]; the trials so far are in the logs.
+    pub fn run(
+        &self,
+        dataset: &Dataset,
+        threads: usize,
+        presenter: &PresenterFactory<'_>,
+        watch: &(dyn Fn() + Sync),
+        stop: &AtomicBool,
+    ) -> Result<(), CohortError> {
+        let waiting = self.subjects.iter().map(|subject| self.look_up(dataset, *subject));
+        let waiting = waiting.collect::<Result<Vec<_>, _>>()?;
+        let mut waiting: Vec<(SubjectNumber, Progress)> = waiting.into_iter().flatten().collect();
+        waiting.reverse(); // taken from the end
+        let waiting = Mutex::new(waiting);
+        let work = || {
+            while let Some((subject, progress)) = waiting.lock().ok().and_then(|mut queue| queue.pop()) {
+                if stop.load(Ordering::Relaxed) {
+                    break;
+                }
+                let turn = self.turn(dataset, subject, progress)?;
+                self.sit(turn, presenter, watch, stop)?;
+            }
+            Ok(())
+        };
+        let results: Vec<Result<(), CohortError>> = std::thread::scope(|scope| {
+            let threads: Vec<_> = (0..threads.max(1)).map(|_| scope.spawn(work)).collect();
+            threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
+        });
+        results.into_iter().collect::<Result<(), _>>()?;
+        Ok(dataset.write_tables()?)
+    }
+
+    /// Whether a subject has a turn.
+    fn look_up(
+        &self,
+        dataset: &Dataset,
+        subject: SubjectNumber,
+    ) -> Result<Option<(SubjectNumber, Progress)>, CohortError> {
+        let root = || dataset.root().to_path_buf();
+        let progress = dataset.progress(subject, self.protocol.task())?;
+        match (&progress, self.earlier) {
+            (Progress::New, _) => {}
+            (Progress::Complete(log) | Progress::Partial(log), Earlier::Resume) => {
+                let path = log.path().to_path_buf();
+                if let Some(what) = self.begin(subject).differs(&log.begin) {
+                    return Err(DatasetError::Changed { path, what }.into());
+                }
+                if matches!(progress, Progress::Complete(_)) {
+                    return Ok(None);
+                }
+            }
+            (Progress::Complete(_), Earlier::Refuse) => {
+                return Err(DatasetError::Duplicate { subject, root: root() }.into());
+            }
+            (Progress::Partial(log), Earlier::Refuse) => {
+                let trials = log.trials.len();
+                return Err(DatasetError::Unfinished { subject, trials, root: root() }.into());
+            }
+        }
+        Ok(Some((subject, progress)))
+    }
+
+    fn turn(
+        &self,
+        dataset: &Dataset,
+        subject: SubjectNumber,
+        progress: Progress,
+    ) -> Result<Turn, CohortError> {
+        let (sitting, log) = match progress {
+            Progress::Partial(log) => log.resume(&self.version).map_err(DatasetError::from)?,
+            Progress::New | Progress::Complete(_) => dataset.begin(self.begin(subject))?,
+        };
+        Ok(Turn { subject, sitting, log })
+    }
+
+    fn sit(
+        &self,
+        turn: Turn,
+        presenter: &PresenterFactory<'_>,
+        watch: &(dyn Fn() + Sync),
+        stop: &AtomicBool,
+    ) -> Result<(), CohortError> {
+        let Turn { subject, mut sitting, mut log } = turn;
+        let failed = |cause| CohortError::Sitting { subject, cause };
+        let mut presenter = presenter(subject).map_err(|cause| failed(ConductError::Outside(cause)))?;
+        let mut respondent = Stoppable { subject: self.subject(subject), stop };
+        conduct(&mut sitting, &mut log, presenter.as_mut(), &mut respondent, &mut |_| watch())
+            .map(|_| ())
+            .map_err(failed)
+    }
+}
+
+/// A simulated subject who can be asked to stop.
+struct Stoppable<'a> {
+    subject: SimulatedSubject,
+    stop: &'a AtomicBool,
+}
+
+impl crate::conduct::Respondent for Stoppable<'_> {
+    fn respond(
+        &mut self,
+        trial: &crate::trial::Trial,
+        exploration: &crate::trial::Exploration,
+    ) -> Result<crate::conduct::Reply, OutsideError> {
+        if self.stop.load(Ordering::Relaxed) {
+            return Ok(crate::conduct::Reply::Stop);
+        }
+        crate::conduct::Respondent::respond(&mut self.subject, trial, exploration)
+    }
+}

@@ -1,0 +1,230 @@
+//! Where the data of a study lie, in the manner of BIDS (bids.neuroimaging.io):
+//!
+//! ```text
+//! DIR/dataset_description.json
+//! DIR/participants.tsv, participants.json
+//! DIR/task-jnd_beh.json                                  what the columns mean
+//! DIR/sub-01/beh/sub-01_task-jnd_beh.tsv                 one row per presentation
+//! DIR/sourcedata/sub-01/sub-01_task-jnd_log.jsonl        the event log: what everything else is made from
+//! ```
+//!
+//! The logs are the data. Tables are made from them, whole or not at all (written aside, then renamed), and can be made
+//! again at any time.
+
+mod table;
+
+use crate::log::{Begin, Event, LogError, LogWriter, SittingLog};
+use crate::protocol::SubjectNumber;
+use crate::sitting::Sitting;
+use std::path::{Path, PathBuf};
+
+/// A folder with the data of a study.
+#[derive(Clone, Debug)]
+pub struct Dataset {
+    root: PathBuf,
+}
+
+/// How far a subject has come.
+pub enum Progress {
+    /// Never began.
+    New,
+    /// Began, and did not come to the end.
+    Partial(Box<SittingLog>),
+    /// Came to the end.
+    Complete(Box<SittingLog>),
+}
+
+/// What cannot be done with a dataset.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DatasetError {
+    /// A log.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A file or folder.
+    #[error("{}: {action}: {cause}", path.display())]
+    File {
+        /// Which.
+        path: PathBuf,
+        /// What was attempted.
+        action: &'static str,
+        /// What the system said.
+        cause: std::io::Error,
+    },
+    /// There is no study.
+    #[error("{}: holds no study (no logs under sourcedata/); name the folder given to `study --out`", .0.display())]
+    NoStudy(PathBuf),
+    /// Sittings that do not belong together.
+    #[error("{}: differs from {} in {what}; a study has one protocol: use another folder", path.display(), other.display())]
+    Mixed {
+        /// A log.
+        path: PathBuf,
+        /// Another.
+        other: PathBuf,
+        /// What differs.
+        what: &'static str,
+    },
+    /// A sitting that was begun otherwise than it is to go on.
+    #[error("{}: was begun with another {what}; continue it as it was begun, or use another folder", path.display())]
+    Changed {
+        /// Its log.
+        path: PathBuf,
+        /// What differs.
+        what: &'static str,
+    },
+    /// A subject who has been there.
+    #[error("{subject} is already complete in {}; choose another number or folder", root.display())]
+    Duplicate {
+        /// Who.
+        subject: SubjectNumber,
+        /// The dataset.
+        root: PathBuf,
+    },
+    /// A subject who has begun.
+    #[error("{subject} broke off after {trials} trials in {}; add --resume to continue", root.display())]
+    Unfinished {
+        /// Who.
+        subject: SubjectNumber,
+        /// How far they came.
+        trials: usize,
+        /// The dataset.
+        root: PathBuf,
+    },
+}
+
+impl Dataset {
+    /// The data in a folder, which need not exist yet.
+    #[must_use]
+    pub fn at(root: &Path) -> Self {
+        Self { root: root.into() }
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// The log of a subject.
+    #[must_use]
+    pub fn log_path(&self, subject: SubjectNumber, task: &str) -> PathBuf {
+        self.root.join(format!("sourcedata/{subject}/{subject}_task-{task}_log.jsonl"))
+    }
+
+    /// The folder for further recordings of a subject.
+    #[must_use]
+    pub fn source_folder(&self, subject: SubjectNumber) -> PathBuf {
+        self.root.join(format!("sourcedata/{subject}"))
+    }
+
+    fn table_path(&self, subject: SubjectNumber, task: &str) -> PathBuf {
+        self.root.join(format!("{subject}/beh/{subject}_task-{task}_beh.tsv"))
+    }
+
+    /// All logs, read, verified and in the order of their subjects.
+    ///
+    /// # Errors
+    /// A log that cannot be used, none at all, or logs of different experiments.
+    pub fn logs(&self) -> Result<Vec<SittingLog>, DatasetError> {
+        let mut paths: Vec<PathBuf> = Vec::new();
+        let source = self.root.join("sourcedata");
+        let folders = std::fs::read_dir(&source).map_err(|_| DatasetError::NoStudy(self.root.clone()))?;
+        for folder in folders.flatten().filter(|entry| entry.path().is_dir()) {
+            let files =
+                std::fs::read_dir(folder.path()).into_iter().flatten().flatten().map(|file| file.path());
+            paths.extend(files.filter(|path| path.to_string_lossy().ends_with("_log.jsonl")));
+        }
+        paths.sort();
+        if paths.is_empty() {
+            return Err(DatasetError::NoStudy(self.root.clone()));
+        }
+        let logs = paths.iter().map(|path| SittingLog::read(path)).collect::<Result<Vec<_>, _>>()?;
+        if let Some((first, rest)) = logs.split_first() {
+            rest.iter().try_for_each(|log| belongs(log, first))?;
+        }
+        Ok(logs)
+    }
+
+    /// How far a subject has come.
+    ///
+    /// # Errors
+    /// A log that cannot be used.
+    pub fn progress(&self, subject: SubjectNumber, task: &str) -> Result<Progress, DatasetError> {
+        let path = self.log_path(subject, task);
+        if !path.exists() {
+            return Ok(Progress::New);
+        }
+        let log = match SittingLog::read(&path) {
+            // Killed before its first line was complete: nothing happened yet.
+            Err(LogError { problem: crate::log::LogProblem::Empty, .. }) => {
+                self.file(&path, "cannot remove the empty log", std::fs::remove_file(&path))?;
+                return Ok(Progress::New);
+            }
+            other => other?,
+        };
+        let log = Box::new(log);
+        Ok(if log.complete { Progress::Complete(log) } else { Progress::Partial(log) })
+    }
+
+    /// A new sitting with its log.
+    ///
+    /// # Errors
+    /// The log exists or cannot be written.
+    pub fn begin(&self, begin: Begin) -> Result<(Sitting, LogWriter), DatasetError> {
+        let path = self.log_path(begin.subject, begin.protocol.task());
+        let folder = self.source_folder(begin.subject);
+        self.file(&folder, "cannot make the folder", std::fs::create_dir_all(&folder))?;
+        let sitting = Sitting::new(&begin.protocol, begin.seed, begin.subject);
+        let mut writer = LogWriter::create(&path)?;
+        writer.write(&Event::Begin(Box::new(begin)))?;
+        Ok((sitting, writer))
+    }
+
+    /// Makes the tables of every sitting that is complete, and the files that describe them.
+    ///
+    /// # Errors
+    /// A log that cannot be used, or a file that cannot be written.
+    pub fn write_tables(&self) -> Result<(), DatasetError> {
+        let logs = self.logs()?;
+        let Some(first) = logs.first() else { return Ok(()) };
+        let task = first.begin.protocol.task();
+        for log in logs.iter().filter(|log| log.complete) {
+            let path = self.table_path(log.begin.subject, task);
+            self.replace(&path, &table::trials(log))?;
+        }
+        self.replace(
+            &self.root.join(format!("task-{task}_beh.json")),
+            &table::columns(&first.begin.protocol),
+        )?;
+        self.replace(&self.root.join("dataset_description.json"), &table::description(&first.begin))?;
+        self.replace(&self.root.join("participants.tsv"), &table::participants(&logs))?;
+        self.replace(&self.root.join("participants.json"), &table::participant_columns())
+    }
+
+    /// Writes a file whole or not at all.
+    fn replace(&self, path: &Path, text: &str) -> Result<(), DatasetError> {
+        if let Some(folder) = path.parent() {
+            self.file(folder, "cannot make the folder", std::fs::create_dir_all(folder))?;
+        }
+        let aside = path.with_extension("part");
+        self.file(&aside, "cannot write the table", std::fs::write(&aside, text))?;
+        self.file(path, "cannot put the table in place", std::fs::rename(&aside, path))
+    }
+
+    #[allow(clippy::unused_self)] // reads as: of this dataset
+    fn file(
+        &self,
+        path: &Path,
+        action: &'static str,
+        result: std::io::Result<()>,
+    ) -> Result<(), DatasetError> {
+        result.map_err(|cause| DatasetError::File { path: path.into(), action, cause })
+    }
+}
+
+/// Whether two logs are of one study.
+fn belongs(log: &SittingLog, first: &SittingLog) -> Result<(), DatasetError> {
+    log.begin.differs(&first.begin).map_or(Ok(()), |what| {
+        Err(DatasetError::Mixed { path: log.path().into(), other: first.path().into(), what })
+    })
+}

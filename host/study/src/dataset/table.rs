@@ -1,0 +1,165 @@
+//! The tidy tables: one row per presentation, one column per fact, `n/a` for what is not known.
+
+use crate::log::{Begin, SittingLog, TrialRecord};
+use crate::protocol::Protocol;
+use crate::sitting::Verdict;
+use crate::trial::{Judgement, Phase, Position, Presented, Response, StimulusKinematics};
+use serde_json::{Value, json};
+
+/// Missing, as BIDS writes it.
+const MISSING: &str = "n/a";
+
+/// Name and meaning of each column.
+const COLUMNS: [(&str, &str); 27] = [
+    ("trial", "Count of presentations in the sitting, from 1"),
+    ("phase", "practice, or main: only main counts"),
+    ("replication", "Replication, from 1; 0 for practice"),
+    ("track", "Track of the adaptive procedure, from 1; 0 where there is none"),
+    ("repeat", "How often this presentation was repeated before because the handle left its range"),
+    ("modality", "vh: vision and haptics, h: haptics alone"),
+    ("base", "Base of a pair, in the unit of the stimulus"),
+    ("comparison", "Comparison of a pair, in the unit of the stimulus"),
+    ("stimulus", "The stimulus rated, in its unit"),
+    ("delta", "Difference of comparison and base as a share of the base"),
+    ("comparison_at", "first or second: when the comparison was presented"),
+    ("response", "first, second, dont_know, rating or seen"),
+    ("rating", "The number given, in the subject's own scale"),
+    ("judgement", "correct, wrong or unsure"),
+    ("is_reversal", "1 if the answer turned the direction of the track"),
+    ("repeated", "1 if the presentation is repeated and its answer does not count"),
+    ("threshold", "Threshold of the track as a share of the base, on its last trial"),
+    ("response_time", "From the end of the presentation to the answer, s"),
+    ("boundary_hit", "1 if the handle left its range"),
+    ("duration", "Time the stimuli were explored, s"),
+    ("cycles", "Down and up movements"),
+    ("mean_speed", "Mean speed along the vertical, m/s"),
+    ("mean_acceleration", "Mean magnitude of the acceleration along the vertical, m/s2"),
+    ("mean_force", "Mean magnitude of the vertical force on the hand, N"),
+    ("peak_force", "Largest force on the hand, N"),
+    ("felt_stiffness", "Stiffness of each stimulus as the hand felt it, N/m, in order"),
+    ("missed_ticks", "Ticks the servo missed"),
+];
+
+/// The table of one sitting.
+pub(super) fn trials(log: &SittingLog) -> String {
+    let head: Vec<&str> = COLUMNS.iter().map(|(name, _)| *name).collect();
+    let rows = log.trials.iter().map(|record| row(record).join("\t"));
+    [head.join("\t")].into_iter().chain(rows).fold(String::new(), |text, line| text + &line + "\n")
+}
+
+fn row(record: &TrialRecord) -> Vec<String> {
+    let event = &record.event;
+    let trial = &event.trial;
+    let number = |value: Option<f64>| value.map_or(MISSING.to_owned(), |value| value.to_string());
+    let flag = |value: bool| u8::from(value).to_string();
+    let word = |value: Option<&str>| value.unwrap_or(MISSING).to_owned();
+    let (pair, single) = match trial.presented {
+        Presented::Pair(pair) => (Some(pair), None),
+        Presented::One { value } => (None, Some(value)),
+    };
+    let (judgement, reversal) = match event.verdict {
+        Verdict::Judged { judgement, reversal } => (Some(judgement), reversal),
+        Verdict::Taken | Verdict::Repeated => (None, false),
+    };
+    let rating = match event.response {
+        Response::Rating(rating) => Some(rating),
+        _ => None,
+    };
+    let felt = &event.exploration.kinematics;
+    let mean = |value: fn(&StimulusKinematics) -> f64| {
+        let total: f64 = felt.iter().map(|one| one.duration_s).sum();
+        (total > 0.0).then(|| felt.iter().map(|one| value(one) * one.duration_s).sum::<f64>() / total)
+    };
+    let any = !felt.is_empty();
+    let stiffness: Vec<String> = felt.iter().map(|one| one.felt_stiffness_n_per_m.to_string()).collect();
+    vec![
+        trial.number.to_string(),
+        match trial.phase {
+            Phase::Practice => "practice".to_owned(),
+            Phase::Main => "main".to_owned(),
+        },
+        trial.replication.to_string(),
+        trial.track.to_string(),
+        trial.repeat.to_string(),
+        trial.modality.word().to_owned(),
+        number(pair.map(|pair| pair.base)),
+        number(pair.map(|pair| pair.comparison)),
+        number(single),
+        number(pair.map(|pair| pair.delta)),
+        word(pair.map(|pair| match pair.comparison_at {
+            Position::First => "first",
+            Position::Second => "second",
+        })),
+        event.response.word().to_owned(),
+        number(rating),
+        word(judgement.map(|judgement| match judgement {
+            Judgement::Correct => "correct",
+            Judgement::Wrong => "wrong",
+            Judgement::Unsure => "unsure",
+        })),
+        flag(reversal),
+        flag(event.verdict == Verdict::Repeated),
+        number(record.track.and_then(|track| track.threshold)),
+        number(event.exploration.response_time_s),
+        flag(event.exploration.boundary_hit),
+        number(any.then(|| felt.iter().map(|one| one.duration_s).sum())),
+        if any { felt.iter().map(|one| one.cycles).sum::<u32>().to_string() } else { MISSING.to_owned() },
+        number(mean(|one| one.mean_speed_m_per_s)),
+        number(mean(|one| one.mean_acceleration_m_per_s2)),
+        number(mean(|one| one.mean_force_n)),
+        number(any.then(|| felt.iter().map(|one| one.peak_force_n).fold(0.0, f64::max))),
+        if any { stiffness.join(",") } else { MISSING.to_owned() },
+        event.exploration.missed_ticks.to_string(),
+    ]
+}
+
+/// The sidecar of the tables.
+pub(super) fn columns(protocol: &Protocol) -> String {
+    let mut sidecar = serde_json::Map::new();
+    sidecar.insert("TaskName".to_owned(), json!(protocol.task()));
+    sidecar.insert("Stimulus".to_owned(), json!(protocol.stimulus().to_string()));
+    sidecar.insert("Protocol".to_owned(), json!(protocol));
+    for (name, meaning) in COLUMNS {
+        sidecar.insert(name.to_owned(), json!({ "Description": meaning }));
+    }
+    pretty(&Value::Object(sidecar))
+}
+
+/// What the dataset is.
+pub(super) fn description(begin: &Begin) -> String {
+    pretty(&json!({
+        "Name": format!("Perception study: {}", begin.protocol.task()),
+        "BIDSVersion": "1.9.0",
+        "DatasetType": "raw",
+        "GeneratedBy": [{ "Name": "flotor", "Version": begin.version }],
+        "Seed": begin.seed,
+        "ConfigHash": begin.config_hash(),
+        "Observer": begin.observer,
+        "Apparatus": begin.apparatus,
+    }))
+}
+
+/// Who took part.
+pub(super) fn participants(logs: &[SittingLog]) -> String {
+    let head = "participant_id\tfirst_modality\tcomplete\tpresentations\tresumed\n".to_owned();
+    logs.iter().fold(head, |text, log| {
+        let subject = log.begin.subject;
+        let first = log.begin.protocol.first_modality().of(subject).word();
+        let complete = u8::from(log.complete);
+        text + &format!("{subject}\t{first}\t{complete}\t{}\t{}\n", log.trials.len(), log.resumed)
+    })
+}
+
+/// What the columns of the list of participants mean.
+pub(super) fn participant_columns() -> String {
+    pretty(&json!({
+        "first_modality": { "Description": "Modality the subject started with: vh (vision and haptics) or h (haptics alone)" },
+        "complete": { "Description": "1 if the sitting came to its end" },
+        "presentations": { "Description": "Presentations, practice and repeats included" },
+        "resumed": { "Description": "How often the sitting was taken up again" },
+    }))
+}
+
+fn pretty(value: &Value) -> String {
+    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
+}

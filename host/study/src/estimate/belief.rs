@@ -1,0 +1,164 @@
+//! Probabilities of many observers at once, and the next difference that would tell most about them.
+//!
+//! The method of QUEST+ (Watson, Journal of Vision 17(3):10, 2017) with three answers. What a trial tells is the mutual
+//! information of its answer and the observer: the entropy of the answer as one now expects it, less the entropy it
+//! would have if one knew the observer.
+
+use super::{Estimate, Observation, Prior, probability};
+use crate::observer::TernaryObserver;
+use crate::trial::Judgement;
+
+const JUDGEMENTS: [Judgement; 3] = [Judgement::Correct, Judgement::Wrong, Judgement::Unsure];
+/// Observers: so many values of sigma times so many of the criterion, evenly over the prior's probability.
+const SIGMAS: u32 = 31;
+const CRITERIA: u32 = 11;
+/// Differences to choose from, evenly spaced in their logarithm.
+const DELTAS: u32 = 40;
+
+/// What does not change from trial to trial.
+#[derive(Clone, Debug)]
+pub struct BeliefGrid {
+    observers: Vec<Member>,
+    deltas: Vec<f64>,
+}
+
+/// One of the observers of a grid.
+#[derive(Clone, Debug)]
+struct Member {
+    observer: TernaryObserver,
+    threshold: f64,
+    prior: f64,
+    /// Probability of each answer, and the entropy of the answer, at each difference.
+    answers: Vec<([f64; 3], f64)>,
+}
+
+impl BeliefGrid {
+    /// Observers of a prior, and differences between two bounds.
+    #[must_use]
+    pub fn new(prior: &Prior, target: f64, least_delta: f64, most_delta: f64) -> Self {
+        let share = |index: u32, of: u32| f64::from(index) / f64::from(of.saturating_sub(1).max(1));
+        let ratio = libm::log(most_delta / least_delta);
+        let deltas: Vec<f64> =
+            (0..DELTAS).map(|index| least_delta * libm::exp(ratio * share(index, DELTAS))).collect();
+        /// The grid reaches so many deviations of the prior to both sides.
+        const REACH: f64 = 3.0;
+        let spread = |index, of| REACH * (2.0 * share(index, of) - 1.0);
+        let mut observers = Vec::new();
+        for sigma in 0..SIGMAS {
+            for criterion in 0..CRITERIA {
+                let (z_sigma, z_criterion) = (spread(sigma, SIGMAS), spread(criterion, CRITERIA));
+                let sigma = prior.sigma_median * libm::exp(prior.sigma_spread * z_sigma);
+                let criterion = prior.criterion_median * libm::exp(prior.criterion_spread * z_criterion);
+                let observer = prior.observer(sigma, criterion);
+                let answers = deltas.iter().map(|delta| answers(&observer, *delta)).collect();
+                let attentive = TernaryObserver { lapse: 0.0, ..observer };
+                let weight = libm::exp(-0.5 * (z_sigma * z_sigma + z_criterion * z_criterion));
+                observers.push(Member {
+                    observer,
+                    threshold: attentive.threshold(target),
+                    prior: weight,
+                    answers,
+                });
+            }
+        }
+        Self { observers, deltas }
+    }
+}
+
+fn answers(observer: &TernaryObserver, delta: f64) -> ([f64; 3], f64) {
+    let shares = JUDGEMENTS.map(|judgement| probability(observer, &Observation { delta, judgement }));
+    (shares, entropy(&shares))
+}
+
+fn entropy(shares: &[f64]) -> f64 {
+    shares.iter().filter(|share| **share > 0.0).map(|share| -share * libm::log(*share)).sum()
+}
+
+/// How probable each observer of a grid is.
+#[derive(Clone, Debug)]
+pub struct Belief {
+    weights: Vec<f64>,
+}
+
+impl Belief {
+    /// Before the first answer.
+    #[must_use]
+    pub fn new(grid: &BeliefGrid) -> Self {
+        let mut belief = Self { weights: grid.observers.iter().map(|member| member.prior).collect() };
+        belief.normalise();
+        belief
+    }
+
+    /// Takes an answer in, at any difference.
+    pub fn answer(&mut self, grid: &BeliefGrid, observation: &Observation) {
+        for (weight, member) in self.weights.iter_mut().zip(&grid.observers) {
+            *weight *= probability(&member.observer, observation);
+        }
+        self.normalise();
+    }
+
+    fn normalise(&mut self) {
+        let sum: f64 = self.weights.iter().sum();
+        self.weights.iter_mut().for_each(|weight| *weight /= sum);
+    }
+
+    /// The difference whose answer tells most.
+    #[must_use]
+    pub fn best_delta(&self, grid: &BeliefGrid) -> f64 {
+        let mut best = (f64::NEG_INFINITY, 0.0);
+        for (index, delta) in grid.deltas.iter().copied().enumerate() {
+            let mut expected = [0.0; 3];
+            let mut known = 0.0;
+            for (weight, member) in self.weights.iter().zip(&grid.observers) {
+                if let Some((shares, entropy)) = member.answers.get(index) {
+                    expected.iter_mut().zip(shares).for_each(|(sum, share)| *sum += weight * share);
+                    known += weight * entropy;
+                }
+            }
+            let told = entropy(&expected) - known;
+            if told > best.0 {
+                best = (told, delta);
+            }
+        }
+        best.1
+    }
+
+    /// The middle of what is held probable: geometric means of sigma, criterion and threshold.
+    #[must_use]
+    pub fn estimate(&self, grid: &BeliefGrid) -> Estimate {
+        let mean = |value: fn(&Member) -> f64| {
+            let weighted = self.weights.iter().zip(&grid.observers);
+            libm::exp(weighted.map(|(weight, member)| weight * libm::log(value(member))).sum::<f64>())
+        };
+        Estimate {
+            sigma: mean(|member| member.observer.sigma),
+            criterion: mean(|member| member.observer.criterion),
+            threshold: mean(|member| member.threshold),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Answers of one kind only move the belief the way they must, and the next difference with it.
+    #[test]
+    fn belief_follows_the_answers() {
+        let grid = BeliefGrid::new(&Prior::default(), 0.75, 0.01, 0.95);
+        let start = Belief::new(&grid);
+        let after = |judgement| {
+            let mut belief = start.clone();
+            for _ in 0..6 {
+                let delta = belief.best_delta(&grid);
+                belief.answer(&grid, &Observation { delta, judgement });
+            }
+            (belief.estimate(&grid).threshold, belief.best_delta(&grid))
+        };
+        let middle = (start.estimate(&grid).threshold, start.best_delta(&grid));
+        let (keen, dull) = (after(Judgement::Correct), after(Judgement::Wrong));
+        assert!(keen.0 < middle.0 && middle.0 < dull.0, "{keen:?} {middle:?} {dull:?}");
+        assert!(keen.1 < middle.1 && middle.1 < dull.1, "{keen:?} {middle:?} {dull:?}");
+        assert!((start.weights.iter().sum::<f64>() - 1.0).abs() < 1.0e-12);
+    }
+}

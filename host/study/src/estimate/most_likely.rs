@@ -1,0 +1,62 @@
+//! The observer most likely in the light of prior and answers (maximum a posteriori).
+
+use super::{Estimate, Observation, Prior, probability};
+
+/// Steps of the first, coarse look, each way from the median of the prior, and their size in deviations of it.
+const COARSE_STEPS: i32 = 6;
+const COARSE_SIZE: f64 = 0.5;
+/// Halvings of the search that follows: 0.25 deviations down to 1e-5 of them.
+const HALVINGS: u32 = 15;
+
+/// Finds the most likely observer, and the difference at which that observer reaches the target.
+///
+/// Which procedure placed the trials does not matter: given the differences, the answers have the same likelihood.
+#[must_use]
+pub fn most_likely(observations: &[Observation], prior: &Prior, target: f64) -> Estimate {
+    let (centre, spread) = (
+        [libm::log(prior.sigma_median), libm::log(prior.criterion_median)],
+        [prior.sigma_spread, prior.criterion_spread],
+    );
+    let score = |[sigma, criterion]: [f64; 2]| {
+        let observer = prior.observer(libm::exp(sigma), libm::exp(criterion));
+        let likelihood: f64 =
+            observations.iter().map(|observation| libm::log(probability(&observer, observation))).sum();
+        likelihood + prior.log_density(sigma, criterion)
+    };
+    let step =
+        |from: [f64; 2], steps: [f64; 2]| [from[0] + steps[0] * spread[0], from[1] + steps[1] * spread[1]];
+    let mut best = centre;
+    let mut best_score = score(best);
+    let mut consider = |place: [f64; 2], best: &mut [f64; 2]| {
+        let score = score(place);
+        if score > best_score {
+            (best_score, *best) = (score, place);
+            return true;
+        }
+        false
+    };
+    for sigma in -COARSE_STEPS..=COARSE_STEPS {
+        for criterion in -COARSE_STEPS..=COARSE_STEPS {
+            let steps = [f64::from(sigma) * COARSE_SIZE, f64::from(criterion) * COARSE_SIZE];
+            consider(step(centre, steps), &mut best);
+        }
+    }
+    // Compass search: the posterior is smooth with one peak nearby.
+    let mut size = 0.5 * COARSE_SIZE;
+    for _ in 0..HALVINGS {
+        loop {
+            let around = [[size, 0.0], [-size, 0.0], [0.0, size], [0.0, -size], [size, size], [-size, -size]];
+            let diagonal = [[size, -size], [-size, size]];
+            let from = best;
+            let better = around.iter().chain(&diagonal).any(|steps| consider(step(from, *steps), &mut best));
+            if !better {
+                break;
+            }
+        }
+        size *= 0.5;
+    }
+    let [sigma, criterion] = best.map(libm::exp);
+    // The threshold is that of attention: lapses are not a matter of sensitivity.
+    let observer = crate::observer::TernaryObserver { lapse: 0.0, ..prior.observer(sigma, criterion) };
+    Estimate { sigma, criterion, threshold: observer.threshold(target) }
+}

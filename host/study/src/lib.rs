@@ -1,0 +1,37 @@
+//! Perception experiments: what is presented when, what the answers are worth, and how both are kept. Knows trials
+//! and statistics, and no device.
+//!
+//! ```text
+//!                      +----------------- Respondent (a person, a simulated observer)
+//!                      v                        ^
+//! Protocol -> Sitting::next -> Trial -> Presenter -> Exploration
+//!                ^                                      |
+//!                +------- Sitting::answer <-------------+--> log (one line per trial, on disk before the next)
+//! ```
+//!
+//! - [`protocol`]: the experiments and every choice in them.
+//! - [`sitting`]: one subject's way through an experiment, the same for people, simulated observers and replay.
+//! - [`procedure`]: which difference comes next, and the threshold in the end.
+//! - [`observer`]: simulated subjects; [`estimate`]: what they must be like, given their answers; [`bias`]: how well
+//!   that is found.
+//! - [`log`]: what happened, line by line, chained; [`dataset`]: where it lies and the tables made from it.
+//! - [`conduct`]: a sitting with presenter, respondent and log put together.
+//! - [`cohort`]: many simulated subjects at once.
+//! - [`analysis`]: from logs to thresholds, tests and effects.
+//!
+//! Nothing here is real-time.
+
+pub mod analysis;
+pub mod bias;
+pub mod cohort;
+pub mod conduct;
+pub mod dataset;
+pub mod estimate;
+pub mod log;
+pub mod observer;
+pub mod procedure;
+pub mod protocol;
+mod random;
+mod schedule;
+pub mod sitting;
+pub mod trial;

@@ -1,0 +1,136 @@
+//! The event log of a sitting: one line of JSON per event, on disk before the next trial begins.
+//!
+//! ```text
+//! {"chain":"<64 hexadecimal digits>","event":{"begin":{...}}}
+//! {"chain":"...","event":{"trial":{...}}}
+//! ```
+//!
+//! `chain` is the SHA-256 of the chain of the line before and of the event's own text, so a changed, missing or
+//! exchanged line breaks the chain from there on. A last line without its end is what a killed process leaves: the
+//! event it would have told never happened.
+
+mod reader;
+mod writer;
+
+pub use reader::{LogError, LogProblem, SittingLog, TrialRecord};
+pub use writer::LogWriter;
+
+use crate::protocol::{Protocol, SubjectNumber};
+use crate::sitting::Verdict;
+use crate::trial::{Exploration, Response, Trial};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+/// Revision of the format.
+pub const FORMAT: u32 = 1;
+
+/// What a line says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Event {
+    /// The first line: everything needed to do it again.
+    Begin(Box<Begin>),
+    /// A trial was presented and answered.
+    Trial(Box<TrialEvent>),
+    /// The sitting was taken up again.
+    Resume {
+        /// Trials found and replayed.
+        trials: u32,
+        /// Version of the program.
+        version: String,
+    },
+    /// Something the experimenter wants to be known.
+    Note {
+        /// In their words.
+        text: String,
+    },
+    /// Everything was presented.
+    End {
+        /// Presentations in all.
+        trials: u32,
+    },
+}
+
+/// The first line of a log.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Begin {
+    /// Revision of the format.
+    pub format: u32,
+    /// Version of the program.
+    pub version: String,
+    /// Who sits.
+    pub subject: SubjectNumber,
+    /// Seed of order, presentation and simulated answers.
+    pub seed: u64,
+    /// The experiment.
+    pub protocol: Protocol,
+    /// Who answers, with everything that decides how, as JSON.
+    pub observer: serde_json::Value,
+    /// What presents the stimuli, with everything that decides how, as JSON.
+    pub apparatus: serde_json::Value,
+}
+
+impl Begin {
+    /// What makes two sittings parts of different studies, if anything does; the subject and the version may differ.
+    #[must_use]
+    pub fn differs(&self, other: &Self) -> Option<&'static str> {
+        let parts = [
+            ("protocol", self.protocol == other.protocol),
+            ("seed", self.seed == other.seed),
+            ("observer", self.observer == other.observer),
+            ("apparatus", self.apparatus == other.apparatus),
+        ];
+        parts.into_iter().find(|(_, same)| !same).map(|(what, _)| what)
+    }
+
+    /// Digest of the configuration: equal for sittings that differ in the subject only.
+    #[must_use]
+    pub fn config_hash(&self) -> String {
+        let text = serde_json::to_string(&(self.seed, &self.protocol, &self.observer, &self.apparatus));
+        let digest = Sha256::digest(text.unwrap_or_default().as_bytes());
+        hexadecimal(&digest).chars().take(16).collect()
+    }
+}
+
+/// A trial with what came of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrialEvent {
+    /// What was presented.
+    pub trial: Trial,
+    /// The answer.
+    pub response: Response,
+    /// What it was worth.
+    pub verdict: Verdict,
+    /// What happened meanwhile.
+    pub exploration: Exploration,
+}
+
+/// The chain before the first line.
+const CHAIN_START: &str = "flotor-study-log";
+
+/// The chain of a line.
+fn chain(before: &str, event: &str) -> String {
+    let mut digest = Sha256::new();
+    digest.update(before.as_bytes());
+    digest.update(event.as_bytes());
+    hexadecimal(&digest.finalize())
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// A line as it is written, without its end.
+fn line(chain: &str, event: &str) -> String {
+    format!("{{\"chain\":\"{chain}\",\"event\":{event}}}")
+}
+
+/// Chain and event of a line.
+fn parts(line: &str) -> Option<(&str, &str)> {
+    let rest = line.strip_prefix("{\"chain\":\"")?;
+    let (chain, rest) = rest.split_once("\",\"event\":")?;
+    Some((chain, rest.strip_suffix('}')?))
+}
+
+#[cfg(test)]
+mod tests;

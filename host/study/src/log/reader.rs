@@ -1,0 +1,242 @@
+//! Reads a log back, distrusting every line: chain, text, order, and whether the experiment really went so.
+
+use super::{Begin, CHAIN_START, Event, FORMAT, LogWriter, TrialEvent, chain, parts};
+use crate::sitting::{AnswerError, Sitting, TrackResult};
+use crate::trial::{Response, Trial};
+use std::path::{Path, PathBuf};
+
+/// Why a log cannot be used: the file, the line (counted from 1; 0 for the file as a whole) and the reason.
+#[derive(Debug, thiserror::Error)]
+#[error("{}{}: {problem}", path.display(), line_text(*.line))]
+pub struct LogError {
+    /// The file.
+    pub path: PathBuf,
+    /// The line.
+    pub line: usize,
+    /// What is wrong.
+    #[source]
+    pub problem: LogProblem,
+}
+
+fn line_text(line: usize) -> String {
+    if line == 0 { String::new() } else { format!(":{line}") }
+}
+
+/// What is wrong with a log.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LogProblem {
+    /// The file could not be read or written.
+    #[error("{action}: {cause}")]
+    File {
+        /// What was attempted.
+        action: &'static str,
+        /// What the system said.
+        cause: std::io::Error,
+    },
+    /// No log at all.
+    #[error("holds no complete line; nothing was recorded, the file can be removed")]
+    Empty,
+    /// A line that is not made like one.
+    #[error("is not a line of an event log: {0}")]
+    Text(String),
+    /// The chain does not continue.
+    #[error(
+        "the chain is broken: this line, or one before it, was changed, removed or exchanged since it was written; \
+         use an untouched copy"
+    )]
+    Chain,
+    /// A revision this program does not know.
+    #[error("has format {found}, this program reads {FORMAT}; use the version that wrote it")]
+    Format {
+        /// The format found.
+        found: u32,
+    },
+    /// An event where it cannot be.
+    #[error("{0}")]
+    Order(&'static str),
+    /// The experiment would have presented something else.
+    #[error(
+        "trial {number} is not what this protocol, seed and answers lead to; the program that wrote it differs \
+         from this one"
+    )]
+    Diverges {
+        /// Trial, from 1.
+        number: u32,
+    },
+    /// The answer does not fit the trial.
+    #[error("trial {number}: {cause}")]
+    Answer {
+        /// Trial, from 1.
+        number: u32,
+        /// Why.
+        cause: AnswerError,
+    },
+}
+
+impl LogError {
+    pub(crate) fn file(path: &Path, action: &'static str, cause: std::io::Error) -> Self {
+        Self { path: path.into(), line: 0, problem: LogProblem::File { action, cause } }
+    }
+}
+
+/// A trial as the log has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrialRecord {
+    /// Trial, answer and what came of it.
+    pub event: TrialEvent,
+    /// The threshold the trial completed, if it was the last of its track.
+    pub track: Option<TrackResult>,
+}
+
+/// A log that was read and found right.
+pub struct SittingLog {
+    /// The first line.
+    pub begin: Begin,
+    /// Trials in order.
+    pub trials: Vec<TrialRecord>,
+    /// Notes of the experimenter, each with the trials before it.
+    pub notes: Vec<(u32, String)>,
+    /// Whether the sitting came to its end.
+    pub complete: bool,
+    /// How often it was taken up again.
+    pub resumed: u32,
+    sitting: Sitting,
+    path: PathBuf,
+    complete_bytes: u64,
+    chain: String,
+}
+
+impl SittingLog {
+    /// Reads a log, checks its chain, and goes through the experiment with its answers: every trial must be the one
+    /// the state machine asks for, every verdict the one it gives.
+    ///
+    /// # Errors
+    /// [`LogError`] with line and reason.
+    pub fn read(path: &Path) -> Result<Self, LogError> {
+        let bytes =
+            std::fs::read(path).map_err(|cause| LogError::file(path, "cannot read the log", cause))?;
+        let at = |line: usize, problem: LogProblem| LogError { path: path.into(), line, problem };
+        let complete = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+        let whole = bytes.get(..complete).unwrap_or_default();
+        let mut log: Option<Self> = None;
+        let mut before = CHAIN_START.to_owned();
+        for (index, bytes) in whole.split_inclusive(|byte| *byte == b'\n').enumerate() {
+            let number = index + 1;
+            let not_text = || at(number, LogProblem::Text("it is not UTF-8".to_owned()));
+            let text = std::str::from_utf8(bytes).map_err(|_| not_text())?;
+            let text = text.strip_suffix('\n').unwrap_or(text);
+            let (found, event) = parts(text)
+                .ok_or_else(|| at(number, LogProblem::Text("no `chain` and `event`".to_owned())))?;
+            before = chain(&before, event);
+            if found != before {
+                return Err(at(number, LogProblem::Chain));
+            }
+            let event: Event = serde_json::from_str(event)
+                .map_err(|error| at(number, LogProblem::Text(error.to_string())))?;
+            match (&mut log, event) {
+                (None, Event::Begin(begin)) => {
+                    if begin.format != FORMAT {
+                        return Err(at(number, LogProblem::Format { found: begin.format }));
+                    }
+                    log = Some(Self::new(*begin, path));
+                }
+                (None, _) => return Err(at(number, LogProblem::Order("a log starts with `begin`"))),
+                (Some(log), event) => log.take_in(event).map_err(|problem| at(number, problem))?,
+            }
+        }
+        let mut log = log.ok_or_else(|| at(0, LogProblem::Empty))?;
+        log.complete_bytes = complete as u64;
+        log.chain = before;
+        Ok(log)
+    }
+
+    fn new(begin: Begin, path: &Path) -> Self {
+        let sitting = Sitting::new(&begin.protocol, begin.seed, begin.subject);
+        Self {
+            begin,
+            trials: Vec::new(),
+            notes: Vec::new(),
+            complete: false,
+            resumed: 0,
+            sitting,
+            path: path.into(),
+            complete_bytes: 0,
+            chain: String::new(),
+        }
+    }
+
+    fn take_in(&mut self, event: Event) -> Result<(), LogProblem> {
+        if self.complete && !matches!(event, Event::Note { .. }) {
+            return Err(LogProblem::Order("after `end` only notes may follow"));
+        }
+        match event {
+            Event::Begin(_) => Err(LogProblem::Order("a second `begin`")),
+            Event::Trial(event) => self.replay(*event),
+            Event::Resume { trials, .. } if trials != self.sitting.presented() => {
+                Err(LogProblem::Order("`resume` after another number of trials than there are"))
+            }
+            Event::Resume { .. } => {
+                self.resumed += 1;
+                Ok(())
+            }
+            Event::Note { text } => {
+                self.notes.push((self.sitting.presented(), text));
+                Ok(())
+            }
+            Event::End { trials } if !self.sitting.is_over() || trials != self.sitting.presented() => {
+                Err(LogProblem::Order("`end` before the experiment is over"))
+            }
+            Event::End { .. } => {
+                self.complete = true;
+                Ok(())
+            }
+        }
+    }
+
+    fn replay(&mut self, event: TrialEvent) -> Result<(), LogProblem> {
+        let number = event.trial.number;
+        // To the bit: JSON keeps every digit of a number.
+        if self.sitting.next() != Some(event.trial) {
+            return Err(LogProblem::Diverges { number });
+        }
+        let before = self.sitting.results().len();
+        let verdict = self.sitting.answer(event.response, &event.exploration);
+        let verdict = verdict.map_err(|cause| LogProblem::Answer { number, cause })?;
+        if verdict != event.verdict {
+            return Err(LogProblem::Diverges { number });
+        }
+        let track = self.sitting.results().get(before).copied();
+        self.trials.push(TrialRecord { event, track });
+        Ok(())
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Thresholds found so far.
+    #[must_use]
+    pub fn tracks(&self) -> &[TrackResult] {
+        self.sitting.results()
+    }
+
+    /// The answers, for whoever wants to go through them again.
+    pub fn answers(&self) -> impl Iterator<Item = (Trial, Response)> {
+        self.trials.iter().map(|record| (record.event.trial, record.event.response))
+    }
+
+    /// The sitting where it stopped, and the log to go on with: a line that was never completed is cut off, and the
+    /// resumption is noted.
+    ///
+    /// # Errors
+    /// What the system said.
+    pub fn resume(self, version: &str) -> Result<(Sitting, LogWriter), LogError> {
+        let mut writer = LogWriter::append(&self.path, self.complete_bytes, self.chain)?;
+        let trials = self.sitting.presented();
+        writer.write(&Event::Resume { trials, version: version.to_owned() })?;
+        Ok((self.sitting, writer))
+    }
+}

@@ -1,0 +1,182 @@
+//! A log survives what can happen to it, or is refused with line and reason.
+
+use super::*;
+use crate::conduct::{Ending, Nothing, conduct};
+use crate::observer::{Population, SimulatedSubject};
+use crate::protocol::JndProtocol;
+use crate::sitting::Sitting;
+use std::path::{Path, PathBuf};
+
+/// A folder that goes away with the test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("flotor-study-{}-{name}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn begin() -> Begin {
+    let mut jnd = JndProtocol { replications: 1, bases: vec![26.0], ..JndProtocol::default() };
+    jnd.demo.shown = false;
+    Begin {
+        format: FORMAT,
+        version: "0.0.0".to_owned(),
+        subject: SubjectNumber::new(3).unwrap(),
+        seed: 11,
+        protocol: Protocol::Jnd(jnd),
+        observer: serde_json::Value::Null,
+        apparatus: serde_json::Value::Null,
+    }
+}
+
+fn subject(begin: &Begin) -> SimulatedSubject {
+    SimulatedSubject::new(&Population::default(), begin.seed, begin.subject, 30.0)
+}
+
+/// A whole sitting on disk.
+fn sit(path: &Path) {
+    let begin = begin();
+    let mut sitting = Sitting::new(&begin.protocol, begin.seed, begin.subject);
+    let mut subject = subject(&begin);
+    let mut log = LogWriter::create(path).unwrap();
+    log.write(&Event::Begin(Box::new(begin))).unwrap();
+    let ending = conduct(&mut sitting, &mut log, &mut Nothing, &mut subject, &mut |_| ()).unwrap();
+    assert_eq!(ending, Ending::Complete);
+}
+
+#[test]
+fn what_is_written_is_read() {
+    let folder = Folder::new("round");
+    let path = folder.file("log.jsonl");
+    sit(&path);
+    let log = SittingLog::read(&path).unwrap();
+    assert!(log.complete);
+    assert_eq!(log.begin, begin());
+    assert!(log.trials.len() >= 8);
+    assert_eq!(log.tracks().len(), 1);
+    assert_eq!(log.trials.last().unwrap().track, log.tracks().first().copied());
+    assert!(LogWriter::create(&path).is_err(), "an existing log is not overwritten");
+}
+
+/// Every single byte of the file matters: changed, it is refused, with the line it stands in or, for a line end, the
+/// line whose text it spoils.
+#[test]
+fn every_changed_byte_is_found() {
+    let folder = Folder::new("bytes");
+    let path = folder.file("log.jsonl");
+    sit(&path);
+    let bytes = std::fs::read(&path).unwrap();
+    let last = bytes.len() - 1; // without it the last line was never completed, which is legal
+    let mut line = 1;
+    for at in (0..last).step_by(7) {
+        line += bytes[at.saturating_sub(7)..at].iter().filter(|byte| **byte == b'\n').count();
+        let mut changed = bytes.clone();
+        changed[at] = if changed[at] == b'7' { b'3' } else { b'7' };
+        std::fs::write(&path, &changed).unwrap();
+        let error = SittingLog::read(&path).err().unwrap_or_else(|| panic!("byte {at} was not missed"));
+        assert_eq!(error.line, line, "byte {at}: {error}");
+    }
+}
+
+#[test]
+fn a_line_removed_or_exchanged_is_found() {
+    let folder = Folder::new("lines");
+    let path = folder.file("log.jsonl");
+    sit(&path);
+    let text = std::fs::read_to_string(&path).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    let refused = |lines: Vec<&str>| {
+        std::fs::write(&path, lines.join("\n") + "\n").unwrap();
+        SittingLog::read(&path).err().expect("refused")
+    };
+    let mut removed = lines.clone();
+    removed.remove(4);
+    let error = refused(removed);
+    assert!(error.line == 5 && matches!(error.problem, LogProblem::Chain), "{error}");
+    assert!(error.to_string().contains("log.jsonl:5: the chain is broken"), "{error}");
+    let mut exchanged = lines.clone();
+    exchanged.swap(3, 4);
+    assert_eq!(refused(exchanged).line, 4);
+    assert_eq!(refused(lines[1..].to_vec()).line, 1);
+}
+
+/// Somebody who rewrites the chain as well is caught by the experiment itself: the trials no longer follow from the
+/// answers.
+#[test]
+fn a_forged_answer_is_found_by_replay() {
+    let folder = Folder::new("forged");
+    let path = folder.file("log.jsonl");
+    sit(&path);
+    let text = std::fs::read_to_string(&path).unwrap();
+    let mut forged = String::new();
+    let mut before = CHAIN_START.to_owned();
+    let mut changed = false;
+    for text in text.lines() {
+        let (_, event) = parts(text).unwrap();
+        let mut event: Event = serde_json::from_str(event).unwrap();
+        if let Event::Trial(trial) = &mut event
+            && !changed
+        {
+            let other = if trial.response == Response::First { Response::Second } else { Response::First };
+            (trial.response, changed) = (other, true);
+        }
+        let event = serde_json::to_string(&event).unwrap();
+        before = chain(&before, &event);
+        forged += &(line(&before, &event) + "\n");
+    }
+    std::fs::write(&path, forged).unwrap();
+    let error = SittingLog::read(&path).err().expect("refused");
+    assert!(error.line == 2 && matches!(error.problem, LogProblem::Diverges { number: 1 }), "{error}");
+}
+
+/// Cut anywhere, the log has every trial whose line was complete, and going on from there gives the sitting that was
+/// never interrupted.
+#[test]
+fn cut_anywhere_it_goes_on_as_if_nothing_had_happened() {
+    let folder = Folder::new("cut");
+    let path = folder.file("log.jsonl");
+    sit(&path);
+    let whole = std::fs::read(&path).unwrap();
+    let uninterrupted = SittingLog::read(&path).unwrap().trials;
+    let first_line = whole.iter().position(|byte| *byte == b'\n').unwrap() + 1;
+    for cut in (first_line..whole.len()).step_by(61) {
+        std::fs::write(&path, &whole[..cut]).unwrap();
+        let log = SittingLog::read(&path).unwrap();
+        let complete_lines = whole[..cut].iter().filter(|byte| **byte == b'\n').count();
+        assert_eq!(log.trials.len(), (complete_lines - 1).min(uninterrupted.len()));
+        let mut subject = subject(&log.begin);
+        if log.complete {
+            continue;
+        }
+        let (mut sitting, mut writer) = log.resume("0.0.1").unwrap();
+        conduct(&mut sitting, &mut writer, &mut Nothing, &mut subject, &mut |_| ()).unwrap();
+        drop(writer);
+        let resumed = SittingLog::read(&path).unwrap();
+        assert!(resumed.complete && resumed.resumed == 1);
+        assert_eq!(resumed.trials, uninterrupted, "cut at byte {cut}");
+    }
+}
+
+#[test]
+fn an_empty_log_says_so() {
+    let folder = Folder::new("empty");
+    let path = folder.file("log.jsonl");
+    for nothing in ["", "{\"chain\":\"12"] {
+        std::fs::write(&path, nothing).unwrap();
+        let error = SittingLog::read(&path).err().expect("refused");
+        assert!(matches!(error.problem, LogProblem::Empty), "{error}");
+    }
+}

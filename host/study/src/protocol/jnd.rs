@@ -1,0 +1,123 @@
+//! Just noticeable difference: pairs of stimuli, an adaptive procedure for each base and modality.
+
+use super::{AtBoundary, FirstModality, ProtocolError, Stimulus, at_least_one, extremes, positive};
+use crate::procedure::Procedure;
+use serde::{Deserialize, Serialize};
+
+/// On which side of the base the comparison lies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ComparisonSide {
+    /// Always above.
+    #[default]
+    Above,
+    /// Always below.
+    Below,
+    /// Drawn for each trial.
+    Random,
+}
+
+/// Which of a pair is presented first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PresentationOrder {
+    /// Drawn for each trial.
+    #[default]
+    Random,
+    /// Always the base.
+    BaseFirst,
+    /// Always the comparison.
+    ComparisonFirst,
+}
+
+/// Four springs before the first trial, in each modality: three comparisons that sample the range of bases and the
+/// kinds of difference.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JndDemo {
+    /// Whether there is one.
+    pub shown: bool,
+    /// A difference that is close but can be told, as a share.
+    pub close: f64,
+    /// A difference that can hardly be told.
+    pub nearly_equal: f64,
+}
+
+impl Default for JndDemo {
+    /// The report names the kinds, not the numbers: one Weber fraction above what it found, and a fifth of it.
+    fn default() -> Self {
+        Self { shown: true, close: 0.20, nearly_equal: 0.03 }
+    }
+}
+
+/// A just-noticeable-difference experiment.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JndProtocol {
+    /// What is varied.
+    pub stimulus: Stimulus,
+    /// The bases, in the stimulus's unit.
+    pub bases: Vec<f64>,
+    /// Replications, each all bases in one modality; the modality alternates.
+    pub replications: u32,
+    /// Which modality comes first.
+    pub first_modality: FirstModality,
+    /// Which difference comes next.
+    pub procedure: Procedure,
+    /// Side of the comparison.
+    pub side: ComparisonSide,
+    /// Order within a pair.
+    pub order: PresentationOrder,
+    /// When the handle leaves its range.
+    pub at_boundary: AtBoundary,
+    /// Practice.
+    pub demo: JndDemo,
+}
+
+impl Default for JndProtocol {
+    /// CMU-RI-TR-07-21, section 4.2.
+    fn default() -> Self {
+        Self {
+            stimulus: Stimulus::default(),
+            bases: vec![17.0, 26.0, 35.0],
+            replications: 4,
+            first_modality: FirstModality::default(),
+            procedure: Procedure::default(),
+            side: ComparisonSide::default(),
+            order: PresentationOrder::default(),
+            at_boundary: AtBoundary::default(),
+            demo: JndDemo::default(),
+        }
+    }
+}
+
+impl JndProtocol {
+    pub(super) fn check(&self) -> Result<(), ProtocolError> {
+        positive("bases", &self.bases)?;
+        at_least_one("replications", self.replications)?;
+        self.procedure.check()?;
+        for (what, value) in [("close", self.demo.close), ("nearly equal", self.demo.nearly_equal)] {
+            if !(0.0..1.0).contains(&value) {
+                return Err(ProtocolError::Value { what, value, legal: "legal is 0 to below 1, a share" });
+            }
+        }
+        Ok(())
+    }
+
+    /// Smallest and largest value that can be asked for.
+    pub(super) fn extremes(&self) -> [f64; 2] {
+        let [least, most] = extremes(self.bases.iter().copied());
+        let delta = self.procedure.largest_delta();
+        match self.side {
+            ComparisonSide::Above => [least, most * (1.0 + delta)],
+            ComparisonSide::Below => [least * (1.0 - delta), most],
+            ComparisonSide::Random => [least * (1.0 - delta), most * (1.0 + delta)],
+        }
+    }
+
+    /// The four springs of the demo: lowest base, highest, one close to it, one nearly equal to that.
+    #[must_use]
+    pub fn demo_values(&self) -> [f64; 4] {
+        let [least, most] = extremes(self.bases.iter().copied());
+        let close = most * (1.0 - self.demo.close);
+        [least, most, close, close * (1.0 - self.demo.nearly_equal)]
+    }
+}

@@ -1,0 +1,73 @@
+//! Magnitude estimation with free modulus: one stimulus, any number.
+
+use super::{AtBoundary, FirstModality, ProtocolError, Stimulus, at_least_one, extremes, positive};
+use serde::{Deserialize, Serialize};
+
+/// How ratings of subjects with different ranges are made comparable.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RatingScale {
+    /// Each subject's ratings divided by their mean.
+    #[default]
+    DividedByMean,
+    /// Each subject's ratings divided by their geometric mean (modulus equalisation); needs positive ratings.
+    DividedByGeometricMean,
+    /// As they are.
+    Raw,
+}
+
+/// A magnitude-estimation experiment.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MagnitudeProtocol {
+    /// What is varied.
+    pub stimulus: Stimulus,
+    /// The stimuli, in the stimulus's unit.
+    pub values: Vec<f64>,
+    /// Replications in each modality, each all stimuli in an order of its own.
+    pub replications: u32,
+    /// Which modality comes first.
+    pub first_modality: FirstModality,
+    /// Stimuli shown before each modality, the smallest and the largest among them.
+    pub demo: u32,
+    /// When the handle leaves its range.
+    pub at_boundary: AtBoundary,
+}
+
+impl Default for MagnitudeProtocol {
+    /// CMU-RI-TR-07-21, section 4.1.
+    fn default() -> Self {
+        Self {
+            stimulus: Stimulus::default(),
+            values: Self::evenly(12.0, 48.0, 12),
+            replications: 3,
+            first_modality: FirstModality::default(),
+            demo: 5,
+            at_boundary: AtBoundary::default(),
+        }
+    }
+}
+
+impl MagnitudeProtocol {
+    /// So many values from the first to the last at equal distances.
+    #[must_use]
+    pub fn evenly(first: f64, last: f64, count: u32) -> Vec<f64> {
+        let steps = f64::from(count.saturating_sub(1).max(1));
+        (0..count).map(|index| first + (last - first) * f64::from(index) / steps).collect()
+    }
+
+    pub(super) fn check(&self) -> Result<(), ProtocolError> {
+        positive("stimuli", &self.values)?;
+        at_least_one("replications", self.replications)?;
+        if self.values.len() < 3 {
+            #[allow(clippy::cast_precision_loss)] // fewer than 3
+            let value = self.values.len() as f64;
+            return Err(ProtocolError::Value { what: "stimuli", value, legal: "a trend needs 3 or more" });
+        }
+        Ok(())
+    }
+
+    /// Smallest and largest stimulus.
+    pub(super) fn extremes(&self) -> [f64; 2] {
+        extremes(self.values.iter().copied())
+    }
+}

@@ -1,0 +1,132 @@
+//! Orders: which base, which stimulus, when. All from the subject's number and the seed.
+
+use crate::protocol::{JndProtocol, MagnitudeProtocol, SubjectNumber};
+use crate::random::{Purpose, Stream};
+use crate::trial::Modality;
+
+/// Order of the bases in each replication, as indices: the rows of Latin squares, no row twice before all were used.
+///
+/// The rows of a cyclic Latin square (each base once at each place) in random order, with the bases permuted at random
+/// and the square mirrored at random; after its last row the mirrored square follows. For the three bases of the
+/// report these two squares hold all six orders, so four replications never repeat one.
+pub(crate) fn base_orders(protocol: &JndProtocol, seed: u64, subject: SubjectNumber) -> Vec<Vec<usize>> {
+    let count = protocol.bases.len();
+    let mut stream = Stream::new(seed, Purpose::Schedule, subject.get(), 0);
+    let mut labels: Vec<usize> = (0..count).collect();
+    stream.shuffle(&mut labels);
+    let mut mirrored = stream.coin();
+    let mut orders = Vec::new();
+    let replications = protocol.replications as usize;
+    while orders.len() < replications {
+        let mut rows: Vec<usize> = (0..count).collect();
+        stream.shuffle(&mut rows);
+        for row in rows {
+            let place =
+                |place: usize| if mirrored { (row + count - place) % count } else { (row + place) % count };
+            let label = |index: usize| labels.get(index).copied().unwrap_or(0);
+            orders.push((0..count).map(|index| label(place(index))).collect());
+        }
+        mirrored = !mirrored;
+    }
+    orders.truncate(replications);
+    orders
+}
+
+/// The modality of each replication: alternating.
+pub(crate) fn alternating(first: Modality, replication: usize) -> Modality {
+    if replication.is_multiple_of(2) { first } else { first.other() }
+}
+
+/// The demo of a difference experiment: three pairs in each modality, in mixed order.
+///
+/// The pairs are neighbours among four springs: obviously different, close, nearly equal.
+pub(crate) fn jnd_demo(
+    protocol: &JndProtocol,
+    seed: u64,
+    subject: SubjectNumber,
+) -> Vec<(Modality, [f64; 2])> {
+    if !protocol.demo.shown {
+        return Vec::new();
+    }
+    let [lowest, highest, close, nearly] = protocol.demo_values();
+    let pairs = [[lowest, highest], [highest, close], [close, nearly]];
+    let each = |modality: Modality| pairs.iter().map(move |pair| (modality, *pair));
+    let mut demo: Vec<_> = Modality::ALL.into_iter().flat_map(each).collect();
+    Stream::new(seed, Purpose::Schedule, subject.get(), 1).shuffle(&mut demo);
+    demo
+}
+
+/// The stimuli of one replication of a magnitude experiment, in random order.
+pub(crate) fn magnitude_order(
+    protocol: &MagnitudeProtocol,
+    seed: u64,
+    subject: SubjectNumber,
+    replication: u32,
+) -> Vec<f64> {
+    let mut values = protocol.values.clone();
+    Stream::new(seed, Purpose::Schedule, subject.get(), 10 + replication).shuffle(&mut values);
+    values
+}
+
+/// The demo before a modality of a magnitude experiment: the extremes and others, in random order.
+pub(crate) fn magnitude_demo(
+    protocol: &MagnitudeProtocol,
+    seed: u64,
+    subject: SubjectNumber,
+    modality: Modality,
+) -> Vec<f64> {
+    let mut sorted = protocol.values.clone();
+    sorted.sort_by(f64::total_cmp);
+    let mut stream = Stream::new(seed, Purpose::Schedule, subject.get(), 2 + modality as u32);
+    let (Some(least), Some(most)) = (sorted.first().copied(), sorted.last().copied()) else {
+        return Vec::new();
+    };
+    let mut between: Vec<f64> = sorted.iter().copied().skip(1).take(sorted.len().saturating_sub(2)).collect();
+    stream.shuffle(&mut between);
+    let mut demo: Vec<f64> = [least, most].into_iter().chain(between).take(protocol.demo as usize).collect();
+    stream.shuffle(&mut demo);
+    demo
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn subjects() -> impl Iterator<Item = SubjectNumber> {
+        (1..=60).filter_map(SubjectNumber::new)
+    }
+
+    /// Four replications of three bases: no order twice, and each base at each place once in the first three.
+    #[test]
+    fn base_orders_are_a_latin_square_that_does_not_repeat() {
+        let protocol = JndProtocol::default();
+        let mut first_orders = std::collections::BTreeSet::new();
+        for subject in subjects() {
+            let orders = base_orders(&protocol, 7, subject);
+            assert_eq!(orders.len(), 4);
+            for place in 0..3 {
+                let mut column: Vec<usize> = orders.iter().take(3).map(|order| order[place]).collect();
+                column.sort_unstable();
+                assert_eq!(column, [0, 1, 2]);
+            }
+            let distinct: std::collections::BTreeSet<_> = orders.iter().collect();
+            assert_eq!(distinct.len(), 4);
+            first_orders.insert(orders[0].clone());
+        }
+        assert_eq!(first_orders.len(), 6, "all six permutations occur");
+    }
+
+    #[test]
+    fn the_magnitude_demo_has_the_extremes() {
+        let protocol = MagnitudeProtocol::default();
+        for subject in subjects() {
+            let demo = magnitude_demo(&protocol, 7, subject, Modality::H);
+            assert_eq!(demo.len(), 5);
+            assert!(demo.contains(&12.0) && demo.contains(&48.0));
+            let mut distinct = demo.clone();
+            distinct.sort_by(f64::total_cmp);
+            distinct.dedup();
+            assert_eq!(distinct.len(), 5);
+        }
+    }
+}

@@ -1,0 +1,415 @@
+//! One subject's way through an experiment: the state machine behind people, simulated observers and replay alike.
+//!
+//! [`Sitting::next`] says what is to be presented, [`Sitting::answer`] takes in what came of it. Both depend on the
+//! protocol, the seed, the subject's number and the answers so far, and on nothing else.
+
+use crate::procedure::Track;
+use crate::protocol::{AtBoundary, ComparisonSide, JndProtocol, PresentationOrder, Protocol, SubjectNumber};
+use crate::random::{Purpose, Stream};
+use crate::schedule;
+use crate::trial::{Exploration, Judgement, Modality, Pair, Phase, Position, Presented, Response, Trial};
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+
+/// What became of an answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// The handle left its range: the trial comes again.
+    Repeated,
+    /// Practice, or a rating: nothing to judge.
+    Taken,
+    /// A comparison.
+    Judged {
+        /// What it is worth.
+        judgement: Judgement,
+        /// Whether it turned the direction of its track.
+        reversal: bool,
+    },
+}
+
+/// An answer that does not fit the trial.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AnswerError {
+    /// A rating for a pair, or a comparison for one stimulus.
+    #[error("`{}` is no answer to this trial", .0.word())]
+    Kind(Response),
+    /// A rating that is no number.
+    #[error("a rating is a finite number")]
+    NotFinite,
+    /// There is no trial.
+    #[error("the experiment is over")]
+    Over,
+}
+
+/// The threshold a track found.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct TrackResult {
+    /// Track, from 1.
+    pub track: u32,
+    /// Replication, from 1.
+    pub replication: u32,
+    /// Modality.
+    pub modality: Modality,
+    /// Base.
+    pub base: f64,
+    /// Threshold as a share of the base; none if the track never got there.
+    pub threshold: Option<f64>,
+    /// Trials it took.
+    pub trials: u32,
+}
+
+/// A block of a sitting that is yet to come.
+#[derive(Clone, Debug)]
+enum Item {
+    Show { phase: Phase, replication: u32, modality: Modality, presented: Presented },
+    Adapt { replication: u32, modality: Modality, base: f64 },
+}
+
+/// A track under way.
+#[derive(Clone, Debug)]
+struct Running {
+    track: Track,
+    trials: u32,
+}
+
+/// One subject in one experiment.
+#[derive(Clone, Debug)]
+pub struct Sitting {
+    protocol: Protocol,
+    seed: u64,
+    subject: SubjectNumber,
+    items: VecDeque<Item>,
+    running: Option<Running>,
+    tracks_begun: u32,
+    presented: u32,
+    repeat: u32,
+    results: Vec<TrackResult>,
+}
+
+impl Sitting {
+    /// At the first trial.
+    #[must_use]
+    pub fn new(protocol: &Protocol, seed: u64, subject: SubjectNumber) -> Self {
+        let items = match protocol {
+            Protocol::Jnd(jnd) => jnd_items(jnd, seed, subject),
+            Protocol::Magnitude(_) => magnitude_items(protocol, seed, subject),
+        };
+        let mut sitting = Self {
+            protocol: protocol.clone(),
+            seed,
+            subject,
+            items,
+            running: None,
+            tracks_begun: 0,
+            presented: 0,
+            repeat: 0,
+            results: Vec::new(),
+        };
+        sitting.begin_track();
+        sitting
+    }
+
+    /// Who sits.
+    #[must_use]
+    pub fn subject(&self) -> SubjectNumber {
+        self.subject
+    }
+
+    /// Presentations so far.
+    #[must_use]
+    pub fn presented(&self) -> u32 {
+        self.presented
+    }
+
+    /// Trials to come if nothing adapts and nothing is repeated; a track counts as one.
+    #[must_use]
+    pub fn items_left(&self) -> usize {
+        self.items.len()
+    }
+
+    /// Whether everything was presented.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        self.items.is_empty()
+    }
+
+    /// Thresholds of the tracks that are over.
+    #[must_use]
+    pub fn results(&self) -> &[TrackResult] {
+        &self.results
+    }
+
+    /// The trial to present now; the same however often it is asked.
+    #[must_use]
+    pub fn next(&self) -> Option<Trial> {
+        let item = self.items.front()?;
+        let number = self.presented + 1;
+        let (phase, replication, track, modality, presented) = match *item {
+            Item::Show { phase, replication, modality, presented } => {
+                (phase, replication, 0, modality, presented)
+            }
+            Item::Adapt { replication, modality, base } => {
+                let delta = self.running.as_ref().map_or(0.0, |running| running.track.delta());
+                let presented = Presented::Pair(self.pair(base, delta, number));
+                (Phase::Main, replication, self.tracks_begun, modality, presented)
+            }
+        };
+        Some(Trial { number, phase, replication, track, modality, presented, repeat: self.repeat })
+    }
+
+    /// Takes in what came of the trial [`Sitting::next`] named.
+    ///
+    /// # Errors
+    /// An answer of the wrong kind, or none to be given; nothing has changed then.
+    pub fn answer(&mut self, response: Response, exploration: &Exploration) -> Result<Verdict, AnswerError> {
+        let trial = self.next().ok_or(AnswerError::Over)?;
+        check_kind(&trial, response)?;
+        self.presented += 1;
+        if exploration.boundary_hit
+            && let AtBoundary::Repeat { most } = self.protocol.at_boundary()
+            && self.repeat < most
+        {
+            self.repeat += 1;
+            return Ok(Verdict::Repeated);
+        }
+        self.repeat = 0;
+        let judgement = match (trial.phase, trial.presented) {
+            (Phase::Main, Presented::Pair(pair)) => judge(&pair, response),
+            _ => None,
+        };
+        let (Some(judgement), Some(running)) = (judgement, &mut self.running) else {
+            self.items.pop_front();
+            self.begin_track();
+            return Ok(Verdict::Taken);
+        };
+        running.trials += 1;
+        let reversal = running.track.answer(judgement);
+        if running.track.is_done() {
+            self.end_track();
+        }
+        Ok(Verdict::Judged { judgement, reversal })
+    }
+
+    fn begin_track(&mut self) {
+        if let (Some(Item::Adapt { .. }), Protocol::Jnd(jnd)) = (self.items.front(), &self.protocol) {
+            self.running = Some(Running { track: jnd.procedure.start(), trials: 0 });
+            self.tracks_begun += 1;
+        }
+    }
+
+    fn end_track(&mut self) {
+        if let (Some(Item::Adapt { replication, modality, base }), Some(running)) =
+            (self.items.pop_front(), self.running.take())
+        {
+            let (threshold, trials) = (running.track.threshold(), running.trials);
+            let track = self.tracks_begun;
+            self.results.push(TrackResult { track, replication, modality, base, threshold, trials });
+        }
+        self.begin_track();
+    }
+
+    fn pair(&self, base: f64, delta: f64, number: u32) -> Pair {
+        let Protocol::Jnd(jnd) = &self.protocol else {
+            return pair(base, base, Position::Second, true);
+        };
+        let mut stream = Stream::new(self.seed, Purpose::Presentation, self.subject.get(), number);
+        // Both are drawn in any case, so that one choice does not change what the other draws.
+        let (second, above) = (stream.coin(), stream.coin());
+        let comparison_at = match jnd.order {
+            PresentationOrder::Random if second => Position::Second,
+            PresentationOrder::Random | PresentationOrder::ComparisonFirst => Position::First,
+            PresentationOrder::BaseFirst => Position::Second,
+        };
+        let above = match jnd.side {
+            ComparisonSide::Above => true,
+            ComparisonSide::Below => false,
+            ComparisonSide::Random => above,
+        };
+        let comparison = if above { base * (1.0 + delta) } else { base * (1.0 - delta) };
+        Pair { delta, ..pair(base, comparison, comparison_at, above) }
+    }
+}
+
+fn pair(base: f64, comparison: f64, comparison_at: Position, above: bool) -> Pair {
+    let base_at = match comparison_at {
+        Position::First => Position::Second,
+        Position::Second => Position::First,
+    };
+    let larger_at = if above { comparison_at } else { base_at };
+    Pair { base, comparison, delta: (comparison - base).abs() / base, comparison_at, larger_at }
+}
+
+fn check_kind(trial: &Trial, response: Response) -> Result<(), AnswerError> {
+    match (trial.phase, trial.presented, response) {
+        (Phase::Practice, _, Response::Seen)
+        | (_, Presented::Pair(_), Response::First | Response::Second | Response::DontKnow) => Ok(()),
+        (_, Presented::One { .. }, Response::Rating(rating)) => {
+            if rating.is_finite() {
+                Ok(())
+            } else {
+                Err(AnswerError::NotFinite)
+            }
+        }
+        _ => Err(AnswerError::Kind(response)),
+    }
+}
+
+fn judge(pair: &Pair, response: Response) -> Option<Judgement> {
+    let named = match response {
+        Response::First => Position::First,
+        Response::Second => Position::Second,
+        Response::DontKnow => return Some(Judgement::Unsure),
+        Response::Rating(_) | Response::Seen => return None,
+    };
+    Some(if named == pair.larger_at { Judgement::Correct } else { Judgement::Wrong })
+}
+
+fn jnd_items(jnd: &JndProtocol, seed: u64, subject: SubjectNumber) -> VecDeque<Item> {
+    let demo = schedule::jnd_demo(jnd, seed, subject).into_iter().map(|(modality, [first, second])| {
+        let presented = Presented::Pair(pair(first, second, Position::Second, second > first));
+        Item::Show { phase: Phase::Practice, replication: 0, modality, presented }
+    });
+    let first = jnd.first_modality.of(subject);
+    let orders = schedule::base_orders(jnd, seed, subject).into_iter().zip(0_u32..);
+    let tracks = orders.flat_map(|(order, index)| {
+        let modality = schedule::alternating(first, index as usize);
+        let bases = order.into_iter().filter_map(|base| jnd.bases.get(base).copied());
+        bases.map(move |base| Item::Adapt { replication: index + 1, modality, base }).collect::<Vec<_>>()
+    });
+    demo.chain(tracks).collect()
+}
+
+fn magnitude_items(protocol: &Protocol, seed: u64, subject: SubjectNumber) -> VecDeque<Item> {
+    let Protocol::Magnitude(magnitude) = protocol else { return VecDeque::new() };
+    let first = magnitude.first_modality.of(subject);
+    let mut items = VecDeque::new();
+    for (block, modality) in [first, first.other()].into_iter().enumerate() {
+        let show = |phase, replication| {
+            move |value| Item::Show { phase, replication, modality, presented: Presented::One { value } }
+        };
+        let demo = schedule::magnitude_demo(magnitude, seed, subject, modality);
+        items.extend(demo.into_iter().map(show(Phase::Practice, 0)));
+        for replication in 1..=magnitude.replications {
+            let stream = if block == 0 { replication } else { magnitude.replications + replication };
+            let order = schedule::magnitude_order(magnitude, seed, subject, stream);
+            items.extend(order.into_iter().map(show(Phase::Main, replication)));
+        }
+    }
+    items
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::procedure::{Procedure, WeightedUpDownRule};
+    use crate::protocol::MagnitudeProtocol;
+
+    fn subject(number: u16) -> SubjectNumber {
+        SubjectNumber::new(number).unwrap()
+    }
+
+    /// A subject who always knows.
+    fn right(trial: &Trial) -> Response {
+        match (trial.phase, trial.presented) {
+            (Phase::Practice, _) => Response::Seen,
+            (_, Presented::One { value }) => Response::Rating(value),
+            (_, Presented::Pair(pair)) if pair.larger_at == Position::First => Response::First,
+            _ => Response::Second,
+        }
+    }
+
+    #[test]
+    fn a_magnitude_sitting_is_72_trials_and_two_demos() {
+        let protocol = Protocol::Magnitude(MagnitudeProtocol::default());
+        let mut sitting = Sitting::new(&protocol, 1, subject(2));
+        let mut trials = Vec::new();
+        while let Some(trial) = sitting.next() {
+            assert_eq!(sitting.next(), Some(trial), "asking changes nothing");
+            trials.push(trial);
+            assert_eq!(sitting.answer(right(&trial), &Exploration::default()), Ok(Verdict::Taken));
+        }
+        assert!(sitting.is_over());
+        let count = |wanted: &dyn Fn(&Trial) -> bool| trials.iter().filter(|trial| wanted(trial)).count();
+        assert_eq!(count(&|trial| trial.phase == Phase::Main), 72);
+        assert_eq!(count(&|trial| trial.phase == Phase::Practice), 10);
+        assert_eq!(trials[0].modality, Modality::H, "an even number starts with haptics alone");
+        for modality in Modality::ALL {
+            for value in MagnitudeProtocol::default().values {
+                let shown = Presented::One { value };
+                let times =
+                    count(&|t| t.phase == Phase::Main && t.modality == modality && t.presented == shown);
+                assert_eq!(times, 3);
+            }
+        }
+        let error = sitting.answer(Response::Rating(1.0), &Exploration::default());
+        assert_eq!(error, Err(AnswerError::Over));
+    }
+
+    #[test]
+    fn a_jnd_sitting_is_twelve_tracks_in_alternating_modality() {
+        let mut jnd = JndProtocol::default();
+        // Who always knows never turns.
+        let rule = WeightedUpDownRule { trials_most: 8, ..WeightedUpDownRule::default() };
+        jnd.procedure = Procedure::WeightedUpDown(rule);
+        let protocol = Protocol::Jnd(jnd);
+        let mut sitting = Sitting::new(&protocol, 1, subject(1));
+        let mut modalities = Vec::new();
+        while let Some(trial) = sitting.next() {
+            if trial.phase == Phase::Main && modalities.len() < trial.replication as usize {
+                modalities.push(trial.modality);
+            }
+            sitting.answer(right(&trial), &Exploration::default()).unwrap();
+        }
+        assert_eq!(modalities, [Modality::Vh, Modality::H, Modality::Vh, Modality::H]);
+        assert_eq!(sitting.results().len(), 12);
+        assert!(sitting.results().iter().all(|track| track.trials == 8));
+        for modality in Modality::ALL {
+            for base in [17.0, 26.0, 35.0] {
+                let tracks = sitting.results().iter();
+                assert_eq!(tracks.filter(|t| t.modality == modality && t.base == base).count(), 2);
+            }
+        }
+    }
+
+    /// A trial whose handle left its range comes again, the staircase stays where it was, and at some point it goes on.
+    #[test]
+    fn boundary_hits_repeat_a_trial() {
+        let mut jnd = JndProtocol::default();
+        jnd.demo.shown = false;
+        let mut sitting = Sitting::new(&Protocol::Jnd(jnd), 3, subject(5));
+        let hit = Exploration { boundary_hit: true, ..Exploration::default() };
+        let delta = |sitting: &Sitting| match sitting.next().unwrap().presented {
+            Presented::Pair(pair) => pair.delta,
+            Presented::One { .. } => f64::NAN,
+        };
+        for repeat in 0..3 {
+            let trial = sitting.next().unwrap();
+            assert_eq!((trial.repeat, trial.number), (repeat, repeat + 1));
+            assert_eq!(sitting.answer(right(&trial), &hit), Ok(Verdict::Repeated));
+            assert_eq!(delta(&sitting), 0.4);
+        }
+        let trial = sitting.next().unwrap();
+        assert!(matches!(sitting.answer(right(&trial), &hit), Ok(Verdict::Judged { .. })));
+        assert!((delta(&sitting) - 0.3).abs() < 1.0e-12);
+    }
+
+    #[test]
+    fn answers_of_the_wrong_kind_change_nothing() {
+        let mut jnd = JndProtocol::default();
+        jnd.demo.shown = false;
+        let mut sitting = Sitting::new(&Protocol::Jnd(jnd), 3, subject(5));
+        let trial = sitting.next();
+        for wrong in [Response::Rating(3.0), Response::Seen] {
+            assert_eq!(sitting.answer(wrong, &Exploration::default()), Err(AnswerError::Kind(wrong)));
+        }
+        assert_eq!(sitting.next(), trial);
+        let mut rating = Sitting::new(&Protocol::Magnitude(MagnitudeProtocol::default()), 3, subject(5));
+        for _ in 0..5 {
+            rating.answer(Response::Seen, &Exploration::default()).unwrap();
+        }
+        let error = rating.answer(Response::Rating(f64::NAN), &Exploration::default());
+        assert_eq!(error, Err(AnswerError::NotFinite));
+    }
+}
