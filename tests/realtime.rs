@@ -6,7 +6,7 @@
 
 use flotor::registry::Registry;
 use flotor::scene::Scene;
-use flotor::servo::Clock;
+use flotor::servo::{Clock, StopSwitch};
 use flotor::session::{Observer, RunOptions, Session};
 use flotor::trace::TickRecord;
 use flotor_hal::abi::CallStatus;
@@ -14,7 +14,6 @@ use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{Cycle, Demand, DeviceState, Input, LoopConfig, Output, Pose, Tick};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
-use std::sync::atomic::AtomicBool;
 
 thread_local! {
     /// Allocations and releases of this thread so far. Constant start value: using it never allocates.
@@ -78,7 +77,7 @@ fn the_host_allocates_nothing_in_ten_thousand_ticks() {
     let options = RunOptions { clock: Clock::Virtual, seed: 1 };
     let session = Session::prepare(&scene, &Registry::search(&[]), &options).expect("the demo starts");
     let mut watch = Watch::default();
-    let outcome = session.run(&mut watch, &AtomicBool::new(false));
+    let outcome = session.run(&mut watch, &StopSwitch::default());
     assert!(outcome.is_ok() && watch.ticks == 10_000);
     // Between the first and the last tick seen lie ten batches of ticks, run on this thread.
     assert_eq!(watch.first, Some(watch.last));

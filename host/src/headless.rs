@@ -5,11 +5,10 @@ use crate::registry::Registry;
 use crate::report::{RunFacts, RunSummary, Tally};
 use crate::run_description::describe;
 use crate::scene::Scene;
-use crate::servo::Clock;
+use crate::servo::{Clock, StopSwitch};
 use crate::session::{Observer, RunError, RunOptions, Session};
 use crate::trace::TickRecord;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
 /// Why a scene did not run, or its recording is not whole.
 #[derive(Debug, thiserror::Error)]
@@ -40,7 +39,7 @@ pub fn run(
         recording.map(|path| Recorder::create(path, &describe(scene, &options, &plugins))).transpose()?;
     let mut watchers =
         Watchers { tally: Tally::default(), digest: TraceDigest::new(), recorder, failure: None };
-    let outcome = session.run(&mut watchers, &AtomicBool::new(false))?;
+    let outcome = session.run(&mut watchers, &StopSwitch::default())?;
     let Watchers { tally, digest, recorder, failure } = watchers;
     if let Some(failure) = failure {
         return Err(failure.into());

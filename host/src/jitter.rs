@@ -5,11 +5,11 @@
 //! the same neighbours. What the servo adds is the difference.
 
 use crate::servo::{
-    Durations, Percentiles, RealTimeReport, Schedule, SpinWindow, enter_real_time, monotonic_ns, sleep_until,
+    Durations, Percentiles, RealTimeReport, Schedule, SpinWindow, StopSwitch, enter_real_time, monotonic_ns,
+    sleep_until,
 };
 use crate::session::{RunError, Session};
 use serde::Serialize;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Length of one slice, ns.
 const SLICE_NS: u64 = 1_000_000_000;
@@ -55,7 +55,7 @@ pub struct JitterReport {
 pub fn measure(
     session: Session,
     slices: u64,
-    stop: &AtomicBool,
+    stop: &StopSwitch,
     progress: impl Fn(u64) + Send,
 ) -> Result<JitterReport, RunError> {
     let (mut servo, stopper, period_ns) = session.into_loop();
@@ -66,11 +66,11 @@ pub fn measure(
             let window = SpinWindow::measure(period_ns);
             let (mut with_servo, mut bare) = (Tally::default(), Tally::default());
             let mut done = 0;
-            while done < slices && !stop.load(Ordering::Relaxed) {
+            while done < slices && !stop.is_stop_asked() && stop.emergency().is_none() {
                 let mut schedule = Schedule::start_real(period_ns, window);
                 while schedule.next_time_ns() < SLICE_NS {
                     let due = schedule.wait();
-                    let _ = servo.tick(&due.tick, due.lateness_ns, due.missed);
+                    let _ = servo.tick(&due, stop);
                     with_servo.count(due.lateness_ns, due.missed, period_ns);
                 }
                 bare_slice(&mut bare, period_ns, window);

@@ -6,7 +6,7 @@
 use crate::record::{ReadError, Recording, Role, RunDescription};
 use crate::registry::Registry;
 use crate::scene::{Location, ModelUse, ParameterText, PluginUse};
-use crate::servo::{ModelHealth, ModelStack};
+use crate::servo::{Heartbeat, ModelHealth, ModelStack};
 use crate::session::{PluginReport, RunError, prepare_model};
 use crate::trace::{Events, TickRecord};
 use flotor_hal::{DeviceState, LoopConfig, Tick, Wrench};
@@ -99,6 +99,7 @@ impl Replay {
         mut look: impl FnMut(&TickRecord, &Wrench),
     ) -> Result<(Difference, Vec<(ModelHealth, String)>), ReadError> {
         let mut difference = Difference::default();
+        let heart = Heartbeat::default(); // nobody waits for a replay
         for record in &mut self.recording {
             let record = record?;
             let tick = Tick { index: record.tick, time_ns: record.time_ns, dt_ns: record.dt_ns };
@@ -108,7 +109,7 @@ impl Replay {
                 buttons: record.buttons,
                 ..DeviceState::HOME
             };
-            let (wrench, _) = self.models.step(&tick, &state, &mut Events::default());
+            let (wrench, _) = self.models.step(&tick, &state, &heart, &mut Events::default());
             difference.add(&record, &wrench);
             look(&record, &wrench);
         }

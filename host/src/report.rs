@@ -46,7 +46,7 @@ impl Observer for Tally {
 pub struct RunSummary {
     /// Title of the scene.
     pub title: String,
-    /// "finished", "stopped" or "device_fault".
+    /// "finished", "stopped", "device_fault", "emergency_stop" or "watchdog".
     pub end: &'static str,
     /// "real" or "virtual".
     pub clock: &'static str,
@@ -161,6 +161,8 @@ impl RunSummary {
                 RunEnd::Finished => "finished",
                 RunEnd::Stopped => "stopped",
                 RunEnd::DeviceFault(_) => "device_fault",
+                RunEnd::EmergencyStop(_) => "emergency_stop",
+                RunEnd::Watchdog(_) => "watchdog",
             },
             clock: facts.clock,
             seed: facts.seed,

@@ -4,15 +4,15 @@ use crate::mapping::Mapping;
 use crate::registry::{LookupError, Registry};
 use crate::scene::{ModelUse, ParameterText, PluginUse, Scene, SceneError};
 use crate::servo::{
-    Clock, Envelope, ModelHealth, ModelSlot, ModelStack, RealTimeReport, Schedule, Servo, SpinWindow,
-    TickEnd, Timing, enter_real_time,
+    Cause, Clock, EmergencySource, Envelope, Heartbeat, ModelHealth, ModelSlot, ModelStack, Place,
+    RealTimeReport, RunConfig, RunState, Schedule, Servo, SpinWindow, StopSwitch, Stuck, Timing,
+    enter_real_time, start_watchdog,
 };
 use crate::trace::{RECORD_WORDS, TickRecord};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, Setting, Stopper};
 use flotor_hal::{Capabilities, Demand, EnergyLedger, Fault, LoopConfig, Parameter, ParameterKind, Refusal};
 use std::borrow::Cow;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// How a scene is to be run.
@@ -48,6 +48,19 @@ pub enum RunError {
     /// The servo's thread could not be started or died.
     #[error("the servo thread {0}; nothing was moved")]
     Thread(&'static str),
+    /// Somebody did not come back to the loop; the watchdog has stopped the device.
+    #[error(
+        "`{who}` did not come back from {} in tick {}; the watchdog stopped the device after {} ms",
+        stuck.place.call(), stuck.tick, limit_ns / 1_000_000
+    )]
+    Hung {
+        /// Name in the scene, or "device" or "host".
+        who: String,
+        /// Where it is.
+        stuck: Stuck,
+        /// How long the watchdog waits, ns.
+        limit_ns: u64,
+    },
 }
 
 /// A plugin in a run, for reports and recordings.
@@ -74,6 +87,7 @@ pub struct Session {
     clock: Clock,
     period_ns: u64,
     duration_ns: u64,
+    watchdog_ns: u64,
     plugins: Vec<PluginReport>,
 }
 
@@ -86,6 +100,22 @@ pub enum RunEnd {
     Stopped,
     /// The device faulted.
     DeviceFault(Fault),
+    /// The emergency stop was pressed.
+    EmergencyStop(EmergencySource),
+    /// A tick took so long that the watchdog stopped the device; then it came back.
+    Watchdog(Stuck),
+}
+
+impl RunEnd {
+    /// What the last state of a run means for those who asked for it.
+    fn of(run: RunState, heart: &Heartbeat) -> Self {
+        match (run, heart.bitten()) {
+            (RunState::Faulted(Cause::Device(fault)), _) => Self::DeviceFault(fault),
+            (RunState::Faulted(Cause::Watchdog), Some(stuck)) => Self::Watchdog(stuck),
+            (RunState::EmergencyStopped(source), _) => Self::EmergencyStop(source),
+            _ => Self::Stopped,
+        }
+    }
 }
 
 /// What is known after a run.
@@ -116,6 +146,9 @@ const RING_RECORDS: usize = 4096;
 const VIRTUAL_BATCH: usize = 1024;
 /// How often observers look at a loop in real time.
 const OBSERVER_PERIOD: Duration = Duration::from_millis(5);
+/// How long a loop whose device the watchdog has stopped may take to come back before it is given up: a tick that
+/// was only late ends by itself and leaves its report.
+const COME_BACK: Duration = Duration::from_millis(500);
 
 impl Session {
     /// Loads, checks and opens everything a scene names, and nothing else. Not real-time.
@@ -157,8 +190,12 @@ impl Session {
         let envelope = Envelope::new(&scene.limits, &scene.boundary, &capabilities, period_ns);
         let stopper = device.stopper();
         let active = device.activate(&config).map_err(|(_, refusal)| refused(&device_plugin, refusal))?;
-        let servo = Servo::new(active, ModelStack::new(models), envelope, period_ns);
-        Ok(Self { servo, stopper, clock: options.clock, period_ns, duration_ns, plugins })
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a minute
+        let [ramp_ns, watchdog_ns] =
+            [scene.limits.ramp_s, scene.limits.watchdog_s].map(|seconds| (seconds * 1.0e9).round() as u64);
+        let config = RunConfig { period_ns, ramp_ns, emergency_buttons: scene.limits.emergency_buttons };
+        let servo = Servo::new(active, ModelStack::new(models), envelope, config);
+        Ok(Self { servo, stopper, clock: options.clock, period_ns, duration_ns, watchdog_ns, plugins })
     }
 
     /// The loop itself, for whoever paces it differently; the stopper must be used before it is dropped.
@@ -172,11 +209,12 @@ impl Session {
         &self.plugins
     }
 
-    /// Runs until the duration is over, `stop` is set, or the device faults.
+    /// Runs until the duration is over, somebody uses `stop`, or the device faults.
     ///
     /// # Errors
-    /// [`RunError::Thread`] if the servo's thread cannot be had.
-    pub fn run(self, observer: &mut dyn Observer, stop: &AtomicBool) -> Result<Outcome, RunError> {
+    /// [`RunError::Thread`] if the servo's thread cannot be had, [`RunError::Hung`] if it does not come back: it is
+    /// left behind then, and the process should end soon.
+    pub fn run(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Outcome, RunError> {
         let started = Instant::now();
         let stopper = self.stopper.clone();
         let names: Vec<String> = self.plugins.iter().skip(1).map(|plugin| plugin.name.clone()).collect();
@@ -206,7 +244,7 @@ impl Session {
     }
 
     /// Same tick, no waiting: observers look between batches, so that a slow one slows the run and loses nothing.
-    fn run_virtual(self, observer: &mut dyn Observer, stop: &AtomicBool) -> Finished {
+    fn run_virtual(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Finished {
         let mut runner = Runner::new(self.servo, Schedule::start_virtual(self.period_ns), self.duration_ns);
         let mut batch = Vec::with_capacity(VIRTUAL_BATCH);
         while runner.end.is_none() {
@@ -222,33 +260,60 @@ impl Session {
     }
 
     /// The loop on a thread of its own; this one lets the observers look.
-    fn run_real(self, observer: &mut dyn Observer, stop: &AtomicBool) -> Result<Finished, RunError> {
+    fn run_real(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Finished, RunError> {
         let (mut sender, mut receiver) = flotor_sync::ring::<TickRecord, RECORD_WORDS>(RING_RECORDS);
-        let Session { servo, period_ns, duration_ns, .. } = self;
-        std::thread::scope(|scope| {
-            let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
-            let servo_thread = thread.spawn_scoped(scope, move || {
-                let real_time = enter_real_time();
-                let schedule = Schedule::start_real(period_ns, SpinWindow::measure(period_ns));
-                let mut runner = Runner::new(servo, schedule, duration_ns);
-                while runner.end.is_none() {
-                    if let Some(record) = runner.next(stop) {
-                        // A full ring is counted by the ring itself: observers never hold up the loop.
-                        let _ = sender.push(&record);
-                    }
-                }
-                runner.finish(0, real_time)
-            });
-            let servo_thread = servo_thread.map_err(|_| RunError::Thread("could not be started"))?;
-            while !servo_thread.is_finished() {
-                receiver.drain(|record| observer.observe(&record));
-                std::thread::sleep(OBSERVER_PERIOD);
+        let Session { servo, stopper, period_ns, duration_ns, watchdog_ns, plugins, .. } = self;
+        let heart = servo.heart().clone();
+        let loop_stop = stop.clone();
+        // Not scoped: a thread that is stuck in a plugin has to be left behind.
+        let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
+        let (loop_heart, loop_stopper) = (heart.clone(), stopper.clone());
+        let servo_thread = thread.spawn(move || {
+            let real_time = enter_real_time();
+            let window = SpinWindow::measure(period_ns);
+            let watchdog = start_watchdog(loop_heart, loop_stopper, loop_stop.clone(), watchdog_ns);
+            let mut runner = Runner::new(servo, Schedule::start_real(period_ns, window), duration_ns);
+            // Without a watchdog nothing is moved.
+            if watchdog.is_err() {
+                runner.end = Some(RunEnd::Stopped);
             }
-            let finished = servo_thread.join().map_err(|_| RunError::Thread("panicked"))?;
+            while runner.end.is_none() {
+                if let Some(record) = runner.next(&loop_stop) {
+                    // A full ring is counted by the ring itself: observers never hold up the loop.
+                    let _ = sender.push(&record);
+                }
+            }
+            runner.servo.heart().finish();
+            watchdog.map(|_| runner.finish(0, real_time))
+        });
+        let servo_thread = servo_thread.map_err(|_| RunError::Thread("could not be started"))?;
+        let mut bitten = None;
+        while !servo_thread.is_finished() {
             receiver.drain(|record| observer.observe(&record));
-            Ok(Finished { dropped_records: receiver.dropped(), ..finished })
-        })
+            bitten = bitten.or_else(|| heart.bitten().map(|stuck| (stuck, Instant::now())));
+            if let Some((stuck, since)) = bitten
+                && since.elapsed() > COME_BACK
+            {
+                return Err(hung(stuck, &plugins, watchdog_ns));
+            }
+            std::thread::sleep(OBSERVER_PERIOD);
+        }
+        let finished = servo_thread.join().map_err(|_| RunError::Thread("panicked"))?;
+        let finished = finished.map_err(|_| RunError::Thread("got no watchdog"))?;
+        receiver.drain(|record| observer.observe(&record));
+        Ok(Finished { dropped_records: receiver.dropped(), ..finished })
     }
+}
+
+/// Whose fault a stuck loop is, by name.
+fn hung(stuck: Stuck, plugins: &[PluginReport], limit_ns: u64) -> RunError {
+    let name = |index: usize| plugins.get(index).map_or_else(String::new, |plugin| plugin.name.clone());
+    let who = match stuck.place {
+        Place::Model(index) => name(index + 1),
+        Place::DeviceRead | Place::DeviceWrite => name(0),
+        Place::Host | Place::Waiting => "host".to_owned(),
+    };
+    RunError::Hung { who, stuck, limit_ns }
 }
 
 /// The loop proper, the same for both clocks.
@@ -274,19 +339,15 @@ impl Runner {
 
     /// Waits for and runs the next tick, or sets `end`. Real-time: bounded, no allocation.
     #[inline]
-    fn next(&mut self, stop: &AtomicBool) -> Option<TickRecord> {
+    fn next(&mut self, stop: &StopSwitch) -> Option<TickRecord> {
         if self.schedule.next_time_ns() >= self.duration_ns {
             self.end = Some(RunEnd::Finished);
             return None;
         }
-        if stop.load(Ordering::Relaxed) {
-            self.end = Some(RunEnd::Stopped);
-            return None;
-        }
         let due = self.schedule.wait();
-        let (record, end) = self.servo.tick(&due.tick, due.lateness_ns, due.missed);
-        if let TickEnd::DeviceFault(fault) = end {
-            self.end = Some(RunEnd::DeviceFault(fault));
+        let record = self.servo.tick(&due, stop);
+        if self.servo.run().is_over() {
+            self.end = Some(RunEnd::of(self.servo.run(), self.servo.heart()));
         }
         Some(record)
     }

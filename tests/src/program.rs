@@ -4,7 +4,8 @@ use crate::library::build_folder;
 use std::ffi::OsStr;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
+use std::thread::JoinHandle;
 use std::time::SystemTime;
 
 /// Exit codes of the command line, a contract with scripts.
@@ -89,15 +90,47 @@ impl Flotor {
     /// # Panics
     /// If it cannot be started, or its output is not text.
     #[must_use]
-    pub fn run(mut self) -> Ran {
+    pub fn run(self) -> Ran {
+        self.start().wait()
+    }
+
+    /// Starts the program.
+    ///
+    /// # Panics
+    /// If it cannot be started.
+    #[must_use]
+    pub fn start(mut self) -> Running {
         self.command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = self.command.spawn().expect("the program starts");
         let (mut pipe, input) = (child.stdin.take().expect("a pipe was asked for"), self.input);
         // On a thread of its own: neither side waits for the other to empty a full pipe.
         let writer = std::thread::spawn(move || pipe.write_all(input.as_bytes()));
-        let output = child.wait_with_output().expect("the program ends");
+        Running { child, writer }
+    }
+}
+
+/// A call that has been started.
+pub struct Running {
+    child: Child,
+    writer: JoinHandle<std::io::Result<()>>,
+}
+
+impl Running {
+    /// The process.
+    #[must_use]
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Waits for its end.
+    ///
+    /// # Panics
+    /// If its output is not text.
+    #[must_use]
+    pub fn wait(self) -> Ran {
+        let output = self.child.wait_with_output().expect("the program ends");
         // A program that stops reading because its arguments are wrong closes the pipe: its business.
-        let _ = writer.join().expect("the writer only writes");
+        let _ = self.writer.join().expect("the writer only writes");
         let text = |bytes| String::from_utf8(bytes).expect("the program writes text");
         Ran { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
     }

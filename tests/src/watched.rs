@@ -2,11 +2,10 @@
 
 use flotor::registry::Registry;
 use flotor::scene::Scene;
-use flotor::servo::Clock;
+use flotor::servo::{Clock, StopSwitch};
 use flotor::session::{Observer, Outcome, RunOptions, Session};
 use flotor::trace::TickRecord;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
 /// All ticks of a run and what is known after it.
 pub struct Watched {
@@ -36,7 +35,7 @@ pub fn watch(scene: &str) -> Watched {
     let session = Session::prepare(&scene, &Registry::search(&[]), &options);
     let session = session.unwrap_or_else(|error| panic!("it does not start: {error}"));
     let mut keep = Keep(Vec::new());
-    let outcome = session.run(&mut keep, &AtomicBool::new(false));
+    let outcome = session.run(&mut keep, &StopSwitch::default());
     let outcome = outcome.unwrap_or_else(|error| panic!("it does not run: {error}"));
     Watched { records: keep.0, outcome }
 }

@@ -36,9 +36,17 @@ impl Events {
     pub const MISSED: Events = Events { bits: 1 << 10 };
     /// The device's actuators were at their limit and gave less than was commanded.
     pub const SATURATED: Events = Events { bits: 1 << 11 };
+    /// No usable sample for a while: no force.
+    pub const HOLDING: Events = Events { bits: 1 << 12 };
+    /// The force was fading out, on the way to an orderly end.
+    pub const RELEASING: Events = Events { bits: 1 << 13 };
+    /// The emergency stop was pressed.
+    pub const EMERGENCY_STOP: Events = Events { bits: 1 << 14 };
+    /// The handle was faster than allowed: what would have driven it on was taken away.
+    pub const VELOCITY_LIMITED: Events = Events { bits: 1 << 15 };
 
     /// Names of the bits, lowest first: for reports and recordings.
-    pub const NAMES: [&'static str; 12] = [
+    pub const NAMES: [&'static str; 16] = [
         "stale_sample",
         "not_finite",
         "force_limited",
@@ -51,6 +59,10 @@ impl Events {
         "model_degraded",
         "missed",
         "saturated",
+        "holding",
+        "releasing",
+        "emergency_stop",
+        "velocity_limited",
     ];
 
     /// Adds events. Real-time: bounded, no allocation.

@@ -1,6 +1,7 @@
 //! `flotor jitter`: lateness of the servo next to that of a bare loop.
 
 use super::options::{duration_s, rate_hz};
+use super::stopping::stop_on_signals;
 use super::{CommandError, run, style};
 use crate::jitter::{JitterReport, LoopTiming, measure};
 use crate::plot::{Axis, Bin, Figure, Panel, Series};
@@ -40,7 +41,7 @@ pub(crate) fn run(arguments: &JitterArguments) -> Result<(), CommandError> {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
     let slices = ((arguments.duration / 2.0).ceil() as u64).max(1);
     let progress = run::progress_bar(slices, "{percent:>3} %  pair {pos} of {len}");
-    let stop = run::stop_on_interrupt();
+    let stop = stop_on_signals();
     let report = measure(session, slices, &stop, |done| progress.set_position(done))?;
     progress.finish_and_clear();
 

@@ -19,12 +19,14 @@ mod plugins;
 mod replay;
 mod run;
 mod stability;
+mod stopping;
 mod stress;
 mod study;
 mod sweep;
 mod validate;
 
 use crate::registry::LookupError;
+use crate::servo::{EmergencySource, Place, Stuck};
 use crate::session::RunError;
 use clap::{CommandFactory, Parser, Subcommand};
 use flotor_hal::Fault;
@@ -106,6 +108,15 @@ pub(crate) enum CommandError {
         /// What the device itself said; may be empty.
         words: String,
     },
+    /// Somebody pressed the emergency stop.
+    #[error("emergency stop ({}); the device is stopped and gives no force until the next run", .0.word())]
+    EmergencyStop(EmergencySource),
+    /// A tick took so long that the watchdog stopped the device.
+    #[error(
+        "tick {} took longer than the watchdog allows, and it stopped the device; look at the machine with \
+         `flotor doctor`, or allow more with `[limits] watchdog_ms`", .0.tick
+    )]
+    Watchdog(Stuck),
     /// A plugin was refused.
     #[error("{0}")]
     PluginRefused(String),
@@ -165,10 +176,15 @@ impl CommandError {
                 RunError::Lookup(LookupError::Refused(error)) | RunError::Plugin(error) => {
                     refusal_code(error)
                 }
+                RunError::Hung { stuck, .. } => match stuck.place {
+                    Place::Model(_) => 3,
+                    Place::DeviceRead | Place::DeviceWrite => 4,
+                    Place::Waiting | Place::Host => 1,
+                },
                 RunError::Thread(_) => 1,
             },
             Self::PluginRefused(_) => 3,
-            Self::DeviceFault(_) | Self::RunFault { .. } => 4,
+            Self::DeviceFault(_) | Self::RunFault { .. } | Self::EmergencyStop(_) | Self::Watchdog(_) => 4,
             Self::File { .. } | Self::Record(_) | Self::Failed(_) => 1,
         }
     }

@@ -1,6 +1,7 @@
 //! `flotor run`: a scene in the servo loop, watched by whoever is asked for.
 
 use super::options::{ClockOption, PluginKeyValue, duration_s, rate_hz};
+use super::stopping::{Keys, stop_on_signals};
 use super::{CommandError, style};
 use crate::record::{Recorder, TraceDigest};
 use crate::registry::Registry;
@@ -13,8 +14,6 @@ use crate::trace::TickRecord;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Run a scene in the servo loop.
 #[derive(Args, Default)]
@@ -52,6 +51,8 @@ pub(crate) struct RunArguments {
 }
 
 pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
+    // First of all: a signal that comes while things load ends the run, too.
+    let stop = stop_on_signals();
     let scene = scene(&arguments)?;
     let clock = match arguments.clock {
         ClockOption::Real => Clock::Real,
@@ -77,8 +78,10 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         plot: arguments.plot.as_ref().map(|_| RunPicture::new(&scene.title)),
         progress: progress_bar(length_ms, "{percent:>3} %  {msg}"),
     };
-    let stop = stop_on_interrupt();
-    let outcome = session.run(&mut watchers, &stop)?;
+    let keys = (clock == Clock::Real).then(|| Keys::listen(&stop)).flatten();
+    let outcome = session.run(&mut watchers, &stop);
+    drop(keys);
+    let outcome = outcome?;
     watchers.progress.finish_and_clear();
 
     let Watchers { tally, digest, recorder, failure, plot, .. } = watchers;
@@ -108,6 +111,8 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
             let path = plugins.first().map(|device| device.metadata.path.clone()).unwrap_or_default();
             Err(CommandError::RunFault { path, fault, words: outcome.device_words })
         }
+        RunEnd::EmergencyStop(source) => Err(CommandError::EmergencyStop(source)),
+        RunEnd::Watchdog(stuck) => Err(CommandError::Watchdog(stuck)),
         RunEnd::Finished | RunEnd::Stopped => broken_models(&summary),
     }
 }
@@ -213,19 +218,4 @@ pub(super) fn progress_bar(length: u64, template: &str) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
     bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
     bar
-}
-
-/// Ctrl-C ends the run in order: device to safe stop, files closed. A second one is the system's.
-pub(super) fn stop_on_interrupt() -> Arc<AtomicBool> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
-    let handler = ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    });
-    if let Err(error) = handler {
-        eprintln!("{} Ctrl-C will not stop the run in order: {error}", style::warning("note:"));
-    }
-    stop
 }

@@ -2,6 +2,7 @@
 
 mod choices;
 
+use super::stopping::stop_on_signals;
 use super::{CommandError, run, style};
 use crate::registry::Registry;
 use choices::{AveragingChoice, BoundaryChoice, FirstChoice, OrderChoice, SideChoice, StepChoice, range};
@@ -227,7 +228,7 @@ fn carry_out(common: &Common, protocol: Protocol) -> Result<(), CommandError> {
         protocol,
     };
     let progress = run::progress_bar(u64::from(common.subjects), "{spinner} {pos} presentations  {elapsed}");
-    let stop = run::stop_on_interrupt();
+    let stop = stop_on_signals().stop_flag();
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let dataset = Dataset::at(&common.out);
     let watch = || progress.inc(1);

@@ -81,8 +81,16 @@ pub struct Limits {
     pub force_slew_n_per_s: f64,
     /// Fastest change of torque, N·m/s.
     pub torque_slew_nm_per_s: f64,
-    /// Time over which the force fades in at the start, s.
+    /// Velocity along each axis above which nothing may drive the handle on, m/s.
+    pub velocity_m_per_s: [f64; 3],
+    /// Angular velocity about each axis above which nothing may drive the handle on, rad/s.
+    pub angular_velocity_rad_per_s: [f64; 3],
+    /// Time over which the force fades in at the start and out at an orderly end, s.
     pub ramp_s: f64,
+    /// Time without a tick after which the watchdog stops the device, s (real clock).
+    pub watchdog_s: f64,
+    /// Buttons of the device that are emergency stops, one bit each.
+    pub emergency_buttons: u32,
 }
 
 impl Default for Limits {
@@ -94,6 +102,12 @@ impl Default for Limits {
             torque_slew_nm_per_s: f64::INFINITY,
             // Long enough not to startle a hand, short enough not to be waited for.
             ramp_s: 0.2,
+            velocity_m_per_s: [f64::INFINITY; 3],
+            angular_velocity_rad_per_s: [f64::INFINITY; 3],
+            // A hundred periods at 1 kHz: a loaded machine without real-time priority is late by tens of
+            // milliseconds, and a hand that holds a force for a tenth of a second has not gone far.
+            watchdog_s: 0.1,
+            emergency_buttons: 0,
         }
     }
 }
@@ -243,10 +257,31 @@ fn limits(mut section: Section<'_>) -> Result<Limits, SceneError> {
         torque_slew_nm_per_s: section
             .number("torque_slew_nm_per_s", 0.01..=f64::INFINITY)?
             .unwrap_or(default.torque_slew_nm_per_s),
+        velocity_m_per_s: section
+            .three("velocity_m_per_s", 1.0e-6..=f64::INFINITY)?
+            .unwrap_or(default.velocity_m_per_s),
+        angular_velocity_rad_per_s: section
+            .three("angular_velocity_rad_per_s", 1.0e-6..=f64::INFINITY)?
+            .unwrap_or(default.angular_velocity_rad_per_s),
         ramp_s: section.number("ramp_s", 0.0..=60.0)?.unwrap_or(default.ramp_s),
+        watchdog_s: section
+            .number("watchdog_ms", 1.0..=60_000.0)?
+            .map_or(default.watchdog_s, |milliseconds| milliseconds * 1.0e-3),
+        emergency_buttons: section
+            .take("emergency_button")
+            .map(|value| value.number(0.0..=31.0))
+            .transpose()?
+            .map_or(default.emergency_buttons, button_mask),
     };
     section.finish()?;
     Ok(limits)
+}
+
+/// The bit of a button that is counted from 0.
+fn button_mask(button: f64) -> u32 {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked: 0 to 31
+    let button = button as u32;
+    1 << button
 }
 
 fn boundary(mut section: Section<'_>) -> Result<Boundary, SceneError> {

@@ -1,10 +1,12 @@
 //! The envelope: what stands between models and device, and what nothing gets past.
 //!
-//! Order: guard (a number that is not finite becomes zero) -> start-up ramp -> boundary wall -> force and
-//! torque limits -> slew limit. The slew limit is last, so that no fault upstream, not even a model that
+//! Order: guard (a number that is not finite becomes zero) -> gate (the start-up ramp and the other
+//! [states of the run](super::state)) -> velocity limit -> boundary wall -> force and torque limits -> slew limit.
+//! The slew limit is last, so that no fault upstream, not even a model that
 //! vanishes, makes the force jump; the limits hold after it too, because the limited region is convex and the
 //! slew limit only moves along the line from the last wrench, which was inside, to the new one, which is.
 
+use super::state::Gate;
 use crate::scene::{Boundary, Limits};
 use crate::trace::Events;
 use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Wrench, rotation_vector};
@@ -15,7 +17,8 @@ pub struct Envelope {
     max_torque_nm: DVec3,
     force_slew_n_per_s: f64,
     torque_slew_nm_per_s: f64,
-    ramp_ns: f64,
+    velocity_m_per_s: DVec3,
+    angular_velocity_rad_per_s: DVec3,
     boundary: Boundary,
     wall_m: DVec3,
     wall_rad: DVec3,
@@ -35,7 +38,8 @@ impl Envelope {
             max_torque_nm: tighter(limits.torque_nm, device.max_torque_nm),
             force_slew_n_per_s: limits.force_slew_n_per_s.min(device.max_force_slew_n_per_s),
             torque_slew_nm_per_s: limits.torque_slew_nm_per_s.min(device.max_torque_slew_nm_per_s),
-            ramp_ns: limits.ramp_s * 1.0e9,
+            velocity_m_per_s: DVec3::from_array(limits.velocity_m_per_s),
+            angular_velocity_rad_per_s: DVec3::from_array(limits.angular_velocity_rad_per_s),
             boundary: *boundary,
             wall_m: inside(device.range_m, boundary.margin_m),
             wall_rad: inside(device.range_rad, boundary.margin_rad),
@@ -49,6 +53,7 @@ impl Envelope {
     pub fn apply(
         &mut self,
         request: &Wrench,
+        gate: Gate,
         state: &DeviceState,
         tick: &Tick,
         events: &mut Events,
@@ -59,24 +64,27 @@ impl Envelope {
             events.insert(Events::NOT_FINITE);
             Wrench::ZERO
         };
-        let ramped = guarded * self.ramp(tick, events);
-        let walled = ramped + self.wall(state, events);
+        let gated = guarded * gate.models;
+        let driven = self.limit_speed(&gated, state, events);
+        let walled = driven + self.wall(state, events) * gate.boundary;
         let limited = self.limit(&walled, events);
         let safe = self.slew(&limited, tick, events);
         self.last = safe;
         safe
     }
 
-    /// Fades in from 0 to 1 with zero slope at both ends.
-    fn ramp(&self, tick: &Tick, events: &mut Events) -> f64 {
-        #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
-        let time_ns = tick.time_ns as f64;
-        if time_ns >= self.ramp_ns {
-            return 1.0;
+    /// Above the velocity limit fades out what drives the handle on, gone at twice the limit; what brakes it passes.
+    #[inline]
+    fn limit_speed(&self, wrench: &Wrench, state: &DeviceState, events: &mut Events) -> Wrench {
+        let (velocity, spin) = (state.twist.linear(), state.twist.angular());
+        let excess = (velocity.abs() / self.velocity_m_per_s).max_element();
+        let spin_excess = (spin.abs() / self.angular_velocity_rad_per_s).max_element();
+        if excess <= 1.0 && spin_excess <= 1.0 {
+            return *wrench;
         }
-        events.insert(Events::RAMPING);
-        let part = time_ns / self.ramp_ns;
-        part * part * (3.0 - 2.0 * part)
+        events.insert(Events::VELOCITY_LIMITED);
+        let force = without_drive(wrench.force(), velocity, excess);
+        Wrench::new(force, without_drive(wrench.torque(), spin, spin_excess))
     }
 
     /// Spring and damper that push back what has left the range. Zero inside.
@@ -140,6 +148,17 @@ fn wall(at: DVec3, velocity: DVec3, semi_axes: DVec3, stiffness: f64, damping: f
     Some(outward * -push)
 }
 
+/// A force without the part along the velocity that adds to it, which fades from all at an excess of 1 to nothing at 2.
+fn without_drive(force: DVec3, velocity: DVec3, excess: f64) -> DVec3 {
+    let along = velocity.normalize_or_zero();
+    let drive = force.dot(along).max(0.0);
+    // Only a request near the largest double gets here; what cannot be split is no force.
+    if drive.is_infinite() {
+        return DVec3::ZERO;
+    }
+    force - along * (drive * (excess - 1.0).clamp(0.0, 1.0))
+}
+
 /// The longest vector of the same direction inside the box, not longer than `vector`.
 fn shrink_into_box(vector: DVec3, half_sides: DVec3) -> DVec3 {
     let excess = (vector.abs() / half_sides).max_element();
@@ -183,28 +202,24 @@ mod tests {
         Tick { index, time_ns: index * PERIOD_NS, dt_ns: if index == 0 { 0 } else { PERIOD_NS } }
     }
 
-    fn no_ramp() -> Limits {
-        Limits { ramp_s: 0.0, ..Limits::default() }
-    }
-
     /// Runs one tick at home; the wrench and the events.
     fn apply(envelope: &mut Envelope, request: Wrench, index: u64) -> (Wrench, Events) {
         let mut events = Events::NONE;
-        let sent = envelope.apply(&request, &DeviceState::HOME, &tick(index), &mut events);
+        let sent = envelope.apply(&request, Gate::OPEN, &DeviceState::HOME, &tick(index), &mut events);
         (sent, events)
     }
 
     #[test]
     fn what_is_within_all_limits_passes_unchanged() {
         let request = Wrench::new(DVec3::new(1.0, -2.0, 3.0), DVec3::new(0.1, 0.2, -0.3));
-        let (sent, events) = apply(&mut envelope(&no_ramp()), request, 0);
+        let (sent, events) = apply(&mut envelope(&Limits::default()), request, 0);
         assert_eq!(sent, request);
         assert_eq!(events, Events::NONE);
     }
 
     #[test]
     fn nothing_gets_past_limits_and_slew_whatever_a_model_asks() {
-        let limits = Limits { force_n: [30.0, 50.0, 50.0], torque_slew_nm_per_s: 500.0, ..no_ramp() };
+        let limits = Limits { force_n: [30.0, 50.0, 50.0], torque_slew_nm_per_s: 500.0, ..Limits::default() };
         let mut envelope = envelope(&limits);
         // The tighter of scene and device.
         let (most_n, most_nm) = (DVec3::new(30.0, 40.0, 50.0), DVec3::new(5.0, 5.0, 10.0));
@@ -236,7 +251,7 @@ mod tests {
     #[test]
     fn a_force_that_is_too_large_keeps_its_direction() {
         let asked = DVec3::new(100.0, 50.0, 0.0);
-        let limits = Limits { force_n: [20.0; 3], ..no_ramp() };
+        let limits = Limits { force_n: [20.0; 3], ..Limits::default() };
         let (sent, events) = apply(&mut envelope(&limits), Wrench::from_force(asked), 0);
         assert!(sent.force().cross(asked).length() < 1.0e-12);
         assert!(events.intersects(Events::FORCE_LIMITED));
@@ -245,31 +260,64 @@ mod tests {
     #[test]
     fn not_a_number_becomes_no_force_and_is_told() {
         let request = Wrench { force_n: [0.0, f64::NAN, 1.0], torque_nm: [0.0; 3] };
-        let (sent, events) = apply(&mut envelope(&no_ramp()), request, 0);
+        let (sent, events) = apply(&mut envelope(&Limits::default()), request, 0);
         assert_eq!(sent, Wrench::ZERO);
         assert!(events.intersects(Events::NOT_FINITE));
     }
 
     #[test]
-    fn force_fades_in_over_the_ramp() {
-        let mut envelope = envelope(&Limits { ramp_s: 0.1, ..Limits::default() });
-        let request = Wrench::from_force(DVec3::Z);
-        let at = |envelope: &mut Envelope, index| apply(envelope, request, index).0.force().z;
-        assert_eq!(at(&mut envelope, 0), 0.0);
-        assert!((at(&mut envelope, 50) - 0.5).abs() < 1.0e-12);
-        assert_eq!(at(&mut envelope, 100), 1.0);
+    fn the_gate_scales_models_and_boundary() {
+        let mut envelope = envelope(&Limits::default());
+        let mut state = DeviceState::HOME;
+        state.pose = Pose::new(DVec3::new(0.0, 0.0, 0.0117), flotor_hal::DQuat::IDENTITY); // the wall pushes with 2 N
+        let mut sent = |models, boundary| {
+            let (gate, request) = (Gate { models, boundary }, Wrench::from_force(DVec3::X));
+            envelope.last = Wrench::ZERO;
+            envelope.apply(&request, gate, &state, &tick(1), &mut Events::NONE.clone()).force()
+        };
+        assert!((sent(0.5, 1.0) - DVec3::new(0.5, 0.0, -2.0)).length() < 1.0e-9);
+        assert!((sent(1.0, 0.5) - DVec3::new(1.0, 0.0, -1.0)).length() < 1.0e-9);
+        assert_eq!(sent(0.0, 0.0), DVec3::ZERO);
+    }
+
+    #[test]
+    fn nothing_drives_a_handle_on_that_is_too_fast_and_braking_is_left() {
+        let limits = Limits { velocity_m_per_s: [1.0, 0.5, 1.0], ..Limits::default() };
+        let mut envelope = envelope(&limits);
+        let mut sent = |velocity: DVec3, force: DVec3| {
+            let mut state = DeviceState::HOME;
+            state.twist.linear_m_per_s = velocity.to_array();
+            let mut events = Events::NONE;
+            envelope.last = Wrench::ZERO;
+            let sent = envelope.apply(&Wrench::from_force(force), Gate::OPEN, &state, &tick(1), &mut events);
+            (sent.force(), events.intersects(Events::VELOCITY_LIMITED))
+        };
+        let asked = DVec3::new(3.0, 4.0, 0.0);
+        assert_eq!(sent(DVec3::new(1.0, 0.0, 0.0), asked), (asked, false), "at the limit all passes");
+        assert_eq!(
+            sent(DVec3::new(1.5, 0.0, 0.0), asked),
+            (DVec3::new(1.5, 4.0, 0.0), true),
+            "half of the drive"
+        );
+        assert_eq!(sent(DVec3::new(2.0, 0.0, 0.0), asked), (DVec3::new(0.0, 4.0, 0.0), true), "none of it");
+        assert_eq!(sent(DVec3::new(-9.0, 0.0, 0.0), asked), (asked, true), "braking is left alone");
+        assert_eq!(
+            sent(DVec3::new(0.0, 0.75, 0.0), asked).0,
+            DVec3::new(3.0, 2.0, 0.0),
+            "each axis has its limit"
+        );
     }
 
     #[test]
     fn the_wall_pushes_inwards_only_and_only_outside() {
-        let mut envelope = envelope(&no_ramp());
+        let mut envelope = envelope(&Limits::default());
         let mut push = |position_m: DVec3, velocity: DVec3| {
             let mut state = DeviceState::HOME;
             state.pose = Pose::new(position_m, flotor_hal::DQuat::IDENTITY);
             state.twist.linear_m_per_s = velocity.to_array();
             let mut events = Events::NONE;
             envelope.last = Wrench::ZERO;
-            envelope.apply(&Wrench::ZERO, &state, &tick(1), &mut events).force()
+            envelope.apply(&Wrench::ZERO, Gate::OPEN, &state, &tick(1), &mut events).force()
         };
         let inside = push(DVec3::new(0.0, 0.0, 0.0114), DVec3::Z);
         assert_eq!(inside, DVec3::ZERO);

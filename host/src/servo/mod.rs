@@ -7,33 +7,42 @@ mod clock;
 mod envelope;
 mod models;
 mod realtime;
+mod state;
+mod stop;
 mod timing;
+mod watchdog;
 
 pub use clock::{Clock, SpinWindow};
-pub(crate) use clock::{Schedule, monotonic_ns, sleep_until};
+pub(crate) use clock::{Due, Schedule, monotonic_ns, sleep_until};
 pub use envelope::Envelope;
 pub use models::ModelHealth;
 pub(crate) use models::{ModelSlot, ModelStack};
 pub use realtime::{Privilege, RealTimeReport};
 pub(crate) use realtime::{enter_real_time, probe_real_time};
+pub use state::{Cause, EmergencySource, Gate, RunEvent, RunState};
+pub use stop::StopSwitch;
 pub use timing::{Durations, Percentiles, Stage, Timing};
+pub(crate) use watchdog::{Heartbeat, start as start_watchdog};
+pub use watchdog::{Place, Stuck};
 
 use crate::trace::{Events, TickRecord};
 use flotor_hal::abi::loader::ActiveDevice;
-use flotor_hal::{Conditions, Cycle, DeviceState, Fault, Tick, Wrench};
+use flotor_hal::{Conditions, Cycle, DeviceState, Tick};
 use timing::STAGE_SAMPLING;
 
 /// Ticks without a new sample after which the force fades to zero: what is older than this is not where the
 /// hand is. At 1 kHz, 10 ms of a 10 Hz movement of 5 mm are 3 mm.
 const STALE_TICKS_LIMIT: u32 = 10;
 
-/// How a tick ended.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum TickEnd {
-    /// Go on.
-    Continue,
-    /// The device faulted: stop.
-    DeviceFault(Fault),
+/// What the run itself is told, beside device, models and envelope.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RunConfig {
+    /// Nominal time between ticks, ns.
+    pub(crate) period_ns: u64,
+    /// Time over which force fades in and out, ns.
+    pub(crate) ramp_ns: u64,
+    /// Buttons of the device that are emergency stops, one bit each.
+    pub(crate) emergency_buttons: u32,
 }
 
 /// The loop's state: a device, its models, the envelope.
@@ -41,52 +50,65 @@ pub(crate) struct Servo {
     device: ActiveDevice,
     models: ModelStack,
     envelope: Envelope,
+    config: RunConfig,
+    heart: Heartbeat,
+    run: RunState,
     state: DeviceState,
     stale_ticks: u32,
     timing: Timing,
-    period_ns: u64,
 }
 
 impl Servo {
     /// Not real-time.
-    pub(crate) fn new(device: ActiveDevice, models: ModelStack, envelope: Envelope, period_ns: u64) -> Self {
+    pub(crate) fn new(
+        device: ActiveDevice,
+        models: ModelStack,
+        envelope: Envelope,
+        config: RunConfig,
+    ) -> Self {
         Self {
             device,
             models,
             envelope,
+            config,
+            heart: Heartbeat::default(),
+            run: RunState::START,
             state: DeviceState::HOME,
             stale_ticks: 0,
             timing: Timing::default(),
-            period_ns,
         }
     }
 
     /// One tick. Real-time: bounded by device and models, no allocation.
-    pub(crate) fn tick(&mut self, tick: &Tick, lateness_ns: u64, missed: u64) -> (TickRecord, TickEnd) {
+    pub(crate) fn tick(&mut self, due: &Due, stop: &StopSwitch) -> TickRecord {
+        let Due { tick, lateness_ns, missed } = due;
         let started = monotonic_ns();
         let mut watch = StageWatch::start(tick.index, started);
-        let mut events = if missed > 0 { Events::MISSED } else { Events::NONE };
+        let mut events = if *missed > 0 { Events::MISSED } else { Events::NONE };
 
-        let mut end = self.read(tick, &mut events);
+        self.heart.enter(tick.index, Place::DeviceRead);
+        let sample = self.read(tick, &mut events);
+        self.follow(sample, tick, stop, &mut events);
         watch.lap(&mut self.timing, Stage::Read);
 
-        let (model, energy_j) = self.models.step(tick, &self.state, &mut events);
+        let (model, energy_j) = self.models.step(tick, &self.state, &self.heart, &mut events);
         watch.lap(&mut self.timing, Stage::Models);
 
-        let stale = self.stale_ticks > STALE_TICKS_LIMIT || end != TickEnd::Continue;
-        let request = if stale { Wrench::ZERO } else { model };
-        let commanded = self.envelope.apply(&request, &self.state, tick, &mut events);
+        let gate = self.run.gate(tick.time_ns, self.config.ramp_ns);
+        let commanded = self.envelope.apply(&model, gate, &self.state, tick, &mut events);
         watch.lap(&mut self.timing, Stage::Envelope);
 
+        self.heart.enter(tick.index, Place::DeviceWrite);
         if let Cycle::Fault(fault) = self.device.write(tick, &commanded) {
             events.insert(Events::DEVICE_FAULT);
-            end = TickEnd::DeviceFault(fault);
+            self.happen(RunEvent::Failed(Cause::Device(fault)), tick);
         }
+        self.heart.enter(tick.index, Place::Waiting);
         watch.lap(&mut self.timing, Stage::Write);
 
         let compute_ns = monotonic_ns() - started;
-        self.account(lateness_ns, compute_ns, missed);
-        let record = TickRecord {
+        self.account(*lateness_ns, compute_ns, *missed);
+        TickRecord {
             tick: tick.index,
             time_ns: tick.time_ns,
             dt_ns: tick.dt_ns,
@@ -98,15 +120,14 @@ impl Servo {
             energy_j,
             events,
             buttons: self.state.buttons,
-            lateness_ns,
+            lateness_ns: *lateness_ns,
             compute_ns,
-        };
-        (record, end)
+        }
     }
 
-    /// Newest sample into `self.state`; an old one stays, a senseless one is never used.
+    /// Newest sample into `self.state`; an old one stays, a senseless one is never used. What it means for the run.
     #[inline]
-    fn read(&mut self, tick: &Tick, events: &mut Events) -> TickEnd {
+    fn read(&mut self, tick: &Tick, events: &mut Events) -> RunEvent {
         let last = self.state;
         match self.device.read(tick, &mut self.state) {
             Cycle::Fresh if self.state.is_finite() => {
@@ -114,19 +135,42 @@ impl Servo {
                 if self.state.conditions.contains(Conditions::SATURATED) {
                     events.insert(Events::SATURATED);
                 }
-                return TickEnd::Continue;
+                return RunEvent::SamplesBack;
             }
             Cycle::Fresh => events.insert(Events::NOT_FINITE),
             Cycle::Stale => events.insert(Events::STALE_SAMPLE),
             Cycle::Fault(fault) => {
                 self.state = if self.state.is_finite() { self.state } else { last };
                 events.insert(Events::DEVICE_FAULT);
-                return TickEnd::DeviceFault(fault);
+                return RunEvent::Failed(Cause::Device(fault));
             }
         }
         self.state = last;
         self.stale_ticks = self.stale_ticks.saturating_add(1);
-        TickEnd::Continue
+        if self.stale_ticks > STALE_TICKS_LIMIT { RunEvent::SamplesLost } else { RunEvent::Time }
+    }
+
+    /// Takes the run where the sample, the clock and everybody who may stop it lead.
+    #[inline]
+    fn follow(&mut self, sample: RunEvent, tick: &Tick, stop: &StopSwitch, events: &mut Events) {
+        self.happen(RunEvent::Time, tick);
+        self.happen(sample, tick);
+        if stop.is_stop_asked() {
+            self.happen(RunEvent::StopAsked, tick);
+        }
+        if self.heart.bitten().is_some() {
+            self.happen(RunEvent::Failed(Cause::Watchdog), tick);
+        }
+        let pressed = self.state.buttons & self.config.emergency_buttons != 0;
+        if let Some(source) = stop.emergency().or(pressed.then_some(EmergencySource::Button)) {
+            self.happen(RunEvent::Emergency(source), tick);
+        }
+        events.insert(self.run.events());
+    }
+
+    #[inline]
+    fn happen(&mut self, event: RunEvent, tick: &Tick) {
+        self.run = self.run.after(event, tick.time_ns, self.config.ramp_ns);
     }
 
     #[inline]
@@ -135,7 +179,7 @@ impl Servo {
         self.timing.compute.record(compute_ns);
         self.timing.ticks += 1;
         self.timing.missed += missed;
-        if lateness_ns > self.period_ns / 10 {
+        if lateness_ns > self.config.period_ns / 10 {
             self.timing.late += 1;
         }
     }
@@ -144,6 +188,16 @@ impl Servo {
     pub(crate) fn into_timing(self) -> Timing {
         drop(self.device);
         self.timing
+    }
+
+    /// Where the run stands after the last tick.
+    pub(crate) fn run(&self) -> RunState {
+        self.run
+    }
+
+    /// What the watchdog listens to.
+    pub(crate) fn heart(&self) -> &Heartbeat {
+        &self.heart
     }
 
     pub(crate) fn device(&mut self) -> &mut ActiveDevice {

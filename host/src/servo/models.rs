@@ -2,6 +2,7 @@
 //!
 //! The same code runs in the servo and in a replay; that is why a replay can be bit-exact.
 
+use super::watchdog::{Heartbeat, Place};
 use crate::mapping::Mapping;
 use crate::trace::Events;
 use flotor_hal::abi::CallStatus;
@@ -48,10 +49,17 @@ impl ModelStack {
     /// Sum of what the models ask for at a state of the device, in the device frame, and of the energy they store,
     /// J. Real-time: bounded by the models, no allocation.
     #[inline]
-    pub(crate) fn step(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> (Wrench, f64) {
+    pub(crate) fn step(
+        &mut self,
+        tick: &Tick,
+        state: &DeviceState,
+        heart: &Heartbeat,
+        events: &mut Events,
+    ) -> (Wrench, f64) {
         let mut sum = Wrench::ZERO;
         let mut energy_j = 0.0;
-        for slot in &mut self.slots {
+        for (index, slot) in self.slots.iter_mut().enumerate() {
+            heart.enter(tick.index, Place::Model(index));
             if slot.health.panicked_at.is_some() {
                 events.insert(Events::MODEL_FAULT);
                 continue;
@@ -68,6 +76,7 @@ impl ModelStack {
                 events.insert(Events::MODEL_DEGRADED);
             }
         }
+        heart.enter(tick.index, Place::Host);
         (sum, energy_j)
     }
 

@@ -6,8 +6,10 @@ use thread_priority::unix::{
 };
 use thread_priority::{ThreadPriority, ThreadPriorityValue};
 
-/// Priority asked for: below the kernel's own threads (99), above everything ordinary.
-const FIFO_PRIORITY: u8 = 80;
+/// Priority of the loop: below the kernel's own threads (99), above everything ordinary.
+const LOOP_PRIORITY: u8 = 80;
+/// Priority of the watchdog: above the loop, which it has to interrupt.
+pub(super) const WATCHDOG_PRIORITY: u8 = 81;
 
 /// Whether the system granted something.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -68,13 +70,18 @@ impl RealTimeReport {
 /// Asks for real-time priority for the calling thread and locks the process's memory. Not real-time.
 pub(crate) fn enter_real_time() -> RealTimeReport {
     let memory_lock = Privilege::of(mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE));
+    RealTimeReport { fifo: enter_priority(LOOP_PRIORITY), memory_lock }
+}
+
+/// Asks for a real-time priority for the calling thread. Not real-time.
+pub(super) fn enter_priority(priority: u8) -> Privilege {
     let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
-    let fifo =
-        ThreadPriorityValue::try_from(FIFO_PRIORITY).map_err(|error| error.to_string()).and_then(|value| {
+    let granted =
+        ThreadPriorityValue::try_from(priority).map_err(|error| error.to_string()).and_then(|value| {
             set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Crossplatform(value), policy)
                 .map_err(|error| error.to_string())
         });
-    RealTimeReport { fifo: Privilege::of(fifo), memory_lock }
+    Privilege::of(granted)
 }
 
 /// Asks on a thread of its own, so that the caller's priority stays what it is. Not real-time.

@@ -1,0 +1,206 @@
+//! The watchdog: a thread that stops the device when the loop no longer ticks, and says where it got stuck.
+//!
+//! The loop leaves a heartbeat, one word that says which tick it is in and whose code is running. The watchdog
+//! looks at it a few times per limit. A word that stays the same for longer than the limit means that somebody
+//! does not come back; the device is then stopped from here, without the loop's help.
+
+use super::clock::{monotonic_ns, sleep_until};
+use super::realtime::{WATCHDOG_PRIORITY, enter_priority};
+use super::stop::StopSwitch;
+use flotor_hal::abi::loader::Stopper;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
+
+/// Whose code the loop is running.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// Between two ticks.
+    Waiting,
+    /// The device's `read`.
+    DeviceRead,
+    /// A model's `step`, by its place in the scene.
+    Model(usize),
+    /// The host's own code.
+    Host,
+    /// The device's `write`.
+    DeviceWrite,
+}
+
+impl Place {
+    const FIRST_MODEL: u64 = 4;
+
+    /// The call that runs there, for people.
+    #[must_use]
+    pub const fn call(self) -> &'static str {
+        match self {
+            Self::Waiting => "waiting",
+            Self::DeviceRead => "`read`",
+            Self::Model(_) => "`step`",
+            Self::Host => "the tick",
+            Self::DeviceWrite => "`write`",
+        }
+    }
+
+    #[inline]
+    const fn code(self) -> u64 {
+        match self {
+            Self::Waiting => 0,
+            Self::DeviceRead => 1,
+            Self::Host => 2,
+            Self::DeviceWrite => 3,
+            Self::Model(index) => Self::FIRST_MODEL + index as u64,
+        }
+    }
+
+    const fn from_code(code: u64) -> Self {
+        match code {
+            0 => Self::Waiting,
+            1 => Self::DeviceRead,
+            2 => Self::Host,
+            3 => Self::DeviceWrite,
+            #[allow(clippy::cast_possible_truncation)] // an index that fitted before
+            model => Self::Model((model - Self::FIRST_MODEL) as usize),
+        }
+    }
+}
+
+/// What the loop leaves for the watchdog. Clones are the same heart.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Heartbeat {
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    /// Low 48 bits of the tick above 16 bits of the place.
+    beat: AtomicU64,
+    /// The loop is over: no more beats are due.
+    done: AtomicBool,
+    /// The beat at which the watchdog stopped the device, plus one; 0 if it has not.
+    bitten: AtomicU64,
+}
+
+/// Bits of a beat that tell the place.
+const PLACE_BITS: u32 = 16;
+const PLACE_MASK: u64 = (1 << PLACE_BITS) - 1;
+
+impl Heartbeat {
+    /// Notes whose code runs next. Real-time: bounded, no allocation.
+    #[inline]
+    pub(crate) fn enter(&self, tick: u64, place: Place) {
+        self.shared.beat.store(tick << PLACE_BITS | place.code() & PLACE_MASK, Ordering::Relaxed);
+    }
+
+    /// Where the loop was when the watchdog stopped the device, if it has. Real-time: bounded, no allocation.
+    #[inline]
+    pub(crate) fn bitten(&self) -> Option<Stuck> {
+        match self.shared.bitten.load(Ordering::Acquire) {
+            0 => None,
+            beat => Some(Stuck::at(beat - 1)),
+        }
+    }
+
+    /// Tells the watchdog that the loop is over.
+    pub(crate) fn finish(&self) {
+        self.shared.done.store(true, Ordering::Release);
+    }
+
+    fn is_done(&self) -> bool {
+        self.shared.done.load(Ordering::Acquire)
+    }
+
+    fn beat(&self) -> u64 {
+        self.shared.beat.load(Ordering::Relaxed)
+    }
+
+    fn bite(&self, beat: u64) {
+        self.shared.bitten.store(beat + 1, Ordering::Release);
+    }
+}
+
+/// Where a loop got stuck.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stuck {
+    /// In which tick.
+    pub tick: u64,
+    /// In whose code.
+    pub place: Place,
+}
+
+impl Stuck {
+    const fn at(beat: u64) -> Self {
+        Self { tick: beat >> PLACE_BITS, place: Place::from_code(beat & PLACE_MASK) }
+    }
+}
+
+/// How often the watchdog looks within its limit.
+const LOOKS: u64 = 8;
+/// Longest time between two looks, ns: an emergency stop is passed on within it even if the loop is stuck.
+const LONGEST_LOOK_NS: u64 = 1_000_000;
+
+/// Starts the watchdog's thread: `stopper` is used when `heart` has not changed for `limit_ns`, or when the
+/// emergency stop is pressed. Not real-time; ends with [`Heartbeat::finish`].
+///
+/// # Errors
+/// What the system says if there can be no further thread.
+pub(crate) fn start(
+    heart: Heartbeat,
+    stopper: Stopper,
+    stop: StopSwitch,
+    limit_ns: u64,
+) -> std::io::Result<JoinHandle<()>> {
+    let thread = std::thread::Builder::new().name("flotor-watchdog".to_owned());
+    thread.spawn(move || {
+        // Above the loop, which may be what hogs the core. Without the right to it, best effort.
+        let _ = enter_priority(WATCHDOG_PRIORITY);
+        let look_ns = (limit_ns / LOOKS).min(LONGEST_LOOK_NS);
+        let mut last = heart.beat();
+        let mut changed_ns = monotonic_ns();
+        let mut stopped = false;
+        while !heart.is_done() {
+            sleep_until(monotonic_ns() + look_ns);
+            let (beat, now_ns) = (heart.beat(), monotonic_ns());
+            if stop.emergency().is_some() && !stopped {
+                stopper.safe_stop();
+                stopped = true;
+            }
+            if beat != last {
+                (last, changed_ns) = (beat, now_ns);
+            } else if now_ns - changed_ns > limit_ns && !heart.is_done() {
+                stopper.safe_stop();
+                heart.bite(beat);
+                return;
+            }
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_beat_tells_tick_and_place() {
+        let heart = Heartbeat::default();
+        for place in [
+            Place::Waiting,
+            Place::DeviceRead,
+            Place::Host,
+            Place::DeviceWrite,
+            Place::Model(0),
+            Place::Model(9999),
+        ] {
+            heart.enter(123_456_789_012, place);
+            assert_eq!(Stuck::at(heart.beat()), Stuck { tick: 123_456_789_012, place });
+        }
+    }
+
+    #[test]
+    fn the_first_beat_can_be_bitten_too() {
+        let heart = Heartbeat::default();
+        assert_eq!(heart.bitten(), None);
+        heart.bite(0);
+        assert_eq!(heart.bitten(), Some(Stuck { tick: 0, place: Place::Waiting }));
+    }
+}
