@@ -1,14 +1,14 @@
 //! How a run ends when it must: every state of a run reached through real libraries, emergency stops from signal,
 //! button and device, and a watchdog that stops the device when a plugin does not come back.
 
-use flotor::servo::EmergencySource;
+use flotor::servo::{Clock, EmergencySource};
 use flotor::session::RunEnd;
 use flotor::trace::{Events, TickRecord};
 use flotor_hal::DVec3;
 use flotor_tests::library::plugin_file;
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
-use flotor_tests::watched::watch;
+use flotor_tests::watched::{watch, watch_on};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -192,4 +192,49 @@ fn a_model_that_comes_back_late_leaves_a_whole_report_and_the_run_is_over_all_th
     let late = scene("", "fault = \"hangs-once\"\nat_tick = 400", "[limits]\nwatchdog_ms = 50"); // for 300 ms
     let ran = run_in_real_time(&scratch, &late, |_| ());
     assert_eq!((ran.code, end(&ran).as_str()), (Some(exit_code::DEVICE_FAULT), "watchdog"), "{ran:?}");
+}
+
+// ---------------------------------------------------------------- a device that sets the pace
+
+/// The demo for half a second in real time, paced by its device.
+fn paced(rate_hz: u32, model: &str) -> String {
+    format!(
+        "rate_hz = {rate_hz}\nduration_s = 0.5\npacing = \"device\"\n[device]\nplugin = \"simulated\"\n\
+         [[model]]\nplugin = \"{}\"\n[model.parameters]\n{model}\n",
+        plugin_file("fixture-faulty-model").display()
+    )
+}
+
+#[test]
+fn a_device_sets_the_pace_from_100_hz_to_10_khz_and_every_sample_is_a_tick_or_missed() {
+    for rate_hz in [100, 1000, 10_000] {
+        let run = watch_on(Clock::Real, &paced(rate_hz, ""));
+        assert_eq!(run.outcome.end, RunEnd::Finished);
+        let timing = &run.outcome.timing;
+        let periods = u64::from(rate_hz) / 2;
+        // The last wait may find several samples at once.
+        let seen = timing.ticks + timing.missed;
+        let last = run.records.last().expect("ticks");
+        assert_eq!(seen, last.time_ns / (1_000_000_000 / u64::from(rate_hz)) + 1);
+        assert!(seen >= periods, "{rate_hz} Hz: {seen} of {periods}");
+        assert!(timing.ticks > 10, "{rate_hz} Hz: {} ticks", timing.ticks);
+    }
+}
+
+#[test]
+fn samples_that_come_while_a_model_dawdles_are_missed_and_counted() {
+    let run = watch_on(Clock::Real, &paced(1000, "fault = \"overruns\"")); // 2 ms each
+    assert_eq!(run.outcome.end, RunEnd::Finished);
+    let timing = &run.outcome.timing;
+    assert!(timing.missed >= timing.ticks / 2, "{} ticks, {} missed", timing.ticks, timing.missed);
+}
+
+#[test]
+fn a_device_that_cannot_pace_is_a_mismatch_before_anything_moves() {
+    let scratch = Scratch::default();
+    let scene = format!("pacing = \"device\"\n{}", scene("", "", ""));
+    let file = scratch.file("scene.toml", scene);
+    let ran = Flotor::with(["run".as_ref(), file.as_os_str()]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    assert!(ran.error().contains("cannot set the pace"), "{ran:?}");
 }

@@ -647,6 +647,18 @@ typedef struct FlotorEnergyLedgerTable {
     uint32_t (*ledger)(FlotorInstance instance, struct FlotorEnergyLedger *out);
 } FlotorEnergyLedgerTable;
 
+// `flotor.device-pacing/1`: offered by a device that can set the pace, see [`crate::Pacing`].
+typedef struct FlotorDevicePacingTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // Blocks until the device has a sample that no earlier wait has told of, or until `timeout_ns` have passed;
+    // writes the number of samples taken since the last wait that found any, 0 after a wait in vain. Returns a
+    // [`super::CallStatus`] code. Real-time but for the waiting: no allocation.
+    uint32_t (*wait_for_sample)(FlotorInstance instance, uint64_t timeout_ns, uint64_t *samples);
+} FlotorDevicePacingTable;
+
 /* Names of interfaces and extensions. */
 #define FLOTOR_INTERFACE_FORCE "flotor.force/1"
 #define FLOTOR_INTERFACE_DEVICE "flotor.device/1"
@@ -654,6 +666,7 @@ typedef struct FlotorEnergyLedgerTable {
 #define FLOTOR_INTERFACE_VARIANT "flotor.variant/1"
 #define FLOTOR_INTERFACE_DETAILS "flotor.details/1"
 #define FLOTOR_INTERFACE_ENERGY_LEDGER "flotor.energy-ledger/1"
+#define FLOTOR_INTERFACE_DEVICE_PACING "flotor.device-pacing/1"
 
 #if defined(__cplusplus)
 #define FLOTOR_STATIC_ASSERT static_assert

@@ -4,7 +4,7 @@
 //! opened again. The two are different types, so that a real-time call before activation does not compile.
 
 use crate::abi::Str;
-use crate::{LoopConfig, OutOfRange, Parameter, Pose, Refusal, Settings, Twist, Wrench};
+use crate::{LoopConfig, OutOfRange, Pacing, Parameter, Pose, Refusal, SampleWait, Settings, Twist, Wrench};
 
 /// One tick as a device and a host see it. 24 bytes.
 #[repr(C)]
@@ -315,6 +315,8 @@ pub trait Device: Sized + Send + 'static {
     const INFO: DeviceInfo;
     /// What the device can be told.
     const PARAMETERS: &'static [Parameter] = &[];
+    /// Whether it can set the pace of the loop.
+    const PACING: Pacing = Pacing::Host;
     /// The same device, energised.
     type Active: ActiveDevice<Opened = Self>;
     /// How another thread stops it.
@@ -363,6 +365,14 @@ pub trait ActiveDevice: Send + 'static {
     fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
         let _ = index;
         Err(OutOfRange { min: f64::NAN, max: f64::NAN, value })
+    }
+
+    /// Blocks until there is a sample that no earlier wait has told of, or until `timeout_ns` have passed. Asked before
+    /// each `read` of a run that the device paces, which takes [`Device::PACING`] to say so. Real-time but for the
+    /// waiting: no allocation.
+    fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
+        let _ = timeout_ns;
+        SampleWait::NotPaced
     }
 
     /// Energy account of the plant, where there is one to know. Real-time.

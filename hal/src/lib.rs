@@ -32,6 +32,7 @@ mod detail;
 mod device;
 mod frame;
 mod model;
+mod pacing;
 mod parameter;
 mod refusal;
 mod shape;
@@ -46,6 +47,7 @@ pub use frame::{Pose, Twist, Wrench, orientation_from_rotation_vector, rotation_
 pub use glam;
 pub use glam::{DMat3, DQuat, DVec3};
 pub use model::{Demand, ForceModel, Input, LoopConfig, Memory, ModelInfo, Output, StepStatus};
+pub use pacing::{Pacing, SampleWait};
 pub use parameter::{Mutability, OutOfRange, Parameter, ParameterKind, ParameterValue, Settings};
 pub use refusal::{Refusal, RefusalKind};
 pub use shape::{CenterlineInfo, CenterlineModel};

@@ -9,6 +9,7 @@ use crate::servo::{
     sleep_until,
 };
 use crate::session::{RunError, Session};
+use flotor_hal::SampleWait;
 use serde::Serialize;
 
 /// Length of one slice, ns.
@@ -69,7 +70,7 @@ pub fn measure(
             while done < slices && !stop.is_stop_asked() && stop.emergency().is_none() {
                 let mut schedule = Schedule::start_real(period_ns, window);
                 while schedule.next_time_ns() < SLICE_NS {
-                    let due = schedule.wait();
+                    let Some(due) = schedule.wait(|_| SampleWait::NotPaced) else { break };
                     let _ = servo.tick(&due, stop);
                     with_servo.count(due.lateness_ns, due.missed, period_ns);
                 }

@@ -11,7 +11,9 @@ use crate::servo::{
 use crate::trace::{RECORD_WORDS, TickRecord};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, Setting, Stopper};
-use flotor_hal::{Capabilities, Demand, EnergyLedger, Fault, LoopConfig, Parameter, ParameterKind, Refusal};
+use flotor_hal::{
+    Capabilities, Demand, EnergyLedger, Fault, LoopConfig, Pacing, Parameter, ParameterKind, Refusal,
+};
 use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
@@ -85,6 +87,7 @@ pub struct Session {
     servo: Servo,
     stopper: Stopper,
     clock: Clock,
+    pacing: Pacing,
     period_ns: u64,
     duration_ns: u64,
     watchdog_ns: u64,
@@ -182,7 +185,7 @@ impl Session {
             models.push(slot);
             plugins.push(report);
         }
-        let mismatches = pair(scene, &capabilities);
+        let mismatches = pair(scene, &capabilities, device.can_pace());
         if !mismatches.is_empty() {
             return Err(RunError::Mismatch { device: scene.device.plugin.clone(), mismatches });
         }
@@ -195,7 +198,16 @@ impl Session {
             [scene.limits.ramp_s, scene.limits.watchdog_s].map(|seconds| (seconds * 1.0e9).round() as u64);
         let config = RunConfig { period_ns, ramp_ns, emergency_buttons: scene.limits.emergency_buttons };
         let servo = Servo::new(active, ModelStack::new(models), envelope, config);
-        Ok(Self { servo, stopper, clock: options.clock, period_ns, duration_ns, watchdog_ns, plugins })
+        Ok(Self {
+            servo,
+            stopper,
+            clock: options.clock,
+            pacing: scene.pacing,
+            period_ns,
+            duration_ns,
+            watchdog_ns,
+            plugins,
+        })
     }
 
     /// The loop itself, for whoever paces it differently; the stopper must be used before it is dropped.
@@ -262,7 +274,7 @@ impl Session {
     /// The loop on a thread of its own; this one lets the observers look.
     fn run_real(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Finished, RunError> {
         let (mut sender, mut receiver) = flotor_sync::ring::<TickRecord, RECORD_WORDS>(RING_RECORDS);
-        let Session { servo, stopper, period_ns, duration_ns, watchdog_ns, plugins, .. } = self;
+        let Session { servo, stopper, pacing, period_ns, duration_ns, watchdog_ns, plugins, .. } = self;
         let heart = servo.heart().clone();
         let loop_stop = stop.clone();
         // Not scoped: a thread that is stuck in a plugin has to be left behind.
@@ -270,9 +282,12 @@ impl Session {
         let (loop_heart, loop_stopper) = (heart.clone(), stopper.clone());
         let servo_thread = thread.spawn(move || {
             let real_time = enter_real_time();
-            let window = SpinWindow::measure(period_ns);
+            let schedule = match pacing {
+                Pacing::Host => Schedule::start_real(period_ns, SpinWindow::measure(period_ns)),
+                Pacing::Device => Schedule::start_paced(period_ns),
+            };
             let watchdog = start_watchdog(loop_heart, loop_stopper, loop_stop.clone(), watchdog_ns);
-            let mut runner = Runner::new(servo, Schedule::start_real(period_ns, window), duration_ns);
+            let mut runner = Runner::new(servo, schedule, duration_ns);
             // Without a watchdog nothing is moved.
             if watchdog.is_err() {
                 runner.end = Some(RunEnd::Stopped);
@@ -344,7 +359,11 @@ impl Runner {
             self.end = Some(RunEnd::Finished);
             return None;
         }
-        let due = self.schedule.wait();
+        let device = self.servo.device();
+        let Some(due) = self.schedule.wait(|timeout_ns| device.wait_for_sample(timeout_ns)) else {
+            self.end = Some(RunEnd::DeviceFault(Fault::Broken));
+            return None;
+        };
         let record = self.servo.tick(&due, stop);
         if self.servo.run().is_over() {
             self.end = Some(RunEnd::of(self.servo.run(), self.servo.heart()));
@@ -451,7 +470,7 @@ fn in_force(
 }
 
 /// What of a scene the device cannot do; all at once, before anything is energised.
-fn pair(scene: &Scene, device: &Capabilities) -> Vec<String> {
+fn pair(scene: &Scene, device: &Capabilities, can_pace: bool) -> Vec<String> {
     let mut mismatches = Vec::new();
     let [slowest, fastest] = device.rate_hz;
     if scene.rate_hz < slowest || scene.rate_hz > fastest {
@@ -459,6 +478,11 @@ fn pair(scene: &Scene, device: &Capabilities) -> Vec<String> {
             "rate {} Hz, the device runs at {slowest} to {fastest} Hz; change `rate_hz`",
             scene.rate_hz
         ));
+    }
+    if scene.pacing == Pacing::Device && !can_pace {
+        mismatches.push(
+            "it cannot set the pace of the loop; remove `pacing`, or say `pacing = \"host\"`".to_owned(),
+        );
     }
     if !scene.models.is_empty() && !device.actuated.contains(flotor_hal::Axes::TRANSLATION) {
         mismatches

@@ -30,8 +30,17 @@ impl Observer for Keep {
 /// If the scene is wrong or a plugin is refused: such tests have other means.
 #[must_use]
 pub fn watch(scene: &str) -> Watched {
+    watch_on(Clock::Virtual, scene)
+}
+
+/// As [`watch`], on a clock.
+///
+/// # Panics
+/// As [`watch`].
+#[must_use]
+pub fn watch_on(clock: Clock, scene: &str) -> Watched {
     let scene = Scene::parse(Path::new("scene.toml"), scene).expect("the scene is right");
-    let options = RunOptions { clock: Clock::Virtual, seed: 1 };
+    let options = RunOptions { clock, seed: 1 };
     let session = Session::prepare(&scene, &Registry::search(&[]), &options);
     let session = session.unwrap_or_else(|error| panic!("it does not start: {error}"));
     let mut keep = Keep(Vec::new());

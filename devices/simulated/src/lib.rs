@@ -25,6 +25,7 @@ mod noise;
 mod parameters;
 pub mod plant;
 mod plugin;
+mod sample_clock;
 pub mod sensing;
 pub mod simulation;
 pub mod validation;

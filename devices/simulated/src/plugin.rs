@@ -3,6 +3,7 @@
 use crate::machine::{Machine, MachineParameters};
 use crate::parameters::{SCHEMA, in_force, machine, setup};
 use crate::plant::Wrench;
+use crate::sample_clock::SampleClock;
 use crate::simulation::{Setup, Simulation};
 use crate::validation::InvalidParameter;
 use crate::workspace::{
@@ -11,10 +12,12 @@ use crate::workspace::{
 };
 use flotor_hal::{
     ActiveDevice, Axes, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState, EnergyLedger,
-    Fault, LoopConfig, Parameter, Pose, Refusal, SafeStop, Settings, Tick, Twist, export_device,
+    Fault, LoopConfig, Pacing, Parameter, Pose, Refusal, SafeStop, SampleWait, Settings, Tick, Twist,
+    export_device,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 /// The simulated flotor, opened: the numbers are checked, nothing moves.
 pub struct SimulatedFlotor {
@@ -31,6 +34,8 @@ pub struct RunningFlotor {
     simulation: Simulation,
     machine: Option<Box<Machine>>,
     opened: SimulatedFlotor,
+    /// When the device sets the pace.
+    samples: SampleClock,
     /// Acts from the last write to the next.
     held: Wrench,
     /// It is less than was asked for.
@@ -59,6 +64,7 @@ impl Device for SimulatedFlotor {
     const INFO: DeviceInfo =
         DeviceInfo::new("simulated", "Simulated flotor", "A 580 g levitated flotor held by a simulated hand");
     const PARAMETERS: &'static [Parameter] = SCHEMA;
+    const PACING: Pacing = Pacing::Device;
     type Active = RunningFlotor;
     type Stop = CoilSwitch;
 
@@ -111,7 +117,15 @@ impl Device for SimulatedFlotor {
         match self.start(config.period_ns, config.seed) {
             Ok((simulation, machine)) => {
                 self.stopped.store(false, Ordering::Release);
-                Ok(RunningFlotor { simulation, machine, opened: self, held: Wrench::ZERO, is_limited: false })
+                let samples = SampleClock::new(config.period_ns);
+                Ok(RunningFlotor {
+                    simulation,
+                    machine,
+                    opened: self,
+                    samples,
+                    held: Wrench::ZERO,
+                    is_limited: false,
+                })
             }
             Err(error) => Err((self, Refusal::parameter(error))),
         }
@@ -169,6 +183,10 @@ impl ActiveDevice for RunningFlotor {
         };
         self.is_limited = self.machine.is_none() && self.held != asked;
         Cycle::Fresh
+    }
+
+    fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
+        self.samples.wait(Duration::from_nanos(timeout_ns))
     }
 
     fn energy_ledger(&self) -> Option<EnergyLedger> {

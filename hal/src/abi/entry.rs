@@ -24,6 +24,8 @@ pub mod interface_ids {
     pub const DETAILS: &str = "flotor.details/1";
     /// Energy account of a plant: [`crate::abi::EnergyLedgerTable`].
     pub const ENERGY_LEDGER: &str = "flotor.energy-ledger/1";
+    /// A device that can set the pace: [`crate::abi::DevicePacingTable`].
+    pub const DEVICE_PACING: &str = "flotor.device-pacing/1";
 }
 
 /// What a plugin mainly is.

@@ -2,10 +2,10 @@
 
 use super::entry::{CallStatus, Entry, Instance, PluginKind, interface_ids};
 use super::export_model::values_from_raw;
-use super::{DeviceTable, EnergyLedgerTable, Message, Str, panics};
+use super::{DevicePacingTable, DeviceTable, EnergyLedgerTable, Message, Str, panics};
 use crate::{
-    ActiveDevice, Capabilities, Cycle, Device, DeviceState, EnergyLedger, Fault, LoopConfig, ParameterValue,
-    RefusalKind, SafeStop, Settings, Tick, Wrench,
+    ActiveDevice, Capabilities, Cycle, Device, DeviceState, EnergyLedger, Fault, LoopConfig, Pacing,
+    ParameterValue, RefusalKind, SafeStop, SampleWait, Settings, Tick, Wrench,
 };
 use std::ffi::c_void;
 use std::marker::PhantomData;
@@ -243,6 +243,24 @@ unsafe extern "C" fn ledger<D: Device>(instance: Instance, out: *mut EnergyLedge
     }) as u32
 }
 
+unsafe extern "C" fn wait_for_sample<D: Device>(
+    instance: Instance,
+    timeout_ns: u64,
+    samples: *mut u64,
+) -> u32 {
+    // SAFETY: as in `capabilities`.
+    let (work, samples) = unsafe { (work::<D>(instance), &mut *samples) };
+    work.guard(CallStatus::Panicked, |phase| match phase {
+        Phase::Active(device) => {
+            let waited = device.wait_for_sample(timeout_ns);
+            *samples = waited.samples();
+            if waited == SampleWait::NotPaced { CallStatus::Unsupported } else { CallStatus::Ok }
+        }
+        Phase::Opened(_) => CallStatus::WrongPhase,
+        Phase::Dead => CallStatus::Panicked,
+    }) as u32
+}
+
 /// The tables of one device type, as constants that are promoted to statics.
 struct Tables<D>(PhantomData<D>);
 
@@ -270,12 +288,20 @@ impl<D: Device> Tables<D> {
         reserved: 0,
         ledger: Some(ledger::<D>),
     };
+    const PACING: DevicePacingTable = DevicePacingTable {
+        size: size_of::<DevicePacingTable>() as u32,
+        reserved: 0,
+        wait_for_sample: Some(wait_for_sample::<D>),
+    };
 }
 
 unsafe extern "C" fn interface<D: Device>(id: Str) -> *const c_void {
     match id.as_str() {
         interface_ids::DEVICE => std::ptr::from_ref(&Tables::<D>::DEVICE).cast(),
         interface_ids::ENERGY_LEDGER => std::ptr::from_ref(&Tables::<D>::LEDGER).cast(),
+        interface_ids::DEVICE_PACING if D::PACING == Pacing::Device => {
+            std::ptr::from_ref(&Tables::<D>::PACING).cast()
+        }
         _ => std::ptr::null(),
     }
 }

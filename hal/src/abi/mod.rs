@@ -20,6 +20,7 @@ mod export_device;
 mod export_model;
 mod force;
 pub mod metadata;
+mod pacing;
 mod panics;
 #[cfg(feature = "layout-proof")]
 pub mod proof;
@@ -36,4 +37,5 @@ pub use entry::{
 pub use export_device::device_entry;
 pub use export_model::{Extensions, WithCenterline, WithDetails, WithVariant, model_entry, model_entry_with};
 pub use force::{CenterlineTable, DetailsTable, ForceTable, VariantTable};
+pub use pacing::DevicePacingTable;
 pub use text::{MESSAGE_BYTES, Message, Str, StrList};

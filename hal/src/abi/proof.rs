@@ -5,8 +5,8 @@
 //! too (they are held to [`super::ContractSizes`] and to the assertions in the header).
 
 use super::{
-    CenterlineTable, ContractSizes, DetailsTable, DeviceTable, EnergyLedgerTable, ForceTable, Host,
-    LayoutProof, Message, Str, VariantTable,
+    CenterlineTable, ContractSizes, DetailsTable, DevicePacingTable, DeviceTable, EnergyLedgerTable,
+    ForceTable, Host, LayoutProof, Message, Str, VariantTable,
 };
 use crate::{
     Capabilities, CenterlineInfo, Detail, DeviceState, EnergyLedger, Input, LoopConfig, Output, Parameter,
@@ -45,7 +45,7 @@ pub const CONTRACT: [(&str, &TypeLayout); 16] = [
 
 /// The types of the extensions. A plugin that knows one means what the host means; an older plugin knows fewer and
 /// offers fewer.
-pub const EXTENSIONS: [(&str, &TypeLayout); 8] = [
+pub const EXTENSIONS: [(&str, &TypeLayout); 9] = [
     ("CenterlineInfo", CenterlineInfo::LAYOUT),
     ("CenterlineTable", CenterlineTable::LAYOUT),
     ("VariantInfo", VariantInfo::LAYOUT),
@@ -54,6 +54,7 @@ pub const EXTENSIONS: [(&str, &TypeLayout); 8] = [
     ("DetailsTable", DetailsTable::LAYOUT),
     ("EnergyLedger", EnergyLedger::LAYOUT),
     ("EnergyLedgerTable", EnergyLedgerTable::LAYOUT),
+    ("DevicePacingTable", DevicePacingTable::LAYOUT),
 ];
 
 unsafe extern "C" fn layout_of(name: Str) -> *const c_void {

@@ -7,8 +7,9 @@ pub use flotor_record::mapping::MappingConfig;
 pub use reader::{Location, SceneError};
 pub use setting::{KeyValue, PluginKeyValue};
 
+use flotor_hal::Pacing;
 pub(crate) use reader::nearest;
-use reader::{Section, Source};
+use reader::{Section, Source, Value};
 use std::path::{Path, PathBuf};
 
 /// The scene `flotor` runs when none is named: spring 1 on the simulated flotor, held by a hand.
@@ -23,6 +24,8 @@ pub struct Scene {
     pub text: String,
     /// Loop rate, Hz.
     pub rate_hz: f64,
+    /// Who decides when a tick begins (real clock).
+    pub pacing: Pacing,
     /// How long to run, s.
     pub duration_s: f64,
     /// Folders with plugins, searched first; relative to the scene's file.
@@ -179,12 +182,14 @@ impl Scene {
         let mut root = source.parse()?;
         let title = root.take("title").map(|value| value.text()).transpose()?.unwrap_or_default();
         let rate_hz = root.number("rate_hz", 100.0..=10_000.0)?.unwrap_or(1000.0);
+        let pacing = root.take("pacing").map(pacing).transpose()?.unwrap_or(Pacing::Host);
         let duration_s = root.number("duration_s", 0.0..=31_536_000.0)?.unwrap_or(10.0);
         let folders = root.take("plugin_folders").map(|value| value.texts()).transpose()?.unwrap_or_default();
         let scene = Self {
             title,
             text: text.to_owned(),
             rate_hz,
+            pacing,
             duration_s,
             plugin_folders: folders.into_iter().map(PathBuf::from).collect(),
             device: device(root.require_section("device")?)?,
@@ -195,6 +200,10 @@ impl Scene {
         root.finish()?;
         Ok(scene)
     }
+}
+
+fn pacing(value: Value<'_>) -> Result<Pacing, SceneError> {
+    value.one_of(&[("host", Pacing::Host), ("device", Pacing::Device)])
 }
 
 fn device(mut section: Section<'_>) -> Result<PluginUse, SceneError> {

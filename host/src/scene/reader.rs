@@ -230,6 +230,14 @@ impl Value<'_> {
         }
     }
 
+    /// One of a few words, each of which means something.
+    pub(super) fn one_of<T: Copy>(self, words: &[(&str, T)]) -> Result<T, SceneError> {
+        let legal: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
+        let wrong = self.problem(format!("`{}` is one of: {}", self.key, legal.join(", ")));
+        let text = self.text()?;
+        words.iter().find(|(word, _)| *word == text).map(|(_, meaning)| *meaning).ok_or(wrong)
+    }
+
     pub(super) fn texts(self) -> Result<Vec<String>, SceneError> {
         let wrong = self.problem(format!("`{}` is a list of texts in quotes", self.key));
         let DeValue::Array(list) = self.value else { return Err(wrong) };

@@ -3,7 +3,7 @@
 //! The schedule is the same for both: tick `k` belongs to time `k T`, and a tick whose whole period has
 //! passed is missed, counted and skipped, never caught up in a burst.
 
-use flotor_hal::Tick;
+use flotor_hal::{SampleWait, Tick};
 pub use flotor_record::Clock;
 use rustix::thread::{ClockId, clock_nanosleep_absolute};
 use rustix::time::{Timespec, clock_gettime};
@@ -52,14 +52,23 @@ pub(crate) fn monotonic_ns() -> u64 {
 
 /// Gives one tick after the other, each when it is due.
 pub(crate) struct Schedule {
-    clock: Clock,
+    pace: Pace,
     period_ns: u64,
-    window: SpinWindow,
     start_ns: u64,
     /// Number of periods since the start that the next tick belongs to.
     slot: u64,
     next_index: u64,
     last_slot: u64,
+}
+
+/// What ticks wait for.
+enum Pace {
+    /// Nothing.
+    Virtual,
+    /// A deadline on the machine's clock.
+    Clock(SpinWindow),
+    /// The device's next sample; the last one came at this time.
+    Device { last_ns: u64 },
 }
 
 /// A tick that is due, and how the machine kept to it.
@@ -74,22 +83,36 @@ pub(crate) struct Due {
 impl Schedule {
     /// A schedule on the machine's clock, whose first tick is due one period from now.
     pub(crate) fn start_real(period_ns: u64, window: SpinWindow) -> Self {
-        let start_ns = monotonic_ns() + period_ns;
-        Self { clock: Clock::Real, period_ns, window, start_ns, slot: 0, next_index: 0, last_slot: 0 }
+        Self::start(Pace::Clock(window), period_ns, monotonic_ns() + period_ns)
     }
 
     /// A schedule without waiting, whose first tick is at time 0.
     pub(crate) fn start_virtual(period_ns: u64) -> Self {
-        let window = SpinWindow { spin_ns: 0 };
-        Self { clock: Clock::Virtual, period_ns, window, start_ns: 0, slot: 0, next_index: 0, last_slot: 0 }
+        Self::start(Pace::Virtual, period_ns, 0)
     }
 
-    /// Waits for the next tick. Real-time: sleeps, then spins; no allocation.
-    pub(crate) fn wait(&mut self) -> Due {
-        let (lateness_ns, missed) = match self.clock {
-            Clock::Virtual => (0, 0),
-            Clock::Real => self.wait_real(),
+    /// A schedule of a device's samples; the first is expected one period from now.
+    pub(crate) fn start_paced(period_ns: u64) -> Self {
+        let now_ns = monotonic_ns();
+        Self::start(Pace::Device { last_ns: now_ns }, period_ns, now_ns)
+    }
+
+    fn start(pace: Pace, period_ns: u64, start_ns: u64) -> Self {
+        Self { pace, period_ns, start_ns, slot: 0, next_index: 0, last_slot: 0 }
+    }
+
+    /// Waits for the next tick; `wait_for_sample` is how to wait for a device, for so many ns at most, if it is the
+    /// device that sets the pace. `None` if it turns out not to. Real-time: sleeps, then spins; no allocation.
+    pub(crate) fn wait(&mut self, wait_for_sample: impl FnOnce(u64) -> SampleWait) -> Option<Due> {
+        let (lateness_ns, missed) = match self.pace {
+            Pace::Virtual => (0, 0),
+            Pace::Clock(window) => self.wait_for_deadline(window),
+            Pace::Device { last_ns } => {
+                let waited = wait_for_sample(Self::PATIENCE_PERIODS * self.period_ns);
+                self.follow(last_ns, waited)?
+            }
         };
+        self.slot += missed;
         let tick = Tick {
             index: self.next_index,
             time_ns: self.slot * self.period_ns,
@@ -98,14 +121,19 @@ impl Schedule {
         self.last_slot = self.slot;
         self.slot += 1;
         self.next_index += 1;
-        Due { tick, lateness_ns, missed }
+        Some(Due { tick, lateness_ns, missed })
     }
 
-    fn wait_real(&mut self) -> (u64, u64) {
+    /// How long a tick waits for a sample. After that it runs without one: force has to fade out even if the device
+    /// has nothing more to say.
+    const PATIENCE_PERIODS: u64 = 2;
+
+    /// Lateness and whole periods missed of a tick on the machine's clock.
+    fn wait_for_deadline(&mut self, window: SpinWindow) -> (u64, u64) {
         let deadline = self.start_ns + self.slot * self.period_ns;
         let mut now = monotonic_ns();
-        if now + self.window.spin_ns < deadline {
-            sleep_until(deadline - self.window.spin_ns);
+        if now + window.spin_ns < deadline {
+            sleep_until(deadline - window.spin_ns);
             now = monotonic_ns();
         }
         while now < deadline {
@@ -115,19 +143,34 @@ impl Schedule {
         let late = now - deadline;
         // Whole periods that have passed belong to ticks that nobody can use any more.
         let missed = late / self.period_ns;
-        self.slot += missed;
         (late - missed * self.period_ns, missed)
+    }
+
+    /// Lateness and samples missed of a tick that a sample began, or that waited for one in vain.
+    fn follow(&mut self, last_ns: u64, waited: SampleWait) -> Option<(u64, u64)> {
+        let periods = match waited {
+            SampleWait::NotPaced => return None,
+            SampleWait::Arrived { samples } => samples.max(1),
+            SampleWait::TimedOut => {
+                // A device that gives up at once must not make the loop spin.
+                sleep_until(last_ns + self.period_ns);
+                ((monotonic_ns() - last_ns) / self.period_ns).max(1)
+            }
+        };
+        let now_ns = monotonic_ns();
+        self.pace = Pace::Device { last_ns: now_ns };
+        Some((now_ns.saturating_sub(last_ns + periods * self.period_ns), periods - 1))
     }
 
     /// Waits for the end of the last tick's period; time since the start, ns.
     pub(crate) fn finish(mut self) -> u64 {
-        match self.clock {
-            Clock::Virtual => self.next_time_ns(),
-            Clock::Real => {
-                let start_ns = self.start_ns;
-                self.wait_real();
-                monotonic_ns() - start_ns
+        match self.pace {
+            Pace::Virtual => self.next_time_ns(),
+            Pace::Clock(window) => {
+                self.wait_for_deadline(window);
+                monotonic_ns() - self.start_ns
             }
+            Pace::Device { .. } => monotonic_ns() - self.start_ns,
         }
     }
 
@@ -152,10 +195,44 @@ pub(crate) fn sleep_until(deadline_ns: u64) {
 mod tests {
     use super::*;
 
+    /// What a schedule does not ask for on a clock.
+    fn no_device(_: u64) -> SampleWait {
+        panic!("nobody is to be waited for")
+    }
+
+    fn wait(schedule: &mut Schedule) -> Due {
+        schedule.wait(no_device).expect("a tick is due")
+    }
+
+    #[test]
+    fn a_device_that_paces_gives_the_ticks_and_samples_nobody_read_are_missed() {
+        let mut schedule = Schedule::start_paced(1_000_000);
+        let mut next = |samples| schedule.wait(|_| SampleWait::Arrived { samples }).expect("a sample came");
+        assert_eq!(next(1).tick, Tick { index: 0, time_ns: 0, dt_ns: 0 });
+        assert_eq!(next(1).tick, Tick { index: 1, time_ns: 1_000_000, dt_ns: 1_000_000 });
+        let due = next(3);
+        assert_eq!((due.missed, due.tick), (2, Tick { index: 2, time_ns: 4_000_000, dt_ns: 3_000_000 }));
+    }
+
+    #[test]
+    fn a_device_that_says_nothing_more_still_lets_the_loop_run_at_its_rate() {
+        let mut schedule = Schedule::start_paced(1_000_000);
+        let started = std::time::Instant::now();
+        for _ in 0..20 {
+            assert!(schedule.wait(|_| SampleWait::TimedOut).is_some(), "it gives up at once");
+        }
+        assert!(started.elapsed() >= std::time::Duration::from_millis(20), "twenty periods have passed");
+    }
+
+    #[test]
+    fn a_device_that_does_not_pace_after_all_ends_the_loop() {
+        assert!(Schedule::start_paced(1_000_000).wait(|_| SampleWait::NotPaced).is_none());
+    }
+
     #[test]
     fn virtual_ticks_are_evenly_spaced_from_zero() {
         let mut schedule = Schedule::start_virtual(250_000);
-        let ticks: Vec<Tick> = (0..3).map(|_| schedule.wait().tick).collect();
+        let ticks: Vec<Tick> = (0..3).map(|_| wait(&mut schedule).tick).collect();
         assert_eq!(ticks[0], Tick { index: 0, time_ns: 0, dt_ns: 0 });
         assert_eq!(ticks[2], Tick { index: 2, time_ns: 500_000, dt_ns: 250_000 });
     }
@@ -164,9 +241,9 @@ mod tests {
     fn a_loop_that_was_held_up_skips_what_is_past_and_counts_it() {
         let period_ns = 1_000_000;
         let mut schedule = Schedule::start_real(period_ns, SpinWindow { spin_ns: 50_000 });
-        let _ = schedule.wait();
+        let _ = wait(&mut schedule);
         std::thread::sleep(std::time::Duration::from_millis(20));
-        let due = schedule.wait();
+        let due = wait(&mut schedule);
         assert!(due.missed >= 15, "{}", due.missed); // 20 periods passed; a loaded machine only adds to them
         assert!(due.lateness_ns < period_ns);
         assert_eq!(due.tick.index, 1);

@@ -1,11 +1,12 @@
 //! A device a host may use, in two types: opened (it answers) and active (it moves hands).
 
 use super::Setting;
+use super::library::DeviceExtensions;
 use super::model::refusal_from;
-use crate::abi::{CallStatus, DeviceTable, EnergyLedgerTable, Instance, Message};
+use crate::abi::{CallStatus, DeviceTable, Instance, Message};
 use crate::{
     Axes, Capabilities, Cycle, DeviceState, EnergyLedger, LoopConfig, Parameter, ParameterValue, Refusal,
-    Tick, Wrench,
+    SampleWait, Tick, Wrench,
 };
 use std::sync::Arc;
 
@@ -13,7 +14,7 @@ use std::sync::Arc;
 struct Handle {
     instance: Instance,
     table: &'static DeviceTable,
-    ledger: Option<&'static EnergyLedgerTable>,
+    extensions: DeviceExtensions,
     parameters: &'static [Parameter],
 }
 
@@ -68,7 +69,7 @@ impl Stopper {
 impl OpenedDevice {
     pub(super) fn open(
         table: &'static DeviceTable,
-        ledger: Option<&'static EnergyLedgerTable>,
+        extensions: DeviceExtensions,
         parameters: &'static [Parameter],
         settings: &[Setting],
     ) -> Result<Self, Refusal> {
@@ -85,7 +86,7 @@ impl OpenedDevice {
         if instance.is_null() {
             return Err(Refusal::broken("it reported success but opened nothing"));
         }
-        Ok(Self { handle: Arc::new(Handle { instance, table, ledger, parameters }) })
+        Ok(Self { handle: Arc::new(Handle { instance, table, extensions, parameters }) })
     }
 
     /// What the device can be told.
@@ -120,6 +121,12 @@ impl OpenedDevice {
         }
         check_capabilities(&capabilities)?;
         Ok(capabilities)
+    }
+
+    /// Whether the device can set the pace of the loop.
+    #[must_use]
+    pub fn can_pace(&self) -> bool {
+        self.handle.extensions.pacing.is_some_and(|table| table.wait_for_sample.is_some())
     }
 
     /// The handle by which another thread stops the device.
@@ -184,10 +191,25 @@ impl ActiveDevice {
         CallStatus::from_code(code)
     }
 
+    /// Waits for the device's next sample, for `timeout_ns` at most. Real-time but for the waiting: no allocation.
+    pub fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
+        let pacing = self.handle.as_ref().and_then(|handle| handle.extensions.pacing);
+        let Some(wait) = pacing.and_then(|table| table.wait_for_sample) else { return SampleWait::NotPaced };
+        let mut samples = 0;
+        // SAFETY: as in `read`; the out pointer is valid for the call.
+        let code = unsafe { wait(self.instance, timeout_ns, &raw mut samples) };
+        match CallStatus::from_code(code) {
+            CallStatus::Ok if samples > 0 => SampleWait::Arrived { samples },
+            CallStatus::Unsupported => SampleWait::NotPaced,
+            // A device that broke says so in its next `read`.
+            _ => SampleWait::TimedOut,
+        }
+    }
+
     /// Energy account of the plant, where there is one. Real-time: bounded, no allocation.
     #[must_use]
     pub fn energy_ledger(&mut self) -> Option<EnergyLedger> {
-        let ask = self.handle.as_ref()?.ledger?.ledger?;
+        let ask = self.handle.as_ref()?.extensions.ledger?.ledger?;
         let mut ledger = EnergyLedger::default();
         // SAFETY: as in `read`; the out pointer is valid for the call.
         let code = unsafe { ask(self.instance, &raw mut ledger) };

@@ -3,8 +3,8 @@
 use super::model::{Model, ModelTables};
 use super::{LoadError, Metadata, OpenedDevice, Setting, check, metadata_file};
 use crate::abi::{
-    ABI_MAJOR, ABI_MINOR, CenterlineTable, DetailsTable, DeviceTable, EnergyLedgerTable, Entry, ForceTable,
-    HOST_QUIET_PANICS, Host, MAGIC, PluginKind, Str, VariantTable, interface_ids,
+    ABI_MAJOR, ABI_MINOR, CenterlineTable, DetailsTable, DevicePacingTable, DeviceTable, EnergyLedgerTable,
+    Entry, ForceTable, HOST_QUIET_PANICS, Host, MAGIC, PluginKind, Str, VariantTable, interface_ids,
 };
 use crate::{DeviceInfo, ModelInfo, Parameter};
 use std::ffi::CString;
@@ -32,7 +32,14 @@ pub struct Plugin {
 #[derive(Clone, Copy)]
 enum Interface {
     Model(ModelTables),
-    Device { device: &'static DeviceTable, ledger: Option<&'static EnergyLedgerTable> },
+    Device { device: &'static DeviceTable, extensions: DeviceExtensions },
+}
+
+/// What a device offers beyond the plain one.
+#[derive(Clone, Copy)]
+pub(super) struct DeviceExtensions {
+    pub(super) ledger: Option<&'static EnergyLedgerTable>,
+    pub(super) pacing: Option<&'static DevicePacingTable>,
 }
 
 impl Plugin {
@@ -165,10 +172,10 @@ impl Plugin {
     /// # Errors
     /// [`LoadError::OtherKind`] for a model, [`LoadError::Refused`] if the plugin says no.
     pub fn open_device(&self, settings: &[Setting]) -> Result<OpenedDevice, LoadError> {
-        let Interface::Device { device, ledger } = self.interface else {
+        let Interface::Device { device, extensions } = self.interface else {
             return Err(self.other_kind(PluginKind::Device));
         };
-        OpenedDevice::open(device, ledger, self.parameters(), settings)
+        OpenedDevice::open(device, extensions, self.parameters(), settings)
             .map_err(|refusal| self.refused(refusal))
     }
 
@@ -250,7 +257,10 @@ fn find_interface(metadata: &Metadata, entry: &'static Entry) -> Result<Interfac
         }
         // SAFETY: as above, for the extension's table.
         let ledger = unsafe { table(interface_ids::ENERGY_LEDGER).cast::<EnergyLedgerTable>().as_ref() };
-        Ok(Interface::Device { device, ledger })
+        // SAFETY: as above, for the extension's table.
+        let pacing = unsafe { table(interface_ids::DEVICE_PACING).cast::<DevicePacingTable>().as_ref() };
+        let pacing = pacing.filter(|table| table.size as usize >= size_of::<DevicePacingTable>());
+        Ok(Interface::Device { device, extensions: DeviceExtensions { ledger, pacing } })
     } else {
         let id = interface_ids::FORCE;
         // SAFETY: the table behind this id is a `ForceTable`, by the contract and the layout check.

@@ -1,0 +1,63 @@
+//! Samples taken at even times of the machine's clock: the simulated flotor as a device that sets the pace.
+
+use flotor_hal::SampleWait;
+use std::time::{Duration, Instant};
+
+/// Takes a sample every period from the first wait on.
+pub(crate) struct SampleClock {
+    period: Duration,
+    started: Option<Instant>,
+    /// Samples that a wait has told of.
+    told: u64,
+}
+
+impl SampleClock {
+    pub(crate) fn new(period_ns: u64) -> Self {
+        Self { period: Duration::from_nanos(period_ns.max(1)), started: None, told: 0 }
+    }
+
+    /// Sleeps until there is a sample nobody was told of, or for `timeout`.
+    pub(crate) fn wait(&mut self, timeout: Duration) -> SampleWait {
+        let since = self.started.get_or_insert_with(Instant::now).elapsed();
+        let next = Duration::from_nanos(self.nanoseconds(self.told + 1));
+        let until_next = next.saturating_sub(since);
+        std::thread::sleep(until_next.min(timeout));
+        let taken = self.taken();
+        let samples = taken - self.told.min(taken);
+        self.told = taken.max(self.told);
+        if samples == 0 { SampleWait::TimedOut } else { SampleWait::Arrived { samples } }
+    }
+
+    #[allow(clippy::cast_possible_truncation)] // 2^64 ns are centuries
+    fn taken(&self) -> u64 {
+        let since = self.started.map_or(Duration::ZERO, |started| started.elapsed());
+        (since.as_nanos() / self.period.as_nanos()) as u64
+    }
+
+    #[allow(clippy::cast_possible_truncation)] // 2^64 ns are centuries
+    fn nanoseconds(&self, samples: u64) -> u64 {
+        samples.saturating_mul(self.period.as_nanos() as u64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_that_nobody_waited_for_are_counted_and_none_twice() {
+        let mut clock = SampleClock::new(1_000_000);
+        assert_eq!(clock.wait(Duration::from_secs(1)), SampleWait::Arrived { samples: 1 });
+        std::thread::sleep(Duration::from_millis(20));
+        let SampleWait::Arrived { samples } = clock.wait(Duration::from_secs(1)) else {
+            panic!("20 are there")
+        };
+        assert!(samples >= 20, "{samples}"); // a loaded machine only adds to them
+    }
+
+    #[test]
+    fn a_wait_that_is_shorter_than_the_period_ends_without_a_sample() {
+        let mut clock = SampleClock::new(3_600_000_000_000);
+        assert_eq!(clock.wait(Duration::from_millis(1)), SampleWait::TimedOut);
+    }
+}
