@@ -47,6 +47,12 @@ impl Mapping {
         }
     }
 
+    /// Rotation from the device frame to the model frame.
+    #[must_use]
+    pub fn rotation(&self) -> DQuat {
+        self.model_from_device
+    }
+
     /// Factor from the model's stiffness to the stiffness at the hand.
     #[must_use]
     pub fn stiffness_scale(&self) -> f64 {

@@ -24,6 +24,7 @@ mod stress;
 mod study;
 mod sweep;
 mod validate;
+mod view;
 
 use crate::registry::LookupError;
 use crate::servo::{EmergencySource, Place, Stuck};
@@ -54,6 +55,8 @@ enum Command {
     Run(run::RunArguments),
     /// Ask the models of a recording again: bit for bit, or with other parameters
     Replay(replay::ReplayArguments),
+    /// Show a recording: the spring in 3D, and traces
+    View(view::ViewArguments),
     /// Evaluate a force model at poses from a CSV file
     Eval(eval::EvalArguments),
     /// List the plugins that are found, without running any of them
@@ -217,6 +220,7 @@ pub fn main() -> ExitCode {
         None => run::run(run::RunArguments::default()),
         Some(Command::Run(arguments)) => run::run(arguments),
         Some(Command::Replay(arguments)) => replay::run(&arguments),
+        Some(Command::View(arguments)) => view::run(&arguments),
         Some(Command::Eval(arguments)) => eval::run(&arguments),
         Some(Command::Plugins(arguments)) => plugins::run(&arguments),
         Some(Command::Validate(arguments)) => validate::run(&arguments),

@@ -1,0 +1,137 @@
+//! Where the picture is seen from: an orbit around a point, z up.
+
+use flotor_hal::DVec3;
+use flotor_hal::glam::{DMat4, DVec4};
+
+/// An eye on a sphere around a point it looks at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Turn about the vertical, rad; 0 looks along +y, away from the user.
+    pub azimuth_rad: f64,
+    /// Height above the horizon, rad.
+    pub inclination_rad: f64,
+    /// Distance from the point, mm.
+    pub distance_mm: f64,
+    /// The point, mm.
+    pub target_mm: DVec3,
+}
+
+/// Vertical angle of view, rad: that of a 70 mm lens on a full frame, which flatters small things.
+const FIELD_OF_VIEW_RAD: f64 = 0.34;
+/// Legal inclinations, rad: a little below the ground to straight above.
+const INCLINATION_RAD: std::ops::RangeInclusive<f64> = -0.05..=1.55;
+/// Nearest and farthest distance relative to the size of what is shown.
+const NEAREST: f64 = 1.5;
+const FARTHEST: f64 = 30.0;
+
+impl Camera {
+    /// The view an experimenter gets: from the front, right and above, everything of a body of this height in sight.
+    #[must_use]
+    pub fn experimenter(height_mm: f64) -> Self {
+        Self {
+            azimuth_rad: 0.55,
+            inclination_rad: 0.24,
+            distance_mm: 4.6 * height_mm,
+            target_mm: DVec3::new(0.0, 0.0, -0.40 * height_mm),
+        }
+    }
+
+    /// Where the eye is, mm.
+    #[must_use]
+    pub fn eye_mm(&self) -> DVec3 {
+        let (sine, cosine) = self.inclination_rad.sin_cos();
+        let out = DVec3::new(cosine * self.azimuth_rad.sin(), -cosine * self.azimuth_rad.cos(), sine);
+        self.target_mm + out * self.distance_mm
+    }
+
+    /// Turns the eye about the point.
+    pub fn orbit(&mut self, azimuth_rad: f64, inclination_rad: f64) {
+        self.azimuth_rad = (self.azimuth_rad + azimuth_rad) % std::f64::consts::TAU;
+        let inclined = self.inclination_rad + inclination_rad;
+        self.inclination_rad = inclined.clamp(*INCLINATION_RAD.start(), *INCLINATION_RAD.end());
+    }
+
+    /// Comes nearer by a factor (above 1), within sense for a body of this height.
+    pub fn zoom(&mut self, factor: f64, height_mm: f64) {
+        let distance_mm = self.distance_mm / factor.max(f64::MIN_POSITIVE);
+        self.distance_mm = distance_mm.clamp(NEAREST * height_mm, FARTHEST * height_mm);
+    }
+
+    /// From mm to clip coordinates with depth 0 to 1, for a picture of this width to height.
+    #[must_use]
+    pub fn projection(&self, aspect: f64) -> DMat4 {
+        let (near_mm, far_mm) = (0.05 * self.distance_mm, 20.0 * self.distance_mm);
+        lens(aspect.max(1.0e-3), near_mm, far_mm) * self.eye_frame()
+    }
+
+    /// From mm to the eye's frame: x right, y up, z towards the viewer.
+    fn eye_frame(&self) -> DMat4 {
+        let eye = self.eye_mm();
+        let back = (eye - self.target_mm).normalize_or(DVec3::Z);
+        let right = DVec3::Z.cross(back).normalize_or(DVec3::X);
+        let up = back.cross(right);
+        let turn =
+            DMat4::from_cols(right.extend(0.0), up.extend(0.0), back.extend(0.0), DVec4::W).transpose();
+        turn * DMat4::from_translation(-eye)
+    }
+
+    /// Pixels a millimetre at the point looked at covers in a picture so many pixels high.
+    #[must_use]
+    pub fn pixels_per_mm(&self, height_px: f64) -> f64 {
+        0.5 * height_px / (self.distance_mm * (0.5 * FIELD_OF_VIEW_RAD).tan())
+    }
+
+    /// Where a point (mm) appears, as parts of width and height from the upper left; `None` behind the eye.
+    #[must_use]
+    pub fn on_screen(&self, point_mm: DVec3, aspect: f64) -> Option<[f64; 2]> {
+        let DVec4 { x, y, w, .. } = self.projection(aspect) * point_mm.extend(1.0);
+        (w > 0.0).then(|| [0.5 + 0.5 * x / w, 0.5 - 0.5 * y / w])
+    }
+}
+
+/// Perspective with depth 0 at the near plane and 1 at the far one.
+fn lens(aspect: f64, near_mm: f64, far_mm: f64) -> DMat4 {
+    let focal = 1.0 / (0.5 * FIELD_OF_VIEW_RAD).tan();
+    let depth = far_mm / (near_mm - far_mm);
+    DMat4::from_cols(
+        DVec4::new(focal / aspect, 0.0, 0.0, 0.0),
+        DVec4::new(0.0, focal, 0.0, 0.0),
+        DVec4::new(0.0, 0.0, depth, -1.0),
+        DVec4::new(0.0, 0.0, near_mm * depth, 0.0),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_point_looked_at_is_in_the_middle_and_up_is_up() {
+        let camera = Camera::experimenter(25.0);
+        let [x, y] = camera.on_screen(camera.target_mm, 1.6).unwrap();
+        assert!((x - 0.5).abs() < 1.0e-12 && (y - 0.5).abs() < 1.0e-12);
+        let [_, above] = camera.on_screen(camera.target_mm + DVec3::Z, 1.6).unwrap();
+        assert!(above < 0.5);
+        let [right, _] =
+            Camera { azimuth_rad: 0.0, ..camera }.on_screen(camera.target_mm + DVec3::X, 1.6).unwrap();
+        assert!(right > 0.5, "seen from the user, x is to the right");
+    }
+
+    #[test]
+    fn a_millimetre_has_the_size_it_says() {
+        let camera = Camera { inclination_rad: 0.0, ..Camera::experimenter(25.0) };
+        let [_, y] = camera.on_screen(camera.target_mm + DVec3::Z * 1.0e-3, 1.6).unwrap();
+        assert!(((0.5 - y) * 600.0 * 1.0e3 / camera.pixels_per_mm(600.0) - 1.0).abs() < 1.0e-6);
+    }
+
+    #[test]
+    fn orbit_and_zoom_stay_within_sense() {
+        let mut camera = Camera::experimenter(25.0);
+        camera.orbit(100.0, 100.0);
+        camera.zoom(1.0e9, 25.0);
+        assert_eq!((camera.inclination_rad, camera.distance_mm), (1.55, 37.5));
+        camera.orbit(0.0, -100.0);
+        camera.zoom(0.0, 25.0);
+        assert_eq!((camera.inclination_rad, camera.distance_mm), (-0.05, 750.0));
+    }
+}

@@ -1,0 +1,97 @@
+//! Fewer points, the same picture: smallest and largest value of each bucket of time.
+//!
+//! Buckets lie at whole multiples of their width from time zero, not from the edge of the picture: while a trace
+//! scrolls, a sample stays in its bucket and the trace does not shimmer.
+
+/// A point of a trace: time, s, and value.
+pub type Point = [f64; 2];
+
+/// Points of a trace of which not more than two fall into a bucket.
+///
+/// `buckets` is how many may fit between the two times, about one a pixel. A trace with fewer points than that
+/// comes back as it is. Values that are not finite are left out.
+#[must_use]
+pub fn min_max(points: impl Iterator<Item = Point> + Clone, span_s: [f64; 2], buckets: usize) -> Vec<Point> {
+    let finite = points.filter(|[time, value]| time.is_finite() && value.is_finite());
+    if finite.clone().take(2 * buckets + 1).count() <= 2 * buckets {
+        return finite.collect();
+    }
+    let width_s = bucket_width_s(span_s[1] - span_s[0], buckets);
+    let mut kept = Vec::with_capacity(4 * buckets);
+    let mut bucket: Option<(f64, Point, Point)> = None;
+    for point in finite {
+        let number = (point[0] / width_s).floor();
+        match &mut bucket {
+            Some((current, low, high)) if *current == number => {
+                if point[1] < low[1] {
+                    *low = point;
+                }
+                if point[1] > high[1] {
+                    *high = point;
+                }
+            }
+            _ => {
+                close(&mut kept, bucket.take());
+                bucket = Some((number, point, point));
+            }
+        }
+    }
+    close(&mut kept, bucket);
+    kept
+}
+
+/// Width of a bucket, s: a power of two, so that zooming by less does not move any edge.
+#[allow(clippy::cast_precision_loss)] // a few thousand buckets
+fn bucket_width_s(span_s: f64, buckets: usize) -> f64 {
+    let wanted_s = (span_s / buckets.max(1) as f64).max(f64::MIN_POSITIVE);
+    wanted_s.log2().ceil().exp2()
+}
+
+fn close(kept: &mut Vec<Point>, bucket: Option<(f64, Point, Point)>) {
+    let Some((_, low, high)) = bucket else { return };
+    let [first, second] = if low[0] <= high[0] { [low, high] } else { [high, low] };
+    kept.push(first);
+    if first != second {
+        kept.push(second);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noise(count: usize) -> Vec<Point> {
+        (0..count).map(|i| [i as f64 * 1.0e-3, ((i * 7919) % 1009) as f64]).collect()
+    }
+
+    #[test]
+    fn extremes_survive_and_points_do_not() {
+        let points = noise(10_000);
+        let kept = min_max(points.iter().copied(), [0.0, 10.0], 500);
+        assert!(kept.len() <= 1100 && kept.len() >= 500, "{}", kept.len());
+        let extremes = |points: &[Point]| {
+            points.iter().fold([f64::MAX, f64::MIN], |[low, high], [_, v]| [low.min(*v), high.max(*v)])
+        };
+        assert_eq!(extremes(&kept), extremes(&points));
+        assert!(kept.is_sorted_by(|a, b| a[0] < b[0]));
+    }
+
+    #[test]
+    fn a_scrolling_trace_keeps_its_points() {
+        let points = noise(10_000);
+        let window = |from: usize| min_max(points[from..from + 5000].iter().copied(), [0.0, 5.0], 500);
+        let (before, after) = (window(1000), window(1003));
+        // All but the buckets at the two edges.
+        let inside = |point: &&Point| point[0] > 1.1 && point[0] < 5.9;
+        let before: Vec<_> = before.iter().filter(inside).collect();
+        assert!(before.len() > 500);
+        assert_eq!(before, after.iter().filter(inside).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn few_points_and_holes_are_left_alone() {
+        let points = [[0.0, 1.0], [1.0, f64::NAN], [2.0, 3.0]];
+        assert_eq!(min_max(points.into_iter(), [0.0, 2.0], 100), [[0.0, 1.0], [2.0, 3.0]]);
+        assert!(min_max(std::iter::empty(), [0.0, 0.0], 0).is_empty());
+    }
+}

@@ -1,0 +1,69 @@
+//! Force as a straight arrow, torque as one bent around its axis.
+
+use super::{Color, Frame, Mesh, revolve};
+use flotor_hal::DVec3;
+use flotor_hal::glam::DVec2;
+use std::f64::consts::TAU;
+
+/// Sides of a shaft and a head.
+const SIDES: usize = 72;
+/// Length of a head in radii of its shaft, and its radius.
+const HEAD_LENGTH: f64 = 6.0;
+const HEAD_RADIUS: f64 = 2.6;
+
+/// An arrow from a point along a vector, m. Shorter than a head, it is all head.
+pub fn force_arrow(mesh: &mut Mesh, from_m: DVec3, vector_m: DVec3, shaft_radius_m: f64, color: Color) {
+    let length_m = vector_m.length();
+    let Some(direction) = vector_m.try_normalize() else { return };
+    // A small force is a small arrow: below two heads everything shrinks alike.
+    let radius_m = shaft_radius_m.min(length_m / (2.0 * HEAD_LENGTH));
+    let neck_m = length_m - HEAD_LENGTH * radius_m;
+    let head_m = HEAD_RADIUS * radius_m;
+    let profile = [(0.0, 0.0), (radius_m, 0.0), (radius_m, neck_m), (head_m, neck_m), (0.0, length_m)];
+    revolve(mesh, &Frame::along(from_m, direction), &profile, SIDES, color);
+}
+
+/// An arc with a head about an axis, in the sense a torque turns; `angle_rad` is how far around it goes.
+#[allow(clippy::cast_precision_loss)] // a few dozen rings
+pub fn torque_arrow(
+    mesh: &mut Mesh,
+    center_m: DVec3,
+    axis: DVec3,
+    radius_m: f64,
+    angle_rad: f64,
+    shaft_radius_m: f64,
+    color: Color,
+) {
+    const RINGS: usize = 48;
+    let Some(axis) = axis.try_normalize() else { return };
+    let angle_rad = angle_rad.clamp(0.0, 0.95 * TAU);
+    let frame = Frame::along(center_m, axis);
+    let shaft_m = shaft_radius_m.min(radius_m * angle_rad / (2.0 * HEAD_LENGTH));
+    let arc_rad = angle_rad - HEAD_LENGTH * shaft_m / radius_m;
+    if arc_rad <= 0.0 {
+        return;
+    }
+    let out = |angle: f64| frame.x * angle.cos() + frame.y * angle.sin();
+    let mut last: Option<Vec<u32>> = None;
+    for k in 0..=RINGS {
+        let radial = out(arc_rad * k as f64 / RINGS as f64);
+        let ring: Vec<u32> = (0..SIDES)
+            .map(|i| {
+                let around = DVec2::from_angle(TAU * i as f64 / SIDES as f64);
+                let normal = radial * around.x + axis * around.y;
+                mesh.vertex(center_m + radial * radius_m + normal * shaft_m, normal, color)
+            })
+            .collect();
+        if let Some(last) = &last {
+            for i in 0..SIDES {
+                let j = (i + 1) % SIDES;
+                mesh.quad(last[i], ring[i], ring[j], last[j]);
+            }
+        }
+        last = Some(ring);
+    }
+    let tip = out(arc_rad);
+    let head = Frame::along(center_m + tip * radius_m, axis.cross(tip));
+    let profile = [(0.0, 0.0), (HEAD_RADIUS * shaft_m, 0.0), (0.0, HEAD_LENGTH * shaft_m)];
+    revolve(mesh, &head, &profile, SIDES, color);
+}

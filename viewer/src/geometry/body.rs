@@ -1,0 +1,36 @@
+//! A body as its model describes it, at rest.
+
+use super::Curve;
+use flotor_hal::{CenterlineInfo, Pose};
+
+/// What does not change while the handle moves: how the body is drawn, and its shape at rest.
+#[derive(Clone, Debug)]
+pub struct Body {
+    /// How to draw it around its centreline.
+    pub info: CenterlineInfo,
+    /// Its centreline at home.
+    pub rest: Curve,
+    /// Length of the centreline at home, m.
+    pub rest_length_m: f64,
+}
+
+impl Body {
+    /// From what a model says; `None` if there is nothing to draw.
+    #[must_use]
+    pub fn new(info: CenterlineInfo, rest: &[Pose]) -> Option<Self> {
+        let numbers = [info.tube_radius_m, info.helix_radius_m, info.helix_turns, info.plate_radius_m];
+        if !numbers.iter().all(|number| number.is_finite() && *number >= 0.0) || info.tube_radius_m == 0.0 {
+            return None;
+        }
+        let curve = Curve::through(rest)?;
+        let steps = rest.windows(2).map(|pair| (pair[1].position() - pair[0].position()).length());
+        let rest_length_m: f64 = steps.sum();
+        (rest_length_m > 0.0).then_some(Self { info, rest: curve, rest_length_m })
+    }
+
+    /// True if a wire is wound about the centreline; false for a plain tube.
+    #[must_use]
+    pub fn is_coil(&self) -> bool {
+        self.info.helix_turns > 0.0 && self.info.helix_radius_m > 0.0
+    }
+}

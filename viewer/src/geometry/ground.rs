@@ -1,0 +1,123 @@
+//! The ground: a grid that fades out, and soft shadows, so that the eye finds up, near and far.
+
+use super::{Color, Mesh};
+use flotor_hal::DVec3;
+use flotor_hal::glam::DVec2;
+use std::f64::consts::TAU;
+
+/// A round patch of the plane `z = height_m`.
+#[derive(Clone, Copy, Debug)]
+pub struct Ground {
+    /// Height of the plane, m.
+    pub height_m: f64,
+    /// Where it has faded out, m from the origin.
+    pub radius_m: f64,
+    /// Distance of grid lines, m.
+    pub spacing_m: f64,
+    /// Colour of the surface in the middle.
+    pub surface: Color,
+    /// Colour of the lines.
+    pub line: Color,
+}
+
+/// A soft dark spot.
+#[derive(Clone, Copy, Debug)]
+pub struct Shadow {
+    /// Its middle, m.
+    pub center_m: DVec2,
+    /// Where it has lost two thirds of its strength, m.
+    pub radius_m: f64,
+    /// How dark its middle is, 0 to 1.
+    pub strength: f64,
+}
+
+/// Half the width of a grid line, part of the distance of lines.
+const LINE_HALF_WIDTH: f64 = 0.012;
+/// Lines lie this part of the distance of lines above the surface, to be in front of it.
+const LINE_LIFT: f64 = 0.002;
+
+impl Ground {
+    /// Adds surface and lines. Draw it first: what stands on it covers it.
+    pub fn append(&self, mesh: &mut Mesh, shadows: &[Shadow]) {
+        self.surface(mesh, shadows);
+        self.lines(mesh);
+    }
+
+    fn fade(&self, at: DVec2) -> f64 {
+        let x = (1.0 - at.length() / self.radius_m).clamp(0.0, 1.0);
+        x * x * (3.0 - 2.0 * x)
+    }
+
+    #[allow(clippy::cast_precision_loss)] // a few dozen rings
+    fn surface(&self, mesh: &mut Mesh, shadows: &[Shadow]) {
+        const RINGS: usize = 48;
+        const SECTORS: usize = 96;
+        let mut last: Option<Vec<u32>> = None;
+        for k in 0..=RINGS {
+            // Denser in the middle, where the shadows are.
+            let radius_m = self.radius_m * (k as f64 / RINGS as f64).powf(1.6);
+            let ring: Vec<u32> = (0..=SECTORS)
+                .map(|i| {
+                    let at = DVec2::from_angle(TAU * i as f64 / SECTORS as f64) * radius_m;
+                    let light = shadows.iter().fold(1.0, |light, shadow| light * (1.0 - shadow.at(at)));
+                    let color = with_opacity(darker(self.surface, light), self.fade(at));
+                    mesh.vertex(at.extend(self.height_m), DVec3::ZERO, color)
+                })
+                .collect();
+            if let Some(last) = &last {
+                for i in 0..SECTORS {
+                    mesh.quad(last[i], ring[i], ring[i + 1], last[i + 1]);
+                }
+            }
+            last = Some(ring);
+        }
+    }
+
+    #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)] // a few dozen lines
+    fn lines(&self, mesh: &mut Mesh) {
+        const PIECES: usize = 24;
+        let count = (self.radius_m / self.spacing_m) as i32;
+        let height_m = self.height_m + LINE_LIFT * self.spacing_m;
+        let half_m = LINE_HALF_WIDTH * self.spacing_m;
+        for across_x in [true, false] {
+            for line in -count..=count {
+                let offset_m = f64::from(line) * self.spacing_m;
+                let reach_m = (self.radius_m.powi(2) - offset_m.powi(2)).max(0.0).sqrt();
+                let mut last: Option<(u32, u32)> = None;
+                for piece in 0..=PIECES {
+                    let along_m = reach_m * (2.0 * piece as f64 / PIECES as f64 - 1.0);
+                    let at = |side: f64| {
+                        let (u, v) = (along_m, offset_m + side * half_m);
+                        if across_x { DVec2::new(u, v) } else { DVec2::new(-v, u) }
+                    };
+                    let color = with_opacity(self.line, self.fade(at(0.0)));
+                    let [a, b] =
+                        [-1.0, 1.0].map(|side| mesh.vertex(at(side).extend(height_m), DVec3::ZERO, color));
+                    if let Some((a0, b0)) = last {
+                        mesh.quad(a0, a, b, b0);
+                    }
+                    last = Some((a, b));
+                }
+            }
+        }
+    }
+}
+
+impl Shadow {
+    fn at(&self, point_m: DVec2) -> f64 {
+        self.strength * (-point_m.distance_squared(self.center_m) / self.radius_m.powi(2)).exp()
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a part of 255
+fn darker(color: Color, light: f64) -> Color {
+    let [r, g, b, a] = color;
+    let [r, g, b] = [r, g, b].map(|part| (f64::from(part) * light.clamp(0.0, 1.0)) as u8);
+    [r, g, b, a]
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a part of 255
+fn with_opacity(color: Color, opacity: f64) -> Color {
+    let [r, g, b, a] = color;
+    [r, g, b, (f64::from(a) * opacity.clamp(0.0, 1.0)) as u8]
+}

@@ -1,0 +1,57 @@
+//! Triangles to draw, in the form a GPU takes and the CPU rasteriser reads.
+
+use flotor_hal::DVec3;
+
+/// Millimetres per metre: the picture's unit keeps `f32` coordinates near one.
+pub const MM_PER_M: f64 = 1.0e3;
+
+/// A corner of a triangle. 28 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Vertex {
+    /// Position, mm, in the frame of the picture (z up).
+    pub position_mm: [f32; 3],
+    /// Unit normal; zero for a surface that no light changes.
+    pub normal: [f32; 3],
+    /// Colour and opacity, sRGB.
+    pub color: Color,
+}
+
+/// Colour and opacity, sRGB, straight alpha.
+pub type Color = [u8; 4];
+
+/// A list of triangles. Corners run counter-clockwise seen from outside.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// The corners.
+    pub vertices: Vec<Vertex>,
+    /// Three indices a triangle.
+    pub indices: Vec<u32>,
+}
+
+impl Mesh {
+    /// Forgets everything but the memory.
+    pub fn clear(&mut self) {
+        self.vertices.clear();
+        self.indices.clear();
+    }
+
+    /// Adds a corner and gives its index. The position is in metres.
+    #[allow(clippy::cast_possible_truncation)] // a picture needs no more than f32, and no more than 2^32 corners
+    pub fn vertex(&mut self, position_m: DVec3, normal: DVec3, color: Color) -> u32 {
+        let index = self.vertices.len() as u32;
+        let position_mm = (position_m * MM_PER_M).as_vec3().to_array();
+        self.vertices.push(Vertex { position_mm, normal: normal.as_vec3().to_array(), color });
+        index
+    }
+
+    /// Adds a triangle.
+    pub fn triangle(&mut self, a: u32, b: u32, c: u32) {
+        self.indices.extend_from_slice(&[a, b, c]);
+    }
+
+    /// Adds the quad `a b c d`, counter-clockwise.
+    pub fn quad(&mut self, a: u32, b: u32, c: u32, d: u32) {
+        self.indices.extend_from_slice(&[a, b, c, a, c, d]);
+    }
+}

@@ -1,0 +1,26 @@
+//! From a centreline to triangles: the wire wound about it, end plates, ground, arrows.
+//!
+//! Everything here is in metres and `f64` until a vertex is written. Frames are right-handed with z up.
+
+mod arrow;
+mod body;
+mod curve;
+mod detail;
+mod ground;
+mod mesh;
+mod revolve;
+mod strain;
+mod tube;
+
+#[cfg(test)]
+mod tests;
+
+pub use arrow::{force_arrow, torque_arrow};
+pub use body::Body;
+pub use curve::{Curve, Section};
+pub use detail::Detail;
+pub use ground::{Ground, Shadow};
+pub use mesh::{Color, MM_PER_M, Mesh, Vertex};
+pub use revolve::{Frame, plate, revolve};
+pub use strain::{LocalStrain, Strain, contact_strain};
+pub use tube::{append_tube, wire_center};

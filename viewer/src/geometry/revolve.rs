@@ -1,0 +1,81 @@
+//! Surfaces of revolution: plates, arrows, knobs.
+
+use super::{Color, Mesh, Section};
+use flotor_hal::DVec3;
+use flotor_hal::glam::DVec2;
+use std::f64::consts::TAU;
+
+/// Where an axis stands: origin and three unit vectors, z along the axis.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    /// Origin, m.
+    pub origin_m: DVec3,
+    /// First direction across the axis.
+    pub x: DVec3,
+    /// Second direction across the axis.
+    pub y: DVec3,
+    /// The axis.
+    pub z: DVec3,
+}
+
+impl Frame {
+    /// At a point, with the axis in a direction.
+    #[must_use]
+    pub fn along(origin_m: DVec3, direction: DVec3) -> Self {
+        let (x, y) = direction.any_orthonormal_pair();
+        Self { origin_m, x, y, z: direction }
+    }
+
+    /// That of a section.
+    #[must_use]
+    pub fn of(section: &Section) -> Self {
+        let turn = section.orientation;
+        Self { origin_m: section.center_m, x: turn * DVec3::X, y: turn * DVec3::Y, z: turn * DVec3::Z }
+    }
+}
+
+/// Turns a profile of points `(radius, height)`, m, about the z axis of a frame. The profile runs upwards on the
+/// outside; every edge of it is a sharp one.
+#[allow(clippy::cast_precision_loss)] // a few dozen sides
+pub fn revolve(mesh: &mut Mesh, frame: &Frame, profile: &[(f64, f64)], sides: usize, color: Color) {
+    for pair in profile.windows(2) {
+        let [(r0, z0), (r1, z1)] = [pair[0], pair[1]];
+        let slope = DVec2::new(z1 - z0, r0 - r1).normalize_or_zero();
+        let mut last: Option<(u32, u32)> = None;
+        for i in 0..=sides {
+            let around = DVec2::from_angle(TAU * i as f64 / sides as f64);
+            let out = frame.x * around.x + frame.y * around.y;
+            let normal = out * slope.x + frame.z * slope.y;
+            let a = mesh.vertex(frame.origin_m + out * r0 + frame.z * z0, normal, color);
+            let b = mesh.vertex(frame.origin_m + out * r1 + frame.z * z1, normal, color);
+            if let Some((a0, b0)) = last {
+                mesh.quad(a0, a, b, b0);
+            }
+            last = Some((a, b));
+        }
+    }
+}
+
+/// An end plate: a disc with chamfered rims that touches the section's plane and lies outside of it.
+/// `outward` is +1 for the handle's end and -1 for the fixed one.
+pub fn plate(
+    mesh: &mut Mesh,
+    section: &Section,
+    radius_m: f64,
+    thickness_m: f64,
+    outward: f64,
+    color: Color,
+) {
+    const SIDES: usize = 96;
+    let chamfer_m = 0.25 * thickness_m;
+    let (low, high) = if outward > 0.0 { (0.0, thickness_m) } else { (-thickness_m, 0.0) };
+    let profile = [
+        (0.0, low),
+        (radius_m - chamfer_m, low),
+        (radius_m, low + chamfer_m),
+        (radius_m, high - chamfer_m),
+        (radius_m - chamfer_m, high),
+        (0.0, high),
+    ];
+    revolve(mesh, &Frame::of(section), &profile, SIDES, color);
+}

@@ -1,0 +1,220 @@
+//! What has been seen of a run: its description, and samples of its ticks in order.
+
+use flotor_hal::{DVec3, Pose, rotation_vector};
+use flotor_record::trace::{Events, TickRecord};
+use flotor_record::{Ending, Note, ReadError, Recording, RunDescription};
+use std::collections::VecDeque;
+use std::path::Path;
+
+/// What the viewer keeps of a tick. Half the size of the record: pictures need no more than `f32` of most of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Scheduled time since the loop started, ns.
+    pub time_ns: u64,
+    /// Number of the tick.
+    pub tick: u64,
+    /// Pose of the handle in the device frame.
+    pub pose: Pose,
+    /// Velocity of the handle, m/s and rad/s.
+    pub twist: [f32; 6],
+    /// What the models asked for, N and N·m.
+    pub model: [f32; 6],
+    /// What was sent to the device, N and N·m.
+    pub commanded: [f32; 6],
+    /// Energy stored in the models, J.
+    pub energy_j: f32,
+    /// How late the tick started, s.
+    pub lateness_s: f32,
+    /// How long the tick took, s.
+    pub compute_s: f32,
+    /// What happened.
+    pub events: Events,
+}
+
+impl Sample {
+    /// Time since the loop started, s.
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        seconds(self.time_ns)
+    }
+
+    /// Force sent to the device, N.
+    #[must_use]
+    pub fn force_n(&self) -> DVec3 {
+        let [x, y, z, ..] = self.commanded.map(f64::from);
+        DVec3::new(x, y, z)
+    }
+
+    /// Torque sent to the device, N·m.
+    #[must_use]
+    pub fn torque_nm(&self) -> DVec3 {
+        let [.., x, y, z] = self.commanded.map(f64::from);
+        DVec3::new(x, y, z)
+    }
+
+    /// Rotation of the handle as a rotation vector, rad.
+    #[must_use]
+    pub fn rotation_rad(&self) -> DVec3 {
+        rotation_vector(self.pose.orientation())
+    }
+}
+
+impl From<&TickRecord> for Sample {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)] // for pictures
+    fn from(record: &TickRecord) -> Self {
+        let six = |a: [f64; 3], b: [f64; 3]| [a[0], a[1], a[2], b[0], b[1], b[2]].map(|value| value as f32);
+        Self {
+            time_ns: record.time_ns,
+            tick: record.tick,
+            pose: record.pose,
+            twist: six(record.twist.linear_m_per_s, record.twist.angular_rad_per_s),
+            model: six(record.model.force_n, record.model.torque_nm),
+            commanded: six(record.commanded.force_n, record.commanded.torque_nm),
+            energy_j: record.energy_j as f32,
+            lateness_s: record.lateness_ns as f32 * 1.0e-9,
+            compute_s: record.compute_ns as f32 * 1.0e-9,
+            events: record.events,
+        }
+    }
+}
+
+/// How much of the past is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keep {
+    /// All of it: a recording.
+    All,
+    /// The newest so many samples: a running host.
+    Newest(usize),
+}
+
+/// Samples in order of time, and what is known about the run.
+#[derive(Clone, Debug)]
+pub struct History {
+    run: RunDescription,
+    samples: VecDeque<Sample>,
+    keep: Keep,
+    notes: Vec<Note>,
+    ending: Option<Ending>,
+}
+
+impl History {
+    /// Of a run of which nothing has been seen.
+    #[must_use]
+    pub fn new(run: RunDescription, keep: Keep) -> Self {
+        let capacity = if let Keep::Newest(count) = keep { count } else { 0 };
+        Self { run, samples: VecDeque::with_capacity(capacity), keep, notes: Vec::new(), ending: None }
+    }
+
+    /// All of a recording. Damage after the first tick costs only what follows it and becomes a note.
+    ///
+    /// # Errors
+    /// [`ReadError`]: nothing of the file can be used.
+    pub fn read(path: &Path) -> Result<Self, ReadError> {
+        let mut recording = Recording::open(path)?;
+        let mut history = Self::new(recording.run().clone(), Keep::All);
+        history.ending = Some(recording.ending());
+        let mut damage = None;
+        for tick in recording.by_ref() {
+            match tick {
+                Ok(record) => history.push(&record),
+                Err(error) if history.samples.is_empty() => return Err(error),
+                Err(error) => damage = Some(error.to_string()),
+            }
+        }
+        history.notes = recording.notes().to_vec();
+        if let Some(text) = damage {
+            let time_ns = history.samples.back().map_or(0, |sample| sample.time_ns);
+            let severity = flotor_record::Severity::Error;
+            history.notes.push(Note { time_ns, severity, source: "recording".to_owned(), text });
+        }
+        Ok(history)
+    }
+
+    /// Adds a tick; the oldest makes room where only so many are kept.
+    pub fn push(&mut self, record: &TickRecord) {
+        if let Keep::Newest(count) = self.keep {
+            while self.samples.len() >= count.max(1) {
+                self.samples.pop_front();
+            }
+        }
+        self.samples.push_back(Sample::from(record));
+    }
+
+    /// Adds something that happened, in words.
+    pub fn note(&mut self, note: Note) {
+        self.notes.push(note);
+    }
+
+    /// How the run was set up.
+    #[must_use]
+    pub fn run(&self) -> &RunDescription {
+        &self.run
+    }
+
+    /// What happened, in words.
+    #[must_use]
+    pub fn notes(&self) -> &[Note] {
+        &self.notes
+    }
+
+    /// How the recording ends; `None` for a running host.
+    #[must_use]
+    pub fn ending(&self) -> Option<Ending> {
+        self.ending
+    }
+
+    /// How many samples there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// True if nothing has been seen.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.samples.is_empty()
+    }
+
+    /// First and last time, s; both 0 if there is nothing.
+    #[must_use]
+    pub fn span_s(&self) -> [f64; 2] {
+        [self.samples.front(), self.samples.back()].map(|sample| sample.map_or(0.0, Sample::time_s))
+    }
+
+    /// The sample in force at a time: the last one not after it, or the first.
+    #[must_use]
+    pub fn at(&self, time_s: f64) -> Option<&Sample> {
+        let after = self.index_after(time_s);
+        self.samples.get(after.saturating_sub(1))
+    }
+
+    /// Samples between two times, both included.
+    pub fn between(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = &Sample> {
+        let start = self.samples.partition_point(|sample| sample.time_s() < from_s);
+        let end = self.index_after(to_s).max(start);
+        self.samples.range(start..end)
+    }
+
+    /// All samples.
+    pub fn samples(&self) -> impl Iterator<Item = &Sample> {
+        self.samples.iter()
+    }
+
+    /// The sample with the largest force: the moment worth a picture.
+    #[must_use]
+    pub fn strongest(&self) -> Option<&Sample> {
+        self.samples
+            .iter()
+            .max_by(|a, b| a.force_n().length_squared().total_cmp(&b.force_n().length_squared()))
+    }
+
+    fn index_after(&self, time_s: f64) -> usize {
+        self.samples.partition_point(|sample| sample.time_s() <= time_s)
+    }
+}
+
+/// Seconds of nanoseconds.
+#[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
+pub(crate) fn seconds(time_ns: u64) -> f64 {
+    time_ns as f64 * 1.0e-9
+}

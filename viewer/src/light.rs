@@ -1,0 +1,43 @@
+//! How a surface looks: one key light, one fill light, a bright sky over a dark ground, and a highlight.
+//!
+//! The shader of the GPU repeats these numbers; a test compares the two.
+
+use crate::geometry::Vertex;
+use flotor_hal::DVec3;
+
+/// Towards the key light: from the left, the front and above. Not unit.
+pub const KEY: DVec3 = DVec3::new(-0.45, -0.65, 0.9);
+/// Towards the fill light, opposite. Not unit.
+pub const FILL: DVec3 = DVec3::new(0.8, 0.35, 0.25);
+/// Parts of the colour that each source gives.
+const KEY_PART: f64 = 0.62;
+const FILL_PART: f64 = 0.22;
+const SKY_PART: f64 = 0.42;
+const GROUND_PART: f64 = 0.18;
+/// Strength and sharpness of the highlight.
+const SHINE: f64 = 0.42;
+const SHARPNESS: i32 = 48;
+/// A rim where a round thing turns away, which sets it off from what is behind it.
+const RIM: f64 = 0.10;
+
+/// Colour of a corner seen from a place (mm), sRGB parts 0 to 1 and a little above.
+#[must_use]
+pub fn shade(vertex: &Vertex, eye_mm: DVec3) -> [f64; 3] {
+    let [r, g, b, _] = vertex.color;
+    let base = [r, g, b].map(|part| f64::from(part) / 255.0);
+    let normal = DVec3::from_array(vertex.normal.map(f64::from));
+    if normal == DVec3::ZERO {
+        return base;
+    }
+    let to_eye = (eye_mm - DVec3::from_array(vertex.position_mm.map(f64::from))).normalize_or_zero();
+    let (key, fill) = (KEY.normalize(), FILL.normalize());
+    let sky = 0.5 + 0.5 * normal.z;
+    let diffuse = KEY_PART * normal.dot(key).max(0.0)
+        + FILL_PART * normal.dot(fill).max(0.0)
+        + SKY_PART * sky
+        + GROUND_PART * (1.0 - sky);
+    let half = (key + to_eye).normalize_or_zero();
+    let highlight = SHINE * normal.dot(half).max(0.0).powi(SHARPNESS);
+    let rim = RIM * (1.0 - normal.dot(to_eye).max(0.0)).powi(3);
+    base.map(|part| part * diffuse + highlight + rim)
+}

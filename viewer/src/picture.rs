@@ -1,0 +1,191 @@
+//! A picture of a moment of a run, without a window, a display or a GPU.
+
+use crate::camera::Camera;
+use crate::history::{History, Sample};
+use crate::palette::{Look, Palette};
+use crate::quantity::{Quantity, Units};
+use crate::raster::flat::FlatRasterizer;
+use crate::raster::solid::Rasterizer;
+use crate::scene::{ArrowScale, SceneBuilder, Visible};
+use crate::shape::Shape;
+use crate::ui::plots::{PlotView, plot};
+use crate::ui::{legend, readout, style};
+use egui::{Color32, ColorImage, Context, RawInput, Rect, TextureOptions, Ui, pos2, vec2};
+use std::path::{Path, PathBuf};
+
+/// How a picture is to be made.
+#[derive(Clone, Debug)]
+pub struct PictureOptions {
+    /// Width and height, pixels.
+    pub size_px: [usize; 2],
+    /// Pixels a point: 2 draws everything twice as large as 1.
+    pub scale: f32,
+    /// Light or dark.
+    pub look: Look,
+    /// The moment, s; without one, that of the largest force.
+    pub at_s: Option<f64>,
+    /// Units of numbers.
+    pub units: Units,
+    /// From where; without one, the experimenter's view.
+    pub camera: Option<Camera>,
+}
+
+impl Default for PictureOptions {
+    fn default() -> Self {
+        Self {
+            size_px: [1280, 800],
+            scale: 1.0,
+            look: Look::Dark,
+            at_s: None,
+            units: Units::Handy,
+            camera: None,
+        }
+    }
+}
+
+/// Why there is no picture.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PictureError {
+    /// There is nothing to show.
+    #[error("the recording holds no ticks, there is nothing to show; record a longer run")]
+    Empty,
+    /// The file could not be written.
+    #[error("cannot write the picture `{}`: {cause}; name a file in a folder you may write to", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        #[source]
+        cause: std::io::Error,
+    },
+}
+
+/// Part of the height that the 3D view gets.
+const VIEW_PART: f32 = 0.60;
+/// Samples a pixel and direction of the 3D view.
+const SAMPLES: usize = 3;
+/// What stands beneath the 3D view.
+const PLOTS: [Quantity; 2] = [Quantity::Force, Quantity::Position];
+
+/// Draws a moment of a run: 3D view, numbers, traces.
+///
+/// # Errors
+/// [`PictureError::Empty`].
+pub fn picture(
+    history: &History,
+    shapes: &mut [Shape],
+    options: &PictureOptions,
+) -> Result<ColorImage, PictureError> {
+    let palette = Palette::of(options.look);
+    let sample = match options.at_s {
+        Some(at_s) => history.at(at_s),
+        None => history.strongest(),
+    };
+    let sample = *sample.ok_or(PictureError::Empty)?;
+    Ok(draw_without_window(options.size_px, options.scale, options.look, |ui| {
+        let area = ui.max_rect();
+        let view = Rect::from_min_size(area.min, vec2(area.width(), (area.height() * VIEW_PART).round()));
+        view_of(ui, view, history, shapes, &sample, options, &palette);
+        let below = Rect::from_min_max(view.left_bottom() + vec2(14.0, 8.0), area.max - vec2(20.0, 4.0));
+        let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(below));
+        let height = (below.height() - 2.0 * 26.0 - 12.0) / 2.0;
+        for (index, quantity) in PLOTS.into_iter().enumerate() {
+            let time_axis = index + 1 == PLOTS.len();
+            let view = PlotView {
+                quantity,
+                span_s: history.span_s(),
+                cursor_s: sample.time_s(),
+                units: options.units,
+                height: if time_axis { height + 14.0 } else { height - 14.0 },
+                time_axis,
+            };
+            plot(&mut ui, history, view, &palette);
+        }
+    }))
+}
+
+fn view_of(
+    ui: &mut Ui,
+    view: Rect,
+    history: &History,
+    shapes: &mut [Shape],
+    sample: &Sample,
+    options: &PictureOptions,
+    palette: &Palette,
+) {
+    let size_px = [view.width(), view.height()].map(|points| pixels(points * options.scale));
+    let camera = options.camera.unwrap_or_else(|| Camera::experimenter(SceneBuilder::height_mm(shapes)));
+    let scale = ArrowScale::fitting(history.samples());
+    let mut builder = SceneBuilder::default();
+    #[allow(clippy::cast_precision_loss)] // pixels
+    let height_px = size_px[1] as f64;
+    let (mesh, facts) = builder.build(shapes, sample, palette, &camera, height_px, scale, Visible::default());
+    let drawn = Rasterizer::default().draw(mesh, &camera, palette.backdrop, size_px, SAMPLES);
+    let image = ColorImage::from_rgb(drawn.size, &drawn.rgb);
+    let texture = ui.ctx().load_texture("view", image, TextureOptions::NEAREST);
+    let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+    let painter = ui.painter().clone();
+    painter.image(texture.id(), view, whole, Color32::WHITE);
+    // The handle must outlive the frame, or the texture is gone before it is drawn.
+    ui.data_mut(|data| data.insert_temp(egui::Id::unique("view texture"), texture));
+    readout::title(&painter, view, history.run(), palette);
+    readout::numbers(&painter, view, sample, options.units, palette);
+    readout::paint_warnings(&painter, view, &readout::warnings(sample, &facts), palette);
+    legend::paint(&painter, view, &facts, palette);
+}
+
+/// Runs an interface for the few passes it takes to settle, and draws it on the CPU.
+pub fn draw_without_window(
+    size_px: [usize; 2],
+    scale: f32,
+    look: Look,
+    mut interface: impl FnMut(&mut Ui),
+) -> ColorImage {
+    /// Plots know their bounds in the second pass; the third draws what the second laid out.
+    const PASSES: usize = 3;
+    let context = Context::default();
+    style::apply(&context, look);
+    let mut rasterizer = FlatRasterizer::default();
+    let mut primitives = Vec::new();
+    for pass in 0..PASSES {
+        #[allow(clippy::cast_precision_loss)] // pixels
+        let size = vec2(size_px[0] as f32, size_px[1] as f32) / scale;
+        let mut input = RawInput {
+            screen_rect: Some(Rect::from_min_size(pos2(0.0, 0.0), size)),
+            #[allow(clippy::cast_precision_loss)] // a few passes
+            time: Some(pass as f64),
+            ..RawInput::default()
+        };
+        if let Some(viewport) = input.viewports.get_mut(&egui::ViewportId::ROOT) {
+            viewport.native_pixels_per_point = Some(scale);
+        }
+        let mut output = context.run_ui(input, &mut interface);
+        rasterizer.update(&mut output.textures_delta);
+        primitives = context.tessellate(output.shapes, output.pixels_per_point);
+    }
+    rasterizer.draw(&primitives, size_px, scale, Palette::of(look).panel)
+}
+
+/// Writes a picture as PNG.
+///
+/// # Errors
+/// [`PictureError::Write`].
+pub fn write_png(path: &Path, image: &ColorImage) -> Result<(), PictureError> {
+    let write = || -> Result<(), png::EncodingError> {
+        let file = std::io::BufWriter::new(std::fs::File::create(path)?);
+        let [width, height] = image.size.map(|length| u32::try_from(length).unwrap_or(u32::MAX));
+        let mut encoder = png::Encoder::new(file, width, height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let bytes: Vec<u8> =
+            image.pixels.iter().flat_map(|pixel| [pixel.r(), pixel.g(), pixel.b()]).collect();
+        encoder.write_header()?.write_image_data(&bytes)
+    };
+    write().map_err(|cause| PictureError::Write { path: path.into(), cause: cause.into() })
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
+fn pixels(length: f32) -> usize {
+    length.round().max(1.0) as usize
+}

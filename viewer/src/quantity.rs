@@ -1,0 +1,121 @@
+//! What can be plotted, and in which units people read it.
+
+use crate::history::Sample;
+use flotor_hal::DVec3;
+
+/// Units of axes and readouts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Units {
+    /// Millimetres, degrees, newtons, millinewton metres.
+    #[default]
+    Handy,
+    /// Metres, radians, newtons, newton metres.
+    Si,
+}
+
+/// A measured quantity with one component or three.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Force sent to the device.
+    Force,
+    /// Torque sent to the device.
+    Torque,
+    /// Position of the handle.
+    Position,
+    /// Rotation vector of the handle.
+    Rotation,
+    /// Velocity of the handle.
+    Velocity,
+    /// Angular velocity of the handle.
+    AngularVelocity,
+    /// Energy stored in the models.
+    Energy,
+    /// How late ticks started.
+    Lateness,
+}
+
+impl Quantity {
+    /// All of them, in the order of menus.
+    pub const ALL: [Quantity; 8] = [
+        Self::Force,
+        Self::Torque,
+        Self::Position,
+        Self::Rotation,
+        Self::Velocity,
+        Self::AngularVelocity,
+        Self::Energy,
+        Self::Lateness,
+    ];
+
+    /// What people call it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Force => "Force",
+            Self::Torque => "Torque",
+            Self::Position => "Position",
+            Self::Rotation => "Rotation",
+            Self::Velocity => "Velocity",
+            Self::AngularVelocity => "Angular velocity",
+            Self::Energy => "Energy",
+            Self::Lateness => "Lateness",
+        }
+    }
+
+    /// Names of its components.
+    #[must_use]
+    pub const fn components(self) -> &'static [&'static str] {
+        match self {
+            Self::Force => &["Fx", "Fy", "Fz"],
+            Self::Torque => &["Mx", "My", "Mz"],
+            Self::Position => &["x", "y", "z"],
+            Self::Rotation => &["rx", "ry", "rz"],
+            Self::Velocity => &["vx", "vy", "vz"],
+            Self::AngularVelocity => &["wx", "wy", "wz"],
+            Self::Energy => &["stored"],
+            Self::Lateness => &["start", "compute"],
+        }
+    }
+
+    /// Unit, and how many of it one SI unit is.
+    #[must_use]
+    pub const fn unit(self, units: Units) -> (&'static str, f64) {
+        const DEGREES_PER_RAD: f64 = 180.0 / std::f64::consts::PI;
+        match (self, units) {
+            (Self::Force, _) => ("N", 1.0),
+            (Self::Torque, Units::Si) => ("N·m", 1.0),
+            (Self::Torque, Units::Handy) => ("mN·m", 1.0e3),
+            (Self::Position, Units::Si) => ("m", 1.0),
+            (Self::Position, Units::Handy) => ("mm", 1.0e3),
+            (Self::Rotation, Units::Si) => ("rad", 1.0),
+            (Self::Rotation, Units::Handy) => ("°", DEGREES_PER_RAD),
+            (Self::Velocity, Units::Si) => ("m/s", 1.0),
+            (Self::Velocity, Units::Handy) => ("mm/s", 1.0e3),
+            (Self::AngularVelocity, Units::Si) => ("rad/s", 1.0),
+            (Self::AngularVelocity, Units::Handy) => ("°/s", DEGREES_PER_RAD),
+            (Self::Energy, Units::Si) => ("J", 1.0),
+            (Self::Energy, Units::Handy) => ("mJ", 1.0e3),
+            (Self::Lateness, Units::Si) => ("s", 1.0),
+            (Self::Lateness, Units::Handy) => ("µs", 1.0e6),
+        }
+    }
+
+    /// A component of it in a sample, SI; NaN for a component it does not have.
+    #[must_use]
+    pub fn value(self, sample: &Sample, component: usize) -> f64 {
+        let of = |values: &[f32], offset: usize| {
+            values.get(offset + component).map_or(f64::NAN, |v| f64::from(*v))
+        };
+        let vector = |vector: DVec3| vector.to_array().get(component).copied().unwrap_or(f64::NAN);
+        match self {
+            Self::Force => of(&sample.commanded[..3], 0),
+            Self::Torque => of(&sample.commanded, 3),
+            Self::Position => vector(sample.pose.position()),
+            Self::Rotation => vector(sample.rotation_rad()),
+            Self::Velocity => of(&sample.twist[..3], 0),
+            Self::AngularVelocity => of(&sample.twist, 3),
+            Self::Energy => of(&[sample.energy_j], 0),
+            Self::Lateness => of(&[sample.lateness_s, sample.compute_s], 0),
+        }
+    }
+}

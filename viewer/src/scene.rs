@@ -1,0 +1,248 @@
+//! The 3D scene: bodies at the pose of the handle, on a ground, with what the hand feels as arrows.
+
+use crate::camera::Camera;
+use crate::geometry::{
+    Body, Curve, Detail, Ground, LocalStrain, MM_PER_M, Mesh, Section, Shadow, append_tube, contact_strain,
+    force_arrow, plate, torque_arrow,
+};
+use crate::history::Sample;
+use crate::light;
+use crate::palette::{Palette, strain_color};
+use crate::shape::{Posed, Shape};
+use flotor_hal::{DVec3, Pose, Wrench};
+
+/// What of the scene is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Visible {
+    /// The bodies and their plates.
+    pub bodies: bool,
+    /// Force and torque.
+    pub arrows: bool,
+    /// The ground.
+    pub ground: bool,
+}
+
+impl Default for Visible {
+    fn default() -> Self {
+        Self { bodies: true, arrows: true, ground: true }
+    }
+}
+
+/// Lengths of arrows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ArrowScale {
+    /// Force whose arrow is as long as the body, N.
+    pub force_n: f64,
+    /// Torque whose arrow goes three quarters around, N·m.
+    pub torque_nm: f64,
+}
+
+impl ArrowScale {
+    /// So that the largest of some samples fill their arrows.
+    #[must_use]
+    pub fn fitting<'a>(samples: impl Iterator<Item = &'a Sample>) -> Self {
+        let largest = samples.fold([1.0e-3_f64, 1.0e-5], |[force, torque]: [f64; 2], sample| {
+            [force.max(sample.force_n().length()), torque.max(sample.torque_nm().length())]
+        });
+        Self { force_n: 1.9 * largest[0], torque_nm: largest[1] }
+    }
+}
+
+/// A scene being put together; keeps its memory from frame to frame.
+#[derive(Default)]
+pub struct SceneBuilder {
+    mesh: Mesh,
+}
+
+/// What a scene shows beside the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SceneFacts {
+    /// Largest local strain, as part of the scale.
+    pub peak_part: f64,
+    /// True where turns of a coil touch.
+    pub touching: bool,
+    /// True if a model had no shape at this pose.
+    pub no_shape: bool,
+}
+
+/// Strain at the end of the scale for a body whose turns cannot touch.
+const FULL_STRAIN: f64 = 0.5;
+/// Thickness of plates, part of their radius.
+const PLATE_THICKNESS: f64 = 0.16;
+/// How far plates reach beyond the outer edge of the coil.
+const PLATE_OVERHANG: f64 = 1.18;
+/// Height of a scene without any body, m: a hand's breadth.
+const EMPTY_HEIGHT_M: f64 = 0.025;
+
+impl SceneBuilder {
+    /// Height of what is drawn, mm: the tallest body, or a stand-in.
+    #[must_use]
+    pub fn height_mm(shapes: &[Shape]) -> f64 {
+        let tallest = shapes.iter().map(|shape| shape.body().rest_length_m).fold(0.0, f64::max);
+        MM_PER_M * if tallest > 0.0 { tallest } else { EMPTY_HEIGHT_M }
+    }
+
+    /// Puts together the scene at a sample, seen at a height of so many pixels.
+    #[allow(clippy::too_many_arguments)] // one call site for each, and no two belong together
+    pub fn build(
+        &mut self,
+        shapes: &mut [Shape],
+        sample: &Sample,
+        palette: &Palette,
+        camera: &Camera,
+        height_px: f64,
+        scale: ArrowScale,
+        visible: Visible,
+    ) -> (&Mesh, SceneFacts) {
+        self.mesh.clear();
+        let mut facts = SceneFacts::default();
+        let height_m = Self::height_mm(shapes) / MM_PER_M;
+        let posed: Vec<Option<Posed>> = shapes.iter_mut().map(|shape| shape.at(&sample.pose)).collect();
+        facts.no_shape = posed.iter().any(Option::is_none);
+        let drawn = || shapes.iter().zip(&posed).filter_map(|(shape, posed)| Some((shape, posed.as_ref()?)));
+
+        let plate_radius_m =
+            drawn().map(|(shape, _)| plate_radius_m(shape.body())).fold(0.25 * height_m, f64::max);
+        if visible.ground {
+            let handle =
+                shapes.first().map_or(sample.pose, |shape| shape.mapping().pose_to_model(&sample.pose));
+            self.ground(palette, height_m, plate_radius_m, handle.position());
+        }
+        if visible.bodies {
+            let pixels_per_mm = camera.pixels_per_mm(height_px);
+            for (shape, posed) in drawn() {
+                let body = shape.body();
+                facts.peak_part = facts.peak_part.max(body_of(
+                    &mut self.mesh,
+                    body,
+                    posed,
+                    palette,
+                    pixels_per_mm,
+                    &mut facts.touching,
+                ));
+            }
+            if shapes.is_empty() {
+                self.bare_handle(&sample.pose, palette, 0.25 * height_m);
+            }
+        }
+        if visible.arrows {
+            let hand = shapes
+                .first()
+                .map_or((sample.pose, Wrench::new(sample.force_n(), sample.torque_nm())), |shape| {
+                    in_model_frame(shape, sample)
+                });
+            self.arrows(hand, palette, scale, height_m, plate_radius_m);
+        }
+        (&self.mesh, facts)
+    }
+
+    fn ground(&mut self, palette: &Palette, height_m: f64, plate_radius_m: f64, handle_m: DVec3) {
+        let foot_m = -height_m - PLATE_THICKNESS * plate_radius_m;
+        let ground = Ground {
+            height_m: foot_m,
+            radius_m: 3.2 * height_m,
+            spacing_m: 0.2 * height_m,
+            surface: palette.ground[0],
+            line: palette.ground[1],
+        };
+        let fall = light::KEY / light::KEY.z;
+        let of_plate = handle_m - fall * (handle_m.z - foot_m);
+        let shadows = [
+            Shadow {
+                center_m: DVec3::ZERO.truncate(),
+                radius_m: 1.3 * plate_radius_m,
+                strength: 0.8 * palette.shadow,
+            },
+            Shadow {
+                center_m: of_plate.truncate(),
+                radius_m: 1.1 * plate_radius_m,
+                strength: 0.7 * palette.shadow,
+            },
+            Shadow {
+                center_m: 0.5 * of_plate.truncate(),
+                radius_m: 1.3 * plate_radius_m,
+                strength: 0.4 * palette.shadow,
+            },
+        ];
+        ground.append(&mut self.mesh, &shadows);
+    }
+
+    /// Without a body to draw, the handle is a disc.
+    fn bare_handle(&mut self, pose: &Pose, palette: &Palette, radius_m: f64) {
+        let section = Section { center_m: pose.position(), orientation: pose.orientation() };
+        plate(&mut self.mesh, &section, radius_m, PLATE_THICKNESS * radius_m, 1.0, palette.plates[0]);
+    }
+
+    fn arrows(
+        &mut self,
+        (handle, wrench): (Pose, Wrench),
+        palette: &Palette,
+        scale: ArrowScale,
+        height_m: f64,
+        plate_radius_m: f64,
+    ) {
+        let top_m = handle.position() + handle.orientation() * DVec3::Z * (PLATE_THICKNESS * plate_radius_m);
+        let shaft_m = 0.018 * height_m;
+        let force = wrench.force() * (height_m / scale.force_n);
+        force_arrow(&mut self.mesh, top_m, force, shaft_m, palette.force);
+        let torque = wrench.torque();
+        let angle_rad = 0.75 * std::f64::consts::TAU * torque.length() / scale.torque_nm;
+        torque_arrow(
+            &mut self.mesh,
+            top_m,
+            torque,
+            1.35 * plate_radius_m,
+            angle_rad,
+            0.7 * shaft_m,
+            palette.torque,
+        );
+    }
+}
+
+/// Handle and wrench in the frame of the first model, in which the scene is drawn.
+fn in_model_frame(shape: &Shape, sample: &Sample) -> (Pose, Wrench) {
+    let handle = shape.mapping().pose_to_model(&sample.pose);
+    // Only the direction turns: an arrow shows what the hand feels, not what the model says.
+    let turn = shape.mapping().rotation();
+    (handle, Wrench::new(turn * sample.force_n(), turn * sample.torque_nm()))
+}
+
+fn plate_radius_m(body: &Body) -> f64 {
+    PLATE_OVERHANG * body.info.plate_radius_m
+}
+
+/// Adds a body with its plates; gives the largest part of the scale of strain in it.
+fn body_of(
+    mesh: &mut Mesh,
+    body: &Body,
+    Posed { curve, strain }: &Posed,
+    palette: &Palette,
+    pixels_per_mm: f64,
+    touching: &mut bool,
+) -> f64 {
+    let contact = contact_strain(body);
+    let full = contact.map_or(FULL_STRAIN, f64::abs);
+    let mut peak = 0.0_f64;
+    let touches = |strain: LocalStrain| contact.is_some_and(|contact| strain.axial <= contact);
+    for i in 0..=SCALE_PROBES {
+        let s = f64::from(i) / f64::from(SCALE_PROBES);
+        let local = strain.at(s, flotor_hal::glam::DVec2::ZERO);
+        peak = peak.max(local.magnitude() / full);
+        *touching |= touches(local);
+    }
+    let color = |strain: LocalStrain| {
+        if touches(strain) { palette.contact } else { strain_color(strain.magnitude() / full) }
+    };
+    append_tube(mesh, body, curve, strain, Detail::for_size(body, pixels_per_mm), color);
+    let radius_m = plate_radius_m(body);
+    if radius_m > 0.0 {
+        let ends: [(&Curve, f64, f64); 2] = [(curve, 1.0, 1.0), (curve, 0.0, -1.0)];
+        for ((curve, s, outward), color) in ends.into_iter().zip(palette.plates) {
+            plate(mesh, &curve.section(s), radius_m, PLATE_THICKNESS * radius_m, outward, color);
+        }
+    }
+    peak
+}
+
+/// Places along a body where its strain is looked at for the readout.
+const SCALE_PROBES: i32 = 32;

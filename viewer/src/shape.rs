@@ -1,0 +1,142 @@
+//! Shapes of the models of a run, from instances of the viewer's own.
+//!
+//! The viewer loads the plugins a run names and asks them where their bodies are (extension
+//! `flotor.centerline/1`). The servo never computes a shape, and a recording holds none: 65 sections at 60 Hz would
+//! double it, and nothing but the recorded parameters could be shown (docs/src/adr/0008-viewer-process.md).
+
+use crate::geometry::{Body, Curve, Strain};
+use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
+use flotor_hal::{Input, Pose};
+use flotor_record::mapping::Mapping;
+use flotor_record::{PluginDescription, Role, RunDescription};
+use std::path::PathBuf;
+
+/// A model that can be drawn.
+pub struct Shape {
+    name: String,
+    model: Model,
+    mapping: Mapping,
+    body: Body,
+}
+
+/// A body at one pose of the handle.
+#[derive(Clone, Debug)]
+pub struct Posed {
+    /// Its centreline.
+    pub curve: Curve,
+    /// How it is strained against rest.
+    pub strain: Strain,
+}
+
+/// Why a model is not drawn.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ShapeError {
+    /// Nobody told where its plugin is.
+    #[error("the plugin `{id}` of model `{name}` is not here; FLOTOR_PLUGIN_PATH adds folders")]
+    NoPlugin {
+        /// What the scene calls the model.
+        name: String,
+        /// Id of the plugin.
+        id: String,
+    },
+    /// The plugin was refused, or says no.
+    #[error(transparent)]
+    Refused(#[from] LoadError),
+    /// A recorded setting is none of this plugin's.
+    #[error("model `{name}`: {problem}; the recording was made with another version of the plugin")]
+    Setting {
+        /// What the scene calls the model.
+        name: String,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+/// Makes everything of a run that has a shape; the rest is told in words. Not real-time.
+#[must_use]
+pub fn shapes_of(run: &RunDescription, plugin_files: &[PathBuf]) -> (Vec<Shape>, Vec<ShapeError>) {
+    let (mut shapes, mut errors) = (Vec::new(), Vec::new());
+    for plugin in &run.plugins {
+        let Role::Model(mapping) = &plugin.role else { continue };
+        match Shape::load(plugin, Mapping::new(mapping), plugin_files) {
+            Ok(shape) => shapes.extend(shape),
+            Err(error) => errors.push(error),
+        }
+    }
+    (shapes, errors)
+}
+
+impl Shape {
+    /// The shape of a model of a run; none if it has none.
+    fn load(
+        description: &PluginDescription,
+        mapping: Mapping,
+        plugin_files: &[PathBuf],
+    ) -> Result<Option<Self>, ShapeError> {
+        let PluginDescription { name, id, .. } = description;
+        let is_it = |file: &&PathBuf| {
+            flotor_hal::abi::loader::read_metadata(file).is_ok_and(|metadata| metadata.id == *id)
+        };
+        let no_plugin = || ShapeError::NoPlugin { name: name.clone(), id: id.clone() };
+        let plugin = Plugin::load(plugin_files.iter().find(is_it).ok_or_else(no_plugin)?)?;
+        let parse = |(key, value): &(String, String)| {
+            Setting::parse(plugin.parameters(), key, value)
+                .map_err(|error| ShapeError::Setting { name: name.clone(), problem: error.to_string() })
+        };
+        let settings = description.settings.iter().map(parse).collect::<Result<Vec<_>, _>>()?;
+        let mut model = plugin.create_model(&settings)?;
+        let Some(body) = body(&mut model) else { return Ok(None) };
+        Ok(Some(Self { name: name.clone(), model, mapping, body }))
+    }
+
+    /// What the scene calls the model.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The body at rest.
+    #[must_use]
+    pub fn body(&self) -> &Body {
+        &self.body
+    }
+
+    /// Way from the device's frame to the model's.
+    #[must_use]
+    pub fn mapping(&self) -> &Mapping {
+        &self.mapping
+    }
+
+    /// Changes a live parameter of the viewer's instance; the drawn shape follows.
+    pub fn set_parameter(&mut self, key: &str, number: f64) {
+        if let Ok(setting) = Setting::number(self.model.parameters(), key, number) {
+            self.model.set_parameter(&setting);
+            if let Some(body) = body(&mut self.model) {
+                self.body = body;
+            }
+        }
+    }
+
+    /// The body with the handle at a pose in the device frame; `None` where the model has no shape.
+    #[must_use]
+    pub fn at(&mut self, handle: &Pose) -> Option<Posed> {
+        let input = Input::at_rest(self.mapping.pose_to_model(handle));
+        let points = self.body.info.suggested_points as usize;
+        let sections = self.model.centerline()?.points(&input, points)?;
+        let curve = Curve::through(&sections)?;
+        let strain = Strain::between(&self.body.rest, &curve);
+        Some(Posed { curve, strain })
+    }
+}
+
+/// The body of a model at rest, if it has a shape.
+fn body(model: &mut Model) -> Option<Body> {
+    /// Sections asked for: as many as the model suggests, within what can be drawn well.
+    const SECTIONS: std::ops::RangeInclusive<u32> = 17..=1025;
+    let mut shape = model.centerline()?;
+    let mut info = shape.info()?;
+    info.suggested_points = info.suggested_points.clamp(*SECTIONS.start(), *SECTIONS.end());
+    let rest = shape.points(&Input::at_rest(Pose::HOME), info.suggested_points as usize)?;
+    Body::new(info, &rest)
+}

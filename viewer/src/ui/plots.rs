@@ -1,0 +1,170 @@
+//! Traces over time.
+
+use crate::decimate::min_max;
+use crate::history::History;
+use crate::palette::Palette;
+use crate::quantity::{Quantity, Units};
+use egui::{Stroke, Ui};
+use egui_plot::{AxisHints, GridMark, HPlacement, Line, Plot, PlotPoint, PlotPoints, VLine};
+
+/// How a plot is shown.
+#[derive(Clone, Copy, Debug)]
+pub struct PlotView {
+    /// What is plotted.
+    pub quantity: Quantity,
+    /// First and last time, s.
+    pub span_s: [f64; 2],
+    /// Where the time is, s.
+    pub cursor_s: f64,
+    /// Units of the axis.
+    pub units: Units,
+    /// Height, points.
+    pub height: f32,
+    /// Whether time stands beneath: the lowest of a stack.
+    pub time_axis: bool,
+}
+
+/// What a person did to a plot.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PlotAnswer {
+    /// Time the pointer asks for, s.
+    pub seek_s: Option<f64>,
+    /// Time under the pointer, s.
+    pub hover_s: Option<f64>,
+}
+
+/// Shows one quantity over time. The components' names and values at the cursor stand above.
+pub fn plot(ui: &mut Ui, history: &History, view: PlotView, palette: &Palette) -> PlotAnswer {
+    let PlotView { quantity, span_s, cursor_s, units, height, time_axis } = view;
+    let (unit, per_si) = quantity.unit(units);
+    heading(ui, history, &view, palette);
+
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // points
+    let buckets = ui.available_width().max(50.0) as usize;
+    let traces: Vec<Vec<PlotPoint>> = (0..quantity.components().len())
+        .map(|component| {
+            let points = history.between(span_s[0], span_s[1]);
+            let points = points.map(|sample| [sample.time_s(), quantity.value(sample, component) * per_si]);
+            let points: Vec<[f64; 2]> = points.collect();
+            min_max(points.iter().copied(), span_s, buckets).into_iter().map(PlotPoint::from).collect()
+        })
+        .collect();
+
+    let y_axis = AxisHints::new_y()
+        .placement(HPlacement::Left)
+        .min_thickness(52.0)
+        .label_spacing(egui::Rangef::new(11.0, 30.0))
+        .formatter(|mark, _| short(mark.value));
+    let mut x_axis = AxisHints::new_x().formatter(|mark, _| format!("{} s", short(mark.value)));
+    if !time_axis {
+        x_axis = x_axis.min_thickness(0.0).formatter(|_, _| String::new());
+    }
+    let shown = Plot::new(("plot", quantity.name()))
+        .height(height)
+        .show_axes([time_axis, true])
+        .custom_x_axes(vec![x_axis])
+        .custom_y_axes(vec![y_axis])
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_scroll(false)
+        .allow_boxed_zoom(false)
+        .show_background(false)
+        .show_crosshair(false)
+        .set_margin_fraction(egui::vec2(0.0, 0.08))
+        .grid_color(palette.grid)
+        .y_grid_spacer(move |grid| marks(grid.bounds))
+        .grid_spacing(egui::Rangef::new(8.0, 60.0))
+        .include_x(span_s[0])
+        .include_x(span_s[1])
+        .include_y(0.0)
+        .label_formatter(|_| None)
+        .show(ui, |plot| {
+            plot.set_plot_bounds_x(span_s[0]..=span_s[1]);
+            for (component, points) in traces.iter().enumerate() {
+                let name = quantity.components()[component];
+                let line = Line::new(name, PlotPoints::Owned(points.clone()));
+                plot.line(line.color(palette.components[component % 3]).width(1.6));
+            }
+            plot.vline(VLine::new("time", cursor_s).stroke(Stroke::new(1.2, palette.cursor)));
+            plot.pointer_coordinate()
+        });
+    let time = format!("{} over time, {unit}", quantity.name());
+    shown.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &time));
+    let hover_s = shown.inner.map(|at| at.x).filter(|_| shown.response.hovered());
+    let pressed = shown.response.is_pointer_button_down_on();
+    PlotAnswer { seek_s: shown.inner.map(|at| at.x).filter(|_| pressed), hover_s }
+}
+
+fn heading(ui: &mut Ui, history: &History, view: &PlotView, palette: &Palette) {
+    let (unit, per_si) = view.quantity.unit(view.units);
+    ui.horizontal(|ui| {
+        ui.add_space(4.0);
+        ui.strong(view.quantity.name());
+        ui.weak(unit);
+        let sample = history.at(view.cursor_s);
+        for (component, name) in view.quantity.components().iter().enumerate() {
+            ui.add_space(10.0);
+            ui.colored_label(palette.components[component % 3], *name);
+            let value = sample.map_or(f64::NAN, |sample| view.quantity.value(sample, component) * per_si);
+            ui.monospace(fixed(value));
+        }
+    });
+}
+
+/// A number in seven columns, whatever its size.
+#[must_use]
+pub fn fixed(value: f64) -> String {
+    match value.abs() {
+        size if !size.is_finite() => "      –".to_owned(),
+        size if size < 10.0 => format!("{value:+7.3}"),
+        size if size < 100.0 => format!("{value:+7.2}"),
+        size if size < 9_999.9 => format!("{value:+7.1}"),
+        size if size < 999_999.0 => format!("{value:+7.0}"),
+        _ => format!("{value:+7.0e}"),
+    }
+}
+
+/// Marks of an axis at steps of 1, 2 or 5 times a power of ten, three to six of them.
+#[allow(clippy::cast_possible_truncation)] // a handful
+fn marks((low, high): (f64, f64)) -> Vec<GridMark> {
+    let wanted = (high - low) / 4.0;
+    if !(wanted > 0.0 && wanted.is_finite()) {
+        return Vec::new();
+    }
+    let power = 10.0_f64.powf(wanted.log10().floor());
+    let step_size =
+        [1.0, 2.0, 5.0, 10.0].map(|k| k * power).into_iter().find(|step| *step >= wanted).unwrap_or(wanted);
+    let (first, last) = ((low / step_size).ceil() as i64, (high / step_size).floor() as i64);
+    #[allow(clippy::cast_precision_loss)] // a handful
+    (first..=last).map(|k| GridMark { value: k as f64 * step_size, step_size }).collect()
+}
+
+/// A mark of an axis: no more digits than it has, no minus on zero.
+fn short(value: f64) -> String {
+    let rounded = (value * 1.0e6).round() / 1.0e6;
+    if rounded == 0.0 { "0".to_owned() } else { format!("{rounded}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_their_columns() {
+        for value in [0.0, -1.5, 12.345, -123.45, 99_999.0, f64::NAN, f64::INFINITY, 1.0e9] {
+            assert_eq!(fixed(value).chars().count(), 7, "{value}: `{}`", fixed(value));
+        }
+        assert_eq!(short(-1.0e-12), "0");
+        assert_eq!(short(0.1 + 0.2), "0.3");
+    }
+
+    #[test]
+    fn an_axis_has_a_few_round_marks() {
+        for (low, high) in [(-1.5, 8.0), (0.0, 1.0e-9), (-7.0e5, 3.0), (99.0, 101.0)] {
+            let marks = marks((low, high));
+            assert!((2..=6).contains(&marks.len()), "{low} to {high}: {}", marks.len());
+            assert!(marks.iter().all(|mark| mark.value >= low && mark.value <= high));
+        }
+        assert!(marks((1.0, 1.0)).is_empty() && marks((0.0, f64::NAN)).is_empty());
+    }
+}

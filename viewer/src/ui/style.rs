@@ -1,0 +1,41 @@
+//! One style for window and pictures: quiet colours, room to breathe, numbers in columns.
+
+use crate::palette::{Look, Palette};
+use egui::{Color32, Context, FontFamily, FontId, Stroke, TextStyle, Theme};
+
+/// Sizes of text, points.
+pub const TITLE_PT: f32 = 21.0;
+/// Text of readouts and labels.
+pub const BODY_PT: f32 = 13.5;
+/// Text of axes and remarks.
+pub const SMALL_PT: f32 = 11.5;
+
+/// Puts a look in force.
+pub fn apply(context: &Context, look: Look) {
+    let palette = Palette::of(look);
+    let theme = match look {
+        Look::Dark => Theme::Dark,
+        Look::Light => Theme::Light,
+    };
+    context.set_theme(theme);
+    context.style_mut_of(theme, |style| {
+        style.text_styles = [
+            (TextStyle::Heading, FontId::new(TITLE_PT, FontFamily::Proportional)),
+            (TextStyle::Body, FontId::new(BODY_PT, FontFamily::Proportional)),
+            (TextStyle::Button, FontId::new(BODY_PT, FontFamily::Proportional)),
+            (TextStyle::Monospace, FontId::new(BODY_PT - 0.5, FontFamily::Monospace)),
+            (TextStyle::Small, FontId::new(SMALL_PT, FontFamily::Proportional)),
+        ]
+        .into();
+        let visuals = &mut style.visuals;
+        visuals.panel_fill = palette.panel;
+        visuals.window_fill = palette.panel;
+        visuals.extreme_bg_color = palette.panel;
+        visuals.override_text_color = Some(palette.text);
+        visuals.weak_text_color = Some(palette.faint);
+        visuals.warn_fg_color = palette.warning;
+        visuals.widgets.noninteractive.bg_stroke = Stroke::new(1.0, palette.grid.gamma_multiply(0.6));
+        visuals.selection.bg_fill = Color32::from_rgb(0, 114, 178);
+        style.spacing.item_spacing = egui::vec2(8.0, 6.0);
+    });
+}
