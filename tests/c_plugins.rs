@@ -31,7 +31,7 @@ fn scene(scratch: &Scratch, mistakes: &[&str]) -> String {
 
 #[test]
 fn device_and_model_in_c_run_a_scene() {
-    let Watched { records, outcome } = watch(&scene(&Scratch::default(), &[]));
+    let Watched { records, outcome, .. } = watch(&scene(&Scratch::default(), &[]));
     assert_eq!((outcome.end, records.len()), (RunEnd::Finished, 20));
     // A millimetre below home: 0.7 N up, felt from the tick after the first.
     let expected = Wrench { force_n: [0.0, 0.0, 700.0 * 0.001], torque_nm: [0.0; 3] };
@@ -81,7 +81,7 @@ fn a_mistake_in_c_is_told_in_one_line() {
 /// A status outside the contract may mean anything, so the force beside it counts for nothing.
 #[test]
 fn an_answer_outside_the_contract_is_no_force() {
-    let Watched { records, outcome } = watch(&scene(&Scratch::default(), &["ODD_ANSWERS"]));
+    let Watched { records, outcome, .. } = watch(&scene(&Scratch::default(), &["ODD_ANSWERS"]));
     assert!(records.iter().all(|record| record.commanded == Wrench::ZERO));
     assert!(records.iter().all(|record| record.events.intersects(Events::MODEL_FAULT)));
     assert_eq!(outcome.models[0].1.rejected_ticks, 20);

@@ -1,6 +1,8 @@
 //! The schemas inside a recording: up to date with `host/proto`, and enough for a stranger to read every field.
 
-use flotor::record::{Note, PluginDescription, Recorder, Role, RunDescription, Severity};
+use flotor::record::{
+    Change, ChangeOutcome, Note, PluginDescription, Recorder, Role, RunDescription, Severity,
+};
 use flotor::scene::MappingConfig;
 use flotor::servo::Clock;
 use flotor::trace::{Events, TickRecord};
@@ -269,7 +271,17 @@ fn a_stranger_reads_every_field_by_the_schema_in_the_file() {
         source: "device".to_owned(),
         text: "a coil is too hot".to_owned(),
     };
+    let change = Change {
+        tick: 7,
+        time_ns: 3_000_000_007,
+        plugin: "spring".to_owned(),
+        parameter: "gamma_n".to_owned(),
+        value: "20.5".to_owned(),
+        number: 20.5,
+        outcome: ChangeOutcome::Refused,
+    };
     let mut recorder = Recorder::create(&path, &run()).unwrap();
+    recorder.change(&change).unwrap();
     recorder.record(&record()).unwrap();
     recorder.note(&note).unwrap();
     recorder.finish().unwrap();
@@ -294,8 +306,17 @@ fn a_stranger_reads_every_field_by_the_schema_in_the_file() {
         "message = \"a coil is too hot\"".to_owned(),
         "name = \"device\"".to_owned(),
     ];
+    let changed = [
+        "tick = 7",
+        "plugin = \"spring\"",
+        "key = \"gamma_n\"",
+        "value = \"20.5\"",
+        "number = 20.5",
+        "outcome = 2",
+    ];
     let expected = [
         ("/flotor/run", expected_run()),
+        ("/flotor/change", changed.map(str::to_owned).into()),
         ("/tf", expected_pose(&record())),
         ("/flotor/tick", expected_tick(&record())),
         ("/flotor/log", log.into()),

@@ -330,7 +330,7 @@ fn a_panic_names_file_and_line_of_the_plugins_source() {
 
 #[test]
 fn a_model_that_panics_in_a_step_is_out_and_the_run_goes_on_without_it() {
-    let Watched { records, outcome } =
+    let Watched { records, outcome, .. } =
         watch(&faulty_scene("parameters = { fault = \"panics-in-step\", at_tick = 7 }"));
     let (_, health, words) = the_model(&outcome);
     assert_eq!(outcome.end, RunEnd::Finished);
@@ -359,7 +359,7 @@ fn a_model_that_panicked_is_told_in_one_line_with_its_words() {
 
 #[test]
 fn nan_from_a_model_is_no_force_for_that_tick_alone() {
-    let Watched { records, outcome } =
+    let Watched { records, outcome, .. } =
         watch(&faulty_scene("parameters = { fault = \"nan-once\", at_tick = 7 }"));
     let (_, health, _) = the_model(&outcome);
     assert_eq!(outcome.end, RunEnd::Finished);

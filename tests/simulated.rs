@@ -60,7 +60,7 @@ fn every_built_in_script_runs_on_both_presets() {
     for script in ["press", "hold", "release", "shear", "tilt", "tap", "push"] {
         for preset in ["plain", "full"] {
             let parameters = format!("hand_script = \"{script}\"\npreset = \"{preset}\"");
-            let Watched { records, outcome } = watch(&scene(2.5, &parameters));
+            let Watched { records, outcome, .. } = watch(&scene(2.5, &parameters));
             assert_eq!(outcome.end, RunEnd::Finished, "{script} {preset}");
             let ledger = outcome.ledger.expect("the flotor has accounts");
             let imbalance = ledger.residual_j().abs() / ledger.peak_j;
@@ -145,7 +145,7 @@ fn faults_that_end_a_run_end_it_at_their_tick_and_say_which() {
         ("over-temperature", Fault::OverTemperature),
         ("cable-pull", Fault::Disconnected),
     ] {
-        let Watched { records, outcome } = with_fault(fault, "");
+        let Watched { records, outcome, .. } = with_fault(fault, "");
         assert_eq!(outcome.end, RunEnd::DeviceFault(expected), "{fault}");
         assert_eq!(records.len(), FAULT_START + 1, "{fault}");
         let last = records.last().expect("ticks");
@@ -156,7 +156,7 @@ fn faults_that_end_a_run_end_it_at_their_tick_and_say_which() {
 
 #[test]
 fn a_dropped_sample_is_stale_and_the_force_ends_once_it_is_old() {
-    let Watched { records, outcome } = with_fault("dropped-sample", "");
+    let Watched { records, outcome, .. } = with_fault("dropped-sample", "");
     assert_eq!(outcome.end, RunEnd::Finished);
     assert_eq!(stale_ticks(&records), Vec::from_iter(FAULT_START..FAULT_START + FAULT_TICKS));
     // Ten ticks of the last sample, then nothing until the next.

@@ -1,6 +1,6 @@
 //! A scene in virtual time from start to end, with nobody watching: for sweeps, studies and other programs.
 
-use crate::record::{RecordError, Recorder, TraceDigest};
+use crate::record::{Change, RecordError, Recorder, TraceDigest};
 use crate::registry::Registry;
 use crate::report::{RunFacts, RunSummary, Tally};
 use crate::run_description::describe;
@@ -65,14 +65,25 @@ struct Watchers {
     failure: Option<RecordError>,
 }
 
-impl Observer for Watchers {
-    fn observe(&mut self, record: &TickRecord) {
-        self.tally.observe(record);
-        self.digest.update(record);
+impl Watchers {
+    /// Writes into the recording, if there is one and it has not failed.
+    fn write(&mut self, write: impl FnOnce(&mut Recorder) -> Result<(), RecordError>) {
         if self.failure.is_none()
             && let Some(recorder) = &mut self.recorder
         {
-            self.failure = recorder.record(record).err();
+            self.failure = write(recorder).err();
         }
+    }
+}
+
+impl Observer for Watchers {
+    fn change(&mut self, change: &Change) {
+        self.write(|recorder| recorder.change(change));
+    }
+
+    fn observe(&mut self, record: &TickRecord) {
+        self.tally.observe(record);
+        self.digest.update(record);
+        self.write(|recorder| recorder.record(record));
     }
 }

@@ -3,7 +3,7 @@
 //! With nothing changed the wrench must come out bit for bit; with another parameter the difference shows what
 //! the change does to the same hand movement.
 
-use crate::record::{ReadError, Recording, Role, RunDescription};
+use crate::record::{Change, ChangeOutcome, ReadError, Recording, Role, RunDescription};
 use crate::registry::Registry;
 use crate::scene::{Location, ModelUse, ParameterText, PluginUse};
 use crate::servo::{Heartbeat, ModelHealth, ModelStack};
@@ -49,6 +49,8 @@ pub struct Replay {
     recording: Recording,
     models: ModelStack,
     plugins: Vec<PluginReport>,
+    /// Model and parameter that were set for this replay: they keep that value, whatever changed in the run.
+    held: Vec<(String, String)>,
 }
 
 impl Replay {
@@ -59,12 +61,17 @@ impl Replay {
     pub fn open(
         path: &Path,
         registry: &Registry,
-        change: impl FnMut(&mut [ModelUse]),
+        mut change: impl FnMut(&mut [ModelUse]),
     ) -> Result<Self, ReplayError> {
         let recording = Recording::open(path)?;
-        let mut uses = models_of(path, recording.run());
-        let mut change = change;
+        let recorded = models_of(path, recording.run());
+        let mut uses = recorded.clone();
         change(&mut uses);
+        let added = |(before, now): (&ModelUse, &ModelUse)| {
+            let added = now.plugin.parameters.get(before.plugin.parameters.len()..).unwrap_or_default();
+            added.iter().map(|set| (now.name.clone(), set.key.clone())).collect::<Vec<_>>()
+        };
+        let held = recorded.iter().zip(&uses).flat_map(added).collect();
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 100 Hz to 10 kHz
         let period_ns = (1.0e9 / recording.run().rate_hz).round() as u64;
         let config = LoopConfig { period_ns, seed: recording.run().seed };
@@ -75,7 +82,7 @@ impl Replay {
             slots.push(slot);
             plugins.push(report);
         }
-        Ok(Self { recording, models: ModelStack::new(slots), plugins })
+        Ok(Self { recording, models: ModelStack::new(slots), plugins, held })
     }
 
     /// How the run was set up.
@@ -100,8 +107,11 @@ impl Replay {
     ) -> Result<(Difference, Vec<(ModelHealth, String)>), ReadError> {
         let mut difference = Difference::default();
         let heart = Heartbeat::default(); // nobody waits for a replay
-        for record in &mut self.recording {
+        while let Some(record) = self.recording.next() {
             let record = record?;
+            for change in self.recording.take_changes() {
+                self.repeat(&change);
+            }
             let tick = Tick { index: record.tick, time_ns: record.time_ns, dt_ns: record.dt_ns };
             let state = DeviceState {
                 pose: record.pose,
@@ -115,6 +125,23 @@ impl Replay {
         }
         difference.finish();
         Ok((difference, self.models.health()))
+    }
+}
+
+impl Replay {
+    /// Changes a parameter as it changed in the run. Not if it is held at another value, and not of a model that
+    /// has no such parameter: what that does to the wrench is the answer.
+    fn repeat(&mut self, change: &Change) {
+        let names = |plugin: &PluginReport| plugin.name == change.plugin;
+        let Some(model) = self.plugins.iter().position(names) else { return }; // the device
+        let schema = self.plugins.get(model).map_or(&[][..], |plugin| plugin.schema);
+        let is_held =
+            self.held.iter().any(|(plugin, key)| *plugin == change.plugin && *key == change.parameter);
+        let parameter = schema.iter().position(|parameter| parameter.id() == change.parameter);
+        if let (Some(parameter), false, ChangeOutcome::Applied) = (parameter, is_held, change.outcome) {
+            let tick = Tick { index: change.tick, time_ns: change.time_ns, dt_ns: 0 };
+            self.models.set_parameter(model, &tick, parameter, change.number);
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! A scene run through the library on the virtual clock, with every tick kept.
 
+use flotor::record::Change;
 use flotor::registry::Registry;
 use flotor::scene::Scene;
 use flotor::servo::{Clock, StopSwitch};
@@ -11,40 +12,58 @@ use std::path::Path;
 pub struct Watched {
     /// One record a tick, in order.
     pub records: Vec<TickRecord>,
+    /// Every change of a parameter, with the number of records seen before it.
+    pub changes: Vec<(usize, Change)>,
     /// The rest.
     pub outcome: Outcome,
 }
 
-/// Keeps every record it sees.
-struct Keep(Vec<TickRecord>);
+/// Keeps everything it sees.
+#[derive(Default)]
+struct Keep {
+    records: Vec<TickRecord>,
+    changes: Vec<(usize, Change)>,
+}
 
 impl Observer for Keep {
     fn observe(&mut self, record: &TickRecord) {
-        self.0.push(*record);
+        self.records.push(*record);
+    }
+
+    fn change(&mut self, change: &Change) {
+        self.changes.push((self.records.len(), change.clone()));
     }
 }
 
-/// Runs the text of a scene with the plugins built beside the tests.
+/// Makes the text of a scene ready to run on a clock, with the plugins built beside the tests.
 ///
 /// # Panics
 /// If the scene is wrong or a plugin is refused: such tests have other means.
+#[must_use]
+pub fn prepared(clock: Clock, scene: &str) -> Session {
+    let scene = Scene::parse(Path::new("scene.toml"), scene).expect("the scene is right");
+    let options = RunOptions { clock, seed: 1 };
+    let session = Session::prepare(&scene, &Registry::search(&[]), &options);
+    session.unwrap_or_else(|error| panic!("it does not start: {error}"))
+}
+
+/// Runs the text of a scene on the virtual clock; as [`prepared`].
+///
+/// # Panics
+/// As [`prepared`].
 #[must_use]
 pub fn watch(scene: &str) -> Watched {
     watch_on(Clock::Virtual, scene)
 }
 
-/// As [`watch`], on a clock.
+/// Runs the text of a scene; as [`prepared`].
 ///
 /// # Panics
-/// As [`watch`].
+/// As [`prepared`].
 #[must_use]
 pub fn watch_on(clock: Clock, scene: &str) -> Watched {
-    let scene = Scene::parse(Path::new("scene.toml"), scene).expect("the scene is right");
-    let options = RunOptions { clock, seed: 1 };
-    let session = Session::prepare(&scene, &Registry::search(&[]), &options);
-    let session = session.unwrap_or_else(|error| panic!("it does not start: {error}"));
-    let mut keep = Keep(Vec::new());
-    let outcome = session.run(&mut keep, &StopSwitch::default());
+    let mut keep = Keep::default();
+    let outcome = prepared(clock, scene).run(&mut keep, &StopSwitch::default());
     let outcome = outcome.unwrap_or_else(|error| panic!("it does not run: {error}"));
-    Watched { records: keep.0, outcome }
+    Watched { records: keep.records, changes: keep.changes, outcome }
 }

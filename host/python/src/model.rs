@@ -85,7 +85,7 @@ impl Model {
     fn set_parameter(&self, id: &str, value: &str) -> PyResult<()> {
         let setting = Setting::parse(self.plugin.parameters(), id, value).map_err(refuse)?;
         let mut instance = self.lock();
-        match instance.set_parameter(&setting) {
+        match instance.set_parameter(setting.index(), setting.value()) {
             CallStatus::Ok => Ok(()),
             CallStatus::Unsupported => Err(refuse(format!("`{id}` cannot change while the model lives"))),
             _ => Err(refuse(format!("`{id}`: {}", instance.last_message()))),

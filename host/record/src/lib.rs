@@ -12,6 +12,7 @@
 //! | `/flotor/run` | `flotor.Run` | once, first: all that is needed to repeat the run |
 //! | `/tf` | `foxglove.FrameTransform` | every tick: pose of frame `handle` in frame `device` |
 //! | `/flotor/tick` | `flotor.Tick` | every tick: twist, wrenches, energy, events, timing |
+//! | `/flotor/change` | `flotor.Change` | when a parameter changed: before the tick that saw it first |
 //! | `/flotor/log` | `foxglove.Log` | when something happened that needs words: faults |
 //!
 //! [`RunDescription`] goes in first (and once more as the metadata record `flotor.run`, for tools that list
@@ -33,6 +34,7 @@
 //!
 //! Not real-time, but for [`trace`] and [`mapping`]: records reach the rest through the trace ring.
 
+mod change;
 mod container;
 mod digest;
 pub mod mapping;
@@ -45,6 +47,7 @@ mod writer;
 #[cfg(test)]
 mod tests;
 
+pub use change::{Change, ChangeOutcome};
 pub use container::Damage;
 pub use digest::TraceDigest;
 pub use reader::{Ending, ReadError, Recording};

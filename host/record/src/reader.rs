@@ -1,9 +1,9 @@
 //! Reads a recording back: how the run was set up, then tick by tick, bit for bit.
 
 use crate::container::{Damage, Messages, TopicMessage};
-use crate::schema::{FORMAT, FrameTransform, Log, Missing, Run, Tick, Topic};
+use crate::schema::{Change as ChangeMessage, FORMAT, FrameTransform, Log, Missing, Run, Tick, Topic};
 use crate::trace::TickRecord;
-use crate::{Note, RunDescription};
+use crate::{Change, Note, RunDescription};
 use flotor_hal::Pose;
 use mcap::{MAGIC, McapError};
 use prost::Message;
@@ -102,6 +102,8 @@ pub struct Recording {
     run: RunDescription,
     ending: Ending,
     notes: Vec<Note>,
+    /// Changes before the tick read last, not taken yet.
+    changes: Vec<Change>,
     /// The pose that came last, and its time.
     pose: Option<(u64, Pose)>,
     /// Number in the file that the next tick must have.
@@ -135,6 +137,7 @@ impl Recording {
             run,
             ending,
             notes: Vec::new(),
+            changes: Vec::new(),
             pose: None,
             sequence: 0,
             last_tick: None,
@@ -160,6 +163,11 @@ impl Recording {
         &self.notes
     }
 
+    /// The parameters that changed before the tick read last, since this was asked last; oldest first.
+    pub fn take_changes(&mut self) -> Vec<Change> {
+        std::mem::take(&mut self.changes)
+    }
+
     fn next_tick(&mut self) -> Result<Option<TickRecord>, Damage> {
         while let Some(message) = self.messages.next()? {
             match message.topic {
@@ -169,6 +177,10 @@ impl Recording {
                     self.pose = Some((message.time_ns, pose.map_err(|part| lacks(&message, part))?));
                 }
                 Topic::Tick => return self.tick(&message).map(Some),
+                Topic::Change => {
+                    let change = decode::<ChangeMessage>(&message)?.change(message.time_ns);
+                    self.changes.push(change.map_err(|part| lacks(&message, part))?);
+                }
                 Topic::Log => self.notes.push(decode::<Log>(&message)?.note(message.time_ns)),
             }
         }

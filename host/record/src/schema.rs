@@ -5,7 +5,7 @@
 //! default, -0.0 equals 0.0, and a recording is bit-exact. On the wire it is the plain field of the schema.
 
 use crate::trace::{Events, TickRecord};
-use crate::{Note, Severity};
+use crate::{Change as ParameterChange, ChangeOutcome, Note, Severity};
 use flotor_hal::{Pose, Twist as TwistValue, Wrench as WrenchValue};
 use prost::{Enumeration, Message};
 use prost_types::Timestamp;
@@ -32,10 +32,11 @@ pub(crate) enum Topic {
     Pose = 2,
     Tick = 3,
     Log = 4,
+    Change = 5,
 }
 
 impl Topic {
-    pub(crate) const ALL: [Topic; 4] = [Topic::Run, Topic::Pose, Topic::Tick, Topic::Log];
+    pub(crate) const ALL: [Topic; 5] = [Topic::Run, Topic::Pose, Topic::Tick, Topic::Log, Topic::Change];
 
     pub(crate) const fn id(self) -> u16 {
         self as u16
@@ -47,6 +48,7 @@ impl Topic {
             Topic::Pose => "/tf",
             Topic::Tick => "/flotor/tick",
             Topic::Log => "/flotor/log",
+            Topic::Change => "/flotor/change",
         }
     }
 
@@ -56,6 +58,7 @@ impl Topic {
             Topic::Pose => "foxglove.FrameTransform",
             Topic::Tick => "flotor.Tick",
             Topic::Log => "foxglove.Log",
+            Topic::Change => "flotor.Change",
         }
     }
 }
@@ -169,6 +172,31 @@ pub(crate) struct Tick {
     lateness_ns: u64,
     #[prost(uint64, tag = "12")]
     compute_ns: u64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
+#[repr(i32)]
+enum Outcome {
+    Unspecified = 0,
+    Applied = 1,
+    Refused = 2,
+    Broke = 3,
+}
+
+#[derive(Clone, PartialEq, Message)]
+pub(crate) struct Change {
+    #[prost(uint64, tag = "1")]
+    tick: u64,
+    #[prost(string, tag = "2")]
+    plugin: String,
+    #[prost(string, tag = "3")]
+    key: String,
+    #[prost(string, tag = "4")]
+    value: String,
+    #[prost(double, optional, tag = "5")]
+    number: Option<f64>,
+    #[prost(enumeration = "Outcome", tag = "6")]
+    outcome: i32,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -370,6 +398,42 @@ impl Log {
             Level::Error | Level::Fatal => Severity::Error,
         };
         Note { time_ns, severity, source: self.name, text: self.message }
+    }
+}
+
+impl Change {
+    pub(crate) fn new(change: &ParameterChange) -> Self {
+        let outcome = match change.outcome {
+            ChangeOutcome::Applied => Outcome::Applied,
+            ChangeOutcome::Refused => Outcome::Refused,
+            ChangeOutcome::Broke => Outcome::Broke,
+        };
+        Self {
+            tick: change.tick,
+            plugin: change.plugin.clone(),
+            key: change.parameter.clone(),
+            value: change.value.clone(),
+            number: Some(change.number),
+            outcome: outcome.into(),
+        }
+    }
+
+    pub(crate) fn change(self, time_ns: u64) -> Result<ParameterChange, Missing> {
+        let outcome = match self.outcome() {
+            Outcome::Applied => ChangeOutcome::Applied,
+            Outcome::Refused => ChangeOutcome::Refused,
+            Outcome::Broke => ChangeOutcome::Broke,
+            Outcome::Unspecified => return Err(Missing("outcome")),
+        };
+        Ok(ParameterChange {
+            tick: self.tick,
+            time_ns,
+            number: self.number(),
+            plugin: self.plugin,
+            parameter: self.key,
+            value: self.value,
+            outcome,
+        })
     }
 }
 

@@ -44,9 +44,11 @@ impl Events {
     pub const EMERGENCY_STOP: Events = Events { bits: 1 << 14 };
     /// The handle was faster than allowed: what would have driven it on was taken away.
     pub const VELOCITY_LIMITED: Events = Events { bits: 1 << 15 };
+    /// A parameter of a plugin was changed before this tick, or was to be.
+    pub const PARAMETER_CHANGED: Events = Events { bits: 1 << 16 };
 
     /// Names of the bits, lowest first: for reports and recordings.
-    pub const NAMES: [&'static str; 16] = [
+    pub const NAMES: [&'static str; 17] = [
         "stale_sample",
         "not_finite",
         "force_limited",
@@ -63,6 +65,7 @@ impl Events {
         "releasing",
         "emergency_stop",
         "velocity_limited",
+        "parameter_changed",
     ];
 
     /// Adds events. Real-time: bounded, no allocation.

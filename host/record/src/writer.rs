@@ -1,8 +1,8 @@
 //! Writes a recording: a chunk at a time, whole, at least every quarter of a second.
 
-use crate::schema::{DESCRIPTOR_SET, ENCODING, FrameTransform, Log, Tick, Topic};
+use crate::schema::{Change as ChangeMessage, DESCRIPTOR_SET, ENCODING, FrameTransform, Log, Tick, Topic};
 use crate::trace::{Events, TickRecord};
-use crate::{Note, RunDescription};
+use crate::{Change, Note, RunDescription};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{McapError, McapResult, WriteOptions};
 use prost::Message;
@@ -90,6 +90,17 @@ impl Recorder {
     /// [`RecordError::Write`]. The recording is over then: later calls fail too.
     pub fn record(&mut self, record: &TickRecord) -> Result<(), RecordError> {
         self.try_record(record).map_err(|cause| write_error(&self.path, cause))
+    }
+
+    /// Appends a parameter that changed; it belongs before the tick that saw it first. Not real-time.
+    ///
+    /// # Errors
+    /// [`RecordError::Write`]. The recording is over then: later calls fail too.
+    pub fn change(&mut self, change: &Change) -> Result<(), RecordError> {
+        // In the chunk with its tick: a file that lost the change has lost the tick too.
+        encode(&ChangeMessage::new(change), &mut self.buffer)
+            .and_then(|()| self.write(Topic::Change, change.time_ns))
+            .map_err(|cause| write_error(&self.path, cause))
     }
 
     /// Appends something that happened, in words. Not real-time.

@@ -3,7 +3,7 @@
 use super::options::{ClockOption, PluginKeyValue, duration_s, rate_hz};
 use super::stopping::{Keys, stop_on_signals};
 use super::{CommandError, style};
-use crate::record::{Recorder, TraceDigest};
+use crate::record::{Change, RecordError, Recorder, TraceDigest};
 use crate::registry::Registry;
 use crate::report::{RunFacts, RunSummary, Tally};
 use crate::run_picture::RunPicture;
@@ -162,7 +162,7 @@ struct Watchers {
     tally: Tally,
     digest: TraceDigest,
     recorder: Option<Recorder>,
-    failure: Option<crate::record::RecordError>,
+    failure: Option<RecordError>,
     plot: Option<RunPicture>,
     progress: ProgressBar,
 }
@@ -170,16 +170,27 @@ struct Watchers {
 /// How many ticks pass between two updates of the progress line, at 1 kHz thirty a second.
 const PROGRESS_TICKS: u64 = 33;
 
-impl Observer for Watchers {
-    fn observe(&mut self, record: &TickRecord) {
-        self.tally.observe(record);
-        self.digest.update(record);
-        // A failing disk ends the recording, not the run; the command says so at the end.
+impl Watchers {
+    /// Writes into the recording, if there is one. A failing disk ends the recording, not the run; the command says
+    /// so at the end.
+    fn write(&mut self, write: impl FnOnce(&mut Recorder) -> Result<(), RecordError>) {
         if self.failure.is_none()
             && let Some(recorder) = &mut self.recorder
         {
-            self.failure = recorder.record(record).err();
+            self.failure = write(recorder).err();
         }
+    }
+}
+
+impl Observer for Watchers {
+    fn change(&mut self, change: &Change) {
+        self.write(|recorder| recorder.change(change));
+    }
+
+    fn observe(&mut self, record: &TickRecord) {
+        self.tally.observe(record);
+        self.digest.update(record);
+        self.write(|recorder| recorder.record(record));
         if let Some(plot) = &mut self.plot {
             plot.observe(record);
         }

@@ -1,8 +1,10 @@
 //! A scene: which device, which models, how they are mapped and limited. A TOML file; unknown keys are errors.
 
+mod change;
 mod reader;
 mod setting;
 
+pub use change::ChangeUse;
 pub use flotor_record::mapping::MappingConfig;
 pub use reader::{Location, SceneError};
 pub use setting::{KeyValue, PluginKeyValue};
@@ -38,6 +40,8 @@ pub struct Scene {
     pub limits: Limits,
     /// Where the handle is pushed back.
     pub boundary: Boundary,
+    /// What changes while the scene runs, in the order written.
+    pub changes: Vec<ChangeUse>,
 }
 
 /// A plugin and what it is told.
@@ -196,6 +200,7 @@ impl Scene {
             models: root.sections("model")?.into_iter().map(model).collect::<Result<_, _>>()?,
             limits: root.section("limits")?.map_or_else(|| Ok(Limits::default()), limits)?,
             boundary: root.section("boundary")?.map_or_else(|| Ok(Boundary::default()), boundary)?,
+            changes: change::read(root.sections("change")?)?,
         };
         root.finish()?;
         Ok(scene)

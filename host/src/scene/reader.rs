@@ -248,6 +248,14 @@ impl Value<'_> {
         texts.collect()
     }
 
+    /// One text, or a list of them.
+    pub(super) fn one_or_more_texts(self) -> Result<Vec<String>, SceneError> {
+        match self.value {
+            DeValue::Array(_) => self.texts(),
+            _ => self.text().map(|text| vec![text]),
+        }
+    }
+
     pub(super) fn number(self, range: RangeInclusive<f64>) -> Result<f64, SceneError> {
         let number = parse_number(&self.value);
         let number = number.ok_or_else(|| {

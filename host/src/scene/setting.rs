@@ -57,6 +57,11 @@ impl FromStr for PluginKeyValue {
 }
 
 impl PluginKeyValue {
+    /// Plugin, key and value, as written.
+    pub(super) fn into_parts(self) -> (String, String, String) {
+        (self.plugin, self.setting.key, self.setting.value)
+    }
+
     /// Adds the setting to the plugin of a scene it names: `device`, a model's name, or a plugin's id. Not real-time.
     ///
     /// # Errors

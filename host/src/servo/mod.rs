@@ -1,4 +1,4 @@
-//! The servo: one tick after the other, `device -> mapping -> models -> envelope -> device`.
+//! The servo: one tick after the other, `changes -> device -> mapping -> models -> envelope -> device`.
 //!
 //! Nothing in a tick allocates, locks, formats or waits on another thread. What a tick leaves behind is a
 //! [`TickRecord`]; whoever watches gets it through a ring, off the loop.
@@ -6,6 +6,7 @@
 mod clock;
 mod envelope;
 mod models;
+mod parameters;
 mod realtime;
 mod state;
 mod stop;
@@ -17,6 +18,9 @@ pub(crate) use clock::{Due, Schedule, monotonic_ns, sleep_until};
 pub use envelope::Envelope;
 pub use models::ModelHealth;
 pub(crate) use models::{ModelSlot, ModelStack};
+pub(crate) use parameters::{
+    ChangeReport, ChangeSender, ParameterChange, ParameterQueue, ReportReceiver, ScheduledChange,
+};
 pub use realtime::{Privilege, RealTimeReport};
 pub(crate) use realtime::{enter_real_time, probe_real_time};
 pub use state::{Cause, EmergencySource, Gate, RunEvent, RunState};
@@ -49,6 +53,7 @@ pub(crate) struct RunConfig {
 pub(crate) struct Servo {
     device: ActiveDevice,
     models: ModelStack,
+    parameters: ParameterQueue,
     envelope: Envelope,
     config: RunConfig,
     heart: Heartbeat,
@@ -63,12 +68,14 @@ impl Servo {
     pub(crate) fn new(
         device: ActiveDevice,
         models: ModelStack,
+        parameters: ParameterQueue,
         envelope: Envelope,
         config: RunConfig,
     ) -> Self {
         Self {
             device,
             models,
+            parameters,
             envelope,
             config,
             heart: Heartbeat::default(),
@@ -86,6 +93,7 @@ impl Servo {
         let mut watch = StageWatch::start(tick.index, started);
         let mut events = if *missed > 0 { Events::MISSED } else { Events::NONE };
 
+        self.change_parameters(tick, &mut events);
         self.heart.enter(tick.index, Place::DeviceRead);
         let sample = self.read(tick, &mut events);
         self.follow(sample, tick, stop, &mut events);
@@ -122,6 +130,22 @@ impl Servo {
             buttons: self.state.buttons,
             lateness_ns: *lateness_ns,
             compute_ns,
+        }
+    }
+
+    /// What was to change before this tick does so now.
+    #[inline]
+    fn change_parameters(&mut self, tick: &Tick, events: &mut Events) {
+        let Self { device, models, parameters, .. } = self;
+        let changed = parameters.apply_due(tick, |change| {
+            let (plugin, parameter) = (change.plugin as usize, change.parameter as usize);
+            match plugin.checked_sub(1) {
+                None => device.set_parameter(parameter, change.value),
+                Some(model) => models.set_parameter(model, tick, parameter, change.value),
+            }
+        });
+        if changed {
+            events.insert(Events::PARAMETER_CHANGED);
         }
     }
 

@@ -80,6 +80,22 @@ impl ModelStack {
         (sum, energy_j)
     }
 
+    /// Changes a live parameter of the model numbered `model`. Real-time: bounded by the model, no allocation.
+    pub(crate) fn set_parameter(
+        &mut self,
+        model: usize,
+        tick: &Tick,
+        parameter: usize,
+        value: f64,
+    ) -> CallStatus {
+        let Some(slot) = self.slots.get_mut(model) else { return CallStatus::Unsupported };
+        let status = slot.model.set_parameter(parameter, value);
+        if status == CallStatus::Panicked {
+            slot.health.panicked_at.get_or_insert(tick.index);
+        }
+        status
+    }
+
     /// Every model with its health and what it said last. Not real-time.
     pub(crate) fn health(&mut self) -> Vec<(ModelHealth, String)> {
         self.slots.iter_mut().map(|slot| (slot.health, slot.model.last_message())).collect()

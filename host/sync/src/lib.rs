@@ -7,10 +7,11 @@
 //! |---|---|---|
 //! | servo -> viewer: the state now | [`latest`] | it misses values, never the newest |
 //! | servo -> recorder, plot, digest: every tick | [`ring`] | records that find no room are counted |
-//! | panel, experiment -> servo: commands | [`ring`] | the sender is told that there is no room |
+//! | panels, experiment -> servo: commands | [`inbox`] | the sender is told that there is no room |
 //!
-//! [`latest`] makes a latest-value cell, [`ring`] a first-in-first-out queue of fixed size. The servo drains
-//! its commands at tick boundaries, which is bounded by the number of slots.
+//! [`latest`] makes a latest-value cell, [`ring`] a first-in-first-out queue of fixed size, [`inbox`] a ring with
+//! any number of senders, which wait for each other but never make the servo wait. The servo drains its commands
+//! at tick boundaries, which is bounded by the number of slots; what was sent together arrives together.
 //!
 //! A *record* is any plain value that can be written as a fixed number of 64-bit words: see [`Words`].
 //!
@@ -73,7 +74,7 @@
 //! load, a release store or a barrier. Nothing is sequentially consistent: no decision here rests on the
 //! order of two words that different threads write.
 //!
-//! That the comments are true is not left to reading: `tests/loom.rs` runs both primitives under [loom],
+//! That the comments are true is not left to reading: `tests/loom.rs` runs them all under [loom],
 //! which tries every interleaving, and every stale value a core may still see in each. Each ordering was
 //! weakened in turn, and loom objected each time. Run it with
 //!
@@ -85,11 +86,13 @@
 
 #![forbid(unsafe_code)]
 
+mod inbox;
 mod latest;
 mod ring;
 mod shim;
 mod words;
 
+pub use inbox::{InboxSender, inbox};
 pub use latest::{Observer, Publisher, latest};
 pub use ring::{Full, Receiver, Sender, ring};
 pub use words::Words;

@@ -134,6 +134,46 @@ impl<T: Words<N>, const N: usize> Sender<T, N> {
         Ok(())
     }
 
+    /// Appends several records that become visible at once: whoever sees the first of them sees them all. So a
+    /// receiver that drains takes either the whole group or, next time, the whole group. Wait-free.
+    ///
+    /// Real-time: bounded by the group, no allocation.
+    ///
+    /// # Errors
+    /// [`Full`] if there is no room for all of them. Then none was appended, and all are counted as dropped.
+    pub fn push_all(&mut self, records: &[T]) -> Result<(), Full> {
+        if self.room_at(self.known_head) < records.len() {
+            // Acquire, for the reason given in `push`.
+            self.known_head = self.shared.receiver.head.load(Ordering::Acquire);
+        }
+        if self.room_at(self.known_head) < records.len() {
+            self.dropped = self.dropped.wrapping_add(records.len() as u64);
+            // Relaxed: a statistic, as in `push`.
+            self.shared.sender.dropped.store(self.dropped, Ordering::Relaxed);
+            return Err(Full);
+        }
+        for (index, record) in records.iter().enumerate() {
+            if let Some(slot) = self.shared.slot(self.tail.wrapping_add(index)) {
+                slot.turn.assert_writable();
+                slot.words.store(&record.to_words());
+            }
+        }
+        self.tail = self.tail.wrapping_add(records.len());
+        // Release, as in `push`, once for all: one store per record would show a part of the group.
+        self.shared.sender.tail.store(self.tail, Ordering::Release);
+        Ok(())
+    }
+
+    /// How many records can be pushed now; the receiver can only make it more.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn room(&self) -> usize {
+        // Relaxed, for the reason given in `has_room`.
+        self.room_at(self.shared.receiver.head.load(Ordering::Relaxed))
+    }
+
     /// True if the next push will succeed. Where time is virtual the sender may wait for it, so that a slow
     /// receiver slows the run instead of losing records; whoever waits also asks [`Self::is_abandoned`].
     ///
@@ -158,7 +198,13 @@ impl<T: Words<N>, const N: usize> Sender<T, N> {
     /// True if no slot is free when the receiver has come to `head`.
     #[inline]
     fn is_full(&self, head: usize) -> bool {
-        self.tail.wrapping_sub(head) >= self.shared.slots.len()
+        self.room_at(head) == 0
+    }
+
+    /// Free slots when the receiver has come to `head`.
+    #[inline]
+    fn room_at(&self, head: usize) -> usize {
+        self.shared.slots.len().saturating_sub(self.tail.wrapping_sub(head))
     }
 }
 
@@ -206,6 +252,15 @@ impl<T: Words<N>, const N: usize> Receiver<T, N> {
             count += 1;
         }
         count
+    }
+
+    /// How many records can wait at once.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn capacity(&self) -> usize {
+        self.shared.slots.len()
     }
 
     /// How many records found no room so far. Exact once the sender is known to be gone.

@@ -13,7 +13,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-use flotor_sync::{Full, Receiver, latest, ring};
+use flotor_sync::{Full, Receiver, inbox, latest, ring};
 use loom::thread;
 
 /// Two words that belong together: a record is torn if the second is not ten times the first.
@@ -194,5 +194,44 @@ fn a_sender_that_waits_for_room_learns_that_the_receiver_is_gone() {
         }
         assert!(sender.is_abandoned());
         dropper.join().unwrap();
+    });
+}
+
+#[test]
+fn a_group_arrives_whole_or_not_yet() {
+    static WHOLE: Sightings = Sightings::none();
+    static NOT_YET: Sightings = Sightings::none();
+    loom::model(|| {
+        let (sender, mut receiver) = inbox(2);
+        let pusher = thread::spawn(move || {
+            sender.send_all(&[pair(1), pair(2)]).unwrap();
+            // The receiver may have made room by now, or not: all or none either way.
+            sender.send_all(&[pair(3), pair(4)]).is_ok()
+        });
+        let mut arrived = Vec::new();
+        let first = receiver.drain(|record| arrived.push(number(record)));
+        assert!(first == 0 || first == 2, "a part of a group");
+        WHOLE.count_if(first == 2);
+        NOT_YET.count_if(first == 0);
+        let both = pusher.join().unwrap();
+        receiver.drain(|record| arrived.push(number(record)));
+        assert_eq!(arrived, if both { vec![1, 2, 3, 4] } else { vec![1, 2] });
+    });
+    WHOLE.assert_any("a group was there");
+    NOT_YET.assert_any("a group was still to come");
+}
+
+#[test]
+fn two_senders_lose_nothing_and_mix_no_groups() {
+    loom::model(|| {
+        let (sender, mut receiver) = inbox(4);
+        let other = sender.clone();
+        let pusher = thread::spawn(move || other.send_all(&[pair(3), pair(4)]).unwrap());
+        let mut arrived = Vec::new();
+        sender.send_all(&[pair(1), pair(2)]).unwrap();
+        receiver.drain(|record| arrived.push(number(record)));
+        pusher.join().unwrap();
+        receiver.drain(|record| arrived.push(number(record)));
+        assert!(arrived == [1, 2, 3, 4] || arrived == [3, 4, 1, 2], "{arrived:?}");
     });
 }

@@ -181,13 +181,15 @@ impl ActiveDevice {
         Cycle::from_code(unsafe { (self.write)(self.instance, tick, wrench) })
     }
 
-    /// Changes a live parameter at a tick boundary. Real-time: bounded, no allocation.
-    pub fn set_parameter(&mut self, setting: &Setting) -> CallStatus {
+    /// Changes a live parameter, by its index in the schema, at a tick boundary (for a choice, `value` is its index).
+    /// The plugin checks it once more. Real-time: bounded, no allocation.
+    pub fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
+        let Ok(index) = u32::try_from(index) else { return CallStatus::OutOfRange };
         let Some(set_parameter) = self.handle.as_ref().and_then(|handle| handle.table.set_parameter) else {
             return CallStatus::Unsupported;
         };
         // SAFETY: as in `read`.
-        let code = unsafe { set_parameter(self.instance, setting.index, setting.number) };
+        let code = unsafe { set_parameter(self.instance, index, value) };
         CallStatus::from_code(code)
     }
 

@@ -132,11 +132,13 @@ impl Model {
         CallStatus::Ok
     }
 
-    /// Changes a live parameter at a tick boundary. Real-time: bounded, no allocation.
-    pub fn set_parameter(&mut self, setting: &Setting) -> CallStatus {
+    /// Changes a live parameter, by its index in the schema, at a tick boundary (for a choice, `value` is its index).
+    /// The plugin checks it once more. Real-time: bounded, no allocation.
+    pub fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
+        let Ok(index) = u32::try_from(index) else { return CallStatus::OutOfRange };
         let Some(set_parameter) = self.table.set_parameter else { return CallStatus::Unsupported };
         // SAFETY: as in `prepare`.
-        CallStatus::from_code(unsafe { set_parameter(self.instance, setting.index, setting.number) })
+        CallStatus::from_code(unsafe { set_parameter(self.instance, index, value) })
     }
 
     /// The value in force of the parameter at `index`, presets resolved; NaN if unknown. Real-time.

@@ -1,20 +1,24 @@
-//! From a scene to a run: loads what the scene names, pairs it, runs the loop, lets others watch.
+//! From a scene to a run: loads what the scene names, pairs it, runs the loop, lets others watch and change it.
 
-use crate::mapping::Mapping;
+mod controls;
+mod prepare;
+
+pub use controls::{ControlError, Controls, NewValue};
+pub(crate) use prepare::prepare_model;
+
+use crate::record::Change;
 use crate::registry::{LookupError, Registry};
-use crate::scene::{ModelUse, ParameterText, PluginUse, Scene, SceneError};
+use crate::scene::{Scene, SceneError};
 use crate::servo::{
-    Cause, Clock, EmergencySource, Envelope, Heartbeat, ModelHealth, ModelSlot, ModelStack, Place,
+    Cause, Clock, EmergencySource, Envelope, Heartbeat, ModelHealth, ModelStack, ParameterQueue, Place,
     RealTimeReport, RunConfig, RunState, Schedule, Servo, SpinWindow, StopSwitch, Stuck, Timing,
     enter_real_time, start_watchdog,
 };
 use crate::trace::{RECORD_WORDS, TickRecord};
+use controls::{ChangeLog, Parts};
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, Setting, Stopper};
-use flotor_hal::{
-    Capabilities, Demand, EnergyLedger, Fault, LoopConfig, Pacing, Parameter, ParameterKind, Refusal,
-};
-use std::borrow::Cow;
+use flotor_hal::abi::loader::{LoadError, Metadata, Stopper};
+use flotor_hal::{EnergyLedger, Fault, LoopConfig, Pacing, Parameter};
 use std::time::{Duration, Instant};
 
 /// How a scene is to be run.
@@ -66,13 +70,15 @@ pub enum RunError {
 }
 
 /// A plugin in a run, for reports and recordings.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct PluginReport {
     /// Name in the scene ("device", or the model's name).
     pub name: String,
     /// What the plugin says about itself.
     pub metadata: Metadata,
-    /// Every parameter with the value in force, as text.
+    /// What it can be told.
+    pub schema: &'static [Parameter],
+    /// Every parameter with the value in force before the run, as text.
     pub parameters: Vec<(String, String)>,
 }
 
@@ -80,12 +86,17 @@ pub struct PluginReport {
 pub trait Observer {
     /// One tick, in order. Not real-time.
     fn observe(&mut self, record: &TickRecord);
+
+    /// A parameter that changed, before the tick that saw it first. Not real-time.
+    fn change(&mut self, _change: &Change) {}
 }
 
 /// A scene ready to run: everything loaded, paired and opened, nothing energised.
 pub struct Session {
     servo: Servo,
     stopper: Stopper,
+    controls: Controls,
+    changes: ChangeLog,
     clock: Clock,
     pacing: Pacing,
     period_ns: u64,
@@ -165,18 +176,16 @@ impl Session {
         let duration_ns = (scene.duration_s * 1.0e9).round() as u64;
         let config = LoopConfig { period_ns, seed: options.seed };
 
-        let device_plugin = load(registry, &scene.device, PluginKind::Device)?;
-        let settings = settings(&device_plugin, "device", &scene.device.parameters)?;
+        let device_plugin = prepare::load(registry, &scene.device, PluginKind::Device)?;
+        let settings = prepare::settings(&device_plugin, "device", &scene.device.parameters)?;
         let mut device = device_plugin.open_device(&settings)?;
-        let refused = |plugin: &Plugin, refusal: Refusal| {
-            let Metadata { path, id, .. } = plugin.metadata().clone();
-            RunError::Plugin(LoadError::Refused { path, id, refusal })
-        };
-        let capabilities = device.capabilities().map_err(|refusal| refused(&device_plugin, refusal))?;
+        let refused = |refusal| prepare::refused(&device_plugin, refusal);
+        let capabilities = device.capabilities().map_err(refused)?;
         let mut plugins = vec![PluginReport {
             name: "device".to_owned(),
             metadata: device_plugin.metadata().clone(),
-            parameters: in_force(&device_plugin, &settings, |index| device.parameter(index)),
+            schema: device_plugin.parameters(),
+            parameters: prepare::in_force(&device_plugin, &settings, |index| device.parameter(index)),
         }];
 
         let mut models = Vec::new();
@@ -185,22 +194,27 @@ impl Session {
             models.push(slot);
             plugins.push(report);
         }
-        let mismatches = pair(scene, &capabilities, device.can_pace());
+        let mismatches = prepare::pair(scene, &capabilities, device.can_pace());
         if !mismatches.is_empty() {
             return Err(RunError::Mismatch { device: scene.device.plugin.clone(), mismatches });
         }
+        let parts = Parts::new(&plugins);
+        let (parameters, sender, reports) = ParameterQueue::new(prepare::schedule(&scene.changes, &parts)?);
+        let controls = Controls::new(parts.clone(), sender);
 
         let envelope = Envelope::new(&scene.limits, &scene.boundary, &capabilities, period_ns);
         let stopper = device.stopper();
-        let active = device.activate(&config).map_err(|(_, refusal)| refused(&device_plugin, refusal))?;
+        let active = device.activate(&config).map_err(|(_, refusal)| refused(refusal))?;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a minute
         let [ramp_ns, watchdog_ns] =
             [scene.limits.ramp_s, scene.limits.watchdog_s].map(|seconds| (seconds * 1.0e9).round() as u64);
         let config = RunConfig { period_ns, ramp_ns, emergency_buttons: scene.limits.emergency_buttons };
-        let servo = Servo::new(active, ModelStack::new(models), envelope, config);
+        let servo = Servo::new(active, ModelStack::new(models), parameters, envelope, config);
         Ok(Self {
             servo,
             stopper,
+            controls,
+            changes: ChangeLog::new(parts, reports),
             clock: options.clock,
             pacing: scene.pacing,
             period_ns,
@@ -219,6 +233,12 @@ impl Session {
     #[must_use]
     pub fn plugins(&self) -> &[PluginReport] {
         &self.plugins
+    }
+
+    /// The handle by which other threads change parameters of the run.
+    #[must_use]
+    pub fn controls(&self) -> Controls {
+        self.controls.clone()
     }
 
     /// Runs until the duration is over, somebody uses `stop`, or the device faults.
@@ -257,7 +277,8 @@ impl Session {
 
     /// Same tick, no waiting: observers look between batches, so that a slow one slows the run and loses nothing.
     fn run_virtual(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Finished {
-        let mut runner = Runner::new(self.servo, Schedule::start_virtual(self.period_ns), self.duration_ns);
+        let Session { servo, mut changes, period_ns, duration_ns, .. } = self;
+        let mut runner = Runner::new(servo, Schedule::start_virtual(period_ns), duration_ns);
         let mut batch = Vec::with_capacity(VIRTUAL_BATCH);
         while runner.end.is_none() {
             while batch.len() < VIRTUAL_BATCH && runner.end.is_none() {
@@ -265,8 +286,10 @@ impl Session {
                     batch.push(record);
                 }
             }
-            batch.iter().for_each(|record| observer.observe(record));
-            batch.clear();
+            for record in batch.drain(..) {
+                changes.up_to(record.tick, |change| observer.change(change));
+                observer.observe(&record);
+            }
         }
         runner.finish(0, RealTimeReport::not_asked())
     }
@@ -274,7 +297,13 @@ impl Session {
     /// The loop on a thread of its own; this one lets the observers look.
     fn run_real(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Finished, RunError> {
         let (mut sender, mut receiver) = flotor_sync::ring::<TickRecord, RECORD_WORDS>(RING_RECORDS);
-        let Session { servo, stopper, pacing, period_ns, duration_ns, watchdog_ns, plugins, .. } = self;
+        let Session {
+            servo, stopper, mut changes, pacing, period_ns, duration_ns, watchdog_ns, plugins, ..
+        } = self;
+        let mut look = |record: TickRecord| {
+            changes.up_to(record.tick, |change| observer.change(change));
+            observer.observe(&record);
+        };
         let heart = servo.heart().clone();
         let loop_stop = stop.clone();
         // Not scoped: a thread that is stuck in a plugin has to be left behind.
@@ -304,7 +333,7 @@ impl Session {
         let servo_thread = servo_thread.map_err(|_| RunError::Thread("could not be started"))?;
         let mut bitten = None;
         while !servo_thread.is_finished() {
-            receiver.drain(|record| observer.observe(&record));
+            receiver.drain(&mut look);
             bitten = bitten.or_else(|| heart.bitten().map(|stuck| (stuck, Instant::now())));
             if let Some((stuck, since)) = bitten
                 && since.elapsed() > COME_BACK
@@ -315,7 +344,7 @@ impl Session {
         }
         let finished = servo_thread.join().map_err(|_| RunError::Thread("panicked"))?;
         let finished = finished.map_err(|_| RunError::Thread("got no watchdog"))?;
-        receiver.drain(|record| observer.observe(&record));
+        receiver.drain(&mut look);
         Ok(Finished { dropped_records: receiver.dropped(), ..finished })
     }
 }
@@ -376,117 +405,4 @@ impl Runner {
         let elapsed_ns = self.schedule.finish();
         Finished { servo: self.servo, end, elapsed_ns, dropped_records, real_time }
     }
-}
-
-fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
-    registry.load(&plugin.plugin, kind).map_err(|error| match error {
-        LookupError::Unknown { .. } => {
-            SceneError { location: plugin.location.clone(), problem: error.to_string() }.into()
-        }
-        refused => refused.into(),
-    })
-}
-
-/// Loads and creates one model of a scene. Not real-time.
-pub(crate) fn prepare_model(
-    registry: &Registry,
-    model: &ModelUse,
-    config: &LoopConfig,
-) -> Result<(ModelSlot, PluginReport), RunError> {
-    let plugin = load(registry, &model.plugin, PluginKind::Model)?;
-    let settings = settings(&plugin, &model.name, &model.plugin.parameters)?;
-    let mut instance = plugin.create_model(&settings)?;
-    instance.prepare(config).map_err(|refusal| {
-        let Metadata { path, id, .. } = plugin.metadata().clone();
-        LoadError::Refused { path, id, refusal }
-    })?;
-    let report = PluginReport {
-        name: model.name.clone(),
-        metadata: plugin.metadata().clone(),
-        parameters: in_force(&plugin, &settings, |index| instance.parameter(index)),
-    };
-    let demand = Demand::ALL.limited_to(instance.serves());
-    let slot = ModelSlot {
-        model: instance,
-        mapping: Mapping::new(&model.mapping),
-        demand,
-        health: ModelHealth::default(),
-    };
-    Ok((slot, report))
-}
-
-/// Checks what was written against what the plugin understands; complaints name file and line.
-fn settings(plugin: &Plugin, name: &str, parameters: &[ParameterText]) -> Result<Vec<Setting>, SceneError> {
-    let schema = plugin.parameters();
-    let check = |parameter: &ParameterText| {
-        let value = from_the_scene(schema, parameter);
-        Setting::parse(schema, &parameter.key, &value).map_err(|error| SceneError {
-            location: parameter.location.clone(),
-            problem: format!("[{name}] {error}"),
-        })
-    };
-    parameters.iter().map(check).collect()
-}
-
-/// The value as the plugin is to get it: files a scene names lie beside the scene, those of a command line where
-/// the command runs.
-fn from_the_scene<'t>(schema: &[Parameter], text: &'t ParameterText) -> Cow<'t, str> {
-    let ParameterText { key, value, location } = text;
-    let parameter = schema.iter().find(|parameter| parameter.id() == key);
-    let is_file = parameter.is_some_and(|parameter| {
-        let built_in = parameter.choices().iter().any(|name| name.as_str() == value);
-        parameter.kind() == ParameterKind::File && !built_in && !value.is_empty()
-    });
-    match location.file.parent() {
-        Some(folder) if is_file && location.is_in_a_file() => {
-            Cow::Owned(folder.join(value).to_string_lossy().into_owned())
-        }
-        _ => Cow::Borrowed(value),
-    }
-}
-
-/// Every parameter with its value in force, as text.
-fn in_force(
-    plugin: &Plugin,
-    settings: &[Setting],
-    mut value: impl FnMut(usize) -> f64,
-) -> Vec<(String, String)> {
-    let schema = plugin.parameters();
-    let show = |(index, parameter): (usize, &Parameter)| {
-        let text = match parameter.kind() {
-            // Plugins answer with numbers: a text is in force if it was set.
-            ParameterKind::Text | ParameterKind::File => {
-                let set = settings.iter().rev().find(|setting| setting.index() == index);
-                set.map_or_else(String::new, |setting| setting.display(schema))
-            }
-            ParameterKind::Real | ParameterKind::Choice => {
-                let setting = Setting::number(schema, parameter.id(), value(index));
-                setting.map_or_else(|_| String::new(), |setting| setting.display(schema))
-            }
-        };
-        (parameter.id().to_owned(), text)
-    };
-    schema.iter().enumerate().map(show).collect()
-}
-
-/// What of a scene the device cannot do; all at once, before anything is energised.
-fn pair(scene: &Scene, device: &Capabilities, can_pace: bool) -> Vec<String> {
-    let mut mismatches = Vec::new();
-    let [slowest, fastest] = device.rate_hz;
-    if scene.rate_hz < slowest || scene.rate_hz > fastest {
-        mismatches.push(format!(
-            "rate {} Hz, the device runs at {slowest} to {fastest} Hz; change `rate_hz`",
-            scene.rate_hz
-        ));
-    }
-    if scene.pacing == Pacing::Device && !can_pace {
-        mismatches.push(
-            "it cannot set the pace of the loop; remove `pacing`, or say `pacing = \"host\"`".to_owned(),
-        );
-    }
-    if !scene.models.is_empty() && !device.actuated.contains(flotor_hal::Axes::TRANSLATION) {
-        mismatches
-            .push("the device gives no force, so no model can be felt; use it for input only".to_owned());
-    }
-    mismatches
 }

@@ -1,0 +1,31 @@
+//! A parameter that changed while the loop ran.
+
+/// A parameter that changed in a run, or was to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Change {
+    /// The tick before which it changed: the first that saw the new value.
+    pub tick: u64,
+    /// The time of that tick, ns.
+    pub time_ns: u64,
+    /// Name of the plugin in the scene.
+    pub plugin: String,
+    /// Id of the parameter.
+    pub parameter: String,
+    /// The value as a person would type it.
+    pub value: String,
+    /// The value as the plugin got it; for a choice, its index.
+    pub number: f64,
+    /// What the plugin made of it.
+    pub outcome: ChangeOutcome,
+}
+
+/// How a plugin took a change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChangeOutcome {
+    /// The value is in force from this tick on.
+    Applied,
+    /// The plugin said no: the value does not fit its others. The old one stays.
+    Refused,
+    /// The plugin panicked over it.
+    Broke,
+}

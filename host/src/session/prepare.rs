@@ -1,0 +1,152 @@
+//! From a scene to what a loop is made of: plugins loaded, their settings checked, everything paired.
+
+use super::controls::{NewValue, Parts};
+use super::{PluginReport, RunError};
+use crate::mapping::Mapping;
+use crate::registry::{LookupError, Registry};
+use crate::scene::{ChangeUse, ModelUse, ParameterText, PluginUse, Scene, SceneError};
+use crate::servo::{ModelHealth, ModelSlot, ScheduledChange};
+use flotor_hal::abi::PluginKind;
+use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, Setting};
+use flotor_hal::{Capabilities, Demand, LoopConfig, Pacing, Parameter, ParameterKind, Refusal};
+use std::borrow::Cow;
+
+pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
+    registry.load(&plugin.plugin, kind).map_err(|error| match error {
+        LookupError::Unknown { .. } => {
+            SceneError { location: plugin.location.clone(), problem: error.to_string() }.into()
+        }
+        refused => refused.into(),
+    })
+}
+
+/// A plugin that said no.
+pub(super) fn refused(plugin: &Plugin, refusal: Refusal) -> RunError {
+    let Metadata { path, id, .. } = plugin.metadata().clone();
+    RunError::Plugin(LoadError::Refused { path, id, refusal })
+}
+
+/// Loads and creates one model of a scene. Not real-time.
+pub(crate) fn prepare_model(
+    registry: &Registry,
+    model: &ModelUse,
+    config: &LoopConfig,
+) -> Result<(ModelSlot, PluginReport), RunError> {
+    let plugin = load(registry, &model.plugin, PluginKind::Model)?;
+    let settings = settings(&plugin, &model.name, &model.plugin.parameters)?;
+    let mut instance = plugin.create_model(&settings)?;
+    instance.prepare(config).map_err(|refusal| refused(&plugin, refusal))?;
+    let report = PluginReport {
+        name: model.name.clone(),
+        metadata: plugin.metadata().clone(),
+        schema: plugin.parameters(),
+        parameters: in_force(&plugin, &settings, |index| instance.parameter(index)),
+    };
+    let demand = Demand::ALL.limited_to(instance.serves());
+    let slot = ModelSlot {
+        model: instance,
+        mapping: Mapping::new(&model.mapping),
+        demand,
+        health: ModelHealth::default(),
+    };
+    Ok((slot, report))
+}
+
+/// Checks what was written against what the plugin understands; complaints name file and line.
+pub(super) fn settings(
+    plugin: &Plugin,
+    name: &str,
+    parameters: &[ParameterText],
+) -> Result<Vec<Setting>, SceneError> {
+    let schema = plugin.parameters();
+    let check = |parameter: &ParameterText| {
+        let value = from_the_scene(schema, parameter);
+        Setting::parse(schema, &parameter.key, &value).map_err(|error| SceneError {
+            location: parameter.location.clone(),
+            problem: format!("[{name}] {error}"),
+        })
+    };
+    parameters.iter().map(check).collect()
+}
+
+/// The value as the plugin is to get it: files a scene names lie beside the scene, those of a command line where
+/// the command runs.
+fn from_the_scene<'t>(schema: &[Parameter], text: &'t ParameterText) -> Cow<'t, str> {
+    let ParameterText { key, value, location } = text;
+    let parameter = schema.iter().find(|parameter| parameter.id() == key);
+    let is_file = parameter.is_some_and(|parameter| {
+        let built_in = parameter.choices().iter().any(|name| name.as_str() == value);
+        parameter.kind() == ParameterKind::File && !built_in && !value.is_empty()
+    });
+    match location.file.parent() {
+        Some(folder) if is_file && location.is_in_a_file() => {
+            Cow::Owned(folder.join(value).to_string_lossy().into_owned())
+        }
+        _ => Cow::Borrowed(value),
+    }
+}
+
+/// Every parameter with its value in force, as text.
+pub(super) fn in_force(
+    plugin: &Plugin,
+    settings: &[Setting],
+    mut value: impl FnMut(usize) -> f64,
+) -> Vec<(String, String)> {
+    let schema = plugin.parameters();
+    let show = |(index, parameter): (usize, &Parameter)| {
+        let text = match parameter.kind() {
+            // Plugins answer with numbers: a text is in force if it was set.
+            ParameterKind::Text | ParameterKind::File => {
+                let set = settings.iter().rev().find(|setting| setting.index() == index);
+                set.map_or_else(String::new, |setting| setting.display(schema))
+            }
+            ParameterKind::Real | ParameterKind::Choice => {
+                let setting = Setting::number(schema, parameter.id(), value(index));
+                setting.map_or_else(|_| String::new(), |setting| setting.display(schema))
+            }
+        };
+        (parameter.id().to_owned(), text)
+    };
+    schema.iter().enumerate().map(show).collect()
+}
+
+/// What of a scene the device cannot do; all at once, before anything is energised.
+pub(super) fn pair(scene: &Scene, device: &Capabilities, can_pace: bool) -> Vec<String> {
+    let mut mismatches = Vec::new();
+    let [slowest, fastest] = device.rate_hz;
+    if scene.rate_hz < slowest || scene.rate_hz > fastest {
+        mismatches.push(format!(
+            "rate {} Hz, the device runs at {slowest} to {fastest} Hz; change `rate_hz`",
+            scene.rate_hz
+        ));
+    }
+    if scene.pacing == Pacing::Device && !can_pace {
+        mismatches.push(
+            "it cannot set the pace of the loop; remove `pacing`, or say `pacing = \"host\"`".to_owned(),
+        );
+    }
+    if !scene.models.is_empty() && !device.actuated.contains(flotor_hal::Axes::TRANSLATION) {
+        mismatches
+            .push("the device gives no force, so no model can be felt; use it for input only".to_owned());
+    }
+    mismatches
+}
+
+/// The changes a scene has scheduled, checked; complaints name file and line.
+pub(super) fn schedule(changes: &[ChangeUse], parts: &Parts) -> Result<Vec<ScheduledChange>, SceneError> {
+    let check = |change: &ChangeUse| {
+        let new = NewValue {
+            plugin: &change.plugin,
+            parameter: &change.parameter.key,
+            value: &change.parameter.value,
+        };
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
+        let time_ns = (change.at_s * 1.0e9).round() as u64;
+        let checked = parts.check(&new).map_err(|error| SceneError {
+            location: change.parameter.location.clone(),
+            problem: format!("`change.set`: {error}"),
+        })?;
+        Ok(ScheduledChange { time_ns, change: checked })
+    };
+    changes.iter().map(check).collect()
+}
