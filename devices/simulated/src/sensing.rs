@@ -165,7 +165,9 @@ impl Sensing {
         let magnification = self.optics.magnification();
         if self.parameters.noise_m > 0.0 {
             let deviation_m = self.parameters.noise_m * magnification;
-            let [[a, b], [c, d], [e, f]] = [0; 3].map(|_| self.noise.normal_pair());
+            let [a, b] = self.noise.normal_pair();
+            let [c, d] = self.noise.normal_pair();
+            let [e, f] = self.noise.normal_pair();
             spots.across_m += DVec3::new(a, c, e) * deviation_m;
             spots.up_m += DVec3::new(b, d, f) * deviation_m;
         }

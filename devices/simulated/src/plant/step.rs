@@ -38,6 +38,10 @@ pub(super) struct Step<'a> {
     pull: DVec3,
     /// Stiffness of the hand times the pace of its intention, N/s.
     yank: DVec3,
+    /// Damping of the hand times the rate at which it means to turn, device frame, N·m.
+    lead_nm: DVec3,
+    /// Torque of coils and hand while nothing has turned and nothing turns, device frame, N·m.
+    twist_nm: DVec3,
 }
 
 /// The unknowns of the Runge-Kutta method, or their derivatives.
@@ -76,7 +80,9 @@ impl<'a> Step<'a> {
             + hand.stiffness_n_per_m * (contact.intended_m - start.position_m)
             + hand.damping_ns_per_m * contact.pace_m_per_s;
         let yank = hand.stiffness_n_per_m * contact.pace_m_per_s;
-        Self { body, grid, coils, contact, start, pull, yank }
+        let lead_nm = contact.turning_rad_per_s * hand.rotational_damping_nms_per_rad;
+        let twist_nm = coils.torque_nm + lead_nm;
+        Self { body, grid, coils, contact, start, pull, yank, lead_nm, twist_nm }
     }
 
     /// The motion at the end and the work done if nothing turns the flotor: the oscillator's motion, exact
@@ -145,7 +151,9 @@ impl<'a> Step<'a> {
             ..Unknowns::ZERO
         };
         for (slope, share) in slopes.iter().zip(shares) {
-            at.add(slope, share * self.grid.step_s);
+            if *share != 0.0 {
+                at.add(slope, share * self.grid.step_s);
+            }
         }
         at
     }
@@ -187,10 +195,8 @@ impl<'a> Step<'a> {
             - body.hand.stiffness_n_per_m * moved
             - body.damping_ns_per_m * velocity;
         let back = rotation::misalignment_rad(at.orientation, self.contact.intended_orientation)
-            * body.hand.rotational_stiffness_nm_per_rad
-            + swing.attitude.transpose()
-                * (self.contact.turning_rad_per_s * body.hand.rotational_damping_nms_per_rad);
-        let torque = swing.attitude.transpose() * (self.coils.torque_nm - swing.arm.cross(force)) + back
+            * body.hand.rotational_stiffness_nm_per_rad;
+        let torque = swing.attitude.transpose() * (self.twist_nm - swing.arm.cross(force)) + back
             - at.spin * body.rotational_damping_nms_per_rad;
         let remainder =
             body.oscillator.damping_per_s * swing.velocity + body.oscillator.stiffness_per_s2 * swung;
@@ -206,7 +212,7 @@ impl<'a> Step<'a> {
         let velocity2 = velocity * velocity - undisturbed_velocity * undisturbed_velocity;
         let power = Power {
             coils_w: self.coils.torque_nm.dot(swing.turning),
-            hand_w: back.dot(at.spin)
+            hand_w: self.lead_nm.dot(swing.turning) + back.dot(at.spin)
                 - body.hand.rotational_damping_nms_per_rad * spin2
                 - body.hand.damping_ns_per_m.dot(velocity2)
                 - self.yank.dot(sway),

@@ -178,15 +178,23 @@ impl Optics {
     /// Where lenses of any width would put the spots of a pose.
     #[inline]
     fn images(&self, pose: &Pose) -> Spots {
-        let [first, second, third] = self.eyes.map(|eye| {
-            let at = pose.position_m + pose.orientation * eye.diode;
-            let scale = self.scale(&eye, at);
-            (scale * at.dot(eye.tangent), scale * at.z)
-        });
+        let attitude = DMat3::from_quat(pose.orientation);
+        let [first, second, third] = &self.eyes;
+        let first = self.image(first, pose.position_m, &attitude);
+        let second = self.image(second, pose.position_m, &attitude);
+        let third = self.image(third, pose.position_m, &attitude);
         Spots {
             across_m: DVec3::new(first.0, second.0, third.0),
             up_m: DVec3::new(first.1, second.1, third.1),
         }
+    }
+
+    /// Where one lens puts its spot: across and up, m.
+    #[inline(always)]
+    fn image(&self, eye: &Eye, position_m: DVec3, attitude: &DMat3) -> (f64, f64) {
+        let at = position_m + *attitude * eye.diode;
+        let scale = self.scale(eye, at);
+        (scale * at.dot(eye.tangent), scale * at.z)
     }
 
     /// Image over object size for a diode at `at`.
@@ -198,21 +206,11 @@ impl Optics {
     /// How the spots of a pose move with it; nothing if they do not show all of its motion.
     #[inline]
     fn equations(&self, pose: &Pose) -> Option<Equations> {
-        let per_image_m = 1.0 / self.geometry.image_distance_m;
-        // Rows of one eye against (x, y, yaw) and (z, pitch, roll).
-        let rows = self.eyes.map(|eye| {
-            let arm = pose.orientation * eye.diode;
-            let at = pose.position_m + arm;
-            let scale = self.scale(&eye, at);
-            [eye.tangent, DVec3::Z].map(|direction| {
-                // d(f q t / D) = f (t + (q t / D) e) dq / D.
-                let along = scale * (direction + eye.radius * (scale * at.dot(direction) * per_image_m));
-                // (dr x arm) along = dr (arm x along).
-                let turned = arm.cross(along);
-                (DVec3::new(along.x, along.y, turned.z), DVec3::new(along.z, turned.x, turned.y))
-            })
-        });
-        let [[u1, v1], [u2, v2], [u3, v3]] = rows;
+        let attitude = DMat3::from_quat(pose.orientation);
+        let [first, second, third] = &self.eyes;
+        let (u1, v1) = self.rows(first, pose.position_m, &attitude);
+        let (u2, v2) = self.rows(second, pose.position_m, &attitude);
+        let (u3, v3) = self.rows(third, pose.position_m, &attitude);
         let matrix = |a, b, c| DMat3::from_cols(a, b, c).transpose();
         let size = self.magnification().powi(3) * self.geometry.diode_radius_m;
         Equations::new(
@@ -221,7 +219,27 @@ impl Optics {
             [size, size * self.geometry.diode_radius_m],
         )
     }
+
+    /// The rows of one eye: across and up.
+    #[inline(always)]
+    fn rows(&self, eye: &Eye, position_m: DVec3, attitude: &DMat3) -> (Row, Row) {
+        let arm = *attitude * eye.diode;
+        let at = position_m + arm;
+        let scale = self.scale(eye, at);
+        let per_image_m = 1.0 / self.geometry.image_distance_m;
+        let row = |direction: DVec3| {
+            // d(f q t / D) = f (t + (q t / D) e) dq / D.
+            let along = scale * (direction + eye.radius * (scale * at.dot(direction) * per_image_m));
+            // (dr x arm) along = dr (arm x along).
+            let turned = arm.cross(along);
+            (DVec3::new(along.x, along.y, turned.z), DVec3::new(along.z, turned.x, turned.y))
+        };
+        (row(eye.tangent), row(DVec3::Z))
+    }
 }
+
+/// How one coordinate of a spot moves with (x, y, yaw) and with (z, pitch, roll).
+type Row = (DVec3, DVec3);
 
 /// The six linearised equations in two halves: the spots' motion across their cells shows mostly `x, y` and yaw,
 /// their motion up mostly `z`, pitch and roll. What each shows of the other is small, so that the halves can be

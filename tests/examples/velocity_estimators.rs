@@ -1,0 +1,126 @@
+//! What each velocity estimate of the simulated flotor trades: noise at rest against lag in motion, table and
+//! picture.
+//!
+//! Noise is the root mean square of the estimate for flotors that rest at random places, seen by the sensors of
+//! preset `full` (1 µm of noise, steps of 2 µm). Lag is how far the estimate is behind a steady acceleration, over
+//! that acceleration, seen by perfect sensors. Nothing here depends on the machine.
+//!
+//! ```text
+//! cargo run --release -p flotor-tests --example velocity_estimators -- velocity.svg > velocity.csv
+//! ```
+
+use flotor::plot::{Axis, Figure, Panel, Series};
+use flotor_hal::glam::DVec3;
+use flotor_simulated::hand::Pose;
+use flotor_simulated::plant::State;
+use flotor_simulated::sensing::velocity::EstimatorKind;
+use flotor_simulated::sensing::{Sensing, SensingParameters};
+use flotor_simulated::validation::InvalidParameter;
+use std::error::Error;
+
+const TICK_S: f64 = 1.0e-3;
+const TICK_NS: u64 = 1_000_000;
+
+/// Places a flotor rests at, and ticks it is watched at each.
+const PLACES: u32 = 100;
+const TICKS: u64 = 400;
+/// Ticks until an estimate has settled.
+const SETTLED: usize = 200;
+
+/// Steady acceleration, m/s²: 8 mm in the ticks of a run.
+const ACCELERATION_M_PER_S2: f64 = 0.1;
+
+/// An estimate, and the number it is set to, if it has one.
+type Setting = (Option<f64>, EstimatorKind);
+
+fn main() -> Result<(), Box<dyn Error>> {
+    // Deviation of a coordinate of preset `full`: its noise, and its steps evenly distributed.
+    let noise_m = SensingParameters::MAGLEV.noise_m.hypot(SensingParameters::MAGLEV.step_m / 12.0_f64.sqrt());
+    let low_pass = [500.0, 200.0, 100.0, 50.0, 20.0, 10.0, 5.0];
+    let kalman = [200.0, 50.0, 20.0, 5.0, 2.0, 0.5, 0.2];
+    let families: [(&str, Vec<Setting>); 3] = [
+        ("difference", vec![(None, EstimatorKind::Difference)]),
+        (
+            "low-pass",
+            low_pass
+                .map(|bandwidth_hz| (Some(bandwidth_hz), EstimatorKind::LowPass { bandwidth_hz }))
+                .to_vec(),
+        ),
+        (
+            "kalman",
+            kalman
+                .map(|acceleration_m_per_s2| {
+                    (Some(acceleration_m_per_s2), EstimatorKind::Kalman { noise_m, acceleration_m_per_s2 })
+                })
+                .to_vec(),
+        ),
+    ];
+    println!("estimate,setting,noise_mm_per_s,lag_ms");
+    let mut panel = Panel::new(Axis::log("Noise at rest, rms", "mm/s"));
+    for (name, kinds) in families {
+        let mut points = Vec::new();
+        for (setting, kind) in kinds {
+            let (noise_mm_per_s, lag_ms) = (noise_m_per_s(kind)? * 1.0e3, lag_s(kind)? * 1.0e3);
+            let setting = setting.map_or_else(String::new, |number| number.to_string());
+            println!("{name},{setting},{noise_mm_per_s:.3},{lag_ms:.2}");
+            points.push((lag_ms, noise_mm_per_s));
+        }
+        panel = panel.series(if points.len() > 1 {
+            Series::line(name, points)
+        } else {
+            Series::points(name, points)
+        });
+    }
+    let figure = Figure::new("Estimates of velocity", Axis::log("Lag behind a steady acceleration", "ms"))
+        .subtitle("low-pass of 500 to 5 Hz, Kalman filter for 200 to 0.2 m/s², at 1 kHz")
+        .panel_height_px(280.0)
+        .panel(panel);
+    match std::env::args().nth(1) {
+        Some(file) => Ok(std::fs::write(file, figure.to_svg())?),
+        None => Ok(()),
+    }
+}
+
+/// A row of estimates for the heights (m) a flotor is at, tick after tick.
+fn estimates(
+    parameters: &SensingParameters,
+    seed: u64,
+    height_m: impl Fn(u64) -> f64,
+) -> Result<Vec<f64>, InvalidParameter> {
+    let mut sensing = Sensing::new(parameters, seed, &Pose::HOME)?;
+    let rows = (0..TICKS).map(|tick| {
+        let state = State { position_m: DVec3::new(0.0, 0.0, height_m(tick)), ..State::HOME };
+        sensing.sample(&state, tick * TICK_NS, TICK_S);
+        sensing.arrived(0).velocity.linear_m_per_s.z
+    });
+    Ok(rows.collect())
+}
+
+fn noise_m_per_s(estimator: EstimatorKind) -> Result<f64, InvalidParameter> {
+    let parameters = SensingParameters { estimator, latency_ticks: 0, ..SensingParameters::MAGLEV };
+    let (mut sum, mut count) = (0.0, 0.0);
+    for place in 0..PLACES {
+        // Golden section: places spread over a millimetre, nowhere near the steps of the sensor.
+        let height_m = (f64::from(place) * 0.618_033_988_749_895).fract() * 1.0e-3;
+        for estimate in estimates(&parameters, u64::from(place), |_| height_m)?.iter().skip(SETTLED) {
+            sum += estimate * estimate;
+            count += 1.0;
+        }
+    }
+    Ok((sum / count).sqrt())
+}
+
+fn lag_s(estimator: EstimatorKind) -> Result<f64, InvalidParameter> {
+    let parameters = SensingParameters {
+        estimator,
+        latency_ticks: 0,
+        noise_m: 0.0,
+        step_m: 0.0,
+        edge_nonlinearity: 0.0,
+        ..SensingParameters::MAGLEV
+    };
+    let time_s = |tick: u64| tick as f64 * TICK_S;
+    let row = estimates(&parameters, 0, |tick| 0.5 * ACCELERATION_M_PER_S2 * time_s(tick).powi(2))?;
+    let last = row.last().copied().unwrap_or(f64::NAN);
+    Ok(time_s(TICKS - 1) - last / ACCELERATION_M_PER_S2)
+}
