@@ -154,10 +154,13 @@ fn print_description(plugin: &Plugin, parameters: &[Described<'_>]) {
         let range = match parameter.kind {
             "choice" => parameter.choices.join(" | "),
             "text" => "text".to_owned(),
+            "file" if parameter.choices.is_empty() => "a file".to_owned(),
+            "file" => format!("a file, or {}", parameter.choices.join(" | ")),
             _ => format!("{} to {} {}", parameter.min, parameter.max, parameter.unit),
         };
         let live = if parameter.live { ", live" } else { "" };
-        say!("  {:<28} {range} (default {}{live})", parameter.id, parameter.default);
+        let default = if parameter.default.is_empty() { "none" } else { &parameter.default };
+        say!("  {:<28} {range} (default {default}{live})", parameter.id);
         say!("  {:<28} {}", "", parameter.doc);
     }
 }
