@@ -13,6 +13,7 @@ use crate::precision::Precision;
 use crate::preset::Preset;
 use crate::rigidity::{Geometry, Material, Spring, Stiffness};
 use crate::rod::Accuracy;
+use crate::seat::Friction;
 use flotor_hal::abi::Str;
 use flotor_hal::{OutOfRange, Parameter, Refusal, Settings};
 
@@ -45,13 +46,13 @@ pub(crate) enum SeatChoice {
     Free,
 }
 
-/// Whether something only a real coil does is part of the law.
+/// Whether something that may be left out is part of the law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Coil {
-    /// Left out: the spring is a rod.
-    Ignored,
+pub(crate) enum Switch {
+    /// Left out.
+    Off,
     /// Part of it.
-    Counted,
+    On,
 }
 
 /// Which constant rules the stiffness.
@@ -109,6 +110,16 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::choice("precision", &PRECISIONS, 0, "Storage of numbers (variants thesis and closed-form)"),
     Parameter::choice("accuracy", &ACCURACIES, 0, "For the servo, or for reference (variant rod)"),
     Parameter::choice("seat", &SEATS, 0, "Lower plate held, or free to roll up and lift off (energy, rod)"),
+    Parameter::real(
+        "seat_friction",
+        "1",
+        0.01,
+        10.0,
+        10.0,
+        "Friction under a free seat; at 10 nothing slides",
+    )
+    .live(),
+    Parameter::choice("hand_over", &OFF_ON, 0, "Near buckling to the rod, as one energy (variant energy)"),
     Parameter::choice("coil_contact", &OFF_ON, 0, "Coils that meet press on each other (energy, rod)"),
     Parameter::choice(
         "wire",
@@ -158,8 +169,10 @@ pub(crate) struct Choice {
     pub(crate) precision: Precision,
     pub(crate) accuracy: Accuracy,
     pub(crate) seat: SeatChoice,
-    pub(crate) coil_contact: Coil,
-    pub(crate) wire: Coil,
+    pub(crate) friction: Friction,
+    pub(crate) hand_over: Switch,
+    pub(crate) coil_contact: Switch,
+    pub(crate) wire: Switch,
     pub(crate) preset: Preset,
 }
 
@@ -173,6 +186,7 @@ impl Choice {
         let precision = precision(settings, variant)?;
         let accuracy = accuracy(settings, variant)?;
         let seat = seat(settings, variant)?;
+        let hand_over = hand_over(settings, variant)?;
         let coil_contact = coil("coil_contact", settings, variant)?;
         let wire = coil("wire", settings, variant)?;
         let (geometry, material, stiffness) = preset.parameters();
@@ -200,7 +214,20 @@ impl Choice {
             Mode::Physical => Stiffness::Physical,
         };
         let spring = Spring::new(geometry, material, stiffness).map_err(Refusal::parameter)?;
-        Ok(Self { spring, stiffness, variant, precision, accuracy, seat, coil_contact, wire, preset })
+        let friction = Friction { coefficient: settings.number_or_default("seat_friction") };
+        Ok(Self {
+            spring,
+            stiffness,
+            variant,
+            precision,
+            accuracy,
+            seat,
+            friction,
+            hand_over,
+            coil_contact,
+            wire,
+            preset,
+        })
     }
 
     /// Preset `thesis-1` with another law, as no other setting would give.
@@ -215,8 +242,10 @@ impl Choice {
             precision: Precision::Double,
             accuracy: Accuracy::Servo,
             seat: SeatChoice::Fixed,
-            coil_contact: Coil::Ignored,
-            wire: Coil::Ignored,
+            friction: Friction::STICKING,
+            hand_over: Switch::Off,
+            coil_contact: Switch::Off,
+            wire: Switch::Off,
             preset,
         }
     }
@@ -226,6 +255,9 @@ impl Choice {
     /// # Errors
     /// The range that fits the other values; NaN to NaN for a number that follows from others in this mode.
     pub(crate) fn with(&self, index: usize, value: f64) -> Result<Self, OutOfRange> {
+        if SCHEMA.get(index).map(Parameter::id) == Some("seat_friction") {
+            return Ok(Self { friction: Friction { coefficient: value }, ..*self });
+        }
         let (mut geometry, mut material, mut stiffness) =
             (*self.spring.geometry(), *self.spring.material(), self.stiffness);
         let (own, unit) = match (SCHEMA.get(index).map_or("", Parameter::id), &mut stiffness) {
@@ -278,8 +310,10 @@ impl Choice {
             "precision" => position(&[Precision::Double, Precision::Single], &self.precision),
             "accuracy" => position(&[Accuracy::Servo, Accuracy::Tight], &self.accuracy),
             "seat" => position(&[SeatChoice::Fixed, SeatChoice::Free], &self.seat),
-            "coil_contact" => position(&[Coil::Ignored, Coil::Counted], &self.coil_contact),
-            "wire" => position(&[Coil::Ignored, Coil::Counted], &self.wire),
+            "seat_friction" => self.friction.coefficient,
+            "hand_over" => position(&[Switch::Off, Switch::On], &self.hand_over),
+            "coil_contact" => position(&[Switch::Off, Switch::On], &self.coil_contact),
+            "wire" => position(&[Switch::Off, Switch::On], &self.wire),
             "mode" => position(&Mode::ALL, &Mode::of(self.stiffness)),
             "free_length_mm" => geometry.free_length_m / MM,
             "coil_diameter_mm" => geometry.coil_diameter_m / MM,
@@ -328,14 +362,25 @@ fn seat(settings: &Settings<'_>, variant: Variant) -> Result<SeatChoice, Refusal
     }
 }
 
+/// Whether the law `energy` hands over to the rod.
+fn hand_over(settings: &Settings<'_>, variant: Variant) -> Result<Switch, Refusal> {
+    match (settings.choice_or_default("hand_over"), variant) {
+        (1, Variant::Energy) => Ok(Switch::On),
+        (1, Variant::Thesis | Variant::ClosedForm | Variant::CurrentLength | Variant::Rod) => {
+            Err(Refusal::parameter("`hand_over` on is for variant `energy`, which hands over to the rod"))
+        }
+        _ => Ok(Switch::Off),
+    }
+}
+
 /// Whether a property of real coils is counted; it is an energy, added to a law that has one.
-fn coil(id: &'static str, settings: &Settings<'_>, variant: Variant) -> Result<Coil, Refusal> {
+fn coil(id: &'static str, settings: &Settings<'_>, variant: Variant) -> Result<Switch, Refusal> {
     match (settings.choice_or_default(id), variant) {
-        (1, Variant::Energy | Variant::Rod) => Ok(Coil::Counted),
+        (1, Variant::Energy | Variant::Rod) => Ok(Switch::On),
         (1, Variant::Thesis | Variant::ClosedForm | Variant::CurrentLength) => Err(Refusal::parameter(
             format!("`{id}` on needs a law with a stored energy; set `variant` to `energy` or `rod`"),
         )),
-        _ => Ok(Coil::Ignored),
+        _ => Ok(Switch::Off),
     }
 }
 

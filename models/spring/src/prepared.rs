@@ -7,8 +7,9 @@ use crate::centerline::{Centerline, Section};
 use crate::closed_form::{ClosedForm, Form};
 use crate::contact::AxialContact;
 use crate::energy::EnergyForm;
+use crate::hand_over::HandOver;
 use crate::held::{Held, HeldSpring};
-use crate::parameters::{Choice, Coil, SeatChoice, Variant};
+use crate::parameters::{Choice, SeatChoice, Switch, Variant};
 use crate::pose::Pose;
 use crate::response::{Demand, Response};
 use crate::rigidity::Spring;
@@ -29,7 +30,9 @@ pub(crate) enum Prepared {
     ClosedForm(ClosedForm),
     Energy(Held<EnergyForm>),
     Rod(Held<Rod>),
+    HandOver(Held<HandOver>),
     FreeEnergy(Held<EnergyForm>, Seat),
+    FreeHandOver(Held<HandOver>, Seat),
     FreeRod(Held<Rod>, Seat),
 }
 
@@ -44,17 +47,25 @@ pub(crate) struct Insight {
 impl Prepared {
     /// Not real-time: the rod allocates.
     pub(crate) fn new(choice: &Choice) -> Self {
-        let Choice { spring, stiffness, precision, variant, seat, .. } = choice;
+        let Choice { spring, stiffness, precision, variant, seat, friction, hand_over, .. } = choice;
         match (variant, seat) {
             (Variant::Thesis, _) => Self::Thesis(Thesis::new(spring, *stiffness, *precision)),
             (Variant::ClosedForm, _) => {
                 Self::ClosedForm(ClosedForm::new(spring, Form::Printed).with_precision(*precision))
             }
             (Variant::CurrentLength, _) => Self::ClosedForm(ClosedForm::new(spring, Form::CurrentLength)),
+            (Variant::Energy, SeatChoice::Fixed) if *hand_over == Switch::On => {
+                Self::HandOver(handing_over(choice))
+            }
+            (Variant::Energy, SeatChoice::Free) if *hand_over == Switch::On => {
+                Self::FreeHandOver(handing_over(choice), Seat::new(spring, *friction))
+            }
             (Variant::Energy, SeatChoice::Fixed) => Self::Energy(energy(choice)),
-            (Variant::Energy, SeatChoice::Free) => Self::FreeEnergy(energy(choice), Seat::new(spring)),
+            (Variant::Energy, SeatChoice::Free) => {
+                Self::FreeEnergy(energy(choice), Seat::new(spring, *friction))
+            }
             (Variant::Rod, SeatChoice::Fixed) => Self::Rod(rod(choice)),
-            (Variant::Rod, SeatChoice::Free) => Self::FreeRod(rod(choice), Seat::new(spring)),
+            (Variant::Rod, SeatChoice::Free) => Self::FreeRod(rod(choice), Seat::new(spring, *friction)),
         }
     }
 
@@ -63,14 +74,19 @@ impl Prepared {
         match self {
             Self::Thesis(_) | Self::ClosedForm(_) => *self = Self::new(to),
             Self::Energy(held) => retune_energy(held, from, to),
+            Self::HandOver(held) => retune_hand_over(held, to),
             Self::Rod(held) => retune_rod(held, to),
             Self::FreeEnergy(held, seat) => {
                 retune_energy(held, from, to);
-                seat.set_spring(&to.spring);
+                seat.set_spring(&to.spring, to.friction);
+            }
+            Self::FreeHandOver(held, seat) => {
+                retune_hand_over(held, to);
+                seat.set_spring(&to.spring, to.friction);
             }
             Self::FreeRod(held, seat) => {
                 retune_rod(held, to);
-                seat.set_spring(&to.spring);
+                seat.set_spring(&to.spring, to.friction);
             }
         }
     }
@@ -79,8 +95,13 @@ impl Prepared {
     pub(crate) fn reset(&mut self) {
         match self {
             Self::Thesis(_) | Self::ClosedForm(_) | Self::Energy(_) => {}
+            Self::HandOver(held) => held.law.reset(),
             Self::Rod(held) => held.law.reset(),
             Self::FreeEnergy(_, seat) => seat.reset(),
+            Self::FreeHandOver(held, seat) => {
+                held.law.reset();
+                seat.reset();
+            }
             Self::FreeRod(held, seat) => {
                 held.law.reset();
                 seat.reset();
@@ -95,8 +116,10 @@ impl Prepared {
             Self::Thesis(law) => law.respond(pose, demand),
             Self::ClosedForm(law) => law.respond(pose, demand),
             Self::Energy(held) => held.respond(pose, demand),
+            Self::HandOver(held) => held.respond(pose, demand),
             Self::Rod(held) => held.respond(pose, demand),
             Self::FreeEnergy(held, seat) => seat.step(held, pose, demand),
+            Self::FreeHandOver(held, seat) => seat.step(held, pose, demand),
             Self::FreeRod(held, seat) => seat.step(held, pose, demand),
         }
     }
@@ -112,9 +135,7 @@ impl Prepared {
         match self {
             Self::ClosedForm(law) => batch.respond(law, inputs, outputs),
             Self::Energy(held) if held.is_plain() => batch.respond(&held.law, inputs, outputs),
-            Self::Thesis(_) | Self::Energy(_) | Self::Rod(_) | Self::FreeEnergy(..) | Self::FreeRod(..) => {
-                return false;
-            }
+            _ => return false,
         }
         true
     }
@@ -124,21 +145,24 @@ impl Prepared {
         match self {
             Self::Thesis(_) | Self::ClosedForm(_) => VariantInfo::new(Served::WRENCH, Memory::Stateless),
             Self::Energy(_) => VariantInfo::new(Served::ALL, Memory::Stateless),
-            Self::Rod(_) | Self::FreeEnergy(..) | Self::FreeRod(..) => {
-                VariantInfo::new(Served::ALL, Memory::PathDependent)
-            }
+            Self::Rod(_)
+            | Self::HandOver(_)
+            | Self::FreeEnergy(..)
+            | Self::FreeHandOver(..)
+            | Self::FreeRod(..) => VariantInfo::new(Served::ALL, Memory::PathDependent),
         }
     }
 
     /// About the last answer. Real-time: bounded, no allocation.
     pub(crate) fn insight(&self) -> Insight {
-        let (rod, seat) = match self {
+        let (state, seat) = match self {
             Self::Thesis(_) | Self::ClosedForm(_) | Self::Energy(_) => (None, None),
-            Self::Rod(held) => (Some(&held.law), None),
+            Self::HandOver(held) => (held.law.rod_state(), None),
+            Self::Rod(held) => (Some(held.law.state()), None),
             Self::FreeEnergy(_, seat) => (None, Some(seat)),
-            Self::FreeRod(held, seat) => (Some(&held.law), Some(seat)),
+            Self::FreeHandOver(held, seat) => (held.law.rod_state(), Some(seat)),
+            Self::FreeRod(held, seat) => (Some(held.law.state()), Some(seat)),
         };
-        let state = rod.map(Rod::state);
         Insight {
             branch: state.map(|state| state.branch),
             is_stable: state.map(|state| state.is_stable()),
@@ -155,36 +179,56 @@ impl Prepared {
     pub(crate) fn draw(&mut self, spring: &Spring, pose: &Pose, sections: &mut [Section]) -> bool {
         match self {
             Self::Thesis(_) | Self::ClosedForm(_) | Self::Energy(_) => draw_law(spring, pose, sections),
-            Self::Rod(held) => draw_rod(held, pose, sections),
+            Self::HandOver(held) => draw_hand_over(held, spring, pose, sections),
+            Self::Rod(held) => draw_rod(&mut held.law, pose, sections),
             Self::FreeEnergy(held, seat) => {
                 let arrived = arrive(|| seat.step(held, pose, Demand::Wrench));
                 arrived && seat.draw(pose, sections, |pose, sections| draw_law(spring, pose, sections))
             }
+            Self::FreeHandOver(held, seat) => {
+                let arrived = arrive(|| seat.step(held, pose, Demand::Wrench));
+                arrived
+                    && seat
+                        .draw(pose, sections, |pose, sections| draw_hand_over(held, spring, pose, sections))
+            }
             Self::FreeRod(held, seat) => {
                 let arrived = arrive(|| seat.step(held, pose, Demand::Wrench));
-                arrived && seat.draw(pose, sections, |pose, sections| draw_rod(held, pose, sections))
+                arrived && seat.draw(pose, sections, |pose, sections| draw_rod(&mut held.law, pose, sections))
             }
         }
     }
 }
 
 fn wire(choice: &Choice) -> Option<Wire> {
-    (choice.wire == Coil::Counted).then(|| Wire::new(&choice.spring))
+    (choice.wire == Switch::On).then(|| Wire::new(&choice.spring))
 }
 
 fn energy(choice: &Choice) -> Held<EnergyForm> {
-    let touches = choice.coil_contact == Coil::Counted;
+    let touches = choice.coil_contact == Switch::On;
     let contact = touches.then(|| AxialContact::new(&choice.spring));
     Held { law: EnergyForm::new(&choice.spring), contact, wire: wire(choice) }
 }
 
 /// Its coils touch along the bulge, inside the law.
 fn rod(choice: &Choice) -> Held<Rod> {
-    let coils = match choice.coil_contact {
-        Coil::Ignored => Coils::Pass,
-        Coil::Counted => Coils::Touch,
-    };
-    Held { law: Rod::with_coils(&choice.spring, choice.accuracy, coils), contact: None, wire: wire(choice) }
+    let law = Rod::with_coils(&choice.spring, choice.accuracy, coils(choice));
+    Held { law, contact: None, wire: wire(choice) }
+}
+
+fn handing_over(choice: &Choice) -> Held<HandOver> {
+    Held { law: HandOver::new(&choice.spring, coils(choice)), contact: None, wire: wire(choice) }
+}
+
+fn coils(choice: &Choice) -> Coils {
+    match choice.coil_contact {
+        Switch::Off => Coils::Pass,
+        Switch::On => Coils::Touch,
+    }
+}
+
+fn retune_hand_over(held: &mut Held<HandOver>, to: &Choice) {
+    held.law.set_spring(&to.spring);
+    held.wire = held.wire.map(|_| Wire::new(&to.spring));
 }
 
 fn retune_energy(held: &mut Held<EnergyForm>, from: &Choice, to: &Choice) {
@@ -210,12 +254,21 @@ fn arrive(mut tick: impl FnMut() -> Response) -> bool {
     validity.has_answer()
 }
 
-fn draw_rod(held: &mut Held<Rod>, pose: &Pose, sections: &mut [Section]) -> bool {
-    let arrived = arrive(|| held.law.step(pose, Demand::Force));
+fn draw_rod(rod: &mut Rod, pose: &Pose, sections: &mut [Section]) -> bool {
+    let arrived = arrive(|| rod.step(pose, Demand::Force));
     if arrived {
-        held.law.sections(sections);
+        rod.sections(sections);
     }
     arrived
+}
+
+/// The shape of the law that has the say, of `energy` as long as it has one.
+fn draw_hand_over(held: &mut Held<HandOver>, spring: &Spring, pose: &Pose, sections: &mut [Section]) -> bool {
+    arrive(|| held.law.respond(pose, Demand::Force))
+        && match held.law.rod_alone() {
+            Some(rod) => draw_rod(rod, pose, sections),
+            None => draw_law(spring, pose, sections),
+        }
 }
 
 fn draw_law(spring: &Spring, pose: &Pose, sections: &mut [Section]) -> bool {

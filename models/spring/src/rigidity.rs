@@ -186,6 +186,14 @@ impl Spring {
     pub fn axial_stiffness_n_per_m(&self) -> f64 {
         self.rigidities.gamma_n / self.geometry.free_length_m
     }
+
+    /// Stiffness sideways at rest (N/m), the plates held level: a beam that shears (Timoshenko).
+    #[must_use]
+    pub fn lateral_stiffness_n_per_m(&self) -> f64 {
+        let length_m = self.geometry.free_length_m;
+        let Rigidities { alpha_n_m2, beta_n, .. } = self.rigidities;
+        12.0 * alpha_n_m2 / (length_m * (length_m * length_m + 12.0 * alpha_n_m2 / beta_n))
+    }
 }
 
 /// # Errors

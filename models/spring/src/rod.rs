@@ -34,6 +34,7 @@ use crate::pose::Pose;
 use crate::response::{Demand, Response};
 use crate::rigidity::Spring;
 use crate::validity::Validity;
+pub use equilibrium::Work;
 use equilibrium::{Effort, Equilibrium, Outcome, Reading};
 use functional::Ratios;
 use plate::Plate;
@@ -135,11 +136,11 @@ impl Rod {
         let ratios = Ratios::new(spring, coils);
         let solver = match accuracy {
             Accuracy::Servo => {
-                let effort = Effort { most_steps: 4, matrix_life: 32, tolerance: 1e-8 };
+                let effort = Effort { most_steps: 4, most_matrices: 3, matrix_life: 32, tolerance: 1e-8 };
                 Solver::Servo(Box::new(Equilibrium::new(ratios, effort)))
             }
             Accuracy::Tight => {
-                let effort = Effort { most_steps: 8, matrix_life: 1, tolerance: 1e-14 };
+                let effort = Effort { most_steps: 8, most_matrices: 8, matrix_life: 1, tolerance: 1e-14 };
                 Solver::Tight(Box::new(Equilibrium::new(ratios, effort)))
             }
         };
@@ -171,6 +172,12 @@ impl Rod {
     pub fn state(&self) -> State {
         let unstable_directions = either!(&self.solver, equilibrium => equilibrium.unstable_directions());
         State { branch: self.branch, unstable_directions }
+    }
+
+    /// What the last tick cost. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn work(&self) -> Work {
+        either!(&self.solver, equilibrium => equilibrium.work())
     }
 
     /// The sections of the rod as it is after the last tick, from plate to plate, evenly in arc length of the

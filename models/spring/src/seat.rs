@@ -14,6 +14,9 @@
 //! Lifting costs `R P |s|` to first order, an energy with a tip at `s = 0`: that is what keeps the plate
 //! seated while `|M_base| <= P R`.
 //!
+//! The base slides where the force along the ground exceeds the friction of the axial force (Coulomb), until it does
+//! not; it stays where it slid to. That costs energy, and is the one thing here that is not conservative.
+//!
 //! Derivation: the book, chapter "The spring"; the step with a tip is the proximal Newton step of Lee, Sun
 //! and Saunders (2014).
 
@@ -36,10 +39,29 @@ const LONGEST_STEP_RAD: f64 = 0.05;
 const LARGEST_TILT_RAD: f64 = 1.2;
 /// Newton steps on the secular equation; it is nearly straight, three give all digits.
 const SECULAR_STEPS: u32 = 8;
+/// Share of the friction by which the force along the ground may exceed it: no coefficient is known as well.
+const FRICTION_TOLERANCE: f64 = 1e-6;
+/// A sliding base is moved by what the stiffness along the ground makes of the excess; as observed, but within this
+/// factor of that at rest.
+const STIFFNESS_RANGE: f64 = 8.0;
+/// Longest slide between evaluations, in free lengths.
+const LONGEST_SLIDE: f64 = 0.05;
 /// Least curvature assumed, of that of the spring at rest: a flatter model would take wild steps.
 const LEAST_CURVATURE: f64 = 1e-3;
 
-/// The base of one spring, free to tip and lift.
+/// Friction between the base and the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Friction {
+    /// Force along the ground per force onto it at which the base slides.
+    pub coefficient: f64,
+}
+
+impl Friction {
+    /// As good as none slides: no spring pulls its base that hard sideways while it stands.
+    pub const STICKING: Self = Self { coefficient: 10.0 };
+}
+
+/// The base of one spring, free to tip, slide and lift.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seat {
     rim_radius_m: f64,
@@ -50,6 +72,13 @@ pub struct Seat {
     /// Curvature by the tilt as observed, without the tip (N·m/rad).
     curvature: DMat2,
     lifted: bool,
+    /// Coefficient of friction on the ground.
+    friction: f64,
+    /// Where the base has slid to (m).
+    slide_m: DVec2,
+    /// Stiffness along the ground at rest, and as observed (N/m).
+    lateral_n_per_m: f64,
+    sliding_n_per_m: f64,
 }
 
 /// The base at a tilt.
@@ -64,7 +93,7 @@ struct Base {
 impl Seat {
     /// Seated. Real-time: bounded, no allocation.
     #[must_use]
-    pub fn new(spring: &Spring) -> Self {
+    pub fn new(spring: &Spring, friction: Friction) -> Self {
         let free_length_m = spring.geometry().free_length_m;
         let stiffness_nm_per_rad = 4.0 * spring.rigidities().alpha_n_m2 / free_length_m;
         Self {
@@ -74,16 +103,27 @@ impl Seat {
             tilt_rad: DVec2::ZERO,
             curvature: DMat2::from_diagonal(DVec2::splat(stiffness_nm_per_rad)),
             lifted: false,
+            friction: friction.coefficient,
+            slide_m: DVec2::ZERO,
+            lateral_n_per_m: spring.lateral_stiffness_n_per_m(),
+            sliding_n_per_m: spring.lateral_stiffness_n_per_m(),
         }
     }
 
     /// Takes other parameters at a tick boundary and keeps the tilt. Real-time: bounded, no allocation.
-    pub fn set_spring(&mut self, spring: &Spring) {
-        *self = Self { tilt_rad: self.tilt_rad, lifted: self.lifted, ..Self::new(spring) };
+    pub fn set_spring(&mut self, spring: &Spring, friction: Friction) {
+        let fresh = Self::new(spring, friction);
+        *self = Self { tilt_rad: self.tilt_rad, slide_m: self.slide_m, lifted: self.lifted, ..fresh };
     }
 
-    /// Seated again. Real-time: bounded, no allocation.
+    /// Seated again, where it was at first. Real-time: bounded, no allocation.
     pub fn reset(&mut self) {
+        self.sit_down();
+        self.slide_m = DVec2::ZERO;
+        self.sliding_n_per_m = self.lateral_n_per_m;
+    }
+
+    fn sit_down(&mut self) {
         self.tilt_rad = DVec2::ZERO;
         self.curvature = DMat2::from_diagonal(DVec2::splat(self.stiffness_nm_per_rad));
         self.lifted = false;
@@ -93,6 +133,12 @@ impl Seat {
     #[must_use]
     pub fn tilt_rad(&self) -> DVec2 {
         self.tilt_rad
+    }
+
+    /// Where the base has slid to (m).
+    #[must_use]
+    pub fn slide_m(&self) -> DVec2 {
+        self.slide_m
     }
 
     /// Whether the spring hangs in the air, without load.
@@ -109,10 +155,12 @@ impl Seat {
     pub fn step<S: HeldSpring>(&mut self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
         let wanted = demand.max(Demand::Wrench);
         self.lifted = false;
+        let mut slid: Option<(f64, f64)> = None;
         let mut previous: Option<(DVec2, DVec2)> = None;
+        let mut tip_nm = None;
         let mut response = Response::none(Validity::NotConverged);
         for _ in 0..MOST_EVALUATIONS {
-            let base = Base::new(self.tilt_rad, self.rim_radius_m);
+            let base = self.base();
             response = self.held(spring, pose, &base, wanted);
             if !matches!(response.validity, Validity::Ok | Validity::Clamped) {
                 return response;
@@ -120,8 +168,12 @@ impl Seat {
             if response.force_n.z <= 0.0 {
                 return self.lift(&response);
             }
-            // What lifting costs to first order; the rest of the energy has no tip.
-            let tip_nm = self.rim_radius_m * response.force_n.z;
+            // What lifting costs to first order; the rest of the energy has no tip. Off the tip any other number would
+            // do, as long as it stays the same: the rest is then a smooth function, and its curvature can be observed.
+            if base.angle_rad == 0.0 || tip_nm.is_none() {
+                (tip_nm, previous) = (Some(self.rim_radius_m * response.force_n.z), None);
+            }
+            let tip_nm = tip_nm.unwrap_or_default();
             let slope = self.slope(pose, &base, &response) - tip_nm * base.direction;
             if let Some((tilt, old_slope)) = previous {
                 self.observe(self.tilt_rad - tilt, slope - old_slope);
@@ -129,7 +181,15 @@ impl Seat {
             previous = Some((self.tilt_rad, slope));
             let goal = tipped_minimum(self.curvature, self.curvature * self.tilt_rad - slope, tip_nm);
             let step = (goal - self.tilt_rad).clamp_length_max(LONGEST_STEP_RAD);
-            if step.length() <= TOLERANCE_RAD {
+            let excess_n = self.excess_n(&response);
+            if let Some((distance_m, before_n)) = slid {
+                self.observe_sliding((before_n - excess_n) / distance_m);
+            }
+            slid = None;
+            if excess_n > FRICTION_TOLERANCE * self.friction * response.force_n.z {
+                slid = Some((self.slide(&response, excess_n), excess_n));
+                previous = None;
+            } else if step.length() <= TOLERANCE_RAD {
                 return only(response, demand);
             }
             self.tilt_rad = (self.tilt_rad + step).clamp_length_max(LARGEST_TILT_RAD);
@@ -150,7 +210,7 @@ impl Seat {
             // It hangs from the upper plate, unloaded.
             (pose.orientation, pose.position_m, Pose::HOME)
         } else {
-            let base = Base::new(self.tilt_rad, self.rim_radius_m);
+            let base = self.base();
             (base.rotation, base.rotation * rise + base.center_m - rise, self.relative(pose, &base))
         };
         if !draw(&relative, sections) {
@@ -161,6 +221,33 @@ impl Seat {
             section.orientation = rotation * section.orientation;
         }
         true
+    }
+
+    /// By how much the force along the ground exceeds the friction (N).
+    fn excess_n(&self, response: &Response) -> f64 {
+        response.force_n.truncate().length() - self.friction * response.force_n.z
+    }
+
+    /// Slides the base the way it is pulled; returns how far (m).
+    fn slide(&mut self, response: &Response, excess_n: f64) -> f64 {
+        let along = response.force_n.truncate();
+        let distance_m = (excess_n / self.sliding_n_per_m).min(LONGEST_SLIDE * self.free_length_m);
+        // The spring pulls its base the other way than the hand.
+        self.slide_m -= along * (distance_m / along.length());
+        distance_m
+    }
+
+    fn observe_sliding(&mut self, stiffness_n_per_m: f64) {
+        let (least, most) = (self.lateral_n_per_m / STIFFNESS_RANGE, self.lateral_n_per_m * STIFFNESS_RANGE);
+        if stiffness_n_per_m.is_finite() {
+            self.sliding_n_per_m = stiffness_n_per_m.clamp(least, most);
+        }
+    }
+
+    /// The base as it is now.
+    fn base(&self) -> Base {
+        let base = Base::new(self.tilt_rad, self.rim_radius_m);
+        Base { center_m: base.center_m + self.slide_m.extend(0.0), ..base }
     }
 
     /// A pose as the base sees it.
@@ -175,7 +262,7 @@ impl Seat {
 
     /// The law's answer with the base at a tilt, in the model frame.
     fn held<S: HeldSpring>(&self, spring: &mut S, pose: &Pose, base: &Base, demand: Demand) -> Response {
-        if base.angle_rad == 0.0 {
+        if base.angle_rad == 0.0 && base.center_m == DVec3::ZERO {
             return spring.respond(pose, demand);
         }
         let response = spring.respond(&self.relative(pose, base), demand);
@@ -220,7 +307,7 @@ impl Seat {
 
     /// A spring that would be pulled leaves its seat and carries nothing.
     fn lift(&mut self, response: &Response) -> Response {
-        self.reset();
+        self.sit_down();
         self.lifted = true;
         Response {
             force_n: DVec3::ZERO,

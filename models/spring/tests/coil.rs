@@ -12,6 +12,8 @@ use flotor_spring::preset::Preset;
 use flotor_spring::response::{Demand, Response};
 use flotor_spring::rod::{Accuracy, Coils, Rod};
 use flotor_spring::validity::Validity;
+use flotor_spring::wire::Wire;
+use sample::{Loop, Sampler, Workspace};
 
 fn at(free_length_m: f64, shear: f64, compression: f64, tilt_rad: f64) -> Pose {
     let position_m = DVec3::new(shear, 0.0, -compression) * free_length_m;
@@ -68,6 +70,35 @@ fn compressed_straight_both_laws_feel_the_same_coils() {
                 assert!((answer.force_n.z - force_n).abs() < 1e-11, "{preset:?} {compression}");
                 assert!((answer.energy_j.unwrap() - stored_j).abs() < 1e-14, "{preset:?} {compression}");
             }
+        }
+    }
+}
+
+/// Every law that has an energy, with the wire and without: no way round and round gains or loses work.
+#[test]
+fn closed_paths_cost_nothing_with_a_wire() {
+    let spring = Preset::Thesis1.spring();
+    let workspace = Workspace { shear: 0.2, height: 0.4, tilt_rad: 0.12, yaw_rad: 0.12 };
+    let wire = Some(Wire::new(&spring));
+    let mut energy = Held { law: EnergyForm::new(&spring), contact: None, wire };
+    let mut rod = Held { law: Rod::new(&spring, Accuracy::Tight), contact: None, wire };
+    let mut sampler = Sampler::new(21);
+    for _ in 0..3 {
+        let path = Loop::new(&mut sampler, workspace, spring.geometry().free_length_m);
+        for law in [&mut energy as &mut dyn HeldSpring, &mut rod] {
+            let (mut net, mut gross) = (0.0, 0.0f64);
+            for step in 0..400 {
+                let (pose, velocity, angular) = path.at(std::f64::consts::TAU * f64::from(step) / 400.0);
+                let mut answer = law.respond(&pose, Demand::Wrench);
+                while answer.validity == Validity::NotConverged {
+                    answer = law.respond(&pose, Demand::Wrench);
+                }
+                let power = answer.force_n.dot(velocity) + answer.torque_nm.dot(angular);
+                net += power;
+                gross += power.abs();
+            }
+            // The rectangle rule is exact to rounding on smooth periodic integrands. Required 1e-9.
+            assert!(net.abs() < 1e-9 * gross, "{net:e} of {gross:e}");
         }
     }
 }

@@ -9,7 +9,7 @@ use flotor_spring::pose::Pose;
 use flotor_spring::preset::Preset;
 use flotor_spring::response::{Demand, Response};
 use flotor_spring::rigidity::Spring;
-use flotor_spring::rod::{Accuracy, Branch, Rod};
+use flotor_spring::rod::{Accuracy, Branch, Rod, Work};
 use flotor_spring::validity::Validity;
 use sample::{Loop, Sampler, Workspace};
 use table::{Row, preset, rows};
@@ -156,6 +156,33 @@ fn servo_rod_follows_a_smooth_hand() {
             // Required 5e-6 N; the eighth polynomials would do, the tenth are there for the buckled rod.
             assert!((fast.force_n - exact.force_n).length() < 5e-7, "{preset:?} {tick}");
             assert!((fast.torque_nm - exact.torque_nm).length() < 5e-9, "{preset:?} {tick}");
+        }
+    }
+}
+
+/// Instructions of a tick from what it did, in thousands. Counted on x86-64 with `examples/ticks.rs`: one evaluation
+/// takes 9.7, one that computes a matrix and factors it 75 more.
+fn thousand_instructions(work: Work) -> f64 {
+    9.7 * f64::from(work.evaluations) + 63.0 * f64::from(work.matrices) + 12.0 * f64::from(work.factorings)
+}
+
+#[test]
+fn no_tick_of_the_servo_costs_ten_times_the_mean() {
+    for preset in Preset::ALL {
+        let spring = preset.spring();
+        let mut rod = Rod::new(&spring, Accuracy::Servo);
+        let _ = hold(&mut rod, &smooth(&spring, 0));
+        let cost = |tick| {
+            let _ = rod.step(&smooth(&spring, tick), Demand::Wrench);
+            thousand_instructions(rod.work())
+        };
+        let costs: Vec<f64> = (1..2000).map(cost).collect();
+        let mean = costs.iter().sum::<f64>() / costs.len() as f64;
+        let worst = costs.iter().copied().fold(0.0, f64::max);
+        // The slender spring buckles and unbuckles on this way; the mean of the others is that of the servo.
+        assert!(worst <= 10.0 * mean, "{preset:?}: {worst} of {mean}");
+        if preset != Preset::Slender {
+            assert!(mean < 20.0, "{preset:?}: {mean}");
         }
     }
 }

@@ -42,6 +42,9 @@ const CONTRACTION: f64 = 0.3;
 pub(crate) struct Effort {
     /// Newton steps per tick at most.
     pub(crate) most_steps: u32,
+    /// Matrices computed per tick at most: each costs as much as nine steps. A tick that would need one more leaves it
+    /// to the next.
+    pub(crate) most_matrices: u32,
     /// Steps a matrix is good for.
     pub(crate) matrix_life: u32,
     /// Accepted error of the shape after a step, estimated as the length of the step times the way from where
@@ -82,6 +85,19 @@ pub(crate) struct Equilibrium<const K: usize, const N: usize, const Q: usize> {
     matrix: KeptMatrix<N>,
     damping: f64,
     unstable_directions: usize,
+    work: Work,
+}
+
+/// What a tick cost: how often the rod's energy was evaluated, its matrix computed, and a matrix factored. One number
+/// in the place of time, which no test can hold.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Energies and slopes.
+    pub evaluations: u32,
+    /// Matrices of second derivatives.
+    pub matrices: u32,
+    /// Factorings of a matrix.
+    pub factorings: u32,
 }
 
 /// Factored second derivatives and where they were computed.
@@ -125,6 +141,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
             matrix: KeptMatrix::none(),
             damping: LEAST_DAMPING,
             unstable_directions: 0,
+            work: Work::default(),
         }
     }
 
@@ -148,6 +165,11 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         self.unstable_directions
     }
 
+    /// What the last tick cost.
+    pub(crate) fn work(&self) -> Work {
+        self.work
+    }
+
     /// The curve of the rod as it is now. Real-time: bounded, no allocation.
     pub(crate) fn curve(&self) -> Curve<K> {
         Curve::new(&self.functional, &self.shape, self.history.plate())
@@ -156,6 +178,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
     /// One tick. Real-time: bounded, no allocation.
     pub(crate) fn advance(&mut self, plate: &Plate, demand: Demand) -> Outcome {
         let before = self.shape;
+        self.work = Work::default();
         self.shape = self.history.predict(plate);
         let outcome = self.search(plate, demand);
         match outcome {
@@ -177,10 +200,15 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         let mut outcome = Outcome::Failed;
         for _ in 0..self.effort.most_steps {
             let value = self.functional.value(&self.shape, plate);
+            self.work.evaluations += 1;
             let bent = distance(&self.shape, &self.matrix.shape);
             let fall = self.functional.eigenvalue_fall(plate.distance(&self.matrix.plate), bent);
             if self.matrix.steps_left == 0 || fall > self.matrix.softest {
+                if self.work.matrices == self.effort.most_matrices {
+                    break;
+                }
                 let curvature = self.functional.curvature(&value);
+                self.work.matrices += 1;
                 if self.keep(&curvature, plate, &value.slope) > 0 {
                     return self.slide(&value, &curvature, demand);
                 }
@@ -216,10 +244,12 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         self.matrix.neutral = NEUTRAL;
         self.matrix.steps_left = self.effort.matrix_life;
         self.matrix.factored = Factored::new(&curvature.matrix, NEUTRAL);
+        self.work.factorings += 1;
         if self.matrix.factored.negative() > 0 {
             self.matrix.neutral = neutral(slope);
             self.matrix.steps_left = 1;
             self.matrix.factored = Factored::new(&curvature.matrix, self.matrix.neutral);
+            self.work.factorings += 1;
         }
         self.unstable_directions = self.matrix.factored.negative();
         if self.unstable_directions == 0 {
@@ -239,12 +269,14 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
     fn slide(&mut self, value: &Value<N, Q>, curvature: &Curvature<N>, demand: Demand) -> Outcome {
         let mut damping = self.damping;
         let mut damped = Factored::new(&curvature.matrix, damping);
+        self.work.factorings += 1;
         for _ in 0..MOST_DAMPINGS {
             if damped.negative() == 0 {
                 break;
             }
             damping *= DAMPING_FACTOR;
             damped = Factored::new(&curvature.matrix, damping);
+            self.work.factorings += 1;
         }
         if damped.negative() > 0 {
             self.damping = damping * DAMPING_FACTOR;
