@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Sources of the contract, those that hold structs first used first.
-const SOURCES: [&str; 14] = [
+const SOURCES: [&str; 15] = [
     "frame.rs",
     "refusal.rs",
     "parameter.rs",
     "model.rs",
     "shape.rs",
+    "activity.rs",
     "variant.rs",
     "detail.rs",
     "device.rs",

@@ -1,9 +1,9 @@
 //! The schemas inside a recording: up to date with `host/proto`, and enough for a stranger to read every field.
 
 use flotor::record::{
-    Change, ChangeOutcome, Note, PluginDescription, Recorder, Role, RunDescription, Severity,
+    Change, ChangeOutcome, ChangeSubject, Note, PluginDescription, Recorder, Role, RunDescription, Severity,
 };
-use flotor::scene::MappingConfig;
+use flotor::scene::{Blend, MappingConfig};
 use flotor::servo::Clock;
 use flotor::trace::{Events, TickRecord};
 use flotor_hal::{Pose, Twist, Wrench};
@@ -115,6 +115,12 @@ fn run() -> RunDescription {
         version: "1.2.3".to_owned(),
         file: format!("lib{name}.so"),
         role,
+        places_m: if role == Role::Device { Vec::new() } else { vec![[0.001, -0.002, 0.003], [0.25; 3]] },
+        blend: if role == Role::Device {
+            Blend::default()
+        } else {
+            Blend { weight: 0.5, priority: 3, fade_s: 0.25 }
+        },
         settings: vec![pair("preset", "plain")],
         parameters: vec![pair("preset", "plain"), pair("mass_kg", "0.58")],
     };
@@ -258,6 +264,11 @@ fn expected_run() -> Vec<String> {
         "torque_scale = 3.0".to_owned(),
     ];
     lines.extend(mapping.map(|line| format!("plugins[1].mapping.{line}")));
+    lines.extend(expected_vector("plugins[1].places[0]", [0.001, -0.002, 0.003]));
+    lines.extend(expected_vector("plugins[1].places[1]", [0.25; 3]));
+    lines.extend(
+        ["weight = 0.5", "priority = 3", "fade_s = 0.25"].map(|line| format!("plugins[1].blend.{line}")),
+    );
     lines
 }
 
@@ -279,6 +290,7 @@ fn a_stranger_reads_every_field_by_the_schema_in_the_file() {
         value: "20.5".to_owned(),
         number: 20.5,
         outcome: ChangeOutcome::Refused,
+        subject: ChangeSubject::Weight,
     };
     let mut recorder = Recorder::create(&path, &run()).unwrap();
     recorder.change(&change).unwrap();
@@ -313,6 +325,7 @@ fn a_stranger_reads_every_field_by_the_schema_in_the_file() {
         "value = \"20.5\"",
         "number = 20.5",
         "outcome = 2",
+        "subject = 1",
     ];
     let expected = [
         ("/flotor/run", expected_run()),

@@ -482,6 +482,28 @@ typedef struct FlotorVariantTable {
     uint32_t (*info)(FlotorInstance instance, struct FlotorVariantInfo *out);
 } FlotorVariantTable;
 
+// The positions of the handle, in the model frame, at which a model may act. 56 bytes.
+//
+// Outside the region wrench and stored energy are **zero at every orientation and velocity**, and the model has
+// **no history**: the first step inside is as after [`ForceModel::reset`]. The region may be larger than
+// necessary, never smaller; the host checks nothing and skips the step.
+typedef struct FlotorActivityRegion {
+    uint32_t shape;
+    uint32_t reserved;
+    double center_m[3];
+    double half_sides_m[3];
+} FlotorActivityRegion;
+
+// `flotor.activity/1`: see [`crate::LocalModel`]. Real-time.
+typedef struct FlotorActivityTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // Where the instance can act, with the parameters now in force.
+    uint32_t (*region)(FlotorInstance instance, struct FlotorActivityRegion *out);
+} FlotorActivityTable;
+
 // One number about an answer. Built with [`Detail::number`], [`Detail::word`] or [`Detail::flag`].
 typedef struct FlotorDetail {
     struct FlotorStr id;
@@ -664,6 +686,7 @@ typedef struct FlotorDevicePacingTable {
 #define FLOTOR_INTERFACE_DEVICE "flotor.device/1"
 #define FLOTOR_INTERFACE_CENTERLINE "flotor.centerline/1"
 #define FLOTOR_INTERFACE_VARIANT "flotor.variant/1"
+#define FLOTOR_INTERFACE_ACTIVITY "flotor.activity/1"
 #define FLOTOR_INTERFACE_DETAILS "flotor.details/1"
 #define FLOTOR_INTERFACE_ENERGY_LEDGER "flotor.energy-ledger/1"
 #define FLOTOR_INTERFACE_DEVICE_PACING "flotor.device-pacing/1"

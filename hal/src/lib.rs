@@ -27,6 +27,7 @@
 //! see the binary contract; it is in [`abi`], and C authors get it as `include/flotor.h`.
 
 pub mod abi;
+mod activity;
 pub mod conformance;
 mod detail;
 mod device;
@@ -38,6 +39,7 @@ mod refusal;
 mod shape;
 mod variant;
 
+pub use activity::{ActivityRegion, ActivityShape, LocalModel};
 pub use detail::{Detail, DetailedModel};
 pub use device::{
     ActiveDevice, Axes, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState, EnergyLedger,

@@ -3,7 +3,7 @@
 //! With nothing changed the wrench must come out bit for bit; with another parameter the difference shows what
 //! the change does to the same hand movement.
 
-use crate::record::{Change, ChangeOutcome, ReadError, Recording, Role, RunDescription};
+use crate::record::{Change, ChangeOutcome, ChangeSubject, ReadError, Recording, Role, RunDescription};
 use crate::registry::Registry;
 use crate::scene::{Location, ModelUse, ParameterText, PluginUse};
 use crate::servo::{Heartbeat, ModelHealth, ModelStack};
@@ -134,12 +134,16 @@ impl Replay {
     fn repeat(&mut self, change: &Change) {
         let names = |plugin: &PluginReport| plugin.name == change.plugin;
         let Some(model) = self.plugins.iter().position(names) else { return }; // the device
+        let tick = Tick { index: change.tick, time_ns: change.time_ns, dt_ns: 0 };
+        if change.subject == ChangeSubject::Weight {
+            self.models.set_weight(model, &tick, change.number);
+            return;
+        }
         let schema = self.plugins.get(model).map_or(&[][..], |plugin| plugin.schema);
         let is_held =
             self.held.iter().any(|(plugin, key)| *plugin == change.plugin && *key == change.parameter);
         let parameter = schema.iter().position(|parameter| parameter.id() == change.parameter);
         if let (Some(parameter), false, ChangeOutcome::Applied) = (parameter, is_held, change.outcome) {
-            let tick = Tick { index: change.tick, time_ns: change.time_ns, dt_ns: 0 };
             self.models.set_parameter(model, &tick, parameter, change.number);
         }
     }
@@ -203,6 +207,8 @@ fn models_of(path: &Path, run: &RunDescription) -> Vec<ModelUse> {
                     .collect(),
             },
             mapping,
+            places_m: plugin.places_m.clone(),
+            blend: plugin.blend,
         }),
     };
     run.plugins.iter().filter_map(model).collect()

@@ -1,5 +1,6 @@
 //! What a prepared scene says about itself before it runs: the first message of a recording and of a live view.
 
+use crate::mapping::Blend;
 use crate::record::{PluginDescription, Role, RunDescription};
 use crate::scene::{PluginUse, Scene};
 use crate::session::{PluginReport, RunOptions};
@@ -9,8 +10,10 @@ use crate::session::{PluginReport, RunOptions};
 /// `plugins` are those of the prepared scene: the device, then the models in the scene's order.
 #[must_use]
 pub fn describe(scene: &Scene, options: &RunOptions, plugins: &[PluginReport]) -> RunDescription {
-    let device = std::iter::once((&scene.device, Role::Device));
-    let models = scene.models.iter().map(|model| (&model.plugin, Role::Model(model.mapping)));
+    let device = std::iter::once((&scene.device, Role::Device, &[][..], Blend::default()));
+    let models = scene.models.iter();
+    let models = models
+        .map(|model| (&model.plugin, Role::Model(model.mapping), model.places_m.as_slice(), model.blend));
     let plugins = device.chain(models).zip(plugins);
     RunDescription {
         flotor_version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -19,7 +22,13 @@ pub fn describe(scene: &Scene, options: &RunOptions, plugins: &[PluginReport]) -
         seed: options.seed,
         clock: options.clock,
         scene_toml: scene.text.clone(),
-        plugins: plugins.map(|((used, role), report)| describe_plugin(used, role, report)).collect(),
+        plugins: plugins
+            .map(|((used, role, places_m, blend), report)| PluginDescription {
+                places_m: places_m.to_vec(),
+                blend,
+                ..describe_plugin(used, role, report)
+            })
+            .collect(),
     }
 }
 
@@ -32,6 +41,8 @@ fn describe_plugin(used: &PluginUse, role: Role, report: &PluginReport) -> Plugi
         version: report.metadata.version.clone(),
         file: file.to_string_lossy().into_owned(),
         role,
+        places_m: Vec::new(),
+        blend: Blend::default(),
         settings: settings.collect(),
         parameters: report.parameters.clone(),
     }

@@ -20,6 +20,8 @@ pub mod interface_ids {
     pub const CENTERLINE: &str = "flotor.centerline/1";
     /// What an instance serves and remembers: [`crate::abi::VariantTable`].
     pub const VARIANT: &str = "flotor.variant/1";
+    /// Where an instance can act: [`crate::abi::ActivityTable`].
+    pub const ACTIVITY: &str = "flotor.activity/1";
     /// Numbers about an answer: [`crate::abi::DetailsTable`].
     pub const DETAILS: &str = "flotor.details/1";
     /// Energy account of a plant: [`crate::abi::EnergyLedgerTable`].

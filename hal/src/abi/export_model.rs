@@ -1,10 +1,10 @@
 //! From a [`ForceModel`] to its function table: the trampolines that keep panics inside the plugin.
 
 use super::entry::{CallStatus, Entry, Instance, PluginKind, interface_ids};
-use super::{CenterlineTable, DetailsTable, ForceTable, Message, Str, VariantTable, panics};
+use super::{ActivityTable, CenterlineTable, DetailsTable, ForceTable, Message, Str, VariantTable, panics};
 use crate::{
-    CenterlineInfo, CenterlineModel, DetailedModel, ForceModel, Input, LoopConfig, Output, ParameterValue,
-    Pose, RefusalKind, Settings, VariantInfo, VariantModel,
+    ActivityRegion, CenterlineInfo, CenterlineModel, DetailedModel, ForceModel, Input, LocalModel,
+    LoopConfig, Output, ParameterValue, Pose, RefusalKind, Settings, VariantInfo, VariantModel,
 };
 use std::ffi::c_void;
 use std::marker::PhantomData;
@@ -226,6 +226,15 @@ unsafe extern "C" fn centerline<M: CenterlineModel>(
     })
 }
 
+unsafe extern "C" fn region<M: LocalModel>(instance: Instance, out: *mut ActivityRegion) -> u32 {
+    // SAFETY: as in `prepare`.
+    let (slot, out) = unsafe { (slot::<M>(instance), &mut *out) };
+    slot.guard(|model| {
+        *out = model.activity();
+        CallStatus::Ok
+    })
+}
+
 unsafe extern "C" fn variant_info<M: VariantModel>(instance: Instance, out: *mut VariantInfo) -> u32 {
     // SAFETY: as in `prepare`.
     let (slot, out) = unsafe { (slot::<M>(instance), &mut *out) };
@@ -289,6 +298,12 @@ impl<M: VariantModel> Tables<M> {
         VariantTable { size: size_of::<VariantTable>() as u32, reserved: 0, info: Some(variant_info::<M>) };
 }
 
+#[allow(clippy::cast_possible_truncation)] // table sizes are small
+impl<M: LocalModel> Tables<M> {
+    const ACTIVITY: ActivityTable =
+        ActivityTable { size: size_of::<ActivityTable>() as u32, reserved: 0, region: Some(region::<M>) };
+}
+
 #[allow(clippy::cast_possible_truncation)] // table sizes and counts are small
 impl<M: DetailedModel> Tables<M> {
     const DETAILS: DetailsTable = DetailsTable {
@@ -312,6 +327,8 @@ pub struct WithCenterline;
 pub struct WithVariant;
 /// The model is a [`DetailedModel`].
 pub struct WithDetails;
+/// The model is a [`LocalModel`].
+pub struct WithActivity;
 
 impl<M> Extensions<M> for () {
     fn table(_: &str) -> *const c_void {
@@ -346,6 +363,15 @@ impl<M: DetailedModel, Rest: Extensions<M>> Extensions<M> for (WithDetails, Rest
     }
 }
 
+impl<M: LocalModel, Rest: Extensions<M>> Extensions<M> for (WithActivity, Rest) {
+    fn table(id: &str) -> *const c_void {
+        match id {
+            interface_ids::ACTIVITY => std::ptr::from_ref(&Tables::<M>::ACTIVITY).cast(),
+            _ => Rest::table(id),
+        }
+    }
+}
+
 unsafe extern "C" fn interface<M: ForceModel, E: Extensions<M>>(id: Str) -> *const c_void {
     match id.as_str() {
         interface_ids::FORCE => std::ptr::from_ref(&Tables::<M>::FORCE).cast(),
@@ -367,7 +393,7 @@ pub const fn model_entry_with<M: ForceModel, E: Extensions<M>>() -> Entry {
 
 /// Makes a [`crate::ForceModel`] a plugin: `export_model!(Spring);`. Extensions the type implements too are listed
 /// behind it: `export_model!(Spring, centerline, variant, details);` for a [`crate::CenterlineModel`],
-/// [`crate::VariantModel`] and [`crate::DetailedModel`]. One per crate.
+/// [`crate::VariantModel`] and [`crate::DetailedModel`], `activity` for a [`crate::LocalModel`]. One per crate.
 #[macro_export]
 macro_rules! export_model {
     (@extensions) => { () };
@@ -376,6 +402,9 @@ macro_rules! export_model {
     };
     (@extensions variant $($rest:ident)*) => {
         ($crate::abi::WithVariant, $crate::export_model!(@extensions $($rest)*))
+    };
+    (@extensions activity $($rest:ident)*) => {
+        ($crate::abi::WithActivity, $crate::export_model!(@extensions $($rest)*))
     };
     (@extensions details $($rest:ident)*) => {
         ($crate::abi::WithDetails, $crate::export_model!(@extensions $($rest)*))

@@ -1,10 +1,10 @@
-//! Function tables of force models: `flotor.force/1` and its extensions `flotor.centerline/1`, `flotor.variant/1`
-//! and `flotor.details/1`.
+//! Function tables of force models: `flotor.force/1` and its extensions `flotor.centerline/1`, `flotor.variant/1`,
+//! `flotor.details/1` and `flotor.activity/1`.
 
 use super::{Instance, Message};
 use crate::{
-    CenterlineInfo, Detail, Input, LoopConfig, ModelInfo, Output, Parameter, ParameterValue, Pose,
-    VariantInfo,
+    ActivityRegion, CenterlineInfo, Detail, Input, LoopConfig, ModelInfo, Output, Parameter, ParameterValue,
+    Pose, VariantInfo,
 };
 
 /// `flotor.force/1`. Statuses are [`super::CallStatus`] codes; `create` and `prepare` return 0 or a
@@ -84,6 +84,19 @@ pub struct CenterlineTable {
             count: *mut u32,
         ) -> u32,
     >,
+}
+
+/// `flotor.activity/1`: see [`crate::LocalModel`]. Real-time.
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct ActivityTable {
+    /// Bytes of this table as the plugin knows it.
+    pub size: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
+    /// Where the instance can act, with the parameters now in force.
+    pub region: Option<unsafe extern "C" fn(instance: Instance, out: *mut ActivityRegion) -> u32>,
 }
 
 /// `flotor.variant/1`: see [`crate::VariantModel`]. Not real-time.

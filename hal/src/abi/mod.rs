@@ -35,7 +35,9 @@ pub use entry::{
     MAGIC, PluginKind, interface_ids,
 };
 pub use export_device::device_entry;
-pub use export_model::{Extensions, WithCenterline, WithDetails, WithVariant, model_entry, model_entry_with};
-pub use force::{CenterlineTable, DetailsTable, ForceTable, VariantTable};
+pub use export_model::{
+    Extensions, WithActivity, WithCenterline, WithDetails, WithVariant, model_entry, model_entry_with,
+};
+pub use force::{ActivityTable, CenterlineTable, DetailsTable, ForceTable, VariantTable};
 pub use pacing::DevicePacingTable;
 pub use text::{MESSAGE_BYTES, Message, Str, StrList};

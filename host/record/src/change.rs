@@ -1,6 +1,6 @@
-//! A parameter that changed while the loop ran.
+//! What changed while the loop ran.
 
-/// A parameter that changed in a run, or was to.
+/// A parameter or weight that changed in a run, or was to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
     /// The tick before which it changed: the first that saw the new value.
@@ -9,7 +9,9 @@ pub struct Change {
     pub time_ns: u64,
     /// Name of the plugin in the scene.
     pub plugin: String,
-    /// Id of the parameter.
+    /// What of it changed.
+    pub subject: ChangeSubject,
+    /// Id of the parameter, or the host's word for what is not one.
     pub parameter: String,
     /// The value as a person would type it.
     pub value: String,
@@ -17,6 +19,15 @@ pub struct Change {
     pub number: f64,
     /// What the plugin made of it.
     pub outcome: ChangeOutcome,
+}
+
+/// What of a plugin changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChangeSubject {
+    /// A parameter of its schema.
+    Parameter,
+    /// The part of its wrench that is felt, which the host mixes: it moves there at the rate of its fade.
+    Weight,
 }
 
 /// How a plugin took a change.

@@ -47,7 +47,7 @@ mod writer;
 #[cfg(test)]
 mod tests;
 
-pub use change::{Change, ChangeOutcome};
+pub use change::{Change, ChangeOutcome, ChangeSubject};
 pub use container::Damage;
 pub use digest::TraceDigest;
 pub use reader::{Ending, ReadError, Recording};

@@ -25,9 +25,28 @@ impl Default for MappingConfig {
     }
 }
 
-/// Frames and scales of one model on one device.
+/// How a model is mixed with the others of its scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blend {
+    /// Part of its wrench that is felt, 0 to 1.
+    pub weight: f64,
+    /// A model that pushes silences those of lower priority.
+    pub priority: u8,
+    /// Time the weight takes from 0 to 1, s.
+    pub fade_s: f64,
+}
+
+impl Default for Blend {
+    fn default() -> Self {
+        // A tenth of a second: long enough for a hand to follow, short enough to feel prompt.
+        Self { weight: 1.0, priority: 0, fade_s: 0.1 }
+    }
+}
+
+/// Frames and scales of one model on one device, in one place.
 #[derive(Clone, Copy, Debug)]
 pub struct Mapping {
+    home_m: DVec3,
     model_from_device: DQuat,
     motion_scale: f64,
     force_scale: f64,
@@ -40,6 +59,7 @@ impl Mapping {
     pub fn new(config: &MappingConfig) -> Self {
         let conservative = config.force_scale / config.motion_scale;
         Self {
+            home_m: DVec3::ZERO,
             model_from_device: DQuat::from_array(config.rotation_xyzw),
             motion_scale: config.motion_scale,
             force_scale: config.force_scale,
@@ -51,6 +71,12 @@ impl Mapping {
     #[must_use]
     pub fn rotation(&self) -> DQuat {
         self.model_from_device
+    }
+
+    /// The same with the model's home somewhere else than the device's: there, m, device frame. Not real-time.
+    #[must_use]
+    pub fn at(self, home_m: [f64; 3]) -> Self {
+        Self { home_m: DVec3::from_array(home_m), ..self }
     }
 
     /// Factor from the model's stiffness to the stiffness at the hand.
@@ -78,7 +104,30 @@ impl Mapping {
     pub fn pose_to_model(&self, pose: &Pose) -> Pose {
         let rotation = self.model_from_device;
         let orientation = rotation * pose.orientation() * rotation.conjugate();
-        Pose::new(rotation * pose.position() * self.motion_scale, orientation)
+        Pose::new(rotation * (pose.position() - self.home_m) * self.motion_scale, orientation)
+    }
+
+    /// Position in the device frame of a position in the model frame. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn position_to_device(&self, position_m: DVec3) -> DVec3 {
+        self.home_m + self.model_from_device.conjugate() * position_m / self.motion_scale
+    }
+
+    /// Length in the device frame of a length in the model frame. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn length_to_device(&self, length_m: f64) -> f64 {
+        length_m / self.motion_scale
+    }
+
+    /// Half sides of the box along the device's axes that holds a box along the model's. Real-time: bounded, no
+    /// allocation.
+    #[must_use]
+    pub fn half_sides_to_device(&self, half_sides_m: DVec3) -> DVec3 {
+        let back = self.model_from_device.conjugate();
+        let side = |axis: DVec3, half_m: f64| (back * axis).abs() * self.length_to_device(half_m);
+        side(DVec3::X, half_sides_m.x) + side(DVec3::Y, half_sides_m.y) + side(DVec3::Z, half_sides_m.z)
     }
 
     /// Twist in the model frame. Real-time: bounded, no allocation.
@@ -132,6 +181,30 @@ mod tests {
         let mapping = Mapping::new(&thesis());
         let felt = 16.97 / 0.025 * mapping.stiffness_scale();
         assert!((felt - 16.97 / 0.015).abs() < 1.0e-9);
+    }
+
+    #[test]
+    fn a_model_put_elsewhere_has_its_home_there() {
+        let mapping = Mapping::new(&thesis()).at([0.001, -0.002, 0.003]);
+        let home = Pose::new(DVec3::new(0.001, -0.002, 0.003), DQuat::IDENTITY);
+        assert_eq!(mapping.pose_to_model(&home).position(), DVec3::ZERO);
+        let away = DVec3::new(0.004, 0.001, -0.002);
+        let there = mapping.pose_to_model(&Pose::new(away, DQuat::IDENTITY)).position();
+        assert!((mapping.position_to_device(there) - away).length() < 1.0e-17);
+    }
+
+    #[test]
+    fn a_box_that_is_turned_lies_in_the_box_given_for_it_and_touches_its_sides() {
+        let mapping = Mapping::new(&thesis());
+        let half_m = DVec3::new(0.001, 0.002, 0.003);
+        let around = mapping.half_sides_to_device(half_m);
+        let mut reached = DVec3::ZERO;
+        for corner in 0..8_u8 {
+            let sign = |bit: u8| if corner >> bit & 1 == 0 { -1.0 } else { 1.0 };
+            let at = mapping.position_to_device(half_m * DVec3::new(sign(0), sign(1), sign(2)));
+            reached = reached.max(at.abs());
+        }
+        assert!((reached - around).abs().max_element() < 1.0e-17, "{reached} in {around}");
     }
 
     #[test]

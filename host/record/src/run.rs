@@ -1,7 +1,7 @@
 //! What is known before a run begins, in a form that can be kept: enough to repeat it.
 
-use crate::mapping::MappingConfig;
-use crate::schema::{self, FORMAT, Mapping, Missing, Plugin, Quaternion, Run, Setting};
+use crate::mapping::{Blend, MappingConfig};
+use crate::schema::{self, FORMAT, Mapping, Missing, Plugin, Quaternion, Run, Setting, Vector3};
 use std::collections::BTreeMap;
 
 /// Which clock drives the loop.
@@ -45,6 +45,10 @@ pub struct PluginDescription {
     pub file: String,
     /// What it was there for.
     pub role: Role,
+    /// Of a model: where its homes were in the device frame, m, one for each instance.
+    pub places_m: Vec<[f64; 3]>,
+    /// Of a model: how it was mixed with the others.
+    pub blend: Blend,
     /// What scene and command line set, as written, in order: to repeat the run, set these.
     pub settings: Vec<(String, String)>,
     /// Every parameter with the value in force: to know what they were.
@@ -141,6 +145,12 @@ impl PluginDescription {
             settings: to_settings(&self.settings),
             parameters: to_settings(&self.parameters),
             mapping,
+            places: self.places_m.iter().copied().map(Vector3::new).collect(),
+            blend: matches!(self.role, Role::Model(_)).then(|| schema::Blend {
+                weight: Some(self.blend.weight),
+                priority: self.blend.priority.into(),
+                fade_s: Some(self.blend.fade_s),
+            }),
         }
     }
 
@@ -154,7 +164,19 @@ impl PluginDescription {
                 torque_scale: mapping.torque_scale,
             }),
         };
+        // A recording from before there were places has its models at the device's home, alone.
+        let places_m = match (role, plugin.places.as_slice()) {
+            (Role::Model(_), []) => vec![[0.0; 3]],
+            (_, places) => places.iter().map(|place| place.to_array()).collect(),
+        };
+        let blend = plugin.blend.map_or_else(Blend::default, |blend| Blend {
+            weight: blend.weight(),
+            priority: u8::try_from(blend.priority).unwrap_or(u8::MAX),
+            fade_s: blend.fade_s(),
+        });
         Ok(Self {
+            places_m,
+            blend,
             name: plugin.name,
             id: plugin.id,
             version: plugin.version,

@@ -5,7 +5,7 @@
 //! default, -0.0 equals 0.0, and a recording is bit-exact. On the wire it is the plain field of the schema.
 
 use crate::trace::{Events, TickRecord};
-use crate::{Change as ParameterChange, ChangeOutcome, Note, Severity};
+use crate::{Change as ParameterChange, ChangeOutcome, ChangeSubject, Note, Severity};
 use flotor_hal::{Pose, Twist as TwistValue, Wrench as WrenchValue};
 use prost::{Enumeration, Message};
 use prost_types::Timestamp;
@@ -197,6 +197,15 @@ pub(crate) struct Change {
     number: Option<f64>,
     #[prost(enumeration = "Outcome", tag = "6")]
     outcome: i32,
+    #[prost(enumeration = "Subject", tag = "7")]
+    subject: i32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
+#[repr(i32)]
+enum Subject {
+    Parameter = 0,
+    Weight = 1,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -243,6 +252,20 @@ pub(crate) struct Plugin {
     pub(crate) parameters: Vec<Setting>,
     #[prost(message, optional, tag = "7")]
     pub(crate) mapping: Option<Mapping>,
+    #[prost(message, repeated, tag = "8")]
+    pub(crate) places: Vec<Vector3>,
+    #[prost(message, optional, tag = "9")]
+    pub(crate) blend: Option<Blend>,
+}
+
+#[derive(Clone, Copy, PartialEq, Message)]
+pub(crate) struct Blend {
+    #[prost(double, optional, tag = "1")]
+    pub(crate) weight: Option<f64>,
+    #[prost(uint32, tag = "2")]
+    pub(crate) priority: u32,
+    #[prost(double, optional, tag = "3")]
+    pub(crate) fade_s: Option<f64>,
 }
 
 #[derive(Clone, PartialEq, Eq, Message)]
@@ -266,11 +289,11 @@ pub(crate) struct Mapping {
 }
 
 impl Vector3 {
-    fn new([x, y, z]: [f64; 3]) -> Self {
+    pub(crate) fn new([x, y, z]: [f64; 3]) -> Self {
         Self { x: Some(x), y: Some(y), z: Some(z) }
     }
 
-    fn to_array(self) -> [f64; 3] {
+    pub(crate) fn to_array(self) -> [f64; 3] {
         [self.x(), self.y(), self.z()]
     }
 }
@@ -415,6 +438,11 @@ impl Change {
             value: change.value.clone(),
             number: Some(change.number),
             outcome: outcome.into(),
+            subject: match change.subject {
+                ChangeSubject::Parameter => Subject::Parameter,
+                ChangeSubject::Weight => Subject::Weight,
+            }
+            .into(),
         }
     }
 
@@ -425,7 +453,12 @@ impl Change {
             Outcome::Broke => ChangeOutcome::Broke,
             Outcome::Unspecified => return Err(Missing("outcome")),
         };
+        let subject = match self.subject() {
+            Subject::Parameter => ChangeSubject::Parameter,
+            Subject::Weight => ChangeSubject::Weight,
+        };
         Ok(ParameterChange {
+            subject,
             tick: self.tick,
             time_ns,
             number: self.number(),

@@ -1,6 +1,6 @@
 use super::schema::{DESCRIPTOR_SET, ENCODING, FORMAT, Topic};
 use super::*;
-use crate::mapping::MappingConfig;
+use crate::mapping::{Blend, MappingConfig};
 use crate::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
 use flotor_sync::Words;
 use mcap::records::op;
@@ -44,6 +44,12 @@ fn run() -> RunDescription {
         version: "1.2.3".to_owned(),
         file: format!("lib{name}.so"),
         role,
+        places_m: if role == Role::Device { Vec::new() } else { vec![[0.001, -0.002, 0.003], [0.25; 3]] },
+        blend: if role == Role::Device {
+            Blend::default()
+        } else {
+            Blend { weight: 0.5, priority: 3, fade_s: 0.25 }
+        },
         settings,
         parameters: vec![pair("preset", "plain"), pair("mass_kg", "0.58")],
     };

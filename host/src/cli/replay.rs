@@ -1,13 +1,15 @@
 //! `flotor replay`: the models of a recording once more, as they were or changed.
 
-use super::options::PluginKeyValue;
+use super::options::{KeyValue, PluginKeyValue};
 use super::{CommandError, run, style, write_json};
 use crate::plot::{Axis, Figure, Panel, Series};
 use crate::record::Ending;
 use crate::record::Recording;
 use crate::registry::Registry;
 use crate::replay::{Difference, Replay, ReplayError};
+use crate::scene::ModelUse;
 use clap::Args;
+use flotor_hal::{DVec3, Wrench};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -15,9 +17,10 @@ use std::time::Instant;
 /// Ask the models of a recording again.
 #[derive(Args)]
 #[command(
-    after_help = "Without --set the wrench must come out bit for bit: exit code 1 if it does not. With --set the difference is\n\
-    what was asked for.\n\n\
-    Examples:\n  flotor replay run.mcap\n  flotor replay run.mcap --set spring.variant=closed-form --plot difference.svg"
+    after_help = "With nothing changed the wrench must come out bit for bit: exit code 1 if it does not. With --set or --model\n\
+    the difference is what was asked for.\n\n\
+    Examples:\n  flotor replay run.mcap\n  flotor replay run.mcap --set spring.variant=closed-form --plot difference.svg\n  \
+    flotor replay run.mcap --model spring=./libmy_spring.so --json -"
 )]
 pub(crate) struct ReplayArguments {
     /// The recording
@@ -25,6 +28,9 @@ pub(crate) struct ReplayArguments {
     /// Set a parameter of a model of the recording (repeatable)
     #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
     sets: Vec<PluginKeyValue>,
+    /// Ask another model in place of one of the recording (repeatable): its name, and the id or file of a plugin
+    #[arg(long = "model", value_name = "NAME=PLUGIN")]
+    models: Vec<KeyValue>,
     /// Write the difference as JSON (- for standard output)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -46,7 +52,8 @@ struct Report {
 pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
     let mut unknown = None;
     let replay = Replay::open(&arguments.recording, &Registry::search(&[]), |models| {
-        unknown = arguments.sets.iter().find_map(|set| set.apply_to_models(models).err());
+        let others = arguments.models.iter().find_map(|other| replace(other, models).err());
+        unknown = others.or_else(|| arguments.sets.iter().find_map(|set| set.apply_to_models(models).err()));
     });
     if let Some(problem) = unknown {
         return Err(CommandError::Usage(problem));
@@ -64,7 +71,7 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
             end_ns = record.time_ns;
             progress.set_position(record.time_ns / 1_000_000);
             if arguments.plot.is_some() {
-                samples.push((record.time_ns, record.model.force().z, wrench.force().z));
+                samples.push(Sample { time_ns: record.time_ns, recorded: record.model, replayed: *wrench });
             }
         })
         .map_err(ReplayError::from)?;
@@ -85,11 +92,23 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
             "a model of the recording stopped answering: {words}"
         )));
     }
-    if !bit_exact && arguments.sets.is_empty() {
+    if !bit_exact && arguments.sets.is_empty() && arguments.models.is_empty() {
         let problem =
             "nothing was changed, yet the wrench differs: another build of the plugin, or another machine";
         return Err(CommandError::Failed(problem.to_owned()));
     }
+    Ok(())
+}
+
+/// Another plugin in place of a model of the recording; it starts from its own defaults.
+fn replace(other: &KeyValue, models: &mut [ModelUse]) -> Result<(), String> {
+    let (name, plugin) = other.pair();
+    let names: Vec<String> = models.iter().map(|model| model.name.clone()).collect();
+    let model = models.iter_mut().find(|model| model.name == name).ok_or_else(|| {
+        format!("--model {name}={plugin}: the recording has no model `{name}` (it has {})", names.join(", "))
+    })?;
+    plugin.clone_into(&mut model.plugin.plugin);
+    model.plugin.parameters.clear();
     Ok(())
 }
 
@@ -119,18 +138,33 @@ fn tell(arguments: &ReplayArguments, report: &Report) -> Result<(), CommandError
     arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, report))
 }
 
-fn picture(samples: &[(u64, f64, f64)]) -> String {
+/// A tick of the recording and what the models say now.
+struct Sample {
+    time_ns: u64,
+    recorded: Wrench,
+    replayed: Wrench,
+}
+
+/// The force that was and that would be, and how they differ along every axis.
+fn picture(samples: &[Sample]) -> String {
     #[allow(clippy::cast_precision_loss)] // for a picture
-    let line = |value: fn(&(u64, f64, f64)) -> f64| {
-        samples.iter().map(move |sample| (sample.0 as f64 * 1.0e-9, value(sample))).collect::<Vec<_>>()
+    let line = |value: &dyn Fn(&Sample) -> f64| -> Vec<(f64, f64)> {
+        samples.iter().map(|sample| (sample.time_ns as f64 * 1.0e-9, value(sample))).collect()
+    };
+    let axes = |label: &str, unit: &str, scale: f64, difference: fn(&Sample) -> DVec3| {
+        let panel = Panel::new(Axis::linear(label, unit));
+        ["x", "y", "z"].into_iter().enumerate().fold(panel, |panel, (axis, name)| {
+            panel.series(Series::line(name, line(&|sample| difference(sample)[axis] * scale)).slot(axis))
+        })
     };
     Figure::new("Recorded and replayed", Axis::linear("Time", "s"))
         .panel(
             Panel::new(Axis::linear("Force, z", "N"))
-                .series(Series::line("recorded", line(|s| s.1)))
-                .series(Series::line("replayed", line(|s| s.2))),
+                .series(Series::line("recorded", line(&|sample| sample.recorded.force().z)))
+                .series(Series::line("replayed", line(&|sample| sample.replayed.force().z))),
         )
-        .panel(Panel::new(Axis::linear("Difference, z", "N")).series(Series::line("", line(|s| s.2 - s.1))))
+        .panel(axes("Difference of force", "N", 1.0, |s| s.replayed.force() - s.recorded.force()))
+        .panel(axes("Difference of torque", "mN·m", 1.0e3, |s| s.replayed.torque() - s.recorded.torque()))
         .panel_height_px(180.0)
         .to_svg()
 }

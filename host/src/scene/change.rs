@@ -1,39 +1,97 @@
 //! `[[change]]`: what changes while a scene runs.
 
-use super::reader::{SceneError, Section};
+use super::reader::{Location, SceneError, Section};
 use super::{ParameterText, PluginKeyValue};
 
-/// A parameter that gets a new value at a time known beforehand.
+/// What changes at a time known beforehand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChangeUse {
     /// Applied before the first tick at this time or later, s since the start of the loop.
     pub at_s: f64,
-    /// `device`, the name of a model in the scene, or a plugin's id.
-    pub plugin: String,
-    /// The parameter and its new value.
-    pub parameter: ParameterText,
+    /// What changes.
+    pub what: ChangeWhat,
+    /// Where it was written.
+    pub location: Location,
+}
+
+/// What changes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ChangeWhat {
+    /// A parameter gets a new value.
+    Set {
+        /// `device`, the name of a model in the scene, or a plugin's id.
+        plugin: String,
+        /// The parameter and its value.
+        parameter: ParameterText,
+    },
+    /// A model is felt more or less: its weight moves there at the rate of its fade.
+    Weight {
+        /// The name of a model in the scene, or a plugin's id.
+        model: String,
+        /// The part of its wrench that is felt, 0 to 1.
+        weight: f64,
+    },
 }
 
 /// Longest time, s: a year, as for a run.
 const LATEST_S: f64 = 31_536_000.0;
 
-/// Every change of every table, in the order written. A table with several gives them the same time.
+/// Every change of every table, in the order written; those of one table come before the same tick.
 pub(super) fn read(sections: Vec<Section<'_>>) -> Result<Vec<ChangeUse>, SceneError> {
     let mut changes = Vec::new();
     for mut section in sections {
         let at_s = section.require("at_s")?.number(0.0..=LATEST_S)?;
-        let set = section.require("set")?;
-        let location = set.location.clone();
+        let whole = section.location();
+        let (set, weight) = (section.take("set"), section.take("weight"));
         section.finish()?;
-        for text in set.one_or_more_texts()? {
-            let setting = text.parse::<PluginKeyValue>().map_err(|problem| SceneError {
-                location: location.clone(),
-                problem: format!("`change.set`: {problem}"),
-            })?;
-            let (plugin, key, value) = setting.into_parts();
-            let parameter = ParameterText { key, value, location: location.clone() };
-            changes.push(ChangeUse { at_s, plugin, parameter });
+        if set.is_none() && weight.is_none() {
+            let problem = "`change.set` or `change.weight` is missing: what is to change?".to_owned();
+            return Err(SceneError { location: whole, problem });
+        }
+        if let Some(set) = set {
+            let location = set.location.clone();
+            for text in set.one_or_more_texts()? {
+                changes.push(ChangeUse {
+                    at_s,
+                    what: parameter(&text, &location)?,
+                    location: location.clone(),
+                });
+            }
+        }
+        if let Some(weight) = weight {
+            let location = weight.location.clone();
+            for text in weight.one_or_more_texts()? {
+                changes.push(ChangeUse {
+                    at_s,
+                    what: weight_of(&text, &location)?,
+                    location: location.clone(),
+                });
+            }
         }
     }
     Ok(changes)
+}
+
+/// `PLUGIN.KEY=VALUE`
+fn parameter(text: &str, location: &Location) -> Result<ChangeWhat, SceneError> {
+    let setting = text.parse::<PluginKeyValue>().map_err(|problem| SceneError {
+        location: location.clone(),
+        problem: format!("`change.set`: {problem}"),
+    })?;
+    let (plugin, key, value) = setting.into_parts();
+    Ok(ChangeWhat::Set { plugin, parameter: ParameterText { key, value, location: location.clone() } })
+}
+
+/// `MODEL=WEIGHT`
+fn weight_of(text: &str, location: &Location) -> Result<ChangeWhat, SceneError> {
+    let parts = text.split_once('=').and_then(|(model, weight)| {
+        let weight = weight.trim().parse::<f64>().ok().filter(|weight| (0.0..=1.0).contains(weight))?;
+        Some(ChangeWhat::Weight { model: model.trim().to_owned(), weight })
+    });
+    parts.ok_or_else(|| SceneError {
+        location: location.clone(),
+        problem: format!(
+            "`change.weight`: `{text}` is not MODEL=WEIGHT with a weight from 0 to 1, like spring=0.5"
+        ),
+    })
 }

@@ -1,11 +1,12 @@
 //! A scene: which device, which models, how they are mapped and limited. A TOML file; unknown keys are errors.
 
 mod change;
+mod placement;
 mod reader;
 mod setting;
 
-pub use change::ChangeUse;
-pub use flotor_record::mapping::MappingConfig;
+pub use change::{ChangeUse, ChangeWhat};
+pub use flotor_record::mapping::{Blend, MappingConfig};
 pub use reader::{Location, SceneError};
 pub use setting::{KeyValue, PluginKeyValue};
 
@@ -75,6 +76,10 @@ pub struct ModelUse {
     pub plugin: PluginUse,
     /// From device to model and back.
     pub mapping: MappingConfig,
+    /// Where its homes are in the device frame, m: one instance of the model for each.
+    pub places_m: Vec<[f64; 3]>,
+    /// How it is mixed with the other models.
+    pub blend: Blend,
 }
 
 /// What a scene allows; the device's declaration applies too, whichever is tighter.
@@ -220,9 +225,26 @@ fn device(mut section: Section<'_>) -> Result<PluginUse, SceneError> {
 fn model(mut section: Section<'_>) -> Result<ModelUse, SceneError> {
     let plugin = plugin_use(&mut section)?;
     let name = section.take("name").map(|value| value.text()).transpose()?;
-    let mapping = section.section("mapping")?.map_or_else(|| Ok(MappingConfig::default()), mapping)?;
+    let (mapping, places_m) = match section.section("mapping")? {
+        Some(section) => mapping(section)?,
+        None => (MappingConfig::default(), vec![[0.0; 3]]),
+    };
+    let blend = section.section("blend")?.map_or_else(|| Ok(Blend::default()), blend)?;
     section.finish()?;
-    Ok(ModelUse { name: name.unwrap_or_else(|| plugin.plugin.clone()), plugin, mapping })
+    let name = name.unwrap_or_else(|| plugin.plugin.clone());
+    Ok(ModelUse { name, plugin, mapping, places_m, blend })
+}
+
+fn blend(mut section: Section<'_>) -> Result<Blend, SceneError> {
+    let default = Blend::default();
+    let priority = section.take("priority").map(|value| value.whole(0..=u8::MAX.into())).transpose()?;
+    let blend = Blend {
+        weight: section.number("weight", 0.0..=1.0)?.unwrap_or(default.weight),
+        priority: priority.and_then(|priority| u8::try_from(priority).ok()).unwrap_or(default.priority),
+        fade_s: section.number("fade_s", 0.0..=60.0)?.unwrap_or(default.fade_s),
+    };
+    section.finish()?;
+    Ok(blend)
 }
 
 fn plugin_use(section: &mut Section<'_>) -> Result<PluginUse, SceneError> {
@@ -234,7 +256,8 @@ fn plugin_use(section: &mut Section<'_>) -> Result<PluginUse, SceneError> {
     Ok(PluginUse { plugin: plugin.text()?, location, parameters })
 }
 
-fn mapping(mut section: Section<'_>) -> Result<MappingConfig, SceneError> {
+/// Scales, rotation and places of a model.
+fn mapping(mut section: Section<'_>) -> Result<(MappingConfig, Vec<[f64; 3]>), SceneError> {
     let default = MappingConfig::default();
     let rotation =
         section.take("rotation_xyzw").map(|value| (value.numbers::<4>(), value)).map(|(numbers, value)| {
@@ -253,8 +276,9 @@ fn mapping(mut section: Section<'_>) -> Result<MappingConfig, SceneError> {
         force_scale: section.number("force_scale", SCALE)?.unwrap_or(default.force_scale),
         torque_scale: section.number("torque_scale", SCALE)?,
     };
+    let places_m = placement::read(&mut section)?;
     section.finish()?;
-    Ok(mapping)
+    Ok((mapping, places_m))
 }
 
 /// A scale of zero would make a device move nothing or feel nothing; a million is a unit mistaken.

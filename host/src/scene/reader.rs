@@ -96,6 +96,11 @@ impl<'t> Section<'t> {
         Some(Value { location, key: self.path(key), value: value.into_inner() })
     }
 
+    /// Where the table begins.
+    pub(super) fn location(&self) -> Location {
+        self.source.location(&self.span)
+    }
+
     /// Takes a key that must be there.
     pub(super) fn require(&mut self, key: &'static str) -> Result<Value<'t>, SceneError> {
         let missing = self.missing(key);
@@ -109,7 +114,7 @@ impl<'t> Section<'t> {
     }
 
     fn missing(&self, key: &str) -> SceneError {
-        let location = self.source.location(&self.span);
+        let location = self.location();
         SceneError { location, problem: format!("`{}` is missing", self.path(key)) }
     }
 
@@ -273,6 +278,47 @@ impl Value<'_> {
             self.in_range(number, &range)?;
         }
         Ok(numbers)
+    }
+
+    /// A whole number in `range`.
+    pub(super) fn whole(self, range: RangeInclusive<u32>) -> Result<u32, SceneError> {
+        let wrong = self.problem(format!(
+            "`{}` is a whole number from {} to {}",
+            self.key,
+            range.start(),
+            range.end()
+        ));
+        let number =
+            self.number(f64::from(*range.start())..=f64::from(*range.end())).map_err(|_| wrong.clone())?;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // whole, and in the range of a u32
+        if number.fract() == 0.0 { Ok(number as u32) } else { Err(wrong) }
+    }
+
+    /// A list of lists of three numbers in `range`.
+    pub(super) fn points(
+        self,
+        range: RangeInclusive<f64>,
+        counts: RangeInclusive<usize>,
+    ) -> Result<Vec<[f64; 3]>, SceneError> {
+        let wrong = self.problem(format!(
+            "`{}` is a list of {} to {} points, each three numbers from {} to {}",
+            self.key,
+            counts.start(),
+            counts.end(),
+            range.start(),
+            range.end()
+        ));
+        let DeValue::Array(list) = &self.value else { return Err(wrong) };
+        let point = |value: &Spanned<DeValue<'_>>| {
+            let DeValue::Array(numbers) = value.get_ref() else { return None };
+            let numbers: Option<Vec<f64>> =
+                numbers.iter().map(|value| parse_number(value.get_ref())).collect();
+            <[f64; 3]>::try_from(numbers?)
+                .ok()
+                .filter(|point| point.iter().all(|number| range.contains(number)))
+        };
+        let points: Option<Vec<[f64; 3]>> = list.iter().map(point).collect();
+        points.filter(|points| counts.contains(&points.len())).ok_or(wrong)
     }
 
     pub(super) fn numbers<const N: usize>(&self) -> Result<[f64; N], SceneError> {

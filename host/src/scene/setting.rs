@@ -25,6 +25,12 @@ impl FromStr for KeyValue {
 }
 
 impl KeyValue {
+    /// Key and value, as written.
+    #[must_use]
+    pub fn pair(&self) -> (&str, &str) {
+        (&self.key, &self.value)
+    }
+
     /// As a parameter of a plugin.
     pub(crate) fn parameter(&self) -> ParameterText {
         let location = Location { file: PathBuf::from(format!("--set {}", self.key)), line: 0 };

@@ -17,9 +17,9 @@ pub use clock::{Clock, SpinWindow};
 pub(crate) use clock::{Due, Schedule, monotonic_ns, sleep_until};
 pub use envelope::Envelope;
 pub use models::ModelHealth;
-pub(crate) use models::{ModelSlot, ModelStack};
+pub(crate) use models::{Layer, ModelStack};
 pub(crate) use parameters::{
-    ChangeReport, ChangeSender, ParameterChange, ParameterQueue, ReportReceiver, ScheduledChange,
+    ChangeReport, ChangeSender, ParameterChange, ParameterQueue, ReportReceiver, ScheduledChange, WEIGHT,
 };
 pub use realtime::{Privilege, RealTimeReport};
 pub(crate) use realtime::{enter_real_time, probe_real_time};
@@ -141,6 +141,7 @@ impl Servo {
             let (plugin, parameter) = (change.plugin as usize, change.parameter as usize);
             match plugin.checked_sub(1) {
                 None => device.set_parameter(parameter, change.value),
+                Some(model) if change.parameter == WEIGHT => models.set_weight(model, tick, change.value),
                 Some(model) => models.set_parameter(model, tick, parameter, change.value),
             }
         });

@@ -12,12 +12,15 @@ use flotor_sync::{Receiver, Sender, Words, inbox, ring};
 /// Changes other threads may have waiting at a time.
 const WAITING_CHANGES: usize = 256;
 
+/// Stands for the weight of a model where a parameter is named.
+pub(crate) const WEIGHT: u32 = u32::MAX;
+
 /// A new value for a parameter. The numbers come from a schema: see `session::Controls`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ParameterChange {
     /// Number of the plugin in the run: the device is 0, then the models in the scene's order.
     pub(crate) plugin: u32,
-    /// Index into the plugin's schema.
+    /// Index into the plugin's schema, or [`WEIGHT`].
     pub(crate) parameter: u32,
     /// The value; for a choice, its index.
     pub(crate) value: f64,

@@ -3,9 +3,9 @@
 //! Words are checked against the plugin's schema here, off the loop; only numbers travel into it.
 
 use super::PluginReport;
-use crate::record::Change;
+use crate::record::{Change, ChangeSubject};
 use crate::scene::nearest;
-use crate::servo::{ChangeReport, ChangeSender, ParameterChange, ReportReceiver};
+use crate::servo::{ChangeReport, ChangeSender, ParameterChange, ReportReceiver, WEIGHT};
 use flotor_hal::abi::loader::{Setting, SettingError};
 use flotor_hal::{Mutability, Parameter};
 use std::sync::Arc;
@@ -47,6 +47,9 @@ pub enum ControlError {
         /// Parameters that can.
         live: Vec<String>,
     },
+    /// Only models are mixed.
+    #[error("the device has no weight; models have")]
+    NoWeight,
     /// More changes wait than the loop takes in.
     #[error("the loop has not taken the changes before this one yet; try again after a tick")]
     Busy,
@@ -111,13 +114,25 @@ impl Controls {
     /// # Errors
     /// [`ControlError`]; then none of them changes.
     pub fn set_parameters(&self, values: &[NewValue<'_>]) -> Result<(), ControlError> {
-        let Shared { parts, changes, .. } = &*self.shared;
-        let checked: Vec<ParameterChange> =
-            values.iter().map(|value| parts.check(value)).collect::<Result<_, _>>()?;
+        let checked = values.iter().map(|value| self.shared.parts.check(value));
+        self.send(&checked.collect::<Result<Vec<_>, _>>()?)
+    }
+
+    /// Lets a model be felt more or less: its weight moves there at the rate of its fade, from the next tick on. A
+    /// weight of 0 silences it, and it is not asked any more. Not real-time.
+    ///
+    /// # Errors
+    /// [`ControlError`]: no such model; the loop is busy or over.
+    pub fn set_weight(&self, model: &str, weight: f64) -> Result<(), ControlError> {
+        self.send(&[self.shared.parts.check_weight(model, weight)?])
+    }
+
+    fn send(&self, checked: &[ParameterChange]) -> Result<(), ControlError> {
+        let changes = &self.shared.changes;
         if changes.is_abandoned() {
             return Err(ControlError::Ended);
         }
-        changes.send_all(&checked).map_err(|flotor_sync::Full| ControlError::Busy)
+        changes.send_all(checked).map_err(|flotor_sync::Full| ControlError::Busy)
     }
 }
 
@@ -133,16 +148,29 @@ impl Parts {
         Self { list: plugins.into() }
     }
 
+    /// The plugin of a name or id, and its number.
+    fn find(&self, name: &str) -> Result<(u32, &PluginReport), ControlError> {
+        let names = || self.list.iter().map(|part| part.name.as_str());
+        let found = (0..).zip(&*self.list).find(|(_, part)| part.name == name);
+        let found = found.or_else(|| (0..).zip(&*self.list).find(|(_, part)| part.metadata.id == name));
+        found.ok_or_else(|| ControlError::UnknownPlugin {
+            name: name.to_owned(),
+            nearest: nearest(name, names()).map(str::to_owned),
+            names: names().map(str::to_owned).collect(),
+        })
+    }
+
+    /// A new weight for a model.
+    pub(super) fn check_weight(&self, model: &str, weight: f64) -> Result<ParameterChange, ControlError> {
+        match self.find(model)? {
+            (0, _) => Err(ControlError::NoWeight),
+            (plugin, _) => Ok(ParameterChange { plugin, parameter: WEIGHT, value: weight.clamp(0.0, 1.0) }),
+        }
+    }
+
     /// From words to numbers, if the words are right.
     pub(super) fn check(&self, new: &NewValue<'_>) -> Result<ParameterChange, ControlError> {
-        let names = || self.list.iter().map(|part| part.name.as_str());
-        let found = (0..).zip(&*self.list).find(|(_, part)| part.name == new.plugin);
-        let found = found.or_else(|| (0..).zip(&*self.list).find(|(_, part)| part.metadata.id == new.plugin));
-        let (plugin, part) = found.ok_or_else(|| ControlError::UnknownPlugin {
-            name: new.plugin.to_owned(),
-            nearest: nearest(new.plugin, names()).map(str::to_owned),
-            names: names().map(str::to_owned).collect(),
-        })?;
+        let (plugin, part) = self.find(new.plugin)?;
         let setting = Setting::parse(part.schema, new.parameter, new.value)
             .map_err(|error| ControlError::Setting { plugin: part.name.clone(), error })?;
         let is_live = |parameter: &Parameter| parameter.mutability() == Mutability::Live;
@@ -162,13 +190,27 @@ impl Parts {
     fn describe(&self, report: &ChangeReport) -> Change {
         let ChangeReport { tick, time_ns, change, outcome } = *report;
         let part = self.list.get(change.plugin as usize);
+        let name = part.map_or_else(String::new, |part| part.name.clone());
+        if change.parameter == WEIGHT {
+            return Change {
+                tick,
+                time_ns,
+                plugin: name,
+                subject: ChangeSubject::Weight,
+                parameter: "weight".to_owned(),
+                value: change.value.to_string(),
+                number: change.value,
+                outcome,
+            };
+        }
         let parameter = part.and_then(|part| part.schema.get(change.parameter as usize));
         let id = parameter.map_or("", Parameter::id);
         let shown = part.and_then(|part| Setting::number(part.schema, id, change.value).ok().zip(Some(part)));
         Change {
             tick,
             time_ns,
-            plugin: part.map_or_else(String::new, |part| part.name.clone()),
+            plugin: name,
+            subject: ChangeSubject::Parameter,
             parameter: id.to_owned(),
             value: shown.map_or_else(String::new, |(setting, part)| setting.display(part.schema)),
             number: change.value,

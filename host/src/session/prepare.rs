@@ -4,11 +4,11 @@ use super::controls::{NewValue, Parts};
 use super::{PluginReport, RunError};
 use crate::mapping::Mapping;
 use crate::registry::{LookupError, Registry};
-use crate::scene::{ChangeUse, ModelUse, ParameterText, PluginUse, Scene, SceneError};
-use crate::servo::{ModelHealth, ModelSlot, ScheduledChange};
+use crate::scene::{ChangeUse, ChangeWhat, ModelUse, ParameterText, PluginUse, Scene, SceneError};
+use crate::servo::{Layer, ScheduledChange};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, Setting};
-use flotor_hal::{Capabilities, Demand, LoopConfig, Pacing, Parameter, ParameterKind, Refusal};
+use flotor_hal::{Capabilities, LoopConfig, Pacing, Parameter, ParameterKind, Refusal};
 use std::borrow::Cow;
 
 pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
@@ -26,30 +26,29 @@ pub(super) fn refused(plugin: &Plugin, refusal: Refusal) -> RunError {
     RunError::Plugin(LoadError::Refused { path, id, refusal })
 }
 
-/// Loads and creates one model of a scene. Not real-time.
+/// Loads one model of a scene and creates it in all its places. Not real-time.
 pub(crate) fn prepare_model(
     registry: &Registry,
     model: &ModelUse,
     config: &LoopConfig,
-) -> Result<(ModelSlot, PluginReport), RunError> {
+) -> Result<(Layer, PluginReport), RunError> {
     let plugin = load(registry, &model.plugin, PluginKind::Model)?;
     let settings = settings(&plugin, &model.name, &model.plugin.parameters)?;
-    let mut instance = plugin.create_model(&settings)?;
-    instance.prepare(config).map_err(|refusal| refused(&plugin, refusal))?;
+    let mapping = Mapping::new(&model.mapping);
+    let instance = |place_m: &[f64; 3]| {
+        let mut instance = plugin.create_model(&settings)?;
+        instance.prepare(config).map_err(|refusal| refused(&plugin, refusal))?;
+        Ok((instance, mapping.at(*place_m)))
+    };
+    let mut instances = model.places_m.iter().map(instance).collect::<Result<Vec<_>, RunError>>()?;
+    let mut value = |index| instances.first_mut().map_or(f64::NAN, |(first, _)| first.parameter(index));
     let report = PluginReport {
         name: model.name.clone(),
         metadata: plugin.metadata().clone(),
         schema: plugin.parameters(),
-        parameters: in_force(&plugin, &settings, |index| instance.parameter(index)),
+        parameters: in_force(&plugin, &settings, &mut value),
     };
-    let demand = Demand::ALL.limited_to(instance.serves());
-    let slot = ModelSlot {
-        model: instance,
-        mapping: Mapping::new(&model.mapping),
-        demand,
-        health: ModelHealth::default(),
-    };
-    Ok((slot, report))
+    Ok((Layer::new(instances, &model.blend), report))
 }
 
 /// Checks what was written against what the plugin understands; complaints name file and line.
@@ -135,16 +134,17 @@ pub(super) fn pair(scene: &Scene, device: &Capabilities, can_pace: bool) -> Vec<
 /// The changes a scene has scheduled, checked; complaints name file and line.
 pub(super) fn schedule(changes: &[ChangeUse], parts: &Parts) -> Result<Vec<ScheduledChange>, SceneError> {
     let check = |change: &ChangeUse| {
-        let new = NewValue {
-            plugin: &change.plugin,
-            parameter: &change.parameter.key,
-            value: &change.parameter.value,
-        };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
         let time_ns = (change.at_s * 1.0e9).round() as u64;
-        let checked = parts.check(&new).map_err(|error| SceneError {
-            location: change.parameter.location.clone(),
-            problem: format!("`change.set`: {error}"),
+        let (key, checked) = match &change.what {
+            ChangeWhat::Set { plugin, parameter: ParameterText { key, value, .. } } => {
+                ("change.set", parts.check(&NewValue { plugin, parameter: key, value }))
+            }
+            ChangeWhat::Weight { model, weight } => ("change.weight", parts.check_weight(model, *weight)),
+        };
+        let checked = checked.map_err(|error| SceneError {
+            location: change.location.clone(),
+            problem: format!("`{key}`: {error}"),
         })?;
         Ok(ScheduledChange { time_ns, change: checked })
     };

@@ -4,8 +4,8 @@ use crate::proxy::{Proxy, Surface};
 use crate::shape::Shape;
 use flotor_hal::abi::Str;
 use flotor_hal::{
-    DVec3, Demand, ForceModel, Input, Memory, ModelInfo, OutOfRange, Output, Parameter, Refusal, Settings,
-    StepStatus, Wrench,
+    ActivityRegion, DVec3, Demand, ForceModel, Input, LocalModel, Memory, ModelInfo, OutOfRange, Output,
+    Parameter, Refusal, Settings, StepStatus, Wrench,
 };
 
 /// Farther from home than this there is no handle, m: the answer is that at the edge, and says so.
@@ -108,4 +108,17 @@ impl ForceModel for Wall {
     }
 }
 
-flotor_hal::export_model!(Wall);
+impl LocalModel for Wall {
+    /// A ball acts inside only and knows nothing outside. Plane and cube have no bounded region: the one has no
+    /// bounds, the other remembers from which side the handle came.
+    fn activity(&self) -> ActivityRegion {
+        match self.shape {
+            Shape::Sphere { radius_m } => {
+                ActivityRegion::sphere([0.0, 0.0, self.height_m - radius_m], radius_m)
+            }
+            Shape::Plane | Shape::Cube { .. } => ActivityRegion::EVERYWHERE,
+        }
+    }
+}
+
+flotor_hal::export_model!(Wall, activity);

@@ -1,10 +1,12 @@
 //! A force model a host may call: an instance and its function table.
 
 use super::Setting;
-use crate::abi::{CallStatus, CenterlineTable, DetailsTable, ForceTable, Instance, Message, VariantTable};
+use crate::abi::{
+    ActivityTable, CallStatus, CenterlineTable, DetailsTable, ForceTable, Instance, Message, VariantTable,
+};
 use crate::{
-    CenterlineInfo, Demand, Detail, Input, LoopConfig, Memory, ModelInfo, Output, Parameter, ParameterValue,
-    Pose, Refusal, RefusalKind, VariantInfo,
+    ActivityRegion, CenterlineInfo, Demand, Detail, Input, LoopConfig, Memory, ModelInfo, Output, Parameter,
+    ParameterValue, Pose, Refusal, RefusalKind, VariantInfo,
 };
 
 type StepFn = unsafe extern "C" fn(Instance, *const Input, *mut Output) -> u32;
@@ -16,6 +18,7 @@ pub(super) struct ModelTables {
     pub(super) centerline: Option<&'static CenterlineTable>,
     pub(super) variant: Option<&'static VariantTable>,
     pub(super) details: Option<&'static DetailsTable>,
+    pub(super) activity: Option<&'static ActivityTable>,
 }
 
 /// One instance of a force model. Used by one thread at a time.
@@ -149,6 +152,17 @@ impl Model {
         };
         // SAFETY: as in `prepare`.
         unsafe { parameter(self.instance, index) }
+    }
+
+    /// Where the instance can act, with the parameters now in force: everywhere, unless it says otherwise. Real-time:
+    /// bounded, no allocation.
+    #[must_use]
+    pub fn activity(&mut self) -> ActivityRegion {
+        let mut region = ActivityRegion::EVERYWHERE;
+        let Some(ask) = self.extensions.activity.and_then(|table| table.region) else { return region };
+        // SAFETY: as in `prepare`; the out pointer is valid for the call.
+        let code = unsafe { ask(self.instance, &raw mut region) };
+        if code == CallStatus::Ok as u32 { region } else { ActivityRegion::EVERYWHERE }
     }
 
     /// Forgets history. Real-time: bounded, no allocation.

@@ -1,0 +1,52 @@
+//! Where a model is put: in one place, in several, or in all points of a grid.
+
+use super::reader::{SceneError, Section};
+
+/// Places of one model at most: each is an instance of the model, with memory of its own.
+const MOST_PLACES: usize = 1_000_000;
+/// Farthest place along an axis, mm: beyond, somebody has mistaken a unit.
+const FARTHEST_MM: f64 = 1.0e4;
+
+/// The places of a model in the device frame, m: `position_mm`, `positions_mm` or a `grid` about `position_mm`.
+pub(super) fn read(mapping: &mut Section<'_>) -> Result<Vec<[f64; 3]>, SceneError> {
+    let centre_mm = mapping.three("position_mm", -FARTHEST_MM..=FARTHEST_MM)?.unwrap_or_default();
+    let list = mapping.take("positions_mm");
+    let grid = mapping.section("grid")?;
+    let places_mm = match (list, grid) {
+        (None, None) => vec![[0.0; 3]],
+        (Some(list), None) => list.points(-FARTHEST_MM..=FARTHEST_MM, 1..=MOST_PLACES)?,
+        (None, Some(grid)) => points_of(grid)?,
+        (Some(list), Some(_)) => {
+            return Err(list.problem("a model has `positions_mm` or a `grid`, not both".to_owned()));
+        }
+    };
+    let from_centre = |place_mm: [f64; 3]| {
+        let [x, y, z] = std::array::from_fn(|axis| (centre_mm[axis] + place_mm[axis]) * 1.0e-3);
+        [x, y, z]
+    };
+    Ok(places_mm.into_iter().map(from_centre).collect())
+}
+
+/// The points of a grid about its centre, x fastest, mm.
+fn points_of(mut grid: Section<'_>) -> Result<Vec<[f64; 3]>, SceneError> {
+    let count_value = grid.require("count")?;
+    let too_many = count_value.problem(format!("a grid has at most {MOST_PLACES} points"));
+    let not_whole = count_value.problem("`count` is three whole numbers from 1 on".to_owned());
+    #[allow(clippy::cast_precision_loss)] // a million
+    let counts = count_value.three(1.0..=MOST_PLACES as f64)?;
+    let spacing_mm = grid.require("spacing_mm")?.three(0.0..=FARTHEST_MM)?;
+    grid.finish()?;
+    if counts.iter().any(|count| count.fract() != 0.0) {
+        return Err(not_whole);
+    }
+    #[allow(clippy::cast_precision_loss)] // a million
+    if counts.iter().product::<f64>() > MOST_PLACES as f64 {
+        return Err(too_many);
+    }
+    let along = |axis: usize| {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // whole, and at most a million
+        let count = counts[axis] as u32;
+        (0..count).map(move |index| (f64::from(index) - 0.5 * f64::from(count - 1)) * spacing_mm[axis])
+    };
+    Ok(along(2).flat_map(|z| along(1).flat_map(move |y| along(0).map(move |x| [x, y, z]))).collect())
+}

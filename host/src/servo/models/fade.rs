@@ -1,0 +1,83 @@
+//! A weight that moves to where it was told, at a steady rate.
+
+/// A weight from 0 to 1. It is a function of time alone: nobody has to advance it, and one who looks late sees the
+/// same as one who looked all along.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Fade {
+    from: f64,
+    target: f64,
+    /// When it left `from`, ns.
+    since_ns: u64,
+    /// Change per nanosecond; infinite for a step.
+    rate_per_ns: f64,
+}
+
+impl Fade {
+    /// A weight that rests at `at` and will take `fade_s` from 0 to 1.
+    pub(super) fn new(at: f64, fade_s: f64) -> Self {
+        let at = at.clamp(0.0, 1.0);
+        Self { from: at, target: at, since_ns: 0, rate_per_ns: 1.0e-9 / fade_s }
+    }
+
+    /// Sends it somewhere from where it is now. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn set_target(&mut self, target: f64, now_ns: u64) {
+        let target = target.clamp(0.0, 1.0);
+        if target != self.target {
+            *self = Self { from: self.at(now_ns), target, since_ns: now_ns, ..*self };
+        }
+    }
+
+    /// The weight at a time. Real-time: bounded, no allocation.
+    #[inline]
+    #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
+    pub(super) fn at(&self, now_ns: u64) -> f64 {
+        let way = self.target - self.from;
+        let moved = self.rate_per_ns * now_ns.saturating_sub(self.since_ns) as f64;
+        // An infinite rate times no time is NaN, which is not below the way: a step comes at once.
+        if moved < way.abs() { self.from + moved.copysign(way) } else { self.target }
+    }
+
+    /// True if it is 0 now and from now on. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn is_silent(&self, now_ns: u64) -> bool {
+        self.target == 0.0 && self.at(now_ns) == 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    #[test]
+    fn it_goes_to_its_target_at_its_rate_and_not_beyond() {
+        let mut fade = Fade::new(0.0, 0.004);
+        assert!(fade.is_silent(7));
+        fade.set_target(1.0, 10 * MS);
+        assert!(!fade.is_silent(10 * MS));
+        for (ms, expected) in [(10, 0.0), (11, 0.25), (12, 0.5), (14, 1.0), (1000, 1.0)] {
+            assert!((fade.at(ms * MS) - expected).abs() < 1.0e-12, "{ms} ms");
+        }
+        fade.set_target(-3.0, 12 * MS); // half-way up
+        assert!((fade.at(13 * MS) - 0.25).abs() < 1.0e-12);
+        assert!(!fade.is_silent(13 * MS) && fade.is_silent(14 * MS));
+    }
+
+    #[test]
+    fn to_be_told_the_same_again_changes_nothing() {
+        let mut told_once = Fade::new(0.0, 0.004);
+        told_once.set_target(1.0, 0);
+        let mut told_often = told_once;
+        (0..9).for_each(|ms| told_often.set_target(1.0, ms * MS));
+        assert_eq!(told_once, told_often);
+    }
+
+    #[test]
+    fn no_time_to_fade_in_is_a_step() {
+        let mut fade = Fade::new(0.0, 0.0);
+        fade.set_target(1.0, 5);
+        assert_eq!(fade.at(5), 1.0);
+    }
+}

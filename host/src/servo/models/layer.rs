@@ -1,0 +1,195 @@
+//! One force model of a scene, in all the places it is put: the unit that is mixed, faded and replaced.
+
+use super::broad_phase::{Bounds, BroadPhase};
+use super::fade::Fade;
+use crate::mapping::{Blend, Mapping};
+use crate::trace::Events;
+use flotor_hal::abi::CallStatus;
+use flotor_hal::abi::loader::Model;
+use flotor_hal::{
+    ActivityShape, DVec3, Demand, DeviceState, Input, Memory, Output, StepStatus, Tick, Wrench,
+};
+
+/// How a model has behaved so far, in all its places.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ModelHealth {
+    /// The tick at which it first panicked; from then on the instance that did is out.
+    pub panicked_at: Option<u64>,
+    /// Ticks with an answer that was not finite or outside the contract; each counted as no force.
+    pub rejected_ticks: u64,
+    /// The first of them.
+    pub first_rejected: Option<u64>,
+}
+
+impl ModelHealth {
+    fn reject(&mut self, tick: u64) {
+        self.rejected_ticks += 1;
+        self.first_rejected.get_or_insert(tick);
+    }
+}
+
+/// One instance of a model in one place.
+struct Object {
+    model: Model,
+    mapping: Mapping,
+    /// The tick it was stepped at last.
+    stepped_at: Option<u64>,
+    /// It panicked and is never called again.
+    is_out: bool,
+}
+
+/// What a layer asks for in a tick.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Share {
+    /// In the device frame, not weighted.
+    pub(super) wrench: Wrench,
+    /// Stored energy scaled to the device, J.
+    pub(super) energy_j: f64,
+}
+
+/// A model in all its places.
+pub(crate) struct Layer {
+    objects: Box<[Object]>,
+    broad: BroadPhase,
+    demand: Demand,
+    memory: Memory,
+    pub(super) weight: Fade,
+    pub(super) priority: u8,
+    pub(super) health: ModelHealth,
+}
+
+impl Layer {
+    /// A model's instances, each with its mapping. Not real-time.
+    pub(crate) fn new(instances: Vec<(Model, Mapping)>, blend: &Blend) -> Self {
+        let served = |(model, _): &(Model, Mapping)| Demand::ALL.limited_to(model.serves());
+        let demand = instances.first().map_or(Demand::ALL, served);
+        let object = |(model, mapping)| Object { model, mapping, stepped_at: None, is_out: false };
+        let mut objects: Box<[Object]> = instances.into_iter().map(object).collect();
+        let bounds = objects.iter_mut().map(Object::bounds).collect();
+        let memory = objects.first().map_or(Memory::Stateless, |object| object.model.memory());
+        Self {
+            objects,
+            broad: BroadPhase::new(bounds),
+            demand,
+            memory,
+            weight: Fade::new(blend.weight, blend.fade_s),
+            priority: blend.priority,
+            health: ModelHealth::default(),
+        }
+    }
+
+    /// The box in the device frame in which any of its objects can act; `None` if that is everywhere. Real-time.
+    pub(super) fn bounds(&self) -> Option<Bounds> {
+        self.broad.hull()
+    }
+
+    /// What its objects ask for at a state of the device; those that cannot act there are not called.
+    ///
+    /// Real-time: bounded by the objects that are near, no allocation.
+    #[inline]
+    pub(super) fn step(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
+        let Self { objects, broad, demand, memory, health, .. } = self;
+        let mut share = Share::default();
+        broad.for_each_near(state.pose.position(), |index| {
+            let Some(object) = objects.get_mut(index) else { return };
+            let Some(output) = object.step(tick, state, *demand, *memory, health) else {
+                events.insert(Events::MODEL_FAULT);
+                return;
+            };
+            share.wrench = share.wrench + object.mapping.wrench_to_device(&output.wrench);
+            if output.energy_j.is_finite() {
+                share.energy_j += output.energy_j * object.mapping.energy_scale();
+            }
+            if output.status() != Some(StepStatus::Ok) {
+                events.insert(Events::MODEL_DEGRADED);
+            }
+        });
+        share
+    }
+
+    /// Changes a live parameter of all its objects. Real-time: bounded by their number, no allocation.
+    pub(super) fn set_parameter(&mut self, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
+        let mut worst = CallStatus::Ok;
+        for (index, object) in self.objects.iter_mut().enumerate() {
+            let status = object.model.set_parameter(parameter, value);
+            if status == CallStatus::Panicked {
+                object.is_out = true;
+                self.health.panicked_at.get_or_insert(tick.index);
+            }
+            if status != CallStatus::Ok {
+                worst = status;
+            } else if self.broad.bounds(index).is_some() {
+                let bounds = object.bounds();
+                if bounds != self.broad.bounds(index) {
+                    self.broad.watch_always(index, bounds);
+                }
+            }
+        }
+        worst
+    }
+
+    /// What the first instance that has anything to say said last. Not real-time.
+    pub(super) fn last_message(&mut self) -> String {
+        let mut messages = self.objects.iter_mut().map(|object| object.model.last_message());
+        messages.find(|message| !message.is_empty()).unwrap_or_default()
+    }
+}
+
+impl Object {
+    /// The box in the device frame in which it can act; `None` if that is everywhere. Real-time: bounded, no
+    /// allocation.
+    fn bounds(&mut self) -> Option<Bounds> {
+        let region = self.model.activity();
+        let half_sides_m = match region.shape() {
+            ActivityShape::Everywhere => return None,
+            ActivityShape::Sphere => DVec3::splat(self.mapping.length_to_device(region.half_sides().x)),
+            ActivityShape::Box => self.mapping.half_sides_to_device(region.half_sides()),
+        };
+        Some(Bounds::about(self.mapping.position_to_device(region.center()), half_sides_m))
+    }
+
+    /// The model's answer, in its own frame; `None`, booked in the health, if it has none that can be used.
+    #[inline]
+    fn step(
+        &mut self,
+        tick: &Tick,
+        state: &DeviceState,
+        demand: Demand,
+        memory: Memory,
+        health: &mut ModelHealth,
+    ) -> Option<Output> {
+        if self.is_out {
+            return None;
+        }
+        // Where it was not stepped it has no history: it starts anew.
+        let was_asleep = self.stepped_at.is_some_and(|last| last + 1 != tick.index);
+        if was_asleep && memory == Memory::PathDependent && self.model.reset() != CallStatus::Ok {
+            return self.fail(tick, health);
+        }
+        self.stepped_at = Some(tick.index);
+        let input = Input {
+            pose: self.mapping.pose_to_model(&state.pose),
+            twist: self.mapping.twist_to_model(&state.twist),
+            time_ns: tick.time_ns,
+            dt_ns: tick.dt_ns,
+            tick: tick.index,
+            buttons: state.buttons,
+            demand,
+        };
+        let mut output = Output::default();
+        match self.model.step(&input, &mut output) {
+            CallStatus::Ok if output.wrench.is_finite() && output.status().is_some() => Some(output),
+            CallStatus::Ok => {
+                health.reject(tick.index);
+                None
+            }
+            _ => self.fail(tick, health),
+        }
+    }
+
+    fn fail(&mut self, tick: &Tick, health: &mut ModelHealth) -> Option<Output> {
+        self.is_out = true;
+        health.panicked_at.get_or_insert(tick.index);
+        None
+    }
+}

@@ -1,0 +1,127 @@
+//! All force models of a loop: who is asked, and how the answers are put together.
+//!
+//! The same code runs in the servo and in a replay; that is why a replay can be bit-exact.
+//!
+//! A scene's models are *layers*. Their wrenches add up, each by its weight; a layer that pushes silences those of
+//! lower priority; weights move at a steady rate, so that nothing jumps when one model gives way to another. A layer
+//! whose objects cannot act where the handle is, or whose weight is 0, is not asked at all.
+
+mod broad_phase;
+mod fade;
+mod layer;
+
+pub(crate) use layer::Layer;
+pub use layer::ModelHealth;
+
+use super::{Heartbeat, Place};
+use crate::trace::Events;
+use broad_phase::BroadPhase;
+use fade::Fade;
+use flotor_hal::abi::CallStatus;
+use flotor_hal::{DeviceState, Tick, Wrench};
+use layer::Share;
+
+/// Time in which a layer of higher priority silences the others, s: a hand's reaction takes longer, the slew limit
+/// need not act.
+const SILENCE_S: f64 = 0.02;
+
+/// All models of a loop.
+pub(crate) struct ModelStack {
+    layers: Box<[Layer]>,
+    broad: BroadPhase,
+    /// Ascending; more than one only if the scene has several priorities.
+    levels: Box<[Level]>,
+}
+
+/// The layers of one priority.
+struct Level {
+    priority: u8,
+    gain: Fade,
+    /// A layer of it pushed in this tick.
+    pushes: bool,
+}
+
+impl ModelStack {
+    /// Not real-time.
+    pub(crate) fn new(layers: Vec<Layer>) -> Self {
+        let broad = BroadPhase::new(layers.iter().map(Layer::bounds).collect());
+        let mut priorities: Vec<u8> = layers.iter().map(|layer| layer.priority).collect();
+        priorities.sort_unstable();
+        priorities.dedup();
+        let level = |priority| Level { priority, gain: Fade::new(1.0, SILENCE_S), pushes: false };
+        Self { layers: layers.into(), broad, levels: priorities.into_iter().map(level).collect() }
+    }
+
+    /// What the models together ask for at a state of the device, in the device frame, and the energy they store, J.
+    ///
+    /// Real-time: bounded by the models that are near, no allocation.
+    #[inline]
+    pub(crate) fn step(
+        &mut self,
+        tick: &Tick,
+        state: &DeviceState,
+        heart: &Heartbeat,
+        events: &mut Events,
+    ) -> (Wrench, f64) {
+        let Self { layers, broad, levels, .. } = self;
+        levels.iter_mut().for_each(|level| level.pushes = false);
+        let mut sum = Share::default();
+        broad.for_each_near(state.pose.position(), |index| {
+            let Some(layer) = layers.get_mut(index) else { return };
+            let Some(level) = levels.iter_mut().find(|level| level.priority == layer.priority) else {
+                return;
+            };
+            if layer.weight.is_silent(tick.time_ns) || level.gain.is_silent(tick.time_ns) {
+                return;
+            }
+            heart.enter(tick.index, Place::Model(index));
+            let share = layer.step(tick, state, events);
+            let weight = layer.weight.at(tick.time_ns);
+            level.pushes |= weight > 0.0 && share.wrench != Wrench::ZERO;
+            let weight = weight * level.gain.at(tick.time_ns);
+            sum.wrench = sum.wrench + share.wrench * weight;
+            sum.energy_j += share.energy_j * weight;
+        });
+        heart.enter(tick.index, Place::Host);
+        let mut is_silenced = false;
+        for level in levels.iter_mut().rev() {
+            level.gain.set_target(if is_silenced { 0.0 } else { 1.0 }, tick.time_ns);
+            is_silenced |= level.pushes;
+        }
+        (sum.wrench, sum.energy_j)
+    }
+
+    /// Changes a live parameter of the model numbered `model`. Real-time: bounded by its objects, no allocation.
+    pub(crate) fn set_parameter(
+        &mut self,
+        model: usize,
+        tick: &Tick,
+        parameter: usize,
+        value: f64,
+    ) -> CallStatus {
+        let Some(layer) = self.layers.get_mut(model) else { return CallStatus::Unsupported };
+        let status = layer.set_parameter(tick, parameter, value);
+        self.rebound(model);
+        status
+    }
+
+    /// Moves the weight of the model numbered `model` to a new value, at its rate. Real-time: bounded, no allocation.
+    pub(crate) fn set_weight(&mut self, model: usize, tick: &Tick, weight: f64) -> CallStatus {
+        let Some(layer) = self.layers.get_mut(model) else { return CallStatus::Unsupported };
+        layer.weight.set_target(weight, tick.time_ns);
+        CallStatus::Ok
+    }
+
+    /// A layer may act elsewhere now.
+    fn rebound(&mut self, model: usize) {
+        let bounds = self.layers.get(model).and_then(Layer::bounds);
+        if bounds != self.broad.bounds(model) {
+            self.broad.watch_always(model, bounds);
+        }
+    }
+
+    /// Every model with its health and what it said last. Not real-time.
+    pub(crate) fn health(&mut self) -> Vec<(ModelHealth, String)> {
+        self.layers.iter_mut().map(|layer| (layer.health, layer.last_message())).collect()
+    }
+}
