@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Sources of the contract, those that hold structs first used first.
-const SOURCES: [&str; 15] = [
+const SOURCES: [&str; 17] = [
     "frame.rs",
     "refusal.rs",
     "parameter.rs",
@@ -16,10 +16,12 @@ const SOURCES: [&str; 15] = [
     "variant.rs",
     "detail.rs",
     "device.rs",
+    "calibration.rs",
     "abi/text.rs",
     "abi/entry.rs",
     "abi/force.rs",
     "abi/device.rs",
+    "abi/calibration.rs",
     "abi/metadata.rs",
     "abi/mod.rs",
 ];

@@ -10,6 +10,9 @@
 #include <stdint.h>
 #include <stddef.h>
 
+// Number of coefficients a calibration has room for: a polynomial of degree seven.
+#define FLOTOR_CALIBRATION_COEFFICIENTS 8
+
 // Bytes a [`Message`] holds.
 #define FLOTOR_MESSAGE_BYTES 508
 
@@ -681,6 +684,27 @@ typedef struct FlotorDevicePacingTable {
     uint32_t (*wait_for_sample)(FlotorInstance instance, uint64_t timeout_ns, uint64_t *samples);
 } FlotorDevicePacingTable;
 
+// Delivered over commanded vertical force as a polynomial of the height. 80 bytes.
+typedef struct FlotorVerticalCalibration {
+    double range_m[2];
+    double coefficients[FLOTOR_CALIBRATION_COEFFICIENTS];
+} FlotorVerticalCalibration;
+
+// `flotor.calibration/1`: see [`VerticalCalibration`]. Both calls belong to the opened phase.
+typedef struct FlotorCalibrationTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // Serial number of the piece of hardware, empty if it has none; a [`super::CallStatus`] code. Not real-time.
+    uint32_t (*serial)(FlotorInstance instance, struct FlotorMessage *serial);
+    // Corrects the total vertical command from the next activation on; 0 or a [`crate::RefusalKind`] with the
+    // reason in the message. Not real-time.
+    uint32_t (*calibrate_vertical)(FlotorInstance instance,
+                                   const struct FlotorVerticalCalibration *calibration,
+                                   struct FlotorMessage *message);
+} FlotorCalibrationTable;
+
 /* Names of interfaces and extensions. */
 #define FLOTOR_INTERFACE_FORCE "flotor.force/1"
 #define FLOTOR_INTERFACE_DEVICE "flotor.device/1"
@@ -690,6 +714,7 @@ typedef struct FlotorDevicePacingTable {
 #define FLOTOR_INTERFACE_DETAILS "flotor.details/1"
 #define FLOTOR_INTERFACE_ENERGY_LEDGER "flotor.energy-ledger/1"
 #define FLOTOR_INTERFACE_DEVICE_PACING "flotor.device-pacing/1"
+#define FLOTOR_INTERFACE_CALIBRATION "flotor.calibration/1"
 
 #if defined(__cplusplus)
 #define FLOTOR_STATIC_ASSERT static_assert

@@ -4,7 +4,10 @@
 //! opened again. The two are different types, so that a real-time call before activation does not compile.
 
 use crate::abi::Str;
-use crate::{LoopConfig, OutOfRange, Pacing, Parameter, Pose, Refusal, SampleWait, Settings, Twist, Wrench};
+use crate::{
+    LoopConfig, OutOfRange, Pacing, Parameter, Pose, Refusal, SampleWait, Settings, Twist,
+    VerticalCalibration, Wrench,
+};
 
 /// One tick as a device and a host see it. 24 bytes.
 #[repr(C)]
@@ -333,6 +336,21 @@ pub trait Device: Sized + Send + 'static {
 
     /// The handle by which another thread stops it; asked once, right after opening.
     fn stopper(&self) -> Self::Stop;
+
+    /// Serial number of the piece of hardware; empty if it has none.
+    fn serial(&self) -> String {
+        String::new()
+    }
+
+    /// Corrects the total vertical command, gravity compensation included, from the next activation on. The
+    /// numbers are already checked.
+    ///
+    /// # Errors
+    /// A [`Refusal`] if there is nothing to correct.
+    fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
+        let _ = calibration;
+        Err(Refusal::unsupported("this device takes no calibration of the vertical force"))
+    }
 
     /// Energises the device; it starts at zero wrench.
     ///

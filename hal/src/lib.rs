@@ -28,6 +28,7 @@
 
 pub mod abi;
 mod activity;
+mod calibration;
 pub mod conformance;
 mod detail;
 mod device;
@@ -40,6 +41,7 @@ mod shape;
 mod variant;
 
 pub use activity::{ActivityRegion, ActivityShape, LocalModel};
+pub use calibration::{CALIBRATION_COEFFICIENTS, InvalidCalibration, VerticalCalibration};
 pub use detail::{Detail, DetailedModel};
 pub use device::{
     ActiveDevice, Axes, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState, EnergyLedger,

@@ -11,6 +11,7 @@
 //! - [`registry`]: where plugins are.
 //! - [`session`]: from a scene to a run.
 //! - [`servo`]: the tick, the clock, the envelope; the only real-time module.
+//! - [`calibration`]: how much of a commanded force arrives.
 //! - [`stability`]: how stiff a spring the servo can render.
 //! - [`scaffold`]: the start of somebody's own plugin.
 //! - [`mod@bench`]: what an evaluation costs, and how wrong it is.
@@ -21,6 +22,7 @@
 //! - [`cli`]: the `flotor` command.
 
 pub mod bench;
+pub mod calibration;
 pub mod cli;
 pub mod evaluate;
 pub mod headless;

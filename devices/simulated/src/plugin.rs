@@ -13,7 +13,7 @@ use crate::workspace::{
 use flotor_hal::{
     ActiveDevice, Axes, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState, EnergyLedger,
     Fault, LoopConfig, Pacing, Parameter, Pose, Refusal, SafeStop, SampleWait, Settings, Tick, Twist,
-    export_device,
+    VerticalCalibration, export_device,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -26,6 +26,8 @@ pub struct SimulatedFlotor {
     machine: Option<MachineParameters>,
     /// Every parameter as set or by default, in the order of the schema.
     values: Vec<f64>,
+    /// Correction of the vertical force; nothing until somebody has measured it.
+    calibration: VerticalCalibration,
     stopped: Arc<AtomicBool>,
 }
 
@@ -40,6 +42,8 @@ pub struct RunningFlotor {
     held: Wrench,
     /// It is less than was asked for.
     is_limited: bool,
+    /// Height of the latest sample, m: where the vertical force is corrected for.
+    height_m: f64,
 }
 
 /// Cuts the coils from any thread.
@@ -74,6 +78,7 @@ impl Device for SimulatedFlotor {
             setup: setup(settings)?,
             machine: machine(settings),
             values,
+            calibration: VerticalCalibration::NONE,
             stopped: Arc::new(AtomicBool::new(false)),
         };
         // Everything that depends on the tick length is checked again at activation.
@@ -113,6 +118,20 @@ impl Device for SimulatedFlotor {
         CoilSwitch(Arc::clone(&self.stopped))
     }
 
+    fn serial(&self) -> String {
+        Self::INFO.id().to_owned()
+    }
+
+    fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
+        if self.machine.is_none() {
+            let reason =
+                "preset plain has an even field, so there is nothing to calibrate; set preset = \"full\"";
+            return Err(Refusal::unsupported(reason));
+        }
+        self.calibration = *calibration;
+        Ok(())
+    }
+
     fn activate(self, config: &LoopConfig) -> Result<RunningFlotor, (Self, Refusal)> {
         match self.start(config.period_ns, config.seed) {
             Ok((simulation, machine)) => {
@@ -125,6 +144,7 @@ impl Device for SimulatedFlotor {
                     samples,
                     held: Wrench::ZERO,
                     is_limited: false,
+                    height_m: 0.0,
                 })
             }
             Err(error) => Err((self, Refusal::parameter(error))),
@@ -151,7 +171,9 @@ impl ActiveDevice for RunningFlotor {
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
         let coils = if self.is_stopped() { Wrench::ZERO } else { self.held };
         if let Some(machine) = &mut self.machine {
-            return machine.cycle(&mut self.simulation, tick, &coils, state);
+            let cycle = machine.cycle(&mut self.simulation, tick, &coils, state);
+            self.height_m = state.pose.position().z;
+            return cycle;
         }
         let incidents = self.simulation.advance(tick.dt_ns, coils);
         let flotor = self.simulation.state();
@@ -175,7 +197,11 @@ impl ActiveDevice for RunningFlotor {
         // The coils give what they can: the host has limited the wrench already, another caller may not have.
         self.held = match (&self.machine, asked.is_finite()) {
             (_, false) => Wrench::ZERO,
-            (Some(_), true) => asked,
+            (Some(_), true) => {
+                let total_n = asked.force_n;
+                let z = self.opened.calibration.command_n(total_n.z, self.height_m);
+                Wrench { force_n: total_n.with_z(z), ..asked }
+            }
             (None, true) => Wrench {
                 force_n: asked.force_n.clamp(-FORCE_LIMIT_N, FORCE_LIMIT_N),
                 torque_nm: asked.torque_nm.clamp(-TORQUE_LIMIT_NM, TORQUE_LIMIT_NM),

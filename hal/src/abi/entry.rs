@@ -28,6 +28,8 @@ pub mod interface_ids {
     pub const ENERGY_LEDGER: &str = "flotor.energy-ledger/1";
     /// A device that can set the pace: [`crate::abi::DevicePacingTable`].
     pub const DEVICE_PACING: &str = "flotor.device-pacing/1";
+    /// Calibration of a device: [`crate::abi::CalibrationTable`].
+    pub const CALIBRATION: &str = "flotor.calibration/1";
 }
 
 /// What a plugin mainly is.

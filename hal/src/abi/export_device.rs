@@ -2,10 +2,10 @@
 
 use super::entry::{CallStatus, Entry, Instance, PluginKind, interface_ids};
 use super::export_model::values_from_raw;
-use super::{DevicePacingTable, DeviceTable, EnergyLedgerTable, Message, Str, panics};
+use super::{CalibrationTable, DevicePacingTable, DeviceTable, EnergyLedgerTable, Message, Str, panics};
 use crate::{
     ActiveDevice, Capabilities, Cycle, Device, DeviceState, EnergyLedger, Fault, LoopConfig, Pacing,
-    ParameterValue, RefusalKind, SafeStop, SampleWait, Settings, Tick, Wrench,
+    ParameterValue, RefusalKind, SafeStop, SampleWait, Settings, Tick, VerticalCalibration, Wrench,
 };
 use std::ffi::c_void;
 use std::marker::PhantomData;
@@ -261,6 +261,48 @@ unsafe extern "C" fn wait_for_sample<D: Device>(
     }) as u32
 }
 
+unsafe extern "C" fn serial<D: Device>(instance: Instance, serial: *mut Message) -> u32 {
+    // SAFETY: as in `capabilities`.
+    let (work, serial) = unsafe { (work::<D>(instance), &mut *serial) };
+    work.guard(CallStatus::Panicked, |phase| match phase {
+        Phase::Opened(device) => {
+            serial.set(&device.serial());
+            CallStatus::Ok
+        }
+        Phase::Active(_) => CallStatus::WrongPhase,
+        Phase::Dead => CallStatus::Panicked,
+    }) as u32
+}
+
+unsafe extern "C" fn calibrate_vertical<D: Device>(
+    instance: Instance,
+    calibration: *const VerticalCalibration,
+    message: *mut Message,
+) -> u32 {
+    // SAFETY: as in `capabilities`.
+    let (work, calibration, message) = unsafe { (work::<D>(instance), &*calibration, &mut *message) };
+    if let Err(invalid) = calibration.check() {
+        message.set(&invalid.to_string());
+        return RefusalKind::Parameter as u32;
+    }
+    let refused = work.guard(Some((RefusalKind::Broken, None)), |phase| match phase {
+        Phase::Opened(device) => match device.calibrate_vertical(calibration) {
+            Ok(()) => None,
+            Err(refusal) => Some((refusal.kind, Some(refusal.reason))),
+        },
+        Phase::Active(_) | Phase::Dead => {
+            Some((RefusalKind::Broken, Some("the device is not in the opened phase".to_owned())))
+        }
+    });
+    match refused {
+        None => 0,
+        Some((kind, reason)) => {
+            message.set(reason.as_deref().unwrap_or(work.message.as_str()));
+            kind as u32
+        }
+    }
+}
+
 /// The tables of one device type, as constants that are promoted to statics.
 struct Tables<D>(PhantomData<D>);
 
@@ -288,6 +330,12 @@ impl<D: Device> Tables<D> {
         reserved: 0,
         ledger: Some(ledger::<D>),
     };
+    const CALIBRATION: CalibrationTable = CalibrationTable {
+        size: size_of::<CalibrationTable>() as u32,
+        reserved: 0,
+        serial: Some(serial::<D>),
+        calibrate_vertical: Some(calibrate_vertical::<D>),
+    };
     const PACING: DevicePacingTable = DevicePacingTable {
         size: size_of::<DevicePacingTable>() as u32,
         reserved: 0,
@@ -299,6 +347,7 @@ unsafe extern "C" fn interface<D: Device>(id: Str) -> *const c_void {
     match id.as_str() {
         interface_ids::DEVICE => std::ptr::from_ref(&Tables::<D>::DEVICE).cast(),
         interface_ids::ENERGY_LEDGER => std::ptr::from_ref(&Tables::<D>::LEDGER).cast(),
+        interface_ids::CALIBRATION => std::ptr::from_ref(&Tables::<D>::CALIBRATION).cast(),
         interface_ids::DEVICE_PACING if D::PACING == Pacing::Device => {
             std::ptr::from_ref(&Tables::<D>::PACING).cast()
         }

@@ -14,6 +14,7 @@
 //! This module and its children are the only place of the crate with `unsafe` code.
 #![allow(unsafe_code)]
 
+mod calibration;
 mod device;
 mod entry;
 mod export_device;
@@ -29,6 +30,7 @@ mod text;
 #[cfg(feature = "loader")]
 pub mod loader;
 
+pub use calibration::CalibrationTable;
 pub use device::{DeviceTable, EnergyLedgerTable};
 pub use entry::{
     ABI_MAJOR, ABI_MINOR, CallStatus, ContractSizes, Entry, HOST_QUIET_PANICS, Host, Instance, LayoutProof,

@@ -5,12 +5,12 @@
 //! too (they are held to [`super::ContractSizes`] and to the assertions in the header).
 
 use super::{
-    ActivityTable, CenterlineTable, ContractSizes, DetailsTable, DevicePacingTable, DeviceTable,
-    EnergyLedgerTable, ForceTable, Host, LayoutProof, Message, Str, VariantTable,
+    ActivityTable, CalibrationTable, CenterlineTable, ContractSizes, DetailsTable, DevicePacingTable,
+    DeviceTable, EnergyLedgerTable, ForceTable, Host, LayoutProof, Message, Str, VariantTable,
 };
 use crate::{
     ActivityRegion, Capabilities, CenterlineInfo, Detail, DeviceState, EnergyLedger, Input, LoopConfig,
-    Output, Parameter, ParameterValue, Pose, Tick, Twist, VariantInfo, Wrench,
+    Output, Parameter, ParameterValue, Pose, Tick, Twist, VariantInfo, VerticalCalibration, Wrench,
 };
 use abi_stable::StableAbi;
 use abi_stable::library::AbiHeader;
@@ -45,7 +45,7 @@ pub const CONTRACT: [(&str, &TypeLayout); 16] = [
 
 /// The types of the extensions. A plugin that knows one means what the host means; an older plugin knows fewer and
 /// offers fewer.
-pub const EXTENSIONS: [(&str, &TypeLayout); 11] = [
+pub const EXTENSIONS: [(&str, &TypeLayout); 13] = [
     ("ActivityRegion", ActivityRegion::LAYOUT),
     ("ActivityTable", ActivityTable::LAYOUT),
     ("CenterlineInfo", CenterlineInfo::LAYOUT),
@@ -56,6 +56,8 @@ pub const EXTENSIONS: [(&str, &TypeLayout); 11] = [
     ("DetailsTable", DetailsTable::LAYOUT),
     ("EnergyLedger", EnergyLedger::LAYOUT),
     ("EnergyLedgerTable", EnergyLedgerTable::LAYOUT),
+    ("VerticalCalibration", VerticalCalibration::LAYOUT),
+    ("CalibrationTable", CalibrationTable::LAYOUT),
     ("DevicePacingTable", DevicePacingTable::LAYOUT),
 ];
 

@@ -9,6 +9,7 @@ macro_rules! say {
 
 mod analyse;
 mod bench;
+mod calibrate;
 mod companion;
 mod doctor;
 mod eval;
@@ -79,6 +80,8 @@ enum Command {
     Study(study::StudyArguments),
     /// Analyse the data of a perception experiment
     Analyse(analyse::AnalyseArguments),
+    /// Measure how much of the vertical force arrives, and correct it
+    Calibrate(calibrate::CalibrateArguments),
     /// Look at this machine: what a real-time loop may hope for, and how to improve it
     Doctor(doctor::DoctorArguments),
     /// Print a completion script for a shell
@@ -232,6 +235,7 @@ pub fn main() -> ExitCode {
         Some(Command::Sweep(arguments)) => sweep::run(&arguments),
         Some(Command::Study(arguments)) => study::run(&arguments),
         Some(Command::Analyse(arguments)) => analyse::run(&arguments),
+        Some(Command::Calibrate(arguments)) => calibrate::run(&arguments),
         Some(Command::Doctor(arguments)) => doctor::run(&arguments),
         Some(Command::Completions { shell }) => {
             clap_complete::generate(shell, &mut Arguments::command(), "flotor", &mut std::io::stdout());

@@ -6,7 +6,7 @@ use super::model::refusal_from;
 use crate::abi::{CallStatus, DeviceTable, Instance, Message};
 use crate::{
     Axes, Capabilities, Cycle, DeviceState, EnergyLedger, LoopConfig, Parameter, ParameterValue, Refusal,
-    SampleWait, Tick, Wrench,
+    SampleWait, Tick, VerticalCalibration, Wrench,
 };
 use std::sync::Arc;
 
@@ -127,6 +127,34 @@ impl OpenedDevice {
     #[must_use]
     pub fn can_pace(&self) -> bool {
         self.handle.extensions.pacing.is_some_and(|table| table.wait_for_sample.is_some())
+    }
+
+    /// Serial number of the piece of hardware; empty if it has none or does not say.
+    #[must_use]
+    pub fn serial(&mut self) -> String {
+        let mut serial = Message::default();
+        if let Some(ask) = self.handle.extensions.calibration.and_then(|table| table.serial) {
+            // SAFETY: a live instance, used by this thread only (`&mut`), an out pointer valid for the call.
+            let code = unsafe { ask(self.handle.instance, &raw mut serial) };
+            if code != CallStatus::Ok as u32 {
+                return String::new();
+            }
+        }
+        serial.as_str().to_owned()
+    }
+
+    /// Corrects the total vertical command from the next activation on.
+    ///
+    /// # Errors
+    /// A [`Refusal`] if the device takes no calibration.
+    pub fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
+        let calibrate = self.handle.extensions.calibration.and_then(|table| table.calibrate_vertical);
+        let Some(calibrate) = calibrate else {
+            return Err(Refusal::unsupported("this device takes no calibration of the vertical force"));
+        };
+        let mut message = Message::default();
+        // SAFETY: a live instance, used by this thread only (`&mut`), pointers valid for the call.
+        refusal_from(unsafe { calibrate(self.handle.instance, calibration, &raw mut message) }, &message)
     }
 
     /// The handle by which another thread stops the device.

@@ -3,9 +3,9 @@
 use super::model::{Model, ModelTables};
 use super::{LoadError, Metadata, OpenedDevice, Setting, check, metadata_file};
 use crate::abi::{
-    ABI_MAJOR, ABI_MINOR, ActivityTable, CenterlineTable, DetailsTable, DevicePacingTable, DeviceTable,
-    EnergyLedgerTable, Entry, ForceTable, HOST_QUIET_PANICS, Host, MAGIC, PluginKind, Str, VariantTable,
-    interface_ids,
+    ABI_MAJOR, ABI_MINOR, ActivityTable, CalibrationTable, CenterlineTable, DetailsTable, DevicePacingTable,
+    DeviceTable, EnergyLedgerTable, Entry, ForceTable, HOST_QUIET_PANICS, Host, MAGIC, PluginKind, Str,
+    VariantTable, interface_ids,
 };
 use crate::{DeviceInfo, ModelInfo, Parameter};
 use std::ffi::CString;
@@ -40,6 +40,7 @@ enum Interface {
 #[derive(Clone, Copy)]
 pub(super) struct DeviceExtensions {
     pub(super) ledger: Option<&'static EnergyLedgerTable>,
+    pub(super) calibration: Option<&'static CalibrationTable>,
     pub(super) pacing: Option<&'static DevicePacingTable>,
 }
 
@@ -259,9 +260,12 @@ fn find_interface(metadata: &Metadata, entry: &'static Entry) -> Result<Interfac
         // SAFETY: as above, for the extension's table.
         let ledger = unsafe { table(interface_ids::ENERGY_LEDGER).cast::<EnergyLedgerTable>().as_ref() };
         // SAFETY: as above, for the extension's table.
+        let calibration = unsafe { table(interface_ids::CALIBRATION).cast::<CalibrationTable>().as_ref() };
+        let calibration = calibration.filter(|table| table.size as usize >= size_of::<CalibrationTable>());
+        // SAFETY: as above, for the extension's table.
         let pacing = unsafe { table(interface_ids::DEVICE_PACING).cast::<DevicePacingTable>().as_ref() };
         let pacing = pacing.filter(|table| table.size as usize >= size_of::<DevicePacingTable>());
-        Ok(Interface::Device { device, extensions: DeviceExtensions { ledger, pacing } })
+        Ok(Interface::Device { device, extensions: DeviceExtensions { ledger, calibration, pacing } })
     } else {
         let id = interface_ids::FORCE;
         // SAFETY: the table behind this id is a `ForceTable`, by the contract and the layout check.

@@ -1,0 +1,166 @@
+//! Calibration of the vertical force: how much of what is commanded arrives at a height.
+//!
+//! Extension `flotor.calibration/1`. The host measures, fits and keeps the file; the device gets numbers and
+//! divides its **total** vertical command by them, gravity compensation included, because the uneven field acts
+//! on the sum (Varadharajan 2007, section 3.4, corrected only the part of the spring).
+
+/// Number of coefficients a calibration has room for: a polynomial of degree seven.
+pub const CALIBRATION_COEFFICIENTS: usize = 8;
+
+/// Smallest and largest delivered share a calibration may claim. An uneven field is off by tens of percent at
+/// most; what claims more is a mistake, and would multiply a command by it.
+const PLAUSIBLE_SHARE: [f64; 2] = [0.5, 2.0];
+
+/// Heights at which a calibration is checked: fine enough for a polynomial of degree seven.
+const CHECKED_HEIGHTS: u32 = 256;
+
+/// Delivered over commanded vertical force as a polynomial of the height. 80 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct VerticalCalibration {
+    pub(crate) range_m: [f64; 2],
+    pub(crate) coefficients: [f64; CALIBRATION_COEFFICIENTS],
+}
+
+/// Why numbers are no calibration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum InvalidCalibration {
+    /// The range is not finite, empty or upside down, m.
+    Range([f64; 2]),
+    /// None, or more than there is room for.
+    Count(usize),
+    /// The share is not a number, or not between a half and two, at this height in m.
+    Share {
+        /// Height, m.
+        height_m: f64,
+        /// Delivered over commanded force there.
+        share: f64,
+    },
+}
+
+impl std::fmt::Display for InvalidCalibration {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Range([from, to]) => write!(f, "a range from {from} m to {to} m is none"),
+            Self::Count(count) => {
+                write!(f, "{count} coefficients; legal is 1 to {CALIBRATION_COEFFICIENTS}")
+            }
+            Self::Share { height_m, share } => write!(
+                f,
+                "{share} of the force would arrive at {:.3} mm; a share between {} and {} is plausible",
+                height_m * 1.0e3,
+                PLAUSIBLE_SHARE[0],
+                PLAUSIBLE_SHARE[1]
+            ),
+        }
+    }
+}
+
+impl std::error::Error for InvalidCalibration {}
+
+impl VerticalCalibration {
+    /// All that is commanded arrives.
+    pub const NONE: Self =
+        Self { range_m: [-1.0, 1.0], coefficients: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] };
+
+    /// A polynomial `c0 + c1 z + c2 z² ...` with z in m (so `ck` in 1/mᵏ), measured over `range_m`.
+    ///
+    /// # Errors
+    /// [`InvalidCalibration`], unless the share is plausible all over the range.
+    pub fn new(range_m: [f64; 2], coefficients: &[f64]) -> Result<Self, InvalidCalibration> {
+        let mut calibration = Self { range_m, coefficients: [0.0; CALIBRATION_COEFFICIENTS] };
+        match calibration.coefficients.get_mut(..coefficients.len()) {
+            Some(room) if !room.is_empty() => room.copy_from_slice(coefficients),
+            _ => return Err(InvalidCalibration::Count(coefficients.len())),
+        }
+        calibration.check()?;
+        Ok(calibration)
+    }
+
+    /// Checks numbers that came from elsewhere.
+    ///
+    /// # Errors
+    /// [`InvalidCalibration`], unless the share is plausible all over the range.
+    pub fn check(&self) -> Result<(), InvalidCalibration> {
+        let [from, to] = self.range_m;
+        if !(from.is_finite() && to.is_finite() && from < to) {
+            return Err(InvalidCalibration::Range(self.range_m));
+        }
+        let [least, most] = PLAUSIBLE_SHARE;
+        for step in 0..=CHECKED_HEIGHTS {
+            let height_m = from + (to - from) * f64::from(step) / f64::from(CHECKED_HEIGHTS);
+            let share = self.share(height_m);
+            if !(least..=most).contains(&share) {
+                return Err(InvalidCalibration::Share { height_m, share });
+            }
+        }
+        Ok(())
+    }
+
+    /// Where it was measured, lowest and highest, m.
+    #[must_use]
+    pub const fn range_m(&self) -> [f64; 2] {
+        self.range_m
+    }
+
+    /// Coefficients of the powers of the height in m; unused ones are 0.
+    #[must_use]
+    pub const fn coefficients(&self) -> &[f64; CALIBRATION_COEFFICIENTS] {
+        &self.coefficients
+    }
+
+    /// Delivered over commanded vertical force at a height of `z_m`; beyond the range as at its end, and 1 for a
+    /// height that is not a number. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn share(&self, z_m: f64) -> f64 {
+        if z_m.is_nan() {
+            return 1.0;
+        }
+        let [from, to] = self.range_m;
+        let z_m = z_m.max(from).min(to);
+        self.coefficients.iter().rev().fold(0.0, |sum, coefficient| sum * z_m + coefficient)
+    }
+
+    /// The vertical command, N, that delivers the total of `total_n` at a height of `z_m`. Real-time: bounded, no
+    /// allocation.
+    #[inline]
+    #[must_use]
+    pub fn command_n(&self, total_n: f64, z_m: f64) -> f64 {
+        total_n / self.share(z_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_delivers_the_total() {
+        let calibration = VerticalCalibration::new([-7.0e-3, 7.0e-3], &[1.05, -6.0, -1100.0]).unwrap();
+        let z_m = 3.0e-3;
+        let share = 1.05 - 6.0 * z_m - 1100.0 * z_m * z_m;
+        assert!((calibration.share(z_m) - share).abs() < 1.0e-15);
+        assert!((calibration.command_n(10.0, z_m) * share - 10.0).abs() < 1.0e-14);
+        assert_eq!(calibration.share(0.5), calibration.share(7.0e-3), "no extrapolation");
+        assert_eq!(calibration.share(f64::NAN), 1.0);
+        assert_eq!(VerticalCalibration::NONE.command_n(10.0, z_m), 10.0);
+    }
+
+    #[test]
+    fn numbers_that_would_multiply_a_force_are_refused() {
+        let range = [-7.0e-3, 7.0e-3];
+        assert_eq!(VerticalCalibration::new(range, &[]), Err(InvalidCalibration::Count(0)));
+        assert_eq!(VerticalCalibration::new(range, &[1.0; 9]), Err(InvalidCalibration::Count(9)));
+        assert!(matches!(VerticalCalibration::new([0.0, 0.0], &[1.0]), Err(InvalidCalibration::Range(_))));
+        assert!(matches!(
+            VerticalCalibration::new([0.0, f64::NAN], &[1.0]),
+            Err(InvalidCalibration::Range(_))
+        ));
+        for coefficients in [&[0.0][..], &[f64::NAN], &[1.0, 1.0e3], &[-1.0], &[f64::INFINITY]] {
+            let refused = VerticalCalibration::new(range, coefficients);
+            assert!(matches!(refused, Err(InvalidCalibration::Share { .. })), "{coefficients:?}");
+        }
+    }
+}

@@ -1,0 +1,384 @@
+//! The calibration file: TOML that people can read, checked when it is read.
+//!
+//! ```toml
+//! format = 1
+//!
+//! [device]
+//! plugin = "simulated"
+//! serial = "simulated"
+//!
+//! [vertical]                        # delivered over commanded force: c0 + c1 z + c2 z² ..., z in mm
+//! range_mm = [-7.0, 7.0]
+//! coefficients_per_mm = [1.05, -0.006, -0.0011]
+//!
+//! [quality]
+//! error_after_percent = 0.1
+//!
+//! [provenance]
+//! source = "measured"
+//! program = "flotor 0.1.0"
+//! ```
+
+use flotor_hal::VerticalCalibration;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// The format this program writes and reads.
+pub const FORMAT: u32 = 1;
+
+/// A calibration as it is kept.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CalibrationFile {
+    /// Version of the format.
+    pub format: u32,
+    /// What was calibrated.
+    pub device: CalibratedDevice,
+    /// The curve.
+    pub vertical: VerticalCurve,
+    /// How good it is.
+    #[serde(default)]
+    pub quality: Quality,
+    /// Where it comes from.
+    pub provenance: Provenance,
+}
+
+/// The piece of hardware a calibration is for.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CalibratedDevice {
+    /// Id of its plugin.
+    pub plugin: String,
+    /// Serial number; empty: fits every device of the plugin.
+    #[serde(default)]
+    pub serial: String,
+}
+
+/// Delivered over commanded vertical force, as powers of the height in mm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VerticalCurve {
+    /// Lowest and highest measured height, mm.
+    pub range_mm: [f64; 2],
+    /// Coefficients of 1, z, z² ..., in 1, 1/mm, 1/mm² ...
+    pub coefficients_per_mm: Vec<f64>,
+}
+
+/// What the fit and the check afterwards said. Absent where nobody measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Quality {
+    /// Number of readings.
+    pub readings: Option<u32>,
+    /// Standard deviation of the residuals, N.
+    pub residual_n: Option<f64>,
+    /// Half width of the 95 % band of the curve's shape, percent.
+    pub band_95_percent: Option<f64>,
+    /// Unevenness before, percent, peak to peak.
+    pub error_before_percent: Option<f64>,
+    /// Unevenness after, percent, peak to peak.
+    pub error_after_percent: Option<f64>,
+    /// Weight of what moved in the rig, N.
+    pub weight_n: Option<f64>,
+}
+
+/// Where a calibration comes from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Provenance {
+    /// Measured here or taken from elsewhere.
+    pub source: Source,
+    /// Who wrote the file.
+    pub program: String,
+    /// When.
+    pub date: Option<toml::value::Datetime>,
+    /// Seed of a simulated rig.
+    pub seed: Option<i64>,
+    /// Anything else worth knowing.
+    pub note: Option<String>,
+}
+
+/// Whether a calibration was measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Source {
+    /// By `flotor calibrate vertical`.
+    Measured,
+    /// Somebody else's numbers.
+    Imported,
+}
+
+/// Why a file is no calibration. Prints file, cause and remedy in one line.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrationFileError {
+    /// It cannot be read.
+    #[error("{file}: cannot read the calibration: {cause}")]
+    Unreadable {
+        /// The file.
+        file: String,
+        /// What the system said.
+        cause: std::io::Error,
+    },
+    /// It is not TOML, or not this TOML.
+    #[error("{file}:{line}: {problem}")]
+    Syntax {
+        /// The file.
+        file: String,
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong.
+        problem: String,
+    },
+    /// It has another format.
+    #[error("{file}: format {found}, this program reads {FORMAT}; calibrate again")]
+    Format {
+        /// The file.
+        file: String,
+        /// What it says.
+        found: u32,
+    },
+    /// Its curve is none.
+    #[error("{file}: [vertical] {problem}")]
+    Curve {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// It is for another device.
+    #[error("{file}: for {theirs}, the device is {ours}; calibrate this one")]
+    OtherDevice {
+        /// The file.
+        file: String,
+        /// What the file is for.
+        theirs: String,
+        /// What is there.
+        ours: String,
+    },
+}
+
+const MM: f64 = 1.0e-3;
+
+impl VerticalCurve {
+    /// The curve of a calibration, without the coefficients that are zero at its end.
+    #[must_use]
+    pub fn of(calibration: &VerticalCalibration) -> Self {
+        let mut coefficients: Vec<f64> = Vec::new();
+        let mut scale = 1.0;
+        for coefficient in calibration.coefficients() {
+            coefficients.push(coefficient * scale);
+            scale *= MM;
+        }
+        while coefficients.len() > 1 && coefficients.last() == Some(&0.0) {
+            coefficients.pop();
+        }
+        Self { range_mm: calibration.range_m().map(|height| height / MM), coefficients_per_mm: coefficients }
+    }
+
+    /// The calibration a curve means.
+    ///
+    /// # Errors
+    /// [`flotor_hal::InvalidCalibration`] if it means none.
+    pub fn calibration(&self) -> Result<VerticalCalibration, flotor_hal::InvalidCalibration> {
+        let mut scale = 1.0;
+        let powers = self.coefficients_per_mm.iter().map(|coefficient| {
+            let power = coefficient / scale;
+            scale *= MM;
+            power
+        });
+        VerticalCalibration::new(self.range_mm.map(|height| height * MM), &powers.collect::<Vec<_>>())
+    }
+}
+
+impl CalibrationFile {
+    /// Reads and checks a file.
+    ///
+    /// # Errors
+    /// [`CalibrationFileError`].
+    pub fn load(path: &Path) -> Result<(Self, VerticalCalibration), CalibrationFileError> {
+        let file = path.display().to_string();
+        match std::fs::read_to_string(path) {
+            Ok(text) => Self::parse(&file, &text),
+            Err(cause) => Err(CalibrationFileError::Unreadable { file, cause }),
+        }
+    }
+
+    /// Reads and checks a text; `file` is what complaints call it.
+    ///
+    /// # Errors
+    /// [`CalibrationFileError`].
+    pub fn parse(file: &str, text: &str) -> Result<(Self, VerticalCalibration), CalibrationFileError> {
+        let read: Self = toml::from_str(text).map_err(|error| CalibrationFileError::Syntax {
+            file: file.to_owned(),
+            line: error
+                .span()
+                .map_or(1, |span| text.get(..span.start).unwrap_or(text).matches('\n').count() + 1),
+            problem: error.message().lines().next().unwrap_or_default().to_owned(),
+        })?;
+        if read.format != FORMAT {
+            return Err(CalibrationFileError::Format { file: file.to_owned(), found: read.format });
+        }
+        let calibration = read.vertical.calibration().map_err(|invalid| CalibrationFileError::Curve {
+            file: file.to_owned(),
+            problem: invalid.to_string(),
+        })?;
+        Ok((read, calibration))
+    }
+
+    /// The file as text, the same for the same content.
+    ///
+    /// # Errors
+    /// What the writer says; none is known.
+    pub fn to_text(&self) -> Result<String, toml::ser::Error> {
+        const HEAD: &str = "# Vertical calibration of a haptic device: delivered over commanded force is\n\
+                            # c0 + c1 z + c2 z² ..., z in mm above the centre of its range.\n";
+        Ok(format!("{HEAD}{}", toml::to_string(self)?))
+    }
+
+    /// Refuses a file for another device.
+    ///
+    /// # Errors
+    /// [`CalibrationFileError::OtherDevice`].
+    pub fn check_device(&self, file: &str, plugin: &str, serial: &str) -> Result<(), CalibrationFileError> {
+        let CalibratedDevice { plugin: wanted, serial: wanted_serial } = &self.device;
+        if wanted == plugin && (wanted_serial.is_empty() || wanted_serial == serial) {
+            return Ok(());
+        }
+        Err(CalibrationFileError::OtherDevice {
+            file: file.to_owned(),
+            theirs: format!("`{wanted}` {wanted_serial}"),
+            ours: format!("`{plugin}` {serial}"),
+        })
+    }
+}
+
+/// Today in universal time, as a date of TOML.
+#[must_use]
+pub fn today() -> toml::value::Datetime {
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+    let (year, month, day) = civil_date(now.as_secs() / 86_400);
+    toml::value::Datetime { date: Some(toml::value::Date { year, month, day }), time: None, offset: None }
+}
+
+/// Year, month and day of a number of days since 1970, by counting whole years and months.
+fn civil_date(mut days: u64) -> (u16, u8, u8) {
+    let mut year = 1970_u16;
+    let leap = |year: u16| (year.is_multiple_of(4) && !year.is_multiple_of(100)) || year.is_multiple_of(400);
+    loop {
+        let length = if leap(year) { 366 } else { 365 };
+        if days < length || year == u16::MAX {
+            break;
+        }
+        days -= length;
+        year += 1;
+    }
+    let february = if leap(year) { 29 } else { 28 };
+    for (month, length) in (1_u8..).zip([31, february, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31]) {
+        if days < length {
+            return (year, month, u8::try_from(days + 1).unwrap_or(1));
+        }
+        days -= length;
+    }
+    (year, 12, 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub(crate) const EXAMPLE: &str = "format = 1\n[device]\nplugin = \"simulated\"\nserial = \"s1\"\n[vertical]\n\
+        range_mm = [-7.0, 7.0]\ncoefficients_per_mm = [1.05, -0.006, -0.0011]\n[quality]\nresidual_n = 0.02\n\
+        [provenance]\nsource = \"measured\"\nprogram = \"flotor 0.1.0\"\ndate = 2026-03-01\n";
+
+    #[test]
+    fn what_is_written_is_read() {
+        let (file, calibration) = CalibrationFile::parse("c.toml", EXAMPLE).unwrap();
+        let (again, same) = CalibrationFile::parse("c.toml", &file.to_text().unwrap()).unwrap();
+        assert_eq!(file, again);
+        assert_eq!(calibration, same);
+        let back = VerticalCurve::of(&calibration);
+        assert!(
+            (back.coefficients_per_mm[2] + 0.0011).abs() < 1.0e-18 && back.coefficients_per_mm.len() == 3
+        );
+    }
+
+    #[test]
+    fn complaints_name_file_line_and_cause() {
+        let said = |from: &str, to: &str| {
+            let text = EXAMPLE.replace(from, to);
+            assert_ne!(text, EXAMPLE, "{from} stands in the example");
+            CalibrationFile::parse("c.toml", &text).unwrap_err().to_string()
+        };
+        assert!(said("serial", "seriel").starts_with("c.toml:4: unknown field `seriel`"));
+        assert!(said("[-7.0, 7.0]", "[-7.0, true]").starts_with("c.toml:6: "));
+        assert!(said("format = 1", "format = 2").contains("format 2, this program reads 1"));
+        assert!(said("1.05", "nan").contains("[vertical]"));
+        assert!(said("1.05", "0.01").contains("plausible"));
+        assert!(said("[-7.0, 7.0]", "[7.0, -7.0]").contains("range"));
+        assert!(said("-0.0011]", "0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]").contains("9 coefficients"));
+    }
+
+    #[test]
+    fn a_file_for_another_device_is_refused() {
+        let (file, _) = CalibrationFile::parse("c.toml", EXAMPLE).unwrap();
+        assert!(file.check_device("c.toml", "simulated", "s1").is_ok());
+        assert!(file.check_device("c.toml", "simulated", "s2").is_err());
+        let refused = file.check_device("c.toml", "maglev", "s1").unwrap_err().to_string();
+        assert!(refused.contains("`simulated` s1") && refused.contains("`maglev` s1"), "{refused}");
+    }
+
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        assert_eq!(civil_date(0), (1970, 1, 1));
+        assert_eq!(civil_date(11_016), (2000, 2, 29));
+        assert_eq!(civil_date(20_513), (2026, 3, 1));
+        assert_eq!(civil_date(47_540), (2100, 2, 28) /* 2100 is no leap year */);
+        assert_eq!(civil_date(47_541), (2100, 3, 1));
+    }
+
+    /// Mutated files: never a panic, and whatever is accepted is a curve that multiplies no force beyond two.
+    #[test]
+    fn no_text_becomes_a_dangerous_curve() {
+        use rand_core::{Rng, SeedableRng};
+        let cases = if std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size == "full") {
+            2_000_000
+        } else {
+            20_000
+        };
+        let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(1);
+        let pieces: [&[u8]; 12] = [
+            b"nan",
+            b"-inf",
+            b"1e308",
+            b"[",
+            b"]",
+            b"-",
+            b"0",
+            b"9",
+            b"\n",
+            b"\xff",
+            b"format = 1",
+            b"\"\"\"",
+        ];
+        let mut accepted = 0_u32;
+        for _ in 0..cases {
+            let mut bytes = EXAMPLE.as_bytes().to_vec();
+            for _ in 0..=random.next_u64() % 4 {
+                let at = usize::try_from(random.next_u64() % (bytes.len() as u64 + 1)).unwrap();
+                let to = bytes.len().min(at + usize::try_from(random.next_u64() % 4).unwrap());
+                let piece = pieces[usize::try_from(random.next_u64() % 12).unwrap()];
+                bytes.splice(at..to, piece.iter().copied());
+            }
+            let text = String::from_utf8_lossy(&bytes);
+            if let Ok((_, calibration)) = CalibrationFile::parse("fuzz", &text) {
+                accepted += 1;
+                for height_mm in -20..=20 {
+                    let command_n = calibration.command_n(10.0, f64::from(height_mm) * MM);
+                    assert!((4.9..=20.1).contains(&command_n), "{command_n} N from {text}");
+                }
+            }
+        }
+        assert!(accepted > 0, "some mutations leave a file whole");
+    }
+}

@@ -1,0 +1,248 @@
+//! From readings to a polynomial: least squares, degree by cross-validation, confidence.
+//!
+//! With the commanded force `F`, the delivered share `s(z)` and the weight `W` of what moves, the sensor reads
+//!
+//! ```text
+//! R = F s(z) - W,      s(z) = a0 P0(u) + a1 P1(u) + ... + ad Pd(u),      u = z over the measured range, -1..1
+//! ```
+//!
+//! which is linear in all unknowns; two forces tell the share from the weight. The Legendre polynomials `Pk` keep
+//! the unknowns nearly independent; what is kept in the end are powers of the height.
+//!
+//! **Degree.** Each height is left out once and predicted from all others (leaving out single readings would let
+//! those beside it answer). The smallest degree is taken whose error is within one standard error of the least
+//! (Breiman et al. 1984, the one-standard-error rule): more is fitting noise.
+
+use super::CalibrationError;
+use super::least_squares::{Solution, solve};
+use super::procedure::Reading;
+use flotor_hal::{CALIBRATION_COEFFICIENTS, VerticalCalibration};
+
+/// Highest degree that is tried. One less than there is room for: the cross-validated curve has to bend down again.
+pub const MAX_DEGREE: usize = CALIBRATION_COEFFICIENTS - 2;
+
+/// Quantile of the normal distribution for a two-sided interval of 95 %; there are hundreds of readings.
+const QUANTILE_95: f64 = 1.959_963_985;
+
+/// How well a degree predicts heights it has not seen.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Candidate {
+    /// Degree of the polynomial.
+    pub degree: usize,
+    /// Root mean square of the prediction error, N.
+    pub error_n: f64,
+    /// Standard error of that, from height to height, N.
+    pub standard_error_n: f64,
+}
+
+/// A fitted calibration, and how far it can be trusted.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The curve.
+    pub calibration: VerticalCalibration,
+    /// Its degree.
+    pub degree: usize,
+    /// Every degree that was tried.
+    pub candidates: Vec<Candidate>,
+    /// Weight of what moves, N, and its 95 % interval to either side.
+    pub weight_n: [f64; 2],
+    /// Standard deviation of the residuals, N.
+    pub residual_n: f64,
+    /// Largest half width of the 95 % band of the curve's shape (its deviation from its mean) over the measured
+    /// heights, percent of the commanded force.
+    pub band_95_percent: f64,
+    /// Residual of each reading, N, in the order of the readings.
+    pub residuals_n: Vec<f64>,
+}
+
+/// Fits the readings.
+///
+/// # Errors
+/// [`CalibrationError::TooFew`] unless there are two forces and more heights than coefficients;
+/// [`CalibrationError::Implausible`] if the curve is no calibration.
+pub fn fit(readings: &[Reading]) -> Result<Fit, CalibrationError> {
+    let stops = distinct(readings.iter().map(|reading| u64::from(reading.stop)));
+    let forces = distinct(readings.iter().map(|reading| reading.commanded_n.to_bits()));
+    let too_few = |needed| CalibrationError::TooFew {
+        readings: readings.len(),
+        heights: stops.len(),
+        forces: forces.len(),
+        needed,
+    };
+    if forces.len() < 2 {
+        return Err(too_few("two different forces tell the weight from the field"));
+    }
+    if stops.len() < MAX_DEGREE + 2 {
+        return Err(too_few("more heights than coefficients are needed"));
+    }
+    let scale = Scale::of(readings);
+    let candidates: Option<Vec<Candidate>> =
+        (0..=MAX_DEGREE).map(|degree| cross_validate(readings, &stops, &scale, degree)).collect();
+    let candidates = candidates.ok_or_else(|| too_few("the heights must differ"))?;
+    let degree = choose(&candidates);
+    let solution =
+        solution(readings.iter(), &scale, degree).ok_or_else(|| too_few("the heights must differ"))?;
+
+    let shares: Vec<f64> = solution.x.iter().take(degree + 1).copied().collect();
+    let calibration = VerticalCalibration::new(scale.range_m(), &scale.powers_of_height(&shares))?;
+    #[allow(clippy::cast_precision_loss)] // some hundred readings
+    let freedom = readings.len().saturating_sub(solution.x.len()).max(1) as f64;
+    let residual_n = (solution.residual_squares / freedom).sqrt();
+    let weight_n = solution.x.last().copied().unwrap_or(f64::NAN);
+    let mut weight_direction = vec![0.0; degree + 1];
+    weight_direction.push(1.0);
+    let weight_95_n = QUANTILE_95 * residual_n * solution.unit_variance(&weight_direction).sqrt();
+    let residuals_n = readings
+        .iter()
+        .map(|reading| reading.force_n - predict(reading, &solution, &scale, degree))
+        .collect();
+    Ok(Fit {
+        calibration,
+        degree,
+        candidates,
+        weight_n: [weight_n, weight_95_n],
+        residual_n,
+        band_95_percent: QUANTILE_95 * residual_n * shape_deviation(&solution, degree) * 100.0,
+        residuals_n,
+    })
+}
+
+/// Maps the measured heights to -1..1.
+struct Scale {
+    middle_m: f64,
+    half_m: f64,
+}
+
+impl Scale {
+    fn of(readings: &[Reading]) -> Self {
+        let heights = || readings.iter().map(|reading| reading.height_m);
+        let (low, high) =
+            (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
+        Self { middle_m: 0.5 * (low + high), half_m: 0.5 * (high - low) }
+    }
+
+    fn range_m(&self) -> [f64; 2] {
+        [self.middle_m - self.half_m, self.middle_m + self.half_m]
+    }
+
+    fn unit(&self, height_m: f64) -> f64 {
+        (height_m - self.middle_m) / self.half_m
+    }
+
+    /// Coefficients of powers of the height in m for those of Legendre polynomials of `u`.
+    fn powers_of_height(&self, shares: &[f64]) -> Vec<f64> {
+        let mut powers = vec![0.0; shares.len()];
+        // Pk as polynomials in z, by the three-term recurrence (k+1) P(k+1) = (2k+1) u Pk - k P(k-1).
+        let [u0, u1] = [-self.middle_m / self.half_m, 1.0 / self.half_m];
+        let (mut before, mut now): (Vec<f64>, Vec<f64>) = (Vec::new(), vec![1.0]);
+        for (k, share) in (0_u32..).zip(shares) {
+            powers.iter_mut().zip(&now).for_each(|(power, term)| *power += share * term);
+            let (k, mut next) = (f64::from(k), vec![0.0; now.len() + 1]);
+            for (index, term) in now.iter().enumerate() {
+                let grown = (2.0 * k + 1.0) / (k + 1.0) * term;
+                if let Some(slot) = next.get_mut(index) {
+                    *slot += grown * u0;
+                }
+                if let Some(slot) = next.get_mut(index + 1) {
+                    *slot += grown * u1;
+                }
+            }
+            next.iter_mut().zip(&before).for_each(|(slot, term)| *slot -= k / (k + 1.0) * term);
+            before = std::mem::replace(&mut now, next);
+        }
+        powers
+    }
+}
+
+/// Legendre polynomials 0 to `degree` at `u`.
+fn legendre(u: f64, degree: usize) -> Vec<f64> {
+    let mut values = vec![1.0, u];
+    for k in 1..degree.max(1) {
+        let [before, now] = [k - 1, k].map(|index| values.get(index).copied().unwrap_or(0.0));
+        #[allow(clippy::cast_precision_loss)] // a handful
+        let k = k as f64;
+        values.push(((2.0 * k + 1.0) * u * now - k * before) / (k + 1.0));
+    }
+    values.truncate(degree + 1);
+    values
+}
+
+fn row(reading: &Reading, scale: &Scale, degree: usize) -> Vec<f64> {
+    let shares = legendre(scale.unit(reading.height_m), degree).into_iter();
+    shares.map(|value| value * reading.commanded_n).chain([-1.0]).collect()
+}
+
+fn solution<'r>(
+    readings: impl Iterator<Item = &'r Reading>,
+    scale: &Scale,
+    degree: usize,
+) -> Option<Solution> {
+    let (rows, values): (Vec<_>, Vec<_>) =
+        readings.map(|reading| (row(reading, scale, degree), reading.force_n)).unzip();
+    solve(&rows, &values)
+}
+
+fn predict(reading: &Reading, solution: &Solution, scale: &Scale, degree: usize) -> f64 {
+    row(reading, scale, degree).iter().zip(&solution.x).map(|(a, b)| a * b).sum()
+}
+
+/// Predicts each height from all others.
+fn cross_validate(readings: &[Reading], stops: &[u64], scale: &Scale, degree: usize) -> Option<Candidate> {
+    let mut squares = Vec::new();
+    for stop in stops {
+        let (left_out, kept): (Vec<_>, Vec<_>) =
+            readings.iter().partition(|reading| u64::from(reading.stop) == *stop);
+        let solution = solution(kept.into_iter(), scale, degree)?;
+        let errors =
+            left_out.iter().map(|reading| reading.force_n - predict(reading, &solution, scale, degree));
+        squares.push(mean(errors.map(|error| error * error)));
+    }
+    let square = mean(squares.iter().copied());
+    #[allow(clippy::cast_precision_loss)] // some ten heights
+    let count = squares.len() as f64;
+    let spread = (mean(squares.iter().map(|value| (value - square).powi(2))) / (count - 1.0)).sqrt();
+    let error_n = square.sqrt();
+    // The error of a square root: that of what is under it, over twice the root.
+    Some(Candidate { degree, error_n, standard_error_n: spread / (2.0 * error_n) })
+}
+
+/// The smallest degree within one standard error of the best.
+fn choose(candidates: &[Candidate]) -> usize {
+    let best = candidates.iter().min_by(|a, b| a.error_n.total_cmp(&b.error_n));
+    let bound_n = best.map_or(f64::INFINITY, |best| best.error_n + best.standard_error_n);
+    candidates.iter().find(|candidate| candidate.error_n <= bound_n).map_or(0, |candidate| candidate.degree)
+}
+
+/// Largest standard deviation of `s(z) - mean of s` for residuals of unit variance. The mean of the share is less
+/// sure than its shape (it hangs on the difference of two forces) and is a scale, not an unevenness.
+fn shape_deviation(solution: &Solution, degree: usize) -> f64 {
+    /// Odd, so that the middle is looked at.
+    const POINTS: u32 = 101;
+    let variance = |point: u32| {
+        let u = 2.0 * f64::from(point) / f64::from(POINTS - 1) - 1.0;
+        let mut direction = legendre(u, degree);
+        // The mean of every Legendre polynomial but the first is zero.
+        if let Some(first) = direction.first_mut() {
+            *first = 0.0;
+        }
+        direction.push(0.0);
+        solution.unit_variance(&direction)
+    };
+    (0..POINTS).map(variance).fold(0.0, f64::max).sqrt()
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    if count > 0.0 { sum / count } else { 0.0 }
+}
+
+/// The values that occur, each once, in the order of first occurrence.
+fn distinct(values: impl Iterator<Item = u64>) -> Vec<u64> {
+    let mut found = Vec::new();
+    for value in values {
+        if !found.contains(&value) {
+            found.push(value);
+        }
+    }
+    found
+}

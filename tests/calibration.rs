@@ -1,0 +1,115 @@
+//! Calibrating the simulated flotor through the command line: the error falls, files are checked, nothing depends on
+//! luck.
+
+use flotor_tests::program::{Flotor, exit_code};
+use flotor_tests::scratch::Scratch;
+use flotor_tests::{TestSize, library::plugin_file};
+use serde_json::Value;
+use std::path::Path;
+
+fn run(arguments: &[&str]) -> Value {
+    let ran = Flotor::with(arguments.iter().copied().chain(["--json", "-"])).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    serde_json::from_str(&ran.stdout).expect("the report is JSON")
+}
+
+fn number(report: &Value, key: &str) -> f64 {
+    report[key].as_f64().unwrap_or_else(|| panic!("{key} is a number in {report}"))
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("a scratch folder has a plain name")
+}
+
+#[test]
+fn the_error_falls_below_half_a_percent_with_every_seed() {
+    for seed in 1..=TestSize::of_this_run().pick(3, 100) {
+        let report = run(&["calibrate", "vertical", "--simulated", "--seed", &seed.to_string()]);
+        // The field's own error, over heights the rig meets to 2 µm: 0.01 % at the steep end.
+        assert!((number(&report, "error_before_percent") - 10.87).abs() < 0.03, "{report}");
+        assert!(number(&report, "error_after_percent") <= 0.5, "{report}");
+        // A correction cannot be better than its own confidence by luck alone for all seeds, nor much worse for any.
+        assert!(
+            number(&report, "error_after_percent") < 5.0 * number(&report, "band_95_percent"),
+            "the band says what to expect: {report}"
+        );
+        assert!(
+            (number(&report, "weight_n") - 8.58).abs() < 2.5 * number(&report, "weight_95_n"),
+            "{report}"
+        );
+        let rows = report["rows"].as_array().expect("the baselines stand in the same table");
+        let errors: Vec<f64> = rows.iter().map(|row| number(row, "error_percent")).collect();
+        assert_eq!(errors.len(), 4);
+        assert!(errors.is_sorted_by(|better, worse| better >= worse), "{errors:?}");
+    }
+}
+
+#[test]
+fn equal_seeds_give_equal_results_and_other_seeds_do_not() {
+    let report = |seed| run(&["calibrate", "vertical", "--simulated", "--seed", seed]).to_string();
+    assert_eq!(report("5"), report("5"));
+    assert_ne!(report("5"), report("6"));
+}
+
+#[test]
+fn a_written_file_is_read_and_does_what_it_said() {
+    let scratch = Scratch::default();
+    let (file, picture) = (scratch.path().join("c.toml"), scratch.path().join("c.svg"));
+    let report =
+        run(&["calibrate", "vertical", "--simulated", "--out", text(&file), "--plot", text(&picture)]);
+    let verified = run(&["calibrate", "verify", text(&file), "--simulated", "--seed", "99"]);
+    for key in ["error_before_percent", "error_after_percent"] {
+        // Another seed, other noise of the pose: micrometres, in a field of 2 % per millimetre.
+        assert!((number(&report, key) - number(&verified, key)).abs() < 0.02, "{report} {verified}");
+    }
+    let picture = std::fs::read_to_string(&picture).expect("the picture was drawn");
+    assert!(picture.starts_with("<svg") && picture.contains("Residual"));
+}
+
+#[test]
+fn the_reports_polynomial_can_be_imported_and_leaves_what_it_leaves() {
+    let scratch = Scratch::default();
+    let file = scratch.path().join("thesis.toml");
+    let ran = Flotor::with(["calibrate", "import", "--out", text(&file)]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    let verified = run(&["calibrate", "verify", text(&file), "--simulated"]);
+    // On the total command at 10 N: between the field's 10.87 % and the polynomial's own 4.39 %.
+    let after = number(&verified, "error_after_percent");
+    assert!((10.87 - 4.39 - after).abs() < 0.3, "{after}");
+}
+
+#[test]
+fn what_cannot_be_is_refused_in_one_line() {
+    let scratch = Scratch::default();
+    let other = scratch.path().join("other.toml");
+    let ran =
+        Flotor::with(["calibrate", "import", "--device", "maglev", "--serial", "7", "--out", text(&other)])
+            .run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    let broken = scratch.file("broken.toml", "format = 1\n[device]\nplugin = 3\n");
+    let missing = scratch.path().join("missing.toml");
+    for (file, words) in [(&other, "`maglev` 7"), (&broken, "broken.toml:3"), (&missing, "cannot read")] {
+        let ran = Flotor::with(["calibrate", "verify", text(file), "--simulated"]).run();
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+        assert!(ran.error().contains(words), "{}", ran.error());
+    }
+    let one_force = Flotor::with(["calibrate", "vertical", "--simulated", "--force", "10"]).run();
+    assert_eq!(one_force.code, Some(exit_code::CONFIGURATION), "{one_force:#?}");
+    assert!(one_force.error().contains("two different forces"), "{}", one_force.error());
+    let far = Flotor::with(["calibrate", "vertical", "--simulated", "--steps", "30"]).run();
+    assert_eq!(far.code, Some(exit_code::CONFIGURATION), "{far:#?}");
+}
+
+#[test]
+fn the_extension_checks_what_it_is_given() {
+    use flotor_hal::VerticalCalibration;
+    use flotor_hal::abi::loader::{Plugin, Setting};
+    let plugin = Plugin::load(&plugin_file("flotor-simulated")).expect("the simulated flotor loads");
+    let full = [Setting::parse(plugin.parameters(), "preset", "full").expect("the preset exists")];
+    let mut device = plugin.open_device(&full).expect("it opens");
+    assert_eq!(device.serial(), "simulated");
+    device.calibrate_vertical(&VerticalCalibration::NONE).expect("the uneven field can be calibrated");
+    let mut plain = plugin.open_device(&[]).expect("it opens");
+    let refused = plain.calibrate_vertical(&VerticalCalibration::NONE).unwrap_err();
+    assert!(refused.reason.contains("nothing to calibrate"), "{refused}");
+}
