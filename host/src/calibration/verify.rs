@@ -8,7 +8,7 @@ const HALF_STRETCH_M: f64 = 7.0e-3;
 /// Distance of two heights, m; between them a polynomial of the sizes met here bends by less than 1e-4 of itself.
 const STEP_M: f64 = 0.25e-3;
 /// Number of steps to either side of the middle.
-const STEPS: i32 = 28;
+const STEPS: u32 = 28;
 
 /// Total vertical force that is asked for, N: between the two a calibration measures.
 pub const PROBE_N: f64 = 11.0;
@@ -35,8 +35,8 @@ impl ErrorCurve {
         mut stopped: impl FnMut(),
     ) -> Result<Self, CalibrationError> {
         let mut ratios = Vec::new();
-        for step in -STEPS..=STEPS {
-            let rest = rig.rest_at(f64::from(step) * STEP_M, command_n)?;
+        for step in 0..=2 * STEPS {
+            let rest = rig.rest_at((f64::from(step) - f64::from(STEPS)) * STEP_M, command_n)?;
             ratios.push((rest.height_m, rest.delivered_n / PROBE_N));
             stopped();
         }

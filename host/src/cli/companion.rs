@@ -6,14 +6,14 @@ use std::os::unix::process::CommandExt;
 use std::process::Command;
 
 /// A program beside this one.
-pub(super) struct Companion {
+pub(super) struct Companion<'a> {
     /// Its file, without the suffix of executables.
-    pub(super) program: &'static str,
+    pub(super) program: &'a str,
     /// The command that builds it.
-    pub(super) build: &'static str,
+    pub(super) build: &'a str,
 }
 
-impl Companion {
+impl Companion<'_> {
     /// A command that starts it.
     ///
     /// # Errors

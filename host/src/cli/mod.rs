@@ -12,6 +12,7 @@ mod bench;
 mod calibrate;
 mod companion;
 mod doctor;
+mod emulate;
 mod eval;
 mod jitter;
 mod new;
@@ -82,6 +83,8 @@ enum Command {
     Analyse(analyse::AnalyseArguments),
     /// Measure how much of the vertical force arrives, and correct it
     Calibrate(calibrate::CalibrateArguments),
+    /// Emulate the controller of a device, so that its plugin can be used without hardware
+    Emulate(emulate::EmulateArguments),
     /// Look at this machine: what a real-time loop may hope for, and how to improve it
     Doctor(doctor::DoctorArguments),
     /// Print a completion script for a shell
@@ -236,6 +239,7 @@ pub fn main() -> ExitCode {
         Some(Command::Study(arguments)) => study::run(&arguments),
         Some(Command::Analyse(arguments)) => analyse::run(&arguments),
         Some(Command::Calibrate(arguments)) => calibrate::run(&arguments),
+        Some(Command::Emulate(arguments)) => emulate::run(&arguments),
         Some(Command::Doctor(arguments)) => doctor::run(&arguments),
         Some(Command::Completions { shell }) => {
             clap_complete::generate(shell, &mut Arguments::command(), "flotor", &mut std::io::stdout());

@@ -5,7 +5,7 @@ use super::companion::Companion;
 use clap::Args;
 use std::ffi::OsString;
 
-const SWEEPER: Companion = Companion {
+const SWEEPER: Companion<'static> = Companion {
     program: "flotor-sweep",
     build: "cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target",
 };

@@ -1,0 +1,174 @@
+//! The controller of the magnetic-levitation device without the device: its firmware and protocol on a real link,
+//! over the simulated flotor. `flotor emulate maglev` starts it.
+
+mod plant;
+
+use clap::{Parser, ValueEnum};
+use flotor_hal::abi::loader::Setting;
+use flotor_maglev::emulator::{Emulator, Event, Pace, controller_config};
+use flotor_maglev::transport::stream::StreamLink;
+use flotor_maglev::transport::tcp::prepared;
+use plant::LoadedPlant;
+use std::error::Error;
+use std::io::Write;
+use std::net::TcpListener;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::atomic::AtomicBool;
+
+/// Emulate the controller of the magnetic-levitation device.
+#[derive(Parser)]
+#[command(name = "flotor emulate maglev", version, max_term_width = 110)]
+#[command(after_help = "The first line on standard output says where to connect.\n\nExamples:\n  \
+    flotor emulate maglev\n  \
+    flotor emulate maglev --transport pty --link /tmp/flotor-tty\n  \
+    flotor emulate maglev --pace lockstep --set preset=full --set hand=press --once")]
+struct Arguments {
+    /// What the host connects by
+    #[arg(long, value_enum, default_value = "tcp")]
+    transport: TransportOption,
+    /// Tcp: where to listen (port 0: any free one)
+    #[arg(long, default_value = "127.0.0.1:5678", value_name = "HOST:PORT")]
+    listen: String,
+    /// Pty: a name for the terminal, as a symbolic link
+    #[arg(long, value_name = "PATH")]
+    link: Option<PathBuf>,
+    /// Who says when a cycle runs
+    #[arg(long, value_enum, default_value = "real")]
+    pace: PaceOption,
+    /// Set a parameter of the simulated flotor (repeatable)
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<String>,
+    /// Seed of everything random
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    seed: u64,
+    /// Serial number it tells
+    #[arg(long, default_value = "emulated", value_name = "TEXT")]
+    serial: String,
+    /// Plugin file of the plant (default: the simulated flotor beside this program)
+    #[arg(long, value_name = "FILE")]
+    plant: Option<PathBuf>,
+    /// End when the first host is gone
+    #[arg(long)]
+    once: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum TransportOption {
+    /// A connection
+    Tcp,
+    /// A pseudo terminal: a serial port to the host
+    Pty,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum PaceOption {
+    /// The machine's clock
+    Real,
+    /// The host's commands: for a host on a virtual clock
+    Lockstep,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(1)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    let pace = match arguments.pace {
+        PaceOption::Real => Pace::RealTime,
+        PaceOption::Lockstep => Pace::Lockstep,
+    };
+    let plugin = plant::load(arguments.plant.as_deref())?;
+    let settings = arguments.sets.iter().map(|text| {
+        let (key, value) = text.split_once('=').ok_or_else(|| format!("--set {text} is not KEY=VALUE"))?;
+        Setting::parse(plugin.parameters(), key.trim(), value.trim()).map_err(|error| error.to_string())
+    });
+    let settings = settings.collect::<Result<Vec<_>, String>>()?;
+    let (plant, capabilities) = LoadedPlant::open(plugin, settings, arguments.seed)?;
+    let config = controller_config(&capabilities, pace, &arguments.serial);
+    let mut emulator = Emulator::new(config, pace, plant);
+    match arguments.transport {
+        TransportOption::Tcp => serve_tcp(&mut emulator, arguments),
+        TransportOption::Pty => serve_pty(&mut emulator, arguments),
+    }
+}
+
+fn serve_tcp(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    let listener = TcpListener::bind(&arguments.listen).map_err(|error| {
+        format!("cannot listen at {}: {error}; --listen 127.0.0.1:0 takes any", arguments.listen)
+    })?;
+    say(&format!("listening tcp {}", listener.local_addr()?));
+    loop {
+        let (stream, from) = listener.accept()?;
+        say(&format!("connected {from}"));
+        let mut link = StreamLink::new(prepared(stream)?);
+        emulator.serve(&mut link, &AtomicBool::new(false), &mut tell);
+        if arguments.once {
+            return Ok(());
+        }
+    }
+}
+
+#[cfg(feature = "serial")]
+fn serve_pty(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    use serialport::{SerialPort, TTYPort};
+    use std::time::Duration;
+    /// How often the terminal is looked at while nobody has it open.
+    const NAP: Duration = Duration::from_millis(2);
+
+    let (mut ours, theirs) = TTYPort::pair()?;
+    ours.set_timeout(Duration::ZERO)?;
+    let name = theirs.name().ok_or("the pseudo terminal has no name")?;
+    drop(theirs);
+    if let Some(link) = &arguments.link {
+        // Only a link is replaced, never somebody's file.
+        if link.is_symlink() {
+            std::fs::remove_file(link)?;
+        }
+        std::os::unix::fs::symlink(&name, link).map_err(|error| format!("{}: {error}", link.display()))?;
+    }
+    say(&format!("listening pty {name}"));
+    let mut link = StreamLink::new(ours);
+    loop {
+        // Until somebody opens the other end, reading says that it is closed.
+        while !link.is_open() {
+            std::thread::sleep(NAP);
+        }
+        say(&format!("connected {name}"));
+        emulator.serve(&mut link, &AtomicBool::new(false), &mut tell);
+        if arguments.once {
+            return Ok(());
+        }
+    }
+}
+
+#[cfg(not(feature = "serial"))]
+fn serve_pty(_: &mut Emulator<LoadedPlant>, _: &Arguments) -> Result<(), Box<dyn Error>> {
+    Err("this program was built without pseudo terminals; build it with --features serial".into())
+}
+
+/// One line an event, at once: somebody may be waiting for it.
+fn tell(event: Event) {
+    match event {
+        Event::Mode { mode, condition, silence_us, at_us } => {
+            let faults = condition.faults();
+            let why = if faults.is_empty() { String::new() } else { format!(" faults={faults}") };
+            say(&format!("mode {mode:?} at_us={at_us} silence_us={silence_us}{why}"));
+        }
+        Event::Closed { rejections } => {
+            say(&format!("closed rejected={} {rejections:?}", rejections.total()))
+        }
+    }
+}
+
+fn say(line: &str) {
+    let mut out = std::io::stdout().lock();
+    // Nobody reads: nothing to do about it, the controller goes on.
+    let _ = writeln!(out, "{line}").and_then(|()| out.flush());
+}

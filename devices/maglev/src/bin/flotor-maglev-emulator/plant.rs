@@ -1,0 +1,97 @@
+//! A plugin as the plant: what the host would do with it, the controller does.
+
+use flotor_hal::abi::PluginKind;
+use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting, read_metadata};
+use flotor_hal::{Capabilities, Cycle, DeviceState, Fault, LoopConfig, Tick, Wrench};
+use flotor_maglev::controller::Sample;
+use flotor_maglev::emulator::Plant;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+/// Id of the plugin that stands in for the flotor.
+const SIMULATED: &str = "simulated";
+/// Time between two cycles unless a command says otherwise, ns.
+const PERIOD_NS: u64 = 1_000_000;
+
+/// Loads the plugin of a file, or the simulated flotor from the folders beside this program.
+pub(crate) fn load(file: Option<&Path>) -> Result<Plugin, Box<dyn Error>> {
+    if let Some(file) = file {
+        return Ok(Plugin::load(file)?);
+    }
+    let program = std::env::current_exe()?;
+    let own = program.parent().unwrap_or(Path::new("."));
+    for folder in [own.join("deps"), own.to_path_buf(), own.join("plugins")] {
+        let Ok(entries) = std::fs::read_dir(&folder) else { continue };
+        let mut files: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+        files.retain(|file| file.extension().is_some_and(|ending| ending == std::env::consts::DLL_EXTENSION));
+        files.sort();
+        let is_flotor = |file: &PathBuf| {
+            read_metadata(file).is_ok_and(|found| found.id == SIMULATED && found.kind == PluginKind::Device)
+        };
+        if let Some(file) = files.into_iter().find(is_flotor) {
+            return Ok(Plugin::load(&file)?);
+        }
+    }
+    let folder = own.display();
+    Err(format!("no plugin `{SIMULATED}` beside {folder}; `cargo build -p flotor-simulated` makes it").into())
+}
+
+/// An active device behind the controller.
+pub(crate) struct LoadedPlant {
+    plugin: Plugin,
+    settings: Vec<Setting>,
+    seed: u64,
+    /// Nothing if it could not be started again: out of range for good.
+    device: Option<ActiveDevice>,
+    tick: u64,
+    time_ns: u64,
+    state: DeviceState,
+}
+
+impl LoadedPlant {
+    pub(crate) fn open(
+        plugin: Plugin,
+        settings: Vec<Setting>,
+        seed: u64,
+    ) -> Result<(Self, Capabilities), Box<dyn Error>> {
+        let capabilities = plugin.open_device(&settings)?.capabilities()?;
+        let mut plant =
+            Self { plugin, settings, seed, device: None, tick: 0, time_ns: 0, state: DeviceState::HOME };
+        plant.device = Some(plant.activate()?);
+        Ok((plant, capabilities))
+    }
+
+    fn activate(&self) -> Result<ActiveDevice, Box<dyn Error>> {
+        let config = LoopConfig { period_ns: PERIOD_NS, seed: self.seed };
+        let device = self.plugin.open_device(&self.settings)?;
+        device.activate(&config).map_err(|(_, refusal)| refusal.into())
+    }
+}
+
+impl Plant for LoadedPlant {
+    fn advance(&mut self, dt_us: u64, wrench: &Wrench) -> Sample {
+        let lost = Sample { in_range: false, ..Sample::HOME };
+        let Some(device) = &mut self.device else { return lost };
+        let dt_ns = dt_us * 1000;
+        let written = device.write(&Tick { index: self.tick, time_ns: self.time_ns, dt_ns }, wrench);
+        self.tick += 1;
+        self.time_ns += dt_ns;
+        let tick = Tick { index: self.tick, time_ns: self.time_ns, dt_ns };
+        let read = device.read(&tick, &mut self.state);
+        let fault = [written, read].into_iter().find_map(|cycle| match cycle {
+            Cycle::Fault(fault) => Some(fault),
+            Cycle::Fresh | Cycle::Stale => None,
+        });
+        Sample {
+            pose: self.state.pose,
+            twist: self.state.twist,
+            in_range: matches!(fault, None | Some(Fault::OverTemperature)),
+            too_hot: fault == Some(Fault::OverTemperature),
+        }
+    }
+
+    fn restart(&mut self) {
+        (self.tick, self.time_ns, self.state) = (0, 0, DeviceState::HOME);
+        self.device = self.activate().ok();
+    }
+}

@@ -1,0 +1,132 @@
+//! Walls: where they begin, which way they push, and that damping acts once.
+
+use super::{THESIS_ANGLE_LIMIT_RAD, Wall, Walls};
+use flotor_hal::{DQuat, DVec3, DeviceState, Pose, Twist};
+
+fn state(position: DVec3, velocity: DVec3, turn: DVec3, spin: DVec3) -> DeviceState {
+    DeviceState {
+        pose: Pose::new(position, DQuat::from_scaled_axis(turn)),
+        twist: Twist::new(velocity, spin),
+        ..DeviceState::HOME
+    }
+}
+
+#[test]
+fn inside_there_is_nothing() {
+    let walls = Walls::maker(11.0e-3);
+    let inside = state(DVec3::new(0.006, -0.006, 0.006), DVec3::ONE, DVec3::splat(0.02), DVec3::ONE);
+    let wrench = walls.wrench(&inside);
+    assert_eq!((wrench.force(), wrench.torque()), (DVec3::ZERO, DVec3::ZERO));
+}
+
+#[test]
+fn the_sphere_pushes_to_the_centre_and_resists_going_out_only() {
+    let walls = Walls::maker(11.0e-3);
+    let outward = DVec3::new(0.36, -0.48, 0.8);
+    let force =
+        |velocity: DVec3| walls.wrench(&state(outward * 11.5e-3, velocity, DVec3::ZERO, DVec3::ZERO)).force();
+    assert!((force(DVec3::ZERO) - outward * -7.5).length() < 1.0e-9, "0.5 mm at 15 N/mm");
+    assert!((force(outward * 0.1) - outward * -9.0).length() < 1.0e-9, "and 15 N s/m at 0.1 m/s");
+    assert!((force(outward * -0.1) - outward * -7.5).length() < 1.0e-9);
+}
+
+#[test]
+fn a_plane_nearer_than_the_sphere_limits_its_axis() {
+    let mut walls = Walls::maker(11.0e-3);
+    walls.planes[2].limit = 4.0e-3;
+    let force = |z| walls.wrench(&state(DVec3::Z * z, DVec3::ZERO, DVec3::ZERO, DVec3::ZERO)).force();
+    assert_eq!(force(3.9e-3), DVec3::ZERO);
+    assert!((force(5.0e-3) - DVec3::Z * -15.0).length() < 1.0e-9);
+    assert!((force(-5.0e-3) - DVec3::Z * 15.0).length() < 1.0e-9);
+}
+
+#[test]
+fn damping_of_rotation_acts_once() {
+    let walls = Walls::thesis(11.0e-3, 17.0);
+    let torque = |turn: f64, spin: f64| {
+        walls.wrench(&state(DVec3::ZERO, DVec3::ZERO, DVec3::X * turn, DVec3::X * spin)).torque().x
+    };
+    let damped = -0.15 * 2.0;
+    assert!((torque(0.0, 2.0) - damped).abs() < 1.0e-12);
+    // 2.5 gamma beyond the limit, and the same damping, not twice (D20).
+    let beyond = -42.5 * 0.01 + damped;
+    assert!((torque(THESIS_ANGLE_LIMIT_RAD + 0.01, 2.0) - beyond).abs() < 1.0e-9);
+    assert!((torque(-THESIS_ANGLE_LIMIT_RAD - 0.01, -2.0) + beyond).abs() < 1.0e-9);
+    // The least constant is 30.
+    assert_eq!(Walls::thesis(11.0e-3, 5.0).tilt.stiffness, 30.0);
+}
+
+#[test]
+fn no_wall_is_stiffer_than_half_of_what_is_stable() {
+    let wall = Wall { limit: 0.0, stiffness: 15_000.0, damping: 15.0 };
+    // (15 N s/m) / (0.5 ms) = 30 kN/m: half of it is what the makers chose.
+    assert_eq!(wall.stabilised(1.0e-3, 0.0).stiffness, 15_000.0);
+    assert_eq!(wall.stabilised(1.0e-3, 1.0e-3).stiffness, 5_000.0);
+    assert_eq!(Wall { damping: 0.0, ..wall }.stabilised(1.0e-3, 0.0).stiffness, 0.0);
+    // 0.15 N m s/rad allow 150 N m/rad without delay and 50 with one of a millisecond.
+    let walls = Walls::maker(11.0e-3).stabilised(1.0e-3, 1.0e-3);
+    assert_eq!(walls.tilt.stiffness, 50.0);
+}
+
+/// Random pushes of up to 40 N out of the range, sampled and held at 1 kHz: a handle at rest sits where the spring of
+/// the wall says, and one that cannot be held leaves a fault behind, not a wrench.
+#[test]
+fn pushes_end_at_the_wall_or_in_a_fault() {
+    const MASS_KG: f64 = 0.58;
+    /// Damping of the hand that pushes, N·s/m: relaxed (van Beek and others 2015).
+    const HAND_NS_PER_M: f64 = 6.45;
+    const RESOLUTION_M: f64 = 2.0e-6;
+    const EDGE_M: f64 = 12.0e-3;
+    const PERIOD_S: f64 = 1.0e-3;
+    const SUBSTEPS: u32 = 8;
+    let size = std::env::var("FLOTOR_TEST_SIZE");
+    let pushes = if size.is_ok_and(|size| size == "full") { 10_000 } else { 500 };
+    let mut seed = 0x2545_f491_4f6c_dd1d_u64;
+    let mut random = move || {
+        seed ^= seed << 13;
+        seed ^= seed >> 7;
+        seed ^= seed << 17;
+        (seed >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let (mut held, mut faulted) = (0, 0);
+    for _ in 0..pushes {
+        let radius_m = 8.0e-3 + 3.5e-3 * random();
+        let walls = Walls::maker(radius_m).stabilised(PERIOD_S, 0.0);
+        let outward = DVec3::new(random() - 0.5, random() - 0.5, random() - 0.5).normalize();
+        let push_n = 40.0 * random();
+        // Along one line: the walls are a sphere.
+        let (mut x, mut v, mut fault) = (radius_m, 0.0, false);
+        for _ in 0..1500 {
+            let sensed = (x / RESOLUTION_M).round() * RESOLUTION_M;
+            fault |= sensed > EDGE_M;
+            let state = state(outward * sensed, outward * v, DVec3::ZERO, DVec3::ZERO);
+            let wall_n = if fault { DVec3::ZERO } else { walls.wrench(&state).force() };
+            // No deeper than the edge, no faster than the push and the wall's own spring make it.
+            let most_n =
+                walls.sphere.stiffness * (EDGE_M - radius_m + RESOLUTION_M) + walls.sphere.damping * 2.0;
+            assert!(wall_n.length() <= most_n && wall_n.cross(outward).length() < 1.0e-9, "{wall_n}");
+            for _ in 0..SUBSTEPS {
+                let h = PERIOD_S / f64::from(SUBSTEPS);
+                v += h / MASS_KG * (push_n + wall_n.dot(outward) - HAND_NS_PER_M * v);
+                x += h * v;
+            }
+            if fault {
+                break;
+            }
+        }
+        let depth_m = push_n / walls.sphere.stiffness;
+        if fault {
+            // A push from rest overshoots to twice its static depth, and the sampled loop a little more.
+            assert!(2.2 * depth_m > EDGE_M - radius_m, "{push_n} N need not have left the range");
+            faulted += 1;
+        } else {
+            assert!(
+                x - radius_m <= depth_m + RESOLUTION_M,
+                "{} m beyond, {depth_m} m expected",
+                x - radius_m
+            );
+            held += 1;
+        }
+    }
+    assert!(held > pushes / 4 && faulted > pushes / 20, "{held} held, {faulted} faulted");
+}

@@ -1,0 +1,95 @@
+//! What the coils are never asked for, whatever the host says.
+
+use flotor_hal::{DVec3, Wrench};
+
+/// Limits of the controller.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LimitConfig {
+    /// Largest force along each axis, N.
+    pub max_force_n: DVec3,
+    /// Largest torque about each axis, N·m.
+    pub max_torque_nm: DVec3,
+    /// Fastest change of force, N/s.
+    pub force_slew_n_per_s: f64,
+    /// Fastest change of torque, N·m/s.
+    pub torque_slew_nm_per_s: f64,
+    /// Distance from the origin at which the controller's own wall begins, m.
+    pub wall_m: f64,
+    /// Stiffness of that wall, N/m.
+    pub wall_n_per_m: f64,
+    /// Damping in it, N·s/m.
+    pub wall_ns_per_m: f64,
+    /// Share of the full load that is borne for ever; the mean of the squared load is held against its square.
+    pub continuous_load: f64,
+    /// Time over which the load is averaged, s.
+    pub load_time_s: f64,
+}
+
+impl LimitConfig {
+    /// The device as published (`facts`): the weaker force on the horizontal axes; full scale in a millisecond; 2 A
+    /// of 3.5 A mean over a minute. The wall begins just inside the sensors' range with the damping of the makers'
+    /// boundary mode, 15 N·s/m, and a stiffness that keeps it and a wall of the host (10 000 N/m, 15 N·s/m) together
+    /// below the limit of Gil et al. 2009 for a period and a delay of a millisecond: 30 / 0.0015 = 20 000 N/m.
+    pub const MAGLEV: Self = Self {
+        max_force_n: DVec3::new(55.0, 55.0, 140.0),
+        max_torque_nm: DVec3::new(6.3, 6.3, 12.2),
+        force_slew_n_per_s: 55.0e3,
+        torque_slew_nm_per_s: 6.3e3,
+        wall_m: 11.8e-3,
+        wall_n_per_m: 8000.0,
+        wall_ns_per_m: 15.0,
+        continuous_load: 2.0 / 3.5,
+        load_time_s: 60.0,
+    };
+
+    /// Force of the controller's own wall; nothing inside. It resists going out and does not pull back what comes
+    /// back by itself.
+    pub(super) fn wall(&self, position_m: DVec3, velocity_m_per_s: DVec3) -> Option<DVec3> {
+        let distance_m = position_m.length();
+        let depth_m = distance_m - self.wall_m;
+        if depth_m <= 0.0 || !distance_m.is_finite() {
+            return None;
+        }
+        let outward = position_m / distance_m;
+        let leaving_m_per_s = velocity_m_per_s.dot(outward).max(0.0);
+        Some(outward * -(self.wall_n_per_m * depth_m + self.wall_ns_per_m * leaving_m_per_s))
+    }
+
+    /// The wrench within force and torque, each axis for itself.
+    pub(super) fn clamped(&self, wrench: &Wrench) -> Wrench {
+        Wrench::new(
+            wrench.force().clamp(-self.max_force_n, self.max_force_n),
+            wrench.torque().clamp(-self.max_torque_nm, self.max_torque_nm),
+        )
+    }
+
+    /// From `last` towards `wanted`, no faster than the coils may.
+    pub(super) fn slewed(&self, last: &Wrench, wanted: &Wrench, dt_s: f64) -> Wrench {
+        let step = |from: DVec3, to: DVec3, most: f64| from + (to - from).clamp_length_max(most * dt_s);
+        Wrench::new(
+            step(last.force(), wanted.force(), self.force_slew_n_per_s),
+            step(last.torque(), wanted.torque(), self.torque_slew_nm_per_s),
+        )
+    }
+
+    /// Largest share of any axis' limit that a wrench takes.
+    fn share(&self, wrench: &Wrench) -> f64 {
+        let force = (wrench.force() / self.max_force_n).abs().max_element();
+        force.max((wrench.torque() / self.max_torque_nm).abs().max_element())
+    }
+}
+
+/// Mean of the squared load, with the time constant of a coil's temperature: I²t.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Load {
+    mean_square: f64,
+}
+
+impl Load {
+    /// Bears a wrench for a time; true if that was too much for too long.
+    pub fn bear(&mut self, wrench: &Wrench, dt_s: f64, limits: &LimitConfig) -> bool {
+        let share = limits.share(wrench);
+        self.mean_square += (share * share - self.mean_square) * -(-dt_s / limits.load_time_s).exp_m1();
+        self.mean_square > limits.continuous_load * limits.continuous_load
+    }
+}

@@ -1,0 +1,367 @@
+//! The state machine.
+
+use super::limits::{LimitConfig, Load};
+use crate::protocol::{
+    Answer, AnswerFrame, Condition, Description, Intake, Mode, Rejection, Request, RequestFrame, Status,
+};
+use flotor_hal::{DVec3, Pose, Twist, Wrench};
+
+/// What a controller is made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ControllerConfig {
+    /// What it says about itself.
+    pub description: Description,
+    /// What it never does.
+    pub limits: LimitConfig,
+    /// How long it holds before it lands, µs.
+    pub hold_us: u64,
+    /// How long landing takes, µs.
+    pub landing_us: u64,
+    /// Damping while it holds and lands, N·s/m and N·m·s/rad.
+    pub hold_damping: [f64; 2],
+    /// Fastest handle it follows, m/s.
+    pub max_speed_m_per_s: f64,
+}
+
+/// One sample of the sensors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Pose of the handle.
+    pub pose: Pose,
+    /// Velocity of the handle.
+    pub twist: Twist,
+    /// False once the flotor is out of range or a sensor failed.
+    pub in_range: bool,
+    /// True if a coil is too hot.
+    pub too_hot: bool,
+}
+
+impl Sample {
+    /// At home, at rest.
+    pub const HOME: Self = Self { pose: Pose::HOME, twist: Twist::ZERO, in_range: true, too_hot: false };
+}
+
+/// What is to be answered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reply {
+    /// The status, acknowledging this sequence.
+    Status(u32),
+    /// Likewise, after a command that is obeyed.
+    Commanded(u32),
+    /// A page of the description.
+    Page(AnswerFrame),
+}
+
+/// The newest command, and when it came.
+#[derive(Clone, Copy, Debug)]
+struct Command {
+    wrench: Wrench,
+    valid_us: u64,
+    since_us: u64,
+}
+
+/// A controller in operation. Times are µs of its own clock and never go back.
+#[derive(Clone, Debug)]
+pub struct Controller {
+    config: ControllerConfig,
+    mode: Mode,
+    /// Since when it is in this mode.
+    mode_since_us: u64,
+    condition: Condition,
+    /// The session it listens to; 0: none.
+    session: u32,
+    /// The one before: an old frame must not begin it again.
+    last_session: u32,
+    watchdog_us: u64,
+    period_us: u32,
+    /// When the host was last heard in this session.
+    heard_us: u64,
+    intake: Intake,
+    command: Option<Command>,
+    driven: Wrench,
+    load: Load,
+    answers: u32,
+    sample: Sample,
+    sampled_us: u64,
+}
+
+impl Controller {
+    /// A controller with its coils off.
+    #[must_use]
+    pub fn new(config: ControllerConfig) -> Self {
+        Self {
+            config,
+            mode: Mode::Disarmed,
+            mode_since_us: 0,
+            condition: Condition::NONE,
+            session: 0,
+            last_session: 0,
+            watchdog_us: 0,
+            period_us: 0,
+            heard_us: 0,
+            intake: Intake::default(),
+            command: None,
+            driven: Wrench::ZERO,
+            load: Load::default(),
+            answers: 0,
+            sample: Sample::HOME,
+            sampled_us: 0,
+        }
+    }
+
+    /// What it is doing.
+    #[must_use]
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// What is wrong or limited.
+    #[must_use]
+    pub fn condition(&self) -> Condition {
+        self.condition
+    }
+
+    /// What it did not act on, by reason.
+    #[must_use]
+    pub fn intake(&self) -> &Intake {
+        &self.intake
+    }
+
+    /// Time between two commands the host promised when it armed, µs; 0 before.
+    #[must_use]
+    pub fn period_us(&self) -> u32 {
+        self.period_us
+    }
+
+    /// How long the host of the session has been silent, µs.
+    #[must_use]
+    pub fn silence_us(&self, now_us: u64) -> u64 {
+        now_us.saturating_sub(self.heard_us)
+    }
+
+    /// Acts on what arrived, if it may, and says what to answer; nothing to what is not acted on.
+    pub fn receive(&mut self, packet: &[u8], now_us: u64) -> Option<Reply> {
+        match RequestFrame::decode(packet) {
+            Ok(frame) => self.obey(&frame, now_us),
+            Err(rejection) => {
+                self.intake.reject(rejection);
+                None
+            }
+        }
+    }
+
+    /// Something arrived that is no packet.
+    pub fn receive_malformed(&mut self) {
+        self.intake.reject(Rejection::Length);
+    }
+
+    fn obey(&mut self, frame: &RequestFrame, now_us: u64) -> Option<Reply> {
+        // Asking is allowed to anybody, and changes nothing.
+        if let Request::Describe { page } = frame.request {
+            let page = self.config.description.page(page).map_err(|rejection| self.intake.reject(rejection));
+            return page.ok().map(|page| Reply::Page(self.answer(Answer::Description(page), frame.sequence)));
+        }
+        match frame.request {
+            // With no session there is nothing to protect, and switching off twice is switching off.
+            Request::Disarm if self.session == 0 => {
+                self.disarm(now_us);
+                return Some(Reply::Status(frame.sequence));
+            }
+            Request::Arm { .. }
+                if self.mode == Mode::Disarmed && ![0, self.last_session].contains(&frame.session) =>
+            {
+                self.intake.restart();
+            }
+            // A host that has been replaced, or one that never armed, moves nothing.
+            _ if frame.session != self.session || self.session == 0 => {
+                self.intake.reject(Rejection::Session);
+                return None;
+            }
+            _ => {}
+        }
+        if !self.intake.accept(frame.sequence) {
+            return None;
+        }
+        self.heard_us = now_us;
+        match (frame.request, self.mode) {
+            (Request::Arm { period_us, watchdog_us }, Mode::Disarmed) => {
+                let longest_us = self.config.description.longest_watchdog_us;
+                self.watchdog_us = u64::from(watchdog_us.min(longest_us).max(1));
+                self.period_us = period_us;
+                (self.session, self.last_session) = (frame.session, frame.session);
+                self.condition = Condition::NONE;
+                self.enter(Mode::Armed, now_us);
+            }
+            (Request::TakeOff, Mode::Armed) => self.enter(Mode::Levitating, now_us),
+            (Request::Command { wrench, valid_us }, Mode::Levitating) => {
+                let [fx, fy, fz, tx, ty, tz] = wrench.map(f64::from);
+                let wrench = Wrench::new(DVec3::new(fx, fy, fz), DVec3::new(tx, ty, tz));
+                self.command = Some(Command { wrench, valid_us: u64::from(valid_us), since_us: now_us });
+                return Some(Reply::Commanded(frame.sequence));
+            }
+            (Request::Land, Mode::Levitating | Mode::Holding) => self.enter(Mode::Landing, now_us),
+            (Request::Disarm, _) => self.disarm(now_us),
+            // Anything else does not fit the mode: the status in the answer says which that is.
+            _ => {}
+        }
+        Some(Reply::Status(frame.sequence))
+    }
+
+    /// The link to the host broke: coils off, now.
+    pub fn link_lost(&mut self, now_us: u64) {
+        if self.mode != Mode::Disarmed {
+            self.disarm(now_us);
+            self.condition = self.condition.with(Condition::LINK_LOST);
+        }
+    }
+
+    /// Takes a sample of the sensors.
+    pub fn observe(&mut self, now_us: u64, sample: &Sample) {
+        self.sample = *sample;
+        self.sampled_us = now_us;
+    }
+
+    /// The wrench for the coils over the next `dt_us`. Call it once a cycle, after a sample.
+    pub fn drive(&mut self, now_us: u64, dt_us: u64) -> Wrench {
+        self.watch(now_us);
+        let sample = self.sample;
+        #[allow(clippy::cast_precision_loss)] // a cycle
+        let dt_s = dt_us as f64 * 1.0e-6;
+        let mut reports = self.condition.faults();
+        let wanted = match self.mode {
+            Mode::Disarmed | Mode::Armed | Mode::Fault => {
+                self.condition = reports;
+                self.driven = Wrench::ZERO;
+                return Wrench::ZERO;
+            }
+            Mode::Levitating => match self.command {
+                Some(command) if now_us < command.since_us + command.valid_us => command.wrench,
+                Some(_) => {
+                    reports = reports.with(Condition::EXPIRED);
+                    self.damping()
+                }
+                None => Wrench::ZERO,
+            },
+            Mode::Holding | Mode::Landing => self.damping(),
+        };
+        let wall = self.config.limits.wall(sample.pose.position(), sample.twist.linear());
+        if wall.is_some() {
+            reports = reports.with(Condition::BOUNDARY);
+        }
+        let wanted = wanted + Wrench::from_force(wall.unwrap_or(DVec3::ZERO));
+        let limited = self.config.limits.clamped(&wanted);
+        let driven = self.config.limits.slewed(&self.driven, &limited, dt_s);
+        if driven != wanted {
+            reports = reports.with(Condition::LIMITED);
+        }
+        self.condition = reports;
+        self.driven = driven;
+        if self.load.bear(&driven, dt_s, &self.config.limits) {
+            return self.fault(Condition::OVERLOAD, now_us);
+        }
+        driven
+    }
+
+    /// What time and sensors say, whatever the host says.
+    fn watch(&mut self, now_us: u64) {
+        if matches!(self.mode, Mode::Disarmed | Mode::Fault) {
+            return;
+        }
+        if matches!(self.mode, Mode::Levitating | Mode::Holding | Mode::Landing) {
+            let Sample { twist, in_range, too_hot, .. } = self.sample;
+            let too_fast = twist.linear().length() > self.config.max_speed_m_per_s;
+            let wrong = [
+                (!in_range || !self.sample.pose.is_finite(), Condition::SENSOR_RANGE),
+                (too_hot, Condition::OVER_TEMPERATURE),
+                (too_fast || !twist.is_finite(), Condition::OVER_SPEED),
+            ];
+            if let Some((_, condition)) = wrong.into_iter().find(|(wrong, _)| *wrong) {
+                self.fault(condition, now_us);
+                return;
+            }
+        }
+        let in_mode_us = now_us.saturating_sub(self.mode_since_us);
+        match self.mode {
+            Mode::Armed | Mode::Levitating if now_us.saturating_sub(self.heard_us) >= self.watchdog_us => {
+                let flying = self.mode == Mode::Levitating;
+                self.condition = self.condition.with(Condition::WATCHDOG);
+                // The session is over at this moment: a host that wakes up finds nobody who listens.
+                self.session = 0;
+                self.command = None;
+                self.enter(if flying { Mode::Holding } else { Mode::Fault }, now_us);
+            }
+            Mode::Holding if in_mode_us >= self.config.hold_us => self.enter(Mode::Landing, now_us),
+            Mode::Landing if in_mode_us >= self.config.landing_us => {
+                if self.condition.faults().is_empty() {
+                    self.disarm(now_us);
+                } else {
+                    self.enter(Mode::Fault, now_us);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Resists motion, and nothing else.
+    fn damping(&self) -> Wrench {
+        let [linear, angular] = self.config.hold_damping;
+        Wrench::new(self.sample.twist.linear() * -linear, self.sample.twist.angular() * -angular)
+    }
+
+    fn fault(&mut self, condition: Condition, now_us: u64) -> Wrench {
+        self.condition = self.condition.with(condition);
+        self.session = 0;
+        self.command = None;
+        self.driven = Wrench::ZERO;
+        self.enter(Mode::Fault, now_us);
+        Wrench::ZERO
+    }
+
+    fn disarm(&mut self, now_us: u64) {
+        self.session = 0;
+        self.command = None;
+        self.driven = Wrench::ZERO;
+        self.condition = Condition::NONE;
+        self.enter(Mode::Disarmed, now_us);
+    }
+
+    fn enter(&mut self, mode: Mode, now_us: u64) {
+        self.mode = mode;
+        self.mode_since_us = now_us;
+    }
+
+    /// The newest sample as an answer to the request of this sequence.
+    pub fn status(&mut self, acknowledged: u32) -> AnswerFrame {
+        let Sample { pose, twist, .. } = self.sample;
+        let orientation = pose.orientation();
+        // q and -q are one rotation: the one whose scalar part need not be sent.
+        let vector = if orientation.w < 0.0 { -orientation.xyz() } else { orientation.xyz() };
+        let status = Status {
+            mode: self.mode,
+            condition: self.condition,
+            position_m: narrow(pose.position()),
+            rotation_xyz: narrow(vector),
+            velocity_steps: steps(twist.linear(), Status::VELOCITY_STEP_M_PER_S),
+            spin_steps: steps(twist.angular(), Status::SPIN_STEP_RAD_PER_S),
+        };
+        self.answer(Answer::Status(status), acknowledged)
+    }
+
+    fn answer(&mut self, answer: Answer, acknowledged: u32) -> AnswerFrame {
+        self.answers = self.answers.wrapping_add(1);
+        #[allow(clippy::cast_possible_truncation)] // the clock on the wire wraps
+        let time_us = self.sampled_us as u32;
+        AnswerFrame { sequence: self.answers, acknowledged, time_us, session: self.session, answer }
+    }
+}
+
+/// As the wire has it; what is not finite is 0, and the mode says that the sensors failed.
+#[allow(clippy::cast_possible_truncation)] // f32 has what a sensor has
+fn narrow(vector: DVec3) -> [f32; 3] {
+    vector.to_array().map(|value| if value.is_finite() { value as f32 } else { 0.0 })
+}
+
+#[allow(clippy::cast_possible_truncation)] // `as` saturates
+fn steps(vector: DVec3, step: f64) -> [i16; 3] {
+    vector.to_array().map(|value| (value / step).round() as i16)
+}

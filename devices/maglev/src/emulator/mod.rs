@@ -1,0 +1,248 @@
+//! The controller without hardware: its firmware, a plant, and a link to the host.
+//!
+//! The plant is whatever gives samples and takes wrenches; the program `flotor-maglev-emulator` loads the simulated
+//! flotor for it through the plugin contract. Authors of other plugins can use this module as it is: a link, a
+//! plant, and [`Emulator::serve`].
+//!
+//! **Two paces.** In *real time* a cycle runs each period of the machine's clock, whatever the host does, as on
+//! hardware. In *lockstep* a cycle runs for each command, so that a host on a virtual clock gets the same run every
+//! time, bit for bit.
+
+use crate::controller::{Controller, ControllerConfig, LimitConfig, Reply, Sample};
+use crate::protocol::description::serial_bytes;
+use crate::protocol::{Condition, Description, Mode, Rejections};
+use crate::transport::{Incoming, LinkLost, Transport};
+use flotor_hal::{Capabilities, Wrench};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// What moves: takes the wrench of a cycle and gives the sample at its end.
+pub trait Plant {
+    /// Moves on by `dt_us` under a constant wrench; 0 only looks.
+    fn advance(&mut self, dt_us: u64, wrench: &Wrench) -> Sample;
+
+    /// Back to the start.
+    fn restart(&mut self);
+}
+
+/// Who says when a cycle runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// The machine's clock.
+    RealTime,
+    /// The host's commands.
+    Lockstep,
+}
+
+/// Something worth a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// The controller is in another mode.
+    Mode {
+        /// Which.
+        mode: Mode,
+        /// What is wrong or limited.
+        condition: Condition,
+        /// How long the host had been silent, µs.
+        silence_us: u64,
+        /// The controller's clock, µs.
+        at_us: u64,
+    },
+    /// Nobody is at the other end any more.
+    Closed {
+        /// What was not acted on while somebody was.
+        rejections: Rejections,
+    },
+}
+
+/// Time of one cycle in real time, µs.
+const CYCLE_US: u64 = 1000;
+/// Packets looked at in one cycle: a burst is a host that was held up, and its old commands are not obeyed anyway.
+const PACKETS_PER_CYCLE: usize = 16;
+/// How long a lockstep cycle sleeps while there is no command.
+const LOCKSTEP_NAP: Duration = Duration::from_micros(20);
+
+/// A controller in operation.
+pub struct Emulator<P> {
+    controller: Controller,
+    plant: P,
+    pace: Pace,
+    now_us: u64,
+    mode: Mode,
+}
+
+impl<P: Plant> Emulator<P> {
+    /// A controller with its coils off, over a plant.
+    pub fn new(config: ControllerConfig, pace: Pace, plant: P) -> Self {
+        let mut emulator =
+            Self { controller: Controller::new(config), plant, pace, now_us: 0, mode: Mode::Disarmed };
+        emulator.run(0);
+        emulator
+    }
+
+    /// The controller.
+    #[must_use]
+    pub fn controller(&self) -> &Controller {
+        &self.controller
+    }
+
+    /// Serves one host until it is gone, or until `stop`; then the coils are off.
+    pub fn serve(&mut self, link: &mut dyn Transport, stop: &AtomicBool, log: &mut dyn FnMut(Event)) {
+        let before = *self.controller.intake().rejections();
+        match self.pace {
+            Pace::RealTime => self.serve_in_real_time(link, stop, log),
+            Pace::Lockstep => self.serve_in_lockstep(link, stop, log),
+        }
+        self.controller.link_lost(self.now_us);
+        self.tell_mode(log);
+        log(Event::Closed { rejections: self.controller.intake().rejections().since(&before) });
+    }
+
+    fn serve_in_real_time(
+        &mut self,
+        link: &mut dyn Transport,
+        stop: &AtomicBool,
+        log: &mut dyn FnMut(Event),
+    ) {
+        let mut deadline = Instant::now();
+        while !stop.load(Ordering::Relaxed) {
+            if self.receive_all(link).is_err() {
+                return;
+            }
+            self.run(CYCLE_US);
+            self.tell_mode(log);
+            deadline += Duration::from_micros(CYCLE_US);
+            match deadline.checked_duration_since(Instant::now()) {
+                Some(rest) => std::thread::sleep(rest),
+                // Held up: what was missed is made up in simulated time, so that the watchdog sees the silence.
+                None => {
+                    let missed_us = u64::try_from(deadline.elapsed().as_micros()).unwrap_or(u64::MAX);
+                    for _ in 0..(missed_us / CYCLE_US).min(1000) {
+                        deadline += Duration::from_micros(CYCLE_US);
+                        if self.receive_all(link).is_err() {
+                            return;
+                        }
+                        self.run(CYCLE_US);
+                        self.tell_mode(log);
+                    }
+                }
+            }
+        }
+    }
+
+    fn receive_all(&mut self, link: &mut dyn Transport) -> Result<(), LinkLost> {
+        for _ in 0..PACKETS_PER_CYCLE {
+            match link.receive()? {
+                Incoming::Nothing => break,
+                Incoming::Malformed => self.controller.receive_malformed(),
+                Incoming::Packet(packet) => {
+                    if let Some(reply) = self.controller.receive(&packet, self.now_us) {
+                        self.reply(link, reply)?;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn serve_in_lockstep(&mut self, link: &mut dyn Transport, stop: &AtomicBool, log: &mut dyn FnMut(Event)) {
+        while !stop.load(Ordering::Relaxed) {
+            let packet = match link.receive() {
+                Err(LinkLost) => return,
+                Ok(Incoming::Nothing) => {
+                    std::thread::sleep(LOCKSTEP_NAP);
+                    continue;
+                }
+                Ok(Incoming::Malformed) => {
+                    self.controller.receive_malformed();
+                    continue;
+                }
+                Ok(Incoming::Packet(packet)) => packet,
+            };
+            let Some(reply) = self.controller.receive(&packet, self.now_us) else { continue };
+            match (reply, self.controller.mode()) {
+                // Arming starts the plant anew: the same run, the same bits.
+                (Reply::Status(_), Mode::Armed) => {
+                    self.plant.restart();
+                    self.run(0);
+                }
+                (Reply::Commanded(_), _) => self.run(u64::from(self.controller.period_us())),
+                _ => {}
+            }
+            if self.reply(link, reply).is_err() {
+                return;
+            }
+            self.tell_mode(log);
+        }
+    }
+
+    fn reply(&mut self, link: &mut dyn Transport, reply: Reply) -> Result<(), LinkLost> {
+        let answer = match reply {
+            Reply::Status(acknowledged) | Reply::Commanded(acknowledged) => {
+                self.controller.status(acknowledged)
+            }
+            Reply::Page(page) => page,
+        };
+        link.send(&answer.encode())
+    }
+
+    /// A cycle: the wrench for the time of the cycle, and the sample at its end.
+    fn run(&mut self, dt_us: u64) {
+        let wrench = if dt_us == 0 { Wrench::ZERO } else { self.controller.drive(self.now_us, dt_us) };
+        let sample = self.plant.advance(dt_us, &wrench);
+        self.now_us += dt_us;
+        self.controller.observe(self.now_us, &sample);
+    }
+
+    fn tell_mode(&mut self, log: &mut dyn FnMut(Event)) {
+        let mode = self.controller.mode();
+        if mode != self.mode {
+            self.mode = mode;
+            let (condition, silence_us) =
+                (self.controller.condition(), self.controller.silence_us(self.now_us));
+            log(Event::Mode { mode, condition, silence_us, at_us: self.now_us });
+        }
+    }
+}
+
+/// A controller for a device with these capabilities.
+#[must_use]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // f32 is what the wire has, latencies are small
+pub fn controller_config(capabilities: &Capabilities, pace: Pace, serial: &str) -> ControllerConfig {
+    let narrow = |values: [f64; 3]| values.map(|value| value as f32);
+    // The weakest of what the plant says and what is published.
+    let limits = LimitConfig {
+        max_force_n: LimitConfig::MAGLEV.max_force_n.min(capabilities.max_force_n.into()),
+        max_torque_nm: LimitConfig::MAGLEV.max_torque_nm.min(capabilities.max_torque_nm.into()),
+        ..LimitConfig::MAGLEV
+    };
+    ControllerConfig {
+        description: Description {
+            sensed: 0b11_1111,
+            actuated: 0b11_1111,
+            resolution_m: capabilities.resolution_m as f32,
+            rate_hz: capabilities.rate_hz.map(|rate| rate as f32),
+            latency_us: (capabilities.latency_s * 1.0e6) as u32
+                + match pace {
+                    // A command waits for the next cycle at most.
+                    Pace::RealTime => CYCLE_US as u32,
+                    Pace::Lockstep => 0,
+                },
+            serial: serial_bytes(serial),
+            range_m: narrow(capabilities.range_m),
+            range_rad: narrow(capabilities.range_rad),
+            max_stiffness_n_per_m: capabilities.max_stiffness_n_per_m as f32,
+            force_slew_n_per_s: limits.force_slew_n_per_s as f32,
+            torque_slew_nm_per_s: limits.torque_slew_nm_per_s as f32,
+            max_force_n: narrow(limits.max_force_n.to_array()),
+            max_torque_nm: narrow(limits.max_torque_nm.to_array()),
+            longest_watchdog_us: 1_000_000,
+        },
+        limits,
+        hold_us: 50_000,
+        landing_us: 500_000,
+        hold_damping: [15.0, 0.15],
+        // The accuracy of light spots smeared over a millisecond; no figure is published.
+        max_speed_m_per_s: 2.0,
+    }
+}

@@ -1,0 +1,194 @@
+//! The host's end of a link: numbers what is asked, takes what is answered, keeps the newest.
+
+use crate::protocol::description::PAGES;
+use crate::protocol::{
+    Answer, AnswerFrame, Description, Intake, Mode, Rejection, Rejections, Request, RequestFrame, Status,
+};
+use crate::transport::{Incoming, LinkLost, Transport};
+use std::hash::{BuildHasher, RandomState};
+use std::time::{Duration, Instant};
+
+/// Answers taken in one look: a controller gives one for each request, so more is a backlog after a stop.
+const ANSWERS_PER_LOOK: usize = 32;
+/// How long a question that is not real-time waits before it is asked again.
+const ASK_AGAIN: Duration = Duration::from_millis(20);
+/// How long such a question sleeps between two looks.
+const NAP: Duration = Duration::from_micros(100);
+
+/// Why a question got no answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Unanswered {
+    /// There is no other side any more.
+    Lost,
+    /// Nothing was heard in time.
+    Silent,
+}
+
+/// The newest status, and what it answers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Heard {
+    pub(crate) status: Status,
+    pub(crate) acknowledged: u32,
+}
+
+/// A link with its session.
+pub(crate) struct HostLink {
+    transport: Box<dyn Transport>,
+    sequence: u32,
+    /// 0 until armed.
+    session: u32,
+    intake: Intake,
+    newest: Option<Heard>,
+}
+
+impl HostLink {
+    pub(crate) fn new(transport: Box<dyn Transport>) -> Self {
+        Self { transport, sequence: 0, session: 0, intake: Intake::default(), newest: None }
+    }
+
+    /// Answers that were not used, by reason.
+    pub(crate) fn rejections(&self) -> &Rejections {
+        self.intake.rejections()
+    }
+
+    /// Sequence number of the newest request.
+    pub(crate) fn sequence(&self) -> u32 {
+        self.sequence
+    }
+
+    /// Sends a request. Real-time: bounded, no allocation; one call of the system.
+    pub(crate) fn send(&mut self, request: Request, time_us: u32) -> Result<(), LinkLost> {
+        self.sequence = self.sequence.wrapping_add(1);
+        let frame = RequestFrame {
+            sequence: self.sequence,
+            acknowledged: self.intake.last().unwrap_or(0),
+            time_us,
+            session: self.session,
+            request,
+        };
+        self.transport.send(&frame.encode())
+    }
+
+    /// Takes what has arrived; the newest status that has not been taken yet. Real-time: bounded, no allocation.
+    pub(crate) fn take(&mut self) -> Result<Option<Heard>, LinkLost> {
+        for _ in 0..ANSWERS_PER_LOOK {
+            match self.receive()? {
+                Received::Nothing => break,
+                Received::Status(heard) => self.newest = Some(heard),
+                Received::Page(_) | Received::Rejected => {}
+            }
+        }
+        Ok(self.newest.take())
+    }
+
+    fn receive(&mut self) -> Result<Received, LinkLost> {
+        let packet = match self.transport.receive()? {
+            Incoming::Nothing => return Ok(Received::Nothing),
+            Incoming::Malformed => {
+                self.intake.reject(Rejection::Length);
+                return Ok(Received::Rejected);
+            }
+            Incoming::Packet(packet) => packet,
+        };
+        let frame = match AnswerFrame::decode(&packet) {
+            Ok(frame) => frame,
+            Err(rejection) => {
+                self.intake.reject(rejection);
+                return Ok(Received::Rejected);
+            }
+        };
+        if !self.intake.accept(frame.sequence) {
+            return Ok(Received::Rejected);
+        }
+        Ok(match frame.answer {
+            Answer::Status(status) => Received::Status(Heard { status, acknowledged: frame.acknowledged }),
+            Answer::Description(page) => Received::Page(page),
+        })
+    }
+
+    /// Asks until the answer satisfies, or time is over. Not real-time.
+    fn ask<T>(
+        &mut self,
+        request: Request,
+        patience: Duration,
+        mut satisfies: impl FnMut(&Received, u32) -> Option<T>,
+    ) -> Result<T, Unanswered> {
+        let started = Instant::now();
+        while started.elapsed() < patience {
+            self.send(request, 0).map_err(|LinkLost| Unanswered::Lost)?;
+            let asked = Instant::now();
+            while asked.elapsed() < ASK_AGAIN {
+                match self.receive().map_err(|LinkLost| Unanswered::Lost)? {
+                    Received::Nothing => std::thread::sleep(NAP),
+                    received => {
+                        if let Some(answer) = satisfies(&received, self.sequence) {
+                            return Ok(answer);
+                        }
+                    }
+                }
+            }
+        }
+        Err(Unanswered::Silent)
+    }
+
+    /// What the controller says about itself. Not real-time.
+    pub(crate) fn describe(&mut self, patience: Duration) -> Result<Description, Unanswered> {
+        let mut pages = Vec::new();
+        for number in 0..PAGES {
+            pages.push(self.ask(
+                Request::Describe { page: number },
+                patience,
+                |received, _| match received {
+                    Received::Page(page) if page.number() == number => Some(*page),
+                    _ => None,
+                },
+            )?);
+        }
+        let pages = pages.try_into().ok().and_then(Description::from_pages);
+        pages.ok_or(Unanswered::Silent)
+    }
+
+    /// Begins a session and takes off. Not real-time.
+    pub(crate) fn take_off(
+        &mut self,
+        period_us: u32,
+        watchdog_us: u32,
+        patience: Duration,
+    ) -> Result<Status, Unanswered> {
+        // Whoever was here before is over; a fault is cleared by switching off.
+        self.disarm(patience)?;
+        self.session = nonce();
+        self.ask_mode(Request::Arm { period_us, watchdog_us }, Mode::Armed, patience)?;
+        self.ask_mode(Request::TakeOff, Mode::Levitating, patience)
+    }
+
+    /// Switches the coils off and ends the session. Not real-time.
+    pub(crate) fn disarm(&mut self, patience: Duration) -> Result<(), Unanswered> {
+        let off = self.ask_mode(Request::Disarm, Mode::Disarmed, patience).map(|_| ());
+        self.session = 0;
+        off
+    }
+
+    fn ask_mode(&mut self, request: Request, mode: Mode, patience: Duration) -> Result<Status, Unanswered> {
+        self.ask(request, patience, |received, _| match received {
+            Received::Status(heard) if heard.status.mode == mode => Some(heard.status),
+            _ => None,
+        })
+    }
+}
+
+/// What a look at the link found.
+#[derive(Clone, Copy, Debug)]
+enum Received {
+    Nothing,
+    Rejected,
+    Status(Heard),
+    Page(crate::protocol::description::Page),
+}
+
+/// A number no host before has used, but by a chance of one in four thousand million; never 0.
+fn nonce() -> u32 {
+    #[allow(clippy::cast_possible_truncation)] // any 32 of its bits
+    let random = RandomState::new().hash_one(std::process::id()) as u32;
+    random.max(1)
+}

@@ -1,0 +1,334 @@
+//! The device as a plugin: opened over a link, armed and taken off by activation.
+
+use crate::boundary::Walls;
+use crate::host_link::{Heard, HostLink, Unanswered};
+use crate::parameters::{Options, SCHEMA, Values};
+use crate::protocol::{Condition, Description, Mode, Rejections, Request, Status};
+use crate::transport::{self, Kind, LinkLost};
+use flotor_hal::{
+    ActiveDevice, Axes, Capabilities, Conditions, Cycle, DQuat, DVec3, Device, DeviceInfo, DeviceState,
+    Fault, LoopConfig, OutOfRange, Parameter, Pose, Refusal, SafeStop, Settings, Tick, Twist,
+    VerticalCalibration, Wrench, export_device,
+};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// How long a controller may take to describe itself, to arm and take off, and to switch off.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// How long a lockstep tick waits: an emulator that is held up is not a fault.
+const LOCKSTEP_PATIENCE: Duration = Duration::from_secs(10);
+/// Periods a command is valid for: one more than it takes to replace it. A host that has missed two deadlines has
+/// no say until it is back, long before the watchdog ends its session.
+const VALID_PERIODS: u64 = 3;
+/// Rounding of a unit quaternion's vector part in `f32`, squared.
+const LENGTH_TOLERANCE: f64 = 1.0e-5;
+
+/// The magnetic-levitation device, opened: the controller has described itself, its coils are off.
+pub struct MaglevDevice {
+    options: Options,
+    values: Values,
+    link: HostLink,
+    description: Description,
+    calibration: VerticalCalibration,
+    stopped: Arc<AtomicBool>,
+}
+
+/// The device, levitating.
+pub struct LevitatingDevice {
+    opened: MaglevDevice,
+    walls: Option<Walls>,
+    period_s: f64,
+    period_us: u64,
+    /// Sequence number of the command whose answer a lockstep tick waits for.
+    awaited: Option<u32>,
+    /// The status of take-off, until a newer one comes.
+    first: Option<Status>,
+    /// What was commanded last, as the scene sees it: walls included, correction not.
+    commanded: Wrench,
+    state: DeviceState,
+    heard_ns: u64,
+}
+
+/// Asks the device to switch off at its next tick; if there is none, the controller's watchdog sees to it.
+pub struct CoilSwitch(Arc<AtomicBool>);
+
+impl SafeStop for CoilSwitch {
+    fn safe_stop(&self) {
+        self.0.store(true, Ordering::Release);
+    }
+}
+
+impl Device for MaglevDevice {
+    const INFO: DeviceInfo = DeviceInfo::new(
+        "maglev",
+        "Magnetic-levitation haptic device",
+        "A levitated handle behind a controller on USB, HID, a serial port or TCP",
+    );
+    const PARAMETERS: &'static [Parameter] = SCHEMA;
+    type Active = LevitatingDevice;
+    type Stop = CoilSwitch;
+
+    fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        let options = Options::new(settings);
+        let (link, description) = connect(&options)?;
+        Ok(Self {
+            options,
+            values: Values::new(settings),
+            link,
+            description,
+            calibration: VerticalCalibration::NONE,
+            stopped: Arc::new(AtomicBool::new(false)),
+        })
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        let Description { range_m, range_rad, max_force_n, max_torque_nm, rate_hz, .. } = self.description;
+        Capabilities {
+            sensed: axes(self.description.sensed),
+            actuated: axes(self.description.actuated),
+            range_m: range_m.map(f64::from),
+            range_rad: range_rad.map(f64::from),
+            resolution_m: f64::from(self.description.resolution_m),
+            max_force_n: max_force_n.map(f64::from),
+            max_torque_nm: max_torque_nm.map(f64::from),
+            max_force_slew_n_per_s: f64::from(self.description.force_slew_n_per_s),
+            max_torque_slew_nm_per_s: f64::from(self.description.torque_slew_nm_per_s),
+            max_stiffness_n_per_m: f64::from(self.description.max_stiffness_n_per_m),
+            rate_hz: rate_hz.map(f64::from),
+            latency_s: f64::from(self.description.latency_us) * 1.0e-6,
+        }
+    }
+
+    fn stopper(&self) -> CoilSwitch {
+        CoilSwitch(Arc::clone(&self.stopped))
+    }
+
+    fn serial(&self) -> String {
+        self.description.serial_text()
+    }
+
+    fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
+        self.calibration = *calibration;
+        Ok(())
+    }
+
+    fn activate(mut self, config: &LoopConfig) -> Result<LevitatingDevice, (Self, Refusal)> {
+        match self.take_off(config) {
+            Ok(first) => {
+                let mut active = LevitatingDevice {
+                    walls: None,
+                    #[allow(clippy::cast_precision_loss)] // at most 10 ms
+                    period_s: config.period_ns as f64 * 1.0e-9,
+                    period_us: config.period_ns / 1000,
+                    awaited: None,
+                    first: Some(first),
+                    commanded: Wrench::ZERO,
+                    state: DeviceState::HOME,
+                    heard_ns: 0,
+                    opened: self,
+                };
+                active.build_walls();
+                Ok(active)
+            }
+            Err(refusal) => Err((self, refusal)),
+        }
+    }
+
+    fn parameter(&self, index: usize) -> f64 {
+        self.values.get(index)
+    }
+}
+
+impl MaglevDevice {
+    /// Begins a session; a link that broke since (unplugged, plugged in again) is opened anew.
+    fn take_off(&mut self, config: &LoopConfig) -> Result<Status, Refusal> {
+        let period_us = u32::try_from(config.period_ns / 1000).unwrap_or(u32::MAX);
+        let watchdog_us = self.options.watchdog_us;
+        let taken_off = match self.link.take_off(period_us, watchdog_us, PATIENCE) {
+            Err(Unanswered::Lost) => {
+                (self.link, self.description) = connect(&self.options)?;
+                self.link.take_off(period_us, watchdog_us, PATIENCE)
+            }
+            other => other,
+        };
+        let status = taken_off.map_err(|unanswered| refused(&self.options, unanswered))?;
+        self.stopped.store(false, Ordering::Release);
+        Ok(status)
+    }
+}
+
+/// Opens the link and asks who is there.
+fn connect(options: &Options) -> Result<(HostLink, Description), Refusal> {
+    let transport = transport::open(options.kind, &options.address).map_err(Refusal::resource)?;
+    let mut link = HostLink::new(transport);
+    let description = link.describe(PATIENCE).map_err(|unanswered| refused(options, unanswered))?;
+    Ok((link, description))
+}
+
+fn refused(options: &Options, unanswered: Unanswered) -> Refusal {
+    let Options { kind, address, .. } = options;
+    let hint = match kind {
+        Kind::Tcp => "; `flotor emulate maglev` starts one without hardware",
+        Kind::Serial | Kind::Usb | Kind::Hid => "",
+    };
+    Refusal::resource(match unanswered {
+        Unanswered::Lost => format!("the controller at {address} hung up: does another program use it?"),
+        Unanswered::Silent => format!("nothing at {address} answers as a controller of this device{hint}"),
+    })
+}
+
+fn axes(bits: u8) -> Axes {
+    let all = |mask| bits & mask == mask;
+    match (all(0b00_0111), all(0b11_1000)) {
+        (true, true) => Axes::ALL,
+        (true, false) => Axes::TRANSLATION,
+        (false, true) => Axes::ROTATION,
+        (false, false) => Axes::NONE,
+    }
+}
+
+impl ActiveDevice for LevitatingDevice {
+    type Opened = MaglevDevice;
+
+    fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
+        let heard = match self.look() {
+            Ok(heard) => heard,
+            Err(LinkLost) => return Cycle::Fault(Fault::Disconnected),
+        };
+        let status = heard.map(|heard| heard.status).or_else(|| self.first.take());
+        let Some(status) = status else {
+            #[allow(clippy::cast_possible_truncation)] // ten seconds at most
+            let timeout_ns = self.opened.options.timeout.as_nanos() as u64;
+            let silence_ns = tick.time_ns.saturating_sub(self.heard_ns);
+            *state = self.state;
+            return if silence_ns > timeout_ns { Cycle::Fault(Fault::Timeout) } else { Cycle::Stale };
+        };
+        self.heard_ns = tick.time_ns;
+        let Some(sample) = sample(&status) else { return Cycle::Fault(Fault::Protocol) };
+        let is_limited = status.condition.contains(Condition::LIMITED);
+        self.state = DeviceState {
+            conditions: if is_limited { Conditions::SATURATED } else { Conditions::NONE },
+            delivered: if status.mode == Mode::Levitating { self.commanded } else { Wrench::ZERO },
+            sampled_ns: tick.time_ns,
+            ..sample
+        };
+        *state = self.state;
+        match fault(&status) {
+            // Switched off because somebody asked for it: the pose is still worth having.
+            _ if self.is_stopped() => Cycle::Fresh,
+            Some(fault) => Cycle::Fault(fault),
+            None => Cycle::Fresh,
+        }
+    }
+
+    fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle {
+        let request = if self.is_stopped() { Request::Disarm } else { self.command(wrench) };
+        #[allow(clippy::cast_possible_truncation)] // the clock on the wire wraps
+        match self.opened.link.send(request, (tick.time_ns / 1000) as u32) {
+            Ok(()) => {
+                self.awaited = Some(self.opened.link.sequence());
+                Cycle::Fresh
+            }
+            Err(LinkLost) => Cycle::Fault(Fault::Disconnected),
+        }
+    }
+
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+        self.opened.values.set(index, value);
+        self.build_walls();
+        Ok(())
+    }
+
+    fn deactivate(mut self) -> MaglevDevice {
+        // Gone or silent: its own watchdog switches it off.
+        let _ = self.opened.link.disarm(PATIENCE);
+        self.opened
+    }
+}
+
+impl LevitatingDevice {
+    /// Answers of the controller that were not used, by reason.
+    #[must_use]
+    pub fn rejections(&self) -> &Rejections {
+        self.opened.link.rejections()
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.opened.stopped.load(Ordering::Acquire)
+    }
+
+    fn build_walls(&mut self) {
+        let delay_s = f64::from(self.opened.description.latency_us) * 1.0e-6;
+        self.walls = self.opened.values.walls().map(|walls| walls.stabilised(self.period_s, delay_s));
+    }
+
+    /// The newest status, if there is one; in lockstep, the one that answers the last command.
+    fn look(&mut self) -> Result<Option<Heard>, LinkLost> {
+        let awaited = self.awaited.take().filter(|_| self.opened.options.lockstep);
+        let Some(awaited) = awaited else { return self.opened.link.take() };
+        let started = Instant::now();
+        loop {
+            match self.opened.link.take()? {
+                Some(heard) if heard.acknowledged == awaited => return Ok(Some(heard)),
+                _ if started.elapsed() > LOCKSTEP_PATIENCE => return Ok(None),
+                Some(_) => {}
+                None => std::thread::yield_now(),
+            }
+        }
+    }
+
+    /// The command for a wrench: walls added, total vertical force corrected.
+    fn command(&mut self, wrench: &Wrench) -> Request {
+        let wrench = if wrench.is_finite() { *wrench } else { Wrench::ZERO };
+        let walls = self.walls.as_ref().map_or(Wrench::ZERO, |walls| walls.wrench(&self.state));
+        self.commanded = wrench + walls;
+        let force_n = self.commanded.force();
+        let (own_n, height_m) = (self.opened.options.feedforward_n, self.state.pose.position().z);
+        let z = self.opened.calibration.command_n(force_n.z + own_n, height_m) - own_n;
+        let ([fx, fy, _], [tx, ty, tz]) = (force_n.to_array(), self.commanded.torque_nm);
+        #[allow(clippy::cast_possible_truncation)] // f32 is what the wire has
+        let wrench = [fx, fy, z, tx, ty, tz].map(|value| value as f32);
+        let valid_us = u16::try_from(VALID_PERIODS * self.period_us).unwrap_or(u16::MAX);
+        Request::Command { wrench, valid_us }
+    }
+}
+
+/// Pose and velocity of a status; nothing if its rotation is none.
+fn sample(status: &Status) -> Option<DeviceState> {
+    let vector = DVec3::from_array(status.rotation_xyz.map(f64::from));
+    let rest = 1.0 - vector.length_squared();
+    if rest < -LENGTH_TOLERANCE {
+        return None;
+    }
+    let orientation = DQuat::from_xyzw(vector.x, vector.y, vector.z, rest.max(0.0).sqrt()).normalize();
+    let scaled = |steps: [i16; 3], step: f64| DVec3::from_array(steps.map(f64::from)) * step;
+    Some(DeviceState {
+        pose: Pose::new(DVec3::from_array(status.position_m.map(f64::from)), orientation),
+        twist: Twist::new(
+            scaled(status.velocity_steps, Status::VELOCITY_STEP_M_PER_S),
+            scaled(status.spin_steps, Status::SPIN_STEP_RAD_PER_S),
+        ),
+        ..DeviceState::HOME
+    })
+}
+
+/// What a status means to the host: anything but obeying is a fault.
+fn fault(status: &Status) -> Option<Fault> {
+    if status.mode == Mode::Levitating {
+        return None;
+    }
+    const FAULTS: [(Condition, Fault); 6] = [
+        (Condition::SENSOR_RANGE, Fault::SensorOutOfRange),
+        (Condition::OVERLOAD, Fault::OverCurrent),
+        (Condition::OVER_TEMPERATURE, Fault::OverTemperature),
+        (Condition::OVER_SPEED, Fault::OverSpeed),
+        (Condition::WATCHDOG, Fault::Timeout),
+        (Condition::LINK_LOST, Fault::Disconnected),
+    ];
+    let found = FAULTS.iter().find(|(condition, _)| status.condition.contains(*condition));
+    // Disarmed by somebody else, and nothing is wrong.
+    Some(found.map_or(Fault::Protocol, |(_, fault)| *fault))
+}
+
+export_device!(MaglevDevice);

@@ -1,0 +1,454 @@
+//! Frames: what is said, and as which 64 bytes. Little endian, SI, `f32`.
+//!
+//! ```text
+//!  0 magic u16   2 version u8   3 kind u8   4 sequence u32   8 acknowledged u32   12 time_us u32
+//! 16 word u16   18 word u16    20 payload, 36 bytes          56 session u32       60 CRC-32 of bytes 0..60
+//! ```
+
+use super::description::Page;
+
+/// Bytes of every frame: one packet of the smallest interrupt endpoint at high speed.
+pub const FRAME_BYTES: usize = 64;
+/// Version of the protocol this code speaks.
+pub const VERSION: u8 = 1;
+
+/// First two bytes of a frame from the host, "ML".
+const REQUEST_MAGIC: u16 = u16::from_le_bytes(*b"ML");
+/// First two bytes of a frame from the controller, "MS".
+const ANSWER_MAGIC: u16 = u16::from_le_bytes(*b"MS");
+/// What the checksum covers.
+const CHECKED_BYTES: usize = 60;
+/// Where the payload starts.
+const PAYLOAD: usize = 20;
+
+/// What the host asks of the controller.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Request {
+    /// Describe yourself: this page.
+    Describe {
+        /// Number of the page.
+        page: u16,
+    },
+    /// Listen to this session from now on. Coils stay off.
+    Arm {
+        /// Time between two commands, µs.
+        period_us: u32,
+        /// Longest silence before the controller acts by itself, µs.
+        watchdog_us: u32,
+    },
+    /// Levitate: obey commands from now on.
+    TakeOff,
+    /// This wrench on the hand: force in N, torque in N·m.
+    Command {
+        /// Force and torque.
+        wrench: [f32; 6],
+        /// How long it holds at most, µs; after that the controller holds by itself.
+        valid_us: u16,
+    },
+    /// Set the flotor down and disarm.
+    Land,
+    /// Coils off, now. Clears a fault.
+    Disarm,
+}
+
+/// A request with its envelope.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RequestFrame {
+    /// Counts up by one with every frame of a session.
+    pub sequence: u32,
+    /// Sequence of the newest answer the host has seen.
+    pub acknowledged: u32,
+    /// The host's clock, µs, wrapping.
+    pub time_us: u32,
+    /// Chosen by the host when it arms; frames of another session are not acted on.
+    pub session: u32,
+    /// What is asked.
+    pub request: Request,
+}
+
+/// What the controller is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// Coils off.
+    Disarmed = 0,
+    /// Listening to a session; coils off.
+    Armed = 1,
+    /// Obeying commands.
+    Levitating = 2,
+    /// Holding by itself: the host was silent.
+    Holding = 3,
+    /// Setting the flotor down.
+    Landing = 4,
+    /// Coils off, and nothing but a disarm is obeyed.
+    Fault = 5,
+}
+
+impl Mode {
+    fn from_code(code: u16) -> Option<Self> {
+        Some(match code {
+            0 => Self::Disarmed,
+            1 => Self::Armed,
+            2 => Self::Levitating,
+            3 => Self::Holding,
+            4 => Self::Landing,
+            5 => Self::Fault,
+            _ => return None,
+        })
+    }
+}
+
+/// Why the controller is faulted, and what it limits; one bit each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Condition(u16);
+
+impl Condition {
+    /// Nothing to report.
+    pub const NONE: Self = Self(0);
+    /// The host was silent for longer than the watchdog.
+    pub const WATCHDOG: Self = Self(1);
+    /// The link to the host broke.
+    pub const LINK_LOST: Self = Self(1 << 1);
+    /// The flotor left the sensors' range.
+    pub const SENSOR_RANGE: Self = Self(1 << 2);
+    /// Too much current for too long.
+    pub const OVERLOAD: Self = Self(1 << 3);
+    /// A coil is too hot.
+    pub const OVER_TEMPERATURE: Self = Self(1 << 4);
+    /// The flotor moved too fast.
+    pub const OVER_SPEED: Self = Self(1 << 5);
+    /// The command was larger, or changed faster, than the coils may; it was limited. No fault.
+    pub const LIMITED: Self = Self(1 << 8);
+    /// The controller's own boundary pushes back. No fault.
+    pub const BOUNDARY: Self = Self(1 << 9);
+    /// The command outlived its validity; the controller holds until the next. No fault.
+    pub const EXPIRED: Self = Self(1 << 10);
+
+    const FAULTS: u16 = 0x00ff;
+    const KNOWN: u16 = 0x073f;
+
+    /// Both.
+    #[must_use]
+    pub const fn with(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// True if all of `other` is reported.
+    #[must_use]
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// The faults among them.
+    #[must_use]
+    pub const fn faults(self) -> Self {
+        Self(self.0 & Self::FAULTS)
+    }
+
+    /// True if there is nothing.
+    #[must_use]
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+}
+
+impl std::fmt::Display for Condition {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        const WORDS: [(Condition, &str); 9] = [
+            (Condition::WATCHDOG, "watchdog"),
+            (Condition::LINK_LOST, "link-lost"),
+            (Condition::SENSOR_RANGE, "sensor-range"),
+            (Condition::OVERLOAD, "overload"),
+            (Condition::OVER_TEMPERATURE, "over-temperature"),
+            (Condition::OVER_SPEED, "over-speed"),
+            (Condition::LIMITED, "limited"),
+            (Condition::BOUNDARY, "boundary"),
+            (Condition::EXPIRED, "expired"),
+        ];
+        let mut words = WORDS.iter().filter(|(condition, _)| self.contains(*condition)).map(|(_, word)| word);
+        words.next().map_or(Ok(()), |word| f.write_str(word))?;
+        words.try_for_each(|word| write!(f, ",{word}"))
+    }
+}
+
+/// The newest sample and what the controller is doing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Status {
+    /// What the controller is doing.
+    pub mode: Mode,
+    /// What is wrong or limited.
+    pub condition: Condition,
+    /// Position of the handle, m.
+    pub position_m: [f32; 3],
+    /// Vector part of the unit quaternion whose scalar part is not negative.
+    pub rotation_xyz: [f32; 3],
+    /// Velocity, in steps of [`Status::VELOCITY_STEP_M_PER_S`].
+    pub velocity_steps: [i16; 3],
+    /// Angular velocity, in steps of [`Status::SPIN_STEP_RAD_PER_S`].
+    pub spin_steps: [i16; 3],
+}
+
+impl Status {
+    /// A step of velocity: the range of ±3.2 m/s is beyond any hand.
+    pub const VELOCITY_STEP_M_PER_S: f64 = 1.0e-4;
+    /// A step of angular velocity: ±32 rad/s.
+    pub const SPIN_STEP_RAD_PER_S: f64 = 1.0e-3;
+}
+
+/// What the controller answers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Answer {
+    /// To everything but `Describe`.
+    Status(Status),
+    /// A page of the description.
+    Description(Page),
+}
+
+/// An answer with its envelope.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AnswerFrame {
+    /// Counts up by one with every answer.
+    pub sequence: u32,
+    /// Sequence of the newest request that was accepted.
+    pub acknowledged: u32,
+    /// The controller's clock when the sample was taken, µs, wrapping.
+    pub time_us: u32,
+    /// The session it listens to; 0: none.
+    pub session: u32,
+    /// What is said.
+    pub answer: Answer,
+}
+
+/// Why bytes are no frame, or a frame is not acted on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rejection {
+    /// Too short, too long, or not decodable as a packet.
+    Length,
+    /// The checksum is wrong: damaged on the way.
+    Checksum,
+    /// Not the first bytes of a frame in this direction.
+    Magic,
+    /// Another version of the protocol.
+    Version,
+    /// An unknown kind, mode, condition or page.
+    Kind,
+    /// A number is NaN or infinite.
+    NotFinite,
+    /// The same sequence number as the frame before.
+    Duplicate,
+    /// A sequence number that is over.
+    Old,
+    /// Another session: a host that has been replaced.
+    Session,
+}
+
+impl RequestFrame {
+    /// The frame as bytes.
+    #[must_use]
+    pub fn encode(&self) -> [u8; FRAME_BYTES] {
+        let mut bytes =
+            Writer::new(REQUEST_MAGIC, self.sequence, self.acknowledged, self.time_us, self.session);
+        match self.request {
+            Request::Command { wrench, valid_us } => {
+                bytes.kind(1).word(18, valid_us).floats(PAYLOAD, &wrench);
+            }
+            Request::Describe { page } => {
+                bytes.kind(2).word(16, page);
+            }
+            Request::Arm { period_us, watchdog_us } => {
+                bytes.kind(3).double(PAYLOAD, period_us).double(PAYLOAD + 4, watchdog_us);
+            }
+            Request::TakeOff => {
+                bytes.kind(4);
+            }
+            Request::Land => {
+                bytes.kind(5);
+            }
+            Request::Disarm => {
+                bytes.kind(6);
+            }
+        }
+        bytes.finish()
+    }
+
+    /// Reads bytes. Total: any bytes give a frame or a reason.
+    ///
+    /// # Errors
+    /// [`Rejection`], the first reason found.
+    pub fn decode(bytes: &[u8]) -> Result<Self, Rejection> {
+        let bytes = Reader::new(bytes, REQUEST_MAGIC)?;
+        let request = match bytes.kind() {
+            1 => Request::Command { wrench: bytes.floats(PAYLOAD)?, valid_us: bytes.word(18) },
+            2 => Request::Describe { page: bytes.word(16) },
+            3 => Request::Arm { period_us: bytes.double(PAYLOAD), watchdog_us: bytes.double(PAYLOAD + 4) },
+            4 => Request::TakeOff,
+            5 => Request::Land,
+            6 => Request::Disarm,
+            _ => return Err(Rejection::Kind),
+        };
+        let [sequence, acknowledged, time_us, session] = bytes.envelope();
+        Ok(Self { sequence, acknowledged, time_us, session, request })
+    }
+}
+
+impl AnswerFrame {
+    /// The frame as bytes.
+    #[must_use]
+    pub fn encode(&self) -> [u8; FRAME_BYTES] {
+        let mut bytes =
+            Writer::new(ANSWER_MAGIC, self.sequence, self.acknowledged, self.time_us, self.session);
+        match &self.answer {
+            Answer::Status(status) => {
+                bytes.kind(0x81).word(16, status.mode as u16).word(18, status.condition.0);
+                bytes.floats(PAYLOAD, &status.position_m).floats(32, &status.rotation_xyz);
+                bytes.steps(44, status.velocity_steps).steps(50, status.spin_steps);
+            }
+            Answer::Description(page) => {
+                bytes.kind(0x82).word(16, page.number());
+                page.write(&mut bytes);
+            }
+        }
+        bytes.finish()
+    }
+
+    /// Reads bytes. Total: any bytes give a frame or a reason.
+    ///
+    /// # Errors
+    /// [`Rejection`], the first reason found.
+    pub fn decode(bytes: &[u8]) -> Result<Self, Rejection> {
+        let bytes = Reader::new(bytes, ANSWER_MAGIC)?;
+        let answer = match bytes.kind() {
+            0x81 => {
+                let condition = bytes.word(18);
+                if condition & !Condition::KNOWN != 0 {
+                    return Err(Rejection::Kind);
+                }
+                Answer::Status(Status {
+                    mode: Mode::from_code(bytes.word(16)).ok_or(Rejection::Kind)?,
+                    condition: Condition(condition),
+                    position_m: bytes.floats(PAYLOAD)?,
+                    rotation_xyz: bytes.floats(32)?,
+                    velocity_steps: bytes.steps(44),
+                    spin_steps: bytes.steps(50),
+                })
+            }
+            0x82 => Answer::Description(Page::read(bytes.word(16), &bytes)?),
+            _ => return Err(Rejection::Kind),
+        };
+        let [sequence, acknowledged, time_us, session] = bytes.envelope();
+        Ok(Self { sequence, acknowledged, time_us, session, answer })
+    }
+}
+
+/// Fills a frame field by field.
+pub(super) struct Writer {
+    bytes: [u8; FRAME_BYTES],
+}
+
+impl Writer {
+    fn new(magic: u16, sequence: u32, acknowledged: u32, time_us: u32, session: u32) -> Self {
+        let mut writer = Self { bytes: [0; FRAME_BYTES] };
+        writer.word(0, magic).put(2, &[VERSION]);
+        writer.double(4, sequence).double(8, acknowledged).double(12, time_us).double(56, session);
+        writer
+    }
+
+    pub(super) fn put(&mut self, at: usize, field: &[u8]) -> &mut Self {
+        if let Some(room) = self.bytes.get_mut(at..at + field.len()) {
+            room.copy_from_slice(field);
+        }
+        self
+    }
+
+    fn kind(&mut self, kind: u8) -> &mut Self {
+        self.put(3, &[kind])
+    }
+
+    fn word(&mut self, at: usize, value: u16) -> &mut Self {
+        self.put(at, &value.to_le_bytes())
+    }
+
+    pub(super) fn double(&mut self, at: usize, value: u32) -> &mut Self {
+        self.put(at, &value.to_le_bytes())
+    }
+
+    pub(super) fn floats(&mut self, at: usize, values: &[f32]) -> &mut Self {
+        for (index, value) in values.iter().enumerate() {
+            self.put(at + 4 * index, &value.to_le_bytes());
+        }
+        self
+    }
+
+    fn steps(&mut self, at: usize, values: [i16; 3]) -> &mut Self {
+        for (index, value) in values.iter().enumerate() {
+            self.put(at + 2 * index, &value.to_le_bytes());
+        }
+        self
+    }
+
+    fn finish(mut self) -> [u8; FRAME_BYTES] {
+        let checksum = checksum(&self.bytes);
+        self.double(CHECKED_BYTES, checksum);
+        self.bytes
+    }
+}
+
+/// A frame whose length, checksum, magic and version were checked.
+pub(super) struct Reader<'b> {
+    bytes: &'b [u8; FRAME_BYTES],
+}
+
+impl<'b> Reader<'b> {
+    fn new(bytes: &'b [u8], magic: u16) -> Result<Self, Rejection> {
+        let reader = Self { bytes: bytes.try_into().map_err(|_| Rejection::Length)? };
+        // The checksum first: what is damaged says nothing.
+        if reader.double(CHECKED_BYTES) != checksum(reader.bytes) {
+            return Err(Rejection::Checksum);
+        }
+        if reader.word(0) != magic {
+            return Err(Rejection::Magic);
+        }
+        if reader.array::<1>(2) != [VERSION] {
+            return Err(Rejection::Version);
+        }
+        Ok(reader)
+    }
+
+    pub(super) fn array<const N: usize>(&self, at: usize) -> [u8; N] {
+        self.bytes.get(at..at + N).and_then(|field| field.try_into().ok()).unwrap_or([0; N])
+    }
+
+    fn kind(&self) -> u8 {
+        self.array::<1>(3)[0]
+    }
+
+    fn word(&self, at: usize) -> u16 {
+        u16::from_le_bytes(self.array(at))
+    }
+
+    pub(super) fn double(&self, at: usize) -> u32 {
+        u32::from_le_bytes(self.array(at))
+    }
+
+    pub(super) fn floats<const N: usize>(&self, at: usize) -> Result<[f32; N], Rejection> {
+        let values = std::array::from_fn(|index| f32::from_le_bytes(self.array(at + 4 * index)));
+        if values.iter().all(|value: &f32| value.is_finite()) {
+            Ok(values)
+        } else {
+            Err(Rejection::NotFinite)
+        }
+    }
+
+    fn steps(&self, at: usize) -> [i16; 3] {
+        std::array::from_fn(|index| i16::from_le_bytes(self.array(at + 2 * index)))
+    }
+
+    /// Sequence, acknowledged, time, session.
+    fn envelope(&self) -> [u32; 4] {
+        [4, 8, 12, 56].map(|at| self.double(at))
+    }
+}
+
+/// CRC-32 as in Ethernet and zlib (ISO 3309) of what it covers.
+fn checksum(bytes: &[u8; FRAME_BYTES]) -> u32 {
+    crc32fast::hash(bytes.get(..CHECKED_BYTES).unwrap_or(bytes))
+}

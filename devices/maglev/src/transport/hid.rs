@@ -1,0 +1,66 @@
+//! HID: packets as reports of 64 bytes without a number, through the kernel's hidraw.
+
+use super::address::{UsbAddress, udev_remedy};
+use super::{Incoming, LinkLost, OpenError, Transport};
+use crate::protocol::FRAME_BYTES;
+use hidapi::{HidApi, HidDevice, HidError};
+
+/// Longest report that is looked at: one more than a frame, so that a longer one shows.
+const BUFFER_BYTES: usize = FRAME_BYTES + 1;
+
+/// An open HID device.
+pub struct HidLink {
+    device: HidDevice,
+}
+
+/// Opens a device. Not real-time.
+///
+/// # Errors
+/// [`OpenError`].
+pub fn open(address: &str) -> Result<HidLink, OpenError> {
+    let wanted = UsbAddress::parse(address).ok_or_else(|| UsbAddress::misread(address))?;
+    let refused = |error: HidError| refused(address, &wanted, &error);
+    let api = HidApi::new().map_err(refused)?;
+    let device = match &wanted.serial {
+        Some(serial) => api.open_serial(wanted.vendor, wanted.product, serial),
+        None => api.open(wanted.vendor, wanted.product),
+    };
+    let device = device.map_err(refused)?;
+    device.set_blocking_mode(false).map_err(refused)?;
+    Ok(HidLink { device })
+}
+
+impl Transport for HidLink {
+    fn send(&mut self, frame: &[u8; FRAME_BYTES]) -> Result<(), LinkLost> {
+        let mut report = [0; FRAME_BYTES + 1];
+        // The first byte is the number of the report: 0, there is only one.
+        if let Some(room) = report.get_mut(1..) {
+            room.copy_from_slice(frame);
+        }
+        self.device.write(&report).map(|_| ()).map_err(|_| LinkLost)
+    }
+
+    fn receive(&mut self) -> Result<Incoming, LinkLost> {
+        let mut buffer = [0; BUFFER_BYTES];
+        // Every error of reading is a device that is gone: hidapi has only words for it.
+        let length = self.device.read_timeout(&mut buffer, 0).map_err(|_| LinkLost)?;
+        let packet = buffer.get(..length).and_then(|bytes| bytes.try_into().ok());
+        Ok(match (length, packet) {
+            (0, _) => Incoming::Nothing,
+            (_, Some(packet)) => Incoming::Packet(packet),
+            (_, None) => Incoming::Malformed,
+        })
+    }
+}
+
+fn refused(address: &str, wanted: &UsbAddress, error: &HidError) -> OpenError {
+    let (address, cause) = (address.to_owned(), error.to_string());
+    let forbidden = match error {
+        HidError::IoError { error } => error.kind() == std::io::ErrorKind::PermissionDenied,
+        _ => cause.contains("ermission"),
+    };
+    match forbidden {
+        true => OpenError::Forbidden { address, remedy: udev_remedy("hidraw", wanted) },
+        false => OpenError::Missing { address, cause },
+    }
+}

@@ -1,0 +1,104 @@
+//! Coded frames on anything that reads and writes bytes without waiting.
+
+use super::{Incoming, LinkLost, Transport};
+use crate::protocol::FRAME_BYTES;
+use crate::protocol::stream::{CODED_BYTES, Received, StreamDecoder, coded};
+use std::io::{ErrorKind, Read, Write};
+
+/// Bytes taken from the system at once: a few frames.
+const CHUNK_BYTES: usize = 256;
+
+/// A link of bytes. The stream must not wait: what is not there is `WouldBlock` or `TimedOut`.
+#[derive(Debug)]
+pub struct StreamLink<S> {
+    stream: S,
+    decoder: StreamDecoder,
+    chunk: [u8; CHUNK_BYTES],
+    /// What of the chunk is not looked at yet.
+    fresh: std::ops::Range<usize>,
+    /// The frame that is not wholly written yet, and what is left of it.
+    pending: [u8; CODED_BYTES],
+    left: std::ops::Range<usize>,
+}
+
+impl<S: Read + Write + Send> StreamLink<S> {
+    /// A link over a stream that does not wait.
+    pub fn new(stream: S) -> Self {
+        Self {
+            stream,
+            decoder: StreamDecoder::default(),
+            chunk: [0; CHUNK_BYTES],
+            fresh: 0..0,
+            pending: [0; CODED_BYTES],
+            left: 0..0,
+        }
+    }
+
+    /// True if somebody is at the other end.
+    pub fn is_open(&mut self) -> bool {
+        !self.fresh.is_empty() || self.fill().is_ok()
+    }
+
+    /// Takes bytes from the system; true if there were any. Only when all of the last ones are looked at.
+    fn fill(&mut self) -> Result<bool, LinkLost> {
+        loop {
+            match self.stream.read(&mut self.chunk) {
+                Ok(0) => return Err(LinkLost),
+                Ok(length) => {
+                    self.fresh = 0..length;
+                    return Ok(true);
+                }
+                Err(error) => match error.kind() {
+                    ErrorKind::WouldBlock | ErrorKind::TimedOut => return Ok(false),
+                    ErrorKind::Interrupted => {}
+                    _ => return Err(LinkLost),
+                },
+            }
+        }
+    }
+
+    /// Writes what is left of the pending frame; true if all of it went.
+    fn flush(&mut self) -> Result<bool, LinkLost> {
+        while let Some(bytes) = self.pending.get(self.left.clone()).filter(|bytes| !bytes.is_empty()) {
+            match self.stream.write(bytes) {
+                Ok(0) => return Err(LinkLost),
+                Ok(written) => self.left.start += written,
+                Err(error) => match error.kind() {
+                    ErrorKind::WouldBlock | ErrorKind::TimedOut => return Ok(false),
+                    ErrorKind::Interrupted => {}
+                    _ => return Err(LinkLost),
+                },
+            }
+        }
+        Ok(true)
+    }
+}
+
+impl<S: Read + Write + Send> Transport for StreamLink<S> {
+    fn send(&mut self, frame: &[u8; FRAME_BYTES]) -> Result<(), LinkLost> {
+        // Half a frame must be finished, or the other side loses the next one too.
+        if self.flush()? {
+            let length;
+            (self.pending, length) = coded(frame);
+            self.left = 0..length;
+            self.flush()?;
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self) -> Result<Incoming, LinkLost> {
+        loop {
+            for index in self.fresh.by_ref() {
+                let byte = self.chunk.get(index).copied().unwrap_or(0);
+                match self.decoder.push(byte) {
+                    Some(Received::Packet(packet)) => return Ok(Incoming::Packet(packet)),
+                    Some(Received::Malformed) => return Ok(Incoming::Malformed),
+                    None => {}
+                }
+            }
+            if !self.fill()? {
+                return Ok(Incoming::Nothing);
+            }
+        }
+    }
+}

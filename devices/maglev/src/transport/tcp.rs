@@ -1,0 +1,39 @@
+//! TCP: controllers that are reached over a network, and emulators in another process.
+
+use super::OpenError;
+use super::stream::StreamLink;
+use std::io::ErrorKind;
+use std::net::{TcpStream, ToSocketAddrs};
+use std::time::Duration;
+
+/// How long a connection may take to come about.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Connects to `host:port`. Not real-time.
+///
+/// # Errors
+/// [`OpenError`].
+pub fn connect(address: &str) -> Result<StreamLink<TcpStream>, OpenError> {
+    let wrong =
+        || OpenError::Address { address: address.to_owned(), expected: "host:port, like 127.0.0.1:5678" };
+    let target = address.to_socket_addrs().map_err(|_| wrong())?.next().ok_or_else(wrong)?;
+    let stream = TcpStream::connect_timeout(&target, CONNECT_TIMEOUT);
+    let stream = stream.and_then(|stream| prepared(stream).map(StreamLink::new));
+    stream.map_err(|error| match error.kind() {
+        ErrorKind::PermissionDenied => OpenError::Forbidden {
+            address: address.to_owned(),
+            remedy: "a firewall or sandbox forbids the connection".to_owned(),
+        },
+        _ => OpenError::Missing { address: address.to_owned(), cause: error.to_string() },
+    })
+}
+
+/// A connection that neither waits nor collects small frames to large ones.
+///
+/// # Errors
+/// What the system says.
+pub fn prepared(stream: TcpStream) -> std::io::Result<TcpStream> {
+    stream.set_nodelay(true)?;
+    stream.set_nonblocking(true)?;
+    Ok(stream)
+}

@@ -1,0 +1,36 @@
+//! `flotor emulate`: a device without the device, in a process of its own.
+
+use super::CommandError;
+use super::companion::Companion;
+use clap::Args;
+use std::ffi::OsString;
+
+/// Emulate the controller of a device, so that its plugin can be used without hardware.
+#[derive(Args)]
+#[command(
+    after_help = "`flotor emulate NAME` becomes the program `flotor-NAME-emulator` beside this one, with all \
+    further arguments.\n\nExamples:\n  \
+    flotor emulate maglev\n  \
+    flotor emulate maglev --transport pty --link /tmp/flotor-tty\n  \
+    flotor emulate maglev --pace lockstep --set preset=full\n  \
+    flotor emulate maglev --help"
+)]
+pub(crate) struct EmulateArguments {
+    /// Id of the device's plugin
+    #[arg(value_name = "NAME")]
+    device: String,
+    /// Arguments of the emulator
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGUMENTS")]
+    arguments: Vec<OsString>,
+}
+
+pub(crate) fn run(arguments: &EmulateArguments) -> Result<(), CommandError> {
+    let EmulateArguments { device, arguments } = arguments;
+    let is_id = !device.is_empty() && device.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
+    if !is_id {
+        return Err(CommandError::Usage(format!("`{device}` is no id of a device")));
+    }
+    let (program, build) =
+        (format!("flotor-{device}-emulator"), format!("cargo build --release -p flotor-{device}"));
+    Companion { program: &program, build: &build }.become_with(arguments)
+}

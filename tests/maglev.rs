@@ -1,0 +1,224 @@
+//! The maglev plugin against its emulated controller, in processes of their own, over real links: equal trajectories
+//! with the simulated flotor, and what happens when one side dies, hangs, or talks nonsense.
+
+use flotor_tests::library::build_folder;
+use flotor_tests::program::exit_code;
+use flotor_tests::scratch::Scratch;
+use flotor_tests::watched::watch;
+use rustix::process::{Pid, Signal, kill_process};
+use std::io::{BufRead, BufReader, Write};
+use std::net::TcpStream;
+use std::path::PathBuf;
+use std::process::{Child, ChildStdout, Command, Stdio};
+
+fn program(name: &str) -> PathBuf {
+    let file = build_folder().join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
+    assert!(
+        file.is_file(),
+        "{} is missing: run `cargo build`, or all tests with `cargo test`",
+        file.display()
+    );
+    file
+}
+
+/// An emulated controller in a process of its own; ended with the test.
+struct Emulator {
+    child: Child,
+    lines: std::io::Lines<BufReader<ChildStdout>>,
+    transport: &'static str,
+    address: String,
+}
+
+impl Emulator {
+    fn start(transport: &'static str, arguments: &[&str]) -> Self {
+        let mut command = Command::new(program("flotor-maglev-emulator"));
+        command.args(["--transport", transport, "--listen", "127.0.0.1:0", "--once"]).args(arguments);
+        let mut child = command.stdout(Stdio::piped()).spawn().expect("the emulator starts");
+        let output = child.stdout.take().expect("a pipe was asked for");
+        let mut lines = BufReader::new(output).lines();
+        let first = lines.next().expect("the emulator says where it is").expect("its output is text");
+        let address = first.rsplit(' ').next().expect("the last word is the address").to_owned();
+        Self { child, lines, transport, address }
+    }
+
+    /// Reads lines until one holds all of the words.
+    fn wait_for(&mut self, words: &[&str]) -> String {
+        let mut seen = Vec::new();
+        for line in self.lines.by_ref() {
+            let line = line.expect("the emulator's output is text");
+            if words.iter().all(|word| line.contains(word)) {
+                return line;
+            }
+            seen.push(line);
+        }
+        panic!("the emulator never said {words:?}, but {seen:#?}");
+    }
+
+    /// A scene on this controller. Timings are loose: a test machine may be held up for long, and none of these
+    /// tests is about how long.
+    fn scene(&self, device: &str) -> String {
+        let transport = if self.transport == "pty" { "serial" } else { self.transport };
+        format!(
+            "rate_hz = 1000\nduration_s = 60\n[device]\nplugin = \"maglev\"\n[device.parameters]\ntransport = \"{transport}\"\n\
+             address = \"{}\"\nwatchdog_ms = 700\ntimeout_ms = 8000\n{device}\n[[model]]\nplugin = \"spring\"\n",
+            self.address
+        )
+    }
+
+    /// Starts a host that runs the scene in real time.
+    fn host(&self, scratch: &Scratch) -> Child {
+        let scene = scratch.file("maglev.toml", self.scene(""));
+        let mut command = Command::new(program("flotor"));
+        command.arg("run").arg(scene).env("NO_COLOR", "1").stdout(Stdio::null()).stderr(Stdio::piped());
+        command.spawn().expect("the host starts")
+    }
+}
+
+impl Drop for Emulator {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn signal(child: &Child, signal: Signal) {
+    let pid = i32::try_from(child.id()).ok().and_then(Pid::from_raw).expect("a child has an id");
+    kill_process(pid, signal).expect("it is ours");
+}
+
+/// The number after `key=` in a line.
+fn number(line: &str, key: &str) -> u64 {
+    let rest = line.split(&format!("{key}=")).nth(1).unwrap_or_else(|| panic!("{key} in {line}"));
+    rest.split(' ').next().and_then(|word| word.parse().ok()).unwrap_or_else(|| panic!("{key} in {line}"))
+}
+
+// ---------------------------------------------------------------- one scene, two devices
+
+#[test]
+fn one_scene_gives_one_trajectory_on_both_devices() {
+    // The finest published resolution of the device, and that over the radius of its bowl.
+    const RESOLUTION_M: f64 = 2.0e-6;
+    const RESOLUTION_RAD: f64 = RESOLUTION_M / 0.115;
+    for preset in ["plain", "full"] {
+        let tail = "\n[[model]]\nplugin = \"spring\"\n";
+        let simulated = watch(&format!(
+            "duration_s = 2\n[device]\nplugin = \"simulated\"\n[device.parameters]\npreset = \"{preset}\"\n{tail}"
+        ));
+        let emulator = Emulator::start("tcp", &["--pace", "lockstep", "--set", &format!("preset={preset}")]);
+        let scene = emulator.scene("pace = \"lockstep\"").replace("duration_s = 60", "duration_s = 2");
+        let maglev = watch(&scene);
+        assert_eq!(simulated.records.len(), maglev.records.len());
+        let mut moved_m: f64 = 0.0;
+        for (a, b) in simulated.records.iter().zip(&maglev.records) {
+            let apart_m = a.pose.position().distance(b.pose.position());
+            let apart_rad = a.pose.orientation().angle_between(b.pose.orientation());
+            assert!(apart_m <= RESOLUTION_M, "{preset}: {apart_m} m apart in tick {}", a.tick);
+            // `angle_between` goes through acos, which loses half the digits near 0: 1.5e-8 at best.
+            assert!(apart_rad <= RESOLUTION_RAD, "{preset}: {apart_rad} rad apart in tick {}", a.tick);
+            moved_m = moved_m.max(a.pose.position().length());
+        }
+        assert!(moved_m > 2.0e-3, "the handle moved by {moved_m} m only: nothing was compared");
+    }
+}
+
+#[test]
+fn equal_runs_over_a_link_are_equal_to_the_bit() {
+    let run = || {
+        let emulator = Emulator::start("tcp", &["--pace", "lockstep", "--set", "preset=full"]);
+        let scene = emulator.scene("pace = \"lockstep\"").replace("duration_s = 60", "duration_s = 0.5");
+        let records = watch(&scene).records;
+        records.iter().map(|record| (record.pose, record.twist, record.commanded)).collect::<Vec<_>>()
+    };
+    assert!(run() == run());
+}
+
+// ---------------------------------------------------------------- one side is gone
+
+#[test]
+fn a_killed_host_disarms_the_controller() {
+    for transport in ["tcp", "pty"] {
+        let (mut emulator, scratch) = (Emulator::start(transport, &[]), Scratch::default());
+        let mut host = emulator.host(&scratch);
+        emulator.wait_for(&["mode Levitating"]);
+        signal(&host, Signal::KILL);
+        let line = emulator.wait_for(&["mode Disarmed", "link-lost"]);
+        // Long before the watchdog of 700 ms could have seen anything.
+        assert!(number(&line, "silence_us") < 700_000, "{transport}: {line}");
+        emulator.wait_for(&["closed rejected=0"]);
+        let _ = host.wait();
+    }
+}
+
+#[test]
+fn a_hung_host_loses_its_session_and_is_told_when_it_wakes_up() {
+    for transport in ["tcp", "pty"] {
+        let (mut emulator, scratch) = (Emulator::start(transport, &[]), Scratch::default());
+        let host = emulator.host(&scratch);
+        emulator.wait_for(&["mode Levitating"]);
+        signal(&host, Signal::STOP);
+        let line = emulator.wait_for(&["mode Holding", "watchdog"]);
+        // By the controller's own clock, which is what the bound is about: watchdog and two milliseconds.
+        assert!((700_000..=702_000).contains(&number(&line, "silence_us")), "{transport}: {line}");
+        emulator.wait_for(&["mode Landing"]);
+        emulator.wait_for(&["mode Fault", "watchdog"]);
+        signal(&host, Signal::CONT);
+        let output = host.wait_with_output().expect("the host ends");
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(exit_code::DEVICE_FAULT), "{transport}: {error}");
+        assert!(error.contains("device fault"), "{transport}: {error}");
+    }
+}
+
+#[test]
+fn a_controller_that_vanishes_is_a_fault_of_the_device() {
+    for transport in ["tcp", "pty"] {
+        let (mut emulator, scratch) = (Emulator::start(transport, &[]), Scratch::default());
+        let host = emulator.host(&scratch);
+        emulator.wait_for(&["mode Levitating"]);
+        signal(&emulator.child, Signal::KILL);
+        let output = host.wait_with_output().expect("the host ends");
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(exit_code::DEVICE_FAULT), "{transport}: {error}");
+        assert!(error.contains("the device is gone; check cable and power"), "{transport}: {error}");
+    }
+}
+
+#[test]
+fn where_no_controller_is_one_line_says_so() {
+    let scratch = Scratch::default();
+    for (device, words) in [
+        ("address = \"127.0.0.1:1\"", "no controller at 127.0.0.1:1"),
+        ("address = \"here\"", "is not host:port"),
+        ("transport = \"serial\"\naddress = \"/dev/no-such-port\"", "no controller at /dev/no-such-port"),
+    ] {
+        let scene = scratch
+            .file("nobody.toml", format!("[device]\nplugin = \"maglev\"\n[device.parameters]\n{device}\n"));
+        let scene = scene.to_str().expect("a scratch folder has a plain name");
+        let ran = flotor_tests::program::Flotor::with(["run", scene]).run();
+        assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
+        assert!(ran.error().contains(words), "{}", ran.error());
+    }
+}
+
+// ---------------------------------------------------------------- nonsense
+
+#[test]
+fn noise_on_the_line_is_counted_and_moves_nothing() {
+    let mut emulator = Emulator::start("tcp", &[]);
+    let mut stream = TcpStream::connect(&emulator.address).expect("the emulator listens");
+    let mut seed = 1_u32;
+    let noise: Vec<u8> = std::iter::repeat_with(|| {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (seed >> 24) as u8
+    })
+    .take(20_000)
+    .chain([0])
+    .collect();
+    stream.write_all(&noise).expect("the emulator takes bytes");
+    stream.shutdown(std::net::Shutdown::Write).expect("the connection is open");
+    // It closes when it has read all of it; no mode line comes before that.
+    let line =
+        emulator.lines.by_ref().map(|line| line.expect("text")).find(|line| !line.starts_with("connected"));
+    let line = line.expect("the emulator says what it rejected");
+    assert!(line.starts_with("closed") && number(&line, "rejected") >= 20, "{line}");
+}
