@@ -672,18 +672,6 @@ typedef struct FlotorEnergyLedgerTable {
     uint32_t (*ledger)(FlotorInstance instance, struct FlotorEnergyLedger *out);
 } FlotorEnergyLedgerTable;
 
-// `flotor.device-pacing/1`: offered by a device that can set the pace, see [`crate::Pacing`].
-typedef struct FlotorDevicePacingTable {
-    // Bytes of this table as the plugin knows it.
-    uint32_t size;
-    // Reserved, 0.
-    uint32_t reserved;
-    // Blocks until the device has a sample that no earlier wait has told of, or until `timeout_ns` have passed;
-    // writes the number of samples taken since the last wait that found any, 0 after a wait in vain. Returns a
-    // [`super::CallStatus`] code. Real-time but for the waiting: no allocation.
-    uint32_t (*wait_for_sample)(FlotorInstance instance, uint64_t timeout_ns, uint64_t *samples);
-} FlotorDevicePacingTable;
-
 // Delivered over commanded vertical force as a polynomial of the height. 80 bytes.
 typedef struct FlotorVerticalCalibration {
     double range_m[2];
@@ -704,6 +692,18 @@ typedef struct FlotorCalibrationTable {
                                    const struct FlotorVerticalCalibration *calibration,
                                    struct FlotorMessage *message);
 } FlotorCalibrationTable;
+
+// `flotor.device-pacing/1`: offered by a device that can set the pace, see [`crate::Pacing`].
+typedef struct FlotorDevicePacingTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // Blocks until the device has a sample that no earlier wait has told of, or until `timeout_ns` have passed;
+    // writes the number of samples taken since the last wait that found any, 0 after a wait in vain. Returns a
+    // [`super::CallStatus`] code. Real-time but for the waiting: no allocation.
+    uint32_t (*wait_for_sample)(FlotorInstance instance, uint64_t timeout_ns, uint64_t *samples);
+} FlotorDevicePacingTable;
 
 /* Names of interfaces and extensions. */
 #define FLOTOR_INTERFACE_FORCE "flotor.force/1"
