@@ -316,6 +316,23 @@ fn more_polynomials_are_not_needed() {
     assert!(error < 1e-7 && error > 0.0, "{error:e}");
 }
 
+/// A pose that is home but for numbers no processor likes costs what home costs: the rod never computes with them.
+#[test]
+fn numbers_that_are_nothing_are_zero() {
+    let spring = Preset::Thesis1.spring();
+    let answer = |position_m, rotation_rad| {
+        let mut rod = Rod::new(&spring, Accuracy::Servo);
+        let pose = Pose::from_rotation_vector(position_m, rotation_rad);
+        (hold(&mut rod, &pose), rod.step(&pose, Demand::WrenchAndEnergy), rod.work())
+    };
+    let home = answer(DVec3::ZERO, DVec3::ZERO);
+    for nothing in [1e-60, 1e-200, 1e-310] {
+        assert_eq!(answer(DVec3::splat(nothing), DVec3::splat(-nothing)), home, "{nothing:e}");
+    }
+    // A nanometre is something.
+    assert_ne!(answer(DVec3::splat(1e-9), DVec3::ZERO), home);
+}
+
 #[test]
 fn cold_poses_never_give_nan() {
     let wild = Workspace { shear: 1.5, height: 1.5, tilt_rad: 2.0, yaw_rad: 3.0 };

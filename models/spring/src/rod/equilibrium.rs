@@ -14,7 +14,7 @@ use flotor_hal::glam::{DVec2, DVec3};
 use super::curve::Curve;
 use super::functional::{Curvature, Functional, Ratios, Reaction, Shape, Value};
 use super::matrix::{Factored, added, dot, length, product};
-use super::plate::Plate;
+use super::plate::{Plate, or_zero};
 use super::predictor::History;
 use crate::response::Demand;
 
@@ -220,7 +220,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
             }
             let error = size * (size + distance(&self.shape, &self.matrix.shape));
             let step = capped(step, size);
-            self.shape = added(&self.shape, 1.0, &step);
+            self.shape = added(&self.shape, 1.0, &step).map(or_zero);
             self.matrix.steps_left = self.matrix.steps_left.saturating_sub(1);
             let reading = read(&value, &self.matrix.reaction, &step, demand);
             if error <= self.effort.tolerance && size <= LONGEST_STEP && self.matrix.neutral <= SETTLED {

@@ -12,6 +12,15 @@ use crate::pose::Pose;
 /// Smallest `1 + d_z`: 177.4 degrees. There is no shortest turn to upside down.
 const LEAST_OVERTURN: f64 = 1e-3;
 
+/// What is smaller is zero: no length or angle, but a number whose powers the processor computes a hundred times slower.
+const LEAST: f64 = 1e-50;
+
+/// The number itself, or zero where it is nothing. Real-time: bounded, no allocation.
+#[inline]
+pub(crate) fn or_zero(number: f64) -> f64 {
+    if number.abs() < LEAST { 0.0 } else { number }
+}
+
 /// Pose of the upper plate, lengths in free lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Plate {
@@ -38,9 +47,9 @@ impl Plate {
         }
         let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
         Some(Self {
-            displacement: pose.position_m / free_length_m,
-            lean: DVec2::new(q.x * q.z + q.w * q.y, q.y * q.z - q.w * q.x) / upright,
-            turn_rad: 2.0 * (sign * q.z).atan2(sign * q.w),
+            displacement: (pose.position_m / free_length_m).map(or_zero),
+            lean: (DVec2::new(q.x * q.z + q.w * q.y, q.y * q.z - q.w * q.x) / upright).map(or_zero),
+            turn_rad: or_zero(2.0 * (sign * q.z).atan2(sign * q.w)),
         })
     }
 
