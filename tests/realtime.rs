@@ -113,7 +113,7 @@ fn the_host_allocates_nothing_for_a_change_of_a_parameter() {
 #[test]
 fn the_spring_allocates_nothing_in_a_step() {
     let plugin = Plugin::in_process(&flotor_spring::FLOTOR_ENTRY).expect("the spring is a plugin");
-    let kinds: [&[(&str, &str)]; 8] = [
+    let kinds: [&[(&str, &str)]; 10] = [
         &[("variant", "energy")],
         &[("variant", "closed-form")],
         &[("variant", "current-length")],
@@ -122,6 +122,14 @@ fn the_spring_allocates_nothing_in_a_step() {
         &[("variant", "rod"), ("accuracy", "tight")],
         &[("variant", "rod"), ("seat", "free")],
         &[("variant", "energy"), ("seat", "free")],
+        &[("variant", "energy"), ("hand_over", "on"), ("preset", "thesis-3")],
+        &[
+            ("variant", "rod"),
+            ("coil_contact", "on"),
+            ("wire", "on"),
+            ("seat", "free"),
+            ("seat_friction", "0.1"),
+        ],
     ];
     for kind in kinds {
         let settings: Vec<_> = kind
