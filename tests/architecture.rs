@@ -224,6 +224,10 @@ const UNSAFE: &[(&str, &str)] = &[
         "host/python/src/rows.rs",
         "NumPy records that are the contract's structs: the layout promise, and arrays used where they lie",
     ),
+    (
+        "host/src/worker/memory.rs",
+        "memory that a model in a process of its own shares with the loop: a mapping",
+    ),
     ("tests/realtime.rs", "an allocator that counts, to see that a tick does not allocate"),
 ];
 

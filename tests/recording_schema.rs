@@ -100,6 +100,7 @@ fn record() -> TickRecord {
         commanded: wrench(),
         delivered: wrench(),
         energy_j: 99.5,
+        port_energy_j: 98.5,
         events: Events::from_bits(0b101),
         buttons: 0b10,
         lateness_ns: 1234,
@@ -205,6 +206,7 @@ fn expected_tick(record: &TickRecord) -> Vec<String> {
         format!("buttons = {}", record.buttons),
         format!("lateness_ns = {}", record.lateness_ns),
         format!("compute_ns = {}", record.compute_ns),
+        format!("port_energy_j = {:?}", record.port_energy_j),
     ]);
     lines
 }

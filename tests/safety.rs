@@ -1,14 +1,15 @@
 //! How a run ends when it must: every state of a run reached through real libraries, emergency stops from signal,
 //! button and device, and a watchdog that stops the device when a plugin does not come back.
 
-use flotor::servo::{Clock, EmergencySource};
+use flotor::servo::{Clock, EmergencySource, ModelHealth};
 use flotor::session::RunEnd;
 use flotor::trace::{Events, TickRecord};
 use flotor_hal::DVec3;
-use flotor_tests::library::plugin_file;
+use flotor_tests::library::{compile_c_file, plugin_file};
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
-use flotor_tests::watched::{watch, watch_on};
+use flotor_tests::watched::{Watched, watch, watch_on};
+use flotor_tests::{TestSize, workspace_root};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -200,7 +201,7 @@ fn a_model_that_comes_back_late_leaves_a_whole_report_and_the_run_is_over_all_th
 fn paced(rate_hz: u32, model: &str) -> String {
     format!(
         "rate_hz = {rate_hz}\nduration_s = 0.5\npacing = \"device\"\n[device]\nplugin = \"simulated\"\n\
-         [[model]]\nplugin = \"{}\"\n[model.parameters]\n{model}\n",
+         [[model]]\nplugin = \"{}\"\nbudget_us = 1e6\n[model.parameters]\n{model}\n",
         plugin_file("fixture-faulty-model").display()
     )
 }
@@ -237,4 +238,189 @@ fn a_device_that_cannot_pace_is_a_mismatch_before_anything_moves() {
     let ran = Flotor::with(["run".as_ref(), file.as_os_str()]).run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
     assert!(ran.error().contains("cannot set the pace"), "{ran:?}");
+}
+
+// ---------------------------------------------------------------- models that take too long
+
+#[test]
+fn a_model_that_overruns_its_budget_again_and_again_is_faded_out_and_named() {
+    let slow = scene("", "fault = \"overruns\"\nat_tick = 20", "[limits]\nramp_s = 0");
+    // 2 ms a step against 0.5 ms. The budget of a model is looked at on the virtual clock only if the scene asks.
+    let unwatched = watch(&slow);
+    assert_eq!(the_model(&unwatched).overrun, None);
+    let run = watch(&slow.replace("name = \"block\"", "name = \"block\"\nbudget_us = 500"));
+    assert_eq!(run.outcome.end, RunEnd::Finished, "the run goes on without it");
+    let overrun = the_model(&run).overrun.expect("it was too slow");
+    assert_eq!(overrun.limit_ns, 500_000);
+    assert!(overrun.longest_ns >= 2_000_000, "{overrun:?}");
+    assert!(
+        (20..=24).contains(&overrun.tick),
+        "five ticks in a row, one of which may have been the machine's"
+    );
+    let out = usize::try_from(overrun.tick).expect("a small number");
+    let forces: Vec<f64> = run.records.iter().map(height_of_force).collect();
+    assert_eq!(forces[out], HONEST_N);
+    assert!(forces[out..].is_sorted_by(|earlier, later| later <= earlier), "it fades");
+    assert!((forces[out + 25] - 0.5 * HONEST_N).abs() < 1.0e-12, "half of it after half of 50 ms");
+    assert_eq!(forces[out + 50..].iter().sum::<f64>(), 0.0, "and is out");
+}
+
+fn the_model(run: &Watched) -> ModelHealth {
+    let [(_, health, _)] = &run.outcome.models[..] else { panic!("one model") };
+    *health
+}
+
+// ---------------------------------------------------------------- models in a process of their own
+
+/// The scene with its model in a process of its own.
+fn apart(device: &str, model: &str, tables: &str) -> String {
+    scene(device, model, tables).replace("name = \"block\"", "name = \"block\"\nisolation = \"process\"")
+}
+
+#[test]
+fn a_model_in_a_process_of_its_own_answers_bit_for_bit_the_same() {
+    let [here, there] = [scene("", "", ""), apart("", "", "")].map(|scene| watch(&scene).records);
+    let answers = |records: &[TickRecord]| records.iter().map(|record| record.commanded).collect::<Vec<_>>();
+    assert_eq!(answers(&there), answers(&here));
+    assert_eq!(there.len(), 200);
+}
+
+#[test]
+fn a_model_that_ends_its_process_is_out_and_the_loop_goes_on() {
+    let run = watch(&apart("", "fault = \"aborts\"\nat_tick = 50", "[limits]\nramp_s = 0"));
+    assert_eq!((run.outcome.end, run.records.len()), (RunEnd::Finished, 200));
+    let [(name, health, words)] = &run.outcome.models[..] else { panic!("one model") };
+    let lost = health.lost_at.expect("it is gone");
+    assert!((50..=52).contains(&lost), "{lost}");
+    assert_eq!((name.as_str(), words.as_str()), ("block", "its process was ended by signal 6"));
+    assert_force_ends_within_two_ticks(&run, 50);
+}
+
+/// A null pointer: what no boundary can catch in the host's own process.
+#[test]
+fn a_model_that_crashes_its_process_is_out_and_the_loop_goes_on() {
+    let scratch = Scratch::default();
+    let library = scratch.path().join("libwall.so");
+    compile_c_file(&workspace_root().join("tests/c/wall.c"), &["CRASHES"], &library);
+    let honest = plugin_file("fixture-faulty-model").display().to_string();
+    let crashing = apart("", "", "[limits]\nramp_s = 0").replace(&honest, &library.display().to_string());
+    let run = watch(&crashing);
+    assert_eq!((run.outcome.end, run.records.len()), (RunEnd::Finished, 200));
+    let [(_, _, words)] = &run.outcome.models[..] else { panic!("one model") };
+    assert_eq!(words, "its process was ended by signal 11");
+    assert!(the_model(&run).lost_at.is_some());
+    assert_force_ends_within_two_ticks(&run, 50);
+}
+
+#[test]
+fn a_model_that_hangs_in_a_process_of_its_own_costs_two_ticks_of_force() {
+    // In real time: the loop waits half a period for it once, and not at all while it is behind.
+    let run = watch_on(Clock::Real, &apart("", "fault = \"hangs\"\nat_tick = 50", "[limits]\nramp_s = 0"));
+    assert_eq!(run.outcome.end, RunEnd::Finished);
+    assert!(the_model(&run).late_ticks > 50, "{:?}", the_model(&run));
+    assert_force_ends_within_two_ticks(&run, 50);
+    let waited = run.records.iter().filter(|record| record.tick > 52 && record.compute_ns > 400_000).count();
+    assert!(waited < run.records.len() / 10, "{waited} ticks took as long as the wait for an answer");
+}
+
+#[test]
+fn a_model_in_a_process_of_its_own_says_no_like_any_other() {
+    let scratch = Scratch::default();
+    for (fault, words) in [
+        ("refuses-to-create", "the table of forces is on another machine"),
+        ("panics-in-create", "create gave up"),
+    ] {
+        let file = scratch.file("scene.toml", apart("", &format!("fault = \"{fault}\""), ""));
+        let ran =
+            Flotor::with(["run".as_ref(), file.as_os_str(), "--clock".as_ref(), "virtual".as_ref()]).run();
+        assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:?}");
+        assert!(ran.error().contains(words), "{ran:?}");
+    }
+}
+
+/// The last force is held for one tick, then there is none: the device is safe two ticks after the model failed.
+fn assert_force_ends_within_two_ticks(run: &Watched, failed_at: u64) {
+    for record in &run.records {
+        if record.tick + 1 < failed_at && record.events.intersects(Events::MODEL_OVERRUN) {
+            continue; // a busy machine
+        }
+        match record.tick {
+            tick if tick < failed_at => assert!(height_of_force(record) > 0.0, "tick {tick}"),
+            tick if tick < failed_at + 2 => {}
+            tick => assert_eq!(record.commanded.force(), DVec3::ZERO, "tick {tick}"),
+        }
+    }
+}
+
+// ---------------------------------------------------------------- energy at the port
+
+/// The demo with a model that pumps: negative damping of 40 N s/m against a hand that has 5.
+fn pump(limits: &str) -> String {
+    format!(
+        "rate_hz = 1000\nduration_s = 3\n[device]\nplugin = \"simulated\"\n[[model]]\nplugin = \"{}\"\n\
+         [model.parameters]\nfault = \"pumps\"\n[limits]\nforce_n = 5\n{limits}\n",
+        plugin_file("fixture-faulty-model").display()
+    )
+}
+
+fn lowest_port_energy_j(run: &Watched) -> f64 {
+    run.records.iter().map(|record| record.port_energy_j).fold(0.0, f64::min)
+}
+
+#[test]
+fn a_model_that_creates_energy_is_seen_and_with_the_controller_gets_none_out() {
+    let watched = watch(&pump(""));
+    let lowest_j = lowest_port_energy_j(&watched);
+    assert!(lowest_j < -0.01, "it pumps: {lowest_j} J");
+    let guarded = watch(&pump("passivity = \"control\""));
+    assert_eq!(guarded.outcome.end, RunEnd::Finished);
+    let damped =
+        guarded.records.iter().filter(|record| record.events.intersects(Events::PASSIVITY_DAMPED)).count();
+    assert!(damped > 100, "{damped} ticks");
+    assert_eq!(lowest_port_energy_j(&guarded), 0.0, "never negative");
+}
+
+#[test]
+fn a_spring_that_is_too_stiff_for_its_rate_is_seen_and_kept_passive() {
+    // Twice the stiffest spring at 100 Hz: 2 (b + B) / T, with next to no damping in plant and hand.
+    let stiff = |limits: &str| {
+        let demo = flotor::scene::DEMO.replace("rate_hz = 1000", "rate_hz = 100");
+        watch(&format!("{}\n[limits]\n{limits}\n", demo.replace("force_scale = 1.0", "force_scale = 8.0")))
+    };
+    let free = lowest_port_energy_j(&stiff("ramp_s = 0"));
+    let guarded = lowest_port_energy_j(&stiff("ramp_s = 0\npassivity = \"control\""));
+    assert!(free < -1.0e-3, "sampling creates energy: {free} J");
+    assert_eq!(guarded, 0.0, "and none of it comes out");
+}
+
+// ---------------------------------------------------------------- wild models
+
+#[test]
+fn nothing_a_wild_model_answers_gets_past_a_limit_or_the_slew() {
+    let ticks = TestSize::of_this_run().pick(20_000, 1_000_000);
+    let limits = "[limits]\nforce_n = [4.0, 5.0, 6.0]\ntorque_nm = 0.5\nforce_slew_n_per_s = 3000.0\n\
+                  torque_slew_nm_per_s = 200.0\nramp_s = 0.1";
+    let wild = scene("", "fault = \"wild\"", limits)
+        .replace("duration_s = 0.2", &format!("duration_s = {}", ticks / 1000));
+    for tables in ["", "\npassivity = \"control\"\nvelocity_m_per_s = 0.1"] {
+        let run = watch(&format!("{wild}{tables}"));
+        assert_eq!((run.outcome.end, run.records.len()), (RunEnd::Finished, ticks));
+        let rejected = the_model(&run).rejected_ticks;
+        assert!(rejected > 100, "NaN and infinity are counted, by name: {rejected}");
+        // A few roundings of the largest number involved.
+        let slack = 1.0 + 8.0 * f64::EPSILON;
+        let (most_n, most_nm) = (DVec3::new(4.0, 5.0, 6.0), DVec3::splat(0.5));
+        let mut last = flotor_hal::Wrench::ZERO;
+        for record in &run.records {
+            let sent = record.commanded;
+            assert!(sent.is_finite(), "{record:?}");
+            assert!(sent.force().abs().cmple(most_n * slack).all(), "{record:?}");
+            assert!(sent.torque().abs().cmple(most_nm * slack).all(), "{record:?}");
+            assert!((sent.force() - last.force()).length() <= 3.0 * slack, "{last:?} {record:?}");
+            assert!((sent.torque() - last.torque()).length() <= 0.2 * slack, "{last:?} {record:?}");
+            last = sent;
+        }
+        assert!(run.records.iter().any(|record| record.events.intersects(Events::FORCE_LIMITED)));
+        assert!(run.records.iter().any(|record| record.events.intersects(Events::SLEW_LIMITED)));
+    }
 }

@@ -40,6 +40,8 @@ pub mod servo;
 pub mod session;
 pub mod stability;
 pub mod stress;
+pub mod timing_picture;
 pub mod validate;
+pub(crate) mod worker;
 
 pub use flotor_record::{self as record, mapping, trace};

@@ -5,8 +5,8 @@
 
 use crate::record::{Change, ChangeOutcome, ChangeSubject, ReadError, Recording, Role, RunDescription};
 use crate::registry::Registry;
-use crate::scene::{Location, ModelUse, ParameterText, PluginUse};
-use crate::servo::{Heartbeat, ModelHealth, ModelStack};
+use crate::scene::{Isolation, Location, ModelUse, ParameterText, PluginUse};
+use crate::servo::{Clock, Heartbeat, ModelHealth, ModelStack};
 use crate::session::{PluginReport, RunError, prepare_model};
 use crate::trace::{Events, TickRecord};
 use flotor_hal::{DeviceState, LoopConfig, Tick, Wrench};
@@ -78,7 +78,7 @@ impl Replay {
         let mut slots = Vec::new();
         let mut plugins = Vec::new();
         for model in &uses {
-            let (slot, report) = prepare_model(registry, model, &config)?;
+            let (slot, report) = prepare_model(registry, model, &config, Clock::Virtual)?;
             slots.push(slot);
             plugins.push(report);
         }
@@ -209,6 +209,8 @@ fn models_of(path: &Path, run: &RunDescription) -> Vec<ModelUse> {
             mapping,
             places_m: plugin.places_m.clone(),
             blend: plugin.blend,
+            isolation: Isolation::None, // nobody is held by a replay
+            budget_s: None,
         }),
     };
     run.plugins.iter().filter_map(model).collect()

@@ -1,6 +1,6 @@
 //! What a run says about itself: numbers for machines, a page for people.
 
-use crate::servo::{Percentiles, Stage, Timing};
+use crate::servo::{ModelHealth, Overrun, Percentiles, Stage, Timing};
 use crate::session::{Observer, Outcome, PluginReport, RunEnd};
 use crate::trace::{Events, TickRecord};
 use flotor_hal::DVec3;
@@ -15,6 +15,7 @@ pub struct Tally {
     last: Option<(TickRecord, f64)>,
     work_j: f64,
     generated_peak_j: f64,
+    port_lowest_j: f64,
 }
 
 impl Observer for Tally {
@@ -37,6 +38,7 @@ impl Observer for Tally {
         };
         let generated_j = self.work_j - (first_energy_j - record.energy_j);
         self.generated_peak_j = self.generated_peak_j.max(generated_j);
+        self.port_lowest_j = self.port_lowest_j.min(record.port_energy_j);
         self.last = Some((*record, first_energy_j));
     }
 }
@@ -108,6 +110,10 @@ pub struct EnergySummary {
     pub device_peak_j: Option<f64>,
     /// Largest energy the sampled loop has put out beyond what the models had stored, J: a hold leaks.
     pub loop_generated_j: f64,
+    /// Lowest energy at the device's port, J: how much more has come out at some time than had ever gone in.
+    pub port_lowest_j: f64,
+    /// Energy at the port at the end, J: what the hand has put in altogether.
+    pub port_end_j: f64,
 }
 
 /// A plugin of a run.
@@ -191,6 +197,8 @@ impl RunSummary {
                 }),
                 device_peak_j: outcome.ledger.map(|ledger| ledger.peak_j),
                 loop_generated_j: tally.generated_peak_j,
+                port_lowest_j: tally.port_lowest_j,
+                port_end_j: tally.last.as_ref().map_or(0.0, |(record, _)| record.port_energy_j),
             },
             events: events.filter(|(_, count)| *count > 0).collect(),
             trace_digest: facts.trace_digest,
@@ -223,6 +231,11 @@ impl RunSummary {
             lines.push(format!("  {:<11}{}", "lateness", percentiles(&self.lateness_ns)));
         }
         lines.push(format!("  {:<11}{}", "compute", percentiles(&self.compute_ns)));
+        let StageSummary { read, models, envelope, write } = &self.stages_ns;
+        let (read, models, envelope, write) =
+            (duration(read.p50), duration(models.p50), duration(envelope.p50), duration(write.p50));
+        let medians = format!("read {read}   models {models}   envelope {envelope}   write {write}");
+        lines.push(format!("  {:<11}{medians}", "of which"));
         let peaks = format!("{:.3} N   {:.4} N·m", self.peak_force_n, self.peak_torque_nm);
         lines.push(format!("  {:<11}{peaks}", "peak"));
         if let (Some(residual), Some(peak_j)) =
@@ -231,10 +244,20 @@ impl RunSummary {
             let account = format!("peak {:.3} mJ, balanced to {:.1e} of it", peak_j * 1.0e3, residual.abs());
             lines.push(format!("  {:<11}{account}", "energy"));
         }
+        let [lowest_mj, end_mj] =
+            [self.energy.port_lowest_j, self.energy.port_end_j].map(|joule| joule * 1.0e3);
+        lines.push(format!("  {:<11}{end_mj:+.3} mJ at the end, {lowest_mj:+.3} mJ at the lowest", "port"));
         if !self.events.is_empty() {
             let events: Vec<String> =
                 self.events.iter().map(|(name, count)| format!("{name} {count}")).collect();
             lines.push(format!("  {:<11}{}", "events", events.join("   ")));
+        }
+        if self.dropped_records > 0 {
+            let dropped = format!(
+                "{} records that an observer was too slow for; the loop did not wait",
+                self.dropped_records
+            );
+            lines.push(format!("  {:<11}{dropped}", "dropped"));
         }
         for plugin in &self.plugins {
             let health = if plugin.health == "ok" { String::new() } else { format!("  {}", plugin.health) };
@@ -248,17 +271,38 @@ impl RunSummary {
     }
 }
 
+/// What has happened to a model; "ok" if nothing.
+fn health_words(health: &ModelHealth, words: &str) -> String {
+    #[allow(clippy::cast_precision_loss)] // for people
+    let us = |ns: u64| ns as f64 * 1.0e-3;
+    if let Some(tick) = health.panicked_at {
+        return format!("panicked at tick {tick}, no force since: {words}");
+    }
+    if let Some(tick) = health.lost_at {
+        return format!("was lost at tick {tick}, no force since: {words}");
+    }
+    if let Some(Overrun { tick, longest_ns, limit_ns }) = health.overrun {
+        let (longest_us, limit_us) = (us(longest_ns), us(limit_ns));
+        return format!(
+            "took up to {longest_us:.0} µs a step, more than its {limit_us:.0} µs, and was faded out at tick {tick}"
+        );
+    }
+    if let Some(tick) = health.first_late {
+        return format!("gave no answer in time in {} ticks, the first at tick {tick}", health.late_ticks);
+    }
+    health.first_rejected.map_or_else(
+        || "ok".to_owned(),
+        |tick| {
+            let count = health.rejected_ticks;
+            format!("{count} answers were not finite, the first at tick {tick}; each counted as no force")
+        },
+    )
+}
+
 fn plugin_summary(plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
     let model = outcome.models.iter().find(|(name, ..)| *name == plugin.name && plugin.name != "device");
     let health = match model {
-        Some((_, health, words)) => match (health.panicked_at, health.first_rejected) {
-            (Some(tick), _) => format!("panicked at tick {tick}, no force since: {words}"),
-            (None, Some(tick)) => format!(
-                "{} answers were not finite, the first at tick {tick}; each counted as no force",
-                health.rejected_ticks
-            ),
-            (None, None) => "ok".to_owned(),
-        },
+        Some((_, health, words)) => health_words(health, words),
         None => "ok".to_owned(),
     };
     PluginSummary {
@@ -273,12 +317,15 @@ fn plugin_summary(plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
 }
 
 fn percentiles(p: &Percentiles) -> String {
-    let show = |ns: u64| match ns {
+    let [p50, p99, p999, max] = [p.p50, p.p99, p.p999, p.max].map(duration);
+    format!("p50 {p50}   p99 {p99}   p99.9 {p999}   max {max}")
+}
+
+#[allow(clippy::cast_precision_loss)] // for people
+fn duration(ns: u64) -> String {
+    match ns {
         0..1_000 => format!("{ns} ns"),
-        #[allow(clippy::cast_precision_loss)] // for people
         1_000..1_000_000 => format!("{:.1} µs", ns as f64 * 1.0e-3),
-        #[allow(clippy::cast_precision_loss)]
         _ => format!("{:.2} ms", ns as f64 * 1.0e-6),
-    };
-    format!("p50 {}   p99 {}   p99.9 {}   max {}", show(p.p50), show(p.p99), show(p.p999), show(p.max))
+    }
 }

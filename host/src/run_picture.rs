@@ -1,7 +1,9 @@
-//! A run as a picture: where the handle was, what it felt, what was stored, how time was kept.
+//! A run as a picture: where the handle was, what it felt, what was stored and, in real time, how time was kept.
 
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
+use crate::servo::Timing;
 use crate::session::Observer;
+use crate::timing_picture::panels;
 use crate::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, rotation_vector};
 
@@ -20,7 +22,7 @@ impl RunPicture {
 
     /// Draws what was collected. Not real-time.
     #[must_use]
-    pub fn to_svg(&self, subtitle: &str) -> String {
+    pub fn to_svg(&self, subtitle: &str, timing: &Timing) -> String {
         let mut figure = Figure::new(self.title.clone(), Axis::linear("Time", "s")).subtitle(subtitle);
         figure = figure
             .panel(self.axes("Position", "mm", 1.0e3, |record| record.pose.position()))
@@ -33,7 +35,7 @@ impl RunPicture {
         if self.records.iter().any(|record| record.lateness_ns > 0) {
             #[allow(clippy::cast_precision_loss)] // for people
             let lateness = self.single("Lateness", "µs", |record| record.lateness_ns as f64 * 1.0e-3);
-            figure = figure.panel(lateness);
+            figure = panels(timing).into_iter().fold(figure.panel(lateness), Figure::panel);
         }
         figure.to_svg()
     }

@@ -1,7 +1,7 @@
 /* A force model in C: a wall that pushes the hand up where it is below home. All a plugin needs is the header.
  *
  * WITHOUT_STEP, WITHOUT_TABLE, OTHER_SIZES, HIDDEN_ENTRY and ODD_ANSWERS make the mistakes a C author can make;
- * the tests expect each to be refused. */
+ * the tests expect each to be refused. CRASHES follows a null pointer from tick 50 on. */
 #include "flotor.h"
 #include <math.h>
 #include <stdlib.h>
@@ -50,6 +50,11 @@ static uint32_t step(FlotorInstance instance, const FlotorInput *input, FlotorOu
             return FlotorCallStatus_Ok;
         }
     }
+#ifdef CRASHES
+    if (input->tick >= 50) {
+        *(volatile int *)NULL = 1;
+    }
+#endif
     double depth_m = fmax(-pose->position_m[2], 0.0);
     output->wrench.force_n[2] = wall->stiffness_n_per_m * fmin(depth_m, 1.0);
 #ifdef ODD_ANSWERS

@@ -78,6 +78,21 @@ impl Flotor {
         self
     }
 
+    /// Runs it through `sh`: `script` gets the program and its arguments as `"$@"`.
+    #[must_use]
+    pub fn through_shell(mut self, script: &str) -> Self {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", script, "sh"]).arg(self.command.get_program()).args(self.command.get_args());
+        for (name, value) in self.command.get_envs() {
+            match value {
+                Some(value) => shell.env(name, value),
+                None => shell.env_remove(name),
+            };
+        }
+        self.command = shell;
+        self
+    }
+
     /// Text for standard input.
     #[must_use]
     pub fn reading(mut self, input: impl Into<String>) -> Self {

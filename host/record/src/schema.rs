@@ -172,6 +172,8 @@ pub(crate) struct Tick {
     lateness_ns: u64,
     #[prost(uint64, tag = "12")]
     compute_ns: u64,
+    #[prost(double, optional, tag = "13")]
+    port_energy_j: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
@@ -371,6 +373,7 @@ impl Tick {
             commanded: Some(Wrench::new(&record.commanded)),
             delivered: Some(Wrench::new(&record.delivered)),
             energy_j: Some(record.energy_j),
+            port_energy_j: Some(record.port_energy_j),
             events: record.events.bits(),
             buttons: record.buttons,
             lateness_ns: record.lateness_ns,
@@ -390,6 +393,7 @@ impl Tick {
             commanded: self.commanded.ok_or(Missing("commanded"))?.value()?,
             delivered: self.delivered.ok_or(Missing("delivered"))?.value()?,
             energy_j: self.energy_j(),
+            port_energy_j: self.port_energy_j(),
             events: Events::from_bits(self.events),
             buttons: self.buttons,
             lateness_ns: self.lateness_ns,

@@ -46,9 +46,13 @@ impl Events {
     pub const VELOCITY_LIMITED: Events = Events { bits: 1 << 15 };
     /// A parameter of a plugin was changed before this tick, or was to be.
     pub const PARAMETER_CHANGED: Events = Events { bits: 1 << 16 };
+    /// Energy would have come out that had not gone in, and was kept back.
+    pub const PASSIVITY_DAMPED: Events = Events { bits: 1 << 17 };
+    /// A model took longer than its budget.
+    pub const MODEL_OVERRUN: Events = Events { bits: 1 << 18 };
 
     /// Names of the bits, lowest first: for reports and recordings.
-    pub const NAMES: [&'static str; 17] = [
+    pub const NAMES: [&'static str; 19] = [
         "stale_sample",
         "not_finite",
         "force_limited",
@@ -66,6 +70,8 @@ impl Events {
         "emergency_stop",
         "velocity_limited",
         "parameter_changed",
+        "passivity_damped",
+        "model_overrun",
     ];
 
     /// Adds events. Real-time: bounded, no allocation.
@@ -117,6 +123,8 @@ pub struct TickRecord {
     pub delivered: Wrench,
     /// Energy stored in the models, scaled to the device, J.
     pub energy_j: f64,
+    /// Energy the hand has put into the device's port so far less what has come out, J.
+    pub port_energy_j: f64,
     /// What happened.
     pub events: Events,
     /// Buttons of the device.
@@ -128,7 +136,7 @@ pub struct TickRecord {
 }
 
 /// 64-bit words of a record; the last [`TIMING_WORDS`] depend on the machine and are left out of digests.
-pub const RECORD_WORDS: usize = 38;
+pub const RECORD_WORDS: usize = 39;
 /// Words at the end of a record that hold measured times.
 pub const TIMING_WORDS: usize = 2;
 
@@ -154,6 +162,7 @@ impl Words<RECORD_WORDS> for TickRecord {
             wrench.torque_nm.iter().for_each(|v| put(v.to_bits()));
         }
         put(self.energy_j.to_bits());
+        put(self.port_energy_j.to_bits());
         put(u64::from(self.events.bits) | u64::from(self.buttons) << 32);
         put(self.lateness_ns);
         put(self.compute_ns);
@@ -173,7 +182,7 @@ impl Words<RECORD_WORDS> for TickRecord {
         let twist = Twist { linear_m_per_s: three(), angular_rad_per_s: three() };
         let mut wrench = || Wrench { force_n: three(), torque_nm: three() };
         let (model, commanded, delivered) = (wrench(), wrench(), wrench());
-        let energy_j = number();
+        let (energy_j, port_energy_j) = (number(), number());
         let flags = word();
         #[allow(clippy::cast_possible_truncation)] // two halves of one word
         let (events, buttons) = (Events::from_bits(flags as u32), (flags >> 32) as u32);
@@ -189,6 +198,7 @@ impl Words<RECORD_WORDS> for TickRecord {
             commanded,
             delivered,
             energy_j,
+            port_energy_j,
             events,
             buttons,
             lateness_ns,

@@ -50,7 +50,7 @@ impl Diagnosis {
 }
 
 pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
-    let mut diagnoses = vec![cores(), kernel(), governor()];
+    let mut diagnoses = vec![cores(), isolated_cores(), kernel(), throttling(), governor()];
     diagnoses.extend(privileges(&probe_real_time()));
     diagnoses.push(plugins());
     if arguments.json {
@@ -82,6 +82,37 @@ fn cores() -> Diagnosis {
             "the loop shares its core with everything else; give the machine two",
         ),
         _ => Diagnosis::good("cores", cores.to_string()),
+    }
+}
+
+fn isolated_cores() -> Diagnosis {
+    let list = read_to_string("/sys/devices/system/cpu/isolated").unwrap_or_default();
+    match list.trim() {
+        "" => Diagnosis::note(
+            "isolated cores",
+            "none",
+            "where other work competes, boot with `isolcpus=N nohz_full=N` and start with `taskset -c N flotor run`",
+        ),
+        cores => Diagnosis::good("isolated cores", cores),
+    }
+}
+
+/// Share of a core that real-time threads may take together.
+fn throttling() -> Diagnosis {
+    let number = |file: &str| read_to_string(file).ok()?.trim().parse::<f64>().ok();
+    let [runtime, period] =
+        ["sched_rt_runtime_us", "sched_rt_period_us"].map(|name| number(&format!("/proc/sys/kernel/{name}")));
+    match (runtime, period) {
+        (Some(runtime), _) if runtime < 0.0 => Diagnosis::good("RT throttling", "off"),
+        (Some(runtime), Some(period)) if runtime >= 0.9 * period => {
+            Diagnosis::good("RT throttling", format!("at {:.0} % of a core", runtime / period * 100.0))
+        }
+        (Some(runtime), Some(period)) => Diagnosis::note(
+            "RT throttling",
+            format!("at {:.0} % of a core", runtime / period * 100.0),
+            "fast rates are cut off there: `sysctl kernel.sched_rt_runtime_us=950000`",
+        ),
+        _ => Diagnosis::good("RT throttling", "not known here"),
     }
 }
 

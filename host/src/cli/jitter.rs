@@ -4,11 +4,12 @@ use super::options::{duration_s, rate_hz};
 use super::stopping::stop_on_signals;
 use super::{CommandError, run, style};
 use crate::jitter::{JitterReport, LoopTiming, measure};
-use crate::plot::{Axis, Bin, Figure, Panel, Series};
+use crate::plot::{Axis, Figure, Panel, Series};
 use crate::registry::Registry;
 use crate::scene::Scene;
 use crate::servo::Clock;
 use crate::session::{RunError, RunOptions, Session};
+use crate::timing_picture::octaves;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -93,32 +94,4 @@ fn picture(report: &JitterReport) -> String {
         .panel_height_px(260.0)
         .panel(panel)
         .to_svg()
-}
-
-/// Bins of a quarter octave from 10 ns up: what is less late than that is on time.
-fn octaves(bins: &[(u64, u64)]) -> Vec<Bin> {
-    const FIRST_US: f64 = 0.01;
-    const STEP: f64 = 1.189_207_115_002_721; // 2^(1/4)
-    let mut heights = Vec::new();
-    for (ns, count) in bins {
-        #[allow(clippy::cast_precision_loss)] // for a picture
-        let us = *ns as f64 * 1.0e-3;
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most some two hundred bins
-        let index = (4.0 * (us / FIRST_US).max(1.0).log2()).floor() as usize;
-        if heights.len() <= index {
-            heights.resize(index + 1, 0.0);
-        }
-        if let Some(height) = heights.get_mut(index) {
-            #[allow(clippy::cast_precision_loss)] // for a picture
-            let count = *count as f64;
-            *height += count;
-        }
-    }
-    let mut from = FIRST_US;
-    let bin = |height| {
-        let bin = Bin { from, to: from * STEP, height };
-        from *= STEP;
-        bin
-    };
-    heights.into_iter().map(bin).collect()
 }

@@ -87,6 +87,9 @@ enum Command {
     Emulate(emulate::EmulateArguments),
     /// Look at this machine: what a real-time loop may hope for, and how to improve it
     Doctor(doctor::DoctorArguments),
+    /// A process that holds one force model, started by `run` for `isolation = "process"`
+    #[command(hide = true)]
+    Worker(crate::worker::WorkerArguments),
     /// Print a completion script for a shell
     Completions {
         /// The shell
@@ -212,10 +215,12 @@ fn refusal_code(error: &LoadError) -> u8 {
     }
 }
 
-/// Names of the commands, in the order of the help. Not real-time.
+/// Names of the commands that the help lists, in its order. Not real-time.
 #[must_use]
 pub fn command_names() -> Vec<String> {
-    Arguments::command().get_subcommands().map(|command| command.get_name().to_owned()).collect()
+    let arguments = Arguments::command();
+    let listed = arguments.get_subcommands().filter(|command| !command.is_hide_set());
+    listed.map(|command| command.get_name().to_owned()).collect()
 }
 
 /// Runs the command of this process.
@@ -241,6 +246,9 @@ pub fn main() -> ExitCode {
         Some(Command::Calibrate(arguments)) => calibrate::run(&arguments),
         Some(Command::Emulate(arguments)) => emulate::run(&arguments),
         Some(Command::Doctor(arguments)) => doctor::run(&arguments),
+        Some(Command::Worker(arguments)) => crate::worker::serve(&arguments).map_err(|error| {
+            CommandError::Usage(format!("`flotor worker` is started by `flotor run`: {error}"))
+        }),
         Some(Command::Completions { shell }) => {
             clap_complete::generate(shell, &mut Arguments::command(), "flotor", &mut std::io::stdout());
             Ok(())

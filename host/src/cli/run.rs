@@ -98,7 +98,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
 
     // Files last, so that a full disk costs the file and not the report.
     if let (Some(path), Some(plot)) = (&arguments.plot, plot) {
-        std::fs::write(path, plot.to_svg(&summary.one_line()))
+        std::fs::write(path, plot.to_svg(&summary.one_line(), &outcome.timing))
             .map_err(|cause| CommandError::file(path, "cannot write the plot", cause))?;
     }
     match (recorder, failure) {

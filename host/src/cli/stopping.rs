@@ -4,9 +4,10 @@ use super::style;
 use crate::servo::StopSwitch;
 use rustix::process::getpgrp;
 use rustix::termios::{LocalModes, OptionalActions, Termios, isatty, tcgetattr, tcgetpgrp, tcsetattr};
-use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
+use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1, SIGXFSZ};
 use signal_hook::flag;
 use std::io::{Read, stdin};
+use std::sync::Arc;
 
 /// Exit code after a second Ctrl-C, when an orderly end takes too long: 128 + SIGINT, as shells have it.
 const INTERRUPTED: i32 = 130;
@@ -17,7 +18,9 @@ pub(super) fn stop_on_signals() -> StopSwitch {
     let registered = flag::register_conditional_shutdown(SIGINT, INTERRUPTED, stop.stop_flag())
         .and_then(|_| flag::register(SIGINT, stop.stop_flag()))
         .and_then(|_| flag::register(SIGTERM, stop.stop_flag()))
-        .and_then(|_| flag::register(SIGUSR1, stop.emergency_flag()));
+        .and_then(|_| flag::register(SIGUSR1, stop.emergency_flag()))
+        // Else a file that may not grow any further would end the process, not the recording.
+        .and_then(|_| flag::register(SIGXFSZ, Arc::default()));
     if let Err(error) = registered {
         eprintln!("{} signals will not end the run in order: {error}", style::warning("note:"));
     }

@@ -80,6 +80,30 @@ pub struct ModelUse {
     pub places_m: Vec<[f64; 3]>,
     /// How it is mixed with the other models.
     pub blend: Blend,
+    /// Where it runs.
+    pub isolation: Isolation,
+    /// Longest time a step may take, s; `None`: half a period in real time, anything on the virtual clock.
+    pub budget_s: Option<f64>,
+}
+
+/// What stands between a model and the host.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Isolation {
+    /// Nothing: the model runs in the loop's own thread.
+    #[default]
+    None,
+    /// A process of its own, which may hang or crash.
+    Process,
+}
+
+/// What is done about energy that comes out of a port without having gone in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PassivityMode {
+    /// It is measured.
+    #[default]
+    Observe,
+    /// It is measured and kept from coming out.
+    Control,
 }
 
 /// What a scene allows; the device's declaration applies too, whichever is tighter.
@@ -103,6 +127,8 @@ pub struct Limits {
     pub watchdog_s: f64,
     /// Buttons of the device that are emergency stops, one bit each.
     pub emergency_buttons: u32,
+    /// What is done about energy that comes out of the port without having gone in.
+    pub passivity: PassivityMode,
 }
 
 impl Default for Limits {
@@ -120,6 +146,7 @@ impl Default for Limits {
             // milliseconds, and a hand that holds a force for a tenth of a second has not gone far.
             watchdog_s: 0.1,
             emergency_buttons: 0,
+            passivity: PassivityMode::Observe,
         }
     }
 }
@@ -230,9 +257,19 @@ fn model(mut section: Section<'_>) -> Result<ModelUse, SceneError> {
         None => (MappingConfig::default(), vec![[0.0; 3]]),
     };
     let blend = section.section("blend")?.map_or_else(|| Ok(Blend::default()), blend)?;
+    let isolation = section.take("isolation").map(isolation).transpose()?.unwrap_or_default();
+    let budget_us = section.number("budget_us", 1.0..=1.0e6)?;
     section.finish()?;
     let name = name.unwrap_or_else(|| plugin.plugin.clone());
-    Ok(ModelUse { name, plugin, mapping, places_m, blend })
+    Ok(ModelUse {
+        name,
+        plugin,
+        mapping,
+        places_m,
+        blend,
+        isolation,
+        budget_s: budget_us.map(|microseconds| microseconds * 1.0e-6),
+    })
 }
 
 fn blend(mut section: Section<'_>) -> Result<Blend, SceneError> {
@@ -310,9 +347,18 @@ fn limits(mut section: Section<'_>) -> Result<Limits, SceneError> {
             .map(|value| value.number(0.0..=31.0))
             .transpose()?
             .map_or(default.emergency_buttons, button_mask),
+        passivity: section.take("passivity").map(passivity).transpose()?.unwrap_or(default.passivity),
     };
     section.finish()?;
     Ok(limits)
+}
+
+fn isolation(value: Value<'_>) -> Result<Isolation, SceneError> {
+    value.one_of(&[("none", Isolation::None), ("process", Isolation::Process)])
+}
+
+fn passivity(value: Value<'_>) -> Result<PassivityMode, SceneError> {
+    value.one_of(&[("observe", PassivityMode::Observe), ("control", PassivityMode::Control)])
 }
 
 /// The bit of a button that is counted from 0.

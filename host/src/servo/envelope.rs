@@ -1,11 +1,13 @@
 //! The envelope: what stands between models and device, and what nothing gets past.
 //!
 //! Order: guard (a number that is not finite becomes zero) -> gate (the start-up ramp and the other
-//! [states of the run](super::state)) -> velocity limit -> boundary wall -> force and torque limits -> slew limit.
+//! [states of the run](super::state)) -> velocity limit -> boundary wall -> [passivity](super::passivity) -> force
+//! and torque limits -> slew limit.
 //! The slew limit is last, so that no fault upstream, not even a model that
 //! vanishes, makes the force jump; the limits hold after it too, because the limited region is convex and the
 //! slew limit only moves along the line from the last wrench, which was inside, to the new one, which is.
 
+use super::passivity::Passivity;
 use super::state::Gate;
 use crate::scene::{Boundary, Limits};
 use crate::trace::Events;
@@ -22,6 +24,7 @@ pub struct Envelope {
     boundary: Boundary,
     wall_m: DVec3,
     wall_rad: DVec3,
+    passivity: Passivity,
     period_ns: u64,
     last: Wrench,
 }
@@ -29,6 +32,7 @@ pub struct Envelope {
 impl Envelope {
     /// Combines what the scene allows with what the device declares; the tighter wins. Not real-time.
     #[must_use]
+    #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
     pub fn new(limits: &Limits, boundary: &Boundary, device: &Capabilities, period_ns: u64) -> Self {
         let tighter =
             |scene: [f64; 3], device: [f64; 3]| DVec3::from_array(scene).min(DVec3::from_array(device));
@@ -43,6 +47,12 @@ impl Envelope {
             boundary: *boundary,
             wall_m: inside(device.range_m, boundary.margin_m),
             wall_rad: inside(device.range_rad, boundary.margin_rad),
+            // Damping the device is known to stand: that of its boundary.
+            passivity: Passivity::new(
+                limits.passivity,
+                [boundary.damping_ns_per_m, boundary.damping_nms_per_rad],
+                period_ns as f64 * 1.0e-9,
+            ),
             period_ns,
             last: Wrench::ZERO,
         }
@@ -58,6 +68,7 @@ impl Envelope {
         tick: &Tick,
         events: &mut Events,
     ) -> Wrench {
+        self.passivity.observe(state, &self.last);
         let guarded = if request.is_finite() {
             *request
         } else {
@@ -67,10 +78,25 @@ impl Envelope {
         let gated = guarded * gate.models;
         let driven = self.limit_speed(&gated, state, events);
         let walled = driven + self.wall(state, events) * gate.boundary;
-        let limited = self.limit(&walled, events);
+        let passive = match self.passivity.guard(&walled, state) {
+            None => walled,
+            Some(less) => {
+                events.insert(Events::PASSIVITY_DAMPED);
+                less
+            }
+        };
+        let limited = self.limit(&passive, events);
         let safe = self.slew(&limited, tick, events);
         self.last = safe;
         safe
+    }
+
+    /// Energy the hand has put into the device's port so far less what has come out, J; negative: the loop has created
+    /// energy. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn port_energy_j(&self) -> f64 {
+        self.passivity.energy_j()
     }
 
     /// Above the velocity limit fades out what drives the handle on, gone at twice the limit; what brakes it passes.

@@ -3,18 +3,24 @@
 //! Nothing in a tick allocates, locks, formats or waits on another thread. What a tick leaves behind is a
 //! [`TickRecord`]; whoever watches gets it through a ring, off the loop.
 
+mod budget;
 mod clock;
+mod engine;
 mod envelope;
 mod models;
 mod parameters;
+mod passivity;
 mod realtime;
 mod state;
 mod stop;
 mod timing;
 mod watchdog;
 
+pub use budget::Overrun;
+pub(crate) use budget::TimeBudget;
 pub use clock::{Clock, SpinWindow};
 pub(crate) use clock::{Due, Schedule, monotonic_ns, sleep_until};
+pub(crate) use engine::Engine;
 pub use envelope::Envelope;
 pub use models::ModelHealth;
 pub(crate) use models::{Layer, ModelStack};
@@ -22,7 +28,7 @@ pub(crate) use parameters::{
     ChangeReport, ChangeSender, ParameterChange, ParameterQueue, ReportReceiver, ScheduledChange, WEIGHT,
 };
 pub use realtime::{Privilege, RealTimeReport};
-pub(crate) use realtime::{enter_real_time, probe_real_time};
+pub(crate) use realtime::{enter_real_time, enter_worker_priority, probe_real_time};
 pub use state::{Cause, EmergencySource, Gate, RunEvent, RunState};
 pub use stop::StopSwitch;
 pub use timing::{Durations, Percentiles, Stage, Timing};
@@ -126,6 +132,7 @@ impl Servo {
             commanded,
             delivered: self.state.delivered,
             energy_j,
+            port_energy_j: self.envelope.port_energy_j(),
             events,
             buttons: self.state.buttons,
             lateness_ns: *lateness_ns,

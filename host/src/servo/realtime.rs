@@ -8,6 +8,8 @@ use thread_priority::{ThreadPriority, ThreadPriorityValue};
 
 /// Priority of the loop: below the kernel's own threads (99), above everything ordinary.
 const LOOP_PRIORITY: u8 = 80;
+/// Priority of a model in a process of its own: below the loop, which waits for it but not for ever.
+const WORKER_PRIORITY: u8 = 79;
 /// Priority of the watchdog: above the loop, which it has to interrupt.
 pub(super) const WATCHDOG_PRIORITY: u8 = 81;
 
@@ -71,6 +73,12 @@ impl RealTimeReport {
 pub(crate) fn enter_real_time() -> RealTimeReport {
     let memory_lock = Privilege::of(mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE));
     RealTimeReport { fifo: enter_priority(LOOP_PRIORITY), memory_lock }
+}
+
+/// Asks for the priority of a worker for the calling thread. Not real-time; without it the worker is only slower.
+pub(crate) fn enter_worker_priority() {
+    let _ = mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE);
+    let _ = enter_priority(WORKER_PRIORITY);
 }
 
 /// Asks for a real-time priority for the calling thread. Not real-time.

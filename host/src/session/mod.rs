@@ -190,7 +190,7 @@ impl Session {
 
         let mut models = Vec::new();
         for model in &scene.models {
-            let (slot, report) = prepare_model(registry, model, &config)?;
+            let (slot, report) = prepare_model(registry, model, &config, options.clock)?;
             models.push(slot);
             plugins.push(report);
         }

@@ -4,8 +4,9 @@ use super::controls::{NewValue, Parts};
 use super::{PluginReport, RunError};
 use crate::mapping::Mapping;
 use crate::registry::{LookupError, Registry};
-use crate::scene::{ChangeUse, ChangeWhat, ModelUse, ParameterText, PluginUse, Scene, SceneError};
-use crate::servo::{Layer, ScheduledChange};
+use crate::scene::{ChangeUse, ChangeWhat, Isolation, ModelUse, ParameterText, PluginUse, Scene, SceneError};
+use crate::servo::{Clock, Engine, Layer, ScheduledChange, TimeBudget};
+use crate::worker::{Worker, WorkerOrder};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, Setting};
 use flotor_hal::{Capabilities, LoopConfig, Pacing, Parameter, ParameterKind, Refusal};
@@ -31,24 +32,61 @@ pub(crate) fn prepare_model(
     registry: &Registry,
     model: &ModelUse,
     config: &LoopConfig,
+    clock: Clock,
 ) -> Result<(Layer, PluginReport), RunError> {
     let plugin = load(registry, &model.plugin, PluginKind::Model)?;
     let settings = settings(&plugin, &model.name, &model.plugin.parameters)?;
+    let budget_ns = budget_ns(model, clock, config.period_ns);
     let mapping = Mapping::new(&model.mapping);
     let instance = |place_m: &[f64; 3]| {
-        let mut instance = plugin.create_model(&settings)?;
-        instance.prepare(config).map_err(|refusal| refused(&plugin, refusal))?;
-        Ok((instance, mapping.at(*place_m)))
+        let engine = match model.isolation {
+            Isolation::None => {
+                let mut instance = plugin.create_model(&settings)?;
+                instance.prepare(config).map_err(|refusal| refused(&plugin, refusal))?;
+                Engine::Here(instance)
+            }
+            Isolation::Process => {
+                let keys = model.plugin.parameters.iter().map(|parameter| parameter.key.clone());
+                let values = settings.iter().map(|setting| setting.display(plugin.parameters()));
+                let order = WorkerOrder {
+                    plugin: &plugin.metadata().path,
+                    sets: keys.zip(values).collect(),
+                    config: *config,
+                    patience_ns: budget_ns.unwrap_or(PATIENCE_NS),
+                };
+                Engine::Apart(Worker::start(&order).map_err(|refusal| refused(&plugin, refusal))?)
+            }
+        };
+        Ok((engine, mapping.at(*place_m)))
     };
     let mut instances = model.places_m.iter().map(instance).collect::<Result<Vec<_>, RunError>>()?;
     let mut value = |index| instances.first_mut().map_or(f64::NAN, |(first, _)| first.parameter(index));
+    let budget = match model.isolation {
+        Isolation::None => TimeBudget::new(budget_ns),
+        Isolation::Process => TimeBudget::default(), // nobody waits for it any longer than that
+    };
     let report = PluginReport {
         name: model.name.clone(),
         metadata: plugin.metadata().clone(),
         schema: plugin.parameters(),
         parameters: in_force(&plugin, &settings, &mut value),
     };
-    Ok((Layer::new(instances, &model.blend), report))
+    Ok((Layer::new(instances, &model.blend, budget), report))
+}
+
+/// How long a run on the virtual clock waits for a model in a process of its own before it counts as hung, ns.
+const PATIENCE_NS: u64 = 2_000_000_000;
+
+/// Longest time a step of a model may take, ns. On the virtual clock only if the scene says so: what a clock on the
+/// wall says would make two runs differ.
+fn budget_ns(model: &ModelUse, clock: Clock, period_ns: u64) -> Option<u64> {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked: at most a second
+    let told_ns = model.budget_s.map(|seconds| (seconds * 1.0e9).round() as u64);
+    let usual_ns = match clock {
+        Clock::Real => Some(period_ns / 2),
+        Clock::Virtual => None,
+    };
+    told_ns.or(usual_ns)
 }
 
 /// Checks what was written against what the plugin understands; complaints name file and line.

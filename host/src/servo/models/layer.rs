@@ -3,9 +3,10 @@
 use super::broad_phase::{Bounds, BroadPhase};
 use super::fade::Fade;
 use crate::mapping::{Blend, Mapping};
+use crate::servo::budget::{Allowed, Overrun, TimeBudget};
+use crate::servo::engine::{Engine, Stepped};
 use crate::trace::Events;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{
     ActivityShape, DVec3, Demand, DeviceState, Input, Memory, Output, StepStatus, Tick, Wrench,
 };
@@ -19,6 +20,14 @@ pub struct ModelHealth {
     pub rejected_ticks: u64,
     /// The first of them.
     pub first_rejected: Option<u64>,
+    /// The tick at which its process was found to have ended; from then on it is out.
+    pub lost_at: Option<u64>,
+    /// Ticks without an answer in time from a process of its own.
+    pub late_ticks: u64,
+    /// The first of them.
+    pub first_late: Option<u64>,
+    /// How it was too slow, if it was taken out for that.
+    pub overrun: Option<Overrun>,
 }
 
 impl ModelHealth {
@@ -26,15 +35,22 @@ impl ModelHealth {
         self.rejected_ticks += 1;
         self.first_rejected.get_or_insert(tick);
     }
+
+    fn late(&mut self, tick: u64) {
+        self.late_ticks += 1;
+        self.first_late.get_or_insert(tick);
+    }
 }
 
 /// One instance of a model in one place.
 struct Object {
-    model: Model,
+    model: Engine,
     mapping: Mapping,
+    /// The answer of the tick before, in its own frame, if it could be used.
+    last: Option<Output>,
     /// The tick it was stepped at last.
     stepped_at: Option<u64>,
-    /// It panicked and is never called again.
+    /// It panicked, or its process has ended: it is never called again.
     is_out: bool,
 }
 
@@ -53,17 +69,21 @@ pub(crate) struct Layer {
     broad: BroadPhase,
     demand: Demand,
     memory: Memory,
+    budget: TimeBudget,
+    /// What it asked for last: it fades if the model took too long too often.
+    last: Share,
     pub(super) weight: Fade,
     pub(super) priority: u8,
     pub(super) health: ModelHealth,
 }
 
 impl Layer {
-    /// A model's instances, each with its mapping. Not real-time.
-    pub(crate) fn new(instances: Vec<(Model, Mapping)>, blend: &Blend) -> Self {
-        let served = |(model, _): &(Model, Mapping)| Demand::ALL.limited_to(model.serves());
+    /// A model's instances, each with its mapping, and the time they may take together. Not real-time.
+    pub(crate) fn new(instances: Vec<(Engine, Mapping)>, blend: &Blend, budget: TimeBudget) -> Self {
+        let served = |(model, _): &(Engine, Mapping)| Demand::ALL.limited_to(model.serves());
         let demand = instances.first().map_or(Demand::ALL, served);
-        let object = |(model, mapping)| Object { model, mapping, stepped_at: None, is_out: false };
+        let object =
+            |(model, mapping)| Object { model, mapping, last: None, stepped_at: None, is_out: false };
         let mut objects: Box<[Object]> = instances.into_iter().map(object).collect();
         let bounds = objects.iter_mut().map(Object::bounds).collect();
         let memory = objects.first().map_or(Memory::Stateless, |object| object.model.memory());
@@ -72,6 +92,8 @@ impl Layer {
             broad: BroadPhase::new(bounds),
             demand,
             memory,
+            budget,
+            last: Share::default(),
             weight: Fade::new(blend.weight, blend.fade_s),
             priority: blend.priority,
             health: ModelHealth::default(),
@@ -83,16 +105,41 @@ impl Layer {
         self.broad.hull()
     }
 
-    /// What its objects ask for at a state of the device; those that cannot act there are not called.
+    /// What its objects ask for at a state of the device. A model that took too long too often is not asked any more:
+    /// what it asked for last fades.
     ///
     /// Real-time: bounded by the objects that are near, no allocation.
     #[inline]
     pub(super) fn step(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
+        match self.budget.allowed(tick.time_ns) {
+            Allowed::Asked => {}
+            Allowed::Fading(part) => {
+                events.insert(Events::MODEL_FAULT);
+                return Share { wrench: self.last.wrench * part, energy_j: self.last.energy_j * part };
+            }
+            Allowed::Nothing => {
+                events.insert(Events::MODEL_FAULT);
+                return Share::default();
+            }
+        }
+        let begun_ns = self.budget.begin();
+        let share = self.ask(tick, state, events);
+        if self.budget.end(begun_ns, tick.index, tick.time_ns) {
+            events.insert(Events::MODEL_OVERRUN);
+            self.health.overrun = self.budget.overrun();
+        }
+        self.last = share;
+        share
+    }
+
+    /// Asks all objects that can act where the handle is; the others are not called.
+    #[inline]
+    fn ask(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
         let Self { objects, broad, demand, memory, health, .. } = self;
         let mut share = Share::default();
         broad.for_each_near(state.pose.position(), |index| {
             let Some(object) = objects.get_mut(index) else { return };
-            let Some(output) = object.step(tick, state, *demand, *memory, health) else {
+            let Some(output) = object.step(tick, state, *demand, *memory, health, events) else {
                 events.insert(Events::MODEL_FAULT);
                 return;
             };
@@ -157,6 +204,7 @@ impl Object {
         demand: Demand,
         memory: Memory,
         health: &mut ModelHealth,
+        events: &mut Events,
     ) -> Option<Output> {
         if self.is_out {
             return None;
@@ -176,14 +224,28 @@ impl Object {
             buttons: state.buttons,
             demand,
         };
-        let mut output = Output::default();
-        match self.model.step(&input, &mut output) {
-            CallStatus::Ok if output.wrench.is_finite() && output.status().is_some() => Some(output),
-            CallStatus::Ok => {
+        let before = self.last.take();
+        match self.model.step(&input) {
+            Stepped::Answered(output) if output.wrench.is_finite() && output.status().is_some() => {
+                self.last = Some(output);
+                Some(output)
+            }
+            Stepped::Answered(_) => {
                 health.reject(tick.index);
                 None
             }
-            _ => self.fail(tick, health),
+            // One tick may pass with the answer before; a second one in a row finds none.
+            Stepped::Late => {
+                events.insert(Events::MODEL_OVERRUN);
+                health.late(tick.index);
+                before
+            }
+            Stepped::Broken => self.fail(tick, health),
+            Stepped::Gone => {
+                self.is_out = true;
+                health.lost_at.get_or_insert(tick.index);
+                None
+            }
         }
     }
 

@@ -1,0 +1,114 @@
+//! Where a model runs: in this process, or in a worker of its own.
+
+use crate::worker::{Reply, Worker};
+use flotor_hal::abi::CallStatus;
+use flotor_hal::abi::loader::Model;
+use flotor_hal::{ActivityRegion, Demand, Input, Memory, Output};
+
+/// A model, wherever it runs.
+pub(crate) enum Engine {
+    /// In this process: fastest, and what breaks the model may break the process.
+    Here(Model),
+    /// In a process of its own.
+    Apart(Worker),
+}
+
+/// What came of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Stepped {
+    /// An answer, not looked at yet.
+    Answered(Output),
+    /// None in time; there may be one in a later tick.
+    Late,
+    /// The model broke: it panicked, or answered outside the contract.
+    Broken,
+    /// Its process has ended.
+    Gone,
+}
+
+impl Engine {
+    /// One step. Real-time: bounded by the model or its patience, no allocation.
+    #[inline]
+    pub(crate) fn step(&mut self, input: &Input) -> Stepped {
+        let answered = |status, output| match status {
+            CallStatus::Ok => Stepped::Answered(output),
+            _ => Stepped::Broken,
+        };
+        match self {
+            Self::Here(model) => {
+                let mut output = Output::default();
+                let status = model.step(input, &mut output);
+                answered(status, output)
+            }
+            Self::Apart(worker) => match worker.step(input) {
+                Reply::Answered((status, output)) => answered(status, output),
+                Reply::Late => Stepped::Late,
+                Reply::Gone => Stepped::Gone,
+            },
+        }
+    }
+
+    /// Changes a live parameter at a tick boundary. Real-time: bounded by the model or its patience, no allocation.
+    pub(crate) fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
+        match self {
+            Self::Here(model) => model.set_parameter(index, value),
+            Self::Apart(worker) => match worker.set_parameter(index, value) {
+                Reply::Answered(status) => status,
+                // Not now: the next step tells whether it is late or gone.
+                Reply::Late | Reply::Gone => CallStatus::Unsupported,
+            },
+        }
+    }
+
+    /// The value in force of a parameter before the loop starts; NaN if it has none. Not real-time.
+    pub(crate) fn parameter(&mut self, index: usize) -> f64 {
+        match self {
+            Self::Here(model) => model.parameter(index),
+            Self::Apart(worker) => worker.parameter(index),
+        }
+    }
+
+    /// Which demands the model can serve.
+    pub(crate) fn serves(&self) -> Demand {
+        match self {
+            Self::Here(model) => model.serves(),
+            Self::Apart(worker) => worker.serves(),
+        }
+    }
+
+    /// Forgets history. Real-time: bounded by the model or its patience, no allocation.
+    pub(crate) fn reset(&mut self) -> CallStatus {
+        match self {
+            Self::Here(model) => model.reset(),
+            Self::Apart(worker) => match worker.reset() {
+                Reply::Answered(status) => status,
+                // The next step tells whether it is late or gone.
+                Reply::Late | Reply::Gone => CallStatus::Ok,
+            },
+        }
+    }
+
+    /// Where the model can act; one in a process of its own is always asked. Real-time: bounded, no allocation.
+    pub(crate) fn activity(&mut self) -> ActivityRegion {
+        match self {
+            Self::Here(model) => model.activity(),
+            Self::Apart(_) => ActivityRegion::EVERYWHERE,
+        }
+    }
+
+    /// Whether the answer depends on the path.
+    pub(crate) fn memory(&self) -> Memory {
+        match self {
+            Self::Here(model) => model.memory(),
+            Self::Apart(worker) => worker.memory(),
+        }
+    }
+
+    /// What the model said last. Not real-time.
+    pub(crate) fn last_message(&mut self) -> String {
+        match self {
+            Self::Here(model) => model.last_message(),
+            Self::Apart(worker) => worker.last_message(),
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! What host and worker say to each other, as words in shared memory.
+
+use super::memory::{Exchange, INPUT_WORDS, OUTPUT_WORDS};
+use flotor_hal::abi::CallStatus;
+use flotor_hal::{Demand, Input, Output, Pose, StepStatus, Twist, Wrench};
+use rustix::thread::futex;
+use rustix::time::Timespec;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+
+/// What a worker is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Order {
+    Step,
+    SetParameter,
+    Reset,
+}
+
+impl Order {
+    const fn code(self) -> u32 {
+        match self {
+            Self::Step => 0,
+            Self::SetParameter => 1,
+            Self::Reset => 2,
+        }
+    }
+
+    const fn from_code(code: u32) -> Option<Self> {
+        Some(match code {
+            0 => Self::Step,
+            1 => Self::SetParameter,
+            2 => Self::Reset,
+            _ => return None,
+        })
+    }
+}
+
+impl Exchange {
+    /// The host's side: asks for something under a new number. Real-time: one system call.
+    pub(super) fn ask(&self, number: u32, order: Order) {
+        self.order.store(order.code(), Ordering::Relaxed);
+        // Release: who sees the number sees the request.
+        self.request.store(number, Ordering::Release);
+        let _ = futex::wake(&self.request, futex::Flags::empty(), 1);
+    }
+
+    /// The host's side: whether a request is answered.
+    pub(super) fn is_answered(&self, number: u32) -> bool {
+        self.reply.load(Ordering::Acquire) == number
+    }
+
+    /// The worker's side: what is asked for now.
+    pub(super) fn order(&self) -> Option<Order> {
+        Order::from_code(self.order.load(Ordering::Relaxed))
+    }
+
+    /// The worker's side: a request is answered.
+    pub(super) fn answer(&self, number: u32, status: CallStatus) {
+        self.status.store(status as u32, Ordering::Relaxed);
+        self.reply.store(number, Ordering::Release);
+        let _ = futex::wake(&self.reply, futex::Flags::empty(), 1);
+    }
+
+    pub(super) fn status(&self) -> CallStatus {
+        CallStatus::from_code(self.status.load(Ordering::Relaxed))
+    }
+
+    pub(super) fn put_message(&self, text: &str) {
+        let bytes = text.as_bytes().iter().zip(&self.message);
+        let len = bytes.map(|(byte, slot)| slot.store(*byte, Ordering::Relaxed)).count();
+        self.message_len.store(u32::try_from(len).unwrap_or(0), Ordering::Relaxed);
+    }
+
+    pub(super) fn message(&self) -> String {
+        let len = self.message_len.load(Ordering::Relaxed) as usize;
+        let bytes: Vec<u8> = self.message.iter().take(len).map(|byte| byte.load(Ordering::Relaxed)).collect();
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+
+    pub(super) fn put_input(&self, input: &Input) {
+        let mut words = self.input.iter();
+        let mut put = |word: u64| {
+            if let Some(slot) = words.next() {
+                slot.store(word, Ordering::Relaxed);
+            }
+        };
+        let numbers = [&input.pose.position_m[..], &input.pose.orientation_xyzw];
+        let rates = [&input.twist.linear_m_per_s[..], &input.twist.angular_rad_per_s];
+        numbers.into_iter().chain(rates).flatten().for_each(|number| put(number.to_bits()));
+        let demand =
+            DEMANDS.iter().enumerate().map(|(bit, demand)| u64::from(input.demand.contains(*demand)) << bit);
+        let demand: u64 = demand.sum();
+        [input.time_ns, input.dt_ns, input.tick, u64::from(input.buttons) | demand << 32]
+            .into_iter()
+            .for_each(put);
+    }
+
+    pub(super) fn input(&self) -> Input {
+        let words: [u64; INPUT_WORDS] = std::array::from_fn(|i| load(self.input.get(i)));
+        let [px, py, pz, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz, time_ns, dt_ns, tick, flags] = words;
+        let three = |a, b, c| [a, b, c].map(f64::from_bits);
+        let is_demanded = |(bit, demand): (usize, &Demand)| (flags >> (32 + bit) & 1 == 1).then_some(*demand);
+        let demands = DEMANDS.iter().enumerate().filter_map(is_demanded);
+        #[allow(clippy::cast_possible_truncation)] // the lower half
+        let buttons = flags as u32;
+        Input {
+            pose: Pose {
+                position_m: three(px, py, pz),
+                orientation_xyzw: [qx, qy, qz, qw].map(f64::from_bits),
+            },
+            twist: Twist { linear_m_per_s: three(vx, vy, vz), angular_rad_per_s: three(wx, wy, wz) },
+            time_ns,
+            dt_ns,
+            tick,
+            buttons,
+            demand: demands.fold(NO_DEMAND, Demand::with),
+        }
+    }
+
+    pub(super) fn put_output(&self, output: &Output) {
+        // An answer with a status outside the contract crosses as one that is not finite: neither can be used.
+        let (wrench, status) = match output.status() {
+            Some(status) => (output.wrench, status),
+            None => (NOT_USABLE, StepStatus::Ok),
+        };
+        let numbers = wrench.force_n.into_iter().chain(wrench.torque_nm).chain([output.energy_j]);
+        let words = numbers.map(f64::to_bits).chain([status as u64]);
+        self.output.iter().zip(words).for_each(|(slot, word)| slot.store(word, Ordering::Relaxed));
+    }
+
+    pub(super) fn output(&self) -> Output {
+        let words: [u64; OUTPUT_WORDS] = std::array::from_fn(|i| load(self.output.get(i)));
+        let [fx, fy, fz, tx, ty, tz, energy_j, status] = words;
+        let three = |a, b, c| [a, b, c].map(f64::from_bits);
+        let wrench = Wrench { force_n: three(fx, fy, fz), torque_nm: three(tx, ty, tz) };
+        let status = u32::try_from(status).ok().and_then(StepStatus::from_code);
+        let (wrench, status) = status.map_or((NOT_USABLE, StepStatus::Ok), |status| (wrench, status));
+        Output::new(wrench, f64::from_bits(energy_j), status)
+    }
+}
+
+const NOT_USABLE: Wrench = Wrench { force_n: [f64::NAN; 3], torque_nm: [f64::NAN; 3] };
+
+pub(super) const NO_DEMAND: Demand = Demand::FORCE.limited_to(Demand::TORQUE);
+
+/// In the order of their bits here.
+pub(super) const DEMANDS: [Demand; 3] = [Demand::FORCE, Demand::TORQUE, Demand::ENERGY];
+
+fn load(word: Option<&AtomicU64>) -> u64 {
+    word.map_or(0, |word| word.load(Ordering::Relaxed))
+}
+
+/// Sleeps until `word` is no longer `value`, or for `timeout_ns`; may wake earlier. Real-time: one system call.
+#[allow(clippy::cast_possible_wrap)] // seconds of a timeout
+pub(super) fn wait_for_change(word: &AtomicU32, value: u32, timeout_ns: u64) {
+    let timeout = Timespec {
+        tv_sec: (timeout_ns / 1_000_000_000) as i64,
+        tv_nsec: (timeout_ns % 1_000_000_000) as i64,
+    };
+    // Whatever ends the sleep, the caller looks at the word again.
+    let _ = futex::wait(word, futex::Flags::empty(), value, Some(&timeout));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::memory::{SharedMemory, create_file};
+    use super::*;
+    use flotor_hal::{DQuat, DVec3};
+
+    #[test]
+    fn input_and_output_cross_bit_for_bit() {
+        let memory = SharedMemory::map(create_file().expect("an anonymous file")).expect("mapped");
+        let input = Input {
+            pose: Pose::new(DVec3::new(1.0, f64::NAN, -0.0), DQuat::from_xyzw(0.1, 0.2, 0.3, 0.4)),
+            twist: Twist::new(DVec3::new(5.0, 6.0, 7.0), DVec3::new(8.0, f64::INFINITY, 5.0e-324)),
+            time_ns: u64::MAX,
+            dt_ns: 11,
+            tick: 12,
+            buttons: u32::MAX,
+            demand: Demand::FORCE.with(Demand::ENERGY),
+        };
+        memory.put_input(&input);
+        assert_eq!(format!("{:?}", memory.input()), format!("{input:?}"));
+        let wrench = Wrench { force_n: [1.0, -2.0, 3.0], torque_nm: [4.0, 5.0, -6.0] };
+        let output = Output::new(wrench, 7.5, StepStatus::Clamped);
+        memory.put_output(&output);
+        assert_eq!(memory.output(), output);
+    }
+
+    #[test]
+    fn a_status_no_contract_knows_is_no_answer() {
+        let memory = SharedMemory::map(create_file().expect("an anonymous file")).expect("mapped");
+        memory.output.iter().for_each(|word| word.store(u64::MAX, Ordering::Relaxed));
+        assert!(!memory.output().wrench.is_finite());
+    }
+
+    #[test]
+    fn words_that_do_not_fit_are_cut() {
+        let memory = SharedMemory::map(create_file().expect("an anonymous file")).expect("mapped");
+        memory.put_message(&"x".repeat(10_000));
+        assert_eq!(memory.message().len(), super::super::memory::MESSAGE_BYTES);
+    }
+
+    #[test]
+    fn some_other_file_is_not_mapped() {
+        let file = std::fs::File::open("/dev/null").expect("there is one");
+        assert!(SharedMemory::map(file).is_err());
+    }
+}

@@ -1,0 +1,108 @@
+//! A recording survives what ends the process, and the loop survives what ends a recording: SIGKILL, a full disk, a disk
+//! that does not keep up (for the loop, that is an observer like any other).
+
+use flotor::record::{Ending, Recording};
+use flotor::registry::Registry;
+use flotor::scene::Scene;
+use flotor::servo::{Clock, StopSwitch};
+use flotor::session::{Observer, RunEnd, RunOptions, Session};
+use flotor::trace::TickRecord;
+use flotor_tests::library::plugin_bytes;
+use flotor_tests::program::{Flotor, exit_code};
+use flotor_tests::scratch::Scratch;
+use std::ffi::OsStr;
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+/// Time of the last tick of a recording, s, and how the file ends.
+fn last_tick_s(file: &Path) -> (f64, Ending) {
+    let mut recording = Recording::open(file).expect("it can be read");
+    let last = recording.by_ref().map(|record| record.expect("whole up to its last chunk")).last();
+    let ending = recording.ending();
+    #[allow(clippy::cast_precision_loss)] // seconds of a test
+    let last_s = last.expect("there are ticks").time_ns as f64 * 1.0e-9;
+    (last_s, ending)
+}
+
+#[test]
+fn a_killed_process_loses_at_most_a_second_of_its_recording() {
+    let scratch = Scratch::default();
+    let file = scratch.path().join("run.mcap");
+    let arguments = ["run", "--duration", "60s", "--record"].map(OsStr::new);
+    let running = Flotor::with(arguments.into_iter().chain([file.as_os_str()])).start();
+    // The first ticks in the file: the loop has been running since at least now.
+    let started = Instant::now();
+    while !std::fs::metadata(&file).is_ok_and(|file| file.len() > 20_000) {
+        assert!(started.elapsed() < Duration::from_secs(30), "there is no recording");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let seen = Instant::now();
+    std::thread::sleep(Duration::from_millis(2300));
+    let killed_s = seen.elapsed().as_secs_f64();
+    let killed = Command::new("kill").args(["-KILL", &running.id().to_string()]).status();
+    assert!(killed.expect("there is a kill command").success());
+    assert_eq!(running.wait().code, None, "ended by a signal");
+    let (last_s, ending) = last_tick_s(&file);
+    assert_eq!(ending, Ending::CutOff);
+    assert!(
+        last_s >= killed_s - 1.0,
+        "killed {killed_s} s after the first ticks, the last tick is of {last_s} s"
+    );
+}
+
+#[test]
+fn a_full_disk_ends_the_recording_and_not_the_run() {
+    let scratch = Scratch::default();
+    let (file, summary) = (scratch.path().join("run.mcap"), scratch.path().join("run.json"));
+    // A limit on the size of files stands for a disk that is full. Plugins are copied when they are loaded: they have
+    // to fit. A tick takes some three hundred bytes of a recording.
+    let largest =
+        ["flotor-simulated", "flotor-spring"].map(|package| plugin_bytes(package).len()).into_iter().max();
+    let limit_bytes = largest.unwrap_or_default() + 200_000;
+    let limited = format!("ulimit -f {}; exec \"$@\"", limit_bytes / 512); // sh counts in blocks of 512 bytes
+    let duration_s = limit_bytes / 100_000;
+    let duration = format!("{duration_s}s");
+    let arguments = ["run", "--clock", "virtual", "--duration", &duration, "--record"].map(OsStr::new);
+    let arguments =
+        arguments.into_iter().chain([file.as_os_str(), OsStr::new("--json"), summary.as_os_str()]);
+    let ran = Flotor::with(arguments).through_shell(&limited).run();
+    assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:?}");
+    assert!(ran.error().contains("cannot go on writing the recording"), "{ran:?}");
+    let summary = std::fs::read_to_string(summary).expect("the run has its report");
+    let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
+    assert_eq!(summary["end"].as_str(), Some("finished"));
+    assert_eq!(summary["ticks"].to_string(), (duration_s * 1000).to_string());
+    let (last_s, _) = last_tick_s(&file);
+    assert!(last_s > 0.2, "what was written before can be read: {last_s} s");
+}
+
+/// A recorder whose disk does not answer for longer than the ring between loop and recorder lasts.
+struct Stuck {
+    stays: Duration,
+    seen: u64,
+}
+
+impl Observer for Stuck {
+    fn observe(&mut self, _: &TickRecord) {
+        std::thread::sleep(std::mem::take(&mut self.stays));
+        self.seen += 1;
+    }
+}
+
+#[test]
+fn an_observer_that_does_not_keep_up_never_holds_up_the_loop_and_what_is_lost_is_counted() {
+    let scene = flotor::scene::DEMO
+        .replace("rate_hz = 1000", "rate_hz = 10000")
+        .replace("duration_s = 10", "duration_s = 2");
+    let scene = Scene::parse(Path::new("scene.toml"), &scene).expect("the demo is right");
+    let options = RunOptions { clock: Clock::Real, seed: 1 };
+    let session = Session::prepare(&scene, &Registry::search(&[]), &options).expect("the demo starts");
+    let mut stuck = Stuck { stays: Duration::from_millis(1500), seen: 0 };
+    let outcome = session.run(&mut stuck, &StopSwitch::default()).expect("it runs");
+    // Ticks that this machine missed are counted too: together they are all there were to be.
+    assert_eq!((outcome.end, outcome.timing.ticks + outcome.timing.missed), (RunEnd::Finished, 20_000));
+    // 15 000 ticks in 1.5 s, of which the ring holds 4096; a loaded machine misses some before they are dropped.
+    assert!(outcome.dropped_records > 1000, "{} dropped", outcome.dropped_records);
+    assert_eq!(stuck.seen + outcome.dropped_records, outcome.timing.ticks);
+}
