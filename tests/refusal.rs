@@ -12,10 +12,11 @@ use flotor::trace::Events;
 use flotor_hal::abi::loader::{LoadError, Plugin, Setting, read_metadata};
 use flotor_hal::abi::{ABI_MAJOR, ABI_MINOR, CallStatus, MAGIC};
 use flotor_hal::{Input, Output, Pose, Wrench};
-use flotor_tests::library::{compile_c, patched, plugin_bytes, plugin_file};
+use flotor_tests::library::{compile_c, compile_c_file, patched, plugin_bytes, plugin_file};
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::{Watched, watch};
+use flotor_tests::workspace_root;
 use std::path::{Path, PathBuf};
 
 const MODEL: &str = "fixture-faulty-model";
@@ -504,5 +505,58 @@ fn validate_finds_nothing_wrong_with_honest_plugins() {
     for package in ["flotor-spring", "flotor-simulated", MODEL, DEVICE] {
         let ran = Flotor::with(["validate".as_ref(), plugin_file(package).as_os_str()]).run();
         assert_eq!((ran.code, ran.stderr.as_str()), (Some(exit_code::OK), ""), "{ran:#?}");
+    }
+}
+
+#[test]
+fn validate_survives_a_plugin_that_ends_the_process_and_checks_the_other_rules() {
+    let scratch = Scratch::default();
+    let library = scratch.path().join("libwall.so");
+    compile_c_file(&workspace_root().join("tests/c/wall.c"), &["CRASHES"], &library); // from tick 50 on
+    let ran = Flotor::with(["validate".as_ref(), library.as_os_str(), "--json".as_ref()]).run();
+    assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
+    let findings: serde_json::Value = serde_json::from_str(&ran.stdout).expect("JSON");
+    let violated = |rule: &str| {
+        let finding = findings.as_array().and_then(|all| all.iter().find(|finding| finding["rule"] == rule));
+        finding.unwrap_or_else(|| panic!("{rule} was not checked: {findings}"))["violation"].clone()
+    };
+    assert_eq!(violated("finite-near-home"), serde_json::Value::Null);
+    assert_eq!(violated("time-budget"), "it ended the process by signal 11");
+    assert_eq!(violated("no-threads"), "it ended the process by signal 11");
+    assert_eq!(violated("energy-gradient"), serde_json::Value::Null);
+}
+
+#[test]
+fn validate_survives_a_plugin_that_hangs() {
+    let arguments =
+        ["validate".into(), plugin_file(MODEL).into_os_string(), "--timeout".into(), "500ms".into()];
+    let ran = Flotor::with(arguments).env(fixture_faulty_model::FAULT_VARIABLE, "hangs").run();
+    assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
+    assert!(ran.stdout.contains("FAILED  finite-near-home"), "{ran:#?}");
+    assert!(ran.stdout.contains("it did not come back within 500ms"), "{ran:#?}");
+}
+
+/// One rule, asked in the process of its own that `flotor validate` starts for it.
+fn verdict(rule: &str, fault: &str) -> String {
+    let arguments = ["validate".into(), "--rule".into(), rule.into(), plugin_file(MODEL).into_os_string()];
+    let ran = Flotor::with(arguments).env(fixture_faulty_model::FAULT_VARIABLE, fault).run();
+    ran.stdout.lines().last().unwrap_or_default().to_owned()
+}
+
+#[test]
+fn each_rule_of_a_loop_sees_the_model_that_breaks_it() {
+    let good = r#"{"violation":null}"#;
+    for rule in ["time-budget", "independent", "no-threads", "energy-gradient"] {
+        assert_eq!(verdict(rule, "none"), good, "{rule}");
+    }
+    let broken = [
+        ("time-budget", "overruns", "one step in a hundred takes more than"),
+        ("independent", "shares", "two instances stepped in turns answer otherwise than one alone"),
+        ("no-threads", "starts-threads", "threads more after 500 steps"),
+        ("energy-gradient", "wrong-energy", "force and energy disagree in"),
+    ];
+    for (rule, fault, words) in broken {
+        let told = verdict(rule, fault);
+        assert!(told.contains(words), "{rule} with {fault}: {told}");
     }
 }

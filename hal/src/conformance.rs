@@ -22,6 +22,14 @@ pub enum Rule {
     SurvivesFarPoses,
     /// After `reset` the same poses give the same bits.
     ResetRepeats,
+    /// A step takes less than half a period at 1 kHz.
+    TimeBudget,
+    /// Two instances, stepped in turns and on two threads, answer as one alone does.
+    Independent,
+    /// A step starts no thread.
+    NoThreads,
+    /// Where a model without memory serves energy, its force is the energy's gradient: units and frame agree.
+    EnergyGradient,
     /// A device's declared limits, ranges and rates are numbers a host can enforce.
     Capabilities,
     /// Activate, read, write, deactivate and activate again all work.
@@ -32,7 +40,7 @@ pub enum Rule {
 
 impl Rule {
     /// All rules, in the order they are checked.
-    pub const ALL: [Rule; 11] = [
+    pub const ALL: [Rule; 15] = [
         Rule::Metadata,
         Rule::Loads,
         Rule::Schema,
@@ -41,6 +49,10 @@ impl Rule {
         Rule::SurvivesNotFinite,
         Rule::SurvivesFarPoses,
         Rule::ResetRepeats,
+        Rule::TimeBudget,
+        Rule::Independent,
+        Rule::NoThreads,
+        Rule::EnergyGradient,
         Rule::Capabilities,
         Rule::Lifecycle,
         Rule::SafeStop,
@@ -58,6 +70,10 @@ impl Rule {
             Rule::SurvivesNotFinite => "survives-not-finite",
             Rule::SurvivesFarPoses => "survives-far-poses",
             Rule::ResetRepeats => "reset-repeats",
+            Rule::TimeBudget => "time-budget",
+            Rule::Independent => "independent",
+            Rule::NoThreads => "no-threads",
+            Rule::EnergyGradient => "energy-gradient",
             Rule::Capabilities => "capabilities",
             Rule::Lifecycle => "lifecycle",
             Rule::SafeStop => "safe-stop",
@@ -76,6 +92,12 @@ impl Rule {
             Rule::SurvivesNotFinite => "NaN and infinity in the pose give a status, not NaN, and no panic",
             Rule::SurvivesFarPoses => "poses far outside any workspace give finite numbers and no panic",
             Rule::ResetRepeats => "after reset the same poses give the same bits",
+            Rule::TimeBudget => "99 of 100 steps take less than half a period at 1 kHz",
+            Rule::Independent => "two instances, in turns and on two threads, answer as one alone does",
+            Rule::NoThreads => "a step starts no thread",
+            Rule::EnergyGradient => {
+                "where a model without memory serves energy, its force is minus the gradient of it"
+            }
             Rule::Capabilities => "declared limits, ranges and rates are numbers a host can enforce",
             Rule::Lifecycle => "activate, read, write, deactivate and activate again all work",
             Rule::SafeStop => {
@@ -84,14 +106,25 @@ impl Rule {
         }
     }
 
+    /// The rule with a short name, if there is one.
+    #[must_use]
+    pub fn from_id(id: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|rule| rule.id() == id)
+    }
+
     /// Whether the rule is about plugins of this kind.
     #[must_use]
     pub const fn applies_to(self, kind: PluginKind) -> bool {
         match self {
             Rule::Metadata | Rule::Loads | Rule::Schema | Rule::Defaults => true,
-            Rule::FiniteNearHome | Rule::SurvivesNotFinite | Rule::SurvivesFarPoses | Rule::ResetRepeats => {
-                matches!(kind, PluginKind::Model)
-            }
+            Rule::FiniteNearHome
+            | Rule::SurvivesNotFinite
+            | Rule::SurvivesFarPoses
+            | Rule::ResetRepeats
+            | Rule::TimeBudget
+            | Rule::Independent
+            | Rule::NoThreads
+            | Rule::EnergyGradient => matches!(kind, PluginKind::Model),
             Rule::Capabilities | Rule::Lifecycle | Rule::SafeStop => matches!(kind, PluginKind::Device),
         }
     }

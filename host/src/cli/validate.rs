@@ -1,24 +1,54 @@
 //! `flotor validate`: a plugin file against the rules of the contract.
 
+use super::options::duration_s;
 use super::{CommandError, style, write_json};
-use crate::validate::{Finding, validate};
+use crate::validate::{Finding, Verdict, check, validate};
 use clap::Args;
+use flotor_hal::conformance::Rule;
 use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
 
 /// Check a plugin file.
 #[derive(Args)]
 #[command(after_help = "Example:\n  flotor validate target/release/libmy_model.so\n\n\
-    Runs the plugin's code in this process: validate only files you would load.")]
+    Runs the plugin's code, each rule in a process of its own: validate only files you would load.")]
 pub(crate) struct ValidateArguments {
     /// The plugin's shared library
     plugin: PathBuf,
     /// For machines
     #[arg(long)]
     json: bool,
+    /// Longest time for one rule: 10s, 500ms
+    #[arg(long, value_parser = duration_s, value_name = "TIME", default_value = "10s")]
+    timeout: f64,
+    /// Check one rule in this process, and print the verdict as JSON
+    #[arg(long, hide = true, value_parser = rule)]
+    rule: Option<Rule>,
+}
+
+fn rule(id: &str) -> Result<Rule, String> {
+    Rule::from_id(id).ok_or_else(|| format!("no rule `{id}`"))
 }
 
 pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
-    let findings = validate(&arguments.plugin);
+    if let Some(rule) = arguments.rule {
+        let verdict = Verdict { violation: check(&arguments.plugin, rule).err() };
+        // On a line of its own, whatever the plugin has printed before.
+        say!(
+            "\n{}",
+            serde_json::to_string(&verdict).map_err(|error| CommandError::Failed(error.to_string()))?
+        );
+        return Ok(());
+    }
+    let program = std::env::current_exe()
+        .map_err(|cause| CommandError::file(Path::new("flotor"), "cannot find this program", cause))?;
+    let one_rule = |rule: Rule| {
+        let mut command = Command::new(&program);
+        command.arg("validate").args(["--rule", rule.id()]).arg(&arguments.plugin);
+        command
+    };
+    let findings = validate(&arguments.plugin, Duration::from_secs_f64(arguments.timeout), one_rule);
     let violated = findings.iter().filter(|finding| finding.violation.is_some()).count();
     if arguments.json {
         write_json(Path::new("-"), &findings)?;
