@@ -15,6 +15,7 @@
 //! - [`stability`]: how stiff a spring the servo can render.
 //! - [`scaffold`]: the start of somebody's own plugin.
 //! - [`mod@bench`]: what an evaluation costs, and how wrong it is.
+//! - [`study`]: the results of a perception experiment, as a page.
 //! - [`stress`]: how far a force model can be trusted with a hand.
 //! - [`sampling`]: points that cover a space evenly.
 //! - [`headless`]: a whole run in virtual time for other programs.
@@ -40,6 +41,7 @@ pub mod servo;
 pub mod session;
 pub mod stability;
 pub mod stress;
+pub mod study;
 pub mod timing_picture;
 pub mod validate;
 pub(crate) mod worker;

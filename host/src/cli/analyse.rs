@@ -1,9 +1,10 @@
 //! `flotor analyse`: a study's data in, thresholds, effects and tests out.
 
 use super::{CommandError, style, write_json};
+use crate::study::html;
 use clap::{Args, ValueEnum};
 use flotor_statistics::anova::SumOfSquares;
-use flotor_study::analysis::{Analysis, AnalysisOptions, SubjectRecord};
+use flotor_study::analysis::{Analysis, AnalysisOptions, Estimator, ResponseRow, SubjectRecord};
 use flotor_study::dataset::{Dataset, DatasetError};
 use flotor_study::protocol::RatingScale;
 use std::path::PathBuf;
@@ -24,6 +25,15 @@ pub(crate) struct AnalyseArguments {
     /// Write the result as JSON (- for standard output)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Write a page with figures and all numbers
+    #[arg(long, value_name = "FILE.html")]
+    html: Option<PathBuf>,
+    /// Write every subject's response under every condition, for R or Python
+    #[arg(long, value_name = "FILE.csv")]
+    csv: Option<PathBuf>,
+    /// How thresholds are found
+    #[arg(long, value_enum, default_value_t)]
+    estimator: EstimatorOption,
     /// Sums of squares of the analysis of variance
     #[arg(long = "type", value_enum, default_value_t)]
     sums: SumsOption,
@@ -42,6 +52,16 @@ enum SumsOption {
     #[default]
     #[value(name = "III")]
     Three,
+}
+
+/// `--estimator`
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum EstimatorOption {
+    /// As the procedure says: the mean of the last differences, or the belief of QUEST+
+    #[default]
+    Procedure,
+    /// The most likely observer, from all trials at a base
+    Map,
 }
 
 /// `--ratings`
@@ -82,6 +102,10 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
             RatingsOption::GeometricMean => RatingScale::DividedByGeometricMean,
             RatingsOption::Raw => RatingScale::Raw,
         },
+        estimator: match arguments.estimator {
+            EstimatorOption::Procedure => Estimator::Procedure,
+            EstimatorOption::Map => Estimator::Map,
+        },
     };
     let protocol = &first.begin.protocol;
     let analysis = Analysis::of(protocol, &subjects, &options)
@@ -90,5 +114,20 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
         say!("{}", style::title(&format!("{} of {}", protocol.task(), protocol.stimulus())));
         say!("{}", analysis.to_text());
     }
+    if let Some(path) = &arguments.html {
+        std::fs::write(path, html(protocol, &analysis))
+            .map_err(|cause| CommandError::file(path, "cannot write the page", cause))?;
+    }
+    if let Some(path) = &arguments.csv {
+        write_csv(path, analysis.responses()).map_err(|error| {
+            CommandError::file(path, "cannot write the table", std::io::Error::other(error))
+        })?;
+    }
     arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &analysis))
+}
+
+fn write_csv(path: &std::path::Path, rows: &[ResponseRow]) -> Result<(), csv::Error> {
+    let mut writer = csv::Writer::from_path(path)?;
+    rows.iter().try_for_each(|row| writer.serialize(row))?;
+    Ok(writer.flush()?)
 }

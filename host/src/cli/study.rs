@@ -1,11 +1,14 @@
 //! `flotor study`: perception experiments.
 
+mod bias;
 mod choices;
 
 use super::stopping::stop_on_signals;
 use super::{CommandError, run, style};
 use crate::registry::Registry;
-use choices::{AveragingChoice, BoundaryChoice, FirstChoice, OrderChoice, SideChoice, StepChoice, range};
+use choices::{
+    AveragingChoice, BoundaryChoice, FirstChoice, OrderChoice, ProcedureChoice, SideChoice, StepChoice, range,
+};
 use clap::{Args, Subcommand, ValueEnum};
 use flotor_hal::ParameterKind;
 use flotor_hal::abi::PluginKind;
@@ -13,7 +16,7 @@ use flotor_study::cohort::{Cohort, CohortError, Earlier};
 use flotor_study::conduct::Nothing;
 use flotor_study::dataset::{Dataset, DatasetError};
 use flotor_study::observer::Population;
-use flotor_study::procedure::{Procedure, WeightedUpDownRule};
+use flotor_study::procedure::{Procedure, QuestPlusRule, WeightedUpDownRule};
 use flotor_study::protocol::{
     AtBoundary, JndDemo, JndProtocol, MagnitudeProtocol, Protocol, Stimulus, SubjectNumber,
 };
@@ -27,7 +30,8 @@ use std::path::PathBuf;
     flotor analyse data                                      Weber fractions, tests, effects\n  \
     flotor study magnitude --subjects 8 --seed 3 --out ratings\n  \
     flotor study jnd --bases 20,40 --target 0.8 --side random --out other\n  \
-    flotor study jnd --out data --resume                     go on where it broke off")]
+    flotor study jnd --out data --resume                     go on where it broke off\n  \
+    flotor study bias --runs 1000                            what is each estimator worth?")]
 pub(crate) struct StudyArguments {
     #[command(subcommand)]
     task: Task,
@@ -39,6 +43,10 @@ enum Task {
     Jnd(JndArguments),
     /// Magnitude estimation: one at a time, any number
     Magnitude(MagnitudeArguments),
+    /// Add a note of the experimenter to a subject's log
+    Note(NoteArguments),
+    /// How far each way to a threshold is off, with observers whose threshold is known
+    Bias(bias::BiasArguments),
 }
 
 /// `--observer`
@@ -79,6 +87,19 @@ struct Common {
 }
 
 #[derive(Args)]
+struct NoteArguments {
+    /// Folder of the study
+    #[arg(value_name = "DIR")]
+    data: PathBuf,
+    /// Number of the subject
+    #[arg(value_name = "SUBJECT", value_parser = clap::value_parser!(u16).range(1..=i64::from(SubjectNumber::MOST)))]
+    subject: u16,
+    /// What is to be known; no names
+    #[arg(value_name = "TEXT")]
+    text: String,
+}
+
+#[derive(Args)]
 struct JndArguments {
     #[command(flatten)]
     common: Common,
@@ -88,6 +109,12 @@ struct JndArguments {
     /// Replications, in alternating modality
     #[arg(long, default_value_t = 4, value_name = "N")]
     replications: u32,
+    /// Which difference comes next
+    #[arg(long, value_enum, default_value_t)]
+    procedure: ProcedureChoice,
+    /// QUEST+: trials of a track
+    #[arg(long, default_value_t = 18, value_name = "N")]
+    trials: u32,
     /// First difference, as a share of the base
     #[arg(long, default_value_t = 0.40, value_name = "SHARE")]
     initial: f64,
@@ -149,6 +176,8 @@ struct MagnitudeArguments {
 
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
     match &arguments.task {
+        Task::Note(arguments) => note(arguments),
+        Task::Bias(arguments) => bias::run(arguments),
         Task::Jnd(arguments) => carry_out(&arguments.common, Protocol::Jnd(arguments.protocol()?)),
         Task::Magnitude(arguments) => {
             carry_out(&arguments.common, Protocol::Magnitude(arguments.protocol()?))
@@ -185,12 +214,20 @@ impl JndArguments {
             ceiling: self.ceiling,
             ..WeightedUpDownRule::default()
         };
+        let procedure = match self.procedure {
+            ProcedureChoice::WeightedUpDown => Procedure::WeightedUpDown(rule),
+            ProcedureChoice::Questplus => Procedure::QuestPlus(QuestPlusRule {
+                trials: self.trials,
+                target: self.target,
+                ..QuestPlusRule::default()
+            }),
+        };
         Ok(JndProtocol {
             stimulus: self.common.stimulus()?,
             bases: self.bases.clone(),
             replications: self.replications,
             first_modality: self.common.first.into(),
-            procedure: Procedure::WeightedUpDown(rule),
+            procedure,
             side: self.side.into(),
             order: self.order.into(),
             at_boundary: self.common.at_boundary(),
@@ -227,7 +264,8 @@ fn carry_out(common: &Common, protocol: Protocol) -> Result<(), CommandError> {
         earlier: if common.resume { Earlier::Resume } else { Earlier::Refuse },
         protocol,
     };
-    let progress = run::progress_bar(u64::from(common.subjects), "{spinner} {pos} presentations  {elapsed}");
+    let about = u64::from(common.subjects) * cohort.protocol.presentations_about();
+    let progress = run::progress_bar(about, "{wide_bar} {pos} of about {len} presentations  {elapsed}");
     let stop = stop_on_signals().stop_flag();
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let dataset = Dataset::at(&common.out);
@@ -262,6 +300,16 @@ fn check_stimulus(protocol: &Protocol) -> Result<(), CommandError> {
     }
     let in_range = protocol.check_range(parameter.min(), parameter.max());
     in_range.map_err(|error| CommandError::Usage(error.to_string()))
+}
+
+fn note(arguments: &NoteArguments) -> Result<(), CommandError> {
+    let logs = Dataset::at(&arguments.data).logs().map_err(|error| refused(error.into()))?;
+    let log = logs.into_iter().find(|log| log.begin.subject.get() == arguments.subject);
+    let log = log.ok_or_else(|| {
+        let (data, subject) = (arguments.data.display(), arguments.subject);
+        CommandError::Usage(format!("{data}: there is no subject {subject}"))
+    })?;
+    log.annotate(&arguments.text).map_err(|error| CommandError::Failed(error.to_string()))
 }
 
 fn tell(dataset: &Dataset) -> Result<(), CommandError> {

@@ -5,6 +5,7 @@
 #![allow(clippy::cast_precision_loss)] // counts
 
 use flotor_study::analysis::{AnalysisOptions, JndAnalysis, SubjectRecord, analyse_jnd, analyse_magnitude};
+use flotor_study::bias::{BiasRow, Method, observer_of, rows};
 use flotor_study::conduct::rehearse;
 use flotor_study::observer::{Population, Sensitivity, SimulatedSubject};
 use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Protocol, SubjectNumber};
@@ -125,5 +126,28 @@ fn the_staircase_errs_as_it_is_known_to() {
         let found = flotor_statistics::describe::deviation(&thresholds);
         assert!((found / deviation - 1.0).abs() < 0.05, "criterion {criterion}: deviation {found}");
         assert!((mean(&lengths) - trials).abs() < 0.25, "criterion {criterion}: {} trials", mean(&lengths));
+    }
+}
+
+/// The better estimators find the threshold, where the report's rule is a quarter or more too high. Observers of the
+/// default population, and one who says "I don't know" less often; two tracks make an estimate, as in the experiment.
+#[test]
+fn better_estimators_find_the_threshold() {
+    let runs = if std::env::var("FLOTOR_TEST_SIZE").as_deref() == Ok("full") { 10_000 } else { 150 };
+    for (threshold, criterion) in [(0.1114, 1.0), (0.1357, 1.0), (0.142, 0.5)] {
+        let rows = rows(&observer_of(threshold, criterion), 2, runs, 5);
+        let of = |method| *rows.iter().find(|row| row.method == method).unwrap();
+        let (thesis, map, quest) = (of(Method::Thesis), of(Method::Map), of(Method::QuestPlus));
+        // Four standard errors of the mean beside the promised bound.
+        let within = |row: &BiasRow, bound: f64| {
+            row.bias.abs() <= bound + 4.0 * row.deviation / f64::from(row.runs).sqrt()
+        };
+        assert!(within(&map, 0.03), "{map:?}");
+        assert!(within(&quest, 0.08), "{quest:?}");
+        assert_eq!(quest.trials, 18.0);
+        assert!(thesis.bias > 0.2, "{thesis:?}");
+        // The error of a root mean square is a share of 1 / sqrt(2 n) of it.
+        let half = 0.5 * thesis.rms_error * (1.0 + 4.0 / f64::from(2 * runs).sqrt());
+        assert!(map.rms_error <= half && quest.rms_error <= half, "{thesis:?} {map:?} {quest:?}");
     }
 }

@@ -131,6 +131,16 @@ impl From<OrderChoice> for PresentationOrder {
     }
 }
 
+/// `--procedure`
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(super) enum ProcedureChoice {
+    /// Kaernbach's rule, as in the report
+    #[default]
+    WeightedUpDown,
+    /// Trials where they tell most, a fixed number of them
+    Questplus,
+}
+
 /// `LEAST-MOST`, of which the first is smaller.
 pub(super) fn range(text: &str) -> Result<(f64, f64), String> {
     let number = |text: &str| text.trim().parse::<f64>().map_err(|_| format!("`{text}` is no number"));

@@ -1,8 +1,13 @@
 //! Thresholds: Weber fractions, their difference between modalities, effects of base, modality and order.
 
-use super::{AnalysisError, AnalysisOptions, SubjectRecord, order_factor};
+use super::kinematics::{KinematicMeasure, measures};
+use super::{
+    AnalysisError, AnalysisOptions, Estimator, ResponseRow, SubjectRecord, order_factor, response_rows,
+};
+use crate::estimate::{Observation, Prior, most_likely};
 use crate::protocol::JndProtocol;
-use crate::trial::Modality;
+use crate::sitting::Verdict;
+use crate::trial::{Modality, Presented};
 use flotor_statistics::anova::{Design, Effect, WithinFactor, analyse};
 use flotor_statistics::describe::{MeanInterval, mean, mean_interval};
 use flotor_statistics::t_test::{TTest, paired};
@@ -49,6 +54,8 @@ pub struct JndAnalysis {
     pub task: &'static str,
     /// Sittings analysed.
     pub subjects: usize,
+    /// How thresholds were found.
+    pub estimator: Estimator,
     /// Mean threshold as a share of the base.
     pub weber: WeberFractions<f64>,
     /// The same with its variation and 95 % confidence interval.
@@ -67,6 +74,11 @@ pub struct JndAnalysis {
     pub pairs_per_subject: f64,
     /// Tracks that never came to a threshold; they are left out.
     pub unfinished_tracks: usize,
+    /// How people moved; empty without kinematics.
+    pub kinematics: Vec<KinematicMeasure>,
+    /// What the effects are computed from.
+    #[serde(skip)]
+    pub responses: Vec<ResponseRow>,
 }
 
 /// Analyses thresholds.
@@ -78,7 +90,7 @@ pub fn analyse_jnd(
     subjects: &[SubjectRecord],
     options: &AnalysisOptions,
 ) -> Result<JndAnalysis, AnalysisError> {
-    let fractions = subjects.iter().map(|subject| Fractions::of(protocol, subject));
+    let fractions = subjects.iter().map(|subject| Fractions::of(protocol, subject, options.estimator));
     let fractions = fractions.collect::<Result<Vec<_>, _>>()?;
     let of = |modality| fractions.iter().map(|subject| subject.mean(modality)).collect::<Vec<_>>();
     let weber_detail = WeberFractions::try_each(|modality| mean_interval(&of(modality), CONFIDENCE))?;
@@ -97,6 +109,7 @@ pub fn analyse_jnd(
     Ok(JndAnalysis {
         task: "jnd",
         subjects: subjects.len(),
+        estimator: options.estimator,
         weber: weber_detail.map(|detail| detail.mean),
         weber_detail,
         t: paired(&of(Modality::H), &of(Modality::Vh))?,
@@ -106,6 +119,8 @@ pub fn analyse_jnd(
         thresholds: cells(protocol, &fractions)?,
         pairs_per_subject: mean(&pairs),
         unfinished_tracks: subjects.iter().map(unfinished).sum(),
+        kinematics: measures(&protocol.bases, subjects, options)?,
+        responses: response_rows(subjects, &protocol.bases, &responses),
     })
 }
 
@@ -116,20 +131,21 @@ struct Fractions {
 }
 
 impl Fractions {
-    fn of(protocol: &JndProtocol, record: &SubjectRecord) -> Result<Self, AnalysisError> {
-        let mean_of = |modality: Modality, base: f64| {
-            let tracks =
-                record.tracks.iter().filter(|track| track.modality == modality && track.base == base);
-            let thresholds: Vec<f64> = tracks.filter_map(|track| track.threshold).collect();
-            if thresholds.is_empty() {
-                let (subject, modality) = (record.subject, modality.word());
-                return Err(AnalysisError::NoThreshold { subject, modality, base });
-            }
-            Ok(mean(&thresholds))
+    fn of(
+        protocol: &JndProtocol,
+        record: &SubjectRecord,
+        estimator: Estimator,
+    ) -> Result<Self, AnalysisError> {
+        let of = |modality: Modality, base: f64| {
+            let found = match estimator {
+                Estimator::Procedure => mean_of_tracks(record, modality, base),
+                Estimator::Map => map_of_trials(protocol, record, modality, base),
+            };
+            let (subject, modality) = (record.subject, modality.word());
+            found.ok_or(AnalysisError::NoThreshold { subject, modality, base })
         };
-        let each = |modality| {
-            protocol.bases.iter().map(|base| mean_of(modality, *base)).collect::<Result<Vec<_>, _>>()
-        };
+        let each =
+            |modality| protocol.bases.iter().map(|base| of(modality, *base)).collect::<Result<Vec<_>, _>>();
         Ok(Self { vh: each(Modality::Vh)?, h: each(Modality::H)? })
     }
 
@@ -150,6 +166,32 @@ impl Fractions {
             |modality| self.modality(modality).iter().zip(&protocol.bases).map(|(share, base)| share * base);
         Modality::ALL.into_iter().flat_map(each).collect()
     }
+}
+
+/// Mean over the replications whose track came to a threshold.
+fn mean_of_tracks(record: &SubjectRecord, modality: Modality, base: f64) -> Option<f64> {
+    let tracks = record.tracks.iter().filter(|track| track.modality == modality && track.base == base);
+    let thresholds: Vec<f64> = tracks.filter_map(|track| track.threshold).collect();
+    (!thresholds.is_empty()).then(|| mean(&thresholds))
+}
+
+/// The most likely threshold in the light of all answers at a base.
+fn map_of_trials(
+    protocol: &JndProtocol,
+    record: &SubjectRecord,
+    modality: Modality,
+    base: f64,
+) -> Option<f64> {
+    let here = record.counted().filter(|event| event.trial.modality == modality);
+    let observed = here.filter_map(|event| match (event.trial.presented, event.verdict) {
+        (Presented::Pair(pair), Verdict::Judged { judgement, .. }) if pair.base == base => {
+            Some(Observation { delta: pair.delta, judgement })
+        }
+        _ => None,
+    });
+    let observed: Vec<Observation> = observed.collect();
+    let target = protocol.procedure.target();
+    (!observed.is_empty()).then(|| most_likely(&observed, &Prior::default(), target).threshold)
 }
 
 /// Does the Weber fraction change with the base? Nothing to ask of a single base.

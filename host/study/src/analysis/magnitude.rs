@@ -1,6 +1,7 @@
 //! Ratings: made comparable, their trend over the stimuli, effects of stimulus, modality and order.
 
-use super::{AnalysisError, AnalysisOptions, SubjectRecord, order_factor};
+use super::kinematics::{KinematicMeasure, measures};
+use super::{AnalysisError, AnalysisOptions, ResponseRow, SubjectRecord, order_factor, response_rows};
 use crate::protocol::{MagnitudeProtocol, RatingScale};
 use crate::trial::{Modality, Presented, Response};
 use flotor_statistics::anova::{Design, Effect, WithinFactor, analyse};
@@ -40,6 +41,11 @@ pub struct MagnitudeAnalysis {
     pub trials_per_subject: f64,
     /// Presentations repeated because the handle left its range.
     pub repeated: usize,
+    /// How people moved; empty without kinematics.
+    pub kinematics: Vec<KinematicMeasure>,
+    /// What the effects are computed from.
+    #[serde(skip)]
+    pub responses: Vec<ResponseRow>,
 }
 
 /// Analyses ratings.
@@ -86,6 +92,8 @@ pub fn analyse_magnitude(
         ratings,
         trials_per_subject: mean(&counted),
         repeated: subjects.iter().map(repeats).sum(),
+        kinematics: measures(stimuli, subjects, options)?,
+        responses: response_rows(subjects, stimuli, &rows),
     })
 }
 

@@ -1,10 +1,12 @@
 //! From sittings to results: thresholds, Weber fractions, trends, effects, next to what was published.
 
 mod jnd;
+mod kinematics;
 mod magnitude;
 mod text;
 
 pub use jnd::{JndAnalysis, ThresholdCell, WeberFractions, analyse_jnd};
+pub use kinematics::KinematicMeasure;
 pub use magnitude::{MagnitudeAnalysis, RatingCell, analyse_magnitude};
 
 use crate::log::{SittingLog, TrialEvent};
@@ -49,6 +51,17 @@ impl SubjectRecord {
     }
 }
 
+/// How thresholds are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Estimator {
+    /// As the procedure says: mean of the last differences, or the belief of QUEST+.
+    #[default]
+    Procedure,
+    /// The most likely observer, from all trials of a subject at a base in a modality.
+    Map,
+}
+
 /// How an analysis is done.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AnalysisOptions {
@@ -56,6 +69,8 @@ pub struct AnalysisOptions {
     pub sums_of_squares: SumOfSquares,
     /// How ratings are made comparable.
     pub rating_scale: crate::protocol::RatingScale,
+    /// How thresholds are found.
+    pub estimator: Estimator,
 }
 
 /// Why there is no result.
@@ -122,6 +137,15 @@ impl Analysis {
         })
     }
 
+    /// Every subject's response under every condition, which the effects are computed from.
+    #[must_use]
+    pub fn responses(&self) -> &[ResponseRow] {
+        match self {
+            Self::Jnd(analysis) => &analysis.responses,
+            Self::Magnitude(analysis) => &analysis.responses,
+        }
+    }
+
     /// The page for people.
     #[must_use]
     pub fn to_text(&self) -> String {
@@ -130,6 +154,38 @@ impl Analysis {
             Self::Magnitude(analysis) => text::magnitude(analysis),
         }
     }
+}
+
+/// One subject's response under one condition: a row of the table for other programs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ResponseRow {
+    /// Who: `sub-01`.
+    pub subject: String,
+    /// Modality they started with.
+    pub first_modality: Modality,
+    /// Modality.
+    pub modality: Modality,
+    /// Base, or stimulus rated.
+    pub stimulus: f64,
+    /// Threshold in the unit of the stimulus, or scaled rating.
+    pub response: f64,
+}
+
+/// Rows of `responses[subject][modality by level]`.
+fn response_rows(subjects: &[SubjectRecord], levels: &[f64], responses: &[Vec<f64>]) -> Vec<ResponseRow> {
+    let conditions =
+        || Modality::ALL.into_iter().flat_map(|modality| levels.iter().map(move |level| (modality, *level)));
+    let of = |(record, row): (&SubjectRecord, &Vec<f64>)| {
+        let row = conditions().zip(row).map(|((modality, stimulus), response)| ResponseRow {
+            subject: record.subject.to_string(),
+            first_modality: record.first_modality,
+            modality,
+            stimulus,
+            response: *response,
+        });
+        row.collect::<Vec<_>>()
+    };
+    subjects.iter().zip(responses).flat_map(of).collect()
 }
 
 /// The factor "which modality came first", unless all subjects started with the same, or so few are in a group that

@@ -1,6 +1,6 @@
 //! Results for people, next to what CMU-RI-TR-07-21 reports.
 
-use super::{JndAnalysis, MagnitudeAnalysis};
+use super::{JndAnalysis, KinematicMeasure, MagnitudeAnalysis};
 use crate::trial::Modality;
 use flotor_statistics::anova::Effect;
 use flotor_statistics::describe::MeanInterval;
@@ -48,6 +48,7 @@ pub(super) fn jnd(analysis: &JndAnalysis) -> String {
             page.row(name, &effect_text(effect), published);
         }
     }
+    page.movements(&analysis.kinematics);
     if analysis.unfinished_tracks > 0 {
         page.gap();
         page.line(format!(
@@ -73,6 +74,7 @@ pub(super) fn magnitude(analysis: &MagnitudeAnalysis) -> String {
         page.columns(&name, &interval_text(&vh.rating), &interval_text(&h.rating));
     }
     page.effects("ratings", &analysis.anova, &PUBLISHED_MAGNITUDE);
+    page.movements(&analysis.kinematics);
     page.end()
 }
 
@@ -106,6 +108,12 @@ impl Page {
         for effect in table {
             let known = published.iter().find(|(name, _)| *name == effect.effect);
             self.row(&effect.effect, &effect_text(effect), known.map_or("", |(_, text)| text));
+        }
+    }
+
+    fn movements(&mut self, measures: &[KinematicMeasure]) {
+        for measure in measures {
+            self.effects(measure.measure, &measure.anova, &[]);
         }
     }
 

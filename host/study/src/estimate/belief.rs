@@ -9,9 +9,11 @@ use crate::observer::TernaryObserver;
 use crate::trial::Judgement;
 
 const JUDGEMENTS: [Judgement; 3] = [Judgement::Correct, Judgement::Wrong, Judgement::Unsure];
-/// Observers: so many values of sigma times so many of the criterion, evenly over the prior's probability.
+/// Observers: so many values of sigma, evenly in its logarithm, times so many of the criterion, evenly from 0.
 const SIGMAS: u32 = 31;
-const CRITERIA: u32 = 11;
+const CRITERIA: u32 = 10;
+/// The grid reaches so many deviations of the prior.
+const REACH: f64 = 3.0;
 /// Differences to choose from, evenly spaced in their logarithm.
 const DELTAS: u32 = 40;
 
@@ -40,25 +42,19 @@ impl BeliefGrid {
         let ratio = libm::log(most_delta / least_delta);
         let deltas: Vec<f64> =
             (0..DELTAS).map(|index| least_delta * libm::exp(ratio * share(index, DELTAS))).collect();
-        /// The grid reaches so many deviations of the prior to both sides.
-        const REACH: f64 = 3.0;
-        let spread = |index, of| REACH * (2.0 * share(index, of) - 1.0);
         let mut observers = Vec::new();
         for sigma in 0..SIGMAS {
+            let z = REACH * (2.0 * share(sigma, SIGMAS) - 1.0);
+            let sigma = prior.sigma_median * libm::exp(prior.sigma_spread * z);
             for criterion in 0..CRITERIA {
-                let (z_sigma, z_criterion) = (spread(sigma, SIGMAS), spread(criterion, CRITERIA));
-                let sigma = prior.sigma_median * libm::exp(prior.sigma_spread * z_sigma);
-                let criterion = prior.criterion_median * libm::exp(prior.criterion_spread * z_criterion);
+                let criterion =
+                    share(criterion, CRITERIA) * (prior.criterion_mode + REACH * prior.criterion_spread);
                 let observer = prior.observer(sigma, criterion);
                 let answers = deltas.iter().map(|delta| answers(&observer, *delta)).collect();
                 let attentive = TernaryObserver { lapse: 0.0, ..observer };
-                let weight = libm::exp(-0.5 * (z_sigma * z_sigma + z_criterion * z_criterion));
-                observers.push(Member {
-                    observer,
-                    threshold: attentive.threshold(target),
-                    prior: weight,
-                    answers,
-                });
+                let weight = libm::exp(prior.log_density(libm::log(sigma), criterion));
+                let threshold = attentive.threshold(target);
+                observers.push(Member { observer, threshold, prior: weight, answers });
             }
         }
         Self { observers, deltas }
@@ -123,7 +119,7 @@ impl Belief {
         best.1
     }
 
-    /// The middle of what is held probable: geometric means of sigma, criterion and threshold.
+    /// The middle of what is held probable: the mean criterion, geometric means of sigma and threshold.
     #[must_use]
     pub fn estimate(&self, grid: &BeliefGrid) -> Estimate {
         let mean = |value: fn(&Member) -> f64| {
@@ -132,7 +128,12 @@ impl Belief {
         };
         Estimate {
             sigma: mean(|member| member.observer.sigma),
-            criterion: mean(|member| member.observer.criterion),
+            criterion: self
+                .weights
+                .iter()
+                .zip(&grid.observers)
+                .map(|(w, member)| w * member.observer.criterion)
+                .sum(),
             threshold: mean(|member| member.threshold),
         }
     }

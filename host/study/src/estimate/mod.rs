@@ -23,17 +23,18 @@ pub struct Observation {
     pub judgement: Judgement,
 }
 
-/// What is held likely before the first answer: lognormal, wide enough for any stiffness threshold in the literature
-/// (8 to 25 %) to lie within one deviation.
+/// What is held likely before the first answer: sigma lognormal, wide enough for any stiffness threshold in the
+/// literature (8 to 25 %) to lie within one deviation; the criterion normal where it is not negative, from people who
+/// always answer to those who say "I don't know" in half of the trials.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Prior {
     /// Median of sigma, as a share of the base.
     pub sigma_median: f64,
     /// Deviation of its logarithm.
     pub sigma_spread: f64,
-    /// Median of the criterion.
-    pub criterion_median: f64,
-    /// Deviation of its logarithm.
+    /// Most likely criterion.
+    pub criterion_mode: f64,
+    /// Its deviation.
     pub criterion_spread: f64,
     /// Share of trials answered by chance, held fixed: it keeps one slip from outweighing all other answers.
     pub lapse: f64,
@@ -43,9 +44,9 @@ impl Default for Prior {
     fn default() -> Self {
         Self {
             sigma_median: 0.12,
-            sigma_spread: 0.6,
-            criterion_median: 0.7,
-            criterion_spread: 0.6,
+            sigma_spread: 0.7,
+            criterion_mode: 0.75,
+            criterion_spread: 0.5,
             lapse: 0.005,
         }
     }
@@ -56,10 +57,13 @@ impl Prior {
         TernaryObserver { sigma, criterion, bias: 0.0, lapse: self.lapse }
     }
 
-    /// Logarithm of the density over the logarithms of both numbers, up to a constant.
-    fn log_density(&self, log_sigma: f64, log_criterion: f64) -> f64 {
+    /// Logarithm of the density over the logarithm of sigma and the criterion, up to a constant.
+    fn log_density(&self, log_sigma: f64, criterion: f64) -> f64 {
+        if criterion < 0.0 {
+            return f64::NEG_INFINITY;
+        }
         let sigma = (log_sigma - libm::log(self.sigma_median)) / self.sigma_spread;
-        let criterion = (log_criterion - libm::log(self.criterion_median)) / self.criterion_spread;
+        let criterion = (criterion - self.criterion_mode) / self.criterion_spread;
         -0.5 * (sigma * sigma + criterion * criterion)
     }
 }

@@ -1,4 +1,8 @@
 //! The observer most likely in the light of prior and answers (maximum a posteriori).
+//!
+//! Where a density is highest depends on the scale it is over. Here it is the density over the slope 1 / sigma, in
+//! which the likelihood of answers is closest to symmetric; over sigma or its logarithm the estimate of a single track
+//! would be several percent low.
 
 use super::{Estimate, Observation, Prior, probability};
 
@@ -13,15 +17,18 @@ const HALVINGS: u32 = 15;
 /// Which procedure placed the trials does not matter: given the differences, the answers have the same likelihood.
 #[must_use]
 pub fn most_likely(observations: &[Observation], prior: &Prior, target: f64) -> Estimate {
-    let (centre, spread) = (
-        [libm::log(prior.sigma_median), libm::log(prior.criterion_median)],
-        [prior.sigma_spread, prior.criterion_spread],
-    );
+    let (centre, spread) =
+        ([libm::log(prior.sigma_median), prior.criterion_mode], [prior.sigma_spread, prior.criterion_spread]);
     let score = |[sigma, criterion]: [f64; 2]| {
-        let observer = prior.observer(libm::exp(sigma), libm::exp(criterion));
+        let log_density = prior.log_density(sigma, criterion);
+        if log_density == f64::NEG_INFINITY {
+            return log_density;
+        }
+        let observer = prior.observer(libm::exp(sigma), criterion);
         let likelihood: f64 =
             observations.iter().map(|observation| libm::log(probability(&observer, observation))).sum();
-        likelihood + prior.log_density(sigma, criterion)
+        // A density over ln sigma, times sigma: over the slope.
+        likelihood + log_density + sigma
     };
     let step =
         |from: [f64; 2], steps: [f64; 2]| [from[0] + steps[0] * spread[0], from[1] + steps[1] * spread[1]];
@@ -55,7 +62,8 @@ pub fn most_likely(observations: &[Observation], prior: &Prior, target: f64) -> 
         }
         size *= 0.5;
     }
-    let [sigma, criterion] = best.map(libm::exp);
+    let [log_sigma, criterion] = best;
+    let sigma = libm::exp(log_sigma);
     // The threshold is that of attention: lapses are not a matter of sensitivity.
     let observer = crate::observer::TernaryObserver { lapse: 0.0, ..prior.observer(sigma, criterion) };
     Estimate { sigma, criterion, threshold: observer.threshold(target) }

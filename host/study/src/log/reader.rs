@@ -228,6 +228,15 @@ impl SittingLog {
         self.trials.iter().map(|record| (record.event.trial, record.event.response))
     }
 
+    /// Adds a note of the experimenter, also to a sitting that is complete.
+    ///
+    /// # Errors
+    /// What the system said.
+    pub fn annotate(self, text: &str) -> Result<(), LogError> {
+        let mut writer = LogWriter::append(&self.path, self.complete_bytes, self.chain)?;
+        writer.write(&Event::Note { text: text.to_owned() })
+    }
+
     /// The sitting where it stopped, and the log to go on with: a line that was never completed is cut off, and the
     /// resumption is noted.
     ///

@@ -180,3 +180,18 @@ fn an_empty_log_says_so() {
         assert!(matches!(error.problem, LogProblem::Empty), "{error}");
     }
 }
+
+#[test]
+fn notes_are_kept_with_their_place_and_change_nothing_else() {
+    let folder = Folder::new("notes");
+    let path = folder.file("log.jsonl");
+    sit(&path);
+    let before = SittingLog::read(&path).unwrap();
+    let trials = before.trials.clone();
+    before.annotate("asked for a break").unwrap();
+    let after = SittingLog::read(&path).unwrap();
+    assert!(after.complete);
+    assert_eq!(after.trials, trials);
+    let number = u32::try_from(trials.len()).unwrap();
+    assert_eq!(after.notes, [(number, "asked for a break".to_owned())]);
+}

@@ -24,6 +24,9 @@ impl TernaryObserver {
     pub fn correct_and_wrong(&self, delta: f64) -> [f64; 2] {
         let share = |sign: f64| {
             let named = |bias: f64| normal_below(sign * delta / self.sigma + bias - self.criterion);
+            if self.bias == 0.0 {
+                return named(0.0);
+            }
             0.5 * (named(self.bias) + named(-self.bias))
         };
         [1.0, -1.0].map(|sign| (1.0 - self.lapse) * share(sign) + 0.5 * self.lapse)

@@ -113,6 +113,12 @@ impl JndProtocol {
         }
     }
 
+    /// Practice, and about 18 pairs per track.
+    pub(super) fn presentations_about(&self) -> u64 {
+        let practice = if self.demo.shown { 6 } else { 0 };
+        practice + 18 * u64::from(self.replications) * self.bases.len() as u64
+    }
+
     /// The four springs of the demo: lowest base, highest, one close to it, one nearly equal to that.
     #[must_use]
     pub fn demo_values(&self) -> [f64; 4] {

@@ -66,6 +66,11 @@ impl MagnitudeProtocol {
         Ok(())
     }
 
+    /// Demo and replications in both modalities, without repeats.
+    pub(super) fn presentations(&self) -> u64 {
+        2 * (u64::from(self.demo) + u64::from(self.replications) * self.values.len() as u64)
+    }
+
     /// Smallest and largest stimulus.
     pub(super) fn extremes(&self) -> [f64; 2] {
         extremes(self.values.iter().copied())

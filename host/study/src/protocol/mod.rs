@@ -206,6 +206,15 @@ impl Protocol {
         }
     }
 
+    /// Presentations of a sitting, about: adaptive tracks take more or fewer.
+    #[must_use]
+    pub fn presentations_about(&self) -> u64 {
+        match self {
+            Self::Jnd(protocol) => protocol.presentations_about(),
+            Self::Magnitude(protocol) => protocol.presentations(),
+        }
+    }
+
     /// Whether it can be carried out at all.
     ///
     /// # Errors

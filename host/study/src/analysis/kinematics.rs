@@ -1,0 +1,76 @@
+//! How people moved: mean speed, acceleration and force along the vertical, over stimulus and modality.
+
+use super::{AnalysisError, AnalysisOptions, SubjectRecord};
+use crate::log::TrialEvent;
+use crate::trial::{Modality, Presented, StimulusKinematics};
+use flotor_statistics::anova::{Design, Effect, WithinFactor, analyse};
+use flotor_statistics::describe::mean;
+use serde::Serialize;
+
+/// A measure of movement: its name, and the number it is.
+type Measure = (&'static str, fn(&StimulusKinematics) -> f64);
+
+/// The measures of CMU-RI-TR-07-21, section 4.3.
+const MEASURES: [Measure; 3] = [
+    ("mean speed", |one| one.mean_speed_m_per_s),
+    ("mean acceleration", |one| one.mean_acceleration_m_per_s2),
+    ("mean force", |one| one.mean_force_n),
+];
+
+/// One measure: means and effects.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct KinematicMeasure {
+    /// What was measured, in SI units.
+    pub measure: &'static str,
+    /// Modality x stimulus.
+    pub anova: Vec<Effect>,
+    /// Mean over subjects and modalities at each level of the stimulus, in order.
+    pub means: Vec<f64>,
+}
+
+/// Analyses movements over the levels of the stimulus (bases, or stimuli rated). Nothing where some were not measured.
+pub(super) fn measures(
+    levels: &[f64],
+    subjects: &[SubjectRecord],
+    options: &AnalysisOptions,
+) -> Result<Vec<KinematicMeasure>, AnalysisError> {
+    let mut found = Vec::new();
+    for (measure, value) in MEASURES {
+        let rows: Option<Vec<Vec<f64>>> =
+            subjects.iter().map(|subject| cells(levels, subject, value)).collect();
+        let Some(rows) = rows else { return Ok(Vec::new()) };
+        let mut within = vec![WithinFactor { name: "modality".to_owned(), levels: Modality::ALL.len() }];
+        if levels.len() > 1 {
+            within.push(WithinFactor { name: "stimulus".to_owned(), levels: levels.len() });
+        }
+        let anova = analyse(&Design::new(Vec::new(), within, &rows)?, options.sums_of_squares);
+        let at = |level: usize| {
+            let both = rows.iter().flat_map(|row| row.iter().skip(level).step_by(levels.len()));
+            mean(&both.copied().collect::<Vec<_>>())
+        };
+        found.push(KinematicMeasure { measure, anova, means: (0..levels.len()).map(at).collect() });
+    }
+    Ok(found)
+}
+
+/// Means of one subject, modality by level; none if one of them was never measured.
+fn cells(levels: &[f64], record: &SubjectRecord, value: fn(&StimulusKinematics) -> f64) -> Option<Vec<f64>> {
+    let level_of = |event: &TrialEvent| match event.trial.presented {
+        Presented::One { value } => value,
+        Presented::Pair(pair) => pair.base,
+    };
+    let mut cells = Vec::new();
+    for modality in Modality::ALL {
+        for level in levels {
+            let here = record
+                .counted()
+                .filter(|event| event.trial.modality == modality && level_of(event) == *level);
+            let values: Vec<f64> = here.flat_map(|event| &event.exploration.kinematics).map(value).collect();
+            if values.is_empty() {
+                return None;
+            }
+            cells.push(mean(&values));
+        }
+    }
+    Some(cells)
+}
