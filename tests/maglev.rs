@@ -1,6 +1,7 @@
 //! The maglev plugin against its emulated controller, in processes of their own, over real links: equal trajectories
 //! with the simulated flotor, and what happens when one side dies, hangs, or talks nonsense.
 
+use flotor::trace::Events;
 use flotor_tests::library::build_folder;
 use flotor_tests::program::exit_code;
 use flotor_tests::scratch::Scratch;
@@ -119,6 +120,20 @@ fn one_scene_gives_one_trajectory_on_both_devices() {
         }
         assert!(moved_m > 2.0e-3, "the handle moved by {moved_m} m only: nothing was compared");
     }
+}
+
+#[test]
+fn excess_force_is_one_event_with_a_beginning_and_an_end() {
+    // A stiff hand presses 8 mm into a spring of 13.6 N/mm: 65 N, more than the 50 N at which one should be warned.
+    let hand = ["hand=press", "hand_depth_mm=8", "hand_stiffness_n_per_m=20000", "hand_damping_ns_per_m=200"];
+    let hand: Vec<&str> = hand.iter().flat_map(|setting| ["--set", *setting]).collect();
+    let emulator = Emulator::start("tcp", &[&["--pace", "lockstep"], hand.as_slice()].concat());
+    let scene = emulator.scene("pace = \"lockstep\"").replace("duration_s = 60", "duration_s = 1.5");
+    let records = watch(&format!("{scene}[model.mapping]\nforce_scale = 20.0\n")).records;
+    let warned: Vec<bool> =
+        records.iter().map(|record| record.events.intersects(Events::EXCESS_FORCE)).collect();
+    assert_eq!((warned.first(), warned.last()), (Some(&false), Some(&true)));
+    assert_eq!(warned.windows(2).filter(|pair| pair[0] != pair[1]).count(), 1, "one warning, not one a tick");
 }
 
 #[test]

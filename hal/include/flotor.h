@@ -734,6 +734,7 @@ typedef struct FlotorDevicePacingTable {
 #define FLOTOR_AXES_ALL 63u
 /* Sets of conditions: `{FLOTOR_CONDITIONS_SATURATED}` makes a FlotorConditions. */
 #define FLOTOR_CONDITIONS_SATURATED 1u
+#define FLOTOR_CONDITIONS_EXCESS_FORCE 2u
 /* What `read` and `write` of a device return; a fault is one of FlotorFault. */
 #define FLOTOR_CYCLE_FRESH 0u
 #define FLOTOR_CYCLE_STALE 1u

@@ -152,6 +152,15 @@ impl Conditions {
     pub const NONE: Conditions = Conditions { bits: 0 };
     /// The actuators are at their limit: since the previous tick they gave less than was commanded.
     pub const SATURATED: Conditions = Conditions { bits: 1 << 0 };
+    /// The device was asked for more force than it should be used with: warn the person who holds it.
+    pub const EXCESS_FORCE: Conditions = Conditions { bits: 1 << 1 };
+
+    /// Both. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub const fn with(self, other: Conditions) -> Conditions {
+        Conditions { bits: self.bits | other.bits }
+    }
 
     /// True if all of `other` is among them. Real-time: bounded, no allocation.
     #[inline]

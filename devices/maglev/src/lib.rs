@@ -7,6 +7,7 @@
 //! - [`protocol`]: frames of 64 bytes, and which of them may be acted on.
 //! - [`transport`]: what carries them: TCP, serial, USB, HID.
 //! - [`boundary`]: walls and angle limits on the host's side.
+//! - [`warning`]: when the person who holds it should be warned.
 //! - [`controller`]: the firmware as a state machine; the authority over the coils.
 //! - [`emulator`]: the controller without hardware, for tests and for authors of other plugins.
 //! - [`facts`]: what is published about the device.
@@ -22,5 +23,6 @@ mod parameters;
 mod plugin;
 pub mod protocol;
 pub mod transport;
+pub mod warning;
 
 pub use plugin::{FLOTOR_ENTRY, LevitatingDevice, MaglevDevice};

@@ -5,6 +5,7 @@ use crate::host_link::{Heard, HostLink, Unanswered};
 use crate::parameters::{Options, SCHEMA, Values};
 use crate::protocol::{Condition, Description, Mode, Rejections, Request, Status};
 use crate::transport::{self, Kind, LinkLost};
+use crate::warning::ExcessForce;
 use flotor_hal::{
     ActiveDevice, Axes, Capabilities, Conditions, Cycle, DQuat, DVec3, Device, DeviceInfo, DeviceState,
     Fault, LoopConfig, OutOfRange, Parameter, Pose, Refusal, SafeStop, Settings, Tick, Twist,
@@ -46,6 +47,7 @@ pub struct LevitatingDevice {
     first: Option<Status>,
     /// What was commanded last, as the scene sees it: walls included, correction not.
     commanded: Wrench,
+    warning: ExcessForce,
     state: DeviceState,
     heard_ns: u64,
 }
@@ -124,6 +126,7 @@ impl Device for MaglevDevice {
                     awaited: None,
                     first: Some(first),
                     commanded: Wrench::ZERO,
+                    warning: ExcessForce::default(),
                     state: DeviceState::HOME,
                     heard_ns: 0,
                     opened: self,
@@ -206,9 +209,11 @@ impl ActiveDevice for LevitatingDevice {
         };
         self.heard_ns = tick.time_ns;
         let Some(sample) = sample(&status) else { return Cycle::Fault(Fault::Protocol) };
-        let is_limited = status.condition.contains(Condition::LIMITED);
+        let when = |is: bool, condition| if is { condition } else { Conditions::NONE };
+        let saturated = when(status.condition.contains(Condition::LIMITED), Conditions::SATURATED);
+        let excess = when(self.warning.is_active(), Conditions::EXCESS_FORCE);
         self.state = DeviceState {
-            conditions: if is_limited { Conditions::SATURATED } else { Conditions::NONE },
+            conditions: saturated.with(excess),
             delivered: if status.mode == Mode::Levitating { self.commanded } else { Wrench::ZERO },
             sampled_ns: tick.time_ns,
             ..sample
@@ -284,6 +289,7 @@ impl LevitatingDevice {
         let walls = self.walls.as_ref().map_or(Wrench::ZERO, |walls| walls.wrench(&self.state));
         self.commanded = wrench + walls;
         let force_n = self.commanded.force();
+        self.warning.look(force_n);
         let (own_n, height_m) = (self.opened.options.feedforward_n, self.state.pose.position().z);
         let z = self.opened.calibration.command_n(force_n.z + own_n, height_m) - own_n;
         let ([fx, fy, _], [tx, ty, tz]) = (force_n.to_array(), self.commanded.torque_nm);

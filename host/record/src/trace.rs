@@ -50,9 +50,11 @@ impl Events {
     pub const PASSIVITY_DAMPED: Events = Events { bits: 1 << 17 };
     /// A model took longer than its budget.
     pub const MODEL_OVERRUN: Events = Events { bits: 1 << 18 };
+    /// The device was asked for more force than it should be used with.
+    pub const EXCESS_FORCE: Events = Events { bits: 1 << 19 };
 
     /// Names of the bits, lowest first: for reports and recordings.
-    pub const NAMES: [&'static str; 19] = [
+    pub const NAMES: [&'static str; 20] = [
         "stale_sample",
         "not_finite",
         "force_limited",
@@ -72,6 +74,7 @@ impl Events {
         "parameter_changed",
         "passivity_damped",
         "model_overrun",
+        "excess_force",
     ];
 
     /// Adds events. Real-time: bounded, no allocation.

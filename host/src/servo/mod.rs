@@ -167,6 +167,9 @@ impl Servo {
                 if self.state.conditions.contains(Conditions::SATURATED) {
                     events.insert(Events::SATURATED);
                 }
+                if self.state.conditions.contains(Conditions::EXCESS_FORCE) {
+                    events.insert(Events::EXCESS_FORCE);
+                }
                 return RunEvent::SamplesBack;
             }
             Cycle::Fresh => events.insert(Events::NOT_FINITE),
