@@ -83,11 +83,12 @@ fn the_host_allocates_nothing_in_ten_thousand_ticks() {
     assert_eq!(watch.first, Some(watch.last));
 }
 
-/// The demo with a change at tick 5000, in the middle of a batch of ticks.
-const CHANGED: &str = "[[change]]\nat_s = 5.0\nset = \"spring.gamma_n=20\"\n";
+/// The demo with a change at tick 5000 and another spring from tick 7000 on, in the middle of batches of ticks.
+const CHANGED: &str = "[[change]]\nat_s = 5.0\nset = \"spring.gamma_n=20\"\n\
+    [[change]]\nat_s = 7.0\nswap = \"spring\"\n";
 
 #[test]
-fn the_host_allocates_nothing_for_a_change_of_a_parameter() {
+fn the_host_allocates_nothing_for_a_change_of_a_parameter_or_a_model() {
     /// Ticks before whose observation the allocator was called, but for the first.
     struct Calls {
         before: Option<u64>,
@@ -106,8 +107,9 @@ fn the_host_allocates_nothing_for_a_change_of_a_parameter() {
     let session = Session::prepare(&scene, &Registry::search(&[]), &options).expect("the demo starts");
     let mut calls = Calls { before: None, ticks: Vec::with_capacity(16) };
     assert!(session.run(&mut calls, &StopSwitch::default()).is_ok());
-    // The loop ran tick 5000 before tick 4096 was observed; only telling the observer of it takes memory.
-    assert_eq!(calls.ticks, [5000]);
+    // The loop ran tick 5000 before tick 4096 was observed, and 7000 to 7100 before 6144; only telling the observer of
+    // them takes memory, and dropping the old spring at the end of its batch.
+    assert_eq!(calls.ticks, [5000, 7000, 7168]);
 }
 
 #[test]

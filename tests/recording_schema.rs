@@ -293,6 +293,7 @@ fn a_stranger_reads_every_field_by_the_schema_in_the_file() {
         number: 20.5,
         outcome: ChangeOutcome::Refused,
         subject: ChangeSubject::Weight,
+        settings: vec![("variant".to_owned(), "rod".to_owned())],
     };
     let mut recorder = Recorder::create(&path, &run()).unwrap();
     recorder.change(&change).unwrap();
@@ -328,6 +329,8 @@ fn a_stranger_reads_every_field_by_the_schema_in_the_file() {
         "number = 20.5",
         "outcome = 2",
         "subject = 1",
+        "settings[0].key = \"variant\"",
+        "settings[0].value = \"rod\"",
     ];
     let expected = [
         ("/flotor/run", expected_run()),

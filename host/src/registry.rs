@@ -5,6 +5,8 @@ use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, read_metadata};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use xxhash_rust::xxh3::xxh3_64;
 
 /// Environment variable with further plugin folders, separated like `PATH`.
 pub const PATH_VARIABLE: &str = "FLOTOR_PLUGIN_PATH";
@@ -25,6 +27,15 @@ pub struct Registry {
     broken: Vec<LoadError>,
     skipped: Vec<SkippedFolder>,
     folders: Vec<PathBuf>,
+    loaded: Mutex<Vec<Loaded>>,
+}
+
+/// A file that was loaded, as it was then.
+struct Loaded {
+    path: PathBuf,
+    /// xxh3-64 of its bytes: a file that was built anew is another one.
+    hash: u64,
+    plugin: Plugin,
 }
 
 /// Why no plugin answers to an id.
@@ -69,6 +80,7 @@ impl Registry {
             broken: Vec::new(),
             skipped: Vec::new(),
             folders,
+            loaded: Mutex::new(Vec::new()),
         };
         for folder in registry.folders.clone() {
             registry.scan(&folder);
@@ -141,7 +153,7 @@ impl Registry {
     /// [`LookupError`]: unknown, with the nearest known id, or refused, with the reason.
     pub fn load(&self, id: &str, kind: PluginKind) -> Result<Plugin, LookupError> {
         if id.contains(std::path::MAIN_SEPARATOR) {
-            return Ok(Plugin::load(Path::new(id))?);
+            return Ok(self.open(Path::new(id))?);
         }
         if let Some(metadata) = self.found.iter().find(|known| known.id == id) {
             if metadata.kind != kind {
@@ -150,7 +162,7 @@ impl Registry {
                     LoadError::OtherKind { path, id, found: found.word(), wanted: kind.word() }.into()
                 );
             }
-            return Ok(Plugin::load(&metadata.path)?);
+            return Ok(self.open(&metadata.path)?);
         }
         let same_kind = self.found.iter().filter(|known| known.kind == kind).map(|known| known.id.as_str());
         let broken = self.broken.iter().map(ToString::to_string).find(|text| text.contains(id));
@@ -160,5 +172,19 @@ impl Registry {
             nearest: nearest(id, same_kind).map(str::to_owned),
             broken,
         })
+    }
+
+    /// Loads a file, or gives what was loaded before if the file is unchanged: libraries are never unloaded, and a
+    /// thousand models of one plugin share one mapping of it.
+    fn open(&self, path: &Path) -> Result<Plugin, LoadError> {
+        let Ok(bytes) = std::fs::read(path) else { return Plugin::load(path) }; // it says what is wrong
+        let hash = xxh3_64(&bytes);
+        let mut loaded = self.loaded.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = loaded.iter().find(|known| known.path == path && known.hash == hash) {
+            return Ok(known.plugin.clone());
+        }
+        let plugin = Plugin::load(path)?;
+        loaded.push(Loaded { path: path.into(), hash, plugin: plugin.clone() });
+        Ok(plugin)
     }
 }

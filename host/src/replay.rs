@@ -6,7 +6,7 @@
 use crate::record::{Change, ChangeOutcome, ChangeSubject, ReadError, Recording, Role, RunDescription};
 use crate::registry::Registry;
 use crate::scene::{Isolation, Location, ModelUse, ParameterText, PluginUse};
-use crate::servo::{Clock, Heartbeat, ModelHealth, ModelStack};
+use crate::servo::{Clock, Heartbeat, ModelHealth, ModelStack, Replacement};
 use crate::session::{PluginReport, RunError, prepare_model};
 use crate::trace::{Events, TickRecord};
 use flotor_hal::{DeviceState, LoopConfig, Tick, Wrench};
@@ -45,22 +45,27 @@ pub struct Difference {
 }
 
 /// The models of a recording, ready to be asked again.
-pub struct Replay {
+pub struct Replay<'r> {
+    registry: &'r Registry,
+    config: LoopConfig,
     recording: Recording,
+    uses: Vec<ModelUse>,
     models: ModelStack,
     plugins: Vec<PluginReport>,
     /// Model and parameter that were set for this replay: they keep that value, whatever changed in the run.
     held: Vec<(String, String)>,
+    /// Models that were given another plugin for this replay: they keep it.
+    exchanged: Vec<String>,
 }
 
-impl Replay {
+impl<'r> Replay<'r> {
     /// Opens a recording and creates its models as they were set, with changes on top. Not real-time.
     ///
     /// # Errors
     /// [`ReplayError`]: the recording cannot be read, a plugin is missing or refuses the settings.
     pub fn open(
         path: &Path,
-        registry: &Registry,
+        registry: &'r Registry,
         mut change: impl FnMut(&mut [ModelUse]),
     ) -> Result<Self, ReplayError> {
         let recording = Recording::open(path)?;
@@ -72,6 +77,9 @@ impl Replay {
             added.iter().map(|set| (now.name.clone(), set.key.clone())).collect::<Vec<_>>()
         };
         let held = recorded.iter().zip(&uses).flat_map(added).collect();
+        let is_other = |(before, now): &(&ModelUse, &ModelUse)| before.plugin.plugin != now.plugin.plugin;
+        let exchanged =
+            recorded.iter().zip(&uses).filter(is_other).map(|(_, now)| now.name.clone()).collect();
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 100 Hz to 10 kHz
         let period_ns = (1.0e9 / recording.run().rate_hz).round() as u64;
         let config = LoopConfig { period_ns, seed: recording.run().seed };
@@ -82,7 +90,8 @@ impl Replay {
             slots.push(slot);
             plugins.push(report);
         }
-        Ok(Self { recording, models: ModelStack::new(slots), plugins, held })
+        let models = ModelStack::new(slots);
+        Ok(Self { registry, config, recording, uses, models, plugins, held, exchanged })
     }
 
     /// How the run was set up.
@@ -100,17 +109,18 @@ impl Replay {
     /// Asks the models at every recorded pose. `look` gets the recorded tick and the wrench that came out now.
     ///
     /// # Errors
-    /// [`ReadError`] at a damaged place; what was compared before is lost with it.
+    /// [`ReplayError`] at a damaged place, or if a plugin that was put in during the run is refused; what was compared
+    /// before is lost with it.
     pub fn compare(
         mut self,
         mut look: impl FnMut(&TickRecord, &Wrench),
-    ) -> Result<(Difference, Vec<(ModelHealth, String)>), ReadError> {
+    ) -> Result<(Difference, Vec<(ModelHealth, String)>), ReplayError> {
         let mut difference = Difference::default();
         let heart = Heartbeat::default(); // nobody waits for a replay
         while let Some(record) = self.recording.next() {
             let record = record?;
             for change in self.recording.take_changes() {
-                self.repeat(&change);
+                self.repeat(&change)?;
             }
             let tick = Tick { index: record.tick, time_ns: record.time_ns, dt_ns: record.dt_ns };
             let state = DeviceState {
@@ -119,6 +129,7 @@ impl Replay {
                 buttons: record.buttons,
                 ..DeviceState::HOME
             };
+            while self.models.take_faded(&tick).is_some() {}
             let (wrench, _) = self.models.step(&tick, &state, &heart, &mut Events::default());
             difference.add(&record, &wrench);
             look(&record, &wrench);
@@ -128,16 +139,20 @@ impl Replay {
     }
 }
 
-impl Replay {
+impl<'r> Replay<'r> {
     /// Changes a parameter as it changed in the run. Not if it is held at another value, and not of a model that
     /// has no such parameter: what that does to the wrench is the answer.
-    fn repeat(&mut self, change: &Change) {
+    fn repeat(&mut self, change: &Change) -> Result<(), ReplayError> {
         let names = |plugin: &PluginReport| plugin.name == change.plugin;
-        let Some(model) = self.plugins.iter().position(names) else { return }; // the device
+        let Some(model) = self.plugins.iter().position(names) else { return Ok(()) }; // the device
         let tick = Tick { index: change.tick, time_ns: change.time_ns, dt_ns: 0 };
-        if change.subject == ChangeSubject::Weight {
-            self.models.set_weight(model, &tick, change.number);
-            return;
+        match change.subject {
+            ChangeSubject::Weight => {
+                self.models.set_weight(model, &tick, change.number);
+                return Ok(());
+            }
+            ChangeSubject::Plugin => return self.replace(model, change, &tick),
+            ChangeSubject::Parameter => {}
         }
         let schema = self.plugins.get(model).map_or(&[][..], |plugin| plugin.schema);
         let is_held =
@@ -146,6 +161,33 @@ impl Replay {
         if let (Some(parameter), false, ChangeOutcome::Applied) = (parameter, is_held, change.outcome) {
             self.models.set_parameter(model, &tick, parameter, change.number);
         }
+        Ok(())
+    }
+
+    /// Puts another plugin in place of a model as in the run; not if the model was replaced for this replay.
+    fn replace(&mut self, model: usize, change: &Change, tick: &Tick) -> Result<(), ReplayError> {
+        let (Some(used), Some(report)) = (self.uses.get(model), self.plugins.get_mut(model)) else {
+            return Ok(());
+        };
+        if self.exchanged.contains(&change.plugin) {
+            return Ok(());
+        }
+        let settings: Vec<(&str, &str)> =
+            change.settings.iter().map(|(k, v)| (k.as_str(), v.as_str())).collect();
+        let held = used
+            .plugin
+            .parameters
+            .iter()
+            .filter(|set| self.held.iter().any(|(plugin, key)| *plugin == used.name && *key == set.key));
+        let mut other = used.replaced_by(Some(&change.parameter), &settings);
+        other.plugin.parameters.extend(held.cloned());
+        let (layer, now) = prepare_model(self.registry, &other, &self.config, Clock::Virtual)?;
+        *report = now;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a count
+        let generation = change.number as u16;
+        let model = u32::try_from(model).unwrap_or(u32::MAX);
+        drop(self.models.replace(Replacement { model, generation, layer: Box::new(layer) }, tick));
+        Ok(())
     }
 }
 

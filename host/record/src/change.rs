@@ -17,6 +17,8 @@ pub struct Change {
     pub value: String,
     /// The value as the plugin got it; for a choice, its index.
     pub number: f64,
+    /// If the plugin itself was replaced, what was set for the new one, as written.
+    pub settings: Vec<(String, String)>,
     /// What the plugin made of it.
     pub outcome: ChangeOutcome,
 }
@@ -28,6 +30,8 @@ pub enum ChangeSubject {
     Parameter,
     /// The part of its wrench that is felt, which the host mixes: it moves there at the rate of its fade.
     Weight,
+    /// The plugin itself was replaced: `parameter` is the id of the new one, `value` its version.
+    Plugin,
 }
 
 /// How a plugin took a change.

@@ -207,10 +207,10 @@ impl PluginDescription {
     }
 }
 
-fn to_settings(pairs: &[(String, String)]) -> Vec<Setting> {
+pub(crate) fn to_settings(pairs: &[(String, String)]) -> Vec<Setting> {
     pairs.iter().cloned().map(|(key, value)| Setting { key, value }).collect()
 }
 
-fn from_settings(settings: Vec<Setting>) -> Vec<(String, String)> {
+pub(crate) fn from_settings(settings: Vec<Setting>) -> Vec<(String, String)> {
     settings.into_iter().map(|setting| (setting.key, setting.value)).collect()
 }

@@ -201,6 +201,8 @@ pub(crate) struct Change {
     outcome: i32,
     #[prost(enumeration = "Subject", tag = "7")]
     subject: i32,
+    #[prost(message, repeated, tag = "8")]
+    settings: Vec<Setting>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
@@ -208,6 +210,7 @@ pub(crate) struct Change {
 enum Subject {
     Parameter = 0,
     Weight = 1,
+    Plugin = 2,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -445,8 +448,10 @@ impl Change {
             subject: match change.subject {
                 ChangeSubject::Parameter => Subject::Parameter,
                 ChangeSubject::Weight => Subject::Weight,
+                ChangeSubject::Plugin => Subject::Plugin,
             }
             .into(),
+            settings: crate::run::to_settings(&change.settings),
         }
     }
 
@@ -460,9 +465,11 @@ impl Change {
         let subject = match self.subject() {
             Subject::Parameter => ChangeSubject::Parameter,
             Subject::Weight => ChangeSubject::Weight,
+            Subject::Plugin => ChangeSubject::Plugin,
         };
         Ok(ParameterChange {
             subject,
+            settings: crate::run::from_settings(self.settings.clone()),
             tick: self.tick,
             time_ns,
             number: self.number(),

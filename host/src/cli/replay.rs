@@ -51,7 +51,8 @@ struct Report {
 
 pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
     let mut unknown = None;
-    let replay = Replay::open(&arguments.recording, &Registry::search(&[]), |models| {
+    let registry = Registry::search(&[]);
+    let replay = Replay::open(&arguments.recording, &registry, |models| {
         let others = arguments.models.iter().find_map(|other| replace(other, models).err());
         unknown = others.or_else(|| arguments.sets.iter().find_map(|set| set.apply_to_models(models).err()));
     });
@@ -66,15 +67,13 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
     let started = Instant::now();
     let mut samples = Vec::new();
     let mut end_ns = 0;
-    let (difference, health) = replay
-        .compare(|record, wrench| {
-            end_ns = record.time_ns;
-            progress.set_position(record.time_ns / 1_000_000);
-            if arguments.plot.is_some() {
-                samples.push(Sample { time_ns: record.time_ns, recorded: record.model, replayed: *wrench });
-            }
-        })
-        .map_err(ReplayError::from)?;
+    let (difference, health) = replay.compare(|record, wrench| {
+        end_ns = record.time_ns;
+        progress.set_position(record.time_ns / 1_000_000);
+        if arguments.plot.is_some() {
+            samples.push(Sample { time_ns: record.time_ns, recorded: record.model, replayed: *wrench });
+        }
+    })?;
     progress.finish_and_clear();
 
     #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days

@@ -1,6 +1,6 @@
 //! `[[change]]`: what changes while a scene runs.
 
-use super::reader::{Location, SceneError, Section};
+use super::reader::{Location, SceneError, Section, Value};
 use super::{ParameterText, PluginKeyValue};
 
 /// What changes at a time known beforehand.
@@ -24,6 +24,15 @@ pub enum ChangeWhat {
         /// The parameter and its value.
         parameter: ParameterText,
     },
+    /// Another plugin, or the same one built anew, takes the place of a model.
+    Swap {
+        /// The name of a model in the scene, or a plugin's id.
+        model: String,
+        /// Id or file of the plugin; none: the one the scene names.
+        plugin: Option<String>,
+        /// What is set for it.
+        parameters: Vec<ParameterText>,
+    },
     /// A model is felt more or less: its weight moves there at the rate of its fade.
     Weight {
         /// The name of a model in the scene, or a plugin's id.
@@ -42,11 +51,25 @@ pub(super) fn read(sections: Vec<Section<'_>>) -> Result<Vec<ChangeUse>, SceneEr
     for mut section in sections {
         let at_s = section.require("at_s")?.number(0.0..=LATEST_S)?;
         let whole = section.location();
-        let (set, weight) = (section.take("set"), section.take("weight"));
+        let (set, weight, swap) = (section.take("set"), section.take("weight"), section.take("swap"));
+        let plugin = section.take("plugin").map(Value::text).transpose()?;
+        let parameters =
+            section.section("parameters")?.map_or_else(|| Ok(Vec::new()), Section::into_texts)?;
         section.finish()?;
-        if set.is_none() && weight.is_none() {
-            let problem = "`change.set` or `change.weight` is missing: what is to change?".to_owned();
-            return Err(SceneError { location: whole, problem });
+        if set.is_none() && weight.is_none() && swap.is_none() {
+            let problem = "`change.set`, `change.weight` or `change.swap` is missing: what is to change?";
+            return Err(SceneError { location: whole, problem: problem.to_owned() });
+        }
+        if swap.is_none() && (plugin.is_some() || !parameters.is_empty()) {
+            let problem = "`change.plugin` and `change.parameters` belong to a `change.swap`";
+            return Err(SceneError { location: whole, problem: problem.to_owned() });
+        }
+        if let Some(swap) = swap {
+            let location = swap.location.clone();
+            let parameters = parameters.into_iter();
+            let parameters = parameters.map(|(key, value, location)| ParameterText { key, value, location });
+            let what = ChangeWhat::Swap { model: swap.text()?, plugin, parameters: parameters.collect() };
+            changes.push(ChangeUse { at_s, what, location });
         }
         if let Some(set) = set {
             let location = set.location.clone();

@@ -106,6 +106,25 @@ pub enum PassivityMode {
     Control,
 }
 
+impl ModelUse {
+    /// The same place with another plugin, or with none named the same one. Another plugin starts from its own
+    /// defaults; `settings` come on top.
+    #[must_use]
+    pub fn replaced_by(&self, plugin: Option<&str>, settings: &[(&str, &str)]) -> Self {
+        let mut other = self.clone();
+        if let Some(plugin) = plugin {
+            plugin.clone_into(&mut other.plugin.plugin);
+            other.plugin.parameters.clear();
+        }
+        other.plugin.parameters.extend(settings.iter().map(|(key, value)| ParameterText {
+            key: (*key).to_owned(),
+            value: (*value).to_owned(),
+            location: Location { file: PathBuf::from("swap"), line: 0 },
+        }));
+        other
+    }
+}
+
 /// What a scene allows; the device's declaration applies too, whichever is tighter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {

@@ -7,6 +7,7 @@ mod budget;
 mod clock;
 mod engine;
 mod envelope;
+mod exchange;
 mod models;
 mod parameters;
 mod passivity;
@@ -22,10 +23,12 @@ pub use clock::{Clock, SpinWindow};
 pub(crate) use clock::{Due, Schedule, monotonic_ns, sleep_until};
 pub(crate) use engine::Engine;
 pub use envelope::Envelope;
+pub(crate) use exchange::{Exchange, Workshop, exchange};
 pub use models::ModelHealth;
-pub(crate) use models::{Layer, ModelStack};
+pub(crate) use models::{Layer, ModelStack, Replacement};
 pub(crate) use parameters::{
-    ChangeReport, ChangeSender, ParameterChange, ParameterQueue, ReportReceiver, ScheduledChange, WEIGHT,
+    ChangeReport, ChangeSender, PLUGIN, ParameterChange, ParameterQueue, ReportReceiver, ScheduledChange,
+    WEIGHT,
 };
 pub use realtime::{Privilege, RealTimeReport};
 pub(crate) use realtime::{enter_real_time, enter_worker_priority, probe_real_time};
@@ -36,6 +39,7 @@ pub(crate) use watchdog::{Heartbeat, start as start_watchdog};
 pub use watchdog::{Place, Stuck};
 
 use crate::trace::{Events, TickRecord};
+use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::ActiveDevice;
 use flotor_hal::{Conditions, Cycle, DeviceState, Tick};
 use timing::STAGE_SAMPLING;
@@ -60,6 +64,7 @@ pub(crate) struct Servo {
     device: ActiveDevice,
     models: ModelStack,
     parameters: ParameterQueue,
+    exchange: Exchange,
     envelope: Envelope,
     config: RunConfig,
     heart: Heartbeat,
@@ -75,6 +80,7 @@ impl Servo {
         device: ActiveDevice,
         models: ModelStack,
         parameters: ParameterQueue,
+        exchange: Exchange,
         envelope: Envelope,
         config: RunConfig,
     ) -> Self {
@@ -82,6 +88,7 @@ impl Servo {
             device,
             models,
             parameters,
+            exchange,
             envelope,
             config,
             heart: Heartbeat::default(),
@@ -143,16 +150,25 @@ impl Servo {
     /// What was to change before this tick does so now.
     #[inline]
     fn change_parameters(&mut self, tick: &Tick, events: &mut Events) {
-        let Self { device, models, parameters, .. } = self;
-        let changed = parameters.apply_due(tick, |change| {
-            let (plugin, parameter) = (change.plugin as usize, change.parameter as usize);
-            match plugin.checked_sub(1) {
+        let Self { device, models, parameters, exchange, .. } = self;
+        // Looked at before the replacements: whoever sent one of these after a replacement has sent that too.
+        let waiting = parameters.waiting();
+        let mut replaced = false;
+        exchange.apply_due(tick, models, |model, generation| {
+            replaced = true;
+            let plugin = u16::try_from(model + 1).unwrap_or(u16::MAX); // a run has fewer plugins
+            parameters.report_replaced(tick, plugin, generation);
+        });
+        let changed = parameters.apply_due(tick, waiting, |change| {
+            let parameter = change.parameter as usize;
+            match usize::from(change.plugin).checked_sub(1) {
                 None => device.set_parameter(parameter, change.value),
                 Some(model) if change.parameter == WEIGHT => models.set_weight(model, tick, change.value),
+                Some(model) if models.generation(model) != Some(change.generation) => CallStatus::WrongPhase,
                 Some(model) => models.set_parameter(model, tick, parameter, change.value),
             }
         });
-        if changed {
+        if changed || replaced {
             events.insert(Events::PARAMETER_CHANGED);
         }
     }

@@ -14,13 +14,17 @@ const WAITING_CHANGES: usize = 256;
 
 /// Stands for the weight of a model where a parameter is named.
 pub(crate) const WEIGHT: u32 = u32::MAX;
+/// Stands for the plugin itself where a parameter is named.
+pub(crate) const PLUGIN: u32 = u32::MAX - 1;
 
 /// A new value for a parameter. The numbers come from a schema: see `session::Controls`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ParameterChange {
     /// Number of the plugin in the run: the device is 0, then the models in the scene's order.
-    pub(crate) plugin: u32,
-    /// Index into the plugin's schema, or [`WEIGHT`].
+    pub(crate) plugin: u16,
+    /// How often the plugin was replaced when the change was made: a change is for what it was checked against.
+    pub(crate) generation: u16,
+    /// Index into the plugin's schema, [`WEIGHT`], or in a report [`PLUGIN`].
     pub(crate) parameter: u32,
     /// The value; for a choice, its index.
     pub(crate) value: f64,
@@ -32,13 +36,19 @@ pub(crate) const CHANGE_WORDS: usize = 2;
 impl Words<CHANGE_WORDS> for ParameterChange {
     #[inline]
     fn to_words(&self) -> [u64; CHANGE_WORDS] {
-        [u64::from(self.plugin) | u64::from(self.parameter) << 32, self.value.to_bits()]
+        let plugin = u64::from(self.plugin) | u64::from(self.generation) << 16;
+        [plugin | u64::from(self.parameter) << 32, self.value.to_bits()]
     }
 
     #[inline]
-    #[allow(clippy::cast_possible_truncation)] // two halves of one word
+    #[allow(clippy::cast_possible_truncation)] // parts of one word
     fn from_words(&[place, value]: &[u64; CHANGE_WORDS]) -> Self {
-        Self { plugin: place as u32, parameter: (place >> 32) as u32, value: f64::from_bits(value) }
+        Self {
+            plugin: place as u16,
+            generation: (place >> 16) as u16,
+            parameter: (place >> 32) as u32,
+            value: f64::from_bits(value),
+        }
     }
 }
 
@@ -109,21 +119,45 @@ pub(crate) struct ParameterQueue {
 
 impl ParameterQueue {
     /// A queue with a schedule; where changes are sent in, and where reports come out. Not real-time.
-    pub(crate) fn new(mut schedule: Vec<ScheduledChange>) -> (Self, ChangeSender, ReportReceiver) {
+    ///
+    /// `replacements` is the number of reports beside those of the schedule that must find room.
+    pub(crate) fn new(
+        mut schedule: Vec<ScheduledChange>,
+        replacements: usize,
+    ) -> (Self, ChangeSender, ReportReceiver) {
         schedule.sort_by_key(|scheduled| scheduled.time_ns); // stable: equal times keep the scene's order
         let (sender, sent) = inbox(WAITING_CHANGES);
         // Room for the whole schedule and for twice what may wait, so that what is scheduled is never held up.
-        let (reports, receiver) = ring(schedule.len() + 2 * WAITING_CHANGES);
+        let (reports, receiver) = ring(schedule.len() + replacements + 2 * WAITING_CHANGES);
         (Self { schedule: schedule.into(), next: 0, sent, reports }, sender, receiver)
     }
 
-    /// Applies what is due at this tick, oldest first, and reports it; true if there was anything.
+    /// How many changes wait at this moment. Real-time: bounded, no allocation.
+    #[inline]
+    pub(crate) fn waiting(&mut self) -> usize {
+        self.sent.waiting()
+    }
+
+    /// Reports that a plugin was replaced. Real-time: bounded, no allocation.
+    pub(crate) fn report_replaced(&mut self, tick: &Tick, plugin: u16, generation: u16) {
+        let change = ParameterChange { plugin, generation, parameter: PLUGIN, value: f64::from(generation) };
+        let _ = self.reports.push(&ChangeReport {
+            tick: tick.index,
+            time_ns: tick.time_ns,
+            change,
+            outcome: ChangeOutcome::Applied,
+        });
+    }
+
+    /// Applies what is due at this tick, oldest first, and at most `waiting` of those that were sent; reports it; true
+    /// if there was anything.
     ///
-    /// Real-time: bounded by the schedule, what may wait, and `apply`; no allocation.
+    /// Real-time: bounded by the schedule, `waiting`, and `apply`; no allocation.
     #[inline]
     pub(crate) fn apply_due(
         &mut self,
         tick: &Tick,
+        waiting: usize,
         mut apply: impl FnMut(&ParameterChange) -> CallStatus,
     ) -> bool {
         let Self { schedule, next, sent, reports } = self;
@@ -139,8 +173,8 @@ impl ParameterQueue {
             *next += 1;
         }
         // Somebody must take the reports out for what was sent to go in; else it waits.
-        if reports.room() >= schedule.len() - *next + sent.capacity() {
-            sent.drain(|change| take(reports, change));
+        if waiting > 0 && reports.room() >= schedule.len() - *next + sent.capacity() {
+            (0..waiting).map_while(|_| sent.pop()).for_each(|change| take(reports, change));
         }
         any
     }
@@ -151,7 +185,7 @@ mod tests {
     use super::*;
 
     fn change(value: f64) -> ParameterChange {
-        ParameterChange { plugin: 1, parameter: 2, value }
+        ParameterChange { plugin: 1, generation: 3, parameter: 2, value }
     }
 
     fn at(index: u64) -> Tick {
@@ -161,7 +195,8 @@ mod tests {
     /// Values applied at a tick.
     fn applied(queue: &mut ParameterQueue, index: u64) -> Vec<f64> {
         let mut values = Vec::new();
-        let any = queue.apply_due(&at(index), |change| {
+        let waiting = queue.waiting();
+        let any = queue.apply_due(&at(index), waiting, |change| {
             values.push(change.value);
             CallStatus::Ok
         });
@@ -173,7 +208,7 @@ mod tests {
     fn what_is_scheduled_comes_at_its_tick_or_the_next_and_once() {
         let scheduled = |time_ns, value| ScheduledChange { time_ns, change: change(value) };
         let schedule = vec![scheduled(2_000_001, 3.0), scheduled(1_000_000, 1.0), scheduled(1_000_000, 2.0)];
-        let (mut queue, _sender, mut reports) = ParameterQueue::new(schedule);
+        let (mut queue, _sender, mut reports) = ParameterQueue::new(schedule, 0);
         let values: Vec<Vec<f64>> = (0..5).map(|index| applied(&mut queue, index)).collect();
         assert_eq!(values, [vec![], vec![1.0, 2.0], vec![], vec![3.0], vec![]]);
         let ticks: Vec<u64> = std::iter::from_fn(|| reports.pop()).map(|report| report.tick).collect();
@@ -193,7 +228,7 @@ mod tests {
 
     #[test]
     fn nothing_is_applied_that_nobody_could_be_told_of() {
-        let (mut queue, sender, mut reports) = ParameterQueue::new(Vec::new());
+        let (mut queue, sender, mut reports) = ParameterQueue::new(Vec::new(), 0);
         let mut sent = 0;
         let mut arrived = 0;
         for index in 0..10 {

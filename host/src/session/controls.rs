@@ -1,14 +1,17 @@
-//! What other threads may tell a running loop: new values of parameters.
+//! What other threads may tell a running loop: new values of parameters, weights, other models.
 //!
 //! Words are checked against the plugin's schema here, off the loop; only numbers travel into it.
 
-use super::PluginReport;
+use super::{PluginReport, prepare_model};
 use crate::record::{Change, ChangeSubject};
-use crate::scene::nearest;
-use crate::servo::{ChangeReport, ChangeSender, ParameterChange, ReportReceiver, WEIGHT};
+use crate::registry::Registry;
+use crate::scene::{ModelUse, nearest};
+use crate::servo::{
+    ChangeReport, ChangeSender, Clock, PLUGIN, ParameterChange, Replacement, ReportReceiver, WEIGHT, Workshop,
+};
 use flotor_hal::abi::loader::{Setting, SettingError};
-use flotor_hal::{Mutability, Parameter};
-use std::sync::Arc;
+use flotor_hal::{LoopConfig, Mutability, Parameter};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Why the loop was not told.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -47,11 +50,19 @@ pub enum ControlError {
         /// Parameters that can.
         live: Vec<String>,
     },
-    /// Only models are mixed.
-    #[error("the device has no weight; models have")]
+    /// Only models are mixed and replaced.
+    #[error("the device has no weight and cannot be replaced; models have and can")]
     NoWeight,
-    /// More changes wait than the loop takes in.
-    #[error("the loop has not taken the changes before this one yet; try again after a tick")]
+    /// A model cannot be replaced.
+    #[error("[{model}] it stays as it is: {problem}")]
+    Refused {
+        /// The model.
+        model: String,
+        /// Why.
+        problem: String,
+    },
+    /// More changes wait than the loop takes in, or the model replaced last is still fading.
+    #[error("the loop has not taken in the changes before this one yet; try again after a moment")]
     Busy,
     /// The loop has ended.
     #[error("the run is over")]
@@ -86,16 +97,48 @@ pub struct Controls {
 struct Shared {
     parts: Parts,
     changes: ChangeSender,
+    /// The models as the scene has them: where a replacement goes, and how it is mixed.
+    models: Vec<ModelUse>,
+    config: LoopConfig,
+    clock: Clock,
+    workshop: Mutex<Supervised>,
+}
+
+/// The workshop, and which models have a replacement on its way or fading in.
+struct Supervised {
+    workshop: Workshop,
+    busy: Vec<bool>,
+}
+
+impl Supervised {
+    /// Drops what the loop has handed back. Not real-time.
+    fn sweep(&mut self) {
+        while let Ok((model, layer)) = self.workshop.retired.pop() {
+            drop(layer);
+            if let Some(busy) = self.busy.get_mut(model as usize) {
+                *busy = false;
+            }
+        }
+    }
 }
 
 impl Controls {
-    pub(super) fn new(parts: Parts, changes: ChangeSender) -> Self {
-        Self { shared: Arc::new(Shared { parts, changes }) }
+    pub(super) fn new(
+        parts: Parts,
+        changes: ChangeSender,
+        models: &[ModelUse],
+        (config, clock): (LoopConfig, Clock),
+        workshop: Workshop,
+    ) -> Self {
+        let workshop = Mutex::new(Supervised { workshop, busy: vec![false; models.len()] });
+        Self { shared: Arc::new(Shared { parts, changes, models: models.to_vec(), config, clock, workshop }) }
     }
 
     /// Every plugin of the run with its schema: the device, then the models in the scene's order.
-    pub fn plugins(&self) -> impl Iterator<Item = (&str, &'static [Parameter])> {
-        self.shared.parts.list.iter().map(|plugin| (plugin.name.as_str(), plugin.schema))
+    #[must_use]
+    pub fn plugins(&self) -> Vec<(String, &'static [Parameter])> {
+        let plugins = self.shared.parts.lock();
+        plugins.iter().map(|plugin| (plugin.now().name.clone(), plugin.now().schema)).collect()
     }
 
     /// Gives a live parameter a new value before the next tick. Not real-time.
@@ -134,26 +177,124 @@ impl Controls {
         }
         changes.send_all(checked).map_err(|flotor_sync::Full| ControlError::Busy)
     }
+
+    /// Puts another plugin, or the same one built anew, in place of a model: it is loaded and created here, and fades
+    /// in from the next tick on while the old one fades out. Not real-time: takes as long as creating the model.
+    ///
+    /// Without `plugin` it is the one the scene names, with the scene's settings; another one starts from its own
+    /// defaults. `settings` come on top. Places, mapping and weight stay.
+    ///
+    /// # Errors
+    /// [`ControlError`]: no such model; the plugin is refused; the model replaced last is still fading; the loop is over.
+    pub fn swap(
+        &self,
+        registry: &Registry,
+        model: &str,
+        plugin: Option<&str>,
+        settings: &[(&str, &str)],
+    ) -> Result<(), ControlError> {
+        let Shared { parts, changes, models, config, clock, workshop } = &*self.shared;
+        let number = parts.number(model)?.checked_sub(1).ok_or(ControlError::NoWeight)?;
+        let index = usize::from(number);
+        if changes.is_abandoned() {
+            return Err(ControlError::Ended);
+        }
+        let mut supervised = workshop.lock().unwrap_or_else(PoisonError::into_inner);
+        supervised.sweep();
+        if supervised.busy.get(index).is_none_or(|busy| *busy) {
+            return Err(ControlError::Busy);
+        }
+        let place = models.get(index).ok_or(ControlError::Ended)?;
+        let other = place.replaced_by(plugin, settings);
+        let refused = |error: super::RunError| ControlError::Refused {
+            model: model.to_owned(),
+            problem: error.to_string(),
+        };
+        let (layer, report) = prepare_model(registry, &other, config, *clock).map_err(refused)?;
+        let generation = parts.add(number + 1, report);
+        parts.set_current(number + 1, generation);
+        let replacement = Replacement { model: number.into(), generation, layer: Box::new(layer) };
+        // There is room: at most one of each model is on its way.
+        let pushed = supervised.workshop.leaving_for_the_loop.push(replacement);
+        if let Some(busy) = supervised.busy.get_mut(index) {
+            *busy = pushed.is_ok();
+        }
+        pushed.map_err(|_| ControlError::Busy)
+    }
+
+    /// Drops models the loop has handed back, unless somebody else is at it. Not real-time.
+    pub(super) fn sweep(&self) {
+        if let Ok(mut supervised) = self.shared.workshop.try_lock() {
+            supervised.sweep();
+        }
+    }
+}
+
+/// A plugin of a run, and those that took its place.
+pub(super) struct Versions {
+    /// By generation; never empty.
+    first: PluginReport,
+    later: Vec<PluginReport>,
+    current: u16,
+}
+
+impl Versions {
+    fn get(&self, generation: u16) -> &PluginReport {
+        let later = usize::from(generation).checked_sub(1).and_then(|index| self.later.get(index));
+        later.unwrap_or(&self.first)
+    }
+
+    fn now(&self) -> &PluginReport {
+        self.get(self.current)
+    }
 }
 
 /// The plugins of a run as changes name them.
 #[derive(Clone)]
 pub(super) struct Parts {
-    list: Arc<[PluginReport]>,
+    list: Arc<Mutex<Vec<Versions>>>,
 }
 
 impl Parts {
     /// Of the plugins by number: the device, then the models in the scene's order.
     pub(super) fn new(plugins: &[PluginReport]) -> Self {
-        Self { list: plugins.into() }
+        let versions =
+            |report: &PluginReport| Versions { first: report.clone(), later: Vec::new(), current: 0 };
+        Self { list: Arc::new(Mutex::new(plugins.iter().map(versions).collect())) }
     }
 
-    /// The plugin of a name or id, and its number.
-    fn find(&self, name: &str) -> Result<(u32, &PluginReport), ControlError> {
-        let names = || self.list.iter().map(|part| part.name.as_str());
-        let found = (0..).zip(&*self.list).find(|(_, part)| part.name == name);
-        let found = found.or_else(|| (0..).zip(&*self.list).find(|(_, part)| part.metadata.id == name));
-        found.ok_or_else(|| ControlError::UnknownPlugin {
+    fn lock(&self) -> MutexGuard<'_, Vec<Versions>> {
+        self.list.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Another plugin for a place; its generation.
+    pub(super) fn add(&self, plugin: u16, report: PluginReport) -> u16 {
+        let mut list = self.lock();
+        let Some(versions) = list.get_mut(usize::from(plugin)) else { return 0 };
+        versions.later.push(report);
+        u16::try_from(versions.later.len()).unwrap_or(u16::MAX)
+    }
+
+    /// Which plugin of a place changes are checked against.
+    pub(super) fn set_current(&self, plugin: u16, generation: u16) {
+        if let Some(versions) = self.lock().get_mut(usize::from(plugin)) {
+            versions.current = generation;
+        }
+    }
+
+    /// Changes are checked against the plugins a run begins with.
+    pub(super) fn start_with_the_first(&self) {
+        self.lock().iter_mut().for_each(|versions| versions.current = 0);
+    }
+
+    /// The number of the plugin of a name or id.
+    pub(super) fn number(&self, name: &str) -> Result<u16, ControlError> {
+        let list = self.lock();
+        let names = || list.iter().map(|versions| versions.now().name.as_str());
+        let found = (0..).zip(&*list).find(|(_, versions)| versions.now().name == name);
+        let found =
+            found.or_else(|| (0..).zip(&*list).find(|(_, versions)| versions.now().metadata.id == name));
+        found.map(|(number, _)| number).ok_or_else(|| ControlError::UnknownPlugin {
             name: name.to_owned(),
             nearest: nearest(name, names()).map(str::to_owned),
             names: names().map(str::to_owned).collect(),
@@ -162,15 +303,19 @@ impl Parts {
 
     /// A new weight for a model.
     pub(super) fn check_weight(&self, model: &str, weight: f64) -> Result<ParameterChange, ControlError> {
-        match self.find(model)? {
-            (0, _) => Err(ControlError::NoWeight),
-            (plugin, _) => Ok(ParameterChange { plugin, parameter: WEIGHT, value: weight.clamp(0.0, 1.0) }),
+        let value = weight.clamp(0.0, 1.0);
+        match self.number(model)? {
+            0 => Err(ControlError::NoWeight),
+            plugin => Ok(ParameterChange { plugin, generation: 0, parameter: WEIGHT, value }),
         }
     }
 
     /// From words to numbers, if the words are right.
     pub(super) fn check(&self, new: &NewValue<'_>) -> Result<ParameterChange, ControlError> {
-        let (plugin, part) = self.find(new.plugin)?;
+        let plugin = self.number(new.plugin)?;
+        let list = self.lock();
+        let versions = list.get(usize::from(plugin)).ok_or(ControlError::Ended)?;
+        let (part, generation) = (versions.now(), versions.current);
         let setting = Setting::parse(part.schema, new.parameter, new.value)
             .map_err(|error| ControlError::Setting { plugin: part.name.clone(), error })?;
         let is_live = |parameter: &Parameter| parameter.mutability() == Mutability::Live;
@@ -183,37 +328,37 @@ impl Parts {
             });
         }
         let parameter = u32::try_from(setting.index()).unwrap_or(u32::MAX); // schemas have tens of entries
-        Ok(ParameterChange { plugin, parameter, value: setting.value() })
+        Ok(ParameterChange { plugin, generation, parameter, value: setting.value() })
     }
 
     /// From numbers back to words.
     fn describe(&self, report: &ChangeReport) -> Change {
         let ChangeReport { tick, time_ns, change, outcome } = *report;
-        let part = self.list.get(change.plugin as usize);
-        let name = part.map_or_else(String::new, |part| part.name.clone());
-        if change.parameter == WEIGHT {
-            return Change {
-                tick,
-                time_ns,
-                plugin: name,
-                subject: ChangeSubject::Weight,
-                parameter: "weight".to_owned(),
-                value: change.value.to_string(),
-                number: change.value,
-                outcome,
-            };
-        }
-        let parameter = part.and_then(|part| part.schema.get(change.parameter as usize));
-        let id = parameter.map_or("", Parameter::id);
-        let shown = part.and_then(|part| Setting::number(part.schema, id, change.value).ok().zip(Some(part)));
+        let list = self.lock();
+        let part = list.get(usize::from(change.plugin)).map(|versions| versions.get(change.generation));
+        let (subject, parameter, value) = match (part, change.parameter) {
+            (_, WEIGHT) => (ChangeSubject::Weight, "weight".to_owned(), change.value.to_string()),
+            (Some(part), PLUGIN) => {
+                (ChangeSubject::Plugin, part.metadata.id.clone(), part.metadata.version.clone())
+            }
+            (Some(part), parameter) => {
+                let id = part.schema.get(parameter as usize).map_or("", Parameter::id);
+                let setting = Setting::number(part.schema, id, change.value);
+                let shown = setting.map_or_else(|_| String::new(), |setting| setting.display(part.schema));
+                (ChangeSubject::Parameter, id.to_owned(), shown)
+            }
+            (None, _) => (ChangeSubject::Parameter, String::new(), String::new()),
+        };
+        let settings = part.filter(|_| subject == ChangeSubject::Plugin).map(|part| part.settings.clone());
         Change {
             tick,
             time_ns,
-            plugin: name,
-            subject: ChangeSubject::Parameter,
-            parameter: id.to_owned(),
-            value: shown.map_or_else(String::new, |(setting, part)| setting.display(part.schema)),
+            plugin: part.map_or_else(String::new, |part| part.name.clone()),
+            subject,
+            parameter,
+            value,
             number: change.value,
+            settings: settings.unwrap_or_default(),
             outcome,
         }
     }
@@ -238,6 +383,9 @@ impl ChangeLog {
             if report.tick > tick {
                 self.waiting = Some(report);
                 return;
+            }
+            if report.change.parameter == PLUGIN {
+                self.parts.set_current(report.change.plugin, report.change.generation);
             }
             look(&self.parts.describe(&report));
         }

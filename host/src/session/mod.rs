@@ -12,13 +12,14 @@ use crate::scene::{Scene, SceneError};
 use crate::servo::{
     Cause, Clock, EmergencySource, Envelope, Heartbeat, ModelHealth, ModelStack, ParameterQueue, Place,
     RealTimeReport, RunConfig, RunState, Schedule, Servo, SpinWindow, StopSwitch, Stuck, Timing,
-    enter_real_time, start_watchdog,
+    enter_real_time, exchange, start_watchdog,
 };
 use crate::trace::{RECORD_WORDS, TickRecord};
 use controls::{ChangeLog, Parts};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, Stopper};
 use flotor_hal::{EnergyLedger, Fault, LoopConfig, Pacing, Parameter};
+use prepare::Scheduled;
 use std::time::{Duration, Instant};
 
 /// How a scene is to be run.
@@ -78,6 +79,8 @@ pub struct PluginReport {
     pub metadata: Metadata,
     /// What it can be told.
     pub schema: &'static [Parameter],
+    /// What scene and command line set, as written, in order.
+    pub settings: Vec<(String, String)>,
     /// Every parameter with the value in force before the run, as text.
     pub parameters: Vec<(String, String)>,
 }
@@ -185,6 +188,7 @@ impl Session {
             name: "device".to_owned(),
             metadata: device_plugin.metadata().clone(),
             schema: device_plugin.parameters(),
+            settings: prepare::as_written(&scene.device),
             parameters: prepare::in_force(&device_plugin, &settings, |index| device.parameter(index)),
         }];
 
@@ -199,8 +203,12 @@ impl Session {
             return Err(RunError::Mismatch { device: scene.device.plugin.clone(), mismatches });
         }
         let parts = Parts::new(&plugins);
-        let (parameters, sender, reports) = ParameterQueue::new(prepare::schedule(&scene.changes, &parts)?);
-        let controls = Controls::new(parts.clone(), sender);
+        let Scheduled { changes, replacements } =
+            prepare::schedule(scene, &parts, registry, &config, options.clock)?;
+        let room = models.len() + replacements.len();
+        let (parameters, sender, reports) = ParameterQueue::new(changes, room);
+        let (exchange, workshop) = exchange(models.len(), replacements);
+        let controls = Controls::new(parts.clone(), sender, &scene.models, (config, options.clock), workshop);
 
         let envelope = Envelope::new(&scene.limits, &scene.boundary, &capabilities, period_ns);
         let stopper = device.stopper();
@@ -208,8 +216,8 @@ impl Session {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a minute
         let [ramp_ns, watchdog_ns] =
             [scene.limits.ramp_s, scene.limits.watchdog_s].map(|seconds| (seconds * 1.0e9).round() as u64);
-        let config = RunConfig { period_ns, ramp_ns, emergency_buttons: scene.limits.emergency_buttons };
-        let servo = Servo::new(active, ModelStack::new(models), parameters, envelope, config);
+        let run = RunConfig { period_ns, ramp_ns, emergency_buttons: scene.limits.emergency_buttons };
+        let servo = Servo::new(active, ModelStack::new(models), parameters, exchange, envelope, run);
         Ok(Self {
             servo,
             stopper,
@@ -277,7 +285,7 @@ impl Session {
 
     /// Same tick, no waiting: observers look between batches, so that a slow one slows the run and loses nothing.
     fn run_virtual(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Finished {
-        let Session { servo, mut changes, period_ns, duration_ns, .. } = self;
+        let Session { servo, controls, mut changes, period_ns, duration_ns, .. } = self;
         let mut runner = Runner::new(servo, Schedule::start_virtual(period_ns), duration_ns);
         let mut batch = Vec::with_capacity(VIRTUAL_BATCH);
         while runner.end.is_none() {
@@ -290,6 +298,7 @@ impl Session {
                 changes.up_to(record.tick, |change| observer.change(change));
                 observer.observe(&record);
             }
+            controls.sweep();
         }
         runner.finish(0, RealTimeReport::not_asked())
     }
@@ -298,7 +307,16 @@ impl Session {
     fn run_real(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Finished, RunError> {
         let (mut sender, mut receiver) = flotor_sync::ring::<TickRecord, RECORD_WORDS>(RING_RECORDS);
         let Session {
-            servo, stopper, mut changes, pacing, period_ns, duration_ns, watchdog_ns, plugins, ..
+            servo,
+            stopper,
+            controls,
+            mut changes,
+            pacing,
+            period_ns,
+            duration_ns,
+            watchdog_ns,
+            plugins,
+            ..
         } = self;
         let mut look = |record: TickRecord| {
             changes.up_to(record.tick, |change| observer.change(change));
@@ -334,6 +352,7 @@ impl Session {
         let mut bitten = None;
         while !servo_thread.is_finished() {
             receiver.drain(&mut look);
+            controls.sweep();
             bitten = bitten.or_else(|| heart.bitten().map(|stuck| (stuck, Instant::now())));
             if let Some((stuck, since)) = bitten
                 && since.elapsed() > COME_BACK

@@ -1,11 +1,11 @@
 //! From a scene to what a loop is made of: plugins loaded, their settings checked, everything paired.
 
-use super::controls::{NewValue, Parts};
+use super::controls::{ControlError, NewValue, Parts};
 use super::{PluginReport, RunError};
 use crate::mapping::Mapping;
 use crate::registry::{LookupError, Registry};
 use crate::scene::{ChangeUse, ChangeWhat, Isolation, ModelUse, ParameterText, PluginUse, Scene, SceneError};
-use crate::servo::{Clock, Engine, Layer, ScheduledChange, TimeBudget};
+use crate::servo::{Clock, Engine, Layer, Replacement, ScheduledChange, TimeBudget};
 use crate::worker::{Worker, WorkerOrder};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, Setting};
@@ -69,6 +69,7 @@ pub(crate) fn prepare_model(
         name: model.name.clone(),
         metadata: plugin.metadata().clone(),
         schema: plugin.parameters(),
+        settings: as_written(&model.plugin),
         parameters: in_force(&plugin, &settings, &mut value),
     };
     Ok((Layer::new(instances, &model.blend, budget), report))
@@ -169,22 +170,61 @@ pub(super) fn pair(scene: &Scene, device: &Capabilities, can_pace: bool) -> Vec<
     mismatches
 }
 
-/// The changes a scene has scheduled, checked; complaints name file and line.
-pub(super) fn schedule(changes: &[ChangeUse], parts: &Parts) -> Result<Vec<ScheduledChange>, SceneError> {
-    let check = |change: &ChangeUse| {
+/// What a scene sets for a plugin, as written.
+pub(super) fn as_written(plugin: &PluginUse) -> Vec<(String, String)> {
+    plugin.parameters.iter().map(|parameter| (parameter.key.clone(), parameter.value.clone())).collect()
+}
+
+/// What a scene has scheduled, checked and made.
+pub(super) struct Scheduled {
+    pub(super) changes: Vec<ScheduledChange>,
+    pub(super) replacements: Vec<(u64, Replacement)>,
+}
+
+/// The changes a scene has scheduled, checked, and the models they put in, created; complaints name file and line.
+pub(super) fn schedule(
+    scene: &Scene,
+    parts: &Parts,
+    registry: &Registry,
+    config: &LoopConfig,
+    clock: Clock,
+) -> Result<Scheduled, RunError> {
+    let mut in_time: Vec<&ChangeUse> = scene.changes.iter().collect();
+    in_time.sort_by(|a, b| a.at_s.total_cmp(&b.at_s)); // stable: a change is checked against what is there then
+    let mut scheduled = Scheduled { changes: Vec::new(), replacements: Vec::new() };
+    for change in in_time {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
         let time_ns = (change.at_s * 1.0e9).round() as u64;
-        let (key, checked) = match &change.what {
-            ChangeWhat::Set { plugin, parameter: ParameterText { key, value, .. } } => {
-                ("change.set", parts.check(&NewValue { plugin, parameter: key, value }))
-            }
-            ChangeWhat::Weight { model, weight } => ("change.weight", parts.check_weight(model, *weight)),
-        };
-        let checked = checked.map_err(|error| SceneError {
+        let complain = |key: &str, error: ControlError| SceneError {
             location: change.location.clone(),
             problem: format!("`{key}`: {error}"),
-        })?;
-        Ok(ScheduledChange { time_ns, change: checked })
-    };
-    changes.iter().map(check).collect()
+        };
+        let checked = match &change.what {
+            ChangeWhat::Set { plugin, parameter: ParameterText { key, value, .. } } => {
+                let new = NewValue { plugin, parameter: key, value };
+                parts.check(&new).map_err(|error| complain("change.set", error))?
+            }
+            ChangeWhat::Weight { model, weight } => {
+                parts.check_weight(model, *weight).map_err(|error| complain("change.weight", error))?
+            }
+            ChangeWhat::Swap { model, plugin, parameters } => {
+                let number = parts.number(model).map_err(|error| complain("change.swap", error))?;
+                let place = number.checked_sub(1).and_then(|index| scene.models.get(usize::from(index)));
+                let place = place.ok_or_else(|| complain("change.swap", ControlError::NoWeight))?;
+                let mut other = place.replaced_by(plugin.as_deref(), &[]);
+                other.plugin.location = change.location.clone();
+                other.plugin.parameters.extend(parameters.iter().cloned());
+                let (layer, report) = prepare_model(registry, &other, config, clock)?;
+                let generation = parts.add(number, report);
+                parts.set_current(number, generation);
+                let replacement =
+                    Replacement { model: u32::from(number) - 1, generation, layer: Box::new(layer) };
+                scheduled.replacements.push((time_ns, replacement));
+                continue;
+            }
+        };
+        scheduled.changes.push(ScheduledChange { time_ns, change: checked });
+    }
+    parts.start_with_the_first();
+    Ok(scheduled)
 }

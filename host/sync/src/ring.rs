@@ -254,6 +254,15 @@ impl<T: Words<N>, const N: usize> Receiver<T, N> {
         count
     }
 
+    /// How many records wait at this moment; the sender can only make it more.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[inline]
+    pub fn waiting(&mut self) -> usize {
+        self.look_for_more();
+        self.known_tail.wrapping_sub(self.head)
+    }
+
     /// How many records can wait at once.
     ///
     /// Real-time: bounded, no allocation.

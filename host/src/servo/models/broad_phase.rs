@@ -37,8 +37,8 @@ impl Bounds {
         Self { low_m: low_m.map(down), high_m: high_m.map(up) }
     }
 
-    /// The box that holds both.
-    fn with(self, other: Self) -> Self {
+    /// The box that holds both. Real-time: bounded, no allocation.
+    pub(super) fn with(self, other: Self) -> Self {
         let pairs = |a: [f32; 3], b: [f32; 3], pick: fn(f32, f32) -> f32| {
             std::array::from_fn(|axis| pick(a[axis], b[axis]))
         };

@@ -1,7 +1,6 @@
-//! One force model of a scene, in all the places it is put: the unit that is mixed, faded and replaced.
+//! One force model in all the places it is put: the unit that is mixed, faded and replaced.
 
 use super::broad_phase::{Bounds, BroadPhase};
-use super::fade::Fade;
 use crate::mapping::{Blend, Mapping};
 use crate::servo::budget::{Allowed, Overrun, TimeBudget};
 use crate::servo::engine::{Engine, Stepped};
@@ -72,9 +71,7 @@ pub(crate) struct Layer {
     budget: TimeBudget,
     /// What it asked for last: it fades if the model took too long too often.
     last: Share,
-    pub(super) weight: Fade,
-    pub(super) priority: u8,
-    pub(super) health: ModelHealth,
+    blend: Blend,
 }
 
 impl Layer {
@@ -94,10 +91,13 @@ impl Layer {
             memory,
             budget,
             last: Share::default(),
-            weight: Fade::new(blend.weight, blend.fade_s),
-            priority: blend.priority,
-            health: ModelHealth::default(),
+            blend: *blend,
         }
+    }
+
+    /// How it is mixed with the others.
+    pub(super) fn blend(&self) -> &Blend {
+        &self.blend
     }
 
     /// The box in the device frame in which any of its objects can act; `None` if that is everywhere. Real-time.
@@ -110,7 +110,13 @@ impl Layer {
     ///
     /// Real-time: bounded by the objects that are near, no allocation.
     #[inline]
-    pub(super) fn step(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
+    pub(super) fn step(
+        &mut self,
+        tick: &Tick,
+        state: &DeviceState,
+        health: &mut ModelHealth,
+        events: &mut Events,
+    ) -> Share {
         match self.budget.allowed(tick.time_ns) {
             Allowed::Asked => {}
             Allowed::Fading(part) => {
@@ -123,10 +129,10 @@ impl Layer {
             }
         }
         let begun_ns = self.budget.begin();
-        let share = self.ask(tick, state, events);
+        let share = self.ask(tick, state, health, events);
         if self.budget.end(begun_ns, tick.index, tick.time_ns) {
             events.insert(Events::MODEL_OVERRUN);
-            self.health.overrun = self.budget.overrun();
+            health.overrun = self.budget.overrun();
         }
         self.last = share;
         share
@@ -134,8 +140,14 @@ impl Layer {
 
     /// Asks all objects that can act where the handle is; the others are not called.
     #[inline]
-    fn ask(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
-        let Self { objects, broad, demand, memory, health, .. } = self;
+    fn ask(
+        &mut self,
+        tick: &Tick,
+        state: &DeviceState,
+        health: &mut ModelHealth,
+        events: &mut Events,
+    ) -> Share {
+        let Self { objects, broad, demand, memory, .. } = self;
         let mut share = Share::default();
         broad.for_each_near(state.pose.position(), |index| {
             let Some(object) = objects.get_mut(index) else { return };
@@ -155,13 +167,19 @@ impl Layer {
     }
 
     /// Changes a live parameter of all its objects. Real-time: bounded by their number, no allocation.
-    pub(super) fn set_parameter(&mut self, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
+    pub(super) fn set_parameter(
+        &mut self,
+        tick: &Tick,
+        parameter: usize,
+        value: f64,
+        health: &mut ModelHealth,
+    ) -> CallStatus {
         let mut worst = CallStatus::Ok;
         for (index, object) in self.objects.iter_mut().enumerate() {
             let status = object.model.set_parameter(parameter, value);
             if status == CallStatus::Panicked {
                 object.is_out = true;
-                self.health.panicked_at.get_or_insert(tick.index);
+                health.panicked_at.get_or_insert(tick.index);
             }
             if status != CallStatus::Ok {
                 worst = status;

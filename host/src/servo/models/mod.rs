@@ -9,6 +9,7 @@
 mod broad_phase;
 mod fade;
 mod layer;
+mod slot;
 
 pub(crate) use layer::Layer;
 pub use layer::ModelHealth;
@@ -20,6 +21,7 @@ use fade::Fade;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{DeviceState, Tick, Wrench};
 use layer::Share;
+use slot::Slot;
 
 /// Time in which a layer of higher priority silences the others, s: a hand's reaction takes longer, the slew limit
 /// need not act.
@@ -27,10 +29,21 @@ const SILENCE_S: f64 = 0.02;
 
 /// All models of a loop.
 pub(crate) struct ModelStack {
-    layers: Box<[Layer]>,
+    slots: Box<[Slot]>,
     broad: BroadPhase,
+    /// Layers that may still be fading out.
+    leaving: usize,
     /// Ascending; more than one only if the scene has several priorities.
     levels: Box<[Level]>,
+}
+
+/// A model on its way into a running loop.
+pub(crate) struct Replacement {
+    /// Number of the model it replaces.
+    pub(crate) model: u32,
+    /// What changes of its parameters name it by.
+    pub(crate) generation: u16,
+    pub(crate) layer: Box<Layer>,
 }
 
 /// The layers of one priority.
@@ -44,12 +57,13 @@ struct Level {
 impl ModelStack {
     /// Not real-time.
     pub(crate) fn new(layers: Vec<Layer>) -> Self {
-        let broad = BroadPhase::new(layers.iter().map(Layer::bounds).collect());
-        let mut priorities: Vec<u8> = layers.iter().map(|layer| layer.priority).collect();
+        let slots: Box<[Slot]> = layers.into_iter().map(Slot::new).collect();
+        let broad = BroadPhase::new(slots.iter().map(Slot::bounds).collect());
+        let mut priorities: Vec<u8> = slots.iter().map(|slot| slot.priority).collect();
         priorities.sort_unstable();
         priorities.dedup();
         let level = |priority| Level { priority, gain: Fade::new(1.0, SILENCE_S), pushes: false };
-        Self { layers: layers.into(), broad, levels: priorities.into_iter().map(level).collect() }
+        Self { slots, broad, leaving: 0, levels: priorities.into_iter().map(level).collect() }
     }
 
     /// What the models together ask for at a state of the device, in the device frame, and the energy they store, J.
@@ -63,20 +77,20 @@ impl ModelStack {
         heart: &Heartbeat,
         events: &mut Events,
     ) -> (Wrench, f64) {
-        let Self { layers, broad, levels, .. } = self;
+        let Self { slots, broad, levels, .. } = self;
         levels.iter_mut().for_each(|level| level.pushes = false);
         let mut sum = Share::default();
         broad.for_each_near(state.pose.position(), |index| {
-            let Some(layer) = layers.get_mut(index) else { return };
-            let Some(level) = levels.iter_mut().find(|level| level.priority == layer.priority) else {
+            let Some(slot) = slots.get_mut(index) else { return };
+            let Some(level) = levels.iter_mut().find(|level| level.priority == slot.priority) else {
                 return;
             };
-            if layer.weight.is_silent(tick.time_ns) || level.gain.is_silent(tick.time_ns) {
+            if slot.weight.is_silent(tick.time_ns) || level.gain.is_silent(tick.time_ns) {
                 return;
             }
             heart.enter(tick.index, Place::Model(index));
-            let share = layer.step(tick, state, events);
-            let weight = layer.weight.at(tick.time_ns);
+            let share = slot.step(tick, state, events);
+            let weight = slot.weight.at(tick.time_ns);
             level.pushes |= weight > 0.0 && share.wrench != Wrench::ZERO;
             let weight = weight * level.gain.at(tick.time_ns);
             sum.wrench = sum.wrench + share.wrench * weight;
@@ -99,22 +113,53 @@ impl ModelStack {
         parameter: usize,
         value: f64,
     ) -> CallStatus {
-        let Some(layer) = self.layers.get_mut(model) else { return CallStatus::Unsupported };
-        let status = layer.set_parameter(tick, parameter, value);
+        let Some(slot) = self.slots.get_mut(model) else { return CallStatus::Unsupported };
+        let status = slot.set_parameter(tick, parameter, value);
         self.rebound(model);
         status
     }
 
     /// Moves the weight of the model numbered `model` to a new value, at its rate. Real-time: bounded, no allocation.
     pub(crate) fn set_weight(&mut self, model: usize, tick: &Tick, weight: f64) -> CallStatus {
-        let Some(layer) = self.layers.get_mut(model) else { return CallStatus::Unsupported };
-        layer.weight.set_target(weight, tick.time_ns);
+        let Some(slot) = self.slots.get_mut(model) else { return CallStatus::Unsupported };
+        slot.weight.set_target(weight, tick.time_ns);
         CallStatus::Ok
+    }
+
+    /// How often the model numbered `model` was replaced. Real-time: bounded, no allocation.
+    #[inline]
+    pub(crate) fn generation(&self, model: usize) -> Option<u16> {
+        self.slots.get(model).map(|slot| slot.generation)
+    }
+
+    /// Puts another model in place of one, faded in from this tick on. What it pushes out, because it was still
+    /// fading, is returned: dropping it is not for the loop.
+    ///
+    /// Real-time: bounded by the objects of the model, no allocation.
+    pub(crate) fn replace(&mut self, replacement: Replacement, tick: &Tick) -> Option<Box<Layer>> {
+        let Replacement { model, generation, layer } = replacement;
+        let Some(slot) = self.slots.get_mut(model as usize) else { return Some(layer) };
+        let pushed_out = slot.put(layer, generation, tick);
+        self.leaving += usize::from(pushed_out.is_none());
+        self.rebound(model as usize);
+        pushed_out
+    }
+
+    /// A layer that has faded out, and the number of its model. Real-time: bounded by the models, no allocation.
+    #[inline]
+    pub(crate) fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {
+        if self.leaving == 0 {
+            return None;
+        }
+        let mut slots = (0..).zip(&mut *self.slots);
+        let faded = slots.find_map(|(model, slot)| Some((model, slot.take_faded(tick)?)));
+        self.leaving -= usize::from(faded.is_some());
+        faded
     }
 
     /// A layer may act elsewhere now.
     fn rebound(&mut self, model: usize) {
-        let bounds = self.layers.get(model).and_then(Layer::bounds);
+        let bounds = self.slots.get(model).and_then(Slot::bounds);
         if bounds != self.broad.bounds(model) {
             self.broad.watch_always(model, bounds);
         }
@@ -122,6 +167,6 @@ impl ModelStack {
 
     /// Every model with its health and what it said last. Not real-time.
     pub(crate) fn health(&mut self) -> Vec<(ModelHealth, String)> {
-        self.layers.iter_mut().map(|layer| (layer.health, layer.last_message())).collect()
+        self.slots.iter_mut().map(|slot| (slot.health, slot.last_message())).collect()
     }
 }

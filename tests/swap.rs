@@ -1,0 +1,189 @@
+//! A model is replaced while the loop runs: faded, recorded, bounded in memory, and nothing jumps.
+
+use flotor::record::{Change, ChangeOutcome, ChangeSubject};
+use flotor::registry::Registry;
+use flotor::servo::{Clock, StopSwitch};
+use flotor::session::{ControlError, Controls, Observer};
+use flotor::trace::{Events, TickRecord};
+use flotor_hal::abi::PluginKind;
+use flotor_tests::TestSize;
+use flotor_tests::library::plugin_file;
+use flotor_tests::program::{Flotor, exit_code};
+use flotor_tests::scratch::Scratch;
+use flotor_tests::watched::{prepared, watch};
+use serde_json::Value;
+
+/// A spring on the simulated flotor, held by a hand; the force may change by 3 N in a tick.
+const SPRING: &str = "[limits]\nforce_slew_n_per_s = 3000\n[device]\nplugin = \"simulated\"\n\
+    [[model]]\nplugin = \"spring\"\n[model.blend]\nfade_s = 0.05\n";
+
+#[test]
+fn a_scheduled_replacement_fades_in_without_a_jump_and_is_alone_then() {
+    let swapped = watch(&format!(
+        "duration_s = 2\n{SPRING}[[change]]\nat_s = 0.5\nswap = \"spring\"\nparameters = {{ gamma_n = 5 }}\n"
+    ));
+    let plain = watch(&format!("duration_s = 2\n{SPRING}"));
+    let [(seen, change)] = swapped.changes.as_slice() else { panic!("{:?}", swapped.changes) };
+    assert_eq!((*seen, change.tick, change.subject), (500, 500, ChangeSubject::Plugin));
+    assert_eq!((change.plugin.as_str(), change.parameter.as_str()), ("spring", "spring"));
+    assert_eq!(change.settings, [("gamma_n".to_owned(), "5".to_owned())]);
+    // Until its first tick, at which its weight is still 0, nothing differs.
+    let differs = |(a, b): (&TickRecord, &TickRecord)| a.model != b.model;
+    assert_eq!(plain.records.iter().zip(&swapped.records).position(differs), Some(501));
+    // A step of the law, cut into the 50 ticks of the fade: some newtons over 50, not at once.
+    let jumps_n =
+        swapped.records.windows(2).map(|pair| (pair[1].model.force() - pair[0].model.force()).length());
+    let plain_n =
+        plain.records.windows(2).map(|pair| (pair[1].model.force() - pair[0].model.force()).length());
+    let largest = |jumps: &mut dyn Iterator<Item = f64>| jumps.fold(0.0_f64, f64::max);
+    let (with, without) = (largest(&mut { jumps_n }), largest(&mut { plain_n }));
+    let peak_n = plain.records.iter().map(|record| record.model.force().length()).fold(0.0, f64::max);
+    assert!(with < without + peak_n / 50.0 * 1.5, "{with} N against {without} N, of {peak_n} N");
+}
+
+#[test]
+fn a_recording_with_replacements_replays_bit_for_bit() {
+    let scratch = Scratch::default();
+    let recording = scratch.path().join("run.mcap").display().to_string();
+    let changes = "[[change]]\nat_s = 0.4\nswap = \"spring\"\nplugin = \"wall\"\n\
+        [change.parameters]\nstiffness_n_per_m = 400\n\
+        [[change]]\nat_s = 0.9\nset = \"spring.friction=0.3\"\n\
+        [[change]]\nat_s = 1.2\nswap = \"spring\"\n\
+        [[change]]\nat_s = 1.21\nswap = \"spring\"\nplugin = \"wall\"\n";
+    let scene =
+        scratch.file("scene.toml", format!("duration_s = 2\n{SPRING}{changes}")).display().to_string();
+    let ran = Flotor::with(["run", &scene, "--clock", "virtual", "--record", &recording]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let ran = Flotor::with(["replay", &recording, "--json", "-"]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let report: Value = serde_json::from_str(&ran.stdout).expect("the report is JSON");
+    assert_eq!(report["bit_exact"], Value::from(true), "{report}");
+}
+
+/// Replaces the spring as often as the loop lets it.
+struct Swapper<'a> {
+    controls: Controls,
+    registry: &'a Registry,
+    applied: Vec<u64>,
+    refused_as_busy: u64,
+    last: Option<TickRecord>,
+    largest_step_n: f64,
+    swap_ns: Vec<u64>,
+    other_ns: Vec<u64>,
+}
+
+impl Observer for Swapper<'_> {
+    fn observe(&mut self, record: &TickRecord) {
+        if let Some(last) = &self.last {
+            let step_n = (record.commanded.force() - last.commanded.force()).length();
+            self.largest_step_n = self.largest_step_n.max(step_n);
+        }
+        self.last = Some(*record);
+        let replaced = record.events.intersects(Events::PARAMETER_CHANGED);
+        if replaced { &mut self.swap_ns } else { &mut self.other_ns }.push(record.compute_ns);
+        if record.tick.is_multiple_of(100) {
+            let plugin = if record.tick.is_multiple_of(200) { None } else { Some("wall") };
+            match self.controls.swap(self.registry, "spring", plugin, &[]) {
+                Ok(()) => {}
+                Err(ControlError::Busy) => self.refused_as_busy += 1,
+                Err(error) => panic!("{error}"),
+            }
+        }
+    }
+
+    fn change(&mut self, change: &Change) {
+        assert_eq!((change.subject, change.outcome), (ChangeSubject::Plugin, ChangeOutcome::Applied));
+        self.applied.push(change.tick);
+    }
+}
+
+#[test]
+fn a_thousand_replacements_under_load_leave_no_step_and_no_memory_behind() {
+    let seconds = TestSize::of_this_run().pick(100, 1100);
+    let session = prepared(Clock::Virtual, &format!("duration_s = {seconds}\n{SPRING}"));
+    let registry = Registry::search(&[]);
+    let controls = session.controls();
+    let mut swapper = Swapper {
+        controls,
+        registry: &registry,
+        applied: Vec::new(),
+        refused_as_busy: 0,
+        last: None,
+        largest_step_n: 0.0,
+        swap_ns: Vec::new(),
+        other_ns: Vec::new(),
+    };
+    assert!(session.run(&mut swapper, &StopSwitch::default()).is_ok());
+    let swaps = swapper.applied.len();
+    assert!(swaps >= TestSize::of_this_run().pick(90, 1000), "{swaps} replacements");
+    assert!(swapper.refused_as_busy > 0, "at most one of a model is on its way");
+    // 3000 N/s for 1 ms, and the rounding of a length.
+    assert!(swapper.largest_step_n <= 3.0 * (1.0 + 1.0e-12), "{} N", swapper.largest_step_n);
+    let median = |ticks: &mut Vec<u64>| {
+        ticks.sort_unstable();
+        ticks[ticks.len() / 2]
+    };
+    let (with, without) = (median(&mut swapper.swap_ns), median(&mut swapper.other_ns));
+    println!("{swaps} replacements; a tick with one takes {with} ns, another {without} ns");
+}
+
+#[test]
+fn after_a_replacement_changes_are_for_the_new_model() {
+    struct Once<'a>(Controls, &'a Registry, Vec<Change>);
+    impl Observer for Once<'_> {
+        fn observe(&mut self, record: &TickRecord) {
+            let Self(controls, registry, _) = self;
+            if record.tick == 10 {
+                controls.swap(registry, "spring", Some("wall"), &[("friction", "0.1")]).expect("it is right");
+                controls.set_parameter("spring", "friction", "0.5").expect("the wall has friction");
+                let error = controls.set_parameter("spring", "gamma_n", "9").expect_err("the wall has none");
+                assert!(error.to_string().starts_with("[spring] no parameter `gamma_n`"), "{error}");
+                let busy = controls.swap(registry, "spring", None, &[]);
+                assert_eq!(busy, Err(ControlError::Busy));
+            }
+        }
+        fn change(&mut self, change: &Change) {
+            self.2.push(change.clone());
+        }
+    }
+    let registry = Registry::search(&[]);
+    let session = prepared(Clock::Virtual, &format!("duration_s = 3\n{SPRING}"));
+    let mut once = Once(session.controls(), &registry, Vec::new());
+    assert!(session.run(&mut once, &StopSwitch::default()).is_ok());
+    let [replaced, set] = once.2.as_slice() else { panic!("{:?}", once.2) };
+    assert_eq!((replaced.subject, replaced.parameter.as_str()), (ChangeSubject::Plugin, "wall"));
+    assert_eq!((set.parameter.as_str(), set.outcome), ("friction", ChangeOutcome::Applied));
+    assert_eq!(replaced.tick, set.tick, "in one tick, in order");
+}
+
+#[test]
+fn an_unchanged_file_keeps_its_one_mapping_and_a_rebuilt_one_is_another_plugin() {
+    let scratch = Scratch::default();
+    let registry = Registry::search(&[]);
+    let mut bytes = std::fs::read(plugin_file("flotor-wall")).expect("it is built");
+    let file = scratch.file("libmine.so", &bytes);
+    let path = file.display().to_string();
+    // The schema is a static of the library: one address, one mapping.
+    let schema = || registry.load(&path, PluginKind::Model).expect("a plugin").parameters().as_ptr();
+    let first = schema();
+    assert_eq!(schema(), first);
+    bytes.push(0);
+    std::fs::write(&file, &bytes).expect("a scratch file");
+    let rebuilt = schema();
+    assert_ne!(rebuilt, first);
+    assert_eq!(schema(), rebuilt);
+}
+
+#[test]
+fn a_plugin_that_is_refused_changes_nothing() {
+    let scratch = Scratch::default();
+    let registry = Registry::search(&[]);
+    let session = prepared(Clock::Virtual, &format!("duration_s = 1\n{SPRING}"));
+    let controls = session.controls();
+    let path = scratch.file("libmine.so", b"not a plugin").display().to_string();
+    let refused = controls.swap(&registry, "spring", Some(&path), &[]).expect_err("it is no plugin");
+    assert!(refused.to_string().starts_with("[spring] it stays as it is: "), "{refused}");
+    assert!(refused.to_string().contains("libmine.so"), "{refused}");
+    let unknown = controls.swap(&registry, "sprng", None, &[]).expect_err("no such model");
+    assert!(unknown.to_string().contains("did you mean `spring`?"), "{unknown}");
+}
