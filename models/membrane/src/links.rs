@@ -1,0 +1,165 @@
+//! Springs in runs: consecutive masses, each linked to the one the same distance further on.
+//!
+//! A sheet numbered row by row has two such distances, one and a row; a run is then a row. Over a run all is a plain
+//! loop over slices, which the compiler turns into wide instructions; an irregular mesh has short runs, and only loses
+//! speed. Products and sums are in one fixed order and never contracted, so every instruction set gives the same bits.
+
+use crate::mesh::Link;
+use crate::network::Vectors;
+use crate::regions::{BLOCK, Regions};
+use std::ops::Range;
+
+/// Springs from the masses `first..first + count` to those `distance` further on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Run {
+    first: usize,
+    distance: usize,
+    /// Where its springs are in the arrays.
+    springs: Range<usize>,
+}
+
+/// All springs.
+#[derive(Clone, Debug)]
+pub(crate) struct Links {
+    runs: Vec<Run>,
+    rest_m: Vec<f64>,
+    stiffness_n_per_m: Vec<f64>,
+    /// Forces of one run on its first ends, N.
+    scratch: Vectors,
+}
+
+impl Links {
+    /// Not real-time.
+    pub(crate) fn new(links: &[Link]) -> Self {
+        let mut sorted: Vec<Link> = links.to_vec();
+        sorted.sort_by_key(|link| (link.ends[1] - link.ends[0], link.ends[0]));
+        let mut runs: Vec<Run> = Vec::new();
+        for (index, link) in sorted.iter().enumerate() {
+            let [first, second] = link.ends;
+            let distance = second - first;
+            // A run stays inside a block of masses, so that it rests when they do.
+            let continued = runs.last_mut().filter(|run| {
+                let next = run.first + run.springs.len();
+                run.distance == distance && next == first && !first.is_multiple_of(BLOCK)
+            });
+            match continued {
+                Some(run) => run.springs.end += 1,
+                None => runs.push(Run { first, distance, springs: index..index + 1 }),
+            }
+        }
+        Self {
+            runs,
+            rest_m: sorted.iter().map(|link| link.rest_m).collect(),
+            stiffness_n_per_m: sorted.iter().map(|link| link.stiffness_n_per_m).collect(),
+            scratch: Vectors::zero(BLOCK),
+        }
+    }
+
+    /// Blocks of masses that springs join. Not real-time.
+    pub(crate) fn joined_blocks(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
+        self.runs.iter().flat_map(|run| {
+            let ends = run.first..run.first + run.springs.len();
+            ends.map(|end| [end / BLOCK, (end + run.distance) / BLOCK])
+        })
+    }
+
+    /// Adds the forces of all springs that touch a region awake. Real-time: bounded, no allocation.
+    #[inline(always)] // into the function compiled for wide instructions
+    pub(crate) fn add_forces(&mut self, positions_m: &Vectors, forces_n: &mut Vectors, regions: &Regions) {
+        for run in &self.runs {
+            let (first, second) = (run.first, run.first + run.distance);
+            let count = run.springs.len();
+            let last = second + count - 1;
+            if !(regions.is_awake(first / BLOCK)
+                || regions.is_awake(second / BLOCK)
+                || regions.is_awake(last / BLOCK))
+            {
+                continue;
+            }
+            let springs = run.springs.clone();
+            self.scratch.pull(
+                positions_m,
+                first..first + count,
+                second..second + count,
+                &self.rest_m[springs.clone()],
+                &self.stiffness_n_per_m[springs],
+            );
+            forces_n.add(first..first + count, &self.scratch, 1.0);
+            forces_n.add(second..second + count, &self.scratch, -1.0);
+        }
+    }
+}
+
+impl Vectors {
+    /// Forces on the masses `first` of springs to the masses `second`, into the first entries of `self`.
+    #[inline(always)]
+    fn pull(
+        &mut self,
+        positions_m: &Vectors,
+        first: Range<usize>,
+        second: Range<usize>,
+        rest_m: &[f64],
+        stiffness_n_per_m: &[f64],
+    ) {
+        /// Two masses in one place pull nowhere: m².
+        const LEAST_SQUARE: f64 = 1.0e-300;
+        let count = rest_m.len();
+        // Slices of one length, so that the loop below has no checks.
+        let [ax, ay, az] = positions_m.slices(first);
+        let [bx, by, bz] = positions_m.slices(second);
+        let [fx, fy, fz] = self.slices_mut(0..count);
+        let k = &stiffness_n_per_m[..count];
+        for i in 0..count {
+            let (dx, dy, dz) = (bx[i] - ax[i], by[i] - ay[i], bz[i] - az[i]);
+            let square = (dx * dx + dy * dy + dz * dz).max(LEAST_SQUARE);
+            let pull = k[i] - k[i] * rest_m[i] / square.sqrt();
+            fx[i] = pull * dx;
+            fy[i] = pull * dy;
+            fz[i] = pull * dz;
+        }
+    }
+
+    /// Adds the first entries of `other`, times `sign`, to a range.
+    #[inline(always)]
+    fn add(&mut self, range: Range<usize>, other: &Vectors, sign: f64) {
+        let count = range.len();
+        let sums = self.slices_mut(range);
+        for (sum, addend) in sums.into_iter().zip(other.slices(0..count)) {
+            for i in 0..count {
+                sum[i] += sign * addend[i];
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{Mesh, Sheet};
+
+    #[test]
+    fn a_row_is_a_run_unless_a_block_ends_in_it() {
+        let sheet =
+            Sheet { nodes_per_side: 45, side_m: 0.1, mass_kg: 0.01, stiffness_n_per_m: 1.0, stretch: 1.0 };
+        let mesh = Mesh::sheet(&sheet);
+        let links = Links::new(&mesh.links);
+        assert_eq!(links.rest_m.len(), 2 * 43 * 44);
+        assert_eq!(links.runs.iter().map(|run| run.springs.len()).sum::<usize>(), 2 * 43 * 44);
+        // 43 rows and 44 columns' steps, and one more run for each of the 31 block ends inside one.
+        assert!(links.runs.len() <= 43 + 44 + 2 * 31, "{}", links.runs.len());
+    }
+
+    #[test]
+    fn a_stretched_spring_pulls_its_ends_together_and_two_masses_in_one_place_do_nothing() {
+        let mut links = Links::new(&[
+            Link { ends: [0, 1], rest_m: 1.0, stiffness_n_per_m: 10.0 },
+            Link { ends: [1, 2], rest_m: 1.0, stiffness_n_per_m: 10.0 },
+        ]);
+        let mut positions = Vectors::zero(3);
+        (positions.x[1], positions.x[2]) = (1.5, 1.5);
+        let mut forces = Vectors::zero(3);
+        links.add_forces(&positions, &mut forces, &Regions::all_awake(3));
+        assert_eq!(forces.x, [5.0, -5.0, 0.0]);
+        assert!(forces.y.iter().chain(&forces.z).all(|force| *force == 0.0));
+    }
+}

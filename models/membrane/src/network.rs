@@ -1,0 +1,341 @@
+//! The state of a network, and its step in time.
+//!
+//! Positions, velocities and forces are one array per coordinate. The step is the symplectic Euler method with damping
+//! taken implicitly,
+//!
+//! ```text
+//! v <- (v + h a) / (1 + h c),    x <- x + h v
+//! ```
+//!
+//! stable for `h < 2 / omega`, with the highest frequency bounded by Gershgorin: `omega^2 <= 2 sum(k) / m` over the
+//! springs at a mass. [`Network::longest_step_s`] is 0.8 of that limit.
+
+use crate::links::Links;
+use crate::mesh::Mesh;
+use crate::regions::Regions;
+use flotor_hal::DVec3;
+use pulp::Arch;
+use std::ops::Range;
+
+/// Three coordinates of many things, one array each.
+#[derive(Debug)]
+pub struct Vectors {
+    /// Components along x.
+    pub x: Vec<f64>,
+    /// Components along y.
+    pub y: Vec<f64>,
+    /// Components along z.
+    pub z: Vec<f64>,
+}
+
+impl Clone for Vectors {
+    fn clone(&self) -> Self {
+        Self { x: self.x.clone(), y: self.y.clone(), z: self.z.clone() }
+    }
+
+    /// Without allocation, if there are as many.
+    fn clone_from(&mut self, other: &Self) {
+        self.x.clone_from(&other.x);
+        self.y.clone_from(&other.y);
+        self.z.clone_from(&other.z);
+    }
+}
+
+impl Vectors {
+    /// This many zeros. Not real-time.
+    #[must_use]
+    pub fn zero(count: usize) -> Self {
+        Self { x: vec![0.0; count], y: vec![0.0; count], z: vec![0.0; count] }
+    }
+
+    fn from_points(points: &[DVec3]) -> Self {
+        let component = |pick: fn(&DVec3) -> f64| points.iter().map(pick).collect();
+        Self { x: component(|p| p.x), y: component(|p| p.y), z: component(|p| p.z) }
+    }
+
+    /// One of them. Real-time: bounded, no allocation.
+    ///
+    /// # Panics
+    /// If there are not so many.
+    #[must_use]
+    pub fn get(&self, index: usize) -> DVec3 {
+        DVec3::new(self.x[index], self.y[index], self.z[index])
+    }
+
+    #[inline(always)]
+    pub(crate) fn slices(&self, range: Range<usize>) -> [&[f64]; 3] {
+        [&self.x[range.clone()], &self.y[range.clone()], &self.z[range]]
+    }
+
+    #[inline(always)]
+    pub(crate) fn slices_mut(&mut self, range: Range<usize>) -> [&mut [f64]; 3] {
+        [&mut self.x[range.clone()], &mut self.y[range.clone()], &mut self.z[range]]
+    }
+
+    #[inline(always)]
+    pub(crate) fn clear(&mut self, range: Range<usize>) {
+        self.slices_mut(range).into_iter().for_each(|component| component.fill(0.0));
+    }
+
+    /// Square of the longest of a range.
+    #[inline]
+    pub(crate) fn longest_square(&self, range: Range<usize>) -> f64 {
+        let [x, y, z] = self.slices(range);
+        let mut longest = 0.0_f64;
+        for ((x, y), z) in x.iter().zip(y).zip(z) {
+            longest = longest.max(x * x + y * y + z * z);
+        }
+        longest
+    }
+}
+
+/// What acts on every mass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surroundings {
+    /// Gravity downwards, m/s².
+    pub gravity_m_per_s2: f64,
+    /// Rate at which drag takes velocity away, 1/s.
+    pub damping_per_s: f64,
+    /// Stiffness with which the ball pushes a mass out, N/m.
+    pub contact_n_per_m: f64,
+}
+
+/// What touches the network.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball {
+    /// Its centre, m.
+    pub centre_m: DVec3,
+    /// Its radius, m.
+    pub radius_m: f64,
+}
+
+/// What changes from step to step.
+#[derive(Debug)]
+pub struct State {
+    positions_m: Vectors,
+    velocities_m_per_s: Vectors,
+    regions: Regions,
+}
+
+impl Clone for State {
+    fn clone(&self) -> Self {
+        Self {
+            positions_m: self.positions_m.clone(),
+            velocities_m_per_s: self.velocities_m_per_s.clone(),
+            regions: self.regions.clone(),
+        }
+    }
+
+    /// Without allocation, between two states of one network.
+    fn clone_from(&mut self, other: &Self) {
+        self.positions_m.clone_from(&other.positions_m);
+        self.velocities_m_per_s.clone_from(&other.velocities_m_per_s);
+        self.regions.clone_from(&other.regions);
+    }
+}
+
+/// Masses and springs in motion.
+#[derive(Debug)]
+pub struct Network {
+    state: State,
+    forces_n: Vectors,
+    /// 0 for a mass that is held.
+    inverse_masses_per_kg: Vec<f64>,
+    /// Gravity on each mass, m/s²: none on one that is held.
+    weights_m_per_s2: Vec<f64>,
+    links: Links,
+    surroundings: Surroundings,
+    longest_step_s: f64,
+    instructions: Arch,
+}
+
+/// Share of the stability limit that is used: contact and stretching move the limit a little.
+const SHARE_OF_LIMIT: f64 = 0.8;
+
+impl Network {
+    /// At rest where the mesh is. Not real-time.
+    #[must_use]
+    pub fn new(mesh: &Mesh, surroundings: Surroundings) -> Self {
+        let nodes = mesh.positions_m.len();
+        let links = Links::new(&mesh.links);
+        let regions = Regions::new(nodes, links.joined_blocks());
+        let inverse = |mass_kg: &f64| if *mass_kg > 0.0 { 1.0 / mass_kg } else { 0.0 };
+        let inverse_masses_per_kg: Vec<f64> = mesh.masses_kg.iter().map(inverse).collect();
+        let weight = |inverse: &f64| if *inverse > 0.0 { -surroundings.gravity_m_per_s2 } else { 0.0 };
+
+        let mut stiffness_n_per_m = vec![surroundings.contact_n_per_m; nodes];
+        for link in &mesh.links {
+            link.ends.iter().for_each(|end| stiffness_n_per_m[*end] += 2.0 * link.stiffness_n_per_m);
+        }
+        let squares = stiffness_n_per_m.iter().zip(&inverse_masses_per_kg).map(|(k, inverse)| k * inverse);
+        let highest_per_s = squares.fold(0.0, f64::max).sqrt();
+        Self {
+            state: State {
+                positions_m: Vectors::from_points(&mesh.positions_m),
+                velocities_m_per_s: Vectors::zero(nodes),
+                regions,
+            },
+            forces_n: Vectors::zero(nodes),
+            weights_m_per_s2: inverse_masses_per_kg.iter().map(weight).collect(),
+            inverse_masses_per_kg,
+            links,
+            surroundings,
+            longest_step_s: SHARE_OF_LIMIT * 2.0 / highest_per_s,
+            instructions: Arch::new(),
+        }
+    }
+
+    /// Longest stable step, s.
+    #[must_use]
+    pub fn longest_step_s(&self) -> f64 {
+        self.longest_step_s
+    }
+
+    /// Where the masses are, m.
+    #[must_use]
+    pub fn positions_m(&self) -> &Vectors {
+        &self.state.positions_m
+    }
+
+    /// What changes from step to step, to be put back later.
+    #[must_use]
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Goes back to a state of this network. Real-time: bounded, no allocation.
+    pub fn restore(&mut self, state: &State) {
+        self.state.clone_from(state);
+    }
+
+    /// How many masses are awake. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn awake_nodes(&self) -> usize {
+        self.state.regions.awake().map(|range| range.len()).sum()
+    }
+
+    /// Wakes everything, as nothing was asleep in the beginning. Real-time: bounded, no allocation.
+    pub fn wake(&mut self) {
+        self.state.regions.wake_all();
+    }
+
+    /// One step of `step_s`, at most [`Self::longest_step_s`]; the force on the ball, N. Real-time: bounded, no
+    /// allocation.
+    pub fn step(&mut self, step_s: f64, ball: Option<&Ball>) -> DVec3 {
+        // Everything below is compiled for the widest instructions this machine has; the results are the same bits.
+        self.instructions.dispatch(|| self.advance(step_s, ball))
+    }
+
+    /// Steps until all masses sleep, at most so often; true if they do. Not real-time.
+    pub fn come_to_rest(&mut self, most_steps: usize) -> bool {
+        (0..most_steps).any(|_| {
+            self.step(self.longest_step_s, None);
+            self.awake_nodes() == 0
+        })
+    }
+
+    /// Changes what acts on every mass, but for the contact stiffness, which the longest step depends on. Real-time:
+    /// bounded, no allocation.
+    pub fn set_damping_per_s(&mut self, damping_per_s: f64) {
+        self.surroundings.damping_per_s = damping_per_s;
+    }
+
+    #[inline(always)]
+    fn advance(&mut self, step_s: f64, ball: Option<&Ball>) -> DVec3 {
+        let Self { state: State { positions_m, velocities_m_per_s, regions }, forces_n, .. } = self;
+        if let Some(ball) = ball {
+            regions.wake_near(ball);
+        }
+        for range in regions.awake() {
+            forces_n.clear(range);
+        }
+        self.links.add_forces(positions_m, forces_n, regions);
+        let mut on_ball_n = DVec3::ZERO;
+        if let Some(ball) = ball {
+            for range in regions.awake() {
+                on_ball_n += push(ball, self.surroundings.contact_n_per_m, positions_m, forces_n, range);
+            }
+        }
+        let damped = 1.0 / (1.0 + step_s * self.surroundings.damping_per_s);
+        for range in regions.awake() {
+            let inverse = &self.inverse_masses_per_kg[range.clone()];
+            let weight = &self.weights_m_per_s2[range.clone()];
+            let [vx, vy, vz] = velocities_m_per_s.slices_mut(range.clone());
+            let [x, y, z] = positions_m.slices_mut(range.clone());
+            let [fx, fy, fz] = forces_n.slices(range);
+            move_masses(x, vx, fx, inverse, None, step_s, damped);
+            move_masses(y, vy, fy, inverse, None, step_s, damped);
+            move_masses(z, vz, fz, inverse, Some(weight), step_s, damped);
+        }
+        regions.settle(positions_m, velocities_m_per_s);
+        on_ball_n
+    }
+}
+
+/// One coordinate of a block, one step.
+#[inline(always)]
+fn move_masses(
+    x: &mut [f64],
+    v: &mut [f64],
+    f: &[f64],
+    inverse: &[f64],
+    weight: Option<&[f64]>,
+    step_s: f64,
+    damped: f64,
+) {
+    let count = x.len();
+    let (v, f, inverse) = (&mut v[..count], &f[..count], &inverse[..count]);
+    match weight {
+        None => {
+            for i in 0..count {
+                v[i] = (v[i] + step_s * (f[i] * inverse[i])) * damped;
+                x[i] += step_s * v[i];
+            }
+        }
+        Some(weight) => {
+            let weight = &weight[..count];
+            for i in 0..count {
+                v[i] = (v[i] + step_s * (f[i] * inverse[i] + weight[i])) * damped;
+                x[i] += step_s * v[i];
+            }
+        }
+    }
+}
+
+/// Pushes the masses of a block out of the ball; the force on the ball, N.
+#[inline(always)]
+fn push(
+    ball: &Ball,
+    contact_n_per_m: f64,
+    positions_m: &Vectors,
+    forces_n: &mut Vectors,
+    range: Range<usize>,
+) -> DVec3 {
+    /// A mass at the very centre is pushed nowhere: m².
+    const LEAST_SQUARE: f64 = 1.0e-300;
+    let count = range.len();
+    let [x, y, z] = positions_m.slices(range.clone());
+    let centre_m = ball.centre_m;
+    // Most blocks are far away: one cheap pass finds out.
+    let near = ball.radius_m * ball.radius_m;
+    let mut inside = 0_u32;
+    for i in 0..count {
+        let (dx, dy, dz) = (x[i] - centre_m.x, y[i] - centre_m.y, z[i] - centre_m.z);
+        inside += u32::from(dx * dx + dy * dy + dz * dz < near);
+    }
+    if inside == 0 {
+        return DVec3::ZERO;
+    }
+    let [fx, fy, fz] = forces_n.slices_mut(range);
+    let mut on_ball_n = DVec3::ZERO;
+    for i in 0..count {
+        let out = DVec3::new(x[i], y[i], z[i]) - centre_m;
+        let distance_m = out.length_squared().max(LEAST_SQUARE).sqrt();
+        let push = out * (contact_n_per_m * (ball.radius_m - distance_m).max(0.0) / distance_m);
+        fx[i] += push.x;
+        fy[i] += push.y;
+        fz[i] += push.z;
+        on_ball_n -= push;
+    }
+    on_ball_n
+}

@@ -1,0 +1,184 @@
+//! The membrane as a plugin: parameters and the step.
+
+use crate::mesh::{Mesh, Sheet};
+use crate::network::{Network, Surroundings};
+use crate::touch::Touch;
+use flotor_hal::{
+    DVec3, ForceModel, Input, Memory, ModelInfo, OutOfRange, Output, Parameter, Refusal, Settings,
+    StepStatus, Wrench,
+};
+
+/// Farther from home than this there is no handle, m: the answer is that at the edge, and says so.
+const REACH_M: f64 = 1.0;
+/// A longer time between two steps is not caught up, s: the network stands still instead.
+const LONGEST_TIME_S: f64 = 0.02;
+/// Steps in a millisecond that a servo may be asked for.
+const MOST_STEPS_PER_MS: f64 = 100.0;
+
+/// Index of the one live parameter.
+const DAMPING: usize = 6;
+
+/// What it can be told.
+const SCHEMA: &[Parameter] = &[
+    Parameter::real(
+        "nodes_per_side",
+        "1",
+        3.0,
+        200.0,
+        17.0,
+        "Masses along a side of the sheet; the border is held",
+    ),
+    Parameter::real("side_mm", "mm", 1.0, 1000.0, 40.0, "Length of a side of the sheet"),
+    Parameter::real("mass_g", "g", 0.01, 1.0e5, 10.0, "Mass of the whole"),
+    Parameter::real(
+        "stiffness_n_per_m",
+        "N/m",
+        0.1,
+        1.0e5,
+        200.0,
+        "Stiffness of a spring between two masses",
+    ),
+    Parameter::real("stretch", "1", 0.5, 3.0, 1.25, "Length of a spring over its length without force"),
+    Parameter::real("gravity_m_per_s2", "m/s²", 0.0, 30.0, 0.0, "Gravity, downwards"),
+    Parameter::real("damping_per_s", "1/s", 0.0, 1.0e4, 50.0, "Rate at which drag takes velocity away")
+        .live(),
+    Parameter::real("ball_radius_mm", "mm", 0.1, 100.0, 5.0, "Radius of the ball at the handle"),
+    Parameter::real(
+        "contact_n_per_m",
+        "N/m",
+        1.0,
+        1.0e5,
+        400.0,
+        "Stiffness with which the ball pushes a mass out",
+    ),
+    Parameter::file(
+        "file",
+        &[],
+        "A mesh instead of the sheet: Wavefront OBJ, metres, z up; the border is held",
+    ),
+];
+
+/// A membrane of masses and springs, touched with a ball.
+pub struct Membrane {
+    touch: Touch,
+    radius_m: f64,
+    parameters: [f64; SCHEMA.len()],
+}
+
+impl Membrane {
+    /// Centre of the ball for a position of the handle: at home it lies on the sheet.
+    fn centre_m(&self, handle_m: DVec3) -> DVec3 {
+        handle_m + DVec3::Z * self.radius_m
+    }
+
+    /// Where the handle is, as far as it is let, and what to say about it.
+    fn reached(input: &Input) -> Result<(DVec3, StepStatus), StepStatus> {
+        if !input.pose.is_finite() {
+            return Err(StepStatus::InvalidInput);
+        }
+        let position_m = input.pose.position();
+        let reached_m = position_m.clamp(DVec3::splat(-REACH_M), DVec3::splat(REACH_M));
+        Ok((reached_m, if reached_m == position_m { StepStatus::Ok } else { StepStatus::Clamped }))
+    }
+}
+
+impl ForceModel for Membrane {
+    const INFO: ModelInfo =
+        ModelInfo::new("membrane", "Membrane", "A membrane of masses and springs, touched with a ball")
+            .with_memory(Memory::PathDependent);
+
+    const PARAMETERS: &'static [Parameter] = SCHEMA;
+
+    fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        let number = |id| settings.number_or_default(id);
+        let nodes = number("nodes_per_side");
+        if nodes.fract() != 0.0 {
+            return Err(Refusal::parameter(format!(
+                "`nodes_per_side` counts masses; {nodes} is no whole number"
+            )));
+        }
+        let (stiffness_n_per_m, stretch) = (number("stiffness_n_per_m"), number("stretch"));
+        let mass_kg = number("mass_g") * 1.0e-3;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 3 to 200
+        let mesh = match settings.text("file") {
+            None => Mesh::sheet(&Sheet {
+                nodes_per_side: nodes as usize,
+                side_m: number("side_mm") * 1.0e-3,
+                mass_kg,
+                stiffness_n_per_m,
+                stretch,
+            }),
+            Some(file) => {
+                let text = std::fs::read_to_string(file);
+                let text = text
+                    .map_err(|error| Refusal::resource(format!("{file}: cannot read the mesh: {error}")))?;
+                Mesh::from_obj(&text, mass_kg, stiffness_n_per_m, stretch)
+                    .map_err(|problem| Refusal::resource(format!("{file}: {problem}")))?
+            }
+        };
+        let radius_m = number("ball_radius_mm") * 1.0e-3;
+        if radius_m < 0.75 * mesh.coarseness_m() {
+            return Err(Refusal::parameter(format!(
+                "a ball of {} mm would fall through springs of {:.3} mm; make `ball_radius_mm` larger or the mesh finer",
+                radius_m * 1.0e3,
+                mesh.coarseness_m() * 1.0e3
+            )));
+        }
+        let mut network = Network::new(
+            &mesh,
+            Surroundings {
+                gravity_m_per_s2: number("gravity_m_per_s2"),
+                damping_per_s: number("damping_per_s"),
+                contact_n_per_m: number("contact_n_per_m"),
+            },
+        );
+        let steps_per_ms = 1.0e-3 / network.longest_step_s();
+        if steps_per_ms > MOST_STEPS_PER_MS {
+            return Err(Refusal::parameter(format!(
+                "springs this stiff on masses this light swing so fast that a millisecond takes {steps_per_ms:.0} steps \
+                 (at most {MOST_STEPS_PER_MS}); raise `mass_g` or lower the stiffness"
+            )));
+        }
+        // Under gravity it sags before anybody touches it.
+        if number("gravity_m_per_s2") > 0.0 {
+            network.come_to_rest(MOST_SETTLING_STEPS);
+            network.wake();
+        }
+        let mut parameters = [0.0; SCHEMA.len()];
+        for (value, parameter) in parameters.iter_mut().zip(Self::PARAMETERS) {
+            *value = settings.number_or_default(parameter.id());
+        }
+        Ok(Self { touch: Touch::new(network, radius_m, DVec3::Z * radius_m), radius_m, parameters })
+    }
+
+    fn step(&mut self, input: &Input) -> Output {
+        let (handle_m, status) = match Self::reached(input) {
+            Ok(reached) => reached,
+            Err(status) => return Output::new(Wrench::ZERO, f64::NAN, status),
+        };
+        let force_n = self.touch.advance(self.centre_m(handle_m), input.dt_s().min(LONGEST_TIME_S));
+        Output::new(Wrench::from_force(force_n), f64::NAN, status)
+    }
+
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+        if index != DAMPING {
+            return Err(OutOfRange { min: f64::NAN, max: f64::NAN, value });
+        }
+        self.parameters[DAMPING] = value;
+        self.touch.network_mut().set_damping_per_s(value);
+        Ok(())
+    }
+
+    fn parameter(&self, index: usize) -> f64 {
+        self.parameters.get(index).copied().unwrap_or(f64::NAN)
+    }
+
+    fn reset(&mut self) {
+        self.touch.reset(DVec3::Z * self.radius_m);
+    }
+}
+
+/// Steps until a sheet has come to rest under gravity, before it is taken as it is.
+const MOST_SETTLING_STEPS: usize = 20_000;
+
+flotor_hal::export_model!(Membrane);

@@ -1,0 +1,94 @@
+//! The ball of a hand that walks through a network, and what a faster loop needs to know of it.
+
+use crate::network::{Ball, Network, State};
+use flotor_hal::DVec3;
+
+/// How far the ball is moved to feel how the force changes, m: far above rounding, far below a mass's distance.
+const PROBE_M: f64 = 1.0e-5;
+
+/// A network, and the ball that touches it.
+#[derive(Debug)]
+pub struct Touch {
+    network: Network,
+    ball: Ball,
+    /// The network before anybody touched it.
+    untouched: State,
+    /// Rooms for states while the field is felt: nothing is allocated then.
+    before: State,
+    after: State,
+}
+
+/// Force on the ball, and how it changes with where the ball goes in the same time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LocalField {
+    /// Force on the ball, N.
+    pub force_n: DVec3,
+    /// Change of the force for a displacement along x, y and z, N/m.
+    pub slope_n_per_m: [DVec3; 3],
+}
+
+impl Touch {
+    /// A ball of a radius, its centre at `start_m`. Not real-time.
+    #[must_use]
+    pub fn new(network: Network, radius_m: f64, start_m: DVec3) -> Self {
+        let state = network.state().clone();
+        let ball = Ball { centre_m: start_m, radius_m };
+        Self { network, ball, untouched: state.clone(), before: state.clone(), after: state }
+    }
+
+    /// The network as it is now.
+    #[must_use]
+    pub fn network(&self) -> &Network {
+        &self.network
+    }
+
+    /// The same, to change what acts on it.
+    pub fn network_mut(&mut self) -> &mut Network {
+        &mut self.network
+    }
+
+    /// Steps it takes to pass this time.
+    #[must_use]
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand, see the plugin
+    pub fn steps_in(&self, duration_s: f64) -> u32 {
+        (duration_s / self.network.longest_step_s()).ceil().max(1.0) as u32
+    }
+
+    /// Moves the ball to `centre_m` in `duration_s`, steadily; the force on it at the end, N. Real-time: bounded by
+    /// [`Self::steps_in`], no allocation.
+    pub fn advance(&mut self, centre_m: DVec3, duration_s: f64) -> DVec3 {
+        let (from_m, steps) = (self.ball.centre_m, self.steps_in(duration_s));
+        let step_s = duration_s / f64::from(steps);
+        let mut force_n = DVec3::ZERO;
+        for step in 1..=steps {
+            self.ball.centre_m = from_m.lerp(centre_m, f64::from(step) / f64::from(steps));
+            force_n = self.network.step(step_s, Some(&self.ball));
+        }
+        self.ball.centre_m = centre_m;
+        force_n
+    }
+
+    /// The same, and how the force would differ had the ball gone elsewhere: the time is lived three more times, each
+    /// time with the ball ending a little farther along one axis. So the slope has the network's inertia and yielding
+    /// in it, over just this time. Bounded by four times [`Self::steps_in`], no allocation.
+    pub fn feel(&mut self, centre_m: DVec3, duration_s: f64) -> LocalField {
+        let from_m = self.ball.centre_m;
+        self.before.clone_from(self.network.state());
+        let force_n = self.advance(centre_m, duration_s);
+        self.after.clone_from(self.network.state());
+        let slope_n_per_m = DVec3::AXES.map(|axis| {
+            self.network.restore(&self.before);
+            self.ball.centre_m = from_m;
+            (self.advance(centre_m + axis * PROBE_M, duration_s) - force_n) / PROBE_M
+        });
+        self.network.restore(&self.after);
+        self.ball.centre_m = centre_m;
+        LocalField { force_n, slope_n_per_m }
+    }
+
+    /// Back to before anybody touched it, the ball at `start_m`. Real-time: bounded, no allocation.
+    pub fn reset(&mut self, start_m: DVec3) {
+        self.network.restore(&self.untouched);
+        self.ball.centre_m = start_m;
+    }
+}

@@ -1,0 +1,154 @@
+//! Networks in motion: frequency, momentum, sleep, and the field a faster loop is given.
+
+use flotor_hal::DVec3;
+use flotor_membrane::mesh::{Link, Mesh, Sheet};
+use flotor_membrane::network::{Ball, Network, Surroundings};
+use flotor_membrane::touch::Touch;
+use std::f64::consts::TAU;
+
+const FREE: Surroundings = Surroundings { gravity_m_per_s2: 0.0, damping_per_s: 0.0, contact_n_per_m: 0.0 };
+const SHEET: Sheet =
+    Sheet { nodes_per_side: 17, side_m: 0.04, mass_kg: 0.01, stiffness_n_per_m: 200.0, stretch: 1.25 };
+const TOUCHED: Surroundings =
+    Surroundings { gravity_m_per_s2: 0.0, damping_per_s: 50.0, contact_n_per_m: 400.0 };
+const RADIUS_M: f64 = 0.005;
+
+#[test]
+fn a_mass_on_a_spring_swings_at_the_frequency_of_the_textbook() {
+    let mesh = Mesh {
+        positions_m: vec![DVec3::ZERO, DVec3::X * 0.101],
+        masses_kg: vec![0.0, 0.2],
+        links: vec![Link { ends: [0, 1], rest_m: 0.1, stiffness_n_per_m: 80.0 }],
+    };
+    let mut network = Network::new(&mesh, FREE);
+    let step_s = network.longest_step_s() / 200.0;
+    let mut crossings = Vec::new();
+    let mut before_m = 0.001;
+    for step in 1..200_000_u32 {
+        network.step(step_s, None);
+        let now_m = network.positions_m().get(1).x - 0.1;
+        if before_m < 0.0 && now_m >= 0.0 {
+            crossings.push(f64::from(step) - now_m / (now_m - before_m));
+        }
+        before_m = now_m;
+    }
+    let swings = (crossings.len() - 1) as f64;
+    let period_s = (crossings[crossings.len() - 1] - crossings[0]) / swings * step_s;
+    let exact_s = TAU * (0.2_f64 / 80.0).sqrt();
+    // The method's period is short by (omega h)^2 / 24, here 3e-6.
+    assert!((period_s / exact_s - 1.0).abs() < 1.0e-5, "{period_s} {exact_s}");
+}
+
+#[test]
+fn the_step_is_stable_as_long_as_it_says_and_not_much_longer() {
+    let stays = |share: f64| {
+        let mut mesh = Mesh::sheet(&SHEET);
+        // The stiffest mode: neighbours against each other.
+        for (index, position) in mesh.positions_m.iter_mut().enumerate() {
+            let sign = if (index % 17 + index / 17).is_multiple_of(2) { 1.0 } else { -1.0 };
+            position.x += 1.0e-6 * sign * f64::from(u8::from(mesh.masses_kg[index] > 0.0));
+        }
+        let mut network = Network::new(&mesh, FREE);
+        let step_s = share * network.longest_step_s();
+        for _ in 0..20_000 {
+            network.step(step_s, None);
+        }
+        let start = Mesh::sheet(&SHEET);
+        let moved_m = |node: usize| (network.positions_m().get(node) - start.positions_m[node]).length();
+        (0..289).all(|node| moved_m(node) < 1.0e-4) // false for NaN
+    };
+    assert!(stays(1.0));
+    // Gershgorin counts the springs of both axes, of which a motion along one axis feels little more than half: the true
+    // limit is less than the root of two above the bound, and the longest step is 0.8 of the bound.
+    assert!(!stays(2.0_f64.sqrt() / 0.8));
+}
+
+#[test]
+fn what_the_ball_feels_is_what_the_masses_get() {
+    let mut network = Network::new(&Mesh::sheet(&SHEET), TOUCHED);
+    let ball = Ball { centre_m: DVec3::new(0.001, -0.002, 0.004), radius_m: RADIUS_M };
+    // At rest in equilibrium: the border carries the force.
+    let mut force_n = DVec3::ZERO;
+    (0..20_000).for_each(|_| force_n = network.step(1.0e-4, Some(&ball)));
+    let mut border_n = DVec3::ZERO;
+    let mesh = Mesh::sheet(&SHEET);
+    for link in &mesh.links {
+        let held = link.ends.map(|end| mesh.masses_kg[end] == 0.0);
+        let [a, b] = link.ends.map(|end| network.positions_m().get(end));
+        let pull_n = (b - a) * (link.stiffness_n_per_m * (1.0 - link.rest_m / (b - a).length()));
+        // What the spring does to its free end.
+        border_n += if held[0] {
+            -pull_n
+        } else if held[1] {
+            pull_n
+        } else {
+            DVec3::ZERO
+        };
+    }
+    assert!(force_n.z > 0.05, "{force_n}");
+    // Slow motion that is left: 1e-6 m/s within 10 g over the drag's 20 ms.
+    assert!((force_n - border_n).length() < 1.0e-6, "{force_n} {border_n}");
+}
+
+#[test]
+fn a_sheet_at_rest_sleeps_a_touch_wakes_it_and_sleep_changes_nothing_that_is_felt() {
+    let press = |awake: bool| {
+        let mut network = Network::new(&Mesh::sheet(&SHEET), TOUCHED);
+        let step_s = network.longest_step_s();
+        let away = Ball { centre_m: DVec3::Z * 0.1, radius_m: RADIUS_M };
+        for _ in 0..5000 {
+            network.step(step_s, Some(&away));
+        }
+        let asleep = network.awake_nodes() == 0;
+        let mut forces_n = Vec::new();
+        for step in 0..4000_u32 {
+            if awake {
+                network.wake();
+            }
+            let depth_m = 0.002 * (f64::from(step) / 4000.0 * TAU).sin().max(0.0);
+            let ball = Ball { centre_m: DVec3::Z * (RADIUS_M - depth_m), radius_m: RADIUS_M };
+            forces_n.push(network.step(step_s, Some(&ball)));
+        }
+        (asleep, forces_n)
+    };
+    let ((asleep, slept), (_, woken)) = (press(false), press(true));
+    assert!(asleep, "nothing touched it for seconds");
+    let largest_n = woken.iter().map(|force| force.length()).fold(0.0, f64::max);
+    let difference_n = slept.iter().zip(&woken).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
+    assert!(largest_n > 0.1);
+    // Left out: motion below 1e-6 m/s for the time until a neighbour wakes, some 10 nm at 1 kN/m of contact springs.
+    assert!(difference_n < 1.0e-4 * largest_n, "{difference_n} of {largest_n} N");
+}
+
+#[test]
+fn the_slope_of_a_field_is_the_change_of_the_force_it_predicts() {
+    let mut touch = Touch::new(Network::new(&Mesh::sheet(&SHEET), TOUCHED), RADIUS_M, DVec3::Z * RADIUS_M);
+    let at = |depth_m: f64| DVec3::new(0.0007, 0.0003, RADIUS_M - depth_m);
+    let period_s = 5.0e-3;
+    for step in 0..40 {
+        touch.advance(at(0.002 * f64::from(step) / 40.0), period_s);
+    }
+    let before = touch.network().state().clone();
+    let field = touch.feel(at(0.002), period_s);
+    let after = touch.network().positions_m().get(144);
+    // The same period lived again, the ball going elsewhere: the field knows the force beforehand.
+    for offset_m in [(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-0.5, 0.5, -1.0), (0.0, 1.0, -1.0)] {
+        let offset_m = DVec3::from(offset_m) * 1.0e-5;
+        let mut again =
+            Touch::new(Network::new(&Mesh::sheet(&SHEET), TOUCHED), RADIUS_M, at(0.002 * 39.0 / 40.0));
+        again.network_mut().restore(&before);
+        let lived_n = again.advance(at(0.002) + offset_m, period_s);
+        let [x, y, z] = field.slope_n_per_m;
+        let told_n = field.force_n + x * offset_m.x + y * offset_m.y + z * offset_m.z;
+        let (change_n, error_n) = ((lived_n - field.force_n).length(), (told_n - lived_n).length());
+        // What is left is curvature: masses at the edge of the contact come and go within a tenth of a millimetre, a
+        // tenth of which is asked for here.
+        assert!(error_n < 0.2 * change_n, "{offset_m}: {error_n} of {change_n}");
+    }
+    // And feeling changed nothing: the network is where one period brought it.
+    let mut plain =
+        Touch::new(Network::new(&Mesh::sheet(&SHEET), TOUCHED), RADIUS_M, at(0.002 * 39.0 / 40.0));
+    plain.network_mut().restore(&before);
+    let force_n = plain.advance(at(0.002), period_s);
+    assert_eq!((force_n, plain.network().positions_m().get(144)), (field.force_n, after));
+}
