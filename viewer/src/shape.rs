@@ -111,7 +111,7 @@ impl Shape {
     /// Changes a live parameter of the viewer's instance; the drawn shape follows.
     pub fn set_parameter(&mut self, key: &str, number: f64) {
         if let Ok(setting) = Setting::number(self.model.parameters(), key, number) {
-            self.model.set_parameter(&setting);
+            self.model.set_parameter(setting.index(), setting.value());
             if let Some(body) = body(&mut self.model) {
                 self.body = body;
             }
