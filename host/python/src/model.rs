@@ -2,7 +2,7 @@
 
 use crate::error::refuse;
 use crate::rows::{InputRow, OutputRow};
-use flotor::evaluate::{Answer, Evaluator, Handle, Travel};
+use flotor::evaluate::{Answer, Details, Evaluation, Handle, Travel};
 use flotor::registry::Registry;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::abi::{CallStatus, PluginKind};
@@ -31,8 +31,8 @@ pub(crate) struct Parameter {
     choices: Vec<String>,
 }
 
-/// Positions, rotations, forces, torques, energies and statuses of many poses.
-type Evaluation<'py> =
+/// Forces, torques, energies and statuses of many poses.
+type Columns<'py> =
     (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Vec<&'static str>);
 
 /// A force model. Safe to share between threads: calls wait for each other.
@@ -124,7 +124,7 @@ impl Model {
         py: Python<'py>,
         poses: PyReadonlyArray2<'py, f64>,
         successive: bool,
-    ) -> PyResult<Evaluation<'py>> {
+    ) -> PyResult<Columns<'py>> {
         let poses = poses.as_array();
         if poses.ncols() != 6 {
             return Err(refuse(format!(
@@ -141,9 +141,10 @@ impl Model {
             })
             .collect();
         let travel = if successive { Travel::Successive } else { Travel::FromHome };
-        // An instance of its own: the answer is the command's, whatever was stepped before.
-        let model = self.plugin.create_model(&self.settings).map_err(refuse)?;
-        let answers = py.detach(|| Evaluator::new(model, travel).evaluate(&handles)).map_err(refuse)?;
+        // Instances of its own: the answer is the command's, whatever was stepped before.
+        let evaluation =
+            Evaluation { plugin: &self.plugin, settings: &self.settings, travel, details: Details::Omitted };
+        let answers = py.detach(|| evaluation.answers(&handles, &|| ())).map_err(refuse)?;
         Ok(columns(py, &answers))
     }
 
@@ -159,7 +160,7 @@ impl Model {
     }
 }
 
-fn columns<'py>(py: Python<'py>, answers: &[Answer]) -> Evaluation<'py> {
+fn columns<'py>(py: Python<'py>, answers: &[Answer]) -> Columns<'py> {
     let count = answers.len();
     let three = |of: fn(&Answer) -> [f64; 3]| {
         let flat: Vec<f64> = answers.iter().flat_map(of).collect();
@@ -180,7 +181,7 @@ fn describe(parameter: &flotor_hal::Parameter) -> Parameter {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a checked index of a few choices
         ParameterKind::Choice => choices.get(parameter.default() as usize).cloned().unwrap_or_default(),
         ParameterKind::Real => parameter.default().to_string(),
-        ParameterKind::Text => String::new(),
+        ParameterKind::Text | ParameterKind::File => String::new(),
     };
     Parameter {
         id: parameter.id().to_owned(),

@@ -2,7 +2,7 @@
 
 use crate::design::{Cell, Design, Point};
 use crate::plan::{POSE_COLUMNS, Plan, PlanError, Question};
-use flotor::evaluate::{Answer, Evaluator, Handle, Travel};
+use flotor::evaluate::{Answer, Details, Evaluation, Handle, Travel};
 use flotor::headless;
 use flotor::registry::Registry;
 use flotor::scene::{PluginKeyValue, Scene};
@@ -262,8 +262,13 @@ impl Sweep {
             let handles: Vec<Handle> = group.iter().map(|point| self.handle(point)).collect();
             let evaluated = group.first().ok_or_else(String::new).and_then(|point| {
                 let settings = self.settings(point, plugin)?;
-                let model = plugin.create_model(&settings).map_err(|error| error.to_string())?;
-                Evaluator::new(model, Travel::FromHome).evaluate(&handles).map_err(|error| error.to_string())
+                let evaluation = Evaluation {
+                    plugin,
+                    settings: &settings,
+                    travel: Travel::FromHome,
+                    details: Details::Omitted,
+                };
+                evaluation.answers(&handles, &|| ()).map_err(|error| error.to_string())
             });
             match evaluated {
                 Ok(evaluated) => answers.extend(evaluated.iter().map(answered)),
