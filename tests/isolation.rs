@@ -66,3 +66,14 @@ fn of_two_plugins_with_one_id_the_first_wins_and_the_other_is_told() {
     assert!(ran.stdout.contains(&hidden), "{}", ran.stdout);
     assert!(ran.stdout.contains(&copy.display().to_string()), "{}", ran.stdout);
 }
+
+#[test]
+fn one_file_under_two_names_hides_nothing() {
+    let scratch = Scratch::default();
+    let copy = scratch.file("libspring_copy.so", plugin_bytes("flotor-spring"));
+    let link = scratch.path().join("libspring_link.so");
+    std::fs::hard_link(&copy, &link).expect("one folder is one file system");
+    let ran = Flotor::with(["plugins"]).searching(&[scratch.path()]).run();
+    assert!(ran.stdout.contains(&copy.display().to_string()), "{}", ran.stdout);
+    assert!(!ran.stdout.contains(&link.display().to_string()), "{}", ran.stdout);
+}

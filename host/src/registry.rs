@@ -3,7 +3,7 @@
 use crate::scene::nearest;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, read_metadata};
-use std::os::unix::fs::PermissionsExt;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use xxhash_rust::xxh3::xxh3_64;
@@ -106,9 +106,11 @@ impl Registry {
         files.sort();
         for file in files {
             match read_metadata(&file) {
-                Ok(metadata) => match self.found.iter().any(|known| known.id == metadata.id) {
-                    true => self.shadowed.push(metadata),
-                    false => self.found.push(metadata),
+                Ok(metadata) => match self.found.iter().find(|known| known.id == metadata.id) {
+                    None => self.found.push(metadata),
+                    // Cargo links what it builds into two folders: one file under two names hides nothing.
+                    Some(known) if is_same_file(&known.path, &metadata.path) => {}
+                    Some(_) => self.shadowed.push(metadata),
                 },
                 // Other libraries may lie beside plugins; only files that claim to be one are worth a word.
                 Err(LoadError::NotAPlugin { .. }) => {}
@@ -187,4 +189,10 @@ impl Registry {
         loaded.push(Loaded { path: path.into(), hash, plugin: plugin.clone() });
         Ok(plugin)
     }
+}
+
+/// Whether two paths lead to one file. Not real-time.
+fn is_same_file(one: &Path, other: &Path) -> bool {
+    let identity = |path: &Path| std::fs::metadata(path).map(|file| (file.dev(), file.ino()));
+    matches!((identity(one), identity(other)), (Ok(one), Ok(other)) if one == other)
 }

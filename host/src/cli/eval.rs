@@ -20,8 +20,8 @@ use std::path::{Path, PathBuf};
     with --details also what the model knows beside them (the spring: branch, stable, seat_roll_rad).\n\n\
     Examples:\n  \
     flotor eval --model spring --poses poses.csv --out wrenches.csv\n  \
-    flotor eval --model spring --set variant=rod --set accuracy=tight --details --poses poses.csv --out -\n  \
-    echo 'x_m,y_m,z_m,rx_rad,ry_rad,rz_rad\n0,0,-0.005,0,0,0' | flotor eval --model spring --poses - --out -"
+    flotor eval --model spring --set variant=rod --set accuracy=tight --details --poses poses.csv\n  \
+    echo 'x_m,y_m,z_m,rx_rad,ry_rad,rz_rad\n0,0,-0.005,0,0,0' | flotor eval --model spring --poses -"
 )]
 pub(crate) struct EvalArguments {
     /// Id of the model, or path to its plugin file
@@ -34,7 +34,7 @@ pub(crate) struct EvalArguments {
     #[arg(long, value_name = "IN.csv")]
     poses: PathBuf,
     /// Wrenches (- for standard output)
-    #[arg(long, value_name = "OUT.csv")]
+    #[arg(long, value_name = "OUT.csv", default_value = "-")]
     out: PathBuf,
     /// Rows are successive poses of one handle, instead of each being reached from home
     #[arg(long)]
