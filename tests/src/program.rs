@@ -43,7 +43,7 @@ impl Flotor {
     /// The program with these arguments, no plugin folders but its own, and no colours.
     ///
     /// # Panics
-    /// If the program is not built, or older than the library it is made of.
+    /// If the program is not built, or older than a source it is made of.
     #[must_use]
     pub fn with<I: AsRef<OsStr>>(arguments: impl IntoIterator<Item = I>) -> Self {
         let mut command = Command::new(program());
@@ -173,20 +173,28 @@ fn program() -> PathBuf {
     let Ok(built) = std::fs::metadata(&file).and_then(|attributes| attributes.modified()) else {
         panic!("{} is missing: run `{build} -p flotor`, or all tests with `cargo test`", file.display());
     };
-    assert!(
-        newest_library().is_none_or(|library| library <= built),
-        "{} is older than the library it is made of: run `{build} -p flotor`, or all tests with `cargo test`",
-        file.display()
-    );
+    if let Some(source) = sources().into_iter().find(|source| changed_since(source, built)) {
+        panic!(
+            "{} is older than {}: run `{build} -p flotor`, or all tests with `cargo test`",
+            file.display(),
+            source.display()
+        );
+    }
     file
 }
 
-/// When the host's library was last built: `cargo test -p flotor-tests` builds it, but not the program.
-fn newest_library() -> Option<SystemTime> {
-    let files = std::fs::read_dir(build_folder().join("deps")).ok()?.filter_map(Result::ok);
-    let libraries = files.filter(|file| {
-        let name = file.file_name().to_string_lossy().into_owned();
-        name.starts_with("libflotor-") && name.ends_with(".rlib")
-    });
-    libraries.filter_map(|file| file.metadata().ok()?.modified().ok()).max()
+/// What the program was made of, as cargo noted it beside the program: `cargo test -p flotor-tests` does not build it
+/// again, so a test could meet the program of yesterday.
+fn sources() -> Vec<PathBuf> {
+    let notes = std::fs::read_to_string(build_folder().join("flotor.d")).unwrap_or_default();
+    let files = notes.lines().next().and_then(|line| line.split_once(": ")).map_or("", |(_, files)| files);
+    // A space within a name is written `\ `.
+    let files = files.replace("\\ ", "\0");
+    files.split_whitespace().map(|file| PathBuf::from(file.replace('\0', " "))).collect()
+}
+
+fn changed_since(source: &Path, built: SystemTime) -> bool {
+    std::fs::metadata(source)
+        .and_then(|attributes| attributes.modified())
+        .is_ok_and(|changed| changed > built)
 }
