@@ -17,7 +17,8 @@ use std::path::{Path, PathBuf};
 #[command(
     after_help = "Poses: a header [id,]x_m,y_m,z_m,rx_rad,ry_rad,rz_rad and one row a pose, in the model frame (home is\n\
     the origin, z up; rx, ry, rz is a rotation vector). nan and inf are legal. Result: id, force, torque, energy, status;\n\
-    with --details also what the model knows beside them (the spring: branch, stable, seat_roll_rad).\n\n\
+    with --details also what the model knows beside them (the spring: branch, stable, seat_roll_rad,\n\
+    rod_share).\n\n\
     Examples:\n  \
     flotor eval --model spring --poses poses.csv --out wrenches.csv\n  \
     flotor eval --model spring --set variant=rod --set accuracy=tight --details --poses poses.csv\n  \

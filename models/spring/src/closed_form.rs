@@ -85,10 +85,11 @@ impl ClosedForm {
 
     #[inline(always)]
     fn evaluate<R: Real, S: Storage>(&self, at: &Coordinates<R>, demand: Demand) -> Answer<R> {
+        let at = at.without_dust();
         let Vector { x, y, z } = at.position_m;
         let position_m = Vector::new(S::store(x), S::store(y), S::store(z));
         let Span { vector_m, length_m, shortening_m, usable } =
-            Coordinates { position_m, ..*at }.span(self.free_length_m);
+            Coordinates { position_m, ..at }.span(self.free_length_m);
         let Vector { x: turn_x, y: turn_y, z: turn_z } = at.rotation_vector_rad();
         let length_m = S::store(length_m);
         let axial_force_n = S::store(shortening_m * self.axial_n_per_m);
@@ -186,15 +187,9 @@ impl<R: Real> Planes<R> {
         let per_length = base_m * inverse;
         let tangent = sideways_m * (length_m * inverse);
         let to_vertical_rad = tangent * 2.0 * arctangent::quotient(tangent * tangent);
-        let fallen = height_m.below(0.0);
-        let inclination_rad = if Pair::<R>::any(fallen) {
-            let half_turn = height_m.like(PI);
-            let straight_down = Pair::select(sideways_m.below(0.0), -half_turn, half_turn);
-            Pair::select(fallen, straight_down - to_vertical_rad, to_vertical_rad)
-        } else {
-            to_vertical_rad
-        };
-        let inclination_rad = S::store(inclination_rad);
+        // Below the lower plate, from the vertical down: angles stay within a right one, and nothing jumps where the chord
+        // hangs straight.
+        let inclination_rad = S::store(to_vertical_rad);
         Self {
             sine: S::store(sideways_m * per_length),
             cosine: S::store(height_m * per_length),

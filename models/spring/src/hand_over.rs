@@ -11,8 +11,15 @@
 //! alone. So the spring stays conservative, its force continuous, and its stiffness too; and past buckling it is the rod,
 //! where `energy` levels off. Elsewhere nothing but the length is computed in addition.
 //!
-//! The rod remembers, so this law does. It is brought along from a little earlier on, without a say, to be in equilibrium when
-//! it gets one.
+//! **A function of the pose, as far as a spring is one.** Short of buckling there is one equilibrium, and it is found
+//! anew at each pose, from the shape of the linear column. Past it there are several: a bulge may point anywhere, and
+//! where it points depends on how the hand came there. A choice by the pose alone would make torque jump as a plate is
+//! rocked through the level, so from there the rod is followed from tick to tick, until the plates are far enough apart
+//! again. A spring too short to buckle ([`Region::has_buckling`]) has no such poses and no memory.
+
+use std::f64::consts::PI;
+
+use flotor_hal::glam::DVec3;
 
 use crate::contact::AxialContact;
 use crate::energy::EnergyForm;
@@ -21,34 +28,119 @@ use crate::held::{Held, HeldSpring};
 use crate::pose::Pose;
 use crate::response::{Demand, Response};
 use crate::rigidity::Spring;
-use crate::rod::{Accuracy, Coils, Rod, State};
+use crate::rod::{Coils, Rod, State};
 use crate::validity::Validity;
 
-/// `G0` at which the rod is brought along, at which it has a first say, and at which it has the only one.
-const WARM: f64 = 0.36;
+/// `G0` at which the rod has a first say, and at which it has the only one.
 const FIRST: f64 = 0.30;
 const LAST: f64 = 0.20;
 
+/// Argument at which `G0` is [`FIRST`], rounded down.
+const FIRST_ARGUMENT: f64 = 5.552;
 /// Argument past that of [`LAST`], short of where `G0` is computed to rounding: from here on the rod is alone.
 const DEEP_ARGUMENT: f64 = 7.5;
+/// Argument at which the straight rod buckles.
+const BUCKLING_ARGUMENT: f64 = PI * PI;
 
 /// Both laws of one spring.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HandOver {
     energy: Held<EnergyForm>,
     rod: Rod,
+    region: Region,
     coils: Coils,
     spring: Spring,
     share: f64,
+    follows: Follows,
 }
 
-/// The rod's share in the energy, and what follows from it.
+/// Whether the rod goes on from its last tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Follows {
+    /// It is found from the pose.
+    Pose,
+    /// It buckled, or a search did not end: it goes on from where it is, until it has no share any more.
+    LastTick,
+}
+
+/// Where the rod has a share: chords of one spring between two lengths.
+///
+/// The argument `z = gamma (L0 - L) Lam / (4 alpha)`, `Lam = L + (gamma/beta) (L0 - L)`, is a parabola in the length, so
+/// whether a chord is in the region takes no function of `z`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Region {
+    free_length_m: f64,
+    /// `gamma / beta`
+    ratio: f64,
+    /// `gamma / (4 alpha)`
+    unit_per_m2: f64,
+    /// Squares of the shortest and the longest chord in it; nothing is between them where there is no region.
+    squares_m2: [f64; 2],
+    /// Largest argument at any length.
+    largest_argument: f64,
+}
+
+/// The rod's share in the energy, and its derivative by the length of the chord.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Share {
     value: f64,
-    /// By the length of the chord (1/m).
     by_length_per_m: f64,
-    is_warm: bool,
+    is_buckled: bool,
+}
+
+impl Region {
+    fn new(spring: &Spring) -> Self {
+        let (rigidities, free_length_m) = (spring.rigidities(), spring.geometry().free_length_m);
+        let ratio = rigidities.gamma_n / rigidities.beta_n;
+        let unit_per_m2 = 0.25 * rigidities.gamma_n / rigidities.alpha_n_m2;
+        // z = load p (1 - excess p) with the compression p = 1 - L/L0, at most 1.
+        let (load, excess) = (unit_per_m2 * free_length_m * free_length_m, 1.0 - ratio);
+        let crest = if excess > 0.5 { 0.5 / excess } else { 1.0 };
+        let largest_argument = load * crest * (1.0 - excess * crest);
+        let discriminant = 1.0 - 4.0 * excess * FIRST_ARGUMENT / load;
+        let squares_m2 = if largest_argument < FIRST_ARGUMENT || discriminant < 0.0 {
+            [0.0; 2]
+        } else {
+            // The smaller root without cancellation; the other one only where the crest is passed within the stroke.
+            let root = discriminant.sqrt();
+            let first = 2.0 * FIRST_ARGUMENT / (load * (1.0 + root));
+            let last = if excess > 0.5 { ((1.0 + root) / (2.0 * excess)).min(1.0) } else { 1.0 };
+            [last, first].map(|compression| (free_length_m * (1.0 - compression)).powi(2))
+        };
+        Self { free_length_m, ratio, unit_per_m2, squares_m2, largest_argument }
+    }
+
+    /// Whether the straight rod buckles at any length.
+    fn has_buckling(&self) -> bool {
+        self.largest_argument > BUCKLING_ARGUMENT
+    }
+
+    /// Whether the rod has a share at a position of the upper plate. NaN is nowhere.
+    #[inline]
+    fn holds(&self, pose: &Pose) -> bool {
+        let position_m = pose.position_m;
+        let height_m = position_m.z + self.free_length_m;
+        let square_m2 = position_m.truncate().length_squared() + height_m * height_m;
+        let [shortest, longest] = self.squares_m2;
+        square_m2 >= shortest && square_m2 < longest
+    }
+
+    fn share_at(&self, length_m: f64, shortening_m: f64) -> Share {
+        let sheared_m = length_m + self.ratio * shortening_m;
+        let argument = self.unit_per_m2 * shortening_m * sheared_m;
+        if argument >= DEEP_ARGUMENT {
+            return Share { value: 1.0, by_length_per_m: 0.0, is_buckled: argument >= BUCKLING_ARGUMENT };
+        }
+        let EntireFunctions { g0, g1, .. } = EntireFunctions::at(argument);
+        let passed = ((FIRST - g0) / (FIRST - LAST)).clamp(0.0, 1.0);
+        // 6 t⁵ - 15 t⁴ + 10 t³: first and second derivatives vanish at both ends.
+        let value = passed * passed * passed * (10.0 + passed * (6.0 * passed - 15.0));
+        let slope = 30.0 * (passed * (1.0 - passed)).powi(2);
+        // dG0/dz = -G1/6
+        let by_argument = slope * g1 / (6.0 * (FIRST - LAST));
+        let argument_by_length = self.unit_per_m2 * ((1.0 - self.ratio) * shortening_m - sheared_m);
+        Share { value, by_length_per_m: by_argument * argument_by_length, is_buckled: false }
+    }
 }
 
 impl HandOver {
@@ -57,10 +149,12 @@ impl HandOver {
     pub fn new(spring: &Spring, coils: Coils) -> Self {
         Self {
             energy: Held { law: EnergyForm::new(spring), contact: contact(spring, coils), wire: None },
-            rod: Rod::with_coils(spring, Accuracy::Servo, coils),
+            rod: Rod::to_rounding(spring, coils),
+            region: Region::new(spring),
             coils,
             spring: *spring,
             share: 0.0,
+            follows: Follows::Pose,
         }
     }
 
@@ -69,13 +163,20 @@ impl HandOver {
         self.energy.law = self.energy.law.retuned(&self.spring, spring);
         self.energy.contact = contact(spring, self.coils);
         self.rod.set_spring(spring);
+        self.region = Region::new(spring);
         self.spring = *spring;
     }
 
     /// Forgets the past. Real-time: bounded, no allocation.
     pub fn reset(&mut self) {
         self.rod.reset();
-        self.share = 0.0;
+        self.leave();
+    }
+
+    /// Whether an answer may depend on earlier poses: the spring can buckle.
+    #[must_use]
+    pub fn remembers(&self) -> bool {
+        self.region.has_buckling()
     }
 
     /// The rod's share in the last answer, 0 to 1.
@@ -95,32 +196,68 @@ impl HandOver {
         (self.share >= 1.0).then_some(&mut self.rod)
     }
 
-    fn share_at(&self, length_m: f64) -> Share {
-        let (rigidities, free_length_m) = (self.spring.rigidities(), self.spring.geometry().free_length_m);
-        let shortening_m = free_length_m - length_m;
-        let ratio = rigidities.gamma_n / rigidities.beta_n;
-        let unit = 0.25 * rigidities.gamma_n / rigidities.alpha_n_m2;
-        let sheared_m = length_m + ratio * shortening_m;
-        let argument = unit * shortening_m * sheared_m;
-        if argument >= DEEP_ARGUMENT {
-            return Share { value: 1.0, by_length_per_m: 0.0, is_warm: true };
+    /// The law that answers wherever the rod has no share.
+    pub(crate) fn energy(&self) -> &Held<EnergyForm> {
+        &self.energy
+    }
+
+    /// Whether the rod has a share at a pose.
+    #[inline]
+    pub(crate) fn hands_over(&self, pose: &Pose) -> bool {
+        self.region.holds(pose)
+    }
+
+    /// The hand is where the rod has no share: nothing is left to follow.
+    #[inline]
+    pub(crate) fn leave(&mut self) {
+        self.share = 0.0;
+        self.follows = Follows::Pose;
+    }
+
+    /// The rod's answer, by the pose alone as long as that says which of its equilibria is meant.
+    fn ask_rod(&mut self, pose: &Pose, share: Share, demand: Demand) -> Response {
+        let response = match self.follows {
+            Follows::Pose => self.rod.find(&self.spring, pose, demand),
+            Follows::LastTick => self.rod.step(pose, demand),
+        };
+        if share.is_buckled || response.validity == Validity::NotConverged {
+            self.follows = Follows::LastTick;
         }
-        if argument <= 0.0 {
-            return Share { value: 0.0, by_length_per_m: 0.0, is_warm: false };
+        response
+    }
+
+    /// Where the rod has a share.
+    fn blend(&mut self, pose: &Pose, demand: Demand) -> Response {
+        let Ok(chord) = pose.chord(self.spring.geometry().free_length_m) else {
+            self.leave();
+            return self.energy.respond(pose, demand);
+        };
+        let share = self.region.share_at(chord.length_m, chord.shortening_m);
+        self.share = share.value;
+        if share.value >= 1.0 {
+            return self.ask_rod(pose, share, demand);
         }
-        let EntireFunctions { g0, g1, .. } = EntireFunctions::at(argument);
-        let passed = ((FIRST - g0) / (FIRST - LAST)).clamp(0.0, 1.0);
-        // 6 t⁵ - 15 t⁴ + 10 t³: first and second derivatives vanish at both ends.
-        let value = passed * passed * passed * (10.0 + passed * (6.0 * passed - 15.0));
-        let slope = 30.0 * (passed * (1.0 - passed)).powi(2);
-        // dG0/dz = -G1/6
-        let by_argument = slope * g1 / (6.0 * (FIRST - LAST));
-        let argument_by_length = unit * ((1.0 - ratio) * shortening_m - sheared_m);
-        Share { value, by_length_per_m: by_argument * argument_by_length, is_warm: g0 < WARM }
+        let (rod, energy) = (
+            self.ask_rod(pose, share, Demand::WrenchAndEnergy),
+            self.energy.respond(pose, Demand::WrenchAndEnergy),
+        );
+        let (Some(rod_j), Some(energy_j)) = (rod.energy_j, energy.energy_j) else {
+            return self.energy.respond(pose, demand);
+        };
+        let by_length_n = (rod_j - energy_j) * share.by_length_per_m;
+        let torque_nm = energy.torque_nm.lerp(rod.torque_nm, share.value);
+        Response {
+            force_n: energy.force_n.lerp(rod.force_n, share.value)
+                - chord.vector_m * (by_length_n / chord.length_m),
+            torque_nm: if demand >= Demand::Wrench { torque_nm } else { DVec3::ZERO },
+            energy_j: (demand >= Demand::WrenchAndEnergy)
+                .then_some(energy_j + share.value * (rod_j - energy_j)),
+            validity: if rod.validity == Validity::NotConverged { rod.validity } else { energy.validity },
+        }
     }
 }
 
-/// What the rod knows of itself.
+/// What the energy form knows of coils that touch.
 fn contact(spring: &Spring, coils: Coils) -> Option<AxialContact> {
     match coils {
         Coils::Pass => None,
@@ -129,34 +266,16 @@ fn contact(spring: &Spring, coils: Coils) -> Option<AxialContact> {
 }
 
 impl HeldSpring for HandOver {
+    #[inline]
     fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
-        let Ok(chord) = pose.chord(self.spring.geometry().free_length_m) else {
-            return self.energy.respond(pose, demand);
-        };
-        let share = self.share_at(chord.length_m);
-        self.share = share.value;
-        if !share.is_warm {
-            return self.energy.respond(pose, demand);
+        if self.hands_over(pose) {
+            return self.blend(pose, demand);
         }
-        let blends = share.value > 0.0 && share.value < 1.0;
-        let rod = self.rod.step(pose, if blends { Demand::WrenchAndEnergy } else { demand });
-        if share.value >= 1.0 {
-            return rod;
-        }
-        let energy = self.energy.respond(pose, if blends { Demand::WrenchAndEnergy } else { demand });
-        if !blends || !rod.validity.has_answer() || !energy.validity.has_answer() {
-            return energy;
-        }
-        let (Some(rod_j), Some(energy_j)) = (rod.energy_j, energy.energy_j) else { return energy };
-        let by_length_n = (rod_j - energy_j) * share.by_length_per_m;
-        let torque_nm = energy.torque_nm.lerp(rod.torque_nm, share.value);
-        Response {
-            force_n: energy.force_n.lerp(rod.force_n, share.value)
-                - chord.vector_m * (by_length_n / chord.length_m),
-            torque_nm: if demand >= Demand::Wrench { torque_nm } else { 0.0 * torque_nm },
-            energy_j: (demand >= Demand::WrenchAndEnergy)
-                .then_some(energy_j + share.value * (rod_j - energy_j)),
-            validity: if rod.validity == Validity::NotConverged { rod.validity } else { energy.validity },
-        }
+        self.leave();
+        self.energy.respond(pose, demand)
+    }
+
+    fn noise_rad(&self) -> f64 {
+        if self.share > 0.0 { self.rod.noise_rad() } else { 0.0 }
     }
 }

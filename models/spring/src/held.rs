@@ -11,6 +11,12 @@ use crate::wire::Wire;
 pub trait HeldSpring {
     /// Answer at a pose relative to the lower plate. Real-time: bounded, no allocation.
     fn respond(&mut self, pose: &Pose, demand: Demand) -> Response;
+
+    /// How much of the slope of its energy the law leaves open, as the tilt of a plate that makes such a slope (rad).
+    /// Zero for a formula; for a law that solves, what its solver calls equal.
+    fn noise_rad(&self) -> f64 {
+        0.0
+    }
 }
 
 impl HeldSpring for EnergyForm {
@@ -22,6 +28,10 @@ impl HeldSpring for EnergyForm {
 impl HeldSpring for Rod {
     fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
         self.step(pose, demand)
+    }
+
+    fn noise_rad(&self) -> f64 {
+        Rod::noise_rad(self)
     }
 }
 
@@ -57,5 +67,9 @@ impl<L: HeldSpring> HeldSpring for Held<L> {
             Some(wire) => wire.added_to(&response, pose, demand),
             None => response,
         }
+    }
+
+    fn noise_rad(&self) -> f64 {
+        self.law.noise_rad()
     }
 }

@@ -119,7 +119,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "Friction under a free seat; at 10 nothing slides",
     )
     .live(),
-    Parameter::choice("hand_over", &OFF_ON, 0, "Near buckling to the rod, as one energy (variant energy)"),
+    Parameter::choice("hand_over", &OFF_ON, 1, "Near buckling to the rod, as one energy (variant energy)"),
     Parameter::choice("coil_contact", &OFF_ON, 0, "Coils that meet press on each other (energy, rod)"),
     Parameter::choice(
         "wire",
@@ -243,7 +243,7 @@ impl Choice {
             accuracy: Accuracy::Servo,
             seat: SeatChoice::Fixed,
             friction: Friction::STICKING,
-            hand_over: Switch::Off,
+            hand_over: if variant == Variant::Energy { Switch::On } else { Switch::Off },
             coil_contact: Switch::Off,
             wire: Switch::Off,
             preset,
@@ -362,11 +362,14 @@ fn seat(settings: &Settings<'_>, variant: Variant) -> Result<SeatChoice, Refusal
     }
 }
 
-/// Whether the law `energy` hands over to the rod.
+/// Whether the law `energy` hands over to the rod, as it does unless told otherwise. No other law does.
 fn hand_over(settings: &Settings<'_>, variant: Variant) -> Result<Switch, Refusal> {
-    match (settings.choice_or_default("hand_over"), variant) {
-        (1, Variant::Energy) => Ok(Switch::On),
-        (1, Variant::Thesis | Variant::ClosedForm | Variant::CurrentLength | Variant::Rod) => {
+    let wanted = settings.choice_or_default("hand_over") == 1;
+    match variant {
+        Variant::Energy if wanted => Ok(Switch::On),
+        Variant::Thesis | Variant::ClosedForm | Variant::CurrentLength | Variant::Rod
+            if wanted && settings.number("hand_over").is_some() =>
+        {
             Err(Refusal::parameter("`hand_over` on is for variant `energy`, which hands over to the rod"))
         }
         _ => Ok(Switch::Off),

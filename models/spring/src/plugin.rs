@@ -88,16 +88,17 @@ impl DetailedModel for SpringModel {
             "rad",
             "Roll of the lower plate about y; none for a spring in the air",
         ),
+        Detail::number("rod_share", "1", "Share of the exact rod in the energy (energy with hand_over)"),
     ];
 
     fn details(&self, values: &mut [f64]) {
-        let Insight { branch, is_stable, seat_roll_rad } = self.law.insight();
+        let Insight { branch, is_stable, seat_roll_rad, rod_share } = self.law.insight();
         let branch = branch.map(|branch| match branch {
             Branch::Unbuckled => 0.0,
             Branch::Buckled => 1.0,
         });
         let is_stable = is_stable.map(|is_stable| f64::from(u8::from(is_stable)));
-        for (value, known) in values.iter_mut().zip([branch, is_stable, seat_roll_rad]) {
+        for (value, known) in values.iter_mut().zip([branch, is_stable, seat_roll_rad, rod_share]) {
             *value = known.unwrap_or(f64::NAN);
         }
     }

@@ -6,6 +6,7 @@ use crate::batch::Batch;
 use crate::centerline::{Centerline, Section};
 use crate::closed_form::{ClosedForm, Form};
 use crate::contact::AxialContact;
+use crate::contract;
 use crate::energy::EnergyForm;
 use crate::hand_over::HandOver;
 use crate::held::{Held, HeldSpring};
@@ -13,7 +14,7 @@ use crate::parameters::{Choice, SeatChoice, Switch, Variant};
 use crate::pose::Pose;
 use crate::response::{Demand, Response};
 use crate::rigidity::Spring;
-use crate::rod::{Branch, Coils, Rod};
+use crate::rod::{Accuracy, Branch, Coils, Rod};
 use crate::seat::Seat;
 use crate::thesis::Thesis;
 use crate::validity::Validity;
@@ -42,6 +43,8 @@ pub(crate) struct Insight {
     pub(crate) is_stable: Option<bool>,
     /// Roll of the base about the y axis (rad); `None` for a spring that hangs in the air.
     pub(crate) seat_roll_rad: Option<f64>,
+    /// Share of the exact rod in a law that hands over to it, 0 to 1.
+    pub(crate) rod_share: Option<f64>,
 }
 
 impl Prepared {
@@ -65,7 +68,9 @@ impl Prepared {
                 Self::FreeEnergy(energy(choice), Seat::new(spring, *friction))
             }
             (Variant::Rod, SeatChoice::Fixed) => Self::Rod(rod(choice)),
-            (Variant::Rod, SeatChoice::Free) => Self::FreeRod(rod(choice), Seat::new(spring, *friction)),
+            (Variant::Rod, SeatChoice::Free) => {
+                Self::FreeRod(rod_to_tip(choice), Seat::new(spring, *friction))
+            }
         }
     }
 
@@ -127,7 +132,7 @@ impl Prepared {
     /// Answers to all inputs side by side, where the law can do that; `false` where it goes pose by pose.
     /// Real-time per pose: bounded, no allocation.
     pub(crate) fn respond_side_by_side(
-        &self,
+        &mut self,
         batch: &Batch,
         inputs: &[Input],
         outputs: &mut [Output],
@@ -135,6 +140,10 @@ impl Prepared {
         match self {
             Self::ClosedForm(law) => batch.respond(law, inputs, outputs),
             Self::Energy(held) if held.is_plain() => batch.respond(&held.law, inputs, outputs),
+            Self::HandOver(held) if held.is_plain() && held.law.energy().is_plain() => {
+                batch.respond(&held.law.energy().law, inputs, outputs);
+                hand_over_some(&mut held.law, inputs, outputs);
+            }
             _ => return false,
         }
         true
@@ -145,6 +154,7 @@ impl Prepared {
         match self {
             Self::Thesis(_) | Self::ClosedForm(_) => VariantInfo::new(Served::WRENCH, Memory::Stateless),
             Self::Energy(_) => VariantInfo::new(Served::ALL, Memory::Stateless),
+            Self::HandOver(held) if !held.law.remembers() => VariantInfo::new(Served::ALL, Memory::Stateless),
             Self::Rod(_)
             | Self::HandOver(_)
             | Self::FreeEnergy(..)
@@ -166,6 +176,10 @@ impl Prepared {
         Insight {
             branch: state.map(|state| state.branch),
             is_stable: state.map(|state| state.is_stable()),
+            rod_share: match self {
+                Self::HandOver(held) | Self::FreeHandOver(held, _) => Some(held.law.share()),
+                _ => None,
+            },
             seat_roll_rad: match seat {
                 Some(seat) if seat.is_lifted() => None,
                 Some(seat) => Some(seat.tilt_rad().x),
@@ -215,6 +229,14 @@ fn rod(choice: &Choice) -> Held<Rod> {
     Held { law, contact: None, wire: wire(choice) }
 }
 
+/// For a base that asks for the least energy: the servo's rod is too coarse to be minimised.
+fn rod_to_tip(choice: &Choice) -> Held<Rod> {
+    match choice.accuracy {
+        Accuracy::Servo => Held { law: Rod::to_rounding(&choice.spring, coils(choice)), ..rod(choice) },
+        Accuracy::Tight => rod(choice),
+    }
+}
+
 fn handing_over(choice: &Choice) -> Held<HandOver> {
     Held { law: HandOver::new(&choice.spring, coils(choice)), contact: None, wire: wire(choice) }
 }
@@ -223,6 +245,18 @@ fn coils(choice: &Choice) -> Coils {
     match choice.coil_contact {
         Switch::Off => Coils::Pass,
         Switch::On => Coils::Touch,
+    }
+}
+
+/// Asks again, in order, where the rod has a share.
+fn hand_over_some(law: &mut HandOver, inputs: &[Input], outputs: &mut [Output]) {
+    for (input, output) in inputs.iter().zip(outputs) {
+        let pose = contract::pose(input);
+        if law.hands_over(&pose) {
+            *output = contract::output(&law.respond(&pose, contract::demand(input)));
+        } else {
+            law.leave();
+        }
     }
 }
 

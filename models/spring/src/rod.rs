@@ -14,7 +14,7 @@
 //! - `contact`: coils that touch.
 //! - `curve`: where the sections are, for drawing.
 //! - `matrix`: solves, and counts unstable directions; `predictor`, `equilibrium`: follow the minimum in
-//!   time.
+//!   time; `start`: where to begin without a past.
 //!
 //! Shear, stretch and twist follow in closed form from the directions of the sections, two numbers each. So
 //! ten polynomials leave an error below a micronewton before buckling, twenty-eight leave rounding, and the
@@ -48,6 +48,7 @@ pub(crate) mod matrix;
 mod plate;
 mod predictor;
 mod section;
+mod start;
 
 /// How accurate the rod is, and how much a tick costs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -136,19 +137,51 @@ impl Rod {
         let ratios = Ratios::new(spring, coils);
         let solver = match accuracy {
             Accuracy::Servo => {
-                let effort = Effort { most_steps: 4, most_matrices: 3, matrix_life: 32, tolerance: 1e-8 };
+                let effort = Effort {
+                    most_steps: 4,
+                    most_matrices: 3,
+                    matrix_life: 32,
+                    tolerance: 1e-8,
+                    renewal: 1e-7,
+                };
                 Solver::Servo(Box::new(Equilibrium::new(ratios, effort)))
             }
             Accuracy::Tight => {
-                let effort = Effort { most_steps: 8, most_matrices: 8, matrix_life: 1, tolerance: 1e-14 };
+                let effort = Effort {
+                    most_steps: 8,
+                    most_matrices: 8,
+                    matrix_life: 1,
+                    tolerance: 1e-14,
+                    renewal: 1e-13,
+                };
                 Solver::Tight(Box::new(Equilibrium::new(ratios, effort)))
             }
         };
-        let constants = Constants::new(spring);
+        Self::solved_by(solver, spring, coils)
+    }
+
+    /// The rod at rest with the servo's polynomials and each equilibrium to rounding, so that nothing of the past is left
+    /// in an answer: for laws that do something with its energy, mix it ([`crate::hand_over`]) or minimise it
+    /// ([`crate::seat`]). Not real-time: allocates.
+    #[must_use]
+    pub fn to_rounding(spring: &Spring, coils: Coils) -> Self {
+        let effort = Effort {
+            most_steps: 10,
+            most_matrices: 6,
+            matrix_life: 8,
+            tolerance: 1e-13,
+            // A step costs a ninth of a matrix: better several with an old one, as long as they contract.
+            renewal: 1e-3,
+        };
+        let equilibrium = Equilibrium::new(Ratios::new(spring, coils), effort);
+        Self::solved_by(Solver::Servo(Box::new(equilibrium)), spring, coils)
+    }
+
+    fn solved_by(solver: Solver, spring: &Spring, coils: Coils) -> Self {
         Self {
             solver,
             coils,
-            constants,
+            constants: Constants::new(spring),
             branch: Branch::Unbuckled,
             last: Response::none(Validity::NotConverged),
         }
@@ -172,6 +205,11 @@ impl Rod {
     pub fn state(&self) -> State {
         let unstable_directions = either!(&self.solver, equilibrium => equilibrium.unstable_directions());
         State { branch: self.branch, unstable_directions }
+    }
+
+    /// How far equilibria of the same pose may be apart, as a lean of a section (rad).
+    pub(crate) fn noise_rad(&self) -> f64 {
+        either!(&self.solver, equilibrium => equilibrium.tolerance())
     }
 
     /// What the last tick cost. Real-time: bounded, no allocation.
@@ -201,6 +239,32 @@ impl Rod {
     ///
     /// Real-time: bounded, no allocation.
     pub fn step(&mut self, pose: &Pose, demand: Demand) -> Response {
+        self.answer(
+            pose,
+            |solver, plate| either!(solver, equilibrium => equilibrium.advance(plate, demand)),
+            demand,
+        )
+    }
+
+    /// The same without a past: the equilibrium that is found from the shape of the linear beam-column, a function of
+    /// the pose alone. Where the search does not end, [`Validity::NotConverged`], and [`Self::step`] goes on with it.
+    /// `spring` is the rod's own. Real-time: bounded, no allocation; some ten times a step.
+    pub(crate) fn find(&mut self, spring: &Spring, pose: &Pose, demand: Demand) -> Response {
+        self.last = Response::none(Validity::NotConverged);
+        self.answer(
+            pose,
+            |solver, plate| either!(solver, equilibrium => equilibrium.find(spring, pose, plate, demand)),
+            demand,
+        )
+    }
+
+    #[inline]
+    fn answer(
+        &mut self,
+        pose: &Pose,
+        solve: impl FnOnce(&mut Solver, &Plate) -> Outcome,
+        demand: Demand,
+    ) -> Response {
         if let Err(validity) = pose.chord(self.constants.free_length_m) {
             return Response::none(validity);
         }
@@ -208,8 +272,7 @@ impl Rod {
             return Response::none(Validity::OutOfDomain);
         };
         self.branch = self.constants.branch(-pose.position_m.z);
-        let outcome = either!(&mut self.solver, equilibrium => equilibrium.advance(&plate, demand));
-        let response = match outcome {
+        let response = match solve(&mut self.solver, &plate) {
             Outcome::Settled(reading) => self.constants.response(&plate, &reading, demand, Validity::Ok),
             Outcome::Moving(reading) => {
                 self.constants.response(&plate, &reading, demand, Validity::NotConverged)

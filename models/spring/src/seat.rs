@@ -31,8 +31,8 @@ use crate::validity::Validity;
 
 /// Evaluations of the law per tick at most.
 const MOST_EVALUATIONS: u32 = 8;
-/// Change of the tilt that counts as none (rad).
-const TOLERANCE_RAD: f64 = 1e-9;
+/// Change of the tilt that counts as none (rad), of a law that leaves nothing open.
+const TOLERANCE_RAD: f64 = 1e-11;
 /// Largest change of the tilt between evaluations (rad).
 const LONGEST_STEP_RAD: f64 = 0.05;
 /// Largest tilt (rad): beyond it the plate would stand on edge.
@@ -44,6 +44,9 @@ const FRICTION_TOLERANCE: f64 = 1e-6;
 /// A sliding base is moved by what the stiffness along the ground makes of the excess; as observed, but within this
 /// factor of that at rest.
 const STIFFNESS_RANGE: f64 = 8.0;
+/// Least surprise of the slope, in what the law leaves open of it, that says something about the curvature: the quotient
+/// of noise and a short step is any number.
+const LEAST_SURPRISE: f64 = 3.0;
 /// Longest slide between evaluations, in free lengths.
 const LONGEST_SLIDE: f64 = 0.05;
 /// Least curvature assumed, of that of the spring at rest: a flatter model would take wild steps.
@@ -154,6 +157,7 @@ impl Seat {
     /// while seated.
     pub fn step<S: HeldSpring>(&mut self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
         let wanted = demand.max(Demand::Wrench);
+        let noise_rad = spring.noise_rad();
         self.lifted = false;
         let mut slid: Option<(f64, f64)> = None;
         let mut previous: Option<(DVec2, DVec2)> = None;
@@ -176,7 +180,7 @@ impl Seat {
             let tip_nm = tip_nm.unwrap_or_default();
             let slope = self.slope(pose, &base, &response) - tip_nm * base.direction;
             if let Some((tilt, old_slope)) = previous {
-                self.observe(self.tilt_rad - tilt, slope - old_slope);
+                self.observe(self.tilt_rad - tilt, slope - old_slope, noise_rad);
             }
             previous = Some((self.tilt_rad, slope));
             let goal = tipped_minimum(self.curvature, self.curvature * self.tilt_rad - slope, tip_nm);
@@ -189,7 +193,7 @@ impl Seat {
             if excess_n > FRICTION_TOLERANCE * self.friction * response.force_n.z {
                 slid = Some((self.slide(&response, excess_n), excess_n));
                 previous = None;
-            } else if step.length() <= TOLERANCE_RAD {
+            } else if step.length() <= noise_rad.max(TOLERANCE_RAD) {
                 return only(response, demand);
             }
             self.tilt_rad = (self.tilt_rad + step).clamp_length_max(LARGEST_TILT_RAD);
@@ -296,8 +300,11 @@ impl Seat {
     }
 
     /// Symmetric rank-one correction of the curvature (Nocedal and Wright, *Numerical Optimization*, 6.2).
-    fn observe(&mut self, step: DVec2, change: DVec2) {
+    fn observe(&mut self, step: DVec2, change: DVec2, noise_rad: f64) {
         let surprise = change - self.curvature * step;
+        if surprise.length() < LEAST_SURPRISE * noise_rad * self.stiffness_nm_per_rad {
+            return;
+        }
         let along = surprise.dot(step);
         if along.abs() > 1e-8 * surprise.length() * step.length() {
             let update = DMat2::from_cols(surprise * surprise.x, surprise * surprise.y);

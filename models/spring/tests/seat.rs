@@ -12,7 +12,7 @@ use flotor_spring::pose::Pose;
 use flotor_spring::preset::Preset;
 use flotor_spring::response::{Demand, Response};
 use flotor_spring::rigidity::Spring;
-use flotor_spring::rod::{Accuracy, Rod};
+use flotor_spring::rod::{Accuracy, Coils, Rod};
 use flotor_spring::seat::{Friction, Seat};
 use flotor_spring::validity::Validity;
 use sample::{Sampler, Workspace};
@@ -144,7 +144,7 @@ fn a_moving_base_keeps_up_with_the_hand() {
     for preset in [Preset::Thesis1, Preset::Thesis2, Preset::Thesis3] {
         let spring = preset.spring();
         let energy = waited(&spring, &mut EnergyForm::new(&spring));
-        let rod = waited(&spring, &mut Rod::new(&spring, Accuracy::Servo));
+        let rod = waited(&spring, &mut Rod::to_rounding(&spring, Coils::Pass));
         for (waited, tipped) in [energy, rod] {
             assert!(tipped > 500, "{preset:?}: {tipped} ticks tip the base");
             // The rod waits where it jumps to the tipped base: a hundredth at most.

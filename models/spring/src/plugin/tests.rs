@@ -1,5 +1,6 @@
 use super::*;
-use crate::parameters::{SeatChoice, Variant};
+use crate::parameters::{SeatChoice, Switch, Variant};
+use crate::preset::Preset;
 use flotor_hal::Pose;
 
 /// A pose with every kind of load.
@@ -71,6 +72,35 @@ fn a_batch_is_single_steps_for_every_variant() {
     }
 }
 
+/// Spring 3 is handed over past 24 %: in a batch some poses go side by side, some one by one, and what is followed from
+/// pose to pose is the same.
+#[test]
+fn a_batch_hands_over_as_single_steps_do() {
+    let preset = Preset::Thesis3;
+    let (_, _, stiffness) = preset.parameters();
+    let choice =
+        Choice { spring: preset.spring(), stiffness, preset, ..Choice::default_with(Variant::Energy) };
+    let (mut together, mut apart) = (SpringModel::new(choice), SpringModel::new(choice));
+    let inputs: Vec<Input> = (0..200_u32)
+        .map(|index| {
+            let down = 0.027 * 0.6 * f64::from(index * 37 % 200) / 200.0;
+            let demand = [Demand::ALL, Demand::WRENCH, Demand::FORCE][(index % 3) as usize];
+            let position = DVec3::new(1e-3, 0.0, -down);
+            Input { demand, ..Input::at_rest(Pose::new(position, DQuat::from_rotation_x(0.05))) }
+        })
+        .collect();
+    let mut outputs = vec![Output::default(); inputs.len()];
+    together.step_batch(&inputs, &mut outputs);
+    let mut handed_over = 0;
+    for (input, output) in inputs.iter().zip(&outputs) {
+        let single = apart.step(input);
+        handed_over += u32::from(number(&apart, "rod_share") > 0.0);
+        assert_eq!((output.wrench, output.status()), (single.wrench, single.status()), "{input:?}");
+        assert_eq!(output.energy_j.to_bits(), single.energy_j.to_bits(), "{input:?}");
+    }
+    assert!((50..150).contains(&handed_over), "{handed_over}");
+}
+
 fn number(model: &SpringModel, id: &str) -> f64 {
     let mut values = [0.0; SpringModel::DETAILS.len()];
     model.details(&mut values);
@@ -78,7 +108,14 @@ fn number(model: &SpringModel, id: &str) -> f64 {
 }
 
 #[test]
-fn only_the_rod_and_a_free_seat_remember() {
+fn only_the_rod_a_free_seat_and_what_buckles_remember() {
+    for (preset, buckles) in [(Preset::Thesis1, false), (Preset::Thesis3, true)] {
+        let spring = preset.spring();
+        let info = Prepared::new(&Choice { spring, ..Choice::default_with(Variant::Energy) }).info();
+        assert_eq!(info.memory() == Memory::PathDependent, buckles, "{preset:?}");
+        let alone = Choice { hand_over: Switch::Off, spring, ..Choice::default_with(Variant::Energy) };
+        assert_eq!(Prepared::new(&alone).info().memory(), Memory::Stateless, "{preset:?}");
+    }
     for variant in Variant::ALL {
         for seat in [SeatChoice::Fixed, SeatChoice::Free] {
             let info = Prepared::new(&Choice { seat, ..Choice::default_with(variant) }).info();

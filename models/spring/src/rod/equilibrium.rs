@@ -12,14 +12,21 @@
 use flotor_hal::glam::{DVec2, DVec3};
 
 use super::curve::Curve;
-use super::functional::{Curvature, Functional, Ratios, Reaction, Shape, Value};
+use super::functional::{Curvature, Functional, Ratios, Reaction, Shape, Value, joined};
 use super::matrix::{Factored, added, dot, length, product};
 use super::plate::{Plate, or_zero};
 use super::predictor::History;
+use super::start;
+use crate::pose::Pose;
 use crate::response::Demand;
+use crate::rigidity::Spring;
 
 /// Longest change of shape in a tick, as the root mean square slope of `p`. A full bulge has about 3.
 const LONGEST_STEP: f64 = 0.1;
+/// Longest step where the way is not felt, but only its end.
+const LONGEST_UNFELT_STEP: f64 = 0.4;
+/// How often a search that is not felt may begin anew.
+const MOST_SEARCHES: u32 = 6;
 /// Curvature that counts as none. Bending has 4; the softest stable directions have 1e-5; rounding makes
 /// 1e-14.
 const NEUTRAL: f64 = 1.0e-9;
@@ -50,6 +57,8 @@ pub(crate) struct Effort {
     /// Accepted error of the shape after a step, estimated as the length of the step times the way from where
     /// the matrix was computed (Deuflhard 2.1.1, with the Lipschitz constant of a rod, about one).
     pub(crate) tolerance: f64,
+    /// A larger error of a step than this calls for a new matrix.
+    pub(crate) renewal: f64,
 }
 
 /// What the plates feel, in units of the bending rigidity and the free length.
@@ -84,6 +93,7 @@ pub(crate) struct Equilibrium<const K: usize, const N: usize, const Q: usize> {
     history: History<N>,
     matrix: KeptMatrix<N>,
     damping: f64,
+    longest_step: f64,
     unstable_directions: usize,
     work: Work,
 }
@@ -98,6 +108,17 @@ pub struct Work {
     pub matrices: u32,
     /// Factorings of a matrix.
     pub factorings: u32,
+}
+
+impl Work {
+    /// Both together.
+    fn and(self, other: &Self) -> Self {
+        Self {
+            evaluations: self.evaluations + other.evaluations,
+            matrices: self.matrices + other.matrices,
+            factorings: self.factorings + other.factorings,
+        }
+    }
 }
 
 /// Factored second derivatives and where they were computed.
@@ -140,6 +161,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
             history: History::new(Plate::HOME, [0.0; N]),
             matrix: KeptMatrix::none(),
             damping: LEAST_DAMPING,
+            longest_step: LONGEST_STEP,
             unstable_directions: 0,
             work: Work::default(),
         }
@@ -165,6 +187,11 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         self.unstable_directions
     }
 
+    /// Accepted error of a shape.
+    pub(crate) fn tolerance(&self) -> f64 {
+        self.effort.tolerance
+    }
+
     /// What the last tick cost.
     pub(crate) fn work(&self) -> Work {
         self.work
@@ -179,18 +206,46 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
     pub(crate) fn advance(&mut self, plate: &Plate, demand: Demand) -> Outcome {
         let before = self.shape;
         self.work = Work::default();
+        self.longest_step = LONGEST_STEP;
         self.shape = self.history.predict(plate);
         let outcome = self.search(plate, demand);
+        self.remember(plate, &before, &outcome);
+        outcome
+    }
+
+    /// The equilibrium at a pose, whatever was before: from the shape of the linear column, in one go. What happens on
+    /// the way is not felt, so it may go faster. Real-time: bounded, no allocation.
+    pub(crate) fn find(&mut self, spring: &Spring, pose: &Pose, plate: &Plate, demand: Demand) -> Outcome {
+        self.reset();
+        self.longest_step = LONGEST_UNFELT_STEP;
+        if let Some(start) = start::linear(self.functional.basis(), spring, pose) {
+            self.shape = joined(&start[0], &start[1]);
+        }
+        let (mut outcome, mut work) = (Outcome::Failed, Work::default());
+        for _ in 0..MOST_SEARCHES {
+            self.work = Work::default();
+            outcome = self.search(plate, demand);
+            work = work.and(&self.work);
+            if !matches!(outcome, Outcome::Moving(_)) {
+                break;
+            }
+        }
+        self.work = work;
+        self.remember(plate, &[0.0; N], &outcome);
+        outcome
+    }
+
+    /// Keeps what the next tick starts from.
+    fn remember(&mut self, plate: &Plate, before: &Shape<N>, outcome: &Outcome) {
         match outcome {
             Outcome::Settled(_) => self.history.push(*plate, &self.shape),
             Outcome::Moving(_) => self.history = History::new(*plate, self.shape),
             Outcome::Failed => {
-                self.shape = before;
-                self.history = History::new(*plate, before);
+                self.shape = *before;
+                self.history = History::new(*plate, *before);
                 self.matrix.steps_left = 0;
             }
         }
-        outcome
     }
 
     /// Newton's method from the predicted shape.
@@ -219,19 +274,19 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
                 return Outcome::Failed;
             }
             let error = size * (size + distance(&self.shape, &self.matrix.shape));
-            let step = capped(step, size);
+            let step = capped(step, size, self.longest_step);
             self.shape = added(&self.shape, 1.0, &step).map(or_zero);
             self.matrix.steps_left = self.matrix.steps_left.saturating_sub(1);
             let reading = read(&value, &self.matrix.reaction, &step, demand);
-            if error <= self.effort.tolerance && size <= LONGEST_STEP && self.matrix.neutral <= SETTLED {
+            if error <= self.effort.tolerance && size <= self.longest_step && self.matrix.neutral <= SETTLED {
                 self.damping = LEAST_DAMPING;
                 return Outcome::Settled(reading);
             }
             outcome = Outcome::Moving(reading);
-            if size > LONGEST_STEP || size > CONTRACTION * last_size || error > 10.0 * self.effort.tolerance {
+            if size > self.longest_step || size > CONTRACTION * last_size || error > self.effort.renewal {
                 self.matrix.steps_left = 0;
             }
-            if size > LONGEST_STEP {
+            if size > self.longest_step {
                 break;
             }
             last_size = size;
@@ -295,7 +350,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         if !size.is_finite() {
             return Outcome::Failed;
         }
-        let step = capped(step, size);
+        let step = capped(step, size, self.longest_step);
         self.shape = added(&self.shape, 1.0, &step);
         Outcome::Moving(read(value, &curvature.reaction, &step, demand))
     }
@@ -354,8 +409,8 @@ fn read<const N: usize, const Q: usize>(
 }
 
 #[inline]
-fn capped<const N: usize>(step: Shape<N>, size: f64) -> Shape<N> {
-    if size > LONGEST_STEP { step.map(|entry| entry * (LONGEST_STEP / size)) } else { step }
+fn capped<const N: usize>(step: Shape<N>, size: f64, longest: f64) -> Shape<N> {
+    if size > longest { step.map(|entry| entry * (longest / size)) } else { step }
 }
 
 #[inline]

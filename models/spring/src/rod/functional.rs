@@ -108,6 +108,11 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
         Self { basis: Basis::new(), ratios }
     }
 
+    /// The polynomials of its shapes.
+    pub(crate) fn basis(&self) -> &Basis<K, Q> {
+        &self.basis
+    }
+
     /// Another rod. Real-time: bounded, no allocation.
     pub(crate) fn set_ratios(&mut self, ratios: Ratios) {
         self.ratios = ratios;
@@ -275,7 +280,7 @@ fn add_products<const M: usize>(sum: &mut [f64; M], vector: &[f64; M], factor: f
 
 /// Both components one after the other.
 #[inline(always)]
-fn joined<const K: usize, const N: usize>(x: &[f64; K], y: &[f64; K]) -> Shape<N> {
+pub(super) fn joined<const K: usize, const N: usize>(x: &[f64; K], y: &[f64; K]) -> Shape<N> {
     let mut shape = [0.0; N];
     for (entry, value) in shape.iter_mut().zip(x.iter().chain(y)) {
         *entry = *value;

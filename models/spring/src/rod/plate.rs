@@ -7,18 +7,15 @@
 
 use flotor_hal::glam::{DVec2, DVec3};
 
-use crate::pose::Pose;
+use crate::pose::{DUST, Pose};
 
 /// Smallest `1 + d_z`: 177.4 degrees. There is no shortest turn to upside down.
 const LEAST_OVERTURN: f64 = 1e-3;
 
-/// What is smaller is zero: no length or angle, but a number whose powers the processor computes a hundred times slower.
-const LEAST: f64 = 1e-50;
-
 /// The number itself, or zero where it is nothing. Real-time: bounded, no allocation.
 #[inline]
 pub(crate) fn or_zero(number: f64) -> f64 {
-    if number.abs() < LEAST { 0.0 } else { number }
+    if number.abs() < DUST { 0.0 } else { number }
 }
 
 /// Pose of the upper plate, lengths in free lengths.

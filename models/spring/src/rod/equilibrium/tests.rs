@@ -7,7 +7,8 @@ use crate::rod::Coils;
 
 type Medium = Equilibrium<12, 24, 16>;
 
-const EFFORT: Effort = Effort { most_steps: 8, most_matrices: 8, matrix_life: 1, tolerance: 1e-14 };
+const EFFORT: Effort =
+    Effort { most_steps: 8, most_matrices: 8, matrix_life: 1, tolerance: 1e-14, renewal: 1e-13 };
 
 fn plate(preset: Preset, shear: f64, compression: f64, rotation_rad: DVec3) -> Plate {
     let free_length_m = preset.spring().geometry().free_length_m;
