@@ -221,6 +221,10 @@ const UNSAFE: &[(&str, &str)] = &[
         "the binary contract: function tables across shared libraries, the export macros, the loader",
     ),
     (
+        "devices/maglev/src/transport/usb/queue.rs",
+        "USB transfers that wait on the bus while the loop runs: rusb wraps only those that block",
+    ),
+    (
         "host/python/src/rows.rs",
         "NumPy records that are the contract's structs: the layout promise, and arrays used where they lie",
     ),

@@ -12,8 +12,6 @@ use std::time::{Duration, Instant};
 const ANSWERS_PER_LOOK: usize = 32;
 /// How long a question that is not real-time waits before it is asked again.
 const ASK_AGAIN: Duration = Duration::from_millis(20);
-/// How long such a question sleeps between two looks.
-const NAP: Duration = Duration::from_micros(100);
 
 /// Why a question got no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +31,9 @@ pub(crate) struct Heard {
 
 /// A link with its session.
 pub(crate) struct HostLink {
-    transport: Box<dyn Transport>,
+    /// Nothing once the other side was found gone: the system gives the port's name to the next device only when this
+    /// one is closed.
+    transport: Option<Box<dyn Transport>>,
     sequence: u32,
     /// 0 until armed.
     session: u32,
@@ -43,7 +43,7 @@ pub(crate) struct HostLink {
 
 impl HostLink {
     pub(crate) fn new(transport: Box<dyn Transport>) -> Self {
-        Self { transport, sequence: 0, session: 0, intake: Intake::default(), newest: None }
+        Self { transport: Some(transport), sequence: 0, session: 0, intake: Intake::default(), newest: None }
     }
 
     /// Answers that were not used, by reason.
@@ -66,7 +66,7 @@ impl HostLink {
             session: self.session,
             request,
         };
-        self.transport.send(&frame.encode())
+        self.transport.as_mut().ok_or(LinkLost)?.send(&frame.encode())
     }
 
     /// Takes what has arrived; the newest status that has not been taken yet. Real-time: bounded, no allocation.
@@ -82,28 +82,34 @@ impl HostLink {
     }
 
     fn receive(&mut self) -> Result<Received, LinkLost> {
-        let packet = match self.transport.receive()? {
-            Incoming::Nothing => return Ok(Received::Nothing),
+        let incoming = self.transport.as_mut().ok_or(LinkLost)?.receive()?;
+        Ok(self.judge(&incoming))
+    }
+
+    /// Uses what came in, if it may be used.
+    fn judge(&mut self, incoming: &Incoming) -> Received {
+        let packet = match incoming {
+            Incoming::Nothing => return Received::Nothing,
             Incoming::Malformed => {
                 self.intake.reject(Rejection::Length);
-                return Ok(Received::Rejected);
+                return Received::Rejected;
             }
             Incoming::Packet(packet) => packet,
         };
-        let frame = match AnswerFrame::decode(&packet) {
+        let frame = match AnswerFrame::decode(packet) {
             Ok(frame) => frame,
             Err(rejection) => {
                 self.intake.reject(rejection);
-                return Ok(Received::Rejected);
+                return Received::Rejected;
             }
         };
         if !self.intake.accept(frame.sequence) {
-            return Ok(Received::Rejected);
+            return Received::Rejected;
         }
-        Ok(match frame.answer {
+        match frame.answer {
             Answer::Status(status) => Received::Status(Heard { status, acknowledged: frame.acknowledged }),
             Answer::Description(page) => Received::Page(page),
-        })
+        }
     }
 
     /// Asks until the answer satisfies, or time is over. Not real-time.
@@ -117,14 +123,12 @@ impl HostLink {
         while started.elapsed() < patience {
             self.send(request, 0).map_err(|LinkLost| Unanswered::Lost)?;
             let asked = Instant::now();
-            while asked.elapsed() < ASK_AGAIN {
-                match self.receive().map_err(|LinkLost| Unanswered::Lost)? {
-                    Received::Nothing => std::thread::sleep(NAP),
-                    received => {
-                        if let Some(answer) = satisfies(&received, self.sequence) {
-                            return Ok(answer);
-                        }
-                    }
+            while let Some(rest) = ASK_AGAIN.checked_sub(asked.elapsed()) {
+                let transport = self.transport.as_mut().ok_or(Unanswered::Lost)?;
+                let incoming = transport.wait(rest).map_err(|LinkLost| Unanswered::Lost)?;
+                let received = self.judge(&incoming);
+                if let Some(answer) = satisfies(&received, self.sequence) {
+                    return Ok(answer);
                 }
             }
         }
@@ -162,9 +166,12 @@ impl HostLink {
         self.ask_mode(Request::TakeOff, Mode::Levitating, patience)
     }
 
-    /// Switches the coils off and ends the session. Not real-time.
+    /// Switches the coils off and ends the session; a link without another side is closed. Not real-time.
     pub(crate) fn disarm(&mut self, patience: Duration) -> Result<(), Unanswered> {
         let off = self.ask_mode(Request::Disarm, Mode::Disarmed, patience).map(|_| ());
+        if off == Err(Unanswered::Lost) {
+            self.transport = None;
+        }
         self.session = 0;
         off
     }

@@ -10,6 +10,7 @@
 //! - [`warning`]: when the person who holds it should be warned.
 //! - [`controller`]: the firmware as a state machine; the authority over the coils.
 //! - [`emulator`]: the controller without hardware, for tests and for authors of other plugins.
+//! - `gadget`: that controller as a USB device of this machine's own kernel (Linux).
 //! - [`facts`]: what is published about the device.
 //!
 //! The plugin links none of the controller; the emulator links none of the plugin.
@@ -18,6 +19,8 @@ pub mod boundary;
 pub mod controller;
 pub mod emulator;
 pub mod facts;
+#[cfg(target_os = "linux")]
+pub mod gadget;
 mod host_link;
 mod parameters;
 mod plugin;

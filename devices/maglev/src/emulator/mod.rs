@@ -113,7 +113,12 @@ impl<P: Plant> Emulator<P> {
             self.tell_mode(log);
             deadline += Duration::from_micros(CYCLE_US);
             match deadline.checked_duration_since(Instant::now()) {
-                Some(rest) => std::thread::sleep(rest),
+                // Answers go out when the question comes in, as a controller's interrupt does it.
+                Some(_) => {
+                    if self.receive_until(link, deadline).is_err() {
+                        return;
+                    }
+                }
                 // Held up: what was missed is made up in simulated time, so that the watchdog sees the silence.
                 None => {
                     let missed_us = u64::try_from(deadline.elapsed().as_micros()).unwrap_or(u64::MAX);
@@ -134,11 +139,27 @@ impl<P: Plant> Emulator<P> {
         for _ in 0..PACKETS_PER_CYCLE {
             match link.receive()? {
                 Incoming::Nothing => break,
-                Incoming::Malformed => self.controller.receive_malformed(),
-                Incoming::Packet(packet) => {
-                    if let Some(reply) = self.controller.receive(&packet, self.now_us) {
-                        self.reply(link, reply)?;
-                    }
+                incoming => self.take(link, &incoming)?,
+            }
+        }
+        Ok(())
+    }
+
+    fn receive_until(&mut self, link: &mut dyn Transport, deadline: Instant) -> Result<(), LinkLost> {
+        while let Some(rest) = deadline.checked_duration_since(Instant::now()) {
+            let incoming = link.wait(rest)?;
+            self.take(link, &incoming)?;
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, link: &mut dyn Transport, incoming: &Incoming) -> Result<(), LinkLost> {
+        match incoming {
+            Incoming::Nothing => {}
+            Incoming::Malformed => self.controller.receive_malformed(),
+            Incoming::Packet(packet) => {
+                if let Some(reply) = self.controller.receive(packet, self.now_us) {
+                    self.reply(link, reply)?;
                 }
             }
         }

@@ -4,6 +4,7 @@ use super::address::{UsbAddress, udev_remedy};
 use super::{Incoming, LinkLost, OpenError, Transport};
 use crate::protocol::FRAME_BYTES;
 use hidapi::{HidApi, HidDevice, HidError};
+use std::time::Duration;
 
 /// Longest report that is looked at: one more than a frame, so that a longer one shows.
 const BUFFER_BYTES: usize = FRAME_BYTES + 1;
@@ -41,9 +42,15 @@ impl Transport for HidLink {
     }
 
     fn receive(&mut self) -> Result<Incoming, LinkLost> {
+        self.wait(Duration::ZERO)
+    }
+
+    fn wait(&mut self, patience: Duration) -> Result<Incoming, LinkLost> {
         let mut buffer = [0; BUFFER_BYTES];
+        // Rounded up: waiting for less than a millisecond is not waiting at all.
+        let patience_ms = i32::try_from(patience.as_nanos().div_ceil(1_000_000)).unwrap_or(i32::MAX);
         // Every error of reading is a device that is gone: hidapi has only words for it.
-        let length = self.device.read_timeout(&mut buffer, 0).map_err(|_| LinkLost)?;
+        let length = self.device.read_timeout(&mut buffer, patience_ms).map_err(|_| LinkLost)?;
         let packet = buffer.get(..length).and_then(|bytes| bytes.try_into().ok());
         Ok(match (length, packet) {
             (0, _) => Incoming::Nothing,

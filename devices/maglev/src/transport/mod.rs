@@ -7,7 +7,7 @@
 //! | `usb` | `usb` | packets on a pair of interrupt or bulk endpoints |
 //! | `hid` | `hid` | packets as reports |
 //!
-//! A link never waits: what has not arrived is not there. At most one command is on its way; a link that is busy
+//! In a tick a link never waits: what has not arrived is not there. At most one command is on its way; a link that is busy
 //! drops the new one, because a queue of commands is a queue of old forces.
 
 #[cfg(any(feature = "usb", feature = "hid"))]
@@ -22,6 +22,10 @@ pub mod tcp;
 pub mod usb;
 
 use crate::protocol::FRAME_BYTES;
+use std::time::{Duration, Instant};
+
+/// How long a link that cannot wait by itself sleeps between two looks.
+const NAP: Duration = Duration::from_micros(250);
 
 /// What a look at a link found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,6 +56,22 @@ pub trait Transport: Send {
     /// # Errors
     /// [`LinkLost`] if there is no other side.
     fn receive(&mut self) -> Result<Incoming, LinkLost>;
+
+    /// Likewise, waiting for it for at most `patience`. Not real-time.
+    ///
+    /// # Errors
+    /// [`LinkLost`] if there is no other side.
+    fn wait(&mut self, patience: Duration) -> Result<Incoming, LinkLost> {
+        let until = Instant::now() + patience;
+        loop {
+            let incoming = self.receive()?;
+            let rest = until.saturating_duration_since(Instant::now());
+            if incoming != Incoming::Nothing || rest.is_zero() {
+                return Ok(incoming);
+            }
+            std::thread::sleep(rest.min(NAP));
+        }
+    }
 }
 
 /// Why a link cannot be opened: what, and what to do.

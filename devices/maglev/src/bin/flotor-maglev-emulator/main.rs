@@ -2,10 +2,14 @@
 //! over the simulated flotor. `flotor emulate maglev` starts it.
 
 mod plant;
+#[cfg(target_os = "linux")]
+mod usb;
 
 use clap::{Parser, ValueEnum};
 use flotor_hal::abi::loader::Setting;
 use flotor_maglev::emulator::{Emulator, Event, Pace, controller_config};
+#[cfg(target_os = "linux")]
+use flotor_maglev::gadget::Personality;
 use flotor_maglev::transport::stream::StreamLink;
 use flotor_maglev::transport::tcp::prepared;
 use plant::LoadedPlant;
@@ -22,6 +26,7 @@ use std::sync::atomic::AtomicBool;
 #[command(after_help = "The first line on standard output says where to connect.\n\nExamples:\n  \
     flotor emulate maglev\n  \
     flotor emulate maglev --transport pty --link /tmp/flotor-tty\n  \
+    sudo modprobe vhci_hcd && sudo flotor emulate maglev --transport usb\n  \
     flotor emulate maglev --pace lockstep --set preset=full --set hand=press --once")]
 struct Arguments {
     /// What the host connects by
@@ -59,6 +64,18 @@ enum TransportOption {
     Tcp,
     /// A pseudo terminal: a serial port to the host
     Pty,
+    /// A USB device with interrupt endpoints (with the module vhci_hcd, as root)
+    #[cfg(target_os = "linux")]
+    Usb,
+    /// Likewise, with bulk endpoints
+    #[cfg(target_os = "linux")]
+    UsbBulk,
+    /// A USB HID device
+    #[cfg(target_os = "linux")]
+    Hid,
+    /// A USB serial port
+    #[cfg(target_os = "linux")]
+    Cdc,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -96,6 +113,14 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     match arguments.transport {
         TransportOption::Tcp => serve_tcp(&mut emulator, arguments),
         TransportOption::Pty => serve_pty(&mut emulator, arguments),
+        #[cfg(target_os = "linux")]
+        TransportOption::Usb => usb::serve(&mut emulator, arguments, Personality::Interrupt),
+        #[cfg(target_os = "linux")]
+        TransportOption::UsbBulk => usb::serve(&mut emulator, arguments, Personality::Bulk),
+        #[cfg(target_os = "linux")]
+        TransportOption::Hid => usb::serve(&mut emulator, arguments, Personality::Hid),
+        #[cfg(target_os = "linux")]
+        TransportOption::Cdc => usb::serve(&mut emulator, arguments, Personality::Serial),
     }
 }
 

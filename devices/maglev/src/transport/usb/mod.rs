@@ -3,31 +3,22 @@
 //! Where the endpoints are, and what kind they are, is read from the descriptors. They are looked for in alternate
 //! settings other than 0 first: a device that keeps setting 0 empty is told by the kernel when this process dies.
 //!
-//! Reading waits in a thread of its own and hands packets over through a bounded channel, so that a tick only ever
-//! takes what is there. Writing is one short transfer at a time.
+//! Reads wait on the bus all the time, several of them, and a write is submitted and not waited for ([`queue`]): a tick
+//! only ever takes what is there.
+
+mod queue;
 
 use super::address::{UsbAddress, udev_remedy};
 use super::{Incoming, LinkLost, OpenError, Transport};
 use crate::protocol::FRAME_BYTES;
 use rusb::{Context, Device, DeviceHandle, Direction, Error, TransferType, UsbContext};
+use queue::Queue;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Longest a write may take: half a period at 1 kHz would do, but libusb counts whole milliseconds.
-const WRITE_TIMEOUT: Duration = Duration::from_millis(1);
-/// How often the reader looks whether it is still wanted.
-const READ_TIMEOUT: Duration = Duration::from_millis(50);
-/// Packets between reader and tick: a few periods.
-const WAITING_PACKETS: usize = 16;
 /// A device node is there before the kernel has configured the device (seen: up to 14 ms; udev rules take longer).
 const CLAIM_PATIENCE: Duration = Duration::from_secs(2);
 const CLAIM_NAP: Duration = Duration::from_millis(10);
-/// A multiple of every packet size, or a longer packet would be lost to an overflow.
-const BUFFER_BYTES: usize = 512;
-
 /// A pair of endpoints and how to select them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Endpoints {
@@ -42,9 +33,8 @@ struct Endpoints {
 pub struct UsbLink {
     handle: Arc<DeviceHandle<Context>>,
     endpoints: Endpoints,
-    packets: Receiver<Incoming>,
-    wanted: Arc<AtomicBool>,
-    reader: Option<JoinHandle<()>>,
+    /// Gone only while the link is dropped: nothing may be in flight when the setting changes.
+    queue: Option<Queue>,
 }
 
 /// Opens and claims a device. Not real-time.
@@ -57,14 +47,8 @@ pub fn open(address: &str) -> Result<UsbLink, OpenError> {
     let context = Context::new().map_err(refused)?;
     let (handle, endpoints) = find(&context, &wanted).map_err(refused)?;
     let handle = Arc::new(handle);
-    let (sender, packets) = sync_channel(WAITING_PACKETS);
-    let still_wanted = Arc::new(AtomicBool::new(true));
-    let (reading, reading_wanted) = (Arc::clone(&handle), Arc::clone(&still_wanted));
-    let thread = std::thread::Builder::new().name("flotor-usb-read".to_owned());
-    let reader = thread.spawn(move || read(&reading, endpoints, &sender, &reading_wanted));
-    let reader = reader
-        .map_err(|error| OpenError::Missing { address: address.to_owned(), cause: error.to_string() })?;
-    Ok(UsbLink { handle, endpoints, packets, wanted: still_wanted, reader: Some(reader) })
+    let queue = Queue::start(Arc::clone(&handle), endpoints).map_err(refused)?;
+    Ok(UsbLink { handle, endpoints, queue: Some(queue) })
 }
 
 fn find(context: &Context, wanted: &UsbAddress) -> Result<(DeviceHandle<Context>, Endpoints), Error> {
@@ -146,60 +130,23 @@ fn endpoints(device: &Device<Context>) -> Result<Option<Endpoints>, Error> {
     Ok(found.first().copied())
 }
 
-fn read(
-    handle: &DeviceHandle<Context>,
-    endpoints: Endpoints,
-    packets: &SyncSender<Incoming>,
-    wanted: &AtomicBool,
-) {
-    let mut buffer = [0; BUFFER_BYTES];
-    while wanted.load(Ordering::Relaxed) {
-        let read = match endpoints.transfer {
-            TransferType::Interrupt => handle.read_interrupt(endpoints.input, &mut buffer, READ_TIMEOUT),
-            _ => handle.read_bulk(endpoints.input, &mut buffer, READ_TIMEOUT),
-        };
-        let packet = match read {
-            Ok(length) => buffer.get(..length).and_then(|bytes| bytes.try_into().ok()),
-            Err(Error::Timeout | Error::Interrupted) => continue,
-            Err(Error::Overflow) => None,
-            // Ending the thread ends the channel, which is how the tick learns of it.
-            Err(_) => return,
-        };
-        // A tick that does not take them loses the newest ones, and learns so from the sequence numbers.
-        let _ = packets.try_send(packet.map_or(Incoming::Malformed, Incoming::Packet));
-    }
-}
-
 impl Transport for UsbLink {
     fn send(&mut self, frame: &[u8; FRAME_BYTES]) -> Result<(), LinkLost> {
-        let written = match self.endpoints.transfer {
-            TransferType::Interrupt => {
-                self.handle.write_interrupt(self.endpoints.output, frame, WRITE_TIMEOUT)
-            }
-            _ => self.handle.write_bulk(self.endpoints.output, frame, WRITE_TIMEOUT),
-        };
-        match written {
-            // Not taken in time: dropped, the next one is newer.
-            Ok(_) | Err(Error::Timeout | Error::Interrupted) => Ok(()),
-            Err(_) => Err(LinkLost),
-        }
+        self.queue.as_mut().ok_or(LinkLost)?.send(frame)
     }
 
     fn receive(&mut self) -> Result<Incoming, LinkLost> {
-        match self.packets.try_recv() {
-            Ok(incoming) => Ok(incoming),
-            Err(TryRecvError::Empty) => Ok(Incoming::Nothing),
-            Err(TryRecvError::Disconnected) => Err(LinkLost),
-        }
+        self.queue.as_ref().ok_or(LinkLost)?.receive()
+    }
+
+    fn wait(&mut self, patience: Duration) -> Result<Incoming, LinkLost> {
+        self.queue.as_ref().ok_or(LinkLost)?.wait(patience)
     }
 }
 
 impl Drop for UsbLink {
     fn drop(&mut self) {
-        self.wanted.store(false, Ordering::Relaxed);
-        if let Some(reader) = self.reader.take() {
-            let _ = reader.join();
-        }
+        self.queue = None;
         // Told in so many words; the kernel would say it too.
         let _ = self.handle.set_alternate_setting(self.endpoints.interface, 0);
         let _ = self.handle.release_interface(self.endpoints.interface);

@@ -1,0 +1,158 @@
+//! What the device claims to be: descriptors (USB 2.0, chapter 9; HID 1.11; CDC PSTN 1.2).
+
+use crate::protocol::FRAME_BYTES;
+
+/// Vendor of all of them: pid.codes, whose first sixteen products are reserved for tests.
+pub const VENDOR: u16 = 0x1209;
+
+/// A way to be a USB device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Personality {
+    /// A pair of interrupt endpoints in alternate setting 1; setting 0 is empty.
+    Interrupt,
+    /// Likewise, of bulk endpoints.
+    Bulk,
+    /// A HID device with reports of one frame each way.
+    Hid,
+    /// A serial port (CDC ACM).
+    Serial,
+}
+
+/// Address of the endpoint from the host, and to the host.
+pub(super) const OUT: u8 = 0x01;
+pub(super) const IN: u8 = 0x81;
+/// Where a serial port would report its modem lines; it has nothing to say there.
+pub(super) const NOTIFY: u8 = 0x82;
+
+/// Types of descriptors.
+pub(super) const DEVICE: u8 = 1;
+pub(super) const CONFIGURATION: u8 = 2;
+pub(super) const STRING: u8 = 3;
+const INTERFACE: u8 = 4;
+const ENDPOINT: u8 = 5;
+const HID: u8 = 0x21;
+pub(super) const REPORT: u8 = 0x22;
+const CLASS_SPECIFIC: u8 = 0x24;
+
+/// Types of endpoints.
+const TYPE_BULK: u8 = 2;
+const TYPE_INTERRUPT: u8 = 3;
+/// Largest packet of a bulk endpoint at high speed; USB 2.0 allows no other.
+const BULK_BYTES: u16 = 512;
+const INTERRUPT_BYTES: u16 = FRAME_BYTES as u16;
+
+/// A vendor's collection of 64 bytes in and 64 bytes out, without report numbers.
+pub(super) const REPORT_DESCRIPTOR: [u8; 27] = [
+    0x06, 0x00, 0xff, // usage page: vendor
+    0x09, 0x01, // usage 1
+    0xa1, 0x01, // collection: application
+    0x15, 0x00, 0x26, 0xff, 0x00, // each 0 to 255
+    0x75, 0x08, 0x95, 0x40, // 64 of 8 bits
+    0x09, 0x01, 0x81, 0x02, // in
+    0x95, 0x40, 0x09, 0x01, 0x91, 0x02, // out
+    0xc0,
+];
+
+impl Personality {
+    /// Product number: each personality is a product, so that no system takes one for another.
+    #[must_use]
+    pub const fn product(self) -> u16 {
+        match self {
+            Self::Interrupt => 1,
+            Self::Bulk => 2,
+            Self::Hid => 3,
+            Self::Serial => 4,
+        }
+    }
+
+    /// The address the plugin finds it by (`usb`, `hid`).
+    #[must_use]
+    pub fn address(self) -> String {
+        format!("{VENDOR:04x}:{:04x}", self.product())
+    }
+
+    pub(super) fn device(self) -> Vec<u8> {
+        let [vendor_low, vendor_high] = VENDOR.to_le_bytes();
+        let [product_low, product_high] = self.product().to_le_bytes();
+        // A serial port says what it is in the device, the others in their interface.
+        let class = if self == Self::Serial { 2 } else { 0 };
+        let (usb_2, packet, strings, one_configuration) = ([0x00, 0x02], 64, [1, 2, 3], 1);
+        let mut bytes = vec![18, DEVICE];
+        bytes.extend(usb_2);
+        bytes.extend([class, 0, 0, packet, vendor_low, vendor_high, product_low, product_high, 0x00, 0x01]);
+        bytes.extend(strings);
+        bytes.push(one_configuration);
+        bytes
+    }
+
+    pub(super) fn configuration(self) -> Vec<u8> {
+        let mut body = Vec::new();
+        let pair = |kind, bytes, interval| {
+            [endpoint(OUT, kind, bytes, interval), endpoint(IN, kind, bytes, interval)].concat()
+        };
+        match self {
+            Self::Interrupt => {
+                body.extend(interface(0, 0, 0, [0xff, 0, 0]));
+                body.extend(interface(0, 1, 2, [0xff, 0, 0]));
+                body.extend(pair(TYPE_INTERRUPT, INTERRUPT_BYTES, EVERY_MICROFRAME));
+            }
+            Self::Bulk => {
+                body.extend(interface(0, 0, 0, [0xff, 0, 0]));
+                body.extend(interface(0, 1, 2, [0xff, 0, 0]));
+                body.extend(pair(TYPE_BULK, BULK_BYTES, 0));
+            }
+            Self::Hid => {
+                body.extend(interface(0, 0, 2, [3, 0, 0]));
+                #[allow(clippy::cast_possible_truncation)] // 27
+                let report_bytes = REPORT_DESCRIPTOR.len() as u8;
+                body.extend([9, HID, 0x11, 0x01, 0, 1, REPORT, report_bytes, 0]);
+                body.extend(pair(TYPE_INTERRUPT, INTERRUPT_BYTES, EVERY_MICROFRAME));
+            }
+            Self::Serial => {
+                body.extend(interface(0, 0, 1, [2, 2, 1]));
+                // Header 1.10; calls are data on interface 1; line coding and state are understood; union of 0 and 1.
+                body.extend([5, CLASS_SPECIFIC, 0, 0x10, 0x01, 5, CLASS_SPECIFIC, 1, 0, 1]);
+                body.extend([4, CLASS_SPECIFIC, 2, 2, 5, CLASS_SPECIFIC, 6, 0, 1]);
+                body.extend(endpoint(NOTIFY, TYPE_INTERRUPT, 8, EVERY_16_MILLISECONDS));
+                body.extend(interface(1, 0, 2, [10, 0, 0]));
+                body.extend(pair(TYPE_BULK, BULK_BYTES, 0));
+            }
+        }
+        let interfaces = if self == Self::Serial { 2 } else { 1 };
+        let total = u16::try_from(9 + body.len()).unwrap_or(0).to_le_bytes();
+        let (number, name, bus_powered, twice_milliampere) = (1, 0, 0x80, 50);
+        let mut bytes = vec![9, CONFIGURATION, total[0], total[1], interfaces, number, name, bus_powered];
+        bytes.push(twice_milliampere);
+        bytes.extend(body);
+        bytes
+    }
+
+    /// A string; 0 says which languages there are.
+    pub(super) fn string(self, number: u8, serial: &str) -> Option<Vec<u8>> {
+        let text = match number {
+            0 => return Some(vec![4, STRING, 0x09, 0x04]), // American English
+            1 => "Flotor",
+            2 => "Maglev controller, emulated",
+            3 => serial,
+            _ => return None,
+        };
+        // A descriptor has one byte for its length.
+        let mut bytes: Vec<u8> = text.encode_utf16().take(126).flat_map(u16::to_le_bytes).collect();
+        bytes.splice(0..0, [u8::try_from(bytes.len() + 2).unwrap_or(u8::MAX), STRING]);
+        Some(bytes)
+    }
+}
+
+/// `bInterval` at high speed: 2^(n-1) microframes of 125 µs.
+const EVERY_MICROFRAME: u8 = 1;
+const EVERY_16_MILLISECONDS: u8 = 8;
+
+fn interface(number: u8, alternate: u8, endpoints: u8, class: [u8; 3]) -> [u8; 9] {
+    let [class, subclass, protocol] = class;
+    [9, INTERFACE, number, alternate, endpoints, class, subclass, protocol, 0]
+}
+
+fn endpoint(address: u8, kind: u8, packet_bytes: u16, interval: u8) -> [u8; 7] {
+    let [low, high] = packet_bytes.to_le_bytes();
+    [7, ENDPOINT, address, kind, low, high, interval]
+}

@@ -1,0 +1,59 @@
+//! The socket of the virtual cable: the kernel's `vhci_hcd`, told through sysfs.
+
+use std::io::{self, ErrorKind};
+use std::os::fd::AsRawFd;
+use std::os::unix::net::UnixStream;
+use std::path::Path;
+
+const FOLDER: &str = "/sys/devices/platform/vhci_hcd.0";
+/// `USB_SPEED_HIGH` of the kernel: packets every 125 µs.
+const HIGH_SPEED: u32 = 3;
+/// State of a port without a device (`VDEV_ST_NULL`).
+const FREE: &str = "004";
+/// Bus number of the device's far end; any will do.
+const FAR_BUS: u32 = 1 << 16;
+
+/// True if a device can be plugged in here.
+#[must_use]
+pub fn is_available() -> bool {
+    Path::new(FOLDER).join("attach").exists()
+}
+
+/// Plugs what speaks USB/IP at the other end of the stream into a free port of high speed.
+pub(super) fn attach(stream: UnixStream) -> io::Result<()> {
+    let explained = |error: io::Error| {
+        let hint = match error.kind() {
+            ErrorKind::NotFound => "load the kernel's module: sudo modprobe vhci_hcd",
+            ErrorKind::PermissionDenied => "only root may plug a device in",
+            _ => "no port took the device",
+        };
+        io::Error::new(error.kind(), format!("{FOLDER}: {error}; {hint}"))
+    };
+    let status = std::fs::read_to_string(format!("{FOLDER}/status")).map_err(explained)?;
+    let port = free_port(&status).ok_or_else(|| explained(ErrorKind::ResourceBusy.into()))?;
+    let line = format!("{port} {} {} {HIGH_SPEED}", stream.as_raw_fd(), FAR_BUS + port + 1);
+    // The kernel takes a reference of its own; ours ends here.
+    std::fs::write(format!("{FOLDER}/attach"), line).map_err(explained)
+}
+
+/// The first free port of high speed in the controller's table: `hub port sta spd dev sockfd local_busid`.
+fn free_port(status: &str) -> Option<u32> {
+    status.lines().find_map(|line| {
+        let mut words = line.split_whitespace();
+        let (hub, port, state) = (words.next()?, words.next()?, words.next()?);
+        if hub == "hs" && state == FREE { port.parse().ok() } else { None }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_port_is_taken_once() {
+        let table = "hub port sta spd dev      sockfd local_busid\n\
+                     hs  0000 006 003 00010001 000003 1-1\n\
+                     hs  0001 004 000 00000000 000000 0-0\n\
+                     ss  0008 004 000 00000000 000000 0-0\n";
+        assert_eq!(super::free_port(table), Some(1));
+        assert_eq!(super::free_port("hub port sta\nss 0008 004 000 0 0 0-0\n"), None);
+    }
+}

@@ -1,0 +1,108 @@
+//! The messages of USB/IP between a virtual host controller and a device (Linux kernel documentation,
+//! `usb/usbip_protocol`): headers of 48 bytes, big endian, some with data behind.
+
+use std::io::{self, Read, Write};
+
+const HEADER_BYTES: usize = 48;
+const SUBMIT: u32 = 1;
+const UNLINK: u32 = 2;
+const SUBMITTED: u32 = 3;
+const UNLINKED: u32 = 4;
+/// Longest data taken with one message: the largest transfer the kernel's drivers here make is 4 KiB.
+const LONGEST_DATA: usize = 1 << 20;
+
+/// Status of a transfer that the device refuses, and of one that was taken back (Linux `EPIPE`, `ECONNRESET`).
+const STALLED: i32 = -32;
+const TAKEN_BACK: i32 = -104;
+
+/// What the host controller asks.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Message {
+    /// A transfer.
+    Submit(Transfer),
+    /// Take a transfer back.
+    Unlink { number: u32, transfer: u32 },
+}
+
+/// A transfer that waits for its end.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Transfer {
+    pub(super) number: u32,
+    /// Address of the endpoint, with the direction in bit 7.
+    pub(super) endpoint: u8,
+    /// Bytes asked for, or given.
+    pub(super) length: usize,
+    pub(super) setup: [u8; 8],
+    pub(super) data: Vec<u8>,
+}
+
+/// Bit 7 of an endpoint's address: towards the host.
+pub(super) const INPUT: u8 = 0x80;
+
+impl Message {
+    /// Reads one message.
+    ///
+    /// # Errors
+    /// The stream's, and `InvalidData` for what is no message.
+    pub(super) fn read(stream: &mut impl Read) -> io::Result<Self> {
+        let mut header = [0; HEADER_BYTES];
+        stream.read_exact(&mut header)?;
+        let number = |at: usize| {
+            let field = header.get(at..at + 4).and_then(|bytes| bytes.try_into().ok());
+            u32::from_be_bytes(field.unwrap_or_default())
+        };
+        match number(0) {
+            SUBMIT => {
+                let input = number(12) == 1;
+                let length = usize::try_from(number(24)).unwrap_or(usize::MAX);
+                if length > LONGEST_DATA {
+                    return Err(io::ErrorKind::InvalidData.into());
+                }
+                let mut data = vec![0; if input { 0 } else { length }];
+                stream.read_exact(&mut data)?;
+                let endpoint = (number(16) & 0x0f) as u8 | if input { INPUT } else { 0 };
+                let setup = header.get(40..48).and_then(|bytes| bytes.try_into().ok()).unwrap_or_default();
+                Ok(Self::Submit(Transfer { number: number(4), endpoint, length, setup, data }))
+            }
+            UNLINK => Ok(Self::Unlink { number: number(4), transfer: number(20) }),
+            _ => Err(io::ErrorKind::InvalidData.into()),
+        }
+    }
+}
+
+/// Ends a transfer: with data towards the host, or all bytes of the host taken.
+pub(super) fn complete(stream: &mut impl Write, transfer: &Transfer, data: &[u8]) -> io::Result<()> {
+    let is_input = transfer.endpoint & INPUT != 0;
+    let actual = if is_input { data.len() } else { transfer.length };
+    end(stream, SUBMITTED, transfer.number, 0, u32::try_from(actual).unwrap_or(0), data)
+}
+
+/// Ends a transfer the device refuses.
+pub(super) fn stall(stream: &mut impl Write, transfer: &Transfer) -> io::Result<()> {
+    end(stream, SUBMITTED, transfer.number, STALLED, 0, &[])
+}
+
+/// Says that a transfer was taken back, or that it had ended already.
+pub(super) fn unlinked(stream: &mut impl Write, number: u32, in_time: bool) -> io::Result<()> {
+    end(stream, UNLINKED, number, if in_time { TAKEN_BACK } else { 0 }, 0, &[])
+}
+
+/// One write for header and data: the kernel's reader wakes up once.
+fn end(
+    stream: &mut impl Write,
+    kind: u32,
+    number: u32,
+    status: i32,
+    actual: u32,
+    data: &[u8],
+) -> io::Result<()> {
+    let mut message = Vec::with_capacity(HEADER_BYTES + data.len());
+    message.extend(kind.to_be_bytes());
+    message.extend(number.to_be_bytes());
+    message.extend([0; 12]);
+    message.extend(status.to_be_bytes());
+    message.extend(actual.to_be_bytes());
+    message.extend([0; 20]);
+    message.extend(data);
+    stream.write_all(&message)
+}
