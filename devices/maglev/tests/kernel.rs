@@ -4,6 +4,7 @@
 //! Plugging in needs root and the module `vhci_hcd`, so these tests are ignored unless asked for. `.ci/vm` runs them in
 //! a small virtual machine whose clock counts instructions: there, times are the program's and not the machine's.
 #![allow(clippy::cast_precision_loss)] // microseconds of a few seconds
+#![allow(clippy::unwrap_used)] // helpers of tests
 
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Plugin, Setting};
 use flotor_hal::{
@@ -43,8 +44,7 @@ impl Plant for Mass {
         let (dt_s, push_n) = (dt_us as f64 * 1.0e-6, wrench.force().z);
         self.pushes_n.lock().unwrap_or_else(PoisonError::into_inner).push(push_n);
         // A firm hand holds it well inside every wall.
-        self.speed_m_per_s +=
-            dt_s / 0.58 * (push_n - 5000.0 * self.position_m - 70.0 * self.speed_m_per_s);
+        self.speed_m_per_s += dt_s / 0.58 * (push_n - 5000.0 * self.position_m - 70.0 * self.speed_m_per_s);
         self.position_m += dt_s * self.speed_m_per_s;
         let (pose, twist) = (
             Pose::new(DVec3::Z * self.position_m, Pose::HOME.orientation()),
@@ -107,14 +107,14 @@ impl Controller {
                 }
             }
         });
-        let controller =
-            Self { personality, cable, events, pushes_n, ending, thread: Some(thread) };
+        let controller = Self { personality, cable, events, pushes_n, ending, thread: Some(thread) };
         controller.plug_in();
         controller
     }
 
     fn plug_in(&self) {
-        let gadget = Gadget::plug_in(self.personality, "K-1").expect("this kernel has vhci_hcd, and this is root");
+        let gadget =
+            Gadget::plug_in(self.personality, "K-1").expect("this kernel has vhci_hcd, and this is root");
         *self.cable.lock().unwrap() = Some(gadget);
     }
 
@@ -190,8 +190,8 @@ impl Drop for Controller {
 fn plugin() -> Plugin {
     let program = std::env::current_exe().unwrap();
     let folders = program.ancestors().skip(1).take(2);
-    let files = folders.map(|folder| folder.join("libflotor_maglev.so"));
-    let file = files.filter(|file| file.is_file()).next().expect("the plugin was built beside this test");
+    let mut files = folders.map(|folder| folder.join("libflotor_maglev.so"));
+    let file = files.find(|file| file.is_file()).expect("the plugin was built beside this test");
     Plugin::load(&file).expect("it loads")
 }
 
@@ -320,13 +320,8 @@ struct Asking {
 impl Asking {
     fn send(&mut self, request: Request) {
         self.sequence += 1;
-        let frame = RequestFrame {
-            sequence: self.sequence,
-            acknowledged: 0,
-            time_us: 0,
-            session: 0x5e55,
-            request,
-        };
+        let frame =
+            RequestFrame { sequence: self.sequence, acknowledged: 0, time_us: 0, session: 0x5e55, request };
         self.link.send(&frame.encode()).expect("the controller is there");
     }
 
@@ -369,8 +364,8 @@ fn round_trips_at_1_khz_are_never_late() {
             times_us.push(started.elapsed().as_secs_f64() * 1.0e6);
         }
         times_us.sort_by(f64::total_cmp);
-        let quantile = |share: f64| times_us[((times_us.len() - 1) as f64 * share) as usize];
-        let [p50, p99, p999, max] = [0.5, 0.99, 0.999, 1.0].map(quantile);
+        let quantile = |per_mille: usize| times_us[(times_us.len() - 1) * per_mille / 1000];
+        let [p50, p99, p999, max] = [500, 990, 999, 1000].map(quantile);
         println!(
             "  {:<9} {p50:>5.0} / {p99:>5.0} / {p999:>5.0} / {max:>5.0}; {} late",
             format!("{personality:?}"),

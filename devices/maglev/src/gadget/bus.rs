@@ -173,7 +173,11 @@ impl Bus {
             (0xa1, 0x21, Personality::Serial) => Answer::Data(state.line_coding.to_vec()),
             (0x21, 0x22, Personality::Serial) => {
                 let ready = value_low & 1 == 1;
-                if ready { state.attach() } else { state.detach() }
+                if ready {
+                    state.attach()
+                } else {
+                    state.detach()
+                }
                 done()
             }
             _ => Answer::Stall,

@@ -39,7 +39,8 @@ const TYPE_BULK: u8 = 2;
 const TYPE_INTERRUPT: u8 = 3;
 /// Largest packet of a bulk endpoint at high speed; USB 2.0 allows no other.
 const BULK_BYTES: u16 = 512;
-const INTERRUPT_BYTES: u16 = FRAME_BYTES as u16;
+const INTERRUPT_BYTES: u16 = 64;
+const _: () = assert!(INTERRUPT_BYTES as usize == FRAME_BYTES);
 
 /// A vendor's collection of 64 bytes in and 64 bytes out, without report numbers.
 pub(super) const REPORT_DESCRIPTOR: [u8; 27] = [

@@ -23,7 +23,8 @@ impl Host {
     fn submit(&mut self, endpoint: u8, length: u32, setup: [u8; 8], data: &[u8]) -> u32 {
         self.number += 1;
         let mut bytes = Vec::new();
-        for field in [1, self.number, 0x1_0001, u32::from(endpoint >> 7), u32::from(endpoint & 15), 0, length] {
+        for field in [1, self.number, 0x1_0001, u32::from(endpoint >> 7), u32::from(endpoint & 15), 0, length]
+        {
             bytes.extend(field.to_be_bytes());
         }
         bytes.extend([0; 12]);
@@ -50,7 +51,7 @@ impl Host {
         let field = |at: usize| u32::from_be_bytes(header[at..at + 4].try_into().unwrap());
         let mut data = vec![0; if input { field(24) as usize } else { 0 }];
         self.stream.read_exact(&mut data).unwrap();
-        (field(0), field(4), field(20) as i32, data)
+        (field(0), field(4), field(20).cast_signed(), data)
     }
 
     fn control(&mut self, setup: [u8; 8]) -> (i32, Vec<u8>) {
@@ -73,7 +74,10 @@ fn descriptors_are_as_long_as_they_say() {
         let (status, device) = host.control([0x80, 6, 0, 1, 0, 0, 255, 0]);
         assert_eq!((status, device.len(), device[0]), (0, 18, 18));
         let (_, configuration) = host.control([0x80, 6, 0, 2, 0, 0, 255, 0]);
-        assert_eq!(usize::from(u16::from_le_bytes([configuration[2], configuration[3]])), configuration.len());
+        assert_eq!(
+            usize::from(u16::from_le_bytes([configuration[2], configuration[3]])),
+            configuration.len()
+        );
         // Every descriptor begins with its length, and the chain ends where the whole ends.
         let mut at = 0;
         while at < configuration.len() {
@@ -113,8 +117,7 @@ fn a_transfer_waits_until_there_is_something_or_it_is_taken_back() {
     let (mut host, gadget) = Host::with(Personality::Bulk);
     host.control(SELECT_1);
     let mut link = gadget.wait_for_host(SOON).unwrap();
-    let (first, second) =
-        (host.submit(0x81, 512, [0; 8], &[]), host.submit(0x81, 512, [0; 8], &[]));
+    let (first, second) = (host.submit(0x81, 512, [0; 8], &[]), host.submit(0x81, 512, [0; 8], &[]));
     host.unlink(first);
     let (kind, _, status, _) = host.answer(false);
     assert_eq!((kind, status), (4, -104), "in time");
@@ -142,7 +145,7 @@ fn a_serial_port_is_used_while_dtr_is_set() {
     assert_eq!(host.control([0x21, 0x22, 3, 0, 0, 0, 0, 0]).0, 0);
     let mut link = gadget.wait_for_host(SOON).unwrap();
     let (coded, length) = crate::protocol::stream::coded(&[5; 64]);
-    host.submit(1, length as u32, [0; 8], &coded[..length]);
+    host.submit(1, u32::try_from(length).unwrap(), [0; 8], &coded[..length]);
     host.answer(false);
     assert_eq!(link.wait(SOON), Ok(Incoming::Packet([5; 64])));
     link.send(&[6; 64]).unwrap();

@@ -11,8 +11,8 @@ mod queue;
 use super::address::{UsbAddress, udev_remedy};
 use super::{Incoming, LinkLost, OpenError, Transport};
 use crate::protocol::FRAME_BYTES;
-use rusb::{Context, Device, DeviceHandle, Direction, Error, TransferType, UsbContext};
 use queue::Queue;
+use rusb::{Context, Device, DeviceHandle, Direction, Error, TransferType, UsbContext};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 

@@ -73,7 +73,10 @@ unsafe impl Send for Transfer {}
 
 impl Queue {
     /// Submits the reads. Not real-time.
-    pub(super) fn start(handle: Arc<DeviceHandle<Context>>, endpoints: Endpoints) -> Result<Self, rusb::Error> {
+    pub(super) fn start(
+        handle: Arc<DeviceHandle<Context>>,
+        endpoints: Endpoints,
+    ) -> Result<Self, rusb::Error> {
         let (sender, packets) = sync_channel(KEPT_PACKETS);
         let shared = Arc::new(Shared {
             packets: sender,
