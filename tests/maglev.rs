@@ -2,7 +2,9 @@
 //! with the simulated flotor, and what happens when one side dies, hangs, or talks nonsense.
 
 use flotor::trace::Events;
-use flotor_tests::library::build_folder;
+use flotor_hal::abi::loader::{Plugin, Setting};
+use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
+use flotor_tests::library::{build_folder, plugin_file};
 use flotor_tests::program::exit_code;
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::watch;
@@ -11,6 +13,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
 use std::path::PathBuf;
 use std::process::{Child, ChildStdout, Command, Stdio};
+use std::time::Duration;
 
 fn program(name: &str) -> PathBuf {
     let file = build_folder().join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
@@ -32,8 +35,12 @@ struct Emulator {
 
 impl Emulator {
     fn start(transport: &'static str, arguments: &[&str]) -> Self {
+        Self::listening(transport, "127.0.0.1:0", arguments)
+    }
+
+    fn listening(transport: &'static str, at: &str, arguments: &[&str]) -> Self {
         let mut command = Command::new(program("flotor-maglev-emulator"));
-        command.args(["--transport", transport, "--listen", "127.0.0.1:0", "--once"]).args(arguments);
+        command.args(["--transport", transport, "--listen", at, "--once"]).args(arguments);
         let mut child = command.stdout(Stdio::piped()).spawn().expect("the emulator starts");
         let output = child.stdout.take().expect("a pipe was asked for");
         let mut lines = BufReader::new(output).lines();
@@ -195,6 +202,56 @@ fn a_controller_that_vanishes_is_a_fault_of_the_device() {
         let error = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(exit_code::DEVICE_FAULT), "{transport}: {error}");
         assert!(error.contains("the device is gone; check cable and power"), "{transport}: {error}");
+    }
+}
+
+#[test]
+fn a_cable_pulled_in_mid_stroke_is_a_fault_at_once_and_the_next_use_begins_anew() {
+    let plugin = Plugin::load(&plugin_file("flotor-maglev")).expect("it loads");
+    let config = LoopConfig { period_ns: 1_000_000, seed: 1 };
+    let scratch = Scratch::default();
+    for transport in ["tcp", "pty"] {
+        // A name that is the same after the cable is back.
+        let tty = scratch.path().join("tty");
+        let tty = tty.to_str().expect("a scratch folder has a plain name");
+        let link = if transport == "pty" { vec!["--link", tty] } else { Vec::new() };
+        let mut emulator = Emulator::start(transport, &link);
+        let address = if transport == "pty" { tty.to_owned() } else { emulator.address.clone() };
+        let kind = if transport == "pty" { "serial" } else { "tcp" };
+        let settings =
+            [("transport", kind), ("address", &*address), ("timeout_ms", "8000"), ("watchdog_ms", "700")];
+        let settings = settings
+            .map(|(key, value)| Setting::parse(plugin.parameters(), key, value).expect("it is legal"));
+        let mut device = Some(plugin.open_device(&settings).expect("the controller is there"));
+        for stroke in 0..2 {
+            if stroke > 0 {
+                let at = if transport == "tcp" { &*address } else { "127.0.0.1:0" };
+                emulator = Emulator::listening(transport, at, &link);
+            }
+            let opened = device.take().expect("the device was given back");
+            let mut active = opened.activate(&config).map_err(|(_, refusal)| refusal).expect("it takes off");
+            let mut index = 0;
+            let mut tick = |force_n: f64| {
+                let tick = Tick { index, time_ns: index * 1_000_000, dt_ns: 1_000_000 };
+                index += 1;
+                let mut state = DeviceState::HOME;
+                let read = active.read(&tick, &mut state);
+                let written = active.write(&tick, &Wrench::from_force(DVec3::Z * force_n));
+                std::thread::sleep(Duration::from_millis(1));
+                [read, written].into_iter().find_map(|cycle| match cycle {
+                    Cycle::Fault(fault) => Some(fault),
+                    Cycle::Fresh | Cycle::Stale => None,
+                })
+            };
+            assert!((0..100).all(|_| tick(3.0).is_none()), "{transport}");
+            signal(&emulator.child, Signal::KILL);
+            emulator.child.wait().expect("it was killed");
+            // 20 ms are 20 ticks; counted, because this machine's clock is nobody's own.
+            let ticks = (1..).find(|_| tick(3.0).is_some()).expect("the search has no end");
+            assert!(ticks <= 20, "{transport}: a fault in tick {ticks} after the cable was pulled");
+            assert_eq!(tick(3.0), Some(Fault::Disconnected), "{transport}: and it stays one");
+            device = active.deactivate();
+        }
     }
 }
 
