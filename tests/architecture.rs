@@ -18,6 +18,8 @@ enum Role {
     Plugin,
     Sync,
     Record,
+    /// What host and watchers say to each other.
+    Live,
     /// Knows numbers only.
     Statistics,
     /// Knows trials, and neither contract nor device.
@@ -34,6 +36,7 @@ impl Role {
         Some(match folder {
             "hal" => Self::Contract,
             "host" => Self::Host,
+            "host/live" => Self::Live,
             "host/record" => Self::Record,
             "host/statistics" => Self::Statistics,
             "host/study" => Self::Study,
@@ -53,15 +56,23 @@ impl Role {
             Self::Study => &[Self::Statistics],
             Self::Plugin | Self::Fixture => &[Self::Contract],
             // The plugins only as paths, so that one `cargo run` builds them; no line of the host names them.
-            Self::Host => {
-                &[Self::Contract, Self::Sync, Self::Record, Self::Statistics, Self::Study, Self::Plugin]
-            }
+            Self::Host => &[
+                Self::Contract,
+                Self::Sync,
+                Self::Record,
+                Self::Live,
+                Self::Statistics,
+                Self::Study,
+                Self::Plugin,
+            ],
             Self::Record => &[Self::Contract, Self::Sync],
-            Self::Viewer => &[Self::Contract, Self::Record, Self::Study],
+            Self::Live => &[Self::Contract, Self::Sync, Self::Record],
+            Self::Viewer => &[Self::Contract, Self::Record, Self::Live, Self::Study],
             Self::Tests => &[
                 Self::Contract,
                 Self::Sync,
                 Self::Record,
+                Self::Live,
                 Self::Statistics,
                 Self::Study,
                 Self::Plugin,

@@ -18,6 +18,7 @@
 //! - [`study`]: the results of a perception experiment, as a page.
 //! - [`stress`]: how far a force model can be trusted with a hand.
 //! - [`sampling`]: points that cover a space evenly.
+//! - [`live`]: a running host, for other programs to watch and change.
 //! - [`headless`]: a whole run in virtual time for other programs.
 //! - [`trace`]: what a tick leaves behind; [`mod@record`] writes it down, [`plot`] draws it.
 //! - [`cli`]: the `flotor` command.
@@ -28,6 +29,7 @@ pub mod cli;
 pub mod evaluate;
 pub mod headless;
 pub mod jitter;
+pub mod live;
 pub mod plot;
 pub mod registry;
 pub mod replay;

@@ -51,7 +51,7 @@ pub use change::{Change, ChangeOutcome, ChangeSubject};
 pub use container::Damage;
 pub use digest::TraceDigest;
 pub use reader::{Ending, ReadError, Recording};
-pub use run::{Clock, PluginDescription, Role, RunDescription};
+pub use run::{Clock, NoRun, PluginDescription, Role, RunDescription};
 pub use writer::{RecordError, Recorder};
 
 /// How bad it is, what a [`Note`] tells.

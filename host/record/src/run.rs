@@ -2,7 +2,13 @@
 
 use crate::mapping::{Blend, MappingConfig};
 use crate::schema::{self, FORMAT, Mapping, Missing, Plugin, Quaternion, Run, Setting, Vector3};
+use prost::Message;
 use std::collections::BTreeMap;
+
+/// Bytes that describe no run.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no description of a run: {0}")]
+pub struct NoRun(String);
 
 /// Which clock drives the loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,6 +71,24 @@ pub enum Role {
 }
 
 impl RunDescription {
+    /// As the protobuf message `flotor.Run` of a recording. Not real-time.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        self.to_message().encode_to_vec()
+    }
+
+    /// From a protobuf message `flotor.Run`. Not real-time.
+    ///
+    /// # Errors
+    /// [`NoRun`]: it is none, or of a later format, or lacks something.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, NoRun> {
+        let run = Run::decode(bytes).map_err(|cause| NoRun(cause.to_string()))?;
+        if run.format > FORMAT {
+            return Err(NoRun(format!("it is of format {}, this program knows {FORMAT}", run.format)));
+        }
+        Self::from_message(run).map_err(|Missing(field)| NoRun(format!("it has no `{field}`")))
+    }
+
     pub(crate) fn to_message(&self) -> Run {
         let clock = match self.clock {
             Clock::Real => schema::Clock::Real,

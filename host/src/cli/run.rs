@@ -3,15 +3,18 @@
 use super::options::{ClockOption, PluginKeyValue, duration_s, rate_hz};
 use super::stopping::{Keys, stop_on_signals};
 use super::{CommandError, style};
+use crate::live::Publication;
 use crate::record::{Change, RecordError, Recorder, TraceDigest};
 use crate::registry::Registry;
 use crate::report::{RunFacts, RunSummary, Tally};
+use crate::run_description::describe;
 use crate::run_picture::RunPicture;
 use crate::scene::Scene;
 use crate::servo::Clock;
-use crate::session::{Observer, RunEnd, RunError, RunOptions, Session};
+use crate::session::{Observer, Outcome, RunEnd, RunError, RunOptions, Session};
 use crate::trace::TickRecord;
 use clap::Args;
+use flotor_live::Directory;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::path::PathBuf;
 
@@ -62,6 +65,18 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let registry = Registry::search(&scene.plugin_folders);
     let session = Session::prepare(&scene, &registry, &options)?;
     let plugins = session.plugins().to_vec();
+    let description = describe(&scene, &options, &plugins);
+    let handles = (session.controls(), stop.clone());
+    let publication = Publication::open(
+        &Directory::of_this_user(),
+        &scene.title,
+        &description,
+        &plugins,
+        session.limits(),
+        handles,
+    );
+    let publication =
+        publication.map_err(|error| eprintln!("{} nobody can watch: {error}", style::warning("note:"))).ok();
 
     let clock_word = if clock == Clock::Real { "real" } else { "virtual" };
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
@@ -69,13 +84,10 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let mut watchers = Watchers {
         tally: Tally::default(),
         digest: TraceDigest::new(),
-        recorder: arguments
-            .record
-            .as_deref()
-            .map(|path| Recorder::create(path, &crate::run_description::describe(&scene, &options, &plugins)))
-            .transpose()?,
+        recorder: arguments.record.as_deref().map(|path| Recorder::create(path, &description)).transpose()?,
         failure: None,
         plot: arguments.plot.as_ref().map(|_| RunPicture::new(&scene.title)),
+        publication,
         progress: progress_bar(length_ms, "{percent:>3} %  {msg}"),
     };
     let keys = (clock == Clock::Real).then(|| Keys::listen(&stop)).flatten();
@@ -84,7 +96,10 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let outcome = outcome?;
     watchers.progress.finish_and_clear();
 
-    let Watchers { tally, digest, recorder, failure, plot, .. } = watchers;
+    let Watchers { tally, digest, recorder, failure, plot, publication, .. } = watchers;
+    if let Some(publication) = publication {
+        publication.end(&end_words(&outcome));
+    }
     let facts = RunFacts {
         title: &scene.title,
         clock: clock_word,
@@ -136,6 +151,19 @@ fn scene(arguments: &RunArguments) -> Result<Scene, CommandError> {
     Ok(scene)
 }
 
+/// How a run ended, for those who watched it.
+fn end_words(outcome: &Outcome) -> String {
+    match outcome.end {
+        RunEnd::Finished => "the run is finished".to_owned(),
+        RunEnd::Stopped => "the run was stopped in order".to_owned(),
+        RunEnd::DeviceFault(fault) => {
+            format!("device fault: {}{}", super::before_advice(&outcome.device_words), fault.advice())
+        }
+        RunEnd::EmergencyStop(source) => CommandError::EmergencyStop(source).to_string(),
+        RunEnd::Watchdog(stuck) => CommandError::Watchdog(stuck).to_string(),
+    }
+}
+
 /// A model that broke is a refused plugin, told once more where scripts look: in the exit code.
 fn broken_models(summary: &RunSummary) -> Result<(), CommandError> {
     let broken = summary.plugins.iter().find(|plugin| plugin.health != "ok");
@@ -164,6 +192,7 @@ struct Watchers {
     recorder: Option<Recorder>,
     failure: Option<RecordError>,
     plot: Option<RunPicture>,
+    publication: Option<Publication>,
     progress: ProgressBar,
 }
 
@@ -185,6 +214,9 @@ impl Watchers {
 impl Observer for Watchers {
     fn change(&mut self, change: &Change) {
         self.write(|recorder| recorder.change(change));
+        if let Some(publication) = &self.publication {
+            publication.change(change);
+        }
     }
 
     fn observe(&mut self, record: &TickRecord) {
@@ -193,6 +225,9 @@ impl Observer for Watchers {
         self.write(|recorder| recorder.record(record));
         if let Some(plot) = &mut self.plot {
             plot.observe(record);
+        }
+        if let Some(publication) = &self.publication {
+            publication.observe(record);
         }
         if record.tick.is_multiple_of(PROGRESS_TICKS) {
             self.progress.set_position(record.time_ns / 1_000_000);

@@ -58,6 +58,12 @@ impl Envelope {
         }
     }
 
+    /// The most that may reach the hand: force along each axis (N), torque about each (N·m).
+    #[must_use]
+    pub fn most(&self) -> [DVec3; 2] {
+        [self.max_force_n, self.max_torque_nm]
+    }
+
     /// The wrench that goes to the device for what the models ask. Real-time: bounded, no allocation.
     #[inline]
     pub fn apply(

@@ -241,6 +241,11 @@ impl Servo {
         self.timing
     }
 
+    /// What nothing gets past.
+    pub(crate) fn envelope(&self) -> &Envelope {
+        &self.envelope
+    }
+
     /// Where the run stands after the last tick.
     pub(crate) fn run(&self) -> RunState {
         self.run

@@ -29,6 +29,8 @@ pub enum EmergencySource {
     Key,
     /// The signal `SIGUSR1`.
     Signal,
+    /// A program that watches the run: the viewer.
+    Watcher,
     /// A button of the device that the scene names.
     Button,
     /// The device's own emergency stop.
@@ -42,6 +44,7 @@ impl EmergencySource {
         match self {
             Self::Key => "key",
             Self::Signal => "signal",
+            Self::Watcher => "a program that watches",
             Self::Button => "button of the device",
             Self::Device => "the device's own",
         }

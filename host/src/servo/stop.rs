@@ -12,6 +12,7 @@ pub struct StopSwitch {
     in_order: Arc<AtomicBool>,
     by_key: Arc<AtomicBool>,
     by_signal: Arc<AtomicBool>,
+    by_watcher: Arc<AtomicBool>,
 }
 
 impl StopSwitch {
@@ -23,6 +24,11 @@ impl StopSwitch {
     /// The emergency stop of the keyboard. Real-time: bounded, no allocation.
     pub fn emergency_by_key(&self) {
         self.by_key.store(true, Ordering::Relaxed);
+    }
+
+    /// The emergency stop of a program that watches the run. Real-time: bounded, no allocation.
+    pub fn emergency_by_watcher(&self) {
+        self.by_watcher.store(true, Ordering::Relaxed);
     }
 
     /// True if an orderly end is asked for. Real-time: bounded, no allocation.
@@ -38,6 +44,9 @@ impl StopSwitch {
     pub fn emergency(&self) -> Option<EmergencySource> {
         if self.by_key.load(Ordering::Relaxed) {
             return Some(EmergencySource::Key);
+        }
+        if self.by_watcher.load(Ordering::Relaxed) {
+            return Some(EmergencySource::Watcher);
         }
         self.by_signal.load(Ordering::Relaxed).then_some(EmergencySource::Signal)
     }

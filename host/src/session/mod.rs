@@ -18,7 +18,8 @@ use crate::trace::{RECORD_WORDS, TickRecord};
 use controls::{ChangeLog, Parts};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, Stopper};
-use flotor_hal::{EnergyLedger, Fault, LoopConfig, Pacing, Parameter};
+use flotor_hal::{DVec3, EnergyLedger, Fault, LoopConfig, Pacing, Parameter};
+use flotor_live::WrenchLimits;
 use prepare::Scheduled;
 use std::time::{Duration, Instant};
 
@@ -241,6 +242,14 @@ impl Session {
     #[must_use]
     pub fn plugins(&self) -> &[PluginReport] {
         &self.plugins
+    }
+
+    /// The most that may reach the hand: the tighter of what scene and device allow.
+    #[must_use]
+    pub fn limits(&self) -> WrenchLimits {
+        let finite = |most: DVec3| most.to_array().map(|limit| limit.is_finite().then_some(limit));
+        let [force_n, torque_nm] = self.servo.envelope().most().map(finite);
+        WrenchLimits { force_n, torque_nm }
     }
 
     /// The handle by which other threads change parameters of the run.

@@ -1,0 +1,194 @@
+//! Frames: what cuts a stream of bytes into messages.
+
+use flotor_record::trace::{RECORD_WORDS, TickRecord};
+use flotor_sync::Words;
+use std::io::{self, Read};
+
+/// The longest payload either side sends, bytes: a few seconds of ticks. A longer one is no frame of ours.
+pub const MOST_PAYLOAD: usize = 1 << 21;
+/// Length and kind.
+const HEAD: usize = 5;
+/// Bytes of a record.
+const RECORD: usize = 8 * RECORD_WORDS;
+
+/// What a frame holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// [`crate::Greeting`].
+    Greeting,
+    /// `flotor.Run`.
+    Run,
+    /// Records.
+    Ticks,
+    /// [`crate::ChangeMessage`].
+    Change,
+    /// [`crate::Answer`].
+    Answer,
+    /// [`crate::End`].
+    End,
+    /// [`crate::Request`].
+    Request,
+    /// Something of a later protocol: to be ignored.
+    Unknown(u8),
+}
+
+impl Kind {
+    const fn byte(self) -> u8 {
+        match self {
+            Self::Greeting => 1,
+            Self::Run => 2,
+            Self::Ticks => 3,
+            Self::Change => 4,
+            Self::Answer => 5,
+            Self::End => 6,
+            Self::Request => 16,
+            Self::Unknown(byte) => byte,
+        }
+    }
+
+    const fn of(byte: u8) -> Self {
+        match byte {
+            1 => Self::Greeting,
+            2 => Self::Run,
+            3 => Self::Ticks,
+            4 => Self::Change,
+            5 => Self::Answer,
+            6 => Self::End,
+            16 => Self::Request,
+            other => Self::Unknown(other),
+        }
+    }
+}
+
+/// A frame longer than any of ours: the other side speaks something else.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "a frame of {length} bytes; at most {MOST_PAYLOAD} are sent, so the other side speaks something else"
+)]
+pub struct LongFrame {
+    /// What it says of its length.
+    pub length: usize,
+}
+
+/// A message as bytes. `payload` is at most [`MOST_PAYLOAD`] long.
+#[must_use]
+pub fn frame(kind: Kind, payload: &[u8]) -> Vec<u8> {
+    debug_assert!(payload.len() <= MOST_PAYLOAD);
+    let length = u32::try_from(payload.len()).unwrap_or(u32::MAX);
+    let mut bytes = Vec::with_capacity(HEAD + payload.len());
+    bytes.extend(length.to_le_bytes());
+    bytes.push(kind.byte());
+    bytes.extend(payload);
+    bytes
+}
+
+/// Bytes as they come in, and the frames in them.
+#[derive(Debug, Default)]
+pub struct Frames {
+    bytes: Vec<u8>,
+    taken: usize,
+}
+
+impl Frames {
+    /// Takes in what a reader has; how many bytes that were, 0 at its end.
+    ///
+    /// # Errors
+    /// What the reader says, time-outs among it; nothing is lost then.
+    pub fn fill(&mut self, reader: &mut impl Read) -> io::Result<usize> {
+        let mut some = [0; 1 << 14];
+        let count = reader.read(&mut some)?;
+        self.push(&some[..count]);
+        Ok(count)
+    }
+
+    /// Takes in bytes.
+    pub fn push(&mut self, bytes: &[u8]) {
+        self.bytes.drain(..self.taken);
+        self.taken = 0;
+        self.bytes.extend(bytes);
+    }
+
+    /// The next whole frame, if there is one.
+    ///
+    /// # Errors
+    /// [`LongFrame`]: nothing that follows can be trusted.
+    pub fn next(&mut self) -> Result<Option<(Kind, &[u8])>, LongFrame> {
+        let Some((head, rest)) = self.bytes[self.taken..].split_first_chunk::<HEAD>() else {
+            return Ok(None);
+        };
+        let [a, b, c, d, kind] = *head;
+        let length = usize::try_from(u32::from_le_bytes([a, b, c, d])).unwrap_or(usize::MAX);
+        if length > MOST_PAYLOAD {
+            return Err(LongFrame { length });
+        }
+        let Some(payload) = rest.get(..length) else { return Ok(None) };
+        self.taken += HEAD + length;
+        Ok(Some((Kind::of(kind), payload)))
+    }
+}
+
+/// Payload of a frame of ticks.
+#[must_use]
+pub fn ticks_to_payload<'a>(dropped: u64, records: impl ExactSizeIterator<Item = &'a TickRecord>) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(8 + RECORD * records.len());
+    bytes.extend(dropped.to_le_bytes());
+    for record in records {
+        bytes.extend(record.to_words().iter().flat_map(|word| word.to_le_bytes()));
+    }
+    bytes
+}
+
+/// What a frame of ticks holds: how many were dropped so far, and the records. A cut-off record is left out.
+#[must_use]
+pub fn ticks_from_payload(payload: &[u8]) -> (u64, Vec<TickRecord>) {
+    let word = |bytes: &[u8]| u64::from_le_bytes(std::array::from_fn(|i| bytes.get(i).copied().unwrap_or(0)));
+    let (dropped, records) = payload.split_at(payload.len().min(8));
+    let record = |bytes: &[u8]| {
+        TickRecord::from_words(&std::array::from_fn(|i| word(bytes.get(8 * i..).unwrap_or(&[]))))
+    };
+    (word(dropped), records.chunks_exact(RECORD).map(record).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(number: u64) -> TickRecord {
+        TickRecord::from_words(&std::array::from_fn(|i| 0x3ff0_0000_0000_0000 + number * 1000 + i as u64))
+    }
+
+    #[test]
+    fn frames_survive_any_cut() {
+        let records = [record(1), record(2)];
+        let stream: Vec<u8> = [
+            frame(Kind::Answer, b"{}"),
+            frame(Kind::Ticks, &ticks_to_payload(3, records.iter())),
+            frame(Kind::Unknown(99), b""),
+        ]
+        .concat();
+        for cut in 0..stream.len() {
+            let mut frames = Frames::default();
+            let mut seen = Vec::new();
+            for part in [&stream[..cut], &stream[cut..]] {
+                frames.push(part);
+                while let Some((kind, payload)) = frames.next().unwrap() {
+                    seen.push((kind, payload.to_vec()));
+                }
+            }
+            assert_eq!(
+                seen.iter().map(|(kind, _)| *kind).collect::<Vec<_>>(),
+                [Kind::Answer, Kind::Ticks, Kind::Unknown(99)]
+            );
+            assert_eq!(ticks_from_payload(&seen[1].1), (3, records.to_vec()));
+        }
+    }
+
+    #[test]
+    fn rubbish_is_noticed_and_short_payloads_are_harmless() {
+        let mut frames = Frames::default();
+        frames.push(b"GET / HTTP/1.1\r\n");
+        assert!(frames.next().is_err());
+        assert_eq!(ticks_from_payload(b""), (0, Vec::new()));
+        assert_eq!(ticks_from_payload(&[1; 100]).1, Vec::new());
+    }
+}

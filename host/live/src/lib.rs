@@ -1,0 +1,61 @@
+//! Watching a running host, and talking to it, from another program on the same machine: viewer, bridges, scripts.
+//!
+//! A running host listens on a Unix socket in a folder that only its user may enter ([`Directory`]); whoever may open
+//! the socket may watch and change the run, and nobody else. [`Client`] is the other end:
+//!
+//! ```no_run
+//! use flotor_live::{Ask, Client, Directory, Event};
+//! use std::time::Duration;
+//!
+//! let mut client = Client::find(&Directory::of_this_user())?;
+//! client.asker().ask(Ask::Watch { every: 10 })?; // one record in ten; of the others, what happened in them
+//! while let Some(event) = client.next(Duration::from_secs(1))? {
+//!     if let Event::Ticks { records, .. } = event {
+//!         println!("{} ticks, up to {:?}", records.len(), records.last().map(|record| record.time_ns));
+//!     }
+//! }
+//! # Ok::<(), flotor_live::LiveError>(())
+//! ```
+//!
+//! # Protocol 1
+//!
+//! Both directions are a sequence of frames: length of the payload (4 bytes, little endian), kind (1 byte), payload.
+//! Unknown kinds and unknown keys of JSON objects are to be ignored, so that a protocol can grow; [`PROTOCOL`] changes
+//! when that is not enough.
+//!
+//! | kind | from | payload |
+//! |---|---|---|
+//! | 1 greeting | host | JSON [`Greeting`]: what can be asked for, with ranges and the values in force. First, once |
+//! | 2 run | host | protobuf `flotor.Run`, as in a recording (`host/proto`). Second, once |
+//! | 3 ticks | host | records dropped so far (8 bytes), then records of 39 words of 8 bytes, see below |
+//! | 4 change | host | JSON [`ChangeMessage`]: a parameter that changed, before the tick that saw it first |
+//! | 5 answer | host | JSON [`Answer`] to a request |
+//! | 6 end | host | JSON [`End`]: how the run ended. Last |
+//! | 16 request | client | JSON [`Request`] |
+//!
+//! A record is what the digest of a run is made of ([`flotor_record::trace::TickRecord`]): tick, time (ns), time since the
+//! last tick (ns) as integers; position (3), quaternion xyzw (4), velocity (3), angular velocity (3), model's force and
+//! torque (6), commanded (6), delivered (6), stored energy, energy of the port as IEEE doubles; events (low half) and buttons
+//! (high half); lateness and compute time (ns). SI units, device frame, little endian.
+//!
+//! **Nobody who watches can hold up the loop.** A host sends nothing but the first two frames until it is asked to, and
+//! does nothing per tick while nobody watches. Between loop and socket lies a queue of fixed length for each client; what finds
+//! no room is dropped and counted. Requests are answered at most a thousand times a second for each client.
+//!
+//! Not real-time.
+
+mod client;
+mod directory;
+mod frame;
+mod message;
+
+pub use client::{Asker, Client, Event, LiveError};
+pub use directory::{Directory, DirectoryError, Found, Listener};
+pub use frame::{Frames, Kind, LongFrame, MOST_PAYLOAD, frame, ticks_from_payload, ticks_to_payload};
+pub use message::{
+    Answer, Ask, ChangeMessage, End, Greeting, Outcome, PanelParameter, PanelPlugin, ParameterShape, Request,
+    SetValue, Subject, WrenchLimits,
+};
+
+/// Version of what is said over the socket.
+pub const PROTOCOL: u32 = 1;

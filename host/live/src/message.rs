@@ -1,0 +1,288 @@
+//! What is said, as JSON.
+
+use flotor_hal::{Mutability, Parameter, ParameterKind};
+use flotor_record::{Change, ChangeOutcome, ChangeSubject};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// The first thing a host says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Greeting {
+    /// Version of what follows: [`crate::PROTOCOL`].
+    pub protocol: u32,
+    /// Version of the host.
+    pub flotor_version: String,
+    /// Process of the host.
+    pub process: u32,
+    /// Title of the scene.
+    pub title: String,
+    /// The device, then the models in the scene's order.
+    pub plugins: Vec<PanelPlugin>,
+    /// The most that may reach the hand.
+    pub limits: WrenchLimits,
+}
+
+/// The most that may reach the hand, along and about each axis of the device frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct WrenchLimits {
+    /// Force, N; without one, no limit.
+    pub force_n: [Option<f64>; 3],
+    /// Torque, N·m; without one, no limit.
+    pub torque_nm: [Option<f64>; 3],
+}
+
+/// A plugin of the run and what it can be told: all that a panel is made of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PanelPlugin {
+    /// What the scene calls it; `device` for the device.
+    pub name: String,
+    /// Id.
+    pub id: String,
+    /// Its library.
+    pub file: PathBuf,
+    /// Its parameters, in the order of its schema.
+    pub parameters: Vec<PanelParameter>,
+}
+
+/// A parameter, with its value in force.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PanelParameter {
+    /// Id.
+    pub id: String,
+    /// Unit for people; empty where there is none.
+    pub unit: String,
+    /// One sentence for people.
+    pub doc: String,
+    /// What values it takes.
+    pub shape: ParameterShape,
+    /// Whether it may change while the loop runs.
+    pub live: bool,
+    /// The value in force, as a person would type it.
+    pub value: String,
+}
+
+/// What values a parameter takes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum ParameterShape {
+    /// A number.
+    Real {
+        /// Smallest legal.
+        min: f64,
+        /// Largest legal.
+        max: f64,
+        /// What it is when nothing is set.
+        default: f64,
+    },
+    /// One of a list.
+    Choice {
+        /// The list.
+        choices: Vec<String>,
+        /// Index of what it is when nothing is set.
+        default: usize,
+    },
+    /// Text; only when the plugin is created.
+    Text,
+    /// A file; only when the plugin is created.
+    File,
+}
+
+impl PanelPlugin {
+    /// Of a schema, with the values in force.
+    #[must_use]
+    pub fn new(
+        name: &str,
+        id: &str,
+        file: PathBuf,
+        schema: &[Parameter],
+        values: &[(String, String)],
+    ) -> Self {
+        let value = |id: &str| {
+            let known = values.iter().find(|(key, _)| key == id);
+            known.map(|(_, value)| value.clone()).unwrap_or_default()
+        };
+        let parameter = |parameter: &Parameter| PanelParameter {
+            id: parameter.id().to_owned(),
+            unit: parameter.unit().to_owned(),
+            doc: parameter.doc().to_owned(),
+            shape: ParameterShape::of(parameter),
+            live: parameter.mutability() == Mutability::Live,
+            value: value(parameter.id()),
+        };
+        Self {
+            name: name.to_owned(),
+            id: id.to_owned(),
+            file,
+            parameters: schema.iter().map(parameter).collect(),
+        }
+    }
+}
+
+impl ParameterShape {
+    fn of(parameter: &Parameter) -> Self {
+        match parameter.kind() {
+            ParameterKind::Real => {
+                Self::Real { min: parameter.min(), max: parameter.max(), default: parameter.default() }
+            }
+            ParameterKind::Choice => Self::Choice {
+                choices: parameter.choices().iter().map(|choice| choice.as_str().to_owned()).collect(),
+                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // an index of the schema's
+                default: parameter.default() as usize,
+            },
+            ParameterKind::Text => Self::Text,
+            ParameterKind::File => Self::File,
+        }
+    }
+}
+
+/// Something a client asks for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Request {
+    /// Number the answer will carry.
+    pub number: u64,
+    /// What is asked for.
+    #[serde(flatten)]
+    pub ask: Ask,
+}
+
+/// What can be asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "ask", rename_all = "kebab-case")]
+pub enum Ask {
+    /// Ticks from now on: those whose number is a multiple of `every` (0 counts as 1), with the events of the ones
+    /// between them.
+    Watch {
+        /// Which ticks.
+        every: u32,
+    },
+    /// No more ticks.
+    LookAway,
+    /// New values for live parameters, all before the same tick.
+    Set {
+        /// The values.
+        values: Vec<SetValue>,
+    },
+    /// How much of a model is felt, 0 to 1.
+    Weight {
+        /// Its name in the scene.
+        model: String,
+        /// The new weight.
+        weight: f64,
+    },
+    /// An orderly end: force fades out.
+    Stop,
+    /// The emergency stop: no force at once, and the run is over.
+    EmergencyStop,
+}
+
+/// A new value for a parameter.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SetValue {
+    /// `device`, a model's name in the scene, or a plugin's id.
+    pub plugin: String,
+    /// Id of the parameter.
+    pub parameter: String,
+    /// Its value, as a person would type it.
+    pub value: String,
+}
+
+/// What became of a request.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Answer {
+    /// The request's number.
+    pub number: u64,
+    /// Why not, in words; nothing if it was done, or passed on to the loop.
+    pub refused: Option<String>,
+}
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct End {
+    /// One line for people.
+    pub words: String,
+}
+
+/// A parameter that changed, or was to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChangeMessage {
+    /// The tick before which it changed.
+    pub tick: u64,
+    /// The time of that tick, ns.
+    pub time_ns: u64,
+    /// Name of the plugin in the scene.
+    pub plugin: String,
+    /// What of it.
+    pub subject: Subject,
+    /// Id of the parameter, or the host's word for what is none.
+    pub parameter: String,
+    /// The value as a person would type it.
+    pub value: String,
+    /// The value as a number.
+    pub number: f64,
+    /// What the plugin made of it.
+    pub outcome: Outcome,
+    /// If the plugin was replaced, what was set for the new one.
+    #[serde(default)]
+    pub settings: Vec<(String, String)>,
+}
+
+/// What of a plugin changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Subject {
+    /// A parameter of its schema.
+    Parameter,
+    /// How much of it is felt.
+    Weight,
+    /// The plugin itself.
+    Plugin,
+}
+
+/// How a plugin took a change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Outcome {
+    /// In force from this tick on.
+    Applied,
+    /// The old value stays.
+    Refused,
+    /// The plugin panicked over it.
+    Broke,
+}
+
+impl From<&Change> for ChangeMessage {
+    fn from(change: &Change) -> Self {
+        let Change { tick, time_ns, plugin, subject, parameter, value, number, settings, outcome } =
+            change.clone();
+        let subject = match subject {
+            ChangeSubject::Parameter => Subject::Parameter,
+            ChangeSubject::Weight => Subject::Weight,
+            ChangeSubject::Plugin => Subject::Plugin,
+        };
+        let outcome = match outcome {
+            ChangeOutcome::Applied => Outcome::Applied,
+            ChangeOutcome::Refused => Outcome::Refused,
+            ChangeOutcome::Broke => Outcome::Broke,
+        };
+        Self { tick, time_ns, plugin, subject, parameter, value, number, outcome, settings }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_request_reads_as_the_book_prints_it() {
+        let text =
+            r#"{"number":7,"ask":"set","values":[{"plugin":"spring","parameter":"gamma_n","value":"20"}]}"#;
+        let request: Request = serde_json::from_str(text).unwrap();
+        let Ask::Set { values } = &request.ask else { panic!("{request:?}") };
+        assert_eq!((request.number, values[0].parameter.as_str()), (7, "gamma_n"));
+        assert_eq!(serde_json::to_string(&request).unwrap(), text);
+        let stop: Request =
+            serde_json::from_str(r#"{"number":1,"ask":"emergency-stop","why":"later"}"#).unwrap();
+        assert_eq!(stop.ask, Ask::EmergencyStop, "keys of a later protocol are left alone");
+        assert!(serde_json::from_str::<Request>(r#"{"number":1,"ask":"fly"}"#).is_err());
+    }
+}

@@ -1,0 +1,205 @@
+//! The running host, for other programs on this machine to watch and change: viewer, bridges, scripts.
+//!
+//! ```text
+//!  servo -> ring -> observers -> Publication::observe -> outbox of each watcher -> its writer thread -> socket
+//!                                  socket -> its reader thread -> Controls, StopSwitch -> servo, at a tick boundary
+//! ```
+//!
+//! What is said over the socket, and a client for it, are the crate `flotor_live`. Nothing here runs on the servo's thread,
+//! and nothing the servo's observers do here waits: an outbox that is full drops what is new and counts it. While nobody
+//! watches, a tick costs one look at a number. Not real-time.
+
+mod greeting;
+mod outbox;
+mod watcher;
+
+use crate::record::{Change, RunDescription};
+use crate::servo::StopSwitch;
+use crate::session::{Controls, PluginReport};
+use crate::trace::TickRecord;
+use flotor_live::{
+    ChangeMessage, Directory, DirectoryError, End, Greeting, Kind, Listener, WrenchLimits, frame,
+};
+use outbox::Outbox;
+use std::io::{self, ErrorKind};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+use watcher::Watcher;
+
+/// Watchers of one run at a time: every one costs two threads and a queue.
+const MOST_WATCHERS: usize = 16;
+/// Stack of the threads here, bytes. With locked memory every page of it is real.
+const STACK_BYTES: usize = 256 * 1024;
+/// Pause after a connection that failed for lack of something (descriptors, mostly).
+const BREATH: Duration = Duration::from_millis(100);
+
+/// Why a run cannot be watched.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PublishError {
+    /// There is no place for the socket.
+    #[error(transparent)]
+    Directory(#[from] DirectoryError),
+    /// No thread, or no second handle to the socket.
+    #[error("no thread for those who watch: {0}")]
+    Thread(#[from] io::Error),
+}
+
+/// A run that others may watch; over when dropped.
+pub struct Publication {
+    shared: Arc<Shared>,
+    acceptor: Option<JoinHandle<()>>,
+    listener: Listener,
+}
+
+/// What all threads of a publication know.
+struct Shared {
+    watchers: Mutex<Vec<Watcher>>,
+    /// How many watchers want ticks: all that is looked at in a tick.
+    watching: AtomicUsize,
+    greeting: Mutex<Greeting>,
+    run: Vec<u8>,
+    controls: Controls,
+    stop: StopSwitch,
+    is_over: AtomicBool,
+}
+
+impl Publication {
+    /// Lets a prepared run be found and watched.
+    ///
+    /// # Errors
+    /// [`PublishError`]; the run goes on without.
+    pub fn open(
+        directory: &Directory,
+        title: &str,
+        run: &RunDescription,
+        plugins: &[PluginReport],
+        limits: WrenchLimits,
+        (controls, stop): (Controls, StopSwitch),
+    ) -> Result<Self, PublishError> {
+        let listener = directory.listen()?;
+        let shared = Arc::new(Shared {
+            watchers: Mutex::default(),
+            watching: AtomicUsize::new(0),
+            greeting: Mutex::new(greeting::greeting(title, plugins, limits)),
+            run: run.to_bytes(),
+            controls,
+            stop,
+            is_over: AtomicBool::new(false),
+        });
+        let (socket, for_acceptor) = (listener.socket().try_clone()?, Arc::clone(&shared));
+        let acceptor = thread("flotor-live").spawn(move || accept(&socket, &for_acceptor))?;
+        Ok(Self { shared, acceptor: Some(acceptor), listener })
+    }
+
+    /// The socket others connect to.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        self.listener.path()
+    }
+
+    /// One tick, in order. Does not wait for anybody.
+    pub fn observe(&self, record: &TickRecord) {
+        if self.shared.watching.load(Ordering::Relaxed) == 0 {
+            return;
+        }
+        for watcher in self.shared.watchers().iter() {
+            watcher.outbox.tick(record);
+        }
+    }
+
+    /// A parameter that changed, before the tick that saw it first. Does not wait for anybody.
+    pub fn change(&self, change: &Change) {
+        let message = ChangeMessage::from(change);
+        greeting::keep(&mut self.shared.greeting(), &message);
+        let Ok(payload) = serde_json::to_vec(&message) else { return };
+        let bytes = frame(Kind::Change, &payload);
+        self.shared.watchers().iter().for_each(|watcher| watcher.outbox.news(bytes.clone()));
+    }
+
+    /// Tells everybody that the run is over, and how; then nobody can watch it any more.
+    pub fn end(self, words: &str) {
+        let Ok(payload) = serde_json::to_vec(&End { words: words.to_owned() }) else { return };
+        let bytes = frame(Kind::End, &payload);
+        self.shared.watchers().iter().for_each(|watcher| watcher.outbox.last(bytes.clone()));
+    }
+}
+
+impl Drop for Publication {
+    fn drop(&mut self) {
+        self.shared.is_over.store(true, Ordering::Relaxed);
+        // The acceptor sits in a call of the system; a connection wakes it up. Without one it ends with the process.
+        let woken = UnixStream::connect(self.listener.path());
+        if let (Ok(_), Some(acceptor)) = (woken, self.acceptor.take()) {
+            let _ = acceptor.join();
+        }
+        let watchers = std::mem::take(&mut *self.shared.watchers());
+        // All at once, so that their patience runs side by side.
+        watchers.iter().for_each(|watcher| watcher.outbox.close());
+        watchers.into_iter().for_each(Watcher::dismiss);
+    }
+}
+
+impl Shared {
+    fn watchers(&self) -> MutexGuard<'_, Vec<Watcher>> {
+        self.watchers.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn greeting(&self) -> MutexGuard<'_, Greeting> {
+        self.greeting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Counts who wants ticks, after somebody changed their mind or left.
+    fn count(&self, watchers: &[Watcher]) {
+        let watching = watchers.iter().filter(|watcher| watcher.outbox.wants_ticks()).count();
+        self.watching.store(watching, Ordering::Relaxed);
+    }
+}
+
+/// Lets watchers in until the run is over.
+fn accept(socket: &UnixListener, shared: &Arc<Shared>) {
+    while !shared.is_over.load(Ordering::Relaxed) {
+        match socket.accept() {
+            Ok(_) if shared.is_over.load(Ordering::Relaxed) => {}
+            Ok((stream, _)) => welcome(stream, shared),
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(_) => std::thread::sleep(BREATH),
+        }
+    }
+}
+
+/// Serves a connection. A watcher who cannot be served is turned away: the connection closes.
+fn welcome(stream: UnixStream, shared: &Arc<Shared>) {
+    sweep(shared);
+    let mut watchers = shared.watchers();
+    if watchers.len() >= MOST_WATCHERS {
+        return;
+    }
+    let outbox = Arc::new(Outbox::default());
+    let Ok(greeting) = serde_json::to_vec(&*shared.greeting()) else { return };
+    outbox.news(frame(Kind::Greeting, &greeting));
+    outbox.news(frame(Kind::Run, &shared.run));
+    // With the list locked, so that no change is told between greeting and list.
+    watchers.extend(Watcher::start(stream, outbox, shared));
+}
+
+/// Lets go of those who have gone.
+fn sweep(shared: &Shared) {
+    let gone: Vec<Watcher> = {
+        let mut watchers = shared.watchers();
+        let (gone, here) = std::mem::take(&mut *watchers).into_iter().partition(Watcher::is_gone);
+        *watchers = here;
+        shared.count(&watchers);
+        gone
+    };
+    gone.into_iter().for_each(Watcher::dismiss);
+}
+
+/// A thread of this module.
+fn thread(name: &str) -> std::thread::Builder {
+    std::thread::Builder::new().name(name.to_owned()).stack_size(STACK_BYTES)
+}

@@ -1,0 +1,176 @@
+//! What waits to be sent to one watcher: a queue of fixed length that drops and counts.
+
+use crate::trace::{Events, TickRecord};
+use flotor_live::{Kind, frame, ticks_to_payload};
+use std::collections::VecDeque;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+
+/// Ticks that wait at most: four seconds at 1 kHz.
+const MOST_TICKS: usize = 4096;
+/// Everything else that waits at most. A watcher who asks this often and reads nothing gets no answer.
+const MOST_NEWS: usize = 256;
+
+#[derive(Default)]
+pub(super) struct Outbox {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+#[derive(Default)]
+struct State {
+    news: VecDeque<Vec<u8>>,
+    ticks: VecDeque<TickRecord>,
+    dropped: u64,
+    /// What goes out after everything else.
+    last: Option<Vec<u8>>,
+    /// One tick in so many; none while 0.
+    every: u32,
+    /// What happened in the ticks between.
+    passed: Events,
+    is_closed: bool,
+}
+
+impl Outbox {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// One tick in `every` from now on; 0 for none.
+    pub(super) fn want_ticks(&self, every: u32) {
+        let mut state = self.lock();
+        state.every = every;
+        state.ticks.reserve_exact(if every == 0 { 0 } else { MOST_TICKS });
+    }
+
+    pub(super) fn wants_ticks(&self) -> bool {
+        self.lock().every > 0
+    }
+
+    /// A tick, if it is wanted and there is room.
+    pub(super) fn tick(&self, record: &TickRecord) {
+        let mut state = self.lock();
+        if state.every == 0 || state.is_closed {
+            return;
+        }
+        state.passed.insert(record.events);
+        if !record.tick.is_multiple_of(u64::from(state.every)) {
+            return;
+        }
+        if state.ticks.len() >= MOST_TICKS {
+            state.dropped += 1;
+            return;
+        }
+        let events = std::mem::take(&mut state.passed);
+        state.ticks.push_back(TickRecord { events, ..*record });
+        drop(state);
+        self.changed.notify_one();
+    }
+
+    /// A frame that is no tick, if there is room.
+    pub(super) fn news(&self, frame: Vec<u8>) {
+        let mut state = self.lock();
+        if state.news.len() < MOST_NEWS && !state.is_closed {
+            state.news.push_back(frame);
+        }
+        drop(state);
+        self.changed.notify_one();
+    }
+
+    /// The last frame of all; nothing is taken in after it.
+    pub(super) fn last(&self, frame: Vec<u8>) {
+        let mut state = self.lock();
+        if !state.is_closed {
+            state.last = Some(frame);
+            state.is_closed = true;
+        }
+        drop(state);
+        self.changed.notify_one();
+    }
+
+    /// Takes nothing in any more; what waits may still go out.
+    pub(super) fn close(&self) {
+        self.lock().is_closed = true;
+        self.changed.notify_one();
+    }
+
+    pub(super) fn is_closed(&self) -> bool {
+        self.lock().is_closed
+    }
+
+    /// Waits for something to send, and takes all of it; `None` when closed and empty.
+    pub(super) fn take(&self) -> Option<Vec<u8>> {
+        /// Ticks in a frame.
+        const MOST_IN_A_FRAME: usize = 1024;
+        let mut state = self.lock();
+        while state.news.is_empty() && state.ticks.is_empty() {
+            if state.is_closed {
+                return state.last.take();
+            }
+            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+        let mut bytes: Vec<u8> = state.news.drain(..).flatten().collect();
+        // Ticks are dropped only while some wait, so the number goes out with those.
+        let dropped = state.dropped;
+        let ticks: Vec<TickRecord> = state.ticks.drain(..).collect();
+        drop(state);
+        for some in ticks.chunks(MOST_IN_A_FRAME) {
+            bytes.extend(frame(Kind::Ticks, &ticks_to_payload(dropped, some.iter())));
+        }
+        Some(bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trace::RECORD_WORDS;
+    use flotor_live::{Frames, ticks_from_payload};
+    use flotor_sync::Words;
+
+    fn record(tick: u64, events: Events) -> TickRecord {
+        TickRecord { tick, events, ..TickRecord::from_words(&[0; RECORD_WORDS]) }
+    }
+
+    fn taken(outbox: &Outbox) -> (u64, Vec<TickRecord>) {
+        let mut frames = Frames::default();
+        frames.push(&outbox.take().expect("something waits"));
+        let mut all = (0, Vec::new());
+        while let Some((kind, payload)) = frames.next().expect("frames of our own") {
+            assert_eq!(kind, Kind::Ticks);
+            let (dropped, records) = ticks_from_payload(payload);
+            all.0 = dropped;
+            all.1.extend(records);
+        }
+        all
+    }
+
+    #[test]
+    fn what_finds_no_room_is_dropped_and_counted() {
+        let outbox = Outbox::default();
+        outbox.tick(&record(0, Events::NONE));
+        outbox.want_ticks(1);
+        for tick in 0..5000 {
+            outbox.tick(&record(tick, Events::NONE));
+        }
+        let (dropped, records) = taken(&outbox);
+        assert_eq!((dropped, records.len()), (5000 - 4096, 4096), "the oldest stay: they are in order");
+        outbox.last(vec![7]);
+        assert_eq!((outbox.take(), outbox.take()), (Some(vec![7]), None));
+        for _ in 0..1000 {
+            outbox.news(vec![0; 10]);
+        }
+        assert_eq!(outbox.take(), None, "a closed one takes nothing in");
+    }
+
+    #[test]
+    fn nothing_that_happens_between_two_ticks_is_lost() {
+        let outbox = Outbox::default();
+        outbox.want_ticks(10);
+        for tick in 0..20 {
+            outbox.tick(&record(tick, if tick == 7 { Events::BOUNDARY } else { Events::NONE }));
+        }
+        let (_, records) = taken(&outbox);
+        let seen: Vec<_> = records.iter().map(|record| (record.tick, record.events)).collect();
+        assert_eq!(seen, [(0, Events::NONE), (10, Events::BOUNDARY)]);
+    }
+}

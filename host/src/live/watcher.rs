@@ -1,0 +1,157 @@
+//! One watcher: a thread that writes what waits, a thread that reads what is asked for.
+
+use super::outbox::Outbox;
+use super::{Shared, thread};
+use crate::session::NewValue;
+use flotor_live::{Answer, Ask, Frames, Kind, Request, frame};
+use std::io::{ErrorKind, Write};
+use std::net::Shutdown;
+use std::os::unix::net::UnixStream;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Pause between two batches: a watcher draws at most a hundred pictures a second.
+const BATCH_PERIOD: Duration = Duration::from_millis(10);
+/// How long a write may wait before the writer looks whether the run is over.
+const WRITE_WAIT: Duration = Duration::from_millis(100);
+/// How long a watcher may take to read the end of a run.
+const PATIENCE: Duration = Duration::from_millis(500);
+/// Pause after each request: a flood is throttled to a thousand a second and holds up only its sender.
+const REQUEST_PERIOD: Duration = Duration::from_millis(1);
+
+pub(super) struct Watcher {
+    pub(super) outbox: Arc<Outbox>,
+    stream: UnixStream,
+    writer: JoinHandle<()>,
+    reader: JoinHandle<()>,
+}
+
+impl Watcher {
+    /// Serves a connection; `None` if there is no thread to be had.
+    pub(super) fn start(stream: UnixStream, outbox: Arc<Outbox>, shared: &Arc<Shared>) -> Option<Self> {
+        stream.set_write_timeout(Some(WRITE_WAIT)).ok()?;
+        let (to_write, to_read) = (stream.try_clone().ok()?, stream.try_clone().ok()?);
+        let (for_writer, for_reader, of_run) = (Arc::clone(&outbox), Arc::clone(&outbox), Arc::clone(shared));
+        let writer = thread("flotor-live-out").spawn(move || write(to_write, &for_writer)).ok()?;
+        let reader = thread("flotor-live-in").spawn(move || {
+            read(to_read, &for_reader, &of_run);
+            // The watcher has gone or talks nonsense: the writer ends, too.
+            for_reader.want_ticks(0);
+            for_reader.close();
+        });
+        match reader {
+            Ok(reader) => Some(Self { outbox, stream, writer, reader }),
+            Err(_) => {
+                outbox.close();
+                None
+            }
+        }
+    }
+
+    /// True if nobody is at the other end any more.
+    pub(super) fn is_gone(&self) -> bool {
+        self.outbox.is_closed()
+    }
+
+    /// Sends what waits to whoever reads it within some patience, and ends.
+    pub(super) fn dismiss(self) {
+        self.outbox.close();
+        let _ = self.writer.join();
+        let _ = self.stream.shutdown(Shutdown::Both);
+        let _ = self.reader.join();
+    }
+}
+
+/// Writes until the outbox is closed and empty, or nobody reads.
+fn write(mut stream: UnixStream, outbox: &Outbox) {
+    while let Some(bytes) = outbox.take() {
+        if !write_whole(&mut stream, &bytes, outbox) {
+            break;
+        }
+        if !outbox.is_closed() {
+            std::thread::sleep(BATCH_PERIOD);
+        }
+    }
+    outbox.want_ticks(0);
+    // A reader sees the end when it has read all of it.
+    let _ = stream.shutdown(Shutdown::Write);
+}
+
+/// True when all is written; a frozen watcher is waited for as long as the run lasts, and a little longer.
+fn write_whole(stream: &mut UnixStream, mut bytes: &[u8], outbox: &Outbox) -> bool {
+    let mut closed_since: Option<Instant> = None;
+    while !bytes.is_empty() {
+        match stream.write(bytes) {
+            Ok(count) => bytes = bytes.get(count..).unwrap_or_default(),
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                if outbox.is_closed() && closed_since.get_or_insert_with(Instant::now).elapsed() > PATIENCE {
+                    return false;
+                }
+            }
+            Err(_) => return false,
+        }
+    }
+    true
+}
+
+/// Does what is asked for until the watcher goes.
+fn read(mut stream: UnixStream, outbox: &Outbox, shared: &Shared) {
+    let mut frames = Frames::default();
+    loop {
+        match frames.fill(&mut stream) {
+            Ok(0) => return,
+            Ok(_) => {}
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            Err(_) => return,
+        }
+        loop {
+            match frames.next() {
+                Ok(Some((Kind::Request, payload))) => {
+                    let answer = answer(payload, outbox, shared);
+                    if let Ok(payload) = serde_json::to_vec(&answer) {
+                        outbox.news(frame(Kind::Answer, &payload));
+                    }
+                    std::thread::sleep(REQUEST_PERIOD);
+                }
+                Ok(Some(_)) => {}
+                Ok(None) => break,
+                Err(_) => return,
+            }
+        }
+    }
+}
+
+fn answer(payload: &[u8], outbox: &Outbox, shared: &Shared) -> Answer {
+    match serde_json::from_slice::<Request>(payload) {
+        Ok(Request { number, ask }) => Answer { number, refused: carry_out(ask, outbox, shared).err() },
+        Err(error) => Answer { number: 0, refused: Some(format!("no request this host knows: {error}")) },
+    }
+}
+
+fn carry_out(ask: Ask, outbox: &Outbox, shared: &Shared) -> Result<(), String> {
+    match ask {
+        Ask::Watch { every } => {
+            outbox.want_ticks(every.max(1));
+            shared.count(&shared.watchers());
+        }
+        Ask::LookAway => {
+            outbox.want_ticks(0);
+            shared.count(&shared.watchers());
+        }
+        Ask::Set { values } => {
+            let values: Vec<NewValue<'_>> = values
+                .iter()
+                .map(|new| NewValue { plugin: &new.plugin, parameter: &new.parameter, value: &new.value })
+                .collect();
+            shared.controls.set_parameters(&values).map_err(|error| error.to_string())?;
+        }
+        Ask::Weight { model, weight } => {
+            shared.controls.set_weight(&model, weight).map_err(|error| error.to_string())?;
+        }
+        Ask::Stop => shared.stop.stop(),
+        Ask::EmergencyStop => shared.stop.emergency_by_watcher(),
+    }
+    Ok(())
+}
