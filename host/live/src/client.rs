@@ -198,7 +198,7 @@ fn read_frame<T>(
     /// The system takes no time-out of zero.
     const SHORTEST: Duration = Duration::from_micros(100);
     loop {
-        while let Some((kind, payload)) = frames.next()? {
+        while let Some((kind, payload)) = frames.take()? {
             if let Some(used) = use_of(kind, payload) {
                 return Ok(Some(used));
             }

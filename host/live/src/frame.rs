@@ -112,7 +112,7 @@ impl Frames {
     ///
     /// # Errors
     /// [`LongFrame`]: nothing that follows can be trusted.
-    pub fn next(&mut self) -> Result<Option<(Kind, &[u8])>, LongFrame> {
+    pub fn take(&mut self) -> Result<Option<(Kind, &[u8])>, LongFrame> {
         let Some((head, rest)) = self.bytes[self.taken..].split_first_chunk::<HEAD>() else {
             return Ok(None);
         };
@@ -171,7 +171,7 @@ mod tests {
             let mut seen = Vec::new();
             for part in [&stream[..cut], &stream[cut..]] {
                 frames.push(part);
-                while let Some((kind, payload)) = frames.next().unwrap() {
+                while let Some((kind, payload)) = frames.take().unwrap() {
                     seen.push((kind, payload.to_vec()));
                 }
             }
@@ -187,7 +187,7 @@ mod tests {
     fn rubbish_is_noticed_and_short_payloads_are_harmless() {
         let mut frames = Frames::default();
         frames.push(b"GET / HTTP/1.1\r\n");
-        assert!(frames.next().is_err());
+        assert!(frames.take().is_err());
         assert_eq!(ticks_from_payload(b""), (0, Vec::new()));
         assert_eq!(ticks_from_payload(&[1; 100]).1, Vec::new());
     }

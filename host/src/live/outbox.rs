@@ -135,7 +135,7 @@ mod tests {
         let mut frames = Frames::default();
         frames.push(&outbox.take().expect("something waits"));
         let mut all = (0, Vec::new());
-        while let Some((kind, payload)) = frames.next().expect("frames of our own") {
+        while let Some((kind, payload)) = frames.take().expect("frames of our own") {
             assert_eq!(kind, Kind::Ticks);
             let (dropped, records) = ticks_from_payload(payload);
             all.0 = dropped;

@@ -107,7 +107,7 @@ fn read(mut stream: UnixStream, outbox: &Outbox, shared: &Shared) {
             Err(_) => return,
         }
         loop {
-            match frames.next() {
+            match frames.take() {
                 Ok(Some((Kind::Request, payload))) => {
                     let answer = answer(payload, outbox, shared);
                     if let Ok(payload) = serde_json::to_vec(&answer) {
