@@ -329,6 +329,11 @@ impl FrameTransform {
         self.rotation = Some(Quaternion::new(record.pose.orientation_xyzw));
     }
 
+    /// True if it belongs to the tick of this record.
+    pub(crate) fn is_of(&self, record: &TickRecord) -> bool {
+        self.timestamp == Some(timestamp(record.time_ns))
+    }
+
     pub(crate) fn pose(&self) -> Result<Pose, Missing> {
         Ok(Pose {
             position_m: self.translation.ok_or(Missing("translation"))?.to_array(),

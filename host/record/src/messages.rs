@@ -1,0 +1,111 @@
+//! Ticks and changes as the messages of a recording, for those who carry them elsewhere than into a file.
+
+use crate::Change;
+use crate::schema::{Change as ChangeMessage, FrameTransform, Missing, Tick};
+use crate::trace::TickRecord;
+use prost::Message;
+
+/// Bytes that are no message of a recording, or not all of one.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no {message}: {reason}")]
+pub struct NoMessage {
+    message: &'static str,
+    reason: String,
+}
+
+/// Makes the two messages of a tick. Keeps what all of them share.
+#[derive(Debug)]
+pub struct TickMessages {
+    pose: FrameTransform,
+}
+
+impl Default for TickMessages {
+    fn default() -> Self {
+        Self { pose: FrameTransform::of_handle() }
+    }
+}
+
+impl TickMessages {
+    /// A `foxglove.FrameTransform` and a `flotor.Tick`: together all of a record, to the bit. Not real-time.
+    pub fn encode(&mut self, record: &TickRecord) -> (Vec<u8>, Vec<u8>) {
+        self.pose.set(record);
+        (self.pose.encode_to_vec(), Tick::new(record).encode_to_vec())
+    }
+}
+
+/// The record of a tick from its two messages. Not real-time.
+///
+/// # Errors
+/// [`NoMessage`]: they are none, lack something, or are of two different ticks.
+pub fn tick_from_messages(pose: &[u8], tick: &[u8]) -> Result<TickRecord, NoMessage> {
+    let wrong = |message: &'static str| move |reason: String| NoMessage { message, reason };
+    let lacks = |Missing(part)| format!("it has no `{part}`");
+    let of_pose = wrong("foxglove.FrameTransform");
+    let of_tick = wrong("flotor.Tick");
+    let transform = FrameTransform::decode(pose).map_err(|cause| of_pose(cause.to_string()))?;
+    let tick = Tick::decode(tick).map_err(|cause| of_tick(cause.to_string()))?;
+    let record = tick.record(transform.pose().map_err(|part| of_pose(lacks(part)))?);
+    let record = record.map_err(|part| of_tick(lacks(part)))?;
+    if !transform.is_of(&record) {
+        return Err(of_pose("it is of another time than the tick".to_owned()));
+    }
+    Ok(record)
+}
+
+impl Change {
+    /// As the protobuf message `flotor.Change`, which has no time of its own. Not real-time.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        ChangeMessage::new(self).encode_to_vec()
+    }
+
+    /// From a protobuf message `flotor.Change` of this time. Not real-time.
+    ///
+    /// # Errors
+    /// [`NoMessage`]: it is none, or lacks something.
+    pub fn from_bytes(bytes: &[u8], time_ns: u64) -> Result<Self, NoMessage> {
+        let wrong = |reason: String| NoMessage { message: "flotor.Change", reason };
+        let message = ChangeMessage::decode(bytes).map_err(|cause| wrong(cause.to_string()))?;
+        message.change(time_ns).map_err(|Missing(part)| wrong(format!("it has no `{part}`")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trace::RECORD_WORDS;
+    use flotor_sync::Words;
+
+    /// A record in which every word is another number.
+    fn record(seed: u64) -> TickRecord {
+        TickRecord::from_words(&std::array::from_fn(|i| match i {
+            0..=2 => seed + i as u64,
+            i => (seed as f64 * 0.1 - i as f64).to_bits() & 0xffff_ffff_ffff,
+        }))
+    }
+
+    #[test]
+    fn a_tick_survives_to_the_bit() {
+        let mut messages = TickMessages::default();
+        for seed in 0..100 {
+            let record = record(seed);
+            let (pose, tick) = messages.encode(&record);
+            let back = tick_from_messages(&pose, &tick).unwrap();
+            assert_eq!(back.to_words(), record.to_words());
+        }
+        assert_eq!(RECORD_WORDS, 39);
+    }
+
+    #[test]
+    fn halves_of_two_ticks_are_no_tick() {
+        let mut messages = TickMessages::default();
+        let (pose, tick) = messages.encode(&record(1));
+        let (other, _) = messages.encode(&record(2));
+        assert!(tick_from_messages(&other, &tick).is_err());
+        assert!(tick_from_messages(&[], &tick).is_err(), "no pose at all");
+        assert!(tick_from_messages(&pose, &[]).is_err(), "no tick at all");
+        for cut in 0..tick.len() {
+            let _ = tick_from_messages(&pose, &tick[..cut]); // an error or a record, no panic
+        }
+    }
+}
