@@ -50,3 +50,9 @@ wheel() {
     cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target
     FLOTOR=target/release/flotor FLOTOR_SWEEP=target/release/flotor-sweep target/venv/bin/python -m pytest -q host/python
 }
+
+# The bridge: messages to the bit, who may do what, what is refused, over loopback. Full size is a minute at 1 kHz.
+bridge() {
+    FLOTOR_TEST_SIZE=full cargo test --release --manifest-path host/bridge/Cargo.toml --target-dir target/bridge
+    cargo clippy --release --all-targets --manifest-path host/bridge/Cargo.toml --target-dir target/bridge -- -D warnings
+}

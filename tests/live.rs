@@ -1,13 +1,15 @@
 //! Another program watches a run and talks to it; whatever it does, the run is the same.
 
-use flotor::live::Publication;
+use flotor::live::{Announcement, Handles};
 use flotor::record::{Change, TraceDigest};
 use flotor::run_description::describe;
 use flotor::scene::Scene;
 use flotor::servo::{Clock, EmergencySource, StopSwitch};
 use flotor::session::{Observer, Outcome, RunEnd, RunOptions, Session};
 use flotor::trace::{RECORD_WORDS, TickRecord};
-use flotor_live::{Answer, Ask, Client, Directory, Event, LiveError, Outcome as ChangeOutcome, SetValue};
+use flotor_live::{
+    Answer, Ask, Client, Directory, Event, LiveError, Outcome as ChangeOutcome, Publication, SetValue,
+};
 use flotor_sync::Words;
 use flotor_tests::TestSize;
 use flotor_tests::program::{Flotor, exit_code};
@@ -48,8 +50,10 @@ impl Observer for Published<'_> {
 fn publish(session: &Session, directory: &Directory, stop: &StopSwitch) -> Publication {
     let scene = Scene::parse(Path::new("scene.toml"), SCENE).expect("the scene is right");
     let run = describe(&scene, &RunOptions { clock: Clock::Virtual, seed: 1 }, session.plugins());
-    let handles = (session.controls(), stop.clone());
-    let opened = Publication::open(directory, "Test", &run, session.plugins(), session.limits(), handles);
+    let announcement =
+        Announcement { title: "Test", run: &run, plugins: session.plugins(), limits: session.limits() };
+    let handles = Handles { controls: session.controls(), stop: stop.clone() };
+    let opened = flotor::live::publish(directory, announcement, handles);
     opened.expect("a scratch folder takes a socket")
 }
 

@@ -1,7 +1,7 @@
 //! Watching a running host, and talking to it, from another program on the same machine: viewer, bridges, scripts.
 //!
 //! A running host listens on a Unix socket in a folder that only its user may enter ([`Directory`]); whoever may open
-//! the socket may watch and change the run, and nobody else. [`Client`] is the other end:
+//! the socket may watch and change the run, and nobody else. [`Publication`] is the host's end, [`Client`] the other:
 //!
 //! ```no_run
 //! use flotor_live::{Ask, Client, Directory, Event};
@@ -48,6 +48,7 @@ mod client;
 mod directory;
 mod frame;
 mod message;
+mod server;
 
 pub use client::{Asker, Client, Event, LiveError};
 pub use directory::{Directory, DirectoryError, Found, Listener};
@@ -56,6 +57,7 @@ pub use message::{
     Answer, Ask, ChangeMessage, End, Greeting, Outcome, PanelParameter, PanelPlugin, ParameterShape, Request,
     SetValue, Subject, WrenchLimits,
 };
+pub use server::{Publication, PublishError, Serve};
 
 /// Version of what is said over the socket.
 pub const PROTOCOL: u32 = 1;

@@ -87,6 +87,20 @@ pub enum ParameterShape {
     File,
 }
 
+impl Greeting {
+    /// Keeps the values in force up to date, for those who come later.
+    pub fn keep(&mut self, change: &ChangeMessage) {
+        if change.outcome != Outcome::Applied || change.subject != Subject::Parameter {
+            return;
+        }
+        let plugin = self.plugins.iter_mut().find(|plugin| plugin.name == change.plugin);
+        let parameters = plugin.into_iter().flat_map(|plugin| &mut plugin.parameters);
+        for parameter in parameters.filter(|parameter| parameter.id == change.parameter) {
+            parameter.value.clone_from(&change.value);
+        }
+    }
+}
+
 impl PanelPlugin {
     /// Of a schema, with the values in force.
     #[must_use]
@@ -248,6 +262,24 @@ pub enum Outcome {
     Refused,
     /// The plugin panicked over it.
     Broke,
+}
+
+impl From<&ChangeMessage> for Change {
+    fn from(message: &ChangeMessage) -> Self {
+        let ChangeMessage { tick, time_ns, plugin, subject, parameter, value, number, outcome, settings } =
+            message.clone();
+        let subject = match subject {
+            Subject::Parameter => ChangeSubject::Parameter,
+            Subject::Weight => ChangeSubject::Weight,
+            Subject::Plugin => ChangeSubject::Plugin,
+        };
+        let outcome = match outcome {
+            Outcome::Applied => ChangeOutcome::Applied,
+            Outcome::Refused => ChangeOutcome::Refused,
+            Outcome::Broke => ChangeOutcome::Broke,
+        };
+        Self { tick, time_ns, plugin, subject, parameter, value, number, settings, outcome }
+    }
 }
 
 impl From<&Change> for ChangeMessage {

@@ -9,6 +9,7 @@ macro_rules! say {
 
 mod analyse;
 mod bench;
+mod bridge;
 mod calibrate;
 mod companion;
 mod doctor;
@@ -18,6 +19,7 @@ mod jitter;
 mod new;
 mod options;
 mod plugins;
+mod record;
 mod replay;
 mod run;
 mod stability;
@@ -75,6 +77,10 @@ enum Command {
     Bench(bench::BenchArguments),
     /// Score the numerical stability of a force model
     Stress(stress::StressArguments),
+    /// Record a run that is on, from now to its end
+    Record(record::RecordArguments),
+    /// Put a running host on a network, or bring one from there to this machine
+    Bridge(bridge::BridgeArguments),
     /// Sweep a model or a scene over parameters, poses and seeds into a Parquet table
     Sweep(sweep::SweepArguments),
     /// Carry out a perception experiment
@@ -240,6 +246,8 @@ pub fn main() -> ExitCode {
         Some(Command::Stability(arguments)) => stability::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),
         Some(Command::Stress(arguments)) => stress::run(&arguments),
+        Some(Command::Record(arguments)) => record::run(&arguments),
+        Some(Command::Bridge(arguments)) => bridge::run(&arguments),
         Some(Command::Sweep(arguments)) => sweep::run(&arguments),
         Some(Command::Study(arguments)) => study::run(&arguments),
         Some(Command::Analyse(arguments)) => analyse::run(&arguments),

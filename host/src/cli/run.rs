@@ -3,7 +3,7 @@
 use super::options::{ClockOption, PluginKeyValue, duration_s, rate_hz};
 use super::stopping::{Keys, stop_on_signals};
 use super::{CommandError, style};
-use crate::live::Publication;
+use crate::live::{Announcement, Handles, publish};
 use crate::record::{Change, RecordError, Recorder, TraceDigest};
 use crate::registry::Registry;
 use crate::report::{RunFacts, RunSummary, Tally};
@@ -14,7 +14,7 @@ use crate::servo::Clock;
 use crate::session::{Observer, Outcome, RunEnd, RunError, RunOptions, Session};
 use crate::trace::TickRecord;
 use clap::Args;
-use flotor_live::Directory;
+use flotor_live::{Directory, Publication};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::path::PathBuf;
 
@@ -66,15 +66,10 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let session = Session::prepare(&scene, &registry, &options)?;
     let plugins = session.plugins().to_vec();
     let description = describe(&scene, &options, &plugins);
-    let handles = (session.controls(), stop.clone());
-    let publication = Publication::open(
-        &Directory::of_this_user(),
-        &scene.title,
-        &description,
-        &plugins,
-        session.limits(),
-        handles,
-    );
+    let announcement =
+        Announcement { title: &scene.title, run: &description, plugins: &plugins, limits: session.limits() };
+    let handles = Handles { controls: session.controls(), stop: stop.clone() };
+    let publication = publish(&Directory::of_this_user(), announcement, handles);
     let publication =
         publication.map_err(|error| eprintln!("{} nobody can watch: {error}", style::warning("note:"))).ok();
 

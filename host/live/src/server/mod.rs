@@ -1,25 +1,19 @@
-//! The running host, for other programs on this machine to watch and change: viewer, bridges, scripts.
+//! The serving end: lets other programs on this machine watch a run and ask for changes.
 //!
 //! ```text
-//!  servo -> ring -> observers -> Publication::observe -> outbox of each watcher -> its writer thread -> socket
-//!                                  socket -> its reader thread -> Controls, StopSwitch -> servo, at a tick boundary
+//!  Publication::observe -> outbox of each watcher -> its writer thread -> socket -> watcher
+//!  Serve::serve         <-                           its reader thread <- socket <- watcher
 //! ```
 //!
-//! What is said over the socket, and a client for it, are the crate `flotor_live`. Nothing here runs on the servo's thread,
-//! and nothing the servo's observers do here waits: an outbox that is full drops what is new and counts it. While nobody
-//! watches, a tick costs one look at a number. Not real-time.
+//! Nothing here makes the caller wait: an outbox that is full drops what is new and counts it. While nobody watches, a tick
+//! costs one look at a number. Not real-time.
 
-mod greeting;
 mod outbox;
 mod watcher;
 
-use crate::record::{Change, RunDescription};
-use crate::servo::StopSwitch;
-use crate::session::{Controls, PluginReport};
-use crate::trace::TickRecord;
-use flotor_live::{
-    ChangeMessage, Directory, DirectoryError, End, Greeting, Kind, Listener, WrenchLimits, frame,
-};
+use crate::{Ask, ChangeMessage, Directory, DirectoryError, End, Greeting, Kind, Listener, frame};
+use flotor_record::trace::TickRecord;
+use flotor_record::{Change, RunDescription};
 use outbox::Outbox;
 use std::io::{self, ErrorKind};
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -49,6 +43,16 @@ pub enum PublishError {
     Thread(#[from] io::Error),
 }
 
+/// Who does what watchers ask for: the host itself, or somebody who carries it there.
+pub trait Serve: Send + Sync {
+    /// Does it, or passes it on; called from the thread of the watcher, who alone waits for it. Watching itself is never asked
+    /// of it.
+    ///
+    /// # Errors
+    /// Why not, in words for people.
+    fn serve(&self, ask: Ask) -> Result<(), String>;
+}
+
 /// A run that others may watch; over when dropped.
 pub struct Publication {
     shared: Arc<Shared>,
@@ -63,32 +67,28 @@ struct Shared {
     watching: AtomicUsize,
     greeting: Mutex<Greeting>,
     run: Vec<u8>,
-    controls: Controls,
-    stop: StopSwitch,
+    host: Arc<dyn Serve>,
     is_over: AtomicBool,
 }
 
 impl Publication {
-    /// Lets a prepared run be found and watched.
+    /// Lets a run be found and watched.
     ///
     /// # Errors
     /// [`PublishError`]; the run goes on without.
     pub fn open(
         directory: &Directory,
-        title: &str,
+        greeting: Greeting,
         run: &RunDescription,
-        plugins: &[PluginReport],
-        limits: WrenchLimits,
-        (controls, stop): (Controls, StopSwitch),
+        host: Arc<dyn Serve>,
     ) -> Result<Self, PublishError> {
         let listener = directory.listen()?;
         let shared = Arc::new(Shared {
             watchers: Mutex::default(),
             watching: AtomicUsize::new(0),
-            greeting: Mutex::new(greeting::greeting(title, plugins, limits)),
+            greeting: Mutex::new(greeting),
             run: run.to_bytes(),
-            controls,
-            stop,
+            host,
             is_over: AtomicBool::new(false),
         });
         let (socket, for_acceptor) = (listener.socket().try_clone()?, Arc::clone(&shared));
@@ -115,7 +115,7 @@ impl Publication {
     /// A parameter that changed, before the tick that saw it first. Does not wait for anybody.
     pub fn change(&self, change: &Change) {
         let message = ChangeMessage::from(change);
-        greeting::keep(&mut self.shared.greeting(), &message);
+        self.shared.greeting().keep(&message);
         let Ok(payload) = serde_json::to_vec(&message) else { return };
         let bytes = frame(Kind::Change, &payload);
         self.shared.watchers().iter().for_each(|watcher| watcher.outbox.news(bytes.clone()));

@@ -2,8 +2,7 @@
 
 use super::outbox::Outbox;
 use super::{Shared, thread};
-use crate::session::NewValue;
-use flotor_live::{Answer, Ask, Frames, Kind, Request, frame};
+use crate::{Answer, Ask, Frames, Kind, Request, frame};
 use std::io::{ErrorKind, Write};
 use std::net::Shutdown;
 use std::os::unix::net::UnixStream;
@@ -140,18 +139,7 @@ fn carry_out(ask: Ask, outbox: &Outbox, shared: &Shared) -> Result<(), String> {
             outbox.want_ticks(0);
             shared.count(&shared.watchers());
         }
-        Ask::Set { values } => {
-            let values: Vec<NewValue<'_>> = values
-                .iter()
-                .map(|new| NewValue { plugin: &new.plugin, parameter: &new.parameter, value: &new.value })
-                .collect();
-            shared.controls.set_parameters(&values).map_err(|error| error.to_string())?;
-        }
-        Ask::Weight { model, weight } => {
-            shared.controls.set_weight(&model, weight).map_err(|error| error.to_string())?;
-        }
-        Ask::Stop => shared.stop.stop(),
-        Ask::EmergencyStop => shared.stop.emergency_by_watcher(),
+        asked => shared.host.serve(asked)?,
     }
     Ok(())
 }

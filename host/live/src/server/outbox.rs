@@ -1,7 +1,7 @@
 //! What waits to be sent to one watcher: a queue of fixed length that drops and counts.
 
-use crate::trace::{Events, TickRecord};
-use flotor_live::{Kind, frame, ticks_to_payload};
+use crate::{Kind, frame, ticks_to_payload};
+use flotor_record::trace::{Events, TickRecord};
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
@@ -16,10 +16,20 @@ pub(super) struct Outbox {
     changed: Condvar,
 }
 
+/// One thing to be sent.
+#[allow(clippy::large_enum_variant)] // nearly all are ticks: a box for each would be an allocation a tick
+enum Waiting {
+    Tick(TickRecord),
+    /// A frame of any other kind.
+    News(Vec<u8>),
+}
+
 #[derive(Default)]
 struct State {
-    news: VecDeque<Vec<u8>>,
-    ticks: VecDeque<TickRecord>,
+    /// In the order in which it came: a change goes out before the tick that saw it first, and after the one before.
+    waiting: VecDeque<Waiting>,
+    ticks: usize,
+    news: usize,
     dropped: u64,
     /// What goes out after everything else.
     last: Option<Vec<u8>>,
@@ -39,7 +49,7 @@ impl Outbox {
     pub(super) fn want_ticks(&self, every: u32) {
         let mut state = self.lock();
         state.every = every;
-        state.ticks.reserve_exact(if every == 0 { 0 } else { MOST_TICKS });
+        state.waiting.reserve_exact(if every == 0 { 0 } else { MOST_TICKS });
     }
 
     pub(super) fn wants_ticks(&self) -> bool {
@@ -56,12 +66,13 @@ impl Outbox {
         if !record.tick.is_multiple_of(u64::from(state.every)) {
             return;
         }
-        if state.ticks.len() >= MOST_TICKS {
+        if state.ticks >= MOST_TICKS {
             state.dropped += 1;
             return;
         }
         let events = std::mem::take(&mut state.passed);
-        state.ticks.push_back(TickRecord { events, ..*record });
+        state.waiting.push_back(Waiting::Tick(TickRecord { events, ..*record }));
+        state.ticks += 1;
         drop(state);
         self.changed.notify_one();
     }
@@ -69,8 +80,9 @@ impl Outbox {
     /// A frame that is no tick, if there is room.
     pub(super) fn news(&self, frame: Vec<u8>) {
         let mut state = self.lock();
-        if state.news.len() < MOST_NEWS && !state.is_closed {
-            state.news.push_back(frame);
+        if state.news < MOST_NEWS && !state.is_closed {
+            state.waiting.push_back(Waiting::News(frame));
+            state.news += 1;
         }
         drop(state);
         self.changed.notify_one();
@@ -99,32 +111,74 @@ impl Outbox {
 
     /// Waits for something to send, and takes all of it; `None` when closed and empty.
     pub(super) fn take(&self) -> Option<Vec<u8>> {
-        /// Ticks in a frame.
-        const MOST_IN_A_FRAME: usize = 1024;
         let mut state = self.lock();
-        while state.news.is_empty() && state.ticks.is_empty() {
+        while state.waiting.is_empty() {
             if state.is_closed {
                 return state.last.take();
             }
             state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
-        let mut bytes: Vec<u8> = state.news.drain(..).flatten().collect();
-        // Ticks are dropped only while some wait, so the number goes out with those.
-        let dropped = state.dropped;
-        let ticks: Vec<TickRecord> = state.ticks.drain(..).collect();
+        let mut batch = Batch::new(state.dropped);
+        let all: Vec<Waiting> = state.waiting.drain(..).collect();
+        (state.ticks, state.news) = (0, 0);
+        // Whoever brings the next tick does not wait for this one to be written down.
         drop(state);
-        for some in ticks.chunks(MOST_IN_A_FRAME) {
-            bytes.extend(frame(Kind::Ticks, &ticks_to_payload(dropped, some.iter())));
+        for waiting in all {
+            match waiting {
+                Waiting::Tick(record) => batch.tick(record),
+                Waiting::News(frame) => batch.news(&frame),
+            }
         }
-        Some(bytes)
+        Some(batch.finish())
+    }
+}
+
+/// Frames being put together: ticks share one for as long as nothing else comes between them.
+struct Batch {
+    bytes: Vec<u8>,
+    ticks: Vec<TickRecord>,
+    dropped: u64,
+}
+
+impl Batch {
+    /// Ticks in a frame.
+    const MOST_IN_A_FRAME: usize = 1024;
+
+    fn new(dropped: u64) -> Self {
+        Self { bytes: Vec::new(), ticks: Vec::new(), dropped }
+    }
+
+    fn tick(&mut self, record: TickRecord) {
+        self.ticks.push(record);
+        if self.ticks.len() >= Self::MOST_IN_A_FRAME {
+            self.close_frame();
+        }
+    }
+
+    fn news(&mut self, frame: &[u8]) {
+        self.close_frame();
+        self.bytes.extend(frame);
+    }
+
+    fn close_frame(&mut self) {
+        if !self.ticks.is_empty() {
+            let payload = ticks_to_payload(self.dropped, self.ticks.iter());
+            self.bytes.extend(frame(Kind::Ticks, &payload));
+            self.ticks.clear();
+        }
+    }
+
+    fn finish(mut self) -> Vec<u8> {
+        self.close_frame();
+        self.bytes
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trace::RECORD_WORDS;
-    use flotor_live::{Frames, ticks_from_payload};
+    use crate::{Frames, ticks_from_payload};
+    use flotor_record::trace::RECORD_WORDS;
     use flotor_sync::Words;
 
     fn record(tick: u64, events: Events) -> TickRecord {
@@ -172,5 +226,23 @@ mod tests {
         let (_, records) = taken(&outbox);
         let seen: Vec<_> = records.iter().map(|record| (record.tick, record.events)).collect();
         assert_eq!(seen, [(0, Events::NONE), (10, Events::BOUNDARY)]);
+    }
+
+    #[test]
+    fn a_change_stays_between_the_ticks_it_came_between() {
+        let outbox = Outbox::default();
+        outbox.want_ticks(1);
+        outbox.tick(&record(0, Events::NONE));
+        outbox.tick(&record(1, Events::NONE));
+        outbox.news(frame(Kind::Change, b"{}"));
+        outbox.tick(&record(2, Events::NONE));
+        let mut frames = Frames::default();
+        frames.push(&outbox.take().expect("something waits"));
+        let mut seen = Vec::new();
+        while let Some((kind, payload)) = frames.take().expect("frames of our own") {
+            let ticks = if kind == Kind::Ticks { ticks_from_payload(payload).1.len() } else { 0 };
+            seen.push((kind, ticks));
+        }
+        assert_eq!(seen, [(Kind::Ticks, 2), (Kind::Change, 0), (Kind::Ticks, 1)]);
     }
 }

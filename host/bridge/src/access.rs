@@ -1,0 +1,204 @@
+//! Keys and access control: one command makes a network of which every member is known and may do what it may.
+
+use crate::keys::{Name, ROOT};
+use crate::wish::Right;
+use rcgen::{
+    BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair,
+    KeyUsagePurpose,
+};
+use serde_json::{Value, json};
+use std::fs::OpenOptions;
+use std::io::{self, Write};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+
+/// Who is to be a member.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Members {
+    /// Names or addresses under which the bridge is reached.
+    pub hosts: Vec<String>,
+    /// Who may do what. Names of people or machines, each once.
+    pub peers: Vec<(Name, Right)>,
+}
+
+/// Why there are no keys.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum AccessError {
+    /// A file could not be made.
+    #[error("{}: {cause}; keys are written once, into a folder you may write to", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        #[source]
+        cause: io::Error,
+    },
+    /// Two members of one name, or one of a name that is taken.
+    #[error("`{0}` is there twice: a peer has one right, and `bridge` and `authority` are taken")]
+    Twice(Name),
+    /// A certificate could not be made.
+    #[error("no certificate: {0}")]
+    Certificate(#[from] rcgen::Error),
+}
+
+/// The bridge's own name among the files.
+const BRIDGE: &str = "bridge";
+/// The name of who vouches for all.
+const AUTHORITY: &str = "authority";
+
+/// Writes certificates, keys and one Zenoh configuration for the bridge and each member; the configurations written.
+///
+/// # Errors
+/// [`AccessError`]; no file is ever replaced.
+pub fn write_keys(folder: &Path, members: &Members) -> Result<Vec<PathBuf>, AccessError> {
+    for (at, (name, _)) in members.peers.iter().enumerate() {
+        let before = members.peers.iter().take(at).any(|(other, _)| other == name);
+        if before || [BRIDGE, AUTHORITY].contains(&name.to_string().as_str()) {
+            return Err(AccessError::Twice(name.clone()));
+        }
+    }
+    std::fs::create_dir_all(folder).map_err(|cause| AccessError::File { path: folder.into(), cause })?;
+    let folder = folder.canonicalize().map_err(|cause| AccessError::File { path: folder.into(), cause })?;
+    let authority = authority()?;
+    write(&folder.join(format!("{AUTHORITY}.pem")), &authority.1, Readers::All)?;
+    let certify = |name: &str, hosts: &[String]| -> Result<(), AccessError> {
+        let key = KeyPair::generate()?;
+        let certificate = member(name, hosts)?.signed_by(&key, &authority.0)?;
+        write(&folder.join(format!("{name}.pem")), &certificate.pem(), Readers::All)?;
+        write(&folder.join(format!("{name}.key")), &key.serialize_pem(), Readers::Owner)
+    };
+    certify(BRIDGE, &members.hosts)?;
+    let mut written = vec![folder.join(format!("{BRIDGE}.json5"))];
+    write_config(&written[0], &bridge_config(&folder, members))?;
+    for (name, _) in &members.peers {
+        let name = name.to_string();
+        certify(&name, std::slice::from_ref(&name))?;
+        let file = folder.join(format!("{name}.json5"));
+        write_config(&file, &peer_config(&folder, &name, &members.hosts))?;
+        written.push(file);
+    }
+    Ok(written)
+}
+
+/// Who vouches for all members, and the certificate by which they know it. Its key is thrown away: a new member means new keys
+/// for all, and nobody can ever add one secretly.
+fn authority() -> Result<(Issuer<'static, KeyPair>, String), AccessError> {
+    let mut parameters = CertificateParams::default();
+    parameters.distinguished_name.push(DnType::CommonName, format!("{ROOT} {AUTHORITY}"));
+    parameters.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
+    parameters.key_usages = vec![KeyUsagePurpose::KeyCertSign, KeyUsagePurpose::DigitalSignature];
+    let key = KeyPair::generate()?;
+    let certificate = parameters.self_signed(&key)?.pem();
+    Ok((Issuer::new(parameters, key), certificate))
+}
+
+fn member(name: &str, hosts: &[String]) -> Result<CertificateParams, AccessError> {
+    let mut parameters = CertificateParams::new(hosts)?;
+    parameters.distinguished_name.push(DnType::CommonName, name);
+    parameters.extended_key_usages =
+        vec![ExtendedKeyUsagePurpose::ServerAuth, ExtendedKeyUsagePurpose::ClientAuth];
+    parameters.key_usages = vec![KeyUsagePurpose::DigitalSignature];
+    Ok(parameters)
+}
+
+/// What a Zenoh configuration says of keys: both ends show theirs.
+fn tls(folder: &Path, name: &str) -> Value {
+    let file = |name: &str, kind: &str| folder.join(format!("{name}.{kind}")).display().to_string();
+    json!({
+        "enable_mtls": true,
+        "root_ca_certificate": file(AUTHORITY, "pem"),
+        "listen_certificate": file(name, "pem"),
+        "listen_private_key": file(name, "key"),
+        "connect_certificate": file(name, "pem"),
+        "connect_private_key": file(name, "key"),
+        "verify_name_on_connect": true,
+    })
+}
+
+fn bridge_config(folder: &Path, members: &Members) -> Value {
+    json!({
+        "mode": "peer",
+        "listen": { "endpoints": ["tls/0.0.0.0:7447"] },
+        "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
+        "transport": { "link": { "protocols": ["tls"], "tls": tls(folder, BRIDGE) } },
+        "access_control": access_control(members),
+    })
+}
+
+fn peer_config(folder: &Path, name: &str, hosts: &[String]) -> Value {
+    let endpoints: Vec<String> = hosts.iter().map(|host| format!("tls/{host}:7447")).collect();
+    json!({
+        "mode": "client",
+        "connect": { "endpoints": endpoints },
+        "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
+        "transport": { "link": { "protocols": ["tls"], "tls": tls(folder, name) } },
+    })
+}
+
+/// Nobody may do anything, but: the bridge tells everybody, members may listen and ask by their rights.
+fn access_control(members: &Members) -> Value {
+    let rule = |id: &str, flow: &str, messages: Value, keys: Vec<String>| json!({ "id": id, "permission": "allow", "flows": [flow], "messages": messages, "key_exprs": keys });
+    let of_any = |keys: &[&str]| keys.iter().map(|key| format!("{ROOT}/*/{key}")).collect::<Vec<_>>();
+    let mut rules = vec![
+        rule(
+            "tell",
+            "egress",
+            json!(["put", "reply", "declare_queryable", "liveliness_token"]),
+            vec![format!("{ROOT}/**")],
+        ),
+        rule(
+            "listen",
+            "ingress",
+            json!(["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query", "query"]),
+            of_any(&["*"]),
+        ),
+    ];
+    for right in Right::ALL {
+        rules.push(rule(word(right), "ingress", json!(["query"]), of_any(right.keys())));
+    }
+    let subjects: Vec<Value> = members
+        .peers
+        .iter()
+        .map(|(name, _)| json!({ "id": name.to_string(), "cert_common_names": [name.to_string()] }))
+        .collect();
+    let policies: Vec<Value> = members
+        .peers
+        .iter()
+        .map(|(name, right)| {
+            let mut allowed = vec!["tell", "listen"];
+            allowed.extend(Right::ALL.into_iter().filter(|other| other <= right).map(word));
+            json!({ "rules": allowed, "subjects": [name.to_string()] })
+        })
+        .collect();
+    json!({ "enabled": true, "default_permission": "deny", "rules": rules, "subjects": subjects, "policies": policies })
+}
+
+const fn word(right: Right) -> &'static str {
+    match right {
+        Right::Watch => "watch",
+        Right::Operate => "operate",
+        Right::Own => "own",
+    }
+}
+
+/// Who may read a file.
+#[derive(Clone, Copy)]
+enum Readers {
+    All,
+    Owner,
+}
+
+fn write_config(path: &Path, config: &Value) -> Result<(), AccessError> {
+    write(path, &format!("{config:#}\n"), Readers::All)
+}
+
+fn write(path: &Path, text: &str, readers: Readers) -> Result<(), AccessError> {
+    let mode = match readers {
+        Readers::All => 0o644,
+        Readers::Owner => 0o600,
+    };
+    let file = OpenOptions::new().write(true).create_new(true).mode(mode).open(path);
+    file.and_then(|mut file| file.write_all(text.as_bytes()))
+        .map_err(|cause| AccessError::File { path: path.into(), cause })
+}

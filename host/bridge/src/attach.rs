@@ -1,0 +1,71 @@
+//! A remote run as if it ran here: the viewer and everything else that watches runs of this machine sees it.
+
+use crate::link::LinkError;
+use crate::remote::{Errand, Remote, Told};
+use crate::wish::Wish;
+use flotor_live::{Ask, Directory, Publication, PublishError, Serve};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// How long to wait for news before looking whether to stop.
+const LOOK_PERIOD: Duration = Duration::from_millis(100);
+
+/// Why a remote run does not appear here.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum AttachError {
+    /// The network.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// This machine.
+    #[error(transparent)]
+    Publish(#[from] PublishError),
+}
+
+impl Serve for Errand {
+    /// Carries the request to the remote host, and its answer back.
+    fn serve(&self, ask: Ask) -> Result<(), String> {
+        Wish::of_ask(ask).map_or(Ok(()), |wish| self.run(wish))
+    }
+}
+
+/// Shows one remote run after the other here until told to stop. `tell` gets a line for people when something changes.
+///
+/// # Errors
+/// [`AttachError`].
+pub fn attach(
+    remote: &Remote,
+    directory: &Directory,
+    stop: &AtomicBool,
+    tell: &mut dyn FnMut(&str),
+) -> Result<(), AttachError> {
+    while let Some((greeting, run)) = remote.wait_for_run(stop)? {
+        let title = greeting.title.clone();
+        let publication = Publication::open(directory, greeting, &run, Arc::new(remote.errand()))?;
+        tell(&format!("`{title}` is at {}; `flotor view` shows it", publication.path().display()));
+        let lost_before = remote.lost();
+        let words = show(remote, &publication, stop);
+        let lost = remote.lost() - lost_before;
+        tell(&match lost {
+            0 => words.clone(),
+            lost => format!("{words}; {lost} ticks were lost on the way"),
+        });
+        publication.end(&words);
+    }
+    Ok(())
+}
+
+/// Shows one run; how it ended.
+fn show(remote: &Remote, publication: &Publication, stop: &AtomicBool) -> String {
+    while !stop.load(Ordering::Relaxed) {
+        match remote.next(LOOK_PERIOD) {
+            None => {}
+            Some(Told::Tick(record)) => publication.observe(&record),
+            Some(Told::Change(change)) => publication.change(&change),
+            Some(Told::End(end)) => return end.words,
+            Some(Told::Gone) => return "the bridge cannot be seen any more".to_owned(),
+        }
+    }
+    "stopped watching".to_owned()
+}

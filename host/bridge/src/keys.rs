@@ -1,0 +1,98 @@
+//! What is where on the network.
+//!
+//! | key | what | how |
+//! |---|---|---|
+//! | `flotor/NAME/alive` | a bridge is there | liveliness token |
+//! | `flotor/NAME/status` | JSON [`crate::status::Status`] | published when it changes, and for who asks |
+//! | `flotor/NAME/greeting` | JSON [`flotor_live::Greeting`]: plugins, parameters, limits | for who asks |
+//! | `flotor/NAME/run` | protobuf `flotor.Run` | for who asks: late joiners miss nothing they need |
+//! | `flotor/NAME/tf` | protobuf `foxglove.FrameTransform` | published, one a tick |
+//! | `flotor/NAME/tick` | protobuf `flotor.Tick` | published, one a tick, after its pose |
+//! | `flotor/NAME/change` | protobuf `flotor.Change` | published |
+//! | `flotor/NAME/end` | JSON [`flotor_live::End`] | published |
+//! | `flotor/NAME/ask/...` | JSON [`crate::wish::Letter`] | a request, answered |
+//!
+//! The messages are those of a recording. What may be asked for is one key for each right, so that Zenoh's access control
+//! decides who has it: see [`crate::wish::Wish::key`].
+
+use std::fmt;
+
+/// All that this program puts on a network.
+pub const ROOT: &str = "flotor";
+
+/// What the others call a bridge: a part of a key.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Name(String);
+
+/// A text that is no name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is no name: letters a to z, digits and hyphens, at most 40")]
+pub struct NoName(String);
+
+impl Name {
+    /// Checks a name.
+    ///
+    /// # Errors
+    /// [`NoName`].
+    pub fn new(text: &str) -> Result<Self, NoName> {
+        let legal = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+        match text.len() {
+            1..=40 if text.chars().all(legal) => Ok(Self(text.to_owned())),
+            _ => Err(NoName(text.to_owned())),
+        }
+    }
+
+    /// The name of this machine, as far as it can be one.
+    #[must_use]
+    pub fn of_this_machine() -> Self {
+        let system = rustix::system::uname();
+        let host = system.nodename().to_string_lossy().to_lowercase();
+        let text: String =
+            host.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(40).collect();
+        Self::new(&text).unwrap_or_else(|_| Self("host".to_owned()))
+    }
+
+    /// A key of this bridge.
+    #[must_use]
+    pub fn key(&self, what: &str) -> String {
+        format!("{ROOT}/{self}/{what}")
+    }
+
+    /// The bridge a key belongs to.
+    #[must_use]
+    pub fn of_key(key: &str) -> Option<Self> {
+        let name = key.strip_prefix(ROOT)?.strip_prefix('/')?.split('/').next()?;
+        Self::new(name).ok()
+    }
+}
+
+impl fmt::Display for Name {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.pad(&self.0)
+    }
+}
+
+impl std::str::FromStr for Name {
+    type Err = NoName;
+
+    /// `NAME`, or `zenoh/NAME` as the other commands write it.
+    fn from_str(text: &str) -> Result<Self, NoName> {
+        Self::new(text.strip_prefix("zenoh/").unwrap_or(text))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_one_part_of_a_key() {
+        let name: Name = "zenoh/lab-2".parse().unwrap();
+        assert_eq!(name.key("tick"), "flotor/lab-2/tick");
+        assert_eq!(Name::of_key("flotor/lab-2/ask/set"), Some(name));
+        for wrong in ["", "a/b", "*", "Lab", "$", "a b", &"x".repeat(41)] {
+            assert_eq!(Name::new(wrong), Err(NoName(wrong.to_owned())));
+        }
+        assert_eq!(Name::of_key("other/lab-2/tick"), None);
+    }
+}

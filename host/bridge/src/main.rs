@@ -1,0 +1,251 @@
+//! `flotor bridge`: a running host on a network.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use flotor_bridge::access::{Members, write_keys};
+use flotor_bridge::attach::attach;
+use flotor_bridge::keep::keep;
+use flotor_bridge::keys::Name;
+use flotor_bridge::link::{End, LinkError, LinkOptions, open};
+use flotor_bridge::remote::{Remote, bridges};
+use flotor_bridge::serve::{Launcher, Service, serve};
+use flotor_bridge::wish::{Right, Wish};
+use flotor_live::{Directory, SetValue};
+use std::error::Error;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// Put a running host on a network (Zenoh), or bring one from there to this machine
+#[derive(Parser)]
+#[command(
+    name = "flotor bridge",
+    version,
+    subcommand_required = true,
+    after_help = "Without --config, only this machine is reached: a bridge listens on tcp/127.0.0.1:7447, and visitors go there.\n\
+    For more machines, `flotor bridge keys` writes keys and configurations; without keys, do not leave the machine.\n\n\
+    Examples:\n  \
+    flotor bridge serve --name lab                        whatever runs here, for others to see\n  \
+    flotor bridge list                                    who is there\n  \
+    flotor bridge attach lab                              then `flotor view` shows it here\n  \
+    flotor bridge record lab run.mcap\n  \
+    flotor bridge ask lab emergency-stop\n  \
+    flotor bridge keys keys --host lab.example.org --own ada --operate grace --watch alan\n  \
+    flotor bridge serve --name lab --config keys/bridge.json5 --allow own --scene scene.toml"
+)]
+struct Arguments {
+    #[command(flatten)]
+    link: LinkOptions,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Put whatever runs on this machine on the network, run after run
+    Serve(ServeArguments),
+    /// Show a remote run on this machine, where `flotor view` finds it
+    Attach {
+        /// The bridge
+        name: Name,
+    },
+    /// Record a remote run, from now to its end
+    Record {
+        /// The bridge
+        name: Name,
+        /// The recording
+        #[arg(value_name = "FILE.mcap")]
+        file: PathBuf,
+    },
+    /// Ask a remote run for something
+    Ask {
+        /// The bridge
+        name: Name,
+        #[command(subcommand)]
+        wish: WishArgument,
+    },
+    /// List the bridges that can be seen
+    List,
+    /// Write keys and configurations: who is a member of the network, and what each may do
+    Keys(KeysArguments),
+}
+
+#[derive(Args)]
+struct ServeArguments {
+    /// What others call this bridge (default: the machine's name)
+    #[arg(long)]
+    name: Option<Name>,
+    /// The most that may be asked for; who may is up to the network's access control
+    #[arg(long, value_enum, default_value = "watch")]
+    allow: Allow,
+    /// A scene that may be started from the network, with `--allow own`
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+    /// Put one tick in N on the network
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..))]
+    every: u32,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Allow {
+    /// See everything, press the emergency stop
+    Watch,
+    /// Also change parameters, end a run in order
+    Operate,
+    /// Also start the scene, take an emergency stop back
+    Own,
+}
+
+#[derive(Subcommand)]
+enum WishArgument {
+    /// No force at once; the run is over
+    EmergencyStop,
+    /// An orderly end: force fades out
+    Stop,
+    /// Change live parameters, all before the same tick
+    Set {
+        /// PLUGIN.KEY=VALUE
+        #[arg(required = true, value_name = "PLUGIN.KEY=VALUE", value_parser = set_value)]
+        values: Vec<SetValue>,
+    },
+    /// Change how much of a model is felt
+    Weight {
+        /// Its name in the scene
+        model: String,
+        /// 0 to 1
+        weight: f64,
+    },
+    /// Start the bridge's scene
+    Start,
+    /// Take an emergency stop back
+    Release,
+}
+
+#[derive(Args)]
+struct KeysArguments {
+    /// Folder for the files
+    folder: PathBuf,
+    /// Name or address under which the bridge is reached (repeatable)
+    #[arg(long = "host", required = true, value_name = "HOST")]
+    hosts: Vec<String>,
+    /// A member who may watch and press the emergency stop (repeatable)
+    #[arg(long, value_name = "NAME")]
+    watch: Vec<Name>,
+    /// A member who may also change parameters (repeatable)
+    #[arg(long, value_name = "NAME")]
+    operate: Vec<Name>,
+    /// A member who may also start runs and take an emergency stop back (repeatable)
+    #[arg(long, value_name = "NAME")]
+    own: Vec<Name>,
+}
+
+fn set_value(text: &str) -> Result<SetValue, String> {
+    let parts = text.split_once('=').and_then(|(key, value)| Some((key.split_once('.')?, value)));
+    let ((plugin, parameter), value) = parts.ok_or("PLUGIN.KEY=VALUE, such as spring.gamma_n=20")?;
+    Ok(SetValue { plugin: plugin.to_owned(), parameter: parameter.to_owned(), value: value.to_owned() })
+}
+
+/// Exit code of what the user has to change.
+const USAGE: u8 = 2;
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    match run(arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            let is_usage =
+                error.downcast_ref::<LinkError>().is_some_and(|e| matches!(e, LinkError::Config { .. }));
+            if is_usage { ExitCode::from(USAGE) } else { ExitCode::FAILURE }
+        }
+    }
+}
+
+fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
+    let Arguments { link, command } = arguments;
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        signal_hook::flag::register(signal, Arc::clone(&stop))?;
+    }
+    let directory = Directory::of_this_user();
+    let mut tell = |line: &str| eprintln!("{line}");
+    match command {
+        Command::Serve(serving) => {
+            let service = service(serving)?;
+            let session = open(&link, End::Serving)?;
+            tell(&format!("zenoh/{}: waiting for a run on this machine (Ctrl-C ends)", service.name));
+            serve(&session, &directory, service, &stop, &mut tell)?;
+        }
+        Command::Attach { name } => {
+            let remote = Remote::listen(&open(&link, End::Visiting)?, &name)?;
+            tell(&format!("waiting for a run of zenoh/{name} (Ctrl-C ends)"));
+            attach(&remote, &directory, &stop, &mut tell)?;
+        }
+        Command::Record { name, file } => {
+            let remote = Remote::listen(&open(&link, End::Visiting)?, &name)?;
+            tell(&format!("waiting for a run of zenoh/{name} (Ctrl-C ends)"));
+            let kept = keep(&remote, &file, &stop)?;
+            println!(
+                "{}: {} ticks, {} lost on the way; {}",
+                file.display(),
+                kept.ticks,
+                kept.lost,
+                kept.words
+            );
+        }
+        Command::Ask { name, wish } => {
+            let remote = Remote::listen(&open(&link, End::Visiting)?, &name)?;
+            // Most wishes are for the run that is on; the bridge knows without us when none is.
+            let status =
+                remote.status()?.ok_or(format!("zenoh/{name} cannot be seen; `flotor bridge list`"))?;
+            remote.mean(status.run);
+            remote.errand().run(wish.into())?;
+        }
+        Command::List => {
+            let session = open(&link, End::Visiting)?;
+            for name in bridges(&session)? {
+                let status = Remote::listen(&session, &name)?.status()?.unwrap_or_default();
+                println!("zenoh/{name:<20} {:<18} {}", status.state.word(), status.title);
+            }
+        }
+        Command::Keys(KeysArguments { folder, hosts, watch, operate, own }) => {
+            let with = |names: Vec<Name>, right| names.into_iter().map(move |name| (name, right));
+            let peers = with(watch, Right::Watch)
+                .chain(with(operate, Right::Operate))
+                .chain(with(own, Right::Own))
+                .collect();
+            for written in write_keys(&folder, &Members { hosts, peers })? {
+                println!("{}", written.display());
+            }
+            tell(
+                "Give each member its .json5, .pem and .key, and authority.pem; keep the .key files secret.",
+            );
+        }
+    }
+    Ok(())
+}
+
+fn service(arguments: ServeArguments) -> Result<Service, Box<dyn Error>> {
+    let ServeArguments { name, allow, scene, every } = arguments;
+    let program = std::env::current_exe()?.with_file_name(format!("flotor{}", std::env::consts::EXE_SUFFIX));
+    let allow = match allow {
+        Allow::Watch => Right::Watch,
+        Allow::Operate => Right::Operate,
+        Allow::Own => Right::Own,
+    };
+    let launcher = scene.map(|scene| Launcher::new(program, scene));
+    Ok(Service { name: name.unwrap_or_else(Name::of_this_machine), allow, every, launcher })
+}
+
+impl From<WishArgument> for Wish {
+    fn from(argument: WishArgument) -> Self {
+        match argument {
+            WishArgument::EmergencyStop => Wish::EmergencyStop,
+            WishArgument::Stop => Wish::Stop,
+            WishArgument::Set { values } => Wish::Set { values },
+            WishArgument::Weight { model, weight } => Wish::Weight { model, weight },
+            WishArgument::Start => Wish::Start,
+            WishArgument::Release => Wish::Release,
+        }
+    }
+}

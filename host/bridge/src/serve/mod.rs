@@ -1,0 +1,153 @@
+//! A bridge: puts what a running host publishes on the network, and carries requests back.
+//!
+//! ```text
+//!  host -> live socket -> relay -> tf, tick, change, end                    (only while somebody subscribes)
+//!  host <- live socket <- desk  <- ask/...   by letters that pass the gate  (only keys the bridge was told to open)
+//! ```
+//!
+//! The bridge is one of the host's watchers, in a process of its own: whatever happens to it, the host drops what the bridge does
+//! not take, counts it, and goes on.
+
+mod desk;
+mod launcher;
+mod station;
+
+pub use launcher::Launcher;
+
+use crate::keys::Name;
+use crate::link::LinkError;
+use crate::wish::Right;
+use desk::Desk;
+use flotor_live::{Ask, Client, Directory, Event, LiveError};
+use station::Station;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use zenoh::Session;
+
+/// How often a bridge without a run looks for one.
+const LOOK_PERIOD: Duration = Duration::from_millis(200);
+/// How often it is looked whether anybody subscribes, and told how the bridge is doing.
+const CHECK_PERIOD: Duration = Duration::from_millis(100);
+
+/// What a bridge is to do.
+#[derive(Debug)]
+pub struct Service {
+    /// What the others call it.
+    pub name: Name,
+    /// The most that may be asked for; who may is up to the network's access control.
+    pub allow: Right,
+    /// One tick in so many.
+    pub every: u32,
+    /// What may be started.
+    pub launcher: Option<Launcher>,
+}
+
+/// Serves until told to stop. `tell` gets a line for people when something changes.
+///
+/// # Errors
+/// [`LinkError`]: the network refuses what a bridge needs.
+pub fn serve(
+    session: &Session,
+    directory: &Directory,
+    service: Service,
+    stop: &AtomicBool,
+    tell: &mut dyn FnMut(&str),
+) -> Result<(), LinkError> {
+    let Service { name, allow, every, launcher } = service;
+    let desk = Arc::new(Desk::new(name.clone(), launcher));
+    let station = Station::declare(session, &name)?;
+    let _counter = desk::open(session, &desk, allow)?;
+    // Last of all: who sees it can ask.
+    let _alive = session.liveliness().declare_token(name.key("alive")).wait_now()?;
+    let mut told = String::new();
+    while !stop.load(Ordering::Relaxed) {
+        match Client::find(directory) {
+            Ok(client) => {
+                tell(&format!(
+                    "carrying `{}` (process {})",
+                    client.greeting().title,
+                    client.greeting().process
+                ));
+                relay(client, &station, &desk, every, stop)?;
+                tell("the run is over; waiting for the next");
+            }
+            Err(LiveError::NoRun { .. }) => {}
+            Err(error) => {
+                // Once: it is tried again many times a second.
+                let words = error.to_string();
+                if words != told {
+                    tell(&words);
+                    told = words;
+                }
+            }
+        }
+        desk.report(&station)?;
+        std::thread::sleep(LOOK_PERIOD);
+    }
+    Ok(())
+}
+
+/// Carries one run.
+fn relay(
+    mut client: Client,
+    station: &Station,
+    desk: &Desk,
+    every: u32,
+    stop: &AtomicBool,
+) -> Result<(), LinkError> {
+    desk.begin(&client);
+    let asker = client.asker();
+    let mut is_watching = false;
+    let mut checked: Option<Instant> = None;
+    while !stop.load(Ordering::Relaxed) {
+        if checked.is_none_or(|at| at.elapsed() >= CHECK_PERIOD) {
+            checked = Some(Instant::now());
+            let is_wanted = station.is_wanted()?;
+            if is_wanted != is_watching {
+                is_watching = is_wanted;
+                // A host that is gone says so below.
+                let _ = asker.ask(if is_wanted { Ask::Watch { every } } else { Ask::LookAway });
+            }
+            desk.report(station)?;
+        }
+        match client.next(CHECK_PERIOD) {
+            Ok(None) => {}
+            Ok(Some(Event::Ticks { records, dropped })) => {
+                desk.dropped(dropped);
+                for record in &records {
+                    station.tick(record, desk.publishing())?;
+                }
+            }
+            Ok(Some(Event::Change(change))) => {
+                desk.keep(&change);
+                station.change(&change)?;
+            }
+            Ok(Some(Event::Answer(answer))) => desk.answered(answer),
+            Ok(Some(Event::End(end))) => {
+                station.end(&end)?;
+                break;
+            }
+            Err(error) => {
+                station.end(&flotor_live::End { words: error.to_string() })?;
+                break;
+            }
+        }
+    }
+    desk.end();
+    desk.report(station)
+}
+
+/// Waiting for what is over at once: all declarations here are local.
+trait WaitNow<T> {
+    fn wait_now(self) -> Result<T, LinkError>;
+}
+
+impl<T, R> WaitNow<T> for R
+where
+    R: zenoh::Wait + zenoh::Resolvable<To = zenoh::Result<T>>,
+{
+    fn wait_now(self) -> Result<T, LinkError> {
+        self.wait().map_err(LinkError::from)
+    }
+}

@@ -1,0 +1,259 @@
+//! What peers may ask for, and which letters are not even read.
+
+use flotor_live::{Ask, SetValue};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// A longer letter is refused before it is looked at, bytes.
+pub const MOST_LETTER_BYTES: usize = 64 * 1024;
+/// Peers whose last number is remembered; a peer beyond them is refused until the bridge starts anew.
+const MOST_PEERS: usize = 4096;
+
+/// Something a peer asks for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "wish", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Wish {
+    /// The emergency stop. Anybody's.
+    EmergencyStop,
+    /// New values for live parameters.
+    Set {
+        /// The values.
+        values: Vec<SetValue>,
+    },
+    /// How much of a model is felt, 0 to 1.
+    Weight {
+        /// Its name in the scene.
+        model: String,
+        /// The new weight.
+        weight: f64,
+    },
+    /// An orderly end of the run.
+    Stop,
+    /// Runs the bridge's scene.
+    Start,
+    /// Takes the emergency stop back, so that a scene may be started again.
+    Release,
+}
+
+/// Who may ask for what. Each includes the ones before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Right {
+    /// See everything, and press the emergency stop.
+    Watch,
+    /// Change parameters, end a run in order.
+    Operate,
+    /// Start runs, take an emergency stop back.
+    Own,
+}
+
+impl Right {
+    /// All of them, the least first.
+    pub const ALL: [Right; 3] = [Right::Watch, Right::Operate, Right::Own];
+
+    /// The last parts of the keys on which this right's own wishes arrive.
+    #[must_use]
+    pub const fn keys(self) -> &'static [&'static str] {
+        match self {
+            Right::Watch => &["ask/emergency-stop"],
+            Right::Operate => &["ask/set", "ask/weight", "ask/stop"],
+            Right::Own => &["ask/start", "ask/release"],
+        }
+    }
+}
+
+impl Wish {
+    /// The last parts of the key on which it must arrive: access control sees keys, not letters.
+    #[must_use]
+    pub const fn key(&self) -> &'static str {
+        match self {
+            Wish::EmergencyStop => "ask/emergency-stop",
+            Wish::Set { .. } => "ask/set",
+            Wish::Weight { .. } => "ask/weight",
+            Wish::Stop => "ask/stop",
+            Wish::Start => "ask/start",
+            Wish::Release => "ask/release",
+        }
+    }
+
+    /// What the host is asked for; nothing where the bridge itself is meant.
+    #[must_use]
+    pub fn ask(&self) -> Option<Ask> {
+        match self {
+            Wish::EmergencyStop => Some(Ask::EmergencyStop),
+            Wish::Set { values } => Some(Ask::Set { values: values.clone() }),
+            Wish::Weight { model, weight } => Some(Ask::Weight { model: model.clone(), weight: *weight }),
+            Wish::Stop => Some(Ask::Stop),
+            Wish::Start | Wish::Release => None,
+        }
+    }
+
+    /// Of what somebody asked a local host for; nothing where that concerns this machine only.
+    #[must_use]
+    pub fn of_ask(ask: Ask) -> Option<Self> {
+        match ask {
+            Ask::Watch { .. } | Ask::LookAway => None,
+            Ask::Set { values } => Some(Wish::Set { values }),
+            Ask::Weight { model, weight } => Some(Wish::Weight { model, weight }),
+            Ask::Stop => Some(Wish::Stop),
+            Ask::EmergencyStop => Some(Wish::EmergencyStop),
+        }
+    }
+}
+
+/// A wish with what makes it good once.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Letter {
+    /// Who asks: anything that no other peer calls itself, new with every start of a program.
+    pub peer: String,
+    /// Higher than that of the peer's letter before.
+    pub number: u64,
+    /// Process of the run that is meant, from its greeting; 0 for the bridge itself.
+    pub run: u32,
+    /// What is wished.
+    pub wish: Wish,
+}
+
+/// Why a letter was not followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, thiserror::Error)]
+#[serde(rename_all = "kebab-case")]
+pub enum Refusal {
+    /// No letter at all, or on the wrong key.
+    #[error("this is no request that belongs on this key")]
+    Malformed,
+    /// Longer than any request.
+    #[error("longer than {MOST_LETTER_BYTES} bytes, which no request is")]
+    TooLong,
+    /// Its number is not higher than that of the peer's last.
+    #[error("a request with this number, or a higher one, came before: requests are good once")]
+    Replayed,
+    /// It is meant for a run that is over.
+    #[error("the run that is meant is over")]
+    Stale,
+    /// More peers than anybody needs.
+    #[error("too many peers since the bridge started; start it anew")]
+    Crowded,
+}
+
+/// Lets letters through once.
+#[derive(Debug, Default)]
+pub struct Gate {
+    last: BTreeMap<String, u64>,
+    refused: BTreeMap<Refusal, u64>,
+}
+
+impl Gate {
+    /// What a letter on a key asks for, while `run` is the run that is on (0: none).
+    ///
+    /// # Errors
+    /// [`Refusal`], counted.
+    pub fn admit(&mut self, key: &str, payload: &[u8], run: u32) -> Result<Wish, Refusal> {
+        let admitted = self.read(key, payload, run);
+        if let Err(refusal) = &admitted {
+            *self.refused.entry(*refusal).or_default() += 1;
+        }
+        admitted
+    }
+
+    /// How many were refused, by reason.
+    #[must_use]
+    pub fn refused(&self) -> &BTreeMap<Refusal, u64> {
+        &self.refused
+    }
+
+    fn read(&mut self, key: &str, payload: &[u8], run: u32) -> Result<Wish, Refusal> {
+        if payload.len() > MOST_LETTER_BYTES {
+            return Err(Refusal::TooLong);
+        }
+        let letter: Letter = serde_json::from_slice(payload).map_err(|_| Refusal::Malformed)?;
+        let belongs = key.strip_suffix(letter.wish.key()).is_some_and(|rest| rest.ends_with('/'));
+        if !belongs || letter.peer.is_empty() || letter.peer.len() > 64 {
+            return Err(Refusal::Malformed);
+        }
+        let peers = self.last.len();
+        match self.last.get_mut(&letter.peer) {
+            Some(last) if letter.number <= *last => return Err(Refusal::Replayed),
+            Some(last) => *last = letter.number,
+            None if peers >= MOST_PEERS => return Err(Refusal::Crowded),
+            None => {
+                self.last.insert(letter.peer, letter.number);
+            }
+        }
+        // Whoever presses the emergency stop means whatever runs.
+        let is_meant = match letter.wish {
+            Wish::EmergencyStop | Wish::Start | Wish::Release => true,
+            Wish::Set { .. } | Wish::Weight { .. } | Wish::Stop => run != 0 && letter.run == run,
+        };
+        if is_meant { Ok(letter.wish) } else { Err(Refusal::Stale) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn letter(number: u64, run: u32, wish: Wish) -> Vec<u8> {
+        serde_json::to_vec(&Letter { peer: "somebody".to_owned(), number, run, wish }).unwrap()
+    }
+
+    #[test]
+    fn a_letter_is_good_once_and_for_its_run() {
+        let mut gate = Gate::default();
+        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(1, 7, Wish::Stop), 7), Ok(Wish::Stop));
+        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(1, 7, Wish::Stop), 7), Err(Refusal::Replayed));
+        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(2, 7, Wish::Stop), 8), Err(Refusal::Stale));
+        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(3, 0, Wish::Stop), 0), Err(Refusal::Stale));
+        let stop = letter(4, 7, Wish::EmergencyStop);
+        assert_eq!(gate.admit("flotor/a/ask/emergency-stop", &stop, 8), Ok(Wish::EmergencyStop));
+        let refused: Vec<_> = gate.refused().iter().map(|(refusal, count)| (*refusal, *count)).collect();
+        assert_eq!(refused, [(Refusal::Replayed, 1), (Refusal::Stale, 2)]);
+    }
+
+    #[test]
+    fn a_wish_on_another_ones_key_is_no_wish() {
+        let mut gate = Gate::default();
+        for wish in [
+            Wish::EmergencyStop,
+            Wish::Set { values: Vec::new() },
+            Wish::Weight { model: "spring".to_owned(), weight: 0.5 },
+            Wish::Stop,
+            Wish::Start,
+            Wish::Release,
+        ] {
+            for right in Right::ALL {
+                for key in right.keys().iter().filter(|key| **key != wish.key()) {
+                    let refused = gate.admit(&format!("flotor/a/{key}"), &letter(9, 7, wish.clone()), 7);
+                    assert_eq!(refused, Err(Refusal::Malformed), "{wish:?} on {key}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_letter_is_refused_and_counted() {
+        let mut gate = Gate::default();
+        let key = "flotor/a/ask/stop";
+        for nonsense in [b"".as_slice(), b"{}", b"\xff\xfe", b"[[[[", &letter(1, 7, Wish::Stop)[1..]] {
+            assert_eq!(gate.admit(key, nonsense, 7), Err(Refusal::Malformed));
+        }
+        let mut more = letter(1, 7, Wish::Stop);
+        more.splice(1..1, br#""extra":1,"#.iter().copied());
+        assert_eq!(gate.admit(key, &more, 7), Err(Refusal::Malformed), "an unknown word");
+        let long = vec![b' '; MOST_LETTER_BYTES + 1];
+        assert_eq!(gate.admit(key, &long, 7), Err(Refusal::TooLong));
+        assert_eq!(gate.refused().values().sum::<u64>(), 7);
+    }
+
+    #[test]
+    fn no_flood_of_peers_fills_the_memory() {
+        let mut gate = Gate::default();
+        let from = |peer: usize| {
+            let letter = Letter { peer: peer.to_string(), number: 1, run: 7, wish: Wish::Stop };
+            serde_json::to_vec(&letter).unwrap()
+        };
+        let admitted = (0..2 * MOST_PEERS)
+            .filter(|peer| gate.admit("flotor/a/ask/stop", &from(*peer), 7).is_ok())
+            .count();
+        assert_eq!(admitted, MOST_PEERS);
+    }
+}

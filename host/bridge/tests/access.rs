@@ -1,0 +1,127 @@
+//! Who is no member gets nothing; who is one may do what the keys say, and no more.
+
+mod common;
+
+use common::{Bridge, FakeHost, free_port, wait_until};
+use flotor_bridge::access::{AccessError, Members, write_keys};
+use flotor_bridge::keys::Name;
+use flotor_bridge::link::{End, LinkOptions, open};
+use flotor_bridge::remote::Remote;
+use flotor_bridge::wish::{Right, Wish};
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+use zenoh::Wait;
+
+static NEVER: AtomicBool = AtomicBool::new(false);
+
+fn name(text: &str) -> Name {
+    Name::new(text).unwrap()
+}
+
+fn members() -> Members {
+    let peers =
+        vec![(name("alan"), Right::Watch), (name("grace"), Right::Operate), (name("ada"), Right::Own)];
+    Members { hosts: vec!["localhost".to_owned(), "127.0.0.1".to_owned()], peers }
+}
+
+/// A member, as its own configuration makes it, at the port of this test.
+fn visit(folder: &Path, who: &str, endpoint: &str, bridge: &Name) -> Remote {
+    let link = LinkOptions {
+        config: Some(folder.join(format!("{who}.json5"))),
+        connect: vec![endpoint.to_owned()],
+        ..LinkOptions::default()
+    };
+    Remote::listen(&open(&link, End::Visiting).unwrap(), bridge).unwrap()
+}
+
+#[test]
+fn rights_are_what_the_keys_say() {
+    let host = FakeHost::start();
+    let folder = tempfile::tempdir().unwrap();
+    write_keys(folder.path(), &members()).unwrap();
+    let endpoint = format!("tls/localhost:{}", free_port());
+    let link = LinkOptions { config: Some(folder.path().join("bridge.json5")), ..LinkOptions::default() };
+    let bridge = Bridge::start_with(&host.directory, Right::Own, endpoint.clone(), link);
+
+    let weight = || Wish::Weight { model: "spring".to_owned(), weight: 0.5 };
+    for (who, may_operate, may_own) in [("alan", false, false), ("grace", true, false), ("ada", true, true)] {
+        let remote = visit(folder.path(), who, &endpoint, &bridge.name);
+        let (greeting, _) = remote.wait_for_run(&NEVER).unwrap().expect("every member may see");
+        assert_eq!(greeting.title, "Far away", "{who}");
+        let errand = remote.errand();
+        let before = host.asked.0.lock().unwrap().len();
+        assert_eq!(errand.run(weight()).is_ok(), may_operate, "{who}");
+        assert_eq!(host.asked.0.lock().unwrap().len() > before, may_operate, "{who}");
+        assert_eq!(errand.run(Wish::EmergencyStop), Ok(()), "{who}: anybody presses it");
+        assert_eq!(errand.run(Wish::Release).is_ok(), may_own, "{who}");
+    }
+}
+
+#[test]
+fn who_is_no_member_is_not_let_in() {
+    let host = FakeHost::start();
+    let (folder, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    write_keys(folder.path(), &members()).unwrap();
+    write_keys(elsewhere.path(), &members()).unwrap();
+    let endpoint = format!("tls/localhost:{}", free_port());
+    let link = LinkOptions { config: Some(folder.path().join("bridge.json5")), ..LinkOptions::default() };
+    let bridge = Bridge::start_with(&host.directory, Right::Own, endpoint.clone(), link);
+    // The right name, vouched for by somebody else; then no certificate at all.
+    for config in [Some(elsewhere.path().join("ada.json5")), None] {
+        let connect = vec![endpoint.clone()];
+        let link = LinkOptions { config, connect, ..LinkOptions::default() };
+        match open(&link, End::Visiting) {
+            Err(_) => {}
+            Ok(session) => {
+                let remote = Remote::listen(&session, &bridge.name).unwrap();
+                assert_eq!(remote.status().unwrap(), None, "nothing is told");
+                assert!(remote.errand().run(Wish::EmergencyStop).is_err());
+            }
+        }
+    }
+    assert_eq!(host.asked.0.lock().unwrap().len(), 0);
+}
+
+#[test]
+fn members_cannot_pretend_to_be_the_bridge() {
+    let host = FakeHost::start();
+    let folder = tempfile::tempdir().unwrap();
+    write_keys(folder.path(), &members()).unwrap();
+    let endpoint = format!("tls/localhost:{}", free_port());
+    let link = LinkOptions { config: Some(folder.path().join("bridge.json5")), ..LinkOptions::default() };
+    let bridge = Bridge::start_with(&host.directory, Right::Own, endpoint.clone(), link);
+    let honest = visit(folder.path(), "alan", &endpoint, &bridge.name);
+    honest.wait_for_run(&NEVER).unwrap();
+    let link = LinkOptions {
+        config: Some(folder.path().join("ada.json5")),
+        connect: vec![endpoint],
+        ..LinkOptions::default()
+    };
+    let session = open(&link, End::Visiting).unwrap();
+    let lie = serde_json::to_vec(&flotor_live::End { words: "a lie".to_owned() }).unwrap();
+    for _ in 0..20 {
+        session.put(bridge.name.key("end"), lie.clone()).wait().unwrap();
+    }
+    assert_eq!(honest.next(Duration::from_millis(500)), None);
+}
+
+#[test]
+fn keys_are_secret_and_never_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    write_keys(folder.path(), &members()).unwrap();
+    for who in ["bridge", "ada"] {
+        let mode = std::fs::metadata(folder.path().join(format!("{who}.key"))).unwrap().permissions().mode();
+        assert_eq!(mode & 0o777, 0o600, "{who}");
+    }
+    let key = std::fs::read(folder.path().join("ada.key")).unwrap();
+    assert!(matches!(write_keys(folder.path(), &members()), Err(AccessError::File { .. })));
+    assert_eq!(std::fs::read(folder.path().join("ada.key")).unwrap(), key);
+
+    let mut twice = members();
+    twice.peers.push((name("ada"), Right::Watch));
+    let other = tempfile::tempdir().unwrap();
+    assert!(matches!(write_keys(other.path(), &twice), Err(AccessError::Twice(_))));
+    wait_until("nothing was written", || std::fs::read_dir(other.path()).unwrap().count() == 0);
+}

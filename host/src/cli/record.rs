@@ -1,0 +1,108 @@
+//! `flotor record`: a recording of a run that somebody else started, here or elsewhere.
+
+use super::bridge::BRIDGE;
+use super::stopping::stop_on_signals;
+use super::{CommandError, style};
+use crate::record::{Change, Note, Recorder, Severity};
+use crate::servo::StopSwitch;
+use clap::Args;
+use flotor_live::{Ask, Client, Directory, Event, LiveError};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// How the network's runs are written.
+const REMOTE: &str = "zenoh/";
+/// How long to wait for news before looking whether to stop.
+const LOOK_PERIOD: Duration = Duration::from_millis(100);
+
+/// Record a run that is on, from now to its end.
+#[derive(Args)]
+#[command(
+    after_help = "Nobody has to start a run with --record: this joins while it runs, and leaves at Ctrl-C.\n\n\
+    Examples:\n  \
+    flotor record --out run.mcap                 the run that was started last on this machine\n  \
+    flotor record zenoh/lab --out run.mcap       a run elsewhere, see `flotor bridge --help`"
+)]
+pub(crate) struct RecordArguments {
+    /// A run elsewhere: zenoh/NAME (default: the newest run of this machine)
+    #[arg(value_name = "zenoh/NAME")]
+    source: Option<String>,
+    /// The recording
+    #[arg(long, value_name = "FILE.mcap")]
+    out: PathBuf,
+}
+
+pub(crate) fn run(arguments: &RecordArguments) -> Result<(), CommandError> {
+    let RecordArguments { source, out } = arguments;
+    match source.as_deref() {
+        None => record_local(out),
+        Some(remote) if remote.starts_with(REMOTE) => {
+            BRIDGE.become_with(&["record".into(), remote.into(), out.into()])
+        }
+        Some(other) => Err(CommandError::Usage(format!(
+            "`{other}` is no run elsewhere: write {REMOTE}NAME; `flotor bridge list` shows who is there"
+        ))),
+    }
+}
+
+fn record_local(out: &Path) -> Result<(), CommandError> {
+    let stop = stop_on_signals();
+    let client =
+        Client::find(&Directory::of_this_user()).map_err(|error| CommandError::Usage(error.to_string()))?;
+    eprintln!("recording `{}` (Ctrl-C ends)", client.greeting().title);
+    let Kept { ticks, dropped, words } = keep(client, out, &stop)?;
+    let lost = match dropped {
+        0 => String::new(),
+        dropped => format!(", {} {dropped} ticks the host could not hand over", style::warning("without")),
+    };
+    println!("{}: {ticks} ticks{lost}; {words}", out.display());
+    Ok(())
+}
+
+/// What came of a recording.
+struct Kept {
+    ticks: u64,
+    dropped: u64,
+    words: String,
+}
+
+fn keep(mut client: Client, out: &Path, stop: &StopSwitch) -> Result<Kept, CommandError> {
+    let mut recorder = Recorder::create(out, client.run())?;
+    let gone = |error: LiveError| CommandError::Failed(error.to_string());
+    client.asker().ask(Ask::Watch { every: 1 }).map_err(gone)?;
+    let mut kept = Kept { ticks: 0, dropped: 0, words: "stopped recording".to_owned() };
+    while !stop.is_stop_asked() {
+        match client.next(LOOK_PERIOD) {
+            Ok(None | Some(Event::Answer(_))) => {}
+            Ok(Some(Event::Ticks { records, dropped })) => {
+                if let (true, Some(first)) = (dropped > kept.dropped, records.first()) {
+                    let text = format!("{} ticks were dropped", dropped - kept.dropped);
+                    let source = "flotor record".to_owned();
+                    recorder.note(&Note {
+                        time_ns: first.time_ns,
+                        severity: Severity::Warning,
+                        source,
+                        text,
+                    })?;
+                    kept.dropped = dropped;
+                }
+                for record in &records {
+                    recorder.record(record)?;
+                    kept.ticks += 1;
+                }
+            }
+            Ok(Some(Event::Change(change))) => recorder.change(&Change::from(&change))?,
+            Ok(Some(Event::End(end))) => {
+                kept.words = end.words;
+                break;
+            }
+            // What was recorded is good; that the host died belongs to it.
+            Err(error) => {
+                kept.words = error.to_string();
+                break;
+            }
+        }
+    }
+    recorder.finish()?;
+    Ok(kept)
+}
