@@ -334,36 +334,6 @@ fn numbers_that_are_nothing_are_zero() {
 }
 
 #[test]
-fn cold_poses_never_give_nan() {
-    let wild = Workspace { shear: 1.5, height: 1.5, tilt_rad: 2.0, yaw_rad: 3.0 };
-    let device = Workspace { shear: 0.25, height: 0.5, tilt_rad: 0.12, yaw_rad: 0.12 };
-    for preset in Preset::ALL {
-        let spring = preset.spring();
-        let mut rod = Rod::new(&spring, Accuracy::Servo);
-        let mut sampler = Sampler::new(7);
-        for workspace in [wild, device] {
-            for _ in 0..cold_poses() {
-                let pose = workspace.pose(&mut sampler, spring.geometry().free_length_m);
-                rod.reset();
-                for _ in 0..4 {
-                    let answer = rod.step(&pose, Demand::WrenchAndEnergy);
-                    assert!(
-                        answer.force_n.is_finite() && answer.torque_nm.is_finite(),
-                        "{preset:?} {pose:?}"
-                    );
-                    assert!(answer.energy_j.is_none_or(f64::is_finite), "{preset:?} {pose:?}");
-                }
-            }
-        }
-    }
-}
-
-/// 1e5 cold poses with `FLOTOR_LONG_TESTS` set, a hundredth of it each day.
-fn cold_poses() -> u32 {
-    if std::env::var_os("FLOTOR_LONG_TESTS").is_some() { 12_500 } else { 125 }
-}
-
-#[test]
 fn jumps_are_followed_to_a_stable_end() {
     // A cold pose anywhere the device reaches is at most two seconds of ticks away.
     let device = Workspace { shear: 0.25, height: 0.5, tilt_rad: 0.12, yaw_rad: 0.12 };
