@@ -67,6 +67,39 @@ fn a_written_file_is_read_and_does_what_it_said() {
 }
 
 #[test]
+fn a_scene_names_the_file_and_the_device_corrects_the_total_force() {
+    let scratch = Scratch::default();
+    let file = scratch.path().join("thesis.toml");
+    let ran = Flotor::with(["calibrate", "import", "--out", text(&file)]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    let run = |device: &str| {
+        let scene = format!(
+            "duration_s = 1\n[device]\nplugin = \"simulated\"\n{device}\n[device.parameters]\npreset = \"full\"\n\
+             [[model]]\nplugin = \"spring\"\n"
+        );
+        let scene = scratch.file("scene.toml", scene);
+        Flotor::with(["run", text(&scene), "--clock", "virtual", "--json", "-"]).run()
+    };
+    let summary = |device: &str| {
+        let ran = run(device);
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+        serde_json::from_str::<Value>(&ran.stdout).expect("the summary is JSON")["trace_digest"].clone()
+    };
+    // Relative to the scene, not to where the command runs.
+    assert_ne!(summary("calibration = \"thesis.toml\""), summary(""), "another force, another motion");
+    let other = scratch.path().join("other.toml");
+    let ran = Flotor::with(["calibrate", "import", "--serial", "7", "--out", text(&other)]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    for (name, words) in
+        [("other.toml", "calibrate this one"), ("missing.toml", "cannot read the calibration")]
+    {
+        let ran = run(&format!("calibration = \"{name}\""));
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+        assert!(ran.error().contains("scene.toml:4") && ran.error().contains(words), "{}", ran.error());
+    }
+}
+
+#[test]
 fn the_reports_polynomial_can_be_imported_and_leaves_what_it_leaves() {
     let scratch = Scratch::default();
     let file = scratch.path().join("thesis.toml");

@@ -272,6 +272,23 @@ fn where_no_controller_is_one_line_says_so() {
     }
 }
 
+#[test]
+fn validation_says_what_it_could_not_check_without_a_controller() {
+    let plugin = plugin_file("flotor-maglev");
+    let plugin = plugin.to_str().expect("the build folder has a plain name");
+    // The default address: whoever has a controller there checks more.
+    if TcpStream::connect("127.0.0.1:5678").is_ok() {
+        return;
+    }
+    let ran = flotor_tests::program::Flotor::with(["validate", plugin]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    assert!(ran.stdout.contains("ok      schema") && ran.stdout.contains("?       lifecycle"), "{ran:#?}");
+    assert!(
+        ran.stdout.contains("4 of 7 rules could not be checked: no controller at 127.0.0.1:5678"),
+        "{ran:#?}"
+    );
+}
+
 // ---------------------------------------------------------------- nonsense
 
 #[test]

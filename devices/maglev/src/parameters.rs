@@ -1,6 +1,6 @@
 //! What the device can be told.
 
-use crate::boundary::Walls;
+use crate::boundary::{Walls, thesis_nm_per_rad};
 use crate::facts;
 use crate::transport::Kind;
 use flotor_hal::abi::Str;
@@ -79,7 +79,16 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         facts::MAX_STIFFNESS_NM_PER_RAD,
         50.0,
-        "Stiffness beyond it; report: 2.5 gamma, at least 30; scaled down to what is stable",
+        "Stiffness beyond it, with the maker's walls; scaled down to what is stable",
+    )
+    .live(),
+    Parameter::real(
+        "gamma_n",
+        "N",
+        0.0,
+        100.0,
+        17.0,
+        "Gamma of the spring, with the report's walls: the stiffness beyond the angle limit is 2.5 gamma, at least 30",
     )
     .live(),
     Parameter::real(
@@ -160,8 +169,11 @@ impl Values {
     /// The walls as asked for; nothing if they are off. Real-time: bounded, no allocation.
     pub(crate) fn walls(&self) -> Option<Walls> {
         const MM: f64 = 1.0e-3;
+        /// Places in the list of choices.
+        const OFF: f64 = 0.0;
+        const THESIS: f64 = 2.0;
         let choice = self.value("walls");
-        if choice == 0.0 {
+        if choice == OFF {
             return None;
         }
         let mut walls = Walls::maker(self.value("wall_radius_mm") * MM);
@@ -173,11 +185,14 @@ impl Values {
         }
         for turn in [&mut walls.tilt, &mut walls.yaw] {
             turn.limit = self.value("angle_limit_deg").to_radians();
-            turn.stiffness = self.value("angle_stiffness_nm_per_rad");
+            turn.stiffness = match choice {
+                THESIS => thesis_nm_per_rad(self.value("gamma_n")),
+                _ => self.value("angle_stiffness_nm_per_rad"),
+            };
             turn.damping = self.value("angle_damping_nms_per_rad");
         }
         walls.yaw_spring_nm_per_rad = self.value("yaw_stiffness_nm_per_rad");
-        if choice == 2.0 || walls.yaw_spring_nm_per_rad > 0.0 {
+        if choice == THESIS || walls.yaw_spring_nm_per_rad > 0.0 {
             walls.rotation_damping_nms_per_rad = walls.tilt.damping;
         }
         Some(walls)

@@ -324,8 +324,9 @@ fn fault(status: &Status) -> Option<Fault> {
     if status.mode == Mode::Levitating {
         return None;
     }
-    const FAULTS: [(Condition, Fault); 6] = [
+    const FAULTS: [(Condition, Fault); 7] = [
         (Condition::SENSOR_RANGE, Fault::SensorOutOfRange),
+        (Condition::EDGE, Fault::SensorOutOfRange),
         (Condition::OVERLOAD, Fault::OverCurrent),
         (Condition::OVER_TEMPERATURE, Fault::OverTemperature),
         (Condition::OVER_SPEED, Fault::OverSpeed),

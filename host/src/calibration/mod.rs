@@ -12,7 +12,7 @@
 //! | degree of the polynomial | two | chosen by cross-validation, with the scores shown |
 //! | how good it is | not said | residual, 95 % band, and the error measured again afterwards |
 //!
-//! Data flows one way: [`rig`] (device and force sensor) -> [`procedure`] (readings) -> [`fit`] (polynomial) ->
+//! Data flows one way: [`rig`] (device and force [`sensor`]) -> [`procedure`] (readings) -> [`fit`] (polynomial) ->
 //! [`mod@file`] (what is kept) -> the device; [`verify`] asks the device again, [`picture`] draws it. [`thesis`] is
 //! the report's polynomial, as a baseline.
 //!
@@ -24,6 +24,7 @@ mod least_squares;
 pub mod picture;
 pub mod procedure;
 pub mod rig;
+pub mod sensor;
 pub mod thesis;
 pub mod verify;
 
@@ -57,6 +58,12 @@ pub enum CalibrationError {
         /// How much, µm.
         moved_um: f64,
     },
+    /// The force sensor does not say how large the force is.
+    #[error(transparent)]
+    Sensor(#[from] sensor::SensorError),
+    /// There is no pseudo terminal for the sensor of the simulated rig.
+    #[error("the simulated force sensor needs a pseudo terminal: {0}")]
+    NoTerminal(std::io::Error),
     /// The readings do not determine a curve.
     #[error("{readings} readings at {heights} heights and {forces} forces are too few: {needed}")]
     TooFew {

@@ -7,6 +7,11 @@ use crate::plot::{Axis, Figure, Panel, Series};
 use flotor_hal::VerticalCalibration;
 
 const MM_PER_M: f64 = 1.0e3;
+/// Readings of different forces at one height stand side by side, this far apart, mm.
+const APART_MM: f64 = 0.16;
+/// Looks of the fit and of the report's polynomial, the same in every panel.
+const FIT: usize = 2;
+const REPORT: usize = 3;
 
 /// Draws what was measured, what was fitted, and what came of it. `curves` are the error curves by name.
 #[must_use]
@@ -17,13 +22,15 @@ pub fn to_svg(
     curves: &[(&str, &ErrorCurve)],
 ) -> String {
     let subtitle = format!(
-        "degree {} by cross-validation; residual {:.3} N; 95 % band ±{:.3} %; weight {:.2} ± {:.2} N",
+        "delivered over commanded force; degree {} by cross-validation; residual {:.3} N; 95 % band ±{:.3} %; weight {:.2} ± {:.2} N",
         fit.degree, fit.residual_n, fit.band_95_percent, fit.weight_n[0], fit.weight_n[1]
     );
     let mut errors = Panel::new(Axis::linear("Delivered over commanded", "%"));
-    for (name, curve) in curves {
+    // In the order of the corrections: without, the report's two ways, the fit.
+    for ((name, curve), slot) in curves.iter().zip([0, 1, REPORT, FIT]) {
         let samples = curve.ratios.iter().map(|(height_m, ratio)| (height_m * MM_PER_M, ratio * 100.0));
-        errors = errors.series(Series::line(*name, samples));
+        let label = format!("{name}: {:.2} %", curve.error_percent());
+        errors = errors.series(Series::line(label, samples).slot(slot));
     }
     Figure::new("Vertical calibration", Axis::linear("Height", "mm"))
         .subtitle(subtitle)
@@ -44,25 +51,37 @@ fn shares(readings: &[Reading], fit: &Fit, thesis: &VerticalCalibration) -> Pane
         })
     };
     let mut panel = Panel::new(Axis::linear("Share that arrives", "%"));
-    for (force_n, readings) in by_force(readings) {
+    for (shift_mm, (force_n, readings)) in side_by_side(by_force(readings)) {
         let share = readings.iter().map(|(_, reading)| {
-            (reading.height_m * MM_PER_M, (reading.force_n + weight_n) / reading.commanded_n * 100.0)
+            (
+                reading.height_m * MM_PER_M + shift_mm,
+                (reading.force_n + weight_n) / reading.commanded_n * 100.0,
+            )
         });
         panel = panel.series(Series::points(format!("read at {force_n} N"), share.collect::<Vec<_>>()));
     }
-    panel.series(Series::line("fit", line(&fit.calibration))).series(Series::line("report", line(thesis)))
+    panel
+        .series(Series::line("fit", line(&fit.calibration)).slot(FIT))
+        .series(Series::line("report's polynomial", line(thesis)).slot(REPORT))
 }
 
 fn residuals(readings: &[Reading], fit: &Fit) -> Panel {
     let mut panel = Panel::new(Axis::linear("Residual", "mN"));
-    for (force_n, readings) in by_force(readings) {
+    for (shift_mm, (force_n, readings)) in side_by_side(by_force(readings)) {
         let samples = readings.iter().map(|(index, reading)| {
             let residual_n = fit.residuals_n.get(*index).copied().unwrap_or(f64::NAN);
-            (reading.height_m * MM_PER_M, residual_n * 1.0e3)
+            (reading.height_m * MM_PER_M + shift_mm, residual_n * 1.0e3)
         });
         panel = panel.series(Series::points(format!("at {force_n} N"), samples.collect::<Vec<_>>()));
     }
     panel
+}
+
+/// Each group with how far to the side it is drawn, mm, all of them about the height.
+#[allow(clippy::cast_precision_loss)] // a few forces
+fn side_by_side<T>(groups: Vec<T>) -> impl Iterator<Item = (f64, T)> {
+    let middle = 0.5 * groups.len().saturating_sub(1) as f64;
+    groups.into_iter().enumerate().map(move |(index, group)| ((index as f64 - middle) * APART_MM, group))
 }
 
 /// Readings of each commanded force, in order of appearance, with their index.

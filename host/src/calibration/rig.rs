@@ -5,6 +5,7 @@
 //! force less the weight of what moves.
 
 use super::CalibrationError;
+use super::sensor::{EmulatedSensor, ForceSensor};
 use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting};
 use flotor_hal::{
     Cycle, DVec3, DeviceState, LoopConfig, Refusal, Tick, VerticalCalibration, Wrench, rotation_vector,
@@ -66,9 +67,11 @@ const LOCK_NM_PER_RAD: f64 = 50.0;
 const LOCK_NMS_PER_RAD: f64 = 0.15;
 
 /// The simulated flotor under a simulated sensor. Its uneven field is reached as on any device: through the
-/// contract.
+/// contract; its sensor as any sensor: over a serial line.
 pub struct SimulatedRig {
     plugin: Plugin,
+    /// What the handle presses against, and the line it is read by; there from the first reading on.
+    sensor: Option<(EmulatedSensor, ForceSensor)>,
     calibration: Option<VerticalCalibration>,
     noise: Pcg64Mcg,
     seed: u64,
@@ -80,7 +83,7 @@ impl SimulatedRig {
     /// A rig around the plugin `simulated`.
     #[must_use]
     pub fn new(plugin: Plugin, seed: u64) -> Self {
-        Self { plugin, calibration: None, noise: Pcg64Mcg::seed_from_u64(seed), seed, rests: 0 }
+        Self { plugin, sensor: None, calibration: None, noise: Pcg64Mcg::seed_from_u64(seed), seed, rests: 0 }
     }
 
     /// What the device corrects its force by from now on.
@@ -178,7 +181,17 @@ impl Rig for SimulatedRig {
         let true_n = rest.delivered_n - RIG_WEIGHT_N;
         // Box and Muller 1958; 1 - u is never zero.
         let [u, v] = [(); 2].map(|()| (self.noise.next_u64() >> 11) as f64 / (1_u64 << 53) as f64);
-        Ok(true_n + SENSOR_NOISE_N * (-2.0 * (1.0 - u).ln()).sqrt() * (TAU * v).cos())
+        let noisy_n = true_n + SENSOR_NOISE_N * (-2.0 * (1.0 - u).ln()).sqrt() * (TAU * v).cos();
+        let (pressed, line) = match &mut self.sensor {
+            Some(sensor) => sensor,
+            none => {
+                let emulated = EmulatedSensor::start().map_err(CalibrationError::NoTerminal)?;
+                let line = ForceSensor::open(emulated.port())?;
+                none.insert((emulated, line))
+            }
+        };
+        pressed.press(noisy_n);
+        Ok(line.read_n()?)
     }
 }
 

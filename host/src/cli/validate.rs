@@ -33,7 +33,7 @@ fn rule(id: &str) -> Result<Rule, String> {
 
 pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     if let Some(rule) = arguments.rule {
-        let verdict = Verdict { violation: check(&arguments.plugin, rule).err() };
+        let verdict = Verdict { seen: check(&arguments.plugin, rule).err() };
         // On a line of its own, whatever the plugin has printed before.
         say!(
             "\n{}",
@@ -55,6 +55,10 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     } else {
         say!("{}", style::title(&arguments.plugin.display().to_string()));
         findings.iter().for_each(print);
+        if let Some(first) = findings.iter().find_map(|finding| finding.unchecked.as_ref()) {
+            let unchecked = findings.iter().filter(|finding| finding.unchecked.is_some()).count();
+            say!("{unchecked} of {} rules could not be checked: {first}", findings.len());
+        }
     }
     if violated == 0 {
         return Ok(());
@@ -64,8 +68,10 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
 }
 
 fn print(finding: &Finding) {
+    let Finding { rule, text, .. } = finding;
     match &finding.violation {
-        None => say!("  ok      {:<20} {}", finding.rule, finding.text),
-        Some(seen) => say!("  FAILED  {:<20} {}\n          {seen}", finding.rule, finding.text),
+        None if finding.unchecked.is_some() => say!("  ?       {rule:<20} {text}"),
+        None => say!("  ok      {rule:<20} {text}"),
+        Some(seen) => say!("  FAILED  {rule:<20} {text}\n          {seen}"),
     }
 }

@@ -35,6 +35,8 @@ pub struct Scene {
     pub plugin_folders: Vec<PathBuf>,
     /// The device.
     pub device: PluginUse,
+    /// The calibration file it corrects its vertical force by, if any.
+    pub calibration: Option<CalibrationUse>,
     /// The force models; their wrenches add up.
     pub models: Vec<ModelUse>,
     /// Limits, tighter than or equal to what the device declares.
@@ -54,6 +56,26 @@ pub struct PluginUse {
     pub location: Location,
     /// Parameters as written, checked later against the plugin's schema.
     pub parameters: Vec<ParameterText>,
+}
+
+/// A calibration file as named.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CalibrationUse {
+    /// The file; relative to the scene's.
+    pub file: PathBuf,
+    /// Where it was named.
+    pub location: Location,
+}
+
+impl CalibrationUse {
+    /// The file, from where this process runs.
+    #[must_use]
+    pub fn path(&self) -> PathBuf {
+        match self.location.file.parent() {
+            Some(folder) if self.location.is_in_a_file() => folder.join(&self.file),
+            _ => self.file.clone(),
+        }
+    }
 }
 
 /// One parameter as written.
@@ -239,6 +261,7 @@ impl Scene {
         let rate_hz = root.number("rate_hz", 100.0..=10_000.0)?.unwrap_or(1000.0);
         let pacing = root.take("pacing").map(pacing).transpose()?.unwrap_or(Pacing::Host);
         let duration_s = root.number("duration_s", 0.0..=31_536_000.0)?.unwrap_or(10.0);
+        let (device, calibration) = device(root.require_section("device")?)?;
         let folders = root.take("plugin_folders").map(|value| value.texts()).transpose()?.unwrap_or_default();
         let scene = Self {
             title,
@@ -247,7 +270,8 @@ impl Scene {
             pacing,
             duration_s,
             plugin_folders: folders.into_iter().map(PathBuf::from).collect(),
-            device: device(root.require_section("device")?)?,
+            device,
+            calibration,
             models: root.sections("model")?.into_iter().map(model).collect::<Result<_, _>>()?,
             limits: root.section("limits")?.map_or_else(|| Ok(Limits::default()), limits)?,
             boundary: root.section("boundary")?.map_or_else(|| Ok(Boundary::default()), boundary)?,
@@ -262,10 +286,14 @@ fn pacing(value: Value<'_>) -> Result<Pacing, SceneError> {
     value.one_of(&[("host", Pacing::Host), ("device", Pacing::Device)])
 }
 
-fn device(mut section: Section<'_>) -> Result<PluginUse, SceneError> {
+fn device(mut section: Section<'_>) -> Result<(PluginUse, Option<CalibrationUse>), SceneError> {
     let plugin = plugin_use(&mut section)?;
+    let calibration = section.take("calibration").map(|value| {
+        let location = value.location.clone();
+        Ok(CalibrationUse { file: value.text()?.into(), location })
+    });
     section.finish()?;
-    Ok(plugin)
+    Ok((plugin, calibration.transpose()?))
 }
 
 fn model(mut section: Section<'_>) -> Result<ModelUse, SceneError> {

@@ -193,6 +193,10 @@ impl Session {
             parameters: prepare::in_force(&device_plugin, &settings, |index| device.parameter(index)),
         }];
 
+        if let Some(calibration) = &scene.calibration {
+            prepare::calibrate(&device_plugin, &mut device, calibration)?;
+        }
+
         let mut models = Vec::new();
         for model in &scene.models {
             let (slot, report) = prepare_model(registry, model, &config, options.clock)?;

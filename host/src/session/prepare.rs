@@ -2,13 +2,16 @@
 
 use super::controls::{ControlError, NewValue, Parts};
 use super::{PluginReport, RunError};
+use crate::calibration::file::{CalibrationFile, CalibrationFileError};
 use crate::mapping::Mapping;
 use crate::registry::{LookupError, Registry};
-use crate::scene::{ChangeUse, ChangeWhat, Isolation, ModelUse, ParameterText, PluginUse, Scene, SceneError};
+use crate::scene::{
+    CalibrationUse, ChangeUse, ChangeWhat, Isolation, ModelUse, ParameterText, PluginUse, Scene, SceneError,
+};
 use crate::servo::{Clock, Engine, Layer, Replacement, ScheduledChange, TimeBudget};
 use crate::worker::{Worker, WorkerOrder};
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, Setting};
+use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting};
 use flotor_hal::{Capabilities, LoopConfig, Pacing, Parameter, ParameterKind, Refusal};
 use std::borrow::Cow;
 
@@ -25,6 +28,23 @@ pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) ->
 pub(super) fn refused(plugin: &Plugin, refusal: Refusal) -> RunError {
     let Metadata { path, id, .. } = plugin.metadata().clone();
     RunError::Plugin(LoadError::Refused { path, id, refusal })
+}
+
+/// Hands the numbers of a scene's calibration file to the device they were measured on. Not real-time.
+pub(super) fn calibrate(
+    plugin: &Plugin,
+    device: &mut OpenedDevice,
+    calibration: &CalibrationUse,
+) -> Result<(), RunError> {
+    let path = calibration.path();
+    let wrong = |problem: CalibrationFileError| SceneError {
+        location: calibration.location.clone(),
+        problem: problem.to_string(),
+    };
+    let (file, curve) = CalibrationFile::load(&path).map_err(wrong)?;
+    let id = &plugin.metadata().id;
+    file.check_device(&path.display().to_string(), id, &device.serial()).map_err(wrong)?;
+    device.calibrate_vertical(&curve).map_err(|refusal| refused(plugin, refusal))
 }
 
 /// Loads one model of a scene and creates it in all its places. Not real-time.

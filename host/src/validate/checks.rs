@@ -1,11 +1,12 @@
 //! One rule, checked in this process.
 
+use super::Seen;
 use flotor_hal::abi::loader::{LoadError, Model, OpenedDevice, Plugin, read_metadata};
 use flotor_hal::abi::{CallStatus, PluginKind};
 use flotor_hal::conformance::Rule;
 use flotor_hal::{
     Cycle, DQuat, DVec3, Demand, DeviceState, Input, LoopConfig, Memory, Output, Parameter, ParameterKind,
-    Pose, Tick, Wrench,
+    Pose, RefusalKind, Tick, Wrench,
 };
 use std::path::Path;
 use std::time::Instant;
@@ -13,21 +14,46 @@ use std::time::Instant;
 /// Checks one rule. Not real-time; runs the plugin's code in this process, which it may hang or end.
 ///
 /// # Errors
-/// What was seen that violates the rule.
-pub fn check(path: &Path, rule: Rule) -> Result<(), String> {
+/// What was seen that violates the rule, or what is missing to check it.
+pub fn check(path: &Path, rule: Rule) -> Result<(), Seen> {
     let words = |error: LoadError| error.to_string();
     if rule == Rule::Metadata {
-        return read_metadata(path).map(|_| ()).map_err(words);
+        return read_metadata(path).map(|_| ()).map_err(|error| Seen::Violation(words(error)));
     }
-    let plugin = Plugin::load(path).map_err(words)?;
-    let plugin = &plugin;
+    let plugin = Plugin::load(path).map_err(|error| Seen::Violation(words(error)))?;
+    if plugin.metadata().kind == PluginKind::Device && needs_the_device(rule) {
+        return check_device(&plugin, rule);
+    }
+    check_without_device(&plugin, rule).map_err(Seen::Violation)
+}
+
+/// True for rules that open a device plugin.
+fn needs_the_device(rule: Rule) -> bool {
+    matches!(rule, Rule::Defaults | Rule::Capabilities | Rule::Lifecycle | Rule::SafeStop)
+}
+
+/// Rules of a device. One that is not there, busy or forbidden is nobody's violation.
+fn check_device(plugin: &Plugin, rule: Rule) -> Result<(), Seen> {
+    let mut device = plugin.open_device(&[]).map_err(|error| match error {
+        LoadError::Refused { refusal, .. } if refusal.kind == RefusalKind::Resource => {
+            Seen::Missing(refusal.reason)
+        }
+        other => Seen::Violation(other.to_string()),
+    })?;
+    let checked = match rule {
+        Rule::Capabilities => device.capabilities().map(|_| ()).map_err(|refusal| refusal.to_string()),
+        Rule::Lifecycle => lifecycle(device),
+        Rule::SafeStop => safe_stop(device),
+        _ => Ok(()),
+    };
+    checked.map_err(Seen::Violation)
+}
+
+fn check_without_device(plugin: &Plugin, rule: Rule) -> Result<(), String> {
     match rule {
         Rule::Metadata | Rule::Loads => Ok(()),
         Rule::Schema => schema(plugin.parameters()),
-        Rule::Defaults => match plugin.metadata().kind {
-            PluginKind::Model => plugin.create_model(&[]).map(|_| ()).map_err(words),
-            PluginKind::Device => plugin.open_device(&[]).map(|_| ()).map_err(words),
-        },
+        Rule::Defaults => plugin.create_model(&[]).map(|_| ()).map_err(|error| error.to_string()),
         Rule::FiniteNearHome => with_model(plugin, near_home),
         Rule::SurvivesNotFinite => with_model(plugin, not_finite),
         Rule::SurvivesFarPoses => with_model(plugin, far_poses),
@@ -36,11 +62,6 @@ pub fn check(path: &Path, rule: Rule) -> Result<(), String> {
         Rule::Independent => independent(plugin),
         Rule::NoThreads => with_model(plugin, no_threads),
         Rule::EnergyGradient => with_model(plugin, energy_gradient),
-        Rule::Capabilities => with_device(plugin, |mut device| {
-            device.capabilities().map(|_| ()).map_err(|refusal| refusal.to_string())
-        }),
-        Rule::Lifecycle => with_device(plugin, lifecycle),
-        Rule::SafeStop => with_device(plugin, safe_stop),
         unknown => Err(format!("this host cannot check `{}`", unknown.id())),
     }
 }
@@ -52,13 +73,6 @@ fn with_model(plugin: &Plugin, check: impl FnOnce(&mut Model) -> Result<(), Stri
     let mut model = plugin.create_model(&[]).map_err(|error| error.to_string())?;
     model.prepare(&CONFIG).map_err(|refusal| refusal.to_string())?;
     check(&mut model)
-}
-
-fn with_device(
-    plugin: &Plugin,
-    check: impl FnOnce(OpenedDevice) -> Result<(), String>,
-) -> Result<(), String> {
-    check(plugin.open_device(&[]).map_err(|error| error.to_string())?)
 }
 
 fn schema(parameters: &[Parameter]) -> Result<(), String> {

@@ -21,15 +21,38 @@ pub struct Finding {
     pub rule: &'static str,
     /// What it demands.
     pub text: &'static str,
-    /// `None` if it holds, else what was seen.
+    /// What was seen that violates it.
     pub violation: Option<String>,
+    /// Why it could not be checked here: what the plugin needs is not there.
+    pub unchecked: Option<String>,
+}
+
+impl Finding {
+    fn new(rule: Rule, seen: Option<Seen>) -> Self {
+        let (violation, unchecked) = match seen {
+            None => (None, None),
+            Some(Seen::Violation(seen)) => (Some(seen), None),
+            Some(Seen::Missing(what)) => (None, Some(what)),
+        };
+        Self { rule: rule.id(), text: rule.text(), violation, unchecked }
+    }
+}
+
+/// Why a rule is not known to hold.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Seen {
+    /// It does not.
+    Violation(String),
+    /// The plugin needs something that is not there (a device, a permission): neither its fault nor a proof.
+    Missing(String),
 }
 
 /// What the process that checks one rule prints.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Verdict {
     /// `None` if the rule holds, else what was seen.
-    pub(crate) violation: Option<String>,
+    pub(crate) seen: Option<Seen>,
 }
 
 /// How often a process is looked at.
@@ -40,10 +63,10 @@ const LOOK: Duration = Duration::from_millis(2);
 #[must_use]
 pub(crate) fn validate(path: &Path, patience: Duration, program: impl Fn(Rule) -> Command) -> Vec<Finding> {
     let mut findings = Vec::new();
-    let mut note = |rule: Rule, violation: Option<String>| {
-        let holds = violation.is_none();
-        findings.push(Finding { rule: rule.id(), text: rule.text(), violation });
-        holds
+    let mut note = |rule: Rule, seen: Option<Seen>| {
+        let is_violated = matches!(seen, Some(Seen::Violation(_)));
+        findings.push(Finding::new(rule, seen));
+        is_violated
     };
     // Reads the file and runs nothing of it.
     let kind = match read_metadata(path) {
@@ -52,7 +75,7 @@ pub(crate) fn validate(path: &Path, patience: Duration, program: impl Fn(Rule) -
             metadata.kind
         }
         Err(error) => {
-            note(Rule::Metadata, Some(error.to_string()));
+            note(Rule::Metadata, Some(Seen::Violation(error.to_string())));
             return findings;
         }
     };
@@ -61,8 +84,7 @@ pub(crate) fn validate(path: &Path, patience: Duration, program: impl Fn(Rule) -
         let outcome =
             apart(program(rule), patience).unwrap_or_else(|error| Outcome::NotChecked(error.to_string()));
         let stops = matches!(outcome, Outcome::Hung) || matches!(rule, Rule::Loads | Rule::Defaults);
-        let violation = outcome.violation(patience);
-        if !note(rule, violation) && stops {
+        if note(rule, outcome.seen(patience)) && stops {
             break;
         }
     }
@@ -72,7 +94,7 @@ pub(crate) fn validate(path: &Path, patience: Duration, program: impl Fn(Rule) -
 /// How the check of one rule ended.
 enum Outcome {
     Holds,
-    Violated(String),
+    Not(Seen),
     /// The process ended before there was a verdict.
     Died(ExitStatus),
     Hung,
@@ -80,10 +102,10 @@ enum Outcome {
 }
 
 impl Outcome {
-    fn violation(self, patience: Duration) -> Option<String> {
-        Some(match self {
+    fn seen(self, patience: Duration) -> Option<Seen> {
+        Some(Seen::Violation(match self {
             Self::Holds => return None,
-            Self::Violated(seen) => seen,
+            Self::Not(seen) => return Some(seen),
             Self::Died(end) => match end.signal() {
                 Some(signal) => format!("it ended the process by signal {signal}"),
                 None => format!("it ended the process ({end})"),
@@ -92,7 +114,7 @@ impl Outcome {
                 format!("it did not come back within {patience:?}; the rules after it were not checked")
             }
             Self::NotChecked(error) => format!("cannot be checked: {error}"),
-        })
+        }))
     }
 }
 
@@ -108,7 +130,7 @@ fn apart(mut command: Command, patience: Duration) -> io::Result<Outcome> {
     // The verdict is the last line; a plugin may have printed before.
     let verdict = text.lines().last().and_then(|line| serde_json::from_str::<Verdict>(line).ok());
     Ok(match verdict {
-        Some(verdict) if end.success() => verdict.violation.map_or(Outcome::Holds, Outcome::Violated),
+        Some(verdict) if end.success() => verdict.seen.map_or(Outcome::Holds, Outcome::Not),
         _ => Outcome::Died(end),
     })
 }

@@ -33,6 +33,28 @@ impl Wall {
         Self { stiffness: self.stiffness.min(most), ..self }
     }
 
+    /// How deep `push` (N or N·m) drives an inertia (kg or kg·m²) into it that arrives at `speed`, sampled every
+    /// `period_s` and answered after `delay_s` more.
+    ///
+    /// At rest the spring carries the push. On the way there push and speed have done work that the spring takes up,
+    /// `F x + m v² / 2 = K x² / 2` with no damping at all; and what moves at its fastest is seen a period and a delay
+    /// late. The damper of a [stabilised](Self::stabilised) wall takes more than sampling adds (Gil et al. 2009), so
+    /// this is a bound.
+    #[must_use]
+    pub fn penetration(
+        &self,
+        push: f64,
+        speed: f64,
+        inertia: f64,
+        period_s: f64,
+        delay_s: f64,
+    ) -> Penetration {
+        let at_rest = push / self.stiffness;
+        let swing = (at_rest * at_rest + inertia * speed * speed / self.stiffness).sqrt();
+        let fastest = (speed * speed + push * at_rest / inertia).sqrt();
+        Penetration { at_rest, at_most: at_rest + swing + fastest * (period_s + delay_s) }
+    }
+
     /// What it answers `depth` beyond its limit, going out at `speed`; nothing inside.
     fn push(&self, depth: f64, speed: f64) -> f64 {
         if depth > 0.0 { self.stiffness * depth + self.damping * speed.max(0.0) } else { 0.0 }
@@ -43,6 +65,15 @@ impl Wall {
         let side = position.signum();
         -side * self.push(position.abs() - self.limit, speed * side)
     }
+}
+
+/// How deep something gets into a wall, m or rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Penetration {
+    /// Where it comes to rest.
+    pub at_rest: f64,
+    /// The deepest point on the way there.
+    pub at_most: f64,
 }
 
 /// All walls.
@@ -71,6 +102,12 @@ const THESIS_PER_GAMMA: f64 = 2.5;
 /// Angle limit of the report, rad: 2.86 degrees.
 pub const THESIS_ANGLE_LIMIT_RAD: f64 = 0.05;
 
+/// Stiffness of the report's angle limit for a spring of `gamma_n`, N·m/rad.
+#[must_use]
+pub fn thesis_nm_per_rad(gamma_n: f64) -> f64 {
+    (THESIS_PER_GAMMA * gamma_n).max(THESIS_LEAST_NM_PER_RAD)
+}
+
 impl Walls {
     /// The makers' boundary mode, at a radius in m.
     #[must_use]
@@ -94,7 +131,7 @@ impl Walls {
     #[must_use]
     pub fn thesis(radius_m: f64, gamma_n: f64) -> Self {
         let maker = Self::maker(radius_m);
-        let stiffness = (THESIS_PER_GAMMA * gamma_n).max(THESIS_LEAST_NM_PER_RAD);
+        let stiffness = thesis_nm_per_rad(gamma_n);
         Self {
             tilt: Wall { stiffness, ..maker.tilt },
             yaw: Wall { stiffness, ..maker.yaw },

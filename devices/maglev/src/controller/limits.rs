@@ -19,6 +19,10 @@ pub struct LimitConfig {
     pub wall_n_per_m: f64,
     /// Damping in it, N·s/m.
     pub wall_ns_per_m: f64,
+    /// Distance from the origin, m, beyond which it does not wait for the sensors to lose the flotor: it lands.
+    pub edge_m: f64,
+    /// How far ahead it looks for that, s: a flotor that would be beyond then is on its way out.
+    pub edge_ahead_s: f64,
     /// Share of the full load that is borne for ever; the mean of the squared load is held against its square.
     pub continuous_load: f64,
     /// Time over which the load is averaged, s.
@@ -29,7 +33,8 @@ impl LimitConfig {
     /// The device as published (`facts`): the weaker force on the horizontal axes; full scale in a millisecond; 2 A
     /// of 3.5 A mean over a minute. The wall begins just inside the sensors' range with the damping of the makers'
     /// boundary mode, 15 N·s/m, and a stiffness that keeps it and a wall of the host (10 000 N/m, 15 N·s/m) together
-    /// below the limit of Gil et al. 2009 for a period and a delay of a millisecond: 30 / 0.0015 = 20 000 N/m.
+    /// below the limit of Gil et al. 2009 for a period and a delay of a millisecond: 30 / 0.0015 = 20 000 N/m. It
+    /// lands 0.05 mm short of the sensors' range of 12 mm, two cycles ahead: the one that sees it and the one that acts.
     pub const MAGLEV: Self = Self {
         max_force_n: DVec3::new(55.0, 55.0, 140.0),
         max_torque_nm: DVec3::new(6.3, 6.3, 12.2),
@@ -38,6 +43,8 @@ impl LimitConfig {
         wall_m: 11.8e-3,
         wall_n_per_m: 8000.0,
         wall_ns_per_m: 15.0,
+        edge_m: 11.95e-3,
+        edge_ahead_s: 2.0e-3,
         continuous_load: 2.0 / 3.5,
         load_time_s: 60.0,
     };
@@ -53,6 +60,14 @@ impl LimitConfig {
         let outward = position_m / distance_m;
         let leaving_m_per_s = velocity_m_per_s.dot(outward).max(0.0);
         Some(outward * -(self.wall_n_per_m * depth_m + self.wall_ns_per_m * leaving_m_per_s))
+    }
+
+    /// True if the flotor is at the edge of the range, or will be before anything can be done about it.
+    pub(super) fn is_leaving(&self, position_m: DVec3, velocity_m_per_s: DVec3) -> bool {
+        let distance_m = position_m.length();
+        let outward = position_m / distance_m.max(f64::MIN_POSITIVE);
+        let leaving_m_per_s = velocity_m_per_s.dot(outward).max(0.0);
+        distance_m + leaving_m_per_s * self.edge_ahead_s >= self.edge_m
     }
 
     /// The wrench within force and torque, each axis for itself.

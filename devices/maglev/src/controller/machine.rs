@@ -281,7 +281,16 @@ impl Controller {
             }
         }
         let in_mode_us = now_us.saturating_sub(self.mode_since_us);
+        let Sample { pose, twist, .. } = self.sample;
         match self.mode {
+            Mode::Levitating | Mode::Holding
+                if self.config.limits.is_leaving(pose.position(), twist.linear()) =>
+            {
+                self.condition = self.condition.with(Condition::EDGE);
+                self.session = 0;
+                self.command = None;
+                self.enter(Mode::Landing, now_us);
+            }
             Mode::Armed | Mode::Levitating if now_us.saturating_sub(self.heard_us) >= self.watchdog_us => {
                 let flying = self.mode == Mode::Levitating;
                 self.condition = self.condition.with(Condition::WATCHDOG);

@@ -1,8 +1,9 @@
 //! The controller's firmware as a state machine: what stands between the link and the coils, on the device's side.
 //!
 //! The controller trusts nobody. It obeys one session at a time, each command once and only while it is valid;
-//! limits force, torque and their change; keeps the flotor inside its own boundary; and when the host falls
-//! silent it holds, sets the flotor down and stays faulted until it is disarmed.
+//! limits force, torque and their change; keeps the flotor inside its own boundary, and lands before the sensors lose
+//! one that leaves it all the same; and when the host falls silent it holds, sets the flotor down and stays faulted
+//! until it is disarmed.
 //!
 //! ```text
 //!            arm            take off              silence               held            down

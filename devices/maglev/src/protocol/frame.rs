@@ -116,6 +116,8 @@ impl Condition {
     pub const OVER_TEMPERATURE: Self = Self(1 << 4);
     /// The flotor moved too fast.
     pub const OVER_SPEED: Self = Self(1 << 5);
+    /// The flotor was on its way out of the sensors' range; the controller lands.
+    pub const EDGE: Self = Self(1 << 6);
     /// The command was larger, or changed faster, than the coils may; it was limited. No fault.
     pub const LIMITED: Self = Self(1 << 8);
     /// The controller's own boundary pushes back. No fault.
@@ -124,7 +126,7 @@ impl Condition {
     pub const EXPIRED: Self = Self(1 << 10);
 
     const FAULTS: u16 = 0x00ff;
-    const KNOWN: u16 = 0x073f;
+    const KNOWN: u16 = 0x077f;
 
     /// Both.
     #[must_use]
@@ -153,13 +155,14 @@ impl Condition {
 
 impl std::fmt::Display for Condition {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        const WORDS: [(Condition, &str); 9] = [
+        const WORDS: [(Condition, &str); 10] = [
             (Condition::WATCHDOG, "watchdog"),
             (Condition::LINK_LOST, "link-lost"),
             (Condition::SENSOR_RANGE, "sensor-range"),
             (Condition::OVERLOAD, "overload"),
             (Condition::OVER_TEMPERATURE, "over-temperature"),
             (Condition::OVER_SPEED, "over-speed"),
+            (Condition::EDGE, "edge"),
             (Condition::LIMITED, "limited"),
             (Condition::BOUNDARY, "boundary"),
             (Condition::EXPIRED, "expired"),
