@@ -81,6 +81,19 @@ impl HostLink {
         Ok(self.newest.take())
     }
 
+    /// The status that answers this request; nothing if it does not come in time. Spins: for hosts on a virtual clock.
+    pub(crate) fn wait_for(&mut self, awaited: u32, patience: Duration) -> Result<Option<Heard>, LinkLost> {
+        let started = Instant::now();
+        loop {
+            match self.take()? {
+                Some(heard) if heard.acknowledged == awaited => return Ok(Some(heard)),
+                _ if started.elapsed() > patience => return Ok(None),
+                Some(_) => {}
+                None => std::thread::yield_now(),
+            }
+        }
+    }
+
     fn receive(&mut self) -> Result<Received, LinkLost> {
         let incoming = self.transport.as_mut().ok_or(LinkLost)?.receive()?;
         Ok(self.judge(&incoming))

@@ -19,6 +19,7 @@ pub mod boundary;
 pub mod controller;
 pub mod emulator;
 pub mod facts;
+mod flight;
 #[cfg(target_os = "linux")]
 pub mod gadget;
 mod host_link;

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 const TRANSPORTS: [Str; 4] = [Str::new("tcp"), Str::new("serial"), Str::new("usb"), Str::new("hid")];
 const PACES: [Str; 2] = [Str::new("real"), Str::new("lockstep")];
+const GRAVITY: [Str; 2] = [Str::new("off"), Str::new("defy")];
 const WALLS: [Str; 3] = [Str::new("off"), Str::new("maker"), Str::new("thesis")];
 
 /// Where an emulator listens unless told otherwise.
@@ -44,6 +45,21 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         "Vertical force the controller adds by itself; a calibration corrects the sum",
     ),
+    Parameter::real(
+        "takeoff_ms",
+        "ms",
+        0.0,
+        10_000.0,
+        0.0,
+        "Time in which the handle is brought home and held before the scene has a say; 0: the scene has it at once",
+    ),
+    Parameter::choice(
+        "gravity",
+        &GRAVITY,
+        0,
+        "Weight of what moves: off: carried by the controller or the scene; defy: found at take-off, and carried",
+    ),
+    Parameter::real("landing_ms", "ms", 0.0, 10_000.0, 0.0, "Time in which the handle is let down at the end"),
     Parameter::choice(
         "walls",
         &WALLS,
@@ -120,6 +136,10 @@ pub(crate) struct Options {
     pub(crate) watchdog_us: u32,
     pub(crate) timeout: Duration,
     pub(crate) feedforward_n: f64,
+    /// Time for coming home; none: at once.
+    pub(crate) take_off: Duration,
+    pub(crate) landing: Duration,
+    pub(crate) defy_gravity: bool,
 }
 
 impl Options {
@@ -137,6 +157,9 @@ impl Options {
             watchdog_us: u32::try_from(milliseconds("watchdog_ms").as_micros()).unwrap_or(u32::MAX),
             timeout: milliseconds("timeout_ms"),
             feedforward_n: settings.number_or_default("feedforward_n"),
+            take_off: milliseconds("takeoff_ms"),
+            landing: milliseconds("landing_ms"),
+            defy_gravity: settings.choice_or_default("gravity") == 1,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The device as a plugin: opened over a link, armed and taken off by activation.
 
 use crate::boundary::Walls;
+use crate::flight::Holder;
 use crate::host_link::{Heard, HostLink, Unanswered};
 use crate::parameters::{Options, SCHEMA, Values};
 use crate::protocol::{Condition, Description, Mode, Rejections, Request, Status};
@@ -13,7 +14,7 @@ use flotor_hal::{
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// How long a controller may take to describe itself, to arm and take off, and to switch off.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -45,6 +46,10 @@ pub struct LevitatingDevice {
     awaited: Option<u32>,
     /// The status of take-off, until a newer one comes.
     first: Option<Status>,
+    /// The newest status: where landing begins.
+    newest: Status,
+    /// Weight that was found at take-off and is carried, N.
+    weight_n: f64,
     /// What was commanded last, as the scene sees it: walls included, correction not.
     commanded: Wrench,
     warning: ExcessForce,
@@ -117,8 +122,10 @@ impl Device for MaglevDevice {
 
     fn activate(mut self, config: &LoopConfig) -> Result<LevitatingDevice, (Self, Refusal)> {
         match self.take_off(config) {
-            Ok(first) => {
+            Ok((first, weight_n)) => {
                 let mut active = LevitatingDevice {
+                    newest: first,
+                    weight_n,
                     walls: None,
                     #[allow(clippy::cast_precision_loss)] // at most 10 ms
                     period_s: config.period_ns as f64 * 1.0e-9,
@@ -144,8 +151,9 @@ impl Device for MaglevDevice {
 }
 
 impl MaglevDevice {
-    /// Begins a session; a link that broke since (unplugged, plugged in again) is opened anew.
-    fn take_off(&mut self, config: &LoopConfig) -> Result<Status, Refusal> {
+    /// Begins a session, brings the handle home if that is wanted, and weighs it; a link that broke since (unplugged,
+    /// plugged in again) is opened anew.
+    fn take_off(&mut self, config: &LoopConfig) -> Result<(Status, f64), Refusal> {
         let period_us = u32::try_from(config.period_ns / 1000).unwrap_or(u32::MAX);
         let watchdog_us = self.options.watchdog_us;
         let taken_off = match self.link.take_off(period_us, watchdog_us, PATIENCE) {
@@ -157,7 +165,24 @@ impl MaglevDevice {
         };
         let status = taken_off.map_err(|unanswered| refused(&self.options, unanswered))?;
         self.stopped.store(false, Ordering::Release);
-        Ok(status)
+        if self.options.take_off.is_zero() {
+            return Ok((status, 0.0));
+        }
+        let holder = self.holder(period_us);
+        let (status, found_n) =
+            holder.take_off(&mut self.link, status, self.options.take_off).map_err(|why| {
+                let _ = self.link.disarm(PATIENCE);
+                Refusal::resource(format!("the handle did not come home: {why}; is it free to move?"))
+            })?;
+        Ok((status, if self.options.defy_gravity { found_n } else { 0.0 }))
+    }
+
+    fn holder(&self, period_us: u32) -> Holder {
+        Holder {
+            period_us,
+            delay_s: f64::from(self.description.latency_us) * 1.0e-6,
+            lockstep: self.options.lockstep,
+        }
     }
 }
 
@@ -208,6 +233,7 @@ impl ActiveDevice for LevitatingDevice {
             return if silence_ns > timeout_ns { Cycle::Fault(Fault::Timeout) } else { Cycle::Stale };
         };
         self.heard_ns = tick.time_ns;
+        self.newest = status;
         let Some(sample) = sample(&status) else { return Cycle::Fault(Fault::Protocol) };
         let when = |is: bool, condition| if is { condition } else { Conditions::NONE };
         let saturated = when(status.condition.contains(Condition::LIMITED), Conditions::SATURATED);
@@ -246,6 +272,12 @@ impl ActiveDevice for LevitatingDevice {
     }
 
     fn deactivate(mut self) -> MaglevDevice {
+        if !self.opened.options.landing.is_zero() && !self.is_stopped() && fault(&self.newest).is_none() {
+            let holder = self.opened.holder(u32::try_from(self.period_us).unwrap_or(u32::MAX));
+            // Whatever goes wrong: it is switched off next.
+            let _ =
+                holder.land(&mut self.opened.link, self.newest, self.opened.options.landing, self.weight_n);
+        }
         // Gone or silent: its own watchdog switches it off.
         let _ = self.opened.link.disarm(PATIENCE);
         self.opened
@@ -271,15 +303,9 @@ impl LevitatingDevice {
     /// The newest status, if there is one; in lockstep, the one that answers the last command.
     fn look(&mut self) -> Result<Option<Heard>, LinkLost> {
         let awaited = self.awaited.take().filter(|_| self.opened.options.lockstep);
-        let Some(awaited) = awaited else { return self.opened.link.take() };
-        let started = Instant::now();
-        loop {
-            match self.opened.link.take()? {
-                Some(heard) if heard.acknowledged == awaited => return Ok(Some(heard)),
-                _ if started.elapsed() > LOCKSTEP_PATIENCE => return Ok(None),
-                Some(_) => {}
-                None => std::thread::yield_now(),
-            }
+        match awaited {
+            Some(awaited) => self.opened.link.wait_for(awaited, LOCKSTEP_PATIENCE),
+            None => self.opened.link.take(),
         }
     }
 
@@ -291,7 +317,8 @@ impl LevitatingDevice {
         let force_n = self.commanded.force();
         self.warning.look(force_n);
         let (own_n, height_m) = (self.opened.options.feedforward_n, self.state.pose.position().z);
-        let z = self.opened.calibration.command_n(force_n.z + own_n, height_m) - own_n;
+        let total_n = force_n.z + self.weight_n + own_n;
+        let z = self.opened.calibration.command_n(total_n, height_m) - own_n;
         let ([fx, fy, _], [tx, ty, tz]) = (force_n.to_array(), self.commanded.torque_nm);
         #[allow(clippy::cast_possible_truncation)] // f32 is what the wire has
         let wrench = [fx, fy, z, tx, ty, tz].map(|value| value as f32);

@@ -235,13 +235,34 @@ fn the_controllers_own_wall_keeps_the_flotor_in_range() {
     let limits = config().limits;
     let outside = DVec3::X * (limits.wall_m + 0.1e-3);
     bench.sample.pose = Pose::new(outside, DQuat::IDENTITY);
-    bench.sample.twist = Twist::new(DVec3::X * 0.1, DVec3::ZERO);
+    bench.sample.twist = Twist::new(DVec3::X * 0.02, DVec3::ZERO);
     bench.cycle();
     let pushed_n = bench.settled_n(0.0);
     let wrench = bench.controller.drive(bench.now_us, CYCLE_US);
-    let expected = -(limits.wall_n_per_m * 0.1e-3 + limits.wall_ns_per_m * 0.1);
+    let expected = -(limits.wall_n_per_m * 0.1e-3 + limits.wall_ns_per_m * 0.02);
     assert!((wrench.force().x - expected).abs() < 1.0e-9 && pushed_n == 0.0);
     assert!(bench.controller.condition().contains(Condition::BOUNDARY));
+}
+
+#[test]
+fn a_flotor_on_its_way_out_is_landed_before_the_sensors_lose_it() {
+    let mut bench = Bench::levitating();
+    bench.settled_n(5.0);
+    // 11.9 mm, and beyond 11.95 mm within two milliseconds.
+    bench.sample.pose = Pose::new(DVec3::X * 11.9e-3, DQuat::IDENTITY);
+    bench.sample.twist = Twist::new(DVec3::X * 0.1, DVec3::ZERO);
+    bench.cycle();
+    let wrench = bench.cycle();
+    assert_eq!(
+        (bench.controller.mode(), bench.controller.condition().faults()),
+        (Mode::Landing, Condition::EDGE)
+    );
+    assert!(wrench.force().x < -1.5, "wall and damping go on: {wrench:?}");
+    assert_eq!(bench.push(50.0), None, "and its host has no say any more");
+    (0..600).for_each(|_| {
+        bench.cycle();
+    });
+    assert_eq!((bench.controller.mode(), bench.cycle()), (Mode::Fault, Wrench::ZERO));
 }
 
 #[test]
