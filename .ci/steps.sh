@@ -32,6 +32,8 @@ every_change() {
     step format cargo fmt --all --check
     # The README's test command, word for word.
     step test cargo test
+    # The viewer draws with a GPU stack, which the README's command leaves out.
+    step viewer cargo test -p flotor-viewer
     step lint cargo clippy --workspace --all-targets -- -D warnings
     step docs env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
     # Workspaces of their own: that they still compile against the host.

@@ -67,7 +67,7 @@ impl Role {
             ],
             Self::Record => &[Self::Contract, Self::Sync],
             Self::Live => &[Self::Contract, Self::Sync, Self::Record],
-            Self::Viewer => &[Self::Contract, Self::Record, Self::Live, Self::Study],
+            Self::Viewer => &[Self::Contract, Self::Sync, Self::Record, Self::Live, Self::Study],
             Self::Tests => &[
                 Self::Contract,
                 Self::Sync,

@@ -1,26 +1,40 @@
 //! The viewer: what the hand feels, for the eye.
 //!
 //! A program of its own, so that no graphics driver can hold up a servo (docs/src/adr/0008-viewer-process.md). It
-//! reads a recording, draws the bodies of its models in 3D, and plots what was felt.
+//! shows a running host or a recording: the bodies of its models in 3D, what was felt as traces, and panels to change it.
 //!
-//! - [`history`]: what has been seen of a run; [`quantity`] what can be plotted of it, [`decimate`] with how few
-//!   points.
+//! - [`history`]: what has been seen of a run; [`feed`] reads it from a running host, [`player`] says which moment is shown,
+//!   [`tally`] counts what happened, [`panel`] is what can be set.
+//! - [`quantity`]: what can be plotted, [`decimate`] with how few points, [`export`] as files.
 //! - [`shape`]: where the bodies of the models are; [`geometry`] makes triangles of them, [`scene`] a picture's worth,
 //!   seen by a [`camera`] in a [`light`].
-//! - [`raster`]: draws without a GPU; [`picture`] is a whole picture made that way.
-//! - [`ui`], [`palette`]: the interface.
+//! - [`gpu`]: draws the scene on a GPU or software adapter, [`raster`] without either; [`canvas`] is one of the two in the
+//!   interface, [`picture`] a whole picture without a window.
+//! - [`ui`], [`palette`]: the parts of the interface; [`app`] puts them together. [`sound`] warns the ear.
+//! - [`experiment`]: a sitting of a perception experiment, and its screens.
 //!
 //! Nothing here is real-time.
 
+pub mod app;
 pub mod camera;
+pub mod canvas;
 pub mod decimate;
+pub mod experiment;
+pub mod export;
+pub mod feed;
 pub mod geometry;
+pub mod gpu;
 pub mod history;
 pub mod light;
 pub mod palette;
+pub mod panel;
 pub mod picture;
+pub mod player;
 pub mod quantity;
 pub mod raster;
 pub mod scene;
 pub mod shape;
+pub mod sound;
+pub mod tally;
 pub mod ui;
+pub mod window;

@@ -1,6 +1,6 @@
 //! How a surface looks: one key light, one fill light, a bright sky over a dark ground, and a highlight.
 //!
-//! The shader of the GPU repeats these numbers; a test compares the two.
+//! The shader of the GPU is given these numbers; a test compares the two.
 
 use crate::geometry::Vertex;
 use flotor_hal::DVec3;
@@ -40,4 +40,22 @@ pub fn shade(vertex: &Vertex, eye_mm: DVec3) -> [f64; 3] {
     let highlight = SHINE * normal.dot(half).max(0.0).powi(SHARPNESS);
     let rim = RIM * (1.0 - normal.dot(to_eye).max(0.0)).powi(3);
     base.map(|part| part * diffuse + highlight + rim)
+}
+
+/// The numbers of this module in the language of the GPU, to be put in front of its shader.
+#[must_use]
+pub fn wgsl_constants() -> String {
+    let vector =
+        |name: &str, DVec3 { x, y, z }: DVec3| format!("const {name} = vec3<f32>({x:?}, {y:?}, {z:?});\n");
+    let numbers = [
+        ("KEY_PART", KEY_PART),
+        ("FILL_PART", FILL_PART),
+        ("SKY_PART", SKY_PART),
+        ("GROUND_PART", GROUND_PART),
+        ("SHINE", SHINE),
+        ("SHARPNESS", f64::from(SHARPNESS)),
+        ("RIM", RIM),
+    ];
+    let numbers = numbers.iter().map(|(name, number)| format!("const {name}: f32 = {number:?};\n"));
+    vector("KEY", KEY) + &vector("FILL", FILL) + &numbers.collect::<String>()
 }

@@ -1,32 +1,47 @@
-//! `flotor-viewer`: pictures of recordings. Started by `flotor view`, which knows where the plugins are.
+//! `flotor-viewer`: a running host or a recording in a window, or a picture. Started by `flotor view`, which knows where the
+//! plugins are.
 
 use clap::{Parser, ValueEnum};
+use flotor_live::Directory;
+use flotor_study::log::{LogError, SittingLog};
+use flotor_viewer::app::{Start, Viewer, Wanted};
+use flotor_viewer::experiment::Experiment;
 use flotor_viewer::history::History;
 use flotor_viewer::palette::Look;
-use flotor_viewer::picture::{PictureError, PictureOptions, picture, write_png};
+use flotor_viewer::picture::{PictureError, PictureOptions, draw_without_window, picture, write_png};
 use flotor_viewer::shape::shapes_of;
-use std::path::PathBuf;
+use flotor_viewer::window::open;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Shows what the hand feels: the spring in 3D, and traces.
 #[derive(Parser)]
 #[command(name = "flotor-viewer", version, about, max_term_width = 110)]
 struct Arguments {
-    /// Recording to show
-    recording: PathBuf,
+    /// Recording to show; without one, the newest running host
+    recording: Option<PathBuf>,
     /// File of a plugin whose shape may be drawn (repeatable)
     #[arg(long = "plugin", value_name = "PLUGIN.so")]
     plugins: Vec<PathBuf>,
-    /// Write a picture; needs no display and no GPU
-    #[arg(long, value_name = "OUT.png")]
-    screenshot: PathBuf,
+    /// Write a picture instead of opening a window; needs no display and no GPU
+    #[arg(long, value_name = "OUT.png", requires = "recording")]
+    screenshot: Option<PathBuf>,
+    /// Watch the run of this process (default: the newest)
+    #[arg(long, value_name = "PID", conflicts_with = "recording")]
+    run: Option<u32>,
+    /// Carry out the sitting of this log, in front of a subject
+    #[arg(long, value_name = "LOG.jsonl", hide = true, conflicts_with = "recording")]
+    sitting: Option<PathBuf>,
+    /// The picture is that of the whole window, with panels
+    #[arg(long, requires = "screenshot")]
+    window: bool,
     /// The moment to show, s (default: that of the largest force)
     #[arg(long, value_name = "SECONDS")]
     at: Option<f64>,
     /// Light or dark
     #[arg(long, value_enum, default_value_t = LookOption::Dark)]
     look: LookOption,
-    /// Width and height of the picture, pixels
+    /// Width and height of picture or window
     #[arg(long, value_parser = size, default_value = "1280x800", value_name = "WxH")]
     size: [usize; 2],
     /// Size of text and lines, 1 to 3
@@ -63,15 +78,50 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let history = History::read(&arguments.recording).map_err(|error| Failure::Usage(error.to_string()))?;
-    let (mut shapes, missing) = shapes_of(history.run(), &arguments.plugins);
-    for reason in missing {
-        eprintln!("note: {reason}");
-    }
     let look = match arguments.look {
         LookOption::Dark => Look::Dark,
         LookOption::Light => Look::Light,
     };
+    let read = |path: &PathBuf| History::read(path).map_err(|error| Failure::Usage(error.to_string()));
+    let history = arguments.recording.as_ref().map(read).transpose()?;
+    match (history, &arguments.screenshot) {
+        (Some(history), Some(out)) if arguments.window => whole_window(arguments, history, look, out),
+        (Some(history), Some(out)) => screenshot(arguments, &history, look, out),
+        (history, _) => {
+            let start = match history {
+                Some(history) => Start::Recording(Box::new(history), arguments.at, arguments.plugins.clone()),
+                None => live(arguments)?,
+            };
+            open(start, look, arguments.size, arguments.scale)
+                .map_err(|error| Failure::Usage(error.to_string()))
+        }
+    }
+}
+
+/// A running host: for an experimenter, or in front of a subject.
+fn live(arguments: &Arguments) -> Result<Start, Failure> {
+    let wanted = Wanted { directory: Directory::of_this_user(), process: arguments.run };
+    let Some(path) = &arguments.sitting else { return Ok(Start::Live(wanted)) };
+    let wrong = |error: LogError| Failure::Usage(error.to_string());
+    let log = SittingLog::read(path).map_err(wrong)?;
+    let protocol = log.begin.protocol.clone();
+    let (sitting, log) = log.resume(env!("CARGO_PKG_VERSION")).map_err(wrong)?;
+    Ok(Start::Sitting(wanted, Box::new(Experiment::new(sitting, &protocol, Some(log)))))
+}
+
+/// The window as it would open on the recording, drawn on the processor.
+fn whole_window(arguments: &Arguments, history: History, look: Look, out: &Path) -> Result<(), Failure> {
+    let start = Start::Recording(Box::new(history), arguments.at, arguments.plugins.clone());
+    let mut viewer = Viewer::new(&egui::Context::default(), None, start, look);
+    let image = draw_without_window(arguments.size, arguments.scale, look, |ui| viewer.show(ui));
+    write_png(out, &image).map_err(|error| Failure::File(error.to_string()))
+}
+
+fn screenshot(arguments: &Arguments, history: &History, look: Look, out: &Path) -> Result<(), Failure> {
+    let (mut shapes, missing) = shapes_of(history.run(), &arguments.plugins);
+    for reason in missing {
+        eprintln!("note: {reason}");
+    }
     let options = PictureOptions {
         size_px: arguments.size,
         scale: arguments.scale,
@@ -79,9 +129,8 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         at_s: arguments.at,
         ..PictureOptions::default()
     };
-    let image =
-        picture(&history, &mut shapes, &options).map_err(|error| Failure::Usage(error.to_string()))?;
-    write_png(&arguments.screenshot, &image).map_err(|error: PictureError| Failure::File(error.to_string()))
+    let image = picture(history, &mut shapes, &options).map_err(|error| Failure::Usage(error.to_string()))?;
+    write_png(out, &image).map_err(|error: PictureError| Failure::File(error.to_string()))
 }
 
 /// `1280x800`

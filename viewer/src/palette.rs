@@ -46,8 +46,21 @@ pub struct Palette {
     pub contact: Color,
     /// Something is wrong.
     pub warning: Color32,
+    /// All is well.
+    pub well: Color32,
     /// How dark shadows are, 0 to 1.
     pub shadow: f64,
+}
+
+impl Look {
+    /// The other one.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::Dark => Self::Light,
+            Self::Light => Self::Dark,
+        }
+    }
 }
 
 impl Palette {
@@ -73,6 +86,7 @@ impl Palette {
                 torque: [222, 142, 190, 255],
                 contact: [255, 84, 96, 255],
                 warning: Color32::from_rgb(255, 138, 96),
+                well: Color32::from_rgb(0, 190, 140),
                 shadow: 0.62,
             },
             Look::Light => Self {
@@ -93,6 +107,7 @@ impl Palette {
                 torque: [196, 96, 158, 255],
                 contact: [226, 42, 62, 255],
                 warning: Color32::from_rgb(176, 54, 10),
+                well: Color32::from_rgb(0, 134, 100),
                 shadow: 0.34,
             },
         }

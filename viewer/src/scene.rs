@@ -41,12 +41,23 @@ impl ArrowScale {
     /// So that the largest of some samples fill their arrows.
     #[must_use]
     pub fn fitting<'a>(samples: impl Iterator<Item = &'a Sample>) -> Self {
-        let largest = samples.fold([1.0e-3_f64, 1.0e-5], |[force, torque]: [f64; 2], sample| {
-            [force.max(sample.force_n().length()), torque.max(sample.torque_nm().length())]
-        });
-        Self { force_n: 1.9 * largest[0], torque_nm: largest[1] }
+        /// What is smaller than this is shown small.
+        const LEAST: ArrowScale = ArrowScale { force_n: FULL_FORCE * 1.0e-3, torque_nm: 1.0e-5 };
+        samples.fold(LEAST, |scale, sample| scale.with(sample))
+    }
+
+    /// So that one more sample fits.
+    #[must_use]
+    pub fn with(self, sample: &Sample) -> Self {
+        Self {
+            force_n: self.force_n.max(FULL_FORCE * sample.force_n().length()),
+            torque_nm: self.torque_nm.max(sample.torque_nm().length()),
+        }
     }
 }
+
+/// The largest force has an arrow so much shorter than the body.
+const FULL_FORCE: f64 = 1.9;
 
 /// A scene being put together; keeps its memory from frame to frame.
 #[derive(Default)]

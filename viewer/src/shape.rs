@@ -5,6 +5,7 @@
 //! double it, and nothing but the recorded parameters could be shown (docs/src/adr/0008-viewer-process.md).
 
 use crate::geometry::{Body, Curve, Strain};
+use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
 use flotor_hal::{Input, Pose};
 use flotor_record::mapping::Mapping;
@@ -115,6 +116,25 @@ impl Shape {
             if let Some(body) = body(&mut self.model) {
                 self.body = body;
             }
+        }
+    }
+
+    /// The value in force of a parameter of the viewer's instance; `None` for what is no number.
+    #[must_use]
+    pub fn parameter(&mut self, index: usize) -> Option<f64> {
+        let number = self.model.parameter(index);
+        number.is_finite().then_some(number)
+    }
+
+    /// Whether a parameter may be set: one that refuses the value it has follows from others.
+    ///
+    /// # Errors
+    /// What the plugin says.
+    pub fn accepts_its_own(&mut self, index: usize) -> Result<(), String> {
+        let Some(number) = self.parameter(index) else { return Err("it is no number".to_owned()) };
+        match self.model.set_parameter(index, number) {
+            CallStatus::Ok => Ok(()),
+            _ => Err(self.model.last_message()),
         }
     }
 

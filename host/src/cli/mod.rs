@@ -59,7 +59,7 @@ enum Command {
     Run(run::RunArguments),
     /// Ask the models of a recording again: bit for bit, or with other parameters
     Replay(replay::ReplayArguments),
-    /// Show a recording: the spring in 3D, and traces
+    /// Show a running host or a recording: the spring in 3D, and traces
     View(view::ViewArguments),
     /// Evaluate a force model at poses from a CSV file
     Eval(eval::EvalArguments),

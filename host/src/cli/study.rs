@@ -2,6 +2,7 @@
 
 mod bias;
 mod choices;
+mod human;
 
 use super::stopping::stop_on_signals;
 use super::{CommandError, run, style};
@@ -31,6 +32,7 @@ use std::path::PathBuf;
     flotor study magnitude --subjects 8 --seed 3 --out ratings\n  \
     flotor study jnd --bases 20,40 --target 0.8 --side random --out other\n  \
     flotor study jnd --out data --resume                     go on where it broke off\n  \
+    flotor study jnd --observer human --subject 3 --scene mlhd.toml --out people    a person, in front of the viewer\n  \
     flotor study bias --runs 1000                            what is each estimator worth?")]
 pub(crate) struct StudyArguments {
     #[command(subcommand)]
@@ -55,6 +57,8 @@ enum ObserverOption {
     /// Signal detection with known thresholds
     #[default]
     Simulated,
+    /// A person at the device, in front of the viewer
+    Human,
 }
 
 /// What every experiment has.
@@ -66,6 +70,12 @@ struct Common {
     /// How many subjects, numbered from 1
     #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=i64::from(SubjectNumber::MOST)), value_name = "N")]
     subjects: u16,
+    /// The subject's number (--observer human)
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=i64::from(SubjectNumber::MOST)), value_name = "N")]
+    subject: Option<u16>,
+    /// The scene that is felt (--observer human; default: the demo's)
+    #[arg(long, value_name = "SCENE.toml")]
+    scene: Option<PathBuf>,
     /// Seed of orders, presentations and simulated answers
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
@@ -254,7 +264,9 @@ impl MagnitudeArguments {
 fn carry_out(common: &Common, protocol: Protocol) -> Result<(), CommandError> {
     protocol.check().map_err(|error| CommandError::Usage(error.to_string()))?;
     check_stimulus(&protocol)?;
-    let ObserverOption::Simulated = common.observer;
+    if let ObserverOption::Human = common.observer {
+        return human::carry_out(common, &protocol);
+    }
     let cohort = Cohort {
         seed: common.seed,
         subjects: (1..=common.subjects).filter_map(SubjectNumber::new).collect(),

@@ -1,34 +1,43 @@
 //! `flotor view`: starts the viewer, which is a program of its own, and tells it where the plugins are.
 
 use super::CommandError;
-use crate::record::{Recording, Role};
+use super::companion::Companion;
+use crate::record::Recording;
 use crate::registry::Registry;
 use clap::Args;
-use std::os::unix::process::CommandExt;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::ffi::OsString;
+use std::path::PathBuf;
 
-/// Name of the viewer's file, beside this program.
-const VIEWER: &str = "flotor-viewer";
+/// The viewer, built by name because of its graphics stack.
+pub(super) const VIEWER: Companion<'_> =
+    Companion { program: "flotor-viewer", build: "cargo build --release -p flotor-viewer" };
 
 /// Show what the hand feels: the spring in 3D, and traces.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    flotor run --clock virtual --record run.mcap && flotor view --screenshot run.png run.mcap\n  \
+    flotor view                                   the run that goes on in another terminal\n  \
+    flotor run --clock virtual --record run.mcap && flotor view run.mcap\n  \
+    flotor view --screenshot run.png run.mcap     a picture, without display or GPU\n  \
     flotor view --screenshot run.png --at 2.5 --look light --size 1920x1200 --scale 1.5 run.mcap")]
 pub(crate) struct ViewArguments {
-    /// A recording
-    file: PathBuf,
+    /// A recording (without: the running host)
+    file: Option<PathBuf>,
     /// Write a picture of a moment; needs no display and no GPU
-    #[arg(long, value_name = "OUT.png")]
-    screenshot: PathBuf,
+    #[arg(long, value_name = "OUT.png", requires = "file")]
+    screenshot: Option<PathBuf>,
+    /// The picture is that of the whole window, with panels
+    #[arg(long, requires = "screenshot")]
+    window: bool,
+    /// Watch the run of this process (default: the newest run)
+    #[arg(long, value_name = "PID", conflicts_with = "file")]
+    run: Option<u32>,
     /// The moment to show, s (default: that of the largest force)
     #[arg(long, value_name = "SECONDS")]
     at: Option<String>,
     /// Light or dark
     #[arg(long, value_name = "dark|light")]
     look: Option<String>,
-    /// Width and height of the picture, pixels (default: 1280x800)
+    /// Width and height of picture or window (default: 1280x800)
     #[arg(long, value_name = "WxH")]
     size: Option<String>,
     /// Size of text and lines, 1 to 3 (default: 1)
@@ -37,12 +46,12 @@ pub(crate) struct ViewArguments {
 }
 
 pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
-    let mut viewer = Command::new(beside_this_program()?);
-    // Opened here as well: what is wrong with the file is told before anything else is started.
-    let recording = Recording::open(&arguments.file)?;
-    viewer.arg(&arguments.file).arg("--screenshot").arg(&arguments.screenshot);
-    for plugin in plugin_files(&recording) {
-        viewer.arg("--plugin").arg(plugin);
+    let mut for_viewer: Vec<OsString> = Vec::new();
+    let mut add = |name: &str, value: OsString| for_viewer.extend([name.into(), value]);
+    if let Some(file) = &arguments.file {
+        // Opened here as well: what is wrong with the file is told before anything else is started.
+        let recording = Recording::open(file)?;
+        plugin_files(&recording).into_iter().for_each(|plugin| add("--plugin", plugin.into()));
     }
     let options = [
         ("--at", &arguments.at),
@@ -51,30 +60,23 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
         ("--scale", &arguments.scale),
     ];
     for (name, value) in options {
-        viewer.args(value.iter().flat_map(|value| [name, value]));
+        value.iter().for_each(|value| add(name, value.into()));
     }
-    // This process becomes the viewer: its exit code and its words are those of the command.
-    let cause = viewer.exec();
-    Err(CommandError::file(Path::new(VIEWER), "cannot start the viewer", cause))
+    if let Some(process) = arguments.run {
+        add("--run", process.to_string().into());
+    }
+    if let Some(screenshot) = &arguments.screenshot {
+        add("--screenshot", screenshot.into());
+    }
+    for_viewer.extend(arguments.window.then(|| "--window".into()));
+    for_viewer.extend(arguments.file.iter().map(|file| file.into()));
+    VIEWER.become_with(&for_viewer)
 }
 
-/// The viewer's file, which is built by name and lies where this program lies.
-fn beside_this_program() -> Result<PathBuf, CommandError> {
-    let own = std::env::current_exe().map_err(|cause| CommandError::Failed(cause.to_string()))?;
-    let viewer = own.with_file_name(format!("{VIEWER}{}", std::env::consts::EXE_SUFFIX));
-    if viewer.is_file() {
-        return Ok(viewer);
-    }
-    Err(CommandError::Usage(format!(
-        "the viewer is not built: there is no `{}`; `cargo build --release -p flotor-viewer` builds it",
-        viewer.display()
-    )))
-}
-
-/// Files of the models of a recording, as far as they are found; the viewer says what it misses.
+/// Files of the plugins of a recording, as far as they are found; the viewer says what it misses.
 fn plugin_files(recording: &Recording) -> Vec<PathBuf> {
     let registry = Registry::search(&[]);
-    let models = recording.run().plugins.iter().filter(|plugin| matches!(plugin.role, Role::Model(_)));
-    let found = models.filter_map(|model| registry.found().iter().find(|known| known.id == model.id));
+    let plugins = recording.run().plugins.iter();
+    let found = plugins.filter_map(|plugin| registry.found().iter().find(|known| known.id == plugin.id));
     found.map(|metadata| metadata.path.clone()).collect()
 }

@@ -7,7 +7,7 @@ pub const MM_PER_M: f64 = 1.0e3;
 
 /// A corner of a triangle. 28 bytes.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Vertex {
     /// Position, mm, in the frame of the picture (z up).
     pub position_mm: [f32; 3],

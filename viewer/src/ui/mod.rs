@@ -1,6 +1,13 @@
 //! The interface: parts that window, tests and headless pictures put together.
 
 pub mod legend;
+pub mod parameters;
+pub mod playback;
+pub mod plot_stack;
 pub mod plots;
 pub mod readout;
+pub mod standing;
 pub mod style;
+pub mod top_bar;
+pub mod view3d;
+pub mod warnings;

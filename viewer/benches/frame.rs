@@ -1,0 +1,101 @@
+//! What a picture of a running host costs the processor: the shape of the spring, its mesh, and six traces of ten seconds.
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use flotor_hal::Pose;
+use flotor_record::mapping::{Blend, MappingConfig};
+use flotor_record::trace::{RECORD_WORDS, TickRecord};
+use flotor_record::{Clock, PluginDescription, Role, RunDescription};
+use flotor_sync::Words;
+use flotor_viewer::camera::Camera;
+use flotor_viewer::decimate::min_max;
+use flotor_viewer::history::{History, Keep};
+use flotor_viewer::palette::{Look, Palette};
+use flotor_viewer::quantity::Quantity;
+use flotor_viewer::scene::{ArrowScale, SceneBuilder, Visible};
+use flotor_viewer::shape::shapes_of;
+use std::hint::black_box;
+use std::path::PathBuf;
+
+const TICKS: u64 = 10_000;
+const HEIGHT_PX: f64 = 448.0;
+
+fn run() -> RunDescription {
+    RunDescription {
+        flotor_version: String::new(),
+        rate_hz: 1000.0,
+        duration_s: 10.0,
+        seed: 0,
+        clock: Clock::Virtual,
+        scene_toml: String::new(),
+        plugins: vec![PluginDescription {
+            name: "spring".to_owned(),
+            id: "spring".to_owned(),
+            version: String::new(),
+            file: String::new(),
+            role: Role::Model(MappingConfig::default()),
+            places_m: Vec::new(),
+            blend: Blend::default(),
+            settings: Vec::new(),
+            parameters: Vec::new(),
+        }],
+    }
+}
+
+fn history() -> History {
+    let mut history = History::new(run(), Keep::All);
+    for tick in 0..TICKS {
+        let mut record = TickRecord::from_words(&[0; RECORD_WORDS]);
+        let phase = tick as f64 * 7.0e-3;
+        record.tick = tick;
+        record.time_ns = tick * 1_000_000;
+        record.pose = Pose {
+            position_m: [1.0e-3 * phase.cos(), 0.0, 2.0e-3 * phase.sin() - 2.0e-3],
+            orientation_xyzw: [0.02 * phase.sin(), 0.0, 0.0, 1.0],
+        };
+        record.commanded.force_n = [phase.sin(), phase.cos(), 3.0 * phase.sin()];
+        history.push(&record);
+    }
+    history
+}
+
+fn library() -> PathBuf {
+    let own = std::env::current_exe().expect("a bench is a program");
+    let folder = own.ancestors().nth(2).expect("benches lie in a folder of the build");
+    let file = folder.join("libflotor_spring.so");
+    assert!(file.is_file(), "{} is missing: build flotor-spring in this profile first", file.display());
+    file
+}
+
+fn frame(criterion: &mut Criterion) {
+    let history = history();
+    let (mut shapes, missing) = shapes_of(history.run(), &[library()]);
+    assert!(missing.is_empty(), "{missing:?}");
+    let camera = Camera::experimenter(SceneBuilder::height_mm(&shapes));
+    let (palette, scale) = (Palette::of(Look::Dark), ArrowScale::fitting(history.samples()));
+    let mut builder = SceneBuilder::default();
+    let mut moment_s = 0.0;
+    criterion.bench_function("shape and mesh", |bench| {
+        bench.iter(|| {
+            moment_s = (moment_s + 0.016) % 10.0;
+            let sample = history.at(moment_s).expect("ten seconds");
+            let (mesh, facts) =
+                builder.build(&mut shapes, sample, &palette, &camera, HEIGHT_PX, scale, Visible::default());
+            black_box((mesh.indices.len(), facts))
+        });
+    });
+    criterion.bench_function("six traces of 10 s", |bench| {
+        bench.iter(|| {
+            for quantity in [Quantity::Force, Quantity::Position] {
+                for component in 0..3 {
+                    let points = history.between(0.0, 10.0);
+                    let points: Vec<_> =
+                        points.map(|sample| [sample.time_s(), quantity.value(sample, component)]).collect();
+                    black_box(min_max(points.iter().copied(), [0.0, 10.0], 900));
+                }
+            }
+        });
+    });
+}
+
+criterion_group!(benches, frame);
+criterion_main!(benches);

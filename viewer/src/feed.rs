@@ -1,0 +1,188 @@
+//! A running host, as the window sees it: a thread that reads, and what it has read since the last picture.
+
+use flotor_live::{Answer, Ask, Asker, ChangeMessage, Client, End, Event, Greeting, LiveError};
+use flotor_record::RunDescription;
+use flotor_record::trace::TickRecord;
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Ticks that wait for a picture at most: a window that is hidden takes none in, and memory stays what it is.
+const MOST_WAITING: usize = 32_768;
+/// Everything else that waits at most.
+const MOST_NEWS: usize = 1024;
+/// How often the thread looks whether it is still needed.
+const READ_WAIT: Duration = Duration::from_millis(200);
+/// Without a tick for this long, what is shown is old.
+pub const STALE_AFTER: Duration = Duration::from_millis(500);
+
+/// How the connection stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FeedState {
+    /// Ticks come.
+    Running,
+    /// The run is over, and how.
+    Ended(String),
+    /// The host went without a word, or is not understood.
+    Lost(String),
+}
+
+/// What has come since the last look.
+#[derive(Debug, Default)]
+pub struct News {
+    /// Ticks in order.
+    pub records: Vec<TickRecord>,
+    /// Parameters that changed.
+    pub changes: Vec<ChangeMessage>,
+    /// Requests that were answered.
+    pub answers: Vec<Answer>,
+}
+
+#[derive(Debug)]
+struct Waiting {
+    records: VecDeque<TickRecord>,
+    changes: Vec<ChangeMessage>,
+    answers: Vec<Answer>,
+    dropped_by_host: u64,
+    dropped_here: u64,
+    last_tick: Instant,
+    state: FeedState,
+}
+
+/// A run being watched by a thread.
+#[derive(Debug)]
+pub struct Feed {
+    waiting: Arc<Mutex<Waiting>>,
+    is_over: Arc<AtomicBool>,
+    asker: Asker,
+    greeting: Greeting,
+    run: RunDescription,
+}
+
+impl Feed {
+    /// Reads from a client on a thread of its own; `wake` is called when there is something new.
+    ///
+    /// # Errors
+    /// [`LiveError::Connection`]: the host is gone, or there is no thread.
+    pub fn start(mut client: Client, wake: impl Fn() + Send + 'static) -> Result<Self, LiveError> {
+        let waiting = Arc::new(Mutex::new(Waiting {
+            records: VecDeque::new(),
+            changes: Vec::new(),
+            answers: Vec::new(),
+            dropped_by_host: 0,
+            dropped_here: 0,
+            last_tick: Instant::now(),
+            state: FeedState::Running,
+        }));
+        let is_over = Arc::new(AtomicBool::new(false));
+        let (asker, greeting, run) = (client.asker(), client.greeting().clone(), client.run().clone());
+        asker.ask(Ask::Watch { every: every(run.rate_hz) })?;
+        let (for_thread, over) = (Arc::clone(&waiting), Arc::clone(&is_over));
+        std::thread::Builder::new().name("flotor-feed".to_owned()).spawn(move || {
+            while !over.load(Ordering::Relaxed) {
+                let next = client.next(READ_WAIT);
+                let quiet = matches!(next, Ok(None));
+                let goes_on = lock(&for_thread).take_in(next);
+                if !quiet {
+                    wake();
+                }
+                if !goes_on {
+                    return;
+                }
+            }
+        })?;
+        Ok(Self { waiting, is_over, asker, greeting, run })
+    }
+
+    /// What the host said of itself when the connection was made.
+    #[must_use]
+    pub fn greeting(&self) -> &Greeting {
+        &self.greeting
+    }
+
+    /// How the run was set up.
+    #[must_use]
+    pub fn run(&self) -> &RunDescription {
+        &self.run
+    }
+
+    /// Takes what has come.
+    #[must_use]
+    pub fn news(&self) -> News {
+        let mut waiting = lock(&self.waiting);
+        News {
+            records: waiting.records.drain(..).collect(),
+            changes: std::mem::take(&mut waiting.changes),
+            answers: std::mem::take(&mut waiting.answers),
+        }
+    }
+
+    /// How the connection stands.
+    #[must_use]
+    pub fn state(&self) -> FeedState {
+        lock(&self.waiting).state.clone()
+    }
+
+    /// True if the run goes on and its ticks do not come.
+    #[must_use]
+    pub fn is_stale(&self) -> bool {
+        let waiting = lock(&self.waiting);
+        waiting.state == FeedState::Running && waiting.last_tick.elapsed() > STALE_AFTER
+    }
+
+    /// Ticks that found no room, on the way and here.
+    #[must_use]
+    pub fn dropped(&self) -> u64 {
+        let waiting = lock(&self.waiting);
+        waiting.dropped_by_host + waiting.dropped_here
+    }
+
+    /// Asks the host for something.
+    ///
+    /// # Errors
+    /// [`LiveError::Connection`]: the host is gone.
+    pub fn ask(&self, ask: Ask) -> Result<u64, LiveError> {
+        self.asker.ask(ask)
+    }
+}
+
+impl Drop for Feed {
+    fn drop(&mut self) {
+        self.is_over.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Waiting {
+    /// True while there may be more.
+    fn take_in(&mut self, next: Result<Option<Event>, LiveError>) -> bool {
+        match next {
+            Ok(None) => {}
+            Ok(Some(Event::Ticks { records, dropped })) => {
+                self.dropped_by_host = dropped;
+                self.last_tick = Instant::now();
+                self.records.extend(records);
+                while self.records.len() > MOST_WAITING {
+                    self.records.pop_front();
+                    self.dropped_here += 1;
+                }
+            }
+            Ok(Some(Event::Change(change))) if self.changes.len() < MOST_NEWS => self.changes.push(change),
+            Ok(Some(Event::Answer(answer))) if self.answers.len() < MOST_NEWS => self.answers.push(answer),
+            Ok(Some(Event::Change(_) | Event::Answer(_))) => {}
+            Ok(Some(Event::End(End { words }))) => self.state = FeedState::Ended(words),
+            Err(error) => self.state = FeedState::Lost(error.to_string()),
+        }
+        self.state == FeedState::Running
+    }
+}
+
+fn lock(waiting: &Mutex<Waiting>) -> MutexGuard<'_, Waiting> {
+    waiting.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// One tick in so many is enough for pictures: at least a thousand a second.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 100 Hz to 10 kHz
+fn every(rate_hz: f64) -> u32 {
+    (rate_hz / 1000.0).floor().max(1.0) as u32
+}

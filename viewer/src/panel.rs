@@ -1,0 +1,276 @@
+//! The parameters of a plugin, as a panel shows them: generated from its schema, so that any plugin has one.
+//!
+//! Which parameter rules and which follows is the plugin's business (the spring's rigidity follows from its physical
+//! parameters, or the other way round, by its `mode`). The panel asks an instance of its own: a parameter that refuses
+//! the very value it has follows from others. It is shown, moves along, and cannot be pulled.
+
+use crate::shape::Shape;
+use flotor_live::{ChangeMessage, Outcome, PanelParameter, PanelPlugin, ParameterShape, SetValue, Subject};
+
+/// What stands in a panel.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// A number in the parameter's unit.
+    Number(f64),
+    /// Index of a choice.
+    Choice(usize),
+    /// Text, or what cannot be read as the others.
+    Words(String),
+}
+
+/// Whether a parameter can be pulled.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Standing {
+    /// It can.
+    Free,
+    /// It follows from others; the plugin's words for it.
+    Follows(String),
+    /// Only when the plugin is created, or: this is a recording.
+    Fixed,
+}
+
+/// A parameter in a panel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Knob {
+    /// Its entry in the schema.
+    pub parameter: PanelParameter,
+    /// What is shown.
+    pub value: Value,
+    /// Whether it can be pulled.
+    pub standing: Standing,
+    /// The value the loop has.
+    in_force: Value,
+    /// Changes sent of which nothing has been heard.
+    sent: u32,
+}
+
+/// Whether the panel is for a run that can still be changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// A running host.
+    Change,
+    /// A recording, or a run that is over.
+    Read,
+}
+
+/// The panel of one plugin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Panel {
+    /// What the scene calls the plugin.
+    pub name: String,
+    /// Id of the plugin.
+    pub id: String,
+    /// Its parameters in the order of its schema.
+    pub knobs: Vec<Knob>,
+    /// Why the last change was not taken.
+    pub refusal: Option<String>,
+}
+
+impl Panel {
+    /// From what a host says of a plugin, or what a recording's plugin says of itself.
+    #[must_use]
+    pub fn new(plugin: &PanelPlugin, purpose: Use) -> Self {
+        let knob = |parameter: &PanelParameter| Knob {
+            value: Value::read(parameter, &parameter.value),
+            in_force: Value::read(parameter, &parameter.value),
+            standing: if parameter.live && purpose == Use::Change { Standing::Free } else { Standing::Fixed },
+            parameter: parameter.clone(),
+            sent: 0,
+        };
+        Self {
+            name: plugin.name.clone(),
+            id: plugin.id.clone(),
+            knobs: plugin.parameters.iter().map(knob).collect(),
+            refusal: None,
+        }
+    }
+
+    /// Takes in what became of a change.
+    pub fn take_in(&mut self, change: &ChangeMessage) {
+        if change.plugin != self.name || change.subject != Subject::Parameter {
+            return;
+        }
+        let Some(knob) = self.knobs.iter_mut().find(|knob| knob.parameter.id == change.parameter) else {
+            return;
+        };
+        match change.outcome {
+            Outcome::Applied => {
+                knob.in_force = Value::read(&knob.parameter, &change.value);
+                knob.settle();
+                self.refusal = None;
+            }
+            Outcome::Refused => {
+                knob.settle();
+                let name = knob.name();
+                self.refusal =
+                    Some(format!("{name} = {} does not fit the other values; it stays", change.value));
+            }
+            Outcome::Broke => self.refusal = Some(format!("{} broke the plugin; stop the run", knob.name())),
+        }
+    }
+
+    /// Reads the numbers that follow from others, and which do, from an instance with the same settings.
+    pub fn follow(&mut self, shape: &mut Shape) {
+        for (index, knob) in self.knobs.iter_mut().enumerate() {
+            if knob.standing == Standing::Fixed
+                || !matches!(knob.parameter.shape, ParameterShape::Real { .. })
+            {
+                continue;
+            }
+            match shape.accepts_its_own(index) {
+                Ok(()) => knob.standing = Standing::Free,
+                Err(reason) => {
+                    knob.standing = Standing::Follows(reason);
+                    if let Some(number) = shape.parameter(index) {
+                        knob.value = Value::Number(number);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The run is over: nothing can be pulled any more.
+    pub fn freeze(&mut self) {
+        self.knobs.iter_mut().for_each(|knob| knob.standing = Standing::Fixed);
+    }
+
+    /// The host did not pass a change on: what is in force is shown again.
+    pub fn take_back(&mut self) {
+        for knob in self.knobs.iter_mut().filter(|knob| knob.sent > 0) {
+            knob.sent = 0;
+            knob.value = knob.in_force.clone();
+        }
+    }
+
+    /// A change to send, with the value shown.
+    pub fn change(&mut self, index: usize) -> Option<SetValue> {
+        let knob = self.knobs.get_mut(index)?;
+        knob.sent += 1;
+        Some(SetValue {
+            plugin: self.name.clone(),
+            parameter: knob.parameter.id.clone(),
+            value: knob.typed(),
+        })
+    }
+}
+
+impl Knob {
+    /// One change has been heard of: when it was the last, what is in force is shown. Before that a hand is still pulling.
+    fn settle(&mut self) {
+        self.sent = self.sent.saturating_sub(1);
+        if self.sent == 0 {
+            self.value = self.in_force.clone();
+        }
+    }
+
+    /// What people call it: the id without its unit, in words.
+    #[must_use]
+    pub fn name(&self) -> String {
+        let plain =
+            |text: &str| text.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase();
+        let (id, unit) = (&self.parameter.id, plain(&self.parameter.unit));
+        let cut = id.char_indices().filter(|(_, c)| *c == '_').map(|(at, _)| at);
+        let named = cut.into_iter().find(|at| {
+            let end = plain(&id[*at..]);
+            !unit.is_empty() && (end == unit || end.replace("per", "") == unit)
+        });
+        id[..named.unwrap_or(id.len())].replace('_', " ")
+    }
+
+    /// Its unit for people; empty for numbers that have none.
+    #[must_use]
+    pub fn unit(&self) -> &str {
+        if self.parameter.unit == "1" { "" } else { &self.parameter.unit }
+    }
+
+    /// The value as a person would type it.
+    #[must_use]
+    pub fn typed(&self) -> String {
+        match (&self.value, &self.parameter.shape) {
+            (Value::Number(number), _) => number.to_string(),
+            (Value::Choice(index), ParameterShape::Choice { choices, .. }) => {
+                choices.get(*index).cloned().unwrap_or_default()
+            }
+            (Value::Choice(index), _) => index.to_string(),
+            (Value::Words(words), _) => words.clone(),
+        }
+    }
+}
+
+impl Value {
+    fn read(parameter: &PanelParameter, typed: &str) -> Self {
+        let read = match &parameter.shape {
+            ParameterShape::Real { .. } => typed.parse().ok().map(Self::Number),
+            ParameterShape::Choice { choices, .. } => {
+                choices.iter().position(|choice| choice == typed).map(Self::Choice)
+            }
+            ParameterShape::Text | ParameterShape::File => None,
+        };
+        read.unwrap_or_else(|| Self::Words(typed.to_owned()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn knob(id: &str, unit: &str) -> Knob {
+        let parameter = PanelParameter {
+            id: id.to_owned(),
+            unit: unit.to_owned(),
+            doc: "A number".to_owned(),
+            shape: ParameterShape::Real { min: 0.0, max: 10.0, default: 1.0 },
+            live: true,
+            value: "2.5".to_owned(),
+        };
+        let value = Value::read(&parameter, "2.5");
+        Knob { in_force: value.clone(), value, parameter, standing: Standing::Free, sent: 0 }
+    }
+
+    #[test]
+    fn names_leave_out_the_unit() {
+        for (id, unit, name) in [
+            ("free_length_mm", "mm", "free length"),
+            ("gamma_n", "N", "gamma"),
+            ("alpha_n_mm2", "N mm²", "alpha n mm2"),
+            ("alpha_n_mm2", "N mm2", "alpha"),
+            ("stiffness_n_per_m", "N/m", "stiffness"),
+            ("wall_damping_ns_per_m", "N s/m", "wall damping"),
+            ("seat_friction", "1", "seat friction"),
+            ("preset", "", "preset"),
+        ] {
+            assert_eq!(knob(id, unit).name(), name);
+        }
+    }
+
+    #[test]
+    fn a_change_is_taken_in_and_a_refused_one_is_said() {
+        let parameter = knob("gamma_n", "N").parameter;
+        let plugin = PanelPlugin {
+            name: "s".into(),
+            id: "spring".into(),
+            file: "".into(),
+            parameters: vec![parameter],
+        };
+        let mut panel = Panel::new(&plugin, Use::Change);
+        let change = |value: &str, outcome| ChangeMessage {
+            tick: 1,
+            time_ns: 1,
+            plugin: "s".to_owned(),
+            subject: Subject::Parameter,
+            parameter: "gamma_n".to_owned(),
+            value: value.to_owned(),
+            number: 0.0,
+            outcome,
+            settings: Vec::new(),
+        };
+        panel.take_in(&change("4", Outcome::Applied));
+        assert_eq!(panel.knobs[0].value, Value::Number(4.0));
+        panel.knobs[0].value = Value::Number(9.0);
+        assert_eq!(panel.change(0).map(|set| set.value), Some("9".to_owned()));
+        panel.take_in(&change("9", Outcome::Refused));
+        assert_eq!(panel.knobs[0].value, Value::Number(4.0));
+        assert!(panel.refusal.is_some_and(|reason| reason.contains("gamma = 9")));
+        assert_eq!(Panel::new(&plugin, Use::Read).knobs[0].standing, Standing::Fixed);
+    }
+}

@@ -1,0 +1,137 @@
+//! Which moment is shown: the newest of a running host, or any of what has been seen.
+
+/// How fast a recording plays, in times real time.
+pub const SPEEDS: [f64; 6] = [0.05, 0.1, 0.25, 0.5, 1.0, 2.0];
+
+/// What is done about time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Motion {
+    /// Always the newest.
+    Follow,
+    /// Goes on by itself.
+    Play,
+    /// Stands still.
+    Pause,
+}
+
+/// The moment shown, and how it moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Player {
+    /// The moment, s.
+    pub now_s: f64,
+    /// How it moves.
+    pub motion: Motion,
+    /// How fast it plays, in times real time.
+    pub speed: f64,
+    /// Whether it begins again at the end.
+    pub repeats: bool,
+}
+
+impl Player {
+    /// At the newest moment of a running host.
+    #[must_use]
+    pub fn live() -> Self {
+        Self { now_s: 0.0, motion: Motion::Follow, speed: 1.0, repeats: false }
+    }
+
+    /// At a moment of a recording, standing still.
+    #[must_use]
+    pub fn at(now_s: f64) -> Self {
+        Self { now_s, motion: Motion::Pause, speed: 1.0, repeats: true }
+    }
+
+    /// Lets wall-clock time pass over what has been seen.
+    pub fn advance(&mut self, elapsed_s: f64, [first_s, last_s]: [f64; 2]) {
+        match self.motion {
+            Motion::Follow => self.now_s = last_s,
+            Motion::Pause => self.now_s = self.now_s.clamp(first_s, last_s.max(first_s)),
+            Motion::Play => {
+                self.now_s = (self.now_s + elapsed_s * self.speed).max(first_s);
+                if self.now_s >= last_s {
+                    let length_s = last_s - first_s;
+                    if self.repeats && length_s > 0.0 {
+                        self.now_s = first_s + (self.now_s - first_s) % length_s;
+                    } else {
+                        (self.now_s, self.motion) = (last_s, Motion::Pause);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Goes to a moment and stays there.
+    pub fn seek(&mut self, now_s: f64, [first_s, last_s]: [f64; 2]) {
+        self.now_s = now_s.clamp(first_s, last_s.max(first_s));
+        if self.motion == Motion::Follow {
+            self.motion = Motion::Pause;
+        }
+    }
+
+    /// Starts or stops; at the end of a recording it starts from the beginning, of a running host it follows again.
+    pub fn toggle(&mut self, is_live: bool, [first_s, last_s]: [f64; 2]) {
+        self.motion = match self.motion {
+            Motion::Follow | Motion::Play => Motion::Pause,
+            Motion::Pause if is_live => Motion::Follow,
+            Motion::Pause => {
+                if self.now_s >= last_s {
+                    self.now_s = first_s;
+                }
+                Motion::Play
+            }
+        };
+    }
+
+    /// The next speed up or down.
+    pub fn faster(&mut self, by: isize) {
+        let nearest = |speed: f64| {
+            let distance = |index: &usize| (SPEEDS[*index] / speed).ln().abs();
+            (0..SPEEDS.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+        };
+        let index = nearest(self.speed).saturating_add_signed(by).min(SPEEDS.len() - 1);
+        self.speed = SPEEDS[index];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SPAN: [f64; 2] = [1.0, 3.0];
+
+    #[test]
+    fn playing_ends_or_begins_again() {
+        let mut player = Player { motion: Motion::Play, repeats: false, ..Player::at(2.0) };
+        player.advance(0.5, SPAN);
+        assert_eq!((player.now_s, player.motion), (2.5, Motion::Play));
+        player.advance(9.0, SPAN);
+        assert_eq!((player.now_s, player.motion), (3.0, Motion::Pause));
+        player.toggle(false, SPAN);
+        assert_eq!((player.now_s, player.motion), (1.0, Motion::Play), "from the beginning");
+        let mut again = Player { motion: Motion::Play, speed: 2.0, ..Player::at(2.5) };
+        again.advance(0.5, SPAN);
+        assert_eq!(again.now_s, 1.5, "once around");
+    }
+
+    #[test]
+    fn a_running_host_is_followed_until_somebody_looks_back() {
+        let mut player = Player::live();
+        player.advance(0.1, SPAN);
+        assert_eq!(player.now_s, 3.0);
+        player.seek(0.0, SPAN);
+        player.advance(0.1, [1.5, 3.1]);
+        assert_eq!((player.now_s, player.motion), (1.5, Motion::Pause), "the past that is kept moves on");
+        player.toggle(true, SPAN);
+        assert_eq!(player.motion, Motion::Follow);
+    }
+
+    #[test]
+    fn speeds_are_steps() {
+        let mut player = Player::at(0.0);
+        player.faster(9);
+        assert_eq!(player.speed, 2.0);
+        player.faster(-2);
+        assert_eq!(player.speed, 0.5);
+        player.advance(1.0, [0.0, 0.0]);
+        assert_eq!(player.now_s, 0.0, "nothing to play");
+    }
+}

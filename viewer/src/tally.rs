@@ -1,0 +1,51 @@
+//! What has happened in a run so far: counts of events, and the largest wrench.
+
+use crate::history::Sample;
+use crate::scene::ArrowScale;
+use flotor_record::trace::Events;
+
+/// Counts since the beginning of what was seen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tally {
+    counts: [u64; Events::NAMES.len()],
+    scale: ArrowScale,
+    /// Ticks that found no room on the way.
+    pub dropped: u64,
+}
+
+impl Default for Tally {
+    fn default() -> Self {
+        Self { counts: [0; Events::NAMES.len()], scale: ArrowScale::fitting(std::iter::empty()), dropped: 0 }
+    }
+}
+
+impl Tally {
+    /// Of everything in a recording.
+    #[must_use]
+    pub fn of<'a>(samples: impl Iterator<Item = &'a Sample>) -> Self {
+        let mut tally = Self::default();
+        samples.for_each(|sample| tally.add(sample));
+        tally
+    }
+
+    /// Takes a sample in.
+    pub fn add(&mut self, sample: &Sample) {
+        let bits = sample.events.bits();
+        for (bit, count) in self.counts.iter_mut().enumerate() {
+            *count += u64::from(bits >> bit & 1);
+        }
+        self.scale = self.scale.with(sample);
+    }
+
+    /// Ticks in which an event happened, by its bit.
+    #[must_use]
+    pub fn counts(&self) -> &[u64] {
+        &self.counts
+    }
+
+    /// Lengths of arrows that fit everything seen.
+    #[must_use]
+    pub fn scale(&self) -> ArrowScale {
+        self.scale
+    }
+}

@@ -1,0 +1,175 @@
+//! Traces one above the other over one time, and what a person chooses about them.
+
+use crate::history::History;
+use crate::palette::Palette;
+use crate::player::Motion;
+use crate::quantity::{Quantity, Units};
+use crate::ui::plots::{PlotView, plot};
+use crate::ui::style::SMALL_PT;
+use egui::{ComboBox, RichText, Role, Ui, WidgetInfo};
+
+/// Lengths of time that can be shown, s.
+pub const WINDOWS_S: [f64; 5] = [2.0, 5.0, 10.0, 30.0, 60.0];
+
+/// How much of the past is shown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Window {
+    /// All of it.
+    Whole,
+    /// So many seconds, ending at the newest.
+    Newest(f64),
+}
+
+/// What a person asks for beside the traces themselves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PlotWish {
+    /// Another moment, s.
+    Seek(f64),
+    /// A file of what is shown.
+    Export(ExportFormat),
+}
+
+/// Files that traces go into.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExportFormat {
+    /// Numbers.
+    Csv,
+    /// A picture of lines.
+    Svg,
+    /// A picture of pixels.
+    Png,
+}
+
+/// The traces shown.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlotStack {
+    /// From the top.
+    pub shown: Vec<Quantity>,
+    /// How much of the past.
+    pub window: Window,
+    /// Units of all numbers.
+    pub units: Units,
+    /// End of the window while time stands still, s.
+    stands_at_s: Option<f64>,
+    /// Where the pointer was in the last picture, s.
+    hover_s: Option<f64>,
+}
+
+impl PlotStack {
+    /// Force and position.
+    #[must_use]
+    pub fn new(window: Window) -> Self {
+        let shown = vec![Quantity::Force, Quantity::Position];
+        Self { shown, window, units: Units::Handy, stands_at_s: None, hover_s: None }
+    }
+
+    /// First and last time shown, s.
+    #[must_use]
+    pub fn span_s(&self, history: &History) -> [f64; 2] {
+        let [first_s, last_s] = history.span_s();
+        match self.window {
+            Window::Whole => [first_s, last_s.max(first_s + 1.0e-3)],
+            Window::Newest(length_s) => {
+                let end_s = self.stands_at_s.unwrap_or(last_s);
+                [end_s - length_s, end_s]
+            }
+        }
+    }
+
+    /// Shows the row of choices and the traces; says what was asked for.
+    pub fn show(
+        &mut self,
+        ui: &mut Ui,
+        history: &History,
+        now_s: f64,
+        motion: Motion,
+        palette: &Palette,
+    ) -> Vec<PlotWish> {
+        let [_, last_s] = history.span_s();
+        // A trace that is looked at stands still.
+        self.stands_at_s = (motion == Motion::Pause).then(|| self.stands_at_s.unwrap_or(last_s).min(last_s));
+        let mut wishes = Vec::new();
+        ui.horizontal(|ui| self.choices(ui, palette, &mut wishes));
+        let span_s = self.span_s(history);
+        let count = self.shown.len();
+        #[allow(clippy::cast_precision_loss)] // a handful
+        let height = (ui.available_height() - 26.0 * count as f32 - 14.0) / count.max(1) as f32;
+        let cursor_s = self.hover_s.unwrap_or(now_s);
+        self.hover_s = None;
+        for (index, quantity) in self.shown.clone().into_iter().enumerate() {
+            let time_axis = index + 1 == count;
+            let height = if time_axis { height + 14.0 } else { height }.max(24.0);
+            let view = PlotView { quantity, span_s, cursor_s, units: self.units, height, time_axis };
+            let answer = plot(ui, history, view, palette);
+            self.hover_s = self.hover_s.or(answer.hover_s);
+            wishes.extend(answer.seek_s.map(PlotWish::Seek));
+        }
+        wishes
+    }
+
+    fn choices(&mut self, ui: &mut Ui, palette: &Palette, wishes: &mut Vec<PlotWish>) {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        for quantity in Quantity::ALL {
+            let is_shown = self.shown.contains(&quantity);
+            let text = RichText::new(quantity.name()).size(SMALL_PT + 0.5);
+            let text = if is_shown { text.color(palette.text) } else { text.color(palette.faint) };
+            if ui.selectable_label(is_shown, text).clicked() {
+                self.toggle(quantity);
+            }
+        }
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            ui.menu_button(RichText::new("Export").size(SMALL_PT + 0.5), |ui| {
+                for (format, name) in
+                    [(ExportFormat::Csv, "CSV"), (ExportFormat::Svg, "SVG"), (ExportFormat::Png, "PNG")]
+                {
+                    if ui.button(name).clicked() {
+                        wishes.push(PlotWish::Export(format));
+                        ui.close();
+                    }
+                }
+            });
+            let units = match self.units {
+                Units::Handy => "mm, N",
+                Units::Si => "SI",
+            };
+            let switch = ui.button(RichText::new(units).size(SMALL_PT + 0.5));
+            if switch.on_hover_text("Units: millimetres and degrees, or SI (U)").clicked() {
+                self.switch_units();
+            }
+            let shown = match self.window {
+                Window::Whole => "all".to_owned(),
+                Window::Newest(length_s) => format!("{length_s} s"),
+            };
+            let list = ComboBox::from_id_salt("window").selected_text(shown).width(64.0).show_ui(ui, |ui| {
+                ui.selectable_value(&mut self.window, Window::Whole, "all");
+                for length_s in WINDOWS_S {
+                    ui.selectable_value(&mut self.window, Window::Newest(length_s), format!("{length_s} s"));
+                }
+            });
+            list.response.widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, "Time shown"));
+        });
+    }
+
+    /// Shows or hides a quantity; the last one stays.
+    pub fn toggle(&mut self, quantity: Quantity) {
+        match self.shown.iter().position(|shown| *shown == quantity) {
+            Some(_) if self.shown.len() == 1 => {}
+            Some(index) => {
+                self.shown.remove(index);
+            }
+            None => {
+                self.shown.push(quantity);
+                let order = |quantity: &Quantity| Quantity::ALL.iter().position(|known| known == quantity);
+                self.shown.sort_by_key(order);
+            }
+        }
+    }
+
+    /// Millimetres or metres.
+    pub fn switch_units(&mut self) {
+        self.units = match self.units {
+            Units::Handy => Units::Si,
+            Units::Si => Units::Handy,
+        };
+    }
+}

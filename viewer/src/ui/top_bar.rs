@@ -1,0 +1,89 @@
+//! The bar above everything: what is shown, how it stands, and the emergency stop.
+
+use crate::palette::{Look, Palette};
+use crate::ui::style::{BODY_PT, SMALL_PT};
+use egui::{Align, Button, Color32, CornerRadius, Layout, RichText, Stroke, Ui, vec2};
+
+/// What stands in the bar.
+pub struct TopBar<'a> {
+    /// Title of the scene.
+    pub title: &'a str,
+    /// Plugins, rate and clock.
+    pub subtitle: &'a str,
+    /// How the run stands, in a word or two.
+    pub standing: &'a str,
+    /// Whether that is as it should be.
+    pub is_well: bool,
+    /// Whether there is a run to stop.
+    pub can_stop: bool,
+    /// Light or dark.
+    pub look: Look,
+}
+
+/// What was pressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TopBarWish {
+    /// The emergency stop.
+    EmergencyStop,
+    /// The other look.
+    SwitchLook,
+    /// The panel in or out of sight.
+    SwitchPanel,
+}
+
+impl TopBar<'_> {
+    /// Shows the bar.
+    pub fn show(&self, ui: &mut Ui, palette: &Palette) -> Option<TopBarWish> {
+        let mut wish = None;
+        ui.horizontal_centered(|ui| {
+            ui.label(RichText::new(self.title).size(BODY_PT + 2.5).strong());
+            ui.add_space(6.0);
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                if self.can_stop && emergency_stop(ui).clicked() {
+                    wish = Some(TopBarWish::EmergencyStop);
+                }
+                ui.add_space(4.0);
+                if quiet(ui, "☰", "Parameters (P)").clicked() {
+                    wish = Some(TopBarWish::SwitchPanel);
+                }
+                let (sign, help) = match self.look {
+                    Look::Dark => ("☀", "Light (L)"),
+                    Look::Light => ("🌙", "Dark (L)"),
+                };
+                if quiet(ui, sign, help).clicked() {
+                    wish = Some(TopBarWish::SwitchLook);
+                }
+                ui.add_space(6.0);
+                let color = if self.is_well { palette.text } else { palette.warning };
+                ui.label(RichText::new(self.standing).color(color));
+                let dot = if self.is_well { palette.well } else { palette.warning };
+                let (area, _) = ui.allocate_exact_size(vec2(10.0, 10.0), egui::Sense::hover());
+                ui.painter().circle_filled(area.center(), 4.0, dot);
+                ui.add_space(6.0);
+                ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                    let text = RichText::new(self.subtitle).size(SMALL_PT).color(palette.faint);
+                    ui.add(egui::Label::new(text).truncate());
+                });
+            });
+        });
+        wish
+    }
+}
+
+fn quiet(ui: &mut Ui, sign: &str, help: &str) -> egui::Response {
+    let button = ui.add(Button::new(RichText::new(sign).size(15.0)).frame(false)).on_hover_text(help);
+    button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, help));
+    button
+}
+
+/// The one button that must be found without looking for it: the same colours light and dark.
+fn emergency_stop(ui: &mut Ui) -> egui::Response {
+    const RED: Color32 = Color32::from_rgb(196, 30, 36);
+    let text = RichText::new("EMERGENCY STOP").size(BODY_PT).strong().color(Color32::WHITE);
+    let button = Button::new(text)
+        .fill(RED)
+        .stroke(Stroke::new(1.5, Color32::from_rgb(255, 214, 64)))
+        .corner_radius(CornerRadius::same(6))
+        .min_size(vec2(150.0, 32.0));
+    ui.add(button).on_hover_text("No force at once; the run is over (space bar)")
+}

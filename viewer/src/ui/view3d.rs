@@ -1,0 +1,140 @@
+//! The 3D view and what a person does with it: orbit, zoom, incline, reset.
+
+use crate::camera::Camera;
+use crate::canvas::Canvas;
+use crate::history::Sample;
+use crate::palette::{Look, Palette};
+use crate::scene::{ArrowScale, SceneBuilder, SceneFacts, Visible};
+use crate::shape::Shape;
+use egui::{Color32, Key, PointerButton, Rect, Role, Sense, TextureId, Ui, Vec2, WidgetInfo, pos2};
+
+/// Turn for a drag over a point of the screen, rad.
+const ORBIT_RAD_PER_POINT: f64 = 0.008;
+const INCLINE_RAD_PER_POINT: f64 = 0.006;
+/// Turn for a press of a key, rad.
+const ORBIT_RAD_PER_KEY: f64 = 0.12;
+const INCLINE_RAD_PER_KEY: f64 = 0.08;
+/// Zoom for a press of a key, and for a point of the wheel.
+const ZOOM_PER_KEY: f64 = 1.12;
+const ZOOM_PER_POINT: f64 = 1.003;
+
+/// What the view shows.
+pub struct Subject<'a> {
+    /// Bodies of the models.
+    pub shapes: &'a mut [Shape],
+    /// Raised whenever a body changes otherwise than by the pose.
+    pub version: u64,
+    /// The moment.
+    pub sample: &'a Sample,
+    /// Lengths of arrows.
+    pub scale: ArrowScale,
+}
+
+/// The view: camera, buffers, and the picture drawn last.
+pub struct View3d {
+    /// From where.
+    pub camera: Camera,
+    /// What of the scene is drawn.
+    pub visible: Visible,
+    canvas: Canvas,
+    builder: SceneBuilder,
+    drawn: Option<(Look3d, TextureId, SceneFacts)>,
+}
+
+/// All that a picture depends on: equal ones are the same picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Look3d {
+    tick: u64,
+    version: u64,
+    camera: Camera,
+    visible: Visible,
+    size: [usize; 2],
+    look: Look,
+    scale: ArrowScale,
+}
+
+impl View3d {
+    /// The experimenter's view of a body so high.
+    #[must_use]
+    pub fn new(canvas: Canvas, height_mm: f64) -> Self {
+        Self {
+            camera: Camera::experimenter(height_mm),
+            visible: Visible::default(),
+            canvas,
+            builder: SceneBuilder::default(),
+            drawn: None,
+        }
+    }
+
+    /// Shows the scene in a rectangle, follows the mouse, and says what is in the picture.
+    pub fn show(&mut self, ui: &mut Ui, area: Rect, look: Look, subject: Subject<'_>) -> SceneFacts {
+        let height_mm = SceneBuilder::height_mm(subject.shapes);
+        let response = ui.interact(area, ui.scope_id().with("3d view"), Sense::click_and_drag());
+        if response.dragged_by(PointerButton::Primary) {
+            let moved = response.drag_delta();
+            self.camera
+                .orbit(-f64::from(moved.x) * ORBIT_RAD_PER_POINT, f64::from(moved.y) * INCLINE_RAD_PER_POINT);
+        }
+        if response.hovered() {
+            let (scroll, pinch) = ui.input(|input| (input.smooth_scroll_delta().y, input.zoom_delta()));
+            self.camera.zoom(ZOOM_PER_POINT.powf(f64::from(scroll)) * f64::from(pinch), height_mm);
+        }
+        if response.double_clicked() {
+            self.camera = Camera::experimenter(height_mm);
+        }
+        let (texture, facts) = self.picture(ui, area.size(), look, subject);
+        let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+        ui.painter().image(texture, area, whole, Color32::WHITE);
+        response.widget_info(|| {
+            WidgetInfo::labeled(Role::Image, true, "3D view; drag turns it, the wheel zooms")
+        });
+        facts
+    }
+
+    /// Follows the keys that turn and zoom: W A S D, plus, minus, R for the experimenter's view.
+    pub fn keys(&mut self, ui: &Ui, height_mm: f64) {
+        ui.input(|input| {
+            if input.modifiers.command || input.modifiers.alt {
+                return;
+            }
+            let pressed = |key: Key| f64::from(u8::from(input.key_pressed(key)));
+            let turn = pressed(Key::D) - pressed(Key::A);
+            let incline = pressed(Key::W) - pressed(Key::S);
+            let nearer = pressed(Key::Plus) + pressed(Key::Equals) - pressed(Key::Minus);
+            if turn != 0.0 || incline != 0.0 {
+                self.camera.orbit(turn * ORBIT_RAD_PER_KEY, incline * INCLINE_RAD_PER_KEY);
+            }
+            if nearer != 0.0 {
+                self.camera.zoom(ZOOM_PER_KEY.powf(nearer), height_mm);
+            }
+            if input.key_pressed(Key::R) {
+                self.camera = Camera::experimenter(height_mm);
+            }
+        });
+    }
+
+    fn picture(&mut self, ui: &Ui, size: Vec2, look: Look, subject: Subject<'_>) -> (TextureId, SceneFacts) {
+        let Subject { shapes, version, sample, scale } = subject;
+        let (camera, visible) = (self.camera, self.visible);
+        let size = pixels(size * ui.ctx().pixels_per_point());
+        let wanted = Look3d { tick: sample.tick, version, camera, visible, size, look, scale };
+        match self.drawn {
+            Some((drawn, texture, facts)) if drawn == wanted => (texture, facts),
+            _ => {
+                let palette = Palette::of(look);
+                #[allow(clippy::cast_precision_loss)] // pixels
+                let height_px = size[1] as f64;
+                let (mesh, facts) =
+                    self.builder.build(shapes, sample, &palette, &camera, height_px, scale, visible);
+                let texture = self.canvas.draw(ui.ctx(), mesh, &camera, palette.backdrop, size);
+                self.drawn = Some((wanted, texture, facts));
+                (texture, facts)
+            }
+        }
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
+fn pixels(size: Vec2) -> [usize; 2] {
+    [size.x, size.y].map(|length| length.round().max(1.0) as usize)
+}

@@ -1,0 +1,317 @@
+//! Every panel and screen by its accessibility tree, without display or GPU: what a person can find, press and pull, and
+//! what comes of it at the host.
+
+mod support;
+
+use egui::accesskit::Role;
+use egui::{Key, vec2};
+use egui_kittest::Harness;
+use egui_kittest::kittest::{NodeT, Queryable};
+use flotor_live::{Ask, Outcome};
+use flotor_record::trace::Events;
+use flotor_viewer::app::{Start, Viewer, Wanted};
+use flotor_viewer::history::{History, Keep};
+use flotor_viewer::palette::Look;
+use flotor_viewer::panel::{Standing, Value};
+use flotor_viewer::player::Motion;
+use flotor_viewer::ui::plot_stack::ExportFormat;
+use std::time::{Duration, Instant};
+use support::{FakeHost, PATIENCE, plugin_file, spring_run, tick};
+
+type Window<'a> = Harness<'a, Viewer>;
+
+fn window<'a>(start: Start) -> Window<'a> {
+    let harness = Harness::builder().with_size(vec2(1280.0, 800.0)).with_step_dt(1.0 / 60.0);
+    harness.build_eframe(|creation| {
+        let device = creation.wgpu_render_state.clone();
+        Viewer::new(&creation.egui_ctx, device.as_ref(), start, Look::Dark)
+    })
+}
+
+fn recording<'a>() -> Window<'a> {
+    let (run, _) = spring_run(&[]);
+    let mut history = History::new(run, Keep::All);
+    (0..3000).for_each(|number| history.push(&tick(number, Events::NONE)));
+    let mut window = window(Start::Recording(Box::new(history), Some(0.5), vec![plugin_file("spring")]));
+    window.run_steps(3);
+    window
+}
+
+/// A window on a fake host that has run for a while.
+fn live<'a>(settings: &[(&str, &str)]) -> (Window<'a>, FakeHost, tempfile::TempDir) {
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let mut host = FakeHost::new(&folder, settings);
+    let mut window = host.welcome(|directory| window(Start::Live(Wanted::newest(directory.clone()))));
+    assert_eq!(host.request(None), Ask::Watch { every: 1 });
+    host.run_ticks(1500, Events::NONE);
+    until(&mut window, |window| window.state().history().len() >= 1500);
+    window.run_steps(2);
+    (window, host, folder)
+}
+
+/// Makes pictures until something is true.
+fn until(window: &mut Window<'_>, mut is_true: impl FnMut(&Window<'_>) -> bool) {
+    let end = Instant::now() + PATIENCE;
+    while !is_true(window) {
+        assert!(Instant::now() < end, "it does not happen");
+        std::thread::sleep(Duration::from_millis(5));
+        window.run_steps(1);
+    }
+}
+
+fn number_of(window: &Window<'_>, parameter: &str) -> f64 {
+    let panel = &window.state().panels()[1];
+    let knob = panel.knobs.iter().find(|knob| knob.parameter.id == parameter).expect("the spring has it");
+    match knob.value {
+        Value::Number(number) => number,
+        ref other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn without_a_run_the_window_says_what_to_do() {
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let mut window = window(Start::Live(Wanted::newest(flotor_live::Directory::at(folder.path()))));
+    window.run_steps(2);
+    window.get_by_label("Waiting for a run");
+    assert!(window.query_by_label("EMERGENCY STOP").is_none(), "there is nothing to stop");
+}
+
+#[test]
+fn a_slider_reaches_the_host_and_follows_what_the_loop_says() {
+    let (mut window, mut host, _folder) = live(&[]);
+    window.get_by_label("running");
+    window.get_by_role_and_label(Role::Slider, "gamma").set_value_accesskit(30.0);
+    window.run_steps(2);
+    let Ask::Set { values } = host.request(None) else { panic!("something else was asked") };
+    assert_eq!((values[0].plugin.as_str(), values[0].parameter.as_str()), ("spring", "gamma_n"));
+    assert_eq!(values[0].value, "30");
+    let before = number_of(&window, "alpha_n_mm2");
+    host.changed(&values[0], Outcome::Applied);
+    until(&mut window, |window| (number_of(window, "alpha_n_mm2") - before).abs() > 1.0);
+    assert_eq!(number_of(&window, "gamma_n"), 30.0);
+}
+
+#[test]
+fn a_refused_change_goes_back_and_says_why() {
+    let (mut window, mut host, _folder) = live(&[]);
+    window.get_by_role_and_label(Role::Slider, "gamma").set_value_accesskit(25.0);
+    window.run_steps(2);
+    let Ask::Set { values } = host.request(Some("the loop is busy")) else {
+        panic!("something else was asked")
+    };
+    until(&mut window, |window| window.query_by_label_contains("the loop is busy").is_some());
+    host.changed(&values[0], Outcome::Refused);
+    until(&mut window, |window| window.query_by_label_contains("does not fit").is_some());
+    assert!((number_of(&window, "gamma_n") - 25.0).abs() > 1.0, "the old value is in force and shown");
+}
+
+/// As in the thesis: the physical panel drives the rigidity panel, and not the other way round.
+#[test]
+fn physical_parameters_drive_the_rigidities_and_not_the_other_way_round() {
+    let (mut window, mut host, _folder) = live(&[("mode", "physical")]);
+    let standing = |window: &Window<'_>, id: &str| {
+        let knobs = &window.state().panels()[1].knobs;
+        knobs.iter().find(|knob| knob.parameter.id == id).expect("the spring has it").standing.clone()
+    };
+    assert_eq!(standing(&window, "wire_diameter_mm"), Standing::Free);
+    assert!(matches!(standing(&window, "gamma_n"), Standing::Follows(_)));
+    window.get_by_label("Follow from these");
+    assert!(window.get_by_role_and_label(Role::Slider, "gamma").accesskit_node().is_disabled());
+    let before = number_of(&window, "gamma_n");
+    window.get_by_role_and_label(Role::Slider, "wire diameter").set_value_accesskit(0.8);
+    window.run_steps(2);
+    let Ask::Set { values } = host.request(None) else { panic!("something else was asked") };
+    host.changed(&values[0], Outcome::Applied);
+    until(&mut window, |window| number_of(window, "gamma_n") > 1.5 * before);
+
+    let (window, _host, _folder) = live(&[("mode", "gamma")]);
+    assert!(matches!(standing(&window, "wire_diameter_mm"), Standing::Follows(_)));
+    assert_eq!(standing(&window, "gamma_n"), Standing::Free);
+}
+
+#[test]
+fn the_emergency_stop_is_always_in_sight_and_on_the_largest_key() {
+    let (mut window, mut host, _folder) = live(&[]);
+    window.get_by_label("EMERGENCY STOP").click();
+    window.run_steps(2);
+    assert_eq!(host.request(None), Ask::EmergencyStop);
+    window.key_press(Key::P);
+    window.run_steps(2);
+    assert!(window.query_by_role_and_label(Role::Slider, "gamma").is_none(), "P puts the panel away");
+    window.get_by_label("EMERGENCY STOP");
+    window.key_press(Key::Space);
+    window.run_steps(2);
+    assert_eq!(host.request(None), Ask::EmergencyStop);
+    host.end("emergency stop (a program that watches); the device is stopped");
+    until(&mut window, |window| window.query_by_label_contains("emergency stop (").is_some());
+    assert!(window.query_by_label("EMERGENCY STOP").is_none());
+    assert!(window.state().panels()[1].knobs.iter().all(|knob| knob.standing == Standing::Fixed));
+}
+
+#[test]
+fn warnings_say_what_and_what_to_do_and_stay_in_sight_a_while() {
+    let (mut window, mut host, _folder) = live(&[]);
+    assert!(window.query_by_label_contains("⚠").is_none());
+    host.run_ticks(1, Events::FORCE_LIMITED);
+    host.run_ticks(300, Events::NONE);
+    until(&mut window, |window| window.query_by_label_contains("Excess force").is_some());
+    window.get_by_label_contains("ease off");
+    host.run_ticks(1500, Events::NONE);
+    until(&mut window, |window| window.query_by_label_contains("Excess force").is_none());
+    window.get_by_label("force limited"); // counted
+    window.get_by_label("1 ticks");
+    // Nothing comes any more, and the host has not said that it ended.
+    std::thread::sleep(Duration::from_millis(600));
+    window.run_steps(2);
+    window.get_by_label("no ticks come");
+    window.get_by_label_contains("Stale data");
+}
+
+#[test]
+fn the_view_turns_zooms_and_comes_back() {
+    let mut window = recording();
+    let start = window.state().view().camera;
+    let area = window.get_by_role_and_label(Role::Image, "3D view; drag turns it, the wheel zooms").rect();
+    window.hover_at(area.center());
+    window.drag_at(area.center());
+    window.run_steps(1);
+    window.hover_at(area.center() + vec2(60.0, 20.0));
+    window.run_steps(1);
+    window.drop_at(area.center() + vec2(60.0, 20.0));
+    window.run_steps(1);
+    let turned = window.state().view().camera;
+    assert!((turned.azimuth_rad - start.azimuth_rad).abs() > 0.1, "the mouse turns it");
+    assert!(turned.inclination_rad > start.inclination_rad);
+    window.key_press(Key::Minus);
+    window.run_steps(1);
+    assert!(window.state().view().camera.distance_mm > turned.distance_mm);
+    window.key_press(Key::R);
+    window.run_steps(1);
+    assert_eq!(window.state().view().camera, start, "the experimenter's view");
+}
+
+#[test]
+fn a_recording_is_played_scrubbed_and_repeated() {
+    let mut window = recording();
+    window.get_by_label("recording");
+    assert_eq!(window.state().player().now_s, 0.5);
+    window.key_press(Key::Space);
+    window.run_steps(30);
+    let now_s = window.state().player().now_s;
+    assert!(now_s > 0.7 && now_s < 1.3, "half a second later: {now_s}");
+    window.get_by_label("Pause").click();
+    window.run_steps(2);
+    assert_eq!(window.state().player().motion, Motion::Pause);
+    window.get_by_role_and_label(Role::Slider, "Time").set_value_accesskit(2.0);
+    window.run_steps(2);
+    assert!((window.state().player().now_s - 2.0).abs() < 1.0e-9);
+    window.key_press(Key::ArrowLeft);
+    window.run_steps(1);
+    assert!((window.state().player().now_s - 1.0).abs() < 1.0e-9);
+    window.key_press(Key::End);
+    window.key_press(Key::Space);
+    window.run_steps(2);
+    assert!(window.state().player().now_s < 0.5, "from the beginning");
+    window.get_by_label("loop").click();
+    window.run_steps(1);
+    assert!(!window.state().player().repeats);
+}
+
+#[test]
+fn traces_are_chosen_switched_and_written_to_files() {
+    let mut window = recording();
+    window.get_by_label("Force over time, N");
+    window.get_by_role_and_label(Role::Button, "Energy").click();
+    window.run_steps(2);
+    window.get_by_label("Energy over time, mJ");
+    window.key_press(Key::U);
+    window.run_steps(2);
+    window.get_by_label("Energy over time, J");
+    window.get_by_label("Position over time, m");
+
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    for (format, starts) in [
+        (ExportFormat::Csv, b"time_s,Force Fx (N)".as_slice()),
+        (ExportFormat::Svg, b"<svg".as_slice()),
+        (ExportFormat::Png, b"\x89PNG".as_slice()),
+    ] {
+        let path = folder.path().join("traces");
+        let viewer = window.state();
+        flotor_viewer::export::write(viewer.history(), viewer.plots(), format, Look::Light, &path)
+            .expect("written");
+        let written = std::fs::read(&path).expect("it is there");
+        assert!(written.starts_with(starts), "{:?}", String::from_utf8_lossy(&written[..20]));
+        if format == ExportFormat::Csv {
+            assert_eq!(
+                written.iter().filter(|byte| **byte == b'\n').count(),
+                3001,
+                "every sample and the names"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_look_is_switched_and_everything_stays_where_it_was() {
+    let mut window = recording();
+    window.get_by_label("Light (L)").click();
+    window.run_steps(2);
+    assert_eq!(window.state().look(), Look::Light);
+    window.get_by_label("Dark (L)");
+    window.key_press(Key::L);
+    window.run_steps(2);
+    assert_eq!(window.state().look(), Look::Dark);
+}
+
+/// Text twice as large: everything is still there.
+#[test]
+fn twice_the_scale_loses_nothing() {
+    let (run, _) = spring_run(&[]);
+    let mut history = History::new(run, Keep::All);
+    (0..1000).for_each(|number| history.push(&tick(number, Events::NONE)));
+    let harness = Harness::builder().with_size(vec2(960.0, 600.0)).with_pixels_per_point(2.0);
+    let start = Start::Recording(Box::new(history), None, vec![plugin_file("spring")]);
+    let mut window =
+        harness.build_eframe(|creation| Viewer::new(&creation.egui_ctx, None, start, Look::Light));
+    window.run_steps(3);
+    for label in ["A spring under test", "Force over time, N", "Position over time, mm", "Play"] {
+        let area = window.get_by_label(label).rect();
+        assert!(area.max.x <= 960.5 && area.max.y <= 600.5 && area.width() > 8.0, "{label}: {area:?}");
+    }
+}
+
+/// A window that nobody touches makes no pictures: what costs nothing costs no processor.
+#[test]
+fn a_recording_that_stands_still_asks_for_no_more_pictures() {
+    let mut window = recording();
+    window.run_steps(10);
+    let delay = window.output().viewport_output.values().map(|viewport| viewport.repaint_delay).min();
+    assert!(delay.is_none_or(|delay| delay > Duration::from_secs(60)), "{delay:?}");
+}
+
+/// An hour of a running host at full size, two minutes at quick: the history holds a minute, and memory stays.
+#[test]
+fn streaming_is_bounded() {
+    let minutes = if std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size == "full") { 60 } else { 2 };
+    let (run, _) = spring_run(&[]);
+    let mut history = History::new(run, Keep::Newest(60_000));
+    let feed = |history: &mut History, from: u64, count: u64| {
+        (from..from + count).for_each(|number| history.push(&tick(number, Events::NONE)));
+    };
+    feed(&mut history, 0, 70_000);
+    let before = resident_kib();
+    feed(&mut history, 70_000, minutes * 60_000);
+    assert_eq!(history.len(), 60_000);
+    let grown = resident_kib().saturating_sub(before);
+    assert!(
+        grown < 32 * 1024,
+        "{grown} KiB more after {minutes} minutes; other tests of this program allocate, too"
+    );
+}
+
+fn resident_kib() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").expect("Linux tells");
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).expect("it has a size");
+    line.trim().trim_end_matches("kB").trim().parse().expect("a number of KiB")
+}

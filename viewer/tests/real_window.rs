@@ -1,0 +1,157 @@
+//! The program itself: in a real window on a virtual display, a slider is pulled with the mouse and the servo's parameter
+//! follows; without a display, one line and the right exit code.
+//!
+//! The window needs `Xvfb`, `xdotool` and a software adapter (`libgl1-mesa-dri` with `libegl1`, or `mesa-vulkan-drivers`).
+//! Where they are missing, the test says so and passes, unless `FLOTOR_WINDOW_TESTS=require`.
+
+mod support;
+
+use egui::accesskit::Role;
+use egui::{Rect, vec2};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+use flotor_live::{Ask, Client, Directory, Event};
+use flotor_viewer::app::{Start, Viewer, Wanted};
+use flotor_viewer::palette::Look;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use support::PATIENCE;
+
+const SIZE: [u16; 2] = [1280, 800];
+
+/// A process that ends with the test.
+struct Owned(Child);
+
+impl Drop for Owned {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn program(name: &str) -> PathBuf {
+    let file = Path::new(env!("CARGO_BIN_EXE_flotor-viewer")).with_file_name(name);
+    assert!(file.is_file(), "{} is missing: run `cargo build` first", file.display());
+    file
+}
+
+fn is_installed(name: &str) -> bool {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&path).any(|folder| folder.join(name).is_file())
+}
+
+/// A virtual display of the window's size; its picture goes into a file of the folder.
+fn display(folder: &Path) -> (Owned, String) {
+    let screen = format!("{}x{}x24", SIZE[0], SIZE[1]);
+    let mut command = Command::new("Xvfb");
+    command.args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0", &screen, "-fbdir"]).arg(folder);
+    let mut server = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("Xvfb starts");
+    let mut number = String::new();
+    let output = server.stdout.take().expect("a pipe was asked for");
+    BufReader::new(output).read_line(&mut number).expect("it says its number");
+    (Owned(server), format!(":{}", number.trim()))
+}
+
+/// Where a slider lies in the window: the same interface without a display, on the same run.
+fn place_of_slider(directory: &Directory, name: &str) -> Rect {
+    let size = vec2(f32::from(SIZE[0]), f32::from(SIZE[1]));
+    let directory = directory.clone();
+    let mut harness = Harness::builder().with_size(size).build_eframe(|creation| {
+        Viewer::new(&creation.egui_ctx, None, Start::Live(Wanted::newest(directory)), Look::Dark)
+    });
+    let until = Instant::now() + PATIENCE;
+    while harness.state().history().is_empty() {
+        assert!(Instant::now() < until, "no ticks come");
+        std::thread::sleep(Duration::from_millis(20));
+        harness.run_steps(1);
+    }
+    harness.run_steps(3);
+    harness.get_by_role_and_label(Role::Slider, name).rect()
+}
+
+fn patiently<T>(what: &str, mut attempt: impl FnMut() -> Option<T>) -> T {
+    let until = Instant::now() + 3 * PATIENCE;
+    while Instant::now() < until {
+        if let Some(value) = attempt() {
+            return value;
+        }
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    panic!("{what}: not within {:?}", 3 * PATIENCE);
+}
+
+#[test]
+fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
+    let missing: Vec<&str> = ["Xvfb", "xdotool"].into_iter().filter(|name| !is_installed(name)).collect();
+    if !missing.is_empty() {
+        assert!(std::env::var("FLOTOR_WINDOW_TESTS").is_err(), "missing: {missing:?}");
+        eprintln!("skipped: {missing:?} not installed");
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let mut run = Command::new(program("flotor"));
+    run.args(["run", "--duration", "10min", "--rate", "500"]).env("XDG_RUNTIME_DIR", folder.path());
+    let _run =
+        Owned(run.stdin(Stdio::null()).stderr(Stdio::null()).stdout(Stdio::null()).spawn().expect("it runs"));
+    let directory = Directory::at(folder.path().join("flotor"));
+    let mut client = patiently("the run is found", || Client::find(&directory).ok());
+    let slider = place_of_slider(&directory, "gamma");
+
+    let (_server, display) = display(folder.path());
+    let mut window = Command::new(program("flotor-viewer"));
+    window.args(["--size", &format!("{}x{}", SIZE[0], SIZE[1])]).env("DISPLAY", &display);
+    // A software adapter takes all processors if it may; the loop needs one.
+    window.env_remove("WAYLAND_DISPLAY").env("XDG_RUNTIME_DIR", folder.path()).env("LP_NUM_THREADS", "1");
+    let mut window = Owned(window.stderr(Stdio::null()).spawn().expect("the viewer starts"));
+    let xdotool = |arguments: &[&str]| {
+        let output =
+            Command::new("xdotool").args(arguments).env("DISPLAY", &display).output().expect("xdotool runs");
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    };
+    patiently("the window opens", || {
+        assert!(window.0.try_wait().expect("it is ours").is_none(), "the viewer ended by itself");
+        xdotool(&["search", "--onlyvisible", "--name", "Flotor"])
+    });
+
+    client.asker().ask(Ask::Watch { every: 100 }).expect("the host listens");
+    let (y, from, to) =
+        (slider.center().y, slider.left() + 0.3 * slider.width(), slider.left() + 0.7 * slider.width());
+    let changes = patiently("the parameter changes", || {
+        // Pulled again until the window, which may still be starting, has seen it.
+        let [y, from, to] = [y, from, to].map(|at| format!("{at:.0}"));
+        xdotool(&["mousemove", &from, &y, "sleep", "0.2", "mousedown", "1", "sleep", "0.2"]);
+        xdotool(&["mousemove", &to, &y, "sleep", "0.2", "mouseup", "1"]);
+        let (mut changes, until) = (Vec::new(), Instant::now() + Duration::from_secs(2));
+        while Instant::now() < until {
+            if let Ok(Some(Event::Change(change))) = client.next(Duration::from_millis(100)) {
+                changes.push(change);
+            }
+        }
+        // One where the button went down, one where the mouse was moved to.
+        (changes.len() >= 2).then_some(changes)
+    });
+    let (Some(first), Some(last)) = (changes.first(), changes.last()) else { panic!("there are two") };
+    for change in &changes {
+        assert_eq!((change.plugin.as_str(), change.parameter.as_str()), ("spring", "gamma_n"));
+        assert_eq!(change.outcome, flotor_live::Outcome::Applied);
+    }
+    assert!(last.number > 1.2 * first.number, "further right is stiffer: {changes:?}");
+    if let Some(kept) = std::env::var_os("FLOTOR_KEEP_SCREEN") {
+        std::thread::sleep(Duration::from_secs(3));
+        std::fs::copy(folder.path().join("Xvfb_screen0"), kept).expect("the picture is there");
+    }
+}
+
+#[test]
+fn without_a_display_there_is_one_line_and_exit_code_2() {
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let mut viewer = Command::new(program("flotor-viewer"));
+    viewer.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
+    let output = viewer.env("XDG_RUNTIME_DIR", folder.path()).output().expect("it starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert!(said.starts_with("error: no window: ") && said.contains("--screenshot"), "{said}");
+}

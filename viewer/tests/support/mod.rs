@@ -1,0 +1,196 @@
+//! What the tests of the window share: a host that is none, and where plugins lie.
+
+#![allow(dead_code)] // each test program uses its part
+
+use flotor_hal::abi::loader::Plugin;
+use flotor_live::{
+    Answer, Ask, ChangeMessage, Directory, End, Frames, Greeting, Kind, Listener, Outcome, PROTOCOL,
+    PanelPlugin, Request, SetValue, Subject, WrenchLimits, frame, ticks_to_payload,
+};
+use flotor_record::mapping::{Blend, MappingConfig};
+use flotor_record::trace::{Events, RECORD_WORDS, TickRecord};
+use flotor_record::{Clock, PluginDescription, Role, RunDescription};
+use flotor_sync::Words;
+use std::io::Write;
+use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// No test waits longer than this for anything.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(20);
+
+/// The library of a plugin, built beside the tests.
+pub(crate) fn plugin_file(name: &str) -> PathBuf {
+    let own = std::env::current_exe().expect("a test is a program");
+    let folder = own.ancestors().nth(2).expect("tests lie in a folder of the build").to_path_buf();
+    let file = folder.join(format!("libflotor_{name}.so"));
+    assert!(file.is_file(), "{} is missing: run `cargo build` first", file.display());
+    file
+}
+
+/// A run of a spring that nobody computes: what `flotor run` would say of it.
+pub(crate) fn spring_run(settings: &[(&str, &str)]) -> (RunDescription, Vec<PanelPlugin>) {
+    let file = plugin_file("spring");
+    let plugin = Plugin::load(&file).expect("the spring loads");
+    let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
+    let settings: Vec<(String, String)> = settings.iter().map(owned).collect();
+    let parse = |(key, value): &(String, String)| {
+        flotor_hal::abi::loader::Setting::parse(plugin.parameters(), key, value).expect("a legal setting")
+    };
+    let parsed: Vec<_> = settings.iter().map(parse).collect();
+    let mut model = plugin.create_model(&parsed).expect("a legal spring");
+    let schema = plugin.parameters();
+    let in_force = schema.iter().enumerate().map(|(index, parameter)| {
+        let number = model.parameter(index);
+        let choice =
+            parameter.choices().get(number.max(0.0) as usize).map(|choice| choice.as_str().to_owned());
+        (parameter.id().to_owned(), choice.unwrap_or_else(|| number.to_string()))
+    });
+    let parameters: Vec<(String, String)> = in_force.collect();
+    let description = |name: &str, role, settings: Vec<(String, String)>, parameters| PluginDescription {
+        name: name.to_owned(),
+        id: if name == "device" { "simulated".to_owned() } else { name.to_owned() },
+        version: "0.1.0".to_owned(),
+        file: String::new(),
+        role,
+        places_m: Vec::new(),
+        blend: Blend::default(),
+        settings,
+        parameters,
+    };
+    let run = RunDescription {
+        flotor_version: "0.1.0".to_owned(),
+        rate_hz: 1000.0,
+        duration_s: 10.0,
+        seed: 1,
+        clock: Clock::Real,
+        scene_toml: "title = \"A spring under test\"\n".to_owned(),
+        plugins: vec![
+            description("device", Role::Device, Vec::new(), Vec::new()),
+            description("spring", Role::Model(MappingConfig::default()), settings, parameters.clone()),
+        ],
+    };
+    let panels = vec![
+        PanelPlugin::new("device", "simulated", PathBuf::new(), &[], &[]),
+        PanelPlugin::new("spring", "spring", file, schema, &parameters),
+    ];
+    (run, panels)
+}
+
+/// A tick of a handle that goes up and down once a second.
+pub(crate) fn tick(number: u64, events: Events) -> TickRecord {
+    let mut record = TickRecord::from_words(&[0; RECORD_WORDS]);
+    let time_s = number as f64 * 1.0e-3;
+    let z_m = -0.002 * (1.0 - (std::f64::consts::TAU * time_s).cos());
+    record.tick = number;
+    record.time_ns = number * 1_000_000;
+    record.dt_ns = 1_000_000;
+    record.pose.position_m = [0.0, 0.0, z_m];
+    record.pose.orientation_xyzw = [0.0, 0.0, 0.0, 1.0];
+    record.commanded.force_n = [0.0, 0.0, -700.0 * z_m];
+    record.events = events;
+    record
+}
+
+/// Something that talks like a host.
+pub(crate) struct FakeHost {
+    pub(crate) directory: Directory,
+    listener: Listener,
+    greeting: Greeting,
+    run: RunDescription,
+    stream: Option<UnixStream>,
+    frames: Frames,
+    next_tick: u64,
+}
+
+impl FakeHost {
+    /// Listens in a folder of its own.
+    pub(crate) fn new(folder: &tempfile::TempDir, settings: &[(&str, &str)]) -> Self {
+        let directory = Directory::at(folder.path().join("runs"));
+        let listener = directory.listen().expect("a scratch folder takes a socket");
+        let (run, plugins) = spring_run(settings);
+        let greeting = Greeting {
+            protocol: PROTOCOL,
+            flotor_version: "0.1.0".to_owned(),
+            process: std::process::id(),
+            title: "A spring under test".to_owned(),
+            plugins,
+            limits: WrenchLimits { force_n: [Some(30.0); 3], torque_nm: [Some(1.0); 3] },
+        };
+        Self { directory, listener, greeting, run, stream: None, frames: Frames::default(), next_tick: 0 }
+    }
+
+    /// Meets a client on a thread while `meet` makes one.
+    pub(crate) fn welcome<T>(&mut self, meet: impl FnOnce(&Directory) -> T) -> T {
+        let listener = self.listener.socket().try_clone().expect("a second handle");
+        let hello = [
+            frame(Kind::Greeting, &serde_json::to_vec(&self.greeting).expect("it is JSON")),
+            frame(Kind::Run, &self.run.to_bytes()),
+        ]
+        .concat();
+        let accepting = std::thread::spawn(move || {
+            let (mut stream, _) = listener.accept().expect("somebody comes");
+            stream.write_all(&hello).expect("they listen");
+            stream.set_read_timeout(Some(PATIENCE)).expect("a time-out is legal");
+            stream
+        });
+        let met = meet(&self.directory);
+        self.stream = Some(accepting.join().expect("the host waits"));
+        met
+    }
+
+    fn send(&mut self, kind: Kind, payload: &[u8]) {
+        let stream = self.stream.as_mut().expect("somebody watches");
+        stream.write_all(&frame(kind, payload)).expect("they listen");
+    }
+
+    /// Sends the next so many ticks.
+    pub(crate) fn run_ticks(&mut self, count: u64, events: Events) {
+        let records: Vec<TickRecord> =
+            (self.next_tick..self.next_tick + count).map(|n| tick(n, events)).collect();
+        self.next_tick += count;
+        for some in records.chunks(1000) {
+            self.send(Kind::Ticks, &ticks_to_payload(0, some.iter()));
+        }
+    }
+
+    /// The next request; answered with yes or the reason why not.
+    pub(crate) fn request(&mut self, refused: Option<&str>) -> Ask {
+        let until = Instant::now() + PATIENCE;
+        loop {
+            assert!(Instant::now() < until, "nothing is asked");
+            if let Some((kind, payload)) = self.frames.take().expect("they talk sense") {
+                assert_eq!(kind, Kind::Request);
+                let Request { number, ask } = serde_json::from_slice(payload).expect("a request");
+                let answer = Answer { number, refused: refused.map(str::to_owned) };
+                self.send(Kind::Answer, &serde_json::to_vec(&answer).expect("it is JSON"));
+                return ask;
+            }
+            let stream = self.stream.as_mut().expect("somebody watches");
+            self.frames.fill(stream).expect("they talk");
+        }
+    }
+
+    /// Tells that a parameter changed, as a loop does.
+    pub(crate) fn changed(&mut self, SetValue { plugin, parameter, value }: &SetValue, outcome: Outcome) {
+        let change = ChangeMessage {
+            tick: self.next_tick,
+            time_ns: self.next_tick * 1_000_000,
+            plugin: plugin.clone(),
+            subject: Subject::Parameter,
+            parameter: parameter.clone(),
+            value: value.clone(),
+            number: value.parse().unwrap_or(0.0),
+            outcome,
+            settings: Vec::new(),
+        };
+        self.send(Kind::Change, &serde_json::to_vec(&change).expect("it is JSON"));
+    }
+
+    /// The run is over.
+    pub(crate) fn end(&mut self, words: &str) {
+        let end = End { words: words.to_owned() };
+        self.send(Kind::End, &serde_json::to_vec(&end).expect("it is JSON"));
+        self.stream = None;
+    }
+}
