@@ -166,8 +166,10 @@ impl Knob {
     /// What people call it: the id without its unit, in words.
     #[must_use]
     pub fn name(&self) -> String {
-        let plain =
-            |text: &str| text.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase();
+        let plain = |text: &str| {
+            let text = text.replace('²', "2").replace('³', "3").to_lowercase();
+            text.chars().filter(char::is_ascii_alphanumeric).collect::<String>()
+        };
         let (id, unit) = (&self.parameter.id, plain(&self.parameter.unit));
         let cut = id.char_indices().filter(|(_, c)| *c == '_').map(|(at, _)| at);
         let named = cut.into_iter().find(|at| {
@@ -232,7 +234,7 @@ mod tests {
         for (id, unit, name) in [
             ("free_length_mm", "mm", "free length"),
             ("gamma_n", "N", "gamma"),
-            ("alpha_n_mm2", "N mm²", "alpha n mm2"),
+            ("alpha_n_mm2", "N mm²", "alpha"),
             ("alpha_n_mm2", "N mm2", "alpha"),
             ("stiffness_n_per_m", "N/m", "stiffness"),
             ("wall_damping_ns_per_m", "N s/m", "wall damping"),

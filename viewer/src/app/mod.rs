@@ -201,7 +201,7 @@ impl Viewer {
         self.view.camera = crate::camera::Camera::experimenter(SceneBuilder::height_mm(&parts.shapes));
         (self.shapes, self.panels, self.missing) = (parts.shapes, parts.panels, parts.missing);
         self.shape_version += 1;
-        self.source = Source::Live { feed, wanted: wanted.clone() };
+        self.source = Source::Live { feed: Box::new(feed), wanted: wanted.clone() };
     }
 
     fn digest(&mut self, news: News) {

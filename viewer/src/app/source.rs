@@ -38,7 +38,7 @@ pub enum Source {
     /// A running host.
     Live {
         /// The connection.
-        feed: Feed,
+        feed: Box<Feed>,
         /// What is looked for when it is over.
         wanted: Wanted,
     },

@@ -29,6 +29,10 @@ pub fn paint(painter: &Painter, area: Rect, facts: &SceneFacts, palette: &Palett
     painter.text(below, Align2::LEFT_TOP, "rest", font.clone(), palette.faint);
     painter.text(below + vec2(SCALE.x, 0.0), Align2::RIGHT_TOP, "turns touch", font.clone(), palette.faint);
 
+    // In a narrow view they would stand before the body.
+    if area.width() < 1100.0 {
+        return;
+    }
     let mut x = at.x + SCALE.x + 34.0;
     for (color, name) in [(palette.force, "force on the hand"), (palette.torque, "torque on the hand")] {
         painter.circle_filled(Pos2::new(x, at.y + 0.5 * SCALE.y), 5.0, opaque(color));

@@ -107,7 +107,7 @@ fn row(ui: &mut Ui, knob: &mut Knob, palette: &Palette) -> bool {
 /// A parameter that only stands there.
 fn fact(ui: &mut Ui, knob: &Knob, palette: &Palette) {
     let typed = match &knob.value {
-        Value::Number(number) => format!("{number} {}", knob.unit()),
+        Value::Number(number) => format!("{} {}", short(*number), knob.unit()),
         _ => knob.typed(),
     };
     ui.horizontal(|ui| {
@@ -131,6 +131,15 @@ fn help(knob: &Knob) -> String {
         Standing::Fixed => help += "\nCannot change while the loop runs",
     }
     help
+}
+
+/// A number in as many digits as a person reads.
+fn short(number: f64) -> f64 {
+    const DIGITS: i32 = 6;
+    #[allow(clippy::cast_possible_truncation)] // a power of ten
+    let power = 10.0_f64.powi(DIGITS - 1 - number.abs().max(f64::MIN_POSITIVE).log10().floor() as i32);
+    let rounded = (number * power).round() / power;
+    if rounded.is_finite() { rounded } else { number }
 }
 
 /// Change of a number for a point of dragging: a thousandth of it.

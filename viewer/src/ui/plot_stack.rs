@@ -6,7 +6,7 @@ use crate::player::Motion;
 use crate::quantity::{Quantity, Units};
 use crate::ui::plots::{PlotView, plot};
 use crate::ui::style::SMALL_PT;
-use egui::{ComboBox, RichText, Role, Ui, WidgetInfo};
+use egui::{Color32, ComboBox, RichText, Role, Ui, WidgetInfo};
 
 /// Lengths of time that can be shown, s.
 pub const WINDOWS_S: [f64; 5] = [2.0, 5.0, 10.0, 30.0, 60.0];
@@ -93,7 +93,7 @@ impl PlotStack {
         let span_s = self.span_s(history);
         let count = self.shown.len();
         #[allow(clippy::cast_precision_loss)] // a handful
-        let height = (ui.available_height() - 26.0 * count as f32 - 14.0) / count.max(1) as f32;
+        let height = (ui.available_height() - 29.0 * count as f32 - 22.0) / count.max(1) as f32;
         let cursor_s = self.hover_s.unwrap_or(now_s);
         self.hover_s = None;
         for (index, quantity) in self.shown.clone().into_iter().enumerate() {
@@ -112,7 +112,8 @@ impl PlotStack {
         for quantity in Quantity::ALL {
             let is_shown = self.shown.contains(&quantity);
             let text = RichText::new(quantity.name()).size(SMALL_PT + 0.5);
-            let text = if is_shown { text.color(palette.text) } else { text.color(palette.faint) };
+            // White on the blue of what is chosen, light and dark.
+            let text = text.color(if is_shown { Color32::WHITE } else { palette.faint });
             if ui.selectable_label(is_shown, text).clicked() {
                 self.toggle(quantity);
             }
