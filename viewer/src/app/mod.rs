@@ -381,6 +381,7 @@ impl Viewer {
     fn side(&mut self, ui: &mut Ui, palette: &Palette) {
         let mut values: Vec<SetValue> = Vec::new();
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            ui.set_max_width(ui.available_width() - 12.0); // room for the bar that scrolls
             // Models first: they are what people came for.
             let has_device = self.panels.len().min(1);
             let (device, models) = self.panels.split_at_mut(has_device);

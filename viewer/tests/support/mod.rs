@@ -42,8 +42,9 @@ pub(crate) fn spring_run(settings: &[(&str, &str)]) -> (RunDescription, Vec<Pane
     let schema = plugin.parameters();
     let in_force = schema.iter().enumerate().map(|(index, parameter)| {
         let number = model.parameter(index);
+        let mut choices = (0_u32..).zip(parameter.choices());
         let choice =
-            parameter.choices().get(number.max(0.0) as usize).map(|choice| choice.as_str().to_owned());
+            choices.find(|(at, _)| f64::from(*at) == number).map(|(_, choice)| choice.as_str().to_owned());
         (parameter.id().to_owned(), choice.unwrap_or_else(|| number.to_string()))
     });
     let parameters: Vec<(String, String)> = in_force.collect();
