@@ -1,10 +1,11 @@
 //! `flotor analyse`: a study's data in, thresholds, effects and tests out.
 
 use super::{CommandError, style, write_json};
-use crate::study::html;
+use crate::study::report::html;
 use clap::{Args, ValueEnum};
 use flotor_statistics::anova::SumOfSquares;
-use flotor_study::analysis::{Analysis, AnalysisOptions, Estimator, ResponseRow, SubjectRecord};
+use flotor_study::analysis::{Analysis, AnalysisOptions, BlindedAnalysis, Estimator, SubjectRecord};
+use flotor_study::blinding::Codes;
 use flotor_study::dataset::{Dataset, DatasetError};
 use flotor_study::protocol::RatingScale;
 use std::path::PathBuf;
@@ -31,6 +32,9 @@ pub(crate) struct AnalyseArguments {
     /// Write every subject's response under every condition, for R or Python
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
+    /// Codes in place of modalities and stimuli, nothing of the report beside them
+    #[arg(long, conflicts_with = "html")]
+    blind: bool,
     /// How thresholds are found
     #[arg(long, value_enum, default_value_t)]
     estimator: EstimatorOption,
@@ -110,12 +114,16 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     let protocol = &first.begin.protocol;
     let analysis = Analysis::of(protocol, &subjects, &options)
         .map_err(|error| CommandError::Usage(format!("{}: {error}", arguments.data.display())))?;
+    if arguments.blind {
+        let codes = Codes::new(protocol, first.begin.seed);
+        return tell_blinded(arguments, &BlindedAnalysis::of(&analysis, &codes));
+    }
     if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
         say!("{}", style::title(&format!("{} of {}", protocol.task(), protocol.stimulus())));
         say!("{}", analysis.to_text());
     }
     if let Some(path) = &arguments.html {
-        std::fs::write(path, html(protocol, &analysis))
+        std::fs::write(path, html(&first.begin, &subjects, &analysis))
             .map_err(|cause| CommandError::file(path, "cannot write the page", cause))?;
     }
     if let Some(path) = &arguments.csv {
@@ -126,7 +134,20 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &analysis))
 }
 
-fn write_csv(path: &std::path::Path, rows: &[ResponseRow]) -> Result<(), csv::Error> {
+/// Results under codes.
+fn tell_blinded(arguments: &AnalyseArguments, analysis: &BlindedAnalysis) -> Result<(), CommandError> {
+    if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
+        say!("{}\n{}", style::title(analysis.task), analysis.to_text());
+    }
+    if let Some(path) = &arguments.csv {
+        write_csv(path, &analysis.responses).map_err(|error| {
+            CommandError::file(path, "cannot write the table", std::io::Error::other(error))
+        })?;
+    }
+    arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, analysis))
+}
+
+fn write_csv(path: &std::path::Path, rows: &[impl serde::Serialize]) -> Result<(), csv::Error> {
     let mut writer = csv::Writer::from_path(path)?;
     rows.iter().try_for_each(|row| writer.serialize(row))?;
     Ok(writer.flush()?)

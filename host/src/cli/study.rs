@@ -2,19 +2,26 @@
 
 mod bias;
 mod choices;
+mod explore;
+mod front;
 mod human;
+mod person;
+mod spring;
 
+use super::options::{PluginKeyValue, duration_s};
 use super::stopping::stop_on_signals;
 use super::{CommandError, run, style};
-use crate::registry::Registry;
+use crate::scene::Scene;
+use crate::session::{RunEnd, RunError};
+use crate::study::rig::{Rig, RunEnded, TrialFiles};
+use crate::study::{Apparatus, ApparatusError, Kinematics};
 use choices::{
-    AveragingChoice, BoundaryChoice, FirstChoice, OrderChoice, ProcedureChoice, SideChoice, StepChoice, range,
+    AveragingChoice, BoundaryChoice, FirstChoice, ForceWay, KinematicsOption, NoiseOption, OrderChoice,
+    PresentationOption, ProcedureChoice, SideChoice, StepChoice, range,
 };
 use clap::{Args, Subcommand, ValueEnum};
-use flotor_hal::ParameterKind;
-use flotor_hal::abi::PluginKind;
 use flotor_study::cohort::{Cohort, CohortError, Earlier};
-use flotor_study::conduct::Nothing;
+use flotor_study::conduct::{ConductError, Nothing, OutsideError, Presenter};
 use flotor_study::dataset::{Dataset, DatasetError};
 use flotor_study::observer::Population;
 use flotor_study::procedure::{Procedure, QuestPlusRule, WeightedUpDownRule};
@@ -32,7 +39,9 @@ use std::path::PathBuf;
     flotor study magnitude --subjects 8 --seed 3 --out ratings\n  \
     flotor study jnd --bases 20,40 --target 0.8 --side random --out other\n  \
     flotor study jnd --out data --resume                     go on where it broke off\n  \
-    flotor study jnd --observer human --subject 3 --scene mlhd.toml --out people    a person, in front of the viewer\n  \
+    flotor study jnd --observer human --subject 3 --screen viewer --scene mlhd.toml --out people    a person, in front of the viewer\n  \
+    flotor study jnd --observer human --subject 3 --out people --resume\n  \
+    flotor study magnitude --stimulus spring.wire_diameter_mm --set spring.mode=physical --range 0.4-0.8 --out d\n  \
     flotor study bias --runs 1000                            what is each estimator worth?")]
 pub(crate) struct StudyArguments {
     #[command(subcommand)]
@@ -45,6 +54,12 @@ enum Task {
     Jnd(JndArguments),
     /// Magnitude estimation: one at a time, any number
     Magnitude(MagnitudeArguments),
+    /// Just noticeable difference of a force, felt or exerted
+    Force(ForceArguments),
+    /// Feel a spring while its dimensions and material change: no trials, no questions
+    Explore(explore::ExploreArguments),
+    /// Fit a spring to a measured curve of a real one, to be judged beside others
+    Spring(spring::SpringArguments),
     /// Add a note of the experimenter to a subject's log
     Note(NoteArguments),
     /// How far each way to a threshold is off, with observers whose threshold is known
@@ -54,10 +69,10 @@ enum Task {
 /// `--observer`
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 enum ObserverOption {
-    /// Signal detection with known thresholds
+    /// Signal detection with known thresholds, a simulated hand, virtual time
     #[default]
     Simulated,
-    /// A person at the device, in front of the viewer
+    /// A person at the device, in front of the viewer or of this terminal, in real time
     Human,
 }
 
@@ -70,24 +85,45 @@ struct Common {
     /// How many subjects, numbered from 1
     #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=i64::from(SubjectNumber::MOST)), value_name = "N")]
     subjects: u16,
-    /// The subject's number (--observer human)
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=i64::from(SubjectNumber::MOST)), value_name = "N")]
-    subject: Option<u16>,
-    /// The scene that is felt (--observer human; default: the demo's)
-    #[arg(long, value_name = "SCENE.toml")]
-    scene: Option<PathBuf>,
     /// Seed of orders, presentations and simulated answers
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
     /// Folder for the data
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Number of the person (human; default: the first that is free)
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=i64::from(SubjectNumber::MOST)), value_name = "N")]
+    subject: Option<u16>,
+    /// Scene that is felt (TOML); without it, a spring on the simulated flotor
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+    /// Set a parameter of a plugin of the scene (repeatable)
+    #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
+    sets: Vec<PluginKeyValue>,
+    /// What presents the stimuli to simulated observers
+    #[arg(long, value_enum, default_value_t)]
+    apparatus: PresentationOption,
+    /// How long a simulated observer feels each stimulus
+    #[arg(long, default_value = "1s", value_parser = duration_s, value_name = "TIME")]
+    feel: f64,
+    /// What is kept of the movement (default: full for people, summary for simulated observers)
+    #[arg(long, value_enum)]
+    kinematics: Option<KinematicsOption>,
+    /// Offer a rest after so many trials, 0: never (human)
+    #[arg(long, default_value_t = 40, value_name = "N")]
+    rest_every: u32,
+    /// Where the person sees and answers (human)
+    #[arg(long, value_enum, default_value_t)]
+    screen: front::ScreenOption,
+    /// White noise on headphones (human)
+    #[arg(long, value_enum, default_value_t)]
+    noise: NoiseOption,
     /// Go on with subjects who broke off, leave complete ones alone
     #[arg(long)]
     resume: bool,
-    /// What is varied: MODEL.PARAMETER
-    #[arg(long, default_value = "spring.gamma_n", value_name = "MODEL.KEY")]
-    stimulus: String,
+    /// What is varied: MODEL.PARAMETER (default: spring.gamma_n, of a force load.force_n)
+    #[arg(long, value_name = "MODEL.KEY")]
+    stimulus: Option<String>,
     /// Which modality comes first
     #[arg(long, value_enum, default_value_t, value_name = "MODALITY")]
     first: FirstChoice,
@@ -113,9 +149,9 @@ struct NoteArguments {
 struct JndArguments {
     #[command(flatten)]
     common: Common,
-    /// Bases, in the stimulus's unit
-    #[arg(long, value_delimiter = ',', default_values_t = [17.0, 26.0, 35.0], value_name = "LIST")]
-    bases: Vec<f64>,
+    /// Bases, in the stimulus's unit (default: 17,26,35; of a force 3,6,9)
+    #[arg(long, value_delimiter = ',', value_name = "LIST")]
+    bases: Option<Vec<f64>>,
     /// Replications, in alternating modality
     #[arg(long, default_value_t = 4, value_name = "N")]
     replications: u32,
@@ -184,24 +220,75 @@ struct MagnitudeArguments {
     demo: u32,
 }
 
+#[derive(Args)]
+#[command(
+    after_help = "Felt: a weight that pulls down all the time. Exerted: a resistance that is felt only while the hand \
+    pushes.\n\n\
+    Examples:\n  \
+    flotor study force --way felt --out felt\n  \
+    flotor study force --way exerted --out exerted\n  \
+    flotor study force --observer human --way exerted --out people"
+)]
+struct ForceArguments {
+    /// Whether the force is felt or exerted
+    #[arg(long, value_enum, default_value_t)]
+    way: ForceWay,
+    #[command(flatten)]
+    jnd: JndArguments,
+}
+
+/// What a difference experiment is about unless told otherwise.
+struct Subject {
+    stimulus: &'static str,
+    bases: [f64; 3],
+}
+
+/// Springs, as in the report.
+const STIFFNESS: Subject = Subject { stimulus: "spring.gamma_n", bases: [17.0, 26.0, 35.0] };
+/// Forces in the same proportions and in the range those springs are felt with.
+const FORCE: Subject = Subject { stimulus: "load.force_n", bases: [3.0, 6.0, 9.0] };
+
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
     match &arguments.task {
         Task::Note(arguments) => note(arguments),
         Task::Bias(arguments) => bias::run(arguments),
-        Task::Jnd(arguments) => carry_out(&arguments.common, Protocol::Jnd(arguments.protocol()?)),
+        Task::Explore(arguments) => explore::run(arguments),
+        Task::Spring(arguments) => spring::run(arguments),
+        Task::Jnd(arguments) => {
+            carry_out(&arguments.common, Protocol::Jnd(arguments.protocol(&STIFFNESS)?), &[])
+        }
+        Task::Force(arguments) => {
+            let protocol = Protocol::Jnd(arguments.jnd.protocol(&FORCE)?);
+            carry_out(&arguments.jnd.common, protocol, &[arguments.way.setting()?])
+        }
         Task::Magnitude(arguments) => {
-            carry_out(&arguments.common, Protocol::Magnitude(arguments.protocol()?))
+            carry_out(&arguments.common, Protocol::Magnitude(arguments.protocol()?), &[])
         }
     }
 }
 
 impl Common {
-    fn stimulus(&self) -> Result<Stimulus, CommandError> {
-        let (model, parameter) = self.stimulus.split_once('.').ok_or_else(|| {
-            let text = &self.stimulus;
+    fn stimulus(&self, usual: &Subject) -> Result<Stimulus, CommandError> {
+        let text = self.stimulus.as_deref().unwrap_or(usual.stimulus);
+        let (model, parameter) = text.split_once('.').ok_or_else(|| {
             CommandError::Usage(format!("--stimulus {text}: write MODEL.PARAMETER, like spring.gamma_n"))
         })?;
         Ok(Stimulus { model: model.to_owned(), parameter: parameter.to_owned() })
+    }
+
+    /// The scene with everything the command line says on top.
+    fn scene(&self, stimulus: &Stimulus) -> Result<Scene, CommandError> {
+        let scene = match &self.scene {
+            Some(path) => Scene::load(path),
+            None => Scene::study(&stimulus.model),
+        };
+        let mut scene = scene.map_err(RunError::Scene)?;
+        self.sets.iter().try_for_each(|set| set.apply(&mut scene)).map_err(CommandError::Usage)?;
+        Ok(scene)
+    }
+
+    fn kinematics(&self) -> Option<Kinematics> {
+        self.kinematics.map(Kinematics::from)
     }
 
     fn at_boundary(&self) -> AtBoundary {
@@ -210,7 +297,7 @@ impl Common {
 }
 
 impl JndArguments {
-    fn protocol(&self) -> Result<JndProtocol, CommandError> {
+    fn protocol(&self, usual: &Subject) -> Result<JndProtocol, CommandError> {
         let rule = WeightedUpDownRule {
             initial_delta: self.initial,
             first_step: self.step,
@@ -233,8 +320,8 @@ impl JndArguments {
             }),
         };
         Ok(JndProtocol {
-            stimulus: self.common.stimulus()?,
-            bases: self.bases.clone(),
+            stimulus: self.common.stimulus(usual)?,
+            bases: self.bases.clone().unwrap_or_else(|| usual.bases.to_vec()),
             replications: self.replications,
             first_modality: self.common.first.into(),
             procedure,
@@ -250,7 +337,7 @@ impl MagnitudeArguments {
     fn protocol(&self) -> Result<MagnitudeProtocol, CommandError> {
         let (least, most) = self.range;
         Ok(MagnitudeProtocol {
-            stimulus: self.common.stimulus()?,
+            stimulus: self.common.stimulus(&STIFFNESS)?,
             values: MagnitudeProtocol::evenly(least, most, self.stimuli),
             replications: self.replications,
             first_modality: self.common.first.into(),
@@ -261,17 +348,34 @@ impl MagnitudeArguments {
 }
 
 /// Checks everything, then carries the study out.
-fn carry_out(common: &Common, protocol: Protocol) -> Result<(), CommandError> {
+fn carry_out(common: &Common, protocol: Protocol, sets: &[PluginKeyValue]) -> Result<(), CommandError> {
     protocol.check().map_err(|error| CommandError::Usage(error.to_string()))?;
-    check_stimulus(&protocol)?;
-    if let ObserverOption::Human = common.observer {
-        return human::carry_out(common, &protocol);
+    let mut scene = common.scene(protocol.stimulus())?;
+    sets.iter().try_for_each(|set| set.apply(&mut scene)).map_err(CommandError::Usage)?;
+    let apparatus = Apparatus::check(scene, &protocol).map_err(unfit)?;
+    match (common.observer, common.apparatus) {
+        (ObserverOption::Human, _) if common.screen == front::ScreenOption::Viewer => {
+            human::carry_out(common, &protocol)
+        }
+        (ObserverOption::Human, _) => person::sit(common, &protocol, &apparatus),
+        (ObserverOption::Simulated, PresentationOption::Scene) => {
+            apparatus.check_hand().map_err(unfit)?;
+            simulate(common, protocol, Some(&apparatus))
+        }
+        (ObserverOption::Simulated, PresentationOption::None) => simulate(common, protocol, None),
     }
+}
+
+/// All simulated subjects, several at a time.
+fn simulate(common: &Common, protocol: Protocol, apparatus: Option<&Apparatus>) -> Result<(), CommandError> {
     let cohort = Cohort {
         seed: common.seed,
         subjects: (1..=common.subjects).filter_map(SubjectNumber::new).collect(),
         population: Population::default(),
-        apparatus: json!(null),
+        apparatus: apparatus.map_or(
+            json!(null),
+            |apparatus| json!({ "feel_s": common.feel, "scene": apparatus.description() }),
+        ),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         earlier: if common.resume { Earlier::Resume } else { Earlier::Refuse },
         protocol,
@@ -281,37 +385,29 @@ fn carry_out(common: &Common, protocol: Protocol) -> Result<(), CommandError> {
     let stop = stop_on_signals().stop_flag();
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let dataset = Dataset::at(&common.out);
+    let kinematics = common.kinematics().unwrap_or(Kinematics::Summary);
+    let task = cohort.protocol.task();
+    let presenter = |subject: SubjectNumber| -> Result<Box<dyn Presenter + '_>, OutsideError> {
+        let Some(apparatus) = apparatus else { return Ok(Box::new(Nothing)) };
+        let folder = dataset.source_folder(subject).join("motion");
+        let files = (kinematics == Kinematics::Full)
+            .then(|| TrialFiles::make(folder, format!("{subject}_task-{task}")))
+            .transpose()?;
+        Ok(Box::new(Rig::start(apparatus, (common.seed, subject), kinematics, files, common.feel)?))
+    };
     let watch = || progress.inc(1);
-    let result = cohort.run(&dataset, threads, &|_| Ok(Box::new(Nothing)), &watch, &stop);
+    let result = cohort.run(&dataset, threads, &presenter, &watch, &stop);
     progress.finish_and_clear();
     result.map_err(refused)?;
     tell(&dataset)
 }
 
-/// The stimulus is a number of a model that exists, and every value lies in its range.
-fn check_stimulus(protocol: &Protocol) -> Result<(), CommandError> {
-    let stimulus = protocol.stimulus();
-    let plugin = Registry::search(&[]).load(&stimulus.model, PluginKind::Model)?;
-    let known = || plugin.parameters().iter().filter(|known| known.kind() == ParameterKind::Real);
-    let parameter = known().find(|known| known.id() == stimulus.parameter).ok_or_else(|| {
-        let ids: Vec<&str> = known().map(flotor_hal::Parameter::id).collect();
-        let hint = crate::scene::nearest(&stimulus.parameter, ids.iter().copied());
-        let hint = hint.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-        let (model, parameter) = (&stimulus.model, &stimulus.parameter);
-        CommandError::Usage(format!(
-            "--stimulus {stimulus}: `{model}` has no number `{parameter}`{hint} (there are {})",
-            ids.join(", ")
-        ))
-    })?;
-    if parameter.mutability() != flotor_hal::Mutability::Live {
-        return Err(CommandError::Usage(format!(
-            "--stimulus {stimulus}: it can only be set when the model is made, not between trials; choose a live one \
-             (`flotor plugins {}` lists them)",
-            stimulus.model
-        )));
+/// A scene that does not fit the experiment: configuration, unless a plugin was refused.
+fn unfit(error: ApparatusError) -> CommandError {
+    match error {
+        ApparatusError::Run(error) => error.into(),
+        other => CommandError::Usage(other.to_string()),
     }
-    let in_range = protocol.check_range(parameter.min(), parameter.max());
-    in_range.map_err(|error| CommandError::Usage(error.to_string()))
 }
 
 fn note(arguments: &NoteArguments) -> Result<(), CommandError> {
@@ -343,6 +439,21 @@ fn refused(error: CohortError) -> CommandError {
     match error {
         CohortError::Dataset(error @ DatasetError::File { .. }) => CommandError::Failed(error.to_string()),
         CohortError::Dataset(error) => CommandError::Usage(error.to_string()),
+        CohortError::Sitting { cause: ConductError::Outside(ref outside_error), .. } => {
+            outside(outside_error.as_ref(), &error)
+        }
         sitting => CommandError::Failed(sitting.to_string()),
+    }
+}
+
+/// What an apparatus said, with the exit code of a device that faulted where it did.
+fn outside(
+    cause: &(dyn std::error::Error + Send + Sync + 'static),
+    told: &dyn std::fmt::Display,
+) -> CommandError {
+    match cause.downcast_ref::<RunEnded>() {
+        Some(RunEnded(RunEnd::DeviceFault(fault))) => CommandError::DeviceFault(*fault),
+        Some(RunEnded(RunEnd::EmergencyStop(source))) => CommandError::EmergencyStop(*source),
+        _ => CommandError::Failed(told.to_string()),
     }
 }

@@ -18,6 +18,9 @@ use std::path::{Path, PathBuf};
 /// The scene `flotor` runs when none is named: spring 1 on the simulated flotor, held by a hand.
 pub const DEMO: &str = include_str!("../../scenes/demo.toml");
 
+/// The scene of experiments: a spring to be judged, on the simulated flotor.
+pub const STUDY: &str = include_str!("../../scenes/study.toml");
+
 /// A scene as read: complete, checked against itself, not yet against the plugins it names.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
@@ -231,6 +234,21 @@ impl Scene {
     /// None in practice: a test reads it.
     pub fn demo() -> Result<Self, SceneError> {
         Self::parse(Path::new("built-in demo"), DEMO)
+    }
+
+    /// The built-in scene of experiments; for another model than the spring, that model in the spring's place, at its
+    /// natural scale.
+    ///
+    /// # Errors
+    /// None in practice: a test reads it.
+    pub fn study(model: &str) -> Result<Self, SceneError> {
+        let mut scene = Self::parse(Path::new("built-in study"), STUDY)?;
+        if let Some(object) = scene.models.iter_mut().find(|object| object.name != model) {
+            *object = object.replaced_by(Some(model), &[]);
+            model.clone_into(&mut object.name);
+            object.mapping = MappingConfig::default();
+        }
+        Ok(scene)
     }
 
     /// Reads a scene file. Not real-time.

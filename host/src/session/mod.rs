@@ -2,9 +2,11 @@
 
 mod controls;
 mod prepare;
+mod steps;
 
 pub use controls::{ControlError, Controls, NewValue};
 pub(crate) use prepare::prepare_model;
+pub use steps::Steps;
 
 use crate::record::Change;
 use crate::registry::{LookupError, Registry};

@@ -6,6 +6,7 @@ use crate::log::{Begin, FORMAT, LogWriter};
 use crate::observer::{Population, SimulatedSubject};
 use crate::protocol::{Protocol, SubjectNumber};
 use crate::sitting::Sitting;
+use crate::trial::Trial;
 use serde_json::json;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -56,11 +57,14 @@ pub enum CohortError {
 }
 
 /// Makes what presents the stimuli to one subject.
-pub type PresenterFactory<'a> = dyn Fn(SubjectNumber) -> Result<Box<dyn Presenter>, OutsideError> + Sync + 'a;
+pub type PresenterFactory<'a> =
+    dyn Fn(SubjectNumber) -> Result<Box<dyn Presenter + 'a>, OutsideError> + Sync + 'a;
 
 /// One subject's turn.
 struct Turn {
     subject: SubjectNumber,
+    /// What was presented before it broke off.
+    earlier: Vec<Trial>,
     sitting: Sitting,
     log: LogWriter,
 }
@@ -68,11 +72,7 @@ struct Turn {
 impl Cohort {
     /// The middle of the stimuli, which simulated ratings are relative to.
     fn middle(&self) -> f64 {
-        let values = match &self.protocol {
-            Protocol::Jnd(jnd) => &jnd.bases,
-            Protocol::Magnitude(magnitude) => &magnitude.values,
-        };
-        flotor_statistics::describe::mean(values)
+        flotor_statistics::describe::mean(self.protocol.levels())
     }
 
     /// The subject of this number.
@@ -167,11 +167,15 @@ impl Cohort {
         subject: SubjectNumber,
         progress: Progress,
     ) -> Result<Turn, CohortError> {
+        let mut earlier = Vec::new();
         let (sitting, log) = match progress {
-            Progress::Partial(log) => log.resume(&self.version).map_err(DatasetError::from)?,
+            Progress::Partial(log) => {
+                earlier.extend(log.answers().map(|(trial, _)| trial));
+                log.resume(&self.version).map_err(DatasetError::from)?
+            }
             Progress::New | Progress::Complete(_) => dataset.begin(self.begin(subject))?,
         };
-        Ok(Turn { subject, sitting, log })
+        Ok(Turn { subject, earlier, sitting, log })
     }
 
     fn sit(
@@ -181,9 +185,18 @@ impl Cohort {
         watch: &(dyn Fn() + Sync),
         stop: &AtomicBool,
     ) -> Result<(), CohortError> {
-        let Turn { subject, mut sitting, mut log } = turn;
+        let Turn { subject, earlier, mut sitting, mut log } = turn;
         let failed = |cause| CohortError::Sitting { subject, cause };
-        let mut presenter = presenter(subject).map_err(|cause| failed(ConductError::Outside(cause)))?;
+        let outside = |cause| failed(ConductError::Outside(cause));
+        let mut presenter = presenter(subject).map_err(outside)?;
+        // An apparatus has a past: presented with the same trials it comes to where it was, and what follows is, to
+        // the bit, what would have followed.
+        for trial in &earlier {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(());
+            }
+            presenter.present(trial).map_err(outside)?;
+        }
         let mut respondent = Stoppable { subject: self.subject(subject), stop };
         conduct(&mut sitting, &mut log, presenter.as_mut(), &mut respondent, &mut |_| watch())
             .map(|_| ())

@@ -15,6 +15,9 @@
 //! - [`observer`]: simulated subjects; [`estimate`]: what they must be like, given their answers; [`bias`]: how well
 //!   that is found.
 //! - [`log`]: what happened, line by line, chained; [`dataset`]: where it lies and the tables made from it.
+//! - [`kinematics`]: how a stimulus was explored, from samples of handle and force.
+//! - [`screen`]: a person's way through a sitting, for any front end; [`blinding`]: codes in place of conditions.
+//! - [`curve`]: a measured curve of a real spring, and the spring fitted to it.
 //! - [`conduct`]: a sitting with presenter, respondent and log put together.
 //! - [`cohort`]: many simulated subjects at once.
 //! - [`analysis`]: from logs to thresholds, tests and effects.
@@ -23,15 +26,19 @@
 
 pub mod analysis;
 pub mod bias;
+pub mod blinding;
 pub mod cohort;
 pub mod conduct;
+pub mod curve;
 pub mod dataset;
 pub mod estimate;
+pub mod kinematics;
 pub mod log;
 pub mod observer;
 pub mod procedure;
 pub mod protocol;
 mod random;
 mod schedule;
+pub mod screen;
 pub mod sitting;
 pub mod trial;

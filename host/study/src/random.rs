@@ -19,6 +19,10 @@ pub(crate) enum Purpose {
     Subject = 3,
     /// The noise in a simulated answer.
     Answer = 4,
+    /// How a simulated subject's hand moves.
+    Hand = 5,
+    /// Which code stands for which condition.
+    Blinding = 6,
 }
 
 /// A stream of random numbers.

@@ -1,5 +1,6 @@
 //! What is presented and what is answered.
 
+use crate::kinematics::StimulusKinematics;
 use serde::{Deserialize, Serialize};
 
 /// What a subject sees and feels.
@@ -164,25 +165,6 @@ pub enum Judgement {
     Wrong,
     /// Neither.
     Unsure,
-}
-
-/// How one stimulus was explored.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct StimulusKinematics {
-    /// How long, s.
-    pub duration_s: f64,
-    /// Mean speed along the vertical, m/s.
-    pub mean_speed_m_per_s: f64,
-    /// Mean magnitude of the acceleration along the vertical, m/s².
-    pub mean_acceleration_m_per_s2: f64,
-    /// Mean magnitude of the vertical force on the hand, N.
-    pub mean_force_n: f64,
-    /// Largest magnitude of the force on the hand, N.
-    pub peak_force_n: f64,
-    /// Down and up movements.
-    pub cycles: u32,
-    /// Stiffness of vertical force against vertical displacement as the hand felt it, N/m.
-    pub felt_stiffness_n_per_m: f64,
 }
 
 /// What happened while stimuli were presented.

@@ -1,5 +1,8 @@
 //! Choices of a protocol as words of the command line.
 
+use crate::cli::CommandError;
+use crate::cli::options::PluginKeyValue;
+use crate::study::Kinematics;
 use clap::ValueEnum;
 use flotor_study::procedure::{Averaging, StepAtReversal};
 use flotor_study::protocol::{AtBoundary, ComparisonSide, FirstModality, PresentationOrder};
@@ -139,6 +142,70 @@ pub(super) enum ProcedureChoice {
     WeightedUpDown,
     /// Trials where they tell most, a fixed number of them
     Questplus,
+}
+
+/// `--kinematics`
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum KinematicsOption {
+    /// Every tick of every trial (MCAP), and the measures
+    Full,
+    /// Measures of each stimulus
+    Summary,
+    /// Nothing
+    None,
+}
+
+impl From<KinematicsOption> for Kinematics {
+    fn from(option: KinematicsOption) -> Self {
+        match option {
+            KinematicsOption::Full => Self::Full,
+            KinematicsOption::Summary => Self::Summary,
+            KinematicsOption::None => Self::None,
+        }
+    }
+}
+
+/// `--apparatus`
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(super) enum PresentationOption {
+    /// A scene, felt by a simulated hand
+    #[default]
+    Scene,
+    /// Nothing: answers follow from the numbers alone, for studies of the method
+    None,
+}
+
+/// `--noise`
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(super) enum NoiseOption {
+    /// If this machine can
+    #[default]
+    Auto,
+    /// It must
+    On,
+    /// None
+    Off,
+}
+
+/// `--way`
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(super) enum ForceWay {
+    /// A weight: it pulls down
+    #[default]
+    Felt,
+    /// A resistance: it is pushed against
+    Exerted,
+}
+
+impl ForceWay {
+    /// The setting of the load that makes it so.
+    pub(super) fn setting(self) -> Result<PluginKeyValue, CommandError> {
+        let text = match self {
+            Self::Felt => "load.kind=felt",
+            Self::Exerted => "load.kind=exerted",
+        };
+        text.parse().map_err(CommandError::Usage)
+    }
 }
 
 /// `LEAST-MOST`, of which the first is smaller.

@@ -1,8 +1,9 @@
 //! How people moved: mean speed, acceleration and force along the vertical, over stimulus and modality.
 
 use super::{AnalysisError, AnalysisOptions, SubjectRecord};
+use crate::kinematics::StimulusKinematics;
 use crate::log::TrialEvent;
-use crate::trial::{Modality, Presented, StimulusKinematics};
+use crate::trial::{Modality, Presented};
 use flotor_statistics::anova::{Design, Effect, WithinFactor, analyse};
 use flotor_statistics::describe::mean;
 use serde::Serialize;

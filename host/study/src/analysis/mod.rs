@@ -1,10 +1,13 @@
 //! From sittings to results: thresholds, Weber fractions, trends, effects, next to what was published.
 
+mod blinded;
 mod jnd;
 mod kinematics;
 mod magnitude;
+pub mod published;
 mod text;
 
+pub use blinded::{BlindedAnalysis, BlindedCell, BlindedRow};
 pub use jnd::{JndAnalysis, ThresholdCell, WeberFractions, analyse_jnd};
 pub use kinematics::KinematicMeasure;
 pub use magnitude::{MagnitudeAnalysis, RatingCell, analyse_magnitude};
@@ -14,7 +17,7 @@ use crate::protocol::{Protocol, SubjectNumber};
 use crate::sitting::{TrackResult, Verdict};
 use crate::trial::{Modality, Phase};
 use flotor_statistics::StatisticsError;
-use flotor_statistics::anova::{BetweenFactor, SumOfSquares};
+use flotor_statistics::anova::{BetweenFactor, Effect, SumOfSquares};
 use serde::Serialize;
 
 /// One subject's data.
@@ -154,6 +157,18 @@ impl Analysis {
             Self::Magnitude(analysis) => text::magnitude(analysis),
         }
     }
+}
+
+/// An effect in words, as papers print it: `F(2, 30) = 1.46, p = 0.250 (GG p = 0.251)`.
+#[must_use]
+pub fn effect_text(effect: &Effect) -> String {
+    text::effect_text(effect)
+}
+
+/// A probability in words.
+#[must_use]
+pub fn p_text(p: f64) -> String {
+    text::p_text(p)
 }
 
 /// One subject's response under one condition: a row of the table for other programs.

@@ -1,21 +1,24 @@
 //! The tidy tables: one row per presentation, one column per fact, `n/a` for what is not known.
 
+use crate::blinding::Codes;
+use crate::kinematics::StimulusKinematics;
 use crate::log::{Begin, SittingLog, TrialRecord};
 use crate::protocol::Protocol;
 use crate::sitting::Verdict;
-use crate::trial::{Judgement, Phase, Position, Presented, Response, StimulusKinematics};
+use crate::trial::{Judgement, Phase, Position, Presented, Response};
 use serde_json::{Value, json};
 
 /// Missing, as BIDS writes it.
 const MISSING: &str = "n/a";
 
 /// Name and meaning of each column.
-const COLUMNS: [(&str, &str); 27] = [
+const COLUMNS: [(&str, &str); 28] = [
     ("trial", "Count of presentations in the sitting, from 1"),
     ("phase", "practice, or main: only main counts"),
     ("replication", "Replication, from 1; 0 for practice"),
     ("track", "Track of the adaptive procedure, from 1; 0 where there is none"),
     ("repeat", "How often this presentation was repeated before because the handle left its range"),
+    ("condition", "Code of modality and level, for a blinded analysis"),
     ("modality", "vh: vision and haptics, h: haptics alone"),
     ("base", "Base of a pair, in the unit of the stimulus"),
     ("comparison", "Comparison of a pair, in the unit of the stimulus"),
@@ -43,11 +46,12 @@ const COLUMNS: [(&str, &str); 27] = [
 /// The table of one sitting.
 pub(super) fn trials(log: &SittingLog) -> String {
     let head: Vec<&str> = COLUMNS.iter().map(|(name, _)| *name).collect();
-    let rows = log.trials.iter().map(|record| row(record).join("\t"));
+    let codes = Codes::new(&log.begin.protocol, log.begin.seed);
+    let rows = log.trials.iter().map(|record| row(record, &codes).join("\t"));
     [head.join("\t")].into_iter().chain(rows).fold(String::new(), |text, line| text + &line + "\n")
 }
 
-fn row(record: &TrialRecord) -> Vec<String> {
+fn row(record: &TrialRecord, codes: &Codes) -> Vec<String> {
     let event = &record.event;
     let trial = &event.trial;
     let number = |value: Option<f64>| value.map_or(MISSING.to_owned(), |value| value.to_string());
@@ -71,7 +75,7 @@ fn row(record: &TrialRecord) -> Vec<String> {
         (total > 0.0).then(|| felt.iter().map(|one| value(one) * one.duration_s).sum::<f64>() / total)
     };
     let any = !felt.is_empty();
-    let stiffness: Vec<String> = felt.iter().map(|one| one.felt_stiffness_n_per_m.to_string()).collect();
+    let stiffness: Vec<String> = felt.iter().map(|one| number(one.felt_stiffness_n_per_m)).collect();
     vec![
         trial.number.to_string(),
         match trial.phase {
@@ -81,6 +85,7 @@ fn row(record: &TrialRecord) -> Vec<String> {
         trial.replication.to_string(),
         trial.track.to_string(),
         trial.repeat.to_string(),
+        codes.condition(trial.modality, &trial.presented),
         trial.modality.word().to_owned(),
         number(pair.map(|pair| pair.base)),
         number(pair.map(|pair| pair.comparison)),

@@ -9,8 +9,8 @@ use crate::observer::TernaryObserver;
 use crate::trial::Judgement;
 
 const JUDGEMENTS: [Judgement; 3] = [Judgement::Correct, Judgement::Wrong, Judgement::Unsure];
-/// Observers: so many values of sigma, evenly in its logarithm, times so many of the criterion, evenly from 0.
-const SIGMAS: u32 = 31;
+/// Observers: so many values of the threshold, evenly in its logarithm, times so many of the criterion, evenly from 0.
+const THRESHOLDS: u32 = 31;
 const CRITERIA: u32 = 10;
 /// The grid reaches so many deviations of the prior.
 const REACH: f64 = 3.0;
@@ -43,17 +43,15 @@ impl BeliefGrid {
         let deltas: Vec<f64> =
             (0..DELTAS).map(|index| least_delta * libm::exp(ratio * share(index, DELTAS))).collect();
         let mut observers = Vec::new();
-        for sigma in 0..SIGMAS {
-            let z = REACH * (2.0 * share(sigma, SIGMAS) - 1.0);
-            let sigma = prior.sigma_median * libm::exp(prior.sigma_spread * z);
+        for threshold in 0..THRESHOLDS {
+            let z = REACH * (2.0 * share(threshold, THRESHOLDS) - 1.0);
+            let threshold = prior.threshold_median * libm::exp(prior.threshold_spread * z);
             for criterion in 0..CRITERIA {
                 let criterion =
                     share(criterion, CRITERIA) * (prior.criterion_mode + REACH * prior.criterion_spread);
-                let observer = prior.observer(sigma, criterion);
+                let observer = prior.observer(threshold, criterion, target);
                 let answers = deltas.iter().map(|delta| answers(&observer, *delta)).collect();
-                let attentive = TernaryObserver { lapse: 0.0, ..observer };
-                let weight = libm::exp(prior.log_density(libm::log(sigma), criterion));
-                let threshold = attentive.threshold(target);
+                let weight = libm::exp(prior.log_density(libm::log(threshold), criterion));
                 observers.push(Member { observer, threshold, prior: weight, answers });
             }
         }

@@ -12,6 +12,7 @@ pub use most_likely::most_likely;
 
 use crate::observer::TernaryObserver;
 use crate::trial::Judgement;
+use flotor_statistics::distribution::normal_below;
 use serde::{Deserialize, Serialize};
 
 /// One answer: the difference it was given at, as a share of the base, and what it was worth.
@@ -23,15 +24,17 @@ pub struct Observation {
     pub judgement: Judgement,
 }
 
-/// What is held likely before the first answer: sigma lognormal, wide enough for any stiffness threshold in the
-/// literature (8 to 25 %) to lie within one deviation; the criterion normal where it is not negative, from people who
-/// always answer to those who say "I don't know" in half of the trials.
+/// What is held likely before the first answer: the threshold lognormal about the middle of those published for
+/// stiffness (8 to 25 %, whose geometric mean is 14 %), so wide that all of them lie within one deviation; the criterion
+/// normal where it is not negative, from people who always answer to those who say "I don't know" in half of the
+/// trials. The threshold and not sigma, because it is what is asked for: who never says "I don't know" has another sigma
+/// at the same threshold, and a prior on sigma would draw the two apart.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Prior {
-    /// Median of sigma, as a share of the base.
-    pub sigma_median: f64,
+    /// Median of the threshold, as a share of the base.
+    pub threshold_median: f64,
     /// Deviation of its logarithm.
-    pub sigma_spread: f64,
+    pub threshold_spread: f64,
     /// Most likely criterion.
     pub criterion_mode: f64,
     /// Its deviation.
@@ -43,8 +46,8 @@ pub struct Prior {
 impl Default for Prior {
     fn default() -> Self {
         Self {
-            sigma_median: 0.12,
-            sigma_spread: 0.7,
+            threshold_median: 0.14,
+            threshold_spread: 0.7,
             criterion_mode: 0.75,
             criterion_spread: 0.5,
             lapse: 0.005,
@@ -53,19 +56,38 @@ impl Default for Prior {
 }
 
 impl Prior {
-    fn observer(&self, sigma: f64, criterion: f64) -> TernaryObserver {
+    /// The observer of this criterion who reaches the target at this difference, while attentive.
+    fn observer(&self, threshold: f64, criterion: f64, target: f64) -> TernaryObserver {
+        let sigma = threshold / unit_threshold(criterion, target);
         TernaryObserver { sigma, criterion, bias: 0.0, lapse: self.lapse }
     }
 
-    /// Logarithm of the density over the logarithm of sigma and the criterion, up to a constant.
-    fn log_density(&self, log_sigma: f64, criterion: f64) -> f64 {
+    /// Logarithm of the density over the logarithm of the threshold and the criterion, up to a constant.
+    fn log_density(&self, log_threshold: f64, criterion: f64) -> f64 {
         if criterion < 0.0 {
             return f64::NEG_INFINITY;
         }
-        let sigma = (log_sigma - libm::log(self.sigma_median)) / self.sigma_spread;
+        let threshold = (log_threshold - libm::log(self.threshold_median)) / self.threshold_spread;
         let criterion = (criterion - self.criterion_mode) / self.criterion_spread;
-        -0.5 * (sigma * sigma + criterion * criterion)
+        -0.5 * (threshold * threshold + criterion * criterion)
     }
+}
+
+/// The threshold of an attentive observer of sigma 1: where `P(correct) + P(don't know) / 2` is the target.
+///
+/// Newton's method; a test holds it against bisection.
+fn unit_threshold(criterion: f64, target: f64) -> f64 {
+    let density = |x: f64| libm::exp(-0.5 * x * x) / std::f64::consts::TAU.sqrt();
+    let mut delta = criterion.max(0.1);
+    for _ in 0..40 {
+        let reached = 0.5 * (1.0 + normal_below(delta - criterion) - normal_below(-delta - criterion));
+        let step = (target - reached) / (0.5 * (density(delta - criterion) + density(delta + criterion)));
+        delta = (delta + step).max(1.0e-6);
+        if step.abs() < 1.0e-12 {
+            break;
+        }
+    }
+    delta
 }
 
 /// What answers say about an observer.
@@ -87,5 +109,23 @@ fn probability(observer: &TernaryObserver, observation: &Observation) -> f64 {
         Judgement::Wrong => wrong,
         // Rounding may leave a little less than nothing.
         Judgement::Unsure => (1.0 - correct - wrong).max(f64::MIN_POSITIVE),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The quick way to a threshold and the plain one agree, for every criterion and target there may be.
+    #[test]
+    fn thresholds_agree_with_bisection() {
+        for criterion in [0.0, 0.1, 0.5, 1.0, 1.7, 2.25] {
+            for target in [0.6, 0.75, 0.9] {
+                let plain =
+                    TernaryObserver { sigma: 1.0, criterion, bias: 0.0, lapse: 0.0 }.threshold(target);
+                let quick = unit_threshold(criterion, target);
+                assert!((quick - plain).abs() < 1.0e-9, "{criterion} {target}: {quick} for {plain}");
+            }
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! The observer most likely in the light of prior and answers (maximum a posteriori).
 //!
-//! Where a density is highest depends on the scale it is over. Here it is the density over the slope 1 / sigma, in
-//! which the likelihood of answers is closest to symmetric; over sigma or its logarithm the estimate of a single track
+//! Where a density is highest depends on the scale it is over. Here it is the density over the slope, which is as 1 / threshold, in
+//! which the likelihood of answers is closest to symmetric; over the threshold or its logarithm the estimate of a single track
 //! would be several percent low.
 
 use super::{Estimate, Observation, Prior, probability};
@@ -17,18 +17,20 @@ const HALVINGS: u32 = 15;
 /// Which procedure placed the trials does not matter: given the differences, the answers have the same likelihood.
 #[must_use]
 pub fn most_likely(observations: &[Observation], prior: &Prior, target: f64) -> Estimate {
-    let (centre, spread) =
-        ([libm::log(prior.sigma_median), prior.criterion_mode], [prior.sigma_spread, prior.criterion_spread]);
-    let score = |[sigma, criterion]: [f64; 2]| {
-        let log_density = prior.log_density(sigma, criterion);
+    let (centre, spread) = (
+        [libm::log(prior.threshold_median), prior.criterion_mode],
+        [prior.threshold_spread, prior.criterion_spread],
+    );
+    let score = |[threshold, criterion]: [f64; 2]| {
+        let log_density = prior.log_density(threshold, criterion);
         if log_density == f64::NEG_INFINITY {
             return log_density;
         }
-        let observer = prior.observer(libm::exp(sigma), criterion);
+        let observer = prior.observer(libm::exp(threshold), criterion, target);
         let likelihood: f64 =
             observations.iter().map(|observation| libm::log(probability(&observer, observation))).sum();
-        // A density over ln sigma, times sigma: over the slope.
-        likelihood + log_density + sigma
+        // A density over the logarithm, times the threshold: over the slope.
+        likelihood + log_density + threshold
     };
     let step =
         |from: [f64; 2], steps: [f64; 2]| [from[0] + steps[0] * spread[0], from[1] + steps[1] * spread[1]];
@@ -42,9 +44,9 @@ pub fn most_likely(observations: &[Observation], prior: &Prior, target: f64) -> 
         }
         false
     };
-    for sigma in -COARSE_STEPS..=COARSE_STEPS {
+    for threshold in -COARSE_STEPS..=COARSE_STEPS {
         for criterion in -COARSE_STEPS..=COARSE_STEPS {
-            let steps = [f64::from(sigma) * COARSE_SIZE, f64::from(criterion) * COARSE_SIZE];
+            let steps = [f64::from(threshold) * COARSE_SIZE, f64::from(criterion) * COARSE_SIZE];
             consider(step(centre, steps), &mut best);
         }
     }
@@ -62,9 +64,8 @@ pub fn most_likely(observations: &[Observation], prior: &Prior, target: f64) -> 
         }
         size *= 0.5;
     }
-    let [log_sigma, criterion] = best;
-    let sigma = libm::exp(log_sigma);
+    let [log_threshold, criterion] = best;
+    let threshold = libm::exp(log_threshold);
     // The threshold is that of attention: lapses are not a matter of sensitivity.
-    let observer = crate::observer::TernaryObserver { lapse: 0.0, ..prior.observer(sigma, criterion) };
-    Estimate { sigma, criterion, threshold: observer.threshold(target) }
+    Estimate { sigma: prior.observer(threshold, criterion, target).sigma, criterion, threshold }
 }

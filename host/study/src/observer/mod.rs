@@ -3,8 +3,10 @@
 //! A subject's answers depend on the seed, their number and the number of the trial alone, so a sitting continued after
 //! a crash gets the answers it would have got.
 
+mod hand;
 mod ternary;
 
+pub use hand::HandManner;
 pub use ternary::TernaryObserver;
 
 use crate::protocol::SubjectNumber;

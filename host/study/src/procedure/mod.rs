@@ -48,6 +48,16 @@ impl Procedure {
         }
     }
 
+    /// Trials a track takes, about: an adaptive one ends when it has turned often enough (18 with the report's settings
+    /// and observers like its subjects).
+    #[must_use]
+    pub fn trials_about(&self) -> u32 {
+        match self {
+            Self::WeightedUpDown(_) => 18,
+            Self::QuestPlus(rule) => rule.trials,
+        }
+    }
+
     /// The largest difference a track can ask for.
     #[must_use]
     pub fn largest_delta(&self) -> f64 {

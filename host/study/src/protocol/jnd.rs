@@ -113,10 +113,13 @@ impl JndProtocol {
         }
     }
 
-    /// Practice, and about 18 pairs per track.
+    /// Practice, and what each track takes.
     pub(super) fn presentations_about(&self) -> u64 {
         let practice = if self.demo.shown { 6 } else { 0 };
-        practice + 18 * u64::from(self.replications) * self.bases.len() as u64
+        practice
+            + u64::from(self.procedure.trials_about())
+                * u64::from(self.replications)
+                * self.bases.len() as u64
     }
 
     /// The four springs of the demo: lowest base, highest, one close to it, one nearly equal to that.

@@ -22,6 +22,43 @@ pub struct Stimulus {
     pub parameter: String,
 }
 
+/// What people are asked about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Quality {
+    /// How stiff it is.
+    Stiffness,
+    /// How strong.
+    Force,
+}
+
+impl Stimulus {
+    /// Name and unit, from the parameter's id, whose unit stands in it: `gamma_n` is gamma in newtons.
+    #[must_use]
+    pub fn name_and_unit(&self) -> (String, &'static str) {
+        const UNITS: [(&str, &str); 9] = [
+            ("_n_per_m", "N/m"),
+            ("_ns_per_m", "N s/m"),
+            ("_n_mm2", "N mm²"),
+            ("_mm2", "mm²"),
+            ("_mpa", "MPa"),
+            ("_mm", "mm"),
+            ("_nm", "N m"),
+            ("_kg", "kg"),
+            ("_n", "N"),
+        ];
+        let found = UNITS.iter().find_map(|(end, unit)| Some((self.parameter.strip_suffix(end)?, *unit)));
+        let (name, unit) = found.unwrap_or((&self.parameter, ""));
+        (name.replace('_', " "), unit)
+    }
+
+    /// What people are asked about when this is varied: a force where the parameter is one, else stiffness.
+    #[must_use]
+    pub fn quality(&self) -> Quality {
+        if self.parameter.starts_with("force") { Quality::Force } else { Quality::Stiffness }
+    }
+}
+
 impl Default for Stimulus {
     /// The spring's axial rigidity, as in CMU-RI-TR-07-21.
     fn default() -> Self {
@@ -179,6 +216,15 @@ impl Protocol {
         }
     }
 
+    /// The levels of the stimulus that are analysed: bases, or stimuli rated.
+    #[must_use]
+    pub fn levels(&self) -> &[f64] {
+        match self {
+            Self::Jnd(protocol) => &protocol.bases,
+            Self::Magnitude(protocol) => &protocol.values,
+        }
+    }
+
     /// What is varied.
     #[must_use]
     pub fn stimulus(&self) -> &Stimulus {
@@ -226,16 +272,21 @@ impl Protocol {
         }
     }
 
+    /// Smallest and largest stimulus that may be presented.
+    #[must_use]
+    pub fn extremes(&self) -> [f64; 2] {
+        match self {
+            Self::Jnd(protocol) => protocol.extremes(),
+            Self::Magnitude(protocol) => protocol.extremes(),
+        }
+    }
+
     /// Whether all stimuli lie in the range of the parameter.
     ///
     /// # Errors
     /// [`ProtocolError::Range`] with the first value outside.
     pub fn check_range(&self, least: f64, most: f64) -> Result<(), ProtocolError> {
-        let [lowest, highest] = match self {
-            Self::Jnd(protocol) => protocol.extremes(),
-            Self::Magnitude(protocol) => protocol.extremes(),
-        };
-        let outside = [lowest, highest].into_iter().find(|value| !(least..=most).contains(value));
+        let outside = self.extremes().into_iter().find(|value| !(least..=most).contains(value));
         outside.map_or(Ok(()), |value| {
             Err(ProtocolError::Range { stimulus: self.stimulus().to_string(), value, least, most })
         })

@@ -1,0 +1,137 @@
+//! `flotor study spring`: a measured curve of a real spring, fitted, drawn, and made a scene to be judged.
+
+use crate::cli::{CommandError, style, write_json};
+use crate::plot::{Axis, Figure, Panel, Series};
+use crate::scene::STUDY;
+use clap::Args;
+use flotor_study::curve::{FITTED, MeasuredCurve, SpringFit};
+use std::path::{Path, PathBuf};
+
+#[derive(Args)]
+#[command(after_help = "The table has the header `length_mm,force_n` or `compression_mm,force_n`.\n\n\
+    Examples:\n  \
+    flotor study spring measured.csv --plot measured.svg\n  \
+    flotor study spring measured.csv --scene real.toml\n  \
+    flotor study jnd --scene real.toml --bases 17 --out real      the real spring's gamma as the base")]
+pub(super) struct SpringArguments {
+    /// Measured force over length or compression (CSV)
+    #[arg(value_name = "FILE.csv")]
+    curve: PathBuf,
+    /// Length without load (default: the longest in the table)
+    #[arg(long, value_name = "MM")]
+    free_length_mm: Option<f64>,
+    /// Diameter of the coil between wire centres, for the scene (default: spring 1 of the thesis)
+    #[arg(long, value_name = "MM")]
+    coil_diameter_mm: Option<f64>,
+    /// Draw the measurement and the fitted spring
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Write a scene with the fitted spring, for `study jnd --scene` and `run`
+    #[arg(long, value_name = "FILE.toml")]
+    scene: Option<PathBuf>,
+    /// Write the fit as JSON (- for standard output)
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+pub(super) fn run(arguments: &SpringArguments) -> Result<(), CommandError> {
+    let path = &arguments.curve;
+    let text = std::fs::read_to_string(path).map_err(|cause| {
+        CommandError::Usage(format!("{}: cannot read the table: {cause}", path.display()))
+    })?;
+    let refused = |error| CommandError::Usage(format!("{}: {error}", path.display()));
+    let curve =
+        MeasuredCurve::parse(&text, arguments.free_length_mm.map(|mm| mm * 1.0e-3)).map_err(refused)?;
+    let fit = curve.fit().map_err(refused)?;
+    if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
+        say!("{}", style::title(&path.display().to_string()));
+        say!("{}", to_text(&fit));
+    }
+    if let Some(path) = &arguments.plot {
+        write(path, &picture(&curve, &fit))?;
+    }
+    if let Some(path) = &arguments.scene {
+        write(path, &scene(&fit, arguments.coil_diameter_mm))?;
+    }
+    arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &fit))
+}
+
+fn write(path: &Path, text: &str) -> Result<(), CommandError> {
+    std::fs::write(path, text).map_err(|cause| CommandError::file(path, "cannot write the file", cause))
+}
+
+fn to_text(fit: &SpringFit) -> String {
+    let [low, high] = fit.stiffness_interval_n_per_m.map(|end| end * 1.0e-3);
+    [
+        format!("stiffness    {:.4} N/mm  (95 %: {low:.4} to {high:.4})", fit.stiffness_n_per_m * 1.0e-3),
+        format!("free length  {:.3} mm, play {:.3} mm", fit.free_length_m * 1.0e3, fit.offset_m * 1.0e3),
+        format!("gamma        {:.3} N", fit.gamma_n),
+        format!(
+            "R²           {:.6} over {} points between 30 and 70 % of the deflection",
+            fit.r_squared, fit.points
+        ),
+        format!("nonlinearity {:.1} % of the largest force, ends included", fit.nonlinearity * 100.0),
+    ]
+    .map(|line| format!("  {line}"))
+    .join("\n")
+}
+
+/// The measurement with the fitted spring over it.
+fn picture(curve: &MeasuredCurve, fit: &SpringFit) -> String {
+    let points = || curve.points.iter().map(|(x_m, force_n)| (x_m * 1.0e3, *force_n));
+    let deepest_mm = points().map(|(x_mm, _)| x_mm).fold(0.0, f64::max);
+    let line = |share: f64| {
+        let x_mm = share * deepest_mm;
+        (x_mm, fit.stiffness_n_per_m * (x_mm * 1.0e-3 - fit.offset_m))
+    };
+    let panel = Panel::new(Axis::linear("Force", "N"))
+        .series(Series::points("measured", points()).slot(0))
+        .series(Series::line("fitted spring", [0.0, 1.0].map(line)).slot(1))
+        .series(Series::line("fitted here", FITTED.map(line)).slot(2));
+    Figure::new("A real spring", Axis::linear("Compression", "mm"))
+        .subtitle(format!(
+            "{:.4} N/mm, gamma {:.3} N, R² {:.5}",
+            fit.stiffness_n_per_m * 1.0e-3,
+            fit.gamma_n,
+            fit.r_squared
+        ))
+        .panel_height_px(320.0)
+        .panel(panel)
+        .to_svg()
+}
+
+/// The built-in scene of experiments with this spring in it.
+fn scene(fit: &SpringFit, coil_diameter_mm: Option<f64>) -> String {
+    let free_length_mm = fit.free_length_m * 1.0e3;
+    let coil = coil_diameter_mm.map_or(String::new(), |mm| format!("coil_diameter_mm = {mm}\n"));
+    let fitted = format!(
+        "mode = \"gamma\"\n# Fitted to a measured curve.\ngamma_n = {:.6}\nfree_length_mm = {free_length_mm:.6}\n{coil}",
+        fit.gamma_n
+    );
+    STUDY.replace("mode = \"gamma\"\n", &fitted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn a_fitted_spring_makes_a_scene() {
+        let fit = SpringFit {
+            stiffness_n_per_m: 680.0,
+            stiffness_interval_n_per_m: [679.0, 681.0],
+            offset_m: 0.0,
+            free_length_m: 0.025,
+            gamma_n: 17.0,
+            r_squared: 1.0,
+            points: 41,
+            nonlinearity: 0.0,
+        };
+        let scene = Scene::parse(Path::new("real.toml"), &scene(&fit, Some(6.0))).unwrap();
+        let parameters = &scene.models[0].plugin.parameters;
+        let value =
+            |key: &str| parameters.iter().find(|p| p.key == key).unwrap().value.parse::<f64>().unwrap();
+        assert_eq!([value("gamma_n"), value("free_length_mm"), value("coil_diameter_mm")], [17.0, 25.0, 6.0]);
+    }
+}

@@ -1,0 +1,54 @@
+//! A run on the virtual clock that somebody else advances: for experiments, which decide between ticks what comes next.
+
+use super::{ChangeLog, Controls, Observer, RunEnd, RunError, RunOptions, Runner, Session};
+use crate::registry::Registry;
+use crate::scene::Scene;
+use crate::servo::{Clock, Schedule, StopSwitch};
+use flotor_hal::abi::loader::Stopper;
+
+/// A run that goes on when it is told to. When it is dropped the device is stopped.
+pub struct Steps {
+    runner: Runner,
+    controls: Controls,
+    changes: ChangeLog,
+    stop: StopSwitch,
+    stopper: Stopper,
+}
+
+impl Steps {
+    /// Loads, checks, opens and activates everything a scene names. Not real-time.
+    ///
+    /// # Errors
+    /// [`RunError`]; nothing is energised before this has succeeded.
+    pub fn prepare(scene: &Scene, registry: &Registry, seed: u64) -> Result<Self, RunError> {
+        let session = Session::prepare(scene, registry, &RunOptions { clock: Clock::Virtual, seed })?;
+        let Session { servo, stopper, controls, changes, period_ns, duration_ns, .. } = session;
+        let runner = Runner::new(servo, Schedule::start_virtual(period_ns), duration_ns);
+        Ok(Self { runner, controls, changes, stop: StopSwitch::default(), stopper })
+    }
+
+    /// The handle by which parameters, weights and models of the run are changed.
+    #[must_use]
+    pub fn controls(&self) -> &Controls {
+        &self.controls
+    }
+
+    /// One tick; the observer is told of it and of what changed before it. Not real-time: the observer is not.
+    ///
+    /// # Errors
+    /// How the run ended, if it did; then there was no tick.
+    pub fn advance(&mut self, observer: &mut dyn Observer) -> Result<(), RunEnd> {
+        let record = self.runner.next(&self.stop);
+        if let Some(record) = record {
+            self.changes.up_to(record.tick, |change| observer.change(change));
+            observer.observe(&record);
+        }
+        self.runner.end.map_or(Ok(()), Err)
+    }
+}
+
+impl Drop for Steps {
+    fn drop(&mut self) {
+        self.stopper.safe_stop();
+    }
+}

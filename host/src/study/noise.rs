@@ -1,0 +1,116 @@
+//! White noise on headphones, against the sound of the device (CMU-RI-TR-07-21, section 4). Flotor has no sound of its
+//! own: it writes samples to a player of the system, where there is one.
+
+use std::io::Write;
+use std::process::{Child, Command, Stdio};
+use std::thread::JoinHandle;
+
+/// Samples per second and channel.
+const RATE_HZ: u32 = 44_100;
+/// Loudest sample, of 32767: a quarter of full scale, so that the volume of the system decides.
+const LOUDEST: i16 = 8_000;
+
+/// Players that take 16-bit samples from standard input: name and arguments.
+const PLAYERS: [(&str, &[&str]); 3] = [
+    ("pw-cat", &["--playback", "--rate", "44100", "--channels", "1", "--format", "s16", "-"]),
+    ("paplay", &["--raw", "--rate=44100", "--channels=1", "--format=s16le"]),
+    ("aplay", &["-q", "-t", "raw", "-f", "S16_LE", "-r", "44100", "-c", "1"]),
+];
+
+/// Noise, for as long as it lives.
+pub struct WhiteNoise {
+    player: Child,
+    /// Ends when the player does.
+    feeder: Option<JoinHandle<()>>,
+    name: &'static str,
+}
+
+impl WhiteNoise {
+    /// Starts the first player there is; none if this machine has no player or no sound.
+    #[must_use]
+    pub fn start() -> Option<Self> {
+        PLAYERS.iter().find_map(|(name, arguments)| {
+            let player = Command::new(name)
+                .args(*arguments)
+                .stdin(Stdio::piped())
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .spawn();
+            let mut player = player.ok()?;
+            let mut pipe = player.stdin.take()?;
+            let feeder = std::thread::Builder::new().name("flotor-noise".to_owned()).spawn(move || {
+                let mut noise = Noise::default();
+                while pipe.write_all(&noise.tenth_of_a_second()).is_ok() {}
+            });
+            let mut started = Self { player, feeder: feeder.ok(), name };
+            // A player without a sound card ends at once.
+            std::thread::sleep(std::time::Duration::from_millis(200));
+            started.is_playing().then_some(started)
+        })
+    }
+
+    /// The player's name.
+    #[must_use]
+    pub fn player(&self) -> &'static str {
+        self.name
+    }
+
+    fn is_playing(&mut self) -> bool {
+        matches!(self.player.try_wait(), Ok(None))
+    }
+}
+
+impl Drop for WhiteNoise {
+    fn drop(&mut self) {
+        let _ = self.player.kill();
+        let _ = self.player.wait();
+        if let Some(feeder) = self.feeder.take() {
+            let _ = feeder.join();
+        }
+    }
+}
+
+/// Evenly distributed samples without memory (Marsaglia 2003, xorshift): all frequencies alike.
+struct Noise {
+    state: u64,
+}
+
+impl Default for Noise {
+    fn default() -> Self {
+        Self { state: 0x9e37_79b9_7f4a_7c15 }
+    }
+}
+
+impl Noise {
+    fn next(&mut self) -> i16 {
+        self.state ^= self.state << 13;
+        self.state ^= self.state >> 7;
+        self.state ^= self.state << 17;
+        #[allow(clippy::cast_possible_truncation)] // below 2 * LOUDEST + 1
+        let sample = ((self.state >> 33) % (2 * LOUDEST as u64 + 1)) as i16;
+        sample - LOUDEST
+    }
+
+    fn tenth_of_a_second(&mut self) -> Vec<u8> {
+        (0..RATE_HZ / 10).flat_map(|_| self.next().to_le_bytes()).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// White: neighbours at any small distance know nothing of each other, to four standard errors.
+    #[test]
+    fn noise_is_white_and_not_too_loud() {
+        let mut noise = Noise::default();
+        let samples: Vec<f64> = (0..100_000).map(|_| f64::from(noise.next()) / f64::from(LOUDEST)).collect();
+        assert!(samples.iter().all(|sample| sample.abs() <= 1.0));
+        for lag in [1, 2, 3, 10, 100] {
+            let products: f64 = samples.iter().zip(&samples[lag..]).map(|(a, b)| a * b).sum();
+            // A product of two even numbers in -1..1 has variance 1/9.
+            let bound = 4.0 * (samples.len() as f64).sqrt() / 3.0;
+            assert!(products.abs() < bound, "lag {lag}: {products}");
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! What CMU-RI-TR-07-21 reports (section 4.3), to stand beside one's own results.
+
+/// A statistic of the report, and the effect it is of.
+pub type Published = (&'static str, &'static str);
+
+/// Effects on thresholds (section 4.3.2).
+pub const JND: [Published; 3] = [
+    ("modality", "F(1, 14) = 11.94, p = 0.004"),
+    ("base", "F(2, 28) = 23.01, p < 0.001"),
+    ("modality:base", "F(2, 28) = 3.10, p = 0.061"),
+];
+/// Effects on ratings (section 4.3.1).
+pub const MAGNITUDE: [Published; 3] = [
+    ("modality", "F(1, 14) < 0.02, p = 0.88"),
+    ("order", "F(1, 14) < 0.823, p = 0.198"),
+    ("stimulus", "F(11, 154) = 13.57, p < 0.001"),
+];
+/// Weber fractions, vision and haptics, and haptics alone.
+pub const WEBER: [f64; 2] = [0.142, 0.172];
+/// Weber fractions over bases, within each modality.
+pub const CONSTANCY: [&str; 2] = ["F(2, 30) = 1.46, p = 0.25", "F(2, 30) = 0.80, p = 0.46"];
+/// Paired test between the modalities.
+pub const T: &str = "t(15) = 3.30, p = 0.005";
+/// R² of the linear trend of ratings.
+pub const LINEAR_R2: f64 = 0.983;
+
+/// Effects on how people moved, by task and measure; modality had none.
+#[must_use]
+pub fn movement(task: &str, measure: &str) -> &'static [Published] {
+    match (task, measure) {
+        ("jnd", "mean speed") => &[("stimulus", "F(2, 12) = 5.13, p = 0.025"), ("modality", "none")],
+        ("jnd", "mean acceleration") => &[("stimulus", "none"), ("modality", "none")],
+        ("jnd", "mean force") => &[("stimulus", "F(2, 12) = 13.18, p = 0.001"), ("modality", "none")],
+        ("magnitude", "mean speed") => &[("stimulus", "F(11, 77) = 9.25, p < 0.001"), ("modality", "none")],
+        ("magnitude", "mean acceleration") => {
+            &[("stimulus", "F(11, 77) = 3.73, p < 0.001"), ("modality", "none")]
+        }
+        ("magnitude", "mean force") => &[("stimulus", "F(11, 77) = 11.92, p < 0.001"), ("modality", "none")],
+        _ => &[],
+    }
+}

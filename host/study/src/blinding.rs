@@ -1,0 +1,74 @@
+//! Codes in place of conditions, so that nobody who watches or analyses a study knows which is which until they ask.
+//!
+//! Which code stands for which condition follows from the seed; [`Codes`] made from the same protocol and seed tell it
+//! again.
+
+use crate::protocol::Protocol;
+use crate::random::{Purpose, Stream};
+use crate::trial::{Modality, Presented};
+
+/// The codes of a study.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Codes {
+    /// Bases of a difference experiment, or stimuli rated; the number of a level's code is its place here plus one.
+    levels: Vec<f64>,
+    /// The modality that is called A.
+    a: Modality,
+}
+
+impl Codes {
+    /// The codes of a study.
+    #[must_use]
+    pub fn new(protocol: &Protocol, seed: u64) -> Self {
+        let mut stream = Stream::new(seed, Purpose::Blinding, 0, 0);
+        let a = if stream.coin() { Modality::Vh } else { Modality::H };
+        let mut levels = protocol.levels().to_vec();
+        stream.shuffle(&mut levels);
+        Self { levels, a }
+    }
+
+    /// The code of a modality: A or B.
+    #[must_use]
+    pub fn modality(&self, modality: Modality) -> &'static str {
+        if modality == self.a { "A" } else { "B" }
+    }
+
+    /// The code of a base, or of a stimulus rated: 1, 2, ...; 0 for one of practice alone.
+    #[must_use]
+    pub fn level(&self, level: f64) -> usize {
+        self.levels.iter().position(|known| *known == level).map_or(0, |index| index + 1)
+    }
+
+    /// The code of a condition: `A2`.
+    #[must_use]
+    pub fn condition(&self, modality: Modality, presented: &Presented) -> String {
+        let level = match presented {
+            Presented::One { value } => *value,
+            Presented::Pair(pair) => pair.base,
+        };
+        format!("{}{}", self.modality(modality), self.level(level))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::JndProtocol;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_condition_has_its_code_and_seeds_have_others() {
+        let protocol = Protocol::Jnd(JndProtocol::default());
+        let mut keys = BTreeSet::new();
+        for seed in 0..40 {
+            let codes = Codes::new(&protocol, seed);
+            assert_eq!(codes, Codes::new(&protocol, seed));
+            let bases = [17.0, 26.0, 35.0].map(|base| codes.level(base));
+            assert_eq!(BTreeSet::from(bases), BTreeSet::from([1, 2, 3]));
+            assert_ne!(codes.modality(Modality::Vh), codes.modality(Modality::H));
+            assert_eq!(codes.level(99.0), 0);
+            keys.insert((bases, codes.modality(Modality::Vh)));
+        }
+        assert!(keys.len() > 6, "codes must not tell the order: {keys:?}");
+    }
+}

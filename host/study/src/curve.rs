@@ -1,0 +1,179 @@
+//! A measured force-length curve of a real spring: read, fitted, and turned into a spring to be served beside others.
+//!
+//! A table has a header and two columns, the force and one of two lengths:
+//!
+//! ```text
+//! length_mm,force_n            or   compression_mm,force_n
+//! 25.0,0.00                         0.0,0.00
+//! 20.0,3.41                         5.0,3.41
+//! ```
+
+use flotor_statistics::StatisticsError;
+use flotor_statistics::regression::{self, Line};
+use serde::Serialize;
+
+/// A measured curve.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeasuredCurve {
+    /// Compression, m, and force, N: in the order measured.
+    pub points: Vec<(f64, f64)>,
+    /// Length without load, m, where the table gives lengths or somebody measured it.
+    pub free_length_m: Option<f64>,
+}
+
+/// The part of the deflection a stiffness is fitted to, as shares of the largest: ends that do not lie flat yet, and
+/// coils that begin to touch, are no property of the wire (EN 15800 measures a spring's rate between 30 and 70 %).
+pub const FITTED: [f64; 2] = [0.3, 0.7];
+
+/// A spring fitted to a curve.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SpringFit {
+    /// Stiffness, N/m.
+    pub stiffness_n_per_m: f64,
+    /// Its 95 % confidence interval, N/m.
+    pub stiffness_interval_n_per_m: [f64; 2],
+    /// Compression at which the fitted line meets zero force, m: play of the fixture.
+    pub offset_m: f64,
+    /// Length without load, m.
+    pub free_length_m: f64,
+    /// Compression rigidity, N: stiffness times free length.
+    pub gamma_n: f64,
+    /// R² of the line over the fitted part.
+    pub r_squared: f64,
+    /// Points of the fitted part.
+    pub points: usize,
+    /// Largest distance of any point, the ends included, from the line, as a share of the largest force.
+    pub nonlinearity: f64,
+}
+
+/// Why a curve cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CurveError {
+    /// A line that is not made like one, counted from 1.
+    #[error("line {line}: {problem}")]
+    Line {
+        /// Which.
+        line: usize,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The length without load is not known.
+    #[error("the table gives compressions only; say how long the spring is without load (--free-length-mm)")]
+    NoFreeLength,
+    /// Too little in the fitted part.
+    #[error("the middle of the deflection (30 to 70 %) holds too little: {0}")]
+    Statistics(#[from] StatisticsError),
+    /// Not a spring.
+    #[error("the force falls as the spring is compressed ({0:.1} N/m); are length and compression mixed up?")]
+    Falling(f64),
+}
+
+/// What the first column is.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Abscissa {
+    Length,
+    Compression,
+}
+
+impl MeasuredCurve {
+    /// Reads a table. With lengths, the longest is the free length unless `free_length_m` says better.
+    ///
+    /// # Errors
+    /// [`CurveError::Line`].
+    pub fn parse(text: &str, free_length_m: Option<f64>) -> Result<Self, CurveError> {
+        let wrong = |line: usize, problem: &str| CurveError::Line { line, problem: problem.to_owned() };
+        let is_content = |line: &str| !(line.trim().is_empty() || line.starts_with('#'));
+        let mut lines = (1..).zip(text.lines()).filter(|(_, line)| is_content(line));
+        let (number, head) = lines.next().ok_or_else(|| wrong(1, "the table is empty"))?;
+        let abscissa = match head.split(',').map(str::trim).collect::<Vec<_>>().as_slice() {
+            ["length_mm", "force_n"] => Abscissa::Length,
+            ["compression_mm", "force_n"] => Abscissa::Compression,
+            _ => return Err(wrong(number, "the header is `length_mm,force_n` or `compression_mm,force_n`")),
+        };
+        let mut rows = Vec::new();
+        for (number, line) in lines {
+            let cells: Vec<Option<f64>> = line
+                .split(',')
+                .map(|cell| cell.trim().parse().ok().filter(|x: &f64| x.is_finite()))
+                .collect();
+            let &[Some(length_mm), Some(force_n)] = cells.as_slice() else {
+                return Err(wrong(number, "two finite numbers are expected, separated by a comma"));
+            };
+            rows.push((length_mm * 1.0e-3, force_n));
+        }
+        let longest_m = rows.iter().map(|(length_m, _)| *length_m).fold(f64::NEG_INFINITY, f64::max);
+        Ok(match abscissa {
+            Abscissa::Compression => Self { points: rows, free_length_m },
+            Abscissa::Length => {
+                let free_m = free_length_m.unwrap_or(longest_m);
+                let points = rows.into_iter().map(|(length_m, force_n)| (free_m - length_m, force_n));
+                Self { points: points.collect(), free_length_m: Some(free_m) }
+            }
+        })
+    }
+
+    /// Fits a linear spring to the middle of the deflection.
+    ///
+    /// # Errors
+    /// [`CurveError`]: too few points there, a free length nobody knows, a force that falls.
+    pub fn fit(&self) -> Result<SpringFit, CurveError> {
+        let free_length_m = self.free_length_m.ok_or(CurveError::NoFreeLength)?;
+        let deepest_m = self.points.iter().map(|(x, _)| *x).fold(0.0, f64::max);
+        let [from_m, to_m] = FITTED.map(|share| share * deepest_m);
+        let middle = self.points.iter().filter(|(x, _)| (from_m..=to_m).contains(x));
+        let (x, f): (Vec<f64>, Vec<f64>) = middle.copied().unzip();
+        let line: Line = regression::line(&x, &f)?;
+        if line.slope <= 0.0 {
+            return Err(CurveError::Falling(line.slope));
+        }
+        let strongest_n = self.points.iter().map(|(_, force_n)| force_n.abs()).fold(0.0, f64::max);
+        let off = |(x, force_n): &(f64, f64)| (force_n - (line.intercept + line.slope * x)).abs();
+        Ok(SpringFit {
+            stiffness_n_per_m: line.slope,
+            stiffness_interval_n_per_m: line.slope_interval,
+            offset_m: -line.intercept / line.slope,
+            free_length_m,
+            gamma_n: line.slope * free_length_m,
+            r_squared: line.r_squared,
+            points: x.len(),
+            nonlinearity: self.points.iter().map(off).fold(0.0, f64::max) / strongest_n,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A spring of 0.68 N/mm and 25 mm whose coils touch beyond 80 %: the middle gives its stiffness back.
+    #[test]
+    fn the_middle_of_the_deflection_tells_the_stiffness() {
+        let mut text = "# test bench 3\nlength_mm,force_n\n".to_owned();
+        for tenth in 0..=100_u32 {
+            let x_mm = f64::from(tenth) * 0.1;
+            let block_n = 5.0 * (x_mm - 8.0).max(0.0);
+            text += &format!("{},{}\n", 25.0 - x_mm, 0.68 * x_mm + block_n);
+        }
+        let fit = MeasuredCurve::parse(&text, None).unwrap().fit().unwrap();
+        // Rounding of decimal numbers, and nothing else.
+        assert!((fit.stiffness_n_per_m - 680.0).abs() < 1.0e-6, "{fit:?}");
+        assert!((fit.gamma_n - 17.0).abs() < 1.0e-7 && fit.offset_m.abs() < 1.0e-9);
+        assert!((fit.nonlinearity - 10.0 / 16.8).abs() < 1.0e-9 && fit.points == 41);
+    }
+
+    #[test]
+    fn what_is_no_curve_is_refused_with_its_line() {
+        let refused = |text: &str| MeasuredCurve::parse(text, None).unwrap_err().to_string();
+        assert!(refused("x,y\n1,2\n").starts_with("line 1: the header"));
+        assert!(refused("length_mm,force_n\n1,2\n3;4\n").starts_with("line 3: two finite numbers"));
+        assert!(refused("length_mm,force_n\n1,nan\n").starts_with("line 2"));
+        let curve = MeasuredCurve::parse("compression_mm,force_n\n0,0\n1,2\n", None).unwrap();
+        assert_eq!(curve.fit(), Err(CurveError::NoFreeLength));
+        let few = MeasuredCurve::parse("compression_mm,force_n\n0,0\n1,2\n", Some(0.02)).unwrap();
+        assert!(matches!(few.fit(), Err(CurveError::Statistics(_))));
+        let falling = "compression_mm,force_n\n0,9\n4,5\n5,4\n6,3\n10,0\n";
+        let falling = MeasuredCurve::parse(falling, Some(0.02)).unwrap();
+        assert!(matches!(falling.fit(), Err(CurveError::Falling(_))));
+    }
+}

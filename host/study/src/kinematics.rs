@@ -1,0 +1,231 @@
+//! How a stimulus was explored, from samples of handle and force along the vertical: what CMU-RI-TR-07-21 recorded at
+//! 1000 Hz and analysed (section 4.3), and the stiffness that was really there to feel.
+
+use serde::{Deserialize, Serialize};
+
+/// One sample of handle and force, device frame: z is up, the force is the one on the hand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Time since the sample before, s.
+    pub dt_s: f64,
+    /// Height of the handle above home, m.
+    pub z_m: f64,
+    /// Its velocity, m/s.
+    pub velocity_m_per_s: f64,
+    /// Force along z, N.
+    pub force_z_n: f64,
+    /// Magnitude of the whole force, N.
+    pub force_n: f64,
+    /// Whether the handle was out of its range.
+    pub out_of_range: bool,
+}
+
+/// How one stimulus was explored.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StimulusKinematics {
+    /// How long, s.
+    pub duration_s: f64,
+    /// Mean speed along the vertical, m/s.
+    pub mean_speed_m_per_s: f64,
+    /// Mean magnitude of the acceleration along the vertical, m/s².
+    pub mean_acceleration_m_per_s2: f64,
+    /// Mean magnitude of the vertical force on the hand, N.
+    pub mean_force_n: f64,
+    /// Largest magnitude of the force on the hand, N.
+    pub peak_force_n: f64,
+    /// Down and up movements.
+    pub cycles: u32,
+    /// Stiffness of vertical force against vertical displacement as the hand felt it, N/m; none if it did not move.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub felt_stiffness_n_per_m: Option<f64>,
+}
+
+/// A movement shorter than this is none, m: above tremor (Stiles and Randall 1967: tenths of a millimetre), below the
+/// millimetres people explore a spring with.
+const SMALLEST_MOVEMENT_M: f64 = 0.5e-3;
+
+/// Adds up samples as they come, in constant memory.
+#[derive(Clone, Debug, Default)]
+pub struct KinematicsMeter {
+    duration_s: f64,
+    path_m: f64,
+    turning_m_per_s: f64,
+    impulse_ns: f64,
+    peak_force_n: f64,
+    out_of_range: bool,
+    last_velocity_m_per_s: Option<f64>,
+    turns: Turns,
+    line: Line,
+}
+
+impl KinematicsMeter {
+    /// Takes a sample in. Samples that are not finite say nothing and are left out.
+    pub fn take(&mut self, sample: &Sample) {
+        let Sample { dt_s, z_m, velocity_m_per_s, force_z_n, force_n, out_of_range } = *sample;
+        self.out_of_range |= out_of_range;
+        if !(dt_s + z_m + velocity_m_per_s + force_z_n + force_n).is_finite() {
+            return;
+        }
+        self.duration_s += dt_s;
+        self.path_m += velocity_m_per_s.abs() * dt_s;
+        if let Some(last) = self.last_velocity_m_per_s.replace(velocity_m_per_s) {
+            self.turning_m_per_s += (velocity_m_per_s - last).abs();
+        }
+        self.impulse_ns += force_z_n.abs() * dt_s;
+        self.peak_force_n = self.peak_force_n.max(force_n);
+        self.turns.take(z_m);
+        self.line.take(z_m, force_z_n);
+    }
+
+    /// Whether the handle ever was out of its range.
+    #[must_use]
+    pub fn out_of_range(&self) -> bool {
+        self.out_of_range
+    }
+
+    /// What the samples come to; none if they took no time.
+    #[must_use]
+    pub fn finish(&self) -> Option<StimulusKinematics> {
+        let duration_s = self.duration_s;
+        (duration_s > 0.0).then(|| StimulusKinematics {
+            duration_s,
+            mean_speed_m_per_s: self.path_m / duration_s,
+            mean_acceleration_m_per_s2: self.turning_m_per_s / duration_s,
+            mean_force_n: self.impulse_ns / duration_s,
+            peak_force_n: self.peak_force_n,
+            cycles: self.turns.count / 2,
+            // A spring pushes up where the handle is down.
+            felt_stiffness_n_per_m: self.line.slope().map(|slope| -slope),
+        })
+    }
+}
+
+/// Counts changes of direction, with a dead band.
+#[derive(Clone, Debug, Default)]
+struct Turns {
+    /// Farthest place in the present direction, m.
+    extreme_m: Option<f64>,
+    /// 1 up, -1 down, 0 not known yet.
+    direction: f64,
+    count: u32,
+}
+
+impl Turns {
+    fn take(&mut self, z_m: f64) {
+        let extreme_m = *self.extreme_m.get_or_insert(z_m);
+        let way_m = z_m - extreme_m;
+        if way_m * self.direction >= 0.0 && self.direction != 0.0 {
+            self.extreme_m = Some(z_m);
+        } else if way_m.abs() >= SMALLEST_MOVEMENT_M {
+            self.count += u32::from(self.direction != 0.0);
+            self.direction = way_m.signum();
+            self.extreme_m = Some(z_m);
+        }
+    }
+}
+
+/// Slope of force over height by least squares, updated sample by sample (Welford 1962).
+#[derive(Clone, Debug, Default)]
+struct Line {
+    count: f64,
+    mean_z_m: f64,
+    mean_force_n: f64,
+    zz: f64,
+    zf: f64,
+}
+
+impl Line {
+    fn take(&mut self, z_m: f64, force_n: f64) {
+        self.count += 1.0;
+        let from_mean_m = z_m - self.mean_z_m;
+        self.mean_z_m += from_mean_m / self.count;
+        self.mean_force_n += (force_n - self.mean_force_n) / self.count;
+        self.zz += from_mean_m * (z_m - self.mean_z_m);
+        self.zf += from_mean_m * (force_n - self.mean_force_n);
+    }
+
+    /// None unless the handle moved by more than nothing.
+    fn slope(&self) -> Option<f64> {
+        let deviation_m = (self.zz / self.count.max(1.0)).sqrt();
+        (deviation_m > 0.1 * SMALLEST_MOVEMENT_M).then(|| self.zf / self.zz)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::{PI, TAU};
+
+    /// A spring of 1 N/mm swung by 5 mm at 2 Hz for three seconds: everything has a closed form.
+    #[test]
+    fn a_swing_on_a_spring_has_its_closed_form() {
+        const AMPLITUDE_M: f64 = 5.0e-3;
+        const RATE: f64 = TAU * 2.0;
+        let mut meter = KinematicsMeter::default();
+        for tick in 0..3000_u32 {
+            let time_s = f64::from(tick) * 1.0e-3;
+            let z_m = AMPLITUDE_M * (RATE * time_s).sin();
+            let force_z_n = -1000.0 * z_m;
+            meter.take(&Sample {
+                dt_s: 1.0e-3,
+                z_m,
+                velocity_m_per_s: AMPLITUDE_M * RATE * (RATE * time_s).cos(),
+                force_z_n,
+                force_n: force_z_n.abs() + 0.5,
+                out_of_range: false,
+            });
+        }
+        let found = meter.finish().unwrap();
+        // Means of |sin| are 2 / pi; sampling at 500 points per cycle leaves less than a thousandth.
+        let near = |found: f64, expected: f64| {
+            assert!((found / expected - 1.0).abs() < 1.0e-3, "{found} {expected}")
+        };
+        near(found.duration_s, 3.0);
+        near(found.mean_speed_m_per_s, AMPLITUDE_M * RATE * 2.0 / PI);
+        near(found.mean_acceleration_m_per_s2, AMPLITUDE_M * RATE * RATE * 2.0 / PI);
+        near(found.mean_force_n, 1000.0 * AMPLITUDE_M * 2.0 / PI);
+        near(found.peak_force_n, 5.5);
+        near(found.felt_stiffness_n_per_m.unwrap(), 1000.0);
+        // Six cycles begin upwards and end upwards: twelve turns.
+        assert_eq!(found.cycles, 6);
+        assert!(!meter.out_of_range());
+    }
+
+    #[test]
+    fn a_handle_at_rest_has_no_stiffness_and_no_cycles() {
+        let mut meter = KinematicsMeter::default();
+        assert_eq!(meter.finish(), None);
+        let still = Sample {
+            dt_s: 1.0e-3,
+            z_m: -1.0e-3,
+            velocity_m_per_s: 0.0,
+            force_z_n: 3.0,
+            force_n: 3.0,
+            out_of_range: false,
+        };
+        (0..100).for_each(|_| meter.take(&still));
+        let found = meter.finish().unwrap();
+        assert_eq!((found.felt_stiffness_n_per_m, found.cycles, found.mean_speed_m_per_s), (None, 0, 0.0));
+        meter.take(&Sample { force_z_n: f64::NAN, out_of_range: true, ..still });
+        assert!(meter.out_of_range());
+        assert!((meter.finish().unwrap().mean_force_n - 3.0).abs() < 1.0e-12, "NaN is left out");
+    }
+
+    #[test]
+    fn tremor_is_no_cycle() {
+        let mut meter = KinematicsMeter::default();
+        for tick in 0..1000_u32 {
+            let z_m = 0.2e-3 * (TAU * 10.0 * f64::from(tick) * 1.0e-3).sin();
+            let still = Sample {
+                dt_s: 1.0e-3,
+                z_m,
+                velocity_m_per_s: 0.0,
+                force_z_n: 0.0,
+                force_n: 0.0,
+                out_of_range: false,
+            };
+            meter.take(&still);
+        }
+        assert_eq!(meter.finish().unwrap().cycles, 0);
+    }
+}

@@ -1,0 +1,69 @@
+//! How a simulated subject's hand explores: its own pace, reach and grip, all along.
+
+use crate::protocol::SubjectNumber;
+use crate::random::{Purpose, Stream};
+use serde::{Deserialize, Serialize};
+
+/// The movement of a hand on a vertical object: down and up about a place below home, as the subjects of
+/// CMU-RI-TR-07-21 told of themselves (section 5). The hand is compliant, so a stiffer object moves less under it and
+/// pushes back more.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HandManner {
+    /// Cycles per second.
+    pub frequency_hz: f64,
+    /// Middle of the intended movement above home, m.
+    pub centre_m: f64,
+    /// Half the distance between the intended turning points, m.
+    pub amplitude_m: f64,
+    /// Stiffness of the grip, N/m.
+    pub stiffness_n_per_m: f64,
+    /// Physiological tremor, m rms.
+    pub tremor_m: f64,
+}
+
+/// What people do on average: 1.5 cycles a second, from 2 mm above home to 10 mm below, held firmly (2 N/mm: the grip of
+/// the simulated hand), with the tremor of a braced hand (15 to 250 µm).
+const AVERAGE: HandManner = HandManner {
+    frequency_hz: 1.5,
+    centre_m: -4.0e-3,
+    amplitude_m: 6.0e-3,
+    stiffness_n_per_m: 2000.0,
+    tremor_m: 50.0e-6,
+};
+/// Spread between people, as the deviation of the logarithm.
+const SPREAD: f64 = 0.15;
+/// Nobody is farther from the average than this many deviations: the handle stays in its range.
+const FARTHEST: f64 = 2.0;
+
+impl HandManner {
+    /// The hand of a subject: follows from seed and number alone.
+    #[must_use]
+    pub fn of(seed: u64, subject: SubjectNumber) -> Self {
+        let mut stream = Stream::new(seed, Purpose::Hand, subject.get(), 0);
+        let mut factor = || libm::exp(SPREAD * stream.normal().clamp(-FARTHEST, FARTHEST));
+        Self {
+            frequency_hz: AVERAGE.frequency_hz * factor(),
+            centre_m: AVERAGE.centre_m,
+            amplitude_m: AVERAGE.amplitude_m * factor(),
+            stiffness_n_per_m: AVERAGE.stiffness_n_per_m * factor(),
+            tremor_m: AVERAGE.tremor_m * factor(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hands_differ_and_stay_in_range() {
+        let hands: Vec<HandManner> =
+            (1..=200).filter_map(SubjectNumber::new).map(|subject| HandManner::of(3, subject)).collect();
+        assert_ne!(hands[0], hands[1]);
+        assert_eq!(hands[4], HandManner::of(3, SubjectNumber::new(5).unwrap()));
+        for hand in hands {
+            // The flotor moves 12 mm each way.
+            assert!(hand.centre_m - hand.amplitude_m > -12.5e-3 && hand.frequency_hz < 2.1, "{hand:?}");
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! A load: the same force wherever the handle is, felt or exerted. The stimulus of a force-discrimination experiment.
+//!
+//! CMU-RI-TR-07-21 (section 7) asks why people tell weights apart so much better than springs, and whether it matters if a
+//! force is experienced or applied. The two kinds here differ in nothing else:
+//!
+//! ```text
+//! felt      F_z = -F                         a weight: it pulls down all the time, the hand holds against it
+//! exerted   F_z =  F tanh(d / d0),  d > 0    a resistance: nothing is felt until the hand pushes down, and then F
+//! ```
+//!
+//! with depth `d = -z` below home and an onset `d0` that keeps the law smooth. Both have an energy, `F z` and
+//! `F d0 ln cosh(d / d0)`, so nothing is gained on a way there and back.
+
+use flotor_hal::abi::Str;
+use flotor_hal::{
+    DVec3, Demand, ForceModel, Input, ModelInfo, OutOfRange, Output, Parameter, Refusal, Settings,
+    StepStatus, Wrench,
+};
+
+/// Farther from home than this there is no handle, m: the energy there is that at the edge, and the answer says so.
+const REACH_M: f64 = 1.0;
+
+const KINDS: [Str; 2] = [Str::new("felt"), Str::new("exerted")];
+
+/// How the force comes about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// It pulls down.
+    Felt,
+    /// It resists being pushed down.
+    Exerted,
+}
+
+/// A load.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Load {
+    kind: Kind,
+    force_n: f64,
+    onset_m: f64,
+}
+
+impl Load {
+    /// A load of so many newtons; `onset_m` is the depth over which a resistance comes up.
+    #[must_use]
+    pub fn new(kind: Kind, force_n: f64, onset_m: f64) -> Self {
+        Self { kind, force_n, onset_m }
+    }
+
+    /// Force along z, N, and energy, J, at a height. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn at(&self, height_m: f64) -> (f64, f64) {
+        match self.kind {
+            Kind::Felt => (-self.force_n, self.force_n * height_m),
+            Kind::Exerted if height_m >= 0.0 => (0.0, 0.0),
+            Kind::Exerted => {
+                let depth = -height_m / self.onset_m;
+                // ln cosh x without overflow: x + ln((1 + exp(-2x)) / 2).
+                let log_cosh = depth + (-2.0 * depth).exp().ln_1p() - std::f64::consts::LN_2;
+                (self.force_n * depth.tanh(), self.force_n * self.onset_m * log_cosh)
+            }
+        }
+    }
+}
+
+impl ForceModel for Load {
+    const INFO: ModelInfo =
+        ModelInfo::new("load", "Load", "A force to be held or to be overcome").serving(Demand::ALL);
+
+    const PARAMETERS: &'static [Parameter] = &[
+        Parameter::choice("kind", &KINDS, 0, "A weight that pulls down, or a resistance to pushing down"),
+        Parameter::real("force_n", "N", 0.0, 100.0, 3.0, "The force").live(),
+        Parameter::real(
+            "onset_mm",
+            "mm",
+            0.01,
+            100.0,
+            1.0,
+            "Depth over which a resistance comes up (exerted)",
+        )
+        .live(),
+    ];
+
+    fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        let kind = if settings.choice_or_default("kind") == 1 { Kind::Exerted } else { Kind::Felt };
+        let (force_n, onset_mm) =
+            (settings.number_or_default("force_n"), settings.number_or_default("onset_mm"));
+        Ok(Self::new(kind, force_n, onset_mm * 1.0e-3))
+    }
+
+    fn step(&mut self, input: &Input) -> Output {
+        if !input.pose.is_finite() {
+            return Output::new(Wrench::ZERO, 0.0, StepStatus::InvalidInput);
+        }
+        let position_m = input.pose.position();
+        let reached_m = position_m.clamp(DVec3::splat(-REACH_M), DVec3::splat(REACH_M));
+        let (force_n, energy_j) = self.at(reached_m.z);
+        let status = if reached_m == position_m { StepStatus::Ok } else { StepStatus::Clamped };
+        Output::new(Wrench::from_force(DVec3::Z * force_n), energy_j, status)
+    }
+
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+        match index {
+            1 => self.force_n = value,
+            2 => self.onset_m = value * 1.0e-3,
+            _ => return Err(OutOfRange { min: f64::NAN, max: f64::NAN, value }),
+        }
+        Ok(())
+    }
+
+    fn parameter(&self, index: usize) -> f64 {
+        match index {
+            0 => f64::from(u8::from(self.kind == Kind::Exerted)),
+            1 => self.force_n,
+            2 => self.onset_m * 1.0e3,
+            _ => f64::NAN,
+        }
+    }
+
+    fn reset(&mut self) {}
+}
+
+flotor_hal::export_model!(Load);

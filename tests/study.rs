@@ -1,0 +1,433 @@
+//! Perception experiments through the program and through the library: what is felt, what survives a kill, what is
+//! refused, and that a person at a keyboard goes the same way as a simulated observer.
+
+#![allow(clippy::unwrap_used, clippy::cast_precision_loss)] // tests may panic; counts
+
+use flotor::record::{Change, ChangeSubject, Recording};
+use flotor::scene::Scene;
+use flotor::session::Observer;
+use flotor::study::rig::{Rig, TrialFiles};
+use flotor::study::{Apparatus, Kinematics};
+use flotor::trace::{Events, TickRecord};
+use flotor_study::log::SittingLog;
+use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Protocol, Stimulus, SubjectNumber};
+use flotor_study::sitting::Sitting;
+use flotor_study::trial::{Exploration, Modality, Phase, Presented, Response, Trial};
+use flotor_tests::TestSize;
+use flotor_tests::program::{Flotor, Ran, exit_code};
+use flotor_tests::scratch::Scratch;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+fn subject(number: u16) -> SubjectNumber {
+    SubjectNumber::new(number).unwrap()
+}
+
+fn study(arguments: &[&str], out: &Path) -> Flotor {
+    Flotor::with(["study"].iter().chain(arguments).chain(&["--out", out.to_str().unwrap()]))
+}
+
+fn one(number: u32, value: f64) -> Trial {
+    Trial {
+        number,
+        phase: Phase::Main,
+        replication: 1,
+        track: 0,
+        modality: Modality::Vh,
+        presented: Presented::One { value },
+        repeat: 0,
+    }
+}
+
+/// Takes down how the commanded force changes from tick to tick.
+#[derive(Default)]
+struct Steepness {
+    last_n: Option<f64>,
+    largest_step_n: f64,
+    slewed: u64,
+    parameters: usize,
+    plugins: usize,
+}
+
+impl Observer for Steepness {
+    fn observe(&mut self, record: &TickRecord) {
+        let force_n = record.commanded.force().z;
+        if let Some(last_n) = self.last_n.replace(force_n) {
+            self.largest_step_n = self.largest_step_n.max((force_n - last_n).abs());
+        }
+        self.slewed += u64::from(record.events.intersects(Events::SLEW_LIMITED));
+    }
+
+    fn change(&mut self, change: &Change) {
+        self.parameters += usize::from(change.subject == ChangeSubject::Parameter);
+        self.plugins += usize::from(change.subject == ChangeSubject::Plugin);
+    }
+}
+
+fn magnitude_of(stimulus: &str, values: [f64; 3]) -> Protocol {
+    let (model, parameter) = stimulus.split_once('.').unwrap();
+    let stimulus = Stimulus { model: model.to_owned(), parameter: parameter.to_owned() };
+    Protocol::Magnitude(MagnitudeProtocol {
+        stimulus,
+        values: values.to_vec(),
+        ..MagnitudeProtocol::default()
+    })
+}
+
+fn scene(model: &str, settings: &[&str]) -> Scene {
+    let mut scene = Scene::study(model).unwrap();
+    settings
+        .iter()
+        .for_each(|set| set.parse::<flotor::scene::PluginKeyValue>().unwrap().apply(&mut scene).unwrap());
+    scene
+}
+
+/// Stimuli from end to end of the range follow one another under a hand that never stops, by live parameters and by new
+/// models: the force never moves faster than the hand itself moves it.
+#[test]
+fn stimuli_change_without_a_step_of_force() {
+    for (stimulus, set, values) in [
+        ("spring.gamma_n", "spring.mode=gamma", [12.0, 30.0, 48.0]),
+        ("spring.wire_diameter_mm", "spring.mode=physical", [0.5, 0.6, 0.7]),
+        // Read when the model is made, so a new one takes its place.
+        ("wall.size_mm", "wall.shape=sphere", [8.0, 12.0, 20.0]),
+    ] {
+        let protocol = magnitude_of(stimulus, values);
+        let model = stimulus.split_once('.').unwrap().0;
+        let apparatus = Apparatus::check(scene(model, &[set]), &protocol).unwrap();
+        assert_eq!(apparatus.swaps_models(), model == "wall");
+        let mut rig = Rig::start(&apparatus, (1, subject(1)), Kinematics::Summary, None, 0.5).unwrap();
+        let mut steepness = Steepness::default();
+        for (number, value) in [values[2], values[0], values[2], values[1]].into_iter().enumerate() {
+            let trial = one(u32::try_from(number).unwrap(), value);
+            let felt = rig.present_watched(&trial, &mut steepness).unwrap();
+            assert_eq!(felt.kinematics.len(), 1, "{stimulus}");
+        }
+        // A hand at 0.1 m/s on the stiffest of these, 4.6 N/mm, takes half a newton with it in a tick, and a fade of
+        // 0.1 s another quarter; a stiffness that changed under the hand would be a step of many newtons.
+        assert!(steepness.largest_step_n < 1.0, "{stimulus}: {} N in a tick", steepness.largest_step_n);
+        assert_eq!(steepness.slewed, 0, "{stimulus}: the slew limit had nothing to do");
+        let changed = if apparatus.swaps_models() { steepness.plugins } else { steepness.parameters };
+        assert_eq!(changed, 4, "{stimulus}");
+    }
+}
+
+/// The stiffness at the hand is f m gamma / L0 (thesis eq. 77): what the simulated hand measures is what was set.
+#[test]
+fn the_hand_feels_the_stiffness_that_was_set() {
+    let protocol = Protocol::Magnitude(MagnitudeProtocol::default());
+    let apparatus = Apparatus::check(scene("spring", &[]), &protocol).unwrap();
+    let mut rig = Rig::start(&apparatus, (3, subject(2)), Kinematics::Summary, None, 1.0).unwrap();
+    let felt: Vec<_> = [12.0, 24.0, 48.0]
+        .map(|gamma_n| {
+            let exploration = rig.present_watched(&one(1, gamma_n), &mut Steepness::default()).unwrap();
+            let felt = exploration.kinematics[0];
+            let expected = gamma_n / 0.025 * (25.0 / 15.0);
+            let found = felt.felt_stiffness_n_per_m.unwrap();
+            // The law bends a little under the hand's tilt and tremor; a percent is a tenth of what people can tell.
+            assert!((found / expected - 1.0).abs() < 0.01, "{found} for {expected} N/m");
+            felt
+        })
+        .to_vec();
+    // As people did: more force and less movement on a stiffer spring.
+    for pair in felt.windows(2) {
+        assert!(
+            pair[1].mean_force_n > pair[0].mean_force_n
+                && pair[1].mean_speed_m_per_s < pair[0].mean_speed_m_per_s
+        );
+    }
+}
+
+#[test]
+fn a_trial_can_be_kept_tick_by_tick() {
+    let scratch = Scratch::default();
+    let protocol = Protocol::Magnitude(MagnitudeProtocol::default());
+    let apparatus = Apparatus::check(scene("spring", &[]), &protocol).unwrap();
+    let files = TrialFiles::make(scratch.path().join("motion"), "sub-01_task-magnitude".to_owned()).unwrap();
+    let file = files.of(&one(7, 20.0));
+    assert!(file.ends_with("sub-01_task-magnitude_trial-0007_motion.mcap"));
+    let mut rig = Rig::start(&apparatus, (3, subject(1)), Kinematics::Full, Some(files), 0.5).unwrap();
+    rig.present_watched(&one(7, 20.0), &mut Steepness::default()).unwrap();
+    let recording = Recording::open(&file).unwrap();
+    assert_eq!(recording.run().rate_hz, 1000.0);
+    let ticks: Vec<TickRecord> = recording.map(|record| record.unwrap()).collect();
+    // Half a second of feeling between two fades of 0.1 s.
+    assert_eq!(ticks.len(), 500 + 2 * 101);
+    assert!(ticks.windows(2).all(|pair| pair[1].time_ns - pair[0].time_ns == 1_000_000));
+}
+
+/// Everything that can be wrong is told in one line, with exit code 2, and no data folder is begun.
+#[test]
+fn bad_input_is_refused_before_the_first_trial() {
+    let scratch = Scratch::default();
+    let no_force = "[device]\nplugin = \"simulated\"\n[[model]]\nplugin = \"spring\"\nname = \"other\"\n";
+    let other = scratch.file("other.toml", no_force);
+    let other = other.to_str().unwrap();
+    let cases: [(&[&str], &str); 9] = [
+        (&["jnd", "--stimulus", "spring.gama_n"], "did you mean `gamma_n`"),
+        (&["jnd", "--stimulus", "sprin.gamma_n"], "sprin"),
+        (&["jnd", "--stimulus", "gamma"], "MODEL.PARAMETER"),
+        (&["jnd", "--scene", other, "--stimulus", "spin.gamma_n"], "has no model `spin`"),
+        (&["jnd", "--bases", "9000"], "its range is"),
+        (&["magnitude", "--range", "48-12"], "empty"),
+        (&["magnitude", "--stimulus", "spring.alpha_n_mm2"], "mode"),
+        (&["jnd", "--bases", "0"], "above 0"),
+        (&["jnd", "--set", "device.hand=nowhere"], "nowhere"),
+    ];
+    for (arguments, reason) in cases {
+        let out = scratch.path().join("data");
+        let ran = study(arguments, &out).run();
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{arguments:?}: {ran:?}");
+        assert!(ran.stderr.contains(reason), "{arguments:?}: {}", ran.stderr);
+        assert!(!out.exists(), "{arguments:?} left data behind");
+    }
+}
+
+/// A device without a hand cannot be felt by somebody simulated; a person could.
+#[test]
+fn a_device_that_cannot_be_felt_is_refused() {
+    let scratch = Scratch::default();
+    let out = scratch.path().join("data");
+    let scene = "[device]\nplugin = \"fixture-faulty-device\"\n[[model]]\nplugin = \"spring\"\n";
+    let scene = scratch.file("handless.toml", scene);
+    let ran = study(&["jnd", "--scene", scene.to_str().unwrap()], &out).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    assert!(ran.error().contains("has no simulated hand"), "{ran:?}");
+    assert!(!out.exists());
+}
+
+const SMALL: [&str; 8] = ["jnd", "--bases", "26", "--replications", "2", "--no-demo", "--feel", "50ms"];
+
+#[test]
+fn a_subject_who_has_been_there_is_refused() {
+    let scratch = Scratch::default();
+    let out = scratch.path().join("data");
+    let arguments: Vec<&str> = SMALL.into_iter().chain(["--subjects", "2", "--apparatus", "none"]).collect();
+    assert_eq!(study(&arguments, &out).run().code, Some(exit_code::OK));
+    let again = study(&arguments, &out).run();
+    assert_eq!(again.code, Some(exit_code::CONFIGURATION));
+    assert!(again.error().contains("already complete"), "{again:?}");
+    let another: Vec<&str> = arguments.iter().copied().chain(["--resume", "--seed", "9"]).collect();
+    let ran = study(&another, &out).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION));
+    assert!(ran.error().contains("seed"), "{ran:?}");
+}
+
+/// The trials of a log and what becomes of them, without what only the clock decides.
+fn trials(path: &Path) -> Vec<(Trial, Response, Exploration)> {
+    let log = SittingLog::read(path).unwrap_or_else(|error| panic!("{error}"));
+    log.trials
+        .into_iter()
+        .map(|record| (record.event.trial, record.event.response, record.event.exploration))
+        .collect()
+}
+
+fn log_of(out: &Path, number: u16) -> PathBuf {
+    out.join(format!("sourcedata/sub-{number:02}/sub-{number:02}_task-jnd_log.jsonl"))
+}
+
+/// SIGKILL at random moments, again and again, until the study is complete: every log is readable at every moment, no
+/// trial that was on disk is ever gone, and in the end the data are to the bit those of a study nobody killed, the
+/// movements of the hand included.
+#[test]
+fn kills_at_any_moment_lose_no_completed_trial() {
+    let scratch = Scratch::default();
+    let (whole, killed) = (scratch.path().join("whole"), scratch.path().join("killed"));
+    let kills = TestSize::of_this_run().pick(12, 200);
+    // Enough to do for all the kills, little enough to come through between them.
+    let subjects = TestSize::of_this_run().pick(2, 8);
+    let count = subjects.to_string();
+    let arguments: Vec<&str> = SMALL.into_iter().chain(["--subjects", count.as_str()]).collect();
+    let started = Instant::now();
+    assert_eq!(study(&arguments, &whole).run().code, Some(exit_code::OK));
+    let takes = started.elapsed();
+    let numbers = 1..=u16::try_from(subjects).unwrap();
+
+    let mut random = 0x2545_f491_4f6c_dd1d_u64;
+    let mut on_disk = vec![0; subjects];
+    let mut interrupted = 0;
+    for kill in 0..kills {
+        if kill % 50 == 49 || (1..=subjects).all(|n| on_disk[n - 1] > 0 && is_complete(&killed, n)) {
+            // From the start again, so that every part of a study is hit.
+            let _ = std::fs::remove_dir_all(&killed);
+            on_disk.fill(0);
+        }
+        random ^= random << 13;
+        random ^= random >> 7;
+        random ^= random << 17;
+        let resumed: Vec<&str> = arguments.iter().copied().chain(["--resume"]).collect();
+        let running = study(&resumed, &killed).start();
+        std::thread::sleep(takes.mul_f64((random % 1000) as f64 / 1000.0).min(Duration::from_secs(5)));
+        let sent = Command::new("kill").args(["-KILL", &running.id().to_string()]).status();
+        let code = running.wait().code;
+        interrupted += usize::from(sent.is_ok() && code.is_none());
+        for number in numbers.clone() {
+            let path = log_of(&killed, number);
+            // Killed before the first line was whole: nothing had happened yet.
+            if !std::fs::read_to_string(&path).is_ok_and(|text| text.contains('\n')) {
+                continue;
+            }
+            let found = trials(&path);
+            let before = &mut on_disk[usize::from(number) - 1];
+            assert!(
+                found.len() >= *before,
+                "{}: {} trials, {before} were on disk",
+                path.display(),
+                found.len()
+            );
+            *before = found.len();
+            let expected = trials(&log_of(&whole, number));
+            assert_eq!(found[..], expected[..found.len()], "kill {kill}, subject {number}: another schedule");
+        }
+    }
+    assert!(interrupted * 2 >= kills, "{interrupted} of {kills} came in time");
+    let resumed: Vec<&str> = arguments.iter().copied().chain(["--resume"]).collect();
+    let last = study(&resumed, &killed).run();
+    assert_eq!(last.code, Some(exit_code::OK), "{last:?}");
+    for number in numbers {
+        assert_eq!(trials(&log_of(&killed, number)), trials(&log_of(&whole, number)));
+        let table = format!("sub-{number:02}/beh/sub-{number:02}_task-jnd_beh.tsv");
+        let read = |out: &Path| std::fs::read_to_string(out.join(&table)).unwrap();
+        assert_eq!(read(&killed), read(&whole));
+    }
+    println!("{interrupted} of {kills} kills interrupted a study; no trial was lost");
+}
+
+fn is_complete(out: &Path, number: usize) -> bool {
+    SittingLog::read(&log_of(out, u16::try_from(number).unwrap())).is_ok_and(|log| log.complete)
+}
+
+/// Somebody edits an answer by hand: `analyse` and `--resume` refuse, with file, line and reason.
+#[test]
+fn an_edited_log_is_refused_with_line_and_reason() {
+    let scratch = Scratch::default();
+    let out = scratch.path().join("data");
+    let arguments: Vec<&str> = SMALL.into_iter().chain(["--subjects", "2", "--apparatus", "none"]).collect();
+    assert_eq!(study(&arguments, &out).run().code, Some(exit_code::OK));
+    let path = log_of(&out, 2);
+    let text = std::fs::read_to_string(&path).unwrap();
+    let forged: Vec<String> =
+        text.lines()
+            .enumerate()
+            .map(|(index, line)| {
+                if index == 4 { line.replace("\"response\":\"", "\"response\":\"x") } else { line.to_owned() }
+            })
+            .collect();
+    std::fs::write(&path, forged.join("\n") + "\n").unwrap();
+    let analysed = Flotor::with(["analyse", out.to_str().unwrap()]).run();
+    let resumed: Vec<&str> = arguments.iter().copied().chain(["--resume"]).collect();
+    for ran in [analysed, study(&resumed, &out).run()] {
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION));
+        assert!(ran.error().contains("_log.jsonl:5: the chain is broken"), "{ran:?}");
+    }
+}
+
+const PERSON: [&str; 13] = [
+    "jnd",
+    "--observer",
+    "human",
+    "--bases",
+    "26",
+    "--replications",
+    "2",
+    "--procedure",
+    "questplus",
+    "--trials",
+    "3",
+    "--noise=off",
+    "--screen",
+];
+
+/// A study with a person whose lines are these.
+fn person(screen: &str, lines: &str, arguments: &[&str], out: &Path) -> Ran {
+    let arguments: Vec<&str> = PERSON.into_iter().chain([screen]).chain(arguments.iter().copied()).collect();
+    study(&arguments, out).reading(lines).run()
+}
+
+/// A person at a keyboard: breaks off, goes on, and the log says the same as the bare state machine with their answers.
+#[test]
+fn a_person_goes_through_the_same_sitting() {
+    let scratch = Scratch::default();
+    let out = scratch.path().join("data");
+    // Ready, two springs, an answer that is none, a note, an answer; then enough for today.
+    let first = person("terminal", "\n\n\n7\nn cold hands\n1\nq\n", &["--no-demo"], &out);
+    assert_eq!(first.code, Some(exit_code::OK), "{first:?}");
+    assert!(first.stdout.contains("type 1, 2 or 0") && first.stdout.contains("--resume"), "{first:?}");
+    assert!(!first.stdout.contains("26"), "blinded: {}", first.stdout);
+    let log = SittingLog::read(&log_of(&out, 1)).unwrap();
+    assert_eq!((log.trials.len(), log.complete), (1, false));
+    assert!(log.notes.iter().any(|(_, text)| text == "cold hands"));
+
+    let refused = person("terminal", "", &["--no-demo", "--subject", "1"], &out);
+    assert_eq!(refused.code, Some(exit_code::CONFIGURATION));
+    let rest = "\n".to_owned() + &"\n\n1\n".repeat(2) + "\n" + &"\n\n1\n".repeat(3);
+    let second = person("terminal", &rest, &["--no-demo", "--subject", "1", "--resume"], &out);
+    assert_eq!(second.code, Some(exit_code::OK), "{second:?}");
+    let log = SittingLog::read(&log_of(&out, 1)).unwrap();
+    assert_eq!((log.trials.len(), log.complete, log.resumed), (6, true, 1));
+
+    let mut bare = Sitting::new(&log.begin.protocol, log.begin.seed, log.begin.subject);
+    for record in &log.trials {
+        assert_eq!(bare.next(), Some(record.event.trial));
+        bare.answer(Response::First, &Exploration::default()).unwrap();
+        assert_eq!(record.event.exploration.kinematics.len(), 2, "both springs were felt and measured");
+        let file = format!("sub-01_task-jnd_trial-{:04}_motion.mcap", record.event.trial.number);
+        let recording = Recording::open(&out.join("sourcedata/sub-01/motion").join(file)).unwrap();
+        assert!(recording.count() > 100);
+    }
+    assert!(bare.is_over());
+}
+
+/// The same through a pipe, as a window would do it.
+#[test]
+fn screens_travel_as_json_lines() {
+    let scratch = Scratch::default();
+    let out = scratch.path().join("data");
+    let go = r#"{"input":"continue"}"#;
+    let answer = r#"{"input":"answer","response":"dont-know"}"#;
+    let lines = [go, go, go, "nonsense", answer, r#"{"input":"stop"}"#].join("\n") + "\n";
+    let ran = person("json", &lines, &["--no-demo"], &out);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let screens: Vec<serde_json::Value> =
+        ran.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let names: Vec<&str> = screens.iter().filter_map(|screen| screen["screen"].as_str()).collect();
+    assert_eq!(names, ["ready", "feel", "feel", "ask", "feel"]);
+    assert!(screens.iter().any(|line| line["refused"].is_string()), "nonsense is answered");
+    assert_eq!(SittingLog::read(&log_of(&out, 1)).unwrap().trials.len(), 1);
+}
+
+/// Largest memory a study ever had, kB: from `/proc` while it runs.
+fn peak_kb(subjects: &str, out: &Path) -> f64 {
+    let arguments: Vec<&str> = SMALL.into_iter().chain(["--subjects", subjects]).collect();
+    let running = study(&arguments, out).start();
+    let status = PathBuf::from(format!("/proc/{}/status", running.id()));
+    let mut peak = 0.0_f64;
+    while let Ok(text) = std::fs::read_to_string(&status) {
+        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let Some(line) = line else { break };
+        peak = peak.max(line.trim().trim_end_matches("kB").trim().parse().unwrap_or(0.0));
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    assert_eq!(running.wait().code, Some(exit_code::OK));
+    peak
+}
+
+/// Eight times the subjects need no more memory: nothing is kept of what is on disk.
+#[test]
+fn memory_does_not_grow_with_the_subjects() {
+    let scratch = Scratch::default();
+    let (few, many) = (scratch.path().join("few"), scratch.path().join("many"));
+    let (few, many) = (peak_kb("2", &few), peak_kb("16", &many));
+    println!("peak memory of 2 subjects {few} kB, of 16 subjects {many} kB");
+    assert!(few > 1000.0 && many < 1.15 * few, "{few} kB for 2 subjects, {many} kB for 16");
+}
+
+/// Any protocol: thresholds of a default study exist for each base and modality.
+#[test]
+fn the_default_protocol_fits_the_default_scene() {
+    Apparatus::check(scene("spring", &[]), &Protocol::Jnd(JndProtocol::default()))
+        .unwrap()
+        .check_hand()
+        .unwrap();
+}
