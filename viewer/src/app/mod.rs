@@ -75,6 +75,14 @@ pub struct Viewer {
     last_look: Option<Instant>,
     frame: Duration,
     sitting: Option<Sitting>,
+    audience: Audience,
+}
+
+/// Who sits in front of the window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Audience {
+    Experimenter,
+    Subject,
 }
 
 impl Viewer {
@@ -120,6 +128,7 @@ impl Viewer {
             bell: Bell::default(),
             last_look: None,
             frame: if on_cpu { FRAME_ON_CPU } else { FRAME },
+            audience: if sitting.is_some() { Audience::Subject } else { Audience::Experimenter },
             sitting,
         }
     }
@@ -232,7 +241,7 @@ impl Viewer {
         if change.outcome != Outcome::Applied || change.subject != ChangeSubject::Parameter {
             return;
         }
-        if self.sitting.is_some() {
+        if self.audience == Audience::Subject {
             return; // what a subject sees does not change with what is felt
         }
         if let Some(shape) = self.shapes.iter_mut().find(|shape| shape.name() == change.plugin) {
@@ -359,7 +368,7 @@ impl Viewer {
         let (title, subtitle) = match &self.source {
             Source::Waiting(_) => ("Flotor".to_owned(), String::new()),
             // Names of parameters are nothing for a subject's eyes.
-            _ if self.sitting.is_some() => (String::new(), String::new()),
+            _ if self.audience == Audience::Subject => (String::new(), String::new()),
             _ => (readout::title_of(self.history.run()), readout::subtitle_of(self.history.run())),
         };
         let bar = TopBar {
@@ -368,6 +377,7 @@ impl Viewer {
             standing: &standing,
             is_well,
             can_stop: self.source.is_running(),
+            has_panel: self.audience == Audience::Experimenter,
             look: self.look,
         };
         match bar.show(ui, palette) {

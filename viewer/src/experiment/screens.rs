@@ -38,7 +38,10 @@ pub fn show(ui: &mut Ui, area: Rect, experiment: &Experiment, palette: &Palette)
         let color = if experiment.typed().is_empty() { palette.faint } else { palette.text };
         inner.label(RichText::new(typed).size(TYPED_PT).monospace().color(color));
     }
-    let below = Rect::from_min_max(egui::pos2(area.left(), area.bottom() - 84.0), area.max);
+    let below = Rect::from_min_max(
+        egui::pos2(area.left(), area.bottom() - if over_scene { 58.0 } else { 84.0 }),
+        area.max,
+    );
     let mut inner = ui
         .new_child(UiBuilder::new().max_rect(below).id_salt("keys").layout(Layout::top_down(Align::Center)));
     inner.label(RichText::new(keys).size(TEXT_PT - 3.0).color(accent(palette)));

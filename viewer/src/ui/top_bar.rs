@@ -16,6 +16,8 @@ pub struct TopBar<'a> {
     pub is_well: bool,
     /// Whether there is a run to stop.
     pub can_stop: bool,
+    /// Whether there is a panel to put away.
+    pub has_panel: bool,
     /// Light or dark.
     pub look: Look,
 }
@@ -43,7 +45,7 @@ impl TopBar<'_> {
                     wish = Some(TopBarWish::EmergencyStop);
                 }
                 ui.add_space(4.0);
-                if quiet(ui, "☰", "Parameters (P)").clicked() {
+                if self.has_panel && quiet(ui, "☰", "Parameters (P)").clicked() {
                     wish = Some(TopBarWish::SwitchPanel);
                 }
                 let (sign, help) = match self.look {
