@@ -76,7 +76,7 @@ fn heights_m(records: &[TickRecord]) -> Vec<f64> {
 }
 
 fn ledger(watched: &Watched) -> EnergyLedger {
-    watched.outcome.ledger.expect("the simulated flotor keeps accounts")
+    watched.outcome.devices[0].ledger.expect("the simulated flotor keeps accounts")
 }
 
 // ---------------------------------------------------------------- frequency
@@ -161,6 +161,7 @@ fn the_hold_puts_out_exactly_the_energy_a_held_spring_must() {
         seed: 1,
         rate_hz: 1.0 / PERIOD_S,
         plugins: &[],
+        couplings: &[],
         trace_digest: String::new(),
     };
     let reported_j = RunSummary::new(facts, &watched.outcome, &tally).energy.loop_generated_j;

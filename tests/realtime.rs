@@ -83,6 +83,18 @@ fn the_host_allocates_nothing_in_ten_thousand_ticks() {
     assert_eq!(watch.first, Some(watch.last));
 }
 
+#[test]
+fn the_host_allocates_nothing_with_two_devices_and_a_coupling() {
+    let text = include_str!("../host/scenes/teleoperation.toml");
+    let scene = Scene::parse(std::path::Path::new("teleoperation.toml"), text).expect("the scene is right");
+    let options = RunOptions { clock: Clock::Virtual, seed: 1 };
+    let session = Session::prepare(&scene, &Registry::search(&[]), &options).expect("the scene starts");
+    let mut watch = Watch::default();
+    let outcome = session.run(&mut watch, &StopSwitch::default());
+    assert!(outcome.is_ok() && watch.ticks == 20_000);
+    assert_eq!(watch.first, Some(watch.last));
+}
+
 /// The demo with a change at tick 5000 and another spring from tick 7000 on, in the middle of batches of ticks.
 const CHANGED: &str = "[[change]]\nat_s = 5.0\nset = \"spring.gamma_n=20\"\n\
     [[change]]\nat_s = 7.0\nswap = \"spring\"\n";

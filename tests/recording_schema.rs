@@ -1,5 +1,6 @@
 //! The schemas inside a recording: up to date with `host/proto`, and enough for a stranger to read every field.
 
+use flotor::coupling::{CouplingConfig, CouplingDescription, CouplingEnd, PassivityMode};
 use flotor::record::{
     Change, ChangeOutcome, ChangeSubject, Note, PluginDescription, Recorder, Role, RunDescription, Severity,
 };
@@ -92,6 +93,7 @@ fn record() -> TickRecord {
     let mut wrench = || Wrench { force_n: three(), torque_nm: three() };
     TickRecord {
         tick: 7,
+        device: 1,
         time_ns: 3_000_000_007,
         dt_ns: 1_000_001,
         pose: Pose { position_m, orientation_xyzw },
@@ -124,6 +126,7 @@ fn run() -> RunDescription {
         },
         settings: vec![pair("preset", "plain")],
         parameters: vec![pair("preset", "plain"), pair("mass_kg", "0.58")],
+        device: 0,
     };
     let mapping = MappingConfig {
         rotation_xyzw: [0.5, 0.5, -0.5, 0.5],
@@ -138,7 +141,24 @@ fn run() -> RunDescription {
         seed: u64::MAX,
         clock: Clock::Virtual,
         scene_toml: "rate_hz = 1000\n".to_owned(),
-        plugins: vec![plugin("device", Role::Device), plugin("spring", Role::Model(mapping))],
+        plugins: vec![
+            plugin("left", Role::Device),
+            PluginDescription { device: 1, ..plugin("right", Role::Device) },
+            PluginDescription { device: 1, ..plugin("spring", Role::Model(mapping)) },
+        ],
+        couplings: vec![CouplingDescription {
+            name: "pair".to_owned(),
+            config: CouplingConfig {
+                stiffness_n_per_m: 600.5,
+                damping_ns_per_m: 6.5,
+                stiffness_nm_per_rad: 1.5,
+                damping_nms_per_rad: 0.5,
+                delay_ticks: 3,
+                reserve_j: 0.25,
+                passivity: PassivityMode::Control,
+            },
+            ends: [CouplingEnd { device: 0, mapping }, CouplingEnd { device: 1, mapping }],
+        }],
     }
 }
 
@@ -207,6 +227,7 @@ fn expected_tick(record: &TickRecord) -> Vec<String> {
         format!("lateness_ns = {}", record.lateness_ns),
         format!("compute_ns = {}", record.compute_ns),
         format!("port_energy_j = {:?}", record.port_energy_j),
+        format!("device = {}", record.device),
     ]);
     lines
 }
@@ -216,8 +237,8 @@ fn expected_pose(record: &TickRecord) -> Vec<String> {
     let mut lines = vec![
         format!("timestamp.seconds = {}", record.time_ns / 1_000_000_000),
         format!("timestamp.nanos = {}", record.time_ns % 1_000_000_000),
-        "parent_frame_id = \"device\"".to_owned(),
-        "child_frame_id = \"handle\"".to_owned(),
+        "parent_frame_id = \"right\"".to_owned(),
+        "child_frame_id = \"right/handle\"".to_owned(),
     ];
     lines.extend(expected_vector("translation", record.pose.position_m));
     lines
@@ -254,8 +275,10 @@ fn expected_run() -> Vec<String> {
     ]
     .map(str::to_owned)
     .into();
-    lines.extend(plugin(0, "device"));
-    lines.extend(plugin(1, "spring"));
+    lines.extend(plugin(0, "left"));
+    lines.extend(plugin(1, "right"));
+    lines.push("plugins[1].device = 1".to_owned());
+    lines.extend(plugin(2, "spring"));
     let mapping = [
         "rotation.x = 0.5".to_owned(),
         "rotation.y = 0.5".to_owned(),
@@ -265,12 +288,27 @@ fn expected_run() -> Vec<String> {
         "force_scale = 2.0".to_owned(),
         "torque_scale = 3.0".to_owned(),
     ];
-    lines.extend(mapping.map(|line| format!("plugins[1].mapping.{line}")));
-    lines.extend(expected_vector("plugins[1].places[0]", [0.001, -0.002, 0.003]));
-    lines.extend(expected_vector("plugins[1].places[1]", [0.25; 3]));
+    lines.extend(mapping.iter().map(|line| format!("plugins[2].mapping.{line}")));
+    lines.extend(expected_vector("plugins[2].places[0]", [0.001, -0.002, 0.003]));
+    lines.extend(expected_vector("plugins[2].places[1]", [0.25; 3]));
     lines.extend(
-        ["weight = 0.5", "priority = 3", "fade_s = 0.25"].map(|line| format!("plugins[1].blend.{line}")),
+        ["weight = 0.5", "priority = 3", "fade_s = 0.25"].map(|line| format!("plugins[2].blend.{line}")),
     );
+    lines.push("plugins[2].device = 1".to_owned());
+    let coupling = [
+        "name = \"pair\"",
+        "stiffness_n_per_m = 600.5",
+        "damping_ns_per_m = 6.5",
+        "stiffness_nm_per_rad = 1.5",
+        "damping_nms_per_rad = 0.5",
+        "delay_ticks = 3",
+        "reserve_j = 0.25",
+        "passivity = 2",
+    ];
+    lines.extend(coupling.map(|line| format!("couplings[0].{line}")));
+    lines.extend(mapping.iter().map(|line| format!("couplings[0].ends[0].mapping.{line}")));
+    lines.push("couplings[0].ends[1].device = 1".to_owned());
+    lines.extend(mapping.iter().map(|line| format!("couplings[0].ends[1].mapping.{line}")));
     lines
 }
 

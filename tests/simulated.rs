@@ -62,7 +62,7 @@ fn every_built_in_script_runs_on_both_presets() {
             let parameters = format!("hand_script = \"{script}\"\npreset = \"{preset}\"");
             let Watched { records, outcome, .. } = watch(&scene(2.5, &parameters));
             assert_eq!(outcome.end, RunEnd::Finished, "{script} {preset}");
-            let ledger = outcome.ledger.expect("the flotor has accounts");
+            let ledger = outcome.devices[0].ledger.expect("the flotor has accounts");
             let imbalance = ledger.residual_j().abs() / ledger.peak_j;
             assert!(imbalance <= 1.0e-9, "{script} {preset}: {imbalance:e}");
             let moved = records.iter().any(|record| record.pose.position().length() > 0.1e-3);

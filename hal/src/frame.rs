@@ -155,6 +155,14 @@ impl std::ops::Add for Wrench {
     }
 }
 
+impl std::ops::Sub for Wrench {
+    type Output = Wrench;
+    #[inline]
+    fn sub(self, other: Wrench) -> Wrench {
+        Wrench::new(self.force() - other.force(), self.torque() - other.torque())
+    }
+}
+
 impl std::ops::Mul<f64> for Wrench {
     type Output = Wrench;
     #[inline]

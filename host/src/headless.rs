@@ -53,6 +53,7 @@ pub fn run(
         seed,
         rate_hz: scene.rate_hz,
         plugins: &plugins,
+        couplings: &scene.couplings,
         trace_digest: digest.finish(),
     };
     Ok(RunSummary::new(facts, &outcome, &tally))

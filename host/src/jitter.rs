@@ -10,6 +10,7 @@ use crate::servo::{
 };
 use crate::session::{RunError, Session};
 use flotor_hal::SampleWait;
+use flotor_hal::abi::loader::Stopper;
 use serde::Serialize;
 
 /// Length of one slice, ns.
@@ -59,7 +60,7 @@ pub fn measure(
     stop: &StopSwitch,
     progress: impl Fn(u64) + Send,
 ) -> Result<JitterReport, RunError> {
-    let (mut servo, stopper, period_ns) = session.into_loop();
+    let (mut servo, stoppers, period_ns) = session.into_loop();
     let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
     let report = std::thread::scope(|scope| {
         let measured = thread.spawn_scoped(scope, move || {
@@ -71,7 +72,7 @@ pub fn measure(
                 let mut schedule = Schedule::start_real(period_ns, window);
                 while schedule.next_time_ns() < SLICE_NS {
                     let Some(due) = schedule.wait(|_| SampleWait::NotPaced) else { break };
-                    let _ = servo.tick(&due, stop);
+                    servo.tick(&due, stop, |_| ());
                     with_servo.count(due.lateness_ns, due.missed, period_ns);
                 }
                 bare_slice(&mut bare, period_ns, window);
@@ -93,7 +94,7 @@ pub fn measure(
         let measured = measured.map_err(|_| RunError::Thread("could not be started"))?;
         measured.join().map_err(|_| RunError::Thread("panicked"))
     });
-    stopper.safe_stop();
+    stoppers.iter().for_each(Stopper::safe_stop);
     report
 }
 

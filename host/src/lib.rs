@@ -11,6 +11,7 @@
 //! - [`registry`]: where plugins are.
 //! - [`session`]: from a scene to a run.
 //! - [`servo`]: the tick, the clock, the envelope; the only real-time module.
+//! - [`coupling`]: two devices held together by a virtual spring, over any delay; [`passivity`]: energy at a port.
 //! - [`calibration`]: how much of a commanded force arrives.
 //! - [`stability`]: how stiff a spring the servo can render.
 //! - [`scaffold`]: the start of somebody's own plugin.
@@ -26,10 +27,12 @@
 pub mod bench;
 pub mod calibration;
 pub mod cli;
+pub mod coupling;
 pub mod evaluate;
 pub mod headless;
 pub mod jitter;
 pub mod live;
+pub mod passivity;
 pub mod plot;
 pub mod registry;
 pub mod replay;

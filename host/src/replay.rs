@@ -6,9 +6,9 @@
 use crate::record::{Change, ChangeOutcome, ChangeSubject, ReadError, Recording, Role, RunDescription};
 use crate::registry::Registry;
 use crate::scene::{Isolation, Location, ModelUse, ParameterText, PluginUse};
-use crate::servo::{Clock, Heartbeat, ModelHealth, ModelStack, Replacement};
+use crate::servo::{Clock, Coupled, Forces, Heartbeat, ModelHealth, Port, Replacement};
 use crate::session::{PluginReport, RunError, prepare_model};
-use crate::trace::{Events, TickRecord};
+use crate::trace::TickRecord;
 use flotor_hal::{DeviceState, LoopConfig, Tick, Wrench};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -50,7 +50,9 @@ pub struct Replay<'r> {
     config: LoopConfig,
     recording: Recording,
     uses: Vec<ModelUse>,
-    models: ModelStack,
+    /// Number of devices.
+    devices: usize,
+    forces: Forces,
     plugins: Vec<PluginReport>,
     /// Model and parameter that were set for this replay: they keep that value, whatever changed in the run.
     held: Vec<(String, String)>,
@@ -83,15 +85,20 @@ impl<'r> Replay<'r> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 100 Hz to 10 kHz
         let period_ns = (1.0e9 / recording.run().rate_hz).round() as u64;
         let config = LoopConfig { period_ns, seed: recording.run().seed };
-        let mut slots = Vec::new();
+        let mut layers = Vec::new();
         let mut plugins = Vec::new();
         for model in &uses {
-            let (slot, report) = prepare_model(registry, model, &config, Clock::Virtual)?;
-            slots.push(slot);
+            let (layer, report) = prepare_model(registry, model, &config, Clock::Virtual)?;
+            layers.push((usize::from(model.device), layer));
             plugins.push(report);
         }
-        let models = ModelStack::new(slots);
-        Ok(Self { registry, config, recording, uses, models, plugins, held, exchanged })
+        let devices = recording.run().devices().count();
+        #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
+        let period_s = period_ns as f64 * 1.0e-9;
+        let couplings = recording.run().couplings.iter();
+        let couplings = couplings.map(|coupling| Coupled::new(coupling, period_s)).collect();
+        let forces = Forces::new(devices, layers, couplings);
+        Ok(Self { registry, config, recording, uses, devices, forces, plugins, held, exchanged })
     }
 
     /// How the run was set up.
@@ -117,25 +124,42 @@ impl<'r> Replay<'r> {
     ) -> Result<(Difference, Vec<(ModelHealth, String)>), ReplayError> {
         let mut difference = Difference::default();
         let heart = Heartbeat::default(); // nobody waits for a replay
+        let mut ports = vec![Port::REST; self.devices];
+        let mut records: Vec<TickRecord> = Vec::with_capacity(self.devices);
         while let Some(record) = self.recording.next() {
             let record = record?;
+            // A tick that lost a record on its way into the recording cannot be compared.
+            if records.first().is_some_and(|first| first.tick != record.tick) {
+                records.clear();
+            }
+            records.push(record);
+            let [.., record] = records.as_slice() else { continue };
+            // The changes before a tick come with its first record.
             for change in self.recording.take_changes() {
                 self.repeat(&change)?;
             }
-            let tick = Tick { index: record.tick, time_ns: record.time_ns, dt_ns: record.dt_ns };
-            let state = DeviceState {
+            let Some(port) = ports.get_mut(usize::from(record.device)) else { continue };
+            port.state = DeviceState {
                 pose: record.pose,
                 twist: record.twist,
                 buttons: record.buttons,
                 ..DeviceState::HOME
             };
-            while self.models.take_faded(&tick).is_some() {}
-            let (wrench, _) = self.models.step(&tick, &state, &heart, &mut Events::default());
-            difference.add(&record, &wrench);
-            look(&record, &wrench);
+            if records.len() < self.devices {
+                continue;
+            }
+            let tick = Tick { index: record.tick, time_ns: record.time_ns, dt_ns: record.dt_ns };
+            while self.forces.take_faded(&tick).is_some() {}
+            self.forces.step(&tick, &mut ports, &heart);
+            for (port, record) in ports.iter_mut().zip(records.drain(..)) {
+                difference.add(&record, &port.asked);
+                look(&record, &port.asked);
+                // What was really held then.
+                port.commanded = record.commanded;
+            }
         }
         difference.finish();
-        Ok((difference, self.models.health()))
+        Ok((difference, self.forces.health()))
     }
 }
 
@@ -144,11 +168,11 @@ impl<'r> Replay<'r> {
     /// has no such parameter: what that does to the wrench is the answer.
     fn repeat(&mut self, change: &Change) -> Result<(), ReplayError> {
         let names = |plugin: &PluginReport| plugin.name == change.plugin;
-        let Some(model) = self.plugins.iter().position(names) else { return Ok(()) }; // the device
+        let Some(model) = self.plugins.iter().position(names) else { return Ok(()) }; // a device
         let tick = Tick { index: change.tick, time_ns: change.time_ns, dt_ns: 0 };
         match change.subject {
             ChangeSubject::Weight => {
-                self.models.set_weight(model, &tick, change.number);
+                self.forces.set_weight(model, &tick, change.number);
                 return Ok(());
             }
             ChangeSubject::Plugin => return self.replace(model, change, &tick),
@@ -159,7 +183,7 @@ impl<'r> Replay<'r> {
             self.held.iter().any(|(plugin, key)| *plugin == change.plugin && *key == change.parameter);
         let parameter = schema.iter().position(|parameter| parameter.id() == change.parameter);
         if let (Some(parameter), false, ChangeOutcome::Applied) = (parameter, is_held, change.outcome) {
-            self.models.set_parameter(model, &tick, parameter, change.number);
+            self.forces.set_parameter(model, &tick, parameter, change.number);
         }
         Ok(())
     }
@@ -186,7 +210,7 @@ impl<'r> Replay<'r> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a count
         let generation = change.number as u16;
         let model = u32::try_from(model).unwrap_or(u32::MAX);
-        drop(self.models.replace(Replacement { model, generation, layer: Box::new(layer) }, tick));
+        drop(self.forces.replace(Replacement { model, generation, layer: Box::new(layer) }, tick));
         Ok(())
     }
 }
@@ -248,6 +272,7 @@ fn models_of(path: &Path, run: &RunDescription) -> Vec<ModelUse> {
                     })
                     .collect(),
             },
+            device: plugin.device,
             mapping,
             places_m: plugin.places_m.clone(),
             blend: plugin.blend,

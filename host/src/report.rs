@@ -1,30 +1,39 @@
 //! What a run says about itself: numbers for machines, a page for people.
 
+use crate::coupling::{CouplingDescription, Tank};
 use crate::servo::{ModelHealth, Overrun, Percentiles, Stage, Timing};
 use crate::session::{Observer, Outcome, PluginReport, RunEnd};
 use crate::trace::{Events, TickRecord};
-use flotor_hal::DVec3;
+use flotor_hal::{DVec3, EnergyLedger};
 use serde::Serialize;
 
 /// Collects over a run what can only be seen tick by tick.
 #[derive(Default)]
 pub struct Tally {
-    peak_force_n: f64,
-    peak_torque_nm: f64,
+    /// By number of the device.
+    devices: Vec<DeviceTally>,
     event_ticks: [u64; Events::NAMES.len()],
-    last: Option<(TickRecord, f64)>,
-    work_j: f64,
+    /// Events of the tick that is being told, at any device.
+    events: Events,
     generated_peak_j: f64,
     port_lowest_j: f64,
 }
 
-impl Observer for Tally {
+/// The same of one device.
+#[derive(Default)]
+struct DeviceTally {
+    peak_force_n: f64,
+    peak_torque_nm: f64,
+    last: Option<(TickRecord, f64)>,
+    work_j: f64,
+    generated_j: f64,
+    port_lowest_j: f64,
+}
+
+impl DeviceTally {
     fn observe(&mut self, record: &TickRecord) {
         self.peak_force_n = self.peak_force_n.max(record.commanded.force().length());
         self.peak_torque_nm = self.peak_torque_nm.max(record.commanded.torque().length());
-        for (bit, count) in self.event_ticks.iter_mut().enumerate() {
-            *count += u64::from(record.events.bits() >> bit & 1);
-        }
         // Work of the models on the hand, with the wrench held over the tick as the device holds it.
         let first_energy_j = match &self.last {
             None => record.energy_j,
@@ -36,10 +45,47 @@ impl Observer for Tally {
                 *first_energy_j
             }
         };
-        let generated_j = self.work_j - (first_energy_j - record.energy_j);
-        self.generated_peak_j = self.generated_peak_j.max(generated_j);
+        self.generated_j = self.work_j - (first_energy_j - record.energy_j);
         self.port_lowest_j = self.port_lowest_j.min(record.port_energy_j);
         self.last = Some((*record, first_energy_j));
+    }
+
+    fn port_energy_j(&self) -> f64 {
+        self.last.as_ref().map_or(0.0, |(record, _)| record.port_energy_j)
+    }
+}
+
+impl Tally {
+    /// Ticks in which each event happened, at any device.
+    fn event_ticks(&self) -> [u64; Events::NAMES.len()] {
+        std::array::from_fn(|bit| self.event_ticks[bit] + u64::from(self.events.bits() >> bit & 1))
+    }
+
+    /// Largest of a number of all devices.
+    fn largest(&self, number: impl Fn(&DeviceTally) -> f64) -> f64 {
+        self.devices.iter().map(number).fold(0.0, f64::max)
+    }
+}
+
+impl Observer for Tally {
+    fn observe(&mut self, record: &TickRecord) {
+        if record.device == 0 {
+            // The tick before is complete.
+            self.event_ticks = self.event_ticks();
+            self.events = Events::NONE;
+        }
+        self.events.insert(record.events);
+        let device = usize::from(record.device);
+        if self.devices.len() <= device {
+            self.devices.resize_with(device + 1, DeviceTally::default);
+        }
+        self.devices[device].observe(record);
+        if device + 1 == self.devices.len() {
+            let generated_j = self.devices.iter().map(|device| device.generated_j).sum();
+            self.generated_peak_j = self.generated_peak_j.max(generated_j);
+            let port_j = self.devices.iter().map(DeviceTally::port_energy_j).sum();
+            self.port_lowest_j = self.port_lowest_j.min(port_j);
+        }
     }
 }
 
@@ -74,8 +120,12 @@ pub struct RunSummary {
     pub peak_force_n: f64,
     /// Largest torque sent, N·m.
     pub peak_torque_nm: f64,
-    /// Energy accounts.
+    /// Energy accounts, all devices together.
     pub energy: EnergySummary,
+    /// Each device.
+    pub devices: Vec<DeviceSummary>,
+    /// Each coupling between devices.
+    pub couplings: Vec<CouplingSummary>,
     /// Ticks in which each event happened, only those that did.
     pub events: std::collections::BTreeMap<&'static str, u64>,
     /// Digest of the trace without measured times: equal digests, equal runs.
@@ -101,6 +151,34 @@ pub struct StageSummary {
     pub write: Percentiles,
 }
 
+/// One device of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct DeviceSummary {
+    /// Name in the scene.
+    pub name: String,
+    /// Largest force sent, N.
+    pub peak_force_n: f64,
+    /// Largest torque sent, N·m.
+    pub peak_torque_nm: f64,
+    /// Lowest energy at its port, J; below zero where another device drives it.
+    pub port_lowest_j: f64,
+    /// Energy at its port at the end, J.
+    pub port_end_j: f64,
+}
+
+/// One coupling of a run: the energy accounts of its ends, in the frame they share.
+#[derive(Clone, Debug, Serialize)]
+pub struct CouplingSummary {
+    /// Name in the scene.
+    pub name: String,
+    /// The lowest the account of each end ever was, J: below zero, energy has come out that nobody had put in.
+    pub lowest_j: [f64; 2],
+    /// What the hand at each end has put in altogether less what came out, J.
+    pub gone_in_j: [f64; 2],
+    /// What has turned to heat at each end, J.
+    pub given_up_j: [f64; 2],
+}
+
 /// Energy accounts of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct EnergySummary {
@@ -110,9 +188,9 @@ pub struct EnergySummary {
     pub device_peak_j: Option<f64>,
     /// Largest energy the sampled loop has put out beyond what the models had stored, J: a hold leaks.
     pub loop_generated_j: f64,
-    /// Lowest energy at the device's port, J: how much more has come out at some time than had ever gone in.
+    /// Lowest energy at the ports of the devices together, J: how much more has come out at some time than had ever gone in.
     pub port_lowest_j: f64,
-    /// Energy at the port at the end, J: what the hand has put in altogether.
+    /// Energy at the ports at the end, J: what the hands have put in altogether.
     pub port_end_j: f64,
 }
 
@@ -147,6 +225,8 @@ pub struct RunFacts<'a> {
     pub rate_hz: f64,
     /// Plugins.
     pub plugins: &'a [PluginReport],
+    /// What holds devices together.
+    pub couplings: &'a [CouplingDescription],
     /// Digest of the trace.
     pub trace_digest: String,
 }
@@ -158,7 +238,8 @@ impl RunSummary {
         let Timing { ticks, late, missed, lateness, compute, stages: [read, models, envelope, write] } =
             &outcome.timing;
         let _ = Stage::Read; // the array above is in the order of `Stage`
-        let events = Events::NAMES.iter().copied().zip(tally.event_ticks);
+        let events = Events::NAMES.iter().copied().zip(tally.event_ticks());
+        let ledgers = || outcome.devices.iter().filter_map(|device| device.ledger);
         #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
         let elapsed_s = outcome.elapsed_ns as f64 * 1.0e-9;
         Self {
@@ -185,21 +266,19 @@ impl RunSummary {
                 envelope: envelope.percentiles(),
                 write: write.percentiles(),
             },
-            peak_force_n: tally.peak_force_n,
-            peak_torque_nm: tally.peak_torque_nm,
+            peak_force_n: tally.largest(|device| device.peak_force_n),
+            peak_torque_nm: tally.largest(|device| device.peak_torque_nm),
             energy: EnergySummary {
-                device_residual_relative: outcome.ledger.map(|ledger| {
-                    if ledger.peak_j > 0.0 {
-                        ledger.residual_j() / ledger.peak_j
-                    } else {
-                        ledger.residual_j()
-                    }
-                }),
-                device_peak_j: outcome.ledger.map(|ledger| ledger.peak_j),
+                device_residual_relative: ledgers()
+                    .map(relative_residual)
+                    .max_by(|a, b| a.abs().total_cmp(&b.abs())),
+                device_peak_j: ledgers().map(|ledger| ledger.peak_j).max_by(f64::total_cmp),
                 loop_generated_j: tally.generated_peak_j,
                 port_lowest_j: tally.port_lowest_j,
-                port_end_j: tally.last.as_ref().map_or(0.0, |(record, _)| record.port_energy_j),
+                port_end_j: tally.devices.iter().map(DeviceTally::port_energy_j).sum(),
             },
+            devices: facts.plugins.iter().zip(&tally.devices).map(device_summary).collect(),
+            couplings: facts.couplings.iter().zip(&outcome.couplings).map(coupling_summary).collect(),
             events: events.filter(|(_, count)| *count > 0).collect(),
             trace_digest: facts.trace_digest,
             dropped_records: outcome.dropped_records,
@@ -247,6 +326,22 @@ impl RunSummary {
         let [lowest_mj, end_mj] =
             [self.energy.port_lowest_j, self.energy.port_end_j].map(|joule| joule * 1.0e3);
         lines.push(format!("  {:<11}{end_mj:+.3} mJ at the end, {lowest_mj:+.3} mJ at the lowest", "port"));
+        if self.devices.len() > 1 {
+            for DeviceSummary { name, peak_force_n, peak_torque_nm, port_lowest_j, port_end_j } in
+                &self.devices
+            {
+                let [lowest_mj, end_mj] = [port_lowest_j, port_end_j].map(|joule| joule * 1.0e3);
+                let peaks = format!("peak {peak_force_n:.3} N   {peak_torque_nm:.4} N·m");
+                lines.push(format!("  {name:<11}{peaks}   port {end_mj:+.3} mJ, lowest {lowest_mj:+.3} mJ"));
+            }
+        }
+        for CouplingSummary { name, lowest_j, given_up_j, .. } in &self.couplings {
+            let [first, second] = lowest_j.map(|joule| joule * 1.0e3);
+            let heat_mj = given_up_j.iter().sum::<f64>() * 1.0e3;
+            let accounts =
+                format!("accounts never below {first:+.3} and {second:+.3} mJ, {heat_mj:.3} mJ to heat");
+            lines.push(format!("  {:<11}{name}: {accounts}", "coupling"));
+        }
         if !self.events.is_empty() {
             let events: Vec<String> =
                 self.events.iter().map(|(name, count)| format!("{name} {count}")).collect();
@@ -268,6 +363,31 @@ impl RunSummary {
         }
         lines.push(format!("  {:<11}{}", "digest", self.trace_digest));
         lines.join("\n")
+    }
+}
+
+/// What a device's own account fails to explain, over its peak energy.
+fn relative_residual(ledger: EnergyLedger) -> f64 {
+    if ledger.peak_j > 0.0 { ledger.residual_j() / ledger.peak_j } else { ledger.residual_j() }
+}
+
+fn device_summary((plugin, tally): (&PluginReport, &DeviceTally)) -> DeviceSummary {
+    DeviceSummary {
+        name: plugin.name.clone(),
+        peak_force_n: tally.peak_force_n,
+        peak_torque_nm: tally.peak_torque_nm,
+        port_lowest_j: tally.port_lowest_j,
+        port_end_j: tally.port_energy_j(),
+    }
+}
+
+fn coupling_summary((coupling, tanks): (&CouplingDescription, &[Tank; 2])) -> CouplingSummary {
+    let each = |number: fn(&Tank) -> f64| tanks.each_ref().map(number);
+    CouplingSummary {
+        name: coupling.name.clone(),
+        lowest_j: each(Tank::lowest_j),
+        gone_in_j: each(Tank::gone_in_j),
+        given_up_j: each(Tank::given_up_j),
     }
 }
 
@@ -300,7 +420,7 @@ fn health_words(health: &ModelHealth, words: &str) -> String {
 }
 
 fn plugin_summary(plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
-    let model = outcome.models.iter().find(|(name, ..)| *name == plugin.name && plugin.name != "device");
+    let model = outcome.models.iter().find(|(name, ..)| *name == plugin.name);
     let health = match model {
         Some((_, health, words)) => health_words(health, words),
         None => "ok".to_owned(),

@@ -2,19 +2,23 @@
 
 use crate::mapping::Blend;
 use crate::record::{PluginDescription, Role, RunDescription};
-use crate::scene::{PluginUse, Scene};
+use crate::scene::{DeviceUse, ModelUse, PluginUse, Scene};
 use crate::session::{PluginReport, RunOptions};
 
 /// Puts together what is known of a run before it begins. Not real-time.
 ///
-/// `plugins` are those of the prepared scene: the device, then the models in the scene's order.
+/// `plugins` are those of the prepared scene: the devices, then the models, both in the scene's order.
 #[must_use]
 pub fn describe(scene: &Scene, options: &RunOptions, plugins: &[PluginReport]) -> RunDescription {
-    let device = std::iter::once((&scene.device, Role::Device, &[][..], Blend::default()));
-    let models = scene.models.iter();
-    let models = models
-        .map(|model| (&model.plugin, Role::Model(model.mapping), model.places_m.as_slice(), model.blend));
-    let plugins = device.chain(models).zip(plugins);
+    let device = |(number, device): (u16, &DeviceUse)| {
+        (device.plugin.clone(), Role::Device, number, Vec::new(), Blend::default())
+    };
+    let model = |model: &ModelUse| {
+        let role = Role::Model(model.mapping);
+        (model.plugin.clone(), role, model.device, model.places_m.clone(), model.blend)
+    };
+    let devices = (0..).zip(&scene.devices).map(device);
+    let plugins = devices.chain(scene.models.iter().map(model)).zip(plugins);
     RunDescription {
         flotor_version: env!("CARGO_PKG_VERSION").to_owned(),
         rate_hz: scene.rate_hz,
@@ -23,12 +27,14 @@ pub fn describe(scene: &Scene, options: &RunOptions, plugins: &[PluginReport]) -
         clock: options.clock,
         scene_toml: scene.text.clone(),
         plugins: plugins
-            .map(|((used, role, places_m, blend), report)| PluginDescription {
-                places_m: places_m.to_vec(),
+            .map(|((used, role, device, places_m, blend), report)| PluginDescription {
+                device,
+                places_m,
                 blend,
-                ..describe_plugin(used, role, report)
+                ..describe_plugin(&used, role, report)
             })
             .collect(),
+        couplings: scene.couplings.clone(),
     }
 }
 
@@ -41,6 +47,7 @@ fn describe_plugin(used: &PluginUse, role: Role, report: &PluginReport) -> Plugi
         version: report.metadata.version.clone(),
         file: file.to_string_lossy().into_owned(),
         role,
+        device: 0,
         places_m: Vec::new(),
         blend: Blend::default(),
         settings: settings.collect(),

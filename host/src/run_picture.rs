@@ -10,56 +10,80 @@ use flotor_hal::{DVec3, rotation_vector};
 /// Collects the samples of a run; drawing happens at the end.
 pub struct RunPicture {
     title: String,
+    devices: Vec<String>,
     records: Vec<TickRecord>,
 }
 
 impl RunPicture {
-    /// An empty picture.
+    /// An empty picture of a run with these devices.
     #[must_use]
-    pub fn new(title: &str) -> Self {
-        Self { title: title.to_owned(), records: Vec::new() }
+    pub fn new(title: &str, devices: Vec<String>) -> Self {
+        Self { title: title.to_owned(), devices, records: Vec::new() }
     }
 
     /// Draws what was collected. Not real-time.
     #[must_use]
     pub fn to_svg(&self, subtitle: &str, timing: &Timing) -> String {
         let mut figure = Figure::new(self.title.clone(), Axis::linear("Time", "s")).subtitle(subtitle);
-        figure = figure
-            .panel(self.axes("Position", "mm", 1.0e3, |record| record.pose.position()))
-            .panel(
-                self.axes("Rotation", "°", 1.0_f64.to_degrees(), |r| rotation_vector(r.pose.orientation())),
-            )
-            .panel(self.axes("Force", "N", 1.0, |record| record.commanded.force()))
-            .panel(self.axes("Torque", "mN·m", 1.0e3, |record| record.commanded.torque()))
-            .panel(self.single("Stored energy", "mJ", |record| record.energy_j * 1.0e3));
+        for (device, name) in (0..).zip(&self.devices) {
+            // With several devices where they were and what was felt there; the rest is in the recording.
+            let is_one_of_several = self.devices.len() > 1;
+            let label =
+                |what: &str| if is_one_of_several { format!("{what}, {name}") } else { what.to_owned() };
+            let axes = |what: &str, unit: &str, scale: f64, vector: fn(&TickRecord) -> DVec3| {
+                self.axes(device, &label(what), unit, scale, vector)
+            };
+            figure = figure.panel(axes("Position", "mm", 1.0e3, |record| record.pose.position()));
+            if !is_one_of_several {
+                let rotation = |record: &TickRecord| rotation_vector(record.pose.orientation());
+                figure = figure.panel(axes("Rotation", "°", 1.0_f64.to_degrees(), rotation));
+            }
+            figure = figure.panel(axes("Force", "N", 1.0, |record| record.commanded.force()));
+            if !is_one_of_several {
+                figure = figure.panel(axes("Torque", "mN·m", 1.0e3, |record| record.commanded.torque()));
+            }
+            let energy = self.single(device, &label("Stored energy"), "mJ", |record| record.energy_j * 1.0e3);
+            figure = figure.panel(energy);
+        }
         if self.records.iter().any(|record| record.lateness_ns > 0) {
             #[allow(clippy::cast_precision_loss)] // for people
-            let lateness = self.single("Lateness", "µs", |record| record.lateness_ns as f64 * 1.0e-3);
+            let lateness = self.single(0, "Lateness", "µs", |record| record.lateness_ns as f64 * 1.0e-3);
             figure = panels(timing).into_iter().fold(figure.panel(lateness), Figure::panel);
         }
         figure.to_svg()
     }
 
+    fn of(&self, device: u16) -> impl Iterator<Item = &TickRecord> {
+        self.records.iter().filter(move |record| record.device == device)
+    }
+
     /// Three components over time; a boundary contact is marked where it begins.
-    fn axes(&self, label: &str, unit: &str, scale: f64, vector: impl Fn(&TickRecord) -> DVec3) -> Panel {
+    fn axes(
+        &self,
+        device: u16,
+        label: &str,
+        unit: &str,
+        scale: f64,
+        vector: impl Fn(&TickRecord) -> DVec3,
+    ) -> Panel {
         let component = |name: &str, pick: fn(DVec3) -> f64| {
             let samples: Vec<(f64, f64)> =
-                self.records.iter().map(|record| (seconds(record), pick(vector(record)) * scale)).collect();
+                self.of(device).map(|record| (seconds(record), pick(vector(record)) * scale)).collect();
             Series::line(name, samples)
         };
         let panel = Panel::new(Axis::linear(label, unit))
             .series(component("x", |v| v.x).slot(0))
             .series(component("y", |v| v.y).slot(1))
             .series(component("z", |v| v.z).slot(2));
-        match self.records.iter().find(|record| record.events.intersects(Events::BOUNDARY)) {
+        match self.of(device).find(|record| record.events.intersects(Events::BOUNDARY)) {
             Some(record) => panel.mark(Mark::at_x(seconds(record), "boundary")),
             None => panel,
         }
     }
 
-    fn single(&self, label: &str, unit: &str, value: impl Fn(&TickRecord) -> f64) -> Panel {
+    fn single(&self, device: u16, label: &str, unit: &str, value: impl Fn(&TickRecord) -> f64) -> Panel {
         let samples: Vec<(f64, f64)> =
-            self.records.iter().map(|record| (seconds(record), value(record))).collect();
+            self.of(device).map(|record| (seconds(record), value(record))).collect();
         Panel::new(Axis::linear(label, unit)).series(Series::line("", samples))
     }
 }

@@ -41,9 +41,14 @@ impl Observer for Keep {
 /// If the scene is wrong or a plugin is refused: such tests have other means.
 #[must_use]
 pub fn prepared(clock: Clock, scene: &str) -> Session {
+    prepared_with(&Registry::search(&[]), clock, scene)
+}
+
+/// The same with plugins that may have been loaded before: for many runs, which then load none.
+fn prepared_with(registry: &Registry, clock: Clock, scene: &str) -> Session {
     let scene = Scene::parse(Path::new("scene.toml"), scene).expect("the scene is right");
     let options = RunOptions { clock, seed: 1 };
-    let session = Session::prepare(&scene, &Registry::search(&[]), &options);
+    let session = Session::prepare(&scene, registry, &options);
     session.unwrap_or_else(|error| panic!("it does not start: {error}"))
 }
 
@@ -62,8 +67,21 @@ pub fn watch(scene: &str) -> Watched {
 /// As [`prepared`].
 #[must_use]
 pub fn watch_on(clock: Clock, scene: &str) -> Watched {
+    keep(prepared(clock, scene))
+}
+
+/// Runs the text of one of many scenes on the virtual clock; `registry` loads each plugin once for all of them.
+///
+/// # Panics
+/// As [`prepared`].
+#[must_use]
+pub fn watch_with(registry: &Registry, scene: &str) -> Watched {
+    keep(prepared_with(registry, Clock::Virtual, scene))
+}
+
+fn keep(session: Session) -> Watched {
     let mut keep = Keep::default();
-    let outcome = prepared(clock, scene).run(&mut keep, &StopSwitch::default());
+    let outcome = session.run(&mut keep, &StopSwitch::default());
     let outcome = outcome.unwrap_or_else(|error| panic!("it does not run: {error}"));
     Watched { records: keep.records, changes: keep.changes, outcome }
 }

@@ -37,7 +37,9 @@ fn run() -> RunDescription {
             blend: Blend::default(),
             settings: Vec::new(),
             parameters: Vec::new(),
+            device: 0,
         }],
+        couplings: Vec::new(),
     }
 }
 

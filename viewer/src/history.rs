@@ -130,8 +130,11 @@ impl History {
         Ok(history)
     }
 
-    /// Adds a tick; the oldest makes room where only so many are kept.
+    /// Adds a tick of the first device, of several; the oldest makes room where only so many are kept.
     pub fn push(&mut self, record: &TickRecord) {
+        if record.device != 0 {
+            return;
+        }
         if let Keep::Newest(count) = self.keep {
             while self.samples.len() >= count.max(1) {
                 self.samples.pop_front();

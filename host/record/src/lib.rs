@@ -10,8 +10,8 @@
 //! | topic | message | when |
 //! |---|---|---|
 //! | `/flotor/run` | `flotor.Run` | once, first: all that is needed to repeat the run |
-//! | `/tf` | `foxglove.FrameTransform` | every tick: pose of frame `handle` in frame `device` |
-//! | `/flotor/tick` | `flotor.Tick` | every tick: twist, wrenches, energy, events, timing |
+//! | `/tf` | `foxglove.FrameTransform` | every tick and device: pose of frame `handle` in frame `device`; with several devices of `NAME/handle` in `NAME` |
+//! | `/flotor/tick` | `flotor.Tick` | every tick and device: twist, wrenches, energy, events, timing |
 //! | `/flotor/change` | `flotor.Change` | when a parameter changed: before the tick that saw it first |
 //! | `/flotor/log` | `foxglove.Log` | when something happened that needs words: faults |
 //!
@@ -36,6 +36,7 @@
 
 mod change;
 mod container;
+pub mod coupling;
 mod digest;
 pub mod mapping;
 mod messages;

@@ -138,6 +138,16 @@ impl Mapping {
         Twist::new(rotation * twist.linear() * self.motion_scale, rotation * twist.angular())
     }
 
+    /// Wrench in the model frame of one at the device: the inverse of [`Mapping::wrench_to_device`]. Real-time: bounded,
+    /// no allocation.
+    #[inline]
+    #[must_use]
+    pub fn wrench_to_model(&self, wrench: &Wrench) -> Wrench {
+        let rotation = self.model_from_device;
+        let force: DVec3 = rotation * wrench.force() / self.force_scale;
+        Wrench::new(force, rotation * wrench.torque() / self.torque_scale)
+    }
+
     /// Wrench in the device frame. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
@@ -173,6 +183,15 @@ mod tests {
         let device_w = at_device.force().dot(twist.linear()) + at_device.torque().dot(twist.angular());
         assert!((device_w - mapping.energy_scale() * model_w).abs() < 1.0e-15);
         assert!(mapping.is_conservative());
+    }
+
+    #[test]
+    fn a_wrench_comes_back_from_the_device_as_it_went() {
+        let mapping = Mapping::new(&thesis());
+        let wrench = Wrench::new(DVec3::new(1.0, 2.0, -3.0), DVec3::new(0.04, -0.05, 0.06));
+        let back = mapping.wrench_to_model(&mapping.wrench_to_device(&wrench));
+        assert!((back.force() - wrench.force()).length() < 1.0e-15);
+        assert!((back.torque() - wrench.torque()).length() < 1.0e-16);
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! What is known before a run begins, in a form that can be kept: enough to repeat it.
 
+use crate::coupling::CouplingDescription;
 use crate::mapping::{Blend, MappingConfig};
-use crate::schema::{self, FORMAT, Mapping, Missing, Plugin, Quaternion, Run, Setting, Vector3};
+use crate::schema::{self, FORMAT, Mapping, Missing, Plugin, Run, Setting, Vector3};
 use prost::Message;
 use std::collections::BTreeMap;
 
@@ -34,8 +35,10 @@ pub struct RunDescription {
     pub clock: Clock,
     /// The scene as it was written (TOML); the command line may have overruled rate, duration and settings.
     pub scene_toml: String,
-    /// Device first, then the models in the order of the scene.
+    /// Devices first, then the models, both in the order of the scene.
     pub plugins: Vec<PluginDescription>,
+    /// What held devices together.
+    pub couplings: Vec<CouplingDescription>,
 }
 
 /// A plugin of a run.
@@ -51,6 +54,8 @@ pub struct PluginDescription {
     pub file: String,
     /// What it was there for.
     pub role: Role,
+    /// Number of the device it was, or, of a model, was on.
+    pub device: u16,
     /// Of a model: where its homes were in the device frame, m, one for each instance.
     pub places_m: Vec<[f64; 3]>,
     /// Of a model: how it was mixed with the others.
@@ -103,6 +108,7 @@ impl RunDescription {
             clock: clock.into(),
             scene_toml: self.scene_toml.clone(),
             plugins: self.plugins.iter().map(PluginDescription::to_message).collect(),
+            couplings: self.couplings.iter().map(CouplingDescription::to_message).collect(),
         }
     }
 
@@ -124,7 +130,17 @@ impl RunDescription {
                 .into_iter()
                 .map(PluginDescription::from_message)
                 .collect::<Result<_, _>>()?,
+            couplings: run
+                .couplings
+                .into_iter()
+                .map(CouplingDescription::from_message)
+                .collect::<Result<_, _>>()?,
         })
+    }
+
+    /// The devices, in order.
+    pub fn devices(&self) -> impl Iterator<Item = &PluginDescription> {
+        self.plugins.iter().filter(|plugin| plugin.role == Role::Device)
     }
 
     /// The same in flat text, for tools that show an MCAP file's metadata.
@@ -154,12 +170,7 @@ impl PluginDescription {
     fn to_message(&self) -> Plugin {
         let mapping = match &self.role {
             Role::Device => None,
-            Role::Model(mapping) => Some(Mapping {
-                rotation: Some(Quaternion::new(mapping.rotation_xyzw)),
-                motion_scale: Some(mapping.motion_scale),
-                force_scale: Some(mapping.force_scale),
-                torque_scale: mapping.torque_scale,
-            }),
+            Role::Model(mapping) => Some(Mapping::new(mapping)),
         };
         Plugin {
             name: self.name.clone(),
@@ -175,18 +186,14 @@ impl PluginDescription {
                 priority: self.blend.priority.into(),
                 fade_s: Some(self.blend.fade_s),
             }),
+            device: self.device.into(),
         }
     }
 
     fn from_message(plugin: Plugin) -> Result<Self, Missing> {
         let role = match plugin.mapping {
             None => Role::Device,
-            Some(mapping) => Role::Model(MappingConfig {
-                rotation_xyzw: mapping.rotation.ok_or(Missing("mapping.rotation"))?.to_array(),
-                motion_scale: mapping.motion_scale.ok_or(Missing("mapping.motion_scale"))?,
-                force_scale: mapping.force_scale.ok_or(Missing("mapping.force_scale"))?,
-                torque_scale: mapping.torque_scale,
-            }),
+            Some(mapping) => Role::Model(mapping.config()?),
         };
         // A recording from before there were places has its models at the device's home, alone.
         let places_m = match (role, plugin.places.as_slice()) {
@@ -201,6 +208,7 @@ impl PluginDescription {
         Ok(Self {
             places_m,
             blend,
+            device: u16::try_from(plugin.device).map_err(|_| Missing("plugin.device"))?,
             name: plugin.name,
             id: plugin.id,
             version: plugin.version,

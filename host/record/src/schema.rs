@@ -4,6 +4,7 @@
 //! every field. Every `f64` is an `Option` that is always filled: protobuf leaves out a plain field that equals its
 //! default, -0.0 equals 0.0, and a recording is bit-exact. On the wire it is the plain field of the schema.
 
+use crate::mapping::MappingConfig;
 use crate::trace::{Events, TickRecord};
 use crate::{Change as ParameterChange, ChangeOutcome, ChangeSubject, Note, Severity};
 use flotor_hal::{Pose, Twist as TwistValue, Wrench as WrenchValue};
@@ -174,6 +175,8 @@ pub(crate) struct Tick {
     compute_ns: u64,
     #[prost(double, optional, tag = "13")]
     port_energy_j: Option<f64>,
+    #[prost(uint32, tag = "14")]
+    device: u32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
@@ -231,6 +234,46 @@ pub(crate) struct Run {
     pub(crate) scene_toml: String,
     #[prost(message, repeated, tag = "8")]
     pub(crate) plugins: Vec<Plugin>,
+    #[prost(message, repeated, tag = "9")]
+    pub(crate) couplings: Vec<Coupling>,
+}
+
+#[derive(Clone, PartialEq, Message)]
+pub(crate) struct Coupling {
+    #[prost(string, tag = "1")]
+    pub(crate) name: String,
+    #[prost(double, optional, tag = "2")]
+    pub(crate) stiffness_n_per_m: Option<f64>,
+    #[prost(double, optional, tag = "3")]
+    pub(crate) damping_ns_per_m: Option<f64>,
+    #[prost(double, optional, tag = "4")]
+    pub(crate) stiffness_nm_per_rad: Option<f64>,
+    #[prost(double, optional, tag = "5")]
+    pub(crate) damping_nms_per_rad: Option<f64>,
+    #[prost(uint32, tag = "6")]
+    pub(crate) delay_ticks: u32,
+    #[prost(double, optional, tag = "7")]
+    pub(crate) reserve_j: Option<f64>,
+    #[prost(enumeration = "Passivity", tag = "8")]
+    pub(crate) passivity: i32,
+    #[prost(message, repeated, tag = "9")]
+    pub(crate) ends: Vec<CouplingEnd>,
+}
+
+#[derive(Clone, Copy, PartialEq, Message)]
+pub(crate) struct CouplingEnd {
+    #[prost(uint32, tag = "1")]
+    pub(crate) device: u32,
+    #[prost(message, optional, tag = "2")]
+    pub(crate) mapping: Option<Mapping>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
+#[repr(i32)]
+pub(crate) enum Passivity {
+    Unspecified = 0,
+    Observe = 1,
+    Control = 2,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
@@ -261,6 +304,8 @@ pub(crate) struct Plugin {
     pub(crate) places: Vec<Vector3>,
     #[prost(message, optional, tag = "9")]
     pub(crate) blend: Option<Blend>,
+    #[prost(uint32, tag = "10")]
+    pub(crate) device: u32,
 }
 
 #[derive(Clone, Copy, PartialEq, Message)]
@@ -293,6 +338,26 @@ pub(crate) struct Mapping {
     pub(crate) torque_scale: Option<f64>,
 }
 
+impl Mapping {
+    pub(crate) fn new(mapping: &MappingConfig) -> Self {
+        Self {
+            rotation: Some(Quaternion::new(mapping.rotation_xyzw)),
+            motion_scale: Some(mapping.motion_scale),
+            force_scale: Some(mapping.force_scale),
+            torque_scale: mapping.torque_scale,
+        }
+    }
+
+    pub(crate) fn config(self) -> Result<MappingConfig, Missing> {
+        Ok(MappingConfig {
+            rotation_xyzw: self.rotation.ok_or(Missing("mapping.rotation"))?.to_array(),
+            motion_scale: self.motion_scale.ok_or(Missing("mapping.motion_scale"))?,
+            force_scale: self.force_scale.ok_or(Missing("mapping.force_scale"))?,
+            torque_scale: self.torque_scale,
+        })
+    }
+}
+
 impl Vector3 {
     pub(crate) fn new([x, y, z]: [f64; 3]) -> Self {
         Self { x: Some(x), y: Some(y), z: Some(z) }
@@ -319,6 +384,15 @@ impl FrameTransform {
         Self {
             parent_frame_id: DEVICE_FRAME.to_owned(),
             child_frame_id: HANDLE_FRAME.to_owned(),
+            ..Self::default()
+        }
+    }
+
+    /// The same for one of several devices, by its name.
+    pub(crate) fn of_handle_at(device: &str) -> Self {
+        Self {
+            parent_frame_id: device.to_owned(),
+            child_frame_id: format!("{device}/{HANDLE_FRAME}"),
             ..Self::default()
         }
     }
@@ -386,6 +460,7 @@ impl Tick {
             buttons: record.buttons,
             lateness_ns: record.lateness_ns,
             compute_ns: record.compute_ns,
+            device: record.device.into(),
         }
     }
 
@@ -393,6 +468,7 @@ impl Tick {
     pub(crate) fn record(&self, pose: Pose) -> Result<TickRecord, Missing> {
         Ok(TickRecord {
             tick: self.tick,
+            device: u16::try_from(self.device).map_err(|_| Missing("device"))?,
             time_ns: self.time_ns,
             dt_ns: self.dt_ns,
             pose,

@@ -52,6 +52,7 @@ fn run() -> RunDescription {
         },
         settings,
         parameters: vec![pair("preset", "plain"), pair("mass_kg", "0.58")],
+        device: 0,
     };
     RunDescription {
         flotor_version: "9.8.7".to_owned(),
@@ -65,6 +66,7 @@ fn run() -> RunDescription {
             plugin("left", Role::Model(turned), vec![]),
             plugin("right", Role::Model(scaled), vec![pair("variant", "rod"), pair("variant", "energy")]),
         ],
+        couplings: Vec::new(),
     }
 }
 

@@ -105,11 +105,13 @@ impl Events {
     }
 }
 
-/// Everything one tick leaves behind, in the device frame.
+/// Everything one tick leaves behind at one device, in the device frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TickRecord {
-    /// Number of the tick.
+    /// Number of the tick, below 2^48: 8900 years at 1 kHz.
     pub tick: u64,
+    /// Number of the device in the scene: a tick leaves one record for each, in this order.
+    pub device: u16,
     /// Scheduled time since the loop started, ns.
     pub time_ns: u64,
     /// Scheduled time since the previous tick, ns.
@@ -143,6 +145,10 @@ pub const RECORD_WORDS: usize = 39;
 /// Words at the end of a record that hold measured times.
 pub const TIMING_WORDS: usize = 2;
 
+/// Bits of the first word that hold the number of the tick; the device is above.
+const TICK_BITS: u32 = 48;
+const TICK_MASK: u64 = (1 << TICK_BITS) - 1;
+
 impl Words<RECORD_WORDS> for TickRecord {
     #[inline]
     fn to_words(&self) -> [u64; RECORD_WORDS] {
@@ -153,7 +159,7 @@ impl Words<RECORD_WORDS> for TickRecord {
                 *slot = word;
             }
         };
-        put(self.tick);
+        put(self.tick & TICK_MASK | u64::from(self.device) << TICK_BITS);
         put(self.time_ns);
         put(self.dt_ns);
         self.pose.position_m.iter().for_each(|v| put(v.to_bits()));
@@ -176,7 +182,9 @@ impl Words<RECORD_WORDS> for TickRecord {
     fn from_words(words: &[u64; RECORD_WORDS]) -> Self {
         let mut rest = words.iter().copied();
         let mut word = || rest.next().unwrap_or(0);
-        let (tick, time_ns, dt_ns) = (word(), word(), word());
+        let (number, time_ns, dt_ns) = (word(), word(), word());
+        #[allow(clippy::cast_possible_truncation)] // two parts of one word
+        let (tick, device) = (number & TICK_MASK, (number >> TICK_BITS) as u16);
         let mut number = || f64::from_bits(word());
         let mut three = || std::array::from_fn(|_| number());
         let position_m = three();
@@ -193,6 +201,7 @@ impl Words<RECORD_WORDS> for TickRecord {
         let pose = Pose { position_m, orientation_xyzw };
         Self {
             tick,
+            device,
             time_ns,
             dt_ns,
             pose,

@@ -54,8 +54,8 @@ pub enum RecordError {
 pub struct Recorder {
     path: PathBuf,
     file: mcap::Writer<BufWriter<File>>,
-    /// Filled anew for each tick.
-    pose: FrameTransform,
+    /// Of each device, filled anew for each tick.
+    poses: Vec<FrameTransform>,
     /// One encoded message; keeps its memory.
     buffer: Vec<u8>,
     /// Number of the next tick in the file: a reader that finds a gap knows that something is missing.
@@ -72,14 +72,13 @@ impl Recorder {
     pub fn create(path: &Path, run: &RunDescription) -> Result<Self, RecordError> {
         let file = File::create(path).map_err(|cause| RecordError::Create { path: path.into(), cause })?;
         let file = begin(file, run).map_err(|cause| write_error(path, cause))?;
-        let mut recorder = Self {
-            path: path.into(),
-            file,
-            pose: FrameTransform::of_handle(),
-            buffer: Vec::new(),
-            sequence: 0,
-            chunk_start_ns: None,
+        let names: Vec<&str> = run.devices().map(|device| device.name.as_str()).collect();
+        let poses = match names.as_slice() {
+            [] | [_] => vec![FrameTransform::of_handle()],
+            several => several.iter().copied().map(FrameTransform::of_handle_at).collect(),
         };
+        let mut recorder =
+            Self { path: path.into(), file, poses, buffer: Vec::new(), sequence: 0, chunk_start_ns: None };
         recorder.write_now(Topic::Run, &run.to_message(), 0).map_err(|cause| write_error(path, cause))?;
         Ok(recorder)
     }
@@ -124,9 +123,13 @@ impl Recorder {
     }
 
     fn try_record(&mut self, record: &TickRecord) -> McapResult<()> {
-        self.pose.set(record);
-        encode(&self.pose, &mut self.buffer)?;
-        self.write(Topic::Pose, record.time_ns)?;
+        // A device the description does not have is recorded as the first, not lost.
+        let device = usize::from(record.device).min(self.poses.len().saturating_sub(1));
+        if let Some(pose) = self.poses.get_mut(device) {
+            pose.set(record);
+            encode(pose, &mut self.buffer)?;
+            self.write(Topic::Pose, record.time_ns)?;
+        }
         encode(&Tick::new(record), &mut self.buffer)?;
         self.write(Topic::Tick, record.time_ns)?;
         self.sequence = self.sequence.wrapping_add(1);

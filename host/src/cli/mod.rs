@@ -196,7 +196,7 @@ impl CommandError {
                 }
                 RunError::Hung { stuck, .. } => match stuck.place {
                     Place::Model(_) => 3,
-                    Place::DeviceRead | Place::DeviceWrite => 4,
+                    Place::DeviceRead(_) | Place::DeviceWrite(_) => 4,
                     Place::Waiting | Place::Host => 1,
                 },
                 RunError::Thread(_) => 1,

@@ -81,7 +81,9 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         digest: TraceDigest::new(),
         recorder: arguments.record.as_deref().map(|path| Recorder::create(path, &description)).transpose()?,
         failure: None,
-        plot: arguments.plot.as_ref().map(|_| RunPicture::new(&scene.title)),
+        plot: arguments.plot.as_ref().map(|_| {
+            RunPicture::new(&scene.title, scene.devices.iter().map(|device| device.name.clone()).collect())
+        }),
         publication,
         progress: progress_bar(length_ms, "{percent:>3} %  {msg}"),
     };
@@ -101,6 +103,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         seed: arguments.seed,
         rate_hz: scene.rate_hz,
         plugins: &plugins,
+        couplings: &scene.couplings,
         trace_digest: digest.finish(),
     };
     let summary = RunSummary::new(facts, &outcome, &tally);
@@ -118,8 +121,10 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     }
     match outcome.end {
         RunEnd::DeviceFault(fault) => {
-            let path = plugins.first().map(|device| device.metadata.path.clone()).unwrap_or_default();
-            Err(CommandError::RunFault { path, fault, words: outcome.device_words })
+            let (number, words) = outcome.faulted().unwrap_or_default();
+            let path = plugins.get(number).map(|device| device.metadata.path.clone()).unwrap_or_default();
+            let words = words.to_owned();
+            Err(CommandError::RunFault { path, fault, words })
         }
         RunEnd::EmergencyStop(source) => Err(CommandError::EmergencyStop(source)),
         RunEnd::Watchdog(stuck) => Err(CommandError::Watchdog(stuck)),
@@ -152,7 +157,11 @@ fn end_words(outcome: &Outcome) -> String {
         RunEnd::Finished => "the run is finished".to_owned(),
         RunEnd::Stopped => "the run was stopped in order".to_owned(),
         RunEnd::DeviceFault(fault) => {
-            format!("device fault: {}{}", super::before_advice(&outcome.device_words), fault.advice())
+            format!(
+                "device fault: {}{}",
+                super::before_advice(outcome.faulted().map_or("", |(_, words)| words)),
+                fault.advice()
+            )
         }
         RunEnd::EmergencyStop(source) => CommandError::EmergencyStop(source).to_string(),
         RunEnd::Watchdog(stuck) => CommandError::Watchdog(stuck).to_string(),
@@ -224,7 +233,7 @@ impl Observer for Watchers {
         if let Some(publication) = &self.publication {
             publication.observe(record);
         }
-        if record.tick.is_multiple_of(PROGRESS_TICKS) {
+        if record.tick.is_multiple_of(PROGRESS_TICKS) && record.device == 0 {
             self.progress.set_position(record.time_ns / 1_000_000);
             if !self.progress.is_hidden() {
                 self.progress.set_message(live_line(record));

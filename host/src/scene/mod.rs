@@ -1,11 +1,16 @@
-//! A scene: which device, which models, how they are mapped and limited. A TOML file; unknown keys are errors.
+//! A scene: which devices, which models, how they are mapped and limited. A TOML file; unknown keys are errors.
 
 mod change;
+mod coupling;
+mod devices;
 mod placement;
 mod reader;
 mod setting;
 
+pub use crate::coupling::{CouplingConfig, CouplingDescription, PassivityMode};
 pub use change::{ChangeUse, ChangeWhat};
+pub use devices::{DeviceUse, MOST_DEVICES};
+pub(crate) use devices::{is_named, without_device};
 pub use flotor_record::mapping::{Blend, MappingConfig};
 pub use reader::{Location, SceneError};
 pub use setting::{KeyValue, PluginKeyValue};
@@ -36,12 +41,12 @@ pub struct Scene {
     pub duration_s: f64,
     /// Folders with plugins, searched first; relative to the scene's file.
     pub plugin_folders: Vec<PathBuf>,
-    /// The device.
-    pub device: PluginUse,
-    /// The calibration file it corrects its vertical force by, if any.
-    pub calibration: Option<CalibrationUse>,
-    /// The force models; their wrenches add up.
+    /// The devices, one at least.
+    pub devices: Vec<DeviceUse>,
+    /// The force models; their wrenches add up. One that is on several devices is here for each.
     pub models: Vec<ModelUse>,
+    /// What holds devices together.
+    pub couplings: Vec<CouplingDescription>,
     /// Limits, tighter than or equal to what the device declares.
     pub limits: Limits,
     /// Where the handle is pushed back.
@@ -99,6 +104,8 @@ pub struct ModelUse {
     pub name: String,
     /// The plugin.
     pub plugin: PluginUse,
+    /// Number of the device it is on.
+    pub device: u16,
     /// From device to model and back.
     pub mapping: MappingConfig,
     /// Where its homes are in the device frame, m: one instance of the model for each.
@@ -119,16 +126,6 @@ pub enum Isolation {
     None,
     /// A process of its own, which may hang or crash.
     Process,
-}
-
-/// What is done about energy that comes out of a port without having gone in.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PassivityMode {
-    /// It is measured.
-    #[default]
-    Observe,
-    /// It is measured and kept from coming out.
-    Control,
 }
 
 impl ModelUse {
@@ -279,8 +276,12 @@ impl Scene {
         let rate_hz = root.number("rate_hz", 100.0..=10_000.0)?.unwrap_or(1000.0);
         let pacing = root.take("pacing").map(pacing).transpose()?.unwrap_or(Pacing::Host);
         let duration_s = root.number("duration_s", 0.0..=31_536_000.0)?.unwrap_or(10.0);
-        let (device, calibration) = device(root.require_section("device")?)?;
         let folders = root.take("plugin_folders").map(|value| value.texts()).transpose()?.unwrap_or_default();
+        let devices = devices::read(&mut root)?;
+        let models = root.sections("model")?.into_iter().map(|section| model(section, &devices));
+        let models = models.collect::<Result<Vec<_>, _>>()?.concat();
+        devices::tell_apart(&models, &devices)?;
+        let limits = root.section("limits")?.map_or_else(|| Ok(Limits::default()), limits)?;
         let scene = Self {
             title,
             text: text.to_owned(),
@@ -288,10 +289,10 @@ impl Scene {
             pacing,
             duration_s,
             plugin_folders: folders.into_iter().map(PathBuf::from).collect(),
-            device,
-            calibration,
-            models: root.sections("model")?.into_iter().map(model).collect::<Result<_, _>>()?,
-            limits: root.section("limits")?.map_or_else(|| Ok(Limits::default()), limits)?,
+            couplings: coupling::read(root.sections("coupling")?, &devices, &limits)?,
+            devices,
+            models,
+            limits,
             boundary: root.section("boundary")?.map_or_else(|| Ok(Boundary::default()), boundary)?,
             changes: change::read(root.sections("change")?)?,
         };
@@ -304,19 +305,11 @@ fn pacing(value: Value<'_>) -> Result<Pacing, SceneError> {
     value.one_of(&[("host", Pacing::Host), ("device", Pacing::Device)])
 }
 
-fn device(mut section: Section<'_>) -> Result<(PluginUse, Option<CalibrationUse>), SceneError> {
+/// A model, once for each device it is on.
+fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse>, SceneError> {
     let plugin = plugin_use(&mut section)?;
-    let calibration = section.take("calibration").map(|value| {
-        let location = value.location.clone();
-        Ok(CalibrationUse { file: value.text()?.into(), location })
-    });
-    section.finish()?;
-    Ok((plugin, calibration.transpose()?))
-}
-
-fn model(mut section: Section<'_>) -> Result<ModelUse, SceneError> {
-    let plugin = plugin_use(&mut section)?;
-    let name = section.take("name").map(|value| value.text()).transpose()?;
+    let name = section.take("name").map(devices::name).transpose()?;
+    let on = devices::of_model(devices, section.take("device"), &plugin.location)?;
     let (mapping, places_m) = match section.section("mapping")? {
         Some(section) => mapping(section)?,
         None => (MappingConfig::default(), vec![[0.0; 3]]),
@@ -326,15 +319,23 @@ fn model(mut section: Section<'_>) -> Result<ModelUse, SceneError> {
     let budget_us = section.number("budget_us", 1.0..=1.0e6)?;
     section.finish()?;
     let name = name.unwrap_or_else(|| plugin.plugin.clone());
-    Ok(ModelUse {
+    let model = ModelUse {
         name,
         plugin,
+        device: 0,
         mapping,
         places_m,
         blend,
         isolation,
         budget_s: budget_us.map(|microseconds| microseconds * 1.0e-6),
-    })
+    };
+    let only = on.len() == 1;
+    let on_device = |number: u16| {
+        let device = devices.get(usize::from(number)).filter(|_| !only);
+        let name = device.map_or_else(|| model.name.clone(), |device| devices::name_on(&model.name, device));
+        ModelUse { name, device: number, ..model.clone() }
+    };
+    Ok(on.into_iter().map(on_device).collect())
 }
 
 fn blend(mut section: Section<'_>) -> Result<Blend, SceneError> {
@@ -360,6 +361,15 @@ fn plugin_use(section: &mut Section<'_>) -> Result<PluginUse, SceneError> {
 
 /// Scales, rotation and places of a model.
 fn mapping(mut section: Section<'_>) -> Result<(MappingConfig, Vec<[f64; 3]>), SceneError> {
+    let torque_scale = section.number("torque_scale", SCALE)?;
+    let mapping = MappingConfig { torque_scale, ..frame_and_scales(&mut section)? };
+    let places_m = placement::read(&mut section)?;
+    section.finish()?;
+    Ok((mapping, places_m))
+}
+
+/// Rotation and scales, all but that of torque.
+fn frame_and_scales(section: &mut Section<'_>) -> Result<MappingConfig, SceneError> {
     let default = MappingConfig::default();
     let rotation =
         section.take("rotation_xyzw").map(|value| (value.numbers::<4>(), value)).map(|(numbers, value)| {
@@ -372,15 +382,12 @@ fn mapping(mut section: Section<'_>) -> Result<(MappingConfig, Vec<[f64; 3]>), S
             }
             Ok(numbers.map(|x| x / norm))
         });
-    let mapping = MappingConfig {
+    Ok(MappingConfig {
         rotation_xyzw: rotation.transpose()?.unwrap_or(default.rotation_xyzw),
         motion_scale: section.number("motion_scale", SCALE)?.unwrap_or(default.motion_scale),
         force_scale: section.number("force_scale", SCALE)?.unwrap_or(default.force_scale),
-        torque_scale: section.number("torque_scale", SCALE)?,
-    };
-    let places_m = placement::read(&mut section)?;
-    section.finish()?;
-    Ok((mapping, places_m))
+        torque_scale: None,
+    })
 }
 
 /// A scale of zero would make a device move nothing or feel nothing; a million is a unit mistaken.

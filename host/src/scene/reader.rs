@@ -107,13 +107,8 @@ impl<'t> Section<'t> {
         self.take(key).ok_or(missing)
     }
 
-    /// Takes a sub-table that must be there.
-    pub(super) fn require_section(&mut self, key: &'static str) -> Result<Section<'t>, SceneError> {
-        let missing = self.missing(key);
-        self.section(key)?.ok_or(missing)
-    }
-
-    fn missing(&self, key: &str) -> SceneError {
+    /// That a key is not there.
+    pub(super) fn missing(&self, key: &str) -> SceneError {
         let location = self.location();
         SceneError { location, problem: format!("`{}` is missing", self.path(key)) }
     }

@@ -1,6 +1,6 @@
 //! Settings on top of a scene, as people write them: `spring.variant=energy`.
 
-use super::{Location, ModelUse, ParameterText, Scene, nearest};
+use super::{DeviceUse, Location, ModelUse, ParameterText, Scene, is_named, nearest, without_device};
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -68,17 +68,29 @@ impl PluginKeyValue {
         (self.plugin, self.setting.key, self.setting.value)
     }
 
-    /// Adds the setting to the plugin of a scene it names: `device`, a model's name, or a plugin's id. Not real-time.
+    /// Adds the setting to what it names in a scene: a device, a model (on all its devices, or as `MODEL@DEVICE` on
+    /// one), a plugin's id; `device` is every device. Not real-time.
     ///
     /// # Errors
     /// In words: no such plugin in the scene, with the nearest name there is.
     pub fn apply(&self, scene: &mut Scene) -> Result<(), String> {
-        if self.plugin == "device" || self.plugin == scene.device.plugin {
-            scene.device.parameters.push(self.parameter());
+        let Scene { devices, models, .. } = scene;
+        let of_name = |device: &DeviceUse| device.name == self.plugin || self.plugin == "device";
+        let of_id = |device: &DeviceUse| device.plugin.plugin == self.plugin;
+        let by_name = devices.iter().any(of_name);
+        let mut found = false;
+        for device in
+            devices.iter_mut().filter(|device| if by_name { of_name(device) } else { of_id(device) })
+        {
+            device.plugin.parameters.push(self.parameter());
+            found = true;
+        }
+        if found {
             return Ok(());
         }
-        let device = scene.device.plugin.clone();
-        self.apply_among(&mut scene.models, &["device", &device])
+        let names: Vec<&str> =
+            devices.iter().flat_map(|device| [device.name.as_str(), device.plugin.plugin.as_str()]).collect();
+        self.apply_among(models, &names)
     }
 
     /// Adds the setting to the model it names: by its name in the scene, or by its plugin's id.
@@ -87,23 +99,32 @@ impl PluginKeyValue {
     }
 
     fn apply_among(&self, models: &mut [ModelUse], others: &[&str]) -> Result<(), String> {
-        let named = |model: &&mut ModelUse| model.name == self.plugin || model.plugin.plugin == self.plugin;
-        if let Some(model) = models.iter_mut().find(named) {
+        let by_name = |model: &ModelUse| is_named(&model.name, &self.plugin);
+        let first = models.iter().find(|model| model.plugin.plugin == self.plugin);
+        let name = match (models.iter().any(by_name), first) {
+            (true, _) => self.plugin.clone(),
+            (false, Some(first)) => without_device(&first.name).to_owned(),
+            (false, None) => return Err(self.unknown(models, others)),
+        };
+        for model in models.iter_mut().filter(|model| is_named(&model.name, &name)) {
             model.plugin.parameters.push(self.parameter());
-            return Ok(());
         }
+        Ok(())
+    }
+
+    fn unknown(&self, models: &[ModelUse], others: &[&str]) -> String {
         let names: Vec<&str> =
             models.iter().map(|model| model.name.as_str()).chain(others.iter().copied()).collect();
         let hint =
             nearest(&self.plugin, names.iter().copied()).map(|name| format!("; did you mean `{name}`?"));
-        Err(format!(
+        format!(
             "--set {}.{}: there is no plugin `{}`{} (there are {})",
             self.plugin,
             self.setting.key,
             self.plugin,
             hint.unwrap_or_default(),
             names.join(", ")
-        ))
+        )
     }
 
     fn parameter(&self) -> ParameterText {

@@ -9,6 +9,7 @@
 
 use super::passivity::Passivity;
 use super::state::Gate;
+use crate::passivity::Controller;
 use crate::scene::{Boundary, Limits};
 use crate::trace::Events;
 use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Wrench, rotation_vector};
@@ -50,8 +51,11 @@ impl Envelope {
             // Damping the device is known to stand: that of its boundary.
             passivity: Passivity::new(
                 limits.passivity,
-                [boundary.damping_ns_per_m, boundary.damping_nms_per_rad],
-                period_ns as f64 * 1.0e-9,
+                Controller {
+                    damping_ns_per_m: boundary.damping_ns_per_m,
+                    damping_nms_per_rad: boundary.damping_nms_per_rad,
+                    period_s: period_ns as f64 * 1.0e-9,
+                },
             ),
             period_ns,
             last: Wrench::ZERO,

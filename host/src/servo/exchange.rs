@@ -3,7 +3,8 @@
 //! The loop takes a model out of a queue and puts it in place between two ticks; what it replaces fades out and goes
 //! back through another queue. Nothing in the loop allocates or frees.
 
-use super::models::{Layer, ModelStack, Replacement};
+use super::forces::Forces;
+use super::models::{Layer, Replacement};
 use flotor_hal::Tick;
 use rtrb::{Consumer, Producer, RingBuffer};
 
@@ -41,7 +42,7 @@ impl Exchange {
     ///
     /// Real-time: bounded by the models and what is scheduled, no allocation.
     #[inline]
-    pub(crate) fn apply_due(&mut self, tick: &Tick, models: &mut ModelStack, mut told: impl FnMut(u32, u16)) {
+    pub(crate) fn apply_due(&mut self, tick: &Tick, models: &mut Forces, mut told: impl FnMut(u32, u16)) {
         while !self.retired.is_full()
             && let Some(faded) = models.take_faded(tick)
         {

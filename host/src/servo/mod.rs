@@ -1,5 +1,7 @@
 //! The servo: one tick after the other, `changes -> device -> mapping -> models -> envelope -> device`.
 //!
+//! A scene may have several devices: each has models and an envelope of its own, all share tick and state of the run.
+//!
 //! Nothing in a tick allocates, locks, formats or waits on another thread. What a tick leaves behind is a
 //! [`TickRecord`]; whoever watches gets it through a ring, off the loop.
 
@@ -8,11 +10,13 @@ mod clock;
 mod engine;
 mod envelope;
 mod exchange;
+mod forces;
 mod models;
 mod parameters;
 mod passivity;
 mod realtime;
 mod state;
+mod station;
 mod stop;
 mod timing;
 mod watchdog;
@@ -24,8 +28,9 @@ pub(crate) use clock::{Due, Schedule, monotonic_ns, sleep_until};
 pub(crate) use engine::Engine;
 pub use envelope::Envelope;
 pub(crate) use exchange::{Exchange, Workshop, exchange};
+pub(crate) use forces::{Coupled, Forces, Port};
 pub use models::ModelHealth;
-pub(crate) use models::{Layer, ModelStack, Replacement};
+pub(crate) use models::{Layer, Replacement};
 pub(crate) use parameters::{
     ChangeReport, ChangeSender, PLUGIN, ParameterChange, ParameterQueue, ReportReceiver, ScheduledChange,
     WEIGHT,
@@ -33,6 +38,7 @@ pub(crate) use parameters::{
 pub use realtime::{Privilege, RealTimeReport};
 pub(crate) use realtime::{enter_real_time, enter_worker_priority, probe_real_time};
 pub use state::{Cause, EmergencySource, Gate, RunEvent, RunState};
+pub(crate) use station::Station;
 pub use stop::StopSwitch;
 pub use timing::{Durations, Percentiles, Stage, Timing};
 pub(crate) use watchdog::{Heartbeat, start as start_watchdog};
@@ -41,12 +47,8 @@ pub use watchdog::{Place, Stuck};
 use crate::trace::{Events, TickRecord};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::ActiveDevice;
-use flotor_hal::{Conditions, Cycle, DeviceState, Tick};
+use flotor_hal::{DVec3, Fault, Tick};
 use timing::STAGE_SAMPLING;
-
-/// Ticks without a new sample after which the force fades to zero: what is older than this is not where the
-/// hand is. At 1 kHz, 10 ms of a 10 Hz movement of 5 mm are 3 mm.
-const STALE_TICKS_LIMIT: u32 = 10;
 
 /// What the run itself is told, beside device, models and envelope.
 #[derive(Clone, Copy, Debug)]
@@ -59,113 +61,119 @@ pub(crate) struct RunConfig {
     pub(crate) emergency_buttons: u32,
 }
 
-/// The loop's state: a device, its models, the envelope.
+/// The loop's state: devices with their envelopes, and all that asks for a wrench.
 pub(crate) struct Servo {
-    device: ActiveDevice,
-    models: ModelStack,
+    stations: Box<[Station]>,
+    /// Of the devices, in the same order.
+    ports: Box<[Port]>,
+    forces: Forces,
     parameters: ParameterQueue,
     exchange: Exchange,
-    envelope: Envelope,
     config: RunConfig,
     heart: Heartbeat,
     run: RunState,
-    state: DeviceState,
-    stale_ticks: u32,
     timing: Timing,
 }
 
 impl Servo {
     /// Not real-time.
     pub(crate) fn new(
-        device: ActiveDevice,
-        models: ModelStack,
+        stations: Vec<Station>,
+        forces: Forces,
         parameters: ParameterQueue,
         exchange: Exchange,
-        envelope: Envelope,
         config: RunConfig,
     ) -> Self {
         Self {
-            device,
-            models,
+            ports: vec![Port::REST; stations.len()].into(),
+            stations: stations.into(),
+            forces,
             parameters,
             exchange,
-            envelope,
             config,
             heart: Heartbeat::default(),
             run: RunState::START,
-            state: DeviceState::HOME,
-            stale_ticks: 0,
             timing: Timing::default(),
         }
     }
 
-    /// One tick. Real-time: bounded by device and models, no allocation.
-    pub(crate) fn tick(&mut self, due: &Due, stop: &StopSwitch) -> TickRecord {
+    /// One tick; `leave` gets what it leaves behind, a record for each device. Real-time: bounded by devices and models,
+    /// no allocation.
+    pub(crate) fn tick(&mut self, due: &Due, stop: &StopSwitch, mut leave: impl FnMut(&TickRecord)) {
         let Due { tick, lateness_ns, missed } = due;
         let started = monotonic_ns();
         let mut watch = StageWatch::start(tick.index, started);
         let mut events = if *missed > 0 { Events::MISSED } else { Events::NONE };
 
         self.change_parameters(tick, &mut events);
-        self.heart.enter(tick.index, Place::DeviceRead);
-        let sample = self.read(tick, &mut events);
+        let sample = self.read(tick);
         self.follow(sample, tick, stop, &mut events);
         watch.lap(&mut self.timing, Stage::Read);
 
-        let (model, energy_j) = self.models.step(tick, &self.state, &self.heart, &mut events);
+        self.forces.step(tick, &mut self.ports, &self.heart);
         watch.lap(&mut self.timing, Stage::Models);
 
         let gate = self.run.gate(tick.time_ns, self.config.ramp_ns);
-        let commanded = self.envelope.apply(&model, gate, &self.state, tick, &mut events);
+        for (station, port) in self.stations.iter_mut().zip(&mut self.ports) {
+            station.limit(tick, gate, port);
+        }
         watch.lap(&mut self.timing, Stage::Envelope);
 
-        self.heart.enter(tick.index, Place::DeviceWrite);
-        if let Cycle::Fault(fault) = self.device.write(tick, &commanded) {
-            events.insert(Events::DEVICE_FAULT);
-            self.happen(RunEvent::Failed(Cause::Device(fault)), tick);
-        }
+        self.write(tick);
         self.heart.enter(tick.index, Place::Waiting);
         watch.lap(&mut self.timing, Stage::Write);
 
         let compute_ns = monotonic_ns() - started;
         self.account(*lateness_ns, compute_ns, *missed);
-        TickRecord {
-            tick: tick.index,
-            time_ns: tick.time_ns,
-            dt_ns: tick.dt_ns,
-            pose: self.state.pose,
-            twist: self.state.twist,
-            model,
-            commanded,
-            delivered: self.state.delivered,
-            energy_j,
-            port_energy_j: self.envelope.port_energy_j(),
-            events,
-            buttons: self.state.buttons,
-            lateness_ns: *lateness_ns,
-            compute_ns,
+        for (device, (station, port)) in (0..).zip(self.stations.iter().zip(&self.ports)) {
+            let Port { state, asked, commanded, energy_j, .. } = port;
+            let mut events = events;
+            events.insert(port.events);
+            leave(&TickRecord {
+                tick: tick.index,
+                device,
+                time_ns: tick.time_ns,
+                dt_ns: tick.dt_ns,
+                pose: state.pose,
+                twist: state.twist,
+                model: *asked,
+                commanded: *commanded,
+                delivered: state.delivered,
+                energy_j: *energy_j,
+                port_energy_j: station.envelope.port_energy_j(),
+                events,
+                buttons: state.buttons,
+                lateness_ns: *lateness_ns,
+                compute_ns,
+            });
         }
     }
 
     /// What was to change before this tick does so now.
     #[inline]
     fn change_parameters(&mut self, tick: &Tick, events: &mut Events) {
-        let Self { device, models, parameters, exchange, .. } = self;
+        let Self { stations, forces, parameters, exchange, .. } = self;
         // Looked at before the replacements: whoever sent one of these after a replacement has sent that too.
         let waiting = parameters.waiting();
+        let devices = stations.len();
         let mut replaced = false;
-        exchange.apply_due(tick, models, |model, generation| {
+        exchange.apply_due(tick, forces, |model, generation| {
             replaced = true;
-            let plugin = u16::try_from(model + 1).unwrap_or(u16::MAX); // a run has fewer plugins
+            let plugin = u16::try_from(model as usize + devices).unwrap_or(u16::MAX); // a run has fewer plugins
             parameters.report_replaced(tick, plugin, generation);
         });
         let changed = parameters.apply_due(tick, waiting, |change| {
-            let parameter = change.parameter as usize;
-            match usize::from(change.plugin).checked_sub(1) {
-                None => device.set_parameter(parameter, change.value),
-                Some(model) if change.parameter == WEIGHT => models.set_weight(model, tick, change.value),
-                Some(model) if models.generation(model) != Some(change.generation) => CallStatus::WrongPhase,
-                Some(model) => models.set_parameter(model, tick, parameter, change.value),
+            let (plugin, parameter) = (usize::from(change.plugin), change.parameter as usize);
+            if let Some(station) = stations.get_mut(plugin) {
+                return station.device.set_parameter(parameter, change.value);
+            }
+            let model = plugin - devices;
+            if change.parameter == WEIGHT {
+                forces.set_weight(model, tick, change.value)
+            } else if forces.generation(model) == Some(change.generation) {
+                forces.set_parameter(model, tick, parameter, change.value)
+            } else {
+                CallStatus::WrongPhase
             }
         });
         if changed || replaced {
@@ -173,35 +181,35 @@ impl Servo {
         }
     }
 
-    /// Newest sample into `self.state`; an old one stays, a senseless one is never used. What it means for the run.
+    /// Newest samples of all devices; what the worst of them means for the run: the hand is not to be trusted to feel
+    /// one device while another is lost.
     #[inline]
-    fn read(&mut self, tick: &Tick, events: &mut Events) -> RunEvent {
-        let last = self.state;
-        match self.device.read(tick, &mut self.state) {
-            Cycle::Fresh if self.state.is_finite() => {
-                self.stale_ticks = 0;
-                if self.state.conditions.contains(Conditions::SATURATED) {
-                    events.insert(Events::SATURATED);
-                }
-                if self.state.conditions.contains(Conditions::EXCESS_FORCE) {
-                    events.insert(Events::EXCESS_FORCE);
-                }
-                return RunEvent::SamplesBack;
-            }
-            Cycle::Fresh => events.insert(Events::NOT_FINITE),
-            Cycle::Stale => events.insert(Events::STALE_SAMPLE),
-            Cycle::Fault(fault) => {
-                self.state = if self.state.is_finite() { self.state } else { last };
-                events.insert(Events::DEVICE_FAULT);
-                return RunEvent::Failed(Cause::Device(fault));
+    fn read(&mut self, tick: &Tick) -> RunEvent {
+        let mut worst = RunEvent::SamplesBack;
+        for (device, (station, port)) in (0..).zip(self.stations.iter_mut().zip(&mut self.ports)) {
+            self.heart.enter(tick.index, Place::DeviceRead(device));
+            port.events = Events::NONE;
+            let sample = station.read(tick, port);
+            if badness(sample) > badness(worst) {
+                worst = sample;
             }
         }
-        self.state = last;
-        self.stale_ticks = self.stale_ticks.saturating_add(1);
-        if self.stale_ticks > STALE_TICKS_LIMIT { RunEvent::SamplesLost } else { RunEvent::Time }
+        worst
     }
 
-    /// Takes the run where the sample, the clock and everybody who may stop it lead.
+    /// Sends what is to be sent to all devices.
+    #[inline]
+    fn write(&mut self, tick: &Tick) {
+        let Self { stations, ports, heart, run, config, .. } = self;
+        for (device, (station, port)) in (0..).zip(stations.iter_mut().zip(ports)) {
+            heart.enter(tick.index, Place::DeviceWrite(device));
+            if let Some(failed) = station.write(tick, port) {
+                *run = run.after(failed, tick.time_ns, config.ramp_ns);
+            }
+        }
+    }
+
+    /// Takes the run where the samples, the clock and everybody who may stop it lead.
     #[inline]
     fn follow(&mut self, sample: RunEvent, tick: &Tick, stop: &StopSwitch, events: &mut Events) {
         self.happen(RunEvent::Time, tick);
@@ -212,7 +220,8 @@ impl Servo {
         if self.heart.bitten().is_some() {
             self.happen(RunEvent::Failed(Cause::Watchdog), tick);
         }
-        let pressed = self.state.buttons & self.config.emergency_buttons != 0;
+        let buttons = self.ports.iter().fold(0, |buttons, port| buttons | port.state.buttons);
+        let pressed = buttons & self.config.emergency_buttons != 0;
         if let Some(source) = stop.emergency().or(pressed.then_some(EmergencySource::Button)) {
             self.happen(RunEvent::Emergency(source), tick);
         }
@@ -235,15 +244,16 @@ impl Servo {
         }
     }
 
-    /// Ends the loop: the device is deactivated, what was measured remains. Not real-time.
+    /// Ends the loop: the devices are deactivated, what was measured remains. Not real-time.
     pub(crate) fn into_timing(self) -> Timing {
-        drop(self.device);
+        drop(self.stations);
         self.timing
     }
 
-    /// What nothing gets past.
-    pub(crate) fn envelope(&self) -> &Envelope {
-        &self.envelope
+    /// The most that may reach a hand at any device: force along each axis (N), torque about each (N·m).
+    pub(crate) fn most(&self) -> [DVec3; 2] {
+        let most = self.stations.iter().map(|station| station.envelope.most());
+        most.fold([DVec3::ZERO; 2], |[force_n, torque_nm], [f, t]| [force_n.max(f), torque_nm.max(t)])
     }
 
     /// Where the run stands after the last tick.
@@ -256,12 +266,24 @@ impl Servo {
         &self.heart
     }
 
-    pub(crate) fn device(&mut self) -> &mut ActiveDevice {
-        &mut self.device
+    /// The devices, in order, each with the first fault it reported.
+    pub(crate) fn devices(&mut self) -> impl Iterator<Item = (&mut ActiveDevice, Option<Fault>)> {
+        self.stations.iter_mut().map(|station| (&mut station.device, station.fault))
     }
 
-    pub(crate) fn models(&mut self) -> &mut ModelStack {
-        &mut self.models
+    pub(crate) fn forces(&mut self) -> &mut Forces {
+        &mut self.forces
+    }
+}
+
+/// Which of two devices' samples decides: the higher.
+#[inline]
+const fn badness(sample: RunEvent) -> u8 {
+    match sample {
+        RunEvent::Failed(_) => 3,
+        RunEvent::SamplesLost => 2,
+        RunEvent::Time => 1,
+        _ => 0,
     }
 }
 

@@ -20,7 +20,7 @@ pub(crate) const PLUGIN: u32 = u32::MAX - 1;
 /// A new value for a parameter. The numbers come from a schema: see `session::Controls`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ParameterChange {
-    /// Number of the plugin in the run: the device is 0, then the models in the scene's order.
+    /// Number of the plugin in the run: the devices, then the models, both in the scene's order.
     pub(crate) plugin: u16,
     /// How often the plugin was replaced when the change was made: a change is for what it was checked against.
     pub(crate) generation: u16,

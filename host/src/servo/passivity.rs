@@ -1,55 +1,34 @@
-//! Energy at the port of a device: what the hand has put in, and what has come back out.
+//! The energy account of a device's port in the servo, and the controller on top that a scene may ask for.
 //!
-//! With the wrench held from one sample to the next, the energy that crosses the port between two samples is known
-//! exactly: the wrench that was held times the way the handle went (the passivity observer of Hannaford and Ryu,
-//! "Time-domain passivity control of haptic interfaces", IEEE Trans. Robotics and Automation 18(1), 2002, eq. 5).
-//! A spring, a damper, a wall of stored or dissipated energy never gives back more than it got. A loop that does is
-//! active: its model creates energy, or sampling does.
-//!
-//! The controller takes away what the next period could bring out beyond what is there: first by damping along the
-//! motion (the impedance form of the same paper), as much as the device's own boundary uses; where that is not
-//! enough, because the handle hardly moves, by scaling the wrench down (the energy tank of Franken and others,
-//! IEEE Trans. Robotics 27(4), 2011, section IV).
+//! How energy is measured and kept: [`crate::passivity`].
 
+use crate::passivity::{Controller, Expected, PortObserver};
 use crate::scene::PassivityMode;
-use flotor_hal::{DQuat, DVec3, DeviceState, Wrench};
+use flotor_hal::{DeviceState, Wrench};
 
-/// Acceleration that a handle may have without its next sample being a surprise, m/s²: 40 N on 0.58 kg are 69, and
-/// a hand in between takes most of it.
-const EXPECTED_ACCELERATION_M_PER_S2: f64 = 50.0;
-/// The same for rotation, rad/s²: the above at a lever of a tenth of a metre.
-const EXPECTED_ACCELERATION_RAD_PER_S2: f64 = 500.0;
+/// Accelerations that a handle may have without its next sample being a surprise: 40 N on 0.58 kg are 69 m/s², and
+/// a hand in between takes most of it; for rotation the same at a lever of a tenth of a metre.
+const EXPECTED: Expected = Expected { acceleration_m_per_s2: 50.0, acceleration_rad_per_s2: 500.0 };
 
 /// Watches, and on request guards, the energy at one port.
 pub(super) struct Passivity {
     mode: PassivityMode,
-    /// Most damping the controller injects, N·s/m and N·m·s/rad.
-    damping_ns_per_m: f64,
-    damping_nms_per_rad: f64,
-    period_s: f64,
-    /// Pose at the last sample; `None` before the first.
-    last: Option<(DVec3, DQuat)>,
+    observer: PortObserver,
+    controller: Controller,
     energy_j: f64,
 }
 
 impl Passivity {
-    /// `damping` is the most the controller may inject, N·s/m and N·m·s/rad. Not real-time.
-    pub(super) fn new(mode: PassivityMode, damping: [f64; 2], period_s: f64) -> Self {
-        let [damping_ns_per_m, damping_nms_per_rad] = damping;
-        Self { mode, damping_ns_per_m, damping_nms_per_rad, period_s, last: None, energy_j: 0.0 }
+    /// Not real-time.
+    pub(super) fn new(mode: PassivityMode, controller: Controller) -> Self {
+        Self { mode, observer: PortObserver::default(), controller, energy_j: 0.0 }
     }
 
     /// Books what has crossed the port since the last sample, while `held` was applied. Real-time: bounded, no
     /// allocation.
     #[inline]
     pub(super) fn observe(&mut self, state: &DeviceState, held: &Wrench) {
-        let now = (state.pose.position(), state.pose.orientation());
-        if let Some((position_m, orientation)) = self.last {
-            let moved = now.0 - position_m;
-            let turned = small_rotation(now.1 * orientation.conjugate());
-            self.energy_j -= held.force().dot(moved) + held.torque().dot(turned);
-        }
-        self.last = Some(now);
+        self.energy_j += self.observer.gone_in_j(&state.pose, held);
     }
 
     /// Energy the hand has put into the port so far less what has come out, J. Real-time: bounded, no allocation.
@@ -59,92 +38,28 @@ impl Passivity {
     }
 
     /// The wrench with as much taken away as it takes to keep the energy from becoming negative by the next sample,
-    /// and whether that was anything. Real-time: bounded, no allocation.
+    /// if that is anything. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn guard(&self, wrench: &Wrench, state: &DeviceState) -> Option<Wrench> {
-        if self.mode == PassivityMode::Observe {
-            return None;
+        match self.mode {
+            PassivityMode::Observe => None,
+            PassivityMode::Control => {
+                self.controller.keep_within(self.energy_j, wrench, &state.twist, EXPECTED)
+            }
         }
-        let half_period_squared = 0.5 * self.period_s * self.period_s;
-        let force = Side {
-            effort: wrench.force(),
-            way: state.twist.linear() * self.period_s,
-            surprise: EXPECTED_ACCELERATION_M_PER_S2 * half_period_squared,
-            damping: self.damping_ns_per_m / self.period_s,
-        };
-        let torque = Side {
-            effort: wrench.torque(),
-            way: state.twist.angular() * self.period_s,
-            surprise: EXPECTED_ACCELERATION_RAD_PER_S2 * half_period_squared,
-            damping: self.damping_nms_per_rad / self.period_s,
-        };
-        let available_j = self.energy_j.max(0.0);
-        let asked_j = force.may_cost_j() + torque.may_cost_j();
-        if asked_j <= available_j {
-            return None;
-        }
-        // Each side gives up its share of what is too much; a side that only takes energy gives up nothing.
-        let drawn_j = force.may_cost_j().max(0.0) + torque.may_cost_j().max(0.0);
-        let excess = ((asked_j - available_j) / drawn_j).clamp(0.0, 1.0);
-        Some(Wrench::new(force.within(excess), torque.within(excess)))
     }
-}
-
-/// Translation or rotation over the next period: effort in N or N·m, way in m or rad.
-struct Side {
-    effort: DVec3,
-    /// Way the handle goes if nothing happens.
-    way: DVec3,
-    /// How far from that it may end.
-    surprise: f64,
-    /// Most damping, per period: effort per way.
-    damping: f64,
-}
-
-impl Side {
-    /// Most energy that the effort may bring out by the next sample, J; negative if it surely takes some in.
-    fn may_cost_j(&self) -> f64 {
-        self.effort.dot(self.way) + self.effort.length() * self.surprise
-    }
-
-    /// The effort changed so that it brings out less, by this part of what it may cost.
-    fn within(&self, excess: f64) -> DVec3 {
-        let cost_j = self.may_cost_j();
-        if cost_j <= 0.0 {
-            return self.effort;
-        }
-        let allowed_j = cost_j * (1.0 - excess);
-        let way = self.way.length();
-        // Damping takes `d way²` and, by making the effort longer, may cost `d way surprise`.
-        let taken_per_damping = way * (way - self.surprise);
-        let damping = if taken_per_damping > 0.0 {
-            ((cost_j - allowed_j) / taken_per_damping).min(self.damping)
-        } else {
-            0.0
-        };
-        let damped = Self { effort: self.effort - self.way * damping, ..*self };
-        let left_j = damped.may_cost_j();
-        if left_j <= allowed_j { damped.effort } else { damped.effort * (allowed_j / left_j) }
-    }
-}
-
-/// Rotation vector of a rotation from one sample to the next, rad. The series of the arc sine up to its third power is
-/// exact to 1e-6 of the angle up to a tenth of a radian, which is 100 rad/s at 1 kHz; there is no arc tangent to wait for.
-#[inline]
-fn small_rotation(rotation: DQuat) -> DVec3 {
-    let sine = if rotation.w < 0.0 { -rotation.xyz() } else { rotation.xyz() };
-    sine * (2.0 + sine.length_squared() / 3.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flotor_hal::{Pose, Twist, rotation_vector};
+    use flotor_hal::{DQuat, DVec3, Pose, Twist};
 
     const PERIOD_S: f64 = 1.0e-3;
 
     fn passivity(mode: PassivityMode) -> Passivity {
-        Passivity::new(mode, [15.0, 0.15], PERIOD_S)
+        let controller = Controller { damping_ns_per_m: 15.0, damping_nms_per_rad: 0.15, period_s: PERIOD_S };
+        Passivity::new(mode, controller)
     }
 
     fn at(z_m: f64, velocity_m_per_s: f64) -> DeviceState {
@@ -179,18 +94,6 @@ mod tests {
         state.pose = Pose::new(DVec3::ZERO, DQuat::from_rotation_y(0.01));
         observer.observe(&state, &Wrench::new(DVec3::ZERO, DVec3::new(5.0, -2.0, 5.0)));
         assert!((observer.energy_j() - 0.02).abs() < 1.0e-9, "{}", observer.energy_j());
-    }
-
-    #[test]
-    fn the_series_is_the_rotation_vector() {
-        for exponent in -12..=-1 {
-            let rotation = DQuat::from_axis_angle(DVec3::new(0.36, -0.48, 0.8), 10.0_f64.powi(exponent));
-            for rotation in [rotation, -rotation] {
-                let exact = rotation_vector(rotation);
-                let error = (small_rotation(rotation) - exact).length() / exact.length();
-                assert!(error < 1.0e-6, "1e{exponent}: {error}");
-            }
-        }
     }
 
     #[test]
@@ -235,7 +138,7 @@ mod tests {
                 for direction in
                     [DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::NEG_Z, sent.force().normalize_or_zero()]
                 {
-                    let surprise = direction * (0.5 * EXPECTED_ACCELERATION_M_PER_S2 * PERIOD_S * PERIOD_S);
+                    let surprise = direction * (0.5 * EXPECTED.acceleration_m_per_s2 * PERIOD_S * PERIOD_S);
                     let way = state.twist.linear() * PERIOD_S + surprise;
                     let left_j = energy_j - sent.force().dot(way);
                     assert!(

@@ -1,12 +1,13 @@
-//! The watchdog: a thread that stops the device when the loop no longer ticks, and says where it got stuck.
+//! The watchdog: a thread that stops all devices when the loop no longer ticks, and says where it got stuck.
 //!
 //! The loop leaves a heartbeat, one word that says which tick it is in and whose code is running. The watchdog
 //! looks at it a few times per limit. A word that stays the same for longer than the limit means that somebody
-//! does not come back; the device is then stopped from here, without the loop's help.
+//! does not come back; the devices are then stopped from here, without the loop's help.
 
 use super::clock::{monotonic_ns, sleep_until};
 use super::realtime::{WATCHDOG_PRIORITY, enter_priority};
 use super::stop::StopSwitch;
+use crate::scene::MOST_DEVICES;
 use flotor_hal::abi::loader::Stopper;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -17,28 +18,31 @@ use std::thread::JoinHandle;
 pub enum Place {
     /// Between two ticks.
     Waiting,
-    /// The device's `read`.
-    DeviceRead,
+    /// The `read` of a device, by its number.
+    DeviceRead(u16),
     /// A model's `step`, by its place in the scene.
     Model(usize),
     /// The host's own code.
     Host,
-    /// The device's `write`.
-    DeviceWrite,
+    /// The `write` of a device, by its number.
+    DeviceWrite(u16),
 }
 
 impl Place {
-    const FIRST_MODEL: u64 = 4;
+    /// Codes: 0 and 1, the devices' reads, their writes, the models.
+    const FIRST_READ: u64 = 2;
+    const FIRST_WRITE: u64 = Self::FIRST_READ + MOST_DEVICES as u64;
+    const FIRST_MODEL: u64 = Self::FIRST_WRITE + MOST_DEVICES as u64;
 
     /// The call that runs there, for people.
     #[must_use]
     pub const fn call(self) -> &'static str {
         match self {
             Self::Waiting => "waiting",
-            Self::DeviceRead => "`read`",
+            Self::DeviceRead(_) => "`read`",
             Self::Model(_) => "`step`",
             Self::Host => "the tick",
-            Self::DeviceWrite => "`write`",
+            Self::DeviceWrite(_) => "`write`",
         }
     }
 
@@ -46,20 +50,22 @@ impl Place {
     const fn code(self) -> u64 {
         match self {
             Self::Waiting => 0,
-            Self::DeviceRead => 1,
-            Self::Host => 2,
-            Self::DeviceWrite => 3,
+            Self::Host => 1,
+            Self::DeviceRead(device) => Self::FIRST_READ + device as u64,
+            Self::DeviceWrite(device) => Self::FIRST_WRITE + device as u64,
             Self::Model(index) => Self::FIRST_MODEL + index as u64,
         }
     }
 
+    #[allow(clippy::cast_possible_truncation)] // numbers that fitted before
     const fn from_code(code: u64) -> Self {
         match code {
             0 => Self::Waiting,
-            1 => Self::DeviceRead,
-            2 => Self::Host,
-            3 => Self::DeviceWrite,
-            #[allow(clippy::cast_possible_truncation)] // an index that fitted before
+            1 => Self::Host,
+            read @ Self::FIRST_READ..Self::FIRST_WRITE => Self::DeviceRead((read - Self::FIRST_READ) as u16),
+            write @ Self::FIRST_WRITE..Self::FIRST_MODEL => {
+                Self::DeviceWrite((write - Self::FIRST_WRITE) as u16)
+            }
             model => Self::Model((model - Self::FIRST_MODEL) as usize),
         }
     }
@@ -139,14 +145,14 @@ const LOOKS: u64 = 8;
 /// Longest time between two looks, ns: an emergency stop is passed on within it even if the loop is stuck.
 const LONGEST_LOOK_NS: u64 = 1_000_000;
 
-/// Starts the watchdog's thread: `stopper` is used when `heart` has not changed for `limit_ns`, or when the
+/// Starts the watchdog's thread: the `stoppers` of all devices are used when `heart` has not changed for `limit_ns`, or when the
 /// emergency stop is pressed. Not real-time; ends with [`Heartbeat::finish`].
 ///
 /// # Errors
 /// What the system says if there can be no further thread.
 pub(crate) fn start(
     heart: Heartbeat,
-    stopper: Stopper,
+    stoppers: Vec<Stopper>,
     stop: StopSwitch,
     limit_ns: u64,
 ) -> std::io::Result<JoinHandle<()>> {
@@ -162,13 +168,13 @@ pub(crate) fn start(
             sleep_until(monotonic_ns() + look_ns);
             let (beat, now_ns) = (heart.beat(), monotonic_ns());
             if stop.emergency().is_some() && !stopped {
-                stopper.safe_stop();
+                stoppers.iter().for_each(Stopper::safe_stop);
                 stopped = true;
             }
             if beat != last {
                 (last, changed_ns) = (beat, now_ns);
             } else if now_ns - changed_ns > limit_ns && !heart.is_done() {
-                stopper.safe_stop();
+                stoppers.iter().for_each(Stopper::safe_stop);
                 heart.bite(beat);
                 return;
             }
@@ -185,9 +191,11 @@ mod tests {
         let heart = Heartbeat::default();
         for place in [
             Place::Waiting,
-            Place::DeviceRead,
             Place::Host,
-            Place::DeviceWrite,
+            Place::DeviceRead(0),
+            Place::DeviceRead(MOST_DEVICES - 1),
+            Place::DeviceWrite(0),
+            Place::DeviceWrite(MOST_DEVICES - 1),
             Place::Model(0),
             Place::Model(9999),
         ] {

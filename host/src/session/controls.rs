@@ -5,10 +5,11 @@
 use super::{PluginReport, prepare_model};
 use crate::record::{Change, ChangeSubject};
 use crate::registry::Registry;
-use crate::scene::{ModelUse, nearest};
+use crate::scene::{ModelUse, is_named, nearest};
 use crate::servo::{
     ChangeReport, ChangeSender, Clock, PLUGIN, ParameterChange, Replacement, ReportReceiver, WEIGHT, Workshop,
 };
+use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Setting, SettingError};
 use flotor_hal::{LoopConfig, Mutability, Parameter};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -80,7 +81,8 @@ fn live_words(live: &[String]) -> String {
 /// A new value for a parameter of a plugin of the run, in words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NewValue<'a> {
-    /// `device`, a model's name in the scene, or a plugin's id.
+    /// The name of a device or model in the scene (a model on several devices: `NAME@DEVICE` is the one on that
+    /// device, `NAME` all), or a plugin's id.
     pub plugin: &'a str,
     /// Id of the parameter.
     pub parameter: &'a str,
@@ -158,7 +160,7 @@ impl Controls {
     /// [`ControlError`]; then none of them changes.
     pub fn set_parameters(&self, values: &[NewValue<'_>]) -> Result<(), ControlError> {
         let checked = values.iter().map(|value| self.shared.parts.check(value));
-        self.send(&checked.collect::<Result<Vec<_>, _>>()?)
+        self.send(&checked.collect::<Result<Vec<_>, _>>()?.concat())
     }
 
     /// Lets a model be felt more or less: its weight moves there at the rate of its fade, from the next tick on. A
@@ -167,7 +169,7 @@ impl Controls {
     /// # Errors
     /// [`ControlError`]: no such model; the loop is busy or over.
     pub fn set_weight(&self, model: &str, weight: f64) -> Result<(), ControlError> {
-        self.send(&[self.shared.parts.check_weight(model, weight)?])
+        self.send(&self.shared.parts.check_weight(model, weight)?)
     }
 
     fn send(&self, checked: &[ParameterChange]) -> Result<(), ControlError> {
@@ -194,32 +196,36 @@ impl Controls {
         settings: &[(&str, &str)],
     ) -> Result<(), ControlError> {
         let Shared { parts, changes, models, config, clock, workshop } = &*self.shared;
-        let number = parts.number(model)?.checked_sub(1).ok_or(ControlError::NoWeight)?;
-        let index = usize::from(number);
+        let numbers = parts.models(model)?;
         if changes.is_abandoned() {
             return Err(ControlError::Ended);
         }
         let mut supervised = workshop.lock().unwrap_or_else(PoisonError::into_inner);
         supervised.sweep();
-        if supervised.busy.get(index).is_none_or(|busy| *busy) {
+        if numbers.iter().any(|number| supervised.busy.get(*number).is_none_or(|busy| *busy)) {
             return Err(ControlError::Busy);
         }
-        let place = models.get(index).ok_or(ControlError::Ended)?;
-        let other = place.replaced_by(plugin, settings);
         let refused = |error: super::RunError| ControlError::Refused {
             model: model.to_owned(),
             problem: error.to_string(),
         };
-        let (layer, report) = prepare_model(registry, &other, config, *clock).map_err(refused)?;
-        let generation = parts.add(number + 1, report);
-        parts.set_current(number + 1, generation);
-        let replacement = Replacement { model: number.into(), generation, layer: Box::new(layer) };
-        // There is room: at most one of each model is on its way.
-        let pushed = supervised.workshop.leaving_for_the_loop.push(replacement);
-        if let Some(busy) = supervised.busy.get_mut(index) {
-            *busy = pushed.is_ok();
+        let make = |number: &usize| {
+            let other = models.get(*number).ok_or(ControlError::Ended)?.replaced_by(plugin, settings);
+            prepare_model(registry, &other, config, *clock).map_err(refused)
+        };
+        let made = numbers.iter().map(make).collect::<Result<Vec<_>, _>>()?;
+        for (number, (layer, report)) in numbers.into_iter().zip(made) {
+            let generation = parts.put_in(number, report);
+            let model = u32::try_from(number).unwrap_or(u32::MAX); // a scene has fewer models
+            let replacement = Replacement { model, generation, layer: Box::new(layer) };
+            // There is room: at most one of each model is on its way.
+            let pushed = supervised.workshop.leaving_for_the_loop.push(replacement);
+            if let Some(busy) = supervised.busy.get_mut(number) {
+                *busy = pushed.is_ok();
+            }
+            pushed.map_err(|_| ControlError::Busy)?;
         }
-        pushed.map_err(|_| ControlError::Busy)
+        Ok(())
     }
 
     /// Drops models the loop has handed back, unless somebody else is at it. Not real-time.
@@ -267,12 +273,14 @@ impl Parts {
         self.list.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Another plugin for a place; its generation.
-    pub(super) fn add(&self, plugin: u16, report: PluginReport) -> u16 {
+    /// Another plugin in place of a model: changes are checked against it from now on. Its generation.
+    pub(super) fn put_in(&self, model: usize, report: PluginReport) -> u16 {
         let mut list = self.lock();
-        let Some(versions) = list.get_mut(usize::from(plugin)) else { return 0 };
+        let devices = devices(&list);
+        let Some(versions) = list.get_mut(devices + model) else { return 0 };
         versions.later.push(report);
-        u16::try_from(versions.later.len()).unwrap_or(u16::MAX)
+        versions.current = u16::try_from(versions.later.len()).unwrap_or(u16::MAX);
+        versions.current
     }
 
     /// Which plugin of a place changes are checked against.
@@ -287,32 +295,51 @@ impl Parts {
         self.lock().iter_mut().for_each(|versions| versions.current = 0);
     }
 
-    /// The number of the plugin of a name or id.
-    pub(super) fn number(&self, name: &str) -> Result<u16, ControlError> {
+    /// The numbers of the plugins of a name: one, or a model on all its devices; else the first of an id.
+    fn numbers(&self, name: &str) -> Result<Vec<u16>, ControlError> {
         let list = self.lock();
-        let names = || list.iter().map(|versions| versions.now().name.as_str());
-        let found = (0..).zip(&*list).find(|(_, versions)| versions.now().name == name);
-        let found =
-            found.or_else(|| (0..).zip(&*list).find(|(_, versions)| versions.now().metadata.id == name));
-        found.map(|(number, _)| number).ok_or_else(|| ControlError::UnknownPlugin {
-            name: name.to_owned(),
-            nearest: nearest(name, names()).map(str::to_owned),
-            names: names().map(str::to_owned).collect(),
+        let named = |versions: &Versions| is_named(&versions.now().name, name);
+        let found: Vec<u16> =
+            (0..).zip(&*list).filter(|(_, versions)| named(versions)).map(|(number, _)| number).collect();
+        if !found.is_empty() {
+            return Ok(found);
+        }
+        let of_id = (0..).zip(&*list).find(|(_, versions)| versions.now().metadata.id == name);
+        of_id.map(|(number, _)| vec![number]).ok_or_else(|| {
+            let names = || list.iter().map(|versions| versions.now().name.as_str());
+            ControlError::UnknownPlugin {
+                name: name.to_owned(),
+                nearest: nearest(name, names()).map(str::to_owned),
+                names: names().map(str::to_owned).collect(),
+            }
         })
     }
 
+    /// The numbers of the models of a name, among the models.
+    pub(super) fn models(&self, name: &str) -> Result<Vec<usize>, ControlError> {
+        let devices = devices(&self.lock());
+        let model = |number: u16| usize::from(number).checked_sub(devices).ok_or(ControlError::NoWeight);
+        self.numbers(name)?.into_iter().map(model).collect()
+    }
+
     /// A new weight for a model.
-    pub(super) fn check_weight(&self, model: &str, weight: f64) -> Result<ParameterChange, ControlError> {
+    pub(super) fn check_weight(
+        &self,
+        model: &str,
+        weight: f64,
+    ) -> Result<Vec<ParameterChange>, ControlError> {
+        self.models(model)?;
         let value = weight.clamp(0.0, 1.0);
-        match self.number(model)? {
-            0 => Err(ControlError::NoWeight),
-            plugin => Ok(ParameterChange { plugin, generation: 0, parameter: WEIGHT, value }),
-        }
+        let change = |plugin| ParameterChange { plugin, generation: 0, parameter: WEIGHT, value };
+        Ok(self.numbers(model)?.into_iter().map(change).collect())
     }
 
     /// From words to numbers, if the words are right.
-    pub(super) fn check(&self, new: &NewValue<'_>) -> Result<ParameterChange, ControlError> {
-        let plugin = self.number(new.plugin)?;
+    pub(super) fn check(&self, new: &NewValue<'_>) -> Result<Vec<ParameterChange>, ControlError> {
+        self.numbers(new.plugin)?.into_iter().map(|plugin| self.check_one(plugin, new)).collect()
+    }
+
+    fn check_one(&self, plugin: u16, new: &NewValue<'_>) -> Result<ParameterChange, ControlError> {
         let list = self.lock();
         let versions = list.get(usize::from(plugin)).ok_or(ControlError::Ended)?;
         let (part, generation) = (versions.now(), versions.current);
@@ -362,6 +389,11 @@ impl Parts {
             outcome,
         }
     }
+}
+
+/// How many of the plugins are devices: they come first.
+fn devices(plugins: &[Versions]) -> usize {
+    plugins.iter().take_while(|versions| versions.now().metadata.kind == PluginKind::Device).count()
 }
 
 /// Hands the changes of a run to its observer, each before the tick it belongs to.

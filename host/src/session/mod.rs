@@ -8,19 +8,20 @@ pub use controls::{ControlError, Controls, NewValue};
 pub(crate) use prepare::prepare_model;
 pub use steps::Steps;
 
+use crate::coupling::Tank;
 use crate::record::Change;
 use crate::registry::{LookupError, Registry};
-use crate::scene::{Scene, SceneError};
+use crate::scene::{MOST_DEVICES, Scene, SceneError};
 use crate::servo::{
-    Cause, Clock, EmergencySource, Envelope, Heartbeat, ModelHealth, ModelStack, ParameterQueue, Place,
-    RealTimeReport, RunConfig, RunState, Schedule, Servo, SpinWindow, StopSwitch, Stuck, Timing,
+    Cause, Clock, Coupled, EmergencySource, Envelope, Forces, Heartbeat, ModelHealth, ParameterQueue, Place,
+    RealTimeReport, RunConfig, RunState, Schedule, Servo, SpinWindow, Station, StopSwitch, Stuck, Timing,
     enter_real_time, exchange, start_watchdog,
 };
 use crate::trace::{RECORD_WORDS, TickRecord};
 use controls::{ChangeLog, Parts};
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{LoadError, Metadata, Stopper};
-use flotor_hal::{DVec3, EnergyLedger, Fault, LoopConfig, Pacing, Parameter};
+use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, Stopper};
+use flotor_hal::{DVec3, EnergyLedger, Fault, LoopConfig, Pacing, Parameter, SampleWait};
 use flotor_live::WrenchLimits;
 use prepare::Scheduled;
 use std::time::{Duration, Instant};
@@ -76,7 +77,7 @@ pub enum RunError {
 /// A plugin in a run, for reports and recordings.
 #[derive(Clone, Debug)]
 pub struct PluginReport {
-    /// Name in the scene ("device", or the model's name).
+    /// Name in the scene, of device or model.
     pub name: String,
     /// What the plugin says about itself.
     pub metadata: Metadata,
@@ -90,7 +91,7 @@ pub struct PluginReport {
 
 /// Looks at every tick, off the loop.
 pub trait Observer {
-    /// One tick, in order. Not real-time.
+    /// What a tick has left behind at one device: tick after tick, and within a tick device after device. Not real-time.
     fn observe(&mut self, record: &TickRecord);
 
     /// A parameter that changed, before the tick that saw it first. Not real-time.
@@ -100,7 +101,7 @@ pub trait Observer {
 /// A scene ready to run: everything loaded, paired and opened, nothing energised.
 pub struct Session {
     servo: Servo,
-    stopper: Stopper,
+    stoppers: Vec<Stopper>,
     controls: Controls,
     changes: ChangeLog,
     clock: Clock,
@@ -152,12 +153,33 @@ pub struct Outcome {
     pub dropped_records: u64,
     /// What the system granted.
     pub real_time: RealTimeReport,
-    /// Energy account of the device, where there is one.
-    pub ledger: Option<EnergyLedger>,
+    /// What the devices say at the end, in the scene's order.
+    pub devices: Vec<DeviceOutcome>,
+    /// Energy accounts of the ends of each coupling, in the scene's order.
+    pub couplings: Vec<[Tank; 2]>,
     /// Name, health and last words of each model.
     pub models: Vec<(String, ModelHealth, String)>,
-    /// Last words of the device; empty if it had no reason to say any.
-    pub device_words: String,
+}
+
+impl Outcome {
+    /// Which device faulted, and its last words.
+    #[must_use]
+    pub fn faulted(&self) -> Option<(usize, &str)> {
+        let mut devices = self.devices.iter().enumerate();
+        let (number, device) = devices.find(|(_, device)| device.fault.is_some())?;
+        Some((number, device.words.as_str()))
+    }
+}
+
+/// What is known of a device after a run.
+#[derive(Clone, Debug)]
+pub struct DeviceOutcome {
+    /// The first fault it reported.
+    pub fault: Option<Fault>,
+    /// Its own energy account, where it keeps one.
+    pub ledger: Option<EnergyLedger>,
+    /// Its last words; empty if it had no reason to say any.
+    pub words: String,
 }
 
 /// Records that fit between loop and observers: four seconds at 1 kHz.
@@ -182,32 +204,24 @@ impl Session {
         let duration_ns = (scene.duration_s * 1.0e9).round() as u64;
         let config = LoopConfig { period_ns, seed: options.seed };
 
-        let device_plugin = prepare::load(registry, &scene.device, PluginKind::Device)?;
-        let settings = prepare::settings(&device_plugin, "device", &scene.device.parameters)?;
-        let mut device = device_plugin.open_device(&settings)?;
-        let refused = |refusal| prepare::refused(&device_plugin, refusal);
-        let capabilities = device.capabilities().map_err(refused)?;
-        let mut plugins = vec![PluginReport {
-            name: "device".to_owned(),
-            metadata: device_plugin.metadata().clone(),
-            schema: device_plugin.parameters(),
-            settings: prepare::as_written(&scene.device),
-            parameters: prepare::in_force(&device_plugin, &settings, |index| device.parameter(index)),
-        }];
-
-        if let Some(calibration) = &scene.calibration {
-            prepare::calibrate(&device_plugin, &mut device, calibration)?;
-        }
-
-        let mut models = Vec::new();
-        for model in &scene.models {
-            let (slot, report) = prepare_model(registry, model, &config, options.clock)?;
-            models.push(slot);
+        let mut plugins = Vec::new();
+        let mut opened = Vec::new();
+        for device in &scene.devices {
+            let (device, report) = prepare::open_device(registry, device)?;
+            opened.push(device);
             plugins.push(report);
         }
-        let mismatches = prepare::pair(scene, &capabilities, device.can_pace());
-        if !mismatches.is_empty() {
-            return Err(RunError::Mismatch { device: scene.device.plugin.clone(), mismatches });
+        let mut models = Vec::new();
+        for model in &scene.models {
+            let (layer, report) = prepare_model(registry, model, &config, options.clock)?;
+            models.push((usize::from(model.device), layer));
+            plugins.push(report);
+        }
+        for (number, (device, opened)) in (0..).zip(scene.devices.iter().zip(&opened)) {
+            let mismatches = prepare::pair(scene, number, &opened.capabilities, opened.device.can_pace());
+            if !mismatches.is_empty() {
+                return Err(RunError::Mismatch { device: device.plugin.plugin.clone(), mismatches });
+            }
         }
         let parts = Parts::new(&plugins);
         let Scheduled { changes, replacements } =
@@ -217,17 +231,26 @@ impl Session {
         let (exchange, workshop) = exchange(models.len(), replacements);
         let controls = Controls::new(parts.clone(), sender, &scene.models, (config, options.clock), workshop);
 
-        let envelope = Envelope::new(&scene.limits, &scene.boundary, &capabilities, period_ns);
-        let stopper = device.stopper();
-        let active = device.activate(&config).map_err(|(_, refusal)| refused(refusal))?;
+        let stoppers: Vec<Stopper> = opened.iter().map(|opened| opened.device.stopper()).collect();
+        let activate = |opened: prepare::Opened| {
+            let envelope = Envelope::new(&scene.limits, &scene.boundary, &opened.capabilities, period_ns);
+            Ok(Station::new(opened.activate(&config)?, envelope))
+        };
+        let stations = opened.into_iter().map(activate).collect::<Result<Vec<_>, RunError>>();
+        // If one says no, none stays energised.
+        let stations = stations.inspect_err(|_| stoppers.iter().for_each(Stopper::safe_stop))?;
+        #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
+        let period_s = period_ns as f64 * 1.0e-9;
+        let couplings = scene.couplings.iter().map(|coupling| Coupled::new(coupling, period_s)).collect();
+        let forces = Forces::new(stations.len(), models, couplings);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a minute
         let [ramp_ns, watchdog_ns] =
             [scene.limits.ramp_s, scene.limits.watchdog_s].map(|seconds| (seconds * 1.0e9).round() as u64);
         let run = RunConfig { period_ns, ramp_ns, emergency_buttons: scene.limits.emergency_buttons };
-        let servo = Servo::new(active, ModelStack::new(models), parameters, exchange, envelope, run);
+        let servo = Servo::new(stations, forces, parameters, exchange, run);
         Ok(Self {
             servo,
-            stopper,
+            stoppers,
             controls,
             changes: ChangeLog::new(parts, reports),
             clock: options.clock,
@@ -239,9 +262,9 @@ impl Session {
         })
     }
 
-    /// The loop itself, for whoever paces it differently; the stopper must be used before it is dropped.
-    pub(crate) fn into_loop(self) -> (Servo, Stopper, u64) {
-        (self.servo, self.stopper, self.period_ns)
+    /// The loop itself, for whoever paces it differently; the stoppers must be used before it is dropped.
+    pub(crate) fn into_loop(self) -> (Servo, Vec<Stopper>, u64) {
+        (self.servo, self.stoppers, self.period_ns)
     }
 
     /// The plugins of this run with every parameter in force.
@@ -250,11 +273,11 @@ impl Session {
         &self.plugins
     }
 
-    /// The most that may reach the hand: the tighter of what scene and device allow.
+    /// The most that may reach a hand at any device: the tighter of what scene and device allow.
     #[must_use]
     pub fn limits(&self) -> WrenchLimits {
         let finite = |most: DVec3| most.to_array().map(|limit| limit.is_finite().then_some(limit));
-        let [force_n, torque_nm] = self.servo.envelope().most().map(finite);
+        let [force_n, torque_nm] = self.servo.most().map(finite);
         WrenchLimits { force_n, torque_nm }
     }
 
@@ -271,17 +294,22 @@ impl Session {
     /// left behind then, and the process should end soon.
     pub fn run(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Outcome, RunError> {
         let started = Instant::now();
-        let stopper = self.stopper.clone();
-        let names: Vec<String> = self.plugins.iter().skip(1).map(|plugin| plugin.name.clone()).collect();
+        let stoppers = self.stoppers.clone();
+        let names: Vec<String> = self.plugins.iter().map(|plugin| plugin.name.clone()).collect();
         let finished = match self.clock {
             Clock::Virtual => self.run_virtual(observer, stop),
             Clock::Real => self.run_real(observer, stop)?,
         };
-        stopper.safe_stop();
+        stoppers.iter().for_each(Stopper::safe_stop);
         let Finished { mut servo, end, elapsed_ns, dropped_records, real_time } = finished;
-        let ledger = servo.device().energy_ledger();
-        let device_words = servo.device().last_message();
-        let models = names.into_iter().zip(servo.models().health());
+        let told = |(device, fault): (&mut ActiveDevice, Option<Fault>)| DeviceOutcome {
+            fault,
+            ledger: device.energy_ledger(),
+            words: device.last_message(),
+        };
+        let devices: Vec<DeviceOutcome> = servo.devices().map(told).collect();
+        let couplings = servo.forces().tanks();
+        let models = names.into_iter().skip(devices.len()).zip(servo.forces().health());
         let models = models.map(|(name, (health, words))| (name, health, words)).collect();
         let timing = servo.into_timing();
         let wall_s = started.elapsed().as_secs_f64();
@@ -292,9 +320,9 @@ impl Session {
             wall_s,
             dropped_records,
             real_time,
-            ledger,
+            devices,
+            couplings,
             models,
-            device_words,
         })
     }
 
@@ -302,12 +330,11 @@ impl Session {
     fn run_virtual(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Finished {
         let Session { servo, controls, mut changes, period_ns, duration_ns, .. } = self;
         let mut runner = Runner::new(servo, Schedule::start_virtual(period_ns), duration_ns);
-        let mut batch = Vec::with_capacity(VIRTUAL_BATCH);
+        // A tick may end a batch with a record for each device.
+        let mut batch = Vec::with_capacity(VIRTUAL_BATCH + usize::from(MOST_DEVICES));
         while runner.end.is_none() {
             while batch.len() < VIRTUAL_BATCH && runner.end.is_none() {
-                if let Some(record) = runner.next(stop) {
-                    batch.push(record);
-                }
+                runner.next(stop, |record| batch.push(*record));
             }
             for record in batch.drain(..) {
                 changes.up_to(record.tick, |change| observer.change(change));
@@ -323,7 +350,7 @@ impl Session {
         let (mut sender, mut receiver) = flotor_sync::ring::<TickRecord, RECORD_WORDS>(RING_RECORDS);
         let Session {
             servo,
-            stopper,
+            stoppers,
             controls,
             mut changes,
             pacing,
@@ -341,24 +368,24 @@ impl Session {
         let loop_stop = stop.clone();
         // Not scoped: a thread that is stuck in a plugin has to be left behind.
         let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
-        let (loop_heart, loop_stopper) = (heart.clone(), stopper.clone());
+        let loop_heart = heart.clone();
         let servo_thread = thread.spawn(move || {
             let real_time = enter_real_time();
             let schedule = match pacing {
                 Pacing::Host => Schedule::start_real(period_ns, SpinWindow::measure(period_ns)),
                 Pacing::Device => Schedule::start_paced(period_ns),
             };
-            let watchdog = start_watchdog(loop_heart, loop_stopper, loop_stop.clone(), watchdog_ns);
+            let watchdog = start_watchdog(loop_heart, stoppers, loop_stop.clone(), watchdog_ns);
             let mut runner = Runner::new(servo, schedule, duration_ns);
             // Without a watchdog nothing is moved.
             if watchdog.is_err() {
                 runner.end = Some(RunEnd::Stopped);
             }
             while runner.end.is_none() {
-                if let Some(record) = runner.next(&loop_stop) {
+                runner.next(&loop_stop, |record| {
                     // A full ring is counted by the ring itself: observers never hold up the loop.
-                    let _ = sender.push(&record);
-                }
+                    let _ = sender.push(record);
+                });
             }
             runner.servo.heart().finish();
             watchdog.map(|_| runner.finish(0, real_time))
@@ -386,9 +413,10 @@ impl Session {
 /// Whose fault a stuck loop is, by name.
 fn hung(stuck: Stuck, plugins: &[PluginReport], limit_ns: u64) -> RunError {
     let name = |index: usize| plugins.get(index).map_or_else(String::new, |plugin| plugin.name.clone());
+    let devices = plugins.iter().filter(|plugin| plugin.metadata.kind == PluginKind::Device).count();
     let who = match stuck.place {
-        Place::Model(index) => name(index + 1),
-        Place::DeviceRead | Place::DeviceWrite => name(0),
+        Place::Model(index) => name(devices + index),
+        Place::DeviceRead(device) | Place::DeviceWrite(device) => name(device.into()),
         Place::Host | Place::Waiting => "host".to_owned(),
     };
     RunError::Hung { who, stuck, limit_ns }
@@ -415,23 +443,30 @@ impl Runner {
         Self { servo, schedule, duration_ns, end: None }
     }
 
-    /// Waits for and runs the next tick, or sets `end`. Real-time: bounded, no allocation.
+    /// Waits for and runs the next tick, or sets `end`; `leave` gets what it leaves behind. Real-time: bounded, no
+    /// allocation.
     #[inline]
-    fn next(&mut self, stop: &StopSwitch) -> Option<TickRecord> {
+    fn next(&mut self, stop: &StopSwitch, leave: impl FnMut(&TickRecord)) {
         if self.schedule.next_time_ns() >= self.duration_ns {
             self.end = Some(RunEnd::Finished);
-            return None;
+            return;
         }
-        let device = self.servo.device();
-        let Some(due) = self.schedule.wait(|timeout_ns| device.wait_for_sample(timeout_ns)) else {
-            self.end = Some(RunEnd::DeviceFault(Fault::Broken));
-            return None;
+        let Self { servo, schedule, .. } = self;
+        // The first device sets the pace, if one does.
+        let wait_for_sample = |timeout_ns| {
+            servo
+                .devices()
+                .next()
+                .map_or(SampleWait::NotPaced, |(device, _)| device.wait_for_sample(timeout_ns))
         };
-        let record = self.servo.tick(&due, stop);
-        if self.servo.run().is_over() {
-            self.end = Some(RunEnd::of(self.servo.run(), self.servo.heart()));
+        let Some(due) = schedule.wait(wait_for_sample) else {
+            self.end = Some(RunEnd::DeviceFault(Fault::Broken));
+            return;
+        };
+        servo.tick(&due, stop, leave);
+        if servo.run().is_over() {
+            self.end = Some(RunEnd::of(servo.run(), servo.heart()));
         }
-        Some(record)
     }
 
     fn finish(self, dropped_records: u64, real_time: RealTimeReport) -> Finished {

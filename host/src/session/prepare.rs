@@ -6,12 +6,13 @@ use crate::calibration::file::{CalibrationFile, CalibrationFileError};
 use crate::mapping::Mapping;
 use crate::registry::{LookupError, Registry};
 use crate::scene::{
-    CalibrationUse, ChangeUse, ChangeWhat, Isolation, ModelUse, ParameterText, PluginUse, Scene, SceneError,
+    CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, ParameterText, PluginUse, Scene,
+    SceneError,
 };
 use crate::servo::{Clock, Engine, Layer, Replacement, ScheduledChange, TimeBudget};
 use crate::worker::{Worker, WorkerOrder};
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting};
+use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, OpenedDevice, Plugin, Setting};
 use flotor_hal::{Capabilities, LoopConfig, Pacing, Parameter, ParameterKind, Refusal};
 use std::borrow::Cow;
 
@@ -31,7 +32,7 @@ pub(super) fn refused(plugin: &Plugin, refusal: Refusal) -> RunError {
 }
 
 /// Hands the numbers of a scene's calibration file to the device they were measured on. Not real-time.
-pub(super) fn calibrate(
+fn calibrate(
     plugin: &Plugin,
     device: &mut OpenedDevice,
     calibration: &CalibrationUse,
@@ -45,6 +46,44 @@ pub(super) fn calibrate(
     let id = &plugin.metadata().id;
     file.check_device(&path.display().to_string(), id, &device.serial()).map_err(wrong)?;
     device.calibrate_vertical(&curve).map_err(|refusal| refused(plugin, refusal))
+}
+
+/// A device that is opened, not energised.
+pub(super) struct Opened {
+    plugin: Plugin,
+    pub(super) device: OpenedDevice,
+    pub(super) capabilities: Capabilities,
+}
+
+impl Opened {
+    /// Energises it. Not real-time.
+    pub(super) fn activate(self, config: &LoopConfig) -> Result<ActiveDevice, RunError> {
+        let Self { plugin, device, .. } = self;
+        device.activate(config).map_err(|(_, refusal)| refused(&plugin, refusal))
+    }
+}
+
+/// Loads and opens one device of a scene. Not real-time.
+pub(super) fn open_device(
+    registry: &Registry,
+    device: &DeviceUse,
+) -> Result<(Opened, PluginReport), RunError> {
+    let DeviceUse { name, plugin: used, calibration } = device;
+    let plugin = load(registry, used, PluginKind::Device)?;
+    let settings = settings(&plugin, name, &used.parameters)?;
+    let mut device = plugin.open_device(&settings)?;
+    let capabilities = device.capabilities().map_err(|refusal| refused(&plugin, refusal))?;
+    let report = PluginReport {
+        name: name.clone(),
+        metadata: plugin.metadata().clone(),
+        schema: plugin.parameters(),
+        settings: as_written(used),
+        parameters: in_force(&plugin, &settings, |index| device.parameter(index)),
+    };
+    if let Some(calibration) = calibration {
+        calibrate(&plugin, &mut device, calibration)?;
+    }
+    Ok((Opened { plugin, device, capabilities }, report))
 }
 
 /// Loads one model of a scene and creates it in all its places. Not real-time.
@@ -168,8 +207,8 @@ pub(super) fn in_force(
     schema.iter().enumerate().map(show).collect()
 }
 
-/// What of a scene the device cannot do; all at once, before anything is energised.
-pub(super) fn pair(scene: &Scene, device: &Capabilities, can_pace: bool) -> Vec<String> {
+/// What of a scene its device `number` cannot do; all at once, before anything is energised.
+pub(super) fn pair(scene: &Scene, number: u16, device: &Capabilities, can_pace: bool) -> Vec<String> {
     let mut mismatches = Vec::new();
     let [slowest, fastest] = device.rate_hz;
     if scene.rate_hz < slowest || scene.rate_hz > fastest {
@@ -178,12 +217,15 @@ pub(super) fn pair(scene: &Scene, device: &Capabilities, can_pace: bool) -> Vec<
             scene.rate_hz
         ));
     }
-    if scene.pacing == Pacing::Device && !can_pace {
+    // The first device sets the pace, if one does.
+    if scene.pacing == Pacing::Device && number == 0 && !can_pace {
         mismatches.push(
             "it cannot set the pace of the loop; remove `pacing`, or say `pacing = \"host\"`".to_owned(),
         );
     }
-    if !scene.models.is_empty() && !device.actuated.contains(flotor_hal::Axes::TRANSLATION) {
+    let is_felt = scene.models.iter().any(|model| model.device == number)
+        || scene.couplings.iter().any(|coupling| coupling.ends.iter().any(|end| end.device == number));
+    if is_felt && !device.actuated.contains(flotor_hal::Axes::TRANSLATION) {
         mismatches
             .push("the device gives no force, so no model can be felt; use it for input only".to_owned());
     }
@@ -228,22 +270,21 @@ pub(super) fn schedule(
                 parts.check_weight(model, *weight).map_err(|error| complain("change.weight", error))?
             }
             ChangeWhat::Swap { model, plugin, parameters } => {
-                let number = parts.number(model).map_err(|error| complain("change.swap", error))?;
-                let place = number.checked_sub(1).and_then(|index| scene.models.get(usize::from(index)));
-                let place = place.ok_or_else(|| complain("change.swap", ControlError::NoWeight))?;
-                let mut other = place.replaced_by(plugin.as_deref(), &[]);
-                other.plugin.location = change.location.clone();
-                other.plugin.parameters.extend(parameters.iter().cloned());
-                let (layer, report) = prepare_model(registry, &other, config, clock)?;
-                let generation = parts.add(number, report);
-                parts.set_current(number, generation);
-                let replacement =
-                    Replacement { model: u32::from(number) - 1, generation, layer: Box::new(layer) };
-                scheduled.replacements.push((time_ns, replacement));
+                for number in parts.models(model).map_err(|error| complain("change.swap", error))? {
+                    let Some(place) = scene.models.get(number) else { continue };
+                    let mut other = place.replaced_by(plugin.as_deref(), &[]);
+                    other.plugin.location = change.location.clone();
+                    other.plugin.parameters.extend(parameters.iter().cloned());
+                    let (layer, report) = prepare_model(registry, &other, config, clock)?;
+                    let generation = parts.put_in(number, report);
+                    let model = u32::try_from(number).unwrap_or(u32::MAX); // a scene has fewer models
+                    let replacement = Replacement { model, generation, layer: Box::new(layer) };
+                    scheduled.replacements.push((time_ns, replacement));
+                }
                 continue;
             }
         };
-        scheduled.changes.push(ScheduledChange { time_ns, change: checked });
+        scheduled.changes.extend(checked.into_iter().map(|change| ScheduledChange { time_ns, change }));
     }
     parts.start_with_the_first();
     Ok(scheduled)

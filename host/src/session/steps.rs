@@ -6,13 +6,13 @@ use crate::scene::Scene;
 use crate::servo::{Clock, Schedule, StopSwitch};
 use flotor_hal::abi::loader::Stopper;
 
-/// A run that goes on when it is told to. When it is dropped the device is stopped.
+/// A run that goes on when it is told to. When it is dropped the devices are stopped.
 pub struct Steps {
     runner: Runner,
     controls: Controls,
     changes: ChangeLog,
     stop: StopSwitch,
-    stopper: Stopper,
+    stoppers: Vec<Stopper>,
 }
 
 impl Steps {
@@ -22,9 +22,9 @@ impl Steps {
     /// [`RunError`]; nothing is energised before this has succeeded.
     pub fn prepare(scene: &Scene, registry: &Registry, seed: u64) -> Result<Self, RunError> {
         let session = Session::prepare(scene, registry, &RunOptions { clock: Clock::Virtual, seed })?;
-        let Session { servo, stopper, controls, changes, period_ns, duration_ns, .. } = session;
+        let Session { servo, stoppers, controls, changes, period_ns, duration_ns, .. } = session;
         let runner = Runner::new(servo, Schedule::start_virtual(period_ns), duration_ns);
-        Ok(Self { runner, controls, changes, stop: StopSwitch::default(), stopper })
+        Ok(Self { runner, controls, changes, stop: StopSwitch::default(), stoppers })
     }
 
     /// The handle by which parameters, weights and models of the run are changed.
@@ -38,17 +38,17 @@ impl Steps {
     /// # Errors
     /// How the run ended, if it did; then there was no tick.
     pub fn advance(&mut self, observer: &mut dyn Observer) -> Result<(), RunEnd> {
-        let record = self.runner.next(&self.stop);
-        if let Some(record) = record {
-            self.changes.up_to(record.tick, |change| observer.change(change));
-            observer.observe(&record);
-        }
+        let Self { runner, changes, stop, .. } = self;
+        runner.next(stop, |record| {
+            changes.up_to(record.tick, |change| observer.change(change));
+            observer.observe(record);
+        });
         self.runner.end.map_or(Ok(()), Err)
     }
 }
 
 impl Drop for Steps {
     fn drop(&mut self) {
-        self.stopper.safe_stop();
+        self.stoppers.iter().for_each(Stopper::safe_stop);
     }
 }

@@ -157,7 +157,7 @@ impl Apparatus {
         Ok(apparatus)
     }
 
-    /// Whether the device has a hand a simulated observer can feel with.
+    /// Whether the first device has a hand a simulated observer can feel with.
     ///
     /// # Errors
     /// [`ApparatusError::NoHand`].
@@ -166,7 +166,9 @@ impl Apparatus {
         let lacks = |id: &&'static str| !schema.iter().any(|parameter| parameter.id() == *id);
         let missing = HAND.iter().map(|(id, _)| *id).find(lacks);
         missing.map_or(Ok(()), |missing| {
-            Err(ApparatusError::NoHand { device: self.scene.device.plugin.clone(), missing })
+            let device =
+                self.scene.devices.first().map_or_else(String::new, |device| device.plugin.plugin.clone());
+            Err(ApparatusError::NoHand { device, missing })
         })
     }
 
@@ -211,7 +213,9 @@ impl Apparatus {
         let mut scene = self.scene.clone();
         // In front: what a scene or a person has set stays.
         let parameters = HAND.iter().map(|(id, value)| text(id, value(&hand)));
-        scene.device.parameters.splice(0..0, parameters);
+        if let Some(device) = scene.devices.first_mut() {
+            device.plugin.parameters.splice(0..0, parameters);
+        }
         scene
     }
 

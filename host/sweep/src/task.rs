@@ -351,7 +351,10 @@ fn check_model_axes(plan: &Plan, plugin: &Plugin) -> Result<(), SweepError> {
 
 /// Files of the plugins a scene names.
 fn used_plugins(scene: &Scene, registry: &Registry) -> Result<Vec<PathBuf>, SweepError> {
-    let mut files = vec![registry.load(&scene.device.plugin, PluginKind::Device)?.metadata().path.clone()];
+    let mut files = Vec::new();
+    for device in &scene.devices {
+        files.push(registry.load(&device.plugin.plugin, PluginKind::Device)?.metadata().path.clone());
+    }
     for model in &scene.models {
         files.push(registry.load(&model.plugin.plugin, PluginKind::Model)?.metadata().path.clone());
     }

@@ -524,5 +524,6 @@ fn nothing_yet() -> RunDescription {
         clock: flotor_record::Clock::Real,
         scene_toml: String::new(),
         plugins: Vec::new(),
+        couplings: Vec::new(),
     }
 }

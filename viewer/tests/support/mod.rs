@@ -58,6 +58,7 @@ pub(crate) fn spring_run(settings: &[(&str, &str)]) -> (RunDescription, Vec<Pane
         blend: Blend::default(),
         settings,
         parameters,
+        device: 0,
     };
     let run = RunDescription {
         flotor_version: "0.1.0".to_owned(),
@@ -70,6 +71,7 @@ pub(crate) fn spring_run(settings: &[(&str, &str)]) -> (RunDescription, Vec<Pane
             description("device", Role::Device, Vec::new(), Vec::new()),
             description("spring", Role::Model(MappingConfig::default()), settings, parameters.clone()),
         ],
+        couplings: Vec::new(),
     };
     let panels = vec![
         PanelPlugin::new("device", "simulated", PathBuf::new(), &[], &[]),

@@ -1,6 +1,4 @@
-//! All force models of a loop: who is asked, and how the answers are put together.
-//!
-//! The same code runs in the servo and in a replay; that is why a replay can be bit-exact.
+//! All force models of a device: who is asked, and how the answers are put together.
 //!
 //! A scene's models are *layers*. Their wrenches add up, each by its weight; a layer that pushes silences those of
 //! lower priority; weights move at a steady rate, so that nothing jumps when one model gives way to another. A layer
@@ -27,7 +25,7 @@ use slot::Slot;
 /// need not act.
 const SILENCE_S: f64 = 0.02;
 
-/// All models of a loop.
+/// All models of a device.
 pub(crate) struct ModelStack {
     slots: Box<[Slot]>,
     broad: BroadPhase,
@@ -56,8 +54,10 @@ struct Level {
 
 impl ModelStack {
     /// Not real-time.
-    pub(crate) fn new(layers: Vec<Layer>) -> Self {
-        let slots: Box<[Slot]> = layers.into_iter().map(Slot::new).collect();
+    ///
+    /// Each layer comes with the number of its model in the scene.
+    pub(crate) fn new(layers: Vec<(usize, Layer)>) -> Self {
+        let slots: Box<[Slot]> = layers.into_iter().map(|(number, layer)| Slot::new(number, layer)).collect();
         let broad = BroadPhase::new(slots.iter().map(Slot::bounds).collect());
         let mut priorities: Vec<u8> = slots.iter().map(|slot| slot.priority).collect();
         priorities.sort_unstable();
@@ -88,7 +88,7 @@ impl ModelStack {
             if slot.weight.is_silent(tick.time_ns) || level.gain.is_silent(tick.time_ns) {
                 return;
             }
-            heart.enter(tick.index, Place::Model(index));
+            heart.enter(tick.index, Place::Model(slot.number));
             let share = slot.step(tick, state, events);
             let weight = slot.weight.at(tick.time_ns);
             level.pushes |= weight > 0.0 && share.wrench != Wrench::ZERO;
@@ -105,7 +105,7 @@ impl ModelStack {
         (sum.wrench, sum.energy_j)
     }
 
-    /// Changes a live parameter of the model numbered `model`. Real-time: bounded by its objects, no allocation.
+    /// Changes a live parameter of the model in place `model`. Real-time: bounded by its objects, no allocation.
     pub(crate) fn set_parameter(
         &mut self,
         model: usize,
@@ -119,14 +119,14 @@ impl ModelStack {
         status
     }
 
-    /// Moves the weight of the model numbered `model` to a new value, at its rate. Real-time: bounded, no allocation.
+    /// Moves the weight of the model in place `model` to a new value, at its rate. Real-time: bounded, no allocation.
     pub(crate) fn set_weight(&mut self, model: usize, tick: &Tick, weight: f64) -> CallStatus {
         let Some(slot) = self.slots.get_mut(model) else { return CallStatus::Unsupported };
         slot.weight.set_target(weight, tick.time_ns);
         CallStatus::Ok
     }
 
-    /// How often the model numbered `model` was replaced. Real-time: bounded, no allocation.
+    /// How often the model in place `model` was replaced. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn generation(&self, model: usize) -> Option<u16> {
         self.slots.get(model).map(|slot| slot.generation)
@@ -136,23 +136,28 @@ impl ModelStack {
     /// fading, is returned: dropping it is not for the loop.
     ///
     /// Real-time: bounded by the objects of the model, no allocation.
-    pub(crate) fn replace(&mut self, replacement: Replacement, tick: &Tick) -> Option<Box<Layer>> {
-        let Replacement { model, generation, layer } = replacement;
-        let Some(slot) = self.slots.get_mut(model as usize) else { return Some(layer) };
+    pub(crate) fn replace(
+        &mut self,
+        model: usize,
+        layer: Box<Layer>,
+        generation: u16,
+        tick: &Tick,
+    ) -> Option<Box<Layer>> {
+        let Some(slot) = self.slots.get_mut(model) else { return Some(layer) };
         let pushed_out = slot.put(layer, generation, tick);
         self.leaving += usize::from(pushed_out.is_none());
-        self.rebound(model as usize);
+        self.rebound(model);
         pushed_out
     }
 
-    /// A layer that has faded out, and the number of its model. Real-time: bounded by the models, no allocation.
+    /// A layer that has faded out, and the number of its model in the scene. Real-time: bounded by the models, no allocation.
     #[inline]
     pub(crate) fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {
         if self.leaving == 0 {
             return None;
         }
-        let mut slots = (0..).zip(&mut *self.slots);
-        let faded = slots.find_map(|(model, slot)| Some((model, slot.take_faded(tick)?)));
+        let take = |slot: &mut Slot| Some((u32::try_from(slot.number).ok()?, slot.take_faded(tick)?));
+        let faded = self.slots.iter_mut().find_map(take);
         self.leaving -= usize::from(faded.is_some());
         faded
     }

@@ -11,6 +11,8 @@ use flotor_hal::abi::CallStatus;
 use flotor_hal::{DeviceState, Tick};
 
 pub(super) struct Slot {
+    /// Of the model in the scene.
+    pub(super) number: usize,
     current: Box<Layer>,
     /// How far the current layer has come in.
     presence: Fade,
@@ -26,9 +28,10 @@ pub(super) struct Slot {
 
 impl Slot {
     /// Not real-time.
-    pub(super) fn new(layer: Layer) -> Self {
+    pub(super) fn new(number: usize, layer: Layer) -> Self {
         let blend = *layer.blend();
         Self {
+            number,
             current: Box::new(layer),
             presence: Fade::new(1.0, blend.fade_s),
             leaving: None,

@@ -1,0 +1,196 @@
+//! Everything that asks for a wrench: the models of each device, and the couplings between devices.
+//!
+//! The same code runs in the servo and in a replay; that is why a replay can be bit-exact.
+
+use super::Heartbeat;
+use super::models::{Layer, ModelHealth, ModelStack, Replacement};
+use crate::coupling::{Coupling, CouplingDescription, Grip, Pull, Tank};
+use crate::trace::Events;
+use flotor_hal::abi::CallStatus;
+use flotor_hal::{DeviceState, Tick, Wrench};
+
+/// What passes through the port of one device in a tick, device frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Port {
+    /// Where the handle is, as last known.
+    pub(crate) state: DeviceState,
+    /// The wrench that is held since the last tick.
+    pub(crate) commanded: Wrench,
+    /// What models and couplings ask for.
+    pub(crate) asked: Wrench,
+    /// Of this, what the models alone ask for.
+    by_models: Wrench,
+    /// Energy stored in models and couplings, J.
+    pub(crate) energy_j: f64,
+    /// What has happened in this tick.
+    pub(crate) events: Events,
+}
+
+impl Port {
+    /// A port at rest.
+    pub(crate) const REST: Port = Port {
+        state: DeviceState::HOME,
+        commanded: Wrench::ZERO,
+        asked: Wrench::ZERO,
+        by_models: Wrench::ZERO,
+        energy_j: 0.0,
+        events: Events::NONE,
+    };
+
+    /// What is held for the couplings: all that is not the models'. Exact where a device has no models; where it has,
+    /// what the envelope takes away counts as taken from the coupling.
+    #[inline]
+    fn held_for_couplings(&self) -> Wrench {
+        self.commanded - self.by_models
+    }
+}
+
+/// A coupling and the devices it holds together.
+pub(crate) struct Coupled {
+    coupling: Coupling,
+    devices: [usize; 2],
+    pulls: [Pull; 2],
+}
+
+impl Coupled {
+    /// Not real-time.
+    pub(crate) fn new(description: &CouplingDescription, period_s: f64) -> Self {
+        let devices = description.ends.map(|end| usize::from(end.device));
+        Self { coupling: Coupling::new(description, period_s), devices, pulls: [Pull::default(); 2] }
+    }
+
+    /// Asks the coupling. Real-time: bounded, no allocation.
+    #[inline]
+    fn step(&mut self, ports: &[Port]) {
+        let [Some(first), Some(second)] = self.devices.map(|device| ports.get(device)) else { return };
+        let grips = [first, second].map(|port| Grip { state: &port.state, held: port.held_for_couplings() });
+        self.pulls = self.coupling.step(grips);
+    }
+
+    /// Adds what it asked for. Real-time: bounded, no allocation.
+    #[inline]
+    fn add_to(&self, ports: &mut [Port]) {
+        for (device, pull) in self.devices.into_iter().zip(&self.pulls) {
+            let Some(port) = ports.get_mut(device) else { continue };
+            port.asked = port.asked + pull.wrench;
+            port.energy_j += pull.energy_j;
+            if pull.is_damped {
+                port.events.insert(Events::PASSIVITY_DAMPED);
+            }
+        }
+    }
+}
+
+/// Which device a model is on, and which of the models there it is.
+#[derive(Clone, Copy, Debug)]
+struct Whereabouts {
+    device: usize,
+    place: usize,
+}
+
+/// All models and couplings of a run.
+pub(crate) struct Forces {
+    /// The models of each device.
+    stacks: Box<[ModelStack]>,
+    /// By number of the model in the scene.
+    models: Box<[Whereabouts]>,
+    couplings: Box<[Coupled]>,
+}
+
+impl Forces {
+    /// `layers` are the scene's models, each with the device it is on. Not real-time.
+    pub(crate) fn new(devices: usize, layers: Vec<(usize, Layer)>, couplings: Vec<Coupled>) -> Self {
+        let mut on_device: Vec<Vec<(usize, Layer)>> =
+            std::iter::repeat_with(Vec::new).take(devices).collect();
+        let mut models = Vec::with_capacity(layers.len());
+        for (number, (device, layer)) in layers.into_iter().enumerate() {
+            let Some(stack) = on_device.get_mut(device) else { continue };
+            models.push(Whereabouts { device, place: stack.len() });
+            stack.push((number, layer));
+        }
+        Self {
+            stacks: on_device.into_iter().map(ModelStack::new).collect(),
+            models: models.into(),
+            couplings: couplings.into(),
+        }
+    }
+
+    /// What all of them ask for at the states of the ports, one for each device. Real-time: bounded by the models that
+    /// are near, no allocation.
+    #[inline]
+    pub(crate) fn step(&mut self, tick: &Tick, ports: &mut [Port], heart: &Heartbeat) {
+        let Self { stacks, couplings, .. } = self;
+        // The couplings first: what is held now is what they and the models asked for last.
+        couplings.iter_mut().for_each(|coupled| coupled.step(ports));
+        for (stack, port) in stacks.iter_mut().zip(&mut *ports) {
+            let (wrench, energy_j) = stack.step(tick, &port.state, heart, &mut port.events);
+            (port.asked, port.by_models, port.energy_j) = (wrench, wrench, energy_j);
+        }
+        couplings.iter().for_each(|coupled| coupled.add_to(ports));
+    }
+
+    /// The models a model's number stands for, and its place among them.
+    #[inline]
+    fn stack_of(&mut self, model: usize) -> Option<(&mut ModelStack, usize)> {
+        let Whereabouts { device, place } = *self.models.get(model)?;
+        Some((self.stacks.get_mut(device)?, place))
+    }
+
+    /// Changes a live parameter of the model numbered `model`. Real-time: bounded by its objects, no allocation.
+    pub(crate) fn set_parameter(
+        &mut self,
+        model: usize,
+        tick: &Tick,
+        parameter: usize,
+        value: f64,
+    ) -> CallStatus {
+        match self.stack_of(model) {
+            Some((stack, place)) => stack.set_parameter(place, tick, parameter, value),
+            None => CallStatus::Unsupported,
+        }
+    }
+
+    /// Moves the weight of the model numbered `model` to a new value, at its rate. Real-time: bounded, no allocation.
+    pub(crate) fn set_weight(&mut self, model: usize, tick: &Tick, weight: f64) -> CallStatus {
+        match self.stack_of(model) {
+            Some((stack, place)) => stack.set_weight(place, tick, weight),
+            None => CallStatus::Unsupported,
+        }
+    }
+
+    /// How often the model numbered `model` was replaced. Real-time: bounded, no allocation.
+    #[inline]
+    pub(crate) fn generation(&mut self, model: usize) -> Option<u16> {
+        self.stack_of(model).and_then(|(stack, place)| stack.generation(place))
+    }
+
+    /// Puts another model in place of one, faded in from this tick on. What it pushes out, because it was still
+    /// fading, is returned: dropping it is not for the loop.
+    ///
+    /// Real-time: bounded by the objects of the model, no allocation.
+    pub(crate) fn replace(&mut self, replacement: Replacement, tick: &Tick) -> Option<Box<Layer>> {
+        let Replacement { model, generation, layer } = replacement;
+        match self.stack_of(model as usize) {
+            Some((stack, place)) => stack.replace(place, layer, generation, tick),
+            None => Some(layer),
+        }
+    }
+
+    /// A layer that has faded out, and the number of its model. Real-time: bounded by the models, no allocation.
+    #[inline]
+    pub(crate) fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {
+        self.stacks.iter_mut().find_map(|stack| stack.take_faded(tick))
+    }
+
+    /// Every model with its health and what it said last, in the scene's order. Not real-time.
+    pub(crate) fn health(&mut self) -> Vec<(ModelHealth, String)> {
+        let mut stacks: Vec<_> = self.stacks.iter_mut().map(|stack| stack.health().into_iter()).collect();
+        let next = |at: &Whereabouts| stacks.get_mut(at.device).and_then(Iterator::next);
+        self.models.iter().filter_map(next).collect()
+    }
+
+    /// The energy accounts of each coupling. Not real-time.
+    pub(crate) fn tanks(&self) -> Vec<[Tank; 2]> {
+        self.couplings.iter().map(|coupled| coupled.coupling.tanks().map(|tank| *tank)).collect()
+    }
+}

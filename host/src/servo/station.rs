@@ -1,0 +1,77 @@
+//! One device of a loop with the envelope that guards it.
+
+use super::envelope::Envelope;
+use super::forces::Port;
+use super::state::{Cause, Gate, RunEvent};
+use crate::trace::Events;
+use flotor_hal::abi::loader::ActiveDevice;
+use flotor_hal::{Conditions, Cycle, Fault, Tick};
+
+/// Ticks without a new sample after which the force fades to zero: what is older than this is not where the
+/// hand is. At 1 kHz, 10 ms of a 10 Hz movement of 5 mm are 3 mm.
+const STALE_TICKS_LIMIT: u32 = 10;
+
+/// A device, and what nothing gets past on its way there.
+pub(crate) struct Station {
+    pub(super) device: ActiveDevice,
+    pub(super) envelope: Envelope,
+    stale_ticks: u32,
+    /// The first it reported.
+    pub(super) fault: Option<Fault>,
+}
+
+impl Station {
+    /// Not real-time.
+    pub(crate) fn new(device: ActiveDevice, envelope: Envelope) -> Self {
+        Self { device, envelope, stale_ticks: 0, fault: None }
+    }
+
+    /// Newest sample into the port; an old one stays, a senseless one is never used. What it means for the run.
+    ///
+    /// Real-time: bounded by the device, no allocation.
+    #[inline]
+    pub(super) fn read(&mut self, tick: &Tick, port: &mut Port) -> RunEvent {
+        let last = port.state;
+        match self.device.read(tick, &mut port.state) {
+            Cycle::Fresh if port.state.is_finite() => {
+                self.stale_ticks = 0;
+                if port.state.conditions.contains(Conditions::SATURATED) {
+                    port.events.insert(Events::SATURATED);
+                }
+                if port.state.conditions.contains(Conditions::EXCESS_FORCE) {
+                    port.events.insert(Events::EXCESS_FORCE);
+                }
+                return RunEvent::SamplesBack;
+            }
+            Cycle::Fresh => port.events.insert(Events::NOT_FINITE),
+            Cycle::Stale => port.events.insert(Events::STALE_SAMPLE),
+            Cycle::Fault(fault) => {
+                port.state = if port.state.is_finite() { port.state } else { last };
+                return self.failed(fault, port);
+            }
+        }
+        port.state = last;
+        self.stale_ticks = self.stale_ticks.saturating_add(1);
+        if self.stale_ticks > STALE_TICKS_LIMIT { RunEvent::SamplesLost } else { RunEvent::Time }
+    }
+
+    /// What of the port's request may be sent. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn limit(&mut self, tick: &Tick, gate: Gate, port: &mut Port) {
+        port.commanded = self.envelope.apply(&port.asked, gate, &port.state, tick, &mut port.events);
+    }
+
+    /// Sends it. What it means for the run, if anything. Real-time: bounded by the device, no allocation.
+    #[inline]
+    pub(super) fn write(&mut self, tick: &Tick, port: &mut Port) -> Option<RunEvent> {
+        let Cycle::Fault(fault) = self.device.write(tick, &port.commanded) else { return None };
+        Some(self.failed(fault, port))
+    }
+
+    #[inline]
+    fn failed(&mut self, fault: Fault, port: &mut Port) -> RunEvent {
+        port.events.insert(Events::DEVICE_FAULT);
+        self.fault.get_or_insert(fault);
+        RunEvent::Failed(Cause::Device(fault))
+    }
+}
