@@ -9,7 +9,10 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use flotor_live::{Ask, Outcome};
 use flotor_record::trace::Events;
+use flotor_study::protocol::{MagnitudeProtocol, Protocol, SubjectNumber};
+use flotor_study::sitting::Sitting;
 use flotor_viewer::app::{Start, Viewer, Wanted};
+use flotor_viewer::experiment::Experiment;
 use flotor_viewer::history::{History, Keep};
 use flotor_viewer::palette::Look;
 use flotor_viewer::panel::{Standing, Value};
@@ -262,6 +265,51 @@ fn the_look_is_switched_and_everything_stays_where_it_was() {
     window.key_press(Key::L);
     window.run_steps(2);
     assert_eq!(window.state().look(), Look::Dark);
+}
+
+/// A sitting in front of the window, subject 2: haptics alone first. Everything by keyboard, nothing to be seen of the spring.
+#[test]
+fn a_subject_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_alone_condition() {
+    let protocol = Protocol::Magnitude(MagnitudeProtocol { demo: 1, ..MagnitudeProtocol::default() });
+    let sitting = Sitting::new(&protocol, 1, SubjectNumber::new(2).expect("a legal number"));
+    let experiment = Box::new(Experiment::new(sitting, &protocol, None));
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let mut host = FakeHost::new(&folder, &[]);
+    let start =
+        |directory: &flotor_live::Directory| Start::Sitting(Wanted::newest(directory.clone()), experiment);
+    let mut window = host.welcome(|directory| window(start(directory)));
+    assert_eq!(host.request(None), Ask::Watch { every: 1 });
+    host.run_ticks(100, Events::NONE);
+    until(&mut window, |window| window.query_by_label("How stiff is the spring?").is_some());
+    assert!(window.query_by_label_contains("spring 0.1.0").is_none(), "no names of plugins for a subject");
+    assert!(window.query_by_label("Parameters (P)").is_none());
+    let press = |window: &mut Window<'_>, key: Key| {
+        window.key_press(key);
+        window.run_steps(2);
+    };
+    for headline in ["Feel the spring", "Time for a rest"] {
+        press(&mut window, Key::Enter);
+        window.get_by_label(headline);
+        if headline == "Feel the spring" {
+            let Ask::Set { values } = host.request(None) else { panic!("something else was asked") };
+            assert_eq!((values[0].plugin.as_str(), values[0].parameter.as_str()), ("spring", "gamma_n"));
+            assert!(values[0].value.parse::<f64>().is_ok_and(|gamma_n| (12.0..=48.0).contains(&gamma_n)));
+        }
+        assert!(
+            window.query_by_role_and_label(Role::Image, "3D view; drag turns it, the wheel zooms").is_none()
+        );
+        window.get_by_label("EMERGENCY STOP");
+    }
+    press(&mut window, Key::Enter); // the first trial that counts
+    window.get_by_label("Feel the spring");
+    press(&mut window, Key::Enter);
+    window.get_by_label("How stiff was it?");
+    press(&mut window, Key::Num7);
+    window.get_by_label("7");
+    press(&mut window, Key::Enter);
+    assert_eq!(window.state().experiment().map(|experiment| experiment.progress().0), Some(2));
+    host.end("the device has stopped");
+    until(&mut window, |window| window.query_by_label("The device has stopped").is_some());
 }
 
 /// Text twice as large: everything is still there.
