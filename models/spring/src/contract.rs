@@ -2,18 +2,19 @@
 
 use flotor_hal::{Input, Output, StepStatus, Wrench};
 
+use crate::instructions;
 use crate::pose::Pose;
-use crate::response::{Demand, Response};
+use crate::response::{Demand, Law, Response};
 use crate::validity::Validity;
 
 /// The pose of a step.
-#[inline]
+#[inline(always)]
 pub(crate) fn pose(input: &Input) -> Pose {
     Pose { position_m: input.pose.position(), orientation: input.pose.orientation() }
 }
 
 /// The demand of a step.
-#[inline]
+#[inline(always)]
 pub(crate) fn demand(input: &Input) -> Demand {
     if input.demand.contains(flotor_hal::Demand::ENERGY) {
         Demand::WrenchAndEnergy
@@ -24,8 +25,20 @@ pub(crate) fn demand(input: &Input) -> Demand {
     }
 }
 
-/// The answer of a step.
+/// A step of a law that answers from the pose alone. Real-time: bounded, no allocation.
+///
+/// In one go: a pose that is copied first has to be on its way to memory before the law can start on it, and so has all
+/// that the step before has done.
 #[inline]
+pub(crate) fn step<L: Law>(law: &L, input: &Input) -> Output {
+    instructions::best(
+        #[inline(always)]
+        || output(&law.respond_inline(&pose(input), demand(input))),
+    )
+}
+
+/// The answer of a step.
+#[inline(always)]
 pub(crate) fn output(response: &Response) -> Output {
     let status = match response.validity {
         Validity::Ok => StepStatus::Ok,

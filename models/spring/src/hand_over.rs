@@ -207,6 +207,12 @@ impl HandOver {
         self.region.holds(pose)
     }
 
+    /// Whether at a pose the law `energy` answers alone and as it is.
+    #[inline]
+    pub(crate) fn is_energy_alone(&self, pose: &Pose) -> bool {
+        self.energy.is_plain() && !self.hands_over(pose)
+    }
+
     /// The hand is where the rod has no share: nothing is left to follow.
     #[inline]
     pub(crate) fn leave(&mut self) {

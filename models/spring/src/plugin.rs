@@ -40,7 +40,7 @@ impl ForceModel for SpringModel {
 
     #[inline]
     fn step(&mut self, input: &Input) -> Output {
-        contract::output(&self.law.respond(&contract::pose(input), contract::demand(input)))
+        self.law.step(input)
     }
 
     fn step_batch(&mut self, inputs: &[Input], outputs: &mut [Output]) {

@@ -114,9 +114,22 @@ impl Prepared {
         }
     }
 
-    /// Real-time: bounded, no allocation.
+    /// The answer of a step. Real-time: bounded, no allocation.
     #[inline]
-    pub(crate) fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
+    pub(crate) fn step(&mut self, input: &Input) -> Output {
+        match self {
+            Self::ClosedForm(law) => contract::step(law, input),
+            Self::Energy(held) if held.is_plain() => contract::step(&held.law, input),
+            Self::HandOver(held) if held.is_plain() && held.law.is_energy_alone(&contract::pose(input)) => {
+                held.law.leave();
+                contract::step(&held.law.energy().law, input)
+            }
+            _ => contract::output(&self.respond(&contract::pose(input), contract::demand(input))),
+        }
+    }
+
+    /// The answer at a pose. Real-time: bounded, no allocation.
+    fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
         match self {
             Self::Thesis(law) => law.respond(pose, demand),
             Self::ClosedForm(law) => law.respond(pose, demand),

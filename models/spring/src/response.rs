@@ -2,6 +2,7 @@
 
 use flotor_hal::glam::DVec3;
 
+use crate::instructions;
 use crate::pose::{Coordinates, Pose};
 use crate::real::{Real, Vector};
 use crate::validity::Validity;
@@ -55,9 +56,9 @@ pub trait Law {
     /// Where a lane is not answered its numbers mean nothing. What is not demanded is not computed and zero.
     fn answer<R: Real>(&self, at: &Coordinates<R>, demand: Demand) -> Answer<R>;
 
-    /// The response at one pose. Real-time: bounded, no allocation.
-    #[inline]
-    fn respond_at(&self, pose: &Pose, demand: Demand) -> Response {
+    /// The response at one pose, as a part of the formula that asks for it. Real-time: bounded, no allocation.
+    #[inline(always)]
+    fn respond_inline(&self, pose: &Pose, demand: Demand) -> Response {
         let Answer { force_n, torque_nm, energy_j, answered, trusted } =
             self.answer(&pose.coordinates(), demand);
         if !answered {
@@ -70,6 +71,15 @@ pub trait Law {
             energy_j: has_energy.then_some(energy_j),
             validity: if trusted { Validity::Ok } else { Validity::Clamped },
         }
+    }
+
+    /// The response at one pose, with the best instructions of the machine. Real-time: bounded, no allocation.
+    #[inline]
+    fn respond_at(&self, pose: &Pose, demand: Demand) -> Response {
+        instructions::best(
+            #[inline(always)]
+            || self.respond_inline(pose, demand),
+        )
     }
 }
 

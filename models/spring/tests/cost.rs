@@ -163,10 +163,11 @@ fn laws_cost_their_share_of_the_printed_one() {
     }
     #[cfg(target_arch = "x86_64")]
     if pulp::x86::V3::try_new().is_some() {
-        // Four lanes an instruction, less what it takes to lay poses out: what was counted (2.3 and 3.1 times fewer) and a
-        // tenth, for other versions of compiler and libraries. In time the batch gains more, it waits for less.
-        assert!(closed_batch <= closed / 2.1, "closed-form, batch");
-        assert!(energy_batch <= energy / 2.8, "energy, batch");
+        // Four lanes an instruction, less what it takes to lay poses out, which is half of the closed form's batch: what was
+        // counted (2.0 and 2.5 times fewer) and a tenth, for other versions of compiler and libraries. In time the batch
+        // gains more, it waits for less.
+        assert!(closed_batch <= closed / 1.8, "closed-form, batch");
+        assert!(energy_batch <= energy / 2.3, "energy, batch");
     }
 }
 

@@ -17,6 +17,7 @@ use super::matrix::{Factored, added, dot, length, product};
 use super::plate::{Plate, or_zero};
 use super::predictor::History;
 use super::start;
+use crate::instructions;
 use crate::pose::Pose;
 use crate::response::Demand;
 use crate::rigidity::Spring;
@@ -254,7 +255,10 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         let mut last_size = f64::INFINITY;
         let mut outcome = Outcome::Failed;
         for _ in 0..self.effort.most_steps {
-            let value = self.functional.value(&self.shape, plate);
+            let value = instructions::best(
+                #[inline(always)]
+                || self.functional.value(&self.shape, plate),
+            );
             self.work.evaluations += 1;
             let bent = distance(&self.shape, &self.matrix.shape);
             let fall = self.functional.eigenvalue_fall(plate.distance(&self.matrix.plate), bent);
@@ -262,7 +266,10 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
                 if self.work.matrices == self.effort.most_matrices {
                     break;
                 }
-                let curvature = self.functional.curvature(&value);
+                let curvature = instructions::best(
+                    #[inline(always)]
+                    || self.functional.curvature(&value),
+                );
                 self.work.matrices += 1;
                 if self.keep(&curvature, plate, &value.slope) > 0 {
                     return self.slide(&value, &curvature, demand);

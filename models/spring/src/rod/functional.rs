@@ -185,6 +185,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
     }
 
     /// Second derivatives at a shape. Real-time: bounded, no allocation.
+    #[inline(always)]
     pub(crate) fn curvature(&self, value: &Value<N, Q>) -> Curvature<N> {
         let mut local = value.sections.curvatures(&value.load, &self.basis.weight);
         if let Some(contact) = &value.contact {
@@ -241,7 +242,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
     }
 
     /// Row of the local part of the matrix: component `c` of a field against all bubbles of both components.
-    #[inline]
+    #[inline(always)]
     fn row(&self, local: &Curvatures<Q>, c: usize, field: &Along<Q>, rate: &Along<Q>) -> [f64; N] {
         let mut parts = [[0.0; K]; 2];
         for (e, part) in parts.iter_mut().enumerate() {

@@ -167,6 +167,7 @@ impl<const Q: usize> Sections<Q> {
     }
 
     /// Second derivatives of `l` and of the integrals that determine the load, each times the weight.
+    #[inline(always)]
     pub(crate) fn curvatures(&self, load: &Load, weight: &Along<Q>) -> Curvatures<Q> {
         let mut all = Curvatures {
             by_lean_twice: [[[0.0; Q]; 2]; 2],
