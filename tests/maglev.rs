@@ -197,6 +197,8 @@ fn a_controller_that_vanishes_is_a_fault_of_the_device() {
         let (mut emulator, scratch) = (Emulator::start(transport, &[]), Scratch::default());
         let host = emulator.host(&scratch);
         emulator.wait_for(&["mode Levitating"]);
+        // The host has to hear of it too, or it is not running yet.
+        std::thread::sleep(Duration::from_millis(300));
         signal(&emulator.child, Signal::KILL);
         let output = host.wait_with_output().expect("the host ends");
         let error = String::from_utf8_lossy(&output.stderr);

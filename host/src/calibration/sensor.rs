@@ -94,7 +94,7 @@ impl ForceSensor {
         // What was said to an earlier question that nobody waited for is not the answer to this one.
         self.line.clear(serialport::ClearBuffer::Input).map_err(|error| gone(error.into()))?;
         self.line.write_all(b"R\n").map_err(gone)?;
-        match read_line(&mut self.line, PATIENCE).map_err(gone)? {
+        match read_line(&mut self.line, &mut Vec::new(), PATIENCE).map_err(gone)? {
             None => Err(SensorError::Silent { port: self.port.clone() }),
             Some(answer) => parse(&answer).ok_or(SensorError::Nonsense { port: self.port.clone(), answer }),
         }
@@ -107,18 +107,19 @@ fn parse(answer: &str) -> Option<f64> {
     (force_n.abs() <= PLAUSIBLE_N).then_some(force_n)
 }
 
-/// Reads up to the end of a line; nothing if it does not end in time.
-fn read_line(line: &mut TTYPort, patience: Duration) -> std::io::Result<Option<String>> {
-    let (started, mut text) = (Instant::now(), Vec::new());
+/// Reads up to the end of a line; nothing if it does not end in time: what came of it so far stays in `text`.
+fn read_line(line: &mut TTYPort, text: &mut Vec<u8>, patience: Duration) -> std::io::Result<Option<String>> {
+    let started = Instant::now();
     while started.elapsed() < patience {
         let mut byte = [0];
         match line.read(&mut byte) {
             Ok(0) => return Err(std::io::ErrorKind::UnexpectedEof.into()),
             Ok(_) if byte == *b"\n" => {
-                return Ok(Some(String::from_utf8_lossy(&text).trim_end().to_owned()));
+                let whole = std::mem::take(text);
+                return Ok(Some(String::from_utf8_lossy(&whole).trim_end().to_owned()));
             }
             Ok(_) if text.len() < LONGEST_LINE => text.extend(byte),
-            Ok(_) => return Ok(Some(String::from_utf8_lossy(&text).into_owned())),
+            Ok(_) => return Ok(Some(String::from_utf8_lossy(&std::mem::take(text)).into_owned())),
             Err(error)
                 if matches!(error.kind(), std::io::ErrorKind::TimedOut | std::io::ErrorKind::Interrupted) => {
             }
@@ -151,8 +152,9 @@ impl EmulatedSensor {
         let thread = std::thread::Builder::new().name("flotor-sensor".to_owned()).spawn(move || {
             // Held open, or the terminal hangs up whenever nobody listens.
             let _theirs = theirs;
+            let mut text = Vec::new();
             while !end.load(Ordering::Acquire) {
-                let answer = match read_line(&mut ours, LOOK) {
+                let answer = match read_line(&mut ours, &mut text, LOOK) {
                     Ok(None) => continue,
                     // All digits: what is read is what was told.
                     Ok(Some(asked)) if asked == "R" => {
