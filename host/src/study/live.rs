@@ -78,6 +78,12 @@ impl<'a> LiveRig<'a> {
     pub fn begin(&mut self, trial: &Trial, value: f64) -> Result<(), OutsideError> {
         self.check()?;
         self.set(value)?;
+        {
+            // Exploration begins when there is something to feel, not when all of it is there.
+            let mut watch = self.shared.lock();
+            watch.missed_ticks = 0;
+            watch.meter = Some(KinematicsMeter::default());
+        }
         self.apparatus.show(&self.controls, true)?;
         self.wait_for_fade();
         let mut watch = self.shared.lock();
@@ -90,8 +96,6 @@ impl<'a> LiveRig<'a> {
             let run = self.apparatus.describe(self.apparatus.scene(), Clock::Real, 0);
             watch.recorder = Some(Recorder::create(&files.of(trial), &run)?);
         }
-        watch.missed_ticks = 0;
-        watch.meter = Some(KinematicsMeter::default());
         Ok(())
     }
 
