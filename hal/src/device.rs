@@ -200,6 +200,14 @@ pub struct Axes {
 impl Axes {
     /// None.
     pub const NONE: Axes = Axes { bits: 0 };
+    /// Translation along x.
+    pub const X: Axes = Axes { bits: 0b00_0001 };
+    /// Translation along y.
+    pub const Y: Axes = Axes { bits: 0b00_0010 };
+    /// Translation along z.
+    pub const Z: Axes = Axes { bits: 0b00_0100 };
+    /// Translations along x and y: a planar device.
+    pub const PLANE: Axes = Axes { bits: 0b00_0011 };
     /// The three translations.
     pub const TRANSLATION: Axes = Axes { bits: 0b00_0111 };
     /// The three rotations.

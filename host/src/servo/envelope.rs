@@ -145,10 +145,13 @@ impl Envelope {
     fn limit(&self, wrench: &Wrench, events: &mut Events) -> Wrench {
         let force = shrink_into_box(wrench.force(), self.max_force_n);
         let torque = shrink_into_box(wrench.torque(), self.max_torque_nm);
-        if force != wrench.force() {
+        // On an axis that is not driven nothing is limited: pairing has said that nothing is felt there.
+        let is_cut =
+            |before: DVec3, after: DVec3, most: DVec3| (before.cmpne(after) & most.cmpne(DVec3::ZERO)).any();
+        if is_cut(wrench.force(), force, self.max_force_n) {
             events.insert(Events::FORCE_LIMITED);
         }
-        if torque != wrench.torque() {
+        if is_cut(wrench.torque(), torque, self.max_torque_nm) {
             events.insert(Events::TORQUE_LIMITED);
         }
         Wrench::new(force, torque)
@@ -172,8 +175,8 @@ impl Envelope {
 /// Spring and damper along the ray from the centre, outside an ellipsoid (a sphere for equal ranges: the thesis's
 /// boundary, section 3.2); `None` inside. Damping acts outwards only: the wall never pulls.
 fn wall(at: DVec3, velocity: DVec3, semi_axes: DVec3, stiffness: f64, damping: f64) -> Option<DVec3> {
-    let beyond = (at / semi_axes).length();
-    // A range of zero gives 0/0 at the centre, which is inside: an axis that cannot move needs no wall.
+    // An axis without range (0/0 at its centre) cannot move and needs no wall; the others keep theirs.
+    let beyond = DVec3::select(at.cmpeq(DVec3::ZERO), DVec3::ZERO, at / semi_axes).length();
     if beyond.is_nan() || beyond <= 1.0 {
         return None;
     }
@@ -195,10 +198,12 @@ fn without_drive(force: DVec3, velocity: DVec3, excess: f64) -> DVec3 {
     force - along * (drive * (excess - 1.0).clamp(0.0, 1.0))
 }
 
-/// The longest vector of the same direction inside the box, not longer than `vector`.
+/// The longest vector of the same direction inside the box, not longer than `vector`. Axes with a half side of zero are left
+/// out: what cannot be driven takes nothing from what can.
 fn shrink_into_box(vector: DVec3, half_sides: DVec3) -> DVec3 {
-    let excess = (vector.abs() / half_sides).max_element();
-    // A half side of zero makes the ratio infinite (or 0/0, NaN, for a zero component): nothing is allowed then.
+    let vector = DVec3::select(half_sides.cmpeq(DVec3::ZERO), DVec3::ZERO, vector);
+    // 0/0 on such an axis is no excess.
+    let excess = (vector.abs() / half_sides).to_array().into_iter().fold(0.0, f64::max);
     if excess <= 1.0 { vector } else { (vector / excess).clamp(-half_sides, half_sides) }
 }
 
@@ -282,6 +287,34 @@ mod tests {
             );
             last = sent;
         }
+    }
+
+    #[test]
+    fn a_planar_device_has_its_two_axes_limited_and_walled_as_any_other() {
+        let device = Capabilities {
+            range_m: [0.05, 0.04, 0.0],
+            max_force_n: [3.0, 3.0, 0.0],
+            range_rad: [0.0; 3],
+            max_torque_nm: [0.0; 3],
+            ..DEVICE
+        };
+        let mut envelope = Envelope::new(&Limits::default(), &Boundary::default(), &device, PERIOD_NS);
+        let (sent, events) = apply(&mut envelope, Wrench::new(DVec3::new(1.0, -2.0, 7.0), DVec3::X), 0);
+        assert_eq!(
+            sent,
+            Wrench::from_force(DVec3::new(1.0, -2.0, 0.0)),
+            "what cannot be driven costs nothing"
+        );
+        assert_eq!(events, Events::NONE);
+        let (sent, events) = apply(&mut envelope, Wrench::from_force(DVec3::new(30.0, 15.0, 900.0)), 1);
+        assert!((sent.force() - DVec3::new(3.0, 1.5, 0.0)).length() < 1.0e-12, "{sent:?}");
+        assert!(events.intersects(Events::FORCE_LIMITED));
+        // A millimetre beyond the wall along x: 10 N, of which 3 are allowed.
+        let mut state = DeviceState::HOME;
+        state.pose = Pose::new(DVec3::X * 0.0505, flotor_hal::DQuat::IDENTITY);
+        envelope.last = Wrench::ZERO;
+        let walled = envelope.apply(&Wrench::ZERO, Gate::OPEN, &state, &tick(1), &mut Events::NONE.clone());
+        assert!((walled.force() - DVec3::X * -3.0).length() < 1.0e-9, "{walled:?}");
     }
 
     #[test]

@@ -1,0 +1,47 @@
+//! A board without hardware at a pseudo terminal: its handle goes towards the user and back, once in two seconds.
+//!
+//! ```text
+//! $ cargo run -p flotor-haply --example emulated_board
+//! port /dev/pts/3
+//! $ flotor run host/scenes/haply.toml --set device.port=/dev/pts/3
+//! ```
+
+use flotor_hal::glam::DVec2;
+use flotor_haply::emulator::EmulatedBoard;
+use flotor_haply::pantograph::Pantograph;
+use serialport::{SerialPort, TTYPort};
+use std::f64::consts::TAU;
+use std::io::{ErrorKind, Read, Write};
+use std::time::{Duration, Instant};
+
+const LINKAGE: Pantograph = Pantograph { inner_m: 0.07, outer_m: 0.09, base_m: 0.038 };
+const PERIOD_S: f64 = 2.0;
+/// Half the way.
+const AMPLITUDE_M: f64 = 0.02;
+
+fn main() -> std::io::Result<()> {
+    let (mut port, other_end) = TTYPort::pair()?;
+    port.set_timeout(Duration::from_millis(1))?;
+    println!("port {}", other_end.name().unwrap_or_default());
+    let centre_m = DVec2::new(0.5 * LINKAGE.base_m, 0.1);
+    let mut board = EmulatedBoard::new(LINKAGE, centre_m);
+    let (started, mut said) = (Instant::now(), Instant::now());
+    let mut chunk = [0; 256];
+    loop {
+        let phase = TAU * started.elapsed().as_secs_f64() / PERIOD_S;
+        board.move_handle(centre_m + DVec2::Y * (AMPLITUDE_M * phase.sin()));
+        match port.read(&mut chunk) {
+            Ok(length) => port.write_all(&board.hear(&chunk[..length]))?,
+            Err(error) if error.kind() == ErrorKind::TimedOut => {}
+            Err(error) => return Err(error),
+        }
+        if said.elapsed() > Duration::from_secs(1) {
+            said = Instant::now();
+            let force_n = board.force_n().unwrap_or(DVec2::ZERO);
+            println!(
+                "force on the hand {:+.3} N to the left, {:+.3} N towards the user",
+                force_n.x, force_n.y
+            );
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! A board without hardware: it answers as the maker's firmware does, and a hand that cannot be pushed holds the handle.
+//! Not real-time.
+
+use crate::pantograph::Pantograph;
+use crate::protocol::{Arm, Request, answer};
+use flotor_hal::glam::DVec2;
+
+/// An emulated board.
+#[derive(Clone, Debug)]
+pub struct EmulatedBoard {
+    linkage: Pantograph,
+    handle_m: DVec2,
+    arms: Option<[Arm; 2]>,
+    torques_nm: [f64; 2],
+    heard: Vec<u8>,
+}
+
+impl EmulatedBoard {
+    /// A board whose handle is held at a place in the board's frame, m. It has to be told about its arms first.
+    #[must_use]
+    pub fn new(linkage: Pantograph, handle_m: DVec2) -> Self {
+        Self { linkage, handle_m, arms: None, torques_nm: [0.0; 2], heard: Vec::new() }
+    }
+
+    /// The hand goes elsewhere.
+    pub fn move_handle(&mut self, handle_m: DVec2) {
+        self.handle_m = handle_m;
+    }
+
+    /// What the board says to some bytes; requests may be in pieces.
+    pub fn hear(&mut self, bytes: &[u8]) -> Vec<u8> {
+        self.heard.extend_from_slice(bytes);
+        let mut said = Vec::new();
+        loop {
+            match Request::parse(&self.heard) {
+                Ok(None) => return said,
+                Ok(Some((request, length))) => {
+                    self.heard.drain(..length);
+                    said.extend(self.obey(request));
+                }
+                Err(length) => drop(self.heard.drain(..length)),
+            }
+        }
+    }
+
+    fn obey(&mut self, request: Request) -> Vec<u8> {
+        match request {
+            Request::Reset => (self.arms, self.torques_nm) = (None, [0.0; 2]),
+            Request::Setup(arms) => self.arms = Some(arms),
+            Request::Torques(torques_nm) => {
+                // A board that was not told about its arms has nothing to say.
+                if self.arms.is_some()
+                    && let Some(angles_rad) = self.linkage.angles_rad(self.handle_m)
+                {
+                    self.torques_nm = torques_nm.map(f64::from);
+                    #[allow(clippy::cast_possible_truncation)] // f32 is what the board has
+                    return answer(angles_rad.map(|angle| angle.to_degrees() as f32)).to_vec();
+                }
+            }
+        }
+        Vec::new()
+    }
+
+    /// What the board was told about its arms.
+    #[must_use]
+    pub fn arms(&self) -> Option<&[Arm; 2]> {
+        self.arms.as_ref()
+    }
+
+    /// The force on the hand in the board's frame, N; `None` where the linkage has no posture.
+    #[must_use]
+    pub fn force_n(&self) -> Option<DVec2> {
+        let posture = self.linkage.posture(self.linkage.angles_rad(self.handle_m)?)?;
+        Some(posture.force_n(self.torques_nm))
+    }
+}

@@ -1,0 +1,324 @@
+//! The device as a plugin: poses from angles, torques from wrenches, on one plane.
+
+use crate::board::{Board, LinkLost, NoAnswer};
+use crate::pantograph::{Pantograph, Posture};
+use crate::protocol::{Arm, Direction, torques};
+use flotor_hal::abi::Str;
+use flotor_hal::glam::DVec2;
+use flotor_hal::{
+    ActiveDevice, Axes, Capabilities, Conditions, Cycle, DQuat, DVec3, Device, DeviceInfo, DeviceState,
+    Fault, LoopConfig, Parameter, Pose, Refusal, SafeStop, Settings, Tick, Twist, Wrench, export_device,
+};
+use serialport::TTYPort;
+use std::f64::consts::TAU;
+use std::io::Write;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+/// How long a board may take to answer for the first time: one that begins anew with the opening of its port is
+/// back within a second or two.
+const PATIENCE: Duration = Duration::from_secs(3);
+/// Lengths of the arms of both hardware versions, m (hAPI, `Pantograph`).
+const INNER_M: f64 = 0.07;
+const OUTER_M: f64 = 0.09;
+/// From motor to motor in the second and the third hardware version, m (hAPI, `Pantograph`).
+const BASE_M: [f64; 2] = [0.0, 0.038];
+/// Where the host's centre is, from the line of the motors towards the user, m: the arms reach from there as far as
+/// [`RANGE_M`] on either version without being stretched out.
+const CENTRE_M: f64 = 0.1;
+/// Half the range along x and y, m; it cannot move along z.
+const RANGE_M: [f64; 3] = [0.05, 0.04, 0.0];
+/// Stiffness of the wall in the maker's first example, N/m.
+const MAX_STIFFNESS_N_PER_M: f64 = 450.0;
+
+const VERSIONS: [Str; 2] = [Str::new("v2"), Str::new("v3")];
+
+const SCHEMA: &[Parameter] = &[
+    Parameter::text("port", "Where the board is, as /dev/ttyACM0 or a path below /dev/serial/by-id"),
+    Parameter::choice("hardware", &VERSIONS, 1, "Version of the device: v2 of metal, v3 of plastic (3.1)"),
+    Parameter::real("max_force_n", "N", 0.0, 10.0, 3.0, "Largest force on the hand"),
+    Parameter::real(
+        "velocity_cutoff_hz",
+        "Hz",
+        1.0,
+        500.0,
+        30.0,
+        "Velocity is the difference of positions, smoothed below this frequency",
+    ),
+    Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 200.0, "Silence of the board that is a fault"),
+];
+
+/// A version of the hardware, as the maker's examples describe it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Hardware {
+    linkage: Pantograph,
+    /// What the board is told; the handle rests where the examples begin while the board starts.
+    arms: [Arm; 2],
+}
+
+/// In the order of [`VERSIONS`] (hAPI, examples: `add_actuator`, `add_encoder`).
+const HARDWARE: [Hardware; 2] = {
+    use Direction::{Clockwise, Counterclockwise};
+    const fn arm(direction: Direction, start_deg: f32, counts_per_turn: f32) -> Arm {
+        Arm { motor: direction, encoder: direction, start_deg, counts_per_turn }
+    }
+    const fn linkage(base_m: f64) -> Pantograph {
+        Pantograph { inner_m: INNER_M, outer_m: OUTER_M, base_m }
+    }
+    [
+        Hardware {
+            linkage: linkage(BASE_M[0]),
+            arms: [arm(Counterclockwise, 241.0, 10752.0), arm(Clockwise, -61.0, 10752.0)],
+        },
+        Hardware {
+            linkage: linkage(BASE_M[1]),
+            arms: [arm(Counterclockwise, 168.0, 4880.0), arm(Counterclockwise, 12.0, 4880.0)],
+        },
+    ]
+};
+
+impl Hardware {
+    /// A place in the board's frame (x to the left, y towards the user) in the host's, m.
+    fn to_host_m(self, handle_m: DVec2) -> DVec2 {
+        DVec2::new(0.5 * self.linkage.base_m, CENTRE_M) - handle_m
+    }
+}
+
+/// A pantograph, opened: its port is ours, its motors are not driven.
+pub struct HaplyDevice {
+    board: Board,
+    hardware: Hardware,
+    max_force_n: f64,
+    cutoff_hz: f64,
+    timeout: Duration,
+    parameters: [f64; SCHEMA.len()],
+    stop: Arc<Stop>,
+}
+
+/// A pantograph whose motors follow the host.
+pub struct DrivenDevice {
+    opened: HaplyDevice,
+    posture: Posture,
+    /// A posture nobody has read yet.
+    is_fresh: bool,
+    state: DeviceState,
+    /// When the last sample was taken, ns.
+    sampled_ns: Option<u64>,
+    force_n: DVec2,
+}
+
+/// What the loop and whoever stops it share.
+struct Stop {
+    is_stopped: AtomicBool,
+    /// The port once more: the board keeps the last torque for ever, so that somebody has to tell it to let go even
+    /// if the loop never comes back.
+    port: Mutex<TTYPort>,
+}
+
+impl Stop {
+    /// Takes the torque away, whatever else is on its way. Never waits: who holds the lock is doing the same.
+    fn let_go(&self) {
+        if let Ok(mut port) = self.port.try_lock() {
+            let _ = port.write_all(&torques([0.0; 2]));
+        }
+    }
+}
+
+/// Takes the torque away, from any thread.
+pub struct TorqueSwitch(Arc<Stop>);
+
+impl SafeStop for TorqueSwitch {
+    fn safe_stop(&self) {
+        self.0.is_stopped.store(true, Ordering::Release);
+        self.0.let_go();
+    }
+}
+
+impl Device for HaplyDevice {
+    const INFO: DeviceInfo = DeviceInfo::new(
+        "haply",
+        "Haply 2DIY",
+        "A planar pantograph with two motors, over its maker's open serial protocol",
+    );
+    const PARAMETERS: &'static [Parameter] = SCHEMA;
+    type Active = DrivenDevice;
+    type Stop = TorqueSwitch;
+
+    fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        let path = settings.text("port").ok_or_else(|| {
+            Refusal::resource(
+                "where is the board? Say it with `port`, as /dev/ttyACM0; \
+                 `cargo run -p flotor-haply --example emulated_board` starts one without hardware and says where",
+            )
+        })?;
+        let board = Board::open(path).map_err(Refusal::resource)?;
+        let port = board.second_port().map_err(Refusal::resource)?;
+        let mut parameters = [0.0; SCHEMA.len()];
+        for (value, parameter) in parameters.iter_mut().zip(SCHEMA) {
+            *value = settings.number_or_default(parameter.id());
+        }
+        let version = settings.choice_or_default("hardware");
+        Ok(Self {
+            board,
+            hardware: HARDWARE.get(version).copied().unwrap_or(HARDWARE[1]),
+            max_force_n: settings.number_or_default("max_force_n"),
+            cutoff_hz: settings.number_or_default("velocity_cutoff_hz"),
+            timeout: Duration::from_secs_f64(settings.number_or_default("timeout_ms") * 1.0e-3),
+            parameters,
+            stop: Arc::new(Stop { is_stopped: AtomicBool::new(false), port: Mutex::new(port) }),
+        })
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        let counts_per_turn = f64::from(self.hardware.arms[0].counts_per_turn);
+        let max_force_n = self.max_force_n;
+        Capabilities {
+            sensed: Axes::PLANE,
+            actuated: Axes::PLANE,
+            range_m: RANGE_M,
+            range_rad: [0.0; 3],
+            // A count at the end of a stretched arm.
+            resolution_m: TAU / counts_per_turn * (INNER_M + OUTER_M),
+            max_force_n: [max_force_n, max_force_n, 0.0],
+            max_torque_nm: [0.0; 3],
+            // From nothing to the default limit in a millisecond: the motors are driven directly.
+            max_force_slew_n_per_s: 3000.0,
+            max_torque_slew_nm_per_s: f64::INFINITY, // of nothing
+            max_stiffness_n_per_m: MAX_STIFFNESS_N_PER_M,
+            rate_hz: [100.0, 1000.0],
+            // A request and its answer over USB, a frame each.
+            latency_s: 2.0e-3,
+        }
+    }
+
+    fn stopper(&self) -> TorqueSwitch {
+        TorqueSwitch(Arc::clone(&self.stop))
+    }
+
+    fn activate(mut self, _config: &LoopConfig) -> Result<DrivenDevice, (Self, Refusal)> {
+        match self.start() {
+            Ok(posture) => {
+                self.stop.is_stopped.store(false, Ordering::Release);
+                Ok(DrivenDevice {
+                    opened: self,
+                    posture,
+                    is_fresh: true,
+                    state: DeviceState::HOME,
+                    sampled_ns: None,
+                    force_n: DVec2::ZERO,
+                })
+            }
+            Err(refusal) => Err((self, refusal)),
+        }
+    }
+
+    fn parameter(&self, index: usize) -> f64 {
+        self.parameters.get(index).copied().unwrap_or(f64::NAN)
+    }
+}
+
+impl HaplyDevice {
+    fn start(&mut self) -> Result<Posture, Refusal> {
+        let angles_deg = self.board.start(&self.hardware.arms, PATIENCE).map_err(|no_answer| {
+            Refusal::resource(match no_answer {
+                NoAnswer::Lost => "the port of the board was closed: is it plugged in?",
+                NoAnswer::Silent => {
+                    "nothing at this port answers as a board of this device; is it switched on?"
+                }
+            })
+        })?;
+        self.posture(angles_deg).ok_or_else(|| {
+            Refusal::resource(format!(
+                "angles of {:.1}° and {:.1}° are none the arms can have: put the handle where it rests, switch the \
+                 board off and on, and start again",
+                angles_deg[0], angles_deg[1]
+            ))
+        })
+    }
+
+    fn posture(&self, angles_deg: [f64; 2]) -> Option<Posture> {
+        self.hardware.linkage.posture(angles_deg.map(f64::to_radians))
+    }
+}
+
+impl ActiveDevice for DrivenDevice {
+    type Opened = HaplyDevice;
+
+    fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
+        let heard = match self.opened.board.hear() {
+            Ok(heard) => heard,
+            Err(LinkLost) => return Cycle::Fault(Fault::Disconnected),
+        };
+        // Angles no arms can have are noise that looks like an answer: the next one will be right.
+        if let Some(posture) = heard.and_then(|angles_deg| self.opened.posture(angles_deg)) {
+            (self.posture, self.is_fresh) = (posture, true);
+        }
+        let cycle = if std::mem::take(&mut self.is_fresh) {
+            self.sample(tick.time_ns);
+            Cycle::Fresh
+        } else if self.opened.board.silence() > self.opened.timeout {
+            Cycle::Fault(Fault::Timeout)
+        } else {
+            Cycle::Stale
+        };
+        *state = self.state;
+        cycle
+    }
+
+    fn write(&mut self, _tick: &Tick, wrench: &Wrench) -> Cycle {
+        let asked_n = DVec2::new(wrench.force_n[0], wrench.force_n[1]);
+        let is_stopped = self.opened.stop.is_stopped.load(Ordering::Acquire);
+        self.force_n = match asked_n.is_finite() && !is_stopped {
+            true => asked_n.clamp_length_max(self.opened.max_force_n),
+            false => DVec2::ZERO,
+        };
+        // The board's x and y are the host's turned by half a turn.
+        let torques_nm = self.posture.torques_nm(-self.force_n);
+        match self.opened.board.ask(torques_nm) {
+            Ok(()) => Cycle::Fresh,
+            Err(LinkLost) => Cycle::Fault(Fault::Disconnected),
+        }
+    }
+
+    fn deactivate(self) -> HaplyDevice {
+        self.opened.stop.let_go();
+        self.opened
+    }
+}
+
+impl DrivenDevice {
+    /// Takes the posture as the sample of a time.
+    fn sample(&mut self, time_ns: u64) {
+        let position_m = self.opened.hardware.to_host_m(self.posture.handle_m()).extend(0.0);
+        let before_m = self.state.pose.position();
+        let velocity = match self.sampled_ns {
+            Some(before_ns) if time_ns > before_ns => {
+                #[allow(clippy::cast_precision_loss)] // at most seconds
+                let dt_s = (time_ns - before_ns) as f64 * 1.0e-9;
+                // A first-order low pass, exact for a difference that is held over the interval.
+                let share = 1.0 - (-TAU * self.opened.cutoff_hz * dt_s).exp();
+                self.state.twist.linear().lerp((position_m - before_m) / dt_s, share)
+            }
+            _ => DVec3::ZERO,
+        };
+        self.sampled_ns = Some(time_ns);
+        self.state = DeviceState {
+            pose: Pose::new(position_m, DQuat::IDENTITY),
+            twist: Twist::new(velocity, DVec3::ZERO),
+            // What the board was told: it measures no force.
+            delivered: Wrench::from_force(self.force_n.extend(0.0)),
+            sampled_ns: time_ns,
+            buttons: 0,
+            conditions: Conditions::NONE,
+        };
+    }
+}
+
+impl Drop for HaplyDevice {
+    fn drop(&mut self) {
+        self.stop.let_go();
+    }
+}
+
+export_device!(HaplyDevice);

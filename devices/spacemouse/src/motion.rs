@@ -1,0 +1,191 @@
+//! From how far the puck is pushed to where the handle is.
+//!
+//! Deflection is speed: at full deflection the pose moves at its greatest speed, in between in proportion, and not at
+//! all inside the dead zone, which hides the noise of a puck that is let go. Position and rotation stay inside a ball
+//! each; at its surface motion goes on along it.
+
+use crate::report::{FULL_DEFLECTION, Report};
+use flotor_hal::{DQuat, DVec3, Pose, Twist, orientation_from_rotation_vector, rotation_vector};
+
+/// How deflection moves the pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gains {
+    /// Speed at full deflection, m/s.
+    pub speed_m_per_s: f64,
+    /// Angular speed at full deflection, rad/s.
+    pub spin_rad_per_s: f64,
+    /// Share of the full deflection that counts as none.
+    pub dead_zone: f64,
+    /// Farthest from home, m.
+    pub range_m: f64,
+    /// Farthest from home, rad.
+    pub range_rad: f64,
+}
+
+/// How far the puck is pushed, as shares of full deflection in the host's frame (x right, y away from the user, z up).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Deflection {
+    translation: DVec3,
+    rotation: DVec3,
+}
+
+impl Deflection {
+    /// Takes what a report says. Real-time: bounded, no allocation.
+    pub fn update(&mut self, report: &Report) {
+        match report {
+            Report::Translation(axes) => self.translation = share(*axes),
+            Report::Rotation(axes) => self.rotation = share(*axes),
+            Report::Motion { translation, rotation } => {
+                (self.translation, self.rotation) = (share(*translation), share(*rotation));
+            }
+            Report::Buttons(_) | Report::Other => {}
+        }
+    }
+}
+
+/// The puck's axes (y towards the user, z down) are the host's turned half round x; rotations turn likewise.
+fn share([x, y, z]: [i16; 3]) -> DVec3 {
+    let full = f64::from(FULL_DEFLECTION);
+    let share = DVec3::new(f64::from(x), -f64::from(y), -f64::from(z)) / full;
+    share.clamp(DVec3::splat(-1.0), DVec3::splat(1.0))
+}
+
+/// What the puck asks for in a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Wish {
+    /// Move as it is pushed.
+    Follow(Deflection),
+    /// Go home, at full speed.
+    Home,
+}
+
+/// Where the handle is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    position_m: DVec3,
+    orientation: DQuat,
+}
+
+impl Default for Motion {
+    fn default() -> Self {
+        Self { position_m: DVec3::ZERO, orientation: DQuat::IDENTITY }
+    }
+}
+
+impl Motion {
+    /// Moves on for a time; the velocity is that of the motion made, limits included. Real-time: bounded, no allocation.
+    pub fn advance(&mut self, wish: &Wish, gains: &Gains, dt_s: f64) -> Twist {
+        if dt_s <= 0.0 {
+            return Twist::ZERO;
+        }
+        let before = *self;
+        let rotation_rad = rotation_vector(self.orientation);
+        match wish {
+            Wish::Follow(deflection) => {
+                let velocity = gains.past_dead_zone(deflection.translation) * gains.speed_m_per_s;
+                let spin = gains.past_dead_zone(deflection.rotation) * gains.spin_rad_per_s;
+                self.position_m = (self.position_m + velocity * dt_s).clamp_length_max(gains.range_m);
+                let turned = orientation_from_rotation_vector(spin * dt_s) * self.orientation;
+                let limited_rad = rotation_vector(turned).clamp_length_max(gains.range_rad);
+                self.orientation = orientation_from_rotation_vector(limited_rad);
+            }
+            Wish::Home => {
+                self.position_m = towards_zero(self.position_m, gains.speed_m_per_s * dt_s);
+                let left_rad = towards_zero(rotation_rad, gains.spin_rad_per_s * dt_s);
+                self.orientation = orientation_from_rotation_vector(left_rad);
+            }
+        }
+        let turned_rad = rotation_vector(self.orientation * before.orientation.inverse());
+        Twist::new((self.position_m - before.position_m) / dt_s, turned_rad / dt_s)
+    }
+
+    /// Where the handle is. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn pose(&self) -> Pose {
+        Pose::new(self.position_m, self.orientation)
+    }
+}
+
+impl Gains {
+    /// Each axis from 0 at the edge of the dead zone to 1 at full deflection.
+    fn past_dead_zone(&self, share: DVec3) -> DVec3 {
+        let beyond = (share.abs() - self.dead_zone).max(DVec3::ZERO) / (1.0 - self.dead_zone);
+        beyond * share.signum()
+    }
+}
+
+fn towards_zero(from: DVec3, step: f64) -> DVec3 {
+    let length = from.length();
+    if length <= step { DVec3::ZERO } else { from * ((length - step) / length) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const GAINS: Gains =
+        Gains { speed_m_per_s: 0.02, spin_rad_per_s: 0.5, dead_zone: 0.1, range_m: 0.01, range_rad: 0.1 };
+
+    fn pushed(translation: [i16; 3], rotation: [i16; 3]) -> Wish {
+        let mut deflection = Deflection::default();
+        deflection.update(&Report::Motion { translation, rotation });
+        Wish::Follow(deflection)
+    }
+
+    #[test]
+    fn full_deflection_is_full_speed_along_the_axis_of_the_host() {
+        let cases = [([350, 0, 0], DVec3::X), ([0, 350, 0], DVec3::NEG_Y), ([0, 0, 350], DVec3::NEG_Z)];
+        for (axes, direction) in cases {
+            let mut motion = Motion::default();
+            let twist = motion.advance(&pushed(axes, [0; 3]), &GAINS, 0.001);
+            assert!((twist.linear() - direction * 0.02).length() < 1.0e-12, "{axes:?}: {twist:?}");
+            let twist = motion.advance(&pushed([0; 3], axes), &GAINS, 0.001);
+            assert!((twist.angular() - direction * 0.5).length() < 1.0e-9, "{axes:?}: {twist:?}");
+        }
+    }
+
+    #[test]
+    fn a_hand_that_is_off_and_a_puck_that_is_noisy_leave_it_where_it_is() {
+        let mut motion = Motion::default();
+        motion.advance(&pushed([350, 0, 0], [0; 3]), &GAINS, 0.1);
+        let there = motion;
+        for _ in 0..1000 {
+            assert_eq!(motion.advance(&pushed([35, -35, 20], [-35, 1, 0]), &GAINS, 0.001), Twist::ZERO);
+        }
+        assert_eq!(motion.pose().position(), there.pose().position());
+    }
+
+    #[test]
+    fn home_is_reached_at_full_speed_and_kept() {
+        let mut motion = Motion::default();
+        motion.advance(&pushed([350, -350, 0], [0, 0, 350]), &GAINS, 0.2);
+        let far_m = motion.pose().position().length();
+        let twist = motion.advance(&Wish::Home, &GAINS, 0.001);
+        assert!((twist.linear().length() - 0.02).abs() < 1.0e-12 && far_m > 0.004);
+        for _ in 0..1000 {
+            motion.advance(&Wish::Home, &GAINS, 0.001);
+        }
+        assert_eq!(motion, Motion::default());
+    }
+
+    proptest! {
+        /// Wherever it is pushed for however long: finite, inside its range, no faster than its speed on each axis,
+        /// and a unit quaternion.
+        #[test]
+        fn it_stays_inside(
+            pushes in prop::collection::vec((any::<[i16; 3]>(), any::<[i16; 3]>(), 0.0..0.05), 1..200)
+        ) {
+            let mut motion = Motion::default();
+            for (translation, rotation, dt_s) in pushes {
+                let twist = motion.advance(&pushed(translation, rotation), &GAINS, dt_s);
+                let pose = motion.pose();
+                prop_assert!(twist.is_finite() && pose.is_finite());
+                prop_assert!(pose.position().length() <= 0.01 * (1.0 + 1.0e-12));
+                prop_assert!(rotation_vector(pose.orientation()).length() <= 0.1 * (1.0 + 1.0e-12));
+                prop_assert!((pose.orientation().length() - 1.0).abs() < 1.0e-12);
+                prop_assert!(twist.linear().length() <= 0.02 * 3.0_f64.sqrt() * (1.0 + 1.0e-9));
+            }
+        }
+    }
+}

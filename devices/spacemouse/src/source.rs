@@ -1,0 +1,79 @@
+//! Where reports come from.
+
+use flotor_hal::Refusal;
+use hidapi::{HidApi, HidDevice, HidError};
+
+/// Vendor numbers: 3Dconnexion, and Logitech, which sold the older ones.
+const VENDORS: [u16; 2] = [0x256f, 0x046d];
+/// Product numbers of Logitech that are 3Dconnexion's: from the SpaceMouse Plus (c603) to the SpaceMouse Pro (c62b).
+const PRODUCTS_OF_LOGITECH: std::ops::RangeInclusive<u16> = 0xc603..=0xc62b;
+/// What a six-axis puck is in the HID usage tables: a multi-axis controller of the generic desktop page.
+const PAGE: u16 = 0x01;
+const MULTI_AXIS_CONTROLLER: u16 = 0x08;
+
+/// Longest report that is looked at.
+pub const REPORT_BYTES: usize = 64;
+
+/// The puck is gone: unplugged, or switched off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Gone;
+
+/// Something that gives reports.
+pub trait Reports: Send + 'static {
+    /// The next report that has come, and its length; 0 for none. Real-time: bounded, no allocation; one call of the
+    /// system.
+    ///
+    /// # Errors
+    /// [`Gone`].
+    fn next(&mut self, report: &mut [u8; REPORT_BYTES]) -> Result<usize, Gone>;
+}
+
+/// A puck at hidraw.
+pub struct HidPuck(HidDevice);
+
+impl HidPuck {
+    /// Opens the puck at a path like `/dev/hidraw2`, or the first that is found. Not real-time.
+    ///
+    /// # Errors
+    /// A [`Refusal`] that says what is there and what to do.
+    pub fn open(path: Option<&str>) -> Result<Self, Refusal> {
+        let api = HidApi::new().map_err(Refusal::resource)?;
+        let puck = |info: &&hidapi::DeviceInfo| {
+            let (vendor, product) = (info.vendor_id(), info.product_id());
+            let ours =
+                vendor == VENDORS[0] || vendor == VENDORS[1] && PRODUCTS_OF_LOGITECH.contains(&product);
+            // The usage tells a puck from the keyboard that some of them are as well.
+            ours && (info.usage_page(), info.usage()) == (PAGE, MULTI_AXIS_CONTROLLER)
+        };
+        let path = match path {
+            Some(path) => std::ffi::CString::new(path).map_err(Refusal::parameter)?,
+            None => api.device_list().find(puck).map(|info| info.path().to_owned()).ok_or_else(|| {
+                Refusal::resource(
+                    "no SpaceMouse is plugged in; if there is one, `path` says where, as /dev/hidraw2",
+                )
+            })?,
+        };
+        let device = api.open_path(&path).map_err(|error| refused(&path.to_string_lossy(), &error))?;
+        device.set_blocking_mode(false).map_err(Refusal::resource)?;
+        Ok(Self(device))
+    }
+}
+
+fn refused(path: &str, error: &HidError) -> Refusal {
+    let cause = error.to_string();
+    Refusal::resource(if cause.contains("ermission") {
+        format!(
+            "this user may not use {path}; put `KERNEL==\"hidraw*\", ATTRS{{idVendor}}==\"256f\", TAG+=\"uaccess\"` \
+             into /etc/udev/rules.d/70-spacemouse.rules, run `sudo udevadm control --reload` and plug it in again"
+        )
+    } else {
+        format!("cannot open {path}: {cause}")
+    })
+}
+
+impl Reports for HidPuck {
+    fn next(&mut self, report: &mut [u8; REPORT_BYTES]) -> Result<usize, Gone> {
+        // Every error of reading is a puck that is gone: hidapi has only words for it.
+        self.0.read_timeout(report, 0).map_err(|_| Gone)
+    }
+}
