@@ -77,6 +77,19 @@ fn a_new_model_builds_validates_and_pushes() {
 }
 
 #[test]
+fn the_model_a_newcomer_starts_from_is_forty_lines_at_most() {
+    let scratch = Scratch::default();
+    let ran = new(scratch.path(), &["model", "jelly"]);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let source = std::fs::read_to_string(scratch.path().join("jelly/src/lib.rs")).expect("it was made");
+    let model = source.split("#[cfg(test)]").next().unwrap_or_default();
+    let lines =
+        model.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("//")).count();
+    println!("{lines} lines, without comments and its test");
+    assert!((10..=40).contains(&lines), "{lines}");
+}
+
+#[test]
 fn a_new_device_builds_validates_and_moves() {
     for language in ["rust", "c"] {
         let (scratch, name) = (Scratch::default(), format!("crank-in-{language}"));

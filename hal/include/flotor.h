@@ -729,6 +729,7 @@ typedef struct FlotorDevicePacingTable {
 #define FLOTOR_DEMAND_TORQUE 2u
 #define FLOTOR_DEMAND_ENERGY 4u
 /* Sets of axes: `{FLOTOR_AXES_ALL}` makes a FlotorAxes. */
+#define FLOTOR_AXES_PLANE 3u
 #define FLOTOR_AXES_TRANSLATION 7u
 #define FLOTOR_AXES_ROTATION 56u
 #define FLOTOR_AXES_ALL 63u

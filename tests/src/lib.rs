@@ -41,6 +41,31 @@ pub fn files_under(folder: &str, extension: &str) -> std::io::Result<Vec<PathBuf
     Ok(found)
 }
 
+/// The folders of all plugins of the workspace, relative to its root, sorted.
+///
+/// # Panics
+/// If the workspace cannot be read.
+#[must_use]
+pub fn plugin_folders() -> Vec<String> {
+    let kinds = ["devices", "models"];
+    let entries = kinds.into_iter().flat_map(|kind| {
+        let folder = workspace_root().join(kind).read_dir().expect("the workspace has its folders");
+        folder.map(move |entry| {
+            format!("{kind}/{}", entry.expect("a folder can be read").file_name().to_string_lossy())
+        })
+    });
+    let mut folders: Vec<String> =
+        entries.filter(|folder| workspace_root().join(folder).join("Cargo.toml").is_file()).collect();
+    folders.sort();
+    folders
+}
+
+/// The crate of a plugin's folder.
+#[must_use]
+pub fn crate_name_of(plugin_folder: &str) -> String {
+    format!("flotor-{}", plugin_folder.rsplit('/').next().unwrap_or_default())
+}
+
 /// How much work tests that scale may do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TestSize {

@@ -270,7 +270,7 @@ mod tests {
     #[test]
     fn live_parameters_change_and_the_range_does_not() {
         let mut puck = puck([motion(1, [350, 0, 0]), None, None, None, None]);
-        read(&mut puck, 0);
+        let _ = read(&mut puck, 0);
         assert!(puck.set_parameter(SPEED, 40.0).is_ok() && puck.set_parameter(3, 5.0).is_err());
         let (_, state) = read(&mut puck, 1);
         assert!((state.twist.linear().x - 0.04).abs() < 1.0e-12);

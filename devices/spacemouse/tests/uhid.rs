@@ -38,7 +38,7 @@ impl EmulatedPuck {
         let mut put = |at: usize, bytes: &[u8]| event[at..at + bytes.len()].copy_from_slice(bytes);
         put(0, &UHID_CREATE2.to_le_bytes());
         put(4, b"Emulated SpaceNavigator"); // name, of 128 bytes; then 64 each of place and serial number
-        put(260, &u16::try_from(DESCRIPTOR.len()).unwrap().to_le_bytes());
+        put(260, &u16::try_from(DESCRIPTOR.len()).expect("a short descriptor").to_le_bytes());
         put(262, &3_u16.to_le_bytes()); // USB
         put(264, &0x256f_u32.to_le_bytes()); // vendor, then product
         put(268, &0xc635_u32.to_le_bytes());
@@ -48,8 +48,11 @@ impl EmulatedPuck {
     }
 
     fn send(&mut self, report: &[u8]) {
-        let head =
-            [&UHID_INPUT2.to_le_bytes()[..], &u16::try_from(report.len()).unwrap().to_le_bytes()].concat();
+        let head = [
+            &UHID_INPUT2.to_le_bytes()[..],
+            &u16::try_from(report.len()).expect("a short report").to_le_bytes(),
+        ]
+        .concat();
         self.0.write_all(&[&head[..], report].concat()).expect("the kernel takes a report");
     }
 

@@ -13,7 +13,7 @@ use crate::servo::{Clock, Engine, Layer, Replacement, ScheduledChange, TimeBudge
 use crate::worker::{Worker, WorkerOrder};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, OpenedDevice, Plugin, Setting};
-use flotor_hal::{Capabilities, LoopConfig, Pacing, Parameter, ParameterKind, Refusal};
+use flotor_hal::{Axes, Capabilities, LoopConfig, Pacing, Parameter, ParameterKind, Refusal};
 use std::borrow::Cow;
 
 pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
@@ -225,11 +225,41 @@ pub(super) fn pair(scene: &Scene, number: u16, device: &Capabilities, can_pace: 
     }
     let is_felt = scene.models.iter().any(|model| model.device == number)
         || scene.couplings.iter().any(|coupling| coupling.ends.iter().any(|end| end.device == number));
-    if is_felt && !device.actuated.contains(flotor_hal::Axes::TRANSLATION) {
-        mismatches
-            .push("the device gives no force, so no model can be felt; use it for input only".to_owned());
+    if is_felt {
+        mismatches.extend(unfelt(&scene.limits.force_n, device));
     }
     mismatches
+}
+
+/// Force that models would ask for and the device cannot give, unless the scene says that none is wanted there.
+fn unfelt(wanted_n: &[f64; 3], device: &Capabilities) -> Option<String> {
+    let axes = [(Axes::X, "x"), (Axes::Y, "y"), (Axes::Z, "z")];
+    let is_driven = axes.map(|(axis, _)| device.actuated.contains(axis));
+    let is_unfelt =
+        |index: usize| !is_driven[index] && wanted_n.get(index).is_some_and(|most_n| *most_n > 0.0);
+    let unfelt: Vec<&str> = (0..3).filter(|index| is_unfelt(*index)).map(|index| axes[index].1).collect();
+    if unfelt.is_empty() {
+        return None;
+    }
+    let accepted: Vec<String> = device
+        .max_force_n
+        .iter()
+        .zip(is_driven)
+        .map(|(most_n, is_driven)| if is_driven { most_n.to_string() } else { "0".to_owned() })
+        .collect();
+    let accepted = accepted.join(", ");
+    Some(if is_driven == [false; 3] {
+        format!(
+            "the device gives no force, so no model can be felt; `[limits] force_n = [{accepted}]` accepts that: models \
+             are computed, shown and recorded. Without a `[[model]]` it records poses"
+        )
+    } else {
+        format!(
+            "the device gives no force along {}, so that part of a model cannot be felt; `[limits] force_n = \
+             [{accepted}]` accepts that",
+            unfelt.join(" and ")
+        )
+    })
 }
 
 /// What a scene sets for a plugin, as written.
@@ -288,4 +318,42 @@ pub(super) fn schedule(
     }
     parts.start_with_the_first();
     Ok(scheduled)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mismatch(wanted_n: [f64; 3], actuated: Axes, max_force_n: [f64; 3]) -> Option<String> {
+        let device = Capabilities {
+            sensed: Axes::ALL,
+            actuated,
+            range_m: [0.01; 3],
+            range_rad: [0.1; 3],
+            resolution_m: 0.0,
+            max_force_n,
+            max_torque_nm: [0.0; 3],
+            max_force_slew_n_per_s: f64::INFINITY,
+            max_torque_slew_nm_per_s: f64::INFINITY,
+            max_stiffness_n_per_m: 0.0,
+            rate_hz: [100.0, 10_000.0],
+            latency_s: 0.0,
+        };
+        unfelt(&wanted_n, &device)
+    }
+
+    #[test]
+    fn a_device_without_force_says_what_works_and_takes_its_word() {
+        let said = mismatch([f64::INFINITY; 3], Axes::NONE, [0.0; 3]).expect("nothing could be felt");
+        assert!(said.contains("gives no force") && said.contains("force_n = [0, 0, 0]"), "{said}");
+        assert_eq!(mismatch([0.0; 3], Axes::NONE, [0.0; 3]), None);
+        assert_eq!(mismatch([f64::INFINITY; 3], Axes::ALL, [3.0; 3]), None);
+    }
+
+    #[test]
+    fn a_planar_device_says_which_axis_is_missing_and_takes_its_word() {
+        let said = mismatch([f64::INFINITY; 3], Axes::PLANE, [3.0, 3.0, 0.0]).expect("z would not be felt");
+        assert!(said.contains("along z") && said.contains("force_n = [3, 3, 0]"), "{said}");
+        assert_eq!(mismatch([3.0, 3.0, 0.0], Axes::PLANE, [3.0, 3.0, 0.0]), None);
+    }
 }

@@ -1,0 +1,108 @@
+//! A planar device over a serial port in a scene, in real time: an emulated board at a pseudo terminal.
+
+use flotor::registry::Registry;
+use flotor::scene::Scene;
+use flotor::servo::{Clock, StopSwitch};
+use flotor::session::{Observer, RunEnd, RunError, RunOptions, Session};
+use flotor::trace::{Events, TickRecord};
+use flotor_hal::DVec3;
+use flotor_hal::glam::DVec2;
+use flotor_haply::emulator::EmulatedBoard;
+use flotor_haply::pantograph::Pantograph;
+use flotor_tests::workspace_root;
+use serialport::{SerialPort, TTYPort};
+use std::io::{Read, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+const LINKAGE: Pantograph = Pantograph { inner_m: 0.07, outer_m: 0.09, base_m: 0.038 };
+const CENTRE_M: DVec2 = DVec2::new(0.019, 0.1);
+/// The hand holds the handle here, away from the user and to the right, m in the host's frame.
+const HELD_M: DVec3 = DVec3::new(0.005, 0.004, 0.0);
+
+/// A board on a thread of its own, until it is dropped.
+struct Board {
+    path: String,
+    is_over: Arc<AtomicBool>,
+}
+
+impl Board {
+    fn start() -> Self {
+        let (mut port, host_end) = TTYPort::pair().expect("the system has pseudo terminals");
+        port.set_timeout(Duration::from_millis(5)).expect("it is ours");
+        let path = host_end.name().expect("it has a path");
+        let is_over = Arc::new(AtomicBool::new(false));
+        let ended = Arc::clone(&is_over);
+        std::thread::spawn(move || {
+            let host_end = host_end;
+            let mut board = EmulatedBoard::new(LINKAGE, CENTRE_M - DVec2::new(HELD_M.x, HELD_M.y));
+            let mut chunk = [0; 256];
+            while !ended.load(Ordering::Acquire) {
+                let length = port.read(&mut chunk).unwrap_or(0);
+                if port.write_all(&board.hear(&chunk[..length])).is_err() {
+                    break;
+                }
+            }
+            drop(host_end);
+        });
+        Self { path, is_over }
+    }
+
+    /// The scene of the book on this board, with other limits.
+    fn scene(&self, limits: &str) -> Scene {
+        let file = workspace_root().join("host/scenes/haply.toml");
+        let text = std::fs::read_to_string(&file).expect("the scene is there");
+        // A machine that is held up for long is no fault of the board.
+        let port = format!("{}\"\ntimeout_ms = \"9000", self.path).replace("\"9000", "9000");
+        let text = text.replace("/dev/ttyACM0\"", &port).replace("force_n = [3, 3, 0]", limits);
+        Scene::parse(&file, &text.replace("duration_s = 20", "duration_s = 1")).expect("the scene is right")
+    }
+}
+
+impl Drop for Board {
+    fn drop(&mut self) {
+        self.is_over.store(true, Ordering::Release);
+    }
+}
+
+#[derive(Default)]
+struct Keep(Vec<TickRecord>);
+
+impl Observer for Keep {
+    fn observe(&mut self, record: &TickRecord) {
+        self.0.push(*record);
+    }
+}
+
+#[test]
+fn a_wall_is_felt_in_the_plane() {
+    let board = Board::start();
+    let options = RunOptions { clock: Clock::Real, seed: 1 };
+    let session = Session::prepare(&board.scene("force_n = [3, 3, 0]"), &Registry::search(&[]), &options)
+        .unwrap_or_else(|error| panic!("{error}"));
+    let mut keep = Keep::default();
+    let outcome = session.run(&mut keep, &StopSwitch::default()).expect("it runs");
+    assert_eq!(outcome.end, RunEnd::Finished);
+    let pressed = keep.0.iter().filter(|record| record.commanded.force().length() > 1.0);
+    let pressed = pressed.max_by_key(|record| record.tick).expect("the wall was touched");
+    assert!((pressed.pose.position() - HELD_M).length() < 1.0e-6, "{pressed:?}");
+    // 4 mm into a wall of 300 N/m: 1.2 N towards the user, and nothing on the axis there is not.
+    assert!((pressed.commanded.force() - DVec3::new(0.0, -1.2, 0.0)).length() < 0.01, "{pressed:?}");
+    assert!(!pressed.events.intersects(Events::FORCE_LIMITED));
+}
+
+#[test]
+fn a_scene_that_wants_more_than_the_plane_is_told_before_anything_moves() {
+    let board = Board::start();
+    let options = RunOptions { clock: Clock::Real, seed: 1 };
+    let refused = Session::prepare(&board.scene("ramp_s = 0.1"), &Registry::search(&[]), &options);
+    match refused {
+        Err(error @ RunError::Mismatch { .. }) => {
+            let said = error.to_string();
+            assert!(said.contains("along z") && said.contains("force_n = [3, 3, 0]"), "{said}");
+        }
+        Err(error) => panic!("{error}"),
+        Ok(_) => panic!("z would be missing"),
+    }
+}

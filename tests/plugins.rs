@@ -1,0 +1,47 @@
+//! Every plugin of the tree is found without being opened, and violates no rule of the contract.
+
+use flotor_tests::library::{patched, plugin_file};
+use flotor_tests::program::{Flotor, exit_code};
+use flotor_tests::scratch::Scratch;
+use flotor_tests::{crate_name_of, plugin_folders};
+use serde_json::Value;
+
+#[test]
+fn every_plugin_is_listed_without_being_opened() {
+    // A library that the linker would refuse: whoever opened it would not get far.
+    let scratch = Scratch::default();
+    for folder in plugin_folders() {
+        let library = plugin_file(&crate_name_of(&folder));
+        let bytes = std::fs::read(&library).expect("it is built");
+        let bytes = patched(bytes, b"\0libc.so.6\0", b"\0libX.so.6\0");
+        let _ = scratch.file(&library.file_name().expect("a file has a name").to_string_lossy(), &bytes);
+    }
+    let ran = Flotor::with(["plugins", "--json"]).searching(&[scratch.path()]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let listed: Vec<Value> = serde_json::from_str(&ran.stdout).expect("the list is JSON");
+    for folder in plugin_folders() {
+        let id = folder.rsplit('/').next().expect("a folder has a name");
+        let plugin = listed.iter().find(|plugin| plugin["id"] == id);
+        let plugin = plugin.unwrap_or_else(|| panic!("`{id}` is not listed: {}", ran.stdout));
+        let file = plugin["file"].as_str().expect("a file is text");
+        assert!(file.starts_with(&*scratch.path().to_string_lossy()), "{file} is not the unloadable one");
+    }
+}
+
+#[test]
+fn no_plugin_violates_a_rule() {
+    for folder in plugin_folders() {
+        let library = plugin_file(&crate_name_of(&folder)).display().to_string();
+        let ran = Flotor::with(["validate", &library, "--json", "--timeout", "60s"]).run();
+        let findings: Vec<Value> = serde_json::from_str(&ran.stdout).unwrap_or_default();
+        let checked = findings.iter().filter(|finding| finding["unchecked"].is_null()).count();
+        println!("{folder}: {checked} of {} rules checked", findings.len());
+        // How long a step takes here and now says nothing about the plugin.
+        let violated = findings
+            .iter()
+            .find(|finding| !finding["violation"].is_null() && finding["rule"] != "time-budget");
+        assert_eq!(violated, None, "{folder}");
+        // What needs hardware that is not here says so; everything else is checked.
+        assert!(findings.len() >= 7 && checked >= 3, "{folder}: {ran:?}");
+    }
+}
