@@ -402,7 +402,9 @@ fn nothing_a_wild_model_answers_gets_past_a_limit_or_the_slew() {
                   torque_slew_nm_per_s = 200.0\nramp_s = 0.1";
     let wild = scene("", "fault = \"wild\"", limits)
         .replace("duration_s = 0.2", &format!("duration_s = {}", ticks / 1000));
-    for tables in ["", "\npassivity = \"control\"\nvelocity_m_per_s = 0.1"] {
+    let controlled = "\npassivity = \"control\"\nvelocity_m_per_s = 0.1";
+    // The controller leaves so little to a hand that has put nothing in that the slew limit has nothing to do.
+    for (tables, last_guard) in [("", Events::SLEW_LIMITED), (controlled, Events::PASSIVITY_DAMPED)] {
         let run = watch(&format!("{wild}{tables}"));
         assert_eq!((run.outcome.end, run.records.len()), (RunEnd::Finished, ticks));
         let rejected = the_model(&run).rejected_ticks;
@@ -421,6 +423,6 @@ fn nothing_a_wild_model_answers_gets_past_a_limit_or_the_slew() {
             last = sent;
         }
         assert!(run.records.iter().any(|record| record.events.intersects(Events::FORCE_LIMITED)));
-        assert!(run.records.iter().any(|record| record.events.intersects(Events::SLEW_LIMITED)));
+        assert!(run.records.iter().any(|record| record.events.intersects(last_guard)));
     }
 }

@@ -88,14 +88,16 @@ impl Envelope {
         let gated = guarded * gate.models;
         let driven = self.limit_speed(&gated, state, events);
         let walled = driven + self.wall(state, events) * gate.boundary;
-        let passive = match self.passivity.guard(&walled, state) {
-            None => walled,
+        // Before the energy is looked at: what cannot be sent anyway may be too large to be squared.
+        let bounded = self.limit(&walled, events);
+        let limited = match self.passivity.guard(&bounded, state) {
+            None => bounded,
             Some(less) => {
                 events.insert(Events::PASSIVITY_DAMPED);
-                less
+                // Damping may point where there was less to spare.
+                self.limit(&less, events)
             }
         };
-        let limited = self.limit(&passive, events);
         let safe = self.slew(&limited, tick, events);
         self.last = safe;
         safe
