@@ -15,7 +15,7 @@
 //! anew at each pose, from the shape of the linear column. Past it there are several: a bulge may point anywhere, and
 //! where it points depends on how the hand came there. A choice by the pose alone would make torque jump as a plate is
 //! rocked through the level, so from there the rod is followed from tick to tick, until the plates are far enough apart
-//! again. A spring too short to buckle ([`Region::has_buckling`]) has no such poses and no memory.
+//! again. A spring too short to buckle (`Region::has_buckling`) has no such poses and no memory.
 
 use std::f64::consts::PI;
 
