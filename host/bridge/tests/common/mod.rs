@@ -46,6 +46,7 @@ pub fn description() -> RunDescription {
         seed: 7,
         clock: Clock::Real,
         scene_toml: "title = \"Far away\"".to_owned(),
+        couplings: Vec::new(),
         plugins: Vec::new(),
     }
 }
