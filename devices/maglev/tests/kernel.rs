@@ -281,7 +281,7 @@ const ROLE: &str = "FLOTOR_KERNEL_ROLE";
 const PERSONALITY: &str = "FLOTOR_KERNEL_PERSONALITY";
 
 #[test]
-#[ignore = "a part of the other tests"]
+#[ignore = "the host of the other tests, in a process of its own: they start it"]
 fn a_process_that_is_the_host() {
     let (Ok(role), Ok(address)) = (std::env::var(ROLE), std::env::var(PERSONALITY)) else { return };
     let personality = ALL.into_iter().find(|personality| personality.address() == address).unwrap();

@@ -1,3 +1,5 @@
+//! The coupling against what it promises: energy, delay, lost and overtaken news, scales and frames.
+
 use super::*;
 use crate::mapping::MappingConfig;
 use flotor_hal::{DQuat, DVec3, Pose, Twist};
