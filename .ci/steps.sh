@@ -1,5 +1,5 @@
 # Sourced by `run` and `full`: how a step is run and reported, and the steps every change must pass.
-# Stops at the first step that fails. Needs a Rust toolchain with rustfmt and clippy, and a C compiler; installs nothing.
+# Stops at the first step that fails. Needs a Rust toolchain with rustfmt and clippy, and a C compiler.
 
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -27,8 +27,28 @@ summary() {
     printf '%s\n' "${report[@]}"
 }
 
+# What the tests use beyond Rust and a C compiler, by Debian's names: valgrind counts instructions, Xvfb and xdotool hold
+# and push a real window, drawn by Mesa; QEMU, busybox and cpio make the small virtual machine.
+debian_packages="valgrind xvfb xdotool libegl1 libgl1-mesa-dri libxkbcommon-x11-0 qemu-system-x86 busybox-static cpio"
+
+# Installs what is missing where that is possible; elsewhere the tests that need it say that they were skipped.
+machine() {
+    local missing
+    # shellcheck disable=SC2086 # a list of packages
+    missing=$(dpkg-query -Wf '${db:Status-Status} ${Package}\n' $debian_packages 2>/dev/null | sed -n 's/^installed //p' |
+        grep -vxFf - <(printf '%s\n' $debian_packages) || true)
+    [ -n "$missing" ] || return 0
+    if ! command -v apt-get >/dev/null || [ "$(id -u)" != 0 ]; then
+        echo "not installed, and only root on Debian can change that here:" $missing
+        return 0
+    fi
+    # shellcheck disable=SC2086
+    apt-get -qq update && DEBIAN_FRONTEND=noninteractive apt-get -qq install -y --no-install-recommends $missing >/dev/null
+}
+
 # The checks of every change, cheapest first.
 every_change() {
+    step machine machine
     step format cargo fmt --all --check
     # The README's test command, word for word.
     step test cargo test
@@ -37,7 +57,7 @@ every_change() {
     step lint cargo clippy --workspace --all-targets -- -D warnings
     step docs env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
     # Workspaces of their own: that they still compile against the host.
-    step beside cargo check --release --manifest-path host/python/Cargo.toml --target-dir target/beside
+    step beside cargo check --manifest-path host/python/Cargo.toml --target-dir target
     # The maglev plugin against the USB, HID and serial drivers of a kernel; skips, and says why, without QEMU.
     step usb .ci/vm
     # Every interleaving of the lock-free cells. A target folder of its own: the flag changes every crate.

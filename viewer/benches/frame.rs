@@ -62,9 +62,8 @@ fn history() -> History {
 
 fn library() -> PathBuf {
     let own = std::env::current_exe().expect("a bench is a program");
-    let folder = own.ancestors().nth(2).expect("benches lie in a folder of the build");
-    let file = folder.join("libflotor_spring.so");
-    assert!(file.is_file(), "{} is missing: build flotor-spring in this profile first", file.display());
+    let file = own.with_file_name("libflotor_spring.so");
+    assert!(file.is_file(), "{} is missing: is the crate a dev-dependency?", file.display());
     file
 }
 

@@ -19,12 +19,11 @@ use std::time::{Duration, Instant};
 /// No test waits longer than this for anything.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(20);
 
-/// The library of a plugin, built beside the tests.
+/// The library of a plugin, built beside the tests because they depend on its crate.
 pub(crate) fn plugin_file(name: &str) -> PathBuf {
     let own = std::env::current_exe().expect("a test is a program");
-    let folder = own.ancestors().nth(2).expect("tests lie in a folder of the build").to_path_buf();
-    let file = folder.join(format!("libflotor_{name}.so"));
-    assert!(file.is_file(), "{} is missing: run `cargo build` first", file.display());
+    let file = own.with_file_name(format!("libflotor_{name}.so"));
+    assert!(file.is_file(), "{} is missing: is the crate a dev-dependency?", file.display());
     file
 }
 
