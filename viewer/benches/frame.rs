@@ -63,7 +63,7 @@ fn history() -> History {
 fn library() -> PathBuf {
     let own = std::env::current_exe().expect("a bench is a program");
     let file = own.with_file_name("libflotor_spring.so");
-    assert!(file.is_file(), "{} is missing: is the crate a dev-dependency?", file.display());
+    assert!(file.is_file(), "{} is missing: run `cargo build --release` first", file.display());
     file
 }
 

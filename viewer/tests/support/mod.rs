@@ -19,11 +19,11 @@ use std::time::{Duration, Instant};
 /// No test waits longer than this for anything.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(20);
 
-/// The library of a plugin, built beside the tests because they depend on its crate.
+/// The library of a plugin: beside the tests, where `cargo build` and `cargo test` put what they compile.
 pub(crate) fn plugin_file(name: &str) -> PathBuf {
     let own = std::env::current_exe().expect("a test is a program");
     let file = own.with_file_name(format!("libflotor_{name}.so"));
-    assert!(file.is_file(), "{} is missing: is the crate a dev-dependency?", file.display());
+    assert!(file.is_file(), "{} is missing: run `cargo build` first", file.display());
     file
 }
 
