@@ -5,13 +5,13 @@ use flotor::trace::Events;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
 use flotor_tests::library::{build_folder, plugin_file};
-use flotor_tests::program::exit_code;
+use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::watch;
 use rustix::process::{Pid, Signal, kill_process};
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::time::Duration;
 
@@ -44,7 +44,11 @@ impl Emulator {
         let mut child = command.stdout(Stdio::piped()).spawn().expect("the emulator starts");
         let output = child.stdout.take().expect("a pipe was asked for");
         let mut lines = BufReader::new(output).lines();
-        let first = lines.next().expect("the emulator says where it is").expect("its output is text");
+        let first = lines
+            .by_ref()
+            .map(|line| line.expect("its output is text"))
+            .find(|line| line.starts_with("listening"))
+            .expect("the emulator says where it is");
         let address = first.rsplit(' ').next().expect("the last word is the address").to_owned();
         Self { child, lines, transport, address }
     }
@@ -127,6 +131,64 @@ fn one_scene_gives_one_trajectory_on_both_devices() {
         }
         assert!(moved_m > 2.0e-3, "the handle moved by {moved_m} m only: nothing was compared");
     }
+}
+
+// ---------------------------------------------------------------- calibration
+
+/// `flotor calibrate`, with patience for a test machine that is held up.
+fn calibrate(emulator: &Emulator, sensor: &Path, arguments: &[&str]) -> Ran {
+    let address = format!("address={}", emulator.address);
+    let device =
+        ["--device", "maglev", "--set", &address, "--set", "watchdog_ms=700", "--set", "timeout_ms=8000"];
+    let sensor = ["--sensor", sensor.to_str().expect("a scratch folder has a plain name")];
+    Flotor::with(["calibrate"].iter().chain(arguments).chain(&device).chain(&sensor)).run()
+}
+
+#[test]
+fn a_device_is_calibrated_with_a_force_sensor_on_a_serial_port() {
+    let scratch = Scratch::default();
+    let (sensor, file) = (scratch.path().join("force"), scratch.path().join("mine.toml"));
+    let rig = ["--calibration-rig", sensor.to_str().unwrap(), "--rig-step-mm", "2", "--rig-stop-s", "0.8"];
+    let mut emulator = Emulator::listening("tcp", "127.0.0.1:0", &rig);
+    let plan =
+        ["vertical", "--steps", "7", "--step-mm", "2", "--runs", "1", "--readings", "2", "--json", "-"];
+    let ran = calibrate(&emulator, &sensor, &[&plan[..], &["--out", file.to_str().unwrap()]].concat());
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    let report: serde_json::Value = serde_json::from_str(&ran.stdout).expect("the report is JSON");
+    let number = |key: &str| report[key].as_f64().unwrap_or_else(|| panic!("{key} in {report}"));
+    // The field's error is 10.87 % over exactly 14 mm; the stand gives way by at most 0.3 mm, at the steep end of 1.1 %
+    // a millimetre.
+    assert!((number("error_before_percent") - 10.87).abs() < 0.4, "{report}");
+    assert!(number("error_after_percent") <= 0.5, "{report}");
+    assert!((number("weight_n") - 8.58).abs() < 0.05, "{report}");
+    emulator.wait_for(&["mode Disarmed"]);
+    let text = std::fs::read_to_string(&file).expect("the file was written");
+    assert!(text.contains("plugin = \"maglev\"") && text.contains("serial = \"emulated\""), "{text}");
+}
+
+#[test]
+fn a_calibration_that_cannot_be_says_why_and_lets_the_handle_down() {
+    let scratch = Scratch::default();
+    let sensor = scratch.path().join("force");
+    let rig = ["--calibration-rig", sensor.to_str().unwrap(), "--rig-stop-s", "60"];
+    // The stand stays at the top: 5 mm is where nobody brings it.
+    let mut emulator = Emulator::listening("tcp", "127.0.0.1:0", &rig);
+    let ran = calibrate(&emulator, &sensor, &["vertical", "--steps", "10", "--patience", "3s"]);
+    assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
+    assert!(ran.error().contains("not at 5.00 mm; move the sensor"), "{}", ran.error());
+    emulator.wait_for(&["mode Disarmed"]);
+    // Nobody holds the handle, and the sensor is somewhere else: 10 N on 7.7 N that are carried already.
+    let _elsewhere = Emulator::listening("tcp", "127.0.0.1:0", &rig);
+    let mut emulator = Emulator::listening("tcp", "127.0.0.1:0", &["--set", "hand=open"]);
+    let ran = calibrate(&emulator, &sensor, &["vertical", "--patience", "60s"]);
+    assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
+    assert!(ran.error().contains("flew off"), "{}", ran.error());
+    emulator.wait_for(&["mode Disarmed"]);
+    let missing = scratch.path().join("nowhere");
+    let ran = calibrate(&emulator, &missing, &["vertical"]);
+    assert!(ran.error().contains("no force sensor at"), "{}", ran.error());
+    let ran = Flotor::with(["calibrate", "vertical", "--device", "maglev"]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
 }
 
 #[test]

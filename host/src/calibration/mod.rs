@@ -44,6 +44,27 @@ pub enum CalibrationError {
     /// The plugin does not understand what the rig asks of a simulated flotor.
     #[error("the plugin is no simulated flotor: {0}")]
     Setting(#[from] SettingError),
+    /// Nothing held the handle.
+    #[error(
+        "at {height_mm:.1} mm the handle flew off and was braked; is the force sensor above it, and held firmly?"
+    )]
+    RanAway {
+        /// Where, mm.
+        height_mm: f64,
+    },
+    /// The sensor was not brought where it should be.
+    #[error(
+        "the handle rests at {height_mm:.2} mm and not at {target_mm:.2} mm; move the sensor, or wait longer (--patience)"
+    )]
+    NotReached {
+        /// Where it should rest, mm.
+        target_mm: f64,
+        /// Where it does, mm.
+        height_mm: f64,
+    },
+    /// There is no thread to hold the handle.
+    #[error("cannot hold the handle beside measuring: {0}")]
+    NoThread(std::io::Error),
     /// The device refuses to run or to be calibrated.
     #[error("the device refuses: {0}")]
     Refused(Refusal),

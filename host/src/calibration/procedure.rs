@@ -68,10 +68,18 @@ pub fn measure(
     for &commanded_n in &plan.forces_n {
         for run in 0..plan.runs {
             for (stop, target_m) in (0..).zip(plan.heights_m()) {
-                let rest = rig.rest_at(target_m, &|_| commanded_n)?;
-                for _ in 0..plan.readings {
-                    let force_n = rig.read_force_n(&rest)?;
-                    readings.push(Reading { commanded_n, run, stop, height_m: rest.height_m, force_n });
+                let before = readings.len();
+                loop {
+                    let rest = rig.rest_at(target_m, &|_| commanded_n)?;
+                    for _ in 0..plan.readings {
+                        let force_n = rig.read_force_n(&rest)?;
+                        readings.push(Reading { commanded_n, run, stop, height_m: rest.height_m, force_n });
+                    }
+                    if rig.still_rests(&rest)? {
+                        break;
+                    }
+                    // The sensor moved on in between: which height these readings are of is not known.
+                    readings.truncate(before);
                 }
                 stopped();
             }

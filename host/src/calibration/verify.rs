@@ -1,6 +1,8 @@
-//! How uneven the vertical force is: delivered over commanded, measured on the device, over z = -7 mm to 7 mm.
+//! How uneven the vertical force is: delivered over commanded, over the height; as the simulated device says it, over
+//! z = -7 mm to 7 mm, or as a force sensor read it.
 
 use super::CalibrationError;
+use super::procedure::Reading;
 use super::rig::Rig;
 
 /// Half the stretch the error is measured over, m.
@@ -41,6 +43,23 @@ impl ErrorCurve {
             stopped();
         }
         Ok(Self { ratios })
+    }
+
+    /// What a force sensor read at each height, in the mean over forces, runs and readings; what moves weighs `weight_n`.
+    #[must_use]
+    pub fn of_readings(readings: &[Reading], weight_n: f64) -> Self {
+        let mut stops: Vec<u32> = readings.iter().map(|reading| reading.stop).collect();
+        stops.sort_unstable();
+        stops.dedup();
+        let mean = |stop: &u32| {
+            let at_stop = || readings.iter().filter(|reading| reading.stop == *stop);
+            let count = at_stop().count() as f64;
+            let height_m = at_stop().map(|reading| reading.height_m).sum::<f64>() / count;
+            let ratio = |reading: &Reading| (reading.force_n + weight_n) / reading.commanded_n;
+            (height_m, at_stop().map(ratio).sum::<f64>() / count)
+        };
+        // From the bottom to the top: the sensor was lowered.
+        Self { ratios: stops.iter().rev().map(mean).collect() }
     }
 
     /// Difference of the largest and the smallest ratio, percent.

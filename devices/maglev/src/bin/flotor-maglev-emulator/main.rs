@@ -2,6 +2,8 @@
 //! over the simulated flotor. `flotor emulate maglev` starts it.
 
 mod plant;
+#[cfg(feature = "serial")]
+mod rig;
 #[cfg(target_os = "linux")]
 mod usb;
 
@@ -16,7 +18,7 @@ use plant::LoadedPlant;
 use std::error::Error;
 use std::io::Write;
 use std::net::TcpListener;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 
@@ -27,7 +29,8 @@ use std::sync::atomic::AtomicBool;
     flotor emulate maglev\n  \
     flotor emulate maglev --transport pty --link /tmp/flotor-tty\n  \
     sudo modprobe vhci_hcd && sudo flotor emulate maglev --transport usb\n  \
-    flotor emulate maglev --pace lockstep --set preset=full --set hand=press --once")]
+    flotor emulate maglev --pace lockstep --set preset=full --set hand=press --once\n  \
+    flotor emulate maglev --calibration-rig /tmp/flotor-force")]
 struct Arguments {
     /// What the host connects by
     #[arg(long, value_enum, default_value = "tcp")]
@@ -44,6 +47,16 @@ struct Arguments {
     /// Set a parameter of the simulated flotor (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
+    /// Hold the handle in a calibration rig instead of a hand: a stand that comes down step by step, and a force sensor
+    /// as a serial port by this name
+    #[arg(long, value_name = "PATH")]
+    calibration_rig: Option<PathBuf>,
+    /// Calibration rig: step of the stand, in mm
+    #[arg(long, default_value_t = 1.0, value_name = "MM", requires = "calibration_rig", value_parser = step_mm)]
+    rig_step_mm: f64,
+    /// Calibration rig: time at each step, in s
+    #[arg(long, default_value_t = 1.0, value_name = "S", requires = "calibration_rig", value_parser = stop_s)]
+    rig_stop_s: f64,
     /// Seed of everything random
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
@@ -102,12 +115,19 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         PaceOption::Lockstep => Pace::Lockstep,
     };
     let plugin = plant::load(arguments.plant.as_deref())?;
-    let settings = arguments.sets.iter().map(|text| {
+    let parse = |key: &str, value: &str| {
+        Setting::parse(plugin.parameters(), key, value).map_err(|error| error.to_string())
+    };
+    let mut settings = rig_settings(arguments)?
+        .iter()
+        .map(|(key, value)| parse(key, value))
+        .collect::<Result<Vec<_>, String>>()?;
+    for text in &arguments.sets {
         let (key, value) = text.split_once('=').ok_or_else(|| format!("--set {text} is not KEY=VALUE"))?;
-        Setting::parse(plugin.parameters(), key.trim(), value.trim()).map_err(|error| error.to_string())
-    });
-    let settings = settings.collect::<Result<Vec<_>, String>>()?;
-    let (plant, capabilities) = LoadedPlant::open(plugin, settings, arguments.seed)?;
+        settings.push(parse(key.trim(), value.trim())?);
+    }
+    let (mut plant, capabilities) = LoadedPlant::open(plugin, settings, arguments.seed)?;
+    sense_force(&mut plant, arguments)?;
     let config = controller_config(&capabilities, pace, &arguments.serial);
     let mut emulator = Emulator::new(config, pace, plant);
     match arguments.transport {
@@ -122,6 +142,68 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         #[cfg(target_os = "linux")]
         TransportOption::Cdc => usb::serve(&mut emulator, arguments, Personality::Serial),
     }
+}
+
+#[cfg(feature = "serial")]
+fn rig_settings(arguments: &Arguments) -> Result<Vec<(&'static str, String)>, Box<dyn Error>> {
+    match &arguments.calibration_rig {
+        Some(link) => rig::settings(link, arguments.rig_step_mm, arguments.rig_stop_s),
+        None => Ok(Vec::new()),
+    }
+}
+
+#[cfg(feature = "serial")]
+fn sense_force(plant: &mut LoadedPlant, arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    if let Some(link) = &arguments.calibration_rig {
+        let force = rig::SensedForce::default();
+        let port = rig::serve(link, force.clone())?;
+        plant.sense(force)?;
+        say(&format!("force-sensor {}", port.display()));
+    }
+    Ok(())
+}
+
+#[cfg(not(feature = "serial"))]
+fn rig_settings(arguments: &Arguments) -> Result<Vec<(&'static str, String)>, Box<dyn Error>> {
+    match arguments.calibration_rig {
+        Some(_) => Err(WITHOUT_TERMINALS.into()),
+        None => Ok(Vec::new()),
+    }
+}
+
+#[cfg(not(feature = "serial"))]
+fn sense_force(_: &mut LoadedPlant, _: &Arguments) -> Result<(), Box<dyn Error>> {
+    Ok(())
+}
+
+#[cfg(not(feature = "serial"))]
+const WITHOUT_TERMINALS: &str =
+    "this program was built without pseudo terminals; build it with --features serial";
+
+fn step_mm(text: &str) -> Result<f64, String> {
+    within(text, 0.1, 7.0, "mm")
+}
+
+fn stop_s(text: &str) -> Result<f64, String> {
+    within(text, 0.1, 600.0, "s")
+}
+
+fn within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> {
+    let number: f64 = text.trim().parse().map_err(|_| format!("`{text}` is no number"))?;
+    if (least..=most).contains(&number) {
+        Ok(number)
+    } else {
+        Err(format!("legal is {least} to {most} {unit}"))
+    }
+}
+
+/// A symbolic link by this name. Only a link is replaced, never somebody's file.
+#[cfg_attr(not(feature = "serial"), allow(dead_code))]
+fn link_to(target: &Path, link: &Path) -> Result<(), Box<dyn Error>> {
+    if link.is_symlink() {
+        std::fs::remove_file(link)?;
+    }
+    std::os::unix::fs::symlink(target, link).map_err(|error| format!("{}: {error}", link.display()).into())
 }
 
 fn serve_tcp(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Result<(), Box<dyn Error>> {
@@ -152,11 +234,7 @@ fn serve_pty(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Res
     let name = theirs.name().ok_or("the pseudo terminal has no name")?;
     drop(theirs);
     if let Some(link) = &arguments.link {
-        // Only a link is replaced, never somebody's file.
-        if link.is_symlink() {
-            std::fs::remove_file(link)?;
-        }
-        std::os::unix::fs::symlink(&name, link).map_err(|error| format!("{}: {error}", link.display()))?;
+        link_to(Path::new(&name), link)?;
     }
     say(&format!("listening pty {name}"));
     let mut link = StreamLink::new(ours);
@@ -175,7 +253,7 @@ fn serve_pty(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Res
 
 #[cfg(not(feature = "serial"))]
 fn serve_pty(_: &mut Emulator<LoadedPlant>, _: &Arguments) -> Result<(), Box<dyn Error>> {
-    Err("this program was built without pseudo terminals; build it with --features serial".into())
+    Err(WITHOUT_TERMINALS.into())
 }
 
 /// One line an event, at once: somebody may be waiting for it.

@@ -46,6 +46,9 @@ pub(crate) struct LoadedPlant {
     tick: u64,
     time_ns: u64,
     state: DeviceState,
+    /// What carries and weighs the moving part, N, and who feels the rest; nothing without a force sensor.
+    #[cfg(feature = "serial")]
+    sensor: Option<(f64, crate::rig::SensedForce)>,
 }
 
 impl LoadedPlant {
@@ -55,10 +58,32 @@ impl LoadedPlant {
         seed: u64,
     ) -> Result<(Self, Capabilities), Box<dyn Error>> {
         let capabilities = plugin.open_device(&settings)?.capabilities()?;
-        let mut plant =
-            Self { plugin, settings, seed, device: None, tick: 0, time_ns: 0, state: DeviceState::HOME };
+        let mut plant = Self {
+            plugin,
+            settings,
+            seed,
+            device: None,
+            tick: 0,
+            time_ns: 0,
+            state: DeviceState::HOME,
+            #[cfg(feature = "serial")]
+            sensor: None,
+        };
         plant.device = Some(plant.activate()?);
         Ok((plant, capabilities))
+    }
+
+    /// Presses on a force sensor from now on: with what is delivered beyond the weight, as at rest.
+    #[cfg(feature = "serial")]
+    pub(crate) fn sense(&mut self, force: crate::rig::SensedForce) -> Result<(), Box<dyn Error>> {
+        let mut opened = self.plugin.open_device(&self.settings)?;
+        let mut number = |id: &str| {
+            let at = opened.parameters().iter().position(|parameter| parameter.id() == id);
+            at.map(|at| opened.parameter(at)).ok_or_else(|| format!("the plant has no parameter `{id}`"))
+        };
+        let weight_n = number("mass_kg")? * number("gravity_m_per_s2")?;
+        self.sensor = Some((number("feedforward_n")? - weight_n, force));
+        Ok(())
     }
 
     fn activate(&self) -> Result<ActiveDevice, Box<dyn Error>> {
@@ -78,6 +103,10 @@ impl Plant for LoadedPlant {
         self.time_ns += dt_ns;
         let tick = Tick { index: self.tick, time_ns: self.time_ns, dt_ns };
         let read = device.read(&tick, &mut self.state);
+        #[cfg(feature = "serial")]
+        if let Some((carried_n, force)) = &self.sensor {
+            force.press(self.state.delivered.force().z + carried_n);
+        }
         let fault = [written, read].into_iter().find_map(|cycle| match cycle {
             Cycle::Fault(fault) => Some(fault),
             Cycle::Fresh | Cycle::Stale => None,

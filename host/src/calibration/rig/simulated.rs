@@ -1,43 +1,13 @@
-//! The rig: a levitated handle that pushes against a force sensor from below.
-//!
-//! All axes but the vertical are locked by the controller; vertically a constant force is commanded, larger than
-//! the weight, so that the handle follows the sensor wherever it is put. What the sensor reads is the delivered
-//! force less the weight of what moves.
+//! The simulated flotor under a simulated sensor.
 
-use super::CalibrationError;
-use super::sensor::{EmulatedSensor, ForceSensor};
+use super::{AVERAGED_TICKS, Mean, PERIOD_NS, Rest, Rig, locked};
+use crate::calibration::CalibrationError;
+use crate::calibration::sensor::{EmulatedSensor, ForceSensor};
 use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting};
-use flotor_hal::{
-    Cycle, DVec3, DeviceState, LoopConfig, Refusal, Tick, VerticalCalibration, Wrench, rotation_vector,
-};
+use flotor_hal::{Cycle, DeviceState, LoopConfig, Refusal, Tick, VerticalCalibration};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
-
-/// The handle at rest against the sensor.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rest {
-    /// Height as the device measures it, m.
-    pub height_m: f64,
-    /// Vertical force the device says it delivers, N.
-    pub delivered_n: f64,
-}
-
-/// A device with a force sensor above it.
-pub trait Rig {
-    /// Puts the sensor where the handle then rests at `target_m`, while `command_n` (N, for a measured height in
-    /// m) is commanded.
-    ///
-    /// # Errors
-    /// [`CalibrationError`] if the device faults or the handle does not come to rest.
-    fn rest_at(&mut self, target_m: f64, command_n: &dyn Fn(f64) -> f64) -> Result<Rest, CalibrationError>;
-
-    /// Reads the force sensor while the handle rests, N.
-    ///
-    /// # Errors
-    /// [`CalibrationError`] if the sensor does not answer.
-    fn read_force_n(&mut self, rest: &Rest) -> Result<f64, CalibrationError>;
-}
 
 /// Weight of flotor, plates, screws and bolts in the report's rig, N (Varadharajan 2007, section 3.4).
 pub const RIG_WEIGHT_N: f64 = 8.58;
@@ -46,12 +16,8 @@ pub const SENSOR_NOISE_N: f64 = 0.02;
 
 /// Standard gravity, m/s² (ISO 80000-3).
 const GRAVITY_M_PER_S2: f64 = 9.806_65;
-/// Servo period, ns.
-const PERIOD_NS: u64 = 1_000_000;
 /// Time the handle is given to come to rest, ticks. The slowest motion of the rig falls to 1/e within 10 of them.
 const SETTLE_TICKS: u64 = 200;
-/// Ticks averaged for a measured height: the noise of a micrometre falls to a tenth.
-const AVERAGED_TICKS: u64 = 100;
 /// The stand of the sensor, as the simulated hand: stiff and damped, N/m and N s/m.
 const STAND_STIFFNESS_N_PER_M: f64 = 20_000.0;
 const STAND_DAMPING_NS_PER_M: f64 = 250.0;
@@ -60,11 +26,6 @@ const REST_M: f64 = 4.0e-6;
 /// How often the sensor is moved until the handle is where it should be, and how close that is, m.
 const ADJUSTMENTS: u32 = 3;
 const CLOSE_M: f64 = 2.0e-6;
-/// Gains of a locked axis (client of the device's makers: 4800 N/m, 15 N s/m; 50 N·m/rad, 0.15 N·m s/rad).
-const LOCK_N_PER_M: f64 = 4800.0;
-const LOCK_NS_PER_M: f64 = 15.0;
-const LOCK_NM_PER_RAD: f64 = 50.0;
-const LOCK_NMS_PER_RAD: f64 = 0.15;
 
 /// The simulated flotor under a simulated sensor. Its uneven field is reached as on any device: through the
 /// contract; its sensor as any sensor: over a serial line.
@@ -192,30 +153,5 @@ impl Rig for SimulatedRig {
         };
         pressed.press(noisy_n);
         Ok(line.read_n()?)
-    }
-}
-
-/// Every axis but the vertical held at home, and the vertical force as commanded.
-fn locked(state: &DeviceState, vertical_n: f64) -> Wrench {
-    let (position_m, rotation_rad) = (state.pose.position(), rotation_vector(state.pose.orientation()));
-    let force_n = position_m * -LOCK_N_PER_M - state.twist.linear() * LOCK_NS_PER_M;
-    let torque_nm: DVec3 = rotation_rad * -LOCK_NM_PER_RAD - state.twist.angular() * LOCK_NMS_PER_RAD;
-    Wrench::new(force_n.with_z(vertical_n), torque_nm)
-}
-
-#[derive(Default)]
-struct Mean {
-    sum: f64,
-    count: f64,
-}
-
-impl Mean {
-    fn add(&mut self, value: f64) {
-        self.sum += value;
-        self.count += 1.0;
-    }
-
-    fn value(&self) -> f64 {
-        self.sum / self.count
     }
 }

@@ -1,0 +1,129 @@
+//! A real device with a force sensor on a serial port. Somebody, or something, lowers the sensor.
+
+use super::holder::{Holder, Holding};
+use super::{AVERAGED_TICKS, PERIOD_NS, Rest, Rig};
+use crate::calibration::CalibrationError;
+use crate::calibration::sensor::ForceSensor;
+use flotor_hal::abi::loader::{OpenedDevice, Plugin, Setting};
+use flotor_hal::{LoopConfig, Refusal, VerticalCalibration};
+use std::time::{Duration, Instant};
+
+/// Height on two looks after each other that is the same height, m: what the device resolves (5 to 10 µm; Varadharajan
+/// 2007, section 2.2).
+const REST_M: f64 = 10.0e-6;
+/// Time of one mean of the height.
+const AVERAGED_TIME: Duration = Duration::from_nanos(AVERAGED_TICKS * PERIOD_NS);
+/// How often it is looked whether the handle rests where it should.
+const LOOK_AGAIN: Duration = Duration::from_millis(20);
+
+/// Where the sensor has to go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Waiting {
+    /// Where the handle should rest, m.
+    pub target_m: f64,
+    /// Where it is, m.
+    pub height_m: f64,
+    /// Upward force on the handle, N.
+    pub command_n: f64,
+}
+
+/// A device in the rig.
+pub struct DeviceRig<W> {
+    /// Nothing while it is held, and after it was lost.
+    opened: Option<OpenedDevice>,
+    holder: Option<Holder>,
+    sensor: ForceSensor,
+    serial: String,
+    /// How far from its target a stop may be, m.
+    close_m: f64,
+    patience: Duration,
+    waiting: W,
+}
+
+impl<W: FnMut(Option<Waiting>)> DeviceRig<W> {
+    /// Opens the device. A stop counts if the handle rests within `close_m` of where it should, within `patience`;
+    /// until then `waiting` is told where it is, and then told nothing, once.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] if the device refuses.
+    pub fn open(
+        plugin: &Plugin,
+        settings: &[Setting],
+        sensor: ForceSensor,
+        close_m: f64,
+        patience: Duration,
+        waiting: W,
+    ) -> Result<Self, CalibrationError> {
+        let mut opened = plugin.open_device(settings)?;
+        let serial = opened.serial();
+        Ok(Self { opened: Some(opened), holder: None, sensor, serial, close_m, patience, waiting })
+    }
+
+    /// Serial number of the device.
+    #[must_use]
+    pub fn serial(&self) -> &str {
+        &self.serial
+    }
+
+    /// Corrects the force by this from now on. The handle is let down before.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] if the device cannot be calibrated, or was lost.
+    pub fn calibrate(&mut self, calibration: &VerticalCalibration) -> Result<(), CalibrationError> {
+        if let Some(holder) = self.holder.take() {
+            self.opened = holder.end();
+        }
+        let opened = self.opened.as_mut().ok_or_else(lost)?;
+        opened.calibrate_vertical(calibration).map_err(CalibrationError::Refused)
+    }
+
+    fn holder(&mut self) -> Result<&mut Holder, CalibrationError> {
+        if let (None, Some(opened)) = (&self.holder, self.opened.take()) {
+            let config = LoopConfig { period_ns: PERIOD_NS, seed: 0 };
+            let active = opened.activate(&config).map_err(|(opened, refusal)| {
+                self.opened = Some(opened);
+                CalibrationError::Refused(refusal)
+            })?;
+            self.holder = Some(Holder::start(active).map_err(CalibrationError::NoThread)?);
+        }
+        self.holder.as_mut().ok_or_else(lost)
+    }
+}
+
+fn lost() -> CalibrationError {
+    CalibrationError::Refused(Refusal::resource("it was lost; plug it in and begin again"))
+}
+
+impl<W: FnMut(Option<Waiting>)> Rig for DeviceRig<W> {
+    fn rest_at(&mut self, target_m: f64, command_n: &dyn Fn(f64) -> f64) -> Result<Rest, CalibrationError> {
+        let (close_m, until, command_n) = (self.close_m, Instant::now() + self.patience, command_n(target_m));
+        self.holder()?.push(command_n);
+        loop {
+            let report = self.holder()?.look()?;
+            let is_close = (report.height_m - target_m).abs() <= close_m;
+            if report.state == Holding::Steady(command_n) && is_close && report.moved_m <= REST_M {
+                (self.waiting)(None);
+                return Ok(Rest { height_m: report.height_m, delivered_n: report.delivered_n });
+            }
+            if Instant::now() > until {
+                let (target_mm, height_mm) = (target_m * 1.0e3, report.height_m * 1.0e3);
+                return Err(CalibrationError::NotReached { target_mm, height_mm });
+            }
+            (self.waiting)(Some(Waiting { target_m, height_m: report.height_m, command_n }));
+            std::thread::sleep(LOOK_AGAIN);
+        }
+    }
+
+    fn still_rests(&mut self, rest: &Rest) -> Result<bool, CalibrationError> {
+        // What the handle did while the last reading was taken is in the mean after the next.
+        std::thread::sleep(2 * AVERAGED_TIME);
+        let report = self.holder()?.look()?;
+        Ok((report.height_m - rest.height_m).abs() <= REST_M && report.moved_m <= REST_M)
+    }
+
+    fn read_force_n(&mut self, _: &Rest) -> Result<f64, CalibrationError> {
+        // Read while the handle is held: a fault in between says more than a strange force.
+        self.holder()?.look()?;
+        Ok(self.sensor.read_n()?)
+    }
+}

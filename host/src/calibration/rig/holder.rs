@@ -1,0 +1,257 @@
+//! A thread that holds a levitating handle in the rig: every axis but the vertical locked, and along that a force.
+//!
+//! It goes on whatever the procedure does in the meantime: a device that is not spoken to lets go. Nothing in a tick
+//! allocates or waits for anybody.
+
+use super::{AVERAGED_TICKS, Mean, PERIOD_NS, locked};
+use crate::calibration::CalibrationError;
+use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice};
+use flotor_hal::{Cycle, DeviceState, Fault, Tick};
+use flotor_sync::{Observer, Publisher, Words, latest};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Fastest change of the vertical force, N a tick: from nothing to 12 N in half a second.
+const RAMP_STEP_N: f64 = 0.024;
+/// A handle that moves faster is not held by a sensor, m/s: a hand's breadth per second.
+const RUNAWAY_M_PER_S: f64 = 0.1;
+/// Damping that stops it, N·s/m (the locked axes').
+const BRAKE_NS_PER_M: f64 = 15.0;
+
+/// What the thread is told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Order {
+    /// Push up with so many N.
+    Push(f64),
+    /// Let the force go, and end.
+    End,
+}
+
+const ORDER_WORDS: usize = 2;
+
+impl Words<ORDER_WORDS> for Order {
+    fn to_words(&self) -> [u64; ORDER_WORDS] {
+        match self {
+            Self::Push(force_n) => [0, force_n.to_bits()],
+            Self::End => [1, 0],
+        }
+    }
+
+    fn from_words(&[kind, force_bits]: &[u64; ORDER_WORDS]) -> Self {
+        if kind == 0 { Self::Push(f64::from_bits(force_bits)) } else { Self::End }
+    }
+}
+
+/// How the handle is doing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Report {
+    pub(super) state: Holding,
+    /// Height, mean of the last ticks, m.
+    pub(super) height_m: f64,
+    /// Difference of that to the mean before, m.
+    pub(super) moved_m: f64,
+    /// Vertical force the device says it delivers, likewise a mean, N.
+    pub(super) delivered_n: f64,
+}
+
+const REPORT_WORDS: usize = 5;
+
+impl Words<REPORT_WORDS> for Report {
+    fn to_words(&self) -> [u64; REPORT_WORDS] {
+        let (kind, detail) = match self.state {
+            Holding::Changing => (0, 0),
+            Holding::Steady(force_n) => (1, force_n.to_bits()),
+            Holding::RanAway => (2, 0),
+            Holding::Faulted(fault) => (3, u64::from(fault as u32)),
+        };
+        let [height, moved, delivered] = [self.height_m, self.moved_m, self.delivered_n].map(f64::to_bits);
+        [kind, detail, height, moved, delivered]
+    }
+
+    fn from_words(&[kind, detail, height, moved, delivered]: &[u64; REPORT_WORDS]) -> Self {
+        let state = match kind {
+            0 => Holding::Changing,
+            1 => Holding::Steady(f64::from_bits(detail)),
+            2 => Holding::RanAway,
+            _ => {
+                let code = u32::try_from(detail).unwrap_or(u32::MAX);
+                Holding::Faulted(Fault::from_code(code).unwrap_or(Fault::Broken))
+            }
+        };
+        let [height_m, moved_m, delivered_n] = [height, moved, delivered].map(f64::from_bits);
+        Self { state, height_m, moved_m, delivered_n }
+    }
+}
+
+/// What the thread is at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Holding {
+    /// The force is on its way to what was ordered, or was until just now.
+    Changing,
+    /// It has been this many N for a while.
+    Steady(f64),
+    /// The handle flew off and is braked, without force.
+    RanAway,
+    /// The device faulted.
+    Faulted(Fault),
+}
+
+/// The handle in the hands of the thread.
+pub(super) struct Holder {
+    orders: Publisher<Order, ORDER_WORDS>,
+    reports: Observer<Report, REPORT_WORDS>,
+    thread: Option<JoinHandle<ActiveDevice>>,
+}
+
+impl Holder {
+    /// Starts holding, without vertical force. Not real-time.
+    ///
+    /// # Errors
+    /// What the system says about another thread.
+    pub(super) fn start(device: ActiveDevice) -> std::io::Result<Self> {
+        let (orders, ordered) = latest(Order::Push(0.0));
+        let (publisher, reports) = latest(Averages::default().report(Holding::Changing));
+        let hold = move || hold(device, &ordered, publisher);
+        let thread = std::thread::Builder::new().name("flotor-rig".to_owned()).spawn(hold)?;
+        Ok(Self { orders, reports, thread: Some(thread) })
+    }
+
+    /// Pushes up with so many N from now on.
+    pub(super) fn push(&mut self, force_n: f64) {
+        self.orders.publish(&Order::Push(force_n));
+    }
+
+    /// How the handle is doing.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] if it is not held any more.
+    pub(super) fn look(&self) -> Result<Report, CalibrationError> {
+        let report = loop {
+            // A publish takes nanoseconds.
+            if let Some((_, report)) = self.reports.read() {
+                break report;
+            }
+        };
+        match report.state {
+            Holding::Faulted(fault) => Err(CalibrationError::Fault(fault)),
+            Holding::RanAway => Err(CalibrationError::RanAway { height_mm: report.height_m * 1.0e3 }),
+            Holding::Changing | Holding::Steady(_) => Ok(report),
+        }
+    }
+
+    /// Lets the force go and the device land; the device, unless it has to be opened anew.
+    pub(super) fn end(mut self) -> Option<OpenedDevice> {
+        self.stop().and_then(ActiveDevice::deactivate)
+    }
+
+    fn stop(&mut self) -> Option<ActiveDevice> {
+        self.orders.publish(&Order::End);
+        self.thread.take()?.join().ok()
+    }
+}
+
+/// However the procedure ends, the handle is let down.
+impl Drop for Holder {
+    fn drop(&mut self) {
+        let _ = self.stop().and_then(ActiveDevice::deactivate);
+    }
+}
+
+fn hold(
+    mut device: ActiveDevice,
+    orders: &Observer<Order, ORDER_WORDS>,
+    mut reports: Publisher<Report, REPORT_WORDS>,
+) -> ActiveDevice {
+    let period = Duration::from_nanos(PERIOD_NS);
+    let started = Instant::now();
+    let mut order = Order::Push(0.0);
+    let (mut pushed_n, mut ran_away) = (0.0_f64, false);
+    let mut state = DeviceState::HOME;
+    let mut averages = Averages::default();
+    let mut last_ns = 0;
+    for index in 0.. {
+        #[allow(clippy::cast_possible_truncation)] // five hundred years
+        let time_ns = started.elapsed().as_nanos() as u64;
+        let tick = Tick { index, time_ns, dt_ns: time_ns - last_ns };
+        last_ns = time_ns;
+        if let Some((_, newest)) = orders.read() {
+            order = newest;
+        }
+        let ordered_n = if let Order::Push(force_n) = order { force_n } else { 0.0 };
+        let left_n = ordered_n - pushed_n;
+        if left_n != 0.0 {
+            // The last step is what is left, so that it ends at what was ordered to the bit.
+            pushed_n = if left_n.abs() <= RAMP_STEP_N {
+                ordered_n
+            } else {
+                pushed_n + RAMP_STEP_N * left_n.signum()
+            };
+            averages = Averages::default();
+        }
+        let read = device.read(&tick, &mut state);
+        averages.add(state.pose.position().z, state.delivered.force().z);
+        let speed_m_per_s = state.twist.linear().z;
+        ran_away |= speed_m_per_s.abs() > RUNAWAY_M_PER_S;
+        let vertical_n = if ran_away { -BRAKE_NS_PER_M * speed_m_per_s } else { pushed_n };
+        let written = device.write(&tick, &locked(&state, vertical_n));
+        let fault = [read, written].into_iter().find_map(|cycle| match cycle {
+            Cycle::Fault(fault) => Some(fault),
+            Cycle::Fresh | Cycle::Stale => None,
+        });
+        let doing = match fault {
+            Some(fault) => Holding::Faulted(fault),
+            None if ran_away => Holding::RanAway,
+            None if averages.are_full() => Holding::Steady(pushed_n),
+            None => Holding::Changing,
+        };
+        reports.publish(&averages.report(doing));
+        let is_let_go = order == Order::End && (pushed_n == 0.0 || ran_away);
+        if fault.is_some() || is_let_go {
+            break;
+        }
+        // Late ticks are skipped: there is nothing to catch up with.
+        let next = u32::try_from(time_ns / PERIOD_NS + 1).unwrap_or(u32::MAX);
+        std::thread::sleep((started + period * next).saturating_duration_since(Instant::now()));
+    }
+    device
+}
+
+/// Two means, one after the other: what both agree on is at rest.
+#[derive(Default)]
+struct Averages {
+    /// The last full one, and the one before; nothing until there are two.
+    full: Option<[(f64, f64); 2]>,
+    last: Option<(f64, f64)>,
+    height_m: Mean,
+    delivered_n: Mean,
+    ticks: u64,
+}
+
+impl Averages {
+    fn are_full(&self) -> bool {
+        self.full.is_some()
+    }
+
+    fn add(&mut self, height_m: f64, delivered_n: f64) {
+        self.height_m.add(height_m);
+        self.delivered_n.add(delivered_n);
+        self.ticks += 1;
+        if self.ticks == AVERAGED_TICKS {
+            let mean = (self.height_m.value(), self.delivered_n.value());
+            self.full = self.last.map(|last| [mean, last]);
+            self.last = Some(mean);
+            (self.height_m, self.delivered_n, self.ticks) = (Mean::default(), Mean::default(), 0);
+        }
+    }
+
+    fn report(&self, state: Holding) -> Report {
+        match self.full {
+            Some([(height_m, delivered_n), (before_m, _)]) => {
+                Report { state, height_m, moved_m: (height_m - before_m).abs(), delivered_n }
+            }
+            None => {
+                Report { state, height_m: self.height_m.value(), moved_m: f64::INFINITY, delivered_n: 0.0 }
+            }
+        }
+    }
+}

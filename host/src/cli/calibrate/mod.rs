@@ -1,0 +1,67 @@
+//! `flotor calibrate`: how much of the vertical force arrives, and what is done about it.
+
+mod import;
+mod rig;
+mod verify;
+mod vertical;
+
+use super::run::progress_bar;
+use super::{CommandError, eval, options, style, write_json};
+use crate::calibration::CalibrationError;
+use crate::calibration::file::{CalibrationFile, Provenance, Source, today};
+use clap::{Args, Subcommand};
+use std::path::Path;
+
+/// Calibrate a device: measure, check, or take over somebody else's numbers.
+#[derive(Args)]
+pub(crate) struct CalibrateArguments {
+    #[command(subcommand)]
+    command: CalibrateCommand,
+}
+
+#[derive(Subcommand)]
+enum CalibrateCommand {
+    /// Measure how much of the vertical force arrives at each height, and fit it
+    Vertical(vertical::VerticalArguments),
+    /// Measure the error without and with a calibration file
+    Verify(verify::VerifyArguments),
+    /// Make a calibration file of the report's polynomial, or of any other
+    Import(import::ImportArguments),
+}
+
+pub(crate) fn run(arguments: &CalibrateArguments) -> Result<(), CommandError> {
+    match &arguments.command {
+        CalibrateCommand::Vertical(arguments) => vertical::run(arguments),
+        CalibrateCommand::Verify(arguments) => verify::run(arguments),
+        CalibrateCommand::Import(arguments) => import::run(arguments),
+    }
+}
+
+fn provenance(source: Source, note: Option<String>) -> Provenance {
+    let program = format!("flotor {}", env!("CARGO_PKG_VERSION"));
+    Provenance { source, program, date: Some(today()), seed: None, note }
+}
+
+fn write_calibration(path: &Path, file: &CalibrationFile) -> Result<(), CommandError> {
+    let text = file.to_text().map_err(|error| CommandError::Failed(error.to_string()))?;
+    std::fs::write(path, text)
+        .map_err(|cause| CommandError::file(path, "cannot write the calibration", cause))?;
+    Ok(())
+}
+
+fn refused(error: CalibrationError) -> CommandError {
+    match error {
+        CalibrationError::Plugin(error) => error.into(),
+        CalibrationError::Fault(fault) => CommandError::DeviceFault(fault),
+        CalibrationError::Setting(_) | CalibrationError::Refused(_) => {
+            CommandError::PluginRefused(error.to_string())
+        }
+        CalibrationError::TooFew { .. } => CommandError::Usage(error.to_string()),
+        other => CommandError::Failed(other.to_string()),
+    }
+}
+
+fn force_n(text: &str) -> Result<f64, String> {
+    let force_n: f64 = text.trim().parse().map_err(|_| format!("`{text}` is no force"))?;
+    if (1.0..=50.0).contains(&force_n) { Ok(force_n) } else { Err("legal is 1 to 50 N".to_owned()) }
+}

@@ -1,0 +1,89 @@
+//! Which rig is calibrated: the simulated one, or a device with a force sensor on a serial port.
+
+use super::options::{KeyValue, duration_s};
+use super::{CommandError, eval, refused};
+use crate::calibration::rig::{DeviceRig, SimulatedRig, Waiting};
+use crate::calibration::sensor::ForceSensor;
+use crate::registry::Registry;
+use clap::Args;
+use flotor_hal::abi::PluginKind;
+use indicatif::ProgressBar;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// The device that is calibrated in a simulated rig.
+pub(super) const SIMULATED: &str = "simulated";
+
+/// What is calibrated.
+#[derive(Args)]
+pub(super) struct RigArguments {
+    /// The simulated flotor in a simulated rig
+    #[arg(long, required_unless_present = "device", conflicts_with = "device")]
+    pub(super) simulated: bool,
+    /// The device of this plugin (id or file), under a force sensor
+    #[arg(long, value_name = "ID", requires = "sensor")]
+    device: Option<String>,
+    /// Set a parameter of the device (repeatable)
+    #[arg(long = "set", value_name = "KEY=VALUE", requires = "device")]
+    sets: Vec<KeyValue>,
+    /// Serial port of the force sensor
+    #[arg(long, value_name = "PORT", requires = "device")]
+    sensor: Option<String>,
+    /// How far from its height a stop may be, in mm
+    #[arg(long, value_name = "MM", default_value_t = 0.4, requires = "device", value_parser = tolerance_mm)]
+    tolerance_mm: f64,
+    /// How long to wait for the sensor to be moved to the next height
+    #[arg(long, value_name = "TIME", default_value = "10min", requires = "device", value_parser = duration_s)]
+    patience: f64,
+    /// Seed of the simulated sensor's noise
+    #[arg(long, default_value_t = 1, value_name = "N", conflicts_with = "device")]
+    pub(super) seed: u64,
+    /// Folder to search for plugins (repeatable)
+    #[arg(long = "plugin-path", value_name = "FOLDER")]
+    folders: Vec<PathBuf>,
+}
+
+/// Says where the sensor has to go.
+pub(super) type Guide = Box<dyn FnMut(Option<Waiting>)>;
+
+impl RigArguments {
+    /// Id of the plugin.
+    pub(super) fn plugin(&self) -> &str {
+        self.device.as_deref().unwrap_or(SIMULATED)
+    }
+
+    pub(super) fn simulated_rig(&self) -> Result<SimulatedRig, CommandError> {
+        let plugin = Registry::search(&self.folders).load(SIMULATED, PluginKind::Device)?;
+        Ok(SimulatedRig::new(plugin, self.seed))
+    }
+
+    /// The device and its sensor; where the sensor has to go is said at the progress bar.
+    pub(super) fn device_rig(&self, progress: &ProgressBar) -> Result<DeviceRig<Guide>, CommandError> {
+        let plugin = Registry::search(&self.folders).load(self.plugin(), PluginKind::Device)?;
+        let settings = eval::settings(&plugin, &self.sets)?;
+        let port = self.sensor.as_deref().unwrap_or_default();
+        let sensor = ForceSensor::open(port).map_err(|error| refused(error.into()))?;
+        let (close_m, patience) = (self.tolerance_mm * 1.0e-3, Duration::from_secs_f64(self.patience));
+        DeviceRig::open(&plugin, &settings, sensor, close_m, patience, guide(progress)).map_err(refused)
+    }
+}
+
+fn guide(progress: &ProgressBar) -> Guide {
+    let progress = progress.clone();
+    Box::new(move |waiting| match waiting {
+        Some(Waiting { target_m, height_m, command_n }) => {
+            let (target_mm, height_mm) = (target_m * 1.0e3, height_m * 1.0e3);
+            let at = if height_mm.is_finite() { format!("{height_mm:.2} mm") } else { "...".to_owned() };
+            progress.set_message(format!(
+                "pushing with {command_n} N, handle at {at}; sensor to {target_mm:.1} mm"
+            ));
+        }
+        None => progress.set_message("reading"),
+    })
+}
+
+fn tolerance_mm(text: &str) -> Result<f64, String> {
+    let tolerance_mm: f64 = text.trim().parse().map_err(|_| format!("`{text}` is no length"))?;
+    let legal = (0.005..=1.0).contains(&tolerance_mm);
+    if legal { Ok(tolerance_mm) } else { Err("legal is 0.005 to 1 mm".to_owned()) }
+}
