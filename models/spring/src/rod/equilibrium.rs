@@ -22,8 +22,9 @@ use crate::pose::Pose;
 use crate::response::Demand;
 use crate::rigidity::Spring;
 
-/// Longest change of shape in a tick, as the root mean square slope of `p`. A full bulge has about 3.
-const LONGEST_STEP: f64 = 0.1;
+/// Longest change of shape in a tick, beyond what the plates' motion predicts, as the root mean square slope of `p`. A full
+/// bulge has about 3.
+const LONGEST_WAY: f64 = 0.1;
 /// Longest step where the way is not felt, but only its end.
 const LONGEST_UNFELT_STEP: f64 = 0.4;
 /// How often a search that is not felt may begin anew.
@@ -62,6 +63,22 @@ pub(crate) struct Effort {
     pub(crate) renewal: f64,
 }
 
+/// How far a search may go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stride {
+    /// In one step.
+    step: f64,
+    /// In all of them.
+    way: f64,
+}
+
+impl Stride {
+    /// The shapes on the way are felt.
+    const FELT: Self = Self { step: LONGEST_WAY, way: LONGEST_WAY };
+    /// Only the end is.
+    const UNFELT: Self = Self { step: LONGEST_UNFELT_STEP, way: f64::INFINITY };
+}
+
 /// What the plates feel, in units of the bending rigidity and the free length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Reading {
@@ -94,7 +111,7 @@ pub(crate) struct Equilibrium<const K: usize, const N: usize, const Q: usize> {
     history: History<N>,
     matrix: KeptMatrix<N>,
     damping: f64,
-    longest_step: f64,
+    stride: Stride,
     unstable_directions: usize,
     work: Work,
 }
@@ -162,7 +179,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
             history: History::new(Plate::HOME, [0.0; N]),
             matrix: KeptMatrix::none(),
             damping: LEAST_DAMPING,
-            longest_step: LONGEST_STEP,
+            stride: Stride::FELT,
             unstable_directions: 0,
             work: Work::default(),
         }
@@ -207,7 +224,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
     pub(crate) fn advance(&mut self, plate: &Plate, demand: Demand) -> Outcome {
         let before = self.shape;
         self.work = Work::default();
-        self.longest_step = LONGEST_STEP;
+        self.stride = Stride::FELT;
         self.shape = self.history.predict(plate);
         let outcome = self.search(plate, demand);
         self.remember(plate, &before, &outcome);
@@ -218,7 +235,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
     /// the way is not felt, so it may go faster. Real-time: bounded, no allocation.
     pub(crate) fn find(&mut self, spring: &Spring, pose: &Pose, plate: &Plate, demand: Demand) -> Outcome {
         self.reset();
-        self.longest_step = LONGEST_UNFELT_STEP;
+        self.stride = Stride::UNFELT;
         if let Some(start) = start::linear(self.functional.basis(), spring, pose) {
             self.shape = joined(&start[0], &start[1]);
         }
@@ -252,9 +269,10 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
     /// Newton's method from the predicted shape.
     #[inline]
     fn search(&mut self, plate: &Plate, demand: Demand) -> Outcome {
-        let mut last_size = f64::INFINITY;
+        let (mut last_size, mut way_left) = (f64::INFINITY, self.stride.way);
         let mut outcome = Outcome::Failed;
         for _ in 0..self.effort.most_steps {
+            let longest = self.stride.step.min(way_left);
             let value = instructions::best(
                 #[inline(always)]
                 || self.functional.value(&self.shape, plate),
@@ -272,7 +290,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
                 );
                 self.work.matrices += 1;
                 if self.keep(&curvature, plate, &value.slope) > 0 {
-                    return self.slide(&value, &curvature, demand);
+                    return self.slide(&value, &curvature, longest, demand);
                 }
             }
             let step = self.matrix.factored.step_down(&value.slope);
@@ -281,19 +299,20 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
                 return Outcome::Failed;
             }
             let error = size * (size + distance(&self.shape, &self.matrix.shape));
-            let step = capped(step, size, self.longest_step);
+            let step = capped(step, size, longest);
+            way_left -= size.min(longest);
             self.shape = added(&self.shape, 1.0, &step).map(or_zero);
             self.matrix.steps_left = self.matrix.steps_left.saturating_sub(1);
             let reading = read(&value, &self.matrix.reaction, &step, demand);
-            if error <= self.effort.tolerance && size <= self.longest_step && self.matrix.neutral <= SETTLED {
+            if error <= self.effort.tolerance && size <= longest && self.matrix.neutral <= SETTLED {
                 self.damping = LEAST_DAMPING;
                 return Outcome::Settled(reading);
             }
             outcome = Outcome::Moving(reading);
-            if size > self.longest_step || size > CONTRACTION * last_size || error > self.effort.renewal {
+            if size > longest || size > CONTRACTION * last_size || error > self.effort.renewal {
                 self.matrix.steps_left = 0;
             }
-            if size > self.longest_step {
+            if size > longest {
                 break;
             }
             last_size = size;
@@ -326,9 +345,15 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
     }
 
     /// One step of the damped flow, from a shape that is no minimum: an implicit Euler step down the slope of
-    /// the energy, of duration `1 / damping`.
+    /// the energy, of duration `1 / damping`, of at most `longest`.
     #[cold]
-    fn slide(&mut self, value: &Value<N, Q>, curvature: &Curvature<N>, demand: Demand) -> Outcome {
+    fn slide(
+        &mut self,
+        value: &Value<N, Q>,
+        curvature: &Curvature<N>,
+        longest: f64,
+        demand: Demand,
+    ) -> Outcome {
         let mut damping = self.damping;
         let mut damped = Factored::new(&curvature.matrix, damping);
         self.work.factorings += 1;
@@ -357,7 +382,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         if !size.is_finite() {
             return Outcome::Failed;
         }
-        let step = capped(step, size, self.longest_step);
+        let step = capped(step, size, longest);
         self.shape = added(&self.shape, 1.0, &step);
         Outcome::Moving(read(value, &curvature.reaction, &step, demand))
     }
