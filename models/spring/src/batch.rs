@@ -1,27 +1,25 @@
 //! Many independent poses at once: the fast path for sweeps and tables.
 //!
-//! Poses come one after the other; a vector register wants the same component of several. So a block of them is
-//! laid out component by component (a structure of arrays), the law runs over the block a register at a time, and
-//! the answers are put back in order. The law is the very code the servo runs, over [`Wide`] instead of `f64`
-//! ([`crate::real`]): the results, and the status of every pose, are those of single steps, *bit for bit*.
+//! Poses come one after the other; a vector register wants the same component of several. So as many poses as two
+//! registers have lanes are read, half a pose a register, and turned over inside the registers, four by four, into one
+//! register a component; the law runs over them; and the answers are turned back and written, in one pass and with nothing
+//! in memory between. The law is the very code the servo runs, over [`Wide`] instead of `f64` ([`crate::real`]): the
+//! results, and the status of every pose, are those of single steps, *bit for bit*.
 //!
 //! The instruction set is found when the [`Batch`] is made (AVX-512, AVX2, NEON, or one number at a time).
 
 use flotor_hal::{Input, Output, StepStatus, Wrench};
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Simd, WithSimd, bytemuck};
 
 use crate::contract;
 use crate::pose::Coordinates;
 use crate::real::{Pair, Real, Vector, Wide};
 use crate::response::{Answer, Demand, Law, Response};
 
-/// Poses laid out at a time: an even multiple of every register's lanes, and small enough for the first-level cache.
-const BLOCK: usize = 64;
+/// Lanes of two of the widest registers, a multiple of those of the others.
+const MOST_LANES: usize = 16;
 
-const COORDINATES: usize = 7;
-const ANSWERS: usize = 8;
-
-/// Verdicts on a lane, as numbers because that is what lanes hold.
+/// What a lane says about its answer, as the numbers that lanes hold.
 const ANSWERED: f64 = 0.0;
 const CLAMPED: f64 = 1.0;
 const UNANSWERED: f64 = 2.0;
@@ -54,114 +52,147 @@ impl Batch {
     /// One answer per input, as by single steps; surplus of either slice is left alone. Real-time per pose:
     /// bounded, no allocation.
     pub fn respond<L: Law>(&self, law: &L, inputs: &[Input], outputs: &mut [Output]) {
-        let mut block = Block::new();
-        for (inputs, outputs) in inputs.chunks(BLOCK).zip(outputs.chunks_mut(BLOCK)) {
-            // The widest demand of the block serves all; narrower ones get their share of it.
-            let demand = inputs.iter().map(contract::demand).max().unwrap_or(Demand::Force);
-            block.load(inputs);
-            self.instructions.dispatch(Evaluate { law, demand, count: inputs.len(), block: &mut block });
-            block.store::<L>(inputs, outputs);
+        let count = inputs.len().min(outputs.len());
+        let whole = count - count % MOST_LANES;
+        let (inputs, rest) = inputs[..count].split_at(whole);
+        let (outputs, rest_outputs) = outputs[..count].split_at_mut(whole);
+        self.instructions.dispatch(Rows { law, inputs, outputs });
+        if let Some(first) = rest.first() {
+            let (mut inputs, mut outputs) = ([*first; MOST_LANES], [Output::default(); MOST_LANES]);
+            inputs[..rest.len()].copy_from_slice(rest);
+            self.instructions.dispatch(Rows { law, inputs: &inputs, outputs: &mut outputs });
+            rest_outputs.copy_from_slice(&outputs[..rest.len()]);
         }
     }
 }
 
-/// Poses and answers, component by component.
-struct Block {
-    /// Position x, y, z; orientation x, y, z, w.
-    coordinates: [[f64; BLOCK]; COORDINATES],
-    /// Force x, y, z; torque x, y, z; energy; verdict.
-    answers: [[f64; BLOCK]; ANSWERS],
-}
-
-impl Block {
-    /// All poses at home: lanes without an input are evaluated too, and must cost no more than others.
-    fn new() -> Self {
-        let mut coordinates = [[0.0; BLOCK]; COORDINATES];
-        coordinates[COORDINATES - 1] = [1.0; BLOCK];
-        Self { coordinates, answers: [[0.0; BLOCK]; ANSWERS] }
-    }
-
-    /// Lays out the poses of at most a block of inputs.
-    #[inline]
-    fn load(&mut self, inputs: &[Input]) {
-        let [x, y, z, qx, qy, qz, qw] = &mut self.coordinates;
-        // Bounds the compiler can see: no check per number.
-        for index in 0..inputs.len().min(BLOCK) {
-            let pose = &inputs[index].pose;
-            [x[index], y[index], z[index]] = pose.position_m;
-            [qx[index], qy[index], qz[index], qw[index]] = pose.orientation_xyzw;
-        }
-    }
-
-    /// Puts the answers in order, each narrowed to what its input demands.
-    #[inline]
-    fn store<L: Law>(&self, inputs: &[Input], outputs: &mut [Output]) {
-        let [fx, fy, fz, tx, ty, tz, energy, verdict] = &self.answers;
-        for index in 0..inputs.len().min(outputs.len()).min(BLOCK) {
-            let status = if verdict[index] == ANSWERED {
-                StepStatus::Ok
-            } else if verdict[index] == CLAMPED {
-                StepStatus::Clamped
-            } else {
-                let why = contract::pose(&inputs[index]).why_unanswered();
-                outputs[index] = contract::output(&Response::none(why));
-                continue;
-            };
-            let demand = contract::demand(&inputs[index]);
-            let force_n = [fx[index], fy[index], fz[index]];
-            let with_torque = demand >= Demand::Wrench;
-            let torque_nm = if with_torque { [tx[index], ty[index], tz[index]] } else { [0.0; 3] };
-            let with_energy = L::HAS_ENERGY && demand >= Demand::WrenchAndEnergy;
-            let energy_j = if with_energy { energy[index] } else { f64::NAN };
-            outputs[index] = Output::new(Wrench { force_n, torque_nm }, energy_j, status);
-        }
-    }
-}
-
-/// A law over the first poses of a block.
-struct Evaluate<'a, L> {
+/// A law at a multiple of [`MOST_LANES`] poses, with as many outputs.
+struct Rows<'a, L> {
     law: &'a L,
-    demand: Demand,
-    count: usize,
-    block: &'a mut Block,
+    inputs: &'a [Input],
+    outputs: &'a mut [Output],
 }
 
-impl<L: Law> WithSimd for Evaluate<'_, L> {
+impl<L: Law> WithSimd for Rows<'_, L> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { law, demand, count, block } = self;
-        let [x, y, z, qx, qy, qz, qw] = block.coordinates.each_ref().map(|lanes| S::as_simd_f64s(lanes).0);
-        let [fx, fy, fz, tx, ty, tz, energy, verdict] =
-            block.answers.each_mut().map(|lanes| S::as_mut_simd_f64s(lanes).0);
-        // Macros, not closures: those are compiled without the wide instructions.
-        macro_rules! pair {
-            ($lanes:ident, $i:expr) => {
-                Pair(Wide::new(simd, $lanes[$i]), Wide::new(simd, $lanes[$i + 1]))
+        let Self { law, inputs, outputs } = self;
+        let lanes = 2 * S::F64_LANES;
+        for (inputs, outputs) in inputs.chunks_exact(lanes).zip(outputs.chunks_exact_mut(lanes)) {
+            // The widest demand serves all; narrower ones get their share of it.
+            let first = &inputs[0];
+            let is_common =
+                inputs.iter().fold(true, |is_common, input| is_common & (input.demand == first.demand));
+            let demand = if is_common { contract::demand(first) } else { widest(inputs) };
+            let answer = law.answer(&coordinates(simd, inputs), demand);
+            let verdict = verdict(&answer);
+            let energy_j = match L::HAS_ENERGY && demand >= Demand::WrenchAndEnergy {
+                true => answer.energy_j,
+                false => verdict.like(f64::NAN),
             };
+            put(simd, &Answer { energy_j, ..answer }, outputs);
+            if !is_common || Pair::<Wide<S>>::any(verdict.above(ANSWERED)) {
+                // Turned back like the answers: lanes need not be in the order of the poses.
+                let (first, second) = ([verdict.0.lanes(); 4], [verdict.1.lanes(); 4]);
+                let turned = [simd.interleave_shfl_f64s(first), simd.interleave_shfl_f64s(second)];
+                amend(inputs, outputs, bytemuck::cast_slice(&turned));
+            }
         }
-        macro_rules! keep {
-            ($number:expr => $lanes:ident, $i:expr) => {{
-                let Pair(first, second) = $number;
-                [$lanes[$i], $lanes[$i + 1]] = [first.lanes(), second.lanes()];
-            }};
+    }
+}
+
+/// What all of them together demand.
+#[cold]
+fn widest(inputs: &[Input]) -> Demand {
+    inputs.iter().map(contract::demand).max().unwrap_or(Demand::Force)
+}
+
+/// Poses, one in each lane of two registers.
+#[inline(always)]
+fn coordinates<S: Simd>(simd: S, inputs: &[Input]) -> Coordinates<Pair<Wide<S>>> {
+    let (first, second) = inputs.split_at(S::F64_LANES);
+    let ([x0, y0, z0, i0, j0, k0, w0], [x1, y1, z1, i1, j1, k1, w1]) =
+        (components(simd, first), components(simd, second));
+    let pair = |first, second| Pair(Wide::new(simd, first), Wide::new(simd, second));
+    Coordinates {
+        position_m: Vector::new(pair(x0, x1), pair(y0, y1), pair(z0, z1)),
+        orientation: [pair(i0, i1), pair(j0, j1), pair(k0, k1), pair(w0, w1)],
+    }
+}
+
+/// Position x, y, z and orientation x, y, z, w of a register of poses.
+#[inline(always)]
+fn components<S: Simd>(simd: S, inputs: &[Input]) -> [S::f64s; 7] {
+    let mut halves = [[simd.splat_f64s(0.0); 4]; 2];
+    let [positions, orientations] = &mut halves;
+    let positions: &mut [[f64; 4]] = bytemuck::cast_slice_mut(positions);
+    let orientations: &mut [[f64; 4]] = bytemuck::cast_slice_mut(orientations);
+    for ((position, orientation), input) in positions.iter_mut().zip(orientations).zip(inputs) {
+        let ([x, y, z], [next, ..]) = (input.pose.position_m, input.pose.orientation_xyzw);
+        // Four neighbours in memory are one load.
+        *position = [x, y, z, next];
+        *orientation = input.pose.orientation_xyzw;
+    }
+    let [positions, orientations] = halves;
+    let [x, y, z, _] = simd.deinterleave_shfl_f64s(positions);
+    let [qx, qy, qz, qw] = simd.deinterleave_shfl_f64s(orientations);
+    [x, y, z, qx, qy, qz, qw]
+}
+
+/// What each lane says about its answer.
+#[inline(always)]
+fn verdict<R: Real>(answer: &Answer<R>) -> R {
+    let like = answer.energy_j;
+    let trust = R::select(answer.trusted, like.like(ANSWERED), like.like(CLAMPED));
+    R::select(answer.answered, trust, like.like(UNANSWERED))
+}
+
+/// Writes answers, one from each lane of two registers, all of them as good ones.
+#[inline(always)]
+fn put<S: Simd>(simd: S, answer: &Answer<Pair<Wide<S>>>, outputs: &mut [Output]) {
+    let Answer { force_n: force, torque_nm: torque, energy_j, .. } = answer;
+    let (first, second) = outputs.split_at_mut(S::F64_LANES);
+    let numbers = [force.x.0, force.y.0, force.z.0, torque.x.0, torque.y.0, torque.z.0, energy_j.0];
+    put_register(simd, numbers, first);
+    let numbers = [force.x.1, force.y.1, force.z.1, torque.x.1, torque.y.1, torque.z.1, energy_j.1];
+    put_register(simd, numbers, second);
+}
+
+/// The same from one register: force, torque, energy.
+#[inline(always)]
+fn put_register<S: Simd>(simd: S, numbers: [Wide<S>; 7], outputs: &mut [Output]) {
+    let [fx, fy, fz, tx, ty, tz, energy_j] = numbers;
+    let first = simd.interleave_shfl_f64s([fx.lanes(), fy.lanes(), fz.lanes(), tx.lanes()]);
+    let nothing = simd.splat_f64s(0.0);
+    let second = simd.interleave_shfl_f64s([ty.lanes(), tz.lanes(), energy_j.lanes(), nothing]);
+    let first: &[[f64; 4]] = bytemuck::cast_slice(&first);
+    let second: &[[f64; 4]] = bytemuck::cast_slice(&second);
+    for ((output, first), second) in outputs.iter_mut().zip(first).zip(second) {
+        let ([fx, fy, fz, tx], [ty, tz, energy_j, _]) = (*first, *second);
+        let wrench = Wrench { force_n: [fx, fy, fz], torque_nm: [tx, ty, tz] };
+        *output = Output::new(wrench, energy_j, StepStatus::Ok);
+    }
+}
+
+/// Says where an answer is less than good or none at all, and takes away what an input has not demanded.
+#[cold]
+fn amend(inputs: &[Input], outputs: &mut [Output], verdicts: &[[f64; 4]]) {
+    for ((input, output), [verdict, ..]) in inputs.iter().zip(outputs).zip(verdicts) {
+        if *verdict == UNANSWERED {
+            *output = contract::output(&Response::none(contract::pose(input).why_unanswered()));
+            continue;
         }
-        for i in (0..count.div_ceil(S::F64_LANES)).step_by(2) {
-            let at = Coordinates {
-                position_m: Vector::new(pair!(x, i), pair!(y, i), pair!(z, i)),
-                orientation: [pair!(qx, i), pair!(qy, i), pair!(qz, i), pair!(qw, i)],
-            };
-            let Answer { force_n, torque_nm, energy_j, answered, trusted } = law.answer(&at, demand);
-            let trust = Pair::select(trusted, energy_j.like(ANSWERED), energy_j.like(CLAMPED));
-            keep!(force_n.x => fx, i);
-            keep!(force_n.y => fy, i);
-            keep!(force_n.z => fz, i);
-            keep!(torque_nm.x => tx, i);
-            keep!(torque_nm.y => ty, i);
-            keep!(torque_nm.z => tz, i);
-            keep!(energy_j => energy, i);
-            keep!(Pair::select(answered, trust, energy_j.like(UNANSWERED)) => verdict, i);
+        let demand = contract::demand(input);
+        let Output { mut wrench, mut energy_j, .. } = *output;
+        if demand < Demand::Wrench {
+            wrench.torque_nm = [0.0; 3];
         }
+        if demand < Demand::WrenchAndEnergy {
+            energy_j = f64::NAN;
+        }
+        let status = if *verdict == CLAMPED { StepStatus::Clamped } else { StepStatus::Ok };
+        *output = Output::new(wrench, energy_j, status);
     }
 }

@@ -30,7 +30,8 @@ pub(crate) fn demand(input: &Input) -> Demand {
 /// In one go: a pose that is copied first has to be on its way to memory before the law can start on it, and so has all
 /// that the step before has done.
 #[inline]
-pub(crate) fn step<L: Law>(law: &L, input: &Input) -> Output {
+#[must_use]
+pub fn step<L: Law>(law: &L, input: &Input) -> Output {
     instructions::best(
         #[inline(always)]
         || output(&law.respond_inline(&pose(input), demand(input))),

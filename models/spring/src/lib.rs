@@ -29,7 +29,7 @@ pub mod bending;
 pub mod centerline;
 pub mod closed_form;
 pub mod contact;
-mod contract;
+pub mod contract;
 pub mod energy;
 pub mod entire;
 pub mod hand_over;

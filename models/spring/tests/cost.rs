@@ -163,11 +163,10 @@ fn laws_cost_their_share_of_the_printed_one() {
     }
     #[cfg(target_arch = "x86_64")]
     if pulp::x86::V3::try_new().is_some() {
-        // Four lanes an instruction, less what it takes to lay poses out, which is half of the closed form's batch: what was
-        // counted (2.0 and 2.5 times fewer) and a tenth, for other versions of compiler and libraries. In time the batch
-        // gains more, it waits for less.
-        assert!(closed_batch <= closed / 1.8, "closed-form, batch");
-        assert!(energy_batch <= energy / 2.3, "energy, batch");
+        // Four lanes an instruction, less what a single step gains by working on two components at once and what it takes
+        // to turn poses over. In time it is more or less of that: `examples/throughput.rs` measures it.
+        assert!(closed_batch <= closed / 2.5, "closed-form, batch");
+        assert!(energy_batch <= energy / 2.0, "energy, batch");
     }
 }
 
