@@ -1,6 +1,7 @@
 //! The energy form is one energy: its wrench is the gradient, closed paths cost nothing, and nothing depends on
 //! how the axes are laid. The printed law serves as the counter-example.
 
+#[allow(dead_code)] // each test needs its part of the helpers
 mod sample;
 
 use std::f64::consts::TAU;

@@ -25,14 +25,8 @@ const DEVICE: Workspace = Workspace { shear: 0.25, height: 0.5, tilt_rad: 0.12, 
 const WILD: Workspace = Workspace { shear: 1.5, height: 1.5, tilt_rad: 2.0, yaw_rad: 3.0 };
 
 /// A number of poses: all, or each day a hundredth.
-///
-/// The variable is that of `flotor_tests::TestSize`; plugins depend on nothing else of the workspace, so it is read here.
 fn of(all: u32) -> u32 {
-    match std::env::var("FLOTOR_TEST_SIZE").as_deref() {
-        Ok("full") => all,
-        Ok("quick") | Err(_) => all / 100,
-        Ok(other) => panic!("FLOTOR_TEST_SIZE is `quick` or `full`, not `{other}`"),
-    }
+    sample::of(all, all / 100)
 }
 
 fn is_sound(answer: &Response, pose: &Pose) {

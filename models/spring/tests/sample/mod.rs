@@ -3,6 +3,17 @@
 use flotor_hal::glam::DVec3;
 use flotor_spring::pose::Pose;
 
+/// Each day a part of the work, `full` all of it, with the same seeds and bounds.
+///
+/// The variable is that of `flotor_tests::TestSize`; plugins depend on nothing else of the workspace, so it is read here.
+pub(crate) fn of(all: u32, day: u32) -> u32 {
+    match std::env::var("FLOTOR_TEST_SIZE").as_deref() {
+        Ok("full") => all,
+        Ok("quick") | Err(_) => day,
+        Ok(other) => panic!("FLOTOR_TEST_SIZE is `quick` or `full`, not `{other}`"),
+    }
+}
+
 /// SplitMix64 (Steele, Lea and Flood 2014): small, seedable, the same everywhere.
 pub(crate) struct Sampler(u64);
 
