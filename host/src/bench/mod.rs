@@ -1,29 +1,35 @@
 //! Work against precision: what an evaluation of a force model costs, and how wrong it is, for many settings of it.
 //!
-//! Every case goes along one smooth path (1 to 3 Hz in all six coordinates, 1 kHz) and is timed three ways: without
-//! interruption (the mean of a tick), call by call (median and p99.9), and cold (after a reset, each call at another
-//! pose). Its error is the distance from a reference that walks the same path: another setting of the same model,
+//! Every case goes along one smooth path (1 to 3 Hz in all six coordinates, 1 kHz) and is timed four ways: without
+//! interruption (the mean of a tick), in a batch, call by call (median and p99.9), and cold (after a reset, each call at
+//! another pose). All cases take turns, so that what is told of one against another does not depend on what else the
+//! machine does. An error is the distance from a reference that walks the same path: another setting of the same model,
 //! computed in this run, not a table.
 //!
-//! - `path`: the motion. `stopwatch`: the times. `error`: the distance from the reference.
+//! - `path`: the motion. `stopwatch`: the times. `apart`: times of two kinds of calls. `error`: the distance from the
+//!   reference.
 //! - `reach_hand`: the whole loop: what of the reference's force reaches a hand, through sampling and delay.
 //! - `report`: table, CSV and picture.
 //!
 //! Not real-time.
 
+mod apart;
 mod error;
 mod path;
 mod reach_hand;
 mod report;
 mod stopwatch;
 
+pub use apart::{Apart, Speed};
 pub use error::Distance;
+pub use path::Hand;
 pub use reach_hand::{Losses, Sampling};
-pub use report::{BenchReport, CaseRow};
+pub use report::{ApartRow, BenchReport, CaseRow};
 pub use stopwatch::Times;
 
 use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
 use flotor_hal::{Demand, LoopConfig};
+use std::cell::Cell;
 
 /// One setting of the model.
 #[derive(Clone, Debug)]
@@ -52,80 +58,112 @@ impl Effort {
         }
     }
 
-    /// How often the path is walked; the fastest counts.
+    /// How often the path is walked.
     const fn rounds(self) -> usize {
         match self {
-            Self::Short => 3,
+            Self::Short => 5,
             Self::Full => 9,
         }
     }
 }
 
+/// What is measured.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The cases.
+    pub cases: Vec<Case>,
+    /// Which of them the times of the others are compared with.
+    pub yardstick: usize,
+    /// The case errors are measured against.
+    pub reference: Option<Case>,
+    /// The motion.
+    pub hand: Hand,
+    /// Calls to tell apart.
+    pub apart: Option<TellApart>,
+    /// How much is timed.
+    pub effort: Effort,
+}
+
+/// Calls to tell apart by a detail of the answer.
+#[derive(Clone, Debug)]
+pub struct TellApart {
+    /// Id of the detail; what counts is whether it is above zero.
+    pub detail: String,
+    /// In which cases, each along its motion.
+    pub walks: Vec<(Case, Hand)>,
+}
+
 /// Hears how far the work is.
 pub trait Progress {
-    /// One more of `all` cases begins.
-    fn begin(&self, name: &str, number: usize, all: usize);
+    /// A piece of work begins, after `done` of `all` pieces.
+    fn begin(&self, name: &str, done: usize, all: usize);
 }
 
 /// Rate of the path, and of every tick that is timed.
 const PERIOD_NS: u64 = 1_000_000;
 
-/// Measures every case; errors are distances from `reference`, if there is one.
+/// Force only, force and torque, and all that a case serves.
+const DEMANDS: [(&str, Demand); 3] =
+    [("force", Demand::FORCE), ("wrench", Demand::WRENCH), ("all", Demand::ALL)];
+
+/// Measures what is planned.
 ///
 /// # Errors
 /// [`LoadError`] if the plugin refuses a case or the reference.
-pub fn measure(
-    plugin: &Plugin,
-    cases: &[Case],
-    reference: Option<&Case>,
-    effort: Effort,
-    progress: &dyn Progress,
-) -> Result<BenchReport, LoadError> {
-    let path = path::smooth(effort.ticks());
-    let truth = match reference {
-        Some(case) => {
-            progress.begin(&format!("reference: {}", case.name), 0, cases.len());
-            Some(error::walk(&mut create(plugin, case)?, &path))
+pub fn measure(plugin: &Plugin, plan: &Plan, progress: &dyn Progress) -> Result<BenchReport, LoadError> {
+    let Plan { cases, yardstick, reference, hand, apart, effort } = plan;
+    let walks = apart.as_ref().map_or(&[][..], |apart| &apart.walks);
+    let comparisons = if reference.is_some() { 2 * cases.len() } else { 0 };
+    let all = comparisons + DEMANDS.len() * effort.rounds() + walks.len();
+    let done = Cell::new(0);
+    let begin = |name: &str| progress.begin(name, done.replace(done.get() + 1), all);
+
+    let path = hand.poses(effort.ticks());
+    let mut models = cases.iter().map(|case| create(plugin, case)).collect::<Result<Vec<_>, _>>()?;
+    let mut distances = vec![None; cases.len()];
+    let mut losses = Vec::new();
+    if let Some(case) = reference {
+        let mut exact = create(plugin, case)?;
+        let truth = error::walk(&mut exact, &path);
+        for ((case, model), distance) in cases.iter().zip(&mut models).zip(&mut distances) {
+            begin(&format!("error: {}", case.name));
+            *distance = Some(Distance::between(&error::walk(model, &path), &truth));
+            begin(&format!("at the hand: {}", case.name));
+            losses.push((case.name.clone(), reach_hand::losses(&mut exact, model, *hand, Sampling::FULL)));
         }
-        None => None,
-    };
-    let mut rows = Vec::with_capacity(cases.len());
-    for (number, case) in cases.iter().enumerate() {
-        progress.begin(&case.name, number + 1, cases.len());
-        let mut model = create(plugin, case)?;
-        let serves = model.serves();
-        let answers = error::walk(&mut model, &path);
-        let distance = truth.as_ref().map(|truth| Distance::between(&answers, truth));
-        let demands = [Demand::FORCE, Demand::WRENCH, Demand::ALL];
-        let times = demands.map(|demand| {
-            let demand = demand.limited_to(serves);
-            stopwatch::time(&mut model, &path, demand, effort.rounds())
-        });
-        rows.push(CaseRow { name: case.name.clone(), distance, times });
     }
-    let losses = match reference {
-        Some(case) => {
-            let mut losses = Vec::new();
-            for case_used in cases {
-                progress.begin(&format!("at the hand: {}", case_used.name), cases.len(), cases.len());
-                let mut exact = create(plugin, case)?;
-                let mut used = create(plugin, case_used)?;
-                losses.push((
-                    case_used.name.clone(),
-                    reach_hand::losses(&mut exact, &mut used, Sampling::FULL),
-                ));
-            }
-            losses
+    let [force, wrench, everything] = DEMANDS.map(|(name, demand)| {
+        let hear = || begin(&format!("times: {name}"));
+        stopwatch::in_turns(&mut models, *yardstick, &path, demand, effort.rounds(), hear)
+    });
+    let times = force.into_iter().zip(wrench).zip(everything);
+    let rows = cases.iter().zip(distances).zip(times).map(|((case, distance), ((force, wrench), all))| {
+        CaseRow { name: case.name.clone(), distance, times: [force, wrench, all] }
+    });
+    let rows = rows.collect();
+    let mut told_apart = Vec::new();
+    if let Some(TellApart { detail, walks }) = apart {
+        for (case, hand) in walks {
+            begin(&format!("{detail}: {}", case.name));
+            let mut model = create(plugin, case)?;
+            let apart = apart::apart(&mut model, detail, &hand.poses(effort.ticks()), effort.rounds());
+            told_apart.extend(apart.map(|apart| ApartRow {
+                name: case.name.clone(),
+                depth_m: hand.depth_m,
+                detail: detail.clone(),
+                apart,
+            }));
         }
-        None => Vec::new(),
-    };
+    }
     Ok(BenchReport {
         model: plugin.metadata().id.clone(),
         version: plugin.metadata().version.clone(),
-        reference: reference.map(|case| case.name.clone()),
+        reference: reference.as_ref().map(|case| case.name.clone()),
+        yardstick: cases.get(*yardstick).map(|case| case.name.clone()),
         ticks: path.len(),
         rows,
         losses,
+        apart: told_apart,
     })
 }
 

@@ -6,7 +6,7 @@
 //! exact than what sampling and sensing lose anyway buys nothing.
 
 use super::error::answer;
-use super::path;
+use super::path::Hand;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{DVec3, Pose, orientation_from_rotation_vector, rotation_vector};
 use serde::Serialize;
@@ -59,8 +59,8 @@ const TICKS: u64 = 500;
 const MOMENTS: u64 = 4;
 
 /// Measures the causes. `exact` is the reference, `used` the model in the loop.
-pub(super) fn losses(exact: &mut Model, used: &mut Model, sampling: Sampling) -> Losses {
-    let truth = Truth::new(exact);
+pub(super) fn losses(exact: &mut Model, used: &mut Model, hand: Hand, sampling: Sampling) -> Losses {
+    let truth = Truth::new(exact, hand);
     let none = Sampling::NONE;
     let late = Sampling { delay_ticks: sampling.delay_ticks, ..none };
     let coarse = Sampling { delay_ticks: 0, ..sampling };
@@ -75,18 +75,19 @@ pub(super) fn losses(exact: &mut Model, used: &mut Model, sampling: Sampling) ->
 
 /// The reference's force at every moment.
 struct Truth {
+    hand: Hand,
     forces_n: Vec<Option<DVec3>>,
 }
 
 impl Truth {
-    fn new(exact: &mut Model) -> Self {
+    fn new(exact: &mut Model, hand: Hand) -> Self {
         exact.reset();
         let forces = (0..TICKS * MOMENTS).map(|moment| {
             #[allow(clippy::cast_precision_loss)] // a few thousand
             let time_s = moment as f64 / MOMENTS as f64 * 1.0e-3;
-            answer(exact, path::at(time_s), moment).map(|wrench| wrench.force())
+            answer(exact, hand.at(time_s), moment).map(|wrench| wrench.force())
         });
-        Self { forces_n: forces.collect() }
+        Self { hand, forces_n: forces.collect() }
     }
 
     fn at(&self, moment: u64) -> Option<DVec3> {
@@ -95,7 +96,7 @@ impl Truth {
 
     /// Error at the moments of sampling themselves.
     fn at_samples(&self, model: &mut Model, sampling: Sampling) -> f64 {
-        let answers = answers(model, sampling);
+        let answers = answers(model, self.hand, sampling);
         let errors =
             (0..).zip(answers).map(|(tick, force)| Some((force? - self.at(tick * MOMENTS)?).length()));
         root_mean_square(errors.skip(SETTLED))
@@ -103,7 +104,7 @@ impl Truth {
 
     /// Error at every moment, of a force that is held, from `delay_ticks` after its sample.
     fn held(&self, model: &mut Model, sampling: Sampling) -> f64 {
-        let answers = answers(model, sampling);
+        let answers = answers(model, self.hand, sampling);
         let errors = (0..TICKS * MOMENTS).map(|moment| {
             let sample = (moment / MOMENTS).checked_sub(sampling.delay_ticks)?;
             let held = answers.get(usize::try_from(sample).ok()?).copied().flatten()?;
@@ -117,11 +118,11 @@ impl Truth {
 /// Ticks at the start that are not counted: a model with memory finds its branch.
 const SETTLED: usize = 20;
 
-fn answers(model: &mut Model, sampling: Sampling) -> Vec<Option<DVec3>> {
+fn answers(model: &mut Model, hand: Hand, sampling: Sampling) -> Vec<Option<DVec3>> {
     model.reset();
     let answers = (0..TICKS).map(|tick| {
         #[allow(clippy::cast_precision_loss)] // a few thousand
-        let seen = sampling.sees(path::at(tick as f64 * 1.0e-3));
+        let seen = sampling.sees(hand.at(tick as f64 * 1.0e-3));
         answer(model, seen, tick).map(|wrench| wrench.force())
     });
     answers.collect()

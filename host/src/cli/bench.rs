@@ -2,7 +2,7 @@
 
 use super::options::KeyValue;
 use super::{CommandError, style, write_json};
-use crate::bench::{Case, Effort, Progress, measure};
+use crate::bench::{Case, Effort, Hand, Plan, Progress, TellApart, measure};
 use crate::registry::Registry;
 use clap::{Args, ValueEnum};
 use flotor_hal::abi::PluginKind;
@@ -27,7 +27,8 @@ enum SizeOption {
     Examples:\n  \
     flotor bench --csv bench.csv --plot bench.svg\n  \
     flotor bench --case variant=energy --case variant=rod,accuracy=servo --size full\n  \
-    flotor bench --model ./libmy_model.so --case steps=8 --case steps=64 --reference steps=1024"
+    flotor bench --model ./libmy_model.so --case steps=8 --case steps=64 --reference steps=1024\n  \
+    flotor bench --set preset=slender --case variant=energy --depth-mm 20 --apart rod_share"
 )]
 pub(crate) struct BenchArguments {
     /// Id of the model, or path to its plugin file
@@ -42,6 +43,15 @@ pub(crate) struct BenchArguments {
     /// The case errors are measured against
     #[arg(long, value_name = "KEY=VALUE,...")]
     reference: Option<String>,
+    /// The case whose times those of the others are compared with [default: the first]
+    #[arg(long, value_name = "KEY=VALUE,...")]
+    yardstick: Option<String>,
+    /// How far below home the middle of the motion lies
+    #[arg(long, value_name = "MM", default_value_t = 4.0, allow_negative_numbers = true)]
+    depth_mm: f64,
+    /// Time calls apart for which this detail of the answer is above zero
+    #[arg(long, value_name = "DETAIL")]
+    apart: Option<String>,
     /// How much to time
     #[arg(long, value_enum, default_value = "short")]
     size: SizeOption,
@@ -57,18 +67,32 @@ pub(crate) struct BenchArguments {
 }
 
 /// Cases of the spring that ships with Flotor: every variant and setting of it.
-const SPRING_CASES: [&str; 8] = [
+const SPRING_CASES: [&str; 9] = [
     "variant=thesis",
     "variant=thesis,precision=f32",
     "variant=closed-form",
     "variant=closed-form,precision=f32",
     "variant=current-length",
+    "variant=energy,hand_over=off",
     "variant=energy",
     "variant=rod,accuracy=servo",
     "variant=rod,accuracy=tight",
 ];
 /// What they are measured against.
 const SPRING_REFERENCE: &str = "variant=rod,accuracy=tight";
+/// Which of its answers come from two laws, and where: about the depth of the cases, and about half the free length (mm),
+/// where springs that can buckle have.
+const SPRING_APART: &str = "rod_share";
+const SPRING_WALKS: [(&str, f64); 8] = [
+    ("preset=thesis-1", 4.0),
+    ("preset=thesis-1", 12.5),
+    ("preset=thesis-2", 4.0),
+    ("preset=thesis-2", 18.7),
+    ("preset=thesis-3", 4.0),
+    ("preset=thesis-3", 13.5),
+    ("preset=slender", 4.0),
+    ("preset=slender", 30.0),
+];
 
 pub(crate) fn run(arguments: &BenchArguments) -> Result<(), CommandError> {
     let plugin = Registry::search(&[]).load(&arguments.model, PluginKind::Model)?;
@@ -80,14 +104,41 @@ pub(crate) fn run(arguments: &BenchArguments) -> Result<(), CommandError> {
     };
     let reference = arguments.reference.as_deref().or(is_spring.then_some(SPRING_REFERENCE));
     let case = |text: &str| case(&plugin, &arguments.sets, text);
+    let hand = Hand { depth_m: arguments.depth_mm / 1e3 };
     let cases = cases.into_iter().map(case).collect::<Result<Vec<_>, _>>()?;
+    let yardstick = match &arguments.yardstick {
+        Some(text) => {
+            let name = case(text)?.name;
+            cases.iter().position(|case| case.name == name).ok_or_else(|| {
+                CommandError::Usage(format!("yardstick `{text}` is none of the cases; add --case {text}"))
+            })?
+        }
+        None => 0,
+    };
+    let apart = match (&arguments.apart, is_spring) {
+        (Some(detail), _) => {
+            let walks = cases.iter().map(|case| (case.clone(), hand)).collect();
+            Some(TellApart { detail: detail.clone(), walks })
+        }
+        (None, true) => {
+            let walks = SPRING_WALKS
+                .iter()
+                .map(|(text, depth_mm)| Ok((case(text)?, Hand { depth_m: depth_mm / 1e3 })));
+            Some(TellApart {
+                detail: SPRING_APART.to_owned(),
+                walks: walks.collect::<Result<_, CommandError>>()?,
+            })
+        }
+        (None, false) => None,
+    };
     let reference = reference.map(case).transpose()?;
     let effort = match arguments.size {
         SizeOption::Short => Effort::Short,
         SizeOption::Full => Effort::Full,
     };
-    let line = ProgressLine(super::run::progress_bar(cases.len() as u64, "{msg:<44} {wide_bar} {elapsed}"));
-    let report = measure(&plugin, &cases, reference.as_ref(), effort, &line)?;
+    let line = ProgressLine(super::run::progress_bar(1, "{msg:<44} {wide_bar} {elapsed}"));
+    let plan = Plan { cases, yardstick, reference, hand, apart, effort };
+    let report = measure(&plugin, &plan, &line)?;
     line.0.finish_and_clear();
 
     let json_on_stdout = arguments.json.as_ref().is_some_and(|path| path.as_os_str() == "-");
@@ -113,7 +164,15 @@ fn case(plugin: &Plugin, sets: &[KeyValue], text: &str) -> Result<Case, CommandE
         Setting::parse(plugin.parameters(), &parameter.key, &parameter.value)
             .map_err(|error| usage(error.to_string()))
     });
-    let values: Vec<String> = own.iter().map(|set| set.parameter().value).collect();
+    // A value says what it is of, but for a switch.
+    let word = |set: &KeyValue| {
+        let parameter = set.parameter();
+        match parameter.value.as_str() {
+            "on" | "off" => format!("{} {}", parameter.key, parameter.value),
+            _ => parameter.value,
+        }
+    };
+    let values: Vec<String> = own.iter().map(word).collect();
     let name = if values.is_empty() { "defaults".to_owned() } else { values.join(" ") };
     Ok(Case { name, settings: settings.collect::<Result<_, _>>()? })
 }
@@ -122,8 +181,9 @@ fn case(plugin: &Plugin, sets: &[KeyValue], text: &str) -> Result<Case, CommandE
 struct ProgressLine(ProgressBar);
 
 impl Progress for ProgressLine {
-    fn begin(&self, name: &str, number: usize, _all: usize) {
-        self.0.set_position(number as u64);
+    fn begin(&self, name: &str, done: usize, all: usize) {
+        self.0.set_length(all as u64);
+        self.0.set_position(done as u64);
         self.0.set_message(name.to_owned());
     }
 }
