@@ -6,13 +6,14 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Sources of the contract, those that hold structs first used first.
-const SOURCES: [&str; 17] = [
+const SOURCES: [&str; 19] = [
     "frame.rs",
     "refusal.rs",
     "parameter.rs",
     "model.rs",
     "shape.rs",
     "activity.rs",
+    "field.rs",
     "variant.rs",
     "detail.rs",
     "device.rs",
@@ -20,6 +21,7 @@ const SOURCES: [&str; 17] = [
     "abi/text.rs",
     "abi/entry.rs",
     "abi/force.rs",
+    "abi/field.rs",
     "abi/device.rs",
     "abi/calibration.rs",
     "abi/metadata.rs",

@@ -4,7 +4,7 @@ use flotor::coupling::{CouplingConfig, CouplingDescription, CouplingEnd, Passivi
 use flotor::record::{
     Change, ChangeOutcome, ChangeSubject, Note, PluginDescription, Recorder, Role, RunDescription, Severity,
 };
-use flotor::scene::{Blend, MappingConfig};
+use flotor::scene::{Blend, FieldTiming, MappingConfig};
 use flotor::servo::Clock;
 use flotor::trace::{Events, TickRecord};
 use flotor_hal::{Pose, Twist, Wrench};
@@ -124,6 +124,7 @@ fn run() -> RunDescription {
         } else {
             Blend { weight: 0.5, priority: 3, fade_s: 0.25 }
         },
+        field: (role != Role::Device).then_some(FieldTiming { rate_hz: 200.0, latency_s: 0.0025 }),
         settings: vec![pair("preset", "plain")],
         parameters: vec![pair("preset", "plain"), pair("mass_kg", "0.58")],
         device: 0,
@@ -295,6 +296,7 @@ fn expected_run() -> Vec<String> {
         ["weight = 0.5", "priority = 3", "fade_s = 0.25"].map(|line| format!("plugins[2].blend.{line}")),
     );
     lines.push("plugins[2].device = 1".to_owned());
+    lines.extend(["rate_hz = 200.0", "latency_s = 0.0025"].map(|line| format!("plugins[2].field.{line}")));
     let coupling = [
         "name = \"pair\"",
         "stiffness_n_per_m = 600.5",

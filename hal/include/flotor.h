@@ -711,6 +711,7 @@ typedef struct FlotorDevicePacingTable {
 #define FLOTOR_INTERFACE_CENTERLINE "flotor.centerline/1"
 #define FLOTOR_INTERFACE_VARIANT "flotor.variant/1"
 #define FLOTOR_INTERFACE_ACTIVITY "flotor.activity/1"
+#define FLOTOR_INTERFACE_LINEAR_FIELD "flotor.linear-field/1"
 #define FLOTOR_INTERFACE_DETAILS "flotor.details/1"
 #define FLOTOR_INTERFACE_ENERGY_LEDGER "flotor.energy-ledger/1"
 #define FLOTOR_INTERFACE_DEVICE_PACING "flotor.device-pacing/1"

@@ -32,6 +32,7 @@ mod calibration;
 pub mod conformance;
 mod detail;
 mod device;
+mod field;
 mod frame;
 mod model;
 mod pacing;
@@ -47,6 +48,7 @@ pub use device::{
     ActiveDevice, Axes, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState, EnergyLedger,
     Fault, SafeStop, Tick,
 };
+pub use field::{FieldModel, LinearField};
 pub use frame::{Pose, Twist, Wrench, orientation_from_rotation_vector, rotation_vector};
 pub use glam;
 pub use glam::{DMat3, DQuat, DVec3};

@@ -44,6 +44,7 @@ pub mod scaffold;
 pub mod scene;
 pub mod servo;
 pub mod session;
+pub(crate) mod slow;
 pub mod stability;
 pub mod stress;
 pub mod study;

@@ -277,6 +277,7 @@ fn models_of(path: &Path, run: &RunDescription) -> Vec<ModelUse> {
             places_m: plugin.places_m.clone(),
             blend: plugin.blend,
             isolation: Isolation::None, // nobody is held by a replay
+            field: plugin.field,
             budget_s: None,
         }),
     };

@@ -11,11 +11,11 @@ use crate::session::{PluginReport, RunOptions};
 #[must_use]
 pub fn describe(scene: &Scene, options: &RunOptions, plugins: &[PluginReport]) -> RunDescription {
     let device = |(number, device): (u16, &DeviceUse)| {
-        (device.plugin.clone(), Role::Device, number, Vec::new(), Blend::default())
+        (device.plugin.clone(), Role::Device, number, Vec::new(), Blend::default(), None)
     };
     let model = |model: &ModelUse| {
         let role = Role::Model(model.mapping);
-        (model.plugin.clone(), role, model.device, model.places_m.clone(), model.blend)
+        (model.plugin.clone(), role, model.device, model.places_m.clone(), model.blend, model.field)
     };
     let devices = (0..).zip(&scene.devices).map(device);
     let plugins = devices.chain(scene.models.iter().map(model)).zip(plugins);
@@ -27,10 +27,11 @@ pub fn describe(scene: &Scene, options: &RunOptions, plugins: &[PluginReport]) -
         clock: options.clock,
         scene_toml: scene.text.clone(),
         plugins: plugins
-            .map(|((used, role, device, places_m, blend), report)| PluginDescription {
+            .map(|((used, role, device, places_m, blend, field), report)| PluginDescription {
                 device,
                 places_m,
                 blend,
+                field,
                 ..describe_plugin(&used, role, report)
             })
             .collect(),
@@ -50,6 +51,7 @@ fn describe_plugin(used: &PluginUse, role: Role, report: &PluginReport) -> Plugi
         device: 0,
         places_m: Vec::new(),
         blend: Blend::default(),
+        field: None,
         settings: settings.collect(),
         parameters: report.parameters.clone(),
     }

@@ -1,5 +1,6 @@
 //! A scene run through the library on the virtual clock, with every tick kept.
 
+use crate::library::build_folder;
 use flotor::record::Change;
 use flotor::registry::Registry;
 use flotor::scene::Scene;
@@ -41,7 +42,7 @@ impl Observer for Keep {
 /// If the scene is wrong or a plugin is refused: such tests have other means.
 #[must_use]
 pub fn prepared(clock: Clock, scene: &str) -> Session {
-    prepared_with(&Registry::search(&[]), clock, scene)
+    prepared_with(&Registry::search(&[build_folder().join("deps")]), clock, scene)
 }
 
 /// The same with plugins that may have been loaded before: for many runs, which then load none.

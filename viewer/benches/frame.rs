@@ -35,6 +35,7 @@ fn run() -> RunDescription {
             role: Role::Model(MappingConfig::default()),
             places_m: Vec::new(),
             blend: Blend::default(),
+            field: None,
             settings: Vec::new(),
             parameters: Vec::new(),
             device: 0,

@@ -1,10 +1,14 @@
 //! From a [`ForceModel`] to its function table: the trampolines that keep panics inside the plugin.
 
 use super::entry::{CallStatus, Entry, Instance, PluginKind, interface_ids};
-use super::{ActivityTable, CenterlineTable, DetailsTable, ForceTable, Message, Str, VariantTable, panics};
+use super::{
+    ActivityTable, CenterlineTable, DetailsTable, ForceTable, LinearFieldTable, Message, Str, VariantTable,
+    panics,
+};
 use crate::{
-    ActivityRegion, CenterlineInfo, CenterlineModel, DetailedModel, ForceModel, Input, LocalModel,
-    LoopConfig, Output, ParameterValue, Pose, RefusalKind, Settings, VariantInfo, VariantModel,
+    ActivityRegion, CenterlineInfo, CenterlineModel, DetailedModel, FieldModel, ForceModel, Input,
+    LinearField, LocalModel, LoopConfig, Output, ParameterValue, Pose, RefusalKind, Settings, VariantInfo,
+    VariantModel,
 };
 use std::ffi::c_void;
 use std::marker::PhantomData;
@@ -235,6 +239,19 @@ unsafe extern "C" fn region<M: LocalModel>(instance: Instance, out: *mut Activit
     })
 }
 
+unsafe extern "C" fn linear_field<M: FieldModel>(
+    instance: Instance,
+    input: *const Input,
+    field: *mut LinearField,
+) -> u32 {
+    // SAFETY: as in `prepare`.
+    let (slot, input, field) = unsafe { (slot::<M>(instance), &*input, &mut *field) };
+    slot.guard(|model| {
+        *field = model.linear_field(input);
+        CallStatus::Ok
+    })
+}
+
 unsafe extern "C" fn variant_info<M: VariantModel>(instance: Instance, out: *mut VariantInfo) -> u32 {
     // SAFETY: as in `prepare`.
     let (slot, out) = unsafe { (slot::<M>(instance), &mut *out) };
@@ -304,6 +321,15 @@ impl<M: LocalModel> Tables<M> {
         ActivityTable { size: size_of::<ActivityTable>() as u32, reserved: 0, region: Some(region::<M>) };
 }
 
+#[allow(clippy::cast_possible_truncation)] // table sizes are small
+impl<M: FieldModel> Tables<M> {
+    const LINEAR_FIELD: LinearFieldTable = LinearFieldTable {
+        size: size_of::<LinearFieldTable>() as u32,
+        reserved: 0,
+        linear_field: Some(linear_field::<M>),
+    };
+}
+
 #[allow(clippy::cast_possible_truncation)] // table sizes and counts are small
 impl<M: DetailedModel> Tables<M> {
     const DETAILS: DetailsTable = DetailsTable {
@@ -329,6 +355,8 @@ pub struct WithVariant;
 pub struct WithDetails;
 /// The model is a [`LocalModel`].
 pub struct WithActivity;
+/// The model is a [`FieldModel`].
+pub struct WithField;
 
 impl<M> Extensions<M> for () {
     fn table(_: &str) -> *const c_void {
@@ -372,6 +400,15 @@ impl<M: LocalModel, Rest: Extensions<M>> Extensions<M> for (WithActivity, Rest) 
     }
 }
 
+impl<M: FieldModel, Rest: Extensions<M>> Extensions<M> for (WithField, Rest) {
+    fn table(id: &str) -> *const c_void {
+        match id {
+            interface_ids::LINEAR_FIELD => std::ptr::from_ref(&Tables::<M>::LINEAR_FIELD).cast(),
+            _ => Rest::table(id),
+        }
+    }
+}
+
 unsafe extern "C" fn interface<M: ForceModel, E: Extensions<M>>(id: Str) -> *const c_void {
     match id.as_str() {
         interface_ids::FORCE => std::ptr::from_ref(&Tables::<M>::FORCE).cast(),
@@ -393,7 +430,8 @@ pub const fn model_entry_with<M: ForceModel, E: Extensions<M>>() -> Entry {
 
 /// Makes a [`crate::ForceModel`] a plugin: `export_model!(Spring);`. Extensions the type implements too are listed
 /// behind it: `export_model!(Spring, centerline, variant, details);` for a [`crate::CenterlineModel`],
-/// [`crate::VariantModel`] and [`crate::DetailedModel`], `activity` for a [`crate::LocalModel`]. One per crate.
+/// [`crate::VariantModel`] and [`crate::DetailedModel`], `activity` for a [`crate::LocalModel`], `field` for a
+/// [`crate::FieldModel`]. One per crate.
 #[macro_export]
 macro_rules! export_model {
     (@extensions) => { () };
@@ -405,6 +443,9 @@ macro_rules! export_model {
     };
     (@extensions activity $($rest:ident)*) => {
         ($crate::abi::WithActivity, $crate::export_model!(@extensions $($rest)*))
+    };
+    (@extensions field $($rest:ident)*) => {
+        ($crate::abi::WithField, $crate::export_model!(@extensions $($rest)*))
     };
     (@extensions details $($rest:ident)*) => {
         ($crate::abi::WithDetails, $crate::export_model!(@extensions $($rest)*))

@@ -19,6 +19,7 @@ mod device;
 mod entry;
 mod export_device;
 mod export_model;
+mod field;
 mod force;
 pub mod metadata;
 mod pacing;
@@ -38,8 +39,10 @@ pub use entry::{
 };
 pub use export_device::device_entry;
 pub use export_model::{
-    Extensions, WithActivity, WithCenterline, WithDetails, WithVariant, model_entry, model_entry_with,
+    Extensions, WithActivity, WithCenterline, WithDetails, WithField, WithVariant, model_entry,
+    model_entry_with,
 };
+pub use field::LinearFieldTable;
 pub use force::{ActivityTable, CenterlineTable, DetailsTable, ForceTable, VariantTable};
 pub use pacing::DevicePacingTable;
 pub use text::{MESSAGE_BYTES, Message, Str, StrList};

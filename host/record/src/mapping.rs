@@ -43,6 +43,16 @@ impl Default for Blend {
     }
 }
 
+/// When a model that is computed beside the loop gives a new linear field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FieldTiming {
+    /// How often, Hz.
+    pub rate_hz: f64,
+    /// Time from a look at the handle to the field that answers it, s. On the virtual clock it takes just this; on a
+    /// real one as long as the model takes.
+    pub latency_s: f64,
+}
+
 /// Frames and scales of one model on one device, in one place.
 #[derive(Clone, Copy, Debug)]
 pub struct Mapping {

@@ -1,7 +1,7 @@
 //! What is known before a run begins, in a form that can be kept: enough to repeat it.
 
 use crate::coupling::CouplingDescription;
-use crate::mapping::{Blend, MappingConfig};
+use crate::mapping::{Blend, FieldTiming, MappingConfig};
 use crate::schema::{self, FORMAT, Mapping, Missing, Plugin, Run, Setting, Vector3};
 use prost::Message;
 use std::collections::BTreeMap;
@@ -60,6 +60,8 @@ pub struct PluginDescription {
     pub places_m: Vec<[f64; 3]>,
     /// Of a model: how it was mixed with the others.
     pub blend: Blend,
+    /// Of a model that was computed beside the loop: when.
+    pub field: Option<FieldTiming>,
     /// What scene and command line set, as written, in order: to repeat the run, set these.
     pub settings: Vec<(String, String)>,
     /// Every parameter with the value in force: to know what they were.
@@ -187,6 +189,10 @@ impl PluginDescription {
                 fade_s: Some(self.blend.fade_s),
             }),
             device: self.device.into(),
+            field: self.field.map(|field| schema::FieldTiming {
+                rate_hz: Some(field.rate_hz),
+                latency_s: Some(field.latency_s),
+            }),
         }
     }
 
@@ -205,10 +211,13 @@ impl PluginDescription {
             priority: u8::try_from(blend.priority).unwrap_or(u8::MAX),
             fade_s: blend.fade_s(),
         });
+        let field =
+            plugin.field.map(|field| FieldTiming { rate_hz: field.rate_hz(), latency_s: field.latency_s() });
         Ok(Self {
             places_m,
             blend,
             device: u16::try_from(plugin.device).map_err(|_| Missing("plugin.device"))?,
+            field,
             name: plugin.name,
             id: plugin.id,
             version: plugin.version,

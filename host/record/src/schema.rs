@@ -306,6 +306,16 @@ pub(crate) struct Plugin {
     pub(crate) blend: Option<Blend>,
     #[prost(uint32, tag = "10")]
     pub(crate) device: u32,
+    #[prost(message, optional, tag = "11")]
+    pub(crate) field: Option<FieldTiming>,
+}
+
+#[derive(Clone, Copy, PartialEq, Message)]
+pub(crate) struct FieldTiming {
+    #[prost(double, optional, tag = "1")]
+    pub(crate) rate_hz: Option<f64>,
+    #[prost(double, optional, tag = "2")]
+    pub(crate) latency_s: Option<f64>,
 }
 
 #[derive(Clone, Copy, PartialEq, Message)]

@@ -1,6 +1,6 @@
 use super::schema::{DESCRIPTOR_SET, ENCODING, FORMAT, Topic};
 use super::*;
-use crate::mapping::{Blend, MappingConfig};
+use crate::mapping::{Blend, FieldTiming, MappingConfig};
 use crate::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
 use flotor_sync::Words;
 use mcap::records::op;
@@ -50,6 +50,7 @@ fn run() -> RunDescription {
         } else {
             Blend { weight: 0.5, priority: 3, fade_s: 0.25 }
         },
+        field: (role != Role::Device).then_some(FieldTiming { rate_hz: 200.0, latency_s: 0.0025 }),
         settings,
         parameters: vec![pair("preset", "plain"), pair("mass_kg", "0.58")],
         device: 0,

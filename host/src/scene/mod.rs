@@ -11,7 +11,7 @@ pub use crate::coupling::{CouplingConfig, CouplingDescription, PassivityMode};
 pub use change::{ChangeUse, ChangeWhat};
 pub use devices::{DeviceUse, MOST_DEVICES};
 pub(crate) use devices::{is_named, without_device};
-pub use flotor_record::mapping::{Blend, MappingConfig};
+pub use flotor_record::mapping::{Blend, FieldTiming, MappingConfig};
 pub use reader::{Location, SceneError};
 pub use setting::{KeyValue, PluginKeyValue};
 
@@ -114,6 +114,8 @@ pub struct ModelUse {
     pub blend: Blend,
     /// Where it runs.
     pub isolation: Isolation,
+    /// When it is computed, if beside the loop; the loop evaluates its linear field.
+    pub field: Option<FieldTiming>,
     /// Longest time a step may take, s; `None`: half a period in real time, anything on the virtual clock.
     pub budget_s: Option<f64>,
 }
@@ -317,6 +319,7 @@ fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse
     let blend = section.section("blend")?.map_or_else(|| Ok(Blend::default()), blend)?;
     let isolation = section.take("isolation").map(isolation).transpose()?.unwrap_or_default();
     let budget_us = section.number("budget_us", 1.0..=1.0e6)?;
+    let field = section.section("field")?.map(|section| field(section, isolation)).transpose()?;
     section.finish()?;
     let name = name.unwrap_or_else(|| plugin.plugin.clone());
     let model = ModelUse {
@@ -327,6 +330,7 @@ fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse
         places_m,
         blend,
         isolation,
+        field,
         budget_s: budget_us.map(|microseconds| microseconds * 1.0e-6),
     };
     let only = on.len() == 1;
@@ -336,6 +340,23 @@ fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse
         ModelUse { name, device: number, ..model.clone() }
     };
     Ok(on.into_iter().map(on_device).collect())
+}
+
+/// When a model beside the loop is computed.
+fn field(mut section: Section<'_>, isolation: Isolation) -> Result<FieldTiming, SceneError> {
+    let rate = section.require("rate_hz")?;
+    if isolation == Isolation::Process {
+        return Err(rate.problem(
+            "a model in a process of its own is asked in the loop; remove one of the two".to_owned(),
+        ));
+    }
+    let rate_hz = rate.number(1.0..=10_000.0)?;
+    let period_s = 1.0 / rate_hz;
+    let latency_s =
+        section.number("latency_ms", 0.0..=period_s * 1.0e3)?.map(|milliseconds| milliseconds * 1.0e-3);
+    section.finish()?;
+    // A model that takes all the time it has.
+    Ok(FieldTiming { rate_hz, latency_s: latency_s.unwrap_or(period_s) })
 }
 
 fn blend(mut section: Section<'_>) -> Result<Blend, SceneError> {

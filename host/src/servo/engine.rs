@@ -1,5 +1,6 @@
-//! Where a model runs: in this process, or in a worker of its own.
+//! Where a model runs: in the loop, beside it, or in a worker of its own.
 
+use crate::slow::SlowModel;
 use crate::worker::{Reply, Worker};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
@@ -7,10 +8,12 @@ use flotor_hal::{ActivityRegion, Demand, Input, Memory, Output};
 
 /// A model, wherever it runs.
 pub(crate) enum Engine {
-    /// In this process: fastest, and what breaks the model may break the process.
+    /// In the loop: fastest, and what breaks the model may break the process.
     Here(Model),
     /// In a process of its own.
     Apart(Worker),
+    /// Beside the loop, which evaluates its linear field.
+    Beside(Box<SlowModel>),
 }
 
 /// What came of a step.
@@ -45,6 +48,7 @@ impl Engine {
                 Reply::Late => Stepped::Late,
                 Reply::Gone => Stepped::Gone,
             },
+            Self::Beside(model) => model.step(input),
         }
     }
 
@@ -57,6 +61,7 @@ impl Engine {
                 // Not now: the next step tells whether it is late or gone.
                 Reply::Late | Reply::Gone => CallStatus::Unsupported,
             },
+            Self::Beside(model) => model.set_parameter(index, value),
         }
     }
 
@@ -65,6 +70,7 @@ impl Engine {
         match self {
             Self::Here(model) => model.parameter(index),
             Self::Apart(worker) => worker.parameter(index),
+            Self::Beside(model) => model.parameter(index),
         }
     }
 
@@ -73,6 +79,7 @@ impl Engine {
         match self {
             Self::Here(model) => model.serves(),
             Self::Apart(worker) => worker.serves(),
+            Self::Beside(model) => model.serves(),
         }
     }
 
@@ -85,14 +92,15 @@ impl Engine {
                 // The next step tells whether it is late or gone.
                 Reply::Late | Reply::Gone => CallStatus::Ok,
             },
+            Self::Beside(model) => model.reset(),
         }
     }
 
-    /// Where the model can act; one in a process of its own is always asked. Real-time: bounded, no allocation.
+    /// Where the model can act; one beside the loop or in a process of its own is always asked. Real-time: bounded, no allocation.
     pub(crate) fn activity(&mut self) -> ActivityRegion {
         match self {
             Self::Here(model) => model.activity(),
-            Self::Apart(_) => ActivityRegion::EVERYWHERE,
+            Self::Apart(_) | Self::Beside(_) => ActivityRegion::EVERYWHERE,
         }
     }
 
@@ -101,6 +109,7 @@ impl Engine {
         match self {
             Self::Here(model) => model.memory(),
             Self::Apart(worker) => worker.memory(),
+            Self::Beside(model) => model.memory(),
         }
     }
 
@@ -109,6 +118,7 @@ impl Engine {
         match self {
             Self::Here(model) => model.last_message(),
             Self::Apart(worker) => worker.last_message(),
+            Self::Beside(model) => model.last_message(),
         }
     }
 }

@@ -25,7 +25,7 @@ pub use budget::Overrun;
 pub(crate) use budget::TimeBudget;
 pub use clock::{Clock, SpinWindow};
 pub(crate) use clock::{Due, Schedule, monotonic_ns, sleep_until};
-pub(crate) use engine::Engine;
+pub(crate) use engine::{Engine, Stepped};
 pub use envelope::Envelope;
 pub(crate) use exchange::{Exchange, Workshop, exchange};
 pub(crate) use forces::{Coupled, Forces, Port};

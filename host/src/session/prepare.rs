@@ -10,6 +10,7 @@ use crate::scene::{
     SceneError,
 };
 use crate::servo::{Clock, Engine, Layer, Replacement, ScheduledChange, TimeBudget};
+use crate::slow::SlowModel;
 use crate::worker::{Worker, WorkerOrder};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, OpenedDevice, Plugin, Setting};
@@ -98,13 +99,23 @@ pub(crate) fn prepare_model(
     let budget_ns = budget_ns(model, clock, config.period_ns);
     let mapping = Mapping::new(&model.mapping);
     let instance = |place_m: &[f64; 3]| {
-        let engine = match model.isolation {
-            Isolation::None => {
+        let engine = match (model.isolation, &model.field) {
+            (Isolation::None, None) => {
                 let mut instance = plugin.create_model(&settings)?;
                 instance.prepare(config).map_err(|refusal| refused(&plugin, refusal))?;
                 Engine::Here(instance)
             }
-            Isolation::Process => {
+            (Isolation::None, Some(timing)) => {
+                let instance = plugin.create_model(&settings)?;
+                if !instance.has_linear_field() {
+                    let problem =
+                        "it has no linear field, so it can only run in the loop; remove `[model.field]`";
+                    return Err(complain(model, problem).into());
+                }
+                let slow = SlowModel::start(instance, plugin.parameters().len(), timing, config, clock);
+                Engine::Beside(Box::new(slow.map_err(|refusal| refused(&plugin, refusal))?))
+            }
+            (Isolation::Process, _) => {
                 let keys = model.plugin.parameters.iter().map(|parameter| parameter.key.clone());
                 let values = settings.iter().map(|setting| setting.display(plugin.parameters()));
                 let order = WorkerOrder {
@@ -120,9 +131,10 @@ pub(crate) fn prepare_model(
     };
     let mut instances = model.places_m.iter().map(instance).collect::<Result<Vec<_>, RunError>>()?;
     let mut value = |index| instances.first_mut().map_or(f64::NAN, |(first, _)| first.parameter(index));
-    let budget = match model.isolation {
-        Isolation::None => TimeBudget::new(budget_ns),
-        Isolation::Process => TimeBudget::default(), // nobody waits for it any longer than that
+    let budget = match (model.isolation, &model.field) {
+        (Isolation::None, None) => TimeBudget::new(budget_ns),
+        // Nobody waits for it any longer than that, or at all.
+        (Isolation::Process, _) | (_, Some(_)) => TimeBudget::default(),
     };
     let report = PluginReport {
         name: model.name.clone(),
@@ -132,6 +144,11 @@ pub(crate) fn prepare_model(
         parameters: in_force(&plugin, &settings, &mut value),
     };
     Ok((Layer::new(instances, &model.blend, budget), report))
+}
+
+/// What a scene says of a model that cannot be.
+fn complain(model: &ModelUse, problem: &str) -> SceneError {
+    SceneError { location: model.plugin.location.clone(), problem: format!("[{}] {problem}", model.name) }
 }
 
 /// How long a run on the virtual clock waits for a model in a process of its own before it counts as hung, ns.

@@ -4,8 +4,8 @@ use crate::mesh::{Mesh, Sheet};
 use crate::network::{Network, Surroundings};
 use crate::touch::Touch;
 use flotor_hal::{
-    DVec3, ForceModel, Input, Memory, ModelInfo, OutOfRange, Output, Parameter, Refusal, Settings,
-    StepStatus, Wrench,
+    DVec3, FieldModel, ForceModel, Input, LinearField, Memory, ModelInfo, OutOfRange, Output, Parameter,
+    Refusal, Settings, StepStatus, Wrench,
 };
 
 /// Farther from home than this there is no handle, m: the answer is that at the edge, and says so.
@@ -62,6 +62,8 @@ const SCHEMA: &[Parameter] = &[
 pub struct Membrane {
     touch: Touch,
     radius_m: f64,
+    /// Distance of masses, m: the scale on which the sheet is no longer linear.
+    coarseness_m: f64,
     parameters: [f64; SCHEMA.len()],
 }
 
@@ -148,7 +150,12 @@ impl ForceModel for Membrane {
         for (value, parameter) in parameters.iter_mut().zip(Self::PARAMETERS) {
             *value = settings.number_or_default(parameter.id());
         }
-        Ok(Self { touch: Touch::new(network, radius_m, DVec3::Z * radius_m), radius_m, parameters })
+        Ok(Self {
+            touch: Touch::new(network, radius_m, DVec3::Z * radius_m),
+            radius_m,
+            coarseness_m: mesh.coarseness_m(),
+            parameters,
+        })
     }
 
     fn step(&mut self, input: &Input) -> Output {
@@ -178,7 +185,20 @@ impl ForceModel for Membrane {
     }
 }
 
+/// How far the ball is moved to feel the slope, over the distance of two masses: several come into contact on the way.
+const PROBE_SHARE: f64 = 0.125;
+
+impl FieldModel for Membrane {
+    fn linear_field(&mut self, input: &Input) -> LinearField {
+        let Ok((handle_m, _)) = Self::reached(input) else { return LinearField::NONE };
+        let (centre_m, time_s) = (self.centre_m(handle_m), input.dt_s().min(LONGEST_TIME_S));
+        let felt = self.touch.feel(centre_m, time_s, PROBE_SHARE * self.coarseness_m);
+        // Within half the distance of two masses others come into contact or leave it.
+        LinearField::of_force(input, felt.force_n, felt.slope_n_per_m, 0.5 * self.coarseness_m)
+    }
+}
+
 /// Steps until a sheet has come to rest under gravity, before it is taken as it is.
 const MOST_SETTLING_STEPS: usize = 20_000;
 
-flotor_hal::export_model!(Membrane);
+flotor_hal::export_model!(Membrane, field);

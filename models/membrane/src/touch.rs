@@ -3,9 +3,6 @@
 use crate::network::{Ball, Network, State};
 use flotor_hal::DVec3;
 
-/// How far the ball is moved to feel how the force changes, m: far above rounding, far below a mass's distance.
-const PROBE_M: f64 = 1.0e-5;
-
 /// A network, and the ball that touches it.
 #[derive(Debug)]
 pub struct Touch {
@@ -20,7 +17,7 @@ pub struct Touch {
 
 /// Force on the ball, and how it changes with where the ball goes in the same time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LocalField {
+pub struct Felt {
     /// Force on the ball, N.
     pub force_n: DVec3,
     /// Change of the force for a displacement along x, y and z, N/m.
@@ -69,21 +66,24 @@ impl Touch {
     }
 
     /// The same, and how the force would differ had the ball gone elsewhere: the time is lived three more times, each
-    /// time with the ball ending a little farther along one axis. So the slope has the network's inertia and yielding
-    /// in it, over just this time. Bounded by four times [`Self::steps_in`], no allocation.
-    pub fn feel(&mut self, centre_m: DVec3, duration_s: f64) -> LocalField {
+    /// time with the ball ending `probe_m` farther along one axis, the way it went. So the slope has the network's inertia
+    /// and yielding in it, over just this time, and what the ball is about to meet. A short probe takes the blow of a single
+    /// mass that comes into contact for stiffness. Bounded by four times [`Self::steps_in`], no allocation.
+    pub fn feel(&mut self, centre_m: DVec3, duration_s: f64, probe_m: f64) -> Felt {
         let from_m = self.ball.centre_m;
+        let way_m = centre_m - from_m;
         self.before.clone_from(self.network.state());
         let force_n = self.advance(centre_m, duration_s);
         self.after.clone_from(self.network.state());
         let slope_n_per_m = DVec3::AXES.map(|axis| {
             self.network.restore(&self.before);
             self.ball.centre_m = from_m;
-            (self.advance(centre_m + axis * PROBE_M, duration_s) - force_n) / PROBE_M
+            let probe_m = probe_m.copysign(way_m.dot(axis));
+            (self.advance(centre_m + axis * probe_m, duration_s) - force_n) / probe_m
         });
         self.network.restore(&self.after);
         self.ball.centre_m = centre_m;
-        LocalField { force_n, slope_n_per_m }
+        Felt { force_n, slope_n_per_m }
     }
 
     /// Back to before anybody touched it, the ball at `start_m`. Real-time: bounded, no allocation.

@@ -55,6 +55,7 @@ pub(crate) fn spring_run(settings: &[(&str, &str)]) -> (RunDescription, Vec<Pane
         role,
         places_m: Vec::new(),
         blend: Blend::default(),
+        field: None,
         settings,
         parameters,
         device: 0,

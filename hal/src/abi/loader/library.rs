@@ -4,8 +4,8 @@ use super::model::{Model, ModelTables};
 use super::{LoadError, Metadata, OpenedDevice, Setting, check, metadata_file};
 use crate::abi::{
     ABI_MAJOR, ABI_MINOR, ActivityTable, CalibrationTable, CenterlineTable, DetailsTable, DevicePacingTable,
-    DeviceTable, EnergyLedgerTable, Entry, ForceTable, HOST_QUIET_PANICS, Host, MAGIC, PluginKind, Str,
-    VariantTable, interface_ids,
+    DeviceTable, EnergyLedgerTable, Entry, ForceTable, HOST_QUIET_PANICS, Host, LinearFieldTable, MAGIC,
+    PluginKind, Str, VariantTable, interface_ids,
 };
 use crate::{DeviceInfo, ModelInfo, Parameter};
 use std::ffi::CString;
@@ -281,14 +281,15 @@ fn find_interface(metadata: &Metadata, entry: &'static Entry) -> Result<Interfac
             return Err(missing(id, name));
         }
         // SAFETY: as above, for the tables of the extensions.
-        let (centerline, variant, details, activity) = unsafe {
+        let (centerline, variant, details, activity, field) = unsafe {
             (
                 table(interface_ids::CENTERLINE).cast::<CenterlineTable>().as_ref(),
                 table(interface_ids::VARIANT).cast::<VariantTable>().as_ref(),
                 table(interface_ids::DETAILS).cast::<DetailsTable>().as_ref(),
                 table(interface_ids::ACTIVITY).cast::<ActivityTable>().as_ref(),
+                table(interface_ids::LINEAR_FIELD).cast::<LinearFieldTable>().as_ref(),
             )
         };
-        Ok(Interface::Model(ModelTables { force, centerline, variant, details, activity }))
+        Ok(Interface::Model(ModelTables { force, centerline, variant, details, activity, field }))
     }
 }

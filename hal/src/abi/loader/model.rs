@@ -2,11 +2,12 @@
 
 use super::Setting;
 use crate::abi::{
-    ActivityTable, CallStatus, CenterlineTable, DetailsTable, ForceTable, Instance, Message, VariantTable,
+    ActivityTable, CallStatus, CenterlineTable, DetailsTable, ForceTable, Instance, LinearFieldTable,
+    Message, VariantTable,
 };
 use crate::{
-    ActivityRegion, CenterlineInfo, Demand, Detail, Input, LoopConfig, Memory, ModelInfo, Output, Parameter,
-    ParameterValue, Pose, Refusal, RefusalKind, VariantInfo,
+    ActivityRegion, CenterlineInfo, Demand, Detail, Input, LinearField, LoopConfig, Memory, ModelInfo,
+    Output, Parameter, ParameterValue, Pose, Refusal, RefusalKind, VariantInfo,
 };
 
 type StepFn = unsafe extern "C" fn(Instance, *const Input, *mut Output) -> u32;
@@ -19,6 +20,7 @@ pub(super) struct ModelTables {
     pub(super) variant: Option<&'static VariantTable>,
     pub(super) details: Option<&'static DetailsTable>,
     pub(super) activity: Option<&'static ActivityTable>,
+    pub(super) field: Option<&'static LinearFieldTable>,
 }
 
 /// One instance of a force model. Used by one thread at a time.
@@ -163,6 +165,21 @@ impl Model {
         // SAFETY: as in `prepare`; the out pointer is valid for the call.
         let code = unsafe { ask(self.instance, &raw mut region) };
         if code == CallStatus::Ok as u32 { region } else { ActivityRegion::EVERYWHERE }
+    }
+
+    /// Whether the model can say how its wrench changes around a pose.
+    #[must_use]
+    pub fn has_linear_field(&self) -> bool {
+        self.extensions.field.is_some_and(|table| table.linear_field.is_some())
+    }
+
+    /// The field at an input. Not real-time. `field` is only meaningful for [`CallStatus::Ok`].
+    pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> CallStatus {
+        let Some(ask) = self.extensions.field.and_then(|table| table.linear_field) else {
+            return CallStatus::Unsupported;
+        };
+        // SAFETY: as in `prepare`; the out pointer is valid for the call.
+        CallStatus::from_code(unsafe { ask(self.instance, input, field) })
     }
 
     /// Forgets history. Real-time: bounded, no allocation.

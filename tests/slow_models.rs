@@ -1,0 +1,136 @@
+//! A model beside the loop: the membrane at 200 Hz, its linear field evaluated at 1 kHz. No step above the slew limit, an
+//! error smaller than that of a force that is held, equal bits on the virtual clock, and what a thread of its own does when it breaks.
+
+use flotor::scene::Scene;
+use flotor::servo::Clock;
+use flotor::session::RunEnd;
+use flotor::trace::Events;
+use flotor_tests::field_error::{FieldError, Swing, field_error};
+use flotor_tests::program::{Flotor, exit_code};
+use flotor_tests::scratch::Scratch;
+use flotor_tests::watched::{watch, watch_on};
+use flotor_tests::workspace_root;
+use serde_json::Value;
+
+/// Into the sheet and out again, once a second, at up to 9 mm/s.
+const SLOW: Swing = Swing { frequency_hz: 1.0, amplitude_mm: 1.5 };
+/// A hand at work: 3 Hz, 28 mm/s.
+const FAST: Swing = Swing { frequency_hz: 3.0, amplitude_mm: 1.5 };
+/// A limit that never acts.
+const NO_LIMIT_N_PER_S: f64 = 1.0e6;
+
+#[test]
+fn a_field_makes_no_step_that_a_slew_limit_would_have_to_cut() {
+    for swing in [SLOW, FAST] {
+        // A limit that a force held from one field to the next would break with each of the larger steps.
+        let plain = field_error(200.0, swing, NO_LIMIT_N_PER_S, 2.0);
+        let step_n = 0.9 * plain.held_step_n;
+        let seen = field_error(200.0, swing, step_n / 1.0e-3, 2.0);
+        println!(
+            "{swing:?}: largest step {:.4} N, of the membrane itself {:.4} N, held {:.4} N, limit {step_n:.4} N",
+            seen.largest_step_n, seen.direct_step_n, seen.held_step_n
+        );
+        assert!(seen.peak_n > 0.1, "the hand was in the sheet: {} N", seen.peak_n);
+        assert_eq!(seen.slewed_ticks, 0);
+        assert!(seen.largest_step_n <= step_n);
+    }
+}
+
+#[test]
+fn a_field_is_nearer_to_the_membrane_than_a_force_that_is_held() {
+    let errors: Vec<FieldError> =
+        [50.0, 100.0, 200.0].map(|rate_hz| field_error(rate_hz, FAST, NO_LIMIT_N_PER_S, 2.0)).to_vec();
+    let shares = |of: fn(&FieldError) -> f64| -> Vec<f64> {
+        errors.iter().map(|seen| of(seen) / seen.peak_n).collect()
+    };
+    let (field, held) = (shares(|seen| seen.rms_n), shares(|seen| seen.held_rms_n));
+    println!("rms of the error at 50, 100, 200 Hz, over the largest force: {field:?}, held {held:?}");
+    assert!(field.iter().zip(&held).all(|(field, held)| field < held), "{field:?}, held {held:?}");
+    assert!(field[1] < field[0] && field[2] < field[0], "{field:?}");
+    // Extrapolated by its slope the field is not late by more than the period it was computed for.
+    assert!(errors[2].delay_s <= 0.005, "{} s", errors[2].delay_s);
+}
+
+#[test]
+fn equal_runs_give_equal_bits_and_a_recording_replays() {
+    let scratch = Scratch::default();
+    let scene = workspace_root().join("host/scenes/membrane-200hz.toml").display().to_string();
+    let recording = scratch.path().join("run.mcap").display().to_string();
+    let run = |arguments: &[&str]| {
+        let all = ["run", &scene, "--clock", "virtual", "--duration", "1s", "--json", "-"];
+        let ran = Flotor::with(all.iter().chain(arguments)).run();
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+        let report: Value = serde_json::from_str(&ran.stdout).expect("the summary is JSON");
+        report["trace_digest"].clone()
+    };
+    assert_eq!(run(&["--record", &recording]), run(&[]));
+    let ran = Flotor::with(["replay", &recording, "--json", "-"]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let report: Value = serde_json::from_str(&ran.stdout).expect("the report is JSON");
+    assert_eq!(report["bit_exact"], Value::from(true), "{report}");
+}
+
+#[test]
+fn on_a_real_clock_a_thread_computes_and_the_loop_never_waits() {
+    let run = watch_on(
+        Clock::Real,
+        "duration_s = 1\n[limits]\nramp_s = 0\n[device]\nplugin = \"simulated\"\n[device.parameters]\n\
+         hand = \"oscillate\"\nhand_centre_mm = -2\nhand_amplitude_mm = 0.5\nhand_frequency_hz = 1\n\
+         [[model]]\nplugin = \"membrane\"\n[model.field]\nrate_hz = 200\n",
+    );
+    assert_eq!(run.outcome.end, RunEnd::Finished);
+    // However busy the machine is: some field came, and force was felt.
+    assert!(run.records.iter().any(|record| record.model.force().z > 0.05));
+}
+
+#[test]
+fn a_parameter_changes_in_the_field_too() {
+    let scene = |change: &str| {
+        format!(
+            "duration_s = 0.6\n[device]\nplugin = \"simulated\"\n[device.parameters]\nhand = \"oscillate\"\n\
+             hand_centre_mm = -2\nhand_amplitude_mm = 1\nhand_frequency_hz = 5\n\
+             [[model]]\nplugin = \"membrane\"\n[model.field]\nrate_hz = 200\n{change}"
+        )
+    };
+    let plain = watch(&scene(""));
+    let damped = watch(&scene("[[change]]\nat_s = 0.2\nset = \"membrane.damping_per_s=2000\"\n"));
+    let differs = plain.records.iter().zip(&damped.records).position(|(a, b)| a.model != b.model);
+    // The field after the change is held back for a period and fades in from nothing in its first tick.
+    let first = differs.expect("the change shows");
+    assert!((205..=212).contains(&first), "{first}");
+}
+
+#[test]
+fn what_cannot_be_is_told_with_file_and_line() {
+    let scratch = Scratch::default();
+    let error = |model: &str| {
+        let text = format!("duration_s = 0.1\n[device]\nplugin = \"simulated\"\n[[model]]\n{model}");
+        let scene = scratch.file("scene.toml", text).display().to_string();
+        let ran = Flotor::with(["run", &scene, "--clock", "virtual"]).run();
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+        ran.error().to_owned()
+    };
+    let no_field = error("plugin = \"spring\"\n[model.field]\nrate_hz = 200\n");
+    assert!(no_field.contains("scene.toml:5") && no_field.contains("no linear field"), "{no_field}");
+    let apart = error("plugin = \"membrane\"\nisolation = \"process\"\n[model.field]\nrate_hz = 200\n");
+    assert!(apart.contains("process of its own"), "{apart}");
+    let late = error("plugin = \"membrane\"\n[model.field]\nrate_hz = 200\nlatency_ms = 6\n");
+    assert!(late.contains("latency_ms"), "{late}");
+}
+
+#[test]
+fn a_field_nobody_has_renewed_for_long_says_nothing_any_more() {
+    // A second is the longest period: none comes within the run but the first, which is to be had after that.
+    let run = watch(
+        "duration_s = 0.5\n[device]\nplugin = \"simulated\"\n[[model]]\nplugin = \"membrane\"\n\
+         [model.field]\nrate_hz = 1\n",
+    );
+    assert!(run.records.iter().all(|record| record.model.force().length() == 0.0));
+    assert!(run.records.iter().all(|record| !record.events.intersects(Events::MODEL_FAULT)));
+}
+
+#[test]
+fn the_scene_of_the_book_is_read() {
+    let scene = Scene::load(&workspace_root().join("host/scenes/membrane-200hz.toml")).expect("it is right");
+    assert_eq!(scene.models[0].field.map(|field| (field.rate_hz, field.latency_s)), Some((200.0, 0.005)));
+}

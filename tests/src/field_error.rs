@@ -1,0 +1,138 @@
+//! What it costs to compute the membrane beside the loop: its linear field against the membrane itself, at the poses of
+//! one run.
+
+use crate::watched::watch;
+use flotor::trace::{Events, TickRecord};
+use flotor_hal::abi::CallStatus;
+use flotor_hal::abi::loader::Plugin;
+use flotor_hal::{DVec3, Demand, Input, LoopConfig, Output};
+
+/// What a run with a field shows.
+#[derive(Clone, Debug)]
+pub struct FieldError {
+    /// The run, tick by tick.
+    pub records: Vec<TickRecord>,
+    /// The force of the membrane itself at the same poses, stepped at each tick, N.
+    pub direct_n: Vec<DVec3>,
+    /// Largest force of the membrane itself, N.
+    pub peak_n: f64,
+    /// Largest change of the force from one tick to the next, N: of the field, and of the membrane itself.
+    pub largest_step_n: f64,
+    /// The same of the membrane itself.
+    pub direct_step_n: f64,
+    /// The same if each force were held until the next came instead.
+    pub held_step_n: f64,
+    /// What the difference would be if each force were held until the next came instead, root of the mean square, N.
+    pub held_rms_n: f64,
+    /// Ticks in which the slew limit acted.
+    pub slewed_ticks: usize,
+    /// Difference between field and membrane, root of the mean square, N.
+    pub rms_n: f64,
+    /// Largest difference, N.
+    pub worst_n: f64,
+    /// How far the field is behind the membrane: the delay that makes their difference least, s.
+    pub delay_s: f64,
+    /// What is left of the difference then, root of the mean square, N.
+    pub rms_delayed_n: f64,
+}
+
+/// How the hand moves in [`field_error`]'s scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Swing {
+    /// How often it goes up and down, Hz.
+    pub frequency_hz: f64,
+    /// Half the way, mm.
+    pub amplitude_mm: f64,
+}
+
+/// Longest delay looked for, ticks.
+const LONGEST_DELAY: usize = 40;
+
+/// Runs a membrane at `rate_hz` beside a loop of 1 kHz on the virtual clock, with a slew limit, the hand swinging into it
+/// and out again.
+///
+/// # Panics
+/// If the plugins are not built.
+#[must_use]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)] // a few thousand ticks
+pub fn field_error(rate_hz: f64, swing: Swing, slew_n_per_s: f64, duration_s: f64) -> FieldError {
+    let Swing { frequency_hz, amplitude_mm } = swing;
+    let run = watch(&format!(
+        "duration_s = {duration_s}\n[limits]\nforce_slew_n_per_s = {slew_n_per_s}\n\
+         [device]\nplugin = \"simulated\"\n[device.parameters]\nhand = \"oscillate\"\nhand_centre_mm = -1\n\
+         hand_amplitude_mm = {amplitude_mm}\nhand_frequency_hz = {frequency_hz}\n\
+         [[model]]\nplugin = \"membrane\"\n[model.field]\nrate_hz = {rate_hz}\n"
+    ));
+    let records = run.records;
+    let direct_n = direct(&records);
+    let field_n: Vec<DVec3> = records.iter().map(|record| record.model.force()).collect();
+    let held = ((1000.0 / rate_hz).round() as usize).max(1);
+    let steps = |forces: &[DVec3], apart: usize| {
+        let apart = forces.iter().zip(forces.iter().skip(apart));
+        apart.map(|(a, b)| (*b - *a).length()).fold(0.0, f64::max)
+    };
+    // The first two periods belong to a field that is not there yet.
+    let begun = 2 * held;
+    let difference = |delay: usize| {
+        let pairs = field_n.iter().skip(begun + delay).zip(direct_n.iter().skip(begun));
+        pairs.map(|(field, direct)| (*field - *direct).length())
+    };
+    let rms = |delay: usize| {
+        let (sum, count) = difference(delay).fold((0.0, 0.0), |(sum, count), e| (sum + e * e, count + 1.0));
+        (sum / count).sqrt()
+    };
+    // What was asked for at a look is to be had a period later, and held for another.
+    let held_back = (begun..direct_n.len()).map(|tick| direct_n[tick] - direct_n[(tick / held - 1) * held]);
+    let (held_sum, held_count) =
+        held_back.fold((0.0, 0.0), |(sum, count), off| (sum + off.length_squared(), count + 1.0));
+    let rms_of: Vec<f64> = (0..LONGEST_DELAY).map(rms).collect();
+    let best = (0..LONGEST_DELAY).min_by(|a, b| rms_of[*a].total_cmp(&rms_of[*b])).unwrap_or(0);
+    FieldError {
+        peak_n: direct_n.iter().map(|force| force.length()).fold(0.0, f64::max),
+        largest_step_n: steps(&field_n, 1),
+        direct_step_n: steps(&direct_n, 1),
+        held_step_n: steps(&direct_n, held),
+        held_rms_n: (held_sum / held_count).sqrt(),
+        slewed_ticks: records.iter().filter(|record| record.events.intersects(Events::SLEW_LIMITED)).count(),
+        rms_n: rms_of[0],
+        worst_n: difference(0).fold(0.0, f64::max),
+        delay_s: between(&rms_of, best) * 1.0e-3,
+        rms_delayed_n: rms_of[best],
+        records,
+        direct_n,
+    }
+}
+
+/// The place of a minimum between samples, by the parabola through the squares of three.
+#[allow(clippy::cast_precision_loss)] // a few tens
+fn between(rms_of: &[f64], best: usize) -> f64 {
+    let square = |index: usize| rms_of.get(index).map(|rms| rms * rms);
+    let neighbours = best.checked_sub(1).and_then(square).zip(square(best)).zip(square(best + 1));
+    let shift = neighbours.map_or(0.0, |((before, here), after)| {
+        let curvature = before - 2.0 * here + after;
+        if curvature > 0.0 { 0.5 * (before - after) / curvature } else { 0.0 }
+    });
+    best as f64 + shift
+}
+
+/// The membrane itself, led along the poses of a run at its ticks.
+fn direct(records: &[TickRecord]) -> Vec<DVec3> {
+    let plugin = Plugin::in_process(&flotor_membrane::FLOTOR_ENTRY).expect("the membrane is a plugin");
+    let mut model = plugin.create_model(&[]).expect("it has defaults");
+    model.prepare(&LoopConfig { period_ns: 1_000_000, seed: 1 }).expect("it runs at 1 kHz");
+    let step = |record: &TickRecord| {
+        let input = Input {
+            pose: record.pose,
+            twist: record.twist,
+            time_ns: record.time_ns,
+            dt_ns: record.dt_ns,
+            tick: record.tick,
+            buttons: 0,
+            demand: Demand::WRENCH,
+        };
+        let mut output = Output::default();
+        assert_eq!(model.step(&input, &mut output), CallStatus::Ok);
+        output.wrench.force()
+    };
+    records.iter().map(step).collect()
+}
