@@ -20,6 +20,7 @@ mod new;
 mod options;
 mod plugins;
 mod record;
+mod reference;
 mod replay;
 mod run;
 mod stability;
@@ -29,6 +30,8 @@ mod study;
 mod sweep;
 mod validate;
 mod view;
+
+pub use reference::reference;
 
 use crate::registry::LookupError;
 use crate::servo::{EmergencySource, Place, Stuck};

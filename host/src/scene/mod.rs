@@ -5,6 +5,7 @@ mod coupling;
 mod devices;
 mod placement;
 mod reader;
+mod reference;
 mod setting;
 
 pub use crate::coupling::{CouplingConfig, CouplingDescription, PassivityMode};
@@ -13,6 +14,7 @@ pub use devices::{DeviceUse, MOST_DEVICES};
 pub(crate) use devices::{is_named, without_device};
 pub use flotor_record::mapping::{Blend, FieldTiming, MappingConfig};
 pub use reader::{Location, SceneError};
+pub use reference::{KeyReference, SectionReference, reference};
 pub use setting::{KeyValue, PluginKeyValue};
 
 use flotor_hal::Pacing;
@@ -272,7 +274,10 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] with file, line, key and remedy.
     pub fn parse(file: &Path, text: &str) -> Result<Self, SceneError> {
-        let source = Source { file, text };
+        Self::read(&Source::new(file, text))
+    }
+
+    fn read(source: &Source<'_>) -> Result<Self, SceneError> {
         let mut root = source.parse()?;
         let title = root.take("title").map(|value| value.text()).transpose()?.unwrap_or_default();
         let rate_hz = root.number("rate_hz", 100.0..=10_000.0)?.unwrap_or(1000.0);
@@ -286,7 +291,7 @@ impl Scene {
         let limits = root.section("limits")?.map_or_else(|| Ok(Limits::default()), limits)?;
         let scene = Self {
             title,
-            text: text.to_owned(),
+            text: source.text().to_owned(),
             rate_hz,
             pacing,
             duration_s,

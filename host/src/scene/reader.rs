@@ -3,6 +3,7 @@
 //! serde would know the line of an unknown key but not the nearest right one; here each key is taken by name
 //! and what is left over at the end is unknown.
 
+use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -46,11 +47,48 @@ pub struct SceneError {
 
 /// The text of a scene, with what is needed to name a line in it.
 pub(super) struct Source<'t> {
-    pub(super) file: &'t Path,
-    pub(super) text: &'t str,
+    file: &'t Path,
+    text: &'t str,
+    /// The keys that were looked for in each table that was read to its end.
+    seen: RefCell<Vec<(String, Vec<Known>)>>,
+}
+
+/// A key that is looked for, and what it takes.
+#[derive(Clone, Debug)]
+pub(super) struct Known {
+    pub(super) key: &'static str,
+    pub(super) takes: Takes,
+}
+
+/// What a key takes, as far as looking for it says.
+#[derive(Clone, Debug)]
+pub(super) enum Takes {
+    /// What its chapter says.
+    Value,
+    /// A number in a range.
+    Number(RangeInclusive<f64>),
+    /// Three of them, or one for all.
+    Three(RangeInclusive<f64>),
+    /// A table.
+    Table,
+    /// A list of tables.
+    Tables,
 }
 
 impl<'t> Source<'t> {
+    pub(super) fn new(file: &'t Path, text: &'t str) -> Self {
+        Self { file, text, seen: RefCell::new(Vec::new()) }
+    }
+
+    pub(super) fn text(&self) -> &'t str {
+        self.text
+    }
+
+    /// The tables that were read to their end, by name, with the keys that were looked for in each.
+    pub(super) fn into_seen(self) -> Vec<(String, Vec<Known>)> {
+        self.seen.into_inner()
+    }
+
     fn location(&self, span: &Range<usize>) -> Location {
         let before = self.text.get(..span.start).unwrap_or(self.text);
         Location { file: self.file.into(), line: before.matches('\n').count() + 1 }
@@ -77,7 +115,7 @@ pub(super) struct Section<'t> {
     name: String,
     span: Range<usize>,
     table: DeTable<'t>,
-    known: Vec<&'static str>,
+    known: Vec<Known>,
 }
 
 /// A value taken from a section, with the place it came from.
@@ -90,7 +128,11 @@ pub(super) struct Value<'t> {
 impl<'t> Section<'t> {
     /// Takes a key, if it is there.
     pub(super) fn take(&mut self, key: &'static str) -> Option<Value<'t>> {
-        self.known.push(key);
+        self.take_as(key, Takes::Value)
+    }
+
+    fn take_as(&mut self, key: &'static str, takes: Takes) -> Option<Value<'t>> {
+        self.known.push(Known { key, takes });
         let (_, value) = self.table.remove_entry(key)?;
         let location = self.source.location(&value.span());
         Some(Value { location, key: self.path(key), value: value.into_inner() })
@@ -119,7 +161,7 @@ impl<'t> Section<'t> {
         key: &'static str,
         range: RangeInclusive<f64>,
     ) -> Result<Option<f64>, SceneError> {
-        self.take(key).map(|value| value.number(range)).transpose()
+        self.take_as(key, Takes::Number(range.clone())).map(|value| value.number(range)).transpose()
     }
 
     /// Takes three numbers (or one for all three), if there, and checks that they lie in `range`.
@@ -128,13 +170,13 @@ impl<'t> Section<'t> {
         key: &'static str,
         range: RangeInclusive<f64>,
     ) -> Result<Option<[f64; 3]>, SceneError> {
-        self.take(key).map(|value| value.three(range)).transpose()
+        self.take_as(key, Takes::Three(range.clone())).map(|value| value.three(range)).transpose()
     }
 
     /// Takes a sub-table, if it is there.
     pub(super) fn section(&mut self, key: &'static str) -> Result<Option<Section<'t>>, SceneError> {
         let source = self.source;
-        self.known.push(key);
+        self.known.push(Known { key, takes: Takes::Table });
         let Some((_, value)) = self.table.remove_entry(key) else { return Ok(None) };
         Section::from_value(source, self.path(key), value).map(Some)
     }
@@ -142,7 +184,7 @@ impl<'t> Section<'t> {
     /// Takes a list of tables (`[[key]]`); none is an empty list.
     pub(super) fn sections(&mut self, key: &'static str) -> Result<Vec<Section<'t>>, SceneError> {
         let source = self.source;
-        self.known.push(key);
+        self.known.push(Known { key, takes: Takes::Tables });
         let Some((_, value)) = self.table.remove_entry(key) else { return Ok(Vec::new()) };
         let (name, span) = (self.path(key), value.span());
         match value.into_inner() {
@@ -187,8 +229,11 @@ impl<'t> Section<'t> {
 
     /// Complains about the first key nobody took.
     pub(super) fn finish(self) -> Result<(), SceneError> {
-        let Some(key) = self.table.keys().min_by_key(|key| key.span().start) else { return Ok(()) };
-        let nearest = nearest(key.get_ref(), self.known.iter().copied());
+        let Some(key) = self.table.keys().min_by_key(|key| key.span().start) else {
+            self.source.seen.borrow_mut().push((self.name, self.known));
+            return Ok(());
+        };
+        let nearest = nearest(key.get_ref(), self.known.iter().map(|known| known.key));
         let nearest = nearest.map_or(String::new(), |known| format!("; did you mean `{known}`?"));
         Err(SceneError {
             location: self.source.location(&key.span()),

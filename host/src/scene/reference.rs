@@ -1,0 +1,121 @@
+//! Every key a scene may have, as the reader itself looks for them: for the book, and for editors.
+
+use super::Scene;
+use super::reader::{Known, SceneError, Source, Takes};
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+/// A scene with every table there is, so that the reader looks for every key.
+const EVERY_TABLE: &str = r#"
+[[device]]
+plugin = "device"
+name = "left"
+[[device]]
+plugin = "device"
+name = "right"
+[[coupling]]
+[[coupling.end]]
+device = "left"
+[coupling.end.mapping]
+[[coupling.end]]
+device = "right"
+[[model]]
+plugin = "model"
+device = "left"
+[model.mapping.grid]
+count = 1
+spacing_mm = 0
+[model.blend]
+[model.field]
+rate_hz = 1
+[limits]
+[boundary]
+[[change]]
+at_s = 0
+set = "left.key=0"
+"#;
+
+/// A table of a scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SectionReference {
+    /// Its name as in a headline, empty for what stands above all tables.
+    pub name: String,
+    /// What it may hold, in the order the reader looks for it.
+    pub keys: Vec<KeyReference>,
+}
+
+/// A key of a scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct KeyReference {
+    /// The key.
+    pub key: &'static str,
+    /// What it takes, for people; empty where only its chapter says.
+    pub takes: String,
+}
+
+/// Every table of a scene with every key, as the reader looks for them. Not real-time.
+///
+/// # Errors
+/// None in practice: a test reads it.
+pub fn reference() -> Result<Vec<SectionReference>, SceneError> {
+    let source = Source::new(Path::new("every table"), EVERY_TABLE);
+    Scene::read(&source)?;
+    let mut sections: Vec<SectionReference> = source.into_seen().into_iter().map(section).collect();
+    // Outer tables are finished after inner ones: by name, the outermost first, and what there is twice once.
+    sections.sort_by(|a, b| a.name.cmp(&b.name));
+    sections.dedup_by(|a, b| a.name == b.name);
+    Ok(sections)
+}
+
+fn section((name, known): (String, Vec<Known>)) -> SectionReference {
+    let key = |Known { key, takes }: Known| KeyReference { key, takes: words(&takes) };
+    SectionReference { name, keys: known.into_iter().map(key).collect() }
+}
+
+fn words(takes: &Takes) -> String {
+    match takes {
+        Takes::Value => String::new(),
+        Takes::Number(range) => format!("a number, {}", range_words(range)),
+        Takes::Three(range) => format!("three numbers, or one for all, {}", range_words(range)),
+        Takes::Table => "a table".to_owned(),
+        Takes::Tables => "tables, any number of them".to_owned(),
+    }
+}
+
+fn range_words(range: &RangeInclusive<f64>) -> String {
+    match (range.start(), range.end()) {
+        (start, end) if end.is_infinite() => format!("{start} or more"),
+        (start, end) => format!("{start} to {end}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_table_is_there_with_its_keys() {
+        let sections = reference().expect("the specimen is a scene");
+        let names: Vec<&str> = sections.iter().map(|section| section.name.as_str()).collect();
+        assert_eq!(
+            names,
+            [
+                "",
+                "boundary",
+                "change",
+                "coupling",
+                "coupling.end",
+                "coupling.end.mapping",
+                "device",
+                "limits",
+                "model",
+                "model.blend",
+                "model.field",
+                "model.mapping",
+                "model.mapping.grid"
+            ]
+        );
+        let rate = sections[0].keys.iter().find(|key| key.key == "rate_hz").expect("a scene has a rate");
+        assert_eq!(rate.takes, "a number, 100 to 10000");
+    }
+}
