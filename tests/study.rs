@@ -394,6 +394,75 @@ fn screens_travel_as_json_lines() {
     assert_eq!(SittingLog::read(&log_of(&out, 1)).unwrap().trials.len(), 1);
 }
 
+/// A measured spring with play, both strokes and coils that touch, as a test bench gives it.
+fn measured_spring() -> String {
+    let rows = (0..=400_u32).map(|step| {
+        let x_mm = f64::from(step) * 0.03;
+        let straight_n = 0.8 * (x_mm - 0.3).max(0.0);
+        let block_n = 0.9 * (x_mm - 9.0).max(0.0).powi(2);
+        let friction_n = if step % 2 == 0 { 0.05 } else { -0.05 };
+        format!("{},{}\n", 30.0 - x_mm, straight_n + block_n + if x_mm > 0.5 { friction_n } else { 0.0 })
+    });
+    "# bench 3, spring 12\nlength_mm,force_n\n".chars().chain(rows.collect::<String>().chars()).collect()
+}
+
+/// A measured curve is fitted, drawn, and served as it is: through the program, what the model answers is the table, coils
+/// that touch included, and a study takes it as a stimulus.
+#[test]
+fn a_measured_curve_is_a_stimulus_as_it_was_measured() {
+    let scratch = Scratch::default();
+    let path = |name: &str| scratch.path().join(name);
+    std::fs::write(path("bench.csv"), measured_spring()).unwrap();
+    let spring = ["study", "spring", "bench.csv", "--plot", "bench.svg", "--json", "fit.json"];
+    let ran =
+        Flotor::with(spring.into_iter().chain(["--curve-scene", "real.toml"])).inside(scratch.path()).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    assert!(std::fs::read_to_string(path("bench.svg")).unwrap().contains("served as measured"));
+    let fit: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(path("fit.json")).unwrap()).unwrap();
+    // Play and block lie outside the fitted middle; friction of 0.05 N on either side is averaged out.
+    assert!((fit["stiffness_n_per_m"].as_f64().unwrap() - 800.0).abs() < 8.0, "{fit}");
+
+    // The curve and not the fit: 4.5 N more than a straight spring where coils touch, nothing within the play.
+    let poses = "x_m,y_m,z_m,rx_rad,ry_rad,rz_rad\n0,0,-0.0002,0,0,0\n0,0,-0.006,0,0,0\n0,0,-0.0112,0,0,0\n";
+    std::fs::write(path("poses.csv"), poses).unwrap();
+    let eval = ["eval", "--model", "measured", "--set", "curve=real.csv", "--set", "free_length_mm=30"];
+    let ran = Flotor::with(eval.into_iter().chain(["--poses", "poses.csv", "--out", "out.csv"]));
+    let ran = ran.inside(scratch.path()).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let table = std::fs::read_to_string(path("out.csv")).unwrap();
+    let column = table.lines().next().unwrap().split(',').position(|name| name == "fz_n").unwrap();
+    let cell = |line: &str| line.split(',').nth(column).unwrap().parse::<f64>().unwrap();
+    let forces: Vec<f64> = table.lines().skip(1).map(cell).collect();
+    for (found, expected) in forces.iter().zip([0.0, 0.8 * 5.7, 0.8 * 10.9 + 0.9 * 2.2 * 2.2]) {
+        // Knots 0.19 mm apart on a curve of 1.8 N/mm²: a hundredth of a newton between them, and friction's mean.
+        assert!((found - expected).abs() < 0.06, "{forces:?}");
+    }
+
+    let jnd = ["jnd", "--scene", "real.toml", "--stimulus", "measured.stiffness_scale", "--bases", "1"];
+    let rest = ["--replications", "2", "--subjects", "1", "--no-demo", "--feel", "100ms", "--out", "data"];
+    let ran = Flotor::with(["study"].into_iter().chain(jnd).chain(rest)).inside(scratch.path()).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let ran =
+        Flotor::with(["study", "spring", "real.csv", "--free-length-mm", "30", "--curve-scene", "real.toml"]);
+    let ran = ran.inside(scratch.path()).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "a measurement is never overwritten: {ran:?}");
+}
+
+/// What is kept of a person's movements is up to `--kinematics`.
+#[test]
+fn nothing_is_kept_of_the_movements_if_so_asked() {
+    let scratch = Scratch::default();
+    for (kept, measures, files) in [("none", 0, false), ("summary", 2, false), ("full", 2, true)] {
+        let out = scratch.path().join(kept);
+        let ran = person("terminal", "\n\n\n1\nq\n", &["--no-demo", "--kinematics", kept], &out);
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+        let log = SittingLog::read(&log_of(&out, 1)).unwrap();
+        assert_eq!(log.trials[0].event.exploration.kinematics.len(), measures, "{kept}");
+        assert_eq!(out.join("sourcedata/sub-01/motion").exists(), files, "{kept}");
+    }
+}
+
 /// Largest memory a study ever had, kB: from `/proc` while it runs.
 fn peak_kb(subjects: &str, out: &Path) -> f64 {
     let arguments: Vec<&str> = SMALL.into_iter().chain(["--subjects", subjects]).collect();

@@ -8,9 +8,10 @@
 //! What is said over the socket, and both its ends, are the crate `flotor_live`; here is what this host says of itself, and how it
 //! does what it is asked for. Nothing of it runs on the servo's thread. Not real-time.
 
-use crate::record::RunDescription;
+use crate::record::{Change, RunDescription};
 use crate::servo::StopSwitch;
-use crate::session::{Controls, NewValue, PluginReport};
+use crate::session::{Controls, NewValue, Observer, PluginReport};
+use crate::trace::TickRecord;
 use flotor_live::{
     Ask, Directory, Greeting, PROTOCOL, PanelPlugin, Publication, PublishError, Serve, WrenchLimits,
 };
@@ -38,7 +39,7 @@ pub struct Handles {
     pub stop: StopSwitch,
 }
 
-/// Lets a prepared run be found and watched.
+/// Lets a prepared run be found, watched and changed.
 ///
 /// # Errors
 /// [`PublishError`]; the run goes on without.
@@ -46,6 +47,18 @@ pub fn publish(
     directory: &Directory,
     announcement: Announcement<'_>,
     handles: Handles,
+) -> Result<Publication, PublishError> {
+    announce(directory, announcement, Arc::new(handles))
+}
+
+/// Lets a prepared run be found and watched; what else may be asked of it is up to `host`.
+///
+/// # Errors
+/// [`PublishError`]; the run goes on without.
+pub fn announce(
+    directory: &Directory,
+    announcement: Announcement<'_>,
+    host: Arc<dyn Serve>,
 ) -> Result<Publication, PublishError> {
     let Announcement { title, run, plugins, limits } = announcement;
     let greeting = Greeting {
@@ -56,12 +69,45 @@ pub fn publish(
         plugins: plugins.iter().map(panel).collect(),
         limits,
     };
-    Publication::open(directory, greeting, run, Arc::new(handles))
+    Publication::open(directory, greeting, run, host)
 }
 
 fn panel(report: &PluginReport) -> PanelPlugin {
     let PluginReport { name, metadata, schema, parameters, .. } = report;
     PanelPlugin::new(name, &metadata.id, metadata.path.clone(), schema, parameters)
+}
+
+/// An observer, and beside it whoever watches.
+pub struct Watched<O> {
+    /// The one that is always there.
+    pub observer: O,
+    /// The others, unless nobody can watch.
+    pub publication: Option<Publication>,
+}
+
+impl<O> Watched<O> {
+    /// Tells those who watch that the run is over.
+    pub fn end(self, words: &str) {
+        if let Some(publication) = self.publication {
+            publication.end(words);
+        }
+    }
+}
+
+impl<O: Observer> Observer for Watched<O> {
+    fn observe(&mut self, record: &TickRecord) {
+        self.observer.observe(record);
+        if let Some(publication) = &self.publication {
+            publication.observe(record);
+        }
+    }
+
+    fn change(&mut self, change: &Change) {
+        self.observer.change(change);
+        if let Some(publication) = &self.publication {
+            publication.change(change);
+        }
+    }
 }
 
 impl Serve for Handles {

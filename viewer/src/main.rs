@@ -3,9 +3,8 @@
 
 use clap::{Parser, ValueEnum};
 use flotor_live::Directory;
-use flotor_study::log::{LogError, SittingLog};
 use flotor_viewer::app::{Start, Viewer, Wanted};
-use flotor_viewer::experiment::Experiment;
+use flotor_viewer::experiment::wire::at_standard_streams;
 use flotor_viewer::history::History;
 use flotor_viewer::palette::Look;
 use flotor_viewer::picture::{PictureError, PictureOptions, draw_without_window, picture, write_png};
@@ -29,9 +28,9 @@ struct Arguments {
     /// Watch the run of this process (default: the newest)
     #[arg(long, value_name = "PID", conflicts_with = "recording")]
     run: Option<u32>,
-    /// Carry out the sitting of this log, in front of a subject
-    #[arg(long, value_name = "LOG.jsonl", hide = true, conflicts_with = "recording")]
-    sitting: Option<PathBuf>,
+    /// Show the screens of an experiment, told and answered by lines of JSON on standard input and output
+    #[arg(long, requires = "run", conflicts_with = "recording")]
+    sitting: bool,
     /// The picture is that of the whole window, with panels
     #[arg(long, requires = "screenshot")]
     window: bool,
@@ -98,15 +97,14 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// A running host: for an experimenter, or in front of a subject.
+/// A running host: for an experimenter, or in front of a person in a sitting.
 fn live(arguments: &Arguments) -> Result<Start, Failure> {
     let wanted = Wanted { directory: Directory::of_this_user(), process: arguments.run };
-    let Some(path) = &arguments.sitting else { return Ok(Start::Live(wanted)) };
-    let wrong = |error: LogError| Failure::Usage(error.to_string());
-    let log = SittingLog::read(path).map_err(wrong)?;
-    let protocol = log.begin.protocol.clone();
-    let (sitting, log) = log.resume(env!("CARGO_PKG_VERSION")).map_err(wrong)?;
-    Ok(Start::Sitting(wanted, Box::new(Experiment::new(sitting, &protocol, Some(log)))))
+    if !arguments.sitting {
+        return Ok(Start::Live(wanted));
+    }
+    let prompt = at_standard_streams().map_err(|error| Failure::File(error.to_string()))?;
+    Ok(Start::Sitting(wanted, prompt))
 }
 
 /// The window as it would open on the recording, drawn on the processor.

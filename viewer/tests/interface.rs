@@ -10,14 +10,17 @@ use egui_kittest::kittest::{NodeT, Queryable};
 use flotor_live::{Ask, Outcome};
 use flotor_record::trace::Events;
 use flotor_study::protocol::{MagnitudeProtocol, Protocol, SubjectNumber};
+use flotor_study::screen::{Attended, Pause, Question, Said, Screen, Told, Warning, WindowState};
 use flotor_study::sitting::Sitting;
+use flotor_study::trial::Phase;
 use flotor_viewer::app::{Start, Viewer, Wanted};
-use flotor_viewer::experiment::Experiment;
+use flotor_viewer::experiment::Prompt;
 use flotor_viewer::history::{History, Keep};
 use flotor_viewer::palette::Look;
 use flotor_viewer::panel::{Standing, Value};
 use flotor_viewer::player::Motion;
 use flotor_viewer::ui::plot_stack::ExportFormat;
+use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 use support::{FakeHost, PATIENCE, plugin_file, spring_run, tick};
 
@@ -267,49 +270,73 @@ fn the_look_is_switched_and_everything_stays_where_it_was() {
     assert_eq!(window.state().look(), Look::Dark);
 }
 
-/// A sitting in front of the window, subject 2: haptics alone first. Everything by keyboard, nothing to be seen of the spring.
+/// A sitting in front of the window, subject 2: haptics alone first, then with vision. Everything by keyboard; nothing is to be
+/// seen of the spring unless it may be.
 #[test]
-fn a_subject_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_alone_condition() {
-    let protocol = Protocol::Magnitude(MagnitudeProtocol { demo: 1, ..MagnitudeProtocol::default() });
+fn a_person_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_alone_condition() {
+    const VIEW: &str = "3D view; drag turns it, the wheel zooms";
+    let magnitude = MagnitudeProtocol {
+        demo: 1,
+        replications: 1,
+        values: vec![12.0, 30.0, 48.0],
+        ..MagnitudeProtocol::default()
+    };
+    let protocol = Protocol::Magnitude(magnitude);
     let sitting = Sitting::new(&protocol, 1, SubjectNumber::new(2).expect("a legal number"));
-    let experiment = Box::new(Experiment::new(sitting, &protocol, None));
+    let mut experiment = Attended::new(sitting, &protocol, 1, 0);
+    let ((teller, told), (said, hears)) = (channel(), channel());
+    let prompt = Prompt::new(told, said);
     let folder = tempfile::tempdir().expect("a scratch folder");
     let mut host = FakeHost::new(&folder, &[]);
     let start =
-        |directory: &flotor_live::Directory| Start::Sitting(Wanted::newest(directory.clone()), experiment);
+        |directory: &flotor_live::Directory| Start::Sitting(Wanted::newest(directory.clone()), prompt);
     let mut window = host.welcome(|directory| window(start(directory)));
+    assert_eq!(hears.recv_timeout(PATIENCE), Ok(Said::Window { window: WindowState::Open }));
     assert_eq!(host.request(None), Ask::Watch { every: 1 });
     host.run_ticks(100, Events::NONE);
-    until(&mut window, |window| window.query_by_label("How stiff is the spring?").is_some());
-    assert!(window.query_by_label_contains("spring 0.1.0").is_none(), "no names of plugins for a subject");
-    assert!(window.query_by_label("Parameters (P)").is_none());
-    let press = |window: &mut Window<'_>, key: Key| {
-        window.key_press(key);
-        window.run_steps(2);
-    };
-    for headline in ["Feel the spring", "Time for a rest"] {
-        press(&mut window, Key::Enter);
-        window.get_by_label(headline);
-        if headline == "Feel the spring" {
-            let Ask::Set { values } = host.request(None) else { panic!("something else was asked") };
-            assert_eq!((values[0].plugin.as_str(), values[0].parameter.as_str()), ("spring", "gamma_n"));
-            assert!(values[0].value.parse::<f64>().is_ok_and(|gamma_n| (12.0..=48.0).contains(&gamma_n)));
-        }
-        assert!(
-            window.query_by_role_and_label(Role::Image, "3D view; drag turns it, the wheel zooms").is_none()
-        );
+
+    let (mut headlines, mut seen) = (Vec::new(), 0);
+    while !experiment.is_over() {
+        let screen = experiment.screen();
+        teller.send(Told::Screen(screen.clone())).expect("the window listens");
+        until(&mut window, |window| window.state().prompt().is_some_and(Prompt::is_persons_turn));
+        window.run_steps(1);
+        let is_seen = matches!(&screen, Screen::Feel { trial, .. } if trial.object_is_shown);
+        assert_eq!(window.query_by_role_and_label(Role::Image, VIEW).is_some(), is_seen, "{screen:?}");
+        seen += u32::from(is_seen);
         window.get_by_label("EMERGENCY STOP");
+        assert!(window.query_by_label_contains("spring 0.1.0").is_none(), "no names of plugins");
+        assert!(window.query_by_label("Parameters (P)").is_none());
+        let headline = match &screen {
+            Screen::Ready { reason: Pause::Welcome, .. } => "How stiff is the spring?",
+            Screen::Ready { next, .. } if next.phase == Phase::Main => "From now on it counts",
+            Screen::Ready { .. } => "A few to get used to it",
+            Screen::Feel { .. } => "Feel the spring",
+            Screen::Ask { question: Question::Nothing, .. } => "That was one to practise",
+            Screen::Ask { .. } => "How stiff was it?",
+            Screen::Over => unreachable!("it ends the loop"),
+        };
+        window.get_by_label(headline);
+        headlines.push(headline);
+        if headline == "How stiff was it?" {
+            window.key_press(Key::Num7);
+            window.run_steps(1);
+            window.get_by_label("7");
+        }
+        window.key_press(Key::Enter);
+        window.run_steps(1);
+        let Ok(Said::Input(input)) = hears.recv_timeout(PATIENCE) else { panic!("nothing is said") };
+        assert!(experiment.input(input, 1.0).is_ok());
     }
-    press(&mut window, Key::Enter); // the first trial that counts
-    window.get_by_label("Feel the spring");
-    press(&mut window, Key::Enter);
-    window.get_by_label("How stiff was it?");
-    press(&mut window, Key::Num7);
-    window.get_by_label("7");
-    press(&mut window, Key::Enter);
-    assert_eq!(window.state().experiment().map(|experiment| experiment.progress().0), Some(2));
+    let times = |what: &str| headlines.iter().filter(|headline| **headline == what).count();
+    assert_eq!((times("Feel the spring"), times("How stiff was it?"), seen), (8, 6, 4));
+
+    teller.send(Told::Warning { warning: Warning::OutOfRange }).expect("the window listens");
+    until(&mut window, |window| window.query_by_label_contains("out of its range").is_some());
     host.end("the device has stopped");
     until(&mut window, |window| window.query_by_label("The device has stopped").is_some());
+    teller.send(Told::Screen(Screen::Over)).expect("the window listens");
+    until(&mut window, |window| window.query_by_label("Thank you").is_some());
 }
 
 /// Text twice as large: everything is still there.

@@ -144,6 +144,71 @@ fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
     }
 }
 
+/// A whole sitting as a person goes through it: `flotor study` opens the window, everything is answered with keys, and the log,
+/// the tables and the movements are there in the end.
+#[test]
+fn a_sitting_in_a_real_window_is_gone_through_by_keyboard() {
+    let missing: Vec<&str> = ["Xvfb", "xdotool"].into_iter().filter(|name| !is_installed(name)).collect();
+    if !missing.is_empty() {
+        assert!(std::env::var("FLOTOR_WINDOW_TESTS").is_err(), "missing: {missing:?}");
+        eprintln!("skipped: {missing:?} not installed");
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let out = folder.path().join("data");
+    let (_server, display) = display(folder.path());
+    let mut study = Command::new(program("flotor"));
+    study.args(["study", "magnitude", "--observer", "human", "--stimuli", "3", "--replications", "1"]);
+    study.args(["--demo", "2", "--noise", "off", "--out"]).arg(&out);
+    study.env("DISPLAY", &display).env_remove("WAYLAND_DISPLAY").env("XDG_RUNTIME_DIR", folder.path());
+    study.env("LP_NUM_THREADS", "1").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    let mut study = Owned(study.spawn().expect("the study starts"));
+    let press = |keys: &[&str]| {
+        let output = Command::new("xdotool").arg("key").args(keys).env("DISPLAY", &display).output();
+        assert!(output.is_ok_and(|output| output.status.success()), "a key cannot be pressed");
+    };
+    // A digit means something on a rating's screen only, Return on every screen: together they go through all of them.
+    let until = Instant::now() + 6 * PATIENCE;
+    let status = loop {
+        if let Some(status) = study.0.try_wait().expect("it is ours") {
+            break status;
+        }
+        assert!(Instant::now() < until, "the sitting does not come to its end");
+        if out.exists() {
+            press(&["7", "Return"]);
+        }
+        std::thread::sleep(Duration::from_millis(150));
+    };
+    assert!(status.success(), "{status}");
+    let log = out.join("sourcedata/sub-01/sub-01_task-magnitude_log.jsonl");
+    let log = flotor_study::log::SittingLog::read(&log).expect("a log whose chain holds");
+    assert!(log.complete);
+    let main = |trial: &&flotor_study::trial::Trial| trial.phase == flotor_study::trial::Phase::Main;
+    let trials: Vec<_> = log.trials.iter().map(|record| record.event.trial).collect();
+    assert_eq!((trials.iter().filter(main).count(), trials.len()), (6, 10));
+    for record in &log.trials {
+        assert_eq!(record.event.exploration.kinematics.len(), 1, "every stimulus was felt and measured");
+        let file = format!("sub-01_task-magnitude_trial-{:04}_motion.mcap", record.event.trial.number);
+        assert!(out.join("sourcedata/sub-01/motion").join(file).is_file(), "every tick is kept");
+    }
+    assert!(out.join("sub-01/beh/sub-01_task-magnitude_beh.tsv").is_file());
+}
+
+/// No display: one line of the viewer, one of the study, exit code 2, and no data folder is begun.
+#[test]
+fn a_sitting_without_a_display_is_refused_before_it_begins() {
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let out = folder.path().join("data");
+    let mut study = Command::new(program("flotor"));
+    study.args(["study", "jnd", "--observer", "human", "--noise", "off", "--out"]).arg(&out);
+    study.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
+    let output = study.env("XDG_RUNTIME_DIR", folder.path()).output().expect("it starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("no window") && said.contains("--screen terminal"), "{said}");
+    assert!(!out.exists(), "nothing was begun");
+}
+
 #[test]
 fn without_a_display_there_is_one_line_and_exit_code_2() {
     let folder = tempfile::tempdir().expect("a scratch folder");

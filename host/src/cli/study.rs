@@ -4,7 +4,6 @@ mod bias;
 mod choices;
 mod explore;
 mod front;
-mod human;
 mod person;
 mod spring;
 
@@ -39,7 +38,7 @@ use std::path::PathBuf;
     flotor study magnitude --subjects 8 --seed 3 --out ratings\n  \
     flotor study jnd --bases 20,40 --target 0.8 --side random --out other\n  \
     flotor study jnd --out data --resume                     go on where it broke off\n  \
-    flotor study jnd --observer human --subject 3 --screen viewer --scene mlhd.toml --out people    a person, in front of the viewer\n  \
+    flotor study jnd --observer human --subject 3 --scene mlhd.toml --out people    a person, in front of the viewer\n  \
     flotor study jnd --observer human --subject 3 --out people --resume\n  \
     flotor study magnitude --stimulus spring.wire_diameter_mm --set spring.mode=physical --range 0.4-0.8 --out d\n  \
     flotor study bias --runs 1000                            what is each estimator worth?")]
@@ -354,9 +353,6 @@ fn carry_out(common: &Common, protocol: Protocol, sets: &[PluginKeyValue]) -> Re
     sets.iter().try_for_each(|set| set.apply(&mut scene)).map_err(CommandError::Usage)?;
     let apparatus = Apparatus::check(scene, &protocol).map_err(unfit)?;
     match (common.observer, common.apparatus) {
-        (ObserverOption::Human, _) if common.screen == front::ScreenOption::Viewer => {
-            human::carry_out(common, &protocol)
-        }
         (ObserverOption::Human, _) => person::sit(common, &protocol, &apparatus),
         (ObserverOption::Simulated, PresentationOption::Scene) => {
             apparatus.check_hand().map_err(unfit)?;

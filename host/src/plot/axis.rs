@@ -30,12 +30,13 @@ pub struct Axis {
     pub(super) unit: String,
     pub(super) scale: Scale,
     pub(super) fixed: Option<(f64, f64)>,
+    pub(super) levels: Vec<f64>,
 }
 
 impl Axis {
     /// A linear axis; `unit` is empty for a pure number.
     pub fn linear(label: impl Into<String>, unit: impl Into<String>) -> Self {
-        Self { label: label.into(), unit: unit.into(), scale: Scale::Linear, fixed: None }
+        Self { label: label.into(), unit: unit.into(), scale: Scale::Linear, fixed: None, levels: Vec::new() }
     }
 
     /// A decimal-logarithmic axis; `unit` is empty for a pure number.
@@ -48,6 +49,13 @@ impl Axis {
     #[must_use]
     pub fn range(mut self, low: f64, high: f64) -> Self {
         self.fixed = Some((low.min(high), low.max(high)));
+        self
+    }
+
+    /// Numbers at these values and nowhere else: the levels of an experiment.
+    #[must_use]
+    pub fn levels(mut self, levels: impl IntoIterator<Item = f64>) -> Self {
+        self.levels = levels.into_iter().collect();
         self
     }
 

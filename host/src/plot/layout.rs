@@ -209,7 +209,11 @@ impl<'a> Head<'a> {
             + LEGEND_ROW_PX * legend.own_rows as f64
             + MARK_ROW_PX * mark_rows as f64
             + HEADING_TO_FRAME_PX;
-        Self { x_ticks: Ticks::fit(&draft.x, frame_width, spacing), heading, legend, top_labels, height_px }
+        let x_ticks = match draft.x_axis.levels.as_slice() {
+            [] => Ticks::fit(&draft.x, frame_width, spacing),
+            levels => Ticks::at(&draft.x, levels),
+        };
+        Self { x_ticks, heading, legend, top_labels, height_px }
     }
 }
 

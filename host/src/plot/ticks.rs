@@ -77,6 +77,16 @@ impl Ticks {
         }
     }
 
+    /// Labels at these values, without minor ticks; those outside the axis are left out.
+    pub(super) fn at(domain: &Domain, values: &[f64]) -> Self {
+        let tick = |value: &f64| {
+            let position = domain.fraction(domain.scale.forward(*value)?);
+            let tick = Tick { position, label: value.to_string() };
+            (-END_TOLERANCE..=1.0 + END_TOLERANCE).contains(&position).then_some(tick)
+        };
+        Self { major: values.iter().filter_map(tick).collect(), ..Self::none() }
+    }
+
     /// About `most` ticks or fewer.
     fn at_most(domain: &Domain, most: f64) -> Self {
         match domain.scale {

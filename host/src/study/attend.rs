@@ -62,8 +62,7 @@ pub fn attend(
             let Some(input) = wait_for_input(rig, front, &screen)? else { break Step::Stopped };
             let leaves = felt.is_some() && matches!(input, Input::Continue);
             if leaves {
-                let (meter, missed_ticks) = rig.end()?;
-                attended.felt(&meter, missed_ticks);
+                attended.felt(rig.end()?);
             }
             match attended.input(input, shown.elapsed().as_secs_f64()) {
                 Ok(Step::Note(text)) => log.write(&Event::Note { text })?,

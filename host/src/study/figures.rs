@@ -6,6 +6,7 @@ use flotor_statistics::describe::MeanInterval;
 use flotor_study::analysis::{
     JndAnalysis, KinematicMeasure, MagnitudeAnalysis, SubjectRecord, ThresholdCell, published,
 };
+use flotor_study::log::TrialEvent;
 use flotor_study::protocol::Stimulus;
 use flotor_study::sitting::Verdict;
 use flotor_study::trial::{Modality, Presented};
@@ -46,7 +47,7 @@ pub(super) fn thresholds(analysis: &JndAnalysis, stimulus: &Stimulus) -> String 
         bases.iter().map(move |base| (centre(slot, *base), weber * base)).collect::<Vec<_>>()
     });
     panel = panel.series(Series::points("report: its Weber fraction times the base", report).slot(2));
-    Figure::new("Thresholds", Axis::linear(format!("Base {name}"), unit))
+    Figure::new("Thresholds", Axis::linear(format!("Base {name}"), unit).levels(bases))
         .subtitle("Mean over subjects; strokes: one standard error each way")
         .panel_height_px(HEIGHT_PX)
         .panel(panel)
@@ -86,15 +87,17 @@ pub(super) fn tracks(record: &SubjectRecord) -> String {
         .subtitle(format!("{}: difference presented, one line per track", record.subject))
         .columns(2)
         .panel_height_px(200.0);
+    let difference = |event: &&TrialEvent| match (event.trial.presented, event.verdict) {
+        (Presented::Pair(pair), Verdict::Judged { .. }) => Some(pair.delta * 100.0),
+        _ => None,
+    };
+    let largest = record.counted().filter_map(|event| difference(&event)).fold(1.0, f64::max);
     for (slot, (modality, name)) in MODALITIES.into_iter().enumerate() {
-        let mut panel = Panel::new(Axis::linear("Difference", "% of the base")).title(name);
+        let y = Axis::linear("Difference", "% of the base").range(0.0, 1.05 * largest);
+        let mut panel = Panel::new(y).title(name);
         for track in record.tracks.iter().filter(|track| track.modality == modality) {
             let here = record.counted().filter(|event| event.trial.track == track.track);
-            let differences = here.filter_map(|event| match (event.trial.presented, event.verdict) {
-                (Presented::Pair(pair), Verdict::Judged { .. }) => Some(pair.delta * 100.0),
-                _ => None,
-            });
-            let samples = (1_u32..).map(f64::from).zip(differences);
+            let samples = (1_u32..).map(f64::from).zip(here.filter_map(|event| difference(&event)));
             panel = panel.series(Series::steps("", samples).slot(slot));
         }
         figure = figure.panel(panel);

@@ -1,15 +1,19 @@
-//! Presents stimuli to a person: the servo loop in real time, on threads of its own.
+//! Presents stimuli to a person: the servo loop in real time, on threads of its own. Windows may watch it, and stop it; what
+//! is felt is the experiment's to change.
 
 use super::watch::Watch;
 pub use super::watch::sample as measured;
 use super::{Apparatus, Kinematics};
+use crate::live::{Announcement, Watched, announce};
 use crate::record::{Change, Recorder};
 use crate::servo::{Clock, StopSwitch};
 use crate::session::{ControlError, Controls, Observer, Outcome, RunError, RunOptions, Session};
 use crate::study::rig::{RunEnded, StimulusRefused, TrialFiles};
 use crate::trace::TickRecord;
+use flotor_live::{Ask, Directory, Serve};
 use flotor_study::conduct::OutsideError;
 use flotor_study::kinematics::KinematicsMeter;
+use flotor_study::screen::Felt;
 use flotor_study::trial::Trial;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -26,6 +30,7 @@ pub struct LiveRig<'a> {
     controls: Controls,
     stop: StopSwitch,
     shared: Shared,
+    unseen: Option<String>,
     run: Option<JoinHandle<Result<Outcome, RunError>>>,
 }
 
@@ -49,6 +54,23 @@ impl Observer for Shared {
     }
 }
 
+/// Who watches a study may end it, and nothing else.
+struct OnlyStop(StopSwitch);
+
+impl Serve for OnlyStop {
+    fn serve(&self, ask: Ask) -> Result<(), String> {
+        match ask {
+            Ask::Watch { .. } | Ask::LookAway => {} // the publication's own
+            Ask::Stop => self.0.stop(),
+            Ask::EmergencyStop => self.0.emergency_by_watcher(),
+            Ask::Set { .. } | Ask::Weight { .. } => {
+                return Err("an experiment is under way: what is felt is its own to change".to_owned());
+            }
+        }
+        Ok(())
+    }
+}
+
 impl<'a> LiveRig<'a> {
     /// Starts the loop; no object is felt yet.
     ///
@@ -57,7 +79,6 @@ impl<'a> LiveRig<'a> {
     pub fn start(
         apparatus: &'a Apparatus,
         kinematics: Kinematics,
-        files: Option<TrialFiles>,
         stop: &StopSwitch,
     ) -> Result<Self, OutsideError> {
         let options = RunOptions { clock: Clock::Real, seed: 0 };
@@ -65,10 +86,37 @@ impl<'a> LiveRig<'a> {
         let controls = session.controls();
         apparatus.show(&controls, false)?;
         let (shared, stop) = (Shared::default(), stop.clone());
-        let (mut observer, switch) = (shared.clone(), stop.clone());
+        let publication = {
+            let announcement = Announcement {
+                title: &apparatus.scene().title,
+                run: &apparatus.describe(apparatus.scene(), Clock::Real, 0),
+                plugins: session.plugins(),
+                limits: session.limits(),
+            };
+            let host = Arc::new(OnlyStop(stop.clone()));
+            announce(&Directory::of_this_user(), announcement, host)
+        };
+        let unseen = publication.as_ref().err().map(ToString::to_string);
+        let mut observers = Watched { observer: shared.clone(), publication: publication.ok() };
+        let switch = stop.clone();
         let thread = std::thread::Builder::new().name("flotor-study".to_owned());
-        let run = thread.spawn(move || session.run(&mut observer, &switch))?;
-        Ok(Self { apparatus, kinematics, files, controls, stop, shared, run: Some(run) })
+        let run = thread.spawn(move || {
+            let outcome = session.run(&mut observers, &switch);
+            observers.end("the sitting has ended");
+            outcome
+        })?;
+        Ok(Self { apparatus, kinematics, files: None, controls, stop, shared, unseen, run: Some(run) })
+    }
+
+    /// From now on keeps every tick of every trial, in a file for each.
+    pub fn record_into(&mut self, files: TrialFiles) {
+        self.files = Some(files);
+    }
+
+    /// Why no window can watch the run, if so.
+    #[must_use]
+    pub fn unseen(&self) -> Option<&str> {
+        self.unseen.as_deref()
     }
 
     /// Gives the object its value and lets it be felt.
@@ -90,28 +138,27 @@ impl<'a> LiveRig<'a> {
         if let Some(what) = watch.refused.take() {
             return Err(StimulusRefused(what).into());
         }
-        if let (Kinematics::Full, Some(files)) = (self.kinematics, &self.files)
-            && watch.recorder.is_none()
-        {
+        if let (Some(files), None) = (&self.files, &watch.recorder) {
             let run = self.apparatus.describe(self.apparatus.scene(), Clock::Real, 0);
             watch.recorder = Some(Recorder::create(&files.of(trial), &run)?);
         }
         Ok(())
     }
 
-    /// Lets the object go; how it was explored, and the ticks the servo missed meanwhile.
+    /// Lets the object go; how it was felt.
     ///
     /// # Errors
     /// The run has ended.
-    pub fn end(&mut self) -> Result<(KinematicsMeter, u64), OutsideError> {
-        let (meter, missed) = {
+    pub fn end(&mut self) -> Result<Felt, OutsideError> {
+        let (meter, missed_ticks) = {
             let mut watch = self.shared.lock();
             (watch.meter.take().unwrap_or_default(), std::mem::take(&mut watch.missed_ticks))
         };
         self.check()?;
         self.apparatus.show(&self.controls, false)?;
         self.wait_for_fade();
-        Ok((meter, missed))
+        let kinematics = (self.kinematics != Kinematics::None).then(|| meter.finish()).flatten();
+        Ok(Felt { kinematics, boundary_hit: meter.out_of_range(), missed_ticks })
     }
 
     /// Closes the recording of a trial that was answered.

@@ -9,6 +9,7 @@
 //! ```
 
 use flotor_statistics::StatisticsError;
+use flotor_statistics::describe::mean;
 use flotor_statistics::regression::{self, Line};
 use serde::Serialize;
 
@@ -46,6 +47,19 @@ pub struct SpringFit {
     pub nonlinearity: f64,
 }
 
+/// A measured curve made fit to be felt: without the scatter of the bench, and with a force that never falls.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ServedCurve {
+    /// Compression, m, and force, N: the first (0, 0), both growing.
+    pub knots: Vec<(f64, f64)>,
+    /// Root mean square distance of the measured points from the curve, N: scatter, friction, and what was smoothed.
+    pub rms_n: f64,
+}
+
+/// Equal parts of the deflection within which points are averaged: finer than a hand moves between two ticks, coarse enough
+/// to hold points of both strokes.
+const PARTS: u32 = 64;
+
 /// Why a curve cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -67,6 +81,9 @@ pub enum CurveError {
     /// Not a spring.
     #[error("the force falls as the spring is compressed ({0:.1} N/m); are length and compression mixed up?")]
     Falling(f64),
+    /// Too few different lengths to serve the curve itself.
+    #[error("a curve to be felt needs points at three lengths at least; there are {0}")]
+    Sparse(usize),
 }
 
 /// What the first column is.
@@ -140,6 +157,71 @@ impl MeasuredCurve {
             nonlinearity: self.points.iter().map(off).fold(0.0, f64::max) / strongest_n,
         })
     }
+
+    /// The curve to be felt: points averaged in small parts of the deflection (both strokes, if both were measured), from no
+    /// force at no compression, and nowhere falling (isotonic regression by pooling adjacent violators).
+    ///
+    /// # Errors
+    /// [`CurveError::Sparse`].
+    pub fn served(&self) -> Result<ServedCurve, CurveError> {
+        let deepest_m = self.points.iter().map(|(x, _)| *x).fold(0.0, f64::max);
+        let part_m = deepest_m / f64::from(PARTS);
+        // Part 0 is around no compression, where the spring gives no force.
+        let mut parts: Vec<(f64, f64, f64)> = vec![(0.0, 0.0, 0.0); PARTS as usize + 1];
+        for (x_m, force_n) in self.points.iter().filter(|(x_m, _)| *x_m > 0.5 * part_m) {
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive, at most PARTS
+            if let Some(part) = parts.get_mut((x_m / part_m).round() as usize) {
+                *part = (part.0 + 1.0, part.1 + x_m, part.2 + force_n.max(0.0));
+            }
+        }
+        let filled = parts.into_iter().filter(|(count, ..)| *count > 0.0);
+        let means: Vec<(f64, f64, f64)> =
+            filled.map(|(count, x_m, force_n)| (count, x_m / count, force_n / count)).collect();
+        if means.len() < 2 {
+            return Err(CurveError::Sparse(means.len() + 1));
+        }
+        let weighted: Vec<(f64, f64)> = means.iter().map(|(count, _, force_n)| (*count, *force_n)).collect();
+        let forces = never_falling(&weighted);
+        let inner = means.iter().zip(forces).map(|((_, x_m, _), force_n)| (*x_m, force_n));
+        let knots: Vec<(f64, f64)> = std::iter::once((0.0, 0.0)).chain(inner).collect();
+        let square = |(x_m, force_n): &(f64, f64)| (force_n - between(&knots, *x_m)).powi(2);
+        let squares: Vec<f64> = self.points.iter().map(square).collect();
+        Ok(ServedCurve { rms_n: mean(&squares).sqrt(), knots })
+    }
+}
+
+impl ServedCurve {
+    /// The table the force model `measured` reads.
+    #[must_use]
+    pub fn to_table(&self) -> String {
+        let row = |(x_m, force_n): &(f64, f64)| format!("{:.6},{force_n:.6}\n", x_m * 1.0e3);
+        let rows: String = self.knots.iter().map(row).collect();
+        format!("compression_mm,force_n\n{rows}")
+    }
+}
+
+/// The non-decreasing values nearest to weighted ones: neighbours in the wrong order become their mean.
+fn never_falling(weighted: &[(f64, f64)]) -> Vec<f64> {
+    let mut blocks: Vec<(f64, f64, usize)> = Vec::new();
+    for (weight, value) in weighted {
+        let mut block = (*weight, *value, 1);
+        while let Some((before, lower, count)) = blocks.pop_if(|(_, lower, _)| *lower > block.1) {
+            let sum = before + block.0;
+            block = (sum, (before * lower + block.0 * block.1) / sum, count + block.2);
+        }
+        blocks.push(block);
+    }
+    blocks.into_iter().flat_map(|(_, value, count)| std::iter::repeat_n(value, count)).collect()
+}
+
+/// Straight between knots, the last force beyond them, none before.
+fn between(knots: &[(f64, f64)], x_m: f64) -> f64 {
+    let after = knots.partition_point(|(at, _)| *at <= x_m);
+    match (after.checked_sub(1).and_then(|before| knots.get(before)), knots.get(after)) {
+        (Some(a), Some(b)) => a.1 + (b.1 - a.1) * (x_m - a.0) / (b.0 - a.0),
+        (Some(last), None) => last.1,
+        (None, _) => 0.0,
+    }
 }
 
 #[cfg(test)]
@@ -160,6 +242,37 @@ mod tests {
         assert!((fit.stiffness_n_per_m - 680.0).abs() < 1.0e-6, "{fit:?}");
         assert!((fit.gamma_n - 17.0).abs() < 1.0e-7 && fit.offset_m.abs() < 1.0e-9);
         assert!((fit.nonlinearity - 10.0 / 16.8).abs() < 1.0e-9 && fit.points == 41);
+    }
+
+    /// Two strokes with friction between them and scatter on top: what is served lies in the middle, begins at nothing and
+    /// never falls.
+    #[test]
+    fn what_is_served_is_the_middle_of_both_strokes_and_never_falls() {
+        let mut text = "compression_mm,force_n\n".to_owned();
+        for step in 0..=1000_u32 {
+            let x_mm = f64::from(step) * 0.01;
+            let scatter_n = 0.03 * (f64::from(step) * 12.9898).sin();
+            text += &format!("{x_mm},{}\n{x_mm},{}\n", 0.68 * x_mm + 0.1 + scatter_n, 0.68 * x_mm - 0.1);
+        }
+        let curve = MeasuredCurve::parse(&text, Some(0.025)).unwrap();
+        let served = curve.served().unwrap();
+        assert_eq!((served.knots[0], served.knots.len()), ((0.0, 0.0), 65));
+        assert!(served.knots.windows(2).all(|pair| pair[1].0 > pair[0].0 && pair[1].1 >= pair[0].1));
+        for (x_m, force_n) in &served.knots[1..] {
+            // A mean of 15 points of such scatter.
+            assert!((force_n - 680.0 * x_m).abs() < 0.02, "{x_m}: {force_n}");
+        }
+        // Friction of 0.1 N, and the scatter.
+        assert!((0.09..0.12).contains(&served.rms_n), "{}", served.rms_n);
+        assert_eq!(served.to_table().lines().nth(1), Some("0.000000,0.000000"));
+        let few = MeasuredCurve::parse("compression_mm,force_n\n0,0\n1,2\n", Some(0.02)).unwrap();
+        assert_eq!(few.served(), Err(CurveError::Sparse(2)));
+    }
+
+    #[test]
+    fn values_in_the_wrong_order_become_their_weighted_mean() {
+        let values = never_falling(&[(1.0, 1.0), (1.0, 4.0), (3.0, 2.0), (1.0, 2.4), (1.0, 5.0)]);
+        assert_eq!(values, [1.0, 2.48, 2.48, 2.48, 5.0]);
     }
 
     #[test]

@@ -6,11 +6,10 @@
 mod sitting;
 mod source;
 
-pub use sitting::Sitting;
 pub use source::{Source, Wanted, connect};
 
 use crate::canvas::Canvas;
-use crate::experiment::Experiment;
+use crate::experiment::Prompt;
 use crate::export::export;
 use crate::feed::{FeedState, News};
 use crate::history::{History, Keep, Sample};
@@ -49,7 +48,7 @@ pub enum Start {
     /// A run, now or when it comes.
     Live(Wanted),
     /// A run, in front of a subject.
-    Sitting(Wanted, Box<Experiment>),
+    Sitting(Wanted, Prompt),
     /// A recording, at a moment, with the files of its plugins.
     Recording(Box<History>, Option<f64>, Vec<PathBuf>),
 }
@@ -74,7 +73,7 @@ pub struct Viewer {
     bell: Bell,
     last_look: Option<Instant>,
     frame: Duration,
-    sitting: Option<Sitting>,
+    sitting: Option<Prompt>,
     audience: Audience,
 }
 
@@ -93,7 +92,10 @@ impl Viewer {
         let on_cpu =
             device.is_some_and(|state| state.adapter.get_info().device_type == wgpu::DeviceType::Cpu);
         let (start, sitting) = match start {
-            Start::Sitting(wanted, experiment) => (Start::Live(wanted), Some(Sitting::new(*experiment))),
+            Start::Sitting(wanted, mut prompt) => {
+                prompt.open();
+                (Start::Live(wanted), Some(prompt))
+            }
             other => (other, None),
         };
         let (source, history, parts, player, window) = match start {
@@ -217,9 +219,6 @@ impl Viewer {
         for record in &news.records {
             self.history.push(record);
             self.tally.add(&Sample::from(record));
-            if let Some(sitting) = &mut self.sitting {
-                sitting.experiment.observe(record);
-            }
             if record.events.intersects(EXCESS) {
                 self.bell.ring();
             }

@@ -1,47 +1,42 @@
-//! The window in front of a subject: one screen at a time, the emergency stop, and nothing else.
+//! The window in front of a person in a sitting: one screen at a time, the emergency stop, and nothing else.
 
 use super::{Source, Viewer};
-use crate::experiment::{Experiment, screens};
+use crate::experiment::{Prompt, screens};
 use crate::palette::Palette;
-use crate::scene::Visible;
+use crate::scene::{SceneBuilder, Visible};
 use crate::ui::view3d::Subject;
-use egui::{CentralPanel, Frame, Key, Panel as Edge, Ui};
-use flotor_live::{Ask, SetValue};
+use egui::{CentralPanel, Frame, Key, Panel as Edge, Rect, Ui, ViewportCommand};
+use flotor_live::Ask;
+use flotor_study::screen::Screen;
+use std::time::Duration;
 
-/// A sitting in a window.
-pub struct Sitting {
-    pub(super) experiment: Experiment,
-    /// The value the loop was told last.
-    told: Option<f64>,
-    /// Why it cannot go on.
-    pub(super) broken: Option<String>,
-}
-
-impl Sitting {
-    pub(super) fn new(experiment: Experiment) -> Self {
-        Self { experiment, told: None, broken: None }
-    }
-}
+/// How often it is looked whether the experiment has said something.
+const LISTEN: Duration = Duration::from_millis(30);
 
 impl Viewer {
     /// The sitting under way, if this window is one.
     #[must_use]
-    pub fn experiment(&self) -> Option<&Experiment> {
-        self.sitting.as_ref().map(|sitting| &sitting.experiment)
+    pub fn prompt(&self) -> Option<&Prompt> {
+        self.sitting.as_ref()
     }
 
-    /// Shows the screen of a sitting, follows keys, and tells the loop what is to be felt.
+    /// Shows the screen of a sitting, and tells the experiment what the person does.
     pub(super) fn sit(&mut self, ui: &mut Ui, palette: &Palette) {
+        ui.ctx().request_repaint_after(LISTEN);
         let is_running = self.source.is_running();
         if is_running && ui.input(|input| input.key_pressed(Key::Space)) {
             self.ask(Ask::EmergencyStop);
         }
-        let Some(mut sitting) = self.sitting.take() else { return };
-        if is_running && sitting.broken.is_none() {
-            for key in screens::keys(ui) {
-                sitting.broken = sitting.experiment.key(key).err().map(|error| error.to_string());
+        let Some(mut prompt) = self.sitting.take() else { return };
+        if prompt.take_in() {
+            self.bell.ring();
+        }
+        if prompt.screen() == Some(&Screen::Over) || prompt.is_lost() {
+            if ui.input(|input| input.key_pressed(Key::Enter)) {
+                ui.ctx().send_viewport_cmd(ViewportCommand::Close);
             }
-            self.tell_stimulus(&mut sitting);
+        } else if is_running {
+            screens::keys(ui).into_iter().for_each(|key| prompt.key(key));
         }
         let plain = Frame::new().fill(palette.panel).inner_margin(egui::Margin::symmetric(16, 4));
         Edge::top("top")
@@ -51,41 +46,37 @@ impl Viewer {
             .show(ui, |ui| self.top(ui, palette));
         CentralPanel::default().frame(Frame::new().fill(palette.panel)).show(ui, |ui| {
             let area = ui.max_rect();
-            let sample = self.history.at(self.player.now_s).copied();
-            match (&sitting.broken, &self.source, sample) {
-                (Some(reason), ..) => self.words(ui, area, "The sitting cannot go on", reason, palette),
-                (None, Source::Live { .. }, _) if !is_running => {
-                    self.words(ui, area, "The device has stopped", "Please call the experimenter", palette);
-                }
-                (None, Source::Live { .. }, Some(sample)) => {
-                    if sitting.experiment.shows_scene() {
-                        // Nothing of what is drawn may tell how stiff it is: no arrows, no colours of the moment's
-                        // largest force, and a wire that stays what it is.
-                        self.view.visible = Visible { arrows: false, ..Visible::default() };
-                        let subject = Subject {
-                            shapes: &mut self.shapes,
-                            version: self.shape_version,
-                            sample: &sample,
-                            scale: self.tally.scale(),
-                        };
-                        self.facts = self.view.show(ui, area, self.look, subject);
-                    }
-                    screens::show(ui, area, &sitting.experiment, palette);
-                }
-                _ => self.words(ui, area, "One moment", "The device is being started", palette),
-            }
+            self.screen(ui, area, &prompt, palette);
         });
-        self.sitting = Some(sitting);
+        self.sitting = Some(prompt);
     }
 
-    /// The next stimulus goes to the loop once, before the subject is told to feel it.
-    fn tell_stimulus(&mut self, sitting: &mut Sitting) {
-        let Some((stimulus, value)) = sitting.experiment.stimulus() else { return };
-        if sitting.told == Some(value) {
-            return;
+    fn screen(&mut self, ui: &mut Ui, area: Rect, prompt: &Prompt, palette: &Palette) {
+        const CALL: &str = "Please call the experimenter";
+        let sample = self.history.at(self.player.now_s).copied();
+        match (&self.source, prompt.screen(), sample) {
+            (_, Some(Screen::Over), _) => screens::show(ui, area, prompt, palette),
+            _ if prompt.is_lost() => self.words(ui, area, "The experiment has stopped", CALL, palette),
+            (Source::Live { .. }, ..) if !self.source.is_running() => {
+                self.words(ui, area, "The device has stopped", CALL, palette);
+            }
+            (Source::Live { .. }, Some(_), Some(sample)) => {
+                if prompt.shows_scene() {
+                    // Nothing of what is drawn may tell how stiff it is: no arrows, no colours of the moment's
+                    // largest force, and a wire that stays what it is.
+                    self.view.visible = Visible { arrows: false, ..Visible::default() };
+                    let subject = Subject {
+                        shapes: &mut self.shapes,
+                        version: self.shape_version,
+                        sample: &sample,
+                        scale: self.tally.scale(),
+                    };
+                    self.facts = self.view.show(ui, area, self.look, subject);
+                    self.view.keys(ui, SceneBuilder::height_mm(&self.shapes));
+                }
+                screens::show(ui, area, prompt, palette);
+            }
+            _ => self.words(ui, area, "One moment", "The device is being started", palette),
         }
-        let (plugin, parameter) = (stimulus.model.clone(), stimulus.parameter.clone());
-        self.ask(Ask::Set { values: vec![SetValue { plugin, parameter, value: value.to_string() }] });
-        sitting.told = Some(value);
     }
 }

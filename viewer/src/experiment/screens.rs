@@ -1,54 +1,66 @@
-//! What the subject sees: few words, large, in the middle; nothing that tells how stiff anything is.
+//! What a person in a sitting sees: few words, large, in the middle; nothing that tells how stiff anything is.
 
-use super::{Experiment, Screen};
+use super::{Prompt, StudyKey};
 use crate::palette::Palette;
 use egui::{Align, Color32, Key, Layout, Rect, RichText, Ui, UiBuilder};
-use flotor_study::trial::{Phase, Presented};
-
-use super::StudyKey;
+use flotor_study::protocol::Quality;
+use flotor_study::screen::{Pause, Question, Screen, TrialView};
+use flotor_study::trial::{Phase, Position};
 
 /// Sizes of text, points: read from an arm's length and more.
 const HEADLINE_PT: f32 = 34.0;
 const TEXT_PT: f32 = 21.0;
+const KEYS_PT: f32 = 18.0;
 const TYPED_PT: f32 = 54.0;
 
 /// The words of a screen.
 struct Words {
-    headline: String,
+    headline: &'static str,
     text: String,
     keys: &'static str,
 }
 
 /// Shows the screen of a moment over an area; the scene, if it may be seen, lies beneath.
-pub fn show(ui: &mut Ui, area: Rect, experiment: &Experiment, palette: &Palette) {
-    let Words { headline, text, keys } = words(experiment);
-    let over_scene = experiment.shows_scene();
-    let mut inner = ui
-        .new_child(UiBuilder::new().max_rect(area).id_salt("screen").layout(Layout::top_down(Align::Center)));
+pub fn show(ui: &mut Ui, area: Rect, prompt: &Prompt, palette: &Palette) {
+    let Some(screen) = prompt.screen() else { return };
+    let Words { headline, text, keys } = words(screen);
+    let over_scene = prompt.shows_scene();
+    let centred = Layout::top_down(Align::Center);
+    let mut inner = ui.new_child(UiBuilder::new().max_rect(area).id_salt("screen").layout(centred));
     // Over the scene the words keep out of its way.
     inner.add_space(if over_scene { 0.05 } else { 0.30 } * area.height());
     inner.label(RichText::new(headline).size(HEADLINE_PT).color(palette.text));
     inner.add_space(14.0);
     inner.label(RichText::new(text).size(TEXT_PT).color(palette.faint));
-    if experiment.screen() == Screen::Answer
-        && experiment.trial().is_some_and(|trial| matches!(trial.presented, Presented::One { .. }))
-    {
+    if matches!(screen, Screen::Ask { question: Question::HowMuch, .. }) {
         inner.add_space(24.0);
-        let typed = if experiment.typed().is_empty() { "–" } else { experiment.typed() };
-        let color = if experiment.typed().is_empty() { palette.faint } else { palette.text };
+        let (typed, color) =
+            if prompt.typed().is_empty() { ("–", palette.faint) } else { (prompt.typed(), palette.text) };
         inner.label(RichText::new(typed).size(TYPED_PT).monospace().color(color));
     }
-    let below = Rect::from_min_max(
-        egui::pos2(area.left(), area.bottom() - if over_scene { 58.0 } else { 84.0 }),
-        area.max,
+    below(ui, area, prompt, keys, palette);
+}
+
+/// The foot of a screen: warnings, which keys mean something, how far it is.
+fn below(ui: &mut Ui, area: Rect, prompt: &Prompt, keys: &str, palette: &Palette) {
+    let top = area.bottom() - if prompt.shows_scene() { 92.0 } else { 118.0 };
+    let area = Rect::from_min_max(egui::pos2(area.left(), top), area.max);
+    let centred = Layout::top_down(Align::Center);
+    let mut inner = ui.new_child(UiBuilder::new().max_rect(area).id_salt("keys").layout(centred));
+    let warning = prompt.is_warned().then_some("The handle is out of its range: let it come back");
+    if let Some(warning) = warning.or(prompt.refused()) {
+        inner.label(RichText::new(warning).size(TEXT_PT).strong().color(palette.warning));
+    } else {
+        inner.add_space(TEXT_PT + 8.0);
+    }
+    let color = if prompt.is_persons_turn() { accent(palette) } else { palette.faint };
+    inner.label(
+        RichText::new(if prompt.is_persons_turn() { keys } else { "One moment" }).size(KEYS_PT).color(color),
     );
-    let mut inner = ui
-        .new_child(UiBuilder::new().max_rect(below).id_salt("keys").layout(Layout::top_down(Align::Center)));
-    inner.label(RichText::new(keys).size(TEXT_PT - 3.0).color(accent(palette)));
     inner.add_space(6.0);
-    let (presented, _) = experiment.progress();
-    if presented > 0 && experiment.screen() != Screen::Over {
-        inner.label(RichText::new(format!("{presented} done")).small().color(palette.faint));
+    if let Some(trial) = prompt.screen().and_then(trial) {
+        let text = format!("{} of about {}", trial.number, trial.of_about);
+        inner.label(RichText::new(text).small().color(palette.faint));
     }
 }
 
@@ -56,50 +68,114 @@ fn accent(palette: &Palette) -> Color32 {
     palette.components[2]
 }
 
-fn words(experiment: &Experiment) -> Words {
-    let words = |headline: &str, text: &str, keys: &'static str| Words {
-        headline: headline.to_owned(),
-        text: text.to_owned(),
-        keys,
-    };
-    let Some(trial) = experiment.trial() else {
-        return words("Thank you", "That was all. Please let go of the handle.", "");
-    };
-    let is_pair = matches!(trial.presented, Presented::Pair(_));
-    match experiment.screen() {
-        Screen::Instruction if is_pair => words(
-            "Which spring is stiffer?",
-            "You will feel two springs, one after the other.\nThen say which of the two was stiffer.\n\nPress the handle \
-             down and let it come up, as often as you like.",
-            "Enter to begin",
-        ),
-        Screen::Instruction => words(
-            "How stiff is the spring?",
-            "You will feel one spring at a time.\nGive each a number that says how stiff it is to you:\ntwice as stiff, twice \
-             the number. Any number above zero will do.\n\nPress the handle down and let it come up, as often as you like.",
-            "Enter to begin",
-        ),
-        Screen::Present(index) => {
-            let practice = if trial.phase == Phase::Practice { "To get used to it. " } else { "" };
-            let name =
-                if is_pair { ["First spring", "Second spring"][index.min(1)] } else { "Feel the spring" };
-            words(
-                name,
-                &format!("{practice}Press the handle down and let it come up."),
-                "Enter when you have felt it",
-            )
-        }
-        Screen::Answer if is_pair => words(
-            "Which one was stiffer?",
-            "",
-            "1  the first          2  the second          0  I don't know",
-        ),
-        Screen::Answer => {
-            words("How stiff was it?", "Type a number", "Enter when it is right, Backspace to correct")
-        }
-        Screen::Break => words("Time for a rest", "Let go of the handle for a while.", "Enter to go on"),
-        Screen::Over => words("Thank you", "That was all. Please let go of the handle.", ""),
+fn trial(screen: &Screen) -> Option<&TrialView> {
+    match screen {
+        Screen::Ready { next, .. } => Some(next),
+        Screen::Feel { trial, .. } | Screen::Ask { trial, .. } => Some(trial),
+        Screen::Over => None,
     }
+}
+
+fn words(screen: &Screen) -> Words {
+    match screen {
+        Screen::Ready { reason, next } => pause(*reason, next),
+        Screen::Feel { trial, position } => feel(trial, *position),
+        Screen::Ask { trial, question } => ask(trial, *question),
+        Screen::Over => Words {
+            headline: "Thank you",
+            text: "That was all. Please let go of the handle.".to_owned(),
+            keys: "Enter closes the window",
+        },
+    }
+}
+
+fn pause(reason: Pause, next: &TrialView) -> Words {
+    let seen = match (next.object_is_shown, next.quality) {
+        (true, Quality::Stiffness) => "You will see the spring while you feel it.",
+        (true, Quality::Force) => "You will see what you feel.",
+        (false, _) => "There will be nothing to see, only to feel.",
+    };
+    let (headline, text, keys) = match reason {
+        Pause::Welcome => (task(next), format!("{}\n\n{seen}", how(next)), "Enter to begin"),
+        Pause::PhaseChanges if next.phase == Phase::Main => {
+            ("From now on it counts", seen.to_owned(), "Enter to go on")
+        }
+        Pause::PhaseChanges => {
+            ("A few to get used to it", format!("They do not count.\n{seen}"), "Enter to go on")
+        }
+        Pause::ModalityChanges if next.object_is_shown => {
+            ("From now on you see what you feel", seen.to_owned(), "Enter to go on")
+        }
+        Pause::ModalityChanges => ("From now on you feel only", seen.to_owned(), "Enter to go on"),
+        Pause::Rest => ("Time for a rest", "Let go of the handle for a while.".to_owned(), "Enter to go on"),
+        Pause::OutOfRange => (
+            "Once more",
+            "The handle was pushed out of its range, so this one comes again.\nPress a little less far."
+                .to_owned(),
+            "Enter to go on",
+        ),
+    };
+    Words { headline, text, keys }
+}
+
+fn task(trial: &TrialView) -> &'static str {
+    match (trial.stimuli, trial.quality) {
+        (1, Quality::Stiffness) => "How stiff is the spring?",
+        (1, Quality::Force) => "How strong is the force?",
+        (_, Quality::Stiffness) => "Which spring is stiffer?",
+        (_, Quality::Force) => "Which force is stronger?",
+    }
+}
+
+fn how(trial: &TrialView) -> String {
+    let (noun, more, how) = match trial.quality {
+        Quality::Stiffness => ("spring", "stiffer", "stiff"),
+        Quality::Force => ("force", "stronger", "strong"),
+    };
+    let press = "Press the handle down and let it come up, as often as you like.";
+    if trial.stimuli == 1 {
+        format!(
+            "You will feel one {noun} at a time.\nGive each a number that says how {how} it is to you:\ntwice as {how}, twice \
+             the number. Any number will do.\n\n{press}"
+        )
+    } else {
+        format!(
+            "You will feel two, one after the other.\nThen say which of the two was {more}, or that you do not know.\n\n{press}"
+        )
+    }
+}
+
+fn feel(trial: &TrialView, position: Option<Position>) -> Words {
+    let headline = match (position, trial.quality) {
+        (None, Quality::Stiffness) => "Feel the spring",
+        (Some(Position::First), Quality::Stiffness) => "First spring",
+        (Some(Position::Second), Quality::Stiffness) => "Second spring",
+        (None, Quality::Force) => "Feel the force",
+        (Some(Position::First), Quality::Force) => "First force",
+        (Some(Position::Second), Quality::Force) => "Second force",
+    };
+    let practice = if trial.phase == Phase::Practice { "To get used to it. " } else { "" };
+    let text = format!("{practice}Press the handle down and let it come up.");
+    Words { headline, text, keys: "Enter when you have felt it" }
+}
+
+fn ask(trial: &TrialView, question: Question) -> Words {
+    let (headline, text, keys) = match (question, trial.quality) {
+        (Question::Nothing, _) => {
+            ("That was one to practise", "", "Enter to go on          A  feel it again")
+        }
+        (Question::WhichIsMore, quality) => (
+            if quality == Quality::Stiffness { "Which one was stiffer?" } else { "Which one was stronger?" },
+            "",
+            "1  the first          2  the second          0  I don't know          A  feel them again",
+        ),
+        (Question::HowMuch, quality) => (
+            if quality == Quality::Stiffness { "How stiff was it?" } else { "How strong was it?" },
+            "Type a number",
+            "Enter when it is right          Backspace corrects          A  feel it again",
+        ),
+    };
+    Words { headline, text: text.to_owned(), keys }
 }
 
 /// The keys pressed in this picture that mean something here.
@@ -125,6 +201,7 @@ pub fn keys(ui: &Ui) -> Vec<StudyKey> {
             (Key::Comma, StudyKey::Point),
             (Key::Backspace, StudyKey::Back),
             (Key::Enter, StudyKey::Enter),
+            (Key::A, StudyKey::Again),
         ];
         keys.extend(others.into_iter().filter(|(key, _)| input.key_pressed(*key)).map(|(_, means)| means));
         keys

@@ -1,12 +1,14 @@
 //! `flotor study explore`: no trials, no questions. A spring to feel while its dimensions and its material change under
 //! the hand: what the report names as an immediate use of it (CMU-RI-TR-07-21, section 7).
 
-use super::front::typed_lines;
+use super::front::lines_of;
 use crate::cli::options::PluginKeyValue;
 use crate::cli::stopping::stop_on_signals;
 use crate::cli::{CommandError, style};
+use crate::live::{Announcement, Handles, Watched, publish};
 use crate::record::{Change, ChangeOutcome};
 use crate::registry::Registry;
+use crate::run_description::describe;
 use crate::scene::Scene;
 use crate::servo::{Clock, StopSwitch};
 use crate::session::{ControlError, Controls, NewValue, Observer, RunError, RunOptions, Session};
@@ -14,7 +16,9 @@ use crate::study::live::measured;
 use crate::trace::TickRecord;
 use clap::Args;
 use flotor_hal::{Parameter, ParameterKind};
+use flotor_live::Directory;
 use flotor_study::kinematics::{KinematicsMeter, StimulusKinematics};
+use std::io::{BufReader, stdin};
 use std::path::PathBuf;
 use std::sync::mpsc::RecvTimeoutError;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -52,19 +56,33 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     let stop = stop_on_signals();
     let scene = scene(arguments)?;
     let registry = Registry::search(&scene.plugin_folders);
-    let session = Session::prepare(&scene, &registry, &RunOptions { clock: Clock::Real, seed: 0 })?;
+    let options = RunOptions { clock: Clock::Real, seed: 0 };
+    let session = Session::prepare(&scene, &registry, &options)?;
     let model =
         scene.models.first().map(|model| model.name.clone()).ok_or_else(|| {
             CommandError::Usage(format!("{}: the scene has no model to explore", scene.title))
         })?;
     let felt = Felt::default();
+    let announcement = Announcement {
+        title: &scene.title,
+        run: &describe(&scene, &options, session.plugins()),
+        plugins: session.plugins(),
+        limits: session.limits(),
+    };
+    let handles = Handles { controls: session.controls(), stop: stop.clone() };
+    let publication = publish(&Directory::of_this_user(), announcement, handles);
+    let hint = if publication.is_ok() { "; `flotor view` shows it and has it on sliders" } else { "" };
     let mut desk =
         Desk { controls: session.controls(), registry, model, settings: Vec::new(), felt: felt.clone() };
-    let (switch, mut observer) = (stop.clone(), felt);
-    let run = std::thread::spawn(move || session.run(&mut observer, &switch));
+    let (switch, mut observers) = (stop.clone(), Watched { observer: felt, publication: publication.ok() });
+    let run = std::thread::spawn(move || {
+        let outcome = session.run(&mut observers, &switch);
+        observers.end("the exploration has ended");
+        outcome
+    });
     say!("{}", style::title(&scene.title));
-    say!("  type a parameter and its value; ? lists them, q ends");
-    let lines = typed_lines().map_err(|error| CommandError::Failed(error.to_string()))?;
+    say!("  type a parameter and its value; ? lists them, q ends{hint}");
+    let lines = lines_of(BufReader::new(stdin())).map_err(|error| CommandError::Failed(error.to_string()))?;
     while !(stop.is_stop_asked() || run.is_finished()) {
         match lines.recv_timeout(Duration::from_millis(50)) {
             Ok(line) if line.trim() == "q" => break,

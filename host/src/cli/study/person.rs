@@ -1,23 +1,23 @@
 //! `--observer human`: one person, one sitting, in real time.
 
-use super::front::{LineFront, ScreenOption};
+use super::front::{JsonLines, ScreenOption, Terminal, Window, lines_of};
 use super::{Common, NoiseOption, tell};
 use crate::cli::stopping::stop_on_signals;
 use crate::cli::{CommandError, style};
-use crate::study::attend::attend;
+use crate::study::attend::{FrontEnd, attend};
 use crate::study::live::LiveRig;
 use crate::study::noise::WhiteNoise;
 use crate::study::rig::TrialFiles;
 use crate::study::{Apparatus, Kinematics};
 use flotor_study::conduct::Ending;
 use flotor_study::dataset::{Dataset, DatasetError, Progress};
-use flotor_study::log::{Begin, Event, FORMAT, LogWriter};
+use flotor_study::log::{Begin, Event, FORMAT, SittingLog};
 use flotor_study::protocol::{Protocol, SubjectNumber};
 use flotor_study::screen::Attended;
-use flotor_study::sitting::Sitting;
 use serde_json::json;
+use std::io::{BufReader, Stdout, stdin, stdout};
 
-/// Presents a study to a person.
+/// Presents a study to a person: everything is checked, the loop runs and the window is open before the log begins.
 pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -> Result<(), CommandError> {
     let dataset = Dataset::at(&common.out);
     let subject = subject(common, &dataset, protocol)?;
@@ -30,26 +30,38 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         observer: json!("human"),
         apparatus: apparatus.description(),
     };
-    let (sitting, mut log) = open(common, &dataset, begin)?;
-    let kinematics = common.kinematics().unwrap_or(Kinematics::Full);
-    let files = TrialFiles::make(
-        dataset.source_folder(subject).join("motion"),
-        format!("{subject}_task-{}", protocol.task()),
-    );
-    let files = files.map_err(|cause| CommandError::file(&common.out, "cannot make the folder", cause))?;
+    let before = before(common, &dataset, &begin)?;
+    let files =
+        (dataset.source_folder(subject).join("motion"), format!("{subject}_task-{}", protocol.task()));
     let stop = stop_on_signals();
     let noise = noise(common)?;
+    let kinematics = common.kinematics().unwrap_or(Kinematics::Full);
+    let mut rig = LiveRig::start(apparatus, kinematics, &stop)
+        .map_err(|error| super::outside(error.as_ref(), &error))?;
+    let mut front = Front::open(common.screen, &rig)?;
+
+    let refuse = |error: DatasetError| super::refused(error.into());
+    let (sitting, mut log) = match before {
+        None => dataset.begin(begin).map_err(refuse)?,
+        Some(log) => log.resume(&begin.version).map_err(|error| refuse(error.into()))?,
+    };
+    if kinematics == Kinematics::Full {
+        let files = TrialFiles::make(files.0, files.1);
+        rig.record_into(
+            files.map_err(|cause| CommandError::file(&common.out, "cannot make the folder", cause))?,
+        );
+    }
     let text = format!("white noise: {}", noise.as_ref().map_or("none", WhiteNoise::player));
     log.write(&Event::Note { text }).map_err(failed)?;
 
     let mut attended = Attended::new(sitting, protocol, common.seed, common.rest_every);
-    let mut front = LineFront::listen(common.screen).map_err(failed)?;
-    let mut rig = LiveRig::start(apparatus, kinematics, Some(files), &stop)
-        .map_err(|error| super::outside(error.as_ref(), &error))?;
-    let ending = attend(&mut attended, &mut log, &mut rig, &mut front, &mut |_| ());
-    drop((rig, noise));
+    let ending = attend(&mut attended, &mut log, &mut rig, front.as_dyn(), &mut |_| ());
     let ending = ending.map_err(|error| super::outside(error.as_ref(), &error))?;
-    dataset.write_tables().map_err(|error| super::refused(error.into()))?;
+    dataset.write_tables().map_err(refuse)?;
+    if let (Ending::Complete, Front::Window(window)) = (ending, front) {
+        window.wait_closed(&stop); // the last screen says thank you
+    }
+    drop((rig, noise));
     match (ending, common.screen) {
         (_, ScreenOption::Json) => Ok(()),
         (Ending::Complete, _) => tell(&dataset),
@@ -60,6 +72,37 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
                 subject.get()
             );
             Ok(())
+        }
+    }
+}
+
+/// Where the person sees and answers.
+enum Front {
+    Window(Window),
+    Terminal(Terminal),
+    Json(JsonLines<Stdout>),
+}
+
+impl Front {
+    fn open(screen: ScreenOption, rig: &LiveRig<'_>) -> Result<Self, CommandError> {
+        match screen {
+            ScreenOption::Viewer => match rig.unseen() {
+                None => Ok(Self::Window(Window::open()?)),
+                Some(why) => Err(CommandError::Failed(format!("no window can watch the run: {why}"))),
+            },
+            ScreenOption::Terminal => Terminal::listen().map(Self::Terminal).map_err(failed),
+            ScreenOption::Json => {
+                let lines = lines_of(BufReader::new(stdin())).map_err(failed)?;
+                Ok(Self::Json(JsonLines::new(lines, stdout())))
+            }
+        }
+    }
+
+    fn as_dyn(&mut self) -> &mut dyn FrontEnd {
+        match self {
+            Self::Window(window) => window,
+            Self::Terminal(terminal) => terminal,
+            Self::Json(lines) => lines,
         }
     }
 }
@@ -79,23 +122,25 @@ fn subject(common: &Common, dataset: &Dataset, protocol: &Protocol) -> Result<Su
     })
 }
 
-/// A new sitting, or the one that broke off.
-fn open(common: &Common, dataset: &Dataset, begin: Begin) -> Result<(Sitting, LogWriter), CommandError> {
+/// The sitting that broke off and is to go on; none where there was none yet.
+fn before(
+    common: &Common,
+    dataset: &Dataset,
+    begin: &Begin,
+) -> Result<Option<Box<SittingLog>>, CommandError> {
     let (subject, root) = (begin.subject, dataset.root().to_path_buf());
     let progress = dataset.progress(subject, begin.protocol.task());
-    let refuse = |error: DatasetError| super::refused(error.into());
-    match progress.map_err(refuse)? {
-        Progress::New => dataset.begin(begin).map_err(refuse),
-        Progress::Complete(_) => Err(refuse(DatasetError::Duplicate { subject, root })),
+    let refuse = |error: DatasetError| Err(super::refused(error.into()));
+    match progress.map_err(|error| super::refused(error.into()))? {
+        Progress::New => Ok(None),
+        Progress::Complete(_) => refuse(DatasetError::Duplicate { subject, root }),
         Progress::Partial(log) if !common.resume => {
-            Err(refuse(DatasetError::Unfinished { subject, trials: log.trials.len(), root }))
+            refuse(DatasetError::Unfinished { subject, trials: log.trials.len(), root })
         }
-        Progress::Partial(log) => {
-            if let Some(what) = begin.differs(&log.begin) {
-                return Err(refuse(DatasetError::Changed { path: log.path().to_path_buf(), what }));
-            }
-            log.resume(&begin.version).map_err(|error| refuse(error.into()))
-        }
+        Progress::Partial(log) => match begin.differs(&log.begin) {
+            Some(what) => refuse(DatasetError::Changed { path: log.path().to_path_buf(), what }),
+            None => Ok(Some(log)),
+        },
     }
 }
 

@@ -1,10 +1,11 @@
-//! `flotor study spring`: a measured curve of a real spring, fitted, drawn, and made a scene to be judged.
+//! `flotor study spring`: a measured curve of a real spring, fitted, drawn, and made a scene to be judged: the fitted spring,
+//! or the curve itself.
 
 use crate::cli::{CommandError, style, write_json};
 use crate::plot::{Axis, Figure, Panel, Series};
 use crate::scene::STUDY;
 use clap::Args;
-use flotor_study::curve::{FITTED, MeasuredCurve, SpringFit};
+use flotor_study::curve::{FITTED, MeasuredCurve, ServedCurve, SpringFit};
 use std::path::{Path, PathBuf};
 
 #[derive(Args)]
@@ -12,7 +13,9 @@ use std::path::{Path, PathBuf};
     Examples:\n  \
     flotor study spring measured.csv --plot measured.svg\n  \
     flotor study spring measured.csv --scene real.toml\n  \
-    flotor study jnd --scene real.toml --bases 17 --out real      the real spring's gamma as the base")]
+    flotor study jnd --scene real.toml --bases 17 --out real      the real spring's gamma as the base\n  \
+    flotor study spring measured.csv --curve-scene as-measured.toml\n  \
+    flotor study jnd --scene as-measured.toml --stimulus measured.stiffness_scale --bases 1 --out curve")]
 pub(super) struct SpringArguments {
     /// Measured force over length or compression (CSV)
     #[arg(value_name = "FILE.csv")]
@@ -29,6 +32,9 @@ pub(super) struct SpringArguments {
     /// Write a scene with the fitted spring, for `study jnd --scene` and `run`
     #[arg(long, value_name = "FILE.toml")]
     scene: Option<PathBuf>,
+    /// Write a scene that serves the measured curve itself, and beside it the table it reads
+    #[arg(long, value_name = "FILE.toml")]
+    curve_scene: Option<PathBuf>,
     /// Write the fit as JSON (- for standard output)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -43,24 +49,42 @@ pub(super) fn run(arguments: &SpringArguments) -> Result<(), CommandError> {
     let curve =
         MeasuredCurve::parse(&text, arguments.free_length_mm.map(|mm| mm * 1.0e-3)).map_err(refused)?;
     let fit = curve.fit().map_err(refused)?;
+    let served = curve.served().map_err(refused)?;
     if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
         say!("{}", style::title(&path.display().to_string()));
-        say!("{}", to_text(&fit));
+        say!("{}", to_text(&fit, &served));
     }
     if let Some(path) = &arguments.plot {
-        write(path, &picture(&curve, &fit))?;
+        write(path, &picture(&curve, &fit, &served))?;
     }
     if let Some(path) = &arguments.scene {
         write(path, &scene(&fit, arguments.coil_diameter_mm))?;
     }
+    if let Some(path) = &arguments.curve_scene {
+        let table = path.with_extension("csv");
+        if same_file(&table, &arguments.curve) {
+            let table = table.display();
+            let why = format!(
+                "--curve-scene {}: `{table}` is the measurement itself; choose another name",
+                path.display()
+            );
+            return Err(CommandError::Usage(why));
+        }
+        write(&table, &served.to_table())?;
+        write(path, &curve_scene(&table, &fit, arguments.coil_diameter_mm))?;
+    }
     arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &fit))
+}
+
+fn same_file(one: &Path, other: &Path) -> bool {
+    matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
 }
 
 fn write(path: &Path, text: &str) -> Result<(), CommandError> {
     std::fs::write(path, text).map_err(|cause| CommandError::file(path, "cannot write the file", cause))
 }
 
-fn to_text(fit: &SpringFit) -> String {
+fn to_text(fit: &SpringFit, served: &ServedCurve) -> String {
     let [low, high] = fit.stiffness_interval_n_per_m.map(|end| end * 1.0e-3);
     [
         format!("stiffness    {:.4} N/mm  (95 %: {low:.4} to {high:.4})", fit.stiffness_n_per_m * 1.0e-3),
@@ -71,13 +95,14 @@ fn to_text(fit: &SpringFit) -> String {
             fit.r_squared, fit.points
         ),
         format!("nonlinearity {:.1} % of the largest force, ends included", fit.nonlinearity * 100.0),
+        format!("as measured  {} knots, {:.3} N rms from the points", served.knots.len(), served.rms_n),
     ]
     .map(|line| format!("  {line}"))
     .join("\n")
 }
 
-/// The measurement with the fitted spring over it.
-fn picture(curve: &MeasuredCurve, fit: &SpringFit) -> String {
+/// The measurement with both springs over it: the fitted one, and the curve as it is served.
+fn picture(curve: &MeasuredCurve, fit: &SpringFit, served: &ServedCurve) -> String {
     let points = || curve.points.iter().map(|(x_m, force_n)| (x_m * 1.0e3, *force_n));
     let deepest_mm = points().map(|(x_mm, _)| x_mm).fold(0.0, f64::max);
     let line = |share: f64| {
@@ -87,7 +112,10 @@ fn picture(curve: &MeasuredCurve, fit: &SpringFit) -> String {
     let panel = Panel::new(Axis::linear("Force", "N"))
         .series(Series::points("measured", points()).slot(0))
         .series(Series::line("fitted spring", [0.0, 1.0].map(line)).slot(1))
-        .series(Series::line("fitted here", FITTED.map(line)).slot(2));
+        .series(Series::line("fitted here", FITTED.map(line)).slot(2))
+        .series(
+            Series::line("served as measured", served.knots.iter().map(|(x_m, n)| (x_m * 1.0e3, *n))).slot(3),
+        );
     Figure::new("A real spring", Axis::linear("Compression", "mm"))
         .subtitle(format!(
             "{:.4} N/mm, gamma {:.3} N, R² {:.5}",
@@ -109,6 +137,19 @@ fn scene(fit: &SpringFit, coil_diameter_mm: Option<f64>) -> String {
         fit.gamma_n
     );
     STUDY.replace("mode = \"gamma\"\n", &fitted)
+}
+
+/// A scene with the curve itself in it, millimetre for millimetre and newton for newton.
+fn curve_scene(table: &Path, fit: &SpringFit, coil_diameter_mm: Option<f64>) -> String {
+    let table = table.file_name().unwrap_or_default().to_string_lossy();
+    let coil = coil_diameter_mm.map_or(String::new(), |mm| format!("coil_diameter_mm = {mm}\n"));
+    format!(
+        "# A real spring as it was measured; `stiffness_scale` makes it stiffer or softer as a whole.\n\
+         title = \"A real spring, as measured\"\nrate_hz = 1000\n\n[device]\nplugin = \"simulated\"\n\n[[model]]\n\
+         plugin = \"measured\"\n\n[model.parameters]\ncurve = {table:?}\nfree_length_mm = {:.6}\n{coil}\n[model.mapping]\n\
+         motion_scale = 1.0\nforce_scale = 1.0\n",
+        fit.free_length_m * 1.0e3
+    )
 }
 
 #[cfg(test)]

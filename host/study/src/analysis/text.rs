@@ -97,11 +97,11 @@ impl Page {
 
     /// What, what it is here, and what it is in the report.
     fn row(&mut self, name: &str, here: &str, published: &str) {
-        self.lines.push(format!("  {name:<25}{here:<46}{published}").trim_end().to_owned());
+        self.lines.push(format!("  {name:<30}{here:<46}{published}").trim_end().to_owned());
     }
 
     fn columns(&mut self, name: &str, first: &str, second: &str) {
-        self.lines.push(format!("  {name:<25}{first:<23}{second}"));
+        self.lines.push(format!("  {name:<30}{first:<23}{second}"));
     }
 
     fn effects(&mut self, what: &str, table: &[Effect], published: &[(&str, &str)]) {

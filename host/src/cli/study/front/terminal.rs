@@ -1,64 +1,30 @@
-//! Front ends of lines: words on a terminal, or JSON for a window that runs as another program.
+//! Words on a terminal, answers by keyboard.
 
+use super::{MOMENT, lines_of};
 use crate::cli::style;
 use crate::study::attend::FrontEnd;
-use clap::ValueEnum;
 use flotor_study::conduct::OutsideError;
 use flotor_study::protocol::Quality;
 use flotor_study::screen::{Input, Pause, Question, Screen, TrialView};
 use flotor_study::trial::{Phase, Position, Response};
-use std::io::{BufRead, stdin};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::time::Duration;
+use std::io::BufReader;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
 
-/// How long the handle goes unwatched at most while somebody thinks.
-const MOMENT: Duration = Duration::from_millis(50);
-
-/// `--screen`
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(super) enum ScreenOption {
-    /// The viewer's window, in front of the person
-    #[default]
-    Viewer,
-    /// Words on this terminal, answers by keyboard
-    Terminal,
-    /// A screen per line of JSON on standard output, an input per line on standard input
-    Json,
-}
-
-/// Lines of standard input as they come.
-pub(super) fn typed_lines() -> std::io::Result<Receiver<String>> {
-    let (sender, lines) = channel();
-    // Ends with the process: nothing can call it back from a read.
-    std::thread::Builder::new().name("flotor-answers".to_owned()).spawn(move || {
-        for line in stdin().lock().lines().map_while(Result::ok) {
-            if sender.send(line).is_err() {
-                break;
-            }
-        }
-    })?;
-    Ok(lines)
-}
-
-/// Reads lines as they come, and shows screens in one of two languages.
-pub(super) struct LineFront {
-    language: ScreenOption,
+/// A person at this terminal.
+pub(in crate::cli::study) struct Terminal {
     lines: Receiver<String>,
 }
 
-impl LineFront {
+impl Terminal {
     /// Listens to standard input from now on.
-    pub(super) fn listen(language: ScreenOption) -> std::io::Result<Self> {
-        Ok(Self { language, lines: typed_lines()? })
+    pub(in crate::cli::study) fn listen() -> std::io::Result<Self> {
+        Ok(Self { lines: lines_of(BufReader::new(std::io::stdin()))? })
     }
 }
 
-impl FrontEnd for LineFront {
+impl FrontEnd for Terminal {
     fn show(&mut self, screen: &Screen) -> Result<(), OutsideError> {
-        match self.language {
-            ScreenOption::Terminal | ScreenOption::Viewer => say!("{}", words(screen)),
-            ScreenOption::Json => say!("{}", serde_json::to_string(screen)?),
-        }
+        say!("{}", words(screen));
         Ok(())
     }
 
@@ -69,11 +35,7 @@ impl FrontEnd for LineFront {
             // Nobody types any more.
             Err(RecvTimeoutError::Disconnected) => return Ok(Some(Input::Stop)),
         };
-        let input = match self.language {
-            ScreenOption::Terminal | ScreenOption::Viewer => typed(&line, screen),
-            ScreenOption::Json => serde_json::from_str(&line).map_err(|error| error.to_string()),
-        };
-        match input {
+        match typed(&line, screen) {
             Ok(input) => Ok(Some(input)),
             Err(why) => {
                 self.refuse(&why)?;
@@ -83,21 +45,13 @@ impl FrontEnd for LineFront {
     }
 
     fn warn_out_of_range(&mut self) -> Result<(), OutsideError> {
-        match self.language {
-            // The bell is the beep of the report; it is not the noise that masks it.
-            ScreenOption::Terminal | ScreenOption::Viewer => {
-                say!("\x07  {} the handle is out of its range: let it come back", style::warning("!"))
-            }
-            ScreenOption::Json => say!("{}", serde_json::json!({ "warning": "out-of-range" })),
-        }
+        // The bell is the beep of the report; it is not the noise that masks it.
+        say!("\x07  {} the handle is out of its range: let it come back", style::warning("!"));
         Ok(())
     }
 
     fn refuse(&mut self, why: &str) -> Result<(), OutsideError> {
-        match self.language {
-            ScreenOption::Terminal | ScreenOption::Viewer => say!("  {why}"),
-            ScreenOption::Json => say!("{}", serde_json::json!({ "refused": why })),
-        }
+        say!("  {why}");
         Ok(())
     }
 }
@@ -120,8 +74,8 @@ fn words(screen: &Screen) -> String {
             };
             format!("\n{}\n  {which}; Enter when done", place(trial))
         }
-        Screen::Ask { question, quality, .. } => {
-            let (more, how) = match quality {
+        Screen::Ask { question, trial } => {
+            let (more, how) = match trial.quality {
                 Quality::Stiffness => ("stiffer", "stiff"),
                 Quality::Force => ("stronger", "strong"),
             };
@@ -197,8 +151,10 @@ mod tests {
             object_is_shown: true,
             condition: "A1".to_owned(),
             repeat: 0,
+            stimuli: 2,
+            quality: Quality::Stiffness,
         };
-        Screen::Ask { trial, question, quality: Quality::Stiffness }
+        Screen::Ask { trial, question }
     }
 
     #[test]

@@ -1,120 +1,12 @@
-//! A person's way through a sitting, screen by screen: what is shown now, and what they may do about it.
-//!
-//! Made for any front end, a terminal or a window alike: show [`Attended::screen`], wait for an [`Input`], hand it to
-//! [`Attended::input`]. Screens and inputs are plain data (serde), so they also travel as lines of JSON. No screen says
-//! which stimulus it is: conditions are codes ([`crate::blinding`]).
-//!
-//! ```text
-//! Ready -> Feel (first) -> Feel (second) -> Ask -> Ready or Feel of the next trial ... -> Over
-//!            ^                               |
-//!            +------------ again ------------+
-//! ```
+//! The state machine behind the screens: which comes after which, and what an input does to a sitting.
 
+use super::{Input, Pause, Question, Screen, TrialView};
 use crate::blinding::Codes;
-use crate::kinematics::{KinematicsMeter, StimulusKinematics};
+use crate::kinematics::StimulusKinematics;
 use crate::log::TrialEvent;
 use crate::protocol::{Protocol, Quality};
 use crate::sitting::{AnswerError, Sitting, Verdict};
 use crate::trial::{Exploration, Modality, Phase, Position, Presented, Response, Trial};
-use serde::{Deserialize, Serialize};
-
-/// What is shown now.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "screen", rename_all = "kebab-case")]
-pub enum Screen {
-    /// Words before the next trial; [`Input::Continue`] goes on.
-    Ready {
-        /// Why.
-        reason: Pause,
-        /// What is to come.
-        next: TrialView,
-    },
-    /// A stimulus is there to be felt; [`Input::Continue`] when it was.
-    Feel {
-        /// The trial.
-        trial: TrialView,
-        /// Which of a pair; none where there is only one.
-        position: Option<Position>,
-    },
-    /// A question; [`Input::Answer`], or [`Input::Continue`] where none is expected.
-    Ask {
-        /// The trial.
-        trial: TrialView,
-        /// The question.
-        question: Question,
-        /// What it is about.
-        quality: Quality,
-    },
-    /// Everything was presented.
-    Over,
-}
-
-/// Why nothing is felt just now.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Pause {
-    /// The sitting begins, or goes on after it broke off.
-    Welcome,
-    /// From practice to what counts, or to practice again.
-    PhaseChanges,
-    /// The object will be seen from now on, or no longer.
-    ModalityChanges,
-    /// Time to rest the hand.
-    Rest,
-    /// The handle left its range: the trial comes again.
-    OutOfRange,
-}
-
-/// What may be asked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Question {
-    /// Which had more of it: [`Response::First`], [`Response::Second`] or [`Response::DontKnow`].
-    WhichIsMore,
-    /// How much: [`Response::Rating`], any number of one's own.
-    HowMuch,
-    /// Practice: nothing.
-    Nothing,
-}
-
-/// What a front end may know of a trial.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TrialView {
-    /// Count of presentations in the sitting, from 1.
-    pub number: u32,
-    /// About how many there will be.
-    pub of_about: u64,
-    /// Whether it counts.
-    pub phase: Phase,
-    /// Whether the object is to be seen.
-    pub object_is_shown: bool,
-    /// Code of the condition, for the experimenter.
-    pub condition: String,
-    /// How often it had to be repeated.
-    pub repeat: u32,
-}
-
-/// What a person does.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "input", rename_all = "kebab-case")]
-pub enum Input {
-    /// Goes on.
-    Continue,
-    /// Wants to feel the trial once more, from the first stimulus on.
-    Again,
-    /// Answers the question.
-    Answer {
-        /// The answer.
-        response: Response,
-    },
-    /// A note of the experimenter; the screen stays.
-    Note {
-        /// In their words.
-        text: String,
-    },
-    /// Enough for now.
-    Stop,
-}
 
 /// What became of an input.
 #[derive(Clone, Debug, PartialEq)]
@@ -127,6 +19,17 @@ pub enum Step {
     Note(String),
     /// The person stopped.
     Stopped,
+}
+
+/// How one stimulus was felt.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Felt {
+    /// Measures of the movement, where they are kept.
+    pub kinematics: Option<StimulusKinematics>,
+    /// Whether the handle left its range.
+    pub boundary_hit: bool,
+    /// Ticks the servo missed meanwhile.
+    pub missed_ticks: u64,
 }
 
 /// An input that does not fit the screen; nothing has changed.
@@ -187,7 +90,7 @@ impl Attended {
         match self.stage {
             Stage::Ready(reason) => Screen::Ready { reason, next: view },
             Stage::Feel(index) => Screen::Feel { position: position(&trial, index), trial: view },
-            Stage::Ask => Screen::Ask { question: question(&trial), trial: view, quality: self.quality },
+            Stage::Ask => Screen::Ask { question: question(&trial), trial: view },
         }
     }
 
@@ -201,12 +104,11 @@ impl Attended {
         }
     }
 
-    /// Takes in how the stimulus was explored that has just been felt, and the ticks the servo missed meanwhile.
-    pub fn felt(&mut self, meter: &KinematicsMeter, missed_ticks: u64) {
-        let kinematics: Option<StimulusKinematics> = meter.finish();
-        self.exploration.kinematics.extend(kinematics);
-        self.exploration.boundary_hit |= meter.out_of_range();
-        self.exploration.missed_ticks += missed_ticks;
+    /// Takes in how the stimulus was felt that has just gone.
+    pub fn felt(&mut self, felt: Felt) {
+        self.exploration.kinematics.extend(felt.kinematics);
+        self.exploration.boundary_hit |= felt.boundary_hit;
+        self.exploration.missed_ticks += felt.missed_ticks;
     }
 
     /// Takes in what a person did, `time_s` after the screen came up.
@@ -295,6 +197,8 @@ impl Attended {
             object_is_shown: trial.modality == Modality::Vh,
             condition: self.codes.condition(trial.modality, &trial.presented),
             repeat: trial.repeat,
+            stimuli: trial.presented.values().len(),
+            quality: self.quality,
         }
     }
 }
@@ -318,7 +222,6 @@ fn question(trial: &Trial) -> Question {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kinematics::Sample;
     use crate::protocol::{JndProtocol, MagnitudeProtocol, SubjectNumber};
 
     fn attended(protocol: &Protocol, rest_every: u32) -> Attended {
@@ -350,8 +253,8 @@ mod tests {
                     Input::Continue
                 }
                 Screen::Ask { question: Question::Nothing, .. } => Input::Continue,
-                Screen::Ask { question, quality, .. } => {
-                    assert_eq!((question, quality), (Question::HowMuch, Quality::Stiffness));
+                Screen::Ask { question, trial } => {
+                    assert_eq!((question, trial.quality), (Question::HowMuch, Quality::Stiffness));
                     Input::Answer { response: Response::Rating(3.0) }
                 }
             };
@@ -405,16 +308,7 @@ mod tests {
         jnd.demo.shown = false;
         let mut person = attended(&Protocol::Jnd(jnd), 0);
         person.input(Input::Continue, 0.0).unwrap();
-        let mut meter = KinematicsMeter::default();
-        meter.take(&Sample {
-            dt_s: 1.0e-3,
-            z_m: -0.013,
-            velocity_m_per_s: 0.0,
-            force_z_n: 30.0,
-            force_n: 30.0,
-            out_of_range: true,
-        });
-        person.felt(&meter, 2);
+        person.felt(Felt { kinematics: None, boundary_hit: true, missed_ticks: 2 });
         person.input(Input::Continue, 0.0).unwrap();
         person.input(Input::Continue, 0.0).unwrap();
         let step = person.input(Input::Answer { response: Response::First }, 0.0).unwrap();

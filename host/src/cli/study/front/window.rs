@@ -1,0 +1,84 @@
+//! The viewer's window: a process of its own that watches the run, shows what it is told and says what the person does.
+
+use super::{JsonLines, lines_of};
+use crate::cli::CommandError;
+use crate::cli::view::VIEWER;
+use crate::servo::StopSwitch;
+use crate::study::attend::FrontEnd;
+use flotor_study::conduct::OutsideError;
+use flotor_study::screen::{Input, Screen};
+use rustix::process::{Pid, Signal, kill_process};
+use std::io::BufReader;
+use std::process::{Child, ChildStdin, Stdio};
+use std::time::Duration;
+
+/// How often it is looked whether the window is still there.
+const LOOK_PERIOD: Duration = Duration::from_millis(50);
+
+/// A window in front of a person. Dropped, it closes.
+pub(in crate::cli::study) struct Window {
+    lines: JsonLines<ChildStdin>,
+    viewer: Viewer,
+}
+
+impl Window {
+    /// Opens a window on the run of this process, and waits until it is there.
+    ///
+    /// # Errors
+    /// There is no viewer, or it cannot open a window and has said why.
+    pub(in crate::cli::study) fn open() -> Result<Self, CommandError> {
+        let mut command = VIEWER.command()?;
+        command.arg("--sitting").arg("--run").arg(std::process::id().to_string());
+        command.stdin(Stdio::piped()).stdout(Stdio::piped());
+        let failed = |cause| CommandError::file(VIEWER.program.as_ref(), "cannot be started", cause);
+        let mut viewer = Viewer(command.spawn().map_err(failed)?);
+        let (Some(input), Some(output)) = (viewer.0.stdin.take(), viewer.0.stdout.take()) else {
+            return Err(CommandError::Failed("the viewer has no pipes".to_owned()));
+        };
+        let heard = lines_of(BufReader::new(output)).map_err(failed)?;
+        // Its first word is that it is open; it says none when it cannot be.
+        if heard.recv().is_err() {
+            let why = "no window for the sitting: the viewer says why above; --screen terminal needs none";
+            return Err(CommandError::Usage(why.to_owned()));
+        }
+        Ok(Self { lines: JsonLines::new(heard, input), viewer })
+    }
+
+    /// Waits until the person closes the window, or somebody stops the study.
+    pub(in crate::cli::study) fn wait_closed(mut self, stop: &StopSwitch) {
+        while self.viewer.0.try_wait().is_ok_and(|status| status.is_none()) && !stop.is_stop_asked() {
+            std::thread::sleep(LOOK_PERIOD);
+        }
+    }
+}
+
+impl FrontEnd for Window {
+    fn show(&mut self, screen: &Screen) -> Result<(), OutsideError> {
+        self.lines.show(screen)
+    }
+
+    fn poll(&mut self, screen: &Screen) -> Result<Option<Input>, OutsideError> {
+        self.lines.poll(screen)
+    }
+
+    fn warn_out_of_range(&mut self) -> Result<(), OutsideError> {
+        self.lines.warn_out_of_range()
+    }
+
+    fn refuse(&mut self, why: &str) -> Result<(), OutsideError> {
+        self.lines.refuse(why)
+    }
+}
+
+/// The process; asked to end in order when nobody needs it.
+struct Viewer(Child);
+
+impl Drop for Viewer {
+    fn drop(&mut self) {
+        if self.0.try_wait().ok().flatten().is_none() {
+            let id = i32::try_from(self.0.id()).ok().and_then(Pid::from_raw);
+            let _ = id.map(|id| kill_process(id, Signal::TERM));
+        }
+        let _ = self.0.wait();
+    }
+}

@@ -1,0 +1,127 @@
+//! Force over compression between knots: cubic pieces that meet with one slope and never fall where the knots do not.
+//!
+//! The slopes at the knots are Fritsch and Butland's weighted harmonic means (SIAM J. Sci. Stat. Comput. 5:300, 1984): between
+//! two knots the curve is monotone if they are, so smoothing adds no bump that nobody measured.
+
+/// Why knots are no curve of a spring.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CurveError {
+    /// Fewer than three, or more than [`Curve::MOST_KNOTS`].
+    Count(usize),
+    /// The first is not without compression and without force.
+    Start,
+    /// Compression does not grow, or the force falls, at this knot (from 0).
+    Order(usize),
+}
+
+/// One cubic piece: force as a polynomial of the distance from its knot, and the energy stored up to there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Piece {
+    from_m: f64,
+    /// N, N/m, N/m², N/m³.
+    force: [f64; 4],
+    energy_j: f64,
+}
+
+impl Piece {
+    /// Force, N, and energy, J, at a distance from the knot.
+    fn at(&self, distance_m: f64) -> (f64, f64) {
+        let [a, b, c, d] = self.force;
+        let s = distance_m;
+        let force_n = a + s * (b + s * (c + s * d));
+        let energy_j = self.energy_j + s * (a + s * (b / 2.0 + s * (c / 3.0 + s * d / 4.0)));
+        (force_n, energy_j)
+    }
+}
+
+/// A curve through knots.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    pieces: Vec<Piece>,
+    deepest_m: f64,
+    /// Beyond the last knot: force, slope and energy there.
+    end: (f64, f64, f64),
+}
+
+impl Curve {
+    /// More than any test bench gives after smoothing; a search among them takes twelve steps.
+    pub const MOST_KNOTS: usize = 4096;
+
+    /// A curve through knots of compression, m, and force, N, the first (0, 0). Not real-time.
+    ///
+    /// # Errors
+    /// [`CurveError`].
+    pub fn new(knots: &[(f64, f64)]) -> Result<Self, CurveError> {
+        if knots.len() < 3 || knots.len() > Self::MOST_KNOTS {
+            return Err(CurveError::Count(knots.len()));
+        }
+        if knots[0] != (0.0, 0.0) {
+            return Err(CurveError::Start);
+        }
+        // Written so that a NaN fails.
+        let rises = |pair: &[(f64, f64)]| pair[1].0 > pair[0].0 && pair[1].1 >= pair[0].1;
+        if let Some(at) = knots.windows(2).position(|pair| !rises(pair)) {
+            return Err(CurveError::Order(at + 1));
+        }
+        let slopes = slopes(knots);
+        let mut energy_j = 0.0;
+        let mut pieces = Vec::with_capacity(knots.len() - 1);
+        for (pair, ends) in knots.windows(2).zip(slopes.windows(2)) {
+            let (width_m, rise_n) = (pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
+            let chord = rise_n / width_m;
+            let square = (3.0 * chord - 2.0 * ends[0] - ends[1]) / width_m;
+            let cube = (ends[0] + ends[1] - 2.0 * chord) / (width_m * width_m);
+            let piece = Piece { from_m: pair[0].0, force: [pair[0].1, ends[0], square, cube], energy_j };
+            energy_j = piece.at(width_m).1;
+            pieces.push(piece);
+        }
+        let (deepest_m, force_n) = knots[knots.len() - 1];
+        Ok(Self { pieces, deepest_m, end: (force_n, slopes[slopes.len() - 1], energy_j) })
+    }
+
+    /// Compression of the last knot, m: what was measured ends there.
+    #[must_use]
+    pub fn deepest_m(&self) -> f64 {
+        self.deepest_m
+    }
+
+    /// Force against compression, N, and stored energy, J; beyond the last knot along its tangent, above the first none.
+    /// Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn at(&self, compression_m: f64) -> (f64, f64) {
+        if compression_m <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let beyond_m = compression_m - self.deepest_m;
+        if beyond_m >= 0.0 {
+            let (force_n, slope, energy_j) = self.end;
+            return (force_n + slope * beyond_m, energy_j + beyond_m * (force_n + 0.5 * slope * beyond_m));
+        }
+        let after = self.pieces.partition_point(|piece| piece.from_m <= compression_m);
+        let piece = after.checked_sub(1).and_then(|index| self.pieces.get(index));
+        piece.map_or((0.0, 0.0), |piece| piece.at(compression_m - piece.from_m))
+    }
+}
+
+/// The slope at each knot, N/m.
+fn slopes(knots: &[(f64, f64)]) -> Vec<f64> {
+    let widths: Vec<f64> = knots.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
+    let chords: Vec<f64> =
+        knots.windows(2).zip(&widths).map(|(pair, width)| (pair[1].1 - pair[0].1) / width).collect();
+    let inner = widths.windows(2).zip(chords.windows(2)).map(|(h, d)| {
+        let weights = [h[0] + 2.0 * h[1], 2.0 * h[0] + h[1]];
+        if d[0] > 0.0 && d[1] > 0.0 {
+            (weights[0] + weights[1]) / (weights[0] / d[0] + weights[1] / d[1])
+        } else {
+            0.0
+        }
+    });
+    // At an end a parabola through three knots, no steeper than keeps the piece monotone.
+    let end = |h: [f64; 2], d: [f64; 2]| {
+        (((2.0 * h[0] + h[1]) * d[0] - h[0] * d[1]) / (h[0] + h[1])).clamp(0.0, 3.0 * d[0])
+    };
+    let last = widths.len() - 1;
+    let first_slope = end([widths[0], widths[1]], [chords[0], chords[1]]);
+    let last_slope = end([widths[last], widths[last - 1]], [chords[last], chords[last - 1]]);
+    std::iter::once(first_slope).chain(inner).chain(std::iter::once(last_slope)).collect()
+}

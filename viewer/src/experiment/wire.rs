@@ -1,0 +1,37 @@
+//! The two ways between this window and the experiment that opened it: a line of JSON for each thing said, on standard input
+//! and output. Threads of their own read and write, so that neither program waits for the other.
+
+use super::Prompt;
+use flotor_study::screen::{Said, Told};
+use std::io::{BufRead, Write, stdin, stdout};
+use std::sync::mpsc::channel;
+use std::thread::Builder;
+
+/// The experiment at this program's standard input and output.
+///
+/// # Errors
+/// There are no threads to be had.
+pub fn at_standard_streams() -> std::io::Result<Prompt> {
+    let (teller, told) = channel();
+    // Both end with the process, or with the experiment.
+    Builder::new().name("flotor-told".to_owned()).spawn(move || {
+        for line in stdin().lock().lines().map_while(Result::ok) {
+            // A word of a newer experiment that is not known here is nothing to show.
+            let Ok(word) = serde_json::from_str::<Told>(&line) else { continue };
+            if teller.send(word).is_err() {
+                return;
+            }
+        }
+    })?;
+    let (said, sayer) = channel::<Said>();
+    Builder::new().name("flotor-said".to_owned()).spawn(move || {
+        let mut out = stdout();
+        for word in sayer {
+            let Ok(line) = serde_json::to_string(&word) else { continue };
+            if writeln!(out, "{line}").and_then(|()| out.flush()).is_err() {
+                return;
+            }
+        }
+    })?;
+    Ok(Prompt::new(told, said))
+}
