@@ -396,14 +396,16 @@ fn screens_travel_as_json_lines() {
 
 /// A measured spring with play, both strokes and coils that touch, as a test bench gives it.
 fn measured_spring() -> String {
-    let rows = (0..=400_u32).map(|step| {
+    let row = |step: u32| {
         let x_mm = f64::from(step) * 0.03;
         let straight_n = 0.8 * (x_mm - 0.3).max(0.0);
         let block_n = 0.9 * (x_mm - 9.0).max(0.0).powi(2);
         let friction_n = if step % 2 == 0 { 0.05 } else { -0.05 };
-        format!("{},{}\n", 30.0 - x_mm, straight_n + block_n + if x_mm > 0.5 { friction_n } else { 0.0 })
-    });
-    "# bench 3, spring 12\nlength_mm,force_n\n".chars().chain(rows.collect::<String>().chars()).collect()
+        let friction_n = if x_mm > 0.5 { friction_n } else { 0.0 };
+        format!("{},{}\n", 30.0 - x_mm, straight_n + block_n + friction_n)
+    };
+    let rows: String = (0..=400).map(row).collect();
+    "# bench 3, spring 12\nlength_mm,force_n\n".to_owned() + &rows
 }
 
 /// A measured curve is fitted, drawn, and served as it is: through the program, what the model answers is the table, coils

@@ -104,7 +104,7 @@ fn live(arguments: &Arguments) -> Result<Start, Failure> {
         return Ok(Start::Live(wanted));
     }
     let prompt = at_standard_streams().map_err(|error| Failure::File(error.to_string()))?;
-    Ok(Start::Sitting(wanted, prompt))
+    Ok(Start::Sitting(wanted, Box::new(prompt)))
 }
 
 /// The window as it would open on the recording, drawn on the processor.

@@ -297,7 +297,7 @@ fn a_person_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_al
     let sitting = Sitting::new(&protocol, 1, SubjectNumber::new(2).expect("a legal number"));
     let mut experiment = Attended::new(sitting, &protocol, 1, 0);
     let ((teller, told), (said, hears)) = (channel(), channel());
-    let prompt = Prompt::new(told, said);
+    let prompt = Box::new(Prompt::new(told, said));
     let folder = tempfile::tempdir().expect("a scratch folder");
     let mut host = FakeHost::new(&folder, &[]);
     let start =

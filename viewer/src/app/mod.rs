@@ -48,7 +48,7 @@ pub enum Start {
     /// A run, now or when it comes.
     Live(Wanted),
     /// A run, in front of a subject.
-    Sitting(Wanted, Prompt),
+    Sitting(Wanted, Box<Prompt>),
     /// A recording, at a moment, with the files of its plugins.
     Recording(Box<History>, Option<f64>, Vec<PathBuf>),
 }
@@ -94,7 +94,7 @@ impl Viewer {
         let (start, sitting) = match start {
             Start::Sitting(wanted, mut prompt) => {
                 prompt.open();
-                (Start::Live(wanted), Some(prompt))
+                (Start::Live(wanted), Some(*prompt))
             }
             other => (other, None),
         };
