@@ -400,7 +400,7 @@ fn measured_spring() -> String {
         let x_mm = f64::from(step) * 0.03;
         let straight_n = 0.8 * (x_mm - 0.3).max(0.0);
         let block_n = 0.9 * (x_mm - 9.0).max(0.0).powi(2);
-        let friction_n = if step % 2 == 0 { 0.05 } else { -0.05 };
+        let friction_n = if step.is_multiple_of(2) { 0.05 } else { -0.05 };
         let friction_n = if x_mm > 0.5 { friction_n } else { 0.0 };
         format!("{},{}\n", 30.0 - x_mm, straight_n + block_n + friction_n)
     };
