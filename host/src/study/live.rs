@@ -134,6 +134,7 @@ impl<'a> LiveRig<'a> {
         }
         self.apparatus.show(&self.controls, true)?;
         self.wait_for_fade();
+        self.wait_until_seen();
         let mut watch = self.shared.lock();
         if let Some(what) = watch.refused.take() {
             return Err(StimulusRefused(what).into());
@@ -194,6 +195,22 @@ impl<'a> LiveRig<'a> {
 
     fn wait_for_fade(&self) {
         std::thread::sleep(Duration::from_secs_f64(self.apparatus.fade_s()) + SETTLE);
+    }
+
+    /// Waits until the loop has seen the object: on a machine with other things to do a fade's time may pass without a tick,
+    /// and what nobody could feel is no trial.
+    fn wait_until_seen(&self) {
+        const MOST_LOOKS: u32 = 250;
+        let is_seen = || {
+            let watch = self.shared.lock();
+            watch.meter.as_ref().is_none_or(|meter| meter.finish().is_some())
+        };
+        for _ in 0..MOST_LOOKS {
+            if is_seen() || self.is_stopping() {
+                return;
+            }
+            std::thread::sleep(SETTLE);
+        }
     }
 
     /// An error if the run has ended by itself.
