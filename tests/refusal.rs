@@ -112,20 +112,20 @@ const WRONG_FILES: &[WrongFile] = &[
         name: "another contract, said by the metadata",
         make: |scratch| {
             let ours = format!("abi = \"{ABI_MAJOR}.{ABI_MINOR}\"");
-            let theirs = format!("abi = \"{}.{ABI_MINOR}\"", ABI_MAJOR + 9);
+            let theirs = format!("abi = \"{}.{ABI_MINOR}\"", ABI_MAJOR + 8);
             let bytes = patched(plugin_bytes(MODEL), ours.as_bytes(), theirs.as_bytes());
             scratch.file("other_contract.so", bytes)
         },
-        cause: "built for plugin contract 9.1, this host speaks 0.1",
+        cause: "built for plugin contract 9.0, this host speaks 1.0",
         remedy: "rebuild the plugin against this version",
     },
     WrongFile {
         name: "another contract, said by the entry alone",
         make: |scratch| {
-            let bytes = patched(plugin_bytes(MODEL), &entry_head(ABI_MAJOR), &entry_head(ABI_MAJOR + 9));
+            let bytes = patched(plugin_bytes(MODEL), &entry_head(ABI_MAJOR), &entry_head(ABI_MAJOR + 8));
             scratch.file("other_entry.so", bytes)
         },
-        cause: "built for plugin contract 9.1, this host speaks 0.1",
+        cause: "built for plugin contract 9.0, this host speaks 1.0",
         remedy: "rebuild the plugin against this version",
     },
     WrongFile {

@@ -16,11 +16,11 @@
 // Bytes a [`Message`] holds.
 #define FLOTOR_MESSAGE_BYTES 508
 
-// Major version of the contract. 0: the interfaces are drafts, and every minor may break.
-#define FLOTOR_ABI_MAJOR 0
+// Major version of the contract. Another one is another contract.
+#define FLOTOR_ABI_MAJOR 1
 
-// Minor version of the contract.
-#define FLOTOR_ABI_MINOR 1
+// Minor version of the contract. A later one only adds.
+#define FLOTOR_ABI_MINOR 0
 
 // [`Host::flags`] bit: the plugin has its own Rust runtime and may silence its panic hook.
 #define FLOTOR_HOST_QUIET_PANICS 1

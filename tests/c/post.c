@@ -7,7 +7,7 @@
 #include <string.h>
 
 FLOTOR_METADATA("kind = \"device\"\nid = \"fixture-c-post\"\nname = \"Post\"\ndoc = \"A handle that does not move, in C\"\n"
-                "version = \"0.1.0\"\nabi = \"0.1\"\nentry = \"flotor_entry_post\"\n");
+                "version = \"0.1.0\"\nabi = \"1.0\"\nentry = \"flotor_entry_post\"\n");
 
 typedef struct {
     FlotorWrench held;

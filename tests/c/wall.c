@@ -8,7 +8,7 @@
 #include <string.h>
 
 FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-c-wall\"\nname = \"Wall\"\ndoc = \"A flat wall, in C\"\n"
-                "version = \"0.1.0\"\nabi = \"0.1\"\nentry = \"flotor_entry_wall\"\n");
+                "version = \"0.1.0\"\nabi = \"1.0\"\nentry = \"flotor_entry_wall\"\n");
 
 typedef struct {
     double stiffness_n_per_m;

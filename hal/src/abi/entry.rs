@@ -5,10 +5,20 @@ use std::ffi::c_void;
 
 /// First eight bytes of every entry.
 pub const MAGIC: [u8; 8] = *b"FLOTOR\r\n";
-/// Major version of the contract. 0: the interfaces are drafts, and every minor may break.
-pub const ABI_MAJOR: u16 = 0;
-/// Minor version of the contract.
-pub const ABI_MINOR: u16 = 1;
+/// Major version of the contract. Another one is another contract.
+pub const ABI_MAJOR: u16 = 1;
+/// Minor version of the contract. A later one only adds.
+pub const ABI_MINOR: u16 = 0;
+
+/// The draft that was frozen as 1.0 as it stood.
+const FROZEN_DRAFT: (u16, u16) = (0, 1);
+
+/// True if a host of this contract loads a plugin made for that one: of the same major version, and no later.
+#[must_use]
+#[allow(clippy::absurd_extreme_comparisons)] // until there is a 1.1
+pub const fn is_spoken(major: u16, minor: u16) -> bool {
+    (major == ABI_MAJOR && minor <= ABI_MINOR) || (major == FROZEN_DRAFT.0 && minor == FROZEN_DRAFT.1)
+}
 
 /// Ids of the interfaces and extensions a plugin may offer.
 pub mod interface_ids {

@@ -134,7 +134,7 @@ mod tests {
         };
         const TEXT: [u8; length(&FACTS)] = render(&FACTS);
         let expected = "kind = \"model\"\nid = \"floor\"\nname = \"Floor\"\ndoc = \"A flat floor\"\n\
-                        version = \"1.2.3\"\nabi = \"0.1\"\nentry = \"flotor_entry_floor\"\n";
+                        version = \"1.2.3\"\nabi = \"1.0\"\nentry = \"flotor_entry_floor\"\n";
         assert_eq!(std::str::from_utf8(&TEXT), Ok(expected));
     }
 }

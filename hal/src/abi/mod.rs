@@ -35,7 +35,7 @@ pub use calibration::CalibrationTable;
 pub use device::{DeviceTable, EnergyLedgerTable};
 pub use entry::{
     ABI_MAJOR, ABI_MINOR, CallStatus, ContractSizes, Entry, HOST_QUIET_PANICS, Host, Instance, LayoutProof,
-    MAGIC, PluginKind, interface_ids,
+    MAGIC, PluginKind, interface_ids, is_spoken,
 };
 pub use export_device::device_entry;
 pub use export_model::{

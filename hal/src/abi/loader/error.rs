@@ -53,7 +53,7 @@ pub enum LoadError {
     /// Built for another contract.
     #[error(
         "{}: built for plugin contract {theirs}, this host speaks {ours}; rebuild the plugin against this \
-         version (drafts 0.x match exactly)", path.display()
+         version", path.display()
     )]
     OtherContract {
         /// The file.

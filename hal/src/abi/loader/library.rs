@@ -5,7 +5,7 @@ use super::{LoadError, Metadata, OpenedDevice, Setting, check, metadata_file};
 use crate::abi::{
     ABI_MAJOR, ABI_MINOR, ActivityTable, CalibrationTable, CenterlineTable, DetailsTable, DevicePacingTable,
     DeviceTable, EnergyLedgerTable, Entry, ForceTable, HOST_QUIET_PANICS, Host, LinearFieldTable, MAGIC,
-    PluginKind, Str, VariantTable, interface_ids,
+    PluginKind, Str, VariantTable, interface_ids, is_spoken,
 };
 use crate::{DeviceInfo, ModelInfo, Parameter};
 use std::ffi::CString;
@@ -93,7 +93,7 @@ impl Plugin {
         if entry.magic != MAGIC || (entry.size as usize) < size_of::<Entry>() {
             return Err(bad_entry());
         }
-        if (entry.abi_major, entry.abi_minor) != (ABI_MAJOR, ABI_MINOR) {
+        if !is_spoken(entry.abi_major, entry.abi_minor) {
             return Err(LoadError::OtherContract {
                 path: path.clone(),
                 theirs: format!("{}.{}", entry.abi_major, entry.abi_minor),

@@ -1,7 +1,7 @@
 //! Reads what a file says about itself without running any of it.
 
 use super::LoadError;
-use crate::abi::{ABI_MAJOR, ABI_MINOR, PluginKind, metadata};
+use crate::abi::{ABI_MAJOR, ABI_MINOR, PluginKind, is_spoken, metadata};
 use object::elf::FileHeader64;
 use object::read::elf::{ElfFile64, FileHeader, ProgramHeader, SectionHeader};
 use object::{Endianness, Object, ObjectSection, ReadCache, ReadRef};
@@ -49,12 +49,14 @@ impl Metadata {
     /// Checks that the plugin was built for the contract this host speaks.
     ///
     /// # Errors
-    /// [`LoadError::OtherContract`]. While the interfaces are drafts (major 0), the minor must match too.
+    /// [`LoadError::OtherContract`], unless [`is_spoken`].
     pub fn check_contract(&self) -> Result<(), LoadError> {
-        let ours = format!("{ABI_MAJOR}.{ABI_MINOR}");
-        if self.abi == ours {
+        let number = |digits: &str| digits.parse::<u16>().ok();
+        let theirs = self.abi.split_once('.').and_then(|(major, minor)| number(major).zip(number(minor)));
+        if theirs.is_some_and(|(major, minor)| is_spoken(major, minor)) {
             return Ok(());
         }
+        let ours = format!("{ABI_MAJOR}.{ABI_MINOR}");
         Err(LoadError::OtherContract { path: self.path.clone(), theirs: self.abi.clone(), ours })
     }
 }
