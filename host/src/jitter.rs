@@ -73,7 +73,7 @@ pub fn measure(
                 while schedule.next_time_ns() < SLICE_NS {
                     let Some(due) = schedule.wait(|_| SampleWait::NotPaced) else { break };
                     servo.tick(&due, stop, |_| ());
-                    with_servo.count(due.lateness_ns, due.missed, period_ns);
+                    with_servo.count(due.lateness_ns.unwrap_or_default(), due.missed, period_ns);
                 }
                 bare_slice(&mut bare, period_ns, window);
                 done += 1;

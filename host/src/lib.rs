@@ -11,7 +11,7 @@
 //! - [`registry`]: where plugins are.
 //! - [`session`]: from a scene to a run.
 //! - [`servo`]: the tick, the clock, the envelope; the only real-time module.
-//! - [`coupling`]: two devices held together by a virtual spring, over any delay; [`passivity`]: energy at a port.
+//! - [`coupling`]: two devices held together by a virtual spring, over any delay; [`port_energy`]: what crosses a port.
 //! - [`calibration`]: how much of a commanded force arrives.
 //! - [`stability`]: how stiff a spring the servo can render.
 //! - [`scaffold`]: the start of somebody's own plugin.
@@ -24,6 +24,8 @@
 //! - [`trace`]: what a tick leaves behind; [`mod@record`] writes it down, [`plot`] draws it.
 //! - [`cli`]: the `flotor` command.
 
+#![cfg_attr(rtsan, feature(sanitize))] // the step `blocking` of .ci/full
+
 pub mod bench;
 pub mod calibration;
 pub mod cli;
@@ -32,8 +34,8 @@ pub mod evaluate;
 pub mod headless;
 pub mod jitter;
 pub mod live;
-pub mod passivity;
 pub mod plot;
+pub mod port_energy;
 pub mod registry;
 pub mod replay;
 pub mod report;

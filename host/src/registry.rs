@@ -1,8 +1,8 @@
 //! Where plugins are, and which one an id means. Files are read, not run, until a scene needs one.
 
 use crate::scene::nearest;
-use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, read_metadata};
+use flotor_hal::abi::{Entry, PluginKind};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -22,6 +22,7 @@ pub struct SkippedFolder {
 
 /// Plugins found, in search order; of two with one id the first wins.
 pub struct Registry {
+    linked: Vec<Plugin>,
     found: Vec<Metadata>,
     shadowed: Vec<Metadata>,
     broken: Vec<LoadError>,
@@ -75,6 +76,7 @@ impl Registry {
             folders.extend([own.join("deps"), own.to_path_buf(), own.join("plugins")]);
         }
         let mut registry = Self {
+            linked: Vec::new(),
             found: Vec::new(),
             shadowed: Vec::new(),
             broken: Vec::new(),
@@ -86,6 +88,16 @@ impl Registry {
             registry.scan(&folder);
         }
         registry
+    }
+
+    /// The same with a plugin that is linked into this program, which answers to its id before any file does: for
+    /// instruments of the host, and for debuggers and sanitizers, which see through no library. Not real-time.
+    ///
+    /// # Errors
+    /// [`LoadError`], as for a file.
+    pub fn with_linked(mut self, entry: &'static Entry) -> Result<Self, LoadError> {
+        self.linked.push(Plugin::in_process(entry)?);
+        Ok(self)
     }
 
     fn scan(&mut self, folder: &Path) {
@@ -156,6 +168,11 @@ impl Registry {
     pub fn load(&self, id: &str, kind: PluginKind) -> Result<Plugin, LookupError> {
         if id.contains(std::path::MAIN_SEPARATOR) {
             return Ok(self.open(Path::new(id))?);
+        }
+        let is_meant =
+            |plugin: &&Plugin| (plugin.metadata().id.as_str(), plugin.metadata().kind) == (id, kind);
+        if let Some(linked) = self.linked.iter().find(is_meant) {
+            return Ok(linked.clone());
         }
         if let Some(metadata) = self.found.iter().find(|known| known.id == id) {
             if metadata.kind != kind {

@@ -10,6 +10,7 @@
 //!   reference.
 //! - `reach_hand`: the whole loop: what of the reference's force reaches a hand, through sampling and delay.
 //! - `report`: table, CSV and picture.
+//! - `whole_tick`: what the loop around a model costs with it, on a [`scripted`] device and on the simulated flotor.
 //!
 //! Not real-time.
 
@@ -18,7 +19,9 @@ mod error;
 mod path;
 mod reach_hand;
 mod report;
+pub mod scripted;
 mod stopwatch;
+mod whole_tick;
 
 pub use apart::{Apart, Speed};
 pub use error::Distance;
@@ -26,6 +29,7 @@ pub use path::Hand;
 pub use reach_hand::{Losses, Sampling};
 pub use report::{ApartRow, BenchReport, CaseRow};
 pub use stopwatch::Times;
+pub use whole_tick::{BenchDevice, TickCost, WholeTick};
 
 use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
 use flotor_hal::{Demand, LoopConfig};

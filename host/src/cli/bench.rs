@@ -1,13 +1,16 @@
-//! `flotor bench`: work against precision of a force model's settings.
+//! `flotor bench`: work against precision of a force model's settings, and the cost of the loop around it.
 
 use super::options::KeyValue;
 use super::{CommandError, style, write_json};
-use crate::bench::{Case, Effort, Hand, Plan, Progress, TellApart, measure};
+use crate::bench::{
+    BenchDevice, Case, Effort, Hand, Plan, Progress, TellApart, TickCost, WholeTick, measure,
+};
 use crate::registry::Registry;
 use clap::{Args, ValueEnum};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use indicatif::ProgressBar;
+use serde::Serialize;
 use std::path::PathBuf;
 
 /// `--size`
@@ -23,12 +26,14 @@ enum SizeOption {
 #[derive(Args)]
 #[command(
     after_help = "Without --case, the spring's variants and settings are compared with its exact rod; another model's\n\
-    defaults alone. Times are wall clock: compare within one run.\n\n\
+    defaults alone. With --tick, the whole tick around the model is timed instead: device, mapping, envelope, trace.\n\
+    Times are wall clock: compare within one run.\n\n\
     Examples:\n  \
     flotor bench --csv bench.csv --plot bench.svg\n  \
     flotor bench --case variant=energy --case variant=rod,accuracy=servo --size full\n  \
     flotor bench --model ./libmy_model.so --case steps=8 --case steps=64 --reference steps=1024\n  \
-    flotor bench --set preset=slender --case variant=energy --depth-mm 20 --apart rod_share"
+    flotor bench --set preset=slender --case variant=energy --depth-mm 20 --apart rod_share\n  \
+    flotor bench --tick"
 )]
 pub(crate) struct BenchArguments {
     /// Id of the model, or path to its plugin file
@@ -52,6 +57,9 @@ pub(crate) struct BenchArguments {
     /// Time calls apart for which this detail of the answer is above zero
     #[arg(long, value_name = "DETAIL")]
     apart: Option<String>,
+    /// Time the whole tick around the model, on a scripted device and on the simulated flotor
+    #[arg(long, conflicts_with_all = ["cases", "sets", "reference", "yardstick", "apart", "csv", "plot"])]
+    tick: bool,
     /// How much to time
     #[arg(long, value_enum, default_value = "short")]
     size: SizeOption,
@@ -95,6 +103,39 @@ const SPRING_WALKS: [(&str, f64); 8] = [
 ];
 
 pub(crate) fn run(arguments: &BenchArguments) -> Result<(), CommandError> {
+    if arguments.tick { time_ticks(arguments) } else { compare_cases(arguments) }
+}
+
+/// A whole tick of the loop on one device.
+#[derive(Serialize)]
+struct TickRow {
+    device: BenchDevice,
+    #[serde(flatten)]
+    cost: TickCost,
+}
+
+/// `--tick`
+fn time_ticks(arguments: &BenchArguments) -> Result<(), CommandError> {
+    let batches = match arguments.size {
+        SizeOption::Short => 2_000,
+        SizeOption::Full => 50_000,
+    };
+    let row = |device: BenchDevice| {
+        let cost = WholeTick::prepare(device, &arguments.model)?.time(batches);
+        Ok(TickRow { device, cost })
+    };
+    let rows = BenchDevice::ALL.into_iter().map(row).collect::<Result<Vec<_>, CommandError>>()?;
+    if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
+        let title = format!("a tick with `{}`, trace on, virtual clock", arguments.model);
+        say!("{}", style::title(&format!("{title:<46}   median     p99  fastest, ns")));
+        for TickRow { device, cost: TickCost { median_ns, p99_ns, fastest_ns } } in &rows {
+            say!("  {:<46}  {median_ns:>6.0}  {p99_ns:>6.0}   {fastest_ns:>6.0}", device.name());
+        }
+    }
+    arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &rows))
+}
+
+fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
     let plugin = Registry::search(&[]).load(&arguments.model, PluginKind::Model)?;
     let is_spring = plugin.metadata().id == "spring" && arguments.cases.is_empty();
     let cases: Vec<&str> = match (arguments.cases.is_empty(), is_spring) {

@@ -2,7 +2,7 @@
 
 use super::{CouplingConfig, PassivityMode, Pull, Tank};
 use crate::mapping::{Mapping, MappingConfig};
-use crate::passivity::{Controller, Expected, PortObserver};
+use crate::port_energy::{Controller, Expected, PortObserver};
 use flotor_hal::{DVec3, DeviceState, Pose, Twist, Wrench, rotation_vector};
 
 /// What one end tells the other in every tick, in the shared frame.

@@ -18,7 +18,9 @@
 //!
 //! Sources: account and transfer of energy, M. Franken, S. Stramigioli, S. Misra, C. Secchi, A. Macchelli, "Bilateral
 //! telemanipulation with time delays: a two-layer approach combining passivity and transparency", IEEE Trans. Robotics
-//! 27(4), 2011, sections III and IV; controller at an end, see [`crate::passivity`].
+//! 27(4), 2011, sections III and IV; controller at an end, see [`crate::port_energy`].
+#![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
+#![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
 mod delay;
 mod end;

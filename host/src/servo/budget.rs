@@ -58,10 +58,10 @@ impl TimeBudget {
         Allowed::Fading(1.0 - elapsed_ns as f64 / FADE_NS as f64)
     }
 
-    /// When a step begins, ns; 0 if nobody looks at the clock. Real-time: bounded, no allocation.
+    /// When a step begins, ns; `None` if nobody looks at the clock. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn begin(&self) -> u64 {
-        if self.limit_ns.is_some() { monotonic_ns() } else { 0 }
+    pub(super) fn begin(&self) -> Option<u64> {
+        self.limit_ns.map(|_| monotonic_ns())
     }
 
     /// Books a step that began at [`Self::begin`]; true if it took too long. Real-time: bounded, no allocation.
@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn without_a_limit_nobody_looks_at_the_clock() {
         let mut budget = TimeBudget::new(None);
-        assert_eq!(budget.begin(), 0);
+        assert_eq!(budget.begin(), None);
         assert!((0..100).all(|tick| !budget.end(0, tick, tick)));
         assert_eq!(budget.allowed(u64::MAX), Allowed::Asked);
     }

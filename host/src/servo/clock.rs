@@ -74,10 +74,22 @@ enum Pace {
 /// A tick that is due, and how the machine kept to it.
 pub(crate) struct Due {
     pub(crate) tick: Tick,
-    /// How long after its deadline it starts, ns.
-    pub(crate) lateness_ns: u64,
+    /// How long after its deadline it starts, ns; on the virtual clock nothing is ever late.
+    pub(crate) lateness_ns: Option<u64>,
     /// Ticks skipped just before it.
     pub(crate) missed: u64,
+    /// When it starts on the machine's clock, ns, if anybody has looked.
+    pub(crate) started_ns: Option<u64>,
+}
+
+/// How a wait ended on the machine's clock.
+#[derive(Clone, Copy)]
+struct Woken {
+    now_ns: u64,
+    /// After the deadline of the first period that has not passed.
+    late_ns: u64,
+    /// Whole periods that passed before it, or samples nobody read.
+    missed: u64,
 }
 
 impl Schedule {
@@ -104,14 +116,15 @@ impl Schedule {
     /// Waits for the next tick; `wait_for_sample` is how to wait for a device, for so many ns at most, if it is the
     /// device that sets the pace. `None` if it turns out not to. Real-time: sleeps, then spins; no allocation.
     pub(crate) fn wait(&mut self, wait_for_sample: impl FnOnce(u64) -> SampleWait) -> Option<Due> {
-        let (lateness_ns, missed) = match self.pace {
-            Pace::Virtual => (0, 0),
-            Pace::Clock(window) => self.wait_for_deadline(window),
+        let woken = match self.pace {
+            Pace::Virtual => None,
+            Pace::Clock(window) => Some(self.wait_for_deadline(window)),
             Pace::Device { last_ns } => {
                 let waited = wait_for_sample(Self::PATIENCE_PERIODS * self.period_ns);
-                self.follow(last_ns, waited)?
+                Some(self.follow(last_ns, waited)?)
             }
         };
+        let missed = woken.map_or(0, |woken| woken.missed);
         self.slot += missed;
         let tick = Tick {
             index: self.next_index,
@@ -121,15 +134,20 @@ impl Schedule {
         self.last_slot = self.slot;
         self.slot += 1;
         self.next_index += 1;
-        Some(Due { tick, lateness_ns, missed })
+        Some(Due {
+            tick,
+            lateness_ns: woken.map(|woken| woken.late_ns),
+            missed,
+            started_ns: woken.map(|woken| woken.now_ns),
+        })
     }
 
     /// How long a tick waits for a sample. After that it runs without one: force has to fade out even if the device
     /// has nothing more to say.
     const PATIENCE_PERIODS: u64 = 2;
 
-    /// Lateness and whole periods missed of a tick on the machine's clock.
-    fn wait_for_deadline(&mut self, window: SpinWindow) -> (u64, u64) {
+    /// Waits for the deadline of a tick on the machine's clock.
+    fn wait_for_deadline(&mut self, window: SpinWindow) -> Woken {
         let deadline = self.start_ns + self.slot * self.period_ns;
         let mut now = monotonic_ns();
         if now + window.spin_ns < deadline {
@@ -143,11 +161,11 @@ impl Schedule {
         let late = now - deadline;
         // Whole periods that have passed belong to ticks that nobody can use any more.
         let missed = late / self.period_ns;
-        (late - missed * self.period_ns, missed)
+        Woken { now_ns: now, late_ns: late - missed * self.period_ns, missed }
     }
 
-    /// Lateness and samples missed of a tick that a sample began, or that waited for one in vain.
-    fn follow(&mut self, last_ns: u64, waited: SampleWait) -> Option<(u64, u64)> {
+    /// A tick that a sample began, or that waited for one in vain.
+    fn follow(&mut self, last_ns: u64, waited: SampleWait) -> Option<Woken> {
         let periods = match waited {
             SampleWait::NotPaced => return None,
             SampleWait::Arrived { samples } => samples.max(1),
@@ -159,7 +177,8 @@ impl Schedule {
         };
         let now_ns = monotonic_ns();
         self.pace = Pace::Device { last_ns: now_ns };
-        Some((now_ns.saturating_sub(last_ns + periods * self.period_ns), periods - 1))
+        let late_ns = now_ns.saturating_sub(last_ns + periods * self.period_ns);
+        Some(Woken { now_ns, late_ns, missed: periods - 1 })
     }
 
     /// Waits for the end of the last tick's period; time since the start, ns.
@@ -193,6 +212,7 @@ pub(crate) fn sleep_until(deadline_ns: u64) {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::disallowed_methods)] // a test may sleep and look at another clock
     use super::*;
 
     /// What a schedule does not ask for on a clock.
@@ -245,7 +265,7 @@ mod tests {
         std::thread::sleep(std::time::Duration::from_millis(20));
         let due = wait(&mut schedule);
         assert!(due.missed >= 15, "{}", due.missed); // 20 periods passed; a loaded machine only adds to them
-        assert!(due.lateness_ns < period_ns);
+        assert!(due.lateness_ns.is_some_and(|late_ns| late_ns < period_ns));
         assert_eq!(due.tick.index, 1);
         assert_eq!(due.tick.dt_ns, (due.missed + 1) * period_ns);
         assert_eq!(due.tick.time_ns, due.tick.dt_ns);

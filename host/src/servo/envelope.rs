@@ -1,30 +1,35 @@
 //! The envelope: what stands between models and device, and what nothing gets past.
 //!
 //! Order: guard (a number that is not finite becomes zero) -> gate (the start-up ramp and the other
-//! [states of the run](super::state)) -> velocity limit -> boundary wall -> [passivity](super::passivity) -> force
-//! and torque limits -> slew limit.
-//! The slew limit is last, so that no fault upstream, not even a model that
-//! vanishes, makes the force jump; the limits hold after it too, because the limited region is convex and the
-//! slew limit only moves along the line from the last wrench, which was inside, to the new one, which is.
+//! [states of the run](super::state)) -> velocity limit -> [boundary wall](super::boundary) -> force and torque limits
+//! -> [passivity](super::passivity), and the limits once more if it took something away -> slew limit.
+//!
+//! The slew limit is last, so that no fault upstream, not even a model that vanishes, makes the force jump; the limits
+//! hold after it too, because the limited region is convex and the slew limit only moves along the line from the last
+//! wrench, which was inside, to the new one, which is.
+//!
+//! Nearly every tick is within all limits: each stage sees that first, by comparisons alone, and computes only when it
+//! has to act.
 
+use super::boundary::BoundaryWall;
 use super::passivity::Passivity;
 use super::state::Gate;
-use crate::passivity::Controller;
+use crate::port_energy::Controller;
 use crate::scene::{Boundary, Limits};
 use crate::trace::Events;
-use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Wrench, rotation_vector};
+use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Wrench};
 
 /// Limits of force, torque and their change, and a wall at the edge of the range.
 pub struct Envelope {
     max_force_n: DVec3,
     max_torque_nm: DVec3,
-    force_slew_n_per_s: f64,
-    torque_slew_nm_per_s: f64,
+    /// Fastest change of force (N/s) and torque (N·m/s).
+    slew_per_s: [f64; 2],
+    /// What that is in a period.
+    most_change_in_a_period: [f64; 2],
     velocity_m_per_s: DVec3,
     angular_velocity_rad_per_s: DVec3,
-    boundary: Boundary,
-    wall_m: DVec3,
-    wall_rad: DVec3,
+    wall: BoundaryWall,
     passivity: Passivity,
     period_ns: u64,
     last: Wrench,
@@ -37,17 +42,20 @@ impl Envelope {
     pub fn new(limits: &Limits, boundary: &Boundary, device: &Capabilities, period_ns: u64) -> Self {
         let tighter =
             |scene: [f64; 3], device: [f64; 3]| DVec3::from_array(scene).min(DVec3::from_array(device));
-        let inside = |range: [f64; 3], margin: f64| (DVec3::from_array(range) - margin).max(DVec3::ZERO);
+        let slew_per_s = [
+            limits.force_slew_n_per_s.min(device.max_force_slew_n_per_s),
+            limits.torque_slew_nm_per_s.min(device.max_torque_slew_nm_per_s),
+        ];
+        let max_force_n = tighter(limits.force_n, device.max_force_n);
+        let max_torque_nm = tighter(limits.torque_nm, device.max_torque_nm);
         Self {
-            max_force_n: tighter(limits.force_n, device.max_force_n),
-            max_torque_nm: tighter(limits.torque_nm, device.max_torque_nm),
-            force_slew_n_per_s: limits.force_slew_n_per_s.min(device.max_force_slew_n_per_s),
-            torque_slew_nm_per_s: limits.torque_slew_nm_per_s.min(device.max_torque_slew_nm_per_s),
+            max_force_n,
+            max_torque_nm,
+            slew_per_s,
+            most_change_in_a_period: most_change(slew_per_s, period_ns),
             velocity_m_per_s: DVec3::from_array(limits.velocity_m_per_s),
             angular_velocity_rad_per_s: DVec3::from_array(limits.angular_velocity_rad_per_s),
-            boundary: *boundary,
-            wall_m: inside(device.range_m, boundary.margin_m),
-            wall_rad: inside(device.range_rad, boundary.margin_rad),
+            wall: BoundaryWall::new(boundary, device),
             // Damping the device is known to stand: that of its boundary.
             passivity: Passivity::new(
                 limits.passivity,
@@ -56,6 +64,7 @@ impl Envelope {
                     damping_nms_per_rad: boundary.damping_nms_per_rad,
                     period_s: period_ns as f64 * 1.0e-9,
                 },
+                [max_force_n, max_torque_nm],
             ),
             period_ns,
             last: Wrench::ZERO,
@@ -87,14 +96,20 @@ impl Envelope {
         };
         let gated = guarded * gate.models;
         let driven = self.limit_speed(&gated, state, events);
-        let walled = driven + self.wall(state, events) * gate.boundary;
+        let walled = match self.wall.push(state) {
+            None => driven,
+            Some(push) => {
+                events.insert(Events::BOUNDARY);
+                driven + push * gate.boundary
+            }
+        };
         // Before the energy is looked at: what cannot be sent anyway may be too large to be squared.
         let bounded = self.limit(&walled, events);
         let limited = match self.passivity.guard(&bounded, state) {
             None => bounded,
             Some(less) => {
                 events.insert(Events::PASSIVITY_DAMPED);
-                // Damping may point where there was less to spare.
+                // Damping may be more than an axis can give.
                 self.limit(&less, events)
             }
         };
@@ -115,36 +130,28 @@ impl Envelope {
     #[inline]
     fn limit_speed(&self, wrench: &Wrench, state: &DeviceState, events: &mut Events) -> Wrench {
         let (velocity, spin) = (state.twist.linear(), state.twist.angular());
-        let excess = (velocity.abs() / self.velocity_m_per_s).max_element();
-        let spin_excess = (spin.abs() / self.angular_velocity_rad_per_s).max_element();
-        if excess <= 1.0 && spin_excess <= 1.0 {
+        let (most, most_spin) = (self.velocity_m_per_s, self.angular_velocity_rad_per_s);
+        if velocity.abs().cmple(most).all() && spin.abs().cmple(most_spin).all() {
             return *wrench;
         }
         events.insert(Events::VELOCITY_LIMITED);
+        let excess = (velocity.abs() / most).max_element();
+        let spin_excess = (spin.abs() / most_spin).max_element();
         let force = without_drive(wrench.force(), velocity, excess);
         Wrench::new(force, without_drive(wrench.torque(), spin, spin_excess))
     }
 
-    /// Spring and damper that push back what has left the range. Zero inside.
-    fn wall(&self, state: &DeviceState, events: &mut Events) -> Wrench {
-        if !state.is_finite() {
-            return Wrench::ZERO;
+    #[inline]
+    fn limit(&self, wrench: &Wrench, events: &mut Events) -> Wrench {
+        let (force, torque) = (wrench.force(), wrench.torque());
+        if force.abs().cmple(self.max_force_n).all() && torque.abs().cmple(self.max_torque_nm).all() {
+            return *wrench;
         }
-        let Boundary {
-            stiffness_n_per_m, damping_ns_per_m, stiffness_nm_per_rad, damping_nms_per_rad, ..
-        } = self.boundary;
-        let (position_m, velocity) = (state.pose.position(), state.twist.linear());
-        let force = wall(position_m, velocity, self.wall_m, stiffness_n_per_m, damping_ns_per_m);
-        let (rotation_rad, spin) = (rotation_vector(state.pose.orientation()), state.twist.angular());
-        let torque = wall(rotation_rad, spin, self.wall_rad, stiffness_nm_per_rad, damping_nms_per_rad);
-        if force.is_none() && torque.is_none() {
-            return Wrench::ZERO;
-        }
-        events.insert(Events::BOUNDARY);
-        Wrench::new(force.unwrap_or(DVec3::ZERO), torque.unwrap_or(DVec3::ZERO))
+        self.shrink(wrench, events)
     }
 
-    fn limit(&self, wrench: &Wrench, events: &mut Events) -> Wrench {
+    #[cold]
+    fn shrink(&self, wrench: &Wrench, events: &mut Events) -> Wrench {
         let force = shrink_into_box(wrench.force(), self.max_force_n);
         let torque = shrink_into_box(wrench.torque(), self.max_torque_nm);
         // On an axis that is not driven nothing is limited: pairing has said that nothing is felt there.
@@ -159,34 +166,34 @@ impl Envelope {
         Wrench::new(force, torque)
     }
 
+    #[inline]
     fn slew(&self, wrench: &Wrench, tick: &Tick, events: &mut Events) -> Wrench {
-        // A tick after missed ones may change no more than one on time: the hand felt nothing in between.
-        #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
-        let period_s = tick.dt_ns.min(self.period_ns).max(1) as f64 * 1.0e-9;
-        let period_s = if tick.dt_ns == 0 { self.period_ns as f64 * 1.0e-9 } else { period_s };
-        let force = move_towards(self.last.force(), wrench.force(), self.force_slew_n_per_s * period_s);
-        let torque = move_towards(self.last.torque(), wrench.torque(), self.torque_slew_nm_per_s * period_s);
-        let slewed = Wrench::new(force, torque);
-        if slewed != *wrench {
-            events.insert(Events::SLEW_LIMITED);
+        let [force_n, torque_nm] = self.most_change(tick);
+        let force = step_short_of(self.last.force(), wrench.force(), force_n);
+        let torque = step_short_of(self.last.torque(), wrench.torque(), torque_nm);
+        if force.is_none() && torque.is_none() {
+            return *wrench;
         }
-        slewed
+        events.insert(Events::SLEW_LIMITED);
+        Wrench::new(force.unwrap_or(wrench.force()), torque.unwrap_or(wrench.torque()))
+    }
+
+    /// How far force (N) and torque (N·m) may move in a tick. One after missed ticks may change no more than one on time:
+    /// the hand felt nothing in between.
+    #[inline]
+    fn most_change(&self, tick: &Tick) -> [f64; 2] {
+        if tick.dt_ns == 0 || tick.dt_ns >= self.period_ns {
+            return self.most_change_in_a_period;
+        }
+        most_change(self.slew_per_s, tick.dt_ns)
     }
 }
 
-/// Spring and damper along the ray from the centre, outside an ellipsoid (a sphere for equal ranges: the thesis's
-/// boundary, section 3.2); `None` inside. Damping acts outwards only: the wall never pulls.
-fn wall(at: DVec3, velocity: DVec3, semi_axes: DVec3, stiffness: f64, damping: f64) -> Option<DVec3> {
-    // An axis without range (0/0 at its centre) cannot move and needs no wall; the others keep theirs.
-    let beyond = DVec3::select(at.cmpeq(DVec3::ZERO), DVec3::ZERO, at / semi_axes).length();
-    if beyond.is_nan() || beyond <= 1.0 {
-        return None;
-    }
-    let distance = at.length();
-    let outward = at / distance;
-    let depth = distance - distance / beyond;
-    let push = (stiffness * depth + damping * velocity.dot(outward).max(0.0)).max(0.0);
-    Some(outward * -push)
+/// The change in so many ns at rates per s.
+#[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
+fn most_change(slew_per_s: [f64; 2], dt_ns: u64) -> [f64; 2] {
+    let dt_s = dt_ns as f64 * 1.0e-9;
+    slew_per_s.map(|per_s| per_s * dt_s)
 }
 
 /// A force without the part along the velocity that adds to it, which fades from all at an excess of 1 to nothing at 2.
@@ -209,11 +216,12 @@ fn shrink_into_box(vector: DVec3, half_sides: DVec3) -> DVec3 {
     if excess <= 1.0 { vector } else { (vector / excess).clamp(-half_sides, half_sides) }
 }
 
-/// From `from` towards `to`, by `step` at most.
-fn move_towards(from: DVec3, to: DVec3, step: f64) -> DVec3 {
+/// The point `most` from `from` on the way to `to`; `None` if `to` is no farther than that.
+#[inline]
+fn step_short_of(from: DVec3, to: DVec3, most: f64) -> Option<DVec3> {
     let way = to - from;
-    let length = way.length();
-    if length <= step { to } else { from + way * (step / length) }
+    let squared = way.length_squared();
+    if squared <= most * most { None } else { Some(from + way * (most / squared.sqrt())) }
 }
 
 #[cfg(test)]

@@ -38,6 +38,13 @@ pub(crate) fn exchange(models: usize, mut schedule: Vec<(u64, Replacement)>) -> 
 }
 
 impl Exchange {
+    /// True if a replacement is due at this tick. Real-time: bounded, no allocation.
+    #[inline]
+    pub(crate) fn is_due(&self, tick: &Tick) -> bool {
+        let scheduled = self.schedule.get(self.next).is_some_and(|(time_ns, _)| *time_ns <= tick.time_ns);
+        scheduled || !self.arriving.is_empty()
+    }
+
     /// Hands back what has faded out and puts in what is due; `told` hears of model and generation.
     ///
     /// Real-time: bounded by the models and what is scheduled, no allocation.

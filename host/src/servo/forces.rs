@@ -176,6 +176,12 @@ impl Forces {
         }
     }
 
+    /// True if a layer may be fading out. Real-time: bounded by the devices, no allocation.
+    #[inline]
+    pub(crate) fn is_fading(&self) -> bool {
+        self.stacks.iter().any(ModelStack::is_fading)
+    }
+
     /// A layer that has faded out, and the number of its model. Real-time: bounded by the models, no allocation.
     #[inline]
     pub(crate) fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {

@@ -4,7 +4,10 @@
 //!
 //! Nothing in a tick allocates, locks, formats or waits on another thread. What a tick leaves behind is a
 //! [`TickRecord`]; whoever watches gets it through a ring, off the loop.
+#![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
+#![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
+mod boundary;
 mod budget;
 mod clock;
 mod engine;
@@ -73,6 +76,15 @@ pub(crate) struct Servo {
     heart: Heartbeat,
     run: RunState,
     timing: Timing,
+    /// When the last tick ended, ns, if nothing else has happened since.
+    ended_ns: Option<u64>,
+}
+
+/// What is known after a tick, beside the ports.
+struct Done {
+    /// Of the run, not of a device.
+    events: Events,
+    compute_ns: u64,
 }
 
 impl Servo {
@@ -94,14 +106,44 @@ impl Servo {
             heart: Heartbeat::default(),
             run: RunState::START,
             timing: Timing::default(),
+            ended_ns: None,
         }
     }
 
     /// One tick; `leave` gets what it leaves behind, a record for each device. Real-time: bounded by devices and models,
     /// no allocation.
+    #[inline]
+    #[cfg_attr(rtsan, sanitize(realtime = "nonblocking"))]
     pub(crate) fn tick(&mut self, due: &Due, stop: &StopSwitch, mut leave: impl FnMut(&TickRecord)) {
-        let Due { tick, lateness_ns, missed } = due;
-        let started = monotonic_ns();
+        let Done { events, compute_ns } = self.advance(due, stop);
+        for (device, (station, port)) in (0..).zip(self.stations.iter().zip(&self.ports)) {
+            let Port { state, asked, commanded, energy_j, .. } = port;
+            let mut events = events;
+            events.insert(port.events);
+            leave(&TickRecord {
+                tick: due.tick.index,
+                device,
+                time_ns: due.tick.time_ns,
+                dt_ns: due.tick.dt_ns,
+                pose: state.pose,
+                twist: state.twist,
+                model: *asked,
+                commanded: *commanded,
+                delivered: state.delivered,
+                energy_j: *energy_j,
+                port_energy_j: station.envelope.port_energy_j(),
+                events,
+                buttons: state.buttons,
+                lateness_ns: due.lateness_ns.unwrap_or_default(),
+                compute_ns,
+            });
+        }
+    }
+
+    /// All of a tick but its records.
+    fn advance(&mut self, due: &Due, stop: &StopSwitch) -> Done {
+        let Due { tick, lateness_ns, missed, .. } = due;
+        let started = due.started_ns.or(self.ended_ns).unwrap_or_else(monotonic_ns);
         let mut watch = StageWatch::start(tick.index, started);
         let mut events = if *missed > 0 { Events::MISSED } else { Events::NONE };
 
@@ -123,38 +165,34 @@ impl Servo {
         self.heart.enter(tick.index, Place::Waiting);
         watch.lap(&mut self.timing, Stage::Write);
 
-        let compute_ns = monotonic_ns() - started;
+        let ended = monotonic_ns();
+        self.ended_ns = Some(ended);
+        let compute_ns = ended - started;
         self.account(*lateness_ns, compute_ns, *missed);
-        for (device, (station, port)) in (0..).zip(self.stations.iter().zip(&self.ports)) {
-            let Port { state, asked, commanded, energy_j, .. } = port;
-            let mut events = events;
-            events.insert(port.events);
-            leave(&TickRecord {
-                tick: tick.index,
-                device,
-                time_ns: tick.time_ns,
-                dt_ns: tick.dt_ns,
-                pose: state.pose,
-                twist: state.twist,
-                model: *asked,
-                commanded: *commanded,
-                delivered: state.delivered,
-                energy_j: *energy_j,
-                port_energy_j: station.envelope.port_energy_j(),
-                events,
-                buttons: state.buttons,
-                lateness_ns: *lateness_ns,
-                compute_ns,
-            });
+        Done { events, compute_ns }
+    }
+
+    /// Something else than a tick has happened since the last one. Between two ticks on the virtual clock there is nothing
+    /// but the record of the first: one look at the machine's clock ends the one and begins the other.
+    #[inline]
+    pub(crate) fn pause(&mut self) {
+        self.ended_ns = None;
+    }
+
+    /// What was to change before this tick does so now. Nearly always that is nothing.
+    #[inline]
+    fn change_parameters(&mut self, tick: &Tick, events: &mut Events) {
+        let Self { forces, parameters, exchange, .. } = self;
+        // Looked at before the replacements: whoever sent one of these after a replacement has sent that too.
+        let waiting = parameters.waiting();
+        if waiting > 0 || parameters.is_due(tick) || exchange.is_due(tick) || forces.is_fading() {
+            self.apply_changes(tick, waiting, events);
         }
     }
 
-    /// What was to change before this tick does so now.
-    #[inline]
-    fn change_parameters(&mut self, tick: &Tick, events: &mut Events) {
+    #[inline(never)] // out of the way of the many ticks without
+    fn apply_changes(&mut self, tick: &Tick, waiting: usize, events: &mut Events) {
         let Self { stations, forces, parameters, exchange, .. } = self;
-        // Looked at before the replacements: whoever sent one of these after a replacement has sent that too.
-        let waiting = parameters.waiting();
         let devices = stations.len();
         let mut replaced = false;
         exchange.apply_due(tick, forces, |model, generation| {
@@ -212,8 +250,11 @@ impl Servo {
     /// Takes the run where the samples, the clock and everybody who may stop it lead.
     #[inline]
     fn follow(&mut self, sample: RunEvent, tick: &Tick, stop: &StopSwitch, events: &mut Events) {
-        self.happen(RunEvent::Time, tick);
-        self.happen(sample, tick);
+        // An active run with a sample goes on as it is.
+        if (self.run, sample) != (RunState::Active, RunEvent::SamplesBack) {
+            self.happen(RunEvent::Time, tick);
+            self.happen(sample, tick);
+        }
         if stop.is_stop_asked() {
             self.happen(RunEvent::StopAsked, tick);
         }
@@ -234,13 +275,13 @@ impl Servo {
     }
 
     #[inline]
-    fn account(&mut self, lateness_ns: u64, compute_ns: u64, missed: u64) {
-        self.timing.lateness.record(lateness_ns);
+    fn account(&mut self, lateness_ns: Option<u64>, compute_ns: u64, missed: u64) {
         self.timing.compute.record(compute_ns);
         self.timing.ticks += 1;
         self.timing.missed += missed;
-        if lateness_ns > self.config.period_ns / 10 {
-            self.timing.late += 1;
+        if let Some(lateness_ns) = lateness_ns {
+            self.timing.lateness.record(lateness_ns);
+            self.timing.late += u64::from(lateness_ns > self.config.period_ns / 10);
         }
     }
 

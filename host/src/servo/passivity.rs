@@ -1,10 +1,10 @@
-//! The energy account of a device's port in the servo, and the controller on top that a scene may ask for.
+//! The envelope's stage for energy: the account of a device's port, and the controller on top that a scene may ask for.
 //!
-//! How energy is measured and kept: [`crate::passivity`].
+//! What crosses a port and how it is kept back: [`crate::port_energy`].
 
-use crate::passivity::{Controller, Expected, PortObserver};
+use crate::port_energy::{Controller, Expected, PortObserver};
 use crate::scene::PassivityMode;
-use flotor_hal::{DeviceState, Wrench};
+use flotor_hal::{DVec3, DeviceState, Twist, Wrench};
 
 /// Accelerations that a handle may have without its next sample being a surprise: 40 N on 0.58 kg are 69 m/s², and
 /// a hand in between takes most of it; for rotation the same at a lever of a tenth of a metre.
@@ -15,13 +15,16 @@ pub(super) struct Passivity {
     mode: PassivityMode,
     observer: PortObserver,
     controller: Controller,
+    /// 1 for each axis of force and torque that is driven, 0 for the others.
+    driven: [DVec3; 2],
     energy_j: f64,
 }
 
 impl Passivity {
-    /// Not real-time.
-    pub(super) fn new(mode: PassivityMode, controller: Controller) -> Self {
-        Self { mode, observer: PortObserver::default(), controller, energy_j: 0.0 }
+    /// For a port at which at most this force and torque may be sent. Not real-time.
+    pub(super) fn new(mode: PassivityMode, controller: Controller, most: [DVec3; 2]) -> Self {
+        let driven = most.map(|most| DVec3::select(most.cmpgt(DVec3::ZERO), DVec3::ONE, DVec3::ZERO));
+        Self { mode, observer: PortObserver::default(), controller, driven, energy_j: 0.0 }
     }
 
     /// Books what has crossed the port since the last sample, while `held` was applied. Real-time: bounded, no
@@ -38,13 +41,18 @@ impl Passivity {
     }
 
     /// The wrench with as much taken away as it takes to keep the energy from becoming negative by the next sample,
-    /// if that is anything. Real-time: bounded, no allocation.
+    /// if that is anything. Only motion along driven axes counts: along the others nothing can be damped, and damping
+    /// that was counted on there would be missed.
+    ///
+    /// Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn guard(&self, wrench: &Wrench, state: &DeviceState) -> Option<Wrench> {
         match self.mode {
             PassivityMode::Observe => None,
             PassivityMode::Control => {
-                self.controller.keep_within(self.energy_j, wrench, &state.twist, EXPECTED)
+                let [linear, angular] = self.driven;
+                let slowed = Twist::new(state.twist.linear() * linear, state.twist.angular() * angular);
+                self.controller.keep_within(self.energy_j, wrench, &slowed, EXPECTED)
             }
         }
     }
@@ -53,13 +61,13 @@ impl Passivity {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flotor_hal::{DQuat, DVec3, Pose, Twist};
+    use flotor_hal::{DQuat, Pose};
 
     const PERIOD_S: f64 = 1.0e-3;
 
     fn passivity(mode: PassivityMode) -> Passivity {
         let controller = Controller { damping_ns_per_m: 15.0, damping_nms_per_rad: 0.15, period_s: PERIOD_S };
-        Passivity::new(mode, controller)
+        Passivity::new(mode, controller, [DVec3::splat(40.0); 2])
     }
 
     fn at(z_m: f64, velocity_m_per_s: f64) -> DeviceState {
@@ -119,6 +127,22 @@ mod tests {
         assert!(moving.force().z < 0.0, "15 N s/m at 0.1 m/s are more than 0.5 N: {moving:?}");
         let at_rest = controller.guard(&push, &at(0.0, 0.0)).expect("it is too much");
         assert_eq!(at_rest, Wrench::ZERO, "nothing to damp");
+    }
+
+    /// A planar device that is carried along an axis it cannot drive: that motion damps nothing and takes nothing.
+    #[test]
+    fn what_cannot_be_slowed_is_not_counted_on() {
+        let damping = Controller { damping_ns_per_m: 15.0, damping_nms_per_rad: 0.15, period_s: PERIOD_S };
+        let planar =
+            Passivity::new(PassivityMode::Control, damping, [DVec3::new(3.0, 3.0, 0.0), DVec3::ZERO]);
+        let mut state = at(0.0, 0.5); // along z
+        state.twist.linear_m_per_s[0] = 0.1;
+        let push = Wrench::from_force(DVec3::X * 2.0);
+        let kept = planar.guard(&push, &state).expect("there is no energy for it").force();
+        assert_eq!(kept.z, 0.0, "{kept}");
+        let way = state.twist.linear() * PERIOD_S;
+        let surprise_m = 0.5 * EXPECTED.acceleration_m_per_s2 * PERIOD_S * PERIOD_S;
+        assert!(kept.x * way.x + kept.x.abs() * surprise_m <= 1.0e-15, "{kept} still brings energy out");
     }
 
     /// The promise of the controller: no motion within what is expected makes the energy negative.

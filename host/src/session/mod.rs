@@ -341,6 +341,7 @@ impl Session {
                 observer.observe(&record);
             }
             controls.sweep();
+            runner.servo.pause();
         }
         runner.finish(0, RealTimeReport::not_asked())
     }

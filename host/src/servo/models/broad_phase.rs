@@ -39,8 +39,8 @@ impl Bounds {
 
     /// The box that holds both. Real-time: bounded, no allocation.
     pub(super) fn with(self, other: Self) -> Self {
-        let pairs = |a: [f32; 3], b: [f32; 3], pick: fn(f32, f32) -> f32| {
-            std::array::from_fn(|axis| pick(a[axis], b[axis]))
+        let pairs = |[ax, ay, az]: [f32; 3], [bx, by, bz]: [f32; 3], pick: fn(f32, f32) -> f32| {
+            [pick(ax, bx), pick(ay, by), pick(az, bz)]
         };
         Self {
             low_m: pairs(self.low_m, other.low_m, f32::min),
@@ -101,32 +101,14 @@ impl BroadPhase {
         Self { bounds: bounds.into(), always, grid }
     }
 
-    /// Calls `act` for each object that can act with the handle at `position_m`, in order of their numbers.
+    /// The objects that can act with the handle at `position_m`, in order of their numbers.
     ///
     /// Real-time: bounded by the objects that are near or may act anywhere; no allocation.
     #[inline]
-    pub(super) fn for_each_near(&self, position_m: DVec3, mut act: impl FnMut(usize)) {
-        let mut near = self.grid.cell(position_m).iter().copied().peekable();
-        let mut always = self.always.iter().copied().peekable();
-        loop {
-            // The smaller number first, and one that is in both lists once: sums do not depend on who sleeps.
-            let object = match (near.peek(), always.peek()) {
-                (Some(a), Some(b)) if a < b => near.next(),
-                (Some(a), Some(b)) if a == b => {
-                    near.next();
-                    always.next()
-                }
-                (Some(_), None) => near.next(),
-                (_, Some(_)) => always.next(),
-                (None, None) => return,
-            };
-            let Some(object) = object else { return };
-            let object = object as usize;
-            match self.bounds.get(object) {
-                Some(Some(bounds)) if !bounds.contains(position_m) => {}
-                _ => act(object),
-            }
-        }
+    pub(super) fn near(&self, position_m: DVec3) -> Near<'_> {
+        // Where no object has a place of its own there is no cell to look for.
+        let in_cell = if self.grid.objects.is_empty() { &[] } else { self.grid.cell(position_m) };
+        Near { bounds: &self.bounds, in_cell, always: &self.always, position_m }
     }
 
     /// A live parameter has changed where an object can act: it is looked at in every tick from now on.
@@ -168,8 +150,51 @@ impl BroadPhase {
     }
 }
 
+/// Objects that can act where the handle is: see [`BroadPhase::near`].
+pub(super) struct Near<'a> {
+    bounds: &'a [Option<Bounds>],
+    /// Those of the cell, and those that are always looked at, not looked at yet.
+    in_cell: &'a [u32],
+    always: &'a [u32],
+    position_m: DVec3,
+}
+
+impl Near<'_> {
+    /// The smaller number first, and one that is in both lists once: sums do not depend on who sleeps.
+    #[inline]
+    fn next_to_look_at(&mut self) -> Option<u32> {
+        let (cell, always) = (self.in_cell.split_first(), self.always.split_first());
+        let (number, in_cell, always) = match (cell, always) {
+            (None, None) => return None,
+            (None, Some((number, rest))) => (number, self.in_cell, rest),
+            (Some((number, rest)), None) => (number, rest, self.always),
+            (Some((a, rest)), Some((b, _))) if a < b => (a, rest, self.always),
+            (Some((a, _)), Some((b, rest))) if a > b => (b, self.in_cell, rest),
+            (Some((number, rest)), Some((_, other_rest))) => (number, rest, other_rest),
+        };
+        (self.in_cell, self.always) = (in_cell, always);
+        Some(*number)
+    }
+}
+
+impl Iterator for Near<'_> {
+    type Item = usize;
+
+    #[inline]
+    fn next(&mut self) -> Option<usize> {
+        loop {
+            let object = self.next_to_look_at()? as usize;
+            match self.bounds.get(object) {
+                Some(Some(bounds)) if !bounds.contains(self.position_m) => {}
+                _ => return Some(object),
+            }
+        }
+    }
+}
+
 impl Grid {
-    /// A grid without objects over all boxes.
+    /// A grid without objects over all boxes. Not real-time.
+    #[allow(clippy::indexing_slicing)] // three axes
     fn over(boxed: &[(u32, Bounds)]) -> Self {
         let empty = Self {
             origin_m: DVec3::ZERO,
@@ -205,7 +230,8 @@ impl Grid {
         Self { origin_m: low, per_m, cells, ..empty }
     }
 
-    /// Puts the objects in, in order of their numbers.
+    /// Puts the objects in, in order of their numbers. Not real-time.
+    #[allow(clippy::indexing_slicing)] // the cells of a box are cells of the grid
     fn fill(&mut self, boxed: &[(u32, Bounds)]) {
         let [x, y, z] = self.cells;
         let mut in_cell = vec![Vec::new(); x * y * z];
@@ -223,13 +249,13 @@ impl Grid {
         self.objects = in_cell.concat().into();
     }
 
-    /// Numbers of the cells a box lies in.
+    /// Numbers of the cells a box lies in. Not real-time.
     fn cells_of(&self, bounds: &Bounds) -> impl Iterator<Item = usize> + use<> {
         let [_, y_cells, z_cells] = self.cells;
-        let [low, high] = [bounds.low(), bounds.high()].map(|corner| self.coordinates(corner));
-        (low[0]..=high[0]).flat_map(move |x| {
-            (low[1]..=high[1])
-                .flat_map(move |y| (low[2]..=high[2]).map(move |z| (x * y_cells + y) * z_cells + z))
+        let [[x0, y0, z0], [x1, y1, z1]] =
+            [bounds.low(), bounds.high()].map(|corner| self.coordinates(corner));
+        (x0..=x1).flat_map(move |x| {
+            (y0..=y1).flat_map(move |y| (z0..=z1).map(move |z| (x * y_cells + y) * z_cells + z))
         })
     }
 
@@ -273,9 +299,7 @@ mod tests {
     }
 
     fn near(phase: &BroadPhase, position_m: DVec3) -> Vec<usize> {
-        let mut found = Vec::new();
-        phase.for_each_near(position_m, |object| found.push(object));
-        found
+        phase.near(position_m).collect()
     }
 
     /// Boxes of all sizes, some objects without one, and what comparing with each of them finds.

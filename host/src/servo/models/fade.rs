@@ -32,6 +32,9 @@ impl Fade {
     #[inline]
     #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
     pub(super) fn at(&self, now_ns: u64) -> f64 {
+        if self.from == self.target {
+            return self.target; // it never moved
+        }
         let way = self.target - self.from;
         let moved = self.rate_per_ns * now_ns.saturating_sub(self.since_ns) as f64;
         // An infinite rate times no time is NaN, which is not below the way: a step comes at once.

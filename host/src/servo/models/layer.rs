@@ -45,7 +45,7 @@ impl ModelHealth {
 struct Object {
     model: Engine,
     mapping: Mapping,
-    /// The answer of the tick before, in its own frame, if it could be used.
+    /// The answer of the tick before, in its own frame, if it could be used and the next one may be late.
     last: Option<Output>,
     /// The tick it was stepped at last.
     stepped_at: Option<u64>,
@@ -130,11 +130,13 @@ impl Layer {
         }
         let begun_ns = self.budget.begin();
         let share = self.ask(tick, state, health, events);
-        if self.budget.end(begun_ns, tick.index, tick.time_ns) {
-            events.insert(Events::MODEL_OVERRUN);
-            health.overrun = self.budget.overrun();
+        if let Some(begun_ns) = begun_ns {
+            if self.budget.end(begun_ns, tick.index, tick.time_ns) {
+                events.insert(Events::MODEL_OVERRUN);
+                health.overrun = self.budget.overrun();
+            }
+            self.last = share;
         }
-        self.last = share;
         share
     }
 
@@ -149,11 +151,11 @@ impl Layer {
     ) -> Share {
         let Self { objects, broad, demand, memory, .. } = self;
         let mut share = Share::default();
-        broad.for_each_near(state.pose.position(), |index| {
-            let Some(object) = objects.get_mut(index) else { return };
+        for index in broad.near(state.pose.position()) {
+            let Some(object) = objects.get_mut(index) else { continue };
             let Some(output) = object.step(tick, state, *demand, *memory, health, events) else {
                 events.insert(Events::MODEL_FAULT);
-                return;
+                continue;
             };
             share.wrench = share.wrench + object.mapping.wrench_to_device(&output.wrench);
             if output.energy_j.is_finite() {
@@ -162,7 +164,7 @@ impl Layer {
             if output.status() != Some(StepStatus::Ok) {
                 events.insert(Events::MODEL_DEGRADED);
             }
-        });
+        }
         share
     }
 
@@ -242,13 +244,15 @@ impl Object {
             buttons: state.buttons,
             demand,
         };
-        let before = self.last.take();
         match self.model.step(&input) {
             Stepped::Answered(output) if output.wrench.is_finite() && output.status().is_some() => {
-                self.last = Some(output);
+                if self.model.may_be_late() {
+                    self.last = Some(output);
+                }
                 Some(output)
             }
             Stepped::Answered(_) => {
+                self.last = None;
                 health.reject(tick.index);
                 None
             }
@@ -256,7 +260,7 @@ impl Object {
             Stepped::Late => {
                 events.insert(Events::MODEL_OVERRUN);
                 health.late(tick.index);
-                before
+                self.last.take()
             }
             Stepped::Broken => self.fail(tick, health),
             Stepped::Gone => {

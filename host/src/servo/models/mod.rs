@@ -31,7 +31,7 @@ pub(crate) struct ModelStack {
     broad: BroadPhase,
     /// Layers that may still be fading out.
     leaving: usize,
-    /// Ascending; more than one only if the scene has several priorities.
+    /// Ascending; none if all layers have one priority, for then nobody is silenced.
     levels: Box<[Level]>,
 }
 
@@ -62,6 +62,9 @@ impl ModelStack {
         let mut priorities: Vec<u8> = slots.iter().map(|slot| slot.priority).collect();
         priorities.sort_unstable();
         priorities.dedup();
+        if priorities.len() == 1 {
+            priorities.clear();
+        }
         let level = |priority| Level { priority, gain: Fade::new(1.0, SILENCE_S), pushes: false };
         Self { slots, broad, leaving: 0, levels: priorities.into_iter().map(level).collect() }
     }
@@ -80,22 +83,23 @@ impl ModelStack {
         let Self { slots, broad, levels, .. } = self;
         levels.iter_mut().for_each(|level| level.pushes = false);
         let mut sum = Share::default();
-        broad.for_each_near(state.pose.position(), |index| {
-            let Some(slot) = slots.get_mut(index) else { return };
-            let Some(level) = levels.iter_mut().find(|level| level.priority == slot.priority) else {
-                return;
-            };
-            if slot.weight.is_silent(tick.time_ns) || level.gain.is_silent(tick.time_ns) {
-                return;
+        for index in broad.near(state.pose.position()) {
+            let Some(slot) = slots.get_mut(index) else { continue };
+            let level = levels.iter_mut().find(|level| level.priority == slot.priority);
+            let is_silenced = level.as_ref().is_some_and(|level| level.gain.is_silent(tick.time_ns));
+            if is_silenced || slot.weight.is_silent(tick.time_ns) {
+                continue;
             }
             heart.enter(tick.index, Place::Model(slot.number));
             let share = slot.step(tick, state, events);
-            let weight = slot.weight.at(tick.time_ns);
-            level.pushes |= weight > 0.0 && share.wrench != Wrench::ZERO;
-            let weight = weight * level.gain.at(tick.time_ns);
+            let mut weight = slot.weight.at(tick.time_ns);
+            if let Some(level) = level {
+                level.pushes |= weight > 0.0 && share.wrench != Wrench::ZERO;
+                weight *= level.gain.at(tick.time_ns);
+            }
             sum.wrench = sum.wrench + share.wrench * weight;
             sum.energy_j += share.energy_j * weight;
-        });
+        }
         heart.enter(tick.index, Place::Host);
         let mut is_silenced = false;
         for level in levels.iter_mut().rev() {
@@ -160,6 +164,12 @@ impl ModelStack {
         let faded = self.slots.iter_mut().find_map(take);
         self.leaving -= usize::from(faded.is_some());
         faded
+    }
+
+    /// True if a layer may be fading out. Real-time: bounded, no allocation.
+    #[inline]
+    pub(crate) fn is_fading(&self) -> bool {
+        self.leaving > 0
     }
 
     /// A layer may act elsewhere now.

@@ -12,6 +12,8 @@
 //! IEEE Trans. Robotics 27(4), 2011, section IV).
 //!
 //! The envelope guards each device's port with it, a [coupling](crate::coupling) each of its ends.
+#![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
+#![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
 use flotor_hal::{DQuat, DVec3, Pose, Twist, Wrench};
 
@@ -29,13 +31,10 @@ impl PortObserver {
     #[inline]
     pub fn gone_in_j(&mut self, pose: &Pose, held: &Wrench) -> f64 {
         let now = (pose.position(), pose.orientation());
-        let gone_in_j = self.last.map_or(0.0, |(position_m, orientation)| {
-            let moved = now.0 - position_m;
-            let turned = small_rotation(now.1 * orientation.conjugate());
-            -(held.force().dot(moved) + held.torque().dot(turned))
-        });
-        self.last = Some(now);
-        gone_in_j
+        let Some((position_m, orientation)) = self.last.replace(now) else { return 0.0 };
+        let moved = now.0 - position_m;
+        let turned = small_rotation(now.1 * orientation.conjugate());
+        -(held.force().dot(moved) + held.torque().dot(turned))
     }
 }
 
@@ -141,7 +140,7 @@ impl Side {
 #[inline]
 fn small_rotation(rotation: DQuat) -> DVec3 {
     let sine = if rotation.w < 0.0 { -rotation.xyz() } else { rotation.xyz() };
-    sine * (2.0 + sine.length_squared() / 3.0)
+    sine * (2.0 + sine.length_squared() * (1.0 / 3.0))
 }
 
 #[cfg(test)]

@@ -1,0 +1,142 @@
+//! What a whole tick costs: device, mapping, model, envelope, and the record of it through the trace ring.
+//!
+//! On the virtual clock, so that nothing waits, and otherwise the loop of every run. Ticks are timed a batch at a time,
+//! what the clock costs being spread over the batch; the ring is emptied between batches, as observers do on a thread of
+//! their own. The middle of many batches counts: a neighbour on the machine spoils some of them.
+
+use super::scripted::{SCRIPTED, SCRIPTED_ENTRY};
+use crate::registry::Registry;
+use crate::scene::Scene;
+use crate::servo::{Clock, Schedule, Servo, StopSwitch, monotonic_ns};
+use crate::session::{RunError, RunOptions, Session};
+use crate::trace::{RECORD_WORDS, TickRecord};
+use flotor_hal::SampleWait;
+use flotor_hal::abi::loader::Stopper;
+use flotor_sync::{Receiver, Sender};
+use serde::Serialize;
+use std::path::Path;
+
+/// Ticks that are timed together: some 20 µs, short against a time slice of the system.
+const BATCH: usize = 64;
+/// Ticks before the first that is timed: the force has faded in, caches and branch predictors are warm.
+const WARM_UP: usize = 2000;
+
+/// What the model acts on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BenchDevice {
+    /// A handle that follows a script, which costs next to nothing: what is left is the loop.
+    Scripted,
+    /// The simulated flotor, preset `plain`, in its hand.
+    Simulated,
+}
+
+impl BenchDevice {
+    /// All of them.
+    pub const ALL: [BenchDevice; 2] = [BenchDevice::Scripted, BenchDevice::Simulated];
+
+    /// Name in a table.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Scripted => "on a scripted device",
+            Self::Simulated => "on the simulated flotor",
+        }
+    }
+
+    /// The scene: one device, one model with its defaults.
+    fn scene(self, model: &str) -> String {
+        let device = match self {
+            Self::Scripted => SCRIPTED,
+            Self::Simulated => "simulated",
+        };
+        format!("[device]\nplugin = \"{device}\"\n[[model]]\nplugin = \"{model}\"\n")
+    }
+}
+
+/// What a tick takes, ns. Wall clock: compare within a run, not between machines.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct TickCost {
+    /// Middle of all batches.
+    pub median_ns: f64,
+    /// The fastest batch.
+    pub fastest_ns: f64,
+    /// One batch in a hundred takes longer, interruptions of the machine included.
+    pub p99_ns: f64,
+}
+
+/// A loop that is advanced by hand, with its trace.
+pub struct WholeTick {
+    servo: Servo,
+    schedule: Schedule,
+    stoppers: Vec<Stopper>,
+    stop: StopSwitch,
+    sender: Sender<TickRecord, RECORD_WORDS>,
+    receiver: Receiver<TickRecord, RECORD_WORDS>,
+}
+
+impl WholeTick {
+    /// A model, by id or file, on a device. Not real-time.
+    ///
+    /// # Errors
+    /// [`RunError`] if the model is unknown, refused, or does not fit.
+    pub fn prepare(device: BenchDevice, model: &str) -> Result<Self, RunError> {
+        let registry = Registry::search(&[]).with_linked(&SCRIPTED_ENTRY)?;
+        let scene = Scene::parse(Path::new("bench"), &device.scene(model))?;
+        let options = RunOptions { clock: Clock::Virtual, seed: 1 };
+        let (servo, stoppers, period_ns) = Session::prepare(&scene, &registry, &options)?.into_loop();
+        let (sender, receiver) = flotor_sync::ring(2 * BATCH);
+        let schedule = Schedule::start_virtual(period_ns);
+        Ok(Self { servo, schedule, stoppers, stop: StopSwitch::default(), sender, receiver })
+    }
+
+    /// Runs ticks, a batch at least; what they left behind is taken out of the ring and thrown away.
+    pub fn run(&mut self, ticks: usize) {
+        for _ in 0..ticks.div_ceil(BATCH) {
+            self.batch();
+            self.receiver.drain(|_| ());
+        }
+    }
+
+    /// Times so many batches.
+    #[must_use]
+    pub fn time(&mut self, batches: usize) -> TickCost {
+        self.run(WARM_UP);
+        let mut times_ns: Vec<u64> = Vec::with_capacity(batches);
+        for _ in 0..batches.max(1) {
+            let started_ns = monotonic_ns();
+            self.batch();
+            times_ns.push(monotonic_ns() - started_ns);
+            self.receiver.drain(|_| ());
+        }
+        times_ns.sort_unstable();
+        #[allow(clippy::cast_precision_loss)] // microseconds
+        let per_tick = |index: usize| {
+            times_ns.get(index.min(times_ns.len() - 1)).copied().unwrap_or_default() as f64 / BATCH as f64
+        };
+        TickCost {
+            median_ns: per_tick(times_ns.len() / 2),
+            fastest_ns: per_tick(0),
+            p99_ns: per_tick(times_ns.len() * 99 / 100),
+        }
+    }
+
+    /// A batch of ticks, each with its record pushed. Real-time: bounded, no allocation.
+    #[inline(never)] // where a counter of instructions cuts
+    fn batch(&mut self) {
+        let Self { servo, schedule, stop, sender, .. } = self;
+        servo.pause();
+        for _ in 0..BATCH {
+            let Some(due) = schedule.wait(|_| SampleWait::NotPaced) else { return };
+            servo.tick(&due, stop, |record| {
+                let _ = sender.push(record); // it has room for two batches
+            });
+        }
+    }
+}
+
+impl Drop for WholeTick {
+    fn drop(&mut self) {
+        self.stoppers.iter().for_each(Stopper::safe_stop);
+    }
+}

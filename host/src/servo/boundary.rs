@@ -1,0 +1,153 @@
+//! The wall at the edge of a device's range: spring and damper that push back what has left it, and never pull.
+//!
+//! The range is an ellipsoid of positions and one of rotation vectors; equal semi-axes make it the sphere of the
+//! thesis's boundary (section 3.2). Nearly every tick is inside, so that is seen first, without a root or an arc.
+
+use crate::scene::Boundary;
+use flotor_hal::{Capabilities, DVec3, DeviceState, Wrench, rotation_vector};
+use std::f64::consts::PI;
+
+/// The wall of one device.
+pub(super) struct BoundaryWall {
+    position: Ellipsoid,
+    rotation: Ellipsoid,
+}
+
+impl BoundaryWall {
+    /// A wall the boundary's margin inside the device's range. Not real-time.
+    pub(super) fn new(boundary: &Boundary, device: &Capabilities) -> Self {
+        let Boundary {
+            margin_m,
+            margin_rad,
+            stiffness_n_per_m,
+            damping_ns_per_m,
+            stiffness_nm_per_rad,
+            damping_nms_per_rad,
+        } = *boundary;
+        Self {
+            position: Ellipsoid::new(device.range_m, margin_m, stiffness_n_per_m, damping_ns_per_m),
+            rotation: Ellipsoid::new(device.range_rad, margin_rad, stiffness_nm_per_rad, damping_nms_per_rad),
+        }
+    }
+
+    /// The push of the wall; `None` inside, and where nobody knows where the handle is. Real-time: bounded, no
+    /// allocation.
+    #[inline]
+    pub(super) fn push(&self, state: &DeviceState) -> Option<Wrench> {
+        let position_m = state.pose.position();
+        // A rotation vector is the axis times the angle, which is at most pi times the sine of its half.
+        let at_most_rad = state.pose.orientation().xyz() * PI;
+        if self.position.surely_holds(position_m) && self.rotation.surely_holds(at_most_rad) {
+            return None;
+        }
+        self.push_outside(state)
+    }
+
+    #[cold]
+    fn push_outside(&self, state: &DeviceState) -> Option<Wrench> {
+        if !state.is_finite() {
+            return None;
+        }
+        let force = self.position.push(state.pose.position(), state.twist.linear());
+        let torque = self.rotation.push(rotation_vector(state.pose.orientation()), state.twist.angular());
+        if force.is_none() && torque.is_none() {
+            return None;
+        }
+        Some(Wrench::new(force.unwrap_or(DVec3::ZERO), torque.unwrap_or(DVec3::ZERO)))
+    }
+}
+
+/// Where translation or rotation may be, and what it meets outside. Metres and newtons, or radians and newton metres.
+struct Ellipsoid {
+    semi_axes: DVec3,
+    /// Their reciprocals; infinite on an axis without range.
+    per_semi_axis: DVec3,
+    /// Effort per way.
+    stiffness: f64,
+    /// Effort per speed.
+    damping: f64,
+}
+
+/// Squared distance from the centre, in semi-axes, below which rounding cannot make an inside of an outside.
+const SURELY_INSIDE: f64 = 1.0 - 1.0e-12;
+
+impl Ellipsoid {
+    fn new(range: [f64; 3], margin: f64, stiffness: f64, damping: f64) -> Self {
+        let semi_axes = (DVec3::from_array(range) - margin).max(DVec3::ZERO);
+        Self { semi_axes, per_semi_axis: semi_axes.recip(), stiffness, damping }
+    }
+
+    /// True only inside. An axis without range (zero times infinity at its centre) cannot move and needs no wall.
+    #[inline]
+    fn surely_holds(&self, at: DVec3) -> bool {
+        let scaled = DVec3::select(at.cmpeq(DVec3::ZERO), DVec3::ZERO, at * self.per_semi_axis);
+        scaled.length_squared() < SURELY_INSIDE // false for NaN
+    }
+
+    /// Spring and damper along the ray from the centre; `None` inside. Damping acts outwards only: the wall never
+    /// pulls.
+    fn push(&self, at: DVec3, velocity: DVec3) -> Option<DVec3> {
+        let beyond = DVec3::select(at.cmpeq(DVec3::ZERO), DVec3::ZERO, at / self.semi_axes).length();
+        if beyond.is_nan() || beyond <= 1.0 {
+            return None;
+        }
+        let distance = at.length();
+        let outward = at / distance;
+        let depth = distance - distance / beyond;
+        let push = (self.stiffness * depth + self.damping * velocity.dot(outward).max(0.0)).max(0.0);
+        Some(outward * -push)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_hal::{Pose, orientation_from_rotation_vector};
+
+    /// What is surely inside meets no wall, anywhere near the edge of either range.
+    #[test]
+    fn nothing_that_meets_a_wall_is_taken_for_inside() {
+        let ellipsoid = Ellipsoid::new([0.012, 0.01, 0.0], 0.0005, 1.0e4, 15.0);
+        let mut outside = 0;
+        for step in 0..10_000_u32 {
+            let angle = f64::from(step) * 0.37;
+            let direction = DVec3::new(angle.cos(), angle.sin(), 0.0) * DVec3::new(0.0115, 0.0095, 0.0);
+            let at = direction * (1.0 + (f64::from(step % 41) - 20.0) * 1.0e-13);
+            let pushed = ellipsoid.push(at, DVec3::ZERO).is_some();
+            assert!(!(pushed && ellipsoid.surely_holds(at)), "{at}");
+            outside += u32::from(pushed);
+        }
+        assert!((3000..7000).contains(&outside), "{outside} of 10 000");
+        assert!(!ellipsoid.surely_holds(DVec3::NAN) && !ellipsoid.surely_holds(DVec3::Z * 1.0e-300));
+    }
+
+    #[test]
+    fn a_rotation_that_meets_a_wall_is_not_taken_for_inside() {
+        let boundary = Boundary::default();
+        let device = Capabilities { range_m: [1.0; 3], range_rad: [0.12, 3.0, 0.5], ..CAPABILITIES };
+        let wall = BoundaryWall::new(&boundary, &device);
+        for step in 0..20_000_u32 {
+            let turn = f64::from(step);
+            let direction = DVec3::new((turn * 0.7).sin(), (turn * 1.3).cos(), (turn * 0.31).sin());
+            let rotation_rad = direction.normalize() * (turn * 1.0e-4 * 1.57);
+            let mut state = DeviceState::HOME;
+            state.pose = Pose::new(DVec3::ZERO, orientation_from_rotation_vector(rotation_rad));
+            assert_eq!(wall.push(&state), wall.push_outside(&state), "{rotation_rad}");
+        }
+    }
+
+    const CAPABILITIES: Capabilities = Capabilities {
+        sensed: flotor_hal::Axes::ALL,
+        actuated: flotor_hal::Axes::ALL,
+        range_m: [0.012; 3],
+        range_rad: [0.12; 3],
+        resolution_m: 0.0,
+        max_force_n: [40.0; 3],
+        max_torque_nm: [5.0; 3],
+        max_force_slew_n_per_s: f64::INFINITY,
+        max_torque_slew_nm_per_s: f64::INFINITY,
+        max_stiffness_n_per_m: 25_000.0,
+        rate_hz: [100.0, 10_000.0],
+        latency_s: 0.0,
+    };
+}
