@@ -10,7 +10,7 @@ use flotor_tests::TestSize;
 use flotor_tests::library::plugin_file;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
-use flotor_tests::watched::{prepared, watch};
+use flotor_tests::watched::{prepared, watch, watch_seed};
 use serde_json::Value;
 
 /// A spring on the simulated flotor, held by a hand; the force may change by 3 N in a tick.
@@ -58,6 +58,48 @@ fn a_recording_with_replacements_replays_bit_for_bit() {
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     let report: Value = serde_json::from_str(&ran.stdout).expect("the report is JSON");
     assert_eq!(report["bit_exact"], Value::from(true), "{report}");
+}
+
+#[test]
+fn the_seed_chooses_one_of_several_and_a_pair_of_seeds_gets_each() {
+    let alternatives =
+        ["parameters = { gamma_n = 5 }", "plugin = \"wall\", parameters = { stiffness_n_per_m = 300 }"];
+    let scene =
+        |by: &str| format!("duration_s = 0.5\n{SPRING}[[change]]\nat_s = 0.2\nswap = \"spring\"\n{by}\n");
+    let [first, second] = alternatives;
+    let either = scene(&format!("either = [{{ {first} }}, {{ {second} }}]"));
+    let alone = alternatives.map(|by| watch(&scene(&by.replace(", parameters", "\nparameters"))).records);
+    let forces = |records: &[TickRecord]| records.iter().map(|record| record.model).collect::<Vec<_>>();
+    let alone = alone.map(|records| forces(&records));
+    assert_ne!(alone[0], alone[1]);
+    for pair in 0..4 {
+        let mut got = [2 * pair, 2 * pair + 1].map(|seed| {
+            let felt = forces(&watch_seed(&either, seed).records);
+            alone.iter().position(|alone| *alone == felt).expect("one of the two, and nothing else")
+        });
+        assert_eq!(
+            forces(&watch_seed(&either, 2 * pair).records),
+            alone[got[0]],
+            "the same seed, the same one"
+        );
+        got.sort_unstable();
+        assert_eq!(got, [0, 1], "seeds {} and {}", 2 * pair, 2 * pair + 1);
+    }
+}
+
+#[test]
+fn what_is_wrong_with_an_alternative_is_said_whatever_the_seed() {
+    let scratch = Scratch::default();
+    let text = format!(
+        "duration_s = 0.1\n{SPRING}[[change]]\nat_s = 0.05\nswap = \"spring\"\n\
+         either = [{{}}, {{ parameters = {{ gama_n = 5 }} }}]\n"
+    );
+    let scene = scratch.file("scene.toml", text).display().to_string();
+    for seed in ["0", "1"] {
+        let ran = Flotor::with(["run", &scene, "--clock", "virtual", "--seed", seed]).run();
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+        assert!(ran.error().contains("did you mean `gamma_n`?"), "{ran:?}");
+    }
 }
 
 /// Replaces the spring as often as the loop lets it.

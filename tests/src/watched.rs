@@ -47,8 +47,11 @@ pub fn prepared(clock: Clock, scene: &str) -> Session {
 
 /// The same with plugins that may have been loaded before: for many runs, which then load none.
 fn prepared_with(registry: &Registry, clock: Clock, scene: &str) -> Session {
+    seeded(registry, RunOptions { clock, seed: 1 }, scene)
+}
+
+fn seeded(registry: &Registry, options: RunOptions, scene: &str) -> Session {
     let scene = Scene::parse(Path::new("scene.toml"), scene).expect("the scene is right");
-    let options = RunOptions { clock, seed: 1 };
     let session = Session::prepare(&scene, registry, &options);
     session.unwrap_or_else(|error| panic!("it does not start: {error}"))
 }
@@ -60,6 +63,15 @@ fn prepared_with(registry: &Registry, clock: Clock, scene: &str) -> Session {
 #[must_use]
 pub fn watch(scene: &str) -> Watched {
     watch_on(Clock::Virtual, scene)
+}
+
+/// The same with a seed of the caller's.
+///
+/// # Panics
+/// As [`prepared`].
+#[must_use]
+pub fn watch_seed(scene: &str, seed: u64) -> Watched {
+    keep(seeded(&Registry::search(&[]), RunOptions { clock: Clock::Virtual, seed }, scene))
 }
 
 /// Runs the text of a scene; as [`prepared`].

@@ -28,10 +28,8 @@ pub enum ChangeWhat {
     Swap {
         /// The name of a model in the scene, or a plugin's id.
         model: String,
-        /// Id or file of the plugin; none: the one the scene names.
-        plugin: Option<String>,
-        /// What is set for it.
-        parameters: Vec<ParameterText>,
+        /// What comes; of several, the seed of the run chooses one. Never empty.
+        by: Vec<Alternative>,
     },
     /// A model is felt more or less: its weight moves there at the rate of its fade.
     Weight {
@@ -40,6 +38,26 @@ pub enum ChangeWhat {
         /// The part of its wrench that is felt, 0 to 1.
         weight: f64,
     },
+}
+
+/// What may take the place of a model.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Alternative {
+    /// Id or file of the plugin; none: the one the scene names.
+    pub plugin: Option<String>,
+    /// What is set for it.
+    pub parameters: Vec<ParameterText>,
+}
+
+impl Alternative {
+    /// `plugin` and `parameters` of a table.
+    fn take(section: &mut Section<'_>) -> Result<Self, SceneError> {
+        let plugin = section.take("plugin").map(Value::text).transpose()?;
+        let texts = section.section("parameters")?.map_or_else(|| Ok(Vec::new()), Section::into_texts)?;
+        let parameters =
+            texts.into_iter().map(|(key, value, location)| ParameterText { key, value, location });
+        Ok(Self { plugin, parameters: parameters.collect() })
+    }
 }
 
 /// Longest time, s: a year, as for a run.
@@ -52,24 +70,33 @@ pub(super) fn read(sections: Vec<Section<'_>>) -> Result<Vec<ChangeUse>, SceneEr
         let at_s = section.require("at_s")?.number(0.0..=LATEST_S)?;
         let whole = section.location();
         let (set, weight, swap) = (section.take("set"), section.take("weight"), section.take("swap"));
-        let plugin = section.take("plugin").map(Value::text).transpose()?;
-        let parameters =
-            section.section("parameters")?.map_or_else(|| Ok(Vec::new()), Section::into_texts)?;
+        let alone = Alternative::take(&mut section)?;
+        let either = section.sections("either")?;
         section.finish()?;
         if set.is_none() && weight.is_none() && swap.is_none() {
             let problem = "`change.set`, `change.weight` or `change.swap` is missing: what is to change?";
             return Err(SceneError { location: whole, problem: problem.to_owned() });
         }
-        if swap.is_none() && (plugin.is_some() || !parameters.is_empty()) {
-            let problem = "`change.plugin` and `change.parameters` belong to a `change.swap`";
+        if swap.is_none() && (alone != Alternative::default() || !either.is_empty()) {
+            let problem =
+                "`change.plugin`, `change.parameters` and `change.either` belong to a `change.swap`";
+            return Err(SceneError { location: whole, problem: problem.to_owned() });
+        }
+        if alone != Alternative::default() && !either.is_empty() {
+            let problem =
+                "`change.either` has a `plugin` and `parameters` for each alternative: not beside it";
             return Err(SceneError { location: whole, problem: problem.to_owned() });
         }
         if let Some(swap) = swap {
             let location = swap.location.clone();
-            let parameters = parameters.into_iter();
-            let parameters = parameters.map(|(key, value, location)| ParameterText { key, value, location });
-            let what = ChangeWhat::Swap { model: swap.text()?, plugin, parameters: parameters.collect() };
-            changes.push(ChangeUse { at_s, what, location });
+            let several = either.into_iter().map(|mut alternative| {
+                let taken = Alternative::take(&mut alternative)?;
+                alternative.finish()?;
+                Ok(taken)
+            });
+            let several = several.collect::<Result<Vec<_>, SceneError>>()?;
+            let by = if several.is_empty() { vec![alone] } else { several };
+            changes.push(ChangeUse { at_s, what: ChangeWhat::Swap { model: swap.text()?, by }, location });
         }
         if let Some(set) = set {
             let location = set.location.clone();

@@ -9,7 +9,7 @@ mod reference;
 mod setting;
 
 pub use crate::coupling::{CouplingConfig, CouplingDescription, PassivityMode};
-pub use change::{ChangeUse, ChangeWhat};
+pub use change::{Alternative, ChangeUse, ChangeWhat};
 pub use devices::{DeviceUse, MOST_DEVICES};
 pub(crate) use devices::{is_named, without_device};
 pub use flotor_record::mapping::{Blend, FieldTiming, MappingConfig};

@@ -1,5 +1,6 @@
 //! From a scene to a run: loads what the scene names, pairs it, runs the loop, lets others watch and change it.
 
+mod choice;
 mod controls;
 mod prepare;
 mod steps;

@@ -1,13 +1,14 @@
 //! From a scene to what a loop is made of: plugins loaded, their settings checked, everything paired.
 
+use super::choice::chosen;
 use super::controls::{ControlError, NewValue, Parts};
 use super::{PluginReport, RunError};
 use crate::calibration::file::{CalibrationFile, CalibrationFileError};
 use crate::mapping::Mapping;
 use crate::registry::{LookupError, Registry};
 use crate::scene::{
-    CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, ParameterText, PluginUse, Scene,
-    SceneError,
+    Alternative, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, ParameterText,
+    PluginUse, Scene, SceneError,
 };
 use crate::servo::{Clock, Engine, Layer, Replacement, ScheduledChange, TimeBudget};
 use crate::slow::SlowModel;
@@ -301,7 +302,7 @@ pub(super) fn schedule(
     let mut in_time: Vec<&ChangeUse> = scene.changes.iter().collect();
     in_time.sort_by(|a, b| a.at_s.total_cmp(&b.at_s)); // stable: a change is checked against what is there then
     let mut scheduled = Scheduled { changes: Vec::new(), replacements: Vec::new() };
-    for change in in_time {
+    for (draw, change) in (0..).zip(in_time) {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
         let time_ns = (change.at_s * 1.0e9).round() as u64;
         let complain = |key: &str, error: ControlError| SceneError {
@@ -316,13 +317,19 @@ pub(super) fn schedule(
             ChangeWhat::Weight { model, weight } => {
                 parts.check_weight(model, *weight).map_err(|error| complain("change.weight", error))?
             }
-            ChangeWhat::Swap { model, plugin, parameters } => {
+            ChangeWhat::Swap { model, by } => {
+                let choice = chosen(config.seed, draw, by.len());
                 for number in parts.models(model).map_err(|error| complain("change.swap", error))? {
                     let Some(place) = scene.models.get(number) else { continue };
-                    let mut other = place.replaced_by(plugin.as_deref(), &[]);
-                    other.plugin.location = change.location.clone();
-                    other.plugin.parameters.extend(parameters.iter().cloned());
-                    let (layer, report) = prepare_model(registry, &other, config, clock)?;
+                    let make = |Alternative { plugin, parameters }: &Alternative| {
+                        let mut other = place.replaced_by(plugin.as_deref(), &[]);
+                        other.plugin.location = change.location.clone();
+                        other.plugin.parameters.extend(parameters.iter().cloned());
+                        prepare_model(registry, &other, config, clock)
+                    };
+                    // All of them: what is wrong with one is to be known whatever the seed.
+                    let made = by.iter().map(make).collect::<Result<Vec<_>, _>>()?;
+                    let Some((layer, report)) = made.into_iter().nth(choice) else { continue };
                     let generation = parts.put_in(number, report);
                     let model = u32::try_from(number).unwrap_or(u32::MAX); // a scene has fewer models
                     let replacement = Replacement { model, generation, layer: Box::new(layer) };
