@@ -7,17 +7,20 @@
 use flotor::registry::Registry;
 use flotor::scene::Scene;
 use flotor::servo::{Clock, StopSwitch};
-use flotor::session::{Observer, RunOptions, Session};
+use flotor::session::{ControlError, Controls, Observer, RunOptions, Session};
 use flotor::trace::TickRecord;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{Cycle, Demand, DeviceState, Input, LoopConfig, Output, Pose, Tick};
+use flotor_tests::TestSize;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 thread_local! {
     /// Allocations and releases of this thread so far. Constant start value: using it never allocates.
     static CALLS: Cell<u64> = const { Cell::new(0) };
+    /// Bytes this thread has allocated and not released so far.
+    static LIVE: Cell<isize> = const { Cell::new(0) };
 }
 
 /// The system's allocator, counting.
@@ -28,12 +31,14 @@ struct Counting;
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         CALLS.set(CALLS.get() + 1);
+        LIVE.set(LIVE.get() + layout.size().cast_signed());
         // SAFETY: the caller keeps the contract of `GlobalAlloc::alloc`.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
         CALLS.set(CALLS.get() + 1);
+        LIVE.set(LIVE.get() - layout.size().cast_signed());
         // SAFETY: the caller keeps the contract of `GlobalAlloc::dealloc`.
         unsafe { System.dealloc(at, layout) }
     }
@@ -122,6 +127,57 @@ fn the_host_allocates_nothing_for_a_change_of_a_parameter_or_a_model() {
     // The loop ran tick 5000 before tick 4096 was observed, and 7000 to 7100 before 6144; only telling the observer of
     // them takes memory, and dropping the old spring at the end of its batch.
     assert_eq!(calls.ticks, [5000, 7000, 7168]);
+}
+
+/// Replaces the spring as often as the loop lets it, and looks at the memory of the thread that does everything.
+struct Replacing<'a> {
+    controls: Controls,
+    registry: &'a Registry,
+    replaced: usize,
+    /// Live bytes when so many had been replaced.
+    live: [(usize, Option<isize>); 2],
+}
+
+impl Observer for Replacing<'_> {
+    fn observe(&mut self, record: &TickRecord) {
+        if !record.tick.is_multiple_of(100) {
+            return;
+        }
+        let plugin = if self.replaced.is_multiple_of(2) { Some("wall") } else { None };
+        match self.controls.swap(self.registry, "spring", plugin, &[]) {
+            Err(ControlError::Busy) => return, // the one before has not come in yet
+            outcome => outcome.expect("both can be made"),
+        }
+        self.replaced += 1;
+        for (count, live) in &mut self.live {
+            if *count == self.replaced {
+                *live = Some(LIVE.get());
+            }
+        }
+    }
+}
+
+#[test]
+fn models_that_are_replaced_for_ever_leave_no_memory_behind() {
+    let most = TestSize::of_this_run().pick(40, 1000);
+    // On the virtual clock observers see a second of ticks at a time: one replacement in each.
+    let text = format!(
+        "duration_s = {}\n[device]\nplugin = \"simulated\"\n[[model]]\nplugin = \"spring\"\n\
+         [model.blend]\nfade_s = 0.05\n",
+        most + most / 10
+    );
+    let scene = Scene::parse(std::path::Path::new("scene.toml"), &text).expect("it is right");
+    let registry = Registry::search(&[]);
+    let options = RunOptions { clock: Clock::Virtual, seed: 1 };
+    let session = Session::prepare(&scene, &registry, &options).expect("it starts");
+    // Both after an even number: a spring is on its way.
+    let live = [most / 2, most].map(|count| (count, None));
+    let mut replacing = Replacing { controls: session.controls(), registry: &registry, replaced: 0, live };
+    assert!(session.run(&mut replacing, &StopSwitch::default()).is_ok());
+    let [Some(half), Some(all)] = replacing.live.map(|(_, live)| live) else {
+        panic!("{:?}", replacing.live)
+    };
+    assert_eq!(half, all, "bytes after {} and after {most} replacements", most / 2);
 }
 
 #[test]

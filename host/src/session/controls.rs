@@ -12,6 +12,7 @@ use crate::servo::{
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Setting, SettingError};
 use flotor_hal::{LoopConfig, Mutability, Parameter};
+use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Why the loop was not told.
@@ -238,16 +239,34 @@ impl Controls {
 
 /// A plugin of a run, and those that took its place.
 pub(super) struct Versions {
-    /// By generation; never empty.
     first: PluginReport,
-    later: Vec<PluginReport>,
+    /// Those that may still be spoken of, in order of their generations.
+    later: VecDeque<(u16, PluginReport)>,
+    /// How many there have been after the first.
+    count: u16,
     current: u16,
 }
 
 impl Versions {
     fn get(&self, generation: u16) -> &PluginReport {
-        let later = usize::from(generation).checked_sub(1).and_then(|index| self.later.get(index));
-        later.unwrap_or(&self.first)
+        let is_meant = |(of, _): &&(u16, PluginReport)| *of == generation;
+        self.later.iter().find(is_meant).map_or(&self.first, |(_, report)| report)
+    }
+
+    /// One more, and its generation.
+    fn put_in(&mut self, report: PluginReport) -> u16 {
+        self.count = self.count.saturating_add(1);
+        self.current = self.count;
+        self.later.push_back((self.count, report));
+        self.count
+    }
+
+    /// This one is in place: the one before may still be named by a change that was under way, older ones are not. So a
+    /// run may replace its models for ever.
+    fn forget_before(&mut self, generation: u16) {
+        while self.later.front().is_some_and(|(of, _)| of.saturating_add(1) < generation) {
+            self.later.pop_front();
+        }
     }
 
     fn now(&self) -> &PluginReport {
@@ -264,8 +283,12 @@ pub(super) struct Parts {
 impl Parts {
     /// Of the plugins by number: the device, then the models in the scene's order.
     pub(super) fn new(plugins: &[PluginReport]) -> Self {
-        let versions =
-            |report: &PluginReport| Versions { first: report.clone(), later: Vec::new(), current: 0 };
+        let versions = |report: &PluginReport| Versions {
+            first: report.clone(),
+            later: VecDeque::new(),
+            count: 0,
+            current: 0,
+        };
         Self { list: Arc::new(Mutex::new(plugins.iter().map(versions).collect())) }
     }
 
@@ -277,16 +300,14 @@ impl Parts {
     pub(super) fn put_in(&self, model: usize, report: PluginReport) -> u16 {
         let mut list = self.lock();
         let devices = devices(&list);
-        let Some(versions) = list.get_mut(devices + model) else { return 0 };
-        versions.later.push(report);
-        versions.current = u16::try_from(versions.later.len()).unwrap_or(u16::MAX);
-        versions.current
+        list.get_mut(devices + model).map_or(0, |versions| versions.put_in(report))
     }
 
     /// Which plugin of a place changes are checked against.
     pub(super) fn set_current(&self, plugin: u16, generation: u16) {
         if let Some(versions) = self.lock().get_mut(usize::from(plugin)) {
             versions.current = generation;
+            versions.forget_before(generation);
         }
     }
 
