@@ -64,6 +64,42 @@ every_change() {
     step loom env RUSTFLAGS="--cfg loom" cargo test -p flotor-sync --release --test loom --target-dir target/loom
 }
 
+# The machine this runs on, as Rust calls it: with a target of its own, build scripts stay without sanitizers.
+target() {
+    rustc -vV | sed -n 's/^host: //p'
+}
+
+# Data races by ThreadSanitizer: threads on the lock-free cells. The standard library is built along, for its locks and
+# threads to be seen too; that takes its sources. Loom finds what depends on memory orders, this what is not atomic at all.
+race() {
+    rustup component add rust-src
+    RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=thread" cargo test -Zbuild-std --target "$(target)" --target-dir target/tsan \
+        -p flotor-sync --lib
+}
+
+# Whatever a tick does that may block, by RealtimeSanitizer: memory, files, locks, also inside plugins. It ends the process
+# with the place. The plugins are ordinary ones: the sanitizer is in the program, which has to be the only one with it. The
+# model that starts a thread in a step has to be caught: else nothing was watched.
+blocking() {
+    local flotor
+    flotor=target/rtsan/$(target)/debug/flotor
+    cargo build -p flotor -p fixture-faulty-model
+    RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=realtime --cfg rtsan" cargo build --target "$(target)" --target-dir target/rtsan \
+        -p flotor --bin flotor
+    export FLOTOR_PLUGIN_PATH=target/debug/deps
+    "$flotor" run --clock virtual --duration 5s --seed 1
+    "$flotor" run --clock real --duration 2s --seed 1
+    "$flotor" run --clock virtual --duration 5s --set device.preset=full
+    "$flotor" run --clock virtual host/scenes/teleoperation.toml
+    "$flotor" run --clock virtual host/scenes/balls.toml
+    printf '%s\n' '[device]' 'plugin = "simulated"' '[[model]]' 'plugin = "fixture-faulty-model"' '[model.parameters]' \
+        'fault = "starts-threads"' > target/rtsan/blocks.toml
+    if "$flotor" run --clock virtual --duration 1s target/rtsan/blocks.toml; then
+        echo "a model that starts threads in a step was not noticed"
+        return 1
+    fi
+}
+
 # The Python wheel as a user installs it, and its tests against the command: models, runs, sweeps on threads and Dask.
 wheel() {
     python3 -m venv target/venv

@@ -83,7 +83,8 @@
 //! ```
 //!
 //! [loom]: https://github.com/tokio-rs/loom
-
+#![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
+#![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 #![forbid(unsafe_code)]
 
 mod inbox;

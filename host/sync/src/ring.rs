@@ -81,6 +81,7 @@ impl<const N: usize> Shared<N> {
 /// # Panics
 /// If memory for that many records cannot be had.
 #[must_use]
+#[allow(clippy::expect_used)] // not real-time
 pub fn ring<T: Words<N>, const N: usize>(capacity: usize) -> (Sender<T, N>, Receiver<T, N>) {
     let slot_count = capacity.max(1).checked_next_power_of_two().expect("a ring fits into memory");
     let slot = || Slot { words: AtomicWords::new([0; N]), turn: Exclusive::new() };

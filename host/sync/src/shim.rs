@@ -1,4 +1,5 @@
 //! The atomics: the standard library's, or loom's when the interleavings are checked (`--cfg loom`).
+#![allow(clippy::disallowed_types, clippy::expect_used)] // the lock is for senders of an inbox, and for loom
 
 #[cfg(not(loom))]
 pub(crate) use std::sync::{
