@@ -7,9 +7,10 @@ use flotor::scene::Scene;
 use flotor::servo::{Clock, StopSwitch};
 use flotor::session::{Observer, RunEnd, RunOptions, Session};
 use flotor::trace::TickRecord;
-use flotor_tests::library::plugin_bytes;
+use flotor_tests::library::compile_c_file;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
+use flotor_tests::workspace_root;
 use std::ffi::OsStr;
 use std::path::Path;
 use std::process::Command;
@@ -51,30 +52,52 @@ fn a_killed_process_loses_at_most_a_second_of_its_recording() {
     );
 }
 
+/// Bytes at which the disk is full. Plugins are copied when they are loaded, and the copy has to fit too: those in C take
+/// some twenty kilobytes. A tick takes some three hundred bytes of a recording, a quarter of a second goes out at once.
+const DISK_BYTES: u64 = 600_000;
+/// Length of the run whose recording does not fit, s: the disk is full after less than half of it.
+const TOO_LONG_S: u64 = 5;
+
 #[test]
 fn a_full_disk_ends_the_recording_and_not_the_run() {
     let scratch = Scratch::default();
+    let plugin = |name: &str| {
+        let library = scratch.path().join(format!("lib{name}.so"));
+        compile_c_file(&workspace_root().join(format!("tests/c/{name}.c")), &[], &library);
+        assert!(std::fs::metadata(&library).is_ok_and(|file| file.len() < DISK_BYTES / 4));
+        library
+    };
+    let scene = format!(
+        "duration_s = {TOO_LONG_S}\n[device]\nplugin = \"{}\"\n[[model]]\nplugin = \"{}\"\n",
+        plugin("post").display(),
+        plugin("wall").display()
+    );
+    let scene = scratch.file("scene.toml", scene);
     let (file, summary) = (scratch.path().join("run.mcap"), scratch.path().join("run.json"));
-    // A limit on the size of files stands for a disk that is full. Plugins are copied when they are loaded: they have
-    // to fit. A tick takes some three hundred bytes of a recording.
-    let largest =
-        ["flotor-simulated", "flotor-spring"].map(|package| plugin_bytes(package).len()).into_iter().max();
-    let limit_bytes = largest.unwrap_or_default() + 200_000;
-    let limited = format!("ulimit -f {}; exec \"$@\"", limit_bytes / 512); // sh counts in blocks of 512 bytes
-    let duration_s = limit_bytes / 100_000;
-    let duration = format!("{duration_s}s");
-    let arguments = ["run", "--clock", "virtual", "--duration", &duration, "--record"].map(OsStr::new);
-    let arguments =
-        arguments.into_iter().chain([file.as_os_str(), OsStr::new("--json"), summary.as_os_str()]);
+    // A limit on the size of files stands for a disk that is full; sh counts in blocks of 512 bytes.
+    let limited = format!("ulimit -f {}; exec \"$@\"", DISK_BYTES / 512);
+    let arguments: [&OsStr; 8] = [
+        "run".as_ref(),
+        scene.as_ref(),
+        "--clock".as_ref(),
+        "virtual".as_ref(),
+        "--record".as_ref(),
+        file.as_ref(),
+        "--json".as_ref(),
+        summary.as_ref(),
+    ];
     let ran = Flotor::with(arguments).through_shell(&limited).run();
     assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:?}");
     assert!(ran.error().contains("cannot go on writing the recording"), "{ran:?}");
     let summary = std::fs::read_to_string(summary).expect("the run has its report");
     let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
     assert_eq!(summary["end"].as_str(), Some("finished"));
-    assert_eq!(summary["ticks"].to_string(), (duration_s * 1000).to_string());
+    assert_eq!(summary["ticks"].to_string(), (TOO_LONG_S * 1000).to_string());
     let (last_s, _) = last_tick_s(&file);
-    assert!(last_s > 0.2, "what was written before can be read: {last_s} s");
+    assert!(
+        last_s > 0.2 && last_s < TOO_LONG_S as f64 / 2.0,
+        "what was written before can be read: {last_s} s"
+    );
 }
 
 /// A recorder whose disk does not answer for longer than the ring between loop and recorder lasts.

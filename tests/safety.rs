@@ -395,34 +395,66 @@ fn a_spring_that_is_too_stiff_for_its_rate_is_seen_and_kept_passive() {
 
 // ---------------------------------------------------------------- wild models
 
+/// Ticks of a model that answers anything at all, and the limits it meets.
+fn wild(ticks: usize, fault: &str, tables: &str) -> Watched {
+    let limits = "[limits]\nforce_n = [4.0, 5.0, 6.0]\ntorque_nm = 0.5\nforce_slew_n_per_s = 3000.0\n\
+                  torque_slew_nm_per_s = 200.0\nramp_s = 0.1";
+    let scene = scene("", fault, limits).replace("name = \"block\"", "name = \"block\"\nbudget_us = 20");
+    let scene = scene.replace("duration_s = 0.2", &format!("duration_s = {}", ticks / 1000));
+    let run = watch(&format!("{scene}{tables}"));
+    assert_eq!((run.outcome.end, run.records.len()), (RunEnd::Finished, ticks));
+    run
+}
+
+fn assert_no_limit_is_passed(run: &Watched) {
+    // A few roundings of the largest number involved.
+    let slack = 1.0 + 8.0 * f64::EPSILON;
+    let (most_n, most_nm) = (DVec3::new(4.0, 5.0, 6.0), DVec3::splat(0.5));
+    let mut last = flotor_hal::Wrench::ZERO;
+    for record in &run.records {
+        let sent = record.commanded;
+        assert!(sent.is_finite(), "{record:?}");
+        assert!(sent.force().abs().cmple(most_n * slack).all(), "{record:?}");
+        assert!(sent.torque().abs().cmple(most_nm * slack).all(), "{record:?}");
+        assert!((sent.force() - last.force()).length() <= 3.0 * slack, "{last:?} {record:?}");
+        assert!((sent.torque() - last.torque()).length() <= 0.2 * slack, "{last:?} {record:?}");
+        last = sent;
+    }
+    assert!(run.records.iter().any(|record| record.events.intersects(Events::FORCE_LIMITED)));
+}
+
+/// Random numbers, NaN, infinities, 1e300, alternating signs.
 #[test]
 fn nothing_a_wild_model_answers_gets_past_a_limit_or_the_slew() {
     let ticks = TestSize::of_this_run().pick(20_000, 1_000_000);
-    let limits = "[limits]\nforce_n = [4.0, 5.0, 6.0]\ntorque_nm = 0.5\nforce_slew_n_per_s = 3000.0\n\
-                  torque_slew_nm_per_s = 200.0\nramp_s = 0.1";
-    let wild = scene("", "fault = \"wild\"", limits)
-        .replace("duration_s = 0.2", &format!("duration_s = {}", ticks / 1000));
     let controlled = "\npassivity = \"control\"\nvelocity_m_per_s = 0.1";
     // The controller leaves so little to a hand that has put nothing in that the slew limit has nothing to do.
     for (tables, last_guard) in [("", Events::SLEW_LIMITED), (controlled, Events::PASSIVITY_DAMPED)] {
-        let run = watch(&format!("{wild}{tables}"));
-        assert_eq!((run.outcome.end, run.records.len()), (RunEnd::Finished, ticks));
+        let run = wild(ticks, "fault = \"wild\"", tables);
+        assert_no_limit_is_passed(&run);
         let rejected = the_model(&run).rejected_ticks;
         assert!(rejected > 100, "NaN and infinity are counted, by name: {rejected}");
-        // A few roundings of the largest number involved.
-        let slack = 1.0 + 8.0 * f64::EPSILON;
-        let (most_n, most_nm) = (DVec3::new(4.0, 5.0, 6.0), DVec3::splat(0.5));
-        let mut last = flotor_hal::Wrench::ZERO;
-        for record in &run.records {
-            let sent = record.commanded;
-            assert!(sent.is_finite(), "{record:?}");
-            assert!(sent.force().abs().cmple(most_n * slack).all(), "{record:?}");
-            assert!(sent.torque().abs().cmple(most_nm * slack).all(), "{record:?}");
-            assert!((sent.force() - last.force()).length() <= 3.0 * slack, "{last:?} {record:?}");
-            assert!((sent.torque() - last.torque()).length() <= 0.2 * slack, "{last:?} {record:?}");
-            last = sent;
-        }
-        assert!(run.records.iter().any(|record| record.events.intersects(Events::FORCE_LIMITED)));
         assert!(run.records.iter().any(|record| record.events.intersects(last_guard)));
     }
+}
+
+#[test]
+fn a_wild_model_that_is_late_or_panics_gets_past_nothing_either_and_the_cause_is_named() {
+    let ticks = TestSize::of_this_run().pick(20_000, 1_000_000);
+    let at_tick = ticks * 9 / 10;
+    let late = wild(ticks, &format!("fault = \"wild-and-late\"\nat_tick = {at_tick}"), "");
+    assert_no_limit_is_passed(&late);
+    let alone = late.records.iter().filter(|record| record.events.intersects(Events::MODEL_OVERRUN)).count();
+    assert!(alone > ticks / 200, "single late steps are counted and borne: {alone}");
+    let overrun = the_model(&late).overrun.expect("late in every tick at the end");
+    assert_eq!(overrun.limit_ns, 20_000);
+    assert!(overrun.tick < at_tick as u64 + 5, "{overrun:?}");
+
+    let panics = wild(ticks, &format!("fault = \"wild-and-panics\"\nat_tick = {at_tick}"), "");
+    assert_no_limit_is_passed(&panics);
+    assert_eq!(the_model(&panics).panicked_at, Some(at_tick as u64));
+    let [(name, _, words)] = &panics.outcome.models[..] else { panic!("one model") };
+    assert_eq!(name, "block");
+    assert!(words.contains(&format!("step gave up at tick {at_tick}")), "{words}");
+    assert_eq!(panics.records[ticks - 1].commanded, flotor_hal::Wrench::ZERO, "nothing is left of it");
 }
