@@ -55,7 +55,7 @@ impl Engine {
     /// True if a step may come back without an answer and have one in a later tick.
     #[inline]
     pub(crate) fn may_be_late(&self) -> bool {
-        matches!(self, Self::Apart(_))
+        !matches!(self, Self::Here(_))
     }
 
     /// Changes a live parameter at a tick boundary. Real-time: bounded by the model or its patience, no allocation.
