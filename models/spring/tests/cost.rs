@@ -1,15 +1,13 @@
 //! What the laws cost, in instructions: the same on every machine of a kind, however busy it is.
 //!
-//! Callgrind (valgrind) counts while this test runs itself once more. The count of a pose is the difference between a
-//! long and a short run, so that preparing does not matter. Bounds are quotients of two counts of one build. Without
-//! valgrind the test says so and passes.
+//! Callgrind (valgrind) counts while this test runs itself once more, and cuts its count each time a function begins that
+//! is there for nothing else. Bounds are quotients of two counts of one build. Without valgrind the test says so and passes.
 
 #[allow(dead_code)] // each test needs its part of the helpers
 mod sample;
 
 use std::hint::black_box;
-use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 
 use flotor_hal::glam::DVec3;
 use flotor_hal::{Demand as Demanded, Input, Output as Answer};
@@ -21,19 +19,22 @@ use flotor_spring::held::HeldSpring;
 use flotor_spring::pose::Pose;
 use flotor_spring::precision::Precision;
 use flotor_spring::preset::Preset;
-use flotor_spring::response::{Demand, Law};
+use flotor_spring::response::Demand;
 use flotor_spring::rod::{Accuracy, Coils, Rod};
 use flotor_spring::thesis::Thesis;
 use sample::{Sampler, Workspace};
 
-/// The environment variable that makes this program a workload: its name, and how many poses.
+/// The environment variable that makes this program a workload.
 const WORKLOAD: &str = "FLOTOR_SPRING_WORKLOAD";
 /// The workspace of the thesis: a quarter of the free length, seven degrees.
 const DEVICE: Workspace = Workspace { shear: 0.25, height: 0.3, tilt_rad: 0.12, yaw_rad: 0.12 };
-/// Poses in a block; a workload goes over it again and again.
+/// Poses in a block.
 const BLOCK: usize = 1024;
-/// Blocks in a short and in a long run.
-const BLOCKS: [u32; 2] = [4, 20];
+/// Blocks of a law: the count of the second, from its beginning to that of the third, has nothing else in it.
+const BLOCKS: usize = 3;
+/// The laws, in the order in which they run.
+const LAWS: [&str; 6] =
+    ["printed", "closed-form", "energy", "energy, handing over", "closed-form, batch", "energy, batch"];
 /// Ticks of the rod whose counts are compared.
 const TICKS: u32 = 400;
 
@@ -52,24 +53,11 @@ fn smooth(tick: u32) -> Pose {
     Pose::from_rotation_vector(position * Preset::Thesis1.spring().geometry().free_length_m, rotation_rad)
 }
 
-fn one_by_one(blocks: u32, mut respond: impl FnMut(&Pose)) {
-    let poses = poses(Preset::Thesis1.spring().geometry().free_length_m);
-    for _ in 0..blocks {
-        poses.iter().for_each(|pose| respond(black_box(pose)));
-    }
-}
-
-fn side_by_side<L: Law>(blocks: u32, law: &L, batch: &Batch) {
-    let poses = poses(Preset::Thesis1.spring().geometry().free_length_m);
-    let input = |pose: &Pose| Input {
-        demand: Demanded::WRENCH,
-        ..Input::at_rest(flotor_hal::Pose::new(pose.position_m, pose.orientation))
-    };
-    let inputs: Vec<Input> = poses.iter().map(input).collect();
-    let mut answers = vec![Answer::default(); inputs.len()];
-    for _ in 0..blocks {
-        batch.respond(law, black_box(&inputs), black_box(&mut answers));
-    }
+/// Where the counter cuts.
+#[inline(never)]
+fn one_counted_block(work: &mut dyn FnMut()) {
+    work();
+    black_box(());
 }
 
 /// Where the counter cuts.
@@ -78,81 +66,101 @@ fn one_counted_tick(rod: &mut Rod, pose: &Pose) {
     black_box(rod.step(pose, Demand::Wrench));
 }
 
-/// Not a test by itself: what the counted processes run.
-#[test]
-fn workload() {
-    let Ok(workload) = std::env::var(WORKLOAD) else { return };
-    let (name, count) = workload.rsplit_once(' ').expect("a name and a number");
-    let count: u32 = count.parse().expect("a number");
+/// Blocks of each of [`LAWS`].
+fn run_laws() {
     let spring = Preset::Thesis1.spring();
     let (_, _, stiffness) = Preset::Thesis1.parameters();
     let printed = Thesis::new(&spring, stiffness, Precision::Double);
     let closed = ClosedForm::new(&spring, Form::Printed);
     let energy = EnergyForm::new(&spring);
     let mut handing_over = HandOver::new(&spring, Coils::Pass);
-    match name {
-        "printed" => one_by_one(count, |pose| _ = black_box(printed.respond(pose, Demand::Wrench))),
-        "closed-form" => one_by_one(count, |pose| _ = black_box(closed.respond(pose, Demand::Wrench))),
-        "energy" => one_by_one(count, |pose| _ = black_box(energy.respond(pose, Demand::Wrench))),
-        "energy, handing over" => {
-            one_by_one(count, |pose| _ = black_box(handing_over.respond(pose, Demand::Wrench)));
+    let batch = Batch::new();
+    let poses = poses(spring.geometry().free_length_m);
+    let input = |pose: &Pose| Input {
+        demand: Demanded::WRENCH,
+        ..Input::at_rest(flotor_hal::Pose::new(pose.position_m, pose.orientation))
+    };
+    let inputs: Vec<Input> = poses.iter().map(input).collect();
+    let mut answers = vec![Answer::default(); inputs.len()];
+    for law in LAWS {
+        for _ in 0..BLOCKS {
+            let poses = black_box(&poses);
+            one_counted_block(&mut || match law {
+                "printed" => {
+                    poses.iter().for_each(|pose| _ = black_box(printed.respond(pose, Demand::Wrench)));
+                }
+                "closed-form" => {
+                    poses.iter().for_each(|pose| _ = black_box(closed.respond(pose, Demand::Wrench)));
+                }
+                "energy" => {
+                    poses.iter().for_each(|pose| _ = black_box(energy.respond(pose, Demand::Wrench)));
+                }
+                "energy, handing over" => {
+                    poses.iter().for_each(|pose| _ = black_box(handing_over.respond(pose, Demand::Wrench)));
+                }
+                "closed-form, batch" => batch.respond(&closed, black_box(&inputs), black_box(&mut answers)),
+                "energy, batch" => batch.respond(&energy, black_box(&inputs), black_box(&mut answers)),
+                other => panic!("no law {other}"),
+            });
         }
-        "closed-form, batch" => side_by_side(count, &closed, &Batch::new()),
-        "energy, batch" => side_by_side(count, &energy, &Batch::new()),
-        "rod" => {
-            let mut rod = Rod::new(&spring, Accuracy::Servo);
-            for tick in 0..200 {
-                let _ = rod.step(&smooth(tick.min(1)), Demand::Wrench);
-            }
-            (1..=count).for_each(|tick| one_counted_tick(&mut rod, &smooth(tick)));
-        }
-        other => panic!("no workload {other}"),
     }
 }
 
-/// This program under valgrind; nothing where there is none.
-fn counted(workload: &str, arguments: &[&str], folder: &Path) -> Option<Output> {
+fn run_rod() {
+    let mut rod = Rod::new(&Preset::Thesis1.spring(), Accuracy::Servo);
+    for tick in 0..200 {
+        let _ = rod.step(&smooth(tick.min(1)), Demand::Wrench);
+    }
+    (1..=TICKS).for_each(|tick| one_counted_tick(&mut rod, &smooth(tick)));
+}
+
+/// Not a test by itself: what the counted process runs.
+#[test]
+fn workload() {
+    match std::env::var(WORKLOAD).as_deref() {
+        Ok("laws") => run_laws(),
+        Ok("rod") => run_rod(),
+        Ok(other) => panic!("no workload {other}"),
+        Err(_) => {}
+    }
+}
+
+/// Counts of this program under valgrind, one from each beginning of a function to the next; nothing where there is no
+/// valgrind.
+fn counts(workload: &str, cut_at: &str) -> Option<Vec<f64>> {
+    let folder = tempfile::tempdir().expect("a folder");
     Command::new("valgrind")
-        .arg("--tool=callgrind")
-        .arg(format!("--callgrind-out-file={}", folder.join("count").display()))
-        .args(arguments)
+        .args(["--tool=callgrind", "--separate-threads=no"])
+        .arg(format!("--dump-before=*{cut_at}*"))
+        .arg(format!("--callgrind-out-file={}", folder.path().join("count").display()))
         .arg(std::env::current_exe().expect("a running test has a file"))
         .args(["--exact", "workload", "--test-threads=1"])
         .env(WORKLOAD, workload)
         .output()
         .ok()
-        .filter(|output| output.status.success())
-}
-
-/// Instructions a pose.
-fn instructions(name: &str) -> Option<f64> {
-    let folder = tempfile::tempdir().expect("a folder");
-    let count = |blocks: u32| {
-        let output = counted(&format!("{name} {blocks}"), &[], folder.path())?;
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        let total = told.lines().find_map(|line| line.split("Collected : ").nth(1))?;
-        total.trim().parse::<f64>().ok()
+        .filter(|output| output.status.success())?;
+    // count.1 is what comes before the first beginning; what comes after the last is in a file of another name.
+    let count = |part: usize| {
+        let text = std::fs::read_to_string(folder.path().join(format!("count.{part}"))).ok()?;
+        text.lines().find_map(|line| line.strip_prefix("totals: "))?.trim().parse().ok()
     };
-    let [short, long] = BLOCKS;
-    Some((count(long)? - count(short)?) / (f64::from(long - short) * BLOCK as f64))
+    Some((2..).map_while(count).collect())
 }
 
 #[test]
 fn laws_cost_their_share_of_the_printed_one() {
-    let Some(printed) = instructions("printed") else {
+    let Some(counts) = counts("laws", "one_counted_block") else {
         eprintln!("skipped: there is no valgrind to count instructions with");
         return;
     };
-    let of = |name: &str| {
-        let count = instructions(name).expect("valgrind was there a moment ago");
-        println!(
-            "{name}: {count:.0} instructions a pose, {:.2} of the printed law's {printed:.0}",
-            count / printed
-        );
-        count
-    };
-    let (closed, energy, handing_over) = (of("closed-form"), of("energy"), of("energy, handing over"));
-    let (closed_batch, energy_batch) = (of("closed-form, batch"), of("energy, batch"));
+    // The last block has no next one: its count is not among them.
+    assert_eq!(counts.len(), LAWS.len() * BLOCKS - 1);
+    let per_pose = |law: usize| counts[law * BLOCKS + 1] / BLOCK as f64;
+    let [printed, closed, energy, handing_over, closed_batch, energy_batch] = std::array::from_fn(per_pose);
+    for (law, name) in LAWS.iter().enumerate() {
+        let (count, share) = (per_pose(law), per_pose(law) / printed);
+        println!("{name}: {count:.0} instructions a pose, {share:.2} of the printed law's");
+    }
     assert!(closed <= 0.6 * printed, "closed-form");
     assert!(energy <= 1.5 * printed, "energy");
     // To look at the length first and find nothing to hand over.
@@ -172,20 +180,11 @@ fn laws_cost_their_share_of_the_printed_one() {
 
 #[test]
 fn no_tick_of_the_rod_costs_ten_times_the_mean() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let cuts = ["--dump-before=*one_counted_tick*", "--separate-threads=no"];
-    if counted(&format!("rod {TICKS}"), &cuts, folder.path()).is_none() {
+    let Some(counts) = counts("rod", "one_counted_tick") else {
         eprintln!("skipped: there is no valgrind to count instructions with");
         return;
-    }
-    // count.1 is what comes before the first tick, the last file what comes after the last.
-    let count = |tick: u32| {
-        let part =
-            std::fs::read_to_string(folder.path().join(format!("count.{tick}"))).expect("a part a tick");
-        let total = part.lines().find_map(|line| line.strip_prefix("totals: ")).expect("a total");
-        total.trim().parse::<f64>().expect("a number")
     };
-    let counts: Vec<f64> = (2..=TICKS).map(count).collect();
+    assert_eq!(counts.len(), TICKS as usize - 1);
     let mean = counts.iter().sum::<f64>() / counts.len() as f64;
     let worst = counts.iter().copied().fold(0.0, f64::max);
     println!(
