@@ -7,9 +7,10 @@
 //! W = (1 - s) W_energy + s W_rod        F = -dW/dr = (1 - s) F_energy + s F_rod - (W_rod - W_energy) ds/dr
 //! ```
 //!
-//! with a share `s` that goes from 0 to 1 with two continuous derivatives, in `G0` and so in the length of the chord
-//! alone. So the spring stays conservative, its force continuous, and its stiffness too; and past buckling it is the rod,
-//! where `energy` levels off. Elsewhere nothing but the length is computed in addition.
+//! with a share `s` that goes from 0 to 1 with two continuous derivatives, in `G0` and so in the length of the chord, and
+//! back to 0 where the chord lies down: a rod whose plates stand beside one another, or past one another, has several
+//! shapes, and none that a coil could take. So the spring stays conservative, its force continuous, and its stiffness too;
+//! and past buckling it is the rod, where `energy` levels off. Elsewhere nothing but the length is computed in addition.
 //!
 //! **A function of the pose, as far as a spring is one.** Short of buckling there is one equilibrium, and it is found
 //! anew at each pose, from the shape of the linear column. Past it there are several: a bulge may point anywhere, and
@@ -25,7 +26,7 @@ use crate::contact::AxialContact;
 use crate::energy::EnergyForm;
 use crate::entire::EntireFunctions;
 use crate::held::{Held, HeldSpring};
-use crate::pose::Pose;
+use crate::pose::{Chord, Pose};
 use crate::response::{Demand, Response};
 use crate::rigidity::Spring;
 use crate::rod::{Coils, Rod, State};
@@ -34,6 +35,11 @@ use crate::validity::Validity;
 /// `G0` at which the rod has a first say, and at which it has the only one.
 const FIRST: f64 = 0.30;
 const LAST: f64 = 0.20;
+
+/// Cosine of the chord's inclination from which on the rod loses its say, 60 degrees (where the measures of angles of
+/// `energy` cease to be the angles), and at which it has none, 75.5 degrees.
+const UPRIGHT: f64 = 0.5;
+const LYING: f64 = 0.25;
 
 /// Argument at which `G0` is [`FIRST`], rounded down.
 const FIRST_ARGUMENT: f64 = 5.552;
@@ -80,12 +86,30 @@ struct Region {
     largest_argument: f64,
 }
 
-/// The rod's share in the energy, and its derivative by the length of the chord.
+/// The rod's share in the energy, and its derivative by the position of the upper plate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Share {
     value: f64,
-    by_length_per_m: f64,
+    by_position_per_m: DVec3,
     is_buckled: bool,
+}
+
+/// From 0 to 1 as a quantity goes from one bound to another, and its derivative by the quantity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Passage {
+    value: f64,
+    slope: f64,
+}
+
+impl Passage {
+    /// `6 t⁵ - 15 t⁴ + 10 t³`: first and second derivatives vanish at both ends.
+    fn at(quantity: f64, from: f64, to: f64) -> Self {
+        let passed = ((quantity - from) / (to - from)).clamp(0.0, 1.0);
+        Self {
+            value: passed * passed * passed * (10.0 + passed * (6.0 * passed - 15.0)),
+            slope: 30.0 * (passed * (1.0 - passed)).powi(2) / (to - from),
+        }
+    }
 }
 
 impl Region {
@@ -122,24 +146,31 @@ impl Region {
         let height_m = position_m.z + self.free_length_m;
         let square_m2 = position_m.truncate().length_squared() + height_m * height_m;
         let [shortest, longest] = self.squares_m2;
-        square_m2 >= shortest && square_m2 < longest
+        let is_lying = height_m <= 0.0 || height_m * height_m <= LYING * LYING * square_m2;
+        square_m2 >= shortest && square_m2 < longest && !is_lying
     }
 
-    fn share_at(&self, length_m: f64, shortening_m: f64) -> Share {
+    fn share_at(&self, chord: &Chord) -> Share {
+        let Chord { vector_m, length_m, shortening_m } = *chord;
         let sheared_m = length_m + self.ratio * shortening_m;
         let argument = self.unit_per_m2 * shortening_m * sheared_m;
-        if argument >= DEEP_ARGUMENT {
-            return Share { value: 1.0, by_length_per_m: 0.0, is_buckled: argument >= BUCKLING_ARGUMENT };
+        let (short, by_length_per_m) = if argument >= DEEP_ARGUMENT {
+            (1.0, 0.0)
+        } else {
+            let EntireFunctions { g0, g1, .. } = EntireFunctions::at(argument);
+            let passage = Passage::at(g0, FIRST, LAST);
+            let argument_by_length = self.unit_per_m2 * ((1.0 - self.ratio) * shortening_m - sheared_m);
+            // dG0/dz = -G1/6
+            (passage.value, -passage.slope * g1 / 6.0 * argument_by_length)
+        };
+        let direction = vector_m / length_m;
+        let upright = Passage::at(direction.z, LYING, UPRIGHT);
+        let by_direction = (DVec3::Z - direction * direction.z) * (short * upright.slope / length_m);
+        Share {
+            value: short * upright.value,
+            by_position_per_m: direction * (by_length_per_m * upright.value) + by_direction,
+            is_buckled: argument >= BUCKLING_ARGUMENT,
         }
-        let EntireFunctions { g0, g1, .. } = EntireFunctions::at(argument);
-        let passed = ((FIRST - g0) / (FIRST - LAST)).clamp(0.0, 1.0);
-        // 6 t⁵ - 15 t⁴ + 10 t³: first and second derivatives vanish at both ends.
-        let value = passed * passed * passed * (10.0 + passed * (6.0 * passed - 15.0));
-        let slope = 30.0 * (passed * (1.0 - passed)).powi(2);
-        // dG0/dz = -G1/6
-        let by_argument = slope * g1 / (6.0 * (FIRST - LAST));
-        let argument_by_length = self.unit_per_m2 * ((1.0 - self.ratio) * shortening_m - sheared_m);
-        Share { value, by_length_per_m: by_argument * argument_by_length, is_buckled: false }
     }
 }
 
@@ -238,7 +269,7 @@ impl HandOver {
             self.leave();
             return self.energy.respond(pose, demand);
         };
-        let share = self.region.share_at(chord.length_m, chord.shortening_m);
+        let share = self.region.share_at(&chord);
         self.share = share.value;
         if share.value >= 1.0 {
             return self.ask_rod(pose, share, demand);
@@ -250,11 +281,10 @@ impl HandOver {
         let (Some(rod_j), Some(energy_j)) = (rod.energy_j, energy.energy_j) else {
             return self.energy.respond(pose, demand);
         };
-        let by_length_n = (rod_j - energy_j) * share.by_length_per_m;
         let torque_nm = energy.torque_nm.lerp(rod.torque_nm, share.value);
         Response {
             force_n: energy.force_n.lerp(rod.force_n, share.value)
-                - chord.vector_m * (by_length_n / chord.length_m),
+                - share.by_position_per_m * (rod_j - energy_j),
             torque_nm: if demand >= Demand::Wrench { torque_nm } else { DVec3::ZERO },
             energy_j: (demand >= Demand::WrenchAndEnergy)
                 .then_some(energy_j + share.value * (rod_j - energy_j)),
