@@ -58,7 +58,7 @@ every_change() {
     step docs env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
     # Workspaces of their own: that they still compile against the host.
     step beside cargo check --manifest-path host/python/Cargo.toml --target-dir target
-    # The maglev plugin against the USB, HID and serial drivers of a kernel; skips, and says why, without QEMU.
+    # Plugins against the USB, HID and serial drivers of a kernel; skips, and says why, without QEMU.
     step usb .ci/vm
     # Every interleaving of the lock-free cells. A target folder of its own: the flag changes every crate.
     step loom env RUSTFLAGS="--cfg loom" cargo test -p flotor-sync --release --test loom --target-dir target/loom
