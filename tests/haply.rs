@@ -9,6 +9,8 @@ use flotor_hal::DVec3;
 use flotor_hal::glam::DVec2;
 use flotor_haply::emulator::EmulatedBoard;
 use flotor_haply::pantograph::Pantograph;
+use flotor_tests::library::plugin_file;
+use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::workspace_root;
 use serialport::{SerialPort, TTYPort};
 use std::io::{Read, Write};
@@ -105,4 +107,16 @@ fn a_scene_that_wants_more_than_the_plane_is_told_before_anything_moves() {
         Err(error) => panic!("{error}"),
         Ok(_) => panic!("z would be missing"),
     }
+}
+
+#[test]
+fn with_a_board_every_rule_is_checked_and_holds() {
+    let board = Board::start();
+    let library = plugin_file("flotor-haply").display().to_string();
+    let port = format!("port={}", board.path);
+    let ran =
+        Flotor::with(["validate", &library, "--timeout", "60s", "--set", &port, "--set", "timeout_ms=9000"]);
+    let ran = ran.run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    assert_eq!(ran.stdout.matches("  ok ").count(), 7, "{}", ran.stdout);
 }

@@ -39,8 +39,13 @@ impl Emulator {
     }
 
     fn listening(transport: &'static str, at: &str, arguments: &[&str]) -> Self {
+        Self::staying(transport, at, &[&["--once"], arguments].concat())
+    }
+
+    /// One that waits for the next host when one is gone.
+    fn staying(transport: &'static str, at: &str, arguments: &[&str]) -> Self {
         let mut command = Command::new(program("flotor-maglev-emulator"));
-        command.args(["--transport", transport, "--listen", at, "--once"]).args(arguments);
+        command.args(["--transport", transport, "--listen", at]).args(arguments);
         let mut child = command.stdout(Stdio::piped()).spawn().expect("the emulator starts");
         let output = child.stdout.take().expect("a pipe was asked for");
         let mut lines = BufReader::new(output).lines();
@@ -351,6 +356,19 @@ fn validation_says_what_it_could_not_check_without_a_controller() {
         ran.stdout.contains("4 of 7 rules could not be checked: no controller at 127.0.0.1:5678"),
         "{ran:#?}"
     );
+}
+
+#[test]
+fn with_a_controller_every_rule_is_checked_and_holds() {
+    let emulator = Emulator::staying("tcp", "127.0.0.1:0", &[]);
+    let library = plugin_file("flotor-maglev").display().to_string();
+    let address = format!("address={}", emulator.address);
+    let sets = ["--set", &address, "--set", "timeout_ms=8000", "--set", "watchdog_ms=700"];
+    let ran = Flotor::with(["validate", &library, "--timeout", "60s"].iter().chain(&sets)).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    assert_eq!(ran.stdout.matches("  ok ").count(), 7, "{}", ran.stdout);
+    let ran = Flotor::with(["validate", &library, "--set", "addres=1"]).run();
+    assert!(ran.stdout.contains("did you mean `address`?"), "{}", ran.stdout);
 }
 
 // ---------------------------------------------------------------- nonsense

@@ -1,6 +1,6 @@
 //! `flotor validate`: a plugin file against the rules of the contract.
 
-use super::options::duration_s;
+use super::options::{KeyValue, duration_s};
 use super::{CommandError, style, write_json};
 use crate::validate::{Finding, Verdict, check, validate};
 use clap::Args;
@@ -11,11 +11,15 @@ use std::time::Duration;
 
 /// Check a plugin file.
 #[derive(Args)]
-#[command(after_help = "Example:\n  flotor validate target/release/libmy_model.so\n\n\
+#[command(after_help = "Examples:\n  flotor validate target/release/libmy_model.so\n  \
+    flotor validate target/release/libmy_device.so --set port=/dev/ttyACM0\n\n\
     Runs the plugin's code, each rule in a process of its own: validate only files you would load.")]
 pub(crate) struct ValidateArguments {
     /// The plugin's shared library
     plugin: PathBuf,
+    /// Set a parameter of the instances that are checked, as where the device is (repeatable)
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<KeyValue>,
     /// For machines
     #[arg(long)]
     json: bool,
@@ -33,7 +37,7 @@ fn rule(id: &str) -> Result<Rule, String> {
 
 pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     if let Some(rule) = arguments.rule {
-        let verdict = Verdict { seen: check(&arguments.plugin, rule).err() };
+        let verdict = Verdict { seen: check(&arguments.plugin, &arguments.sets, rule).err() };
         // On a line of its own, whatever the plugin has printed before.
         say!(
             "\n{}",
@@ -46,6 +50,9 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     let one_rule = |rule: Rule| {
         let mut command = Command::new(&program);
         command.arg("validate").args(["--rule", rule.id()]).arg(&arguments.plugin);
+        for (key, value) in arguments.sets.iter().map(KeyValue::pair) {
+            command.arg("--set").arg(format!("{key}={value}"));
+        }
         command
     };
     let findings = validate(&arguments.plugin, Duration::from_secs_f64(arguments.timeout), one_rule);

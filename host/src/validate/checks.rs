@@ -1,7 +1,8 @@
 //! One rule, checked in this process.
 
 use super::Seen;
-use flotor_hal::abi::loader::{LoadError, Model, OpenedDevice, Plugin, read_metadata};
+use crate::scene::KeyValue;
+use flotor_hal::abi::loader::{LoadError, Model, OpenedDevice, Plugin, Setting, read_metadata};
 use flotor_hal::abi::{CallStatus, PluginKind};
 use flotor_hal::conformance::Rule;
 use flotor_hal::{
@@ -11,20 +12,44 @@ use flotor_hal::{
 use std::path::Path;
 use std::time::Instant;
 
-/// Checks one rule. Not real-time; runs the plugin's code in this process, which it may hang or end.
+/// Checks one rule, of instances with these settings. Not real-time; runs the plugin's code in this process, which it may hang or end.
 ///
 /// # Errors
 /// What was seen that violates the rule, or what is missing to check it.
-pub fn check(path: &Path, rule: Rule) -> Result<(), Seen> {
+pub fn check(path: &Path, settings: &[KeyValue], rule: Rule) -> Result<(), Seen> {
     let words = |error: LoadError| error.to_string();
     if rule == Rule::Metadata {
         return read_metadata(path).map(|_| ()).map_err(|error| Seen::Violation(words(error)));
     }
     let plugin = Plugin::load(path).map_err(|error| Seen::Violation(words(error)))?;
-    if plugin.metadata().kind == PluginKind::Device && needs_the_device(rule) {
-        return check_device(&plugin, rule);
+    let parse = |set: &KeyValue| {
+        let (key, value) = set.pair();
+        Setting::parse(plugin.parameters(), key, value).map_err(|error| Seen::Missing(error.to_string()))
+    };
+    let settings = settings.iter().map(parse).collect::<Result<Vec<_>, Seen>>()?;
+    let subject = Subject { plugin, settings };
+    if subject.plugin.metadata().kind == PluginKind::Device && needs_the_device(rule) {
+        return check_device(&subject, rule);
     }
-    check_without_device(&plugin, rule).map_err(Seen::Violation)
+    check_without_device(&subject, rule).map_err(Seen::Violation)
+}
+
+/// What is checked: a plugin, and how its instances are set.
+struct Subject {
+    plugin: Plugin,
+    settings: Vec<Setting>,
+}
+
+impl Subject {
+    fn model(&self) -> Result<Model, String> {
+        self.plugin.create_model(&self.settings).map_err(|error| error.to_string())
+    }
+
+    fn prepared_model(&self) -> Result<Model, String> {
+        let mut model = self.model()?;
+        model.prepare(&CONFIG).map_err(|refusal| refusal.to_string())?;
+        Ok(model)
+    }
 }
 
 /// True for rules that open a device plugin.
@@ -33,8 +58,8 @@ fn needs_the_device(rule: Rule) -> bool {
 }
 
 /// Rules of a device. One that is not there, busy or forbidden is nobody's violation.
-fn check_device(plugin: &Plugin, rule: Rule) -> Result<(), Seen> {
-    let mut device = plugin.open_device(&[]).map_err(|error| match error {
+fn check_device(subject: &Subject, rule: Rule) -> Result<(), Seen> {
+    let mut device = subject.plugin.open_device(&subject.settings).map_err(|error| match error {
         LoadError::Refused { refusal, .. } if refusal.kind == RefusalKind::Resource => {
             Seen::Missing(refusal.reason)
         }
@@ -49,19 +74,19 @@ fn check_device(plugin: &Plugin, rule: Rule) -> Result<(), Seen> {
     checked.map_err(Seen::Violation)
 }
 
-fn check_without_device(plugin: &Plugin, rule: Rule) -> Result<(), String> {
+fn check_without_device(subject: &Subject, rule: Rule) -> Result<(), String> {
     match rule {
         Rule::Metadata | Rule::Loads => Ok(()),
-        Rule::Schema => schema(plugin.parameters()),
-        Rule::Defaults => plugin.create_model(&[]).map(|_| ()).map_err(|error| error.to_string()),
-        Rule::FiniteNearHome => with_model(plugin, near_home),
-        Rule::SurvivesNotFinite => with_model(plugin, not_finite),
-        Rule::SurvivesFarPoses => with_model(plugin, far_poses),
-        Rule::ResetRepeats => with_model(plugin, reset_repeats),
-        Rule::TimeBudget => with_model(plugin, time_budget),
-        Rule::Independent => independent(plugin),
-        Rule::NoThreads => with_model(plugin, no_threads),
-        Rule::EnergyGradient => with_model(plugin, energy_gradient),
+        Rule::Schema => schema(subject.plugin.parameters()),
+        Rule::Defaults => subject.model().map(|_| ()),
+        Rule::FiniteNearHome => with_model(subject, near_home),
+        Rule::SurvivesNotFinite => with_model(subject, not_finite),
+        Rule::SurvivesFarPoses => with_model(subject, far_poses),
+        Rule::ResetRepeats => with_model(subject, reset_repeats),
+        Rule::TimeBudget => with_model(subject, time_budget),
+        Rule::Independent => independent(subject),
+        Rule::NoThreads => with_model(subject, no_threads),
+        Rule::EnergyGradient => with_model(subject, energy_gradient),
         unknown => Err(format!("this host cannot check `{}`", unknown.id())),
     }
 }
@@ -69,10 +94,8 @@ fn check_without_device(plugin: &Plugin, rule: Rule) -> Result<(), String> {
 /// Rate a plugin is checked at.
 const CONFIG: LoopConfig = LoopConfig { period_ns: 1_000_000, seed: 1 };
 
-fn with_model(plugin: &Plugin, check: impl FnOnce(&mut Model) -> Result<(), String>) -> Result<(), String> {
-    let mut model = plugin.create_model(&[]).map_err(|error| error.to_string())?;
-    model.prepare(&CONFIG).map_err(|refusal| refusal.to_string())?;
-    check(&mut model)
+fn with_model(subject: &Subject, check: impl FnOnce(&mut Model) -> Result<(), String>) -> Result<(), String> {
+    check(&mut subject.prepared_model()?)
 }
 
 fn schema(parameters: &[Parameter]) -> Result<(), String> {
@@ -209,12 +232,8 @@ fn walked(models: &mut [&mut Model]) -> Result<Vec<Vec<Wrench>>, String> {
     Ok(wrenches)
 }
 
-fn independent(plugin: &Plugin) -> Result<(), String> {
-    let make = || -> Result<Model, String> {
-        let mut model = plugin.create_model(&[]).map_err(|error| error.to_string())?;
-        model.prepare(&CONFIG).map_err(|refusal| refusal.to_string())?;
-        Ok(model)
-    };
+fn independent(subject: &Subject) -> Result<(), String> {
+    let make = || subject.prepared_model();
     let alone = walked(&mut [&mut make()?])?;
     let alone = alone.first().cloned().unwrap_or_default();
     let in_turns = walked(&mut [&mut make()?, &mut make()?])?;
