@@ -102,9 +102,9 @@ fn instructions(name: &str) -> Option<f64> {
     Some(counted)
 }
 
-/// A whole tick with the spring: device, mapping, model, envelope, record into the trace ring. What was counted on x86-64
+/// A whole tick with the spring: device, mapping, model, envelope, record into the trace ring and out of it again. What was counted on x86-64
 /// and a tenth, for other versions of compiler and libraries.
-const MOST_INSTRUCTIONS: [(&str, f64); 2] = [("scripted", 3150.0), ("simulated", 4900.0)];
+const MOST_INSTRUCTIONS: [(&str, f64); 2] = [("scripted", 3280.0), ("simulated", 5070.0)];
 
 #[test]
 fn a_whole_tick_stays_within_its_instructions() {
@@ -134,7 +134,8 @@ fn a_tick_that_replaces_a_model_does_next_to_nothing_for_it() {
     }
     let scratch = Scratch::default();
     let counts = scratch.path().join("count");
-    let ticks = TestSize::of_this_run().pick(1_000, 10_000);
+    // Nine replacements and nine changes of a parameter: each call of the function makes a file of counts.
+    let ticks = 1_000;
     // Only what a tick does about changes is counted, and each time on its own.
     let arguments = [
         "--toggle-collect=flotor::servo::Servo::apply_changes",
