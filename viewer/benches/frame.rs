@@ -6,7 +6,9 @@ use flotor_record::mapping::{Blend, MappingConfig};
 use flotor_record::trace::{RECORD_WORDS, TickRecord};
 use flotor_record::{Clock, PluginDescription, Role, RunDescription};
 use flotor_sync::Words;
+use flotor_viewer::app::{Start, Viewer};
 use flotor_viewer::camera::Camera;
+use flotor_viewer::canvas::Canvas;
 use flotor_viewer::decimate::min_max;
 use flotor_viewer::history::{History, Keep};
 use flotor_viewer::palette::{Look, Palette};
@@ -18,6 +20,8 @@ use std::path::PathBuf;
 
 const TICKS: u64 = 10_000;
 const HEIGHT_PX: f64 = 448.0;
+/// The 3D view in a window of 1280 x 800 with its panel.
+const SCENE_PX: [usize; 2] = [980, 396];
 
 fn run() -> RunDescription {
     RunDescription {
@@ -99,5 +103,51 @@ fn frame(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, frame);
+/// The whole picture but its rasterising: interface, six traces of ten seconds, 3D scene, and egui's triangles of it all.
+fn whole_picture(criterion: &mut Criterion) {
+    let context = egui::Context::default();
+    let start = Start::Recording(Box::new(history()), Some(0.0), vec![library()]);
+    let mut viewer = Viewer::new(&context, None, start, Look::Dark);
+    // What a GPU does otherwise, at the size the scene has in this window: not part of the bound.
+    let run = history();
+    let (mut shapes, _) = shapes_of(run.run(), &[library()]);
+    let camera = Camera::experimenter(SceneBuilder::height_mm(&shapes));
+    let (palette, scale) = (Palette::of(Look::Dark), ArrowScale::fitting(run.samples()));
+    let sample = run.at(0.2).expect("ten seconds");
+    let mut builder = SceneBuilder::default();
+    let (mesh, _) =
+        builder.build(&mut shapes, sample, &palette, &camera, SCENE_PX[1] as f64, scale, Visible::default());
+    let mut canvas = Canvas::new(None);
+    criterion.bench_function("3D scene drawn on the processor", |bench| {
+        bench.iter(|| black_box(canvas.draw(&context, mesh, &camera, palette.backdrop, SCENE_PX)));
+    });
+
+    let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(1280.0, 800.0));
+    let mut time_s = 0.0;
+    let mut picture = |viewer: &mut Viewer, events: Vec<egui::Event>| {
+        time_s += 0.016;
+        let input = egui::RawInput {
+            screen_rect: Some(screen),
+            time: Some(time_s),
+            events,
+            ..egui::RawInput::default()
+        };
+        let output = context.run_ui(input, |ui| viewer.show(ui));
+        context.tessellate(output.shapes, 1.0).len()
+    };
+    let space = |pressed| egui::Event::Key {
+        key: egui::Key::Space,
+        physical_key: None,
+        pressed,
+        repeat: false,
+        modifiers: egui::Modifiers::NONE,
+    };
+    picture(&mut viewer, Vec::new());
+    picture(&mut viewer, vec![space(true), space(false)]); // plays: every picture is another moment
+    criterion.bench_function("whole picture at 1280x800", |bench| {
+        bench.iter(|| black_box(picture(&mut viewer, Vec::new())));
+    });
+}
+
+criterion_group!(benches, frame, whole_picture);
 criterion_main!(benches);

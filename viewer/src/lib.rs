@@ -11,6 +11,7 @@
 //! - [`gpu`]: draws the scene on a GPU or software adapter, [`raster`] without either; [`canvas`] is one of the two in the
 //!   interface, [`picture`] a whole picture without a window.
 //! - [`ui`], [`palette`]: the parts of the interface; [`app`] puts them together. [`sound`] warns the ear.
+//! - [`remembered`]: what a person has chosen about the window, from one time to the next.
 //! - [`experiment`]: a sitting of a perception experiment, and its screens.
 //!
 //! Nothing here is real-time.
@@ -32,6 +33,7 @@ pub mod picture;
 pub mod player;
 pub mod quantity;
 pub mod raster;
+pub mod remembered;
 pub mod scene;
 pub mod shape;
 pub mod sound;

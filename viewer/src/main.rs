@@ -9,7 +9,7 @@ use flotor_viewer::history::History;
 use flotor_viewer::palette::Look;
 use flotor_viewer::picture::{PictureError, PictureOptions, draw_without_window, picture, write_png};
 use flotor_viewer::shape::shapes_of;
-use flotor_viewer::window::open;
+use flotor_viewer::window::{WindowWish, open};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -37,15 +37,15 @@ struct Arguments {
     /// The moment to show, s (default: that of the largest force)
     #[arg(long, value_name = "SECONDS")]
     at: Option<f64>,
-    /// Light or dark
-    #[arg(long, value_enum, default_value_t = LookOption::Dark)]
-    look: LookOption,
-    /// Width and height of picture or window
-    #[arg(long, value_parser = size, default_value = "1280x800", value_name = "WxH")]
-    size: [usize; 2],
-    /// Size of text and lines, 1 to 3
-    #[arg(long, value_parser = scale, default_value_t = 1.0, value_name = "FACTOR")]
-    scale: f32,
+    /// Light or dark (default: dark; a window: as the last time)
+    #[arg(long, value_enum)]
+    look: Option<LookOption>,
+    /// Width and height of picture or window (default: 1280x800; a window: as the last time)
+    #[arg(long, value_parser = size, value_name = "WxH")]
+    size: Option<[usize; 2]>,
+    /// Size of text and lines, 1 to 3 (default: 1; a window: as the last time)
+    #[arg(long, value_parser = scale, value_name = "FACTOR")]
+    scale: Option<f32>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -77,22 +77,25 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let look = match arguments.look {
-        LookOption::Dark => Look::Dark,
-        LookOption::Light => Look::Light,
+    let wish = WindowWish {
+        look: arguments.look.map(|look| match look {
+            LookOption::Dark => Look::Dark,
+            LookOption::Light => Look::Light,
+        }),
+        size: arguments.size,
+        scale: arguments.scale,
     };
     let read = |path: &PathBuf| History::read(path).map_err(|error| Failure::Usage(error.to_string()));
     let history = arguments.recording.as_ref().map(read).transpose()?;
     match (history, &arguments.screenshot) {
-        (Some(history), Some(out)) if arguments.window => whole_window(arguments, history, look, out),
-        (Some(history), Some(out)) => screenshot(arguments, &history, look, out),
+        (Some(history), Some(out)) if arguments.window => whole_window(arguments, history, wish, out),
+        (Some(history), Some(out)) => screenshot(arguments, &history, wish, out),
         (history, _) => {
             let start = match history {
                 Some(history) => Start::Recording(Box::new(history), arguments.at, arguments.plugins.clone()),
                 None => live(arguments)?,
             };
-            open(start, look, arguments.size, arguments.scale)
-                .map_err(|error| Failure::Usage(error.to_string()))
+            open(start, wish).map_err(|error| Failure::Usage(error.to_string()))
         }
     }
 }
@@ -108,25 +111,31 @@ fn live(arguments: &Arguments) -> Result<Start, Failure> {
 }
 
 /// The window as it would open on the recording, drawn on the processor.
-fn whole_window(arguments: &Arguments, history: History, look: Look, out: &Path) -> Result<(), Failure> {
+fn whole_window(
+    arguments: &Arguments,
+    history: History,
+    wish: WindowWish,
+    out: &Path,
+) -> Result<(), Failure> {
+    let (look, size, scale) = of_picture(wish);
     let start = Start::Recording(Box::new(history), arguments.at, arguments.plugins.clone());
     let mut viewer = Viewer::new(&egui::Context::default(), None, start, look);
-    let image = draw_without_window(arguments.size, arguments.scale, look, |ui| viewer.show(ui));
+    let image = draw_without_window(size, scale, look, |ui| viewer.show(ui));
     write_png(out, &image).map_err(|error| Failure::File(error.to_string()))
 }
 
-fn screenshot(arguments: &Arguments, history: &History, look: Look, out: &Path) -> Result<(), Failure> {
+/// Look, size and scale of a picture: the same for everybody.
+fn of_picture(wish: WindowWish) -> (Look, [usize; 2], f32) {
+    (wish.look.unwrap_or_default(), wish.size.unwrap_or([1280, 800]), wish.scale.unwrap_or(1.0))
+}
+
+fn screenshot(arguments: &Arguments, history: &History, wish: WindowWish, out: &Path) -> Result<(), Failure> {
+    let (look, size_px, scale) = of_picture(wish);
     let (mut shapes, missing) = shapes_of(history.run(), &arguments.plugins);
     for reason in missing {
         eprintln!("note: {reason}");
     }
-    let options = PictureOptions {
-        size_px: arguments.size,
-        scale: arguments.scale,
-        look,
-        at_s: arguments.at,
-        ..PictureOptions::default()
-    };
+    let options = PictureOptions { size_px, scale, look, at_s: arguments.at, ..PictureOptions::default() };
     let image = picture(history, &mut shapes, &options).map_err(|error| Failure::Usage(error.to_string()))?;
     write_png(out, &image).map_err(|error: PictureError| Failure::File(error.to_string()))
 }

@@ -6,9 +6,11 @@
 use crate::geometry::Color;
 use crate::raster::solid::Backdrop;
 use egui::Color32;
+use serde::{Deserialize, Serialize};
 
 /// Light or dark.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Look {
     /// Dark background.
     #[default]

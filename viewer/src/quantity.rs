@@ -2,9 +2,11 @@
 
 use crate::history::Sample;
 use flotor_hal::DVec3;
+use serde::{Deserialize, Serialize};
 
 /// Units of axes and readouts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Units {
     /// Millimetres, degrees, newtons, millinewton metres.
     #[default]
@@ -14,7 +16,8 @@ pub enum Units {
 }
 
 /// A measured quantity with one component or three.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Quantity {
     /// Force sent to the device.
     Force,

@@ -1,9 +1,11 @@
 //! A real window: display, device, and what is said where there is none.
 
 use crate::app::{Start, Viewer};
-use crate::palette::Look;
-use egui::ViewportBuilder;
+use crate::palette::{Look, Palette};
+use crate::remembered::Remembered;
+use egui::{Ui, ViewportBuilder};
 use std::panic::{self, AssertUnwindSafe};
+use std::path::PathBuf;
 
 /// Why there is no window.
 #[derive(Debug, thiserror::Error)]
@@ -22,13 +24,29 @@ pub enum WindowError {
     NoAdapter(String),
 }
 
+/// What a command line says about a window; what it does not say is as it was the last time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WindowWish {
+    /// Light or dark.
+    pub look: Option<Look>,
+    /// Width and height, points.
+    pub size: Option<[usize; 2]>,
+    /// Size of text and lines.
+    pub scale: Option<f32>,
+}
+
 /// Opens a window and stays until it is closed.
 ///
 /// # Errors
 /// [`WindowError`].
-pub fn open(start: Start, look: Look, size: [usize; 2], scale: f32) -> Result<(), WindowError> {
+pub fn open(start: Start, wish: WindowWish) -> Result<(), WindowError> {
+    // A sitting looks the same for everybody.
+    let file = if matches!(start, Start::Sitting(..)) { None } else { Remembered::file() };
+    let mut remembered = file.as_deref().map(Remembered::load).unwrap_or_default();
+    remembered.look = wish.look.unwrap_or(remembered.look);
+    remembered.zoom = wish.scale.unwrap_or(remembered.zoom);
     #[allow(clippy::cast_precision_loss)] // pixels
-    let size = size.map(|length| length as f32);
+    let size = wish.size.map_or(remembered.size_pt, |size| size.map(|length| length as f32));
     let viewport = ViewportBuilder::default()
         .with_title("Flotor")
         .with_app_id("flotor-viewer")
@@ -40,9 +58,11 @@ pub fn open(start: Start, look: Look, size: [usize; 2], scale: f32) -> Result<()
             "flotor-viewer",
             options,
             Box::new(move |creation| {
-                creation.egui_ctx.set_zoom_factor(scale);
+                creation.egui_ctx.set_zoom_factor(remembered.zoom);
                 let device = creation.wgpu_render_state.as_ref();
-                Ok(Box::new(Viewer::new(&creation.egui_ctx, device, start, look)))
+                let mut viewer = Viewer::new(&creation.egui_ctx, device, start, remembered.look);
+                viewer.recall(&creation.egui_ctx, &remembered);
+                Ok(Box::new(Kept { viewer, file, kept: remembered }))
             }),
         )
     };
@@ -60,6 +80,35 @@ pub fn open(start: Start, look: Look, size: [usize; 2], scale: f32) -> Result<()
             let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
             Err(WindowError::NoDisplay(one_line(text.unwrap_or("the display's libraries do not work"))))
         }
+    }
+}
+
+/// A window whose choices are kept whenever they change.
+struct Kept {
+    viewer: Viewer,
+    file: Option<PathBuf>,
+    kept: Remembered,
+}
+
+impl eframe::App for Kept {
+    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        self.viewer.show(ui);
+        let Some(file) = &self.file else { return };
+        let size_pt = ui.input(|input| input.viewport().inner_rect.map(|rect| rect.size().into()));
+        let now = Remembered {
+            size_pt: size_pt.unwrap_or(self.kept.size_pt),
+            zoom: ui.ctx().zoom_factor(),
+            ..self.viewer.remembered()
+        };
+        // Not with every picture while something is pulled.
+        if now != self.kept && !ui.input(|input| input.pointer.any_down()) {
+            let _ = now.save(file); // a full disk costs the choices of the next time, and nothing now
+            self.kept = now;
+        }
+    }
+
+    fn clear_color(&self, _visuals: &egui::Visuals) -> [f32; 4] {
+        Palette::of(self.viewer.look()).panel.to_normalized_gamma_f32()
     }
 }
 

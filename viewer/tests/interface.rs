@@ -368,6 +368,59 @@ fn twice_the_scale_loses_nothing() {
     }
 }
 
+/// From 100 to 200 %, in windows from a small laptop's to a large screen's: everything that can be pressed or read lies inside, and
+/// nothing is cut off at the right of the side.
+#[test]
+fn every_scale_and_size_keeps_everything_in_sight() {
+    for (scale, size) in
+        [(1.0, [1280.0, 800.0]), (1.25, [1024.0, 640.0]), (1.5, [853.0, 533.0]), (2.0, [960.0, 600.0])]
+    {
+        let (run, _) = spring_run(&[]);
+        let mut history = History::new(run, Keep::All);
+        (0..1000).for_each(|number| history.push(&tick(number, Events::NONE)));
+        let harness = Harness::builder().with_size(egui::Vec2::from(size)).with_pixels_per_point(scale);
+        let start = Start::Recording(Box::new(history), None, vec![plugin_file("spring")]);
+        let mut window =
+            harness.build_eframe(|creation| Viewer::new(&creation.egui_ctx, None, start, Look::Dark));
+        window.run_steps(3);
+        let labels = [
+            "A spring under test",
+            "Force over time, N",
+            "Position over time, mm",
+            "Play",
+            "Export",
+            "Light (L)",
+        ];
+        for label in labels {
+            let area = window.get_by_label(label).rect();
+            let is_inside = area.min.x >= 0.0 && area.max.x <= size[0] + 0.5 && area.max.y <= size[1] + 0.5;
+            assert!(is_inside && area.width() > 8.0, "{label} at {scale} in {size:?}: {area:?}");
+        }
+    }
+}
+
+/// What was chosen is there the next time: look, units, traces, the panel.
+#[test]
+fn a_window_is_as_it_was_left() {
+    let mut left = recording();
+    left.key_press(Key::L);
+    left.key_press(Key::U);
+    left.run_steps(1);
+    left.get_by_label("Energy").click();
+    left.key_press(Key::P);
+    left.run_steps(3);
+    let remembered = left.state().remembered();
+    let mut next = recording();
+    assert_ne!(next.state().remembered(), remembered);
+    let context = next.ctx.clone();
+    next.state_mut().recall(&context, &remembered);
+    next.run_steps(3);
+    assert_eq!(next.state().remembered(), remembered);
+    next.get_by_label("Dark (L)");
+    next.get_by_label("Energy over time, J");
+    assert!(next.query_by_label("preset").is_none(), "the panel was put away");
+}
+
 /// A window that nobody touches makes no pictures: what costs nothing costs no processor.
 #[test]
 fn a_recording_that_stands_still_asks_for_no_more_pictures() {
@@ -375,6 +428,33 @@ fn a_recording_that_stands_still_asks_for_no_more_pictures() {
     window.run_steps(10);
     let delay = window.output().viewport_output.values().map(|viewport| viewport.repaint_delay).min();
     assert!(delay.is_none_or(|delay| delay > Duration::from_secs(60)), "{delay:?}");
+}
+
+/// The window itself under a stream: pictures are made while ticks come, an hour's worth at full size, half a minute's at quick, and
+/// memory stays. What waits for a picture is bounded, so a window that makes none loses ticks and not memory.
+#[test]
+fn a_window_that_streams_does_not_grow() {
+    let seconds = if std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size == "full") { 3600 } else { 30 };
+    const STEP_S: u64 = 5;
+    let (mut window, mut host, _folder) = live(&[]);
+    let (mut before, mut sent) = (0, 1500);
+    // The history holds a minute, and is filled first.
+    for step in 0..(60 + seconds) / STEP_S {
+        host.run_ticks(1000 * STEP_S, Events::NONE);
+        sent += 1000 * STEP_S;
+        until(&mut window, |window| {
+            window.state().history().at(f64::INFINITY).is_some_and(|sample| sample.tick + 1 >= sent)
+        });
+        if step == 60 / STEP_S {
+            before = resident_kib();
+        }
+    }
+    assert_eq!(window.state().history().len(), 60_000);
+    let grown = resident_kib().saturating_sub(before);
+    assert!(
+        grown < 32 * 1024,
+        "{grown} KiB more after {seconds} s; other tests of this program allocate, too"
+    );
 }
 
 /// An hour of a running host at full size, two minutes at quick: the history holds a minute, and memory stays.

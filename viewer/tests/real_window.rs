@@ -92,7 +92,9 @@ fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
     }
     let folder = tempfile::tempdir().expect("a scratch folder");
     let mut run = Command::new(program("flotor"));
-    run.args(["run", "--duration", "10min", "--rate", "500"]).env("XDG_RUNTIME_DIR", folder.path());
+    run.args(["run", "--duration", "10min", "--rate", "500"])
+        .env("XDG_RUNTIME_DIR", folder.path())
+        .env("XDG_CONFIG_HOME", folder.path());
     let _run =
         Owned(run.stdin(Stdio::null()).stderr(Stdio::null()).stdout(Stdio::null()).spawn().expect("it runs"));
     let directory = Directory::at(folder.path().join("flotor"));
@@ -103,7 +105,11 @@ fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
     let mut window = Command::new(program("flotor-viewer"));
     window.args(["--size", &format!("{}x{}", SIZE[0], SIZE[1])]).env("DISPLAY", &display);
     // A software adapter takes all processors if it may; the loop needs one.
-    window.env_remove("WAYLAND_DISPLAY").env("XDG_RUNTIME_DIR", folder.path()).env("LP_NUM_THREADS", "1");
+    window
+        .env_remove("WAYLAND_DISPLAY")
+        .env("XDG_RUNTIME_DIR", folder.path())
+        .env("XDG_CONFIG_HOME", folder.path())
+        .env("LP_NUM_THREADS", "1");
     let mut window = Owned(window.stderr(Stdio::null()).spawn().expect("the viewer starts"));
     let xdotool = |arguments: &[&str]| {
         let output =
@@ -160,7 +166,11 @@ fn a_sitting_in_a_real_window_is_gone_through_by_keyboard() {
     let mut study = Command::new(program("flotor"));
     study.args(["study", "magnitude", "--observer", "human", "--stimuli", "3", "--replications", "1"]);
     study.args(["--demo", "2", "--noise", "off", "--out"]).arg(&out);
-    study.env("DISPLAY", &display).env_remove("WAYLAND_DISPLAY").env("XDG_RUNTIME_DIR", folder.path());
+    study
+        .env("DISPLAY", &display)
+        .env_remove("WAYLAND_DISPLAY")
+        .env("XDG_RUNTIME_DIR", folder.path())
+        .env("XDG_CONFIG_HOME", folder.path());
     study.env("LP_NUM_THREADS", "1").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     let mut study = Owned(study.spawn().expect("the study starts"));
     // Without a window manager nobody gives the window the keyboard. While it opens or closes there is none to be found: the
@@ -204,7 +214,11 @@ fn a_sitting_without_a_display_is_refused_before_it_begins() {
     let mut study = Command::new(program("flotor"));
     study.args(["study", "jnd", "--observer", "human", "--noise", "off", "--out"]).arg(&out);
     study.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
-    let output = study.env("XDG_RUNTIME_DIR", folder.path()).output().expect("it starts");
+    let output = study
+        .env("XDG_RUNTIME_DIR", folder.path())
+        .env("XDG_CONFIG_HOME", folder.path())
+        .output()
+        .expect("it starts");
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(said.contains("no window") && said.contains("--screen terminal"), "{said}");
@@ -216,7 +230,11 @@ fn without_a_display_there_is_one_line_and_exit_code_2() {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let mut viewer = Command::new(program("flotor-viewer"));
     viewer.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
-    let output = viewer.env("XDG_RUNTIME_DIR", folder.path()).output().expect("it starts");
+    let output = viewer
+        .env("XDG_RUNTIME_DIR", folder.path())
+        .env("XDG_CONFIG_HOME", folder.path())
+        .output()
+        .expect("it starts");
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert_eq!(said.lines().count(), 1, "{said}");

@@ -11,6 +11,9 @@ use egui::{Color32, ComboBox, RichText, Role, Ui, WidgetInfo};
 /// Lengths of time that can be shown, s.
 pub const WINDOWS_S: [f64; 5] = [2.0, 5.0, 10.0, 30.0, 60.0];
 
+/// The traces shown to who has not chosen others.
+pub const FIRST_TRACES: [Quantity; 2] = [Quantity::Force, Quantity::Position];
+
 /// How much of the past is shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Window {
@@ -59,8 +62,7 @@ impl PlotStack {
     /// Force and position.
     #[must_use]
     pub fn new(window: Window) -> Self {
-        let shown = vec![Quantity::Force, Quantity::Position];
-        Self { shown, window, units: Units::Handy, stands_at_s: None, hover_s: None }
+        Self { shown: FIRST_TRACES.to_vec(), window, units: Units::Handy, stands_at_s: None, hover_s: None }
     }
 
     /// First and last time shown, s.

@@ -1,0 +1,108 @@
+//! What has come since the last picture, from a running host or a search for one.
+
+use super::source::{Parts, connect};
+use super::{Audience, Source, Viewer, Wanted};
+use crate::camera::Camera;
+use crate::feed::{FeedState, News, STALE_AFTER};
+use crate::history::{History, Keep, Sample};
+use crate::panel::Panel;
+use crate::player::Player;
+use crate::scene::SceneBuilder;
+use crate::tally::Tally;
+use egui::Context;
+use flotor_live::{ChangeMessage, Outcome, Subject};
+use flotor_record::trace::Events;
+use std::time::{Duration, Instant};
+
+/// How often a run is looked for while there is none.
+const LOOK_PERIOD: Duration = Duration::from_millis(500);
+/// How much of a running host is kept, s, and how many ticks at most.
+const KEPT_S: f64 = 60.0;
+const MOST_KEPT: usize = 120_000;
+/// What a hand should be warned of with a sound.
+const EXCESS: Events = Events::from_bits(
+    Events::FORCE_LIMITED.bits() | Events::TORQUE_LIMITED.bits() | Events::EXCESS_FORCE.bits(),
+);
+
+impl Viewer {
+    /// Takes in what has come since the last picture.
+    pub(super) fn take_in(&mut self, context: &Context) {
+        let due = self.last_look.is_none_or(|last| last.elapsed() >= LOOK_PERIOD);
+        let wanted = match &self.source {
+            Source::Waiting(wanted) => Some(wanted),
+            Source::Live { feed, wanted } if feed.state() != FeedState::Running => Some(wanted),
+            _ => None,
+        };
+        if let Some(wanted) = wanted {
+            // Somebody may start the next run at any time.
+            context.request_repaint_after(LOOK_PERIOD);
+            if due {
+                self.last_look = Some(Instant::now());
+                let wanted = wanted.clone();
+                self.look_for(&wanted, context);
+            }
+        }
+        if let Source::Live { feed, .. } = &self.source {
+            let news = feed.news();
+            self.tally.dropped = feed.dropped();
+            if feed.state() == FeedState::Running {
+                context.request_repaint_after(STALE_AFTER); // to notice that nothing comes
+            } else {
+                self.panels.iter_mut().for_each(Panel::freeze);
+            }
+            self.digest(news);
+        }
+    }
+
+    fn look_for(&mut self, wanted: &Wanted, context: &Context) {
+        let Ok(feed) = connect(wanted, context, self.frame) else { return };
+        let parts = Parts::of_host(&feed);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a minute of ticks
+        let kept = ((feed.run().rate_hz * KEPT_S) as usize).clamp(1, MOST_KEPT);
+        self.history = History::new(feed.run().clone(), Keep::Newest(kept));
+        self.limits = feed.greeting().limits;
+        self.tally = Tally::default();
+        self.player = Player::live();
+        self.view.camera = Camera::experimenter(SceneBuilder::height_mm(&parts.shapes));
+        (self.shapes, self.panels, self.missing) = (parts.shapes, parts.panels, parts.missing);
+        self.shape_version += 1;
+        self.source = Source::Live { feed: Box::new(feed), wanted: wanted.clone() };
+    }
+
+    fn digest(&mut self, news: News) {
+        for record in &news.records {
+            self.history.push(record);
+            self.tally.add(&Sample::from(record));
+            if record.events.intersects(EXCESS) {
+                self.bell.ring();
+            }
+        }
+        for change in &news.changes {
+            self.follow(change);
+        }
+        for answer in news.answers {
+            if let Some(reason) = answer.refused {
+                self.panels.iter_mut().for_each(Panel::take_back);
+                self.say(reason);
+            }
+        }
+    }
+
+    /// A parameter changed in the loop: panels and the drawn instance follow.
+    fn follow(&mut self, change: &ChangeMessage) {
+        self.panels.iter_mut().for_each(|panel| panel.take_in(change));
+        if change.outcome != Outcome::Applied || change.subject != Subject::Parameter {
+            return;
+        }
+        if self.audience == Audience::Subject {
+            return; // what a subject sees does not change with what is felt
+        }
+        if let Some(shape) = self.shapes.iter_mut().find(|shape| shape.name() == change.plugin) {
+            shape.set_parameter(&change.parameter, change.number);
+            self.shape_version += 1;
+            for panel in self.panels.iter_mut().filter(|panel| panel.name == change.plugin) {
+                panel.follow(shape);
+            }
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! What keys do in the window of an experimenter.
+
+use super::Viewer;
+use crate::player::Motion;
+use crate::scene::SceneBuilder;
+use crate::ui::style;
+use egui::{Context, Key, Ui};
+use flotor_live::Ask;
+
+impl Viewer {
+    /// Keys, unless somebody types into a field. The space bar is the largest key: with a run it is the emergency stop,
+    /// whatever has the focus.
+    pub(super) fn keys(&mut self, ui: &Ui) {
+        let span_s = self.history.span_s();
+        let is_live = self.source.is_running();
+        let pressed = |key: Key| ui.input(|input| input.key_pressed(key) && !input.modifiers.command);
+        if is_live && ui.input(|input| input.key_pressed(Key::Space)) {
+            self.ask(Ask::EmergencyStop);
+        }
+        if ui.ctx().egui_wants_keyboard_input() {
+            return;
+        }
+        if !is_live && pressed(Key::Space) {
+            self.player.toggle(false, span_s);
+        }
+        let (shift, tick) = ui.input(|input| (input.modifiers.shift, input.modifiers.command));
+        let step_s = if shift { 10.0 } else { 1.0 };
+        let arrows = ui.input(|input| {
+            f64::from(u8::from(input.key_pressed(Key::ArrowRight)))
+                - f64::from(u8::from(input.key_pressed(Key::ArrowLeft)))
+        });
+        if arrows != 0.0 {
+            let step_s = if tick { 1.0 / self.history.run().rate_hz.max(1.0) } else { step_s };
+            self.player.seek(self.player.now_s + arrows * step_s, span_s);
+        }
+        if pressed(Key::Home) {
+            self.player.seek(span_s[0], span_s);
+        }
+        if pressed(Key::End) {
+            self.player.seek(span_s[1], span_s);
+            if is_live {
+                self.player.motion = Motion::Follow;
+            }
+        }
+        if pressed(Key::F) && is_live {
+            self.player.toggle(true, span_s);
+        }
+        if pressed(Key::U) {
+            self.plots.switch_units();
+        }
+        if pressed(Key::P) {
+            self.shows_panel = !self.shows_panel;
+        }
+        if pressed(Key::L) {
+            self.switch_look(ui.ctx());
+        }
+        self.view.keys(ui, SceneBuilder::height_mm(&self.shapes));
+    }
+
+    pub(super) fn switch_look(&mut self, context: &Context) {
+        self.look = self.look.other();
+        style::apply(context, self.look);
+    }
+}

@@ -1,0 +1,115 @@
+//! The parts of an experimenter's window and where they stand: bar, side, middle.
+
+use super::{Audience, Source, Viewer};
+use crate::export::export;
+use crate::palette::Palette;
+use crate::ui::plot_stack::PlotWish;
+use crate::ui::top_bar::{TopBar, TopBarWish};
+use crate::ui::view3d::Subject;
+use crate::ui::{legend, parameters, readout, standing, style, warnings};
+use egui::{Rect, RichText, ScrollArea, Ui, vec2};
+use flotor_live::{Ask, SetValue};
+
+impl Viewer {
+    pub(super) fn top(&mut self, ui: &mut Ui, palette: &Palette) {
+        let (standing, is_well) = self.standing();
+        let (title, subtitle) = match &self.source {
+            Source::Waiting(_) => ("Flotor".to_owned(), String::new()),
+            // Names of parameters are nothing for a subject's eyes.
+            _ if self.audience == Audience::Subject => (String::new(), String::new()),
+            _ => (readout::title_of(self.history.run()), readout::subtitle_of(self.history.run())),
+        };
+        let bar = TopBar {
+            title: &title,
+            subtitle: &subtitle,
+            standing: &standing,
+            is_well,
+            can_stop: self.source.is_running(),
+            has_panel: self.audience == Audience::Experimenter,
+            look: self.look,
+        };
+        match bar.show(ui, palette) {
+            Some(TopBarWish::EmergencyStop) => self.ask(Ask::EmergencyStop),
+            Some(TopBarWish::SwitchLook) => self.switch_look(ui.ctx()),
+            Some(TopBarWish::SwitchPanel) => self.shows_panel = !self.shows_panel,
+            None => {}
+        }
+    }
+
+    pub(super) fn side(&mut self, ui: &mut Ui, palette: &Palette) {
+        let mut values: Vec<SetValue> = Vec::new();
+        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            ui.set_max_width(ui.available_width() - 12.0); // room for the bar that scrolls
+            // Models first: they are what people came for.
+            let has_device = self.panels.len().min(1);
+            let (device, models) = self.panels.split_at_mut(has_device);
+            for panel in models.iter_mut().chain(device) {
+                let changed = parameters::panel(ui, panel, palette);
+                values.extend(changed.into_iter().filter_map(|index| panel.change(index)));
+                ui.add_space(8.0);
+            }
+            if let Some(sample) = self.history.at(self.player.now_s) {
+                standing::standing(ui, sample, &self.limits, &self.tally, palette);
+            }
+        });
+        if !values.is_empty() {
+            self.ask(Ask::Set { values });
+        }
+    }
+
+    pub(super) fn middle(&mut self, ui: &mut Ui, palette: &Palette) {
+        /// Part of the height that the 3D view gets.
+        const VIEW_PART: f32 = 0.56;
+        let area = ui.max_rect();
+        let Some(sample) = self.history.at(self.player.now_s).copied() else {
+            self.nothing(ui, area, palette);
+            return;
+        };
+        let view = Rect::from_min_size(area.min, vec2(area.width(), (area.height() * VIEW_PART).round()));
+        let subject = Subject {
+            shapes: &mut self.shapes,
+            version: self.shape_version,
+            sample: &sample,
+            scale: self.tally.scale(),
+        };
+        self.facts = self.view.show(ui, view, self.look, subject);
+        readout::numbers(ui.painter(), view, &sample, self.plots.units, palette);
+        legend::paint(ui.painter(), view, &self.facts, palette);
+        warnings::warnings(ui, view, &self.warnings(&sample), palette);
+
+        let below = Rect::from_min_max(view.left_bottom() + vec2(12.0, 6.0), area.max - vec2(16.0, 2.0));
+        let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(below).id_salt("plots"));
+        let motion = self.player.motion;
+        let wishes = self.plots.show(&mut ui, &self.history, self.player.now_s, motion, palette);
+        for wish in wishes {
+            match wish {
+                PlotWish::Seek(now_s) => self.player.seek(now_s, self.history.span_s()),
+                PlotWish::Export(format) => {
+                    let remark = match export(&self.history, &self.plots, format, self.look) {
+                        Ok(path) => format!("Written: {}", path.display()),
+                        Err(error) => error.to_string(),
+                    };
+                    self.say(remark);
+                }
+            }
+        }
+    }
+
+    /// There is nothing to show: what to do.
+    fn nothing(&self, ui: &mut Ui, area: Rect, palette: &Palette) {
+        let (first, second) = match &self.source {
+            Source::Waiting(_) => ("Waiting for a run", "Start one in a terminal:  flotor run"),
+            _ => ("No ticks yet", "They appear as soon as the loop runs"),
+        };
+        self.words(ui, area, first, second, palette);
+    }
+
+    /// A line and what to do about it, in the middle of an area.
+    pub(super) fn words(&self, ui: &mut Ui, area: Rect, first: &str, second: &str, palette: &Palette) {
+        let layout = egui::Layout::top_down(egui::Align::Center);
+        let mut inner = ui.new_child(egui::UiBuilder::new().max_rect(area).layout(layout));
+        inner.add_space(0.42 * area.height());
+        inner.label(RichText::new(first).size(style::TITLE_PT));
+        inner.label(RichText::new(second).color(palette.faint));
+    }
+}

@@ -1,0 +1,62 @@
+//! How things stand, in words: the state of the run, and what a person should know at this moment.
+
+use super::{Source, Viewer};
+use crate::feed::FeedState;
+use crate::history::Sample;
+use crate::player::Motion;
+use crate::ui::readout;
+use flotor_record::Severity;
+use flotor_record::trace::Events;
+use std::time::Duration;
+
+/// How long something that happened in one tick stays in sight, s.
+const IN_SIGHT_S: f64 = 1.0;
+/// How long a remark stays in sight.
+const REMARK: Duration = Duration::from_secs(6);
+
+impl Viewer {
+    /// How the run stands, and whether that is well.
+    pub(super) fn standing(&self) -> (String, bool) {
+        let newest = self.history.at(f64::INFINITY);
+        let events = newest.map_or(Events::NONE, |sample| sample.events);
+        match &self.source {
+            Source::Waiting(_) => ("no run".to_owned(), true),
+            Source::Recording => ("recording".to_owned(), true),
+            Source::Live { feed, .. } => match feed.state() {
+                FeedState::Ended(words) => (words, !events.intersects(Events::EMERGENCY_STOP)),
+                FeedState::Lost(_) => ("connection lost".to_owned(), false),
+                FeedState::Running if feed.is_stale() => ("no ticks come".to_owned(), false),
+                FeedState::Running if events.intersects(Events::HOLDING) => ("holding".to_owned(), false),
+                FeedState::Running if events.intersects(Events::RELEASING) => ("fading out".to_owned(), true),
+                FeedState::Running if events.intersects(Events::RAMPING) => ("fading in".to_owned(), true),
+                FeedState::Running => ("running".to_owned(), true),
+            },
+        }
+    }
+
+    /// What a person should know at this moment.
+    pub(super) fn warnings(&self, sample: &Sample) -> Vec<String> {
+        let mut said = Vec::new();
+        if let Source::Live { feed, .. } = &self.source {
+            if feed.is_stale() {
+                said.push("Stale data: no ticks come; look at the terminal of `flotor run`".to_owned());
+            }
+            if let FeedState::Lost(reason) = feed.state() {
+                said.push(reason);
+            }
+        }
+        // What happens in a tick is over in a millisecond: it stays in sight a while.
+        let mut shown = *sample;
+        if self.player.motion == Motion::Follow {
+            let now_s = sample.time_s();
+            self.history.between(now_s - IN_SIGHT_S, now_s).for_each(|past| shown.events.insert(past.events));
+        }
+        said.extend(readout::warnings(&shown, &self.facts).into_iter().map(str::to_owned));
+        said.extend(self.missing.iter().cloned());
+        let notes = self.history.notes().iter().filter(|note| note.severity == Severity::Error);
+        said.extend(notes.map(|note| format!("{}: {}", note.source, note.text)));
+        let remark = self.remark.as_ref().filter(|(_, since)| since.elapsed() < REMARK);
+        said.extend(remark.map(|(remark, _)| remark.clone()));
+        said
+    }
+}
