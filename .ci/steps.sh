@@ -82,11 +82,11 @@ race() {
 # model that starts a thread in a step has to be caught: else nothing was watched.
 blocking() {
     local flotor
+    local -x FLOTOR_PLUGIN_PATH=target/debug/deps
     flotor=target/rtsan/$(target)/debug/flotor
     cargo build -p flotor -p fixture-faulty-model
     RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=realtime --cfg rtsan" cargo build --target "$(target)" --target-dir target/rtsan \
         -p flotor --bin flotor
-    export FLOTOR_PLUGIN_PATH=target/debug/deps
     "$flotor" run --clock virtual --duration 5s --seed 1
     "$flotor" run --clock real --duration 2s --seed 1
     "$flotor" run --clock virtual --duration 5s --set device.preset=full
