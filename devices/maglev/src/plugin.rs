@@ -254,7 +254,14 @@ impl ActiveDevice for LevitatingDevice {
     }
 
     fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle {
-        let request = if self.is_stopped() { Request::Disarm } else { self.command(wrench) };
+        let request = if self.is_stopped() {
+            // Whatever the next status still says: nothing is asked of the coils any more.
+            self.commanded = Wrench::ZERO;
+            self.state.delivered = Wrench::ZERO;
+            Request::Disarm
+        } else {
+            self.command(wrench)
+        };
         #[allow(clippy::cast_possible_truncation)] // the clock on the wire wraps
         match self.opened.link.send(request, (tick.time_ns / 1000) as u32) {
             Ok(()) => {
