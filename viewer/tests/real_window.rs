@@ -42,6 +42,16 @@ fn is_installed(name: &str) -> bool {
     std::env::split_paths(&path).any(|folder| folder.join(name).is_file())
 }
 
+/// True if a virtual display and a hand for it are installed; says so if not.
+fn can_have_a_window() -> bool {
+    let missing: Vec<&str> = ["Xvfb", "xdotool"].into_iter().filter(|name| !is_installed(name)).collect();
+    if !missing.is_empty() {
+        assert!(std::env::var("FLOTOR_WINDOW_TESTS").is_err(), "missing: {missing:?}");
+        eprintln!("skipped: {missing:?} not installed");
+    }
+    missing.is_empty()
+}
+
 /// A virtual display of the window's size; its picture goes into a file of the folder.
 fn display(folder: &Path) -> (Owned, String) {
     let screen = format!("{}x{}x24", SIZE[0], SIZE[1]);
@@ -84,10 +94,7 @@ fn patiently<T>(what: &str, mut attempt: impl FnMut() -> Option<T>) -> T {
 
 #[test]
 fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
-    let missing: Vec<&str> = ["Xvfb", "xdotool"].into_iter().filter(|name| !is_installed(name)).collect();
-    if !missing.is_empty() {
-        assert!(std::env::var("FLOTOR_WINDOW_TESTS").is_err(), "missing: {missing:?}");
-        eprintln!("skipped: {missing:?} not installed");
+    if !can_have_a_window() {
         return;
     }
     let folder = tempfile::tempdir().expect("a scratch folder");
@@ -154,10 +161,7 @@ fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
 /// the tables and the movements are there in the end.
 #[test]
 fn a_sitting_in_a_real_window_is_gone_through_by_keyboard() {
-    let missing: Vec<&str> = ["Xvfb", "xdotool"].into_iter().filter(|name| !is_installed(name)).collect();
-    if !missing.is_empty() {
-        assert!(std::env::var("FLOTOR_WINDOW_TESTS").is_err(), "missing: {missing:?}");
-        eprintln!("skipped: {missing:?} not installed");
+    if !can_have_a_window() {
         return;
     }
     let folder = tempfile::tempdir().expect("a scratch folder");

@@ -1,7 +1,7 @@
 //! Which rig is calibrated: the simulated one, or a device with a force sensor on a serial port.
 
 use super::options::{KeyValue, duration_s};
-use super::{CommandError, eval, refused};
+use super::{CommandError, eval, progress_bar, refused};
 use crate::calibration::rig::{DeviceRig, SimulatedRig, Waiting};
 use crate::calibration::sensor::ForceSensor;
 use crate::registry::Registry;
@@ -13,6 +13,9 @@ use std::time::Duration;
 
 /// The device that is calibrated in a simulated rig.
 pub(super) const SIMULATED: &str = "simulated";
+
+/// How often the line below the bar is drawn.
+const REDRAWN: Duration = Duration::from_millis(100);
 
 /// What is calibrated.
 #[derive(Args)]
@@ -57,14 +60,17 @@ impl RigArguments {
         Ok(SimulatedRig::new(plugin, self.seed))
     }
 
-    /// The device and its sensor; where the sensor has to go is said at the progress bar.
-    pub(super) fn device_rig(&self, progress: &ProgressBar) -> Result<DeviceRig<Guide>, CommandError> {
+    /// The device and its sensor, and a bar over so many stops that says where the sensor has to go.
+    pub(super) fn device_rig(&self, stops: u64) -> Result<(DeviceRig<Guide>, ProgressBar), CommandError> {
         let plugin = Registry::search(&self.folders).load(self.plugin(), PluginKind::Device)?;
         let settings = eval::settings(&plugin, &self.sets)?;
         let port = self.sensor.as_deref().unwrap_or_default();
         let sensor = ForceSensor::open(port).map_err(|error| refused(error.into()))?;
         let (close_m, patience) = (self.tolerance_mm * 1.0e-3, Duration::from_secs_f64(self.patience));
-        DeviceRig::open(&plugin, &settings, sensor, close_m, patience, guide(progress)).map_err(refused)
+        let progress = progress_bar(stops, "{pos}/{len}  {wide_bar}\n{msg}");
+        progress.enable_steady_tick(REDRAWN);
+        let rig = DeviceRig::open(&plugin, &settings, sensor, close_m, patience, guide(&progress));
+        Ok((rig.map_err(refused)?, progress))
     }
 }
 

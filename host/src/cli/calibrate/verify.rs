@@ -1,7 +1,6 @@
 //! `flotor calibrate verify`: the error of the vertical force without and with a file.
 
 use super::rig::RigArguments;
-use super::vertical::device_progress;
 use super::{CommandError, progress_bar, refused, style, write_json};
 use crate::calibration::file::{CalibrationFile, CalibrationFileError};
 use crate::calibration::procedure::{Plan, measure};
@@ -83,8 +82,7 @@ fn device(
     calibration: &VerticalCalibration,
 ) -> Result<[f64; 2], CommandError> {
     let plan = Plan { forces_n: vec![PROBE_N], runs: 1, ..Plan::thesis() };
-    let progress = device_progress(2 * plan.stops());
-    let mut rig = arguments.rig.device_rig(&progress)?;
+    let (mut rig, progress) = arguments.rig.device_rig(2 * plan.stops())?;
     check(arguments, file, rig.serial())?;
     let mut errors = [0.0; 2];
     for (error, calibration) in errors.iter_mut().zip([&VerticalCalibration::NONE, calibration]) {

@@ -11,7 +11,6 @@ use crate::calibration::verify::{ErrorCurve, PROBE_N};
 use crate::calibration::{picture, thesis};
 use clap::Args;
 use flotor_hal::VerticalCalibration;
-use indicatif::ProgressBar;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -162,8 +161,7 @@ fn simulated(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, Com
 /// more run over all heights.
 fn device(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, CommandError> {
     let check = Plan { forces_n: plan.forces_n.iter().copied().take(1).collect(), runs: 1, ..plan.clone() };
-    let progress = device_progress(plan.stops() + check.stops());
-    let mut rig = arguments.rig.device_rig(&progress)?;
+    let (mut rig, progress) = arguments.rig.device_rig(plan.stops() + check.stops())?;
     let serial = rig.serial().to_owned();
     let readings = measure(&mut rig, plan, || progress.inc(1)).map_err(refused)?;
     let (fit, report) = (fit(&readings).map_err(refused)?, report(plan)?);
@@ -176,13 +174,6 @@ fn device(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, Comman
         (FITTED, ErrorCurve::of_readings(&after, weight_n)),
     ];
     Ok(Measured { serial, readings, fit, report, curves })
-}
-
-/// A bar with a line that says where the sensor has to go.
-pub(super) fn device_progress(length: u64) -> ProgressBar {
-    let progress = progress_bar(length, "{pos}/{len}  {wide_bar}\n{msg}");
-    progress.enable_steady_tick(std::time::Duration::from_millis(100));
-    progress
 }
 
 fn report(plan: &Plan) -> Result<VerticalCalibration, CommandError> {
