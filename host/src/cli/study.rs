@@ -28,6 +28,7 @@ use flotor_study::protocol::{
     AtBoundary, JndDemo, JndProtocol, MagnitudeProtocol, Protocol, Stimulus, SubjectNumber,
 };
 use serde_json::json;
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 /// Perception experiments
@@ -84,6 +85,9 @@ struct Common {
     /// How many subjects, numbered from 1
     #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=i64::from(SubjectNumber::MOST)), value_name = "N")]
     subjects: u16,
+    /// Simulated subjects at a time (default: one a core)
+    #[arg(long, value_name = "N")]
+    jobs: Option<NonZeroUsize>,
     /// Seed of orders, presentations and simulated answers
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
@@ -379,7 +383,7 @@ fn simulate(common: &Common, protocol: Protocol, apparatus: Option<&Apparatus>) 
     let about = u64::from(common.subjects) * cohort.protocol.presentations_about();
     let progress = run::progress_bar(about, "{wide_bar} {pos} of about {len} presentations  {elapsed}");
     let stop = stop_on_signals().stop_flag();
-    let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let jobs = common.jobs.or_else(|| std::thread::available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN);
     let dataset = Dataset::at(&common.out);
     let kinematics = common.kinematics().unwrap_or(Kinematics::Summary);
     let task = cohort.protocol.task();
@@ -392,7 +396,7 @@ fn simulate(common: &Common, protocol: Protocol, apparatus: Option<&Apparatus>) 
         Ok(Box::new(Rig::start(apparatus, (common.seed, subject), kinematics, files, common.feel)?))
     };
     let watch = || progress.inc(1);
-    let result = cohort.run(&dataset, threads, &presenter, &watch, &stop);
+    let result = cohort.run(&dataset, jobs, &presenter, &watch, &stop);
     progress.finish_and_clear();
     result.map_err(refused)?;
     tell(&dataset)

@@ -8,6 +8,7 @@ use crate::protocol::{Protocol, SubjectNumber};
 use crate::sitting::Sitting;
 use crate::trial::Trial;
 use serde_json::json;
+use std::num::NonZeroUsize;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -93,7 +94,7 @@ impl Cohort {
         }
     }
 
-    /// Carries the study out, `threads` subjects at a time, and makes the tables. `watch` is told of every trial that
+    /// Carries the study out, `jobs` subjects at a time, and makes the tables. `watch` is told of every trial that
     /// is on disk; `stop` ends it after the trials under way.
     ///
     /// Nothing is presented before all subjects were found to be free, or what they did to be in order.
@@ -103,7 +104,7 @@ impl Cohort {
     pub fn run(
         &self,
         dataset: &Dataset,
-        threads: usize,
+        jobs: NonZeroUsize,
         presenter: &PresenterFactory<'_>,
         watch: &(dyn Fn() + Sync),
         stop: &AtomicBool,
@@ -124,7 +125,7 @@ impl Cohort {
             Ok(())
         };
         let results: Vec<Result<(), CohortError>> = std::thread::scope(|scope| {
-            let threads: Vec<_> = (0..threads.max(1)).map(|_| scope.spawn(work)).collect();
+            let threads: Vec<_> = (0..jobs.get()).map(|_| scope.spawn(work)).collect();
             threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
         });
         results.into_iter().collect::<Result<(), _>>()?;
