@@ -11,6 +11,7 @@ use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::{Watched, watch, watch_on};
 use flotor_tests::{TestSize, workspace_root};
 use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The faulty model on the faulty device, with their faults and further tables of the scene. At 1 kHz for 0.2 s.
@@ -94,8 +95,21 @@ fn a_handle_that_is_too_fast_is_driven_no_further() {
 
 // ---------------------------------------------------------------- signals and the watchdog, in real time
 
+/// One run in real time at a time: a plugin that hangs there takes a core at real-time priority from all others.
+fn alone() -> MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Runs a scene in real time in this process.
+fn watch_in_real_time(scene: &str) -> Watched {
+    let _alone = alone();
+    watch_on(Clock::Real, scene)
+}
+
 /// Runs a scene in real time, for longer than any test waits; `meanwhile` gets the process id once it runs.
 fn run_in_real_time(scratch: &Scratch, scene: &str, meanwhile: impl FnOnce(u32)) -> Ran {
+    let _alone = alone();
     let file = scratch.file("scene.toml", scene);
     let recording = scratch.path().join("run.mcap");
     let stop_file = scratch.path().join("stopped");
@@ -166,10 +180,10 @@ fn sigint_ends_a_run_in_order() {
 #[test]
 fn a_model_that_hangs_costs_the_run_and_is_named_and_the_device_is_stopped() {
     let scratch = Scratch::default();
-    let hangs = scene("", "fault = \"hangs\"\nat_tick = 400", "[limits]\nwatchdog_ms = 50");
+    let hangs = scene("", "fault = \"hangs\"\nat_tick = 400", "[limits]\nwatchdog_ms = 500");
     let ran = run_in_real_time(&scratch, &hangs, |_| ());
     assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:?}");
-    let told = "error: `block` did not come back from `step` in tick 400; the watchdog stopped the device after 50 ms";
+    let told = "error: `block` did not come back from `step` in tick 400; the watchdog stopped the device after 500 ms";
     // A tick that was missed earlier moves the number of the tick.
     assert!(
         last_line(&ran).starts_with("error: `block` did not come back from `step` in tick 4"),
@@ -201,7 +215,8 @@ fn a_model_that_comes_back_late_leaves_a_whole_report_and_the_run_is_over_all_th
 fn paced(rate_hz: u32, model: &str) -> String {
     format!(
         "rate_hz = {rate_hz}\nduration_s = 0.5\npacing = \"device\"\n[device]\nplugin = \"simulated\"\n\
-         [[model]]\nplugin = \"{}\"\nbudget_us = 1e6\n[model.parameters]\n{model}\n",
+         [[model]]\nplugin = \"{}\"\nbudget_us = 1e6\n[model.parameters]\n{model}\n\
+         [limits]\nwatchdog_ms = 1000\n",
         plugin_file("fixture-faulty-model").display()
     )
 }
@@ -209,7 +224,7 @@ fn paced(rate_hz: u32, model: &str) -> String {
 #[test]
 fn a_device_sets_the_pace_from_100_hz_to_10_khz_and_every_sample_is_a_tick_or_missed() {
     for rate_hz in [100, 1000, 10_000] {
-        let run = watch_on(Clock::Real, &paced(rate_hz, ""));
+        let run = watch_in_real_time(&paced(rate_hz, ""));
         assert_eq!(run.outcome.end, RunEnd::Finished);
         let timing = &run.outcome.timing;
         let periods = u64::from(rate_hz) / 2;
@@ -224,7 +239,7 @@ fn a_device_sets_the_pace_from_100_hz_to_10_khz_and_every_sample_is_a_tick_or_mi
 
 #[test]
 fn samples_that_come_while_a_model_dawdles_are_missed_and_counted() {
-    let run = watch_on(Clock::Real, &paced(1000, "fault = \"overruns\"")); // 2 ms each
+    let run = watch_in_real_time(&paced(1000, "fault = \"overruns\"")); // 2 ms each
     assert_eq!(run.outcome.end, RunEnd::Finished);
     let timing = &run.outcome.timing;
     assert!(timing.missed >= timing.ticks / 2, "{} ticks, {} missed", timing.ticks, timing.missed);
@@ -314,8 +329,10 @@ fn a_model_that_crashes_its_process_is_out_and_the_loop_goes_on() {
 
 #[test]
 fn a_model_that_hangs_in_a_process_of_its_own_costs_two_ticks_of_force() {
-    // In real time: the loop waits half a period for it once, and not at all while it is behind.
-    let run = watch_on(Clock::Real, &apart("", "fault = \"hangs\"\nat_tick = 50", "[limits]\nramp_s = 0"));
+    // In real time: the loop waits half a period for it once, and not at all while it is behind. For a second: a machine
+    // that holds the loop up costs it ticks.
+    let hangs = apart("", "fault = \"hangs\"\nat_tick = 50", "[limits]\nramp_s = 0\nwatchdog_ms = 1000");
+    let run = watch_in_real_time(&hangs.replace("duration_s = 0.2", "duration_s = 1"));
     assert_eq!(run.outcome.end, RunEnd::Finished);
     assert!(the_model(&run).late_ticks > 50, "{:?}", the_model(&run));
     assert_force_ends_within_two_ticks(&run, 50);
