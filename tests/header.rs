@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Sources of the contract, those that hold structs first used first.
-const SOURCES: [&str; 19] = [
+const SOURCES: [&str; 21] = [
     "frame.rs",
     "refusal.rs",
     "parameter.rs",
@@ -14,6 +14,7 @@ const SOURCES: [&str; 19] = [
     "shape.rs",
     "activity.rs",
     "field.rs",
+    "reach.rs",
     "variant.rs",
     "detail.rs",
     "device.rs",
@@ -22,6 +23,7 @@ const SOURCES: [&str; 19] = [
     "abi/entry.rs",
     "abi/force.rs",
     "abi/field.rs",
+    "abi/reach.rs",
     "abi/device.rs",
     "abi/calibration.rs",
     "abi/metadata.rs",

@@ -34,6 +34,8 @@ pub mod interface_ids {
     pub const ACTIVITY: &str = "flotor.activity/1";
     /// A local linear field, for models slower than the loop: [`crate::abi::LinearFieldTable`].
     pub const LINEAR_FIELD: &str = "flotor.linear-field/1";
+    /// Where a model ends: [`crate::abi::ReachTable`].
+    pub const REACH: &str = "flotor.reach/1";
     /// Numbers about an answer: [`crate::abi::DetailsTable`].
     pub const DETAILS: &str = "flotor.details/1";
     /// Energy account of a plant: [`crate::abi::EnergyLedgerTable`].

@@ -2,13 +2,13 @@
 
 use super::entry::{CallStatus, Entry, Instance, PluginKind, interface_ids};
 use super::{
-    ActivityTable, CenterlineTable, DetailsTable, ForceTable, LinearFieldTable, Message, Str, VariantTable,
-    panics,
+    ActivityTable, CenterlineTable, DetailsTable, ForceTable, LinearFieldTable, Message, ReachTable, Str,
+    VariantTable, panics,
 };
 use crate::{
-    ActivityRegion, CenterlineInfo, CenterlineModel, DetailedModel, FieldModel, ForceModel, Input,
-    LinearField, LocalModel, LoopConfig, Output, ParameterValue, Pose, RefusalKind, Settings, VariantInfo,
-    VariantModel,
+    ActivityRegion, BoundedModel, CenterlineInfo, CenterlineModel, DetailedModel, FieldModel, ForceModel,
+    Input, LinearField, LocalModel, LoopConfig, Output, ParameterValue, Pose, Reach, RefusalKind, Settings,
+    VariantInfo, VariantModel,
 };
 use std::ffi::c_void;
 use std::marker::PhantomData;
@@ -252,6 +252,15 @@ unsafe extern "C" fn linear_field<M: FieldModel>(
     })
 }
 
+unsafe extern "C" fn reach<M: BoundedModel>(instance: Instance, out: *mut Reach) -> u32 {
+    // SAFETY: as in `prepare`.
+    let (slot, out) = unsafe { (slot::<M>(instance), &mut *out) };
+    slot.guard(|model| {
+        *out = model.reach();
+        CallStatus::Ok
+    })
+}
+
 unsafe extern "C" fn variant_info<M: VariantModel>(instance: Instance, out: *mut VariantInfo) -> u32 {
     // SAFETY: as in `prepare`.
     let (slot, out) = unsafe { (slot::<M>(instance), &mut *out) };
@@ -330,6 +339,12 @@ impl<M: FieldModel> Tables<M> {
     };
 }
 
+#[allow(clippy::cast_possible_truncation)] // table sizes are small
+impl<M: BoundedModel> Tables<M> {
+    const REACH: ReachTable =
+        ReachTable { size: size_of::<ReachTable>() as u32, reserved: 0, reach: Some(reach::<M>) };
+}
+
 #[allow(clippy::cast_possible_truncation)] // table sizes and counts are small
 impl<M: DetailedModel> Tables<M> {
     const DETAILS: DetailsTable = DetailsTable {
@@ -357,6 +372,8 @@ pub struct WithDetails;
 pub struct WithActivity;
 /// The model is a [`FieldModel`].
 pub struct WithField;
+/// The model is a [`BoundedModel`].
+pub struct WithReach;
 
 impl<M> Extensions<M> for () {
     fn table(_: &str) -> *const c_void {
@@ -409,6 +426,15 @@ impl<M: FieldModel, Rest: Extensions<M>> Extensions<M> for (WithField, Rest) {
     }
 }
 
+impl<M: BoundedModel, Rest: Extensions<M>> Extensions<M> for (WithReach, Rest) {
+    fn table(id: &str) -> *const c_void {
+        match id {
+            interface_ids::REACH => std::ptr::from_ref(&Tables::<M>::REACH).cast(),
+            _ => Rest::table(id),
+        }
+    }
+}
+
 unsafe extern "C" fn interface<M: ForceModel, E: Extensions<M>>(id: Str) -> *const c_void {
     match id.as_str() {
         interface_ids::FORCE => std::ptr::from_ref(&Tables::<M>::FORCE).cast(),
@@ -431,7 +457,7 @@ pub const fn model_entry_with<M: ForceModel, E: Extensions<M>>() -> Entry {
 /// Makes a [`crate::ForceModel`] a plugin: `export_model!(Spring);`. Extensions the type implements too are listed
 /// behind it: `export_model!(Spring, centerline, variant, details);` for a [`crate::CenterlineModel`],
 /// [`crate::VariantModel`] and [`crate::DetailedModel`], `activity` for a [`crate::LocalModel`], `field` for a
-/// [`crate::FieldModel`]. One per crate.
+/// [`crate::FieldModel`], `reach` for a [`crate::BoundedModel`]. One per crate.
 #[macro_export]
 macro_rules! export_model {
     (@extensions) => { () };
@@ -446,6 +472,9 @@ macro_rules! export_model {
     };
     (@extensions field $($rest:ident)*) => {
         ($crate::abi::WithField, $crate::export_model!(@extensions $($rest)*))
+    };
+    (@extensions reach $($rest:ident)*) => {
+        ($crate::abi::WithReach, $crate::export_model!(@extensions $($rest)*))
     };
     (@extensions details $($rest:ident)*) => {
         ($crate::abi::WithDetails, $crate::export_model!(@extensions $($rest)*))

@@ -26,6 +26,7 @@ mod pacing;
 mod panics;
 #[cfg(feature = "layout-proof")]
 pub mod proof;
+mod reach;
 mod text;
 
 #[cfg(feature = "loader")]
@@ -39,10 +40,11 @@ pub use entry::{
 };
 pub use export_device::device_entry;
 pub use export_model::{
-    Extensions, WithActivity, WithCenterline, WithDetails, WithField, WithVariant, model_entry,
+    Extensions, WithActivity, WithCenterline, WithDetails, WithField, WithReach, WithVariant, model_entry,
     model_entry_with,
 };
 pub use field::LinearFieldTable;
 pub use force::{ActivityTable, CenterlineTable, DetailsTable, ForceTable, VariantTable};
 pub use pacing::DevicePacingTable;
+pub use reach::ReachTable;
 pub use text::{MESSAGE_BYTES, Message, Str, StrList};

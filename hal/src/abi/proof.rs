@@ -6,13 +6,13 @@
 
 use super::{
     ActivityTable, CalibrationTable, CenterlineTable, ContractSizes, DetailsTable, DevicePacingTable,
-    DeviceTable, EnergyLedgerTable, ForceTable, Host, LayoutProof, LinearFieldTable, Message, Str,
-    VariantTable,
+    DeviceTable, EnergyLedgerTable, ForceTable, Host, LayoutProof, LinearFieldTable, Message, ReachTable,
+    Str, VariantTable,
 };
 use crate::{
     ActivityRegion, Capabilities, CenterlineInfo, Detail, DeviceState, EnergyLedger, Input, LinearField,
-    LoopConfig, Output, Parameter, ParameterValue, Pose, Tick, Twist, VariantInfo, VerticalCalibration,
-    Wrench,
+    LoopConfig, Output, Parameter, ParameterValue, Pose, Reach, Tick, Twist, VariantInfo,
+    VerticalCalibration, Wrench,
 };
 use abi_stable::StableAbi;
 use abi_stable::library::AbiHeader;
@@ -47,13 +47,15 @@ pub const CONTRACT: [(&str, &TypeLayout); 16] = [
 
 /// The types of the extensions. A plugin that knows one means what the host means; an older plugin knows fewer and
 /// offers fewer.
-pub const EXTENSIONS: [(&str, &TypeLayout); 15] = [
+pub const EXTENSIONS: [(&str, &TypeLayout); 17] = [
     ("ActivityRegion", ActivityRegion::LAYOUT),
     ("ActivityTable", ActivityTable::LAYOUT),
     ("CenterlineInfo", CenterlineInfo::LAYOUT),
     ("CenterlineTable", CenterlineTable::LAYOUT),
     ("LinearField", LinearField::LAYOUT),
     ("LinearFieldTable", LinearFieldTable::LAYOUT),
+    ("Reach", Reach::LAYOUT),
+    ("ReachTable", ReachTable::LAYOUT),
     ("VariantInfo", VariantInfo::LAYOUT),
     ("VariantTable", VariantTable::LAYOUT),
     ("Detail", Detail::LAYOUT),

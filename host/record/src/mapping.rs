@@ -170,7 +170,14 @@ impl Mapping {
     #[inline]
     #[must_use]
     pub fn position_to_device(&self, position_m: DVec3) -> DVec3 {
-        self.home_m + self.model_from_device.back(position_m) / self.motion_scale
+        self.home_m + self.vector_to_device(position_m)
+    }
+
+    /// Vector between positions in the device frame of one in the model frame. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn vector_to_device(&self, vector_m: DVec3) -> DVec3 {
+        self.model_from_device.back(vector_m) / self.motion_scale
     }
 
     /// Length in the device frame of a length in the model frame. Real-time: bounded, no allocation.

@@ -4,7 +4,7 @@ use crate::slow::SlowModel;
 use crate::worker::{Reply, Worker};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
-use flotor_hal::{ActivityRegion, Demand, Input, Memory, Output};
+use flotor_hal::{ActivityRegion, Demand, Input, Memory, Output, Reach};
 
 /// A model, wherever it runs.
 pub(crate) enum Engine {
@@ -107,6 +107,14 @@ impl Engine {
         match self {
             Self::Here(model) => model.activity(),
             Self::Apart(_) | Self::Beside(_) => ActivityRegion::EVERYWHERE,
+        }
+    }
+
+    /// Where the model ends; one beside the loop or in a process of its own has no end. Real-time: bounded, no allocation.
+    pub(crate) fn reach(&mut self) -> Reach {
+        match self {
+            Self::Here(model) => model.reach(),
+            Self::Apart(_) | Self::Beside(_) => Reach::UNBOUNDED,
         }
     }
 

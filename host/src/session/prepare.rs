@@ -144,7 +144,7 @@ pub(crate) fn prepare_model(
         settings: as_written(&model.plugin),
         parameters: in_force(&plugin, &settings, &mut value),
     };
-    Ok((Layer::new(instances, &model.blend, budget), report))
+    Ok((Layer::new(instances, &model.blend, budget, config), report))
 }
 
 /// What a scene says of a model that cannot be.

@@ -3,14 +3,15 @@
 use crate::batch::Batch;
 use crate::centerline::{Helix, Section};
 use crate::contract;
-use crate::parameters::{Choice, SCHEMA};
+use crate::parameters::{Choice, SCHEMA, Switch};
 use crate::prepared::{Insight, Prepared};
 use crate::rod::Branch;
 use flotor_hal::abi::Str;
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::{
-    CenterlineInfo, CenterlineModel, Demand, Detail, DetailedModel, ForceModel, Input, Memory, ModelInfo,
-    OutOfRange, Output, Parameter, Refusal, Settings, VariantInfo, VariantModel, export_model,
+    BoundedModel, CenterlineInfo, CenterlineModel, Demand, Detail, DetailedModel, ForceModel, Input, Memory,
+    ModelInfo, OutOfRange, Output, Parameter, Reach, Refusal, Settings, VariantInfo, VariantModel,
+    export_model,
 };
 
 /// The spring: what it is, and the law that answers.
@@ -125,7 +126,19 @@ impl CenterlineModel for SpringModel {
     }
 }
 
-export_model!(SpringModel, centerline, variant, details);
+impl BoundedModel for SpringModel {
+    /// Down to where all coils touch: no law without contact knows of that.
+    fn reach(&self) -> Reach {
+        if self.choice.coil_contact == Switch::On {
+            return Reach::UNBOUNDED;
+        }
+        let geometry = self.choice.spring.geometry();
+        let solid_m = geometry.solid_length_m() - geometry.free_length_m;
+        Reach::between([f64::NEG_INFINITY, f64::NEG_INFINITY, solid_m], [f64::INFINITY; 3])
+    }
+}
+
+export_model!(SpringModel, centerline, variant, details, reach);
 
 #[cfg(test)]
 mod tests;

@@ -5,7 +5,7 @@ use super::{LoadError, Metadata, OpenedDevice, Setting, check, metadata_file};
 use crate::abi::{
     ABI_MAJOR, ABI_MINOR, ActivityTable, CalibrationTable, CenterlineTable, DetailsTable, DevicePacingTable,
     DeviceTable, EnergyLedgerTable, Entry, ForceTable, HOST_QUIET_PANICS, Host, LinearFieldTable, MAGIC,
-    PluginKind, Str, VariantTable, interface_ids, is_spoken,
+    PluginKind, ReachTable, Str, VariantTable, interface_ids, is_spoken,
 };
 use crate::{DeviceInfo, ModelInfo, Parameter};
 use std::ffi::CString;
@@ -281,15 +281,16 @@ fn find_interface(metadata: &Metadata, entry: &'static Entry) -> Result<Interfac
             return Err(missing(id, name));
         }
         // SAFETY: as above, for the tables of the extensions.
-        let (centerline, variant, details, activity, field) = unsafe {
+        let (centerline, variant, details, activity, field, reach) = unsafe {
             (
                 table(interface_ids::CENTERLINE).cast::<CenterlineTable>().as_ref(),
                 table(interface_ids::VARIANT).cast::<VariantTable>().as_ref(),
                 table(interface_ids::DETAILS).cast::<DetailsTable>().as_ref(),
                 table(interface_ids::ACTIVITY).cast::<ActivityTable>().as_ref(),
                 table(interface_ids::LINEAR_FIELD).cast::<LinearFieldTable>().as_ref(),
+                table(interface_ids::REACH).cast::<ReachTable>().as_ref(),
             )
         };
-        Ok(Interface::Model(ModelTables { force, centerline, variant, details, activity, field }))
+        Ok(Interface::Model(ModelTables { force, centerline, variant, details, activity, field, reach }))
     }
 }

@@ -3,11 +3,11 @@
 use super::Setting;
 use crate::abi::{
     ActivityTable, CallStatus, CenterlineTable, DetailsTable, ForceTable, Instance, LinearFieldTable,
-    Message, VariantTable,
+    Message, ReachTable, VariantTable,
 };
 use crate::{
     ActivityRegion, CenterlineInfo, Demand, Detail, Input, LinearField, LoopConfig, Memory, ModelInfo,
-    Output, Parameter, ParameterValue, Pose, Refusal, RefusalKind, VariantInfo,
+    Output, Parameter, ParameterValue, Pose, Reach, Refusal, RefusalKind, VariantInfo,
 };
 
 type StepFn = unsafe extern "C" fn(Instance, *const Input, *mut Output) -> u32;
@@ -21,6 +21,7 @@ pub(super) struct ModelTables {
     pub(super) details: Option<&'static DetailsTable>,
     pub(super) activity: Option<&'static ActivityTable>,
     pub(super) field: Option<&'static LinearFieldTable>,
+    pub(super) reach: Option<&'static ReachTable>,
 }
 
 /// One instance of a force model. Used by one thread at a time.
@@ -165,6 +166,17 @@ impl Model {
         // SAFETY: as in `prepare`; the out pointer is valid for the call.
         let code = unsafe { ask(self.instance, &raw mut region) };
         if code == CallStatus::Ok as u32 { region } else { ActivityRegion::EVERYWHERE }
+    }
+
+    /// Where the instance ends, with the parameters now in force: nowhere, unless it says otherwise. Real-time: bounded, no
+    /// allocation.
+    #[must_use]
+    pub fn reach(&mut self) -> Reach {
+        let mut reach = Reach::UNBOUNDED;
+        let Some(ask) = self.extensions.reach.and_then(|table| table.reach) else { return reach };
+        // SAFETY: as in `prepare`; the out pointer is valid for the call.
+        let code = unsafe { ask(self.instance, &raw mut reach) };
+        if code == CallStatus::Ok as u32 { reach } else { Reach::UNBOUNDED }
     }
 
     /// Whether the model can say how its wrench changes around a pose.

@@ -1,13 +1,14 @@
 //! One force model in all the places it is put: the unit that is mixed, faded and replaced.
 
 use super::broad_phase::{Bounds, BroadPhase};
+use super::end_wall::EndWall;
 use crate::mapping::{Blend, Mapping};
 use crate::servo::budget::{Allowed, Overrun, TimeBudget};
 use crate::servo::engine::{Engine, Stepped};
 use crate::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
-    ActivityShape, DVec3, Demand, DeviceState, Input, Memory, Output, StepStatus, Tick, Wrench,
+    ActivityShape, DVec3, Demand, DeviceState, Input, LoopConfig, Memory, Output, StepStatus, Tick, Wrench,
 };
 
 /// How a model has behaved so far, in all its places.
@@ -45,6 +46,8 @@ impl ModelHealth {
 struct Object {
     model: Engine,
     mapping: Mapping,
+    /// The wall where the model ends, if it does.
+    end: Option<EndWall>,
     /// The answer of the tick before, in its own frame, if it could be used and the next one may be late.
     last: Option<Output>,
     /// The tick it was stepped at last.
@@ -76,11 +79,20 @@ pub(crate) struct Layer {
 
 impl Layer {
     /// A model's instances, each with its mapping, and the time they may take together. Not real-time.
-    pub(crate) fn new(instances: Vec<(Engine, Mapping)>, blend: &Blend, budget: TimeBudget) -> Self {
+    ///
+    /// Where a model ends, there is a wall as stiff as a loop of this `config` allows.
+    pub(crate) fn new(
+        instances: Vec<(Engine, Mapping)>,
+        blend: &Blend,
+        budget: TimeBudget,
+        config: &LoopConfig,
+    ) -> Self {
         let served = |(model, _): &(Engine, Mapping)| Demand::ALL.limited_to(model.serves());
         let demand = instances.first().map_or(Demand::ALL, served);
-        let object =
-            |(model, mapping)| Object { model, mapping, last: None, stepped_at: None, is_out: false };
+        let object = |(mut model, mapping): (Engine, Mapping)| {
+            let end = EndWall::new(&model.reach(), config);
+            Object { model, mapping, end, last: None, stepped_at: None, is_out: false }
+        };
         let mut objects: Box<[Object]> = instances.into_iter().map(object).collect();
         let bounds = objects.iter_mut().map(Object::bounds).collect();
         let memory = objects.first().map_or(Memory::Stateless, |object| object.model.memory());
@@ -158,6 +170,10 @@ impl Layer {
                 continue;
             };
             share.wrench = share.wrench + object.mapping.wrench_to_device(&output.wrench);
+            if let Some(push) = object.end.as_ref().and_then(|end| end.push(&object.mapping, state)) {
+                events.insert(Events::BOUNDARY);
+                share.wrench = share.wrench + push;
+            }
             if output.energy_j.is_finite() {
                 share.energy_j += output.energy_j * object.mapping.energy_scale();
             }
@@ -185,7 +201,12 @@ impl Layer {
             }
             if status != CallStatus::Ok {
                 worst = status;
-            } else if self.broad.bounds(index).is_some() {
+                continue;
+            }
+            if let Some(end) = &mut object.end {
+                end.move_to(&object.model.reach());
+            }
+            if self.broad.bounds(index).is_some() {
                 let bounds = object.bounds();
                 if bounds != self.broad.bounds(index) {
                     self.broad.watch_always(index, bounds);

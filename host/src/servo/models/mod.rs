@@ -5,6 +5,7 @@
 //! whose objects cannot act where the handle is, or whose weight is 0, is not asked at all.
 
 mod broad_phase;
+mod end_wall;
 mod fade;
 mod layer;
 mod slot;
