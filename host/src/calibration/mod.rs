@@ -18,6 +18,7 @@
 //!
 //! Not real-time throughout.
 
+mod emulated_sensor;
 pub mod file;
 pub mod fit;
 mod least_squares;
@@ -80,8 +81,8 @@ pub enum CalibrationError {
         moved_um: f64,
     },
     /// The force sensor does not say how large the force is.
-    #[error(transparent)]
-    Sensor(#[from] sensor::SensorError),
+    #[error("the force sensor faulted: {}", .0.advice())]
+    Sensor(Fault),
     /// There is no pseudo terminal for the sensor of the simulated rig.
     #[error("the simulated force sensor needs a pseudo terminal: {0}")]
     NoTerminal(std::io::Error),

@@ -5,7 +5,7 @@ use super::forces::Port;
 use super::state::{Cause, Gate, RunEvent};
 use crate::trace::Events;
 use flotor_hal::abi::loader::ActiveDevice;
-use flotor_hal::{Conditions, Cycle, Fault, Tick};
+use flotor_hal::{Axes, Conditions, Cycle, Fault, Tick};
 
 /// Ticks without a new sample after which the force fades to zero: what is older than this is not where the
 /// hand is. At 1 kHz, 10 ms of a 10 Hz movement of 5 mm are 3 mm.
@@ -15,6 +15,8 @@ const STALE_TICKS_LIMIT: u32 = 10;
 pub(crate) struct Station {
     pub(super) device: ActiveDevice,
     pub(super) envelope: Envelope,
+    /// Stale ticks that are borne; without end where no hand is sensed that could be elsewhere by now.
+    stale_ticks_limit: u32,
     stale_ticks: u32,
     /// The first it reported.
     pub(super) fault: Option<Fault>,
@@ -22,8 +24,9 @@ pub(crate) struct Station {
 
 impl Station {
     /// Not real-time.
-    pub(crate) fn new(device: ActiveDevice, envelope: Envelope) -> Self {
-        Self { device, envelope, stale_ticks: 0, fault: None }
+    pub(crate) fn new(device: ActiveDevice, envelope: Envelope, sensed: Axes) -> Self {
+        let stale_ticks_limit = if sensed == Axes::NONE { u32::MAX } else { STALE_TICKS_LIMIT };
+        Self { device, envelope, stale_ticks_limit, stale_ticks: 0, fault: None }
     }
 
     /// Newest sample into the port; an old one stays, a senseless one is never used. What it means for the run.
@@ -52,7 +55,7 @@ impl Station {
         }
         port.state = last;
         self.stale_ticks = self.stale_ticks.saturating_add(1);
-        if self.stale_ticks > STALE_TICKS_LIMIT { RunEvent::SamplesLost } else { RunEvent::Time }
+        if self.stale_ticks > self.stale_ticks_limit { RunEvent::SamplesLost } else { RunEvent::Time }
     }
 
     /// What of the port's request may be sent. Real-time: bounded, no allocation.

@@ -235,7 +235,8 @@ impl Session {
         let stoppers: Vec<Stopper> = opened.iter().map(|opened| opened.device.stopper()).collect();
         let activate = |opened: prepare::Opened| {
             let envelope = Envelope::new(&scene.limits, &scene.boundary, &opened.capabilities, period_ns);
-            Ok(Station::new(opened.activate(&config)?, envelope))
+            let sensed = opened.capabilities.sensed;
+            Ok(Station::new(opened.activate(&config)?, envelope, sensed))
         };
         let stations = opened.into_iter().map(activate).collect::<Result<Vec<_>, RunError>>();
         // If one says no, none stays energised.

@@ -2,7 +2,8 @@
 
 use super::{AVERAGED_TICKS, Mean, PERIOD_NS, Rest, Rig, locked};
 use crate::calibration::CalibrationError;
-use crate::calibration::sensor::{EmulatedSensor, ForceSensor};
+use crate::calibration::emulated_sensor::EmulatedSensor;
+use crate::calibration::sensor::ForceSensor;
 use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting};
 use flotor_hal::{Cycle, DeviceState, LoopConfig, Refusal, Tick, VerticalCalibration};
 use rand_core::{Rng, SeedableRng};
@@ -31,6 +32,7 @@ const CLOSE_M: f64 = 2.0e-6;
 /// contract; its sensor as any sensor: over a serial line.
 pub struct SimulatedRig {
     plugin: Plugin,
+    sensor_plugin: Plugin,
     /// What the handle presses against, and the line it is read by; there from the first reading on.
     sensor: Option<(EmulatedSensor, ForceSensor)>,
     calibration: Option<VerticalCalibration>,
@@ -41,10 +43,11 @@ pub struct SimulatedRig {
 }
 
 impl SimulatedRig {
-    /// A rig around the plugin `simulated`.
+    /// A rig around the plugin `simulated`, read by that of sensors on a serial line.
     #[must_use]
-    pub fn new(plugin: Plugin, seed: u64) -> Self {
-        Self { plugin, sensor: None, calibration: None, noise: Pcg64Mcg::seed_from_u64(seed), seed, rests: 0 }
+    pub fn new(plugin: Plugin, sensor_plugin: Plugin, seed: u64) -> Self {
+        let noise = Pcg64Mcg::seed_from_u64(seed);
+        Self { plugin, sensor_plugin, sensor: None, calibration: None, noise, seed, rests: 0 }
     }
 
     /// What the device corrects its force by from now on.
@@ -147,11 +150,11 @@ impl Rig for SimulatedRig {
             Some(sensor) => sensor,
             none => {
                 let emulated = EmulatedSensor::start().map_err(CalibrationError::NoTerminal)?;
-                let line = ForceSensor::open(emulated.port())?;
+                let line = ForceSensor::open(&self.sensor_plugin, emulated.port())?;
                 none.insert((emulated, line))
             }
         };
         pressed.press(noisy_n);
-        Ok(line.read_n()?)
+        line.read_n()
     }
 }

@@ -3,7 +3,7 @@
 use super::options::{KeyValue, duration_s};
 use super::{CommandError, eval, progress_bar, refused};
 use crate::calibration::rig::{DeviceRig, SimulatedRig, Waiting};
-use crate::calibration::sensor::ForceSensor;
+use crate::calibration::sensor::{ForceSensor, SERIAL_SENSOR};
 use crate::registry::Registry;
 use clap::Args;
 use flotor_hal::abi::PluginKind;
@@ -32,6 +32,9 @@ pub(super) struct RigArguments {
     /// Serial port of the force sensor
     #[arg(long, value_name = "PORT", requires = "device")]
     sensor: Option<String>,
+    /// Plugin that reads it (id or file): a device with a parameter `port`
+    #[arg(long, value_name = "ID", default_value = SERIAL_SENSOR, requires = "device")]
+    sensor_plugin: String,
     /// How far from its height a stop may be, in mm
     #[arg(long, value_name = "MM", default_value_t = 0.4, requires = "device", value_parser = tolerance_mm)]
     tolerance_mm: f64,
@@ -56,16 +59,20 @@ impl RigArguments {
     }
 
     pub(super) fn simulated_rig(&self) -> Result<SimulatedRig, CommandError> {
-        let plugin = Registry::search(&self.folders).load(SIMULATED, PluginKind::Device)?;
-        Ok(SimulatedRig::new(plugin, self.seed))
+        let registry = Registry::search(&self.folders);
+        let plugin = registry.load(SIMULATED, PluginKind::Device)?;
+        let sensor_plugin = registry.load(SERIAL_SENSOR, PluginKind::Device)?;
+        Ok(SimulatedRig::new(plugin, sensor_plugin, self.seed))
     }
 
     /// The device and its sensor, and a bar over so many stops that says where the sensor has to go.
     pub(super) fn device_rig(&self, stops: u64) -> Result<(DeviceRig<Guide>, ProgressBar), CommandError> {
-        let plugin = Registry::search(&self.folders).load(self.plugin(), PluginKind::Device)?;
+        let registry = Registry::search(&self.folders);
+        let plugin = registry.load(self.plugin(), PluginKind::Device)?;
+        let sensor_plugin = registry.load(&self.sensor_plugin, PluginKind::Device)?;
         let settings = eval::settings(&plugin, &self.sets)?;
         let port = self.sensor.as_deref().unwrap_or_default();
-        let sensor = ForceSensor::open(port).map_err(|error| refused(error.into()))?;
+        let sensor = ForceSensor::open(&sensor_plugin, port).map_err(refused)?;
         let (close_m, patience) = (self.tolerance_mm * 1.0e-3, Duration::from_secs_f64(self.patience));
         let progress = progress_bar(stops, "{pos}/{len}  {wide_bar}\n{msg}");
         progress.enable_steady_tick(REDRAWN);

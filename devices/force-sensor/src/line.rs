@@ -1,0 +1,110 @@
+//! One question at a time over a serial port.
+
+use crate::protocol::{Lines, QUESTION, parse};
+use serialport::{ClearBuffer, ErrorKind, SerialPort, TTYPort};
+use std::io::{self, Read, Write};
+use std::time::{Duration, Instant};
+
+/// Speed of the line, baud: what microcontrollers' boards start with.
+const BAUD: u32 = 115_200;
+/// How long the system may take to accept a question of two bytes.
+const LOOK: Duration = Duration::from_millis(20);
+/// Bytes looked at at once: several answers.
+const CHUNK_BYTES: usize = 256;
+
+/// The port is closed, or the sensor unplugged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LineLost;
+
+/// What came of a look at the line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Heard {
+    /// Nothing yet.
+    Nothing,
+    /// A force, N.
+    Force(f64),
+    /// A line that is no force: [`SensorLine::last`] has it.
+    Nonsense,
+}
+
+/// A sensor at the other end of a serial port.
+pub struct SensorLine {
+    port: TTYPort,
+    lines: Lines,
+    /// When the question that waits for its answer was asked.
+    asked: Option<Instant>,
+}
+
+impl SensorLine {
+    /// Opens a port. Not real-time.
+    ///
+    /// # Errors
+    /// One sentence: port, cause and remedy.
+    pub fn open(path: &str) -> Result<Self, String> {
+        let port = TTYPort::open(&serialport::new(path, BAUD).timeout(LOOK));
+        let port = port.map_err(|error| {
+            // The second program on a port finds it locked (TIOCEXCL), which serialport reports like this.
+            let is_busy = error.kind() == ErrorKind::NoDevice && std::path::Path::new(path).exists();
+            let cause = if is_busy { "another program uses it".to_owned() } else { error.description };
+            format!(
+                "no force sensor at {path}: {cause}; is it connected, and may this user use it (group dialout)?"
+            )
+        })?;
+        // What it said before anybody asked.
+        let _ = port.clear(ClearBuffer::Input);
+        Ok(Self { port, lines: Lines::default(), asked: None })
+    }
+
+    /// Asks, unless a question waits for its answer. Real-time: bounded, no allocation; one call of the system.
+    ///
+    /// # Errors
+    /// [`LineLost`].
+    pub fn ask(&mut self) -> Result<(), LineLost> {
+        if self.asked.is_some() {
+            return Ok(());
+        }
+        match self.port.write_all(QUESTION) {
+            Ok(()) => self.asked = Some(Instant::now()),
+            // The port is full: asked again next time.
+            Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock) => {}
+            Err(_) => return Err(LineLost),
+        }
+        Ok(())
+    }
+
+    /// What has arrived; the last line counts. Real-time: bounded, no allocation; two calls of the system.
+    ///
+    /// # Errors
+    /// [`LineLost`].
+    pub fn hear(&mut self) -> Result<Heard, LineLost> {
+        // Asked beforehand: a read without anything to read would make an error, and an error is an allocation.
+        if self.port.bytes_to_read().map_err(|_| LineLost)? == 0 {
+            return Ok(Heard::Nothing);
+        }
+        let mut chunk = [0; CHUNK_BYTES];
+        let length = self.port.read(&mut chunk).map_err(|_| LineLost)?;
+        if length == 0 {
+            return Err(LineLost);
+        }
+        let mut heard = Heard::Nothing;
+        for byte in chunk.iter().take(length) {
+            if let Some(line) = self.lines.push(*byte) {
+                heard = parse(line).map_or(Heard::Nonsense, Heard::Force);
+                self.asked = None;
+            }
+        }
+        Ok(heard)
+    }
+
+    /// The last line, as far as it has come.
+    #[must_use]
+    pub fn last(&self) -> String {
+        String::from_utf8_lossy(self.lines.last()).into_owned()
+    }
+
+    /// How long a question has been without an answer. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn silence(&self) -> Duration {
+        self.asked.map_or(Duration::ZERO, |asked| asked.elapsed())
+    }
+}

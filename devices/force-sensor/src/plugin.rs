@@ -1,0 +1,159 @@
+//! The sensor as a plugin: a device without axes, whose state holds a measured force.
+
+use crate::line::{Heard, LineLost, SensorLine};
+use flotor_hal::{
+    ActiveDevice, Axes, Capabilities, Cycle, DVec3, Device, DeviceInfo, DeviceState, Fault, LoopConfig,
+    Parameter, Refusal, SafeStop, Settings, Tick, Wrench, export_device,
+};
+use std::time::Duration;
+
+const SCHEMA: &[Parameter] = &[
+    Parameter::text("port", "Where the sensor is, as /dev/ttyACM0 or a path below /dev/serial/by-id"),
+    Parameter::real(
+        "timeout_ms",
+        "ms",
+        10.0,
+        60_000.0,
+        2000.0,
+        "Silence of the sensor that is a fault; a slow one averages for a tenth of a second",
+    ),
+];
+
+/// How often a sensor that is waited for is looked at.
+const LOOK_AGAIN: Duration = Duration::from_millis(1);
+
+/// A force sensor, known to answer.
+pub struct ForceSensor {
+    line: SensorLine,
+    timeout: Duration,
+}
+
+/// A force sensor that is asked all the time.
+pub struct AskedSensor {
+    opened: ForceSensor,
+    /// The reading held since it was new.
+    state: DeviceState,
+}
+
+/// There is nothing to make safe: it drives nothing.
+pub struct NothingToStop;
+
+impl SafeStop for NothingToStop {
+    fn safe_stop(&self) {}
+}
+
+impl ForceSensor {
+    /// Waits for the first reading: what is wrong with a sensor is to be said before it is needed.
+    fn prove(&mut self, port: &str) -> Result<(), String> {
+        let gone = |LineLost| format!("the force sensor at {port} is gone; plug it in and measure again");
+        loop {
+            self.line.ask().map_err(gone)?;
+            match self.line.hear().map_err(gone)? {
+                Heard::Force(_) => return Ok(()),
+                Heard::Nonsense => {
+                    let answer = self.line.last();
+                    return Err(format!(
+                        "the force sensor at {port} answers `{answer}` instead of a force like `F 1.234`"
+                    ));
+                }
+                Heard::Nothing if self.line.silence() > self.timeout => {
+                    return Err(format!(
+                        "the force sensor at {port} does not answer within {} ms; is it one that answers `R`, at \
+                         115200 baud?",
+                        self.timeout.as_millis()
+                    ));
+                }
+                Heard::Nothing => std::thread::sleep(LOOK_AGAIN),
+            }
+        }
+    }
+}
+
+impl Device for ForceSensor {
+    const INFO: DeviceInfo = DeviceInfo::new(
+        "force-sensor",
+        "Force sensor",
+        "A force sensor on a serial port: says which force rests on it, and drives nothing",
+    );
+    const PARAMETERS: &'static [Parameter] = SCHEMA;
+    type Active = AskedSensor;
+    type Stop = NothingToStop;
+
+    fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        let port = settings.text("port").ok_or_else(|| {
+            Refusal::resource("where is the force sensor? Say it with `port`, as /dev/ttyACM0")
+        })?;
+        let timeout = Duration::from_secs_f64(settings.number_or_default("timeout_ms") * 1.0e-3);
+        let mut sensor = Self { line: SensorLine::open(port).map_err(Refusal::resource)?, timeout };
+        sensor.prove(port).map_err(Refusal::resource)?;
+        Ok(sensor)
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            sensed: Axes::NONE,
+            actuated: Axes::NONE,
+            range_m: [0.0; 3],
+            range_rad: [0.0; 3],
+            resolution_m: 0.0, // of no place
+            max_force_n: [0.0; 3],
+            max_torque_nm: [0.0; 3],
+            max_force_slew_n_per_s: f64::INFINITY, // of nothing
+            max_torque_slew_nm_per_s: f64::INFINITY,
+            max_stiffness_n_per_m: 0.0,
+            rate_hz: [100.0, 10_000.0],
+            // A question and its answer over USB, a frame each.
+            latency_s: 2.0e-3,
+        }
+    }
+
+    fn stopper(&self) -> NothingToStop {
+        NothingToStop
+    }
+
+    fn activate(self, _config: &LoopConfig) -> Result<AskedSensor, (Self, Refusal)> {
+        Ok(AskedSensor { opened: self, state: DeviceState::HOME })
+    }
+
+    fn parameter(&self, index: usize) -> f64 {
+        match index {
+            0 => 0.0,
+            1 => self.timeout.as_secs_f64() * 1.0e3,
+            _ => f64::NAN,
+        }
+    }
+}
+
+impl ActiveDevice for AskedSensor {
+    type Opened = ForceSensor;
+
+    /// Fresh with each reading; the force is that on the sensor, N.
+    fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
+        let heard = self.opened.line.hear().and_then(|heard| self.opened.line.ask().map(|()| heard));
+        let cycle = match heard {
+            Err(LineLost) => Cycle::Fault(Fault::Disconnected),
+            Ok(Heard::Nonsense) => Cycle::Fault(Fault::Protocol),
+            Ok(Heard::Nothing) if self.opened.line.silence() > self.opened.timeout => {
+                Cycle::Fault(Fault::Timeout)
+            }
+            Ok(Heard::Nothing) => Cycle::Stale,
+            Ok(Heard::Force(force_n)) => {
+                self.state.delivered = Wrench::from_force(DVec3::Z * force_n);
+                self.state.sampled_ns = tick.time_ns;
+                Cycle::Fresh
+            }
+        };
+        *state = self.state;
+        cycle
+    }
+
+    fn write(&mut self, _tick: &Tick, _wrench: &Wrench) -> Cycle {
+        Cycle::Fresh
+    }
+
+    fn deactivate(self) -> ForceSensor {
+        self.opened
+    }
+}
+
+export_device!(ForceSensor);

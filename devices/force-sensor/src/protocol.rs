@@ -1,0 +1,115 @@
+//! The protocol: lines of ASCII, so that a terminal program and a twenty-line sketch on a microcontroller speak it.
+//!
+//! | host | sensor | |
+//! |---|---|---|
+//! | `R` | `F 1.234` | read: the vertical force on the sensor, N, upwards positive |
+//! | anything else, or out of range | `E words` | what is wrong |
+//!
+//! Lines end in a line feed; a carriage return before it is not looked at.
+
+/// Asks for a reading.
+pub const QUESTION: &[u8] = b"R\n";
+/// Longest line: a number of any precision, or a sentence.
+pub const LONGEST_LINE_BYTES: usize = 200;
+/// More than any sensor for this has, N.
+pub const PLAUSIBLE_N: f64 = 500.0;
+
+/// The force in an answer, N; `None` if it is none. Real-time: bounded, no allocation.
+#[must_use]
+pub fn parse(answer: &[u8]) -> Option<f64> {
+    let answer = std::str::from_utf8(answer).ok()?;
+    let force_n: f64 = answer.strip_prefix("F ")?.trim().parse().ok()?;
+    (force_n.abs() <= PLAUSIBLE_N).then_some(force_n) // false for NaN
+}
+
+/// Lines out of bytes, as they come.
+#[derive(Clone, Debug)]
+pub struct Lines {
+    text: [u8; LONGEST_LINE_BYTES],
+    length: usize,
+    /// The last byte ended a line: the next one begins another.
+    is_whole: bool,
+}
+
+impl Default for Lines {
+    fn default() -> Self {
+        Self { text: [0; LONGEST_LINE_BYTES], length: 0, is_whole: false }
+    }
+}
+
+impl Lines {
+    /// Forgets a line that has begun. Real-time: bounded, no allocation.
+    pub fn clear(&mut self) {
+        (self.length, self.is_whole) = (0, false);
+    }
+
+    /// Takes a byte; the line it ends, if it does, or one that is too long so far. Real-time: bounded, no allocation.
+    pub fn push(&mut self, byte: u8) -> Option<&[u8]> {
+        if std::mem::take(&mut self.is_whole) {
+            self.length = 0;
+        }
+        if byte != b'\n'
+            && let Some(place) = self.text.get_mut(self.length)
+        {
+            *place = byte;
+            self.length += 1;
+        }
+        self.is_whole = byte == b'\n' || self.length == LONGEST_LINE_BYTES;
+        self.is_whole.then(|| self.last())
+    }
+
+    /// The line that ended last, or the one that has begun, without what ends it.
+    #[must_use]
+    pub fn last(&self) -> &[u8] {
+        let line = self.text.get(..self.length).unwrap_or_default();
+        line.strip_suffix(b"\r").unwrap_or(line)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn what_is_no_force_is_none() {
+        for (answer, force_n) in
+            [("F 1.5", Some(1.5)), ("F -2e-1", Some(-0.2)), ("F  3 ", Some(3.0)), ("F 501", None)]
+        {
+            assert_eq!(parse(answer.as_bytes()), force_n, "{answer}");
+        }
+        for answer in ["", "F", "F nan", "F inf", "E overload", "1.5", "F 1,5", "F \u{ff11}"] {
+            assert_eq!(parse(answer.as_bytes()), None, "{answer}");
+        }
+        assert_eq!(parse(b"F \xff"), None);
+    }
+
+    #[test]
+    fn lines_end_in_a_line_feed_or_where_nobody_reads_on() {
+        let mut lines = Lines::default();
+        let ended: Vec<Vec<u8>> =
+            b"F 1\r\n\nF 2".iter().filter_map(|byte| lines.push(*byte).map(<[u8]>::to_vec)).collect();
+        assert_eq!(ended, [&b"F 1"[..], b""]);
+        assert_eq!(lines.last(), b"F 2");
+        lines.clear();
+        let long =
+            (0..LONGEST_LINE_BYTES).filter_map(|_| lines.push(b'x').map(<[u8]>::len)).collect::<Vec<_>>();
+        assert_eq!(long, [LONGEST_LINE_BYTES]);
+        assert_eq!(lines.push(b'F'), None);
+        assert_eq!(lines.last(), b"F");
+    }
+
+    proptest! {
+        /// However the bytes of a force are cut, and whatever came before its line, it is read.
+        #[test]
+        fn a_force_is_read_after_any_noise(noise in proptest::collection::vec(any::<u8>(), 0..600), force_n in -500.0..500.0_f64) {
+            let mut lines = Lines::default();
+            let answer = format!("\nF {force_n}\r\n");
+            let mut heard = None;
+            for byte in noise.iter().copied().chain(answer.bytes()) {
+                heard = lines.push(byte).map(parse);
+            }
+            prop_assert_eq!(heard, Some(Some(force_n)));
+        }
+    }
+}
