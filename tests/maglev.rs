@@ -5,7 +5,7 @@ use flotor::trace::Events;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
 use flotor_tests::library::{build_folder, plugin_file};
-use flotor_tests::program::{Flotor, Ran, exit_code};
+use flotor_tests::program::{Flotor, Ran, Running, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::watch;
 use rustix::process::{Pid, Signal, kill_process};
@@ -142,11 +142,15 @@ fn one_scene_gives_one_trajectory_on_both_devices() {
 
 /// `flotor calibrate`, with patience for a test machine that is held up.
 fn calibrate(emulator: &Emulator, sensor: &Path, arguments: &[&str]) -> Ran {
+    start_calibrating(emulator, sensor, arguments).wait()
+}
+
+fn start_calibrating(emulator: &Emulator, sensor: &Path, arguments: &[&str]) -> Running {
     let address = format!("address={}", emulator.address);
     let device =
         ["--device", "maglev", "--set", &address, "--set", "watchdog_ms=700", "--set", "timeout_ms=8000"];
     let sensor = ["--sensor", sensor.to_str().expect("a scratch folder has a plain name")];
-    Flotor::with(["calibrate"].iter().chain(arguments).chain(&device).chain(&sensor)).run()
+    Flotor::with(["calibrate"].iter().chain(arguments).chain(&device).chain(&sensor)).start()
 }
 
 #[test]
@@ -194,6 +198,25 @@ fn a_calibration_that_cannot_be_says_why_and_lets_the_handle_down() {
     assert!(ran.error().contains("no force sensor at"), "{}", ran.error());
     let ran = Flotor::with(["calibrate", "vertical", "--device", "maglev"]).run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+}
+
+#[test]
+fn a_calibration_that_is_broken_off_lets_the_handle_down() {
+    let scratch = Scratch::default();
+    let (sensor, file) = (scratch.path().join("force"), scratch.path().join("mine.toml"));
+    let rig = ["--calibration-rig", sensor.to_str().unwrap(), "--rig-stop-s", "60"];
+    let mut emulator = Emulator::listening("tcp", "127.0.0.1:0", &rig);
+    let running = start_calibrating(&emulator, &sensor, &["vertical", "--out", file.to_str().unwrap()]);
+    emulator.wait_for(&["mode Levitating"]);
+    std::thread::sleep(Duration::from_millis(300));
+    kill_process(Pid::from_raw(i32::try_from(running.id()).unwrap()).unwrap(), Signal::INT).unwrap();
+    let ran = running.wait();
+    assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
+    assert!(ran.error().contains("stopped before it was done"), "{}", ran.error());
+    assert!(!file.exists());
+    // Told to let go, not found dead.
+    let line = emulator.wait_for(&["mode Disarmed"]);
+    assert!(!line.contains("faults="), "{line}");
 }
 
 #[test]

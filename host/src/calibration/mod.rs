@@ -63,6 +63,9 @@ pub enum CalibrationError {
         /// Where it does, mm.
         height_mm: f64,
     },
+    /// Somebody stopped it.
+    #[error("stopped before it was done: the handle was let down, nothing was written")]
+    BrokenOff,
     /// There is no thread to hold the handle.
     #[error("cannot hold the handle beside measuring: {0}")]
     NoThread(std::io::Error),

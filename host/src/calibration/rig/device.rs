@@ -6,6 +6,7 @@ use crate::calibration::CalibrationError;
 use crate::calibration::sensor::ForceSensor;
 use flotor_hal::abi::loader::{OpenedDevice, Plugin, Setting};
 use flotor_hal::{LoopConfig, Refusal, VerticalCalibration};
+use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 /// Height on two looks after each other that is the same height, m: what the device resolves (5 to 10 µm; Varadharajan
@@ -40,9 +41,9 @@ pub struct DeviceRig<W> {
     waiting: W,
 }
 
-impl<W: FnMut(Option<Waiting>)> DeviceRig<W> {
+impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
     /// Opens the device. A stop counts if the handle rests within `close_m` of where it should, within `patience`;
-    /// until then `waiting` is told where it is, and then told nothing, once.
+    /// until then `waiting` is told where it is, and then told nothing, once. When it breaks off, the handle is let down.
     ///
     /// # Errors
     /// [`CalibrationError`] if the device refuses.
@@ -77,6 +78,13 @@ impl<W: FnMut(Option<Waiting>)> DeviceRig<W> {
         opened.calibrate_vertical(calibration).map_err(CalibrationError::Refused)
     }
 
+    fn tell(&mut self, waiting: Option<Waiting>) -> Result<(), CalibrationError> {
+        match (self.waiting)(waiting) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(CalibrationError::BrokenOff),
+        }
+    }
+
     fn holder(&mut self) -> Result<&mut Holder, CalibrationError> {
         if let (None, Some(opened)) = (&self.holder, self.opened.take()) {
             let config = LoopConfig { period_ns: PERIOD_NS, seed: 0 };
@@ -94,7 +102,7 @@ fn lost() -> CalibrationError {
     CalibrationError::Refused(Refusal::resource("it was lost; plug it in and begin again"))
 }
 
-impl<W: FnMut(Option<Waiting>)> Rig for DeviceRig<W> {
+impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {
     fn rest_at(&mut self, target_m: f64, command_n: &dyn Fn(f64) -> f64) -> Result<Rest, CalibrationError> {
         let (close_m, until, command_n) = (self.close_m, Instant::now() + self.patience, command_n(target_m));
         self.holder()?.push(command_n);
@@ -102,14 +110,14 @@ impl<W: FnMut(Option<Waiting>)> Rig for DeviceRig<W> {
             let report = self.holder()?.look()?;
             let is_close = (report.height_m - target_m).abs() <= close_m;
             if report.state == Holding::Steady(command_n) && is_close && report.moved_m <= REST_M {
-                (self.waiting)(None);
+                self.tell(None)?;
                 return Ok(Rest { height_m: report.height_m, delivered_n: report.delivered_n });
             }
             if Instant::now() > until {
                 let (target_mm, height_mm) = (target_m * 1.0e3, report.height_m * 1.0e3);
                 return Err(CalibrationError::NotReached { target_mm, height_mm });
             }
-            (self.waiting)(Some(Waiting { target_m, height_m: report.height_m, command_n }));
+            self.tell(Some(Waiting { target_m, height_m: report.height_m, command_n }))?;
             std::thread::sleep(LOOK_AGAIN);
         }
     }

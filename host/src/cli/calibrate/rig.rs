@@ -4,10 +4,12 @@ use super::options::{KeyValue, duration_s};
 use super::{CommandError, eval, progress_bar, refused};
 use crate::calibration::rig::{DeviceRig, SimulatedRig, Waiting};
 use crate::calibration::sensor::{ForceSensor, SERIAL_SENSOR};
+use crate::cli::stopping::stop_on_signals;
 use crate::registry::Registry;
 use clap::Args;
 use flotor_hal::abi::PluginKind;
 use indicatif::ProgressBar;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -49,8 +51,8 @@ pub(super) struct RigArguments {
     folders: Vec<PathBuf>,
 }
 
-/// Says where the sensor has to go.
-pub(super) type Guide = Box<dyn FnMut(Option<Waiting>)>;
+/// Says where the sensor has to go, until somebody breaks it off.
+pub(super) type Guide = Box<dyn FnMut(Option<Waiting>) -> ControlFlow<()>>;
 
 impl RigArguments {
     /// Id of the plugin.
@@ -82,16 +84,19 @@ impl RigArguments {
 }
 
 fn guide(progress: &ProgressBar) -> Guide {
-    let progress = progress.clone();
-    Box::new(move |waiting| match waiting {
-        Some(Waiting { target_m, height_m, command_n }) => {
-            let (target_mm, height_mm) = (target_m * 1.0e3, height_m * 1.0e3);
-            let at = if height_mm.is_finite() { format!("{height_mm:.2} mm") } else { "...".to_owned() };
-            progress.set_message(format!(
-                "pushing with {command_n} N, handle at {at}; sensor to {target_mm:.1} mm"
-            ));
+    let (progress, stop) = (progress.clone(), stop_on_signals());
+    Box::new(move |waiting| {
+        match waiting {
+            Some(Waiting { target_m, height_m, command_n }) => {
+                let (target_mm, height_mm) = (target_m * 1.0e3, height_m * 1.0e3);
+                let at = if height_mm.is_finite() { format!("{height_mm:.2} mm") } else { "...".to_owned() };
+                progress.set_message(format!(
+                    "pushing with {command_n} N, handle at {at}; sensor to {target_mm:.1} mm"
+                ));
+            }
+            None => progress.set_message("reading"),
         }
-        None => progress.set_message("reading"),
+        if stop.is_stop_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })
 }
 
