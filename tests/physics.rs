@@ -162,6 +162,7 @@ fn the_hold_puts_out_exactly_the_energy_a_held_spring_must() {
         rate_hz: 1.0 / PERIOD_S,
         plugins: &[],
         couplings: &[],
+        carried: &[],
         trace_digest: String::new(),
     };
     let reported_j = RunSummary::new(facts, &watched.outcome, &tally).energy.loop_generated_j;

@@ -1,6 +1,6 @@
 //! The schemas inside a recording: up to date with `host/proto`, and enough for a stranger to read every field.
 
-use flotor::coupling::{CouplingConfig, CouplingDescription, CouplingEnd, PassivityMode};
+use flotor::coupling::{CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, PassivityMode};
 use flotor::record::{
     Change, ChangeOutcome, ChangeSubject, Note, PluginDescription, Recorder, Role, RunDescription, Severity,
 };
@@ -158,7 +158,10 @@ fn run() -> RunDescription {
                 reserve_j: 0.25,
                 passivity: PassivityMode::Control,
             },
-            ends: [CouplingEnd { device: 0, mapping }, CouplingEnd { device: 1, mapping }],
+            ends: CouplingEnds::Here([
+                CouplingEnd { device: 0, mapping },
+                CouplingEnd { device: 1, mapping },
+            ]),
         }],
     }
 }

@@ -125,7 +125,7 @@ fn pair(registry: &Registry, left: &str, right: &str, duration_s: f64) -> Pair {
     let thrown = RunEnd::DeviceFault(Fault::SensorOutOfRange);
     let throws = throws_a_free_handle(left) || throws_a_free_handle(right);
     assert!(run.outcome.end == RunEnd::Finished || throws && run.outcome.end == thrown, "{left} and {right}");
-    let accounts = run.outcome.couplings.iter().flatten();
+    let accounts = run.outcome.couplings.iter().flat_map(|coupling| coupling.accounts);
     let fastest = |records: &[TickRecord]| {
         records.iter().map(|record| record.twist.linear().length()).fold(0.0, f64::max)
     };
@@ -133,7 +133,7 @@ fn pair(registry: &Registry, left: &str, right: &str, duration_s: f64) -> Pair {
     Pair {
         left: left.to_owned(),
         right: right.to_owned(),
-        lowest_account_j: accounts.map(|tank| tank.lowest_j()).fold(0.0, f64::min),
+        lowest_account_j: accounts.map(|account| account.lowest_j).fold(0.0, f64::min),
         lowest_ports_j: lowest_sum_of_ports_j(&run),
         fastest_late_m_per_s: fastest(&run.records[tail..]),
         fastest_m_per_s: fastest(&run.records),
@@ -301,6 +301,23 @@ fn what_is_wrong_with_devices_and_couplings_is_said() {
         (
             format!("{two}[[coupling]]\nend = [{{ device = \"left\" }}, {{ device = \"left\" }}]\n"),
             "not one with itself",
+        ),
+        (format!("{two}{COUPLING}partner = \"elsewhere\"\nname = \"pair\"\n"), "a coupling has one end here"),
+        (
+            format!(
+                "{two}[[coupling]]\nname = \"Pair\"\npartner = \"elsewhere\"\nend = [{{ device = \"left\" }}]\n"
+            ),
+            "both hosts know the coupling by its `name`: lower-case letters",
+        ),
+        (
+            format!("{two}[[coupling]]\npartner = \"far\"\nend = [{{ device = \"left\" }}]\n"),
+            "here, elsewhere",
+        ),
+        (
+            format!(
+                "{two}[[coupling]]\nname = \"pair\"\npartner = \"elsewhere\"\ndelay_ticks = 3\nend = [{{ device = \"left\" }}]\n"
+            ),
+            "leave `delay_ticks` out",
         ),
         (
             format!("{two}{COUPLING}[limits]\npassivity = \"control\"\n"),

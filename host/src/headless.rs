@@ -54,6 +54,7 @@ pub fn run(
         rate_hz: scene.rate_hz,
         plugins: &plugins,
         couplings: &scene.couplings,
+        carried: &[],
         trace_digest: digest.finish(),
     };
     Ok(RunSummary::new(facts, &outcome, &tally))

@@ -3,6 +3,7 @@
 //! With nothing changed the wrench must come out bit for bit; with another parameter the difference shows what
 //! the change does to the same hand movement.
 
+use crate::coupling::{CouplingDescription, CouplingEnds, Patience};
 use crate::record::{Change, ChangeOutcome, ChangeSubject, ReadError, Recording, Role, RunDescription};
 use crate::registry::Registry;
 use crate::scene::{Isolation, Location, ModelUse, ParameterText, PluginUse};
@@ -23,6 +24,22 @@ pub enum ReplayError {
     /// A model cannot be had.
     #[error(transparent)]
     Run(#[from] RunError),
+    /// What another host told is not in the recording.
+    #[error(
+        "the coupling `{coupling}` was held by another host too, and what that one told is not in the recording: \
+         only runs whose couplings have both ends here can be replayed"
+    )]
+    Apart {
+        /// Its name.
+        coupling: String,
+    },
+}
+
+/// Of couplings whose ends are both here.
+const NOBODY_TO_WAIT_FOR: Patience = Patience { silence_ns: 0, fade_ns: 0 };
+
+fn is_apart(coupling: &CouplingDescription) -> bool {
+    matches!(coupling.ends, CouplingEnds::Apart(_))
 }
 
 /// How the replayed wrench differs from the recorded one.
@@ -95,9 +112,12 @@ impl<'r> Replay<'r> {
         let devices = recording.run().devices().count();
         #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
         let period_s = period_ns as f64 * 1.0e-9;
+        if let Some(coupling) = recording.run().couplings.iter().find(|coupling| is_apart(coupling)) {
+            return Err(ReplayError::Apart { coupling: coupling.name.clone() });
+        }
         let couplings = recording.run().couplings.iter();
-        let couplings = couplings.map(|coupling| Coupled::new(coupling, period_s)).collect();
-        let forces = Forces::new(devices, layers, couplings);
+        let couplings = couplings.map(|coupling| Coupled::new(coupling, period_s, NOBODY_TO_WAIT_FOR).0);
+        let forces = Forces::new(devices, layers, couplings.collect());
         Ok(Self { registry, config, recording, uses, devices, forces, plugins, held, exchanged })
     }
 

@@ -1,7 +1,8 @@
 //! What a run says about itself: numbers for machines, a page for people.
 
-use crate::coupling::{CouplingDescription, Tank};
-use crate::servo::{ModelHealth, Overrun, Percentiles, Stage, Timing};
+use crate::coupling::{Account, CouplingDescription, Hearing};
+use crate::live::Carried;
+use crate::servo::{CouplingOutcome, ModelHealth, Overrun, Percentiles, Stage, Timing};
 use crate::session::{Observer, Outcome, PluginReport, RunEnd};
 use crate::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, EnergyLedger};
@@ -177,6 +178,22 @@ pub struct CouplingSummary {
     pub gone_in_j: [f64; 2],
     /// What has turned to heat at each end, J.
     pub given_up_j: [f64; 2],
+    /// The way to the second end, if that is on another host; its numbers above are those it told last.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub link: Option<LinkSummary>,
+}
+
+/// How news crossed the way between two hosts.
+#[derive(Clone, Debug, Serialize)]
+pub struct LinkSummary {
+    /// Ticks in which there was news.
+    pub heard_ticks: u64,
+    /// How often there was none for as long as the watchdog waits: the coupling let go.
+    pub silences: u64,
+    /// The longest the coupling went by old news, ms; always less than the watchdog waits.
+    pub longest_wait_ms: f64,
+    /// What was carried.
+    pub carried: Carried,
 }
 
 /// Energy accounts of a run.
@@ -227,8 +244,25 @@ pub struct RunFacts<'a> {
     pub plugins: &'a [PluginReport],
     /// What holds devices together.
     pub couplings: &'a [CouplingDescription],
+    /// What was carried between hosts, by name of the coupling.
+    pub carried: &'a [(String, Carried)],
     /// Digest of the trace.
     pub trace_digest: String,
+}
+
+impl LinkSummary {
+    /// For people.
+    fn to_text(&self) -> String {
+        let Self { heard_ticks, silences, longest_wait_ms, carried } = self;
+        let Carried { lost, overtaken, refused, .. } = carried;
+        let silent = match silences {
+            0 => format!("never silent for longer than {longest_wait_ms:.0} ms"),
+            silences => format!("let go {silences} times, when nothing was heard"),
+        };
+        format!(
+            "heard in {heard_ticks} ticks, {silent}; {lost} lost, {overtaken} overtaken, {refused} refused"
+        )
+    }
 }
 
 impl RunSummary {
@@ -278,7 +312,9 @@ impl RunSummary {
                 port_end_j: tally.devices.iter().map(DeviceTally::port_energy_j).sum(),
             },
             devices: facts.plugins.iter().zip(&tally.devices).map(device_summary).collect(),
-            couplings: facts.couplings.iter().zip(&outcome.couplings).map(coupling_summary).collect(),
+            couplings: (facts.couplings.iter().zip(&outcome.couplings))
+                .map(|(coupling, outcome)| coupling_summary(coupling, outcome, facts.carried))
+                .collect(),
             events: events.filter(|(_, count)| *count > 0).collect(),
             trace_digest: facts.trace_digest,
             dropped_records: outcome.dropped_records,
@@ -335,12 +371,13 @@ impl RunSummary {
                 lines.push(format!("  {name:<11}{peaks}   port {end_mj:+.3} mJ, lowest {lowest_mj:+.3} mJ"));
             }
         }
-        for CouplingSummary { name, lowest_j, given_up_j, .. } in &self.couplings {
+        for CouplingSummary { name, lowest_j, given_up_j, link, .. } in &self.couplings {
             let [first, second] = lowest_j.map(|joule| joule * 1.0e3);
             let heat_mj = given_up_j.iter().sum::<f64>() * 1.0e3;
             let accounts =
                 format!("accounts never below {first:+.3} and {second:+.3} mJ, {heat_mj:.3} mJ to heat");
             lines.push(format!("  {:<11}{name}: {accounts}", "coupling"));
+            lines.extend(link.iter().map(|link| format!("  {:<11}{name}: {}", "link", link.to_text())));
         }
         if !self.events.is_empty() {
             let events: Vec<String> =
@@ -381,13 +418,26 @@ fn device_summary((plugin, tally): (&PluginReport, &DeviceTally)) -> DeviceSumma
     }
 }
 
-fn coupling_summary((coupling, tanks): (&CouplingDescription, &[Tank; 2])) -> CouplingSummary {
-    let each = |number: fn(&Tank) -> f64| tanks.each_ref().map(number);
+fn coupling_summary(
+    coupling: &CouplingDescription,
+    outcome: &CouplingOutcome,
+    carried: &[(String, Carried)],
+) -> CouplingSummary {
+    let each = |number: fn(&Account) -> f64| outcome.accounts.each_ref().map(number);
+    let carried = carried.iter().find(|(name, _)| *name == coupling.name).map(|(_, carried)| *carried);
+    #[allow(clippy::cast_precision_loss)] // for people
+    let link = |hearing: Hearing| LinkSummary {
+        heard_ticks: hearing.ticks,
+        silences: hearing.silences,
+        longest_wait_ms: hearing.longest_wait_ns as f64 * 1.0e-6,
+        carried: carried.unwrap_or_default(),
+    };
     CouplingSummary {
         name: coupling.name.clone(),
-        lowest_j: each(Tank::lowest_j),
-        gone_in_j: each(Tank::gone_in_j),
-        given_up_j: each(Tank::given_up_j),
+        lowest_j: each(|account| account.lowest_j),
+        gone_in_j: each(|account| account.gone_in_j),
+        given_up_j: each(|account| account.given_up_j),
+        link: outcome.hearing.map(link),
     }
 }
 

@@ -144,15 +144,16 @@ fn access_control(members: &Members) -> Value {
         rule(
             "tell",
             "egress",
-            json!(["put", "reply", "declare_queryable", "liveliness_token"]),
+            json!(["put", "reply", "declare_queryable", "declare_subscriber", "liveliness_token"]),
             vec![format!("{ROOT}/**")],
         ),
         rule(
             "listen",
             "ingress",
             json!(["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query", "query"]),
-            of_any(&["*"]),
+            of_any(&["*", "news/*"]),
         ),
+        rule("couple", "ingress", json!(["put"]), of_any(&["couple/*"])),
     ];
     for right in Right::ALL {
         rules.push(rule(word(right), "ingress", json!(["query"]), of_any(right.keys())));
@@ -168,6 +169,8 @@ fn access_control(members: &Members) -> Value {
         .map(|(name, right)| {
             let mut allowed = vec!["tell", "listen"];
             allowed.extend(Right::ALL.into_iter().filter(|other| other <= right).map(word));
+            // Who holds the other end of a coupling moves the hand here.
+            allowed.extend((*right >= Right::Operate).then_some("couple"));
             json!({ "rules": allowed, "subjects": [name.to_string()] })
         })
         .collect();

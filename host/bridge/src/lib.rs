@@ -4,17 +4,19 @@
 //!  machine A                                              machine B
 //!  flotor run -> live socket -> bridge serve  -> network -> bridge attach -> live socket -> flotor view
 //!                                                        -> bridge record -> FILE.mcap
+//!  flotor run <-> news socket <-> bridge serve <-> network <-> bridge couple <-> news socket <-> flotor run
 //! ```
 //!
 //! [`serve`] is the one end: a watcher of the host like any other ([`flotor_live`]), whose words it puts on keys
 //! ([`keys`]) in the messages of a recording. [`remote`] is the other, [`attach`] shows what it hears as if it ran there,
-//! and [`keep`] records it. Requests go back the same way ([`wish`]); who may ask for what is Zenoh's access control, for which
+//! and [`keep`] records it. [`couple`] holds a hand here and one there together. Requests go back the same way ([`wish`]); who may ask for what is Zenoh's access control, for which
 //! [`access`] writes keys and configurations.
 //!
 //! Not real-time: nothing here runs in the process of a servo.
 
 pub mod access;
 pub mod attach;
+pub mod couple;
 pub mod keep;
 pub mod keys;
 pub mod link;

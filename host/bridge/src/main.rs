@@ -3,6 +3,7 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use flotor_bridge::access::{Members, write_keys};
 use flotor_bridge::attach::attach;
+use flotor_bridge::couple::couple;
 use flotor_bridge::keep::keep;
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkError, LinkOptions, open};
@@ -29,6 +30,7 @@ use std::sync::atomic::AtomicBool;
     flotor bridge list                                    who is there\n  \
     flotor bridge attach lab                              then `flotor view` shows it here\n  \
     flotor bridge record lab run.mcap\n  \
+    flotor bridge couple lab                              two hands, two hosts: see the book, Several devices\n  \
     flotor bridge ask lab emergency-stop\n  \
     flotor bridge keys keys --host lab.example.org --own ada --operate grace --watch alan\n  \
     flotor bridge serve --name lab --config keys/bridge.json5 --allow own --scene scene.toml"
@@ -46,6 +48,11 @@ enum Command {
     Serve(ServeArguments),
     /// Show a remote run on this machine, where `flotor view` finds it
     Attach {
+        /// The bridge
+        name: Name,
+    },
+    /// Hold a hand here and one there together: carry the news of couplings with `partner = "elsewhere"`
+    Couple {
         /// The bridge
         name: Name,
     },
@@ -180,6 +187,11 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
             let remote = Remote::listen(&open(&link, End::Visiting)?, &name)?;
             tell(&format!("waiting for a run of zenoh/{name} (Ctrl-C ends)"));
             attach(&remote, &directory, &stop, &mut tell)?;
+        }
+        Command::Couple { name } => {
+            let session = open(&link, End::Visiting)?;
+            tell(&format!("waiting for a coupling to hold with zenoh/{name} (Ctrl-C ends)"));
+            couple(&session, &directory, &name, &stop, &mut tell)?;
         }
         Command::Record { name, file } => {
             let remote = Remote::listen(&open(&link, End::Visiting)?, &name)?;

@@ -1,5 +1,6 @@
 //! How a bridge is doing: what is lost or refused is shown.
 
+use crate::couple::Carried;
 use crate::wish::Refusal;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -19,6 +20,9 @@ pub struct Status {
     pub dropped: u64,
     /// Requests not followed, by reason.
     pub refused: BTreeMap<Refusal, u64>,
+    /// What was carried for each coupling with another host.
+    #[serde(default)]
+    pub couplings: BTreeMap<String, Carried>,
 }
 
 /// What a bridge does.

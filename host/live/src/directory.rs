@@ -103,16 +103,7 @@ impl Directory {
     /// [`DirectoryError`]: the folder is not usable, or not ours alone.
     pub fn listen(&self) -> Result<Listener, DirectoryError> {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
-        let unusable = |path: &Path| {
-            let path = path.to_path_buf();
-            move |cause| DirectoryError::Unusable { path, cause }
-        };
-        DirBuilder::new().recursive(true).mode(PRIVATE).create(&self.path).map_err(unusable(&self.path))?;
-        let attributes = std::fs::symlink_metadata(&self.path).map_err(unusable(&self.path))?;
-        let ours = attributes.is_dir() && attributes.uid() == getuid().as_raw();
-        if !ours || attributes.mode() & 0o077 != 0 {
-            return Err(DirectoryError::NotPrivate { path: self.path.clone() });
-        }
+        private(&self.path)?;
         let _ = self.runs(); // cleans up
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let path = self.path.join(format!("{}-{number}.{SUFFIX}", std::process::id()));
@@ -150,6 +141,23 @@ impl Drop for Listener {
     }
 }
 
+/// Makes a folder that only its user may enter, if it is not there.
+pub(crate) fn private(path: &Path) -> Result<(), DirectoryError> {
+    DirBuilder::new().recursive(true).mode(PRIVATE).create(path).map_err(unusable(path))?;
+    let attributes = std::fs::symlink_metadata(path).map_err(unusable(path))?;
+    let ours = attributes.is_dir() && attributes.uid() == getuid().as_raw();
+    if ours && attributes.mode() & 0o077 == 0 {
+        Ok(())
+    } else {
+        Err(DirectoryError::NotPrivate { path: path.to_path_buf() })
+    }
+}
+
+fn unusable(path: &Path) -> impl FnOnce(io::Error) -> DirectoryError {
+    let path = path.to_path_buf();
+    move |cause| DirectoryError::Unusable { path, cause }
+}
+
 /// The process whose socket this is.
 fn process_of(path: &Path) -> Option<u32> {
     let name = path.file_stem()?.to_str()?;
@@ -158,7 +166,7 @@ fn process_of(path: &Path) -> Option<u32> {
 }
 
 /// Whether a process exists; one of somebody else's counts.
-fn lives(process: u32) -> bool {
+pub(crate) fn lives(process: u32) -> bool {
     let Some(process) = i32::try_from(process).ok().and_then(Pid::from_raw) else { return false };
     test_kill_process(process) != Err(rustix::io::Errno::SRCH)
 }

@@ -42,12 +42,18 @@
 //! does nothing per tick while nobody watches. Between loop and socket lies a queue of fixed length for each client; what finds
 //! no room is dropped and counted. Requests are answered at most a thousand times a second for each client.
 //!
+//! # Couplings
+//!
+//! A run with a coupling whose other end is on another host has a second socket, for datagrams: [`NewsSocket`] gives and takes what
+//! the ends tell each other ([`flotor_record::news`]).
+//!
 //! Not real-time.
 
 mod client;
 mod directory;
 mod frame;
 mod message;
+mod news;
 mod server;
 
 pub use client::{Asker, Client, Event, LiveError};
@@ -57,6 +63,7 @@ pub use message::{
     Answer, Ask, ChangeMessage, End, Greeting, Outcome, PanelParameter, PanelPlugin, ParameterShape, Request,
     SetValue, Subject, WrenchLimits,
 };
+pub use news::{CALL_PERIOD, FoundCoupling, NewsSocket};
 pub use server::{Publication, PublishError, Serve};
 
 /// Version of what is said over the socket.

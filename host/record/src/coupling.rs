@@ -24,7 +24,7 @@ pub struct CouplingConfig {
     pub stiffness_nm_per_rad: f64,
     /// Damping of relative rotation, N·m·s/rad.
     pub damping_nms_per_rad: f64,
-    /// How long news of one end takes to the other, ticks.
+    /// How long news of one end takes to the other, ticks; of ends in one run.
     pub delay_ticks: u32,
     /// Energy an end may keep beyond what its spring stores, J.
     pub reserve_j: f64,
@@ -61,6 +61,26 @@ pub struct CouplingEnd {
     pub mapping: MappingConfig,
 }
 
+/// Where the ends of a coupling are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CouplingEnds {
+    /// Both in this run.
+    Here([CouplingEnd; 2]),
+    /// One here, the other on another host, which knows the coupling by the same name.
+    Apart(CouplingEnd),
+}
+
+impl CouplingEnds {
+    /// Those in this run.
+    #[must_use]
+    pub fn here(&self) -> &[CouplingEnd] {
+        match self {
+            CouplingEnds::Here(ends) => ends,
+            CouplingEnds::Apart(end) => std::slice::from_ref(end),
+        }
+    }
+}
+
 /// A coupling of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CouplingDescription {
@@ -69,7 +89,7 @@ pub struct CouplingDescription {
     /// Spring, damper, delay.
     pub config: CouplingConfig,
     /// What it holds together.
-    pub ends: [CouplingEnd; 2],
+    pub ends: CouplingEnds,
 }
 
 impl CouplingDescription {
@@ -92,7 +112,7 @@ impl CouplingDescription {
             delay_ticks: config.delay_ticks,
             reserve_j: Some(config.reserve_j),
             passivity: passivity.into(),
-            ends: self.ends.iter().map(end).collect(),
+            ends: self.ends.here().iter().map(end).collect(),
         }
     }
 
@@ -116,7 +136,11 @@ impl CouplingDescription {
             let mapping = end.mapping.ok_or(Missing("coupling.ends.mapping"))?.config()?;
             Ok(CouplingEnd { device, mapping })
         };
-        let [first, second] = message.ends.as_slice() else { return Err(Missing("coupling.ends")) };
-        Ok(Self { ends: [end(first)?, end(second)?], config, name: message.name })
+        let ends = match message.ends.as_slice() {
+            [first, second] => CouplingEnds::Here([end(first)?, end(second)?]),
+            [here] => CouplingEnds::Apart(end(here)?),
+            _ => return Err(Missing("coupling.ends")),
+        };
+        Ok(Self { ends, config, name: message.name })
     }
 }

@@ -32,7 +32,7 @@
 //! FLOTOR_WRITE_SCHEMA=1 cargo test -p flotor-tests --test recording_schema committed
 //! ```
 //!
-//! Not real-time, but for [`trace`] and [`mapping`]: records reach the rest through the trace ring.
+//! Not real-time, but for [`trace`], [`mapping`] and the words of [`news`]: records reach the rest through the trace ring.
 
 mod change;
 mod container;
@@ -40,6 +40,7 @@ pub mod coupling;
 mod digest;
 pub mod mapping;
 mod messages;
+pub mod news;
 mod reader;
 mod run;
 mod schema;

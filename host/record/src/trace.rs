@@ -54,9 +54,11 @@ impl Events {
     pub const MODEL_OVERRUN: Events = Events { bits: 1 << 18 };
     /// The device was asked for more force than it should be used with.
     pub const EXCESS_FORCE: Events = Events { bits: 1 << 19 };
+    /// Nothing is heard of a coupling's other end, on another host: the coupling does not pull.
+    pub const PARTNER_SILENT: Events = Events { bits: 1 << 20 };
 
     /// Names of the bits, lowest first: for reports and recordings.
-    pub const NAMES: [&'static str; 20] = [
+    pub const NAMES: [&'static str; 21] = [
         "stale_sample",
         "not_finite",
         "force_limited",
@@ -77,6 +79,7 @@ impl Events {
         "passivity_damped",
         "model_overrun",
         "excess_force",
+        "partner_silent",
     ];
 
     /// Adds events. Real-time: bounded, no allocation.

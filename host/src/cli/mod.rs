@@ -179,6 +179,7 @@ impl From<crate::replay::ReplayError> for CommandError {
         match error {
             crate::replay::ReplayError::Read(error) => Self::Read(error),
             crate::replay::ReplayError::Run(error) => Self::Run(error),
+            error @ crate::replay::ReplayError::Apart { .. } => Self::Usage(error.to_string()),
         }
     }
 }

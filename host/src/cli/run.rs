@@ -3,7 +3,8 @@
 use super::options::{ClockOption, PluginKeyValue, duration_s, rate_hz};
 use super::stopping::{Keys, stop_on_signals};
 use super::{CommandError, style};
-use crate::live::{Announcement, Handles, publish};
+use crate::coupling::Line;
+use crate::live::{Announcement, Carried, Carrier, Handles, carry, publish};
 use crate::record::{Change, RecordError, Recorder, TraceDigest};
 use crate::registry::Registry;
 use crate::report::{RunFacts, RunSummary, Tally};
@@ -63,7 +64,8 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     };
     let options = RunOptions { clock, seed: arguments.seed };
     let registry = Registry::search(&scene.plugin_folders);
-    let session = Session::prepare(&scene, &registry, &options)?;
+    let mut session = Session::prepare(&scene, &registry, &options)?;
+    let carriers = carriers(&mut session, clock)?;
     let plugins = session.plugins().to_vec();
     let description = describe(&scene, &options, &plugins);
     let announcement =
@@ -93,6 +95,8 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let outcome = outcome?;
     watchers.progress.finish_and_clear();
 
+    let carried: Vec<(String, Carried)> =
+        carriers.into_iter().map(|(name, carrier)| (name, carrier.finish())).collect();
     let Watchers { tally, digest, recorder, failure, plot, publication, .. } = watchers;
     if let Some(publication) = publication {
         publication.end(&end_words(&outcome));
@@ -104,6 +108,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         rate_hz: scene.rate_hz,
         plugins: &plugins,
         couplings: &scene.couplings,
+        carried: &carried,
         trace_digest: digest.finish(),
     };
     let summary = RunSummary::new(facts, &outcome, &tally);
@@ -149,6 +154,22 @@ fn scene(arguments: &RunArguments) -> Result<Scene, CommandError> {
         set.apply(&mut scene).map_err(CommandError::Usage)?;
     }
     Ok(scene)
+}
+
+/// Begins to carry the news of couplings whose other end is on another host.
+fn carriers(session: &mut Session, clock: Clock) -> Result<Vec<(String, Carrier)>, CommandError> {
+    let lines = session.take_lines();
+    if let (Some((name, _)), Clock::Virtual) = (lines.first(), clock) {
+        return Err(CommandError::Usage(format!(
+            "the other end of the coupling `{name}` is on another host, which keeps real time: leave `--clock virtual` out"
+        )));
+    }
+    let directory = Directory::of_this_user();
+    let carrier = |(name, line): (String, Line)| match carry(&directory, &name, line) {
+        Ok(carrier) => Ok((name, carrier)),
+        Err(error) => Err(CommandError::Failed(format!("the coupling `{name}` reaches nobody: {error}"))),
+    };
+    lines.into_iter().map(carrier).collect()
 }
 
 /// How a run ended, for those who watched it.

@@ -14,7 +14,8 @@
 //! Where frames and scales differ, both ends speak of one shared frame; the way there is a mapping like a model's.
 //! Energies are those of the shared frame.
 //!
-//! [`Coupling`] is both ends in one loop with a delay of whole ticks. Ends on two machines exchange the same news.
+//! [`Coupling`] is both ends in one loop with a delay of whole ticks. [`EndApart`] is one end whose partner is on another host:
+//! the same end, the same news, which other threads carry ([`crate::live::carry`]).
 //!
 //! Sources: account and transfer of energy, M. Franken, S. Stramigioli, S. Misra, C. Secchi, A. Macchelli, "Bilateral
 //! telemanipulation with time delays: a two-layer approach combining passivity and transparency", IEEE Trans. Robotics
@@ -22,16 +23,19 @@
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
+mod apart;
 mod delay;
 mod end;
 mod tank;
 #[cfg(test)]
 mod tests;
 
-pub use end::{End, News};
+pub use apart::{EndApart, Hearing, Line, Patience};
+pub use end::End;
 pub use flotor_record::coupling::{
-    CouplingConfig, CouplingDescription, CouplingEnd, MOST_DELAY_TICKS, PassivityMode,
+    CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MOST_DELAY_TICKS, PassivityMode,
 };
+pub use flotor_record::news::{Account, Dispatch, News};
 pub use tank::Tank;
 
 use delay::DelayLine;
@@ -67,8 +71,7 @@ pub struct Coupling {
 impl Coupling {
     /// A coupling at rest, with empty accounts; `period_s` is the time between ticks. Not real-time.
     #[must_use]
-    pub fn new(description: &CouplingDescription, period_s: f64) -> Self {
-        let CouplingDescription { config, ends, .. } = description;
+    pub fn new(config: &CouplingConfig, ends: &[CouplingEnd; 2], period_s: f64) -> Self {
         Self {
             ends: ends.map(|end| End::new(config, &end.mapping, period_s)),
             ways: [(); 2].map(|()| DelayLine::new(config.delay_ticks)),

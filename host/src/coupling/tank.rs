@@ -1,5 +1,7 @@
 //! The energy account of one end of a coupling.
 
+use flotor_record::news::Account;
+
 /// Part of an account that is passed on in a tick. Ends that share halves are level after a few ticks, so that an end
 /// that is to push has what the other one's hand has put in; what is on its way is out of reach for as long as it travels.
 const PASSED_ON: f64 = 0.1;
@@ -11,7 +13,10 @@ pub struct Tank {
     lowest_j: f64,
     gone_in_j: f64,
     told_j: f64,
+    /// All that the partner has ever passed on, as it was told last.
     heard_j: f64,
+    /// What of that was for others, as a negative number, and what partners before it have passed on.
+    heard_before_j: f64,
     given_up_j: f64,
 }
 
@@ -24,10 +29,11 @@ impl Tank {
         self.lowest_j = self.lowest_j.min(self.level_j);
     }
 
-    /// Passes a part on to the partner; all that was ever passed on, J. Real-time: bounded, no allocation.
+    /// Passes a part of what is more than `kept_j` on to the partner; all that was ever passed on, J. Real-time: bounded, no
+    /// allocation.
     #[inline]
-    pub(super) fn pass_on(&mut self) -> f64 {
-        let part_j = PASSED_ON * self.level_j.max(0.0);
+    pub(super) fn pass_on(&mut self, kept_j: f64) -> f64 {
+        let part_j = PASSED_ON * (self.level_j - kept_j).max(0.0);
         self.level_j -= part_j;
         self.told_j += part_j;
         self.told_j
@@ -41,6 +47,29 @@ impl Tank {
             self.level_j += told_j - self.heard_j;
             self.heard_j = told_j;
         }
+    }
+
+    /// From here on another partner tells, or the first: what it had passed on before, `told_j`, was for somebody else.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn meet(&mut self, told_j: f64) {
+        self.heard_before_j += self.heard_j - told_j;
+        self.heard_j = told_j;
+    }
+
+    /// All that was ever passed on to the partner, J.
+    #[inline]
+    pub(super) fn told_j(&self) -> f64 {
+        self.told_j
+    }
+
+    /// The account in numbers, for whoever is to see it. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn account(&self) -> Account {
+        let Self { level_j, lowest_j, gone_in_j, given_up_j, .. } = *self;
+        Account { level_j, lowest_j, gone_in_j, given_up_j }
     }
 
     /// Gives up what is more than `most_j`: energy that has turned to heat in a damper is not to drive anything later.
@@ -80,6 +109,6 @@ impl Tank {
     /// By how much the account is off: what it has seen come and go, less what is there, J.
     #[must_use]
     pub fn imbalance_j(&self) -> f64 {
-        self.gone_in_j + self.heard_j - self.told_j - self.given_up_j - self.level_j
+        self.gone_in_j + self.heard_before_j + self.heard_j - self.told_j - self.given_up_j - self.level_j
     }
 }

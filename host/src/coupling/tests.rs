@@ -51,15 +51,14 @@ impl Slider {
     }
 }
 
-fn description(config: CouplingConfig) -> CouplingDescription {
-    let end = |device| CouplingEnd { device, mapping: MappingConfig::default() };
-    CouplingDescription { name: "pair".to_owned(), config, ends: [end(0), end(1)] }
+fn ends() -> [CouplingEnd; 2] {
+    [0, 1].map(|device| CouplingEnd { device, mapping: MappingConfig::default() })
 }
 
 /// Two sliders, the hand of the first shaking, the second free, for five seconds. The lowest that was ever there of
 /// what has gone in at both ends together, J, and how fast the second slider ever was, m/s.
 fn shaken(config: CouplingConfig) -> (f64, f64) {
-    let mut coupling = Coupling::new(&description(config), PERIOD_S);
+    let mut coupling = Coupling::new(&config, &ends(), PERIOD_S);
     let mut sliders = [Slider::AT_REST, Slider::AT_REST];
     let (mut lowest_j, mut fastest_m_per_s) = (0.0_f64, 0.0_f64);
     for tick in 0..5000 {
@@ -100,8 +99,8 @@ fn a_long_delay_makes_energy_and_the_controller_keeps_it_back() {
 
 #[test]
 fn accounts_balance_and_what_is_on_its_way_is_nobodys() {
-    let mut coupling =
-        Coupling::new(&description(CouplingConfig { delay_ticks: 7, ..CouplingConfig::default() }), PERIOD_S);
+    let config = CouplingConfig { delay_ticks: 7, ..CouplingConfig::default() };
+    let mut coupling = Coupling::new(&config, &ends(), PERIOD_S);
     let mut sliders = [Slider::AT_REST, Slider::AT_REST];
     for tick in 0..2000 {
         let states = sliders.each_ref().map(Slider::state);
@@ -174,9 +173,9 @@ fn scales_and_frames_are_the_mappings_and_energy_balances_across_them() {
         torque_scale: None,
     };
     let config = CouplingConfig { delay_ticks: 1, ..CouplingConfig::default() };
-    let mut pair = description(config);
-    pair.ends[1].mapping = mapping;
-    let mut coupling = Coupling::new(&pair, PERIOD_S);
+    let mut pair = ends();
+    pair[1].mapping = mapping;
+    let mut coupling = Coupling::new(&config, &pair, PERIOD_S);
     // The first is drawn up by 4 mm at 20 mm/s, the second rests: first energy goes in, then there is a force.
     let still = DeviceState::HOME;
     let mut pulls = [Pull::default(); 2];

@@ -8,7 +8,7 @@ mod reader;
 mod reference;
 mod setting;
 
-pub use crate::coupling::{CouplingConfig, CouplingDescription, PassivityMode};
+pub use crate::coupling::{CouplingConfig, CouplingDescription, CouplingEnds, PassivityMode};
 pub use change::{Alternative, ChangeUse, ChangeWhat};
 pub use devices::{DeviceUse, MOST_DEVICES};
 pub(crate) use devices::{is_named, without_device};

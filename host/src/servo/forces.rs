@@ -4,7 +4,9 @@
 
 use super::Heartbeat;
 use super::models::{Layer, ModelHealth, ModelStack, Replacement};
-use crate::coupling::{Coupling, CouplingDescription, Grip, Pull, Tank};
+use crate::coupling::{
+    Account, Coupling, CouplingDescription, CouplingEnds, EndApart, Grip, Hearing, Line, Patience, Pull, Tank,
+};
 use crate::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{DeviceState, Tick, Wrench};
@@ -43,39 +45,104 @@ impl Port {
     fn held_for_couplings(&self) -> Wrench {
         self.commanded - self.by_models
     }
+
+    /// Adds what a coupling asks for.
+    #[inline]
+    fn add(&mut self, pull: &Pull) {
+        self.asked = self.asked + pull.wrench;
+        self.energy_j += pull.energy_j;
+        if pull.is_damped {
+            self.events.insert(Events::PASSIVITY_DAMPED);
+        }
+    }
 }
 
-/// A coupling and the devices it holds together.
-pub(crate) struct Coupled {
-    coupling: Coupling,
-    devices: [usize; 2],
-    pulls: [Pull; 2],
+/// What becomes of a coupling in a run: for reports.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CouplingOutcome {
+    /// The accounts of both ends; that of an end on another host as it was told last.
+    pub accounts: [Account; 2],
+    /// How an end on another host was heard.
+    pub hearing: Option<Hearing>,
+}
+
+/// A coupling and the devices of this run that it holds.
+pub(crate) enum Coupled {
+    /// Both ends are here.
+    Here { coupling: Box<Coupling>, devices: [usize; 2], pulls: [Pull; 2] },
+    /// The other end is on another host.
+    Apart { end: Box<EndApart>, device: usize, pull: Pull },
 }
 
 impl Coupled {
-    /// Not real-time.
-    pub(crate) fn new(description: &CouplingDescription, period_s: f64) -> Self {
-        let devices = description.ends.map(|end| usize::from(end.device));
-        Self { coupling: Coupling::new(description, period_s), devices, pulls: [Pull::default(); 2] }
+    /// With the line on which news is to be carried to another host, if one end is there. Not real-time.
+    pub(crate) fn new(
+        description: &CouplingDescription,
+        period_s: f64,
+        patience: Patience,
+    ) -> (Self, Option<Line>) {
+        let CouplingDescription { config, ends, .. } = description;
+        match ends {
+            CouplingEnds::Here(ends) => {
+                let devices = ends.map(|end| usize::from(end.device));
+                let coupling = Box::new(Coupling::new(config, ends, period_s));
+                (Self::Here { coupling, devices, pulls: [Pull::default(); 2] }, None)
+            }
+            CouplingEnds::Apart(here) => {
+                let (end, line) = EndApart::new(config, here, period_s, patience);
+                let device = usize::from(here.device);
+                (Self::Apart { end: Box::new(end), device, pull: Pull::default() }, Some(line))
+            }
+        }
     }
 
     /// Asks the coupling. Real-time: bounded, no allocation.
     #[inline]
-    fn step(&mut self, ports: &[Port]) {
-        let [Some(first), Some(second)] = self.devices.map(|device| ports.get(device)) else { return };
-        let grips = [first, second].map(|port| Grip { state: &port.state, held: port.held_for_couplings() });
-        self.pulls = self.coupling.step(grips);
+    fn step(&mut self, tick: &Tick, ports: &[Port]) {
+        let grip = |port: &'_ Port| (port.state, port.held_for_couplings());
+        match self {
+            Self::Here { coupling, devices, pulls } => {
+                let [Some(first), Some(second)] = devices.map(|device| ports.get(device).map(grip)) else {
+                    return;
+                };
+                *pulls = coupling.step([&first, &second].map(|(state, held)| Grip { state, held: *held }));
+            }
+            Self::Apart { end, device, pull } => {
+                let Some((state, held)) = ports.get(*device).map(grip) else { return };
+                *pull = end.step(tick, Grip { state: &state, held });
+            }
+        }
     }
 
     /// Adds what it asked for. Real-time: bounded, no allocation.
     #[inline]
     fn add_to(&self, ports: &mut [Port]) {
-        for (device, pull) in self.devices.into_iter().zip(&self.pulls) {
-            let Some(port) = ports.get_mut(device) else { continue };
-            port.asked = port.asked + pull.wrench;
-            port.energy_j += pull.energy_j;
-            if pull.is_damped {
-                port.events.insert(Events::PASSIVITY_DAMPED);
+        match self {
+            Self::Here { devices, pulls, .. } => {
+                for (device, pull) in devices.iter().zip(pulls) {
+                    let Some(port) = ports.get_mut(*device) else { continue };
+                    port.add(pull);
+                }
+            }
+            Self::Apart { end, device, pull } => {
+                let Some(port) = ports.get_mut(*device) else { return };
+                port.add(pull);
+                if end.is_alone() {
+                    port.events.insert(Events::PARTNER_SILENT);
+                }
+            }
+        }
+    }
+
+    /// Not real-time.
+    fn outcome(&self) -> CouplingOutcome {
+        match self {
+            Self::Here { coupling, .. } => {
+                CouplingOutcome { accounts: coupling.tanks().map(Tank::account), hearing: None }
+            }
+            Self::Apart { end, .. } => {
+                let hearing = end.hearing();
+                CouplingOutcome { accounts: [end.account(), hearing.partner], hearing: Some(hearing) }
             }
         }
     }
@@ -121,7 +188,7 @@ impl Forces {
     pub(crate) fn step(&mut self, tick: &Tick, ports: &mut [Port], heart: &Heartbeat) {
         let Self { stacks, couplings, .. } = self;
         // The couplings first: what is held now is what they and the models asked for last.
-        couplings.iter_mut().for_each(|coupled| coupled.step(ports));
+        couplings.iter_mut().for_each(|coupled| coupled.step(tick, ports));
         for (stack, port) in stacks.iter_mut().zip(&mut *ports) {
             let (wrench, energy_j) = stack.step(tick, &port.state, heart, &mut port.events);
             (port.asked, port.by_models, port.energy_j) = (wrench, wrench, energy_j);
@@ -195,8 +262,8 @@ impl Forces {
         self.models.iter().filter_map(next).collect()
     }
 
-    /// The energy accounts of each coupling. Not real-time.
-    pub(crate) fn tanks(&self) -> Vec<[Tank; 2]> {
-        self.couplings.iter().map(|coupled| coupled.coupling.tanks().map(|tank| *tank)).collect()
+    /// What has become of each coupling. Not real-time.
+    pub(crate) fn coupling_outcomes(&self) -> Vec<CouplingOutcome> {
+        self.couplings.iter().map(Coupled::outcome).collect()
     }
 }

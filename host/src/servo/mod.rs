@@ -31,6 +31,7 @@ pub(crate) use clock::{Due, Schedule, monotonic_ns, sleep_until};
 pub(crate) use engine::{Engine, Stepped};
 pub use envelope::Envelope;
 pub(crate) use exchange::{Exchange, Workshop, exchange};
+pub use forces::CouplingOutcome;
 pub(crate) use forces::{Coupled, Forces, Port};
 pub use models::ModelHealth;
 pub(crate) use models::{Layer, Replacement};

@@ -9,14 +9,14 @@ pub use controls::{ControlError, Controls, NewValue};
 pub(crate) use prepare::prepare_model;
 pub use steps::Steps;
 
-use crate::coupling::Tank;
+use crate::coupling::{Line, Patience};
 use crate::record::Change;
 use crate::registry::{LookupError, Registry};
 use crate::scene::{MOST_DEVICES, Scene, SceneError};
 use crate::servo::{
-    Cause, Clock, Coupled, EmergencySource, Envelope, Forces, Heartbeat, ModelHealth, ParameterQueue, Place,
-    RealTimeReport, RunConfig, RunState, Schedule, Servo, SpinWindow, Station, StopSwitch, Stuck, Timing,
-    enter_real_time, exchange, start_watchdog,
+    Cause, Clock, Coupled, CouplingOutcome, EmergencySource, Envelope, Forces, Heartbeat, ModelHealth,
+    ParameterQueue, Place, RealTimeReport, RunConfig, RunState, Schedule, Servo, SpinWindow, Station,
+    StopSwitch, Stuck, Timing, enter_real_time, exchange, start_watchdog,
 };
 use crate::trace::{RECORD_WORDS, TickRecord};
 use controls::{ChangeLog, Parts};
@@ -111,6 +111,7 @@ pub struct Session {
     duration_ns: u64,
     watchdog_ns: u64,
     plugins: Vec<PluginReport>,
+    lines: Vec<(String, Line)>,
 }
 
 /// How a run ended.
@@ -156,8 +157,8 @@ pub struct Outcome {
     pub real_time: RealTimeReport,
     /// What the devices say at the end, in the scene's order.
     pub devices: Vec<DeviceOutcome>,
-    /// Energy accounts of the ends of each coupling, in the scene's order.
-    pub couplings: Vec<[Tank; 2]>,
+    /// What has become of each coupling, in the scene's order.
+    pub couplings: Vec<CouplingOutcome>,
     /// Name, health and last words of each model.
     pub models: Vec<(String, ModelHealth, String)>,
 }
@@ -243,11 +244,18 @@ impl Session {
         let stations = stations.inspect_err(|_| stoppers.iter().for_each(Stopper::safe_stop))?;
         #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
         let period_s = period_ns as f64 * 1.0e-9;
-        let couplings = scene.couplings.iter().map(|coupling| Coupled::new(coupling, period_s)).collect();
-        let forces = Forces::new(stations.len(), models, couplings);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a minute
         let [ramp_ns, watchdog_ns] =
             [scene.limits.ramp_s, scene.limits.watchdog_s].map(|seconds| (seconds * 1.0e9).round() as u64);
+        // A partner on another host is watched like the loop itself.
+        let patience = Patience { silence_ns: watchdog_ns, fade_ns: ramp_ns };
+        let mut lines = Vec::new();
+        let couplings = scene.couplings.iter().map(|coupling| {
+            let (coupled, line) = Coupled::new(coupling, period_s, patience);
+            lines.extend(line.map(|line| (coupling.name.clone(), line)));
+            coupled
+        });
+        let forces = Forces::new(stations.len(), models, couplings.collect());
         let run = RunConfig { period_ns, ramp_ns, emergency_buttons: scene.limits.emergency_buttons };
         let servo = Servo::new(stations, forces, parameters, exchange, run);
         Ok(Self {
@@ -261,6 +269,7 @@ impl Session {
             duration_ns,
             watchdog_ns,
             plugins,
+            lines,
         })
     }
 
@@ -281,6 +290,13 @@ impl Session {
         let finite = |most: DVec3| most.to_array().map(|limit| limit.is_finite().then_some(limit));
         let [force_n, torque_nm] = self.servo.most().map(finite);
         WrenchLimits { force_n, torque_nm }
+    }
+
+    /// The couplings whose other end is on another host, by name, each with the line on which its news is to be carried.
+    /// Given once; an end whose line nobody takes is never heard of, and asks for nothing.
+    #[must_use]
+    pub fn take_lines(&mut self) -> Vec<(String, Line)> {
+        std::mem::take(&mut self.lines)
     }
 
     /// The handle by which other threads change parameters of the run.
@@ -310,7 +326,7 @@ impl Session {
             words: device.last_message(),
         };
         let devices: Vec<DeviceOutcome> = servo.devices().map(told).collect();
-        let couplings = servo.forces().tanks();
+        let couplings = servo.forces().coupling_outcomes();
         let models = names.into_iter().skip(devices.len()).zip(servo.forces().health());
         let models = models.map(|(name, (health, words))| (name, health, words)).collect();
         let timing = servo.into_timing();

@@ -1,9 +1,10 @@
 //! A run on the virtual clock that somebody else advances: for experiments, which decide between ticks what comes next.
 
 use super::{ChangeLog, Controls, Observer, RunEnd, RunError, RunOptions, Runner, Session};
+use crate::coupling::Line;
 use crate::registry::Registry;
 use crate::scene::Scene;
-use crate::servo::{Clock, Schedule, StopSwitch};
+use crate::servo::{Clock, CouplingOutcome, Schedule, StopSwitch};
 use flotor_hal::abi::loader::Stopper;
 
 /// A run that goes on when it is told to. When it is dropped the devices are stopped.
@@ -13,6 +14,7 @@ pub struct Steps {
     changes: ChangeLog,
     stop: StopSwitch,
     stoppers: Vec<Stopper>,
+    lines: Vec<(String, Line)>,
 }
 
 impl Steps {
@@ -22,15 +24,27 @@ impl Steps {
     /// [`RunError`]; nothing is energised before this has succeeded.
     pub fn prepare(scene: &Scene, registry: &Registry, seed: u64) -> Result<Self, RunError> {
         let session = Session::prepare(scene, registry, &RunOptions { clock: Clock::Virtual, seed })?;
-        let Session { servo, stoppers, controls, changes, period_ns, duration_ns, .. } = session;
+        let Session { servo, stoppers, controls, changes, period_ns, duration_ns, lines, .. } = session;
         let runner = Runner::new(servo, Schedule::start_virtual(period_ns), duration_ns);
-        Ok(Self { runner, controls, changes, stop: StopSwitch::default(), stoppers })
+        Ok(Self { runner, controls, changes, stop: StopSwitch::default(), stoppers, lines })
     }
 
     /// The handle by which parameters, weights and models of the run are changed.
     #[must_use]
     pub fn controls(&self) -> &Controls {
         &self.controls
+    }
+
+    /// As [`Session::take_lines`]: whoever advances two runs can be the way between them.
+    #[must_use]
+    pub fn take_lines(&mut self) -> Vec<(String, Line)> {
+        std::mem::take(&mut self.lines)
+    }
+
+    /// What has become of each coupling so far, in the scene's order. Not real-time.
+    #[must_use]
+    pub fn couplings(&mut self) -> Vec<CouplingOutcome> {
+        self.runner.servo.forces().coupling_outcomes()
     }
 
     /// One tick; the observer is told of it and of what changed before it. Not real-time: the observer is not.

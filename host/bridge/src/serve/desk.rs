@@ -2,6 +2,7 @@
 
 use super::station::{Station, json};
 use super::{Launcher, WaitNow};
+use crate::couple::Carried;
 use crate::keys::Name;
 use crate::link::LinkError;
 use crate::status::{State, Status};
@@ -128,6 +129,11 @@ impl Desk {
         self.lock().status.dropped = dropped;
     }
 
+    /// What was carried for couplings.
+    pub(super) fn carried(&self, couplings: BTreeMap<String, Carried>) {
+        self.lock().status.couplings = couplings;
+    }
+
     /// The number of the tick to be published now.
     pub(super) fn publishing(&self) -> u64 {
         let mut inside = self.lock();
@@ -160,7 +166,11 @@ impl Desk {
             None => true,
             Some((last, since)) => {
                 since.elapsed() >= STATUS_PERIOD
-                    || Status { published: last.published, ..status.clone() } != *last
+                    || Status {
+                        published: last.published,
+                        couplings: last.couplings.clone(),
+                        ..status.clone()
+                    } != *last
             }
         };
         if is_news {

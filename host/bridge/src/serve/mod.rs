@@ -14,6 +14,7 @@ mod station;
 
 pub use launcher::Launcher;
 
+use crate::couple::{CoupleError, Couplers, Side};
 use crate::keys::Name;
 use crate::link::LinkError;
 use crate::wish::Right;
@@ -46,20 +47,23 @@ pub struct Service {
 /// Serves until told to stop. `tell` gets a line for people when something changes.
 ///
 /// # Errors
-/// [`LinkError`]: the network refuses what a bridge needs.
+/// [`CoupleError`]: the network, or this machine, refuses what a bridge needs.
 pub fn serve(
     session: &Session,
     directory: &Directory,
     service: Service,
     stop: &AtomicBool,
     tell: &mut dyn FnMut(&str),
-) -> Result<(), LinkError> {
+) -> Result<(), CoupleError> {
     let Service { name, allow, every, launcher } = service;
     let desk = Arc::new(Desk::new(name.clone(), launcher));
     let station = Station::declare(session, &name)?;
     let _counter = desk::open(session, &desk, allow)?;
     // Last of all: who sees it can ask.
     let _alive = session.liveliness().declare_token(name.key("alive")).wait_now()?;
+    let side = if allow >= Right::Operate { Side::Serving } else { Side::ServingDeaf };
+    let couplers = Couplers::new(session, directory, &name, side);
+    let mut relay = Relay { station, desk, couplers, every, stop };
     let mut told = String::new();
     while !stop.load(Ordering::Relaxed) {
         match Client::find(directory) {
@@ -69,7 +73,7 @@ pub fn serve(
                     client.greeting().title,
                     client.greeting().process
                 ));
-                relay(client, &station, &desk, every, stop)?;
+                relay.carry(client, tell)?;
                 tell("the run is over; waiting for the next");
             }
             Err(LiveError::NoRun { .. }) => {}
@@ -82,60 +86,74 @@ pub fn serve(
                 }
             }
         }
-        desk.report(&station)?;
+        relay.report(tell)?;
         std::thread::sleep(LOOK_PERIOD);
     }
     Ok(())
 }
 
-/// Carries one run.
-fn relay(
-    mut client: Client,
-    station: &Station,
-    desk: &Desk,
+/// What it takes to carry runs.
+struct Relay<'s> {
+    station: Station,
+    desk: Arc<Desk>,
+    couplers: Couplers,
     every: u32,
-    stop: &AtomicBool,
-) -> Result<(), LinkError> {
-    desk.begin(&client);
-    let asker = client.asker();
-    let mut is_watching = false;
-    let mut checked: Option<Instant> = None;
-    while !stop.load(Ordering::Relaxed) {
-        if checked.is_none_or(|at| at.elapsed() >= CHECK_PERIOD) {
-            checked = Some(Instant::now());
-            let is_wanted = station.is_wanted()?;
-            if is_wanted != is_watching {
-                is_watching = is_wanted;
-                // A host that is gone says so below.
-                let _ = asker.ask(if is_wanted { Ask::Watch { every } } else { Ask::LookAway });
+    stop: &'s AtomicBool,
+}
+
+impl Relay<'_> {
+    /// Carries one run.
+    fn carry(&mut self, mut client: Client, tell: &mut dyn FnMut(&str)) -> Result<(), CoupleError> {
+        self.desk.begin(&client);
+        let asker = client.asker();
+        let mut is_watching = false;
+        let mut checked: Option<Instant> = None;
+        while !self.stop.load(Ordering::Relaxed) {
+            if checked.is_none_or(|at| at.elapsed() >= CHECK_PERIOD) {
+                checked = Some(Instant::now());
+                let is_wanted = self.station.is_wanted()?;
+                if is_wanted != is_watching {
+                    is_watching = is_wanted;
+                    // A host that is gone says so below.
+                    let every = self.every;
+                    let _ = asker.ask(if is_wanted { Ask::Watch { every } } else { Ask::LookAway });
+                }
+                self.report(tell)?;
             }
-            desk.report(station)?;
-        }
-        match client.next(CHECK_PERIOD) {
-            Ok(None) => {}
-            Ok(Some(Event::Ticks { records, dropped })) => {
-                desk.dropped(dropped);
-                for record in &records {
-                    station.tick(record, desk.publishing())?;
+            let Self { station, desk, .. } = self;
+            match client.next(CHECK_PERIOD) {
+                Ok(None) => {}
+                Ok(Some(Event::Ticks { records, dropped })) => {
+                    desk.dropped(dropped);
+                    for record in &records {
+                        station.tick(record, desk.publishing())?;
+                    }
+                }
+                Ok(Some(Event::Change(change))) => {
+                    desk.keep(&change);
+                    station.change(&change)?;
+                }
+                Ok(Some(Event::Answer(answer))) => desk.answered(answer),
+                Ok(Some(Event::End(end))) => {
+                    station.end(&end)?;
+                    break;
+                }
+                Err(error) => {
+                    station.end(&flotor_live::End { words: error.to_string() })?;
+                    break;
                 }
             }
-            Ok(Some(Event::Change(change))) => {
-                desk.keep(&change);
-                station.change(&change)?;
-            }
-            Ok(Some(Event::Answer(answer))) => desk.answered(answer),
-            Ok(Some(Event::End(end))) => {
-                station.end(&end)?;
-                break;
-            }
-            Err(error) => {
-                station.end(&flotor_live::End { words: error.to_string() })?;
-                break;
-            }
         }
+        self.desk.end();
+        self.report(tell)
     }
-    desk.end();
-    desk.report(station)
+
+    /// Looks after the couplings, and says how the bridge is doing.
+    fn report(&mut self, tell: &mut dyn FnMut(&str)) -> Result<(), CoupleError> {
+        self.couplers.follow(tell)?;
+        self.desk.carried(self.couplers.carried());
+        Ok(self.desk.report(&self.station)?)
+    }
 }
 
 /// Waiting for what is over at once: all declarations here are local.

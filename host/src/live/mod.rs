@@ -8,6 +8,10 @@
 //! What is said over the socket, and both its ends, are the crate `flotor_live`; here is what this host says of itself, and how it
 //! does what it is asked for. Nothing of it runs on the servo's thread. Not real-time.
 
+mod carrier;
+
+pub use carrier::{Carried, Carrier, carry};
+
 use crate::record::{Change, RunDescription};
 use crate::servo::StopSwitch;
 use crate::session::{Controls, NewValue, Observer, PluginReport};

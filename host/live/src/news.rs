@@ -1,0 +1,251 @@
+//! Where news of a coupling leaves a host and enters it: a datagram socket beside that of the run.
+//!
+//! ```text
+//!  host: NewsSocket::listen  <- news, or an empty call: "tell me" -  NewsSocket::join :bridge
+//!                            -  news                              ->
+//! ```
+//!
+//! Datagrams because only the newest news counts: one that finds no room is dropped, and nothing waits behind it. Whoever
+//! joined tells so again every [`CALL_PERIOD`]; a host forgets who has not for a while. Not real-time.
+
+use crate::Directory;
+use crate::directory::{DirectoryError, lives, private};
+use flotor_record::news::{Dispatch, NoDispatch};
+use std::io::{self, ErrorKind};
+use std::os::unix::net::UnixDatagram;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+/// Ending of the name of a host's socket.
+const HOST: &str = "news";
+/// Ending of the name of one that joined.
+const JOINED: &str = "joined";
+/// Who joined calls this often.
+pub const CALL_PERIOD: Duration = Duration::from_millis(100);
+/// A host forgets who has not called for so long.
+const FORGET_AFTER: Duration = Duration::from_secs(1);
+/// Who may join a host's coupling at a time.
+const MOST_JOINED: usize = 8;
+/// Longer than any news: what fills this is no news.
+const BUFFER_BYTES: usize = 1024;
+
+/// A coupling of a running host whose other end is on another host.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FoundCoupling {
+    /// What both hosts call it.
+    pub name: String,
+    /// The process of the run.
+    pub process: u32,
+    path: PathBuf,
+}
+
+/// One end of the local way; its file is gone when dropped.
+#[derive(Debug)]
+pub struct NewsSocket {
+    socket: UnixDatagram,
+    path: PathBuf,
+    peers: Vec<Peer>,
+}
+
+/// Who is told.
+#[derive(Debug)]
+struct Peer {
+    path: PathBuf,
+    /// When it called last; never forgotten without.
+    called: Option<Instant>,
+}
+
+impl Directory {
+    /// Couplings of runs that live. Sockets of dead ones are removed on the way.
+    #[must_use]
+    pub fn couplings(&self) -> Vec<FoundCoupling> {
+        let entries = std::fs::read_dir(self.path()).into_iter().flatten().flatten();
+        let mut found: Vec<FoundCoupling> = entries
+            .filter_map(|entry| {
+                let path = entry.path();
+                let ending = path.extension()?.to_str()?;
+                let (process, name) = path.file_stem()?.to_str()?.split_once('-')?;
+                let (process, name) = (process.parse().ok()?, name.to_owned());
+                if [HOST, JOINED].contains(&ending) && !lives(process) {
+                    let _ = std::fs::remove_file(&path); // somebody else may have been faster
+                    return None;
+                }
+                (ending == HOST).then_some(FoundCoupling { name, process, path })
+            })
+            .collect();
+        found.sort_by(|a, b| (&a.name, a.process).cmp(&(&b.name, b.process)));
+        found
+    }
+}
+
+impl NewsSocket {
+    /// The host's end for a coupling.
+    ///
+    /// # Errors
+    /// [`DirectoryError`]: the folder is not usable, or not ours alone.
+    pub fn listen(directory: &Directory, coupling: &str) -> Result<Self, DirectoryError> {
+        private(directory.path())?;
+        let path = directory.path().join(format!("{}-{coupling}.{HOST}", std::process::id()));
+        Self::bind(path).map_err(|(path, cause)| DirectoryError::Unusable { path, cause })
+    }
+
+    /// The end of somebody who carries news to a host and from it.
+    ///
+    /// # Errors
+    /// [`DirectoryError`]: the folder is not usable, or not ours alone.
+    pub fn join(directory: &Directory, coupling: &FoundCoupling) -> Result<Self, DirectoryError> {
+        static NUMBER: AtomicU32 = AtomicU32::new(0);
+        private(directory.path())?;
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        let file = format!("{}-{}-{number}.{JOINED}", std::process::id(), coupling.name);
+        let joined = Self::bind(directory.path().join(file));
+        let mut joined = joined.map_err(|(path, cause)| DirectoryError::Unusable { path, cause })?;
+        joined.peers.push(Peer { path: coupling.path.clone(), called: None });
+        Ok(joined)
+    }
+
+    fn bind(path: PathBuf) -> Result<Self, (PathBuf, io::Error)> {
+        // A process of this number may have died without cleaning up.
+        let _ = std::fs::remove_file(&path);
+        // Without waiting, both ways: the system's time-outs are some milliseconds long, whatever is asked for.
+        let bound =
+            UnixDatagram::bind(&path).and_then(|socket| socket.set_nonblocking(true).map(|()| socket));
+        match bound {
+            Ok(socket) => Ok(Self { socket, path, peers: Vec::new() }),
+            Err(cause) => Err((path, cause)),
+        }
+    }
+
+    /// Its file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Sends news to everybody at the other end. Who is gone is forgotten; who has no room misses it.
+    pub fn tell(&mut self, dispatch: &Dispatch) {
+        self.send(&dispatch.to_bytes());
+    }
+
+    /// Says that news is wanted, without any. False if the host is gone.
+    pub fn call(&mut self) -> bool {
+        self.send(&[]);
+        !self.peers.is_empty()
+    }
+
+    fn send(&mut self, bytes: &[u8]) {
+        let Self { socket, peers, .. } = self;
+        peers.retain(|peer| {
+            let is_here = peer.called.is_none_or(|called| called.elapsed() < FORGET_AFTER);
+            let sent = socket.send_to(bytes, &peer.path);
+            let is_gone = sent.is_err_and(|error| !is_passing(error.kind()));
+            is_here && !is_gone
+        });
+    }
+
+    /// The next news that has come, or what came that was none; nothing when all has been heard. Does not wait. Whoever calls
+    /// a host is told from then on.
+    ///
+    /// # Errors
+    /// [`NoDispatch`].
+    pub fn hear(&mut self) -> Result<Option<Dispatch>, NoDispatch> {
+        let mut buffer = [0; BUFFER_BYTES];
+        loop {
+            let Ok((length, from)) = self.socket.recv_from(&mut buffer) else { return Ok(None) };
+            if let Some(path) = from.as_pathname() {
+                self.called_by(path);
+            }
+            match buffer.get(..length).unwrap_or_default() {
+                [] => {} // a call
+                bytes => return Dispatch::from_bytes(bytes).map(Some),
+            }
+        }
+    }
+
+    fn called_by(&mut self, path: &Path) {
+        let has_room = self.peers.len() < MOST_JOINED;
+        match self.peers.iter_mut().find(|peer| peer.path == path) {
+            Some(Peer { called: None, .. }) => {} // the host, whom this end has joined
+            Some(peer) => peer.called = Some(Instant::now()),
+            None if has_room => {
+                self.peers.push(Peer { path: path.to_path_buf(), called: Some(Instant::now()) });
+            }
+            None => {}
+        }
+    }
+}
+
+impl Drop for NewsSocket {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+/// Whether an error says that there is no room now, rather than that nobody is there.
+fn is_passing(kind: ErrorKind) -> bool {
+    matches!(kind, ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_record::news::{Account, News};
+
+    fn dispatch(tick: u64) -> Dispatch {
+        let news = News { pose: flotor_hal::Pose::HOME, twist: flotor_hal::Twist::ZERO, told_j: 0.0 };
+        Dispatch { run: 1, tick, news, account: Account::default() }
+    }
+
+    #[test]
+    fn who_joined_is_told_and_heard_and_who_left_is_forgotten() {
+        let scratch = tempfile::tempdir().unwrap();
+        let directory = Directory::at(scratch.path().join("runs"));
+        let mut host = NewsSocket::listen(&directory, "pair").unwrap();
+        let found = directory.couplings();
+        assert_eq!(found.iter().map(|found| found.name.as_str()).collect::<Vec<_>>(), ["pair"]);
+        let mut bridges = [(); 2].map(|()| NewsSocket::join(&directory, &found[0]).unwrap());
+        host.tell(&dispatch(1));
+        assert_eq!(bridges[0].hear(), Ok(None), "nobody has called yet");
+        assert!(bridges[0].call());
+        bridges[1].tell(&dispatch(7));
+        assert_eq!(host.hear(), Ok(Some(dispatch(7))), "a call is no news");
+        assert_eq!(host.hear(), Ok(None));
+        host.tell(&dispatch(2));
+        for bridge in &mut bridges {
+            assert_eq!(bridge.hear(), Ok(Some(dispatch(2))));
+        }
+        let [mut first, second] = bridges;
+        drop(second);
+        host.tell(&dispatch(3));
+        assert_eq!(host.peers.len(), 1);
+        drop(host);
+        assert_eq!(directory.couplings(), []);
+        assert!(!first.call(), "the host is gone");
+    }
+
+    #[test]
+    fn who_takes_nothing_holds_up_nobody() {
+        let scratch = tempfile::tempdir().unwrap();
+        let directory = Directory::at(scratch.path().join("runs"));
+        let mut host = NewsSocket::listen(&directory, "pair").unwrap();
+        let mut stalled = NewsSocket::join(&directory, &directory.couplings()[0]).unwrap();
+        assert!(stalled.call());
+        assert_eq!(host.hear(), Ok(None));
+        (0..2000).for_each(|tick| host.tell(&dispatch(tick)));
+        assert_eq!(host.peers.len(), 1, "no room is no reason to forget it");
+        assert_eq!(stalled.hear(), Ok(Some(dispatch(0))));
+    }
+
+    #[test]
+    fn what_is_no_news_is_said_to_be_none() {
+        let scratch = tempfile::tempdir().unwrap();
+        let directory = Directory::at(scratch.path().join("runs"));
+        let mut host = NewsSocket::listen(&directory, "pair").unwrap();
+        let stranger = UnixDatagram::unbound().unwrap();
+        for length in [1, 167, 169, 5000] {
+            stranger.send_to(&vec![7; length], host.path()).unwrap();
+            assert!(matches!(host.hear(), Err(NoDispatch::Length { .. })), "{length} bytes");
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! What the two ends of a coupling tell each other, and how that crosses a network.
+
+use flotor_hal::{Pose, Twist};
+use flotor_sync::Words;
+
+/// What one end tells the other in every tick, in the shared frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct News {
+    /// Where the handle is, m and unit quaternion.
+    pub pose: Pose,
+    /// How it moves, m/s and rad/s.
+    pub twist: Twist,
+    /// All the energy this end has ever passed on to the other, J.
+    pub told_j: f64,
+}
+
+/// An end's energy account, for whoever is to see it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Account {
+    /// What is there to be taken out, J; negative: overdrawn.
+    pub level_j: f64,
+    /// The lowest it ever was, J.
+    pub lowest_j: f64,
+    /// What the hand has put in so far less what has come out, J.
+    pub gone_in_j: f64,
+    /// What was put in and can never come out again, J.
+    pub given_up_j: f64,
+}
+
+/// News with what it takes to be carried to another host.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dispatch {
+    /// Which run tells: when it began, ns since 1970. A later run counts its energy from nothing.
+    pub run: u64,
+    /// The tick that tells: of two dispatches of a run the higher is the newer.
+    pub tick: u64,
+    /// The news.
+    pub news: News,
+    /// The account of the end that tells.
+    pub account: Account,
+}
+
+/// 64-bit words of a [`Dispatch`].
+pub const DISPATCH_WORDS: usize = 20;
+/// Bytes of a [`Dispatch`] on its way: a word that says what it is, then its words, all little endian.
+pub const DISPATCH_BYTES: usize = 8 * (1 + DISPATCH_WORDS);
+/// The word that says what it is; the digit is the version.
+const MARK: u64 = u64::from_le_bytes(*b"flotnew1");
+/// Largest error of the length of a quaternion that is one after all: far above that of arithmetic.
+const UNIT_TOLERANCE: f64 = 1.0e-6;
+
+/// Bytes that are no dispatch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoDispatch {
+    /// Too long or too short.
+    #[error("{length} bytes, and a dispatch has {DISPATCH_BYTES}")]
+    Length {
+        /// How many.
+        length: usize,
+    },
+    /// Not marked as one.
+    #[error("no dispatch of this version; use both hosts from one build")]
+    Mark,
+    /// A number is not finite, the orientation has no unit length, or the energy passed on is negative.
+    #[error("numbers that no handle and no account can have")]
+    Numbers,
+}
+
+impl Dispatch {
+    /// As it travels. Not real-time.
+    #[must_use]
+    pub fn to_bytes(&self) -> [u8; DISPATCH_BYTES] {
+        let mut bytes = [0; DISPATCH_BYTES];
+        let words = std::iter::once(MARK).chain(self.to_words());
+        for (place, word) in bytes.chunks_exact_mut(8).zip(words) {
+            place.copy_from_slice(&word.to_le_bytes());
+        }
+        bytes
+    }
+
+    /// Checks what has travelled. Not real-time.
+    ///
+    /// # Errors
+    /// [`NoDispatch`].
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, NoDispatch> {
+        if bytes.len() != DISPATCH_BYTES {
+            return Err(NoDispatch::Length { length: bytes.len() });
+        }
+        let mut words =
+            bytes.chunks_exact(8).map(|word| u64::from_le_bytes(word.try_into().unwrap_or_default()));
+        if words.next() != Some(MARK) {
+            return Err(NoDispatch::Mark);
+        }
+        let words: [u64; DISPATCH_WORDS] = std::array::from_fn(|_| words.next().unwrap_or_default());
+        let dispatch = Self::from_words(&words);
+        if dispatch.is_possible() { Ok(dispatch) } else { Err(NoDispatch::Numbers) }
+    }
+
+    /// True if it comes after `other`: of a later run, or later in the same.
+    #[must_use]
+    pub fn is_newer_than(&self, other: &Self) -> bool {
+        (self.run, self.tick) > (other.run, other.tick)
+    }
+
+    fn is_possible(&self) -> bool {
+        let Self { news: News { pose, twist, told_j }, account, .. } = self;
+        let Account { level_j, lowest_j, gone_in_j, given_up_j } = account;
+        let length = pose.orientation().length();
+        pose.is_finite()
+            && (length - 1.0).abs() < UNIT_TOLERANCE
+            && twist.is_finite()
+            && [told_j, level_j, lowest_j, gone_in_j, given_up_j].iter().all(|number| number.is_finite())
+            && *told_j >= 0.0
+    }
+}
+
+impl Words<DISPATCH_WORDS> for Dispatch {
+    #[inline]
+    fn to_words(&self) -> [u64; DISPATCH_WORDS] {
+        let Self { run, tick, news: News { pose, twist, told_j }, account } = self;
+        let Pose { position_m: [x, y, z], orientation_xyzw: [qx, qy, qz, qw] } = *pose;
+        let Twist { linear_m_per_s: [vx, vy, vz], angular_rad_per_s: [wx, wy, wz] } = *twist;
+        let Account { level_j, lowest_j, gone_in_j, given_up_j } = *account;
+        let [x, y, z, qx, qy, qz, qw] = [x, y, z, qx, qy, qz, qw].map(f64::to_bits);
+        let [vx, vy, vz, wx, wy, wz] = [vx, vy, vz, wx, wy, wz].map(f64::to_bits);
+        let [told, level, lowest, gone_in, given_up] =
+            [*told_j, level_j, lowest_j, gone_in_j, given_up_j].map(f64::to_bits);
+        #[rustfmt::skip] // a line for each part
+        let words = [
+            *run, *tick,
+            x, y, z, qx, qy, qz, qw,
+            vx, vy, vz, wx, wy, wz,
+            told, level, lowest, gone_in, given_up,
+        ];
+        words
+    }
+
+    #[inline]
+    fn from_words(words: &[u64; DISPATCH_WORDS]) -> Self {
+        let [run, tick, numbers @ ..] = *words;
+        let [
+            x,
+            y,
+            z,
+            qx,
+            qy,
+            qz,
+            qw,
+            vx,
+            vy,
+            vz,
+            wx,
+            wy,
+            wz,
+            told_j,
+            level_j,
+            lowest_j,
+            gone_in_j,
+            given_up_j,
+        ] = numbers.map(f64::from_bits);
+        let pose = Pose { position_m: [x, y, z], orientation_xyzw: [qx, qy, qz, qw] };
+        let twist = Twist { linear_m_per_s: [vx, vy, vz], angular_rad_per_s: [wx, wy, wz] };
+        let account = Account { level_j, lowest_j, gone_in_j, given_up_j };
+        Self { run, tick, news: News { pose, twist, told_j }, account }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn dispatch() -> Dispatch {
+        let pose = Pose { position_m: [1.0e-3, -2.0e-3, 3.0e-3], orientation_xyzw: [0.6, 0.0, 0.0, 0.8] };
+        let twist = Twist { linear_m_per_s: [0.1, 0.2, 0.3], angular_rad_per_s: [1.0, 2.0, 3.0] };
+        let account = Account { level_j: 4.0e-3, lowest_j: -1.0e-3, gone_in_j: -0.5, given_up_j: 0.25 };
+        Dispatch { run: 7, tick: 9, news: News { pose, twist, told_j: 0.125 }, account }
+    }
+
+    #[test]
+    fn what_is_sent_is_what_arrives() {
+        assert_eq!(Dispatch::from_bytes(&dispatch().to_bytes()), Ok(dispatch()));
+        // Every word has its place: none is read as another.
+        let words: [u64; DISPATCH_WORDS] = std::array::from_fn(|i| 0x3ff0_0000_0000_0000 + i as u64);
+        assert_eq!(Dispatch::from_words(&words).to_words(), words);
+    }
+
+    #[test]
+    fn what_is_none_is_not_taken_for_one() {
+        let bytes = dispatch().to_bytes();
+        for length in [0, 1, DISPATCH_BYTES - 1] {
+            assert_eq!(Dispatch::from_bytes(&bytes[..length]), Err(NoDispatch::Length { length }));
+        }
+        let long = [bytes.as_slice(), &[0]].concat();
+        assert_eq!(Dispatch::from_bytes(&long), Err(NoDispatch::Length { length: DISPATCH_BYTES + 1 }));
+        let mut other = bytes;
+        other[7] += 1;
+        assert_eq!(Dispatch::from_bytes(&other), Err(NoDispatch::Mark));
+        for word in 2..DISPATCH_WORDS {
+            for number in [f64::NAN, f64::INFINITY] {
+                let mut wrong = bytes;
+                wrong[8 * (1 + word)..8 * (2 + word)].copy_from_slice(&number.to_le_bytes());
+                assert_eq!(Dispatch::from_bytes(&wrong), Err(NoDispatch::Numbers), "{number} in word {word}");
+            }
+        }
+        let longer = Pose { orientation_xyzw: [0.6, 0.0, 0.0, 0.9], ..dispatch().news.pose };
+        let owing = News { told_j: -1.0e-9, ..dispatch().news };
+        for news in [News { pose: longer, ..dispatch().news }, owing] {
+            let wrong = Dispatch { news, ..dispatch() };
+            assert_eq!(Dispatch::from_bytes(&wrong.to_bytes()), Err(NoDispatch::Numbers));
+        }
+    }
+
+    #[test]
+    fn a_later_run_is_newer_whatever_its_tick() {
+        let (first, later) = (dispatch(), Dispatch { tick: 10, ..dispatch() });
+        assert!(later.is_newer_than(&first) && !first.is_newer_than(&later) && !first.is_newer_than(&first));
+        let other_run = Dispatch { run: 8, tick: 0, ..first };
+        assert!(other_run.is_newer_than(&later) && !later.is_newer_than(&other_run));
+    }
+}
