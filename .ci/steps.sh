@@ -50,10 +50,9 @@ machine() {
 every_change() {
     step machine machine
     step format cargo fmt --all --check
-    # The README's test command, word for word.
-    step test cargo test
-    # The viewer draws with a GPU stack, which the README's command leaves out.
-    step viewer cargo test -p flotor-viewer
+    # The README's `cargo test`, and the viewer, whose GPU stack that leaves out. One command: of two, the second builds half of
+    # what both use again, with other features.
+    step test cargo test --workspace
     step lint cargo clippy --workspace --all-targets -- -D warnings
     step docs env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
     # Workspaces of their own: that they still compile against the host.
