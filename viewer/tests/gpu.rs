@@ -1,53 +1,138 @@
-//! A GPU or software adapter and the processor draw the same picture from the same scene.
+//! A GPU or software adapter and the processor draw the same pictures: of a scene, and of the whole window.
 
+mod support;
+
+use eframe::egui_wgpu::RenderState;
+use egui::{ColorImage, Context, Theme, vec2};
+use egui_kittest::Harness;
 use egui_kittest::wgpu::{create_render_state, default_wgpu_setup};
-use flotor_hal::DVec3;
+use flotor_hal::Pose;
+use flotor_record::trace::Events;
+use flotor_viewer::app::{Start, Viewer};
 use flotor_viewer::camera::Camera;
-use flotor_viewer::geometry::{Ground, Mesh, force_arrow, torque_arrow};
 use flotor_viewer::gpu::GpuScene;
+use flotor_viewer::history::{History, Keep, Sample};
 use flotor_viewer::palette::{Look, Palette};
+use flotor_viewer::picture::{draw_without_window, write_png};
 use flotor_viewer::raster::solid::Rasterizer;
+use flotor_viewer::scene::{ArrowScale, SceneBuilder, Visible};
+use flotor_viewer::shape::shapes_of;
+use support::{plugin_file, spring_run, tick};
 
-/// A scene with everything in it that the two could draw differently: faded lines, curved surfaces, edges, arrows.
-fn scene(palette: &Palette) -> Mesh {
-    let mut mesh = Mesh::default();
-    let ground = Ground {
-        height_m: -0.025,
-        radius_m: 0.08,
-        spacing_m: 0.005,
-        surface: palette.ground[0],
-        line: palette.ground[1],
+/// An adapter; without any the setup panics, and that machine has nothing to compare.
+fn adapter() -> Option<RenderState> {
+    let state = std::panic::catch_unwind(|| create_render_state(default_wgpu_setup(), Default::default()));
+    if state.is_err() {
+        assert!(std::env::var("FLOTOR_WINDOW_TESTS").is_err(), "there is no adapter");
+        eprintln!("skipped: there is no adapter");
+    }
+    state.ok()
+}
+
+/// Two pictures of one size, 8 bits a channel: mean difference, levels, and the part of all values that differ by more than 40.
+fn difference(a: &[u8], b: &[u8]) -> (f64, f64) {
+    assert_eq!(a.len(), b.len(), "one size");
+    let differences = || a.iter().zip(b).map(|(a, b)| f64::from(a.abs_diff(*b)));
+    #[allow(clippy::cast_precision_loss)] // pixels
+    let part = |sum: f64| sum / a.len() as f64;
+    #[allow(clippy::cast_precision_loss)] // pixels
+    let far = differences().filter(|difference| *difference > 40.0).count() as f64;
+    (part(differences().sum()), part(far))
+}
+
+/// One lights corners, the other pixels; edges are smoothed with 4 and with 16 samples. A mirrored, shifted or unlit picture
+/// differs by tens of levels all over.
+const MEAN_LEVELS: f64 = 2.0;
+/// Of a scene, which is edges all over, and of a window, most of which is text and lines of the same triangles.
+const FAR_PART_OF_SCENE: f64 = 0.01;
+const FAR_PART_OF_WINDOW: f64 = 0.002;
+
+#[test]
+fn an_adapter_and_the_processor_draw_the_same_scene() {
+    let Some(state) = adapter() else { return };
+    let mut gpu = GpuScene::new(&state.device, &state.queue);
+    // A spring that is bent and shortened, arrows, ground, shadows: all that the two could draw differently.
+    let mut record = tick(350, Events::NONE);
+    let half = 0.1_f64;
+    record.pose =
+        Pose { position_m: [2.0e-3, -1.0e-3, -4.0e-3], orientation_xyzw: [half.sin(), 0.0, 0.0, half.cos()] };
+    (record.commanded.force_n, record.commanded.torque_nm) = ([0.4, 0.2, 2.0], [0.0, 0.01, 0.02]);
+    let sample = Sample::from(&record);
+    let (mut shapes, missing) = shapes_of(&spring_run(&[]).0, &[plugin_file("spring")]);
+    assert!(missing.is_empty() && shapes.len() == 1, "{missing:?}");
+    for look in [Look::Dark, Look::Light] {
+        let palette = Palette::of(look);
+        let (camera, size) = (Camera::experimenter(SceneBuilder::height_mm(&shapes)), [641, 400]);
+        let (mut builder, scale) = (SceneBuilder::default(), ArrowScale::fitting([&sample].into_iter()));
+        let (mesh, _) =
+            builder.build(&mut shapes, &sample, &palette, &camera, 400.0, scale, Visible::default());
+        let _ = gpu.draw(mesh, &camera, palette.backdrop, size);
+        let drawn = gpu.read().expect("a picture comes back");
+        let expected = Rasterizer::default().draw(mesh, &camera, palette.backdrop, size, 4);
+        assert_eq!(drawn.size, expected.size);
+        let (mean, far) = difference(&drawn.rgb, &expected.rgb);
+        assert!(
+            mean < MEAN_LEVELS && far < FAR_PART_OF_SCENE,
+            "{look:?}: {mean} levels on average, {far} far off"
+        );
+    }
+}
+
+/// The window at a moment of a recording.
+fn start(at_s: f64) -> Start {
+    let mut history = History::new(spring_run(&[]).0, Keep::All);
+    (0..3000).for_each(|number| history.push(&tick(number, Events::NONE)));
+    Start::Recording(Box::new(history), Some(at_s), vec![plugin_file("spring")])
+}
+
+fn by_processor(at_s: f64, look: Look) -> Vec<u8> {
+    let mut viewer = Viewer::new(&Context::default(), None, start(at_s), look);
+    let image = draw_without_window([1280, 800], 1.0, look, |ui| viewer.show(ui));
+    image.pixels.iter().flat_map(|pixel| [pixel.r(), pixel.g(), pixel.b()]).collect()
+}
+
+fn by_adapter(at_s: f64, look: Look) -> Vec<u8> {
+    let theme = match look {
+        Look::Dark => Theme::Dark,
+        Look::Light => Theme::Light,
     };
-    ground.append(&mut mesh, &[]);
-    force_arrow(&mut mesh, DVec3::new(0.0, 0.0, -0.02), DVec3::new(0.002, 0.0, 0.02), 0.001, palette.force);
-    torque_arrow(&mut mesh, DVec3::new(0.0, 0.0, -0.012), DVec3::Z, 0.006, 4.0, 0.0008, palette.torque);
-    mesh
+    let builder = Harness::builder().with_size(vec2(1280.0, 800.0)).with_theme(theme).wgpu();
+    let mut harness = builder.build_eframe(|creation| {
+        assert!(creation.wgpu_render_state.is_some(), "the 3D view is drawn by the adapter as well");
+        Viewer::new(&creation.egui_ctx, creation.wgpu_render_state.as_ref(), start(at_s), look)
+    });
+    harness.run_steps(4);
+    let image = harness.render().expect("it is drawn");
+    assert_eq!(image.dimensions(), (1280, 800));
+    image.pixels().flat_map(|pixel| [pixel.0[0], pixel.0[1], pixel.0[2]]).collect()
+}
+
+/// Keeps a picture for people to look at, where `FLOTOR_KEEP_PICTURES` names a folder.
+fn keep(drawn_by: &str, look: Look, rgb: &[u8]) {
+    let Some(folder) = std::env::var_os("FLOTOR_KEEP_PICTURES") else { return };
+    let file = std::path::Path::new(&folder).join(format!("{drawn_by}-{look:?}.png"));
+    write_png(&file, &ColorImage::from_rgb([1280, 800], rgb)).expect("the folder is there");
 }
 
 #[test]
-fn gpu_and_processor_draw_the_same_picture() {
-    // Without any adapter the setup panics; that machine has nothing to compare.
-    let state = std::panic::catch_unwind(|| create_render_state(default_wgpu_setup(), Default::default()));
-    let Ok(state) = state else {
-        assert!(std::env::var("FLOTOR_WINDOW_TESTS").is_err(), "there is no adapter");
-        eprintln!("skipped: there is no adapter");
+fn an_adapter_and_the_processor_draw_the_same_window() {
+    if adapter().is_none() {
         return;
-    };
-    let mut gpu = GpuScene::new(&state.device, &state.queue);
+    }
     for look in [Look::Dark, Look::Light] {
-        let palette = Palette::of(look);
-        let (mesh, camera, size) = (scene(&palette), Camera::experimenter(25.0), [321, 200]);
-        let _ = gpu.draw(&mesh, &camera, palette.backdrop, size);
-        let drawn = gpu.read().expect("a picture comes back");
-        let expected = Rasterizer::default().draw(&mesh, &camera, palette.backdrop, size, 4);
-        assert_eq!(drawn.size, expected.size);
-        let differences = || drawn.rgb.iter().zip(&expected.rgb).map(|(a, b)| f64::from(a.abs_diff(*b)));
-        #[allow(clippy::cast_precision_loss)] // pixels
-        let mean = differences().sum::<f64>() / drawn.rgb.len() as f64;
-        let far = differences().filter(|difference| *difference > 40.0).count();
-        // One lights corners, the other pixels; edges are smoothed with 4 and with 16 samples. A mirrored, shifted or
-        // unlit picture differs by tens of levels all over.
-        assert!(mean < 2.0, "{look:?}: {mean} levels on average");
-        assert!(far < drawn.rgb.len() / 100, "{look:?}: {far} of {} far off", drawn.rgb.len());
+        let drawn = by_adapter(0.5, look);
+        let expected = by_processor(0.5, look);
+        keep("adapter", look, &drawn);
+        keep("processor", look, &expected);
+        let (mean, far) = difference(&drawn, &expected);
+        assert!(
+            mean < MEAN_LEVELS && far < FAR_PART_OF_WINDOW,
+            "{look:?}: {mean} levels on average, {far} far off"
+        );
+        // That a difference would be seen: the spring half a second later, and the other look.
+        let (_, later) = difference(&drawn, &by_processor(1.0, look));
+        assert!(later > FAR_PART_OF_WINDOW, "{look:?}: another moment, and {later} far off");
+        let (other, _) = difference(&drawn, &by_processor(0.5, look.other()));
+        assert!(other > 20.0 * MEAN_LEVELS, "{look:?}: {other} levels to the other look");
     }
 }

@@ -34,7 +34,9 @@ pub fn apply(context: &Context, look: Look) {
         visuals.override_text_color = Some(palette.text);
         visuals.weak_text_color = Some(palette.faint);
         visuals.warn_fg_color = palette.warning;
-        visuals.widgets.noninteractive.bg_stroke = Stroke::new(1.0, palette.grid.gamma_multiply(0.6));
+        // Opaque: between panels there is nothing beneath it.
+        let seam = palette.panel.lerp_to_gamma(palette.grid, 0.6);
+        visuals.widgets.noninteractive.bg_stroke = Stroke::new(1.0, seam);
         visuals.selection.bg_fill = Color32::from_rgb(0, 114, 178);
         style.spacing.item_spacing = egui::vec2(8.0, 6.0);
     });
