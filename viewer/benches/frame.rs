@@ -1,6 +1,10 @@
 //! What a picture of a running host costs the processor: the shape of the spring, its mesh, and six traces of ten seconds.
+//!
+//! Processor time of the thread, not time on the wall: what other programs take meanwhile does not count.
 
+use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use criterion::{Criterion, criterion_group, criterion_main};
+use egui_kittest::wgpu::{create_render_state, default_wgpu_setup};
 use flotor_hal::Pose;
 use flotor_record::mapping::{Blend, MappingConfig};
 use flotor_record::trace::{RECORD_WORDS, TickRecord};
@@ -9,14 +13,51 @@ use flotor_sync::Words;
 use flotor_viewer::app::{Start, Viewer};
 use flotor_viewer::camera::Camera;
 use flotor_viewer::canvas::Canvas;
-use flotor_viewer::decimate::min_max;
 use flotor_viewer::history::{History, Keep};
 use flotor_viewer::palette::{Look, Palette};
 use flotor_viewer::quantity::Quantity;
 use flotor_viewer::scene::{ArrowScale, SceneBuilder, Visible};
 use flotor_viewer::shape::shapes_of;
+use flotor_viewer::trace::Trace;
 use std::hint::black_box;
 use std::path::PathBuf;
+
+/// Processor time of this thread, ns.
+struct ProcessorTime;
+
+fn used_ns() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 * 1.0e9 + time.tv_nsec as f64
+}
+
+impl Measurement for ProcessorTime {
+    type Intermediate = f64;
+    type Value = f64;
+
+    fn start(&self) -> f64 {
+        used_ns()
+    }
+
+    fn end(&self, start: f64) -> f64 {
+        used_ns() - start
+    }
+
+    fn add(&self, a: &f64, b: &f64) -> f64 {
+        a + b
+    }
+
+    fn zero(&self) -> f64 {
+        0.0
+    }
+
+    fn to_f64(&self, value: &f64) -> f64 {
+        *value
+    }
+
+    fn formatter(&self) -> &dyn ValueFormatter {
+        WallTime.formatter() // ns as well
+    }
+}
 
 const TICKS: u64 = 10_000;
 const HEIGHT_PX: f64 = 448.0;
@@ -50,19 +91,21 @@ fn run() -> RunDescription {
 
 fn history() -> History {
     let mut history = History::new(run(), Keep::All);
-    for tick in 0..TICKS {
-        let mut record = TickRecord::from_words(&[0; RECORD_WORDS]);
-        let phase = tick as f64 * 7.0e-3;
-        record.tick = tick;
-        record.time_ns = tick * 1_000_000;
-        record.pose = Pose {
-            position_m: [1.0e-3 * phase.cos(), 0.0, 2.0e-3 * phase.sin() - 2.0e-3],
-            orientation_xyzw: [0.02 * phase.sin(), 0.0, 0.0, 1.0],
-        };
-        record.commanded.force_n = [phase.sin(), phase.cos(), 3.0 * phase.sin()];
-        history.push(&record);
-    }
+    (0..TICKS).for_each(|tick| history.push(&record(tick)));
     history
+}
+
+fn record(tick: u64) -> TickRecord {
+    let mut record = TickRecord::from_words(&[0; RECORD_WORDS]);
+    let phase = tick as f64 * 7.0e-3;
+    record.tick = tick;
+    record.time_ns = tick * 1_000_000;
+    record.pose = Pose {
+        position_m: [1.0e-3 * phase.cos(), 0.0, 2.0e-3 * phase.sin() - 2.0e-3],
+        orientation_xyzw: [0.02 * phase.sin(), 0.0, 0.0, 1.0],
+    };
+    record.commanded.force_n = [phase.sin(), phase.cos(), 3.0 * phase.sin()];
+    record
 }
 
 fn library() -> PathBuf {
@@ -72,7 +115,7 @@ fn library() -> PathBuf {
     file
 }
 
-fn frame(criterion: &mut Criterion) {
+fn frame(criterion: &mut Criterion<ProcessorTime>) {
     let history = history();
     let (mut shapes, missing) = shapes_of(history.run(), &[library()]);
     assert!(missing.is_empty(), "{missing:?}");
@@ -89,25 +132,33 @@ fn frame(criterion: &mut Criterion) {
             black_box((mesh.indices.len(), facts))
         });
     });
+    // As while ticks come: each picture has 16 new ones.
+    let mut coming = History::new(run(), Keep::Newest(20_000));
+    let mut ticks = (0..).map(record);
+    ticks.by_ref().take(10_000).for_each(|record| coming.push(&record));
+    let mut traces = [Trace::of(Quantity::Force), Trace::of(Quantity::Position)];
     criterion.bench_function("six traces of 10 s", |bench| {
         bench.iter(|| {
-            for quantity in [Quantity::Force, Quantity::Position] {
-                for component in 0..3 {
-                    let points = history.between(0.0, 10.0);
-                    let points: Vec<_> =
-                        points.map(|sample| [sample.time_s(), quantity.value(sample, component)]).collect();
-                    black_box(min_max(points.iter().copied(), [0.0, 10.0], 900));
-                }
+            ticks.by_ref().take(16).for_each(|record| coming.push(&record));
+            let end_s = coming.span_s()[1];
+            for trace in &mut traces {
+                black_box(trace.points(&coming, [end_s - 10.0, end_s], 900, 1.0));
             }
         });
     });
 }
 
 /// The whole picture but its rasterising: interface, six traces of ten seconds, 3D scene, and egui's triangles of it all.
-fn whole_picture(criterion: &mut Criterion) {
+fn whole_picture(criterion: &mut Criterion<ProcessorTime>) {
     let context = egui::Context::default();
     let start = Start::Recording(Box::new(history()), Some(0.0), vec![library()]);
-    let mut viewer = Viewer::new(&context, None, start, Look::Dark);
+    // Drawn by an adapter, whose threads are not this one; without any, by this one.
+    let state =
+        std::panic::catch_unwind(|| create_render_state(default_wgpu_setup(), Default::default())).ok();
+    if state.is_none() {
+        eprintln!("there is no adapter: the whole picture includes the 3D scene drawn on the processor");
+    }
+    let mut viewer = Viewer::new(&context, state.as_ref(), start, Look::Dark);
     // What a GPU does otherwise, at the size the scene has in this window: not part of the bound.
     let run = history();
     let (mut shapes, _) = shapes_of(run.run(), &[library()]);
@@ -149,5 +200,9 @@ fn whole_picture(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, frame, whole_picture);
+criterion_group! {
+    name = benches;
+    config = Criterion::default().with_measurement(ProcessorTime);
+    targets = frame, whole_picture
+}
 criterion_main!(benches);

@@ -3,6 +3,8 @@
 //! Buckets lie at whole multiples of their width from time zero, not from the edge of the picture: while a trace
 //! scrolls, a sample stays in its bucket and the trace does not shimmer.
 
+use std::collections::VecDeque;
+
 /// A point of a trace: time, s, and value.
 pub type Point = [f64; 2];
 
@@ -16,43 +18,79 @@ pub fn min_max(points: impl Iterator<Item = Point> + Clone, span_s: [f64; 2], bu
     if finite.clone().take(2 * buckets + 1).count() <= 2 * buckets {
         return finite.collect();
     }
-    let width_s = bucket_width_s(span_s[1] - span_s[0], buckets);
-    let mut kept = Vec::with_capacity(4 * buckets);
-    let mut bucket: Option<(f64, Point, Point)> = None;
-    for point in finite {
-        let number = (point[0] / width_s).floor();
-        match &mut bucket {
-            Some((current, low, high)) if *current == number => {
-                if point[1] < low[1] {
-                    *low = point;
-                }
-                if point[1] > high[1] {
-                    *high = point;
-                }
-            }
-            _ => {
-                close(&mut kept, bucket.take());
-                bucket = Some((number, point, point));
-            }
-        }
-    }
-    close(&mut kept, bucket);
-    kept
+    let mut kept = Buckets::of_width(bucket_width_s(span_s[1] - span_s[0], buckets));
+    finite.for_each(|point| kept.push(point));
+    kept.points().collect()
 }
 
 /// Width of a bucket, s: a power of two, so that zooming by less does not move any edge.
+#[must_use]
 #[allow(clippy::cast_precision_loss)] // a few thousand buckets
-fn bucket_width_s(span_s: f64, buckets: usize) -> f64 {
+pub fn bucket_width_s(span_s: f64, buckets: usize) -> f64 {
     let wanted_s = (span_s / buckets.max(1) as f64).max(f64::MIN_POSITIVE);
     wanted_s.log2().ceil().exp2()
 }
 
-fn close(kept: &mut Vec<Point>, bucket: Option<(f64, Point, Point)>) {
-    let Some((_, low, high)) = bucket else { return };
-    let [first, second] = if low[0] <= high[0] { [low, high] } else { [high, low] };
-    kept.push(first);
-    if first != second {
-        kept.push(second);
+/// Buckets of a trace that grows at its end and is forgotten at its beginning. A point is looked at once.
+#[derive(Clone, Debug, Default)]
+pub struct Buckets {
+    width_s: f64,
+    kept: VecDeque<Bucket>,
+}
+
+/// Smallest and largest point of a bucket, the number of which is its place in time.
+#[derive(Clone, Copy, Debug)]
+struct Bucket {
+    number: f64,
+    low: Point,
+    high: Point,
+}
+
+impl Buckets {
+    /// Without any point yet.
+    #[must_use]
+    pub fn of_width(width_s: f64) -> Self {
+        Self { width_s, kept: VecDeque::new() }
+    }
+
+    /// Width of a bucket, s.
+    #[must_use]
+    pub fn width_s(&self) -> f64 {
+        self.width_s
+    }
+
+    /// Adds a point that is not earlier than those before it. One that is not finite is left out.
+    pub fn push(&mut self, point: Point) {
+        if !point.iter().all(|part| part.is_finite()) {
+            return;
+        }
+        let number = (point[0] / self.width_s).floor();
+        match self.kept.back_mut() {
+            Some(bucket) if bucket.number == number => {
+                if point[1] < bucket.low[1] {
+                    bucket.low = point;
+                }
+                if point[1] > bucket.high[1] {
+                    bucket.high = point;
+                }
+            }
+            _ => self.kept.push_back(Bucket { number, low: point, high: point }),
+        }
+    }
+
+    /// Forgets the buckets that end before a time.
+    pub fn forget_before(&mut self, time_s: f64) {
+        while self.kept.front().is_some_and(|bucket| (bucket.number + 1.0) * self.width_s < time_s) {
+            self.kept.pop_front();
+        }
+    }
+
+    /// One point or two of each bucket, in order of time.
+    pub fn points(&self) -> impl Iterator<Item = Point> {
+        self.kept.iter().flat_map(|Bucket { low, high, .. }| {
+            let [first, second] = if low[0] <= high[0] { [*low, *high] } else { [*high, *low] };
+            [Some(first), (first != second).then_some(second)].into_iter().flatten()
+        })
     }
 }
 

@@ -5,6 +5,7 @@ use crate::history::History;
 use crate::palette::{Look, Palette};
 use crate::picture::{draw_without_window, write_png};
 use crate::quantity::Quantity;
+use crate::trace::Trace;
 use crate::ui::plot_stack::{ExportFormat, PlotStack};
 use crate::ui::plots::{PlotView, plot};
 use std::fmt::Write;
@@ -210,9 +211,8 @@ fn png(history: &History, plots: &PlotStack, look: Look) -> egui::ColorImage {
         for (index, quantity) in plots.shown.iter().enumerate() {
             let time_axis = index + 1 == plots.shown.len();
             let height = HEIGHT_OF_ONE - 30.0 + if time_axis { 14.0 } else { 0.0 };
-            let (quantity, units) = (*quantity, plots.units);
-            let view = PlotView { quantity, span_s, cursor_s: span_s[1], units, height, time_axis };
-            plot(&mut ui, history, view, &palette);
+            let view = PlotView { span_s, cursor_s: span_s[1], units: plots.units, height, time_axis };
+            plot(&mut ui, history, &mut Trace::of(*quantity), view, &palette);
         }
     })
 }

@@ -92,6 +92,7 @@ pub enum Keep {
 pub struct History {
     run: RunDescription,
     samples: VecDeque<Sample>,
+    forgotten: u64,
     keep: Keep,
     notes: Vec<Note>,
     ending: Option<Ending>,
@@ -102,7 +103,8 @@ impl History {
     #[must_use]
     pub fn new(run: RunDescription, keep: Keep) -> Self {
         let capacity = if let Keep::Newest(count) = keep { count } else { 0 };
-        Self { run, samples: VecDeque::with_capacity(capacity), keep, notes: Vec::new(), ending: None }
+        let samples = VecDeque::with_capacity(capacity);
+        Self { run, samples, forgotten: 0, keep, notes: Vec::new(), ending: None }
     }
 
     /// All of a recording. Damage after the first tick costs only what follows it and becomes a note.
@@ -138,6 +140,7 @@ impl History {
         if let Keep::Newest(count) = self.keep {
             while self.samples.len() >= count.max(1) {
                 self.samples.pop_front();
+                self.forgotten += 1;
             }
         }
         self.samples.push_back(Sample::from(record));
@@ -196,6 +199,19 @@ impl History {
         let start = self.samples.partition_point(|sample| sample.time_s() < from_s);
         let end = self.index_after(to_s).max(start);
         self.samples.range(start..end)
+    }
+
+    /// How many samples came before the first one at or after a time, those that are forgotten included: a number that a
+    /// sample keeps.
+    #[must_use]
+    pub fn number_at(&self, time_s: f64) -> u64 {
+        self.forgotten + self.samples.partition_point(|sample| sample.time_s() < time_s) as u64
+    }
+
+    /// The samples from a number on, as far as they are kept.
+    pub fn from_number(&self, number: u64) -> impl Iterator<Item = &Sample> {
+        let skipped = usize::try_from(number.saturating_sub(self.forgotten)).unwrap_or(usize::MAX);
+        self.samples.range(skipped.min(self.samples.len())..)
     }
 
     /// All samples.

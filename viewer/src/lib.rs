@@ -5,12 +5,13 @@
 //!
 //! - [`history`]: what has been seen of a run; [`feed`] reads it from a running host, [`player`] says which moment is shown,
 //!   [`tally`] counts what happened, [`panel`] is what can be set.
-//! - [`quantity`]: what can be plotted, [`decimate`] with how few points, [`export`] as files.
+//! - [`quantity`]: what can be plotted, [`decimate`] with how few points, [`trace`] from picture to picture, [`export`] as files.
 //! - [`shape`]: where the bodies of the models are; [`geometry`] makes triangles of them, [`scene`] a picture's worth,
 //!   seen by a [`camera`] in a [`light`].
 //! - [`gpu`]: draws the scene on a GPU or software adapter, [`raster`] without either; [`canvas`] is one of the two in the
 //!   interface, [`picture`] a whole picture without a window.
 //! - [`ui`], [`palette`]: the parts of the interface; [`app`] puts them together. [`sound`] warns the ear.
+//! - [`window`]: opens it, or says why there is none; [`cost`] is what it takes of the machine.
 //! - [`remembered`]: what a person has chosen about the window, from one time to the next.
 //! - [`experiment`]: a sitting of a perception experiment, and its screens.
 //!
@@ -19,6 +20,7 @@
 pub mod app;
 pub mod camera;
 pub mod canvas;
+pub mod cost;
 pub mod decimate;
 pub mod experiment;
 pub mod export;
@@ -38,5 +40,6 @@ pub mod scene;
 pub mod shape;
 pub mod sound;
 pub mod tally;
+pub mod trace;
 pub mod ui;
 pub mod window;

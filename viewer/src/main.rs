@@ -12,6 +12,7 @@ use flotor_viewer::shape::shapes_of;
 use flotor_viewer::window::{WindowWish, open};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 /// Shows what the hand feels: the spring in 3D, and traces.
 #[derive(Parser)]
@@ -46,6 +47,9 @@ struct Arguments {
     /// Size of text and lines, 1 to 3 (default: 1; a window: as the last time)
     #[arg(long, value_parser = scale, value_name = "FACTOR")]
     scale: Option<f32>,
+    /// Say what the window costs over so many seconds, 1 to 3600, and close it then
+    #[arg(long, value_parser = seconds, value_name = "SECONDS", conflicts_with_all = ["screenshot", "sitting"])]
+    measure: Option<Duration>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -84,6 +88,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         }),
         size: arguments.size,
         scale: arguments.scale,
+        measure: arguments.measure,
     };
     let read = |path: &PathBuf| History::read(path).map_err(|error| Failure::Usage(error.to_string()));
     let history = arguments.recording.as_ref().map(read).transpose()?;
@@ -95,7 +100,9 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
                 Some(history) => Start::Recording(Box::new(history), arguments.at, arguments.plugins.clone()),
                 None => live(arguments)?,
             };
-            open(start, wish).map_err(|error| Failure::Usage(error.to_string()))
+            let cost = open(start, wish).map_err(|error| Failure::Usage(error.to_string()))?;
+            cost.iter().for_each(|cost| println!("{cost}"));
+            Ok(())
         }
     }
 }
@@ -147,6 +154,14 @@ fn size(text: &str) -> Result<[usize; 2], String> {
     let length =
         |text: &str| text.parse().ok().filter(|length| (64..=8192).contains(length)).ok_or_else(wrong);
     Ok([length(width)?, length(height)?])
+}
+
+/// `10`
+fn seconds(text: &str) -> Result<Duration, String> {
+    let wrong = || format!("`{text}` is no time to watch a window; legal is 1 to 3600 seconds");
+    let seconds: f64 =
+        text.parse().ok().filter(|seconds| (1.0..=3600.0).contains(seconds)).ok_or_else(wrong)?;
+    Ok(Duration::from_secs_f64(seconds))
 }
 
 /// `1.5`

@@ -8,6 +8,7 @@ use crate::raster::flat::FlatRasterizer;
 use crate::raster::solid::Rasterizer;
 use crate::scene::{ArrowScale, SceneBuilder, Visible};
 use crate::shape::Shape;
+use crate::trace::Trace;
 use crate::ui::plots::{PlotView, plot};
 use crate::ui::{legend, readout, style};
 use egui::{Color32, ColorImage, Context, RawInput, Rect, TextureOptions, Ui, pos2, vec2};
@@ -93,14 +94,13 @@ pub fn picture(
         for (index, quantity) in PLOTS.into_iter().enumerate() {
             let time_axis = index + 1 == PLOTS.len();
             let view = PlotView {
-                quantity,
                 span_s: history.span_s(),
                 cursor_s: sample.time_s(),
                 units: options.units,
                 height: if time_axis { height + 14.0 } else { height - 14.0 },
                 time_axis,
             };
-            plot(&mut ui, history, view, &palette);
+            plot(&mut ui, history, &mut Trace::of(quantity), view, &palette);
         }
     }))
 }

@@ -56,13 +56,18 @@ impl ArrowScale {
     }
 }
 
-/// The largest force has an arrow so much shorter than the body.
-const FULL_FORCE: f64 = 1.9;
+/// The largest force has an arrow so much shorter than the body: at rest, too, its tip is in sight of the experimenter's view.
+const FULL_FORCE: f64 = 2.8;
 
 /// A scene being put together; keeps its memory from frame to frame.
 #[derive(Default)]
 pub struct SceneBuilder {
     mesh: Mesh,
+    /// What the mesh begins with, made once: it stands still.
+    ground: Option<Ground>,
+    /// The mesh with the ground and nothing else: so many corners, so many indices.
+    bare: [usize; 2],
+    corners_made: u64,
 }
 
 /// What a scene shows beside the picture.
@@ -93,6 +98,12 @@ impl SceneBuilder {
         MM_PER_M * if tallest > 0.0 { tallest } else { EMPTY_HEIGHT_M }
     }
 
+    /// Corners of triangles put together so far.
+    #[must_use]
+    pub fn corners_made(&self) -> u64 {
+        self.corners_made
+    }
+
     /// Puts together the scene at a sample, seen at a height of so many pixels.
     #[allow(clippy::too_many_arguments)] // one call site for each, and no two belong together
     pub fn build(
@@ -105,7 +116,6 @@ impl SceneBuilder {
         scale: ArrowScale,
         visible: Visible,
     ) -> (&Mesh, SceneFacts) {
-        self.mesh.clear();
         let mut facts = SceneFacts::default();
         let height_m = Self::height_mm(shapes) / MM_PER_M;
         let posed: Vec<Option<Posed>> = shapes.iter_mut().map(|shape| shape.at(&sample.pose)).collect();
@@ -114,10 +124,13 @@ impl SceneBuilder {
 
         let plate_radius_m =
             drawn().map(|(shape, _)| plate_radius_m(shape.body())).fold(0.25 * height_m, f64::max);
-        if visible.ground {
+        let ground = visible.ground.then(|| ground(palette, height_m, plate_radius_m));
+        self.begin(ground);
+        if let Some(ground) = ground {
             let handle =
                 shapes.first().map_or(sample.pose, |shape| shape.mapping().pose_to_model(&sample.pose));
-            self.ground(palette, height_m, plate_radius_m, handle.position());
+            let shadows = shadows(&ground, palette, plate_radius_m, handle.position());
+            ground.shade(&mut self.mesh.vertices, &shadows);
         }
         if visible.bodies {
             let pixels_per_mm = camera.pixels_per_mm(height_px);
@@ -144,38 +157,20 @@ impl SceneBuilder {
                 });
             self.arrows(hand, palette, scale, height_m, plate_radius_m);
         }
+        self.corners_made += (self.mesh.vertices.len() - self.bare[0]) as u64;
         (&self.mesh, facts)
     }
 
-    fn ground(&mut self, palette: &Palette, height_m: f64, plate_radius_m: f64, handle_m: DVec3) {
-        let foot_m = -height_m - PLATE_THICKNESS * plate_radius_m;
-        let ground = Ground {
-            height_m: foot_m,
-            radius_m: 3.2 * height_m,
-            spacing_m: 0.2 * height_m,
-            surface: palette.ground[0],
-            line: palette.ground[1],
-        };
-        let fall = light::KEY / light::KEY.z;
-        let of_plate = handle_m - fall * (handle_m.z - foot_m);
-        let shadows = [
-            Shadow {
-                center_m: DVec3::ZERO.truncate(),
-                radius_m: 1.3 * plate_radius_m,
-                strength: 0.8 * palette.shadow,
-            },
-            Shadow {
-                center_m: of_plate.truncate(),
-                radius_m: 1.1 * plate_radius_m,
-                strength: 0.7 * palette.shadow,
-            },
-            Shadow {
-                center_m: 0.5 * of_plate.truncate(),
-                radius_m: 1.3 * plate_radius_m,
-                strength: 0.4 * palette.shadow,
-            },
-        ];
-        ground.append(&mut self.mesh, &shadows);
+    /// Leaves nothing in the mesh but the ground.
+    fn begin(&mut self, ground: Option<Ground>) {
+        if self.ground != ground {
+            self.mesh.clear();
+            ground.iter().for_each(|ground| ground.append(&mut self.mesh));
+            self.bare = [self.mesh.vertices.len(), self.mesh.indices.len()];
+            self.ground = ground;
+        }
+        self.mesh.vertices.truncate(self.bare[0]);
+        self.mesh.indices.truncate(self.bare[1]);
     }
 
     /// Without a body to draw, the handle is a disc.
@@ -208,6 +203,29 @@ impl SceneBuilder {
             palette.torque,
         );
     }
+}
+
+/// The ground beneath bodies so high, with plates so large.
+fn ground(palette: &Palette, height_m: f64, plate_radius_m: f64) -> Ground {
+    Ground {
+        height_m: -height_m - PLATE_THICKNESS * plate_radius_m,
+        radius_m: 3.2 * height_m,
+        spacing_m: 0.2 * height_m,
+        surface: palette.ground[0],
+        line: palette.ground[1],
+    }
+}
+
+/// The shadows of the fixed plate, of the one at the handle, and of what is between them.
+fn shadows(ground: &Ground, palette: &Palette, plate_radius_m: f64, handle_m: DVec3) -> [Shadow; 3] {
+    let fall = light::KEY / light::KEY.z;
+    let of_plate = handle_m - fall * (handle_m.z - ground.height_m);
+    let shadow = |center_m: DVec3, radius: f64, strength: f64| Shadow {
+        center_m: center_m.truncate(),
+        radius_m: radius * plate_radius_m,
+        strength: strength * palette.shadow,
+    };
+    [shadow(DVec3::ZERO, 1.3, 0.8), shadow(of_plate, 1.1, 0.7), shadow(0.5 * of_plate, 1.3, 0.4)]
 }
 
 /// Handle and wrench in the frame of the first model, in which the scene is drawn.
@@ -257,3 +275,50 @@ fn body_of(
 
 /// Places along a body where its strain is looked at for the readout.
 const SCALE_PROBES: i32 = 32;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::palette::Look;
+    use flotor_record::trace::{RECORD_WORDS, TickRecord};
+    use flotor_sync::Words;
+
+    fn sample(force_n: DVec3) -> Sample {
+        let mut record = TickRecord::from_words(&[0; RECORD_WORDS]);
+        (record.pose, record.commanded.force_n) = (Pose::HOME, force_n.to_array());
+        Sample::from(&record)
+    }
+
+    fn build(builder: &mut SceneBuilder, sample: &Sample, visible: Visible) -> Mesh {
+        let (palette, camera) = (Palette::of(Look::Dark), Camera::experimenter(SceneBuilder::height_mm(&[])));
+        let scale = ArrowScale::fitting([sample].into_iter());
+        builder.build(&mut [], sample, &palette, &camera, 400.0, scale, visible).0.clone()
+    }
+
+    #[test]
+    fn the_largest_force_on_a_handle_at_rest_is_in_sight() {
+        let camera = Camera::experimenter(SceneBuilder::height_mm(&[]));
+        let only = Visible { ground: false, ..Visible::default() };
+        for force_n in [DVec3::Z, DVec3::X, -DVec3::Z, DVec3::new(1.0, 1.0, 1.0)] {
+            let mesh = build(&mut SceneBuilder::default(), &sample(30.0 * force_n), only);
+            for vertex in &mesh.vertices {
+                let place = DVec3::from_array(vertex.position_mm.map(f64::from)).extend(1.0);
+                let clip = camera.projection(2.0) * place;
+                let [x, y] = [clip.x / clip.w, clip.y / clip.w];
+                assert!(x.abs() < 0.98 && y.abs() < 0.98, "{force_n}: {x}, {y}");
+            }
+        }
+    }
+
+    /// A builder that has made pictures before makes the same one as a new builder.
+    #[test]
+    fn the_ground_is_kept_and_what_stands_on_it_is_not() {
+        let mut used = SceneBuilder::default();
+        for (force_n, ground) in [(DVec3::X, true), (DVec3::Z, true), (DVec3::Z, false), (-DVec3::Z, true)] {
+            let visible = Visible { ground, ..Visible::default() };
+            let again = build(&mut used, &sample(force_n), visible);
+            let new = build(&mut SceneBuilder::default(), &sample(force_n), visible);
+            assert_eq!((again.vertices, again.indices), (new.vertices, new.indices));
+        }
+    }
+}

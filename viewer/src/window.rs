@@ -1,11 +1,14 @@
 //! A real window: display, device, and what is said where there is none.
 
 use crate::app::{Start, Viewer};
+use crate::cost::{self, Cost};
 use crate::palette::{Look, Palette};
 use crate::remembered::Remembered;
 use egui::{Ui, ViewportBuilder};
 use std::panic::{self, AssertUnwindSafe};
 use std::path::PathBuf;
+use std::sync::mpsc::{Sender, channel};
+use std::time::Duration;
 
 /// Why there is no window.
 #[derive(Debug, thiserror::Error)]
@@ -33,13 +36,15 @@ pub struct WindowWish {
     pub size: Option<[usize; 2]>,
     /// Size of text and lines.
     pub scale: Option<f32>,
+    /// Watch what the window costs for so long, and close it then.
+    pub measure: Option<Duration>,
 }
 
-/// Opens a window and stays until it is closed.
+/// Opens a window and stays until it is closed; gives what it cost, if that was asked for.
 ///
 /// # Errors
 /// [`WindowError`].
-pub fn open(start: Start, wish: WindowWish) -> Result<(), WindowError> {
+pub fn open(start: Start, wish: WindowWish) -> Result<Option<Cost>, WindowError> {
     // A sitting looks the same for everybody.
     let file = if matches!(start, Start::Sitting(..)) { None } else { Remembered::file() };
     let mut remembered = file.as_deref().map(Remembered::load).unwrap_or_default();
@@ -53,6 +58,7 @@ pub fn open(start: Start, wish: WindowWish) -> Result<(), WindowError> {
         .with_inner_size(size)
         .with_min_inner_size([640.0, 480.0]);
     let options = eframe::NativeOptions { viewport, ..eframe::NativeOptions::default() };
+    let (tells, watched) = channel();
     let run = || {
         eframe::run_native(
             "flotor-viewer",
@@ -62,7 +68,12 @@ pub fn open(start: Start, wish: WindowWish) -> Result<(), WindowError> {
                 let device = creation.wgpu_render_state.as_ref();
                 let mut viewer = Viewer::new(&creation.egui_ctx, device, start, remembered.look);
                 viewer.recall(&creation.egui_ctx, &remembered);
-                Ok(Box::new(Kept { viewer, file, kept: remembered }))
+                Ok(Box::new(Kept {
+                    viewer,
+                    file,
+                    kept: remembered,
+                    measure: wish.measure.map(|duration| (duration, tells)),
+                }))
             }),
         )
     };
@@ -72,7 +83,7 @@ pub fn open(start: Start, wish: WindowWish) -> Result<(), WindowError> {
     let result = panic::catch_unwind(AssertUnwindSafe(run));
     panic::set_hook(said);
     match result {
-        Ok(Ok(())) => Ok(()),
+        Ok(Ok(())) => Ok(watched.try_recv().ok()),
         Ok(Err(eframe::Error::Wgpu(error))) => Err(WindowError::NoAdapter(one_line(&error.to_string()))),
         Ok(Err(error)) => Err(WindowError::NoDisplay(one_line(&error.to_string()))),
         Err(panic) => {
@@ -88,10 +99,15 @@ struct Kept {
     viewer: Viewer,
     file: Option<PathBuf>,
     kept: Remembered,
+    /// What is still to be watched, and who wants to know.
+    measure: Option<(Duration, Sender<Cost>)>,
 }
 
 impl eframe::App for Kept {
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        if let Some((duration, tells)) = self.measure.take() {
+            cost::watch(ui.ctx(), duration, tells);
+        }
         self.viewer.show(ui);
         let Some(file) = &self.file else { return };
         let size_pt = ui.input(|input| input.viewport().inner_rect.map(|rect| rect.size().into()));

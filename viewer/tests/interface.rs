@@ -4,15 +4,15 @@
 mod support;
 
 use egui::accesskit::Role;
-use egui::{Key, vec2};
+use egui::{Key, Pos2, Rect, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use flotor_live::{Ask, Outcome};
 use flotor_record::trace::Events;
-use flotor_study::protocol::{MagnitudeProtocol, Protocol, SubjectNumber};
-use flotor_study::screen::{Attended, Pause, Question, Said, Screen, Told, Warning, WindowState};
+use flotor_study::protocol::{MagnitudeProtocol, Protocol, Quality, SubjectNumber};
+use flotor_study::screen::{Attended, Pause, Question, Said, Screen, Told, TrialView, Warning, WindowState};
 use flotor_study::sitting::Sitting;
-use flotor_study::trial::Phase;
+use flotor_study::trial::{Phase, Position};
 use flotor_viewer::app::{Start, Viewer, Wanted};
 use flotor_viewer::experiment::Prompt;
 use flotor_viewer::history::{History, Keep};
@@ -330,6 +330,13 @@ fn a_person_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_al
         };
         window.get_by_label(headline);
         headlines.push(headline);
+        if !is_seen {
+            // A window of words leaves the processor to the loop: ticks that come do not make 60 pictures a second of them.
+            host.run_ticks(20, Events::NONE);
+            window.run_steps(1);
+            let delay = window.output().viewport_output.values().map(|output| output.repaint_delay).min();
+            assert!(delay.is_some_and(|delay| delay >= Duration::from_millis(100)), "{delay:?}");
+        }
         if headline == "How stiff was it?" {
             window.key_press(Key::Num7);
             window.run_steps(1);
@@ -349,6 +356,100 @@ fn a_person_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_al
     until(&mut window, |window| window.query_by_label("The device has stopped").is_some());
     teller.send(Told::Screen(Screen::Over)).expect("the window listens");
     until(&mut window, |window| window.query_by_label("Thank you").is_some());
+}
+
+fn trial(quality: Quality, stimuli: usize, object_is_shown: bool) -> TrialView {
+    TrialView {
+        number: 3,
+        of_about: 12,
+        phase: Phase::Main,
+        object_is_shown,
+        condition: "K".to_owned(),
+        repeat: 0,
+        stimuli,
+        quality,
+    }
+}
+
+/// Every screen there is: its headline and the keys that mean something, in sight, apart from each other, in a small window too.
+#[test]
+fn every_screen_of_a_sitting_says_what_to_do_and_which_keys_do_it() {
+    use Quality::{Force, Stiffness};
+    let ready = |reason, next| Screen::Ready { reason, next };
+    let feel = |position, trial| Screen::Feel { trial, position };
+    let ask = |question, trial| Screen::Ask { trial, question };
+    let [one, two] = [1, 2].map(|stimuli| trial(Stiffness, stimuli, false));
+    let [strong, stronger] = [1, 2].map(|stimuli| trial(Force, stimuli, false));
+    let seen = trial(Stiffness, 1, true);
+    let practice = TrialView { phase: Phase::Practice, ..one.clone() };
+    let screens = [
+        (ready(Pause::Welcome, one.clone()), "How stiff is the spring?", "Enter to begin"),
+        (ready(Pause::Welcome, two.clone()), "Which spring is stiffer?", "Enter to begin"),
+        (ready(Pause::Welcome, strong.clone()), "How strong is the force?", "Enter to begin"),
+        (ready(Pause::Welcome, stronger.clone()), "Which force is stronger?", "Enter to begin"),
+        (ready(Pause::PhaseChanges, practice.clone()), "A few to get used to it", "Enter to go on"),
+        (ready(Pause::PhaseChanges, one.clone()), "From now on it counts", "Enter to go on"),
+        (ready(Pause::ModalityChanges, seen.clone()), "From now on you see what you feel", "Enter to go on"),
+        (ready(Pause::ModalityChanges, one.clone()), "From now on you feel only", "Enter to go on"),
+        (ready(Pause::Rest, one.clone()), "Time for a rest", "Enter to go on"),
+        (ready(Pause::OutOfRange, one.clone()), "Once more", "Enter to go on"),
+        (feel(None, practice.clone()), "Feel the spring", "Enter when you have felt it"),
+        (feel(None, seen), "Feel the spring", "Enter when you have felt it"),
+        (feel(None, strong.clone()), "Feel the force", "Enter when you have felt it"),
+        (feel(Some(Position::First), two.clone()), "First spring", "Enter when you have felt it"),
+        (feel(Some(Position::Second), two.clone()), "Second spring", "Enter when you have felt it"),
+        (feel(Some(Position::First), stronger.clone()), "First force", "Enter when you have felt it"),
+        (ask(Question::Nothing, practice), "That was one to practise", "A  feel it again"),
+        (ask(Question::HowMuch, one), "How stiff was it?", "Backspace corrects"),
+        (ask(Question::HowMuch, strong), "How strong was it?", "Enter when it is right"),
+        (ask(Question::WhichIsMore, two), "Which one was stiffer?", "0  I don't know"),
+        (ask(Question::WhichIsMore, stronger), "Which one was stronger?", "1  the first"),
+        (Screen::Over, "Thank you", "Enter closes the window"),
+    ];
+    let ((teller, told), (said, _hears)) = (channel(), channel());
+    let prompt = Box::new(Prompt::new(told, said));
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let mut host = FakeHost::new(&folder, &[]);
+    let size = vec2(800.0, 600.0);
+    let mut window = host.welcome(|directory| {
+        let start = Start::Sitting(Wanted::newest(directory.clone()), prompt);
+        let harness = Harness::builder().with_size(size).with_step_dt(1.0 / 60.0);
+        harness.build_eframe(|creation| Viewer::new(&creation.egui_ctx, None, start, Look::Light))
+    });
+    assert_eq!(host.request(None), Ask::Watch { every: 1 });
+    host.run_ticks(100, Events::NONE);
+    for (screen, headline, keys) in screens {
+        teller.send(Told::Screen(screen.clone())).expect("the window listens");
+        until_fresh(&mut window, &mut host, |window| {
+            window.query_by_label(headline).is_some() && window.query_by_label_contains(keys).is_some()
+        });
+        let [headline, keys] =
+            [window.get_by_label(headline).rect(), window.get_by_label_contains(keys).rect()];
+        let all = Rect::from_min_size(Pos2::ZERO, size);
+        assert!(all.contains_rect(headline) && all.contains_rect(keys), "{screen:?}: {headline:?}, {keys:?}");
+        assert!(headline.bottom() < keys.top(), "{screen:?}: {headline:?}, {keys:?}");
+    }
+}
+
+#[test]
+fn limits_say_how_much_of_them_is_used() {
+    let (mut window, mut host, _folder) = live(&[]);
+    // 30 N and 1 N·m at the host; the spring of the ticks that are sent has 0.7 N/mm and is 4 mm short after half a second.
+    host.run_ticks(1001, Events::NONE);
+    until_fresh(&mut window, &mut host, |window| {
+        window.query_by_role_and_label(Role::ProgressIndicator, "Fz +2.8 of 30 N").is_some()
+    });
+    window.get_by_role_and_label(Role::ProgressIndicator, "Mx +0.0 of 1000 mN·m");
+}
+
+#[test]
+fn traces_can_be_written_in_three_formats() {
+    let mut window = recording();
+    window.get_by_label("Export").click();
+    window.run_steps(2);
+    for format in ["CSV", "SVG", "PNG"] {
+        window.get_by_role_and_label(Role::Button, format);
+    }
 }
 
 /// Text twice as large: everything is still there.
@@ -419,6 +520,93 @@ fn a_window_is_as_it_was_left() {
     next.get_by_label("Dark (L)");
     next.get_by_label("Energy over time, J");
     assert!(next.query_by_label("preset").is_none(), "the panel was put away");
+}
+
+/// What has not changed is not made again: while the mouse moves, no sample is looked at and no corner of a triangle is made;
+/// a tick that comes is looked at once for each trace; a handle that rests costs no corner, whatever the time.
+#[test]
+fn a_picture_makes_what_is_new_and_nothing_else() {
+    let work = |window: &Window<'_>| {
+        let viewer = window.state();
+        (viewer.plots().visited(), viewer.view().corners_made())
+    };
+    let mut window = recording();
+    let before = work(&window);
+    let area = window.get_by_label("Force over time, N").rect();
+    for step in 0..20_u8 {
+        window.hover_at(area.center() + vec2(4.0 * f32::from(step), 0.0));
+        window.run_steps(1);
+    }
+    assert_eq!(work(&window), before, "a cursor that moves over a recording");
+    window.key_press(Key::D);
+    window.run_steps(2);
+    let (visited, corners) = work(&window);
+    assert!(visited == before.0 && corners > before.1, "a view that turns");
+
+    let (mut window, mut host, _folder) = live(&[]);
+    let traces = window.state().plots().shown.len() as u64;
+    for new in [16, 1, 33] {
+        let (visited, _) = work(&window);
+        let last = window.state().history().len() + usize::try_from(new).expect("a few");
+        host.run_ticks(new, Events::NONE);
+        until(&mut window, |window| window.state().history().len() == last);
+        window.run_steps(5);
+        assert_eq!(work(&window).0, visited + traces * new, "{new} ticks");
+    }
+
+    let (run, _) = spring_run(&[]);
+    let mut history = History::new(run, Keep::All);
+    for number in 0..3000 {
+        let mut resting = tick(number, Events::NONE);
+        resting.pose = tick(250, Events::NONE).pose;
+        resting.commanded = tick(250, Events::NONE).commanded;
+        history.push(&resting);
+    }
+    let mut window =
+        crate::window(Start::Recording(Box::new(history), Some(0.0), vec![plugin_file("spring")]));
+    window.run_steps(3);
+    let before = work(&window);
+    window.key_press(Key::Space);
+    window.run_steps(30);
+    assert!(window.state().player().now_s > 0.3, "it plays");
+    assert_eq!(work(&window), before, "a handle that rests");
+}
+
+/// A window of time that is shorter than the run has the moment shown in it, wherever that is.
+#[test]
+fn traces_go_where_the_moment_is() {
+    let (run, _) = spring_run(&[]);
+    let mut history = History::new(run, Keep::All);
+    (0..30_000).for_each(|number| history.push(&tick(number, Events::NONE)));
+    let mut window = window(Start::Recording(Box::new(history), Some(12.0), vec![plugin_file("spring")]));
+    window.run_steps(2);
+    window.get_by_label("Time shown").click();
+    window.run_steps(2);
+    window.get_by_label("5 s").click();
+    window.run_steps(2);
+    let span_s = |window: &Window<'_>| {
+        let viewer = window.state();
+        let [first_s, last_s] = viewer.plots().span_s(viewer.history());
+        assert!((last_s - first_s - 5.0).abs() < 1.0e-9);
+        assert!((first_s..=last_s).contains(&viewer.player().now_s), "{first_s} to {last_s}");
+        [first_s, last_s]
+    };
+    span_s(&window);
+    let keys = [
+        (Key::ArrowRight, false),
+        (Key::ArrowRight, false),
+        (Key::ArrowLeft, false),
+        (Key::Home, true),
+        (Key::ArrowRight, false),
+        (Key::End, true),
+        (Key::ArrowLeft, false),
+    ];
+    for (key, moves) in keys {
+        let before = span_s(&window);
+        window.key_press(key);
+        window.run_steps(2);
+        assert_eq!(span_s(&window) != before, moves, "{key:?} from {before:?}");
+    }
 }
 
 /// A window that nobody touches makes no pictures: what costs nothing costs no processor.

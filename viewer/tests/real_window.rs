@@ -81,6 +81,34 @@ fn place_of_slider(directory: &Directory, name: &str) -> Rect {
     harness.get_by_role_and_label(Role::Slider, name).rect()
 }
 
+/// A recording of two seconds of the demo.
+fn recording(folder: &Path) -> PathBuf {
+    let file = folder.join("run.mcap");
+    let mut run = Command::new(program("flotor"));
+    run.args(["run", "--clock", "virtual", "--duration", "2s", "--record"]).arg(&file);
+    let output = run.stdin(Stdio::null()).output().expect("it starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    file
+}
+
+/// `flotor view` for a test: no run and no choices of whoever runs the test.
+fn view(folder: &Path, display: Option<&str>) -> Command {
+    let mut view = Command::new(program("flotor"));
+    view.arg("view").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET").env_remove("DISPLAY");
+    view.envs(display.map(|display| ("DISPLAY", display)));
+    view.env("XDG_RUNTIME_DIR", folder).env("XDG_CONFIG_HOME", folder).env("LP_NUM_THREADS", "1");
+    view.stdin(Stdio::null());
+    view
+}
+
+/// As on a machine without a driver: neither Vulkan nor OpenGL finds any.
+fn without_drivers(view: &mut Command, empty: &Path) {
+    let nothing = empty.join("nothing.json");
+    for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES", "__EGL_VENDOR_LIBRARY_FILENAMES"] {
+        view.env(variable, &nothing);
+    }
+}
+
 fn patiently<T>(what: &str, mut attempt: impl FnMut() -> Option<T>) -> T {
     let until = Instant::now() + 3 * PATIENCE;
     while Instant::now() < until {
@@ -243,4 +271,54 @@ fn without_a_display_there_is_one_line_and_exit_code_2() {
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert_eq!(said.lines().count(), 1, "{said}");
     assert!(said.starts_with("error: no window: ") && said.contains("--screenshot"), "{said}");
+}
+
+/// A window on a recording that stands still costs nothing: no picture is made, so nothing but the system's own events can wake
+/// it. Ten seconds at full size; the processor time, which other programs disturb, is printed and not asserted.
+#[test]
+fn a_window_that_nobody_touches_makes_no_picture() {
+    if !can_have_a_window() {
+        return;
+    }
+    let seconds = if std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size == "full") { "10" } else { "2" };
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let file = recording(folder.path());
+    let (_server, display) = display(folder.path());
+    let output = view(folder.path(), Some(&display)).args(["--measure", seconds]).arg(file).output();
+    let output = output.expect("it starts");
+    let (cost, said) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    eprintln!("a recording that stands still: {}", cost.trim());
+    assert!(output.status.success() && cost.starts_with("0 pictures in "), "{cost}{said}");
+}
+
+/// A display and no driver: one line that says what to install, exit code 2; pictures are made all the same, to the last bit.
+#[test]
+fn without_a_driver_there_is_one_line_and_pictures_all_the_same() {
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let file = recording(folder.path());
+    let picture = |name: &str, drivers: bool| {
+        let out = folder.path().join(name);
+        let mut view = view(folder.path(), None);
+        view.arg("--screenshot").arg(&out).arg(&file);
+        if !drivers {
+            without_drivers(&mut view, folder.path());
+        }
+        let output = view.output().expect("it starts");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        std::fs::read(&out).expect("it is there")
+    };
+    let made = picture("without.png", false);
+    assert!(made.starts_with(b"\x89PNG") && made == picture("with.png", true));
+    if !can_have_a_window() {
+        return;
+    }
+    let (_server, display) = display(folder.path());
+    let mut view = view(folder.path(), Some(&display));
+    without_drivers(&mut view, folder.path());
+    let output = view.arg(&file).output().expect("it starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert!(said.starts_with("error: no window: ") && said.contains("libgl1-mesa-dri"), "{said}");
+    assert!(said.contains("--screenshot"), "{said}");
 }

@@ -18,7 +18,8 @@ pub(super) const VIEWER: Companion<'_> =
     flotor view                                   the run that goes on in another terminal\n  \
     flotor run --clock virtual --record run.mcap && flotor view run.mcap\n  \
     flotor view --screenshot run.png run.mcap     a picture, without display or GPU\n  \
-    flotor view --screenshot run.png --at 2.5 --look light --size 1920x1200 --scale 1.5 run.mcap")]
+    flotor view --screenshot run.png --at 2.5 --look light --size 1920x1200 --scale 1.5 run.mcap\n  \
+    flotor view --measure 10 run.mcap             pictures made and processor time taken in ten seconds")]
 pub(crate) struct ViewArguments {
     /// A recording (without: the running host)
     file: Option<PathBuf>,
@@ -43,6 +44,9 @@ pub(crate) struct ViewArguments {
     /// Size of text and lines, 1 to 3 (default: 1)
     #[arg(long, value_name = "FACTOR")]
     scale: Option<String>,
+    /// Say what the window costs over so many seconds, and close it then
+    #[arg(long, value_name = "SECONDS", conflicts_with = "screenshot")]
+    measure: Option<String>,
 }
 
 pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
@@ -58,6 +62,7 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
         ("--look", &arguments.look),
         ("--size", &arguments.size),
         ("--scale", &arguments.scale),
+        ("--measure", &arguments.measure),
     ];
     for (name, value) in options {
         value.iter().for_each(|value| add(name, value.into()));

@@ -1,7 +1,7 @@
 //! What has come since the last picture, from a running host or a search for one.
 
 use super::source::{Parts, connect};
-use super::{Audience, Source, Viewer, Wanted};
+use super::{Audience, Heading, Source, Viewer, Wanted};
 use crate::camera::Camera;
 use crate::feed::{FeedState, News, STALE_AFTER};
 use crate::history::{History, Keep, Sample};
@@ -55,14 +55,16 @@ impl Viewer {
     }
 
     fn look_for(&mut self, wanted: &Wanted, context: &Context) {
-        let Ok(feed) = connect(wanted, context, self.frame) else { return };
+        let Ok(feed) = connect(wanted, context, &self.pace) else { return };
         let parts = Parts::of_host(&feed);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a minute of ticks
         let kept = ((feed.run().rate_hz * KEPT_S) as usize).clamp(1, MOST_KEPT);
         self.history = History::new(feed.run().clone(), Keep::Newest(kept));
+        self.heading = Heading::of(feed.run());
         self.limits = feed.greeting().limits;
         self.tally = Tally::default();
         self.player = Player::live();
+        self.plots.start_over();
         self.view.camera = Camera::experimenter(SceneBuilder::height_mm(&parts.shapes));
         (self.shapes, self.panels, self.missing) = (parts.shapes, parts.panels, parts.missing);
         self.shape_version += 1;

@@ -14,14 +14,14 @@ impl Viewer {
     pub(super) fn top(&mut self, ui: &mut Ui, palette: &Palette) {
         let (standing, is_well) = self.standing();
         let (title, subtitle) = match &self.source {
-            Source::Waiting(_) => ("Flotor".to_owned(), String::new()),
+            Source::Waiting(_) => ("Flotor", ""),
             // Names of parameters are nothing for a subject's eyes.
-            _ if self.audience == Audience::Subject => (String::new(), String::new()),
-            _ => (readout::title_of(self.history.run()), readout::subtitle_of(self.history.run())),
+            _ if self.audience == Audience::Subject => ("", ""),
+            _ => (self.heading.title.as_str(), self.heading.subtitle.as_str()),
         };
         let bar = TopBar {
-            title: &title,
-            subtitle: &subtitle,
+            title,
+            subtitle,
             standing: &standing,
             is_well,
             can_stop: self.source.is_running(),

@@ -10,7 +10,7 @@ mod sitting;
 mod source;
 mod words;
 
-pub use source::{Source, Wanted, connect};
+pub use source::{Pace, Source, Wanted, connect};
 
 use crate::canvas::Canvas;
 use crate::experiment::Prompt;
@@ -25,12 +25,12 @@ use crate::sound::Bell;
 use crate::tally::Tally;
 use crate::ui::plot_stack::{PlotStack, Window};
 use crate::ui::view3d::View3d;
-use crate::ui::{playback, style};
+use crate::ui::{playback, readout, style};
 use eframe::egui_wgpu::RenderState;
 use egui::{CentralPanel, Context, Frame, Margin, Panel as Edge, Ui};
 use flotor_live::{Ask, WrenchLimits};
 use flotor_record::RunDescription;
-use source::{FRAME, FRAME_ON_CPU, Parts};
+use source::{FRAME, FRAME_OF_WORDS, FRAME_ON_CPU, Parts};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -52,6 +52,7 @@ pub enum Start {
 pub struct Viewer {
     source: Source,
     history: History,
+    heading: Heading,
     shapes: Vec<Shape>,
     shape_version: u64,
     panels: Vec<Panel>,
@@ -69,8 +70,21 @@ pub struct Viewer {
     bell: Bell,
     last_look: Option<Instant>,
     frame: Duration,
+    pace: Pace,
     sitting: Option<Prompt>,
     audience: Audience,
+}
+
+/// What stands above everything: of a run, made once.
+struct Heading {
+    title: String,
+    subtitle: String,
+}
+
+impl Heading {
+    fn of(run: &RunDescription) -> Self {
+        Self { title: readout::title_of(run), subtitle: readout::subtitle_of(run) }
+    }
 }
 
 /// Who sits in front of the window.
@@ -87,9 +101,10 @@ impl Viewer {
         style::apply(context, look);
         let on_cpu =
             device.is_some_and(|state| state.adapter.get_info().device_type == wgpu::DeviceType::Cpu);
+        let frame = if on_cpu { FRAME_ON_CPU } else { FRAME };
         let (start, sitting) = match start {
             Start::Sitting(wanted, mut prompt) => {
-                prompt.open();
+                prompt.open(context);
                 (Start::Live(wanted), Some(*prompt))
             }
             other => (other, None),
@@ -110,6 +125,7 @@ impl Viewer {
         Self {
             source,
             tally: Tally::of(history.samples()),
+            heading: Heading::of(history.run()),
             history,
             shapes: parts.shapes,
             shape_version: 0,
@@ -126,7 +142,8 @@ impl Viewer {
             remark: None,
             bell: Bell::default(),
             last_look: None,
-            frame: if on_cpu { FRAME_ON_CPU } else { FRAME },
+            frame,
+            pace: Pace::of(frame),
             audience: if sitting.is_some() { Audience::Subject } else { Audience::Experimenter },
             sitting,
         }
@@ -198,6 +215,7 @@ impl Viewer {
     pub fn show(&mut self, ui: &mut Ui) {
         let palette = Palette::of(self.look);
         self.take_in(ui.ctx());
+        self.pace.set(if self.is_moving() { self.frame } else { FRAME_OF_WORDS });
         if self.sitting.is_some() {
             self.player.advance(0.0, self.history.span_s());
             self.sit(ui, &palette);
@@ -225,6 +243,14 @@ impl Viewer {
             }
         }
         CentralPanel::default().frame(plain(0, 0)).show(ui, |ui| self.middle(ui, &palette));
+    }
+
+    /// Whether anything in sight moves with the ticks that come.
+    fn is_moving(&self) -> bool {
+        match &self.sitting {
+            Some(prompt) => prompt.shows_scene(),
+            None => self.player.motion == Motion::Follow,
+        }
     }
 
     fn say(&mut self, remark: impl Into<String>) {

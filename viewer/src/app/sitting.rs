@@ -8,10 +8,6 @@ use crate::ui::view3d::Subject;
 use egui::{CentralPanel, Frame, Key, Panel as Edge, Rect, Ui, ViewportCommand};
 use flotor_live::Ask;
 use flotor_study::screen::Screen;
-use std::time::Duration;
-
-/// How often it is looked whether the experiment has said something.
-const LISTEN: Duration = Duration::from_millis(30);
 
 impl Viewer {
     /// The sitting under way, if this window is one.
@@ -22,7 +18,6 @@ impl Viewer {
 
     /// Shows the screen of a sitting, and tells the experiment what the person does.
     pub(super) fn sit(&mut self, ui: &mut Ui, palette: &Palette) {
-        ui.ctx().request_repaint_after(LISTEN);
         let is_running = self.source.is_running();
         if is_running && ui.input(|input| input.key_pressed(Key::Space)) {
             self.ask(Ask::EmergencyStop);
@@ -30,6 +25,9 @@ impl Viewer {
         let Some(mut prompt) = self.sitting.take() else { return };
         if prompt.take_in() {
             self.bell.ring();
+        }
+        if let Some(rest) = prompt.warned_for() {
+            ui.ctx().request_repaint_after(rest); // to take it out of sight again
         }
         if prompt.screen() == Some(&Screen::Over) || prompt.is_lost() {
             if ui.input(|input| input.key_pressed(Key::Enter)) {

@@ -8,11 +8,38 @@ use flotor_hal::abi::loader::Plugin;
 use flotor_live::{Client, Directory, LiveError, PanelPlugin};
 use flotor_record::RunDescription;
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 /// Between two pictures of a running host on a GPU, and on a software adapter, which needs the processor for itself.
 pub(super) const FRAME: Duration = Duration::from_millis(16);
 pub(super) const FRAME_ON_CPU: Duration = Duration::from_millis(33);
+/// The same where nothing that moves is in sight: counts and words go on.
+pub(super) const FRAME_OF_WORDS: Duration = Duration::from_millis(250);
+
+/// How soon ticks that have come are to be seen: said by the window, followed by the thread that reads them.
+#[derive(Clone, Debug)]
+pub struct Pace(Arc<AtomicU64>);
+
+impl Pace {
+    /// A picture so long after the last one.
+    #[must_use]
+    pub fn of(frame: Duration) -> Self {
+        let pace = Self(Arc::default());
+        pace.set(frame);
+        pace
+    }
+
+    /// Changes it.
+    pub fn set(&self, frame: Duration) {
+        self.0.store(u64::try_from(frame.as_millis()).unwrap_or(u64::MAX), Ordering::Relaxed);
+    }
+
+    fn frame(&self) -> Duration {
+        Duration::from_millis(self.0.load(Ordering::Relaxed))
+    }
+}
 
 /// Which run is to be watched.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -58,13 +85,13 @@ impl Source {
 ///
 /// # Errors
 /// [`LiveError`]: there is none, or it cannot be watched.
-pub fn connect(wanted: &Wanted, context: &Context, frame: Duration) -> Result<Feed, LiveError> {
-    let context = context.clone();
+pub fn connect(wanted: &Wanted, context: &Context, pace: &Pace) -> Result<Feed, LiveError> {
+    let (context, pace) = (context.clone(), pace.clone());
     let client = match wanted.process {
         Some(process) => Client::of_process(&wanted.directory, process)?,
         None => Client::find(&wanted.directory)?,
     };
-    Feed::start(client, move || context.request_repaint_after(frame))
+    Feed::start(client, move || context.request_repaint_after(pace.frame()))
 }
 
 /// Bodies and panels of a run.

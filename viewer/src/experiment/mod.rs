@@ -8,9 +8,11 @@
 pub mod screens;
 pub mod wire;
 
+use egui::Context;
 use flotor_study::screen::{Input, Question, Said, Screen, Told, WindowState};
 use flotor_study::trial::Response;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError};
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 /// What a key means.
@@ -53,6 +55,21 @@ pub struct Prompt {
     warned: Option<Instant>,
     refused: Option<String>,
     is_lost: bool,
+    waker: Waker,
+}
+
+/// Wakes the window when the experiment has said something: shared with who listens to it, and without effect until the window is
+/// open.
+#[derive(Clone, Debug, Default)]
+pub struct Waker(Arc<OnceLock<Context>>);
+
+impl Waker {
+    /// Asks for a picture.
+    pub fn wake(&self) {
+        if let Some(context) = self.0.get() {
+            context.request_repaint();
+        }
+    }
 }
 
 impl Prompt {
@@ -68,11 +85,19 @@ impl Prompt {
             warned: None,
             refused: None,
             is_lost: false,
+            waker: Waker::default(),
         }
     }
 
+    /// What is to be woken by who sends what the experiment says.
+    #[must_use]
+    pub fn waker(&self) -> Waker {
+        self.waker.clone()
+    }
+
     /// Says that the window is open.
-    pub fn open(&mut self) {
+    pub fn open(&mut self, window: &Context) {
+        let _ = self.waker.0.set(window.clone()); // a window opens once
         self.say(Said::Window { window: WindowState::Open });
     }
 
@@ -131,7 +156,13 @@ impl Prompt {
     /// Whether the handle was out of its range a moment ago.
     #[must_use]
     pub fn is_warned(&self) -> bool {
-        self.warned.is_some_and(|since| since.elapsed() < WARNED)
+        self.warned_for().is_some()
+    }
+
+    /// How much longer that stays in sight.
+    #[must_use]
+    pub fn warned_for(&self) -> Option<Duration> {
+        self.warned.and_then(|since| WARNED.checked_sub(since.elapsed()))
     }
 
     /// Why the last answer was not taken, if so.

@@ -13,6 +13,9 @@ use std::thread::Builder;
 /// There are no threads to be had.
 pub fn at_standard_streams() -> std::io::Result<Prompt> {
     let (teller, told) = channel();
+    let (said, sayer) = channel::<Said>();
+    let prompt = Prompt::new(told, said);
+    let waker = prompt.waker();
     // Both end with the process, or with the experiment.
     Builder::new().name("flotor-told".to_owned()).spawn(move || {
         for line in stdin().lock().lines().map_while(Result::ok) {
@@ -21,9 +24,11 @@ pub fn at_standard_streams() -> std::io::Result<Prompt> {
             if teller.send(word).is_err() {
                 return;
             }
+            waker.wake();
         }
+        drop(teller);
+        waker.wake(); // the experiment has gone, which the person is told
     })?;
-    let (said, sayer) = channel::<Said>();
     Builder::new().name("flotor-said".to_owned()).spawn(move || {
         let mut out = stdout();
         for word in sayer {
@@ -33,5 +38,5 @@ pub fn at_standard_streams() -> std::io::Result<Prompt> {
             }
         }
     })?;
-    Ok(Prompt::new(told, said))
+    Ok(prompt)
 }

@@ -1,12 +1,14 @@
 //! The ground: a grid that fades out, and soft shadows, so that the eye finds up, near and far.
+//!
+//! Grid and surface stand still; where the shadows fall is all that changes from picture to picture.
 
-use super::{Color, Mesh};
+use super::{Color, MM_PER_M, Mesh, Vertex};
 use flotor_hal::DVec3;
 use flotor_hal::glam::DVec2;
 use std::f64::consts::TAU;
 
 /// A round patch of the plane `z = height_m`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ground {
     /// Height of the plane, m.
     pub height_m: f64,
@@ -25,22 +27,36 @@ pub struct Ground {
 pub struct Shadow {
     /// Its middle, m.
     pub center_m: DVec2,
-    /// Where it has lost two thirds of its strength, m.
+    /// Where it has lost two thirds of its strength, m; at twice that it has gone.
     pub radius_m: f64,
     /// How dark its middle is, 0 to 1.
     pub strength: f64,
 }
 
+/// Rings and sectors of the surface: as fine as a shadow is soft.
+const RINGS: usize = 48;
+const SECTORS: usize = 96;
 /// Half the width of a grid line, part of the distance of lines.
 const LINE_HALF_WIDTH: f64 = 0.012;
 /// Lines lie this part of the distance of lines above the surface, to be in front of it.
 const LINE_LIFT: f64 = 0.002;
 
 impl Ground {
-    /// Adds surface and lines. Draw it first: what stands on it covers it.
-    pub fn append(&self, mesh: &mut Mesh, shadows: &[Shadow]) {
-        self.surface(mesh, shadows);
+    /// Adds surface and lines, without shadows. Draw it first: what stands on it covers it.
+    pub fn append(&self, mesh: &mut Mesh) {
+        self.surface(mesh);
         self.lines(mesh);
+    }
+
+    /// Lets shadows fall on a ground: on the corners that [`Ground::append`] has added, whatever fell on them before.
+    pub fn shade(&self, corners: &mut [Vertex], shadows: &[Shadow]) {
+        for corner in corners.iter_mut().take((RINGS + 1) * (SECTORS + 1)) {
+            let [x_mm, y_mm, _] = corner.position_mm.map(f64::from);
+            let at_m = DVec2::new(x_mm, y_mm) / MM_PER_M;
+            let light = shadows.iter().fold(1.0, |light, shadow| light * (1.0 - shadow.at(at_m)));
+            let [r, g, b, _] = darker(self.surface, light);
+            corner.color = [r, g, b, corner.color[3]];
+        }
     }
 
     fn fade(&self, at: DVec2) -> f64 {
@@ -49,9 +65,7 @@ impl Ground {
     }
 
     #[allow(clippy::cast_precision_loss)] // a few dozen rings
-    fn surface(&self, mesh: &mut Mesh, shadows: &[Shadow]) {
-        const RINGS: usize = 48;
-        const SECTORS: usize = 96;
+    fn surface(&self, mesh: &mut Mesh) {
         let mut last: Option<Vec<u32>> = None;
         for k in 0..=RINGS {
             // Denser in the middle, where the shadows are.
@@ -59,8 +73,7 @@ impl Ground {
             let ring: Vec<u32> = (0..=SECTORS)
                 .map(|i| {
                     let at = DVec2::from_angle(TAU * i as f64 / SECTORS as f64) * radius_m;
-                    let light = shadows.iter().fold(1.0, |light, shadow| light * (1.0 - shadow.at(at)));
-                    let color = with_opacity(darker(self.surface, light), self.fade(at));
+                    let color = with_opacity(self.surface, self.fade(at));
                     mesh.vertex(at.extend(self.height_m), DVec3::ZERO, color)
                 })
                 .collect();
@@ -104,8 +117,11 @@ impl Ground {
 }
 
 impl Shadow {
+    /// `(1 - x/4)^4` of the squared distance x in radii: close to `exp(-x)`, and nothing from two radii on.
     fn at(&self, point_m: DVec2) -> f64 {
-        self.strength * (-point_m.distance_squared(self.center_m) / self.radius_m.powi(2)).exp()
+        let left = 1.0 - 0.25 * point_m.distance_squared(self.center_m) / (self.radius_m * self.radius_m);
+        let square = left.max(0.0) * left.max(0.0);
+        self.strength * square * square
     }
 }
 

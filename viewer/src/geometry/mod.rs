@@ -23,4 +23,4 @@ pub use ground::{Ground, Shadow};
 pub use mesh::{Color, MM_PER_M, Mesh, Vertex};
 pub use revolve::{Frame, plate, revolve};
 pub use strain::{LocalStrain, Strain, contact_strain};
-pub use tube::{append_tube, wire_center};
+pub use tube::append_tube;

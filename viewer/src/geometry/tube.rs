@@ -8,11 +8,10 @@ use flotor_hal::DVec3;
 use flotor_hal::glam::DVec2;
 use std::f64::consts::TAU;
 
-/// Centre of the wire at the fraction `s` of the body, m.
-#[must_use]
-pub fn wire_center(body: &Body, curve: &Curve, s: f64) -> DVec3 {
+/// Centre of the wire at the fraction `s` of the body, where it crosses the section at `fibre`, m.
+fn wire_center(curve: &Curve, s: f64, fibre: DVec2) -> DVec3 {
     let section = curve.section(s);
-    section.center_m + section.orientation * fibre(body, s).extend(0.0)
+    section.center_m + section.orientation * fibre.extend(0.0)
 }
 
 /// Where the wire crosses the section at `s`, in the section's frame, m.
@@ -35,7 +34,9 @@ pub fn append_tube(
 ) {
     let Detail { rings, sides } = detail;
     let place = |k: usize| k as f64 / (rings - 1) as f64;
-    let centers: Vec<DVec3> = (0..rings).map(|k| wire_center(body, curve, place(k))).collect();
+    let fibres: Vec<DVec2> = (0..rings).map(|k| fibre(body, place(k))).collect();
+    let center = |(k, fibre): (usize, &DVec2)| wire_center(curve, place(k), *fibre);
+    let centers: Vec<DVec3> = fibres.iter().enumerate().map(center).collect();
     let circle: Vec<DVec2> = (0..sides).map(|i| DVec2::from_angle(TAU * i as f64 / sides as f64)).collect();
     let first = mesh.vertices.len() as u32;
     let radius_m = body.info.tube_radius_m;
@@ -45,7 +46,7 @@ pub fn append_tube(
         let carried = carry(across, tangent);
         across = Some(carried);
         let binormal = tangent.cross(carried);
-        let look = color(strain.at(place(k), fibre(body, place(k))));
+        let look = color(strain.at(place(k), fibres[k]));
         for point in &circle {
             let normal = carried * point.x + binormal * point.y;
             mesh.vertex(*center + normal * radius_m, normal, look);

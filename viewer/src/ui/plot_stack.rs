@@ -4,6 +4,7 @@ use crate::history::History;
 use crate::palette::Palette;
 use crate::player::Motion;
 use crate::quantity::{Quantity, Units};
+use crate::trace::Trace;
 use crate::ui::plots::{PlotView, plot};
 use crate::ui::style::SMALL_PT;
 use egui::{Color32, ComboBox, RichText, Role, Ui, WidgetInfo};
@@ -44,7 +45,7 @@ pub enum ExportFormat {
 }
 
 /// The traces shown.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct PlotStack {
     /// From the top.
     pub shown: Vec<Quantity>,
@@ -52,8 +53,10 @@ pub struct PlotStack {
     pub window: Window,
     /// Units of all numbers.
     pub units: Units,
-    /// End of the window while time stands still, s.
-    stands_at_s: Option<f64>,
+    /// What has been made of the history, for each quantity shown so far.
+    traces: Vec<Trace>,
+    /// End of a window that is shorter than the run, s; the newest while none has been shown.
+    end_s: f64,
     /// Where the pointer was in the last picture, s.
     hover_s: Option<f64>,
 }
@@ -62,7 +65,26 @@ impl PlotStack {
     /// Force and position.
     #[must_use]
     pub fn new(window: Window) -> Self {
-        Self { shown: FIRST_TRACES.to_vec(), window, units: Units::Handy, stands_at_s: None, hover_s: None }
+        Self {
+            shown: FIRST_TRACES.to_vec(),
+            window,
+            units: Units::Handy,
+            traces: Vec::new(),
+            end_s: f64::INFINITY,
+            hover_s: None,
+        }
+    }
+
+    /// Another run is shown from now on.
+    pub fn start_over(&mut self) {
+        self.traces.clear();
+        self.end_s = f64::INFINITY;
+    }
+
+    /// Samples looked at so far: once for each quantity, not once for each picture.
+    #[must_use]
+    pub fn visited(&self) -> u64 {
+        self.traces.iter().map(Trace::visited).sum()
     }
 
     /// First and last time shown, s.
@@ -72,7 +94,7 @@ impl PlotStack {
         match self.window {
             Window::Whole => [first_s, last_s.max(first_s + 1.0e-3)],
             Window::Newest(length_s) => {
-                let end_s = self.stands_at_s.unwrap_or(last_s);
+                let end_s = self.end_s.min(last_s);
                 [end_s - length_s, end_s]
             }
         }
@@ -87,9 +109,7 @@ impl PlotStack {
         motion: Motion,
         palette: &Palette,
     ) -> Vec<PlotWish> {
-        let [_, last_s] = history.span_s();
-        // A trace that is looked at stands still.
-        self.stands_at_s = (motion == Motion::Pause).then(|| self.stands_at_s.unwrap_or(last_s).min(last_s));
+        self.end_s = self.end_of_window(history.span_s(), now_s, motion);
         let mut wishes = Vec::new();
         ui.horizontal(|ui| self.choices(ui, palette, &mut wishes));
         let span_s = self.span_s(history);
@@ -101,12 +121,26 @@ impl PlotStack {
         for (index, quantity) in self.shown.clone().into_iter().enumerate() {
             let time_axis = index + 1 == count;
             let height = if time_axis { height + 14.0 } else { height }.max(24.0);
-            let view = PlotView { quantity, span_s, cursor_s, units: self.units, height, time_axis };
-            let answer = plot(ui, history, view, palette);
+            let view = PlotView { span_s, cursor_s, units: self.units, height, time_axis };
+            let answer = plot(ui, history, trace_of(&mut self.traces, quantity), view, palette);
             self.hover_s = self.hover_s.or(answer.hover_s);
             wishes.extend(answer.seek_s.map(PlotWish::Seek));
         }
         wishes
+    }
+
+    /// A trace that is looked at stands still, as long as the moment shown is in it and not at its edge.
+    fn end_of_window(&self, [first_s, last_s]: [f64; 2], now_s: f64, motion: Motion) -> f64 {
+        /// Part of the window between the moment and an edge.
+        const MARGIN: f64 = 0.1;
+        match (motion, self.window) {
+            (Motion::Follow, _) | (_, Window::Whole) => last_s,
+            (_, Window::Newest(length_s)) => {
+                let margin_s = MARGIN * length_s;
+                let near = self.end_s.clamp(now_s + margin_s, now_s + length_s - margin_s);
+                near.max(first_s + length_s).min(last_s)
+            }
+        }
     }
 
     fn choices(&mut self, ui: &mut Ui, palette: &Palette, wishes: &mut Vec<PlotWish>) {
@@ -175,4 +209,14 @@ impl PlotStack {
             Units::Si => Units::Handy,
         };
     }
+}
+
+/// The trace of a quantity, begun if there is none.
+fn trace_of(traces: &mut Vec<Trace>, quantity: Quantity) -> &mut Trace {
+    let known = traces.iter().position(|trace| trace.quantity() == quantity);
+    let index = known.unwrap_or_else(|| {
+        traces.push(Trace::of(quantity));
+        traces.len() - 1
+    });
+    &mut traces[index]
 }

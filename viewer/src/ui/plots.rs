@@ -1,17 +1,15 @@
 //! Traces over time.
 
-use crate::decimate::min_max;
 use crate::history::History;
 use crate::palette::Palette;
 use crate::quantity::{Quantity, Units};
+use crate::trace::Trace;
 use egui::{Stroke, Ui};
-use egui_plot::{AxisHints, GridMark, HPlacement, Line, Plot, PlotPoint, PlotPoints, VLine};
+use egui_plot::{AxisHints, GridMark, HPlacement, Line, Plot, PlotPoints, VLine};
 
 /// How a plot is shown.
 #[derive(Clone, Copy, Debug)]
 pub struct PlotView {
-    /// What is plotted.
-    pub quantity: Quantity,
     /// First and last time, s.
     pub span_s: [f64; 2],
     /// Where the time is, s.
@@ -34,21 +32,21 @@ pub struct PlotAnswer {
 }
 
 /// Shows one quantity over time. The components' names and values at the cursor stand above.
-pub fn plot(ui: &mut Ui, history: &History, view: PlotView, palette: &Palette) -> PlotAnswer {
-    let PlotView { quantity, span_s, cursor_s, units, height, time_axis } = view;
+pub fn plot(
+    ui: &mut Ui,
+    history: &History,
+    trace: &mut Trace,
+    view: PlotView,
+    palette: &Palette,
+) -> PlotAnswer {
+    let PlotView { span_s, cursor_s, units, height, time_axis } = view;
+    let quantity = trace.quantity();
     let (unit, per_si) = quantity.unit(units);
-    heading(ui, history, &view, palette);
+    heading(ui, history, quantity, &view, palette);
 
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // points
     let buckets = ui.available_width().max(50.0) as usize;
-    let traces: Vec<Vec<PlotPoint>> = (0..quantity.components().len())
-        .map(|component| {
-            let points = history.between(span_s[0], span_s[1]);
-            let points = points.map(|sample| [sample.time_s(), quantity.value(sample, component) * per_si]);
-            let points: Vec<[f64; 2]> = points.collect();
-            min_max(points.iter().copied(), span_s, buckets).into_iter().map(PlotPoint::from).collect()
-        })
-        .collect();
+    let traces = trace.points(history, span_s, buckets, per_si);
 
     let y_axis = AxisHints::new_y()
         .placement(HPlacement::Left)
@@ -82,7 +80,8 @@ pub fn plot(ui: &mut Ui, history: &History, view: PlotView, palette: &Palette) -
             plot.set_plot_bounds_x(span_s[0]..=span_s[1]);
             for (component, points) in traces.iter().enumerate() {
                 let name = quantity.components()[component];
-                let line = Line::new(name, PlotPoints::Owned(points.clone()));
+                // Two points a bucket are few enough: joined they are as wide everywhere.
+                let line = Line::new(name, PlotPoints::Borrowed(points)).allow_band(false);
                 plot.line(line.color(palette.components[component % 3]).width(1.6));
             }
             plot.vline(VLine::new("time", cursor_s).stroke(Stroke::new(1.2, palette.cursor)));
@@ -95,17 +94,17 @@ pub fn plot(ui: &mut Ui, history: &History, view: PlotView, palette: &Palette) -
     PlotAnswer { seek_s: shown.inner.map(|at| at.x).filter(|_| pressed), hover_s }
 }
 
-fn heading(ui: &mut Ui, history: &History, view: &PlotView, palette: &Palette) {
-    let (unit, per_si) = view.quantity.unit(view.units);
+fn heading(ui: &mut Ui, history: &History, quantity: Quantity, view: &PlotView, palette: &Palette) {
+    let (unit, per_si) = quantity.unit(view.units);
     ui.horizontal(|ui| {
         ui.add_space(4.0);
-        ui.strong(view.quantity.name());
+        ui.strong(quantity.name());
         ui.weak(unit);
         let sample = history.at(view.cursor_s);
-        for (component, name) in view.quantity.components().iter().enumerate() {
+        for (component, name) in quantity.components().iter().enumerate() {
             ui.add_space(10.0);
             ui.colored_label(palette.components[component % 3], *name);
-            let value = sample.map_or(f64::NAN, |sample| view.quantity.value(sample, component) * per_si);
+            let value = sample.map_or(f64::NAN, |sample| quantity.value(sample, component) * per_si);
             ui.monospace(fixed(value));
         }
     });

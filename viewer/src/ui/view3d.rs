@@ -7,6 +7,7 @@ use crate::palette::{Look, Palette};
 use crate::scene::{ArrowScale, SceneBuilder, SceneFacts, Visible};
 use crate::shape::Shape;
 use egui::{Color32, Key, PointerButton, Rect, Role, Sense, TextureId, Ui, Vec2, WidgetInfo, pos2};
+use flotor_hal::Pose;
 
 /// Turn for a drag over a point of the screen, rad.
 const ORBIT_RAD_PER_POINT: f64 = 0.008;
@@ -44,7 +45,8 @@ pub struct View3d {
 /// All that a picture depends on: equal ones are the same picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Look3d {
-    tick: u64,
+    pose: Pose,
+    wrench: [f32; 6],
     version: u64,
     camera: Camera,
     visible: Visible,
@@ -64,6 +66,12 @@ impl View3d {
             builder: SceneBuilder::default(),
             drawn: None,
         }
+    }
+
+    /// Corners of triangles put together so far: none for a picture in which nothing has moved.
+    #[must_use]
+    pub fn corners_made(&self) -> u64 {
+        self.builder.corners_made()
     }
 
     /// Shows the scene in a rectangle, follows the mouse, and says what is in the picture.
@@ -117,7 +125,16 @@ impl View3d {
         let Subject { shapes, version, sample, scale } = subject;
         let (camera, visible) = (self.camera, self.visible);
         let size = pixels(size * ui.ctx().pixels_per_point());
-        let wanted = Look3d { tick: sample.tick, version, camera, visible, size, look, scale };
+        let wanted = Look3d {
+            pose: sample.pose,
+            wrench: sample.commanded,
+            version,
+            camera,
+            visible,
+            size,
+            look,
+            scale,
+        };
         match self.drawn {
             Some((drawn, texture, facts)) if drawn == wanted => (texture, facts),
             _ => {

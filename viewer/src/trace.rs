@@ -1,0 +1,171 @@
+//! A quantity over time in as few points as can be seen, kept from picture to picture: of a run that goes on, a picture looks
+//! at the samples that are new, and at no other.
+
+use crate::decimate::{Buckets, bucket_width_s};
+use crate::history::History;
+use crate::quantity::Quantity;
+use egui_plot::PlotPoint;
+use std::ops::Range;
+
+/// The traces of a quantity's components.
+#[derive(Clone, Debug)]
+pub struct Trace {
+    quantity: Quantity,
+    components: Vec<Buckets>,
+    points: Vec<Vec<PlotPoint>>,
+    covered: Range<u64>,
+    visited: u64,
+}
+
+impl Trace {
+    /// Of a quantity of which nothing has been seen.
+    #[must_use]
+    pub fn of(quantity: Quantity) -> Self {
+        let count = quantity.components().len();
+        Self {
+            quantity,
+            components: vec![Buckets::default(); count],
+            points: vec![Vec::new(); count],
+            covered: 0..0,
+            visited: 0,
+        }
+    }
+
+    /// What is traced.
+    #[must_use]
+    pub fn quantity(&self) -> Quantity {
+        self.quantity
+    }
+
+    /// Samples looked at so far.
+    #[must_use]
+    pub fn visited(&self) -> u64 {
+        self.visited
+    }
+
+    /// Points of each component between two times, at most two for each of so many `buckets`; values times `per_si`.
+    pub fn points(
+        &mut self,
+        history: &History,
+        span_s: [f64; 2],
+        buckets: usize,
+        per_si: f64,
+    ) -> &[Vec<PlotPoint>] {
+        let width_s = bucket_width_s(span_s[1] - span_s[0], buckets);
+        let first = history.number_at(span_s[0]);
+        let is_known = self.covered.start <= first && first <= self.covered.end;
+        if !is_known || self.components.first().is_none_or(|known| known.width_s() != width_s) {
+            self.components.fill(Buckets::of_width(width_s));
+            self.covered = first..first;
+        }
+        for sample in history.from_number(self.covered.end).take_while(|sample| sample.time_s() <= span_s[1])
+        {
+            for (component, buckets) in self.components.iter_mut().enumerate() {
+                buckets.push([sample.time_s(), self.quantity.value(sample, component)]);
+            }
+            self.covered.end += 1;
+            self.visited += 1;
+        }
+        self.covered.start = first;
+        for (buckets, points) in self.components.iter_mut().zip(&mut self.points) {
+            buckets.forget_before(span_s[0]);
+            points.clear();
+            let shown = buckets.points().take_while(|[time_s, _]| *time_s <= span_s[1]);
+            points.extend(shown.map(|[time_s, value]| PlotPoint::new(time_s, value * per_si)));
+        }
+        &self.points
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::decimate::min_max;
+    use crate::history::Keep;
+    use flotor_record::trace::{RECORD_WORDS, TickRecord};
+    use flotor_record::{Clock, RunDescription};
+    use flotor_sync::Words;
+
+    const BUCKETS: usize = 100;
+
+    fn nothing(keep: Keep) -> History {
+        let run = RunDescription {
+            flotor_version: String::new(),
+            rate_hz: 1000.0,
+            duration_s: 10.0,
+            seed: 0,
+            clock: Clock::Virtual,
+            scene_toml: String::new(),
+            plugins: Vec::new(),
+            couplings: Vec::new(),
+        };
+        History::new(run, keep)
+    }
+
+    /// Ticks of a force that has no pattern.
+    fn push(history: &mut History, ticks: Range<u64>) {
+        for tick in ticks {
+            let mut record = TickRecord::from_words(&[0; RECORD_WORDS]);
+            record.tick = tick;
+            record.time_ns = tick * 1_000_000;
+            record.commanded.force_n = [(tick * 7919 % 1009) as f64, -(tick as f64), 0.0];
+            history.push(&record);
+        }
+    }
+
+    /// What a trace that has seen nothing before makes of it.
+    fn afresh(history: &History, span_s: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
+        let component = |k: usize| {
+            let samples = history.between(span_s[0], span_s[1]);
+            let points: Vec<_> = samples.map(|s| [s.time_s(), 2.0 * Quantity::Force.value(s, k)]).collect();
+            min_max(points.iter().copied(), span_s, BUCKETS)
+        };
+        (0..3).map(component).collect()
+    }
+
+    fn shown(trace: &mut Trace, history: &History, span_s: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
+        let points = trace.points(history, span_s, BUCKETS, 2.0);
+        points.iter().map(|points| points.iter().map(|point| [point.x, point.y]).collect()).collect()
+    }
+
+    /// A bucket at the left edge may still know of samples that have left the picture.
+    fn inside(points: Vec<Vec<[f64; 2]>>, from_s: f64) -> Vec<Vec<[f64; 2]>> {
+        points
+            .into_iter()
+            .map(|points| points.into_iter().filter(|point| point[0] > from_s).collect())
+            .collect()
+    }
+
+    #[test]
+    fn a_trace_that_scrolls_is_the_one_made_afresh_and_looks_at_each_sample_once() {
+        let (mut history, mut trace) = (nothing(Keep::Newest(5000)), Trace::of(Quantity::Force));
+        let mut ticks = 0;
+        for new in [3000, 16, 1, 0, 17, 900, 4000, 333] {
+            push(&mut history, ticks..ticks + new);
+            ticks += new;
+            let end_s = history.span_s()[1];
+            let span_s = [end_s - 2.0, end_s];
+            let edge_s = span_s[0] + 2.0 * bucket_width_s(2.0, BUCKETS);
+            assert_eq!(
+                inside(shown(&mut trace, &history, span_s), edge_s),
+                inside(afresh(&history, span_s), edge_s)
+            );
+        }
+        // Of the first 3000, and of the 4000 at once, only what is in the picture.
+        assert_eq!(trace.visited(), 2001 + 16 + 1 + 17 + 900 + 2001 + 333);
+        assert_eq!(shown(&mut trace, &history, [7.0, 8.2]), shown(&mut trace, &history, [7.0, 8.2]));
+    }
+
+    #[test]
+    fn another_place_or_length_of_time_begins_again() {
+        let mut history = nothing(Keep::All);
+        push(&mut history, 0..10_000);
+        let mut trace = Trace::of(Quantity::Force);
+        for span_s in [[5.0, 8.0], [0.5, 3.5], [0.0, 9.999], [9.0, 9.5], [2.0, 5.0]] {
+            assert_eq!(shown(&mut trace, &history, span_s), afresh(&history, span_s), "{span_s:?}");
+            let seen = trace.visited();
+            let _ = shown(&mut trace, &history, span_s);
+            assert_eq!(trace.visited(), seen, "the same picture again");
+        }
+    }
+}
