@@ -34,6 +34,8 @@ mod detail;
 mod device;
 mod field;
 mod frame;
+#[cfg(feature = "instructions")]
+pub mod instructions;
 mod model;
 mod pacing;
 mod parameter;

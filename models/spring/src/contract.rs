@@ -1,8 +1,7 @@
 //! Between the contract's types and those of the laws.
 
-use flotor_hal::{Input, Output, StepStatus, Wrench};
+use flotor_hal::{Input, Output, StepStatus, Wrench, instructions};
 
-use crate::instructions;
 use crate::pose::Pose;
 use crate::response::{Demand, Law, Response};
 use crate::validity::Validity;

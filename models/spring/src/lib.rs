@@ -3,8 +3,7 @@
 //! One idea a module, from the wire to the wrench:
 //! - [`rigidity`]: wire and coil become the rigidities of an equivalent rod; [`preset`]: springs with names.
 //! - [`pose`]: where the upper plate is; [`response`], [`validity`]: what a law answers.
-//! - [`real`]: formulas written once, for one pose and for several side by side; [`batch`] runs them over many, and
-//!   `instructions` one of them, as fast as the machine can.
+//! - [`real`]: formulas written once, for one pose and for several side by side; [`batch`] runs them over many.
 //! - [`entire`] and [`beam_column`]: the functions of the compressed rod, without branches or poles of their own.
 //! - [`thesis`]: the thesis's printed code with every branch, window and jump, for comparison.
 //! - [`closed_form`]: the thesis's printed law, regularised, and its current-length correction. [`arctangent`] gives
@@ -34,7 +33,6 @@ pub mod energy;
 pub mod entire;
 pub mod hand_over;
 pub mod held;
-mod instructions;
 pub mod level;
 mod parameters;
 mod plugin;

@@ -1,8 +1,8 @@
 //! What a law is asked for and what it answers.
 
 use flotor_hal::glam::DVec3;
+use flotor_hal::instructions;
 
-use crate::instructions;
 use crate::pose::{Coordinates, Pose};
 use crate::real::{Real, Vector};
 use crate::validity::Validity;

@@ -10,6 +10,7 @@
 //! (pseudo-transient continuation, the damped flow); Morse index by inertia, see [`super::matrix`].
 
 use flotor_hal::glam::{DVec2, DVec3};
+use flotor_hal::instructions;
 
 use super::curve::Curve;
 use super::functional::{Curvature, Functional, Ratios, Reaction, Shape, Value, joined};
@@ -17,7 +18,6 @@ use super::matrix::{Factored, added, dot, length, product};
 use super::plate::{Plate, or_zero};
 use super::predictor::History;
 use super::start;
-use crate::instructions;
 use crate::pose::Pose;
 use crate::response::Demand;
 use crate::rigidity::Spring;

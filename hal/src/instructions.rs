@@ -1,18 +1,17 @@
-//! Formulas in the instructions of the machine at hand, decided when the program runs.
+//! Code in the instructions of the machine at hand, decided when the program runs (feature `instructions`).
 //!
 //! What compilers assume of an x86-64 has instructions of two operands, and the result overwrites one of them: half of a
 //! law's instructions there only carry numbers out of its way. Those of AVX2 have three operands, and room for four
 //! numbers side by side. They round alike, and Rust never fuses a product with a sum: the *same bits*, only sooner.
-//! [`crate::batch`] does it for many poses; this is for one.
 
-/// Evaluates a formula with the best instructions there are. What it calls has to be inlined to gain by it.
+/// Runs code with the best instructions there are. What it calls has to be inlined to gain by it.
 ///
 /// Real-time: bounded, no allocation. The machine is asked once, afterwards it is a load and a branch.
 #[inline(always)]
-pub(crate) fn best<T>(formula: impl FnOnce() -> T) -> T {
+pub fn best<T>(code: impl FnOnce() -> T) -> T {
     #[cfg(target_arch = "x86_64")]
     if let Some(avx2) = pulp::x86::V3::try_new() {
-        return avx2.vectorize(formula);
+        return avx2.vectorize(code);
     }
-    formula()
+    code()
 }
