@@ -261,6 +261,7 @@ impl Plant {
 
     /// Pose and velocity now. Real-time: bounded, no allocation.
     #[must_use]
+    #[inline(always)]
     pub fn state(&self) -> State {
         self.motion.state()
     }
@@ -272,6 +273,7 @@ impl Plant {
 
     /// Mechanical energy of the flotor now. Real-time: bounded, no allocation.
     #[must_use]
+    #[inline(always)]
     pub fn energy(&self) -> MechanicalEnergy {
         self.free.body().energy(&self.motion)
     }
@@ -284,6 +286,7 @@ impl Plant {
     ///
     /// Real-time: bounded, no allocation. A piece other than the nominal one and its predecessor costs a new
     /// set of response functions.
+    #[inline(always)]
     pub fn advance(&mut self, piece_ns: u64, coils: &Wrench, hand: Option<&Intention>) -> Outcome {
         let piece_ns = piece_ns.min(MAX_PIECE_NS);
         let contact = hand.map_or(Contact::NONE, Contact::with);

@@ -121,17 +121,23 @@ impl Simulation {
     /// Splitting a tick changes nothing but rounding in translation and the Runge-Kutta error in rotation.
     /// Total: a wrench that is not finite counts as none. Real-time: bounded, no allocation.
     pub fn advance(&mut self, dt_ns: u64, coils: Wrench) -> Incidents {
+        self.advance_under(dt_ns, &coils)
+    }
+
+    /// [`Self::advance`] with a wrench that stays where it is: a copy would have to be in memory before the motion starts.
+    #[inline(always)]
+    pub(crate) fn advance_under(&mut self, dt_ns: u64, coils: &Wrench) -> Incidents {
         let mut incidents = Incidents {
             wrench_rejected: !coils.is_finite(),
             cut_short: dt_ns > MAX_ADVANCE_NS,
             ..Incidents::default()
         };
-        let coils = if incidents.wrench_rejected { Wrench::ZERO } else { coils };
+        let coils = if incidents.wrench_rejected { &Wrench::ZERO } else { coils };
         let end_ns = self.time_ns.saturating_add(dt_ns.min(MAX_ADVANCE_NS));
         while self.time_ns < end_ns {
             let piece_ns = self.piece_end_ns(end_ns) - self.time_ns;
             let intention = self.drawn_intention();
-            match self.plant.advance(piece_ns, &coils, intention.as_ref()) {
+            match self.plant.advance(piece_ns, coils, intention.as_ref()) {
                 Outcome::Moved(work) => self.ledger.book(work, self.plant.energy()),
                 Outcome::Stopped => {
                     incidents.stopped = true;
@@ -182,6 +188,7 @@ impl Simulation {
     }
 
     /// End of the piece that starts now: the tick's end, the next grid point, or the moment the hand lets go.
+    #[inline(always)]
     fn piece_end_ns(&self, tick_end_ns: u64) -> u64 {
         let grid_ns = (self.time_ns / GRID_NS + 1).saturating_mul(GRID_NS);
         let end_ns = tick_end_ns.min(grid_ns);
@@ -192,16 +199,20 @@ impl Simulation {
     }
 
     /// The intention now as drawn through the grid; nothing while the hand is off the handle.
+    #[inline(always)]
     fn drawn_intention(&mut self) -> Option<Intention> {
         let trajectory = &self.setup.hand.trajectory;
         if trajectory.release_ns().is_some_and(|release_ns| self.time_ns >= release_ns) {
             return None;
         }
         let index = self.time_ns / GRID_NS;
-        if self.stroke.index != Some(index) {
-            self.stroke = Stroke::after(&self.stroke, index, trajectory, &self.wavering);
-        }
-        self.stroke.drawn(self.time_ns % GRID_NS)
+        let stroke = if self.stroke.index == Some(index) {
+            self.stroke
+        } else {
+            Stroke::after(&self.stroke, index, trajectory, &self.wavering)
+        };
+        self.stroke = stroke;
+        stroke.drawn(self.time_ns % GRID_NS)
     }
 }
 
@@ -223,22 +234,31 @@ struct Stroke {
 
 impl Stroke {
     /// Stroke number `index`. Consecutive strokes share a grid point, which is evaluated once.
+    #[inline(always)]
     fn after(previous: &Self, index: u64, trajectory: &Trajectory, wavering: &Wavering) -> Self {
-        let at = |index: u64| {
-            let time_ns = index.saturating_mul(GRID_NS);
-            trajectory.aim(time_ns).map(|aim| wavered(&aim, wavering, seconds(time_ns)))
-        };
         let follows = previous.index.is_some_and(|before| before.checked_add(1) == Some(index));
-        Self {
-            index: Some(index),
-            start: if follows { previous.end } else { at(index) },
-            end: at(index.saturating_add(1)),
-        }
+        let start = if follows { previous.end } else { Self::first_aim(index, trajectory, wavering) };
+        let end = Self::aim(index.saturating_add(1), trajectory, wavering);
+        Self { index: Some(index), start, end }
+    }
+
+    /// What an unsteady hand aims at at a grid point.
+    #[inline(always)]
+    fn aim(index: u64, trajectory: &Trajectory, wavering: &Wavering) -> Option<Aim> {
+        let time_ns = index.saturating_mul(GRID_NS);
+        let aim = trajectory.aim(time_ns)?;
+        Some(wavered(&aim, wavering, seconds(time_ns)))
+    }
+
+    #[cold] // all others are the end of the stroke before
+    fn first_aim(index: u64, trajectory: &Trajectory, wavering: &Wavering) -> Option<Aim> {
+        Self::aim(index, trajectory, wavering)
     }
 
     /// The aim `elapsed_ns` after the start of the stroke, drawn straight to its end: position on the chord with
     /// its slope as velocity; orientation and force, which the plant takes as constant, halfway. Where the hand
     /// lets go before the end it stays.
+    #[inline(always)]
     fn drawn(&self, elapsed_ns: u64) -> Option<Intention> {
         let start = self.start?;
         let end = self.end.unwrap_or(start);
@@ -259,11 +279,13 @@ impl Stroke {
 }
 
 /// An aim as an unsteady hand has it.
+#[inline(always)]
 fn wavered(aim: &Aim, wavering: &Wavering, time_s: f64) -> Aim {
     let pose = Pose { position_m: aim.pose.position_m + wavering.offset_m(time_s), ..aim.pose };
     Aim { pose, force_n: wavering.force_n(aim.force_n, time_s), ..*aim }
 }
 
+#[inline(always)]
 fn seconds(time_ns: u64) -> f64 {
     time_ns as f64 * 1.0e-9
 }

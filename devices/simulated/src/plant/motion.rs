@@ -37,6 +37,7 @@ impl Motion {
     }
 
     /// What the outside sees. Real-time: bounded, no allocation.
+    #[inline(always)]
     pub(super) fn state(&self) -> State {
         State {
             position_m: self.position_m,
@@ -52,6 +53,7 @@ impl Motion {
     }
 
     /// False for NaN as well. Real-time: bounded, no allocation.
+    #[inline(always)]
     pub(super) fn is_physical(&self) -> bool {
         let within = |v: DVec3| v.length_squared() <= PHYSICAL_LIMIT * PHYSICAL_LIMIT;
         within(self.position_m)
@@ -61,6 +63,7 @@ impl Motion {
     }
 
     /// The same motion with what is negligible set to zero. Real-time: bounded, no allocation.
+    #[inline(always)]
     pub(super) fn settled(&self) -> Self {
         let settle = |x: f64| if x.abs() < NEGLIGIBLE { 0.0 } else { x };
         let q = self.orientation;
@@ -124,6 +127,7 @@ impl Contact {
     };
 
     /// Of a hand with an intention. Real-time: bounded, no allocation.
+    #[inline(always)]
     pub(super) fn with(intention: &Intention) -> Self {
         Self {
             intended_m: intention.position_m,
@@ -135,6 +139,7 @@ impl Contact {
     }
 
     /// The same hand `time_s` later. Real-time: bounded, no allocation.
+    #[inline(always)]
     pub(super) fn later(&self, time_s: f64) -> Self {
         Self { intended_m: self.intended_m + self.pace_m_per_s * time_s, ..*self }
     }

@@ -84,6 +84,7 @@ impl Scheme {
     }
 
     /// Moves on by `piece_ns`; gives the new motion and the work done. Real-time: bounded, no allocation.
+    #[inline(always)]
     pub(super) fn advance(
         &mut self,
         from: &Motion,
@@ -95,9 +96,12 @@ impl Scheme {
             return (*from, Work::default());
         }
         let (body, table) = self.prepared(piece_ns);
-        let straight = table.straight.march(from, contact, |contact, motion| {
-            Step::new(body, &table.straight, coils, contact, motion).straight()
-        });
+        let straight = table.straight.march(
+            from,
+            contact,
+            #[inline(always)]
+            |contact, motion| Step::new(body, &table.straight, coils, contact, motion).straight(),
+        );
         let (motion, work) = match straight {
             Some(done) => done,
             None => table
@@ -111,6 +115,7 @@ impl Scheme {
     }
 
     /// The body and the table for a piece of `piece_ns`, computed unless it is at hand.
+    #[inline(always)]
     fn prepared(&mut self, piece_ns: u64) -> (&Body, &Table) {
         if piece_ns == self.nominal.piece_ns {
             return (&self.body, &self.nominal);
@@ -168,12 +173,15 @@ impl Grid {
         mut contact: Contact,
         step: impl Fn(&Contact, &Motion) -> Option<(Motion, Work)>,
     ) -> Option<(Motion, Work)> {
-        let (mut motion, mut work) = step(&contact, from)?;
-        for _ in 1..self.steps {
-            contact = contact.later(self.step_s);
+        let (mut motion, mut work) = (*from, Work::default());
+        // One place from which `step` is called: it has to be inlined.
+        for left in (0..self.steps).rev() {
             let (next, done) = step(&contact, &motion)?;
             motion = next;
             work += done;
+            if left > 0 {
+                contact = contact.later(self.step_s);
+            }
         }
         Some((motion, work))
     }

@@ -26,6 +26,7 @@ use super::translation::Drive;
 use super::{Wrench, rotation};
 use crate::ledger::Work;
 use flotor_hal::glam::{DQuat, DVec3};
+use flotor_hal::instructions;
 
 /// One step: everything that is fixed during it.
 pub(super) struct Step<'a> {
@@ -107,7 +108,7 @@ impl<'a> Step<'a> {
 
     /// True if the flotor does not turn and nothing turns it during the step: neither coils nor hand by a
     /// torque, nor any force by passing beside the centre of mass.
-    #[inline]
+    #[inline(always)]
     fn is_balanced(&self, drive: &Drive) -> bool {
         let (body, start) = (self.body, self.start);
         let twisted = body.hand.rotational_stiffness_nm_per_rad != 0.0
@@ -128,6 +129,14 @@ impl<'a> Step<'a> {
     /// The motion at the end and the work done, whatever turns. Real-time: bounded, no allocation.
     #[inline(never)] // keeps the straight step, in whose place it would be inlined, small
     pub(super) fn turning(&self) -> (Motion, Work) {
+        instructions::best(
+            #[inline(always)]
+            || self.turn(),
+        )
+    }
+
+    #[inline(always)] // into what chooses the instructions
+    fn turn(&self) -> (Motion, Work) {
         let swing = Swing::new(self.start.orientation, self.start.spin_rad_per_s, self.body.centre_of_mass_m);
         let drive = self.drive(self.start.velocity_m_per_s + swing.velocity);
         let mut slopes = [Unknowns::ZERO; STAGES];
@@ -143,7 +152,7 @@ impl<'a> Step<'a> {
     }
 
     /// The unknowns at the start, moved on along each slope by a share of the step.
-    #[inline]
+    #[inline(always)]
     fn moved_on(&self, slopes: &[Unknowns; STAGES], shares: &[f64]) -> Unknowns {
         let mut at = Unknowns {
             orientation: self.start.orientation,
@@ -159,7 +168,7 @@ impl<'a> Step<'a> {
     }
 
     /// What drives the oscillator from a velocity of the centre of mass, m/s.
-    #[inline]
+    #[inline(always)]
     fn drive(&self, velocity: DVec3) -> Drive {
         let body = self.body;
         Drive {
@@ -172,13 +181,13 @@ impl<'a> Step<'a> {
     /// Force at the origin while nothing has moved and nothing moves, device frame, N. The lift, which acts at
     /// the flotor's centre of mass, is in it as the force at the origin that turns the body just as much (law
     /// of the lever).
-    #[inline]
+    #[inline(always)]
     fn still_force(&self) -> DVec3 {
         self.pull - self.body.lift_n * self.body.lift_lever
     }
 
     /// Derivatives at a stage, and the power that rotation adds there.
-    #[inline]
+    #[inline(always)]
     fn slope(&self, drive: &Drive, start: &Swing, node: &Node, at: &Unknowns) -> (Unknowns, Power) {
         let body = self.body;
         let Node { time_s, later, earlier } = node;
@@ -223,7 +232,7 @@ impl<'a> Step<'a> {
     }
 
     /// From the unknowns at the end back to the motion of the origin, with the works.
-    #[inline]
+    #[inline(always)]
     fn finish(&self, drive: &Drive, start: &Swing, end: &Unknowns, power: &Power) -> (Motion, Work) {
         let body = self.body;
         let orientation = end.orientation.normalize();
