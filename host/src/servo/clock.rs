@@ -78,14 +78,11 @@ pub(crate) struct Due {
     pub(crate) lateness_ns: Option<u64>,
     /// Ticks skipped just before it.
     pub(crate) missed: u64,
-    /// When it starts on the machine's clock, ns, if anybody has looked.
-    pub(crate) started_ns: Option<u64>,
 }
 
 /// How a wait ended on the machine's clock.
 #[derive(Clone, Copy)]
 struct Woken {
-    now_ns: u64,
     /// After the deadline of the first period that has not passed.
     late_ns: u64,
     /// Whole periods that passed before it, or samples nobody read.
@@ -134,12 +131,7 @@ impl Schedule {
         self.last_slot = self.slot;
         self.slot += 1;
         self.next_index += 1;
-        Some(Due {
-            tick,
-            lateness_ns: woken.map(|woken| woken.late_ns),
-            missed,
-            started_ns: woken.map(|woken| woken.now_ns),
-        })
+        Some(Due { tick, lateness_ns: woken.map(|woken| woken.late_ns), missed })
     }
 
     /// How long a tick waits for a sample. After that it runs without one: force has to fade out even if the device
@@ -161,7 +153,7 @@ impl Schedule {
         let late = now - deadline;
         // Whole periods that have passed belong to ticks that nobody can use any more.
         let missed = late / self.period_ns;
-        Woken { now_ns: now, late_ns: late - missed * self.period_ns, missed }
+        Woken { late_ns: late - missed * self.period_ns, missed }
     }
 
     /// A tick that a sample began, or that waited for one in vain.
@@ -178,7 +170,7 @@ impl Schedule {
         let now_ns = monotonic_ns();
         self.pace = Pace::Device { last_ns: now_ns };
         let late_ns = now_ns.saturating_sub(last_ns + periods * self.period_ns);
-        Some(Woken { now_ns, late_ns, missed: periods - 1 })
+        Some(Woken { late_ns, missed: periods - 1 })
     }
 
     /// Waits for the end of the last tick's period; time since the start, ns.

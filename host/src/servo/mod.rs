@@ -21,6 +21,7 @@ mod realtime;
 mod state;
 mod station;
 mod stop;
+mod stopwatch;
 mod timing;
 mod watchdog;
 
@@ -52,6 +53,7 @@ use crate::trace::{Events, TickRecord};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::ActiveDevice;
 use flotor_hal::{DVec3, Fault, Tick};
+use stopwatch::{Moment, Stopwatch};
 use timing::STAGE_SAMPLING;
 
 /// What the run itself is told, beside device, models and envelope.
@@ -77,8 +79,9 @@ pub(crate) struct Servo {
     heart: Heartbeat,
     run: RunState,
     timing: Timing,
-    /// When the last tick ended, ns, if nothing else has happened since.
-    ended_ns: Option<u64>,
+    stopwatch: Stopwatch,
+    /// When the last tick ended, if nothing else has happened since.
+    ended: Option<Moment>,
 }
 
 /// What is known after a tick, beside the ports.
@@ -107,7 +110,8 @@ impl Servo {
             heart: Heartbeat::default(),
             run: RunState::START,
             timing: Timing::default(),
-            ended_ns: None,
+            stopwatch: Stopwatch::new(),
+            ended: None,
         }
     }
 
@@ -144,40 +148,41 @@ impl Servo {
     /// All of a tick but its records.
     fn advance(&mut self, due: &Due, stop: &StopSwitch) -> Done {
         let Due { tick, lateness_ns, missed, .. } = due;
-        let started = due.started_ns.or(self.ended_ns).unwrap_or_else(monotonic_ns);
+        let started = self.ended.take().unwrap_or_else(|| self.stopwatch.now());
         let mut watch = StageWatch::start(tick.index, started);
         let mut events = if *missed > 0 { Events::MISSED } else { Events::NONE };
 
         self.change_parameters(tick, &mut events);
         let sample = self.read(tick);
         self.follow(sample, tick, stop, &mut events);
-        watch.lap(&mut self.timing, Stage::Read);
+        watch.lap(&self.stopwatch, &mut self.timing, Stage::Read);
 
         self.forces.step(tick, &mut self.ports, &self.heart);
-        watch.lap(&mut self.timing, Stage::Models);
+        watch.lap(&self.stopwatch, &mut self.timing, Stage::Models);
 
         let gate = self.run.gate(tick.time_ns, self.config.ramp_ns);
         for (station, port) in self.stations.iter_mut().zip(&mut self.ports) {
             station.limit(tick, gate, port);
         }
-        watch.lap(&mut self.timing, Stage::Envelope);
+        watch.lap(&self.stopwatch, &mut self.timing, Stage::Envelope);
 
         self.write(tick);
         self.heart.enter(tick.index, Place::Waiting);
-        watch.lap(&mut self.timing, Stage::Write);
+        watch.lap(&self.stopwatch, &mut self.timing, Stage::Write);
 
-        let ended = monotonic_ns();
-        self.ended_ns = Some(ended);
-        let compute_ns = ended - started;
+        let ended = self.stopwatch.now();
+        // Between two ticks on the machine's clock there is a wait.
+        self.ended = lateness_ns.is_none().then_some(ended);
+        let compute_ns = self.stopwatch.between_ns(started, ended);
         self.account(*lateness_ns, compute_ns, *missed);
         Done { events, compute_ns }
     }
 
     /// Something else than a tick has happened since the last one. Between two ticks on the virtual clock there is nothing
-    /// but the record of the first: one look at the machine's clock ends the one and begins the other.
+    /// but the record of the first: one look at the stopwatch ends the one and begins the other.
     #[inline]
     pub(crate) fn pause(&mut self) {
-        self.ended_ns = None;
+        self.ended = None;
     }
 
     /// What was to change before this tick does so now. Nearly always that is nothing.
@@ -331,21 +336,21 @@ const fn badness(sample: RunEvent) -> u8 {
 
 /// Times the stages of every [`STAGE_SAMPLING`]th tick.
 struct StageWatch {
-    last_ns: Option<u64>,
+    last: Option<Moment>,
 }
 
 impl StageWatch {
     #[inline]
-    fn start(tick: u64, now_ns: u64) -> Self {
-        Self { last_ns: tick.is_multiple_of(STAGE_SAMPLING).then_some(now_ns) }
+    fn start(tick: u64, now: Moment) -> Self {
+        Self { last: tick.is_multiple_of(STAGE_SAMPLING).then_some(now) }
     }
 
     #[inline]
-    fn lap(&mut self, timing: &mut Timing, stage: Stage) {
-        if let Some(last_ns) = self.last_ns {
-            let now_ns = monotonic_ns();
-            timing.stage(stage, now_ns - last_ns);
-            self.last_ns = Some(now_ns);
+    fn lap(&mut self, stopwatch: &Stopwatch, timing: &mut Timing, stage: Stage) {
+        if let Some(last) = self.last {
+            let now = stopwatch.now();
+            timing.stage(stage, stopwatch.between_ns(last, now));
+            self.last = Some(now);
         }
     }
 }
