@@ -201,10 +201,21 @@ pub fn orientation_from_rotation_vector(rotation_rad: DVec3) -> DQuat {
     DQuat::from_xyzw(xyz.x, xyz.y, xyz.z, (0.5 * angle_rad).cos())
 }
 
-/// All are looked at, whatever the first ones are: that is a few vector instructions, not a branch for each.
+/// A number less itself is 0 if it is finite and NaN if not, and so is a sum of such differences: that is a few vector
+/// instructions, not a branch for each.
 #[inline]
-fn all_finite(values: &[f64]) -> bool {
-    values.iter().fold(true, |all, value| all & value.is_finite())
+#[allow(clippy::eq_op)] // that is the point of it
+fn all_finite<const N: usize>(values: &[f64; N]) -> bool {
+    let [mut even, mut odd] = [0.0; 2];
+    let (pairs, rest) = values.as_chunks::<2>();
+    for [first, second] in pairs {
+        even += first - first;
+        odd += second - second;
+    }
+    for last in rest {
+        even += last - last;
+    }
+    even + odd == 0.0
 }
 
 #[cfg(test)]

@@ -79,7 +79,7 @@ impl Turn {
     }
 
     /// A vector of the device frame in the model frame.
-    #[inline]
+    #[inline(always)]
     fn there(self, vector: DVec3) -> DVec3 {
         match self {
             Self::None => vector,
@@ -88,7 +88,7 @@ impl Turn {
     }
 
     /// A vector of the model frame in the device frame.
-    #[inline]
+    #[inline(always)]
     fn back(self, vector: DVec3) -> DVec3 {
         match self {
             Self::None => vector,
@@ -97,7 +97,7 @@ impl Turn {
     }
 
     /// A rotation of the device frame in the model frame.
-    #[inline]
+    #[inline(always)]
     fn rotation_there(self, turned: DQuat) -> DQuat {
         match self {
             Self::None => turned,
@@ -158,7 +158,7 @@ impl Mapping {
     }
 
     /// Pose in the model frame. Real-time: bounded, no allocation.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn pose_to_model(&self, pose: &Pose) -> Pose {
         let turn = self.model_from_device;
@@ -197,7 +197,7 @@ impl Mapping {
     }
 
     /// Twist in the model frame. Real-time: bounded, no allocation.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn twist_to_model(&self, twist: &Twist) -> Twist {
         let turn = self.model_from_device;
@@ -205,7 +205,7 @@ impl Mapping {
     }
 
     /// Wrench in the device frame. Real-time: bounded, no allocation.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn wrench_to_device(&self, wrench: &Wrench) -> Wrench {
         let turn = self.model_from_device;

@@ -34,13 +34,15 @@ impl BoundaryWall {
     /// allocation.
     #[inline]
     pub(super) fn push(&self, state: &DeviceState) -> Option<Wrench> {
-        let position_m = state.pose.position();
+        if self.surely_holds(state) { None } else { self.push_outside(state) }
+    }
+
+    /// True only inside. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn surely_holds(&self, state: &DeviceState) -> bool {
         // A rotation vector is the axis times the angle, which is at most pi times the sine of its half.
         let at_most_rad = state.pose.orientation().xyz() * PI;
-        if self.position.surely_holds(position_m) && self.rotation.surely_holds(at_most_rad) {
-            return None;
-        }
-        self.push_outside(state)
+        self.position.surely_holds(state.pose.position()) && self.rotation.surely_holds(at_most_rad)
     }
 
     #[cold]

@@ -19,8 +19,8 @@ pub(crate) enum Engine {
 /// What came of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Stepped {
-    /// An answer, not looked at yet.
-    Answered(Output),
+    /// There is an answer, not looked at yet.
+    Answered,
     /// None in time; there may be one in a later tick.
     Late,
     /// The model broke: it panicked, or answered outside the contract.
@@ -30,25 +30,25 @@ pub(crate) enum Stepped {
 }
 
 impl Engine {
-    /// One step. Real-time: bounded by the model or its patience, no allocation.
+    /// One step; `output` is only meaningful for [`Stepped::Answered`]. Real-time: bounded by the model or its patience, no
+    /// allocation.
     #[inline]
-    pub(crate) fn step(&mut self, input: &Input) -> Stepped {
-        let answered = |status, output| match status {
-            CallStatus::Ok => Stepped::Answered(output),
+    pub(crate) fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
+        let answered = |status| match status {
+            CallStatus::Ok => Stepped::Answered,
             _ => Stepped::Broken,
         };
         match self {
-            Self::Here(model) => {
-                let mut output = Output::default();
-                let status = model.step(input, &mut output);
-                answered(status, output)
-            }
+            Self::Here(model) => answered(model.step(input, output)),
             Self::Apart(worker) => match worker.step(input) {
-                Reply::Answered((status, output)) => answered(status, output),
+                Reply::Answered((status, answer)) => {
+                    *output = answer;
+                    answered(status)
+                }
                 Reply::Late => Stepped::Late,
                 Reply::Gone => Stepped::Gone,
             },
-            Self::Beside(model) => model.step(input),
+            Self::Beside(model) => model.step(input, output),
         }
     }
 

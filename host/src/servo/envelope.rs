@@ -78,7 +78,10 @@ impl Envelope {
     }
 
     /// The wrench that goes to the device for what the models ask. Real-time: bounded, no allocation.
-    #[inline]
+    ///
+    /// Nearly every tick is within all limits. That is found out by comparisons alone, with nothing written to memory on
+    /// the way; any doubt leads through all stages.
+    #[inline(always)] // so that the wrench comes in registers, not as bytes just written
     pub fn apply(
         &mut self,
         request: &Wrench,
@@ -88,8 +91,50 @@ impl Envelope {
         events: &mut Events,
     ) -> Wrench {
         self.passivity.observe(state, &self.last);
+        let safe = match self.within_limits(request, gate, state, tick) {
+            Some(gated) => gated,
+            None => self.through_all_stages(*request, gate, state, tick, events),
+        };
+        self.last = safe;
+        safe
+    }
+
+    /// What the gate lets pass, if no stage after it would change it or tell anything about it.
+    #[inline(always)]
+    fn within_limits(
+        &self,
+        request: &Wrench,
+        gate: Gate,
+        state: &DeviceState,
+        tick: &Tick,
+    ) -> Option<Wrench> {
+        let gated = *request * gate.models;
+        let (force, torque) = (gated.force(), gated.torque());
+        let [force_n, torque_nm] = self.most_change(tick);
+        // A request that is not finite is not so behind the gate either.
+        let passes = gated.is_finite()
+            && self.passivity.only_observes()
+            && is_within(state.twist.linear(), self.velocity_m_per_s)
+            && is_within(state.twist.angular(), self.angular_velocity_rad_per_s)
+            && self.wall.surely_holds(state)
+            && is_within(force, self.max_force_n)
+            && is_within(torque, self.max_torque_nm)
+            && step_short_of(self.last.force(), force, force_n).is_none()
+            && step_short_of(self.last.torque(), torque, torque_nm).is_none();
+        passes.then_some(gated)
+    }
+
+    #[inline(never)]
+    fn through_all_stages(
+        &mut self,
+        request: Wrench,
+        gate: Gate,
+        state: &DeviceState,
+        tick: &Tick,
+        events: &mut Events,
+    ) -> Wrench {
         let guarded = if request.is_finite() {
-            *request
+            request
         } else {
             events.insert(Events::NOT_FINITE);
             Wrench::ZERO
@@ -113,9 +158,7 @@ impl Envelope {
                 self.limit(&less, events)
             }
         };
-        let safe = self.slew(&limited, tick, events);
-        self.last = safe;
-        safe
+        self.slew(&limited, tick, events)
     }
 
     /// Energy the hand has put into the device's port so far less what has come out, J; negative: the loop has created
@@ -131,7 +174,7 @@ impl Envelope {
     fn limit_speed(&self, wrench: &Wrench, state: &DeviceState, events: &mut Events) -> Wrench {
         let (velocity, spin) = (state.twist.linear(), state.twist.angular());
         let (most, most_spin) = (self.velocity_m_per_s, self.angular_velocity_rad_per_s);
-        if velocity.abs().cmple(most).all() && spin.abs().cmple(most_spin).all() {
+        if is_within(velocity, most) && is_within(spin, most_spin) {
             return *wrench;
         }
         events.insert(Events::VELOCITY_LIMITED);
@@ -143,15 +186,9 @@ impl Envelope {
 
     #[inline]
     fn limit(&self, wrench: &Wrench, events: &mut Events) -> Wrench {
-        let (force, torque) = (wrench.force(), wrench.torque());
-        if force.abs().cmple(self.max_force_n).all() && torque.abs().cmple(self.max_torque_nm).all() {
+        if is_within(wrench.force(), self.max_force_n) && is_within(wrench.torque(), self.max_torque_nm) {
             return *wrench;
         }
-        self.shrink(wrench, events)
-    }
-
-    #[cold]
-    fn shrink(&self, wrench: &Wrench, events: &mut Events) -> Wrench {
         let force = shrink_into_box(wrench.force(), self.max_force_n);
         let torque = shrink_into_box(wrench.torque(), self.max_torque_nm);
         // On an axis that is not driven nothing is limited: pairing has said that nothing is felt there.
@@ -187,6 +224,12 @@ impl Envelope {
         }
         most_change(self.slew_per_s, tick.dt_ns)
     }
+}
+
+/// True if no part of a vector is larger than `most` of its axis, nor NaN.
+#[inline]
+fn is_within(vector: DVec3, most: DVec3) -> bool {
+    vector.x.abs() <= most.x && vector.y.abs() <= most.y && vector.z.abs() <= most.z
 }
 
 /// The change in so many ns at rates per s.
@@ -296,6 +339,77 @@ mod tests {
                 "{sent:?} {last:?}"
             );
             last = sent;
+        }
+    }
+
+    /// Whatever passes at once would pass all stages unchanged, and none would tell anything: at every limit, and for what
+    /// is no number.
+    #[test]
+    fn the_short_way_is_the_long_way() {
+        let boundless = Capabilities {
+            max_force_n: [f64::INFINITY; 3],
+            max_torque_nm: [f64::INFINITY; 3],
+            max_force_slew_n_per_s: f64::INFINITY,
+            max_torque_slew_nm_per_s: f64::INFINITY,
+            ..DEVICE
+        };
+        let limits = Limits { velocity_m_per_s: [1.0, 0.5, 1.0], ..Limits::default() };
+        let no_limits = Limits {
+            force_n: [f64::INFINITY; 3],
+            torque_nm: [f64::INFINITY; 3],
+            force_slew_n_per_s: f64::INFINITY,
+            torque_slew_nm_per_s: f64::INFINITY,
+            ..Limits::default()
+        };
+        let shares = [0.0, -0.0, 0.02, -0.04, 0.3, -0.6, 1.0, -1.0, 1.0 + f64::EPSILON, 1.0e300];
+        let nonsense = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
+        for (limits, device) in [(limits, DEVICE), (no_limits, boundless)] {
+            let mut envelope = Envelope::new(&limits, &Boundary::default(), &device, PERIOD_NS);
+            let mut random: u64 = 1; // Knuth's MMIX, as above
+            let (mut short, mut long) = (0, 0);
+            for index in 0..50_000 {
+                let mut bits = || {
+                    random = random
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1_442_695_040_888_963_407);
+                    (random >> 33) as usize
+                };
+                // Some ticks have a few numbers that are large, or none at all.
+                let is_wild = bits() % 4 == 0;
+                let mut three = |scale: f64| {
+                    [(); 3].map(|()| match (is_wild, bits() % 40) {
+                        (true, 0) => nonsense[bits() % nonsense.len()],
+                        (true, 1..5) => scale * shares[bits() % shares.len()],
+                        _ => scale * shares[bits() % 4],
+                    })
+                };
+                let request = Wrench { force_n: three(20.0), torque_nm: three(2.0) };
+                let position_m = three(0.0115);
+                let [x, y, z] = three(0.055);
+                let state = DeviceState {
+                    pose: Pose { position_m, orientation_xyzw: [x, y, z, 1.0] },
+                    twist: flotor_hal::Twist { linear_m_per_s: three(1.0), angular_rad_per_s: three(5.0) },
+                    ..DeviceState::HOME
+                };
+                let gate = Gate { models: [1.0, 0.5, 0.0][index % 3], boundary: 1.0 };
+                let (tick, mut events) = (tick(1), Events::NONE);
+                let passed = envelope.within_limits(&request, gate, &state, &tick);
+                let all = envelope.through_all_stages(request, gate, &state, &tick, &mut events);
+                if let Some(passed) = passed {
+                    let bits =
+                        |wrench: Wrench| [wrench.force_n, wrench.torque_nm].map(|v| v.map(f64::to_bits));
+                    assert_eq!(bits(passed), bits(all), "{request:?} {state:?}");
+                    assert_eq!(events, Events::NONE, "{request:?} {state:?}");
+                    short += 1;
+                } else {
+                    long += 1;
+                }
+                // Else a wild wrench would be followed for many ticks.
+                if !is_wild {
+                    envelope.last = all;
+                }
+            }
+            assert!(short > 1000 && long > 1000, "{short} {long}");
         }
     }
 

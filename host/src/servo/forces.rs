@@ -184,7 +184,7 @@ impl Forces {
 
     /// What all of them ask for at the states of the ports, one for each device. Real-time: bounded by the models that
     /// are near, no allocation.
-    #[inline]
+    #[inline(never)] // registers of its own: in the tick as a whole there are none left
     pub(crate) fn step(&mut self, tick: &Tick, ports: &mut [Port], heart: &Heartbeat) {
         let Self { stacks, couplings, .. } = self;
         // The couplings first: what is held now is what they and the models asked for last.

@@ -34,6 +34,12 @@ impl Passivity {
         self.energy_j += self.observer.gone_in_j(&state.pose, held);
     }
 
+    /// True if [`Self::guard`] never takes anything away. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn only_observes(&self) -> bool {
+        self.mode == PassivityMode::Observe
+    }
+
     /// Energy the hand has put into the port so far less what has come out, J. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn energy_j(&self) -> f64 {

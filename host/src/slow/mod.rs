@@ -92,9 +92,9 @@ impl SlowModel {
         })
     }
 
-    /// The wrench of the newest fields at the handle. Real-time on a real clock: bounded, no allocation.
-    #[inline]
-    pub(crate) fn step(&mut self, input: &Input) -> Stepped {
+    /// The wrench of the newest fields at the handle; `output` is only meaningful for [`Stepped::Answered`]. Real-time on a
+    /// real clock: bounded, no allocation.
+    pub(crate) fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
         let arrival = match &mut self.computing {
             Computing::Inline(inline) => inline.look(input),
             Computing::Thread(thread) => thread.look(input),
@@ -105,7 +105,10 @@ impl SlowModel {
                 self.newest_ns = Some(field.time_ns);
             }
             // As any answer that cannot be used.
-            Arrival::Field(field) => return Stepped::Answered(field.wrench.into()),
+            Arrival::Field(field) => {
+                *output = field.wrench.into();
+                return Stepped::Answered;
+            }
             Arrival::Nothing => {}
             Arrival::Broken => return Stepped::Broken,
         }
@@ -115,7 +118,8 @@ impl SlowModel {
         }
         let (wrench, is_valid) = self.fields.at(&input.pose, input.time_ns);
         let status = if is_valid { StepStatus::Ok } else { StepStatus::Clamped };
-        Stepped::Answered(Output::new(wrench, f64::NAN, status))
+        *output = Output::new(wrench, f64::NAN, status);
+        Stepped::Answered
     }
 
     /// Changes a live parameter before the next field. Real-time: bounded, no allocation.

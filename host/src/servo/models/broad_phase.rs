@@ -105,9 +105,10 @@ impl BroadPhase {
     ///
     /// Real-time: bounded by the objects that are near or may act anywhere; no allocation.
     #[inline]
-    pub(super) fn near(&self, position_m: DVec3) -> Near<'_> {
+    pub(super) fn near<'a>(&'a self, position_m: &'a [f64; 3]) -> Near<'a> {
         // Where no object has a place of its own there is no cell to look for.
-        let in_cell = if self.grid.objects.is_empty() { &[] } else { self.grid.cell(position_m) };
+        let in_cell =
+            if self.grid.objects.is_empty() { &[] } else { self.grid.cell(DVec3::from_array(*position_m)) };
         Near { bounds: &self.bounds, in_cell, always: &self.always, position_m }
     }
 
@@ -156,7 +157,8 @@ pub(super) struct Near<'a> {
     /// Those of the cell, and those that are always looked at, not looked at yet.
     in_cell: &'a [u32],
     always: &'a [u32],
-    position_m: DVec3,
+    /// Only looked at where an object has bounds.
+    position_m: &'a [f64; 3],
 }
 
 impl Near<'_> {
@@ -185,7 +187,7 @@ impl Iterator for Near<'_> {
         loop {
             let object = self.next_to_look_at()? as usize;
             match self.bounds.get(object) {
-                Some(Some(bounds)) if !bounds.contains(self.position_m) => {}
+                Some(Some(bounds)) if !bounds.contains(DVec3::from_array(*self.position_m)) => {}
                 _ => return Some(object),
             }
         }
@@ -299,7 +301,7 @@ mod tests {
     }
 
     fn near(phase: &BroadPhase, position_m: DVec3) -> Vec<usize> {
-        phase.near(position_m).collect()
+        phase.near(&position_m.to_array()).collect()
     }
 
     /// Boxes of all sizes, some objects without one, and what comparing with each of them finds.

@@ -37,19 +37,24 @@ impl EndWall {
     }
 
     /// Its push in the device frame; `None` within reach. Real-time: bounded, no allocation.
-    #[inline]
+    #[inline(always)] // as `Layer::step`
     pub(super) fn push(&self, mapping: &Mapping, state: &DeviceState) -> Option<Wrench> {
         let beyond_m = self.reach.beyond(mapping.pose_to_model(&state.pose).position());
         if beyond_m == DVec3::ZERO || !beyond_m.is_finite() {
             return None;
         }
+        Some(self.push_back(beyond_m, mapping, state))
+    }
+
+    #[cold]
+    fn push_back(&self, beyond_m: DVec3, mapping: &Mapping, state: &DeviceState) -> Wrench {
         let beyond_m = mapping.vector_to_device(beyond_m);
         let depth_m = beyond_m.length();
         let outward = beyond_m / depth_m;
         // Damping acts outwards only, as that of the boundary.
         let leaving_m_per_s = state.twist.linear().dot(outward).max(0.0);
         let push_n = self.stiffness_n_per_m * depth_m + DAMPING_NS_PER_M * leaving_m_per_s;
-        Some(Wrench::from_force(outward * -push_n))
+        Wrench::from_force(outward * -push_n)
     }
 }
 

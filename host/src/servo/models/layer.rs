@@ -57,7 +57,7 @@ struct Object {
 }
 
 /// What a layer asks for in a tick.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 pub(super) struct Share {
     /// In the device frame, not weighted.
     pub(super) wrench: Wrench,
@@ -65,12 +65,26 @@ pub(super) struct Share {
     pub(super) energy_j: f64,
 }
 
+impl Share {
+    /// Nothing. A constant: what `Default` derives for arrays goes through memory, and the tick waits for it.
+    pub(super) const NONE: Share = Share { wrench: Wrench::ZERO, energy_j: 0.0 };
+}
+
+/// What a model finds where it is to write its answer.
+const NO_ANSWER: Output = Output::new(Wrench::ZERO, 0.0, StepStatus::Ok);
+
+/// How all instances of a model are asked.
+#[derive(Clone, Copy)]
+struct Terms {
+    demand: Demand,
+    memory: Memory,
+}
+
 /// A model in all its places.
 pub(crate) struct Layer {
     objects: Box<[Object]>,
     broad: BroadPhase,
-    demand: Demand,
-    memory: Memory,
+    terms: Terms,
     budget: TimeBudget,
     /// What it asked for last: it fades if the model took too long too often.
     last: Share,
@@ -99,10 +113,9 @@ impl Layer {
         Self {
             objects,
             broad: BroadPhase::new(bounds),
-            demand,
-            memory,
+            terms: Terms { demand, memory },
             budget,
-            last: Share::default(),
+            last: Share::NONE,
             blend: *blend,
         }
     }
@@ -121,7 +134,7 @@ impl Layer {
     /// what it asked for last fades.
     ///
     /// Real-time: bounded by the objects that are near, no allocation.
-    #[inline]
+    #[inline(always)] // so that the share goes on in registers, not as bytes just written
     pub(super) fn step(
         &mut self,
         tick: &Tick,
@@ -137,7 +150,7 @@ impl Layer {
             }
             Allowed::Nothing => {
                 events.insert(Events::MODEL_FAULT);
-                return Share::default();
+                return Share::NONE;
             }
         }
         let begun_ns = self.budget.begin();
@@ -153,7 +166,7 @@ impl Layer {
     }
 
     /// Asks all objects that can act where the handle is; the others are not called.
-    #[inline]
+    #[inline(always)] // as `step`
     fn ask(
         &mut self,
         tick: &Tick,
@@ -161,14 +174,15 @@ impl Layer {
         health: &mut ModelHealth,
         events: &mut Events,
     ) -> Share {
-        let Self { objects, broad, demand, memory, .. } = self;
-        let mut share = Share::default();
-        for index in broad.near(state.pose.position()) {
+        let Self { objects, broad, terms, .. } = self;
+        let mut share = Share::NONE;
+        for index in broad.near(&state.pose.position_m) {
             let Some(object) = objects.get_mut(index) else { continue };
-            let Some(output) = object.step(tick, state, *demand, *memory, health, events) else {
+            let mut output = NO_ANSWER;
+            if !object.answer(tick, state, *terms, &mut output, health, events) {
                 events.insert(Events::MODEL_FAULT);
                 continue;
-            };
+            }
             share.wrench = share.wrench + object.mapping.wrench_to_device(&output.wrench);
             if let Some(push) = object.end.as_ref().and_then(|end| end.push(&object.mapping, state)) {
                 events.insert(Events::BOUNDARY);
@@ -236,23 +250,24 @@ impl Object {
         Some(Bounds::about(self.mapping.position_to_device(region.center()), half_sides_m))
     }
 
-    /// The model's answer, in its own frame; `None`, booked in the health, if it has none that can be used.
-    #[inline]
-    fn step(
+    /// Asks the model; true if `output` is an answer that can be used, in the model's own frame. What is wrong with one
+    /// that cannot is booked in the health.
+    #[inline(always)] // the one call of it in a tick
+    fn answer(
         &mut self,
         tick: &Tick,
         state: &DeviceState,
-        demand: Demand,
-        memory: Memory,
+        terms: Terms,
+        output: &mut Output,
         health: &mut ModelHealth,
         events: &mut Events,
-    ) -> Option<Output> {
+    ) -> bool {
         if self.is_out {
-            return None;
+            return false;
         }
         // Where it was not stepped it has no history: it starts anew.
         let was_asleep = self.stepped_at.is_some_and(|last| last + 1 != tick.index);
-        if was_asleep && memory == Memory::PathDependent && self.model.reset() != CallStatus::Ok {
+        if was_asleep && terms.memory == Memory::PathDependent && self.model.reset() != CallStatus::Ok {
             return self.fail(tick, health);
         }
         self.stepped_at = Some(tick.index);
@@ -263,38 +278,54 @@ impl Object {
             dt_ns: tick.dt_ns,
             tick: tick.index,
             buttons: state.buttons,
-            demand,
+            demand: terms.demand,
         };
-        match self.model.step(&input) {
-            Stepped::Answered(output) if output.wrench.is_finite() && output.status().is_some() => {
-                if self.model.may_be_late() {
-                    self.last = Some(output);
-                }
-                Some(output)
+        let stepped = self.model.step(&input, output);
+        if stepped == Stepped::Answered && output.wrench.is_finite() && output.status().is_some() {
+            if self.model.may_be_late() {
+                self.last = Some(*output);
             }
-            Stepped::Answered(_) => {
+            return true;
+        }
+        self.go_without(stepped, tick, output, health, events)
+    }
+
+    /// There is no answer that can be used; true if the one before may stand in for it.
+    #[cold]
+    fn go_without(
+        &mut self,
+        stepped: Stepped,
+        tick: &Tick,
+        output: &mut Output,
+        health: &mut ModelHealth,
+        events: &mut Events,
+    ) -> bool {
+        match stepped {
+            Stepped::Answered => {
                 self.last = None;
                 health.reject(tick.index);
-                None
+                false
             }
             // One tick may pass with the answer before; a second one in a row finds none.
             Stepped::Late => {
                 events.insert(Events::MODEL_OVERRUN);
                 health.late(tick.index);
-                self.last.take()
+                let last = self.last.take();
+                *output = last.unwrap_or_default();
+                last.is_some()
             }
             Stepped::Broken => self.fail(tick, health),
             Stepped::Gone => {
                 self.is_out = true;
                 health.lost_at.get_or_insert(tick.index);
-                None
+                false
             }
         }
     }
 
-    fn fail(&mut self, tick: &Tick, health: &mut ModelHealth) -> Option<Output> {
+    fn fail(&mut self, tick: &Tick, health: &mut ModelHealth) -> bool {
         self.is_out = true;
         health.panicked_at.get_or_insert(tick.index);
-        None
+        false
     }
 }

@@ -73,7 +73,7 @@ impl ModelStack {
     /// What the models together ask for at a state of the device, in the device frame, and the energy they store, J.
     ///
     /// Real-time: bounded by the models that are near, no allocation.
-    #[inline]
+    #[inline(always)] // as `Layer::step`
     pub(crate) fn step(
         &mut self,
         tick: &Tick,
@@ -83,8 +83,8 @@ impl ModelStack {
     ) -> (Wrench, f64) {
         let Self { slots, broad, levels, .. } = self;
         levels.iter_mut().for_each(|level| level.pushes = false);
-        let mut sum = Share::default();
-        for index in broad.near(state.pose.position()) {
+        let mut sum = Share::NONE;
+        for index in broad.near(&state.pose.position_m) {
             let Some(slot) = slots.get_mut(index) else { continue };
             let level = levels.iter_mut().find(|level| level.priority == slot.priority);
             let is_silenced = level.as_ref().is_some_and(|level| level.gain.is_silent(tick.time_ns));

@@ -68,7 +68,7 @@ impl Slot {
     }
 
     /// What it asks for at a state of the device. Real-time: bounded by the objects that are near, no allocation.
-    #[inline]
+    #[inline(always)] // as `Layer::step`
     pub(super) fn step(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
         let share = self.current.step(tick, state, &mut self.health, events);
         if self.leaving.is_none() { share } else { self.mixed(share, tick, state, events) }
