@@ -158,9 +158,24 @@ fn a_device_is_calibrated_with_a_force_sensor_on_a_serial_port() {
     let scratch = Scratch::default();
     let (sensor, file) = (scratch.path().join("force"), scratch.path().join("mine.toml"));
     let rig = ["--calibration-rig", sensor.to_str().unwrap(), "--rig-step-mm", "2", "--rig-stop-s", "0.8"];
-    let mut emulator = Emulator::listening("tcp", "127.0.0.1:0", &rig);
-    let plan =
-        ["vertical", "--steps", "7", "--step-mm", "2", "--runs", "1", "--readings", "2", "--json", "-"];
+    // In lockstep: the controller waits for a host that is held up, and so does the stand.
+    let mut emulator =
+        Emulator::listening("tcp", "127.0.0.1:0", &[&["--pace", "lockstep"], &rig[..]].concat());
+    let plan = [
+        "vertical",
+        "--set",
+        "pace=lockstep",
+        "--steps",
+        "7",
+        "--step-mm",
+        "2",
+        "--runs",
+        "1",
+        "--readings",
+        "2",
+        "--json",
+        "-",
+    ];
     let ran = calibrate(&emulator, &sensor, &[&plan[..], &["--out", file.to_str().unwrap()]].concat());
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
     let report: serde_json::Value = serde_json::from_str(&ran.stdout).expect("the report is JSON");

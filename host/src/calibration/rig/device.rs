@@ -1,19 +1,14 @@
 //! A real device with a force sensor on a serial port. Somebody, or something, lowers the sensor.
 
-use super::holder::{Holder, Holding};
-use super::{AVERAGED_TICKS, PERIOD_NS, Rest, Rig};
+use super::holder::{Holder, Holding, REST_M};
+use super::{PERIOD_NS, Rest, Rig};
 use crate::calibration::CalibrationError;
 use crate::calibration::sensor::ForceSensor;
 use flotor_hal::abi::loader::{OpenedDevice, Plugin, Setting};
-use flotor_hal::{LoopConfig, Refusal, VerticalCalibration};
+use flotor_hal::{Fault, LoopConfig, Refusal, VerticalCalibration};
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-/// Height on two looks after each other that is the same height, m: what the device resolves (5 to 10 µm; Varadharajan
-/// 2007, section 2.2).
-const REST_M: f64 = 10.0e-6;
-/// Time of one mean of the height.
-const AVERAGED_TIME: Duration = Duration::from_nanos(AVERAGED_TICKS * PERIOD_NS);
 /// How often it is looked whether the handle rests where it should.
 const LOOK_AGAIN: Duration = Duration::from_millis(20);
 
@@ -34,6 +29,8 @@ pub struct DeviceRig<W> {
     opened: Option<OpenedDevice>,
     holder: Option<Holder>,
     sensor: ForceSensor,
+    /// How often the handle was found restless before it came to the rest that is being measured.
+    restless: u64,
     serial: String,
     /// How far from its target a stop may be, m.
     close_m: f64,
@@ -57,7 +54,16 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
     ) -> Result<Self, CalibrationError> {
         let mut opened = plugin.open_device(settings)?;
         let serial = opened.serial();
-        Ok(Self { opened: Some(opened), holder: None, sensor, serial, close_m, patience, waiting })
+        Ok(Self {
+            opened: Some(opened),
+            holder: None,
+            sensor,
+            restless: 0,
+            serial,
+            close_m,
+            patience,
+            waiting,
+        })
     }
 
     /// Serial number of the device.
@@ -111,6 +117,7 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {
             let is_close = (report.height_m - target_m).abs() <= close_m;
             if report.state == Holding::Steady(command_n) && is_close && report.moved_m <= REST_M {
                 self.tell(None)?;
+                self.restless = report.restless;
                 return Ok(Rest { height_m: report.height_m, delivered_n: report.delivered_n });
             }
             if Instant::now() > until {
@@ -123,10 +130,19 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {
     }
 
     fn still_rests(&mut self, rest: &Rest) -> Result<bool, CalibrationError> {
-        // What the handle did while the last reading was taken is in the mean after the next.
-        std::thread::sleep(2 * AVERAGED_TIME);
-        let report = self.holder()?.look()?;
-        Ok((report.height_m - rest.height_m).abs() <= REST_M && report.moved_m <= REST_M)
+        // What the handle did while the last reading was taken is in the mean that has begun, or in the next.
+        let (from, until) = (self.holder()?.look()?.means, Instant::now() + self.patience);
+        loop {
+            let report = self.holder()?.look()?;
+            if report.means >= from + 2 {
+                let is_there = (report.height_m - rest.height_m).abs() <= REST_M;
+                return Ok(is_there && report.restless == self.restless);
+            }
+            if Instant::now() > until {
+                return Err(CalibrationError::Fault(Fault::Timeout));
+            }
+            std::thread::sleep(LOOK_AGAIN);
+        }
     }
 
     fn read_force_n(&mut self, _: &Rest) -> Result<f64, CalibrationError> {

@@ -15,6 +15,12 @@ use std::time::{Duration, Instant};
 const RAMP_STEP_N: f64 = 0.024;
 /// A handle that moves faster is not held by a sensor, m/s: a hand's breadth per second.
 const RUNAWAY_M_PER_S: f64 = 0.1;
+/// Height of two means after each other that is the same height, m: what the device resolves (5 to 10 µm; Varadharajan
+/// 2007, section 2.2).
+pub(super) const REST_M: f64 = 10.0e-6;
+/// Delivered force of two means after each other that is the same force, N: the noise of the sensor. A single tick without
+/// the force, as a host that was held up makes, is five times that.
+const STEADY_N: f64 = 0.02;
 /// Damping that stops it, N·s/m (the locked axes').
 const BRAKE_NS_PER_M: f64 = 15.0;
 
@@ -52,9 +58,13 @@ pub(super) struct Report {
     pub(super) moved_m: f64,
     /// Vertical force the device says it delivers, likewise a mean, N.
     pub(super) delivered_n: f64,
+    /// How often a mean was complete so far.
+    pub(super) means: u64,
+    /// How many of them were of another height or force than the one before.
+    pub(super) restless: u64,
 }
 
-const REPORT_WORDS: usize = 5;
+const REPORT_WORDS: usize = 7;
 
 impl Words<REPORT_WORDS> for Report {
     fn to_words(&self) -> [u64; REPORT_WORDS] {
@@ -65,10 +75,10 @@ impl Words<REPORT_WORDS> for Report {
             Holding::Faulted(fault) => (3, u64::from(fault as u32)),
         };
         let [height, moved, delivered] = [self.height_m, self.moved_m, self.delivered_n].map(f64::to_bits);
-        [kind, detail, height, moved, delivered]
+        [kind, detail, height, moved, delivered, self.means, self.restless]
     }
 
-    fn from_words(&[kind, detail, height, moved, delivered]: &[u64; REPORT_WORDS]) -> Self {
+    fn from_words(&[kind, detail, height, moved, delivered, means, restless]: &[u64; REPORT_WORDS]) -> Self {
         let state = match kind {
             0 => Holding::Changing,
             1 => Holding::Steady(f64::from_bits(detail)),
@@ -79,7 +89,7 @@ impl Words<REPORT_WORDS> for Report {
             }
         };
         let [height_m, moved_m, delivered_n] = [height, moved, delivered].map(f64::from_bits);
-        Self { state, height_m, moved_m, delivered_n }
+        Self { state, height_m, moved_m, delivered_n, means, restless }
     }
 }
 
@@ -162,6 +172,8 @@ fn hold(
     orders: &Observer<Order, ORDER_WORDS>,
     mut reports: Publisher<Report, REPORT_WORDS>,
 ) -> ActiveDevice {
+    // Refused, it holds all the same: a tick that comes too late shows in the force that was delivered.
+    let _ = crate::servo::enter_real_time();
     let period = Duration::from_nanos(PERIOD_NS);
     let started = Instant::now();
     let mut order = Order::Push(0.0);
@@ -186,10 +198,12 @@ fn hold(
             } else {
                 pushed_n + RAMP_STEP_N * left_n.signum()
             };
-            averages = Averages::default();
+            averages.begin_anew();
         }
         let read = device.read(&tick, &mut state);
-        averages.add(state.pose.position().z, state.delivered.force().z);
+        if read == Cycle::Fresh {
+            averages.add(state.pose.position().z, state.delivered.force().z);
+        }
         let speed_m_per_s = state.twist.linear().z;
         ran_away |= speed_m_per_s.abs() > RUNAWAY_M_PER_S;
         let vertical_n = if ran_away { -BRAKE_NS_PER_M * speed_m_per_s } else { pushed_n };
@@ -224,10 +238,17 @@ struct Averages {
     last: Option<(f64, f64)>,
     height_m: Mean,
     delivered_n: Mean,
-    ticks: u64,
+    samples: u64,
+    means: u64,
+    restless: u64,
 }
 
 impl Averages {
+    /// Forgets what was measured under another force.
+    fn begin_anew(&mut self) {
+        *self = Self { means: self.means, restless: self.restless, ..Self::default() };
+    }
+
     fn are_full(&self) -> bool {
         self.full.is_some()
     }
@@ -235,22 +256,30 @@ impl Averages {
     fn add(&mut self, height_m: f64, delivered_n: f64) {
         self.height_m.add(height_m);
         self.delivered_n.add(delivered_n);
-        self.ticks += 1;
-        if self.ticks == AVERAGED_TICKS {
+        self.samples += 1;
+        if self.samples == AVERAGED_TICKS {
             let mean = (self.height_m.value(), self.delivered_n.value());
             self.full = self.last.map(|last| [mean, last]);
             self.last = Some(mean);
-            (self.height_m, self.delivered_n, self.ticks) = (Mean::default(), Mean::default(), 0);
+            (self.height_m, self.delivered_n, self.samples) = (Mean::default(), Mean::default(), 0);
+            self.means += 1;
+            let is_at_rest = self.full.is_some_and(|[(height_m, delivered_n), (before_m, before_n)]| {
+                (height_m - before_m).abs() <= REST_M && (delivered_n - before_n).abs() <= STEADY_N
+            });
+            self.restless += u64::from(!is_at_rest);
         }
     }
 
     fn report(&self, state: Holding) -> Report {
+        let (means, restless) = (self.means, self.restless);
         match self.full {
             Some([(height_m, delivered_n), (before_m, _)]) => {
-                Report { state, height_m, moved_m: (height_m - before_m).abs(), delivered_n }
+                let moved_m = (height_m - before_m).abs();
+                Report { state, height_m, moved_m, delivered_n, means, restless }
             }
             None => {
-                Report { state, height_m: self.height_m.value(), moved_m: f64::INFINITY, delivered_n: 0.0 }
+                let (height_m, moved_m) = (self.height_m.value(), f64::INFINITY);
+                Report { state, height_m, moved_m, delivered_n: 0.0, means, restless }
             }
         }
     }
