@@ -87,6 +87,33 @@ fn the_seed_chooses_one_of_several_and_a_pair_of_seeds_gets_each() {
     }
 }
 
+/// A later change for one of several alternatives is no mistake for the seeds that got another.
+#[test]
+fn a_change_that_one_alternative_understands_is_for_the_seeds_that_got_it() {
+    let scene = |set: &str| {
+        format!(
+            "duration_s = 0.4\n{SPRING}[[change]]\nat_s = 0.1\nswap = \"spring\"\n\
+             either = [{{ parameters = {{ gamma_n = 5 }} }}, {{ plugin = \"wall\" }}]\n\
+             [[change]]\nat_s = 0.2\nset = \"{set}\"\n"
+        )
+    };
+    for (set, parameter) in [("spring.gamma_n=9", "gamma_n"), ("spring.friction=0.2", "friction")] {
+        let told = |seed| watch_seed(&scene(set), seed).changes;
+        let is_it = |(_, change): &(usize, Change)| change.parameter == parameter;
+        let got: Vec<usize> =
+            (0..2).map(|seed| told(seed).iter().filter(|told| is_it(told)).count()).collect();
+        assert!(got == [0, 1] || got == [1, 0], "{set}: {got:?}");
+    }
+    let scratch = Scratch::default();
+    for set in ["spring.gama_n=9", "ball.friction=0.2"] {
+        let file = scratch.file("scene.toml", scene(set)).display().to_string();
+        for seed in ["0", "1"] {
+            let ran = Flotor::with(["run", &file, "--clock", "virtual", "--seed", seed]).run();
+            assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{set}: {ran:?}");
+        }
+    }
+}
+
 #[test]
 fn what_is_wrong_with_an_alternative_is_said_whatever_the_seed() {
     let scratch = Scratch::default();

@@ -274,6 +274,28 @@ impl Versions {
     }
 }
 
+/// A new value of a live parameter, from words to a number.
+fn live_setting(part: &PluginReport, new: &NewValue<'_>) -> Result<Setting, ControlError> {
+    let setting = Setting::parse(part.schema, new.parameter, new.value)
+        .map_err(|error| ControlError::Setting { plugin: part.name.clone(), error })?;
+    let is_live = |parameter: &Parameter| parameter.mutability() == Mutability::Live;
+    if part.schema.get(setting.index()).is_some_and(is_live) {
+        return Ok(setting);
+    }
+    let live = part.schema.iter().filter(|parameter| is_live(parameter));
+    Err(ControlError::Fixed {
+        plugin: part.name.clone(),
+        id: new.parameter.to_owned(),
+        live: live.map(|parameter| parameter.id().to_owned()).collect(),
+    })
+}
+
+/// True if a plugin is meant by a new value and understands it. Not real-time.
+pub(super) fn understands(part: &PluginReport, new: &NewValue<'_>) -> bool {
+    let is_meant = is_named(&part.name, new.plugin) || part.metadata.id == new.plugin;
+    is_meant && live_setting(part, new).is_ok()
+}
+
 /// The plugins of a run as changes name them.
 #[derive(Clone)]
 pub(super) struct Parts {
@@ -364,17 +386,7 @@ impl Parts {
         let list = self.lock();
         let versions = list.get(usize::from(plugin)).ok_or(ControlError::Ended)?;
         let (part, generation) = (versions.now(), versions.current);
-        let setting = Setting::parse(part.schema, new.parameter, new.value)
-            .map_err(|error| ControlError::Setting { plugin: part.name.clone(), error })?;
-        let is_live = |parameter: &Parameter| parameter.mutability() == Mutability::Live;
-        if !part.schema.get(setting.index()).is_some_and(is_live) {
-            let live = part.schema.iter().filter(|parameter| is_live(parameter));
-            return Err(ControlError::Fixed {
-                plugin: part.name.clone(),
-                id: new.parameter.to_owned(),
-                live: live.map(|parameter| parameter.id().to_owned()).collect(),
-            });
-        }
+        let setting = live_setting(part, new)?;
         let parameter = u32::try_from(setting.index()).unwrap_or(u32::MAX); // schemas have tens of entries
         Ok(ParameterChange { plugin, generation, parameter, value: setting.value() })
     }

@@ -1,7 +1,7 @@
 //! From a scene to what a loop is made of: plugins loaded, their settings checked, everything paired.
 
 use super::choice::chosen;
-use super::controls::{ControlError, NewValue, Parts};
+use super::controls::{ControlError, NewValue, Parts, understands};
 use super::{PluginReport, RunError};
 use crate::calibration::file::{CalibrationFile, CalibrationFileError};
 use crate::mapping::Mapping;
@@ -302,6 +302,8 @@ pub(super) fn schedule(
     let mut in_time: Vec<&ChangeUse> = scene.changes.iter().collect();
     in_time.sort_by(|a, b| a.at_s.total_cmp(&b.at_s)); // stable: a change is checked against what is there then
     let mut scheduled = Scheduled { changes: Vec::new(), replacements: Vec::new() };
+    // Of each model, what this seed might have got in its place instead of what it did get.
+    let mut passed_over = vec![Vec::new(); scene.models.len()];
     for (draw, change) in (0..).zip(in_time) {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
         let time_ns = (change.at_s * 1.0e9).round() as u64;
@@ -312,7 +314,12 @@ pub(super) fn schedule(
         let checked = match &change.what {
             ChangeWhat::Set { plugin, parameter: ParameterText { key, value, .. } } => {
                 let new = NewValue { plugin, parameter: key, value };
-                parts.check(&new).map_err(|error| complain("change.set", error))?
+                match parts.check(&new) {
+                    Ok(checked) => checked,
+                    // It is for another seed.
+                    Err(_) if passed_over.iter().flatten().any(|part| understands(part, &new)) => continue,
+                    Err(error) => return Err(complain("change.set", error).into()),
+                }
             }
             ChangeWhat::Weight { model, weight } => {
                 parts.check_weight(model, *weight).map_err(|error| complain("change.weight", error))?
@@ -328,8 +335,14 @@ pub(super) fn schedule(
                         prepare_model(registry, &other, config, clock)
                     };
                     // All of them: what is wrong with one is to be known whatever the seed.
-                    let made = by.iter().map(make).collect::<Result<Vec<_>, _>>()?;
-                    let Some((layer, report)) = made.into_iter().nth(choice) else { continue };
+                    let mut made = by.iter().map(make).collect::<Result<Vec<_>, _>>()?;
+                    if choice >= made.len() {
+                        continue;
+                    }
+                    let (layer, report) = made.swap_remove(choice);
+                    if let Some(others) = passed_over.get_mut(number) {
+                        *others = made.into_iter().map(|(_, report)| report).collect();
+                    }
                     let generation = parts.put_in(number, report);
                     let model = u32::try_from(number).unwrap_or(u32::MAX); // a scene has fewer models
                     let replacement = Replacement { model, generation, layer: Box::new(layer) };
