@@ -108,8 +108,11 @@ wheel() {
     FLOTOR=target/release/flotor FLOTOR_SWEEP=target/release/flotor-sweep target/venv/bin/python -m pytest -q host/python
 }
 
-# The bridge: messages to the bit, who may do what, what is refused, over loopback. Full size is a minute at 1 kHz.
+# The bridge: messages to the bit, who may do what, what is refused, over loopback; two hosts with a hand each over a bad way.
+# Full size is a minute at 1 kHz, and every hand.
 bridge() {
-    FLOTOR_TEST_SIZE=full cargo test --release --manifest-path host/bridge/Cargo.toml --target-dir target/bridge
+    cargo build --release
+    FLOTOR=target/release/flotor FLOTOR_TEST_SIZE=full \
+        cargo test --release --manifest-path host/bridge/Cargo.toml --target-dir target/bridge
     cargo clippy --release --all-targets --manifest-path host/bridge/Cargo.toml --target-dir target/bridge -- -D warnings
 }

@@ -222,12 +222,11 @@ impl Coupler {
         let hears = side.hears(name, &found.name);
         let hears = hears.map(|key| session.declare_subscriber(key).callback(hear).wait()).transpose();
         let hears = hears.map_err(LinkError::from)?;
-        // Each by itself and before everything else: news that waits is no news.
+        // Before everything else. Not each by itself: what the network is too slow for shares a batch, and is not dropped.
         let tells = session
             .declare_publisher(side.tells(name, &found.name))
             .congestion_control(CongestionControl::Drop)
             .priority(Priority::RealTime)
-            .express(true)
             .wait()
             .map_err(LinkError::from)?;
         let socket = NewsSocket::join(directory, found)?;

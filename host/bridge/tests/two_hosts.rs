@@ -1,0 +1,203 @@
+//! Two `flotor run` processes, each with a hand, held together over Zenoh through a long, bad way.
+//!
+//! Needs the program: `FLOTOR=target/release/flotor`, as `.ci/full` sets it; says so and does nothing without.
+
+mod common;
+#[path = "common/proxy.rs"]
+mod proxy;
+
+use common::{free_port, wait_until};
+use flotor_bridge::couple::couple;
+use flotor_bridge::keys::Name;
+use flotor_bridge::link::{End, LinkOptions, open};
+use flotor_bridge::serve::{Service, serve};
+use flotor_bridge::wish::Right;
+use flotor_live::Directory;
+use flotor_record::Recording;
+use flotor_record::trace::{Events, TickRecord};
+use proxy::Proxy;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Every hand preset of the simulated flotor, and how it may be held.
+const HANDS: [&str; 5] = ["oscillate", "press", "release", "hold", "open"];
+const GRIPS: [&str; 2] = ["firm", "relaxed"];
+/// Time without news after which an end lets go, ms: long enough that a loaded machine is not taken for a cut cable.
+const WATCHDOG_MS: f64 = 300.0;
+
+/// The program under test; `None` where there is none.
+fn program() -> Option<PathBuf> {
+    let program = std::env::var_os("FLOTOR").map(PathBuf::from);
+    if program.is_none() {
+        println!("skipped: FLOTOR names no `flotor` program to run");
+    }
+    // Tests run in the folder of their crate, who set it may have been elsewhere.
+    program.map(|path| if path.exists() { path } else { Path::new("../..").join(path) })
+}
+
+fn scene(hand: &str, grip: &str) -> String {
+    format!(
+        "[device]\nplugin = \"simulated\"\n[device.parameters]\nhand = \"{hand}\"\nhand_grip = \"{grip}\"\n\
+         [[coupling]]\nname = \"pair\"\npartner = \"elsewhere\"\nend = [{{ device = \"device\" }}]\n\
+         [limits]\nwatchdog_ms = {WATCHDOG_MS}\n"
+    )
+}
+
+/// A host: a folder in which its run is found, and the run.
+struct Host {
+    folder: tempfile::TempDir,
+}
+
+impl Host {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("runtime")).unwrap();
+        Self { folder }
+    }
+
+    fn directory(&self) -> Directory {
+        Directory::at(self.folder.path().join("runtime/flotor"))
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn run(&self, program: &Path, scene: &str, duration_s: f64) -> Child {
+        std::fs::write(self.file("scene.toml"), scene).unwrap();
+        let mut command = Command::new(program);
+        command.arg("run").arg(self.file("scene.toml")).arg("--duration").arg(format!("{duration_s}s"));
+        command.arg("--record").arg(self.file("run.mcap")).arg("--json").arg(self.file("run.json"));
+        command.env("XDG_RUNTIME_DIR", self.folder.path().join("runtime"));
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    }
+
+    fn summary(&self) -> Value {
+        serde_json::from_slice(&std::fs::read(self.file("run.json")).unwrap()).unwrap()
+    }
+
+    fn records(&self) -> Vec<TickRecord> {
+        Recording::open(&self.file("run.mcap")).unwrap().map(|record| record.unwrap()).collect()
+    }
+}
+
+/// Both hosts, the bridge of the one, who couples the other with it, and the way between them.
+struct Network {
+    hosts: [Host; 2],
+    proxy: Proxy,
+    stop: Arc<AtomicBool>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Network {
+    fn start() -> Self {
+        let hosts = [Host::new(), Host::new()];
+        let (name, stop) = (Name::new("lab").unwrap(), Arc::<AtomicBool>::default());
+        let port = free_port();
+        let proxy = Proxy::to(port);
+        let at = |port: u16| vec![format!("tcp/127.0.0.1:{port}")];
+        let serving = LinkOptions { listen: at(port), ..LinkOptions::default() };
+        let serving = open(&serving, End::Serving).unwrap();
+        let service = Service { name: name.clone(), allow: Right::Operate, every: 1, launcher: None };
+        let (directory, until) = (hosts[0].directory(), Arc::clone(&stop));
+        let served = std::thread::spawn(move || {
+            serve(&serving, &directory, service, &until, &mut |_| {}).unwrap();
+        });
+        let visiting = LinkOptions { connect: at(proxy.port), ..LinkOptions::default() };
+        let visiting = open(&visiting, End::Visiting).unwrap();
+        let (directory, until) = (hosts[1].directory(), Arc::clone(&stop));
+        let coupled = std::thread::spawn(move || {
+            couple(&visiting, &directory, &name, &until, &mut |_| {}).unwrap();
+        });
+        Self { hosts, proxy, stop, threads: vec![served, coupled] }
+    }
+
+    /// Runs both hosts; `meanwhile` may do something to the way.
+    fn run(&self, program: &Path, scenes: [String; 2], duration_s: f64, meanwhile: impl FnOnce(&Proxy)) {
+        let mut runs: Vec<Child> = (self.hosts.iter().zip(&scenes))
+            .map(|(host, scene)| host.run(program, scene, duration_s))
+            .collect();
+        wait_until("both hosts run", || {
+            self.hosts.iter().all(|host| !host.directory().couplings().is_empty())
+        });
+        meanwhile(&self.proxy);
+        for run in &mut runs {
+            assert!(run.wait().unwrap().success(), "a run that ends in order");
+        }
+    }
+}
+
+impl Drop for Network {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        for thread in self.threads.drain(..) {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
+}
+
+#[test]
+fn a_pair_over_zenoh_and_a_bad_way_is_stable_and_no_account_is_overdrawn() {
+    let Some(program) = program() else { return };
+    let full = std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size == "full");
+    let hands: Vec<(&str, &str)> = HANDS.iter().flat_map(|hand| GRIPS.map(|grip| (*hand, grip))).collect();
+    let hands = if full { hands } else { vec![("press", "firm"), ("oscillate", "relaxed")] };
+    for (hand, grip) in hands {
+        let network = Network::start();
+        let scenes = [scene(hand, grip), scene("hold", "relaxed")];
+        network.run(&program, scenes, 4.0, |_| {});
+        let mut gone_in_j = 0.0;
+        for host in &network.hosts {
+            let summary = host.summary();
+            let coupling = &summary["couplings"][0];
+            let link = &coupling["link"];
+            println!("{hand}, {grip}: {coupling}");
+            assert_eq!(summary["end"], "finished");
+            assert!(number(&coupling["lowest_j"][0]) >= 0.0 && number(&coupling["lowest_j"][1]) >= 0.0);
+            assert!(number(&link["heard_ticks"]) > 100.0, "{link}");
+            assert!(number(&link["longest_wait_ms"]) < WATCHDOG_MS, "{link}");
+            assert_eq!(link["carried"]["refused"], 0);
+            gone_in_j += number(&coupling["gone_in_j"][0]);
+            let fastest =
+                host.records().iter().map(|record| record.twist.linear().length()).fold(0.0, f64::max);
+            // A hand swings with up to 0.1 m/s or so; what drives itself gets to the boundary and past it.
+            assert!(fastest < 0.5, "{fastest} m/s");
+        }
+        assert!(network.proxy.lost() > 0, "a way that loses nothing proves nothing");
+        assert!(gone_in_j >= -1.0e-12, "more came out at both ends than went in: {gone_in_j} J");
+    }
+}
+
+#[test]
+fn a_cut_cable_leaves_both_devices_without_force_within_the_watchdog() {
+    let Some(program) = program() else { return };
+    let network = Network::start();
+    let scenes = [scene("press", "firm"), scene("oscillate", "firm")];
+    network.run(&program, scenes, 5.0, |proxy| {
+        std::thread::sleep(Duration::from_millis(3000));
+        proxy.cut();
+    });
+    for host in &network.hosts {
+        let (summary, records) = (host.summary(), host.records());
+        let link = &summary["couplings"][0]["link"];
+        let last_felt =
+            records.iter().rposition(|record| record.commanded.force().length() > 0.0).expect("a pull");
+        let silent = |record: &TickRecord| record.events.intersects(Events::PARTNER_SILENT);
+        let first_silent = 1 + records.iter().rposition(|record| !silent(record)).expect("it was heard");
+        println!("force until {} ms, {link}", records[last_felt].time_ns / 1_000_000);
+        // No tick goes by news as old as the watchdog, and none after that has force.
+        assert!(number(&link["longest_wait_ms"]) < WATCHDOG_MS, "{link}");
+        assert!(number(&link["silences"]) >= 1.0, "{link}");
+        assert!(first_silent < records.len(), "the cut is seen");
+        assert!(last_felt < first_silent, "no force from the tick on that misses the partner");
+    }
+}
