@@ -1,7 +1,8 @@
 //! What a tick costs, in instructions: the same on every machine of a kind, busy or not.
 //!
-//! Callgrind (valgrind) counts while this test runs itself once more. The count of a tick is the difference between
-//! a long and a short run, so that loading and creating does not matter. Without valgrind the tests say so and pass.
+//! Callgrind (valgrind) counts while this test runs itself once more, and only within the loop: what is made before it
+//! takes time that depends on the machine. The count of a tick is the difference between a long and a short run. Without
+//! valgrind the tests say so and pass.
 //!
 //! ```text
 //! FLOTOR_TEST_SIZE=full cargo test --release -p flotor-tests --test tick_cost -- --nocapture
@@ -88,10 +89,15 @@ fn callgrind(arguments: &[&str], workload: &str) -> Option<Output> {
     Some(counted)
 }
 
+/// The loops whose instructions are counted: of a whole tick's bench, and of a scene.
+const BENCH_LOOP: &str = "flotor::bench::whole_tick::WholeTick::batch";
+const SCENE_LOOP: &str = "flotor::session::Session::run";
+
 /// Instructions a tick, or nothing where there is no valgrind.
-fn instructions(name: &str) -> Option<f64> {
+fn instructions(name: &str, within: &str) -> Option<f64> {
     let count = |ticks: u32| {
-        let counted = callgrind(&["--callgrind-out-file=/dev/null"], &format!("{name} {ticks}"))?;
+        let arguments = ["--callgrind-out-file=/dev/null", &format!("--toggle-collect={within}")];
+        let counted = callgrind(&arguments, &format!("{name} {ticks}"))?;
         let told = String::from_utf8_lossy(&counted.stderr).into_owned();
         let total = told.lines().find_map(|line| line.split("Collected : ").nth(1))?;
         total.trim().parse::<f64>().ok()
@@ -102,9 +108,9 @@ fn instructions(name: &str) -> Option<f64> {
     Some(counted)
 }
 
-/// A whole tick with the spring: device, mapping, model, envelope, record into the trace ring and out of it again. What was counted on x86-64
-/// and a tenth, for other versions of compiler and libraries.
-const MOST_INSTRUCTIONS: [(&str, f64); 2] = [("scripted", 3280.0), ("simulated", 4920.0)];
+/// A whole tick with the spring: device, mapping, model, envelope, record into the trace ring. What was counted on x86-64
+/// (2703 and 3985) and a tenth, for other versions of compiler and libraries.
+const MOST_INSTRUCTIONS: [(&str, f64); 2] = [("scripted", 2970.0), ("simulated", 4380.0)];
 
 #[test]
 fn a_whole_tick_stays_within_its_instructions() {
@@ -113,7 +119,7 @@ fn a_whole_tick_stays_within_its_instructions() {
         return;
     }
     for (name, most) in MOST_INSTRUCTIONS {
-        let Some(counted) = instructions(name) else {
+        let Some(counted) = instructions(name, BENCH_LOOP) else {
             eprintln!("skipped: there is no valgrind to count instructions with");
             return;
         };
@@ -164,7 +170,8 @@ fn ten_thousand_sleeping_objects_cost_a_tick_next_to_nothing() {
         eprintln!("skipped: half a minute under valgrind; FLOTOR_TEST_SIZE=full counts");
         return;
     }
-    let (Some(alone), Some(among)) = (instructions("alone"), instructions("among")) else {
+    let (Some(alone), Some(among)) = (instructions("alone", SCENE_LOOP), instructions("among", SCENE_LOOP))
+    else {
         eprintln!("skipped: there is no valgrind to count instructions with");
         return;
     };
