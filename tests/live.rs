@@ -336,3 +336,32 @@ fn patiently<T>(mut attempt: impl FnMut() -> Option<T>) -> T {
     }
     panic!("it did not happen within {PATIENCE:?}");
 }
+
+/// Viewer and bridge are programs of their own; here both are scripts that write down what they were told.
+#[test]
+fn a_run_elsewhere_is_viewed_through_a_bridge_that_ends_with_the_viewer() {
+    use std::os::unix::fs::PermissionsExt;
+    let scratch = Scratch::default();
+    let script = |name: &str, text: &str| {
+        let file = scratch.file(name, format!("#!/bin/sh\ncd \"{}\"\n{text}\n", scratch.path().display()));
+        std::fs::set_permissions(file, std::fs::Permissions::from_mode(0o755)).expect("it is ours");
+    };
+    script("flotor-bridge", "echo $$ \"$@\" > bridge.new; mv bridge.new bridge\nexec sleep 60");
+    script("flotor-viewer", "while ! [ -f bridge ]; do sleep 0.01; done\necho \"$@\" > viewer\nexit 3");
+    let arguments =
+        ["view", "zenoh/lab", "--connect", "tls/lab:7447", "--config", "ada.json5", "--look", "light"];
+    let here = "cp \"$1\" \"$HERE/flotor\"; shift; exec \"$HERE/flotor\" \"$@\"";
+    let ran =
+        Flotor::with(arguments).env("HERE", &scratch.path().display().to_string()).through_shell(here).run();
+    assert_eq!(ran.code, Some(3), "the viewer's own: {ran:?}");
+    let told = |file: &str| std::fs::read_to_string(scratch.path().join(file)).expect("it was started");
+    let bridge = told("bridge");
+    let (process, for_bridge) = bridge.trim().split_once(' ').expect("a number and arguments");
+    assert_eq!(for_bridge, "attach zenoh/lab --config ada.json5 --connect tls/lab:7447");
+    assert_eq!(told("viewer").trim(), format!("--look light --run {process}"));
+    assert!(!Path::new("/proc").join(process).exists(), "the bridge ends with the viewer");
+
+    let picture = Flotor::with(["view", "zenoh/lab", "--screenshot", "run.png"]).run();
+    assert_eq!(picture.code, Some(exit_code::CONFIGURATION));
+    assert!(picture.error().contains("flotor record zenoh/NAME"), "{picture:?}");
+}

@@ -3,12 +3,42 @@
 use super::CommandError;
 use super::companion::Companion;
 use clap::Args;
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
+use std::path::PathBuf;
 
 pub(super) const BRIDGE: Companion<'static> = Companion {
     program: "flotor-bridge",
     build: "cargo build --release --manifest-path host/bridge/Cargo.toml --target-dir target",
 };
+
+/// How runs elsewhere are written.
+const REMOTE: &str = "zenoh/";
+
+/// The way to a run elsewhere.
+#[derive(Args)]
+pub(super) struct Way {
+    /// With zenoh/NAME: Zenoh configuration with keys, see `flotor bridge keys`
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// With zenoh/NAME: whom to reach, such as tls/lab.example.org:7447 (repeatable)
+    #[arg(long, value_name = "ENDPOINT")]
+    connect: Vec<String>,
+}
+
+impl Way {
+    /// What the bridge is told to do something with a run elsewhere.
+    pub(super) fn arguments(&self, command: &str, name: &OsStr) -> Vec<OsString> {
+        let mut arguments = vec![command.into(), name.to_owned()];
+        arguments.extend(self.config.iter().flat_map(|file| ["--config".into(), file.into()]));
+        arguments.extend(self.connect.iter().flat_map(|endpoint| ["--connect".into(), endpoint.into()]));
+        arguments
+    }
+}
+
+/// Whether a text names a run elsewhere.
+pub(super) fn is_elsewhere(text: &OsStr) -> bool {
+    text.to_str().is_some_and(|text| text.starts_with(REMOTE))
+}
 
 /// Put a running host on a network, or bring one from there to this machine.
 #[derive(Args)]

@@ -1,6 +1,6 @@
 //! `flotor record`: a recording of a run that somebody else started, here or elsewhere.
 
-use super::bridge::BRIDGE;
+use super::bridge::{BRIDGE, Way, is_elsewhere};
 use super::stopping::stop_on_signals;
 use super::{CommandError, style};
 use crate::record::{Change, Note, Recorder, Severity};
@@ -10,8 +10,6 @@ use flotor_live::{Ask, Client, Directory, Event, LiveError};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// How the network's runs are written.
-const REMOTE: &str = "zenoh/";
 /// How long to wait for news before looking whether to stop.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
 
@@ -30,17 +28,21 @@ pub(crate) struct RecordArguments {
     /// The recording
     #[arg(long, value_name = "FILE.mcap")]
     out: PathBuf,
+    #[command(flatten)]
+    way: Way,
 }
 
 pub(crate) fn run(arguments: &RecordArguments) -> Result<(), CommandError> {
-    let RecordArguments { source, out } = arguments;
+    let RecordArguments { source, out, way } = arguments;
     match source.as_deref() {
         None => record_local(out),
-        Some(remote) if remote.starts_with(REMOTE) => {
-            BRIDGE.become_with(&["record".into(), remote.into(), out.into()])
+        Some(remote) if is_elsewhere(remote.as_ref()) => {
+            let mut arguments = way.arguments("record", remote.as_ref());
+            arguments.insert(2, out.into());
+            BRIDGE.become_with(&arguments)
         }
         Some(other) => Err(CommandError::Usage(format!(
-            "`{other}` is no run elsewhere: write {REMOTE}NAME; `flotor bridge list` shows who is there"
+            "`{other}` is no run elsewhere: write zenoh/NAME; `flotor bridge list` shows who is there"
         ))),
     }
 }

@@ -1,12 +1,15 @@
 //! `flotor view`: starts the viewer, which is a program of its own, and tells it where the plugins are.
 
 use super::CommandError;
+use super::bridge::{BRIDGE, Way, is_elsewhere};
 use super::companion::Companion;
 use crate::record::Recording;
 use crate::registry::Registry;
 use clap::Args;
+use rustix::process::{Pid, Signal, kill_process};
 use std::ffi::OsString;
 use std::path::PathBuf;
+use std::process::{Child, Stdio};
 
 /// The viewer, built by name because of its graphics stack.
 pub(super) const VIEWER: Companion<'_> =
@@ -16,12 +19,14 @@ pub(super) const VIEWER: Companion<'_> =
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     flotor view                                   the run that goes on in another terminal\n  \
+    flotor view zenoh/lab                         one on another machine, see `flotor bridge --help`\n  \
     flotor run --clock virtual --record run.mcap && flotor view run.mcap\n  \
     flotor view --screenshot run.png run.mcap     a picture, without display or GPU\n  \
     flotor view --screenshot run.png --at 2.5 --look light --size 1920x1200 --scale 1.5 run.mcap\n  \
     flotor view --measure 10 run.mcap             pictures made and processor time taken in ten seconds")]
 pub(crate) struct ViewArguments {
-    /// A recording (without: the running host)
+    /// A recording, or zenoh/NAME for a run elsewhere (without: the running host)
+    #[arg(value_name = "FILE.mcap | zenoh/NAME")]
     file: Option<PathBuf>,
     /// Write a picture of a moment; needs no display and no GPU
     #[arg(long, value_name = "OUT.png", requires = "file")]
@@ -47,12 +52,22 @@ pub(crate) struct ViewArguments {
     /// Say what the window costs over so many seconds, and close it then
     #[arg(long, value_name = "SECONDS", conflicts_with = "screenshot")]
     measure: Option<String>,
+    #[command(flatten)]
+    way: Way,
 }
 
 pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
     let mut for_viewer: Vec<OsString> = Vec::new();
     let mut add = |name: &str, value: OsString| for_viewer.extend([name.into(), value]);
-    if let Some(file) = &arguments.file {
+    let elsewhere = arguments.file.as_deref().filter(|file| is_elsewhere(file.as_os_str()));
+    let file = if elsewhere.is_some() { None } else { arguments.file.as_ref() };
+    if elsewhere.is_some() && arguments.screenshot.is_some() {
+        return Err(CommandError::Usage(
+            "a picture of a moment needs a recording: `flotor record zenoh/NAME --out FILE.mcap` makes one"
+                .to_owned(),
+        ));
+    }
+    if let Some(file) = file {
         // Opened here as well: what is wrong with the file is told before anything else is started.
         let recording = Recording::open(file)?;
         plugin_files(&recording).into_iter().for_each(|plugin| add("--plugin", plugin.into()));
@@ -74,8 +89,40 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
         add("--screenshot", screenshot.into());
     }
     for_viewer.extend(arguments.window.then(|| "--window".into()));
-    for_viewer.extend(arguments.file.iter().map(|file| file.into()));
-    VIEWER.become_with(&for_viewer)
+    for_viewer.extend(file.map(|file| file.into()));
+    match elsewhere {
+        None => VIEWER.become_with(&for_viewer),
+        Some(name) => view_elsewhere(&arguments.way.arguments("attach", name.as_os_str()), for_viewer),
+    }
+}
+
+/// The bridge shows the run here, and the viewer watches that one; the bridge's words of loss and reconnection go to the terminal.
+fn view_elsewhere(for_bridge: &[OsString], mut for_viewer: Vec<OsString>) -> Result<(), CommandError> {
+    let (mut viewer, mut bridge) = (VIEWER.command()?, BRIDGE.command()?);
+    let cannot = |program: &str, cause| CommandError::file(program.as_ref(), "cannot be started", cause);
+    let bridge = bridge.args(for_bridge).stdin(Stdio::null()).spawn();
+    let bridge = Attached(bridge.map_err(|cause| cannot(BRIDGE.program, cause))?);
+    for_viewer.extend(["--run".into(), bridge.0.id().to_string().into()]);
+    let shown = viewer.args(&for_viewer).status().map_err(|cause| cannot(VIEWER.program, cause))?;
+    drop(bridge);
+    if shown.success() {
+        return Ok(());
+    }
+    // It has said why.
+    std::process::exit(shown.code().unwrap_or(1));
+}
+
+/// A bridge that shows a run here, until this is dropped.
+struct Attached(Child);
+
+impl Drop for Attached {
+    fn drop(&mut self) {
+        // In order, so that its socket goes with it.
+        if let Some(process) = Pid::from_raw(i32::try_from(self.0.id()).unwrap_or_default()) {
+            let _ = kill_process(process, Signal::TERM);
+        }
+        let _ = self.0.wait();
+    }
 }
 
 /// Files of the plugins of a recording, as far as they are found; the viewer says what it misses.
