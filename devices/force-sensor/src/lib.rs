@@ -8,7 +8,7 @@
 //! reads it, and a scene may hold it as one more device, so that a recording has what a handle really pressed with.
 //!
 //! - [`protocol`]: questions and answers as bytes.
-//! - [`line`]: one question at a time over a serial port.
+//! - [`mod@line`]: one question at a time over a serial port.
 //! - `plugin`: parameters and the contract.
 
 pub mod line;
