@@ -57,7 +57,7 @@ impl ArrowScale {
 }
 
 /// The largest force has an arrow so much shorter than the body: at rest, too, its tip is in sight of the experimenter's view.
-const FULL_FORCE: f64 = 2.8;
+const FULL_FORCE: f64 = 3.6;
 
 /// A scene being put together; keeps its memory from frame to frame.
 #[derive(Default)]
