@@ -1,12 +1,14 @@
 //! Where plugins are, and which one an id means. Files are read, not run, until a scene needs one.
 
+mod stamp;
+
+use self::stamp::{FileStamp, hash_of};
 use crate::scene::nearest;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, read_metadata};
 use flotor_hal::abi::{Entry, PluginKind};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use xxhash_rust::xxh3::xxh3_64;
 
 /// Environment variable with further plugin folders, separated like `PATH`.
 pub const PATH_VARIABLE: &str = "FLOTOR_PLUGIN_PATH";
@@ -34,6 +36,7 @@ pub struct Registry {
 /// A file that was loaded, as it was then.
 struct Loaded {
     path: PathBuf,
+    stamp: FileStamp,
     /// xxh3-64 of its bytes: a file that was built anew is another one.
     hash: u64,
     plugin: Plugin,
@@ -196,14 +199,20 @@ impl Registry {
     /// Loads a file, or gives what was loaded before if the file is unchanged: libraries are never unloaded, and a
     /// thousand models of one plugin share one mapping of it.
     fn open(&self, path: &Path) -> Result<Plugin, LoadError> {
-        let Ok(bytes) = std::fs::read(path) else { return Plugin::load(path) }; // it says what is wrong
-        let hash = xxh3_64(&bytes);
+        // Taken before the bytes are read: whoever writes meanwhile is noticed the next time.
+        let Ok(stamp) = FileStamp::of(path) else { return Plugin::load(path) }; // it says what is wrong
         let mut loaded = self.loaded.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = loaded.iter().find(|known| known.path == path && known.hash == hash) {
+        if let Some(known) = loaded.iter().find(|known| known.path == path && known.stamp.vouches_for(&stamp))
+        {
+            return Ok(known.plugin.clone());
+        }
+        let Ok(hash) = hash_of(path) else { return Plugin::load(path) };
+        if let Some(known) = loaded.iter_mut().find(|known| known.path == path && known.hash == hash) {
+            known.stamp = stamp;
             return Ok(known.plugin.clone());
         }
         let plugin = Plugin::load(path)?;
-        loaded.push(Loaded { path: path.into(), hash, plugin: plugin.clone() });
+        loaded.push(Loaded { path: path.into(), stamp, hash, plugin: plugin.clone() });
         Ok(plugin)
     }
 }

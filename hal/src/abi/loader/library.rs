@@ -8,9 +8,11 @@ use crate::abi::{
     PluginKind, ReachTable, Str, VariantTable, interface_ids, is_spoken,
 };
 use crate::{DeviceInfo, ModelInfo, Parameter};
+use object::ReadCache;
 use std::ffi::CString;
-use std::io::Write;
+use std::fs::File;
 use std::os::fd::AsRawFd;
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
 /// Whose Rust runtime a plugin's panics happen in.
@@ -50,11 +52,13 @@ impl Plugin {
     /// # Errors
     /// [`LoadError`], with file, cause and remedy; the process survives all of them.
     pub fn load(path: &Path) -> Result<Self, LoadError> {
-        let bytes =
-            std::fs::read(path).map_err(|cause| LoadError::Unreadable { path: path.into(), cause })?;
-        let metadata = metadata_file::parse(path, bytes.as_slice(), bytes.len() as u64)?;
+        let (mut original, _) = metadata_file::open_regular(path)?;
+        let copy_error = |cause: std::io::Error| LoadError::Copy { path: path.into(), cause };
+        let mut copy = file_in_memory(path).map_err(copy_error)?;
+        let length = std::io::copy(&mut original, &mut copy).map_err(copy_error)?;
+        let metadata = metadata_file::parse(path, &ReadCache::new(&copy), length)?;
         metadata.check_contract()?;
-        let entry = open_private_copy(path, &metadata, &bytes)?;
+        let entry = open_private_copy(&metadata, copy)?;
         Self::from_entry(metadata, entry, Runtime::Own)
     }
 
@@ -191,21 +195,24 @@ impl Plugin {
     }
 }
 
-/// Opens a copy of the bytes that were checked, so that nobody can change the file under a running loop (an
-/// overwritten mapped library raises SIGBUS at the next call) and a rebuilt plugin at the same path is new code.
-fn open_private_copy(path: &Path, metadata: &Metadata, bytes: &[u8]) -> Result<&'static Entry, LoadError> {
-    let copy_error = |cause: std::io::Error| LoadError::Copy { path: path.into(), cause };
-    let name = CString::new(metadata.id.as_str()).unwrap_or_default();
-    let descriptor = rustix::fs::memfd_create(&name, rustix::fs::MemfdFlags::CLOEXEC);
-    let mut file = std::fs::File::from(descriptor.map_err(|cause| copy_error(cause.into()))?);
-    file.write_all(bytes).map_err(copy_error)?;
+/// An empty file nobody else can reach, called like `path` for debuggers.
+fn file_in_memory(path: &Path) -> std::io::Result<File> {
+    let name = path.file_name().map(OsStrExt::as_bytes).unwrap_or_default();
+    let name = CString::new(name).unwrap_or_default();
+    Ok(rustix::fs::memfd_create(&name, rustix::fs::MemfdFlags::CLOEXEC)?.into())
+}
+
+/// Opens a copy in memory, the very bytes that were checked, so that nobody can change the file under a running loop
+/// (an overwritten mapped library raises SIGBUS at the next call) and a rebuilt plugin at the same path is new code.
+fn open_private_copy(metadata: &Metadata, file: File) -> Result<&'static Entry, LoadError> {
+    let path = &metadata.path;
     let copy = format!("/proc/self/fd/{}", file.as_raw_fd());
 
     use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
     // RTLD_NOW: with lazy binding a missing symbol would kill the process in the middle of a tick.
     // SAFETY: opening runs the library's initialisers; that this is trusted code is the contract of `load`.
     let library = unsafe { Library::open(Some(&copy), RTLD_NOW | RTLD_LOCAL) }.map_err(|cause| {
-        LoadError::Link { path: path.into(), cause: whole_cause(&cause).replace(&copy, "it") }
+        LoadError::Link { path: path.clone(), cause: whole_cause(&cause).replace(&copy, "it") }
     })?;
     let symbol = metadata.entry.as_str();
     // SAFETY: the symbol is only used as an address here; it is checked to be an `Entry` before it is trusted.
@@ -217,7 +224,7 @@ fn open_private_copy(path: &Path, metadata: &Metadata, bytes: &[u8]) -> Result<&
     // SAFETY: null, or a static of at least the magic's size in a library that is never unloaded; its content is
     // compared with the magic first, and `from_entry` checks its size and version before any pointer is followed.
     let entry = unsafe { address.as_ref() };
-    entry.ok_or_else(|| LoadError::NoEntry { path: path.into(), symbol: symbol.to_owned() })
+    entry.ok_or_else(|| LoadError::NoEntry { path: path.clone(), symbol: symbol.to_owned() })
 }
 
 fn whole_cause(error: &dyn std::error::Error) -> String {

@@ -5,6 +5,7 @@ use crate::abi::{ABI_MAJOR, ABI_MINOR, PluginKind, is_spoken, metadata};
 use object::elf::FileHeader64;
 use object::read::elf::{ElfFile64, FileHeader, ProgramHeader, SectionHeader};
 use object::{Endianness, Object, ObjectSection, ReadCache, ReadRef};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// What a plugin says about itself.
@@ -34,15 +35,23 @@ pub struct Metadata {
 /// Everything of [`LoadError`] that can be known without `dlopen`, except the contract version, which a list
 /// may want to show: see [`Metadata::check_contract`].
 pub fn read_metadata(path: &Path) -> Result<Metadata, LoadError> {
+    let (file, length) = open_regular(path)?;
+    // Reads headers and one section: a folder of large libraries is listed in a millisecond.
+    parse(path, &ReadCache::new(file), length)
+}
+
+/// Opens what is to be a library, and says how long it is, bytes. Whatever else has the name is never opened: a pipe
+/// would wait for a writer for ever.
+pub(super) fn open_regular(path: &Path) -> Result<(File, u64), LoadError> {
     let unreadable = |cause| LoadError::Unreadable { path: path.into(), cause };
-    let file = std::fs::File::open(path).map_err(unreadable)?;
-    let attributes = file.metadata().map_err(unreadable)?;
+    let attributes = std::fs::metadata(path).map_err(unreadable)?;
     if attributes.is_dir() {
         return Err(unreadable(std::io::ErrorKind::IsADirectory.into()));
     }
-    // Reads headers and one section: a folder of large libraries is listed in a millisecond.
-    let cache = ReadCache::new(file);
-    parse(path, &cache, attributes.len())
+    if !attributes.is_file() {
+        return Err(unreadable(std::io::Error::new(std::io::ErrorKind::InvalidInput, "not a regular file")));
+    }
+    Ok((File::open(path).map_err(unreadable)?, attributes.len()))
 }
 
 impl Metadata {

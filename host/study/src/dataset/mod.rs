@@ -126,6 +126,32 @@ impl Dataset {
     /// # Errors
     /// A log that cannot be used, none at all, or logs of different experiments.
     pub fn logs(&self) -> Result<Vec<SittingLog>, DatasetError> {
+        let mut logs = Vec::new();
+        self.each_log(|log| {
+            logs.push(log);
+            Ok(())
+        })?;
+        Ok(logs)
+    }
+
+    /// The same one after the other: only one is in memory.
+    fn each_log(
+        &self,
+        mut take: impl FnMut(SittingLog) -> Result<(), DatasetError>,
+    ) -> Result<(), DatasetError> {
+        let mut first: Option<(Begin, PathBuf)> = None;
+        for path in self.log_paths()? {
+            let log = SittingLog::read(&path)?;
+            let (begin, other) = first.get_or_insert_with(|| (log.begin.clone(), path.clone()));
+            if let Some(what) = log.begin.differs(begin) {
+                return Err(DatasetError::Mixed { path, other: other.clone(), what });
+            }
+            take(log)?;
+        }
+        Ok(())
+    }
+
+    fn log_paths(&self) -> Result<Vec<PathBuf>, DatasetError> {
         let mut paths: Vec<PathBuf> = Vec::new();
         let source = self.root.join("sourcedata");
         let folders = std::fs::read_dir(&source).map_err(|_| DatasetError::NoStudy(self.root.clone()))?;
@@ -135,14 +161,7 @@ impl Dataset {
             paths.extend(files.filter(|path| path.to_string_lossy().ends_with("_log.jsonl")));
         }
         paths.sort();
-        if paths.is_empty() {
-            return Err(DatasetError::NoStudy(self.root.clone()));
-        }
-        let logs = paths.iter().map(|path| SittingLog::read(path)).collect::<Result<Vec<_>, _>>()?;
-        if let Some((first, rest)) = logs.split_first() {
-            rest.iter().try_for_each(|log| belongs(log, first))?;
-        }
-        Ok(logs)
+        if paths.is_empty() { Err(DatasetError::NoStudy(self.root.clone())) } else { Ok(paths) }
     }
 
     /// How far a subject has come.
@@ -185,19 +204,22 @@ impl Dataset {
     /// # Errors
     /// A log that cannot be used, or a file that cannot be written.
     pub fn write_tables(&self) -> Result<(), DatasetError> {
-        let logs = self.logs()?;
-        let Some(first) = logs.first() else { return Ok(()) };
-        let task = first.begin.protocol.task();
-        for log in logs.iter().filter(|log| log.complete) {
-            let path = self.table_path(log.begin.subject, task);
-            self.replace(&path, &table::trials(log))?;
-        }
-        self.replace(
-            &self.root.join(format!("task-{task}_beh.json")),
-            &table::columns(&first.begin.protocol),
-        )?;
-        self.replace(&self.root.join("dataset_description.json"), &table::description(&first.begin))?;
-        self.replace(&self.root.join("participants.tsv"), &table::participants(&logs))?;
+        let mut participants = table::PARTICIPANTS_HEAD.to_owned();
+        let mut first = None;
+        self.each_log(|log| {
+            participants += &table::participant(&log);
+            if log.complete {
+                let path = self.table_path(log.begin.subject, log.begin.protocol.task());
+                self.replace(&path, &table::trials(&log))?;
+            }
+            first.get_or_insert(log.begin);
+            Ok(())
+        })?;
+        let Some(begin) = first else { return Ok(()) };
+        let task = begin.protocol.task();
+        self.replace(&self.root.join(format!("task-{task}_beh.json")), &table::columns(&begin.protocol))?;
+        self.replace(&self.root.join("dataset_description.json"), &table::description(&begin))?;
+        self.replace(&self.root.join("participants.tsv"), &participants)?;
         self.replace(&self.root.join("participants.json"), &table::participant_columns())
     }
 
@@ -220,11 +242,4 @@ impl Dataset {
     ) -> Result<(), DatasetError> {
         result.map_err(|cause| DatasetError::File { path: path.into(), action, cause })
     }
-}
-
-/// Whether two logs are of one study.
-fn belongs(log: &SittingLog, first: &SittingLog) -> Result<(), DatasetError> {
-    log.begin.differs(&first.begin).map_or(Ok(()), |what| {
-        Err(DatasetError::Mixed { path: log.path().into(), other: first.path().into(), what })
-    })
 }

@@ -144,15 +144,16 @@ pub(super) fn description(begin: &Begin) -> String {
     }))
 }
 
-/// Who took part.
-pub(super) fn participants(logs: &[SittingLog]) -> String {
-    let head = "participant_id\tfirst_modality\tcomplete\tpresentations\tresumed\n".to_owned();
-    logs.iter().fold(head, |text, log| {
-        let subject = log.begin.subject;
-        let first = log.begin.protocol.first_modality().of(subject).word();
-        let complete = u8::from(log.complete);
-        text + &format!("{subject}\t{first}\t{complete}\t{}\t{}\n", log.trials.len(), log.resumed)
-    })
+/// First line of the list of who took part.
+pub(super) const PARTICIPANTS_HEAD: &str =
+    "participant_id\tfirst_modality\tcomplete\tpresentations\tresumed\n";
+
+/// One who took part: a line.
+pub(super) fn participant(log: &SittingLog) -> String {
+    let subject = log.begin.subject;
+    let first = log.begin.protocol.first_modality().of(subject).word();
+    let complete = u8::from(log.complete);
+    format!("{subject}\t{first}\t{complete}\t{}\t{}\n", log.trials.len(), log.resumed)
 }
 
 /// What the columns of the list of participants mean.

@@ -1,0 +1,97 @@
+//! Whether a file is still the one that was read.
+
+use std::fs::File;
+use std::os::unix::fs::MetadataExt;
+use std::path::Path;
+use std::time::{Duration, SystemTime};
+use xxhash_rust::xxh3::Xxh3Default;
+
+/// A change this soon after another may leave a file's time as it was: file systems count in ticks of the kernel
+/// (10 ms at most), some in seconds (FAT in two).
+const COARSEST_FILE_TIME: Duration = Duration::from_secs(2);
+
+/// What the file system says of a file, and when it was asked.
+#[derive(Clone, Debug)]
+pub(super) struct FileStamp {
+    device: u64,
+    inode: u64,
+    length_bytes: u64,
+    /// Of contents or attributes: no program can set it back.
+    changed: (i64, i64),
+    /// Long enough before it was asked that a later change has another time.
+    settled: bool,
+}
+
+impl FileStamp {
+    /// Not real-time.
+    pub(super) fn of(path: &Path) -> std::io::Result<Self> {
+        let file = std::fs::metadata(path)?;
+        let changed = (file.ctime(), file.ctime_nsec());
+        Ok(Self {
+            device: file.dev(),
+            inode: file.ino(),
+            length_bytes: file.len(),
+            changed,
+            settled: is_settled(changed, SystemTime::now()),
+        })
+    }
+
+    /// Whether the contents read when this stamp was taken are those of a file with that one: a no means to look.
+    pub(super) fn vouches_for(&self, other: &Self) -> bool {
+        let what = |stamp: &Self| (stamp.device, stamp.inode, stamp.length_bytes, stamp.changed);
+        self.settled && what(self) == what(other)
+    }
+}
+
+fn is_settled((seconds, nanoseconds): (i64, i64), now: SystemTime) -> bool {
+    let (Ok(seconds), Ok(nanoseconds)) = (u64::try_from(seconds), u32::try_from(nanoseconds)) else {
+        return false;
+    };
+    let changed = SystemTime::UNIX_EPOCH + Duration::new(seconds, nanoseconds);
+    now.duration_since(changed).is_ok_and(|age| age > COARSEST_FILE_TIME)
+}
+
+/// xxh3-64 of a file's bytes, however many. Not real-time.
+pub(super) fn hash_of(path: &Path) -> std::io::Result<u64> {
+    let mut hash = Xxh3Default::new();
+    std::io::copy(&mut File::open(path)?, &mut hash)?;
+    Ok(hash.digest())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_was_just_written_is_looked_at_again() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("file");
+        std::fs::write(&file, b"one").expect("a file");
+        let fresh = FileStamp::of(&file).expect("it is there");
+        assert!(!fresh.vouches_for(&fresh), "a write within the clock's tick would have the same time");
+        let settled = FileStamp { settled: true, ..fresh };
+        assert!(settled.vouches_for(&FileStamp::of(&file).expect("it is there")));
+        let other = FileStamp { changed: (settled.changed.0, settled.changed.1 + 1), ..settled.clone() };
+        assert!(!settled.vouches_for(&other));
+        let other = FileStamp { length_bytes: 4, ..settled.clone() };
+        assert!(!settled.vouches_for(&other));
+    }
+
+    #[test]
+    fn settled_is_two_seconds_ago_and_never_the_future() {
+        let at = |seconds| SystemTime::UNIX_EPOCH + Duration::from_secs(seconds);
+        assert!(is_settled((100, 0), at(103)));
+        assert!(!is_settled((100, 0), at(101)));
+        assert!(!is_settled((100, 0), at(50)), "a clock was set back");
+        assert!(!is_settled((-1, 0), at(50)));
+    }
+
+    #[test]
+    fn the_hash_is_that_of_all_bytes() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("file");
+        let bytes: Vec<u8> = (0..300_000_u32).map(|k| k.to_le_bytes()[0]).collect();
+        std::fs::write(&file, &bytes).expect("a file");
+        assert_eq!(hash_of(&file).expect("it is there"), xxhash_rust::xxh3::xxh3_64(&bytes));
+    }
+}
