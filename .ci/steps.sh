@@ -8,13 +8,17 @@ report=()
 
 # step NAME COMMAND...: says what runs, runs it, says how long it took.
 step() {
-    local name=$1 started=$SECONDS
+    local name=$1 started=$SECONDS code
     shift
     printf '\n[%s] %s\n' "$name" "$*"
-    if "$@"; then
+    # Not as a condition: within one, `set -e` is ignored, and a function of many commands is what its last one says.
+    set +e
+    (set -e; "$@")
+    code=$?
+    set -e
+    if [ "$code" = 0 ]; then
         report+=("$(printf '%-8s ok %6d s' "$name" $((SECONDS - started)))")
     else
-        local code=$?
         report+=("$(printf '%-8s FAILED after %d s (exit code %d): %s' "$name" $((SECONDS - started)) "$code" "$*")")
         summary
         exit "$code"
