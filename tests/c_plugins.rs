@@ -41,6 +41,24 @@ fn device_and_model_in_c_run_a_scene() {
     }
 }
 
+/// A recording knows a plugin by its id, not by where its file was: that is another place tomorrow.
+#[test]
+fn a_recording_of_plugins_named_by_their_files_replays_where_their_folder_is_told() {
+    let scratch = Scratch::default();
+    let file = scratch.file("scene.toml", scene(&scratch, &[])).display().to_string();
+    let recording = scratch.path().join("run.mcap").display().to_string();
+    let ran = Flotor::with(["run", &file, "--clock", "virtual", "--record", &recording]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    let lost = Flotor::with(["replay", &recording]).run();
+    assert_eq!(lost.code, Some(exit_code::CONFIGURATION), "{lost:#?}");
+    assert!(lost.error().contains("no model plugin `fixture-c-wall`"), "{lost:#?}");
+    assert!(lost.error().contains("FLOTOR_PLUGIN_PATH adds folders"), "{lost:#?}");
+    let folder = scratch.path().display().to_string();
+    let found = Flotor::with(["replay", &recording, "--plugin-path", &folder]).run();
+    assert_eq!(found.code, Some(exit_code::OK), "{found:#?}");
+    assert!(found.stdout.contains("bit for bit the recorded wrench"), "{found:#?}");
+}
+
 #[test]
 fn plugins_in_c_pass_validation_and_are_found_by_id() {
     let scratch = Scratch::default();

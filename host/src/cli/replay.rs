@@ -20,7 +20,8 @@ use std::time::Instant;
     after_help = "With nothing changed the wrench must come out bit for bit: exit code 1 if it does not. With --set or --model\n\
     the difference is what was asked for.\n\n\
     Examples:\n  flotor replay run.mcap\n  flotor replay run.mcap --set spring.variant=closed-form --plot difference.svg\n  \
-    flotor replay run.mcap --model spring=./libmy_spring.so --json -"
+    flotor replay run.mcap --model spring=./libmy_spring.so --json -\n  \
+    flotor replay run.mcap --plugin-path target/release"
 )]
 pub(crate) struct ReplayArguments {
     /// The recording
@@ -31,6 +32,9 @@ pub(crate) struct ReplayArguments {
     /// Ask another model in place of one of the recording (repeatable): its name, and the id or file of a plugin
     #[arg(long = "model", value_name = "NAME=PLUGIN")]
     models: Vec<KeyValue>,
+    /// Folder to search for plugins (repeatable): for those the run's scene named by their files
+    #[arg(long = "plugin-path", value_name = "FOLDER")]
+    folders: Vec<PathBuf>,
     /// Write the difference as JSON (- for standard output)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -51,7 +55,7 @@ struct Report {
 
 pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
     let mut unknown = None;
-    let registry = Registry::search(&[]);
+    let registry = Registry::search(&arguments.folders);
     let replay = Replay::open(&arguments.recording, &registry, |models| {
         let others = arguments.models.iter().find_map(|other| replace(other, models).err());
         unknown = others.or_else(|| arguments.sets.iter().find_map(|set| set.apply_to_models(models).err()));
