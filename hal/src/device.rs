@@ -253,6 +253,24 @@ pub struct Capabilities {
     pub latency_s: f64,
 }
 
+impl Capabilities {
+    /// Of a device that drives nothing: a sensor says here what it senses, and takes the rest.
+    pub const UNDRIVEN: Capabilities = Capabilities {
+        sensed: Axes::NONE,
+        actuated: Axes::NONE,
+        range_m: [0.0; 3],
+        range_rad: [0.0; 3],
+        resolution_m: 0.0,
+        max_force_n: [0.0; 3],
+        max_torque_nm: [0.0; 3],
+        max_force_slew_n_per_s: f64::INFINITY, // of nothing
+        max_torque_slew_nm_per_s: f64::INFINITY,
+        max_stiffness_n_per_m: 0.0,
+        rate_hz: [100.0, 10_000.0],
+        latency_s: 0.0,
+    };
+}
+
 /// Account of the mechanical energy of a device with a known plant (a simulation), J since activation. 56 bytes.
 ///
 /// Extension `flotor.energy-ledger/1`. Every term is integrated on its own, none is the difference of others:
@@ -327,6 +345,14 @@ pub trait SafeStop: Send + Sync + 'static {
     /// Actuators to zero (or to a controlled landing) and stay there until the next activation.
     /// Bounded, no allocation, no lock; may be called twice and while another thread is inside `read` or `write`.
     fn safe_stop(&self);
+}
+
+/// The stop of a device that drives nothing: there is no force to take away.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NothingToStop;
+
+impl SafeStop for NothingToStop {
+    fn safe_stop(&self) {}
 }
 
 /// A device that is opened: known, not energised. Not real-time.

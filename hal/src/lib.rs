@@ -49,7 +49,7 @@ pub use calibration::{CALIBRATION_COEFFICIENTS, InvalidCalibration, VerticalCali
 pub use detail::{Detail, DetailedModel};
 pub use device::{
     ActiveDevice, Axes, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState, EnergyLedger,
-    Fault, SafeStop, Tick,
+    Fault, NothingToStop, SafeStop, Tick,
 };
 pub use field::{FieldModel, LinearField};
 pub use frame::{Pose, Twist, Wrench, orientation_from_rotation_vector, rotation_vector};

@@ -2,8 +2,8 @@
 
 use crate::line::{Heard, LineLost, SensorLine};
 use flotor_hal::{
-    ActiveDevice, Axes, Capabilities, Cycle, DVec3, Device, DeviceInfo, DeviceState, Fault, LoopConfig,
-    Parameter, Refusal, SafeStop, Settings, Tick, Wrench, export_device,
+    ActiveDevice, Capabilities, Cycle, DVec3, Device, DeviceInfo, DeviceState, Fault, LoopConfig,
+    NothingToStop, Parameter, Refusal, Settings, Tick, Wrench, export_device,
 };
 use std::time::Duration;
 
@@ -33,13 +33,6 @@ pub struct AskedSensor {
     opened: ForceSensor,
     /// The reading held since it was new.
     state: DeviceState,
-}
-
-/// There is nothing to make safe: it drives nothing.
-pub struct NothingToStop;
-
-impl SafeStop for NothingToStop {
-    fn safe_stop(&self) {}
 }
 
 impl ForceSensor {
@@ -90,21 +83,8 @@ impl Device for ForceSensor {
     }
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            sensed: Axes::NONE,
-            actuated: Axes::NONE,
-            range_m: [0.0; 3],
-            range_rad: [0.0; 3],
-            resolution_m: 0.0, // of no place
-            max_force_n: [0.0; 3],
-            max_torque_nm: [0.0; 3],
-            max_force_slew_n_per_s: f64::INFINITY, // of nothing
-            max_torque_slew_nm_per_s: f64::INFINITY,
-            max_stiffness_n_per_m: 0.0,
-            rate_hz: [100.0, 10_000.0],
-            // A question and its answer over USB, a frame each.
-            latency_s: 2.0e-3,
-        }
+        // A question and its answer over USB, a frame each.
+        Capabilities { latency_s: 2.0e-3, ..Capabilities::UNDRIVEN }
     }
 
     fn stopper(&self) -> NothingToStop {

@@ -4,8 +4,8 @@ use crate::motion::{Deflection, Gains, Motion, Wish};
 use crate::report::Report;
 use crate::source::{Gone, HidPuck, REPORT_BYTES, Reports};
 use flotor_hal::{
-    ActiveDevice, Axes, Capabilities, Cycle, Device, DeviceInfo, DeviceState, Fault, LoopConfig, OutOfRange,
-    Parameter, Refusal, SafeStop, Settings, Tick, Wrench, export_device,
+    ActiveDevice, Axes, Capabilities, Cycle, Device, DeviceInfo, DeviceState, Fault, LoopConfig,
+    NothingToStop, OutOfRange, Parameter, Refusal, Settings, Tick, Wrench, export_device,
 };
 
 /// Reports taken in a tick: a puck sends one or two every 8 ms or slower. What is beyond comes in the next tick.
@@ -82,13 +82,6 @@ pub struct OpenPuck<S = HidPuck> {
     buttons: u32,
 }
 
-/// There is no force to take away.
-pub struct NothingToStop;
-
-impl SafeStop for NothingToStop {
-    fn safe_stop(&self) {}
-}
-
 impl<S: Reports> SpaceMouse<S> {
     /// The pose follows from now on, from home.
     fn follow(self) -> OpenPuck<S> {
@@ -111,18 +104,11 @@ impl Device for SpaceMouse {
         let Gains { range_m, range_rad, .. } = self.values.gains();
         Capabilities {
             sensed: Axes::ALL,
-            actuated: Axes::NONE,
             range_m: [range_m; 3],
             range_rad: [range_rad; 3],
-            resolution_m: 0.0, // it counts speed, not place
-            max_force_n: [0.0; 3],
-            max_torque_nm: [0.0; 3],
-            max_force_slew_n_per_s: f64::INFINITY, // of nothing
-            max_torque_slew_nm_per_s: f64::INFINITY,
-            max_stiffness_n_per_m: 0.0,
-            rate_hz: [100.0, 10_000.0],
             // A report every 8 ms and slower.
             latency_s: 8.0e-3,
+            ..Capabilities::UNDRIVEN
         }
     }
 
