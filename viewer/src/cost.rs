@@ -5,8 +5,10 @@ use std::fmt;
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 
-/// Until a window that has just opened is at rest: fonts, shaders, the first ticks.
-const SETTLES: Duration = Duration::from_secs(2);
+/// A window that has just opened (fonts, shaders, the first ticks) is at rest once no picture has been made for so long, or goes on
+/// making them: after so long at most.
+const QUIET: Duration = Duration::from_secs(1);
+const SETTLES: Duration = Duration::from_secs(4);
 
 /// What a window has cost over a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,8 +41,8 @@ impl fmt::Display for Cost {
 pub fn watch(context: &Context, duration: Duration, tells: Sender<Cost>) {
     let context = context.clone();
     let watching = move || {
-        std::thread::sleep(SETTLES);
         let pictures = || context.cumulative_frame_nr_for(ViewportId::ROOT);
+        settle(pictures);
         let (start, before, used) = (Instant::now(), pictures(), processor());
         std::thread::sleep(duration);
         let cost = Cost {
@@ -53,6 +55,20 @@ pub fn watch(context: &Context, duration: Duration, tells: Sender<Cost>) {
         context.send_viewport_cmd_to(ViewportId::ROOT, ViewportCommand::Close);
     };
     let _ = std::thread::Builder::new().name("flotor-cost".to_owned()).spawn(watching);
+}
+
+/// Waits until the number of pictures stays what it is, or goes on growing.
+fn settle(pictures: impl Fn() -> u64) {
+    const LOOK_PERIOD: Duration = Duration::from_millis(50);
+    let opened = Instant::now();
+    let (mut last, mut since) = (pictures(), opened);
+    while since.elapsed() < QUIET && opened.elapsed() < SETTLES {
+        std::thread::sleep(LOOK_PERIOD);
+        let now = pictures();
+        if now != last {
+            (last, since) = (now, Instant::now());
+        }
+    }
 }
 
 /// Processor time of this process so far.

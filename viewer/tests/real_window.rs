@@ -13,55 +13,15 @@ use egui_kittest::kittest::Queryable;
 use flotor_live::{Ask, Client, Directory, Event};
 use flotor_viewer::app::{Start, Viewer, Wanted};
 use flotor_viewer::palette::Look;
-use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use support::PATIENCE;
-
-const SIZE: [u16; 2] = [1280, 800];
-
-/// A process that ends with the test.
-struct Owned(Child);
-
-impl Drop for Owned {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-fn program(name: &str) -> PathBuf {
-    let file = Path::new(env!("CARGO_BIN_EXE_flotor-viewer")).with_file_name(name);
-    assert!(file.is_file(), "{} is missing: run `cargo build` first", file.display());
-    file
-}
-
-fn is_installed(name: &str) -> bool {
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    std::env::split_paths(&path).any(|folder| folder.join(name).is_file())
-}
+use support::display::{Display, Owned, SIZE, alone, are_installed, patiently};
 
 /// True if a virtual display and a hand for it are installed; says so if not.
 fn can_have_a_window() -> bool {
-    let missing: Vec<&str> = ["Xvfb", "xdotool"].into_iter().filter(|name| !is_installed(name)).collect();
-    if !missing.is_empty() {
-        assert!(std::env::var("FLOTOR_WINDOW_TESTS").is_err(), "missing: {missing:?}");
-        eprintln!("skipped: {missing:?} not installed");
-    }
-    missing.is_empty()
-}
-
-/// A virtual display of the window's size; its picture goes into a file of the folder.
-fn display(folder: &Path) -> (Owned, String) {
-    let screen = format!("{}x{}x24", SIZE[0], SIZE[1]);
-    let mut command = Command::new("Xvfb");
-    command.args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0", &screen, "-fbdir"]).arg(folder);
-    let mut server = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("Xvfb starts");
-    let mut number = String::new();
-    let output = server.stdout.take().expect("a pipe was asked for");
-    BufReader::new(output).read_line(&mut number).expect("it says its number");
-    (Owned(server), format!(":{}", number.trim()))
+    are_installed(&["Xvfb", "xdotool"])
 }
 
 /// Where a slider lies in the window: the same interface without a display, on the same run.
@@ -84,20 +44,16 @@ fn place_of_slider(directory: &Directory, name: &str) -> Rect {
 /// A recording of two seconds of the demo.
 fn recording(folder: &Path) -> PathBuf {
     let file = folder.join("run.mcap");
-    let mut run = Command::new(program("flotor"));
+    let mut run = alone("flotor", folder, None);
     run.args(["run", "--clock", "virtual", "--duration", "2s", "--record"]).arg(&file);
-    let output = run.stdin(Stdio::null()).output().expect("it starts");
+    let output = run.output().expect("it starts");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     file
 }
 
-/// `flotor view` for a test: no run and no choices of whoever runs the test.
-fn view(folder: &Path, display: Option<&str>) -> Command {
-    let mut view = Command::new(program("flotor"));
-    view.arg("view").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET").env_remove("DISPLAY");
-    view.envs(display.map(|display| ("DISPLAY", display)));
-    view.env("XDG_RUNTIME_DIR", folder).env("XDG_CONFIG_HOME", folder).env("LP_NUM_THREADS", "1");
-    view.stdin(Stdio::null());
+fn view(folder: &Path, display: Option<&Display>) -> Command {
+    let mut view = alone("flotor", folder, display);
+    view.arg("view");
     view
 }
 
@@ -109,46 +65,29 @@ fn without_drivers(view: &mut Command, empty: &Path) {
     }
 }
 
-fn patiently<T>(what: &str, mut attempt: impl FnMut() -> Option<T>) -> T {
-    let until = Instant::now() + 3 * PATIENCE;
-    while Instant::now() < until {
-        if let Some(value) = attempt() {
-            return value;
-        }
-        std::thread::sleep(Duration::from_millis(100));
-    }
-    panic!("{what}: not within {:?}", 3 * PATIENCE);
-}
-
 #[test]
 fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
     if !can_have_a_window() {
         return;
     }
     let folder = tempfile::tempdir().expect("a scratch folder");
-    let mut run = Command::new(program("flotor"));
-    run.args(["run", "--duration", "10min", "--rate", "500"])
-        .env("XDG_RUNTIME_DIR", folder.path())
-        .env("XDG_CONFIG_HOME", folder.path());
-    let _run =
-        Owned(run.stdin(Stdio::null()).stderr(Stdio::null()).stdout(Stdio::null()).spawn().expect("it runs"));
+    let mut run = alone("flotor", folder.path(), None);
+    run.args(["run", "--duration", "10min", "--rate", "500"]).stderr(Stdio::null()).stdout(Stdio::null());
+    let _run = Owned(run.spawn().expect("it runs"));
     let directory = Directory::at(folder.path().join("flotor"));
     let mut client = patiently("the run is found", || Client::find(&directory).ok());
     let slider = place_of_slider(&directory, "gamma");
 
-    let (_server, display) = display(folder.path());
-    let mut window = Command::new(program("flotor-viewer"));
-    window.args(["--size", &format!("{}x{}", SIZE[0], SIZE[1])]).env("DISPLAY", &display);
-    // A software adapter takes all processors if it may; the loop needs one.
-    window
-        .env_remove("WAYLAND_DISPLAY")
-        .env("XDG_RUNTIME_DIR", folder.path())
-        .env("XDG_CONFIG_HOME", folder.path())
-        .env("LP_NUM_THREADS", "1");
+    let display = Display::start(folder.path());
+    let mut window = alone("flotor-viewer", folder.path(), Some(&display));
+    window.args(["--size", &format!("{}x{}", SIZE[0], SIZE[1])]);
     let mut window = Owned(window.stderr(Stdio::null()).spawn().expect("the viewer starts"));
     let xdotool = |arguments: &[&str]| {
-        let output =
-            Command::new("xdotool").args(arguments).env("DISPLAY", &display).output().expect("xdotool runs");
+        let output = Command::new("xdotool")
+            .args(arguments)
+            .env("DISPLAY", &display.name)
+            .output()
+            .expect("xdotool runs");
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
     };
     patiently("the window opens", || {
@@ -181,7 +120,7 @@ fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
     assert!(last.number > 1.2 * first.number, "further right is stiffer: {changes:?}");
     if let Some(kept) = std::env::var_os("FLOTOR_KEEP_SCREEN") {
         std::thread::sleep(Duration::from_secs(3));
-        std::fs::copy(folder.path().join("Xvfb_screen0"), kept).expect("the picture is there");
+        std::fs::copy(&display.screen, kept).expect("the picture is there");
     }
 }
 
@@ -194,22 +133,17 @@ fn a_sitting_in_a_real_window_is_gone_through_by_keyboard() {
     }
     let folder = tempfile::tempdir().expect("a scratch folder");
     let out = folder.path().join("data");
-    let (_server, display) = display(folder.path());
-    let mut study = Command::new(program("flotor"));
+    let display = Display::start(folder.path());
+    let mut study = alone("flotor", folder.path(), Some(&display));
     study.args(["study", "magnitude", "--observer", "human", "--stimuli", "3", "--replications", "1"]);
     study.args(["--demo", "2", "--noise", "off", "--out"]).arg(&out);
-    study
-        .env("DISPLAY", &display)
-        .env_remove("WAYLAND_DISPLAY")
-        .env("XDG_RUNTIME_DIR", folder.path())
-        .env("XDG_CONFIG_HOME", folder.path());
-    study.env("LP_NUM_THREADS", "1").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    study.stdout(Stdio::null()).stderr(Stdio::null());
     let mut study = Owned(study.spawn().expect("the study starts"));
     // Without a window manager nobody gives the window the keyboard. While it opens or closes there is none to be found: the
     // next attempt, or the end of the loop, tells.
     let press = |keys: &[&str]| {
         let window = ["search", "--onlyvisible", "--name", "Flotor", "windowfocus", "key"];
-        let _ = Command::new("xdotool").args(window).args(keys).env("DISPLAY", &display).output();
+        let _ = Command::new("xdotool").args(window).args(keys).env("DISPLAY", &display.name).output();
     };
     // A digit means something on a rating's screen only, Return on every screen: together they go through all of them.
     let until = Instant::now() + 15 * PATIENCE;
@@ -243,14 +177,9 @@ fn a_sitting_in_a_real_window_is_gone_through_by_keyboard() {
 fn a_sitting_without_a_display_is_refused_before_it_begins() {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let out = folder.path().join("data");
-    let mut study = Command::new(program("flotor"));
+    let mut study = alone("flotor", folder.path(), None);
     study.args(["study", "jnd", "--observer", "human", "--noise", "off", "--out"]).arg(&out);
-    study.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
-    let output = study
-        .env("XDG_RUNTIME_DIR", folder.path())
-        .env("XDG_CONFIG_HOME", folder.path())
-        .output()
-        .expect("it starts");
+    let output = study.output().expect("it starts");
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(said.contains("no window") && said.contains("--screen terminal"), "{said}");
@@ -260,13 +189,7 @@ fn a_sitting_without_a_display_is_refused_before_it_begins() {
 #[test]
 fn without_a_display_there_is_one_line_and_exit_code_2() {
     let folder = tempfile::tempdir().expect("a scratch folder");
-    let mut viewer = Command::new(program("flotor-viewer"));
-    viewer.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
-    let output = viewer
-        .env("XDG_RUNTIME_DIR", folder.path())
-        .env("XDG_CONFIG_HOME", folder.path())
-        .output()
-        .expect("it starts");
+    let output = alone("flotor-viewer", folder.path(), None).output().expect("it starts");
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert_eq!(said.lines().count(), 1, "{said}");
@@ -283,7 +206,7 @@ fn a_window_that_nobody_touches_makes_no_picture() {
     let seconds = if std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size == "full") { "10" } else { "2" };
     let folder = tempfile::tempdir().expect("a scratch folder");
     let file = recording(folder.path());
-    let (_server, display) = display(folder.path());
+    let display = Display::start(folder.path());
     let output = view(folder.path(), Some(&display)).args(["--measure", seconds]).arg(file).output();
     let output = output.expect("it starts");
     let (cost, said) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
@@ -312,7 +235,7 @@ fn without_a_driver_there_is_one_line_and_pictures_all_the_same() {
     if !can_have_a_window() {
         return;
     }
-    let (_server, display) = display(folder.path());
+    let display = Display::start(folder.path());
     let mut view = view(folder.path(), Some(&display));
     without_drivers(&mut view, folder.path());
     let output = view.arg(&file).output().expect("it starts");

@@ -1,6 +1,8 @@
-//! What the tests of the window share: a host that is none, and where plugins lie.
+//! What the tests of the window share: a host that is none, where plugins lie, and a display.
 
 #![allow(dead_code)] // each test program uses its part
+
+pub(crate) mod display;
 
 use flotor_hal::abi::loader::Plugin;
 use flotor_live::{

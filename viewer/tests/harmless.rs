@@ -1,0 +1,186 @@
+//! Whatever the viewer's process does, the run is the same: bit for bit with the virtual clock, with every count that a run says
+//! of itself. It watches, is killed, stands still, or the host is flooded beside it.
+//!
+//! The window needs `Xvfb` and a software adapter (`libgl1-mesa-dri` with `libegl1`, or `mesa-vulkan-drivers`). Where they are
+//! missing, the tests say so and pass, unless `FLOTOR_WINDOW_TESTS=require`.
+
+mod support;
+
+use flotor_live::{Ask, Client, Directory, SetValue};
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
+use std::io::Write;
+use std::os::unix::net::UnixStream;
+use std::path::Path;
+use std::process::Stdio;
+use std::sync::LazyLock;
+use std::thread::JoinHandle;
+use std::time::Duration;
+use support::display::{Display, Owned, alone, are_installed, patiently};
+use tempfile::TempDir;
+
+/// What is read from the wall clock, and nothing else in a summary is: how fast the machine was.
+const OF_THE_MACHINE: [&str; 3] = ["compute_ns", "stages_ns", "wall_s"];
+
+/// Starts the demo: a hundred seconds of virtual time, one or two on the wall.
+fn start_run(folder: &Path) -> Owned {
+    let mut run = alone("flotor", folder, None);
+    run.args(["run", "--clock", "virtual", "--seed", "7", "--duration", "100s", "--json", "-"]);
+    Owned(run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts"))
+}
+
+fn goes_on(run: &mut Owned) -> bool {
+    run.0.try_wait().expect("it is ours").is_none()
+}
+
+/// What a run says of itself in the end, without what the machine had to do with it.
+fn summary(run: &mut Owned) -> Value {
+    let (stdout, stderr) = (run.0.stdout.take(), run.0.stderr.take());
+    let [said, errors] = [stdout.map(std::io::read_to_string), stderr.map(std::io::read_to_string)]
+        .map(|text| text.expect("a pipe was asked for").expect("it is text"));
+    assert!(run.0.wait().expect("it is ours").success(), "{errors}");
+    let mut summary: Value = serde_json::from_str(&said).expect("it is JSON");
+    let all = summary.as_object_mut().expect("an object");
+    OF_THE_MACHINE.iter().for_each(|name| assert!(all.remove(*name).is_some(), "{name}"));
+    summary
+}
+
+/// The run that nobody watches, made once.
+static UNWATCHED: LazyLock<Value> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let summary = summary(&mut start_run(folder.path()));
+    assert_eq!((&summary["ticks"], &summary["end"]), (&Value::from(100_000), &Value::from("finished")));
+    assert!(summary["trace_digest"].as_str().is_some_and(|digest| digest.ends_with("-100000")));
+    summary
+});
+
+/// A run and a viewer that draws it.
+struct Watched {
+    run: Owned,
+    viewer: Owned,
+    display: Display,
+    folder: TempDir,
+}
+
+impl Watched {
+    /// Opens a window that waits, starts a run, and holds it once the window has drawn it moving. `None` where there are no windows.
+    fn begin() -> Option<Self> {
+        if !are_installed(&["Xvfb"]) {
+            return None;
+        }
+        let folder = tempfile::tempdir().expect("a scratch folder");
+        let display = Display::start(folder.path());
+        let empty = display.picture();
+        let mut viewer = alone("flotor-viewer", folder.path(), Some(&display));
+        let mut viewer = Owned(viewer.stderr(Stdio::null()).spawn().expect("it starts"));
+        let waiting = patiently("a window that waits for a run", || {
+            assert!(goes_on(&mut viewer), "the viewer ended by itself");
+            let picture = display.picture();
+            std::thread::sleep(Duration::from_millis(300));
+            (picture != empty && picture == display.picture()).then_some(picture)
+        });
+        let mut watched = Self { run: start_run(folder.path()), viewer, display, folder };
+        watched.wait_until_drawn(waiting);
+        Some(watched)
+    }
+
+    /// Waits for three pictures, each other than the one before: only a run that moves makes so many. The virtual clock does not know
+    /// how busy the machine is, and a window does: until then the run works a millisecond at a time.
+    fn wait_until_drawn(&mut self, mut last: Vec<u8>) {
+        for _ in 0..3 {
+            last = patiently("another picture", || {
+                signal(&self.run, Signal::CONT);
+                std::thread::sleep(Duration::from_millis(1));
+                signal(&self.run, Signal::STOP);
+                assert!(goes_on(&mut self.run), "the run was over before the viewer had drawn it");
+                Some(self.display.picture()).filter(|picture| *picture != last)
+            });
+        }
+    }
+
+    /// Lets the run go on to its end while something happens to it; gives its summary.
+    fn end_with(&mut self, happens: impl FnOnce(&mut Self)) -> Value {
+        signal(&self.run, Signal::CONT);
+        happens(self);
+        assert!(goes_on(&mut self.run), "it is to happen in mid run");
+        summary(&mut self.run)
+    }
+}
+
+fn signal(program: &Owned, signal: Signal) {
+    let number = i32::try_from(program.0.id()).ok().and_then(Pid::from_raw);
+    kill_process(number.expect("a process"), signal).expect("it is ours, and not waited for");
+}
+
+#[test]
+fn a_viewer_that_watches_changes_nothing() {
+    let Some(mut watched) = Watched::begin() else { return };
+    assert_eq!(watched.end_with(|_| {}), *UNWATCHED);
+    assert!(goes_on(&mut watched.viewer), "it was there to the end");
+}
+
+#[test]
+fn a_viewer_that_is_killed_changes_nothing() {
+    let Some(mut watched) = Watched::begin() else { return };
+    let summary = watched.end_with(|watched| {
+        signal(&watched.viewer, Signal::KILL);
+        assert!(!watched.viewer.0.wait().expect("it is ours").success());
+    });
+    assert_eq!(summary, *UNWATCHED);
+}
+
+#[test]
+fn a_viewer_that_is_frozen_changes_nothing() {
+    let Some(mut watched) = Watched::begin() else { return };
+    let mut frozen = Vec::new();
+    let summary = watched.end_with(|watched| {
+        signal(&watched.viewer, Signal::STOP);
+        std::thread::sleep(Duration::from_millis(100)); // what it had drawn reaches the display
+        frozen = watched.display.picture();
+    });
+    assert_eq!(summary, *UNWATCHED);
+    assert!(watched.display.picture() == frozen, "it stood still to the end of the run");
+    signal(&watched.viewer, Signal::CONT);
+    patiently("thawed, it draws again", || Some(()).filter(|()| watched.display.picture() != frozen));
+}
+
+#[test]
+fn a_viewer_and_a_flood_of_requests_and_rubbish_change_nothing() {
+    let Some(mut watched) = Watched::begin() else { return };
+    let mut floods = None;
+    let summary = watched.end_with(|watched| {
+        floods = Some(flood(&Directory::at(watched.folder.path().join("flotor"))));
+    });
+    assert_eq!(summary, *UNWATCHED);
+    let sent = floods.expect("it was begun").map(|flood| flood.join().expect("it only sends"));
+    assert!(sent.iter().all(|sent| *sent > 100), "a flood: {sent:?}");
+    assert!(goes_on(&mut watched.viewer), "it was there to the end");
+}
+
+/// Sends what changes nothing, as fast as it is taken, until the run is over, without ever reading an answer: requests that ask for
+/// no parameter or for one that is not there; and bytes that mean nothing, on connections of their own. Gives how much was sent.
+fn flood(directory: &Directory) -> [JoinHandle<u32>; 2] {
+    let client = Client::find(directory).expect("the run can be watched");
+    let path = directory.runs().remove(0).path;
+    let requests = move || {
+        let nothing = || Ask::Set { values: Vec::new() };
+        let [plugin, parameter, value] = ["spring", "no_such_parameter", "1"].map(str::to_owned);
+        let unknown = Ask::Set { values: vec![SetValue { plugin, parameter, value }] };
+        let asks = (0_u32..).map(|number| if number % 2 == 0 { nothing() } else { unknown.clone() });
+        let asker = client.asker();
+        let sent = asks.take_while(|ask| asker.ask(ask.clone()).is_ok()).count();
+        u32::try_from(sent).expect("of a few seconds")
+    };
+    let rubbish = move || {
+        let mut sent = 0;
+        // A frame of 4 GiB: the host hangs up, and there is a next connection.
+        while let Ok(mut nonsense) = UnixStream::connect(&path) {
+            nonsense.set_write_timeout(Some(Duration::from_millis(10))).expect("a time-out is legal");
+            while nonsense.write_all(&[0xff; 4096]).is_ok() {
+                sent += 1;
+            }
+        }
+        sent
+    };
+    [std::thread::spawn(requests), std::thread::spawn(rubbish)]
+}

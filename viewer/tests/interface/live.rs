@@ -1,0 +1,132 @@
+//! A running host: how it stands, what warns, what stops it, and its parameters: what is pulled reaches the host, and what the
+//! loop took is what is shown.
+
+use super::window::{Window, live, until, until_fresh, window};
+use egui::Key;
+use egui::accesskit::Role;
+use egui_kittest::kittest::{NodeT, Queryable};
+use flotor_live::{Ask, Outcome};
+use flotor_record::trace::Events;
+use flotor_viewer::app::{Start, Wanted};
+use flotor_viewer::panel::{Standing, Value};
+use std::time::Duration;
+
+#[test]
+fn without_a_run_the_window_says_what_to_do() {
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let mut window = window(Start::Live(Wanted::newest(flotor_live::Directory::at(folder.path()))));
+    window.run_steps(2);
+    window.get_by_label("Waiting for a run");
+    assert!(window.query_by_label("EMERGENCY STOP").is_none(), "there is nothing to stop");
+}
+
+#[test]
+fn the_emergency_stop_is_always_in_sight_and_on_the_largest_key() {
+    let (mut window, mut host, _folder) = live(&[]);
+    window.get_by_label("EMERGENCY STOP").click();
+    window.run_steps(2);
+    assert_eq!(host.request(None), Ask::EmergencyStop);
+    window.key_press(Key::P);
+    window.run_steps(2);
+    assert!(window.query_by_role_and_label(Role::Slider, "gamma").is_none(), "P puts the panel away");
+    window.get_by_label("EMERGENCY STOP");
+    window.key_press(Key::Space);
+    window.run_steps(2);
+    assert_eq!(host.request(None), Ask::EmergencyStop);
+    host.end("emergency stop (a program that watches); the device is stopped");
+    until(&mut window, |window| window.query_by_label_contains("emergency stop (").is_some());
+    assert!(window.query_by_label("EMERGENCY STOP").is_none());
+    assert!(window.state().panels()[1].knobs.iter().all(|knob| knob.standing == Standing::Fixed));
+}
+
+#[test]
+fn warnings_say_what_and_what_to_do_and_stay_in_sight_a_while() {
+    let (mut window, mut host, _folder) = live(&[]);
+    until_fresh(&mut window, &mut host, |window| window.query_by_label_contains("⚠").is_none());
+    host.run_ticks(1, Events::FORCE_LIMITED);
+    host.run_ticks(300, Events::NONE);
+    until(&mut window, |window| window.query_by_label_contains("Excess force").is_some());
+    window.get_by_label_contains("ease off");
+    host.run_ticks(1500, Events::NONE);
+    until(&mut window, |window| window.query_by_label_contains("Excess force").is_none());
+    window.get_by_label("force limited"); // counted
+    window.get_by_label("1 ticks");
+    // Nothing comes any more, and the host has not said that it ended.
+    std::thread::sleep(Duration::from_millis(600));
+    window.run_steps(2);
+    window.get_by_label("no ticks come");
+    window.get_by_label_contains("Stale data");
+}
+
+#[test]
+fn limits_say_how_much_of_them_is_used() {
+    let (mut window, mut host, _folder) = live(&[]);
+    // 30 N and 1 N·m at the host; the spring of the ticks that are sent has 0.7 N/mm and is 4 mm short after half a second.
+    host.run_ticks(1001, Events::NONE);
+    until_fresh(&mut window, &mut host, |window| {
+        window.query_by_role_and_label(Role::ProgressIndicator, "Fz +2.8 of 30 N").is_some()
+    });
+    window.get_by_role_and_label(Role::ProgressIndicator, "Mx +0.0 of 1000 mN·m");
+}
+
+#[test]
+fn a_slider_reaches_the_host_and_follows_what_the_loop_says() {
+    let (mut window, mut host, _folder) = live(&[]);
+    until_fresh(&mut window, &mut host, |window| window.query_by_label("running").is_some());
+    window.get_by_role_and_label(Role::Slider, "gamma").set_value_accesskit(30.0);
+    window.run_steps(2);
+    let Ask::Set { values } = host.request(None) else { panic!("something else was asked") };
+    assert_eq!((values[0].plugin.as_str(), values[0].parameter.as_str()), ("spring", "gamma_n"));
+    assert_eq!(values[0].value, "30");
+    let before = number_of(&window, "alpha_n_mm2");
+    host.changed(&values[0], Outcome::Applied);
+    until(&mut window, |window| (number_of(window, "alpha_n_mm2") - before).abs() > 1.0);
+    assert_eq!(number_of(&window, "gamma_n"), 30.0);
+}
+
+#[test]
+fn a_refused_change_goes_back_and_says_why() {
+    let (mut window, mut host, _folder) = live(&[]);
+    window.get_by_role_and_label(Role::Slider, "gamma").set_value_accesskit(25.0);
+    window.run_steps(2);
+    let Ask::Set { values } = host.request(Some("the loop is busy")) else {
+        panic!("something else was asked")
+    };
+    until(&mut window, |window| window.query_by_label_contains("the loop is busy").is_some());
+    host.changed(&values[0], Outcome::Refused);
+    until(&mut window, |window| window.query_by_label_contains("does not fit").is_some());
+    assert!((number_of(&window, "gamma_n") - 25.0).abs() > 1.0, "the old value is in force and shown");
+}
+
+/// As in the thesis: the physical panel drives the rigidity panel, and not the other way round.
+#[test]
+fn physical_parameters_drive_the_rigidities_and_not_the_other_way_round() {
+    let (mut window, mut host, _folder) = live(&[("mode", "physical")]);
+    let standing = |window: &Window<'_>, id: &str| {
+        let knobs = &window.state().panels()[1].knobs;
+        knobs.iter().find(|knob| knob.parameter.id == id).expect("the spring has it").standing.clone()
+    };
+    assert_eq!(standing(&window, "wire_diameter_mm"), Standing::Free);
+    assert!(matches!(standing(&window, "gamma_n"), Standing::Follows(_)));
+    window.get_by_label("Follow from these");
+    assert!(window.get_by_role_and_label(Role::Slider, "gamma").accesskit_node().is_disabled());
+    let before = number_of(&window, "gamma_n");
+    window.get_by_role_and_label(Role::Slider, "wire diameter").set_value_accesskit(0.8);
+    window.run_steps(2);
+    let Ask::Set { values } = host.request(None) else { panic!("something else was asked") };
+    host.changed(&values[0], Outcome::Applied);
+    until(&mut window, |window| number_of(window, "gamma_n") > 1.5 * before);
+
+    let (window, _host, _folder) = live(&[("mode", "gamma")]);
+    assert!(matches!(standing(&window, "wire_diameter_mm"), Standing::Follows(_)));
+    assert_eq!(standing(&window, "gamma_n"), Standing::Free);
+}
+
+fn number_of(window: &Window<'_>, parameter: &str) -> f64 {
+    let panel = &window.state().panels()[1];
+    let knob = panel.knobs.iter().find(|knob| knob.parameter.id == parameter).expect("the spring has it");
+    match knob.value {
+        Value::Number(number) => number,
+        ref other => panic!("{other:?}"),
+    }
+}

@@ -1,0 +1,108 @@
+//! View, light and dark, scale, and what is there the next time.
+
+use super::window::{recorded, recording};
+use egui::accesskit::Role;
+use egui::{Key, vec2};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+use flotor_viewer::app::Viewer;
+use flotor_viewer::palette::Look;
+
+#[test]
+fn the_view_turns_zooms_and_comes_back() {
+    let mut window = recording();
+    let start = window.state().view().camera;
+    let area = window.get_by_role_and_label(Role::Image, "3D view; drag turns it, the wheel zooms").rect();
+    window.hover_at(area.center());
+    window.drag_at(area.center());
+    window.run_steps(1);
+    window.hover_at(area.center() + vec2(60.0, 20.0));
+    window.run_steps(1);
+    window.drop_at(area.center() + vec2(60.0, 20.0));
+    window.run_steps(1);
+    let turned = window.state().view().camera;
+    assert!((turned.azimuth_rad - start.azimuth_rad).abs() > 0.1, "the mouse turns it");
+    assert!(turned.inclination_rad > start.inclination_rad);
+    window.key_press(Key::Minus);
+    window.run_steps(1);
+    assert!(window.state().view().camera.distance_mm > turned.distance_mm);
+    window.key_press(Key::R);
+    window.run_steps(1);
+    assert_eq!(window.state().view().camera, start, "the experimenter's view");
+}
+
+#[test]
+fn the_look_is_switched_and_everything_stays_where_it_was() {
+    let mut window = recording();
+    window.get_by_label("Light (L)").click();
+    window.run_steps(2);
+    assert_eq!(window.state().look(), Look::Light);
+    window.get_by_label("Dark (L)");
+    window.key_press(Key::L);
+    window.run_steps(2);
+    assert_eq!(window.state().look(), Look::Dark);
+}
+
+/// Text twice as large: everything is still there.
+#[test]
+fn twice_the_scale_loses_nothing() {
+    let harness = Harness::builder().with_size(vec2(960.0, 600.0)).with_pixels_per_point(2.0);
+    let start = recorded(1000, None);
+    let mut window =
+        harness.build_eframe(|creation| Viewer::new(&creation.egui_ctx, None, start, Look::Light));
+    window.run_steps(3);
+    for label in ["A spring under test", "Force over time, N", "Position over time, mm", "Play"] {
+        let area = window.get_by_label(label).rect();
+        assert!(area.max.x <= 960.5 && area.max.y <= 600.5 && area.width() > 8.0, "{label}: {area:?}");
+    }
+}
+
+/// From 100 to 200 %, in windows from a small laptop's to a large screen's: everything that can be pressed or read lies inside, and
+/// nothing is cut off at the right of the side.
+#[test]
+fn every_scale_and_size_keeps_everything_in_sight() {
+    for (scale, size) in
+        [(1.0, [1280.0, 800.0]), (1.25, [1024.0, 640.0]), (1.5, [853.0, 533.0]), (2.0, [960.0, 600.0])]
+    {
+        let harness = Harness::builder().with_size(egui::Vec2::from(size)).with_pixels_per_point(scale);
+        let start = recorded(1000, None);
+        let mut window =
+            harness.build_eframe(|creation| Viewer::new(&creation.egui_ctx, None, start, Look::Dark));
+        window.run_steps(3);
+        let labels = [
+            "A spring under test",
+            "Force over time, N",
+            "Position over time, mm",
+            "Play",
+            "Export",
+            "Light (L)",
+        ];
+        for label in labels {
+            let area = window.get_by_label(label).rect();
+            let is_inside = area.min.x >= 0.0 && area.max.x <= size[0] + 0.5 && area.max.y <= size[1] + 0.5;
+            assert!(is_inside && area.width() > 8.0, "{label} at {scale} in {size:?}: {area:?}");
+        }
+    }
+}
+
+/// What was chosen is there the next time: look, units, traces, the panel.
+#[test]
+fn a_window_is_as_it_was_left() {
+    let mut left = recording();
+    left.key_press(Key::L);
+    left.key_press(Key::U);
+    left.run_steps(1);
+    left.get_by_label("Energy").click();
+    left.key_press(Key::P);
+    left.run_steps(3);
+    let remembered = left.state().remembered();
+    let mut next = recording();
+    assert_ne!(next.state().remembered(), remembered);
+    let context = next.ctx.clone();
+    next.state_mut().recall(&context, &remembered);
+    next.run_steps(3);
+    assert_eq!(next.state().remembered(), remembered);
+    next.get_by_label("Dark (L)");
+    next.get_by_label("Energy over time, J");
+    assert!(next.query_by_label("preset").is_none(), "the panel was put away");
+}

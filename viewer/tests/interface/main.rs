@@ -1,0 +1,11 @@
+//! Every panel and screen by its accessibility tree, without display or GPU: what a person can find, press and pull, and
+//! what comes of it at the host.
+
+mod effort;
+mod live;
+mod look;
+mod recording;
+mod sitting;
+#[path = "../support/mod.rs"]
+mod support;
+mod window;

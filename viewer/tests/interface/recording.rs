@@ -1,0 +1,114 @@
+//! A recording: played and scrubbed; its traces, in which units, where the moment is, and as files.
+
+use super::window::{Window, recorded, recording, window};
+use egui::Key;
+use egui::accesskit::Role;
+use egui_kittest::kittest::Queryable;
+use flotor_viewer::palette::Look;
+use flotor_viewer::player::Motion;
+use flotor_viewer::ui::plot_stack::ExportFormat;
+
+#[test]
+fn a_recording_is_played_scrubbed_and_repeated() {
+    let mut window = recording();
+    window.get_by_label("recording");
+    assert_eq!(window.state().player().now_s, 0.5);
+    window.key_press(Key::Space);
+    window.run_steps(30);
+    let now_s = window.state().player().now_s;
+    assert!(now_s > 0.7 && now_s < 1.3, "half a second later: {now_s}");
+    window.get_by_label("Pause").click();
+    window.run_steps(2);
+    assert_eq!(window.state().player().motion, Motion::Pause);
+    window.get_by_role_and_label(Role::Slider, "Time").set_value_accesskit(2.0);
+    window.run_steps(2);
+    assert!((window.state().player().now_s - 2.0).abs() < 1.0e-9);
+    window.key_press(Key::ArrowLeft);
+    window.run_steps(1);
+    assert!((window.state().player().now_s - 1.0).abs() < 1.0e-9);
+    window.key_press(Key::End);
+    window.key_press(Key::Space);
+    window.run_steps(2);
+    assert!(window.state().player().now_s < 0.5, "from the beginning");
+    window.get_by_label("loop").click();
+    window.run_steps(1);
+    assert!(!window.state().player().repeats);
+}
+
+/// A window of time that is shorter than the run has the moment shown in it, wherever that is.
+#[test]
+fn traces_go_where_the_moment_is() {
+    let mut window = window(recorded(30_000, Some(12.0)));
+    window.run_steps(2);
+    window.get_by_label("Time shown").click();
+    window.run_steps(2);
+    window.get_by_label("5 s").click();
+    window.run_steps(2);
+    let span_s = |window: &Window<'_>| {
+        let viewer = window.state();
+        let [first_s, last_s] = viewer.plots().span_s(viewer.history());
+        assert!((last_s - first_s - 5.0).abs() < 1.0e-9);
+        assert!((first_s..=last_s).contains(&viewer.player().now_s), "{first_s} to {last_s}");
+        [first_s, last_s]
+    };
+    span_s(&window);
+    let keys = [
+        (Key::ArrowRight, false),
+        (Key::ArrowRight, false),
+        (Key::ArrowLeft, false),
+        (Key::Home, true),
+        (Key::ArrowRight, false),
+        (Key::End, true),
+        (Key::ArrowLeft, false),
+    ];
+    for (key, moves) in keys {
+        let before = span_s(&window);
+        window.key_press(key);
+        window.run_steps(2);
+        assert_eq!(span_s(&window) != before, moves, "{key:?} from {before:?}");
+    }
+}
+
+#[test]
+fn traces_are_chosen_switched_and_written_to_files() {
+    let mut window = recording();
+    window.get_by_label("Force over time, N");
+    window.get_by_role_and_label(Role::Button, "Energy").click();
+    window.run_steps(2);
+    window.get_by_label("Energy over time, mJ");
+    window.key_press(Key::U);
+    window.run_steps(2);
+    window.get_by_label("Energy over time, J");
+    window.get_by_label("Position over time, m");
+
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    for (format, starts) in [
+        (ExportFormat::Csv, b"time_s,Force Fx (N)".as_slice()),
+        (ExportFormat::Svg, b"<svg".as_slice()),
+        (ExportFormat::Png, b"\x89PNG".as_slice()),
+    ] {
+        let path = folder.path().join("traces");
+        let viewer = window.state();
+        flotor_viewer::export::write(viewer.history(), viewer.plots(), format, Look::Light, &path)
+            .expect("written");
+        let written = std::fs::read(&path).expect("it is there");
+        assert!(written.starts_with(starts), "{:?}", String::from_utf8_lossy(&written[..20]));
+        if format == ExportFormat::Csv {
+            assert_eq!(
+                written.iter().filter(|byte| **byte == b'\n').count(),
+                3001,
+                "every sample and the names"
+            );
+        }
+    }
+}
+
+#[test]
+fn traces_can_be_written_in_three_formats() {
+    let mut window = recording();
+    window.get_by_label("Export").click();
+    window.run_steps(2);
+    for format in ["CSV", "SVG", "PNG"] {
+        window.get_by_role_and_label(Role::Button, format);
+    }
+}

@@ -1,0 +1,97 @@
+//! A virtual display for tests of the real window, and the programs that run on it.
+
+use super::PATIENCE;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Width and height of display and window, pixels.
+pub(crate) const SIZE: [u16; 2] = [1280, 800];
+
+/// A process that ends with the test.
+pub(crate) struct Owned(pub(crate) Child);
+
+impl Drop for Owned {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A program of this workspace.
+pub(crate) fn program(name: &str) -> PathBuf {
+    let file = Path::new(env!("CARGO_BIN_EXE_flotor-viewer")).with_file_name(name);
+    assert!(file.is_file(), "{} is missing: run `cargo build` first", file.display());
+    file
+}
+
+fn is_installed(name: &str) -> bool {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&path).any(|folder| folder.join(name).is_file())
+}
+
+/// True if these programs are installed; says so if not, and fails where the window has to be tested.
+pub(crate) fn are_installed(programs: &[&str]) -> bool {
+    let missing: Vec<&&str> = programs.iter().filter(|name| !is_installed(name)).collect();
+    if !missing.is_empty() {
+        assert!(std::env::var("FLOTOR_WINDOW_TESTS").is_err(), "missing: {missing:?}");
+        eprintln!("skipped: {missing:?} not installed");
+    }
+    missing.is_empty()
+}
+
+/// A virtual display of the window's size.
+pub(crate) struct Display {
+    _server: Owned,
+    /// As programs are told: `:1`.
+    pub(crate) name: String,
+    /// What is on it, kept by the server in a file.
+    pub(crate) screen: PathBuf,
+}
+
+impl Display {
+    /// Starts one; its picture goes into a file of the folder.
+    pub(crate) fn start(folder: &Path) -> Self {
+        let size = format!("{}x{}x24", SIZE[0], SIZE[1]);
+        let mut command = Command::new("Xvfb");
+        command.args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0", &size, "-fbdir"]).arg(folder);
+        let mut server = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("Xvfb starts");
+        let mut number = String::new();
+        let output = server.stdout.take().expect("a pipe was asked for");
+        BufReader::new(output).read_line(&mut number).expect("it says its number");
+        Self {
+            _server: Owned(server),
+            name: format!(":{}", number.trim()),
+            screen: folder.join("Xvfb_screen0"),
+        }
+    }
+
+    /// What is on it now, as the server keeps it.
+    pub(crate) fn picture(&self) -> Vec<u8> {
+        std::fs::read(&self.screen).expect("the server keeps it")
+    }
+}
+
+/// A program of this workspace for a test: on this display or on none, and with no run and no choices of whoever runs the test.
+pub(crate) fn alone(name: &str, folder: &Path, display: Option<&Display>) -> Command {
+    let mut command = Command::new(program(name));
+    command.env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET").env_remove("DISPLAY");
+    command.envs(display.map(|display| ("DISPLAY", &display.name)));
+    command.env("XDG_RUNTIME_DIR", folder).env("XDG_CONFIG_HOME", folder);
+    // A software adapter takes all processors if it may; the loop needs one.
+    command.env("LP_NUM_THREADS", "1").stdin(Stdio::null());
+    command
+}
+
+/// Tries until it works.
+pub(crate) fn patiently<T>(what: &str, mut attempt: impl FnMut() -> Option<T>) -> T {
+    let until = Instant::now() + 3 * PATIENCE;
+    while Instant::now() < until {
+        if let Some(value) = attempt() {
+            return value;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    panic!("{what}: not within {:?}", 3 * PATIENCE);
+}
