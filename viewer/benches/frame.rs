@@ -8,12 +8,12 @@ use egui_kittest::wgpu::{create_render_state, default_wgpu_setup};
 use flotor_hal::Pose;
 use flotor_record::mapping::{Blend, MappingConfig};
 use flotor_record::trace::{RECORD_WORDS, TickRecord};
-use flotor_record::{Clock, PluginDescription, Role, RunDescription};
+use flotor_record::{PluginDescription, Role, RunDescription};
 use flotor_sync::Words;
 use flotor_viewer::app::{Start, Viewer};
 use flotor_viewer::camera::Camera;
 use flotor_viewer::canvas::Canvas;
-use flotor_viewer::history::{History, Keep};
+use flotor_viewer::history::{History, Keep, unknown_run};
 use flotor_viewer::palette::{Look, Palette};
 use flotor_viewer::quantity::Quantity;
 use flotor_viewer::scene::{ArrowScale, SceneBuilder, Visible};
@@ -66,12 +66,6 @@ const SCENE_PX: [usize; 2] = [980, 396];
 
 fn run() -> RunDescription {
     RunDescription {
-        flotor_version: String::new(),
-        rate_hz: 1000.0,
-        duration_s: 10.0,
-        seed: 0,
-        clock: Clock::Virtual,
-        scene_toml: String::new(),
         plugins: vec![PluginDescription {
             name: "spring".to_owned(),
             id: "spring".to_owned(),
@@ -85,7 +79,7 @@ fn run() -> RunDescription {
             parameters: Vec::new(),
             device: 0,
         }],
-        couplings: Vec::new(),
+        ..unknown_run()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use flotor_hal::{DVec3, Pose, rotation_vector};
 use flotor_record::trace::{Events, TickRecord};
-use flotor_record::{Ending, Note, ReadError, Recording, RunDescription};
+use flotor_record::{Clock, Ending, Note, ReadError, Recording, RunDescription};
 use std::collections::VecDeque;
 use std::path::Path;
 
@@ -75,6 +75,21 @@ impl From<&TickRecord> for Sample {
             compute_s: record.compute_ns as f32 * 1.0e-9,
             events: record.events,
         }
+    }
+}
+
+/// Stands in for a run of which nothing is known: a thousand ticks a second of nothing.
+#[must_use]
+pub fn unknown_run() -> RunDescription {
+    RunDescription {
+        flotor_version: String::new(),
+        rate_hz: 1000.0,
+        duration_s: 0.0,
+        seed: 0,
+        clock: Clock::Real,
+        scene_toml: String::new(),
+        plugins: Vec::new(),
+        couplings: Vec::new(),
     }
 }
 

@@ -9,7 +9,7 @@ use flotor_viewer::history::History;
 use flotor_viewer::palette::Look;
 use flotor_viewer::picture::{PictureError, PictureOptions, draw_without_window, picture, write_png};
 use flotor_viewer::shape::shapes_of;
-use flotor_viewer::window::{WindowWish, open};
+use flotor_viewer::window::{WindowError, WindowWish, open};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -64,6 +64,18 @@ enum Failure {
     Usage(String),
     /// A file could not be written.
     File(String),
+    /// There was a window, and then there was none.
+    Window(String),
+}
+
+impl From<WindowError> for Failure {
+    fn from(error: WindowError) -> Self {
+        let text = error.to_string();
+        match error {
+            WindowError::Lost(_) | WindowError::Broken(_) => Self::Window(text),
+            _ => Self::Usage(text),
+        }
+    }
 }
 
 fn main() -> ExitCode {
@@ -72,7 +84,7 @@ fn main() -> ExitCode {
         Err(failure) => {
             let (text, code) = match failure {
                 Failure::Usage(text) => (text, 2),
-                Failure::File(text) => (text, 1),
+                Failure::File(text) | Failure::Window(text) => (text, 1),
             };
             eprintln!("error: {text}");
             ExitCode::from(code)
@@ -100,7 +112,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
                 Some(history) => Start::Recording(Box::new(history), arguments.at, arguments.plugins.clone()),
                 None => live(arguments)?,
             };
-            let cost = open(start, wish).map_err(|error| Failure::Usage(error.to_string()))?;
+            let cost = open(start, wish)?;
             cost.iter().for_each(|cost| println!("{cost}"));
             Ok(())
         }

@@ -81,26 +81,11 @@ impl Trace {
 mod tests {
     use super::*;
     use crate::decimate::min_max;
-    use crate::history::Keep;
+    use crate::history::{Keep, unknown_run};
     use flotor_record::trace::{RECORD_WORDS, TickRecord};
-    use flotor_record::{Clock, RunDescription};
     use flotor_sync::Words;
 
     const BUCKETS: usize = 100;
-
-    fn nothing(keep: Keep) -> History {
-        let run = RunDescription {
-            flotor_version: String::new(),
-            rate_hz: 1000.0,
-            duration_s: 10.0,
-            seed: 0,
-            clock: Clock::Virtual,
-            scene_toml: String::new(),
-            plugins: Vec::new(),
-            couplings: Vec::new(),
-        };
-        History::new(run, keep)
-    }
 
     /// Ticks of a force that has no pattern.
     fn push(history: &mut History, ticks: Range<u64>) {
@@ -138,7 +123,8 @@ mod tests {
 
     #[test]
     fn a_trace_that_scrolls_is_the_one_made_afresh_and_looks_at_each_sample_once() {
-        let (mut history, mut trace) = (nothing(Keep::Newest(5000)), Trace::of(Quantity::Force));
+        let (mut history, mut trace) =
+            (History::new(unknown_run(), Keep::Newest(5000)), Trace::of(Quantity::Force));
         let mut ticks = 0;
         for new in [3000, 16, 1, 0, 17, 900, 4000, 333] {
             push(&mut history, ticks..ticks + new);
@@ -158,7 +144,7 @@ mod tests {
 
     #[test]
     fn another_place_or_length_of_time_begins_again() {
-        let mut history = nothing(Keep::All);
+        let mut history = History::new(unknown_run(), Keep::All);
         push(&mut history, 0..10_000);
         let mut trace = Trace::of(Quantity::Force);
         for span_s in [[5.0, 8.0], [0.5, 3.5], [0.0, 9.999], [9.0, 9.5], [2.0, 5.0]] {

@@ -5,8 +5,11 @@ use crate::cost::{self, Cost};
 use crate::palette::{Look, Palette};
 use crate::remembered::Remembered;
 use egui::{Ui, ViewportBuilder};
+use std::any::Any;
 use std::panic::{self, AssertUnwindSafe};
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::time::Duration;
 
@@ -25,6 +28,12 @@ pub enum WindowError {
          either, `flotor view --screenshot OUT.png FILE.mcap` draws a picture"
     )]
     NoAdapter(String),
+    /// The window was there, and the display or the adapter is not any more.
+    #[error("the window was lost: {0}; are the display and its driver still there?")]
+    Lost(String),
+    /// A mistake of the program; its place in the source has been told.
+    #[error("the window broke: {0}; that should not happen: please report it, with what was done last")]
+    Broken(String),
 }
 
 /// What a command line says about a window; what it does not say is as it was the last time.
@@ -59,11 +68,13 @@ pub fn open(start: Start, wish: WindowWish) -> Result<Option<Cost>, WindowError>
         .with_min_inner_size([640.0, 480.0]);
     let options = eframe::NativeOptions { viewport, ..eframe::NativeOptions::default() };
     let (tells, watched) = channel();
-    let run = || {
+    watched_over(|opened| {
+        let opened = Arc::clone(opened);
         eframe::run_native(
             "flotor-viewer",
             options,
             Box::new(move |creation| {
+                opened.store(true, Ordering::Relaxed);
                 creation.egui_ctx.set_zoom_factor(remembered.zoom);
                 let device = creation.wgpu_render_state.as_ref();
                 let mut viewer = Viewer::new(&creation.egui_ctx, device, start, remembered.look);
@@ -76,22 +87,42 @@ pub fn open(start: Start, wish: WindowWish) -> Result<Option<Cost>, WindowError>
                 }))
             }),
         )
-    };
-    // Libraries of the display that are missing are a panic of those who load them.
-    let said = panic::take_hook();
-    panic::set_hook(Box::new(|_| {}));
-    let result = panic::catch_unwind(AssertUnwindSafe(run));
-    panic::set_hook(said);
-    match result {
-        Ok(Ok(())) => Ok(watched.try_recv().ok()),
-        Ok(Err(eframe::Error::Wgpu(error))) => Err(WindowError::NoAdapter(one_line(&error.to_string()))),
-        Ok(Err(error)) => Err(WindowError::NoDisplay(one_line(&error.to_string()))),
-        Err(panic) => {
-            let text = panic.downcast_ref::<String>().map(String::as_str);
-            let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-            Err(WindowError::NoDisplay(one_line(text.unwrap_or("the display's libraries do not work"))))
+    })?;
+    Ok(watched.try_recv().ok())
+}
+
+/// Runs a window that says when it has opened, and tells how it ended. Libraries of the display that are missing are a panic of those
+/// who load them: until the window is open a panic means that there is none, and is one line; afterwards it is a mistake, told with
+/// its place as everywhere, whether it can be caught or not.
+fn watched_over(run: impl FnOnce(&Arc<AtomicBool>) -> eframe::Result) -> Result<(), WindowError> {
+    let opened = Arc::new(AtomicBool::new(false));
+    let before = Arc::new(panic::take_hook());
+    let (is_open, tells) = (Arc::clone(&opened), Arc::clone(&before));
+    panic::set_hook(Box::new(move |info| {
+        if is_open.load(Ordering::Relaxed) {
+            tells(info);
+        }
+    }));
+    let result = panic::catch_unwind(AssertUnwindSafe(|| run(&opened)));
+    panic::set_hook(Box::new(move |info| before(info)));
+    match (result, opened.load(Ordering::Relaxed)) {
+        (Ok(Ok(())), _) => Ok(()),
+        (Ok(Err(error)), true) => Err(WindowError::Lost(one_line(&error.to_string()))),
+        (Ok(Err(eframe::Error::Wgpu(error))), false) => {
+            Err(WindowError::NoAdapter(one_line(&error.to_string())))
+        }
+        (Ok(Err(error)), false) => Err(WindowError::NoDisplay(one_line(&error.to_string()))),
+        (Err(panic), true) => Err(WindowError::Broken(words_of(&*panic, "without a word"))),
+        (Err(panic), false) => {
+            Err(WindowError::NoDisplay(words_of(&*panic, "the display's libraries do not work")))
         }
     }
+}
+
+/// What a panic said.
+fn words_of(panic: &(dyn Any + Send), otherwise: &str) -> String {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    one_line(text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or(otherwise))
 }
 
 /// A window whose choices are kept whenever they change.
@@ -132,4 +163,36 @@ impl eframe::App for Kept {
 fn one_line(text: &str) -> String {
     let line = text.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or("nothing can be opened");
     line.trim_end_matches('.').to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One test: the hook that is told of panics is one for all threads.
+    #[test]
+    fn only_a_window_that_never_opened_is_called_none() {
+        let missing = watched_over(|_| panic!("libX11.so.6 not found")).expect_err("it cannot go well");
+        let said = missing.to_string();
+        assert!(matches!(missing, WindowError::NoDisplay(_)) && said.contains("libX11.so.6"), "{said}");
+
+        let broken = watched_over(|opened| {
+            opened.store(true, Ordering::Relaxed);
+            panic!("index out of bounds")
+        });
+        let said = broken.expect_err("it broke").to_string();
+        assert!(
+            said.starts_with("the window broke: index out of bounds;") && !said.contains("no window"),
+            "{said}"
+        );
+
+        let error = || Err(eframe::Error::AppCreation("gone".into()));
+        assert!(matches!(watched_over(|_| error()), Err(WindowError::NoDisplay(_))));
+        let lost = watched_over(|opened| {
+            opened.store(true, Ordering::Relaxed);
+            error()
+        });
+        assert!(matches!(lost, Err(WindowError::Lost(_))));
+        assert!(watched_over(|_| Ok(())).is_ok());
+    }
 }

@@ -14,7 +14,7 @@ pub use source::{Pace, Source, Wanted, connect};
 
 use crate::canvas::Canvas;
 use crate::experiment::Prompt;
-use crate::history::{History, Keep, Sample};
+use crate::history::{History, Keep, Sample, unknown_run};
 use crate::palette::{Look, Palette};
 use crate::panel::Panel;
 use crate::player::{Motion, Player};
@@ -111,7 +111,7 @@ impl Viewer {
         };
         let (source, history, parts, player, window) = match start {
             Start::Live(wanted) | Start::Sitting(wanted, _) => {
-                let nothing = History::new(nothing_yet(), Keep::Newest(1));
+                let nothing = History::new(unknown_run(), Keep::Newest(1));
                 let parts = Parts { shapes: Vec::new(), panels: Vec::new(), missing: Vec::new() };
                 (Source::Waiting(wanted), nothing, parts, Player::live(), Window::Newest(10.0))
             }
@@ -272,19 +272,5 @@ impl eframe::App for Viewer {
 
     fn clear_color(&self, _visuals: &egui::Visuals) -> [f32; 4] {
         Palette::of(self.look).panel.to_normalized_gamma_f32()
-    }
-}
-
-/// Stands in for a run until there is one.
-fn nothing_yet() -> RunDescription {
-    RunDescription {
-        flotor_version: String::new(),
-        rate_hz: 1000.0,
-        duration_s: 0.0,
-        seed: 0,
-        clock: flotor_record::Clock::Real,
-        scene_toml: String::new(),
-        plugins: Vec::new(),
-        couplings: Vec::new(),
     }
 }
