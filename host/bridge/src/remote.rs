@@ -7,16 +7,20 @@ use crate::wish::{Letter, Wish};
 use flotor_live::{Answer, End, Greeting};
 use flotor_record::trace::TickRecord;
 use flotor_record::{Change, RunDescription, tick_from_messages};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
+use zenoh::handlers::FifoChannelHandler;
 use zenoh::pubsub::Subscriber;
+use zenoh::query::Reply;
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait};
 
 /// Ticks that wait here at most: eight seconds at 1 kHz. What finds no room is counted as lost.
-const MOST_WAITING: usize = 8192;
+const MOST_TICKS: usize = 8192;
+/// Everything that waits here at most: who falls behind with ticks still hears of the end.
+const MOST_WAITING: usize = 2 * MOST_TICKS;
 /// How long a bridge may take to answer.
 const ANSWER_WAIT: Duration = Duration::from_secs(3);
 /// Pause between two looks for a bridge or run that is not there.
@@ -40,7 +44,7 @@ pub struct Remote {
     session: Session,
     name: Name,
     told: Receiver<Told>,
-    lost: Arc<AtomicU64>,
+    queue: Queue,
     errand: Errand,
     _all: Subscriber<()>,
     _alive: Subscriber<()>,
@@ -51,7 +55,8 @@ pub struct Remote {
 pub struct Errand {
     session: Session,
     name: Name,
-    number: Arc<AtomicU64>,
+    /// The last that was used; held until the letter has left, for letters to leave in the order of their numbers.
+    number: Arc<Mutex<u64>>,
     /// Process of the run that is meant.
     run: Arc<AtomicU64>,
 }
@@ -62,9 +67,10 @@ impl Remote {
     /// # Errors
     /// [`LinkError`]: the network refuses.
     pub fn listen(session: &Session, name: &Name) -> Result<Self, LinkError> {
-        let (sender, told) = sync_channel(MOST_WAITING);
-        let lost = Arc::new(AtomicU64::new(0));
-        let mut ear = Ear::new(sender.clone(), Arc::clone(&lost));
+        let (sender, told) = channel();
+        let queue = Queue { sender, waiting: Arc::default(), lost: Arc::default() };
+        let mut ear = Ear { queue: queue.clone(), pose: None, number: None };
+        let of_liveliness = queue.clone();
         let all =
             session.declare_subscriber(name.key("*")).callback_mut(move |sample| ear.hear(&sample)).wait()?;
         let alive = session
@@ -72,7 +78,7 @@ impl Remote {
             .declare_subscriber(name.key("alive"))
             .callback(move |sample| {
                 if sample.kind() == SampleKind::Delete {
-                    let _ = sender.try_send(Told::Gone);
+                    of_liveliness.put(Told::Gone);
                 }
             })
             .wait()?;
@@ -86,7 +92,7 @@ impl Remote {
             session: session.clone(),
             name: name.clone(),
             told,
-            lost,
+            queue,
             errand,
             _all: all,
             _alive: alive,
@@ -115,7 +121,10 @@ impl Remote {
     #[must_use]
     pub fn next(&self, timeout: Duration) -> Option<Told> {
         match self.told.recv_timeout(timeout) {
-            Ok(told) => Some(told),
+            Ok(told) => {
+                self.queue.waiting.fetch_sub(1, Ordering::Relaxed);
+                Some(told)
+            }
             Err(RecvTimeoutError::Timeout) => None,
             Err(RecvTimeoutError::Disconnected) => Some(Told::Gone),
         }
@@ -129,7 +138,7 @@ impl Remote {
     /// Ticks that were published and did not get here, as far as is known.
     #[must_use]
     pub fn lost(&self) -> u64 {
-        self.lost.load(Ordering::Relaxed)
+        self.queue.lost.load(Ordering::Relaxed)
     }
 
     /// How the bridge is doing.
@@ -147,7 +156,8 @@ impl Remote {
     }
 
     fn get(&self, what: &str) -> Result<Option<Vec<u8>>, LinkError> {
-        get(&self.session, &self.name.key(what), None)
+        let answers = self.session.get(self.name.key(what)).timeout(ANSWER_WAIT).wait()?;
+        Ok(first(&answers))
     }
 }
 
@@ -158,14 +168,8 @@ impl Errand {
     /// In words, for people.
     pub fn run(&self, wish: Wish) -> Result<(), String> {
         let key = self.name.key(wish.key());
-        let letter = Letter {
-            peer: self.session.zid().to_string(),
-            number: self.number.fetch_add(1, Ordering::Relaxed) + 1,
-            run: u32::try_from(self.run.load(Ordering::Relaxed)).unwrap_or(0),
-            wish,
-        };
-        let letter = serde_json::to_vec(&letter).map_err(|error| error.to_string())?;
-        let answer = get(&self.session, &key, Some(letter)).map_err(|error| error.to_string())?;
+        let answer =
+            self.send(&key, wish).map_err(|error| error.to_string()).map(|answers| first(&answers))?;
         let answer = answer.ok_or(
             "nobody answers: the bridge is gone, or does not take this request, or not from this peer; \
              `flotor bridge serve --allow` and the network's access control say who may",
@@ -173,40 +177,63 @@ impl Errand {
         let answer: Answer = serde_json::from_slice(&answer).map_err(|error| error.to_string())?;
         answer.refused.map_or(Ok(()), Err)
     }
+
+    fn send(&self, key: &str, wish: Wish) -> Result<Answers, LinkError> {
+        let mut number = self.number.lock().unwrap_or_else(PoisonError::into_inner);
+        *number += 1;
+        let letter = Letter {
+            peer: self.session.zid().to_string(),
+            number: *number,
+            run: u32::try_from(self.run.load(Ordering::Relaxed)).unwrap_or(0),
+            wish,
+        };
+        Ok(self.session.get(key).timeout(ANSWER_WAIT).payload(letter.to_bytes()).wait()?)
+    }
 }
 
-/// What is answered on a key, if anything is.
-pub(crate) fn get(
-    session: &Session,
-    key: &str,
-    payload: Option<Vec<u8>>,
-) -> Result<Option<Vec<u8>>, LinkError> {
-    let question = session.get(key).timeout(ANSWER_WAIT);
-    let answers = match payload {
-        Some(payload) => question.payload(payload).wait()?,
-        None => question.wait()?,
-    };
-    while let Ok(answer) = answers.recv() {
-        if let Ok(sample) = answer.into_result() {
-            return Ok(Some(sample.payload().to_bytes().into_owned()));
+/// What comes back.
+type Answers = FifoChannelHandler<Reply>;
+
+/// What is answered first, if anything is.
+fn first(answers: &Answers) -> Option<Vec<u8>> {
+    let sample = answers.iter().find_map(|answer| answer.into_result().ok());
+    sample.map(|sample| sample.payload().to_bytes().into_owned())
+}
+
+/// The way from the network's threads to who listens: of bounded length, and what is lost on it is counted.
+#[derive(Clone)]
+struct Queue {
+    sender: Sender<Told>,
+    waiting: Arc<AtomicUsize>,
+    lost: Arc<AtomicU64>,
+}
+
+impl Queue {
+    fn put(&self, told: Told) {
+        let is_tick = matches!(told, Told::Tick(_));
+        let most = if is_tick { MOST_TICKS } else { MOST_WAITING };
+        if self.waiting.load(Ordering::Relaxed) >= most {
+            self.lose(u64::from(is_tick));
+            return;
         }
+        self.waiting.fetch_add(1, Ordering::Relaxed);
+        // Without a listener there is nobody to tell.
+        let _ = self.sender.send(told);
     }
-    Ok(None)
+
+    fn lose(&self, ticks: u64) {
+        self.lost.fetch_add(ticks, Ordering::Relaxed);
+    }
 }
 
 /// Puts messages together to what they tell, in the network's thread.
 struct Ear {
-    sender: SyncSender<Told>,
-    lost: Arc<AtomicU64>,
+    queue: Queue,
     pose: Option<Vec<u8>>,
     number: Option<u64>,
 }
 
 impl Ear {
-    fn new(sender: SyncSender<Told>, lost: Arc<AtomicU64>) -> Self {
-        Self { sender, lost, pose: None, number: None }
-    }
-
     fn hear(&mut self, sample: &Sample) {
         let payload = sample.payload().to_bytes();
         let number = sample.attachment().and_then(|bytes| bytes.to_bytes().as_ref().try_into().ok());
@@ -218,27 +245,34 @@ impl Ear {
             }
             Some("tick") => self.tick(&payload, number),
             Some("change") => Change::from_bytes(&payload, number.unwrap_or(0)).ok().map(Told::Change),
-            Some("end") => serde_json::from_slice(&payload).ok().map(Told::End),
+            Some("end") => self.end(&payload, number),
             _ => return,
         };
-        let Some(told) = told else { return };
-        let is_tick = matches!(told, Told::Tick(_));
-        if self.sender.try_send(told).is_err() && is_tick {
-            self.lost.fetch_add(1, Ordering::Relaxed);
+        if let Some(told) = told {
+            self.queue.put(told);
         }
+    }
+
+    /// The end; what was to come before it and did not is lost.
+    fn end(&mut self, payload: &[u8], last: Option<u64>) -> Option<Told> {
+        if let (Some(heard), Some(last)) = (self.number, last) {
+            self.queue.lose(last.saturating_sub(heard));
+            self.number = Some(last.max(heard));
+        }
+        serde_json::from_slice(payload).ok().map(Told::End)
     }
 
     /// A tick, if its pose came before it; gaps in the numbers are losses.
     fn tick(&mut self, payload: &[u8], number: Option<u64>) -> Option<Told> {
         if let Some(number) = number {
             let missing = self.number.map_or(0, |last| number.saturating_sub(last + 1));
-            self.lost.fetch_add(missing, Ordering::Relaxed);
+            self.queue.lose(missing);
             self.number = Some(number);
         }
         let pose = self.pose.take();
         let record = pose.and_then(|pose| tick_from_messages(&pose, payload).ok());
         if record.is_none() {
-            self.lost.fetch_add(1, Ordering::Relaxed);
+            self.queue.lose(1);
         }
         record.map(Told::Tick)
     }

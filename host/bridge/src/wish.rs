@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 /// A longer letter is refused before it is looked at, bytes.
 pub const MOST_LETTER_BYTES: usize = 64 * 1024;
-/// Peers whose last number is remembered; a peer beyond them is refused until the bridge starts anew.
+/// Peers whose last number is remembered for each right; a peer beyond them is refused until the bridge starts anew.
 const MOST_PEERS: usize = 4096;
 
 /// Something a peer asks for.
@@ -62,6 +62,16 @@ impl Right {
 }
 
 impl Wish {
+    /// What it takes to have it followed.
+    #[must_use]
+    pub const fn right(&self) -> Right {
+        match self {
+            Wish::EmergencyStop => Right::Watch,
+            Wish::Set { .. } | Wish::Weight { .. } | Wish::Stop => Right::Operate,
+            Wish::Start | Wish::Release => Right::Own,
+        }
+    }
+
     /// The last parts of the key on which it must arrive: access control sees keys, not letters.
     #[must_use]
     pub const fn key(&self) -> &'static str {
@@ -114,6 +124,15 @@ pub struct Letter {
     pub wish: Wish,
 }
 
+impl Letter {
+    /// As it is sent.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        // None of its parts fails to become JSON.
+        serde_json::to_vec(self).unwrap_or_default()
+    }
+}
+
 /// Why a letter was not followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "kebab-case")]
@@ -133,12 +152,18 @@ pub enum Refusal {
     /// More peers than anybody needs.
     #[error("too many peers since the bridge started; start it anew")]
     Crowded,
+    /// More requests than the host answers.
+    #[error("too many requests wait for the host's answer; ask again")]
+    Busy,
 }
 
-/// Lets letters through once.
+/// Lets letters through once. The emergency stop alone is let through however often: a stop too many is safe, and whoever may use
+/// up the numbers of another peer could press it anyway.
 #[derive(Debug, Default)]
 pub struct Gate {
-    last: BTreeMap<String, u64>,
+    /// The last number of each peer, for each right by itself: who may only press the emergency stop, and calls itself like an
+    /// owner, does not use up the owner's numbers.
+    last: BTreeMap<Right, BTreeMap<String, u64>>,
     refused: BTreeMap<Refusal, u64>,
 }
 
@@ -148,11 +173,13 @@ impl Gate {
     /// # Errors
     /// [`Refusal`], counted.
     pub fn admit(&mut self, key: &str, payload: &[u8], run: u32) -> Result<Wish, Refusal> {
-        let admitted = self.read(key, payload, run);
-        if let Err(refusal) = &admitted {
-            *self.refused.entry(*refusal).or_default() += 1;
-        }
-        admitted
+        self.read(key, payload, run).map_err(|refusal| self.refuse(refusal))
+    }
+
+    /// Counts a refusal, whoever decided on it.
+    pub fn refuse(&mut self, refusal: Refusal) -> Refusal {
+        *self.refused.entry(refusal).or_default() += 1;
+        refusal
     }
 
     /// How many were refused, by reason.
@@ -170,21 +197,29 @@ impl Gate {
         if !belongs || letter.peer.is_empty() || letter.peer.len() > 64 {
             return Err(Refusal::Malformed);
         }
-        let peers = self.last.len();
-        match self.last.get_mut(&letter.peer) {
-            Some(last) if letter.number <= *last => return Err(Refusal::Replayed),
-            Some(last) => *last = letter.number,
+        // Whoever presses the emergency stop means whatever runs.
+        let is_meant = match letter.wish.right() {
+            Right::Watch => return Ok(letter.wish),
+            Right::Operate => run != 0 && letter.run == run,
+            Right::Own => true,
+        };
+        self.use_up(letter.wish.right(), letter.peer, letter.number)?;
+        if is_meant { Ok(letter.wish) } else { Err(Refusal::Stale) }
+    }
+
+    /// A number is good once.
+    fn use_up(&mut self, right: Right, peer: String, number: u64) -> Result<(), Refusal> {
+        let last = self.last.entry(right).or_default();
+        let peers = last.len();
+        match last.get_mut(&peer) {
+            Some(last) if number <= *last => return Err(Refusal::Replayed),
+            Some(last) => *last = number,
             None if peers >= MOST_PEERS => return Err(Refusal::Crowded),
             None => {
-                self.last.insert(letter.peer, letter.number);
+                last.insert(peer, number);
             }
         }
-        // Whoever presses the emergency stop means whatever runs.
-        let is_meant = match letter.wish {
-            Wish::EmergencyStop | Wish::Start | Wish::Release => true,
-            Wish::Set { .. } | Wish::Weight { .. } | Wish::Stop => run != 0 && letter.run == run,
-        };
-        if is_meant { Ok(letter.wish) } else { Err(Refusal::Stale) }
+        Ok(())
     }
 }
 
@@ -255,5 +290,20 @@ mod tests {
             .filter(|peer| gate.admit("flotor/a/ask/stop", &from(*peer), 7).is_ok())
             .count();
         assert_eq!(admitted, MOST_PEERS);
+        let stop = letter(1, 0, Wish::EmergencyStop);
+        assert_eq!(gate.admit("flotor/a/ask/emergency-stop", &stop, 7), Ok(Wish::EmergencyStop));
+        assert_eq!(gate.admit("flotor/a/ask/start", &letter(1, 0, Wish::Start), 7), Ok(Wish::Start));
+    }
+
+    #[test]
+    fn who_calls_itself_like_another_peer_keeps_nothing_from_it_that_it_may_not_do_itself() {
+        let mut gate = Gate::default();
+        let key = "flotor/a/ask/emergency-stop";
+        let last_of_all = letter(u64::MAX, 0, Wish::EmergencyStop);
+        assert_eq!(gate.admit(key, &last_of_all, 7), Ok(Wish::EmergencyStop));
+        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(1, 7, Wish::Stop), 7), Ok(Wish::Stop));
+        assert_eq!(gate.admit("flotor/a/ask/release", &letter(2, 0, Wish::Release), 7), Ok(Wish::Release));
+        assert_eq!(gate.admit(key, &letter(3, 0, Wish::EmergencyStop), 7), Ok(Wish::EmergencyStop));
+        assert_eq!(gate.refused().len(), 0);
     }
 }

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Bridge, FakeHost, PATIENCE, description, record, wait_until};
+use common::{Bridge, FakeHost, PATIENCE, SLOW, description, is_full_size, record, wait_until};
 use flotor_bridge::attach::attach;
 use flotor_bridge::keep::keep;
 use flotor_bridge::link::{End, LinkOptions, open};
@@ -20,7 +20,7 @@ static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// Ticks at 1 kHz: a minute at full size.
 fn ticks() -> u64 {
-    if std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size == "full") { 60_000 } else { 3000 }
+    if is_full_size() { 60_000 } else { 3000 }
 }
 
 /// A visitor who hears ticks.
@@ -70,6 +70,37 @@ fn every_tick_arrives_to_the_bit() {
     }
     let status = remote.status().unwrap().expect("the bridge is there");
     assert_eq!((status.state, status.dropped), (State::Running, 0));
+}
+
+#[test]
+fn what_the_host_drops_and_what_a_slow_visitor_misses_are_losses_and_the_end_is_told() {
+    /// More than wait for a bridge, and more than wait for a visitor.
+    const TICKS: u64 = 30_000;
+    let mut host = FakeHost::start();
+    let bridge = Bridge::start(&host.directory, Right::Watch);
+    let remote = listening(&bridge, &host);
+    (0..TICKS).for_each(|tick| host.publication().observe(&record(tick)));
+    let published = || remote.status().unwrap().expect("the bridge is there").published;
+    wait_until("the bridge has told all", || {
+        let before = published();
+        std::thread::sleep(Duration::from_millis(300));
+        published() == before
+    });
+    host.end("enough");
+    let (mut heard, mut words) = (0, None);
+    wait_until("the end is heard", || {
+        while let Some(told) = remote.next(Duration::from_millis(10)) {
+            match told {
+                Told::Tick(tick) if tick.tick < 1 << 40 => heard += 1,
+                Told::End(end) => words = Some(end.words),
+                _ => {}
+            }
+        }
+        words.is_some()
+    });
+    let dropped = remote.status().unwrap().expect("the bridge is there").dropped;
+    assert!(dropped > 0, "a host whose queue never fills proves nothing");
+    assert_eq!((heard + remote.lost(), words.as_deref()), (TICKS, Some("enough")), "{dropped} dropped");
 }
 
 #[test]
@@ -162,6 +193,28 @@ fn malformed_long_stale_and_replayed_requests_are_refused_and_counted() {
     let expected =
         [(Refusal::Malformed, 2), (Refusal::TooLong, 1), (Refusal::Replayed, 2), (Refusal::Stale, 1)];
     assert_eq!(refused.into_iter().collect::<Vec<_>>(), expected);
+}
+
+#[test]
+fn a_flood_of_requests_is_cut_short_and_the_emergency_stop_gets_past() {
+    let host = FakeHost::start();
+    let bridge = Bridge::start(&host.directory, Right::Operate);
+    let remote = bridge.visit();
+    remote.wait_for_run(&NEVER).unwrap();
+    std::thread::scope(|scope| {
+        for _ in 0..64 {
+            let errand = remote.errand();
+            let wish = Wish::Weight { model: SLOW.to_owned(), weight: 0.5 };
+            scope.spawn(move || errand.run(wish));
+        }
+        wait_until("requests are refused", || {
+            let status = remote.status().unwrap().expect("the bridge is there");
+            status.refused.contains_key(&Refusal::Busy)
+        });
+        assert_eq!(remote.errand().run(Wish::EmergencyStop), Ok(()));
+    });
+    let asked = host.asked.0.lock().unwrap();
+    assert!(asked.contains(&Ask::EmergencyStop) && asked.len() < 64, "{} requests", asked.len());
 }
 
 #[test]

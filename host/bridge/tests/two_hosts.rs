@@ -6,7 +6,7 @@ mod common;
 #[path = "common/proxy.rs"]
 mod proxy;
 
-use common::{free_port, wait_until};
+use common::{free_port, is_full_size, program, wait_until};
 use flotor_bridge::couple::couple;
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkOptions, open};
@@ -29,16 +29,6 @@ const HANDS: [&str; 5] = ["oscillate", "press", "release", "hold", "open"];
 const GRIPS: [&str; 2] = ["firm", "relaxed"];
 /// Time without news after which an end lets go, ms: long enough that a loaded machine is not taken for a cut cable.
 const WATCHDOG_MS: f64 = 300.0;
-
-/// The program under test; `None` where there is none.
-fn program() -> Option<PathBuf> {
-    let program = std::env::var_os("FLOTOR").map(PathBuf::from);
-    if program.is_none() {
-        println!("skipped: FLOTOR names no `flotor` program to run");
-    }
-    // Tests run in the folder of their crate, who set it may have been elsewhere.
-    program.map(|path| if path.exists() { path } else { Path::new("../..").join(path) })
-}
 
 fn scene(hand: &str, grip: &str) -> String {
     format!(
@@ -148,9 +138,8 @@ fn number(value: &Value) -> f64 {
 #[test]
 fn a_pair_over_zenoh_and_a_bad_way_is_stable_and_no_account_is_overdrawn() {
     let Some(program) = program() else { return };
-    let full = std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size == "full");
     let hands: Vec<(&str, &str)> = HANDS.iter().flat_map(|hand| GRIPS.map(|grip| (*hand, grip))).collect();
-    let hands = if full { hands } else { vec![("press", "firm"), ("oscillate", "relaxed")] };
+    let hands = if is_full_size() { hands } else { vec![("press", "firm"), ("oscillate", "relaxed")] };
     for (hand, grip) in hands {
         let network = Network::start();
         let scenes = [scene(hand, grip), scene("hold", "relaxed")];

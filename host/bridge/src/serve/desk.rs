@@ -6,7 +6,7 @@ use crate::couple::Carried;
 use crate::keys::Name;
 use crate::link::LinkError;
 use crate::status::{State, Status};
-use crate::wish::{Gate, MOST_LETTER_BYTES, Right, Wish};
+use crate::wish::{Gate, MOST_LETTER_BYTES, Refusal, Right, Wish};
 use flotor_live::{Answer, Asker, ChangeMessage, Client, Greeting};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -16,6 +16,8 @@ use zenoh::query::{Query, Queryable};
 
 /// How long a host may take to answer.
 const ANSWER_WAIT: Duration = Duration::from_secs(2);
+/// Requests that wait for the host at most, which answers some thousand a second: an emergency stop is never far behind them.
+const MOST_OPEN: usize = 32;
 /// How often the status goes out when nothing changes: who lost one gets the next.
 const STATUS_PERIOD: Duration = Duration::from_secs(1);
 
@@ -32,6 +34,8 @@ struct Inside {
     launcher: Option<Launcher>,
     is_latched: bool,
     reported: Option<(Status, Instant)>,
+    /// Ticks that were to be published since the bridge started, dropped ones among them.
+    due: u64,
 }
 
 /// The run that is on.
@@ -85,6 +89,7 @@ impl Desk {
             launcher,
             is_latched: false,
             reported: None,
+            due: 0,
         };
         Self { name, inside: Mutex::new(inside) }
     }
@@ -124,9 +129,11 @@ impl Desk {
         }
     }
 
-    /// What the host could not hand over.
+    /// What the host could not hand over in this run so far: a gap in the numbers, for all to see.
     pub(super) fn dropped(&self, dropped: u64) {
-        self.lock().status.dropped = dropped;
+        let mut inside = self.lock();
+        inside.due += dropped.saturating_sub(inside.status.dropped);
+        inside.status.dropped = dropped;
     }
 
     /// What was carried for couplings.
@@ -138,7 +145,13 @@ impl Desk {
     pub(super) fn publishing(&self) -> u64 {
         let mut inside = self.lock();
         inside.status.published += 1;
-        inside.status.published
+        inside.due += 1;
+        inside.due
+    }
+
+    /// The number of the last tick that was to be published.
+    pub(super) fn due(&self) -> u64 {
+        self.lock().due
     }
 
     /// The host has answered.
@@ -226,6 +239,9 @@ impl Inside {
     fn follow(&mut self, wish: &Wish, query: Query) {
         self.is_latched |= *wish == Wish::EmergencyStop;
         match (wish.ask(), &mut self.run) {
+            (Some(_), Some(run)) if run.open.len() >= MOST_OPEN && *wish != Wish::EmergencyStop => {
+                reply(&query, Some(self.gate.refuse(Refusal::Busy).to_string()));
+            }
             (Some(ask), Some(run)) => match run.asker.ask(ask) {
                 // The lock is held: the answer cannot come before the question is noted.
                 Ok(number) => {

@@ -124,10 +124,11 @@ impl Relay<'_> {
             match client.next(CHECK_PERIOD) {
                 Ok(None) => {}
                 Ok(Some(Event::Ticks { records, dropped })) => {
-                    desk.dropped(dropped);
                     for record in &records {
                         station.tick(record, desk.publishing())?;
                     }
+                    // A full queue keeps what is in it: what it dropped came after these.
+                    desk.dropped(dropped);
                 }
                 Ok(Some(Event::Change(change))) => {
                     desk.keep(&change);
@@ -135,11 +136,11 @@ impl Relay<'_> {
                 }
                 Ok(Some(Event::Answer(answer))) => desk.answered(answer),
                 Ok(Some(Event::End(end))) => {
-                    station.end(&end)?;
+                    station.end(&end, desk.due())?;
                     break;
                 }
                 Err(error) => {
-                    station.end(&flotor_live::End { words: error.to_string() })?;
+                    station.end(&flotor_live::End { words: error.to_string() }, desk.due())?;
                     break;
                 }
             }

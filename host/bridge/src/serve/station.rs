@@ -46,7 +46,7 @@ impl Station {
             || self.pose.matching_status().wait_now()?.matching())
     }
 
-    /// Publishes a tick, with its number among all that were published: a gap in these is a loss.
+    /// Publishes a tick, with its number among all that were to be: a gap in these is a loss.
     pub(super) fn tick(&self, record: &TickRecord, number: u64) -> Result<(), LinkError> {
         let (pose, tick) = {
             let mut messages = self.messages.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -62,9 +62,9 @@ impl Station {
         self.change.put(change.to_bytes()).attachment(change.time_ns.to_le_bytes()).wait_now()
     }
 
-    /// Publishes that the run is over.
-    pub(super) fn end(&self, end: &End) -> Result<(), LinkError> {
-        self.end.put(json(end)).wait_now()
+    /// Publishes that the run is over, with the number of its last tick.
+    pub(super) fn end(&self, end: &End, last: u64) -> Result<(), LinkError> {
+        self.end.put(json(end)).attachment(last.to_le_bytes()).wait_now()
     }
 
     /// Publishes how the bridge is doing.

@@ -12,6 +12,7 @@ use flotor_record::trace::{Events, RECORD_WORDS, TickRecord};
 use flotor_record::{Clock, RunDescription};
 use flotor_sync::Words;
 use std::net::TcpListener;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
@@ -51,6 +52,9 @@ pub fn description() -> RunDescription {
     }
 }
 
+/// A model that takes its time to be weighted.
+pub const SLOW: &str = "slow";
+
 /// What a host was asked for.
 #[derive(Default)]
 pub struct Asked(pub Mutex<Vec<Ask>>);
@@ -59,6 +63,10 @@ impl Serve for Asked {
     fn serve(&self, ask: Ask) -> Result<(), String> {
         self.0.lock().unwrap().push(ask.clone());
         match ask {
+            Ask::Weight { model, .. } if model == SLOW => {
+                std::thread::sleep(Duration::from_millis(20));
+                Ok(())
+            }
             Ask::Set { values } if values.iter().any(|value| value.parameter == "gamma") => {
                 Err("no parameter `gamma`; did you mean `gamma_n`?".to_owned())
             }
@@ -157,6 +165,21 @@ impl Drop for Bridge {
             let _ = thread.join();
         }
     }
+}
+
+/// The `flotor` program under test; `None`, and a word about it, where there is none.
+pub fn program() -> Option<PathBuf> {
+    let program = std::env::var_os("FLOTOR").map(PathBuf::from);
+    if program.is_none() {
+        println!("skipped: FLOTOR names no `flotor` program to run");
+    }
+    // Tests run in the folder of their crate, who set it may have been elsewhere.
+    program.map(|path| if path.exists() { path } else { Path::new("../..").join(path) })
+}
+
+/// Whether the tests are to be thorough, not quick.
+pub fn is_full_size() -> bool {
+    std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size == "full")
 }
 
 /// A port nobody listens on.
