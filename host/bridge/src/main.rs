@@ -215,7 +215,11 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
         }
         Command::List => {
             let session = open(&link, End::Visiting)?;
-            for name in bridges(&session)? {
+            let names = bridges(&session)?;
+            if names.is_empty() {
+                tell("no bridge can be seen; `flotor bridge serve` starts one, --connect says where to look");
+            }
+            for name in names {
                 let status = Remote::listen(&session, &name)?.status()?.unwrap_or_default();
                 println!("zenoh/{name:<20} {:<18} {}", status.state.word(), status.title);
             }

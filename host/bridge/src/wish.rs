@@ -146,8 +146,8 @@ pub enum Refusal {
     /// Its number is not higher than that of the peer's last.
     #[error("a request with this number, or a higher one, came before: requests are good once")]
     Replayed,
-    /// It is meant for a run that is over.
-    #[error("the run that is meant is over")]
+    /// It is meant for a run that is over, or none is on.
+    #[error("no run is on, or not the one that was meant")]
     Stale,
     /// More peers than anybody needs.
     #[error("too many peers since the bridge started; start it anew")]
