@@ -20,8 +20,8 @@ pub struct Remembered {
     pub units: Units,
     /// Traces shown.
     pub traces: Vec<Quantity>,
-    /// Whether the panel is in sight.
-    pub shows_panel: bool,
+    /// Whether the panel is to be in sight; not chosen: where there is room for it.
+    pub shows_panel: Option<bool>,
     /// Its width, points.
     pub side_pt: f32,
     /// Width and height of the window, points.
@@ -36,7 +36,7 @@ impl Default for Remembered {
             look: Look::default(),
             units: Units::Handy,
             traces: FIRST_TRACES.to_vec(),
-            shows_panel: true,
+            shows_panel: None,
             side_pt: 300.0,
             size_pt: [1280.0, 800.0],
             zoom: 1.0,
@@ -93,7 +93,7 @@ mod tests {
             look: Look::Light,
             units: Units::Si,
             traces: vec![Quantity::Energy, Quantity::AngularVelocity],
-            shows_panel: false,
+            shows_panel: Some(false),
             side_pt: 360.0,
             size_pt: [1600.0, 900.0],
             zoom: 1.5,

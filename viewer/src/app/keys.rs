@@ -49,7 +49,7 @@ impl Viewer {
             self.plots.switch_units();
         }
         if pressed(Key::P) {
-            self.shows_panel = !self.shows_panel;
+            self.switch_panel(ui.ctx());
         }
         if pressed(Key::L) {
             self.switch_look(ui.ctx());

@@ -10,6 +10,11 @@ use crate::ui::{legend, parameters, readout, standing, style, warnings};
 use egui::{Rect, RichText, ScrollArea, Ui, vec2};
 use flotor_live::{Ask, SetValue};
 
+/// Part of the height that the 3D view gets: low windows leave room for two traces first.
+fn view_part(height_pt: f32) -> f32 {
+    if height_pt < 360.0 { 0.38 } else { 0.56 }
+}
+
 impl Viewer {
     pub(super) fn top(&mut self, ui: &mut Ui, palette: &Palette) {
         let (standing, is_well) = self.standing();
@@ -31,7 +36,7 @@ impl Viewer {
         match bar.show(ui, palette) {
             Some(TopBarWish::EmergencyStop) => self.ask(Ask::EmergencyStop),
             Some(TopBarWish::SwitchLook) => self.switch_look(ui.ctx()),
-            Some(TopBarWish::SwitchPanel) => self.shows_panel = !self.shows_panel,
+            Some(TopBarWish::SwitchPanel) => self.switch_panel(ui.ctx()),
             None => {}
         }
     }
@@ -58,14 +63,15 @@ impl Viewer {
     }
 
     pub(super) fn middle(&mut self, ui: &mut Ui, palette: &Palette) {
-        /// Part of the height that the 3D view gets.
-        const VIEW_PART: f32 = 0.56;
         let area = ui.max_rect();
         let Some(sample) = self.history.at(self.player.now_s).copied() else {
             self.nothing(ui, area, palette);
             return;
         };
-        let view = Rect::from_min_size(area.min, vec2(area.width(), (area.height() * VIEW_PART).round()));
+        let view = Rect::from_min_size(
+            area.min,
+            vec2(area.width(), (area.height() * view_part(area.height())).round()),
+        );
         let subject = Subject {
             shapes: &mut self.shapes,
             version: self.shape_version,

@@ -37,6 +37,8 @@ use std::time::{Duration, Instant};
 /// Width of the side, points: where nobody has pulled it, and how far it can be pulled.
 const SIDE_PT: f32 = 300.0;
 const SIDE_RANGE_PT: std::ops::RangeInclusive<f32> = 240.0..=480.0;
+/// Width of a window from which on the panel stands beside the run unasked, points: narrower, the run would be squeezed.
+const ROOM_FOR_PANEL_PT: f32 = 900.0;
 
 /// What the window begins with.
 pub enum Start {
@@ -64,7 +66,8 @@ pub struct Viewer {
     plots: PlotStack,
     tally: Tally,
     look: Look,
-    shows_panel: bool,
+    /// What was chosen, if anything was.
+    shows_panel: Option<bool>,
     side_pt: f32,
     remark: Option<(String, Instant)>,
     bell: Bell,
@@ -137,7 +140,7 @@ impl Viewer {
             facts: SceneFacts::default(),
             plots: PlotStack::new(window),
             look,
-            shows_panel: true,
+            shows_panel: None,
             side_pt: SIDE_PT,
             remark: None,
             bell: Bell::default(),
@@ -234,7 +237,7 @@ impl Viewer {
             Edge::bottom("playback").exact_size(44.0).frame(plain(16, 4)).show(ui, |ui| {
                 playback::playback(ui, &mut self.player, span_s, is_live, &palette);
             });
-            if self.shows_panel {
+            if self.is_panel_shown(ui.ctx()) {
                 let side = Edge::right("side")
                     .default_size(self.side_pt)
                     .size_range(SIDE_RANGE_PT)
@@ -243,6 +246,15 @@ impl Viewer {
             }
         }
         CentralPanel::default().frame(plain(0, 0)).show(ui, |ui| self.middle(ui, &palette));
+    }
+
+    /// Whether the panel is in sight: as was chosen, else where there is room for it beside the run.
+    fn is_panel_shown(&self, context: &Context) -> bool {
+        self.shows_panel.unwrap_or_else(|| context.content_rect().width() >= ROOM_FOR_PANEL_PT)
+    }
+
+    fn switch_panel(&mut self, context: &Context) {
+        self.shows_panel = Some(!self.is_panel_shown(context));
     }
 
     /// Whether anything in sight moves with the ticks that come.

@@ -15,6 +15,9 @@ pub const WINDOWS_S: [f64; 5] = [2.0, 5.0, 10.0, 30.0, 60.0];
 /// The traces shown to who has not chosen others.
 pub const FIRST_TRACES: [Quantity; 2] = [Quantity::Force, Quantity::Position];
 
+/// Narrower, the choices take two rows, points.
+const ROOM_FOR_ONE_ROW_PT: f32 = 720.0;
+
 /// How much of the past is shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Window {
@@ -111,7 +114,15 @@ impl PlotStack {
     ) -> Vec<PlotWish> {
         self.end_s = self.end_of_window(history.span_s(), now_s, motion);
         let mut wishes = Vec::new();
-        ui.horizontal(|ui| self.choices(ui, palette, &mut wishes));
+        if ui.available_width() < ROOM_FOR_ONE_ROW_PT {
+            ui.horizontal_wrapped(|ui| self.quantities(ui, palette));
+            ui.horizontal(|ui| self.presentation(ui, &mut wishes));
+        } else {
+            ui.horizontal(|ui| {
+                self.quantities(ui, palette);
+                self.presentation(ui, &mut wishes);
+            });
+        }
         let span_s = self.span_s(history);
         let count = self.shown.len();
         #[allow(clippy::cast_precision_loss)] // a handful
@@ -143,7 +154,8 @@ impl PlotStack {
         }
     }
 
-    fn choices(&mut self, ui: &mut Ui, palette: &Palette, wishes: &mut Vec<PlotWish>) {
+    /// Which quantities are shown.
+    fn quantities(&mut self, ui: &mut Ui, palette: &Palette) {
         ui.spacing_mut().item_spacing.x = 4.0;
         for quantity in Quantity::ALL {
             let is_shown = self.shown.contains(&quantity);
@@ -154,6 +166,11 @@ impl PlotStack {
                 self.toggle(quantity);
             }
         }
+    }
+
+    /// How they are shown, from the right.
+    fn presentation(&mut self, ui: &mut Ui, wishes: &mut Vec<PlotWish>) {
+        ui.spacing_mut().item_spacing.x = 4.0;
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             ui.menu_button(RichText::new("Export").size(SMALL_PT + 0.5), |ui| {
                 for (format, name) in

@@ -13,6 +13,9 @@ use flotor_record::{Clock, RunDescription};
 /// Distance of text from the edges, points.
 const MARGIN: f32 = 22.0;
 
+/// Narrower, the numbers would stand before the body: the time has to do, and those above the traces, points.
+const ROOM_FOR_NUMBERS_PT: f32 = 560.0;
+
 /// Title of a run and what it was made with.
 #[must_use]
 pub fn title_of(run: &RunDescription) -> String {
@@ -57,6 +60,9 @@ pub fn numbers(painter: &Painter, area: Rect, sample: &Sample, units: Units, pal
         palette.text,
     );
     y += line + 6.0;
+    if area.width() < ROOM_FOR_NUMBERS_PT {
+        return;
+    }
     let shown = [Quantity::Force, Quantity::Torque, Quantity::Position, Quantity::Rotation, Quantity::Energy];
     for quantity in shown {
         let (unit, per_si) = quantity.unit(units);

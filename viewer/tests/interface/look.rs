@@ -61,9 +61,14 @@ fn twice_the_scale_loses_nothing() {
 /// nothing is cut off at the right of the side.
 #[test]
 fn every_scale_and_size_keeps_everything_in_sight() {
-    for (scale, size) in
-        [(1.0, [1280.0, 800.0]), (1.25, [1024.0, 640.0]), (1.5, [853.0, 533.0]), (2.0, [960.0, 600.0])]
-    {
+    let windows = [
+        (1.0, [1280.0, 800.0]),
+        (1.25, [1024.0, 640.0]),
+        (1.5, [853.0, 533.0]),
+        (2.0, [960.0, 600.0]),
+        (2.0, [640.0, 400.0]),
+    ];
+    for (scale, size) in windows {
         let harness = Harness::builder().with_size(egui::Vec2::from(size)).with_pixels_per_point(scale);
         let start = recorded(1000, None);
         let mut window =
@@ -74,9 +79,17 @@ fn every_scale_and_size_keeps_everything_in_sight() {
             "Force over time, N",
             "Position over time, mm",
             "Play",
+            "Energy",
+            "Lateness",
+            "Time shown",
             "Export",
             "Light (L)",
         ];
+        let lowest = window.get_by_label("Play").rect().min.y;
+        for trace in ["Force over time, N", "Position over time, mm"] {
+            let area = window.get_by_label(trace).rect();
+            assert!(area.max.y <= lowest, "{trace} at {scale} in {size:?} lies behind what plays: {area:?}");
+        }
         for label in labels {
             let area = window.get_by_label(label).rect();
             let is_inside = area.min.x >= 0.0 && area.max.x <= size[0] + 0.5 && area.max.y <= size[1] + 0.5;
