@@ -238,14 +238,16 @@ fn kills_at_any_moment_lose_no_completed_trial() {
     let arguments: Vec<&str> = SMALL.into_iter().chain(["--subjects", count.as_str()]).collect();
     let started = Instant::now();
     assert_eq!(study(&arguments, &whole).run().code, Some(exit_code::OK));
-    let takes = started.elapsed();
+    let mut takes = started.elapsed();
     let numbers = 1..=u16::try_from(subjects).unwrap();
 
     let mut random = 0x2545_f491_4f6c_dd1d_u64;
     let mut on_disk = vec![0; subjects];
-    let mut interrupted = 0;
-    for kill in 0..kills {
-        if kill % 50 == 49 || (1..=subjects).all(|n| on_disk[n - 1] > 0 && is_complete(&killed, n)) {
+    let (mut interrupted, mut kill) = (0, 0);
+    while interrupted < kills {
+        kill += 1;
+        assert!(kill <= 20 * kills, "only {interrupted} of {kill} came in time");
+        if kill % 50 == 0 || (1..=subjects).all(|n| on_disk[n - 1] > 0 && is_complete(&killed, n)) {
             // From the start again, so that every part of a study is hit.
             let _ = std::fs::remove_dir_all(&killed);
             on_disk.fill(0);
@@ -258,7 +260,11 @@ fn kills_at_any_moment_lose_no_completed_trial() {
         std::thread::sleep(takes.mul_f64((random % 1000) as f64 / 1000.0).min(Duration::from_secs(5)));
         let sent = Command::new("kill").args(["-KILL", &running.id().to_string()]).status();
         let code = running.wait().code;
-        interrupted += usize::from(sent.is_ok() && code.is_none());
+        let came_in_time = sent.is_ok() && code.is_none();
+        interrupted += usize::from(came_in_time);
+        if !came_in_time {
+            takes = takes.mul_f64(0.8); // the machine was busier when it was measured
+        }
         for number in numbers.clone() {
             let path = log_of(&killed, number);
             // Killed before the first line was whole: nothing had happened yet.
@@ -278,7 +284,6 @@ fn kills_at_any_moment_lose_no_completed_trial() {
             assert_eq!(found[..], expected[..found.len()], "kill {kill}, subject {number}: another schedule");
         }
     }
-    assert!(interrupted * 2 >= kills, "{interrupted} of {kills} came in time");
     let resumed: Vec<&str> = arguments.iter().copied().chain(["--resume"]).collect();
     let last = study(&resumed, &killed).run();
     assert_eq!(last.code, Some(exit_code::OK), "{last:?}");
@@ -288,7 +293,7 @@ fn kills_at_any_moment_lose_no_completed_trial() {
         let read = |out: &Path| std::fs::read_to_string(out.join(&table)).unwrap();
         assert_eq!(read(&killed), read(&whole));
     }
-    println!("{interrupted} of {kills} kills interrupted a study; no trial was lost");
+    println!("{interrupted} of {kill} kills interrupted a study; no trial was lost");
 }
 
 fn is_complete(out: &Path, number: usize) -> bool {

@@ -11,7 +11,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use std::io::Write;
 use std::os::unix::net::UnixStream;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::sync::LazyLock;
 use std::thread::JoinHandle;
@@ -22,10 +22,10 @@ use tempfile::TempDir;
 /// What is read from the wall clock, and nothing else in a summary is: how fast the machine was.
 const OF_THE_MACHINE: [&str; 3] = ["compute_ns", "stages_ns", "wall_s"];
 
-/// Starts the demo: a hundred seconds of virtual time, one or two on the wall.
+/// Starts the demo: a thousand seconds of virtual time, a few on the wall.
 fn start_run(folder: &Path) -> Owned {
     let mut run = alone("flotor", folder, None);
-    run.args(["run", "--clock", "virtual", "--seed", "7", "--duration", "100s", "--json", "-"]);
+    run.args(["run", "--clock", "virtual", "--seed", "7", "--duration", "1000s", "--json", "-"]);
     Owned(run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts"))
 }
 
@@ -49,8 +49,8 @@ fn summary(run: &mut Owned) -> Value {
 static UNWATCHED: LazyLock<Value> = LazyLock::new(|| {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let summary = summary(&mut start_run(folder.path()));
-    assert_eq!((&summary["ticks"], &summary["end"]), (&Value::from(100_000), &Value::from("finished")));
-    assert!(summary["trace_digest"].as_str().is_some_and(|digest| digest.ends_with("-100000")));
+    assert_eq!((&summary["ticks"], &summary["end"]), (&Value::from(1_000_000), &Value::from("finished")));
+    assert!(summary["trace_digest"].as_str().is_some_and(|digest| digest.ends_with("-1000000")));
     summary
 });
 
@@ -84,25 +84,30 @@ impl Watched {
         Some(watched)
     }
 
-    /// Waits for three pictures, each other than the one before: only a run that moves makes so many. The virtual clock does not know
-    /// how busy the machine is, and a window does: until then the run works a millisecond at a time.
+    /// Waits for three pictures, each other than the one before: only a run that moves makes so many.
     fn wait_until_drawn(&mut self, mut last: Vec<u8>) {
         for _ in 0..3 {
-            last = patiently("another picture", || {
-                signal(&self.run, Signal::CONT);
-                std::thread::sleep(Duration::from_millis(1));
-                signal(&self.run, Signal::STOP);
-                assert!(goes_on(&mut self.run), "the run was over before the viewer had drawn it");
-                Some(self.display.picture()).filter(|picture| *picture != last)
+            last = self.work_until("another picture", |watched| {
+                Some(watched.display.picture()).filter(|picture| *picture != last)
             });
         }
     }
 
-    /// Lets the run go on to its end while something happens to it; gives its summary.
-    fn end_with(&mut self, happens: impl FnOnce(&mut Self)) -> Value {
+    /// The run works a millisecond at a time until something has come about, and is held then: the virtual clock does not know how
+    /// busy the machine is, and a window does.
+    fn work_until<T>(&mut self, what: &str, come_about: impl Fn(&Self) -> Option<T>) -> T {
+        patiently(what, || {
+            signal(&self.run, Signal::CONT);
+            std::thread::sleep(Duration::from_millis(1));
+            signal(&self.run, Signal::STOP);
+            assert!(goes_on(&mut self.run), "the run was over before there was {what}");
+            come_about(self)
+        })
+    }
+
+    /// Lets the run, which was held in its midst, go on to its end; gives its summary.
+    fn end(&mut self) -> Value {
         signal(&self.run, Signal::CONT);
-        happens(self);
-        assert!(goes_on(&mut self.run), "it is to happen in mid run");
         summary(&mut self.run)
     }
 }
@@ -115,30 +120,25 @@ fn signal(program: &Owned, signal: Signal) {
 #[test]
 fn a_viewer_that_watches_changes_nothing() {
     let Some(mut watched) = Watched::begin() else { return };
-    assert_eq!(watched.end_with(|_| {}), *UNWATCHED);
+    assert_eq!(watched.end(), *UNWATCHED);
     assert!(goes_on(&mut watched.viewer), "it was there to the end");
 }
 
 #[test]
 fn a_viewer_that_is_killed_changes_nothing() {
     let Some(mut watched) = Watched::begin() else { return };
-    let summary = watched.end_with(|watched| {
-        signal(&watched.viewer, Signal::KILL);
-        assert!(!watched.viewer.0.wait().expect("it is ours").success());
-    });
-    assert_eq!(summary, *UNWATCHED);
+    signal(&watched.viewer, Signal::KILL);
+    assert!(!watched.viewer.0.wait().expect("it is ours").success());
+    assert_eq!(watched.end(), *UNWATCHED);
 }
 
 #[test]
 fn a_viewer_that_is_frozen_changes_nothing() {
     let Some(mut watched) = Watched::begin() else { return };
-    let mut frozen = Vec::new();
-    let summary = watched.end_with(|watched| {
-        signal(&watched.viewer, Signal::STOP);
-        std::thread::sleep(Duration::from_millis(100)); // what it had drawn reaches the display
-        frozen = watched.display.picture();
-    });
-    assert_eq!(summary, *UNWATCHED);
+    signal(&watched.viewer, Signal::STOP);
+    std::thread::sleep(Duration::from_millis(100)); // what it had drawn reaches the display
+    let frozen = watched.display.picture();
+    assert_eq!(watched.end(), *UNWATCHED);
     assert!(watched.display.picture() == frozen, "it stood still to the end of the run");
     signal(&watched.viewer, Signal::CONT);
     patiently("thawed, it draws again", || Some(()).filter(|()| watched.display.picture() != frozen));
@@ -147,21 +147,21 @@ fn a_viewer_that_is_frozen_changes_nothing() {
 #[test]
 fn a_viewer_and_a_flood_of_requests_and_rubbish_change_nothing() {
     let Some(mut watched) = Watched::begin() else { return };
-    let mut floods = None;
-    let summary = watched.end_with(|watched| {
-        floods = Some(flood(&Directory::at(watched.folder.path().join("flotor"))));
-    });
-    assert_eq!(summary, *UNWATCHED);
-    let sent = floods.expect("it was begun").map(|flood| flood.join().expect("it only sends"));
+    let directory = Directory::at(watched.folder.path().join("flotor"));
+    let path = directory.runs().remove(0).path;
+    let finding = std::thread::spawn(move || Client::find(&directory));
+    watched.work_until("a client", |_| finding.is_finished().then_some(()));
+    let client = finding.join().expect("it only looks").expect("the run can be watched");
+    let floods = flood(client, path);
+    assert_eq!(watched.end(), *UNWATCHED);
+    let sent = floods.map(|flood| flood.join().expect("it only sends"));
     assert!(sent.iter().all(|sent| *sent > 100), "a flood: {sent:?}");
     assert!(goes_on(&mut watched.viewer), "it was there to the end");
 }
 
 /// Sends what changes nothing, as fast as it is taken, until the run is over, without ever reading an answer: requests that ask for
 /// no parameter or for one that is not there; and bytes that mean nothing, on connections of their own. Gives how much was sent.
-fn flood(directory: &Directory) -> [JoinHandle<u32>; 2] {
-    let client = Client::find(directory).expect("the run can be watched");
-    let path = directory.runs().remove(0).path;
+fn flood(client: Client, path: PathBuf) -> [JoinHandle<u32>; 2] {
     let requests = move || {
         let nothing = || Ask::Set { values: Vec::new() };
         let [plugin, parameter, value] = ["spring", "no_such_parameter", "1"].map(str::to_owned);
