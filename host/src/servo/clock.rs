@@ -173,14 +173,12 @@ impl Schedule {
         Some(Woken { late_ns, missed: periods - 1 })
     }
 
-    /// Waits for the end of the last tick's period; time since the start, ns.
+    /// Waits for the end of the last tick's period; time since the start, ns. As for a tick, whole periods in which the loop was
+    /// held up count as passed over: the run was over before them.
     pub(crate) fn finish(mut self) -> u64 {
         match self.pace {
             Pace::Virtual => self.next_time_ns(),
-            Pace::Clock(window) => {
-                self.wait_for_deadline(window);
-                monotonic_ns() - self.start_ns
-            }
+            Pace::Clock(window) => self.next_time_ns() + self.wait_for_deadline(window).late_ns,
             Pace::Device { .. } => monotonic_ns() - self.start_ns,
         }
     }
@@ -261,5 +259,15 @@ mod tests {
         assert_eq!(due.tick.index, 1);
         assert_eq!(due.tick.dt_ns, (due.missed + 1) * period_ns);
         assert_eq!(due.tick.time_ns, first.tick.time_ns + due.tick.dt_ns);
+    }
+
+    #[test]
+    fn a_loop_that_was_held_up_at_its_end_ran_no_longer_for_it() {
+        let period_ns = 1_000_000;
+        let started_ns = monotonic_ns() - 20 * period_ns;
+        let mut schedule = Schedule::start(Pace::Clock(SpinWindow { spin_ns: 0 }), period_ns, started_ns);
+        schedule.slot = 5; // five ticks ran, then nothing for a time
+        let elapsed_ns = schedule.finish();
+        assert!((5 * period_ns..6 * period_ns).contains(&elapsed_ns), "{elapsed_ns}");
     }
 }
