@@ -34,6 +34,8 @@ pub enum Standing {
 pub struct Knob {
     /// Its entry in the schema.
     pub parameter: PanelParameter,
+    /// What people call it: the id without its unit, in words; with the unit where another of the panel is called the same.
+    pub name: String,
     /// What is shown.
     pub value: Value,
     /// Whether it can be pulled.
@@ -70,7 +72,13 @@ impl Panel {
     /// From what a host says of a plugin, or what a recording's plugin says of itself.
     #[must_use]
     pub fn new(plugin: &PanelPlugin, purpose: Use) -> Self {
-        let knob = |parameter: &PanelParameter| Knob {
+        let plain: Vec<String> = plugin.parameters.iter().map(plain_name).collect();
+        let knob = |(parameter, name): (&PanelParameter, &String)| Knob {
+            name: if plain.iter().filter(|other| *other == name).count() > 1 {
+                format!("{name} ({})", parameter.unit)
+            } else {
+                name.clone()
+            },
             value: Value::read(parameter, &parameter.value),
             in_force: Value::read(parameter, &parameter.value),
             standing: if parameter.live && purpose == Use::Change { Standing::Free } else { Standing::Fixed },
@@ -80,7 +88,7 @@ impl Panel {
         Self {
             name: plugin.name.clone(),
             id: plugin.id.clone(),
-            knobs: plugin.parameters.iter().map(knob).collect(),
+            knobs: plugin.parameters.iter().zip(&plain).map(knob).collect(),
             refusal: None,
         }
     }
@@ -101,11 +109,11 @@ impl Panel {
             }
             Outcome::Refused => {
                 knob.settle();
-                let name = knob.name();
+                let name = &knob.name;
                 self.refusal =
                     Some(format!("{name} = {} does not fit the other values; it stays", change.value));
             }
-            Outcome::Broke => self.refusal = Some(format!("{} broke the plugin; stop the run", knob.name())),
+            Outcome::Broke => self.refusal = Some(format!("{} broke the plugin; stop the run", knob.name)),
         }
     }
 
@@ -163,22 +171,6 @@ impl Knob {
         }
     }
 
-    /// What people call it: the id without its unit, in words.
-    #[must_use]
-    pub fn name(&self) -> String {
-        let plain = |text: &str| {
-            let text = text.replace('²', "2").replace('³', "3").to_lowercase();
-            text.chars().filter(char::is_ascii_alphanumeric).collect::<String>()
-        };
-        let (id, unit) = (&self.parameter.id, plain(&self.parameter.unit));
-        let cut = id.char_indices().filter(|(_, c)| *c == '_').map(|(at, _)| at);
-        let named = cut.into_iter().find(|at| {
-            let end = plain(&id[*at..]);
-            !unit.is_empty() && (end == unit || end.replace("per", "") == unit)
-        });
-        id[..named.unwrap_or(id.len())].replace('_', " ")
-    }
-
     /// Its unit for people; empty for numbers that have none.
     #[must_use]
     pub fn unit(&self) -> &str {
@@ -199,6 +191,21 @@ impl Knob {
     }
 }
 
+/// The id of a parameter without its unit, in words.
+fn plain_name(parameter: &PanelParameter) -> String {
+    let plain = |text: &str| {
+        let text = text.replace('²', "2").replace('³', "3").to_lowercase();
+        text.chars().filter(char::is_ascii_alphanumeric).collect::<String>()
+    };
+    let (id, unit) = (&parameter.id, plain(&parameter.unit));
+    let cut = id.char_indices().filter(|(_, c)| *c == '_').map(|(at, _)| at);
+    let named = cut.into_iter().find(|at| {
+        let end = plain(&id[*at..]);
+        !unit.is_empty() && (end == unit || end.replace("per", "") == unit)
+    });
+    id[..named.unwrap_or(id.len())].replace('_', " ")
+}
+
 impl Value {
     fn read(parameter: &PanelParameter, typed: &str) -> Self {
         let read = match &parameter.shape {
@@ -216,17 +223,19 @@ impl Value {
 mod tests {
     use super::*;
 
-    fn knob(id: &str, unit: &str) -> Knob {
-        let parameter = PanelParameter {
+    fn parameter(id: &str, unit: &str) -> PanelParameter {
+        PanelParameter {
             id: id.to_owned(),
             unit: unit.to_owned(),
             doc: "A number".to_owned(),
             shape: ParameterShape::Real { min: 0.0, max: 10.0, default: 1.0 },
             live: true,
             value: "2.5".to_owned(),
-        };
-        let value = Value::read(&parameter, "2.5");
-        Knob { in_force: value.clone(), value, parameter, standing: Standing::Free, sent: 0 }
+        }
+    }
+
+    fn plugin(parameters: Vec<PanelParameter>) -> PanelPlugin {
+        PanelPlugin { name: "s".into(), id: "spring".into(), file: "".into(), parameters }
     }
 
     #[test]
@@ -241,19 +250,21 @@ mod tests {
             ("seat_friction", "1", "seat friction"),
             ("preset", "", "preset"),
         ] {
-            assert_eq!(knob(id, unit).name(), name);
+            assert_eq!(plain_name(&parameter(id, unit)), name);
         }
     }
 
     #[test]
+    fn two_of_one_name_are_told_apart_by_their_units() {
+        let twins = [("damping_ns_per_m", "N s/m"), ("hand", ""), ("damping_nms_per_rad", "N m s/rad")];
+        let panel = Panel::new(&plugin(twins.map(|(id, unit)| parameter(id, unit)).into()), Use::Change);
+        let names: Vec<&str> = panel.knobs.iter().map(|knob| knob.name.as_str()).collect();
+        assert_eq!(names, ["damping (N s/m)", "hand", "damping (N m s/rad)"]);
+    }
+
+    #[test]
     fn a_change_is_taken_in_and_a_refused_one_is_said() {
-        let parameter = knob("gamma_n", "N").parameter;
-        let plugin = PanelPlugin {
-            name: "s".into(),
-            id: "spring".into(),
-            file: "".into(),
-            parameters: vec![parameter],
-        };
+        let plugin = plugin(vec![parameter("gamma_n", "N")]);
         let mut panel = Panel::new(&plugin, Use::Change);
         let change = |value: &str, outcome| ChangeMessage {
             tick: 1,

@@ -67,6 +67,13 @@ impl Player {
         }
     }
 
+    /// There is nothing newer to come: who followed stands at the end.
+    pub fn stop_following(&mut self, [_, last_s]: [f64; 2]) {
+        if self.motion == Motion::Follow {
+            (self.now_s, self.motion) = (last_s, Motion::Pause);
+        }
+    }
+
     /// Starts or stops; at the end of a recording it starts from the beginning, of a running host it follows again.
     pub fn toggle(&mut self, is_live: bool, [first_s, last_s]: [f64; 2]) {
         self.motion = match self.motion {
@@ -122,6 +129,17 @@ mod tests {
         assert_eq!((player.now_s, player.motion), (1.5, Motion::Pause), "the past that is kept moves on");
         player.toggle(true, SPAN);
         assert_eq!(player.motion, Motion::Follow);
+    }
+
+    #[test]
+    fn a_run_that_is_over_is_played_from_its_beginning() {
+        let mut player = Player::live();
+        player.stop_following(SPAN);
+        assert_eq!((player.now_s, player.motion), (3.0, Motion::Pause));
+        player.toggle(false, SPAN);
+        assert_eq!((player.now_s, player.motion), (1.0, Motion::Play));
+        player.stop_following(SPAN);
+        assert_eq!(player.motion, Motion::Play, "who looks back goes on looking");
     }
 
     #[test]

@@ -159,10 +159,17 @@ impl eframe::App for Kept {
     }
 }
 
-/// The first line of what a library says, without its full stop.
+/// The first line of what a library says, without its full stop and without the place in its source: that helps nobody who has
+/// no display.
 fn one_line(text: &str) -> String {
     let line = text.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or("nothing can be opened");
-    line.trim_end_matches('.').to_owned()
+    let words = match line.split_once(".rs:") {
+        Some((before, after)) if before.contains(" at ") => {
+            after.trim_start_matches(|c: char| c.is_ascii_digit() || c == ':').trim_start()
+        }
+        _ => line,
+    };
+    words.trim_end_matches('.').to_owned()
 }
 
 #[cfg(test)]
@@ -175,6 +182,9 @@ mod tests {
         let missing = watched_over(|_| panic!("libX11.so.6 not found")).expect_err("it cannot go well");
         let said = missing.to_string();
         assert!(matches!(missing, WindowError::NoDisplay(_)) && said.contains("libX11.so.6"), "{said}");
+
+        let place = "event loop: os error at /a/winit/src/linux/mod.rs:757: neither DISPLAY nor the other is set.";
+        assert_eq!(one_line(place), "neither DISPLAY nor the other is set");
 
         let broken = watched_over(|opened| {
             opened.store(true, Ordering::Relaxed);

@@ -43,14 +43,19 @@ impl Viewer {
             }
         }
         if let Source::Live { feed, .. } = &self.source {
+            // Before its news: of a run that was over by then, nothing is missing from them.
+            let is_running = feed.state() == FeedState::Running;
             let news = feed.news();
             self.tally.dropped = feed.dropped();
-            if feed.state() == FeedState::Running {
+            if is_running {
                 context.request_repaint_after(STALE_AFTER); // to notice that nothing comes
             } else {
                 self.panels.iter_mut().for_each(Panel::freeze);
             }
             self.digest(news);
+            if !is_running {
+                self.player.stop_following(self.history.span_s());
+            }
         }
     }
 

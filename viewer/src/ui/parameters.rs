@@ -55,7 +55,7 @@ fn heading(ui: &mut Ui, text: &str, palette: &Palette) {
 
 /// A parameter that can be pulled, or follows; true if it was pulled.
 fn row(ui: &mut Ui, knob: &mut Knob, palette: &Palette) -> bool {
-    let (name, unit, help) = (knob.name(), knob.unit().to_owned(), help(knob));
+    let (name, unit, help) = (knob.name.clone(), knob.unit().to_owned(), help(knob));
     let is_free = knob.standing == Standing::Free;
     let shape = knob.parameter.shape.clone();
     match (&mut knob.value, shape) {
@@ -111,7 +111,7 @@ fn fact(ui: &mut Ui, knob: &Knob, palette: &Palette) {
         _ => knob.typed(),
     };
     ui.horizontal(|ui| {
-        ui.label(RichText::new(knob.name()).color(palette.faint)).on_hover_text(help(knob));
+        ui.label(RichText::new(&knob.name).color(palette.faint)).on_hover_text(help(knob));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             ui.add(egui::Label::new(if typed.is_empty() { "–" } else { &typed }).truncate());
         });
