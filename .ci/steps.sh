@@ -108,8 +108,8 @@ wheel() {
     python3 -m venv target/venv
     target/venv/bin/pip install --quiet 'host/python[test]'
     cargo build --release
-    cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target
-    FLOTOR=target/release/flotor FLOTOR_SWEEP=target/release/flotor-sweep target/venv/bin/python -m pytest -q host/python
+    cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target/sweep
+    FLOTOR=target/release/flotor FLOTOR_SWEEP=target/sweep/release/flotor-sweep target/venv/bin/python -m pytest -q host/python
 }
 
 # The bridge: messages to the bit, who may do what, what is refused, over loopback; two hosts with a hand each over a bad way.

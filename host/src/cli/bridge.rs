@@ -1,14 +1,15 @@
 //! `flotor bridge`: starts the bridge, which is a program of its own, because it brings Zenoh.
 
 use super::CommandError;
-use super::companion::Companion;
+use super::companion::{Built, Companion};
 use clap::Args;
 use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;
 
 pub(super) const BRIDGE: Companion<'static> = Companion {
     program: "flotor-bridge",
-    build: "cargo build --release --manifest-path host/bridge/Cargo.toml --target-dir target",
+    built: Built::Apart("bridge"),
+    build: "cargo build --release --manifest-path host/bridge/Cargo.toml --target-dir target/bridge",
 };
 
 /// How runs elsewhere are written.

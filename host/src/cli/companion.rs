@@ -1,14 +1,28 @@
 //! Programs of their own that lie beside this one: what is too heavy to be built with the core.
+//!
+//! Those that are workspaces of their own are built into a folder of their own below the core's `target`: plugins are libraries
+//! without a hash in their name, so two workspaces in one folder overwrite each other's, and then neither builds.
 
 use super::CommandError;
 use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
 use std::process::Command;
+
+/// Where a program comes from.
+pub(super) enum Built {
+    /// The same workspace.
+    WithThis,
+    /// One of its own, into this folder below `target`.
+    Apart(&'static str),
+}
 
 /// A program beside this one.
 pub(super) struct Companion<'a> {
     /// Its file, without the suffix of executables.
     pub(super) program: &'a str,
+    /// Where cargo puts it.
+    pub(super) built: Built,
     /// The command that builds it.
     pub(super) build: &'a str,
 }
@@ -20,16 +34,46 @@ impl Companion<'_> {
     /// [`CommandError::Usage`] with the command that builds it, if it is not there.
     pub(super) fn command(&self) -> Result<Command, CommandError> {
         let own = std::env::current_exe().map_err(|cause| CommandError::Failed(cause.to_string()))?;
-        let file = own.with_file_name(format!("{}{}", self.program, std::env::consts::EXE_SUFFIX));
-        if file.is_file() {
+        let (beside, apart) = self.places(&own);
+        if let Some(file) = [&beside].into_iter().chain(&apart).find(|file| file.is_file()) {
             return Ok(Command::new(file));
         }
+        let file = apart.unwrap_or(beside);
         Err(CommandError::Usage(format!("there is no `{}`; `{}` builds it", file.display(), self.build)))
+    }
+
+    /// Where it is looked for: beside this program, and where cargo puts it if this one lies where cargo has put it.
+    fn places(&self, own: &Path) -> (PathBuf, Option<PathBuf>) {
+        let name = format!("{}{}", self.program, std::env::consts::EXE_SUFFIX);
+        let target = own.parent().and_then(Path::parent);
+        let apart = match (&self.built, target) {
+            (Built::Apart(folder), Some(target)) => Some(target.join(folder).join("release").join(&name)),
+            _ => None,
+        };
+        (own.with_file_name(name), apart)
     }
 
     /// Becomes the companion: its words and its exit code are those of this command.
     pub(super) fn become_with(&self, arguments: &[OsString]) -> Result<(), CommandError> {
         let cause = self.command()?.args(arguments).exec();
         Err(CommandError::file(self.program.as_ref(), "cannot be started", cause))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_built_apart_is_found_from_either_profile() {
+        let sweeper = Companion { program: "flotor-sweep", built: Built::Apart("sweep"), build: "" };
+        let name = format!("flotor-sweep{}", std::env::consts::EXE_SUFFIX);
+        for profile in ["debug", "release"] {
+            let (beside, apart) = sweeper.places(&Path::new("/f/target").join(profile).join("flotor"));
+            assert_eq!(beside, Path::new("/f/target").join(profile).join(&name));
+            assert_eq!(apart, Some(Path::new("/f/target/sweep/release").join(&name)));
+        }
+        let viewer = Companion { program: "flotor-viewer", built: Built::WithThis, build: "" };
+        assert_eq!(viewer.places(Path::new("/f/target/release/flotor")).1, None);
     }
 }

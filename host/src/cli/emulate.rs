@@ -1,7 +1,7 @@
 //! `flotor emulate`: a device without the device, in a process of its own.
 
 use super::CommandError;
-use super::companion::Companion;
+use super::companion::{Built, Companion};
 use clap::Args;
 use std::ffi::OsString;
 
@@ -32,5 +32,5 @@ pub(crate) fn run(arguments: &EmulateArguments) -> Result<(), CommandError> {
     }
     let (program, build) =
         (format!("flotor-{device}-emulator"), format!("cargo build --release -p flotor-{device}"));
-    Companion { program: &program, build: &build }.become_with(arguments)
+    Companion { program: &program, built: Built::WithThis, build: &build }.become_with(arguments)
 }

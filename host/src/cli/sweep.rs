@@ -1,13 +1,14 @@
 //! `flotor sweep`: starts the sweeper, which is a program of its own, because it writes Parquet.
 
 use super::CommandError;
-use super::companion::Companion;
+use super::companion::{Built, Companion};
 use clap::Args;
 use std::ffi::OsString;
 
 const SWEEPER: Companion<'static> = Companion {
     program: "flotor-sweep",
-    build: "cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target",
+    built: Built::Apart("sweep"),
+    build: "cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target/sweep",
 };
 
 /// Sweep a model or a scene over parameters, poses and seeds into a Parquet table.

@@ -2,7 +2,7 @@
 
 use super::CommandError;
 use super::bridge::{BRIDGE, Way, is_elsewhere};
-use super::companion::Companion;
+use super::companion::{Built, Companion};
 use crate::record::Recording;
 use crate::registry::Registry;
 use clap::Args;
@@ -12,8 +12,11 @@ use std::path::PathBuf;
 use std::process::{Child, Stdio};
 
 /// The viewer, built by name because of its graphics stack.
-pub(super) const VIEWER: Companion<'_> =
-    Companion { program: "flotor-viewer", build: "cargo build --release -p flotor-viewer" };
+pub(super) const VIEWER: Companion<'_> = Companion {
+    program: "flotor-viewer",
+    built: Built::WithThis,
+    build: "cargo build --release -p flotor-viewer",
+};
 
 /// Show what the hand feels: the spring in 3D, and traces.
 #[derive(Args)]
