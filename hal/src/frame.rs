@@ -46,7 +46,13 @@ impl Pose {
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        all_finite(&self.position_m) && all_finite(&self.orientation_xyzw)
+        self.doubt() == 0.0
+    }
+
+    /// 0 if every number is finite, else NaN.
+    #[inline]
+    pub(crate) fn doubt(&self) -> f64 {
+        doubt(&self.position_m) + doubt(&self.orientation_xyzw)
     }
 }
 
@@ -90,7 +96,13 @@ impl Twist {
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        all_finite(&self.linear_m_per_s) && all_finite(&self.angular_rad_per_s)
+        self.doubt() == 0.0
+    }
+
+    /// 0 if every number is finite, else NaN.
+    #[inline]
+    pub(crate) fn doubt(&self) -> f64 {
+        doubt(&self.linear_m_per_s) + doubt(&self.angular_rad_per_s)
     }
 }
 
@@ -143,7 +155,7 @@ impl Wrench {
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        all_finite(&self.force_n) && all_finite(&self.torque_nm)
+        doubt(&self.force_n) + doubt(&self.torque_nm) == 0.0
     }
 }
 
@@ -201,11 +213,11 @@ pub fn orientation_from_rotation_vector(rotation_rad: DVec3) -> DQuat {
     DQuat::from_xyzw(xyz.x, xyz.y, xyz.z, (0.5 * angle_rad).cos())
 }
 
-/// A number less itself is 0 if it is finite and NaN if not, and so is a sum of such differences: that is a few vector
-/// instructions, not a branch for each.
+/// 0 if every number is finite, else NaN: that is what a number less itself is, and so is a sum of such differences. A few
+/// vector instructions, not a branch for each.
 #[inline]
 #[allow(clippy::eq_op)] // that is the point of it
-fn all_finite<const N: usize>(values: &[f64; N]) -> bool {
+fn doubt<const N: usize>(values: &[f64; N]) -> f64 {
     let [mut even, mut odd] = [0.0; 2];
     let (pairs, rest) = values.as_chunks::<2>();
     for [first, second] in pairs {
@@ -215,7 +227,7 @@ fn all_finite<const N: usize>(values: &[f64; N]) -> bool {
     for last in rest {
         even += last - last;
     }
-    even + odd == 0.0
+    even + odd
 }
 
 #[cfg(test)]

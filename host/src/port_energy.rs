@@ -139,8 +139,10 @@ impl Side {
 /// exact to 1e-6 of the angle up to a tenth of a radian, which is 100 rad/s at 1 kHz; there is no arc tangent to wait for.
 #[inline]
 fn small_rotation(rotation: DQuat) -> DVec3 {
-    let sine = if rotation.w < 0.0 { -rotation.xyz() } else { rotation.xyz() };
-    sine * (2.0 + sine.length_squared() * (1.0 / 3.0))
+    let sine = rotation.xyz();
+    // q and -q are one rotation: the smaller one is that with w above zero.
+    let factor = (2.0 + sine.length_squared() * (1.0 / 3.0)).copysign(rotation.w);
+    sine * factor
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
-use flotor_hal::{DQuat, DVec3, Pose, Twist, Wrench};
+use flotor_hal::{DQuat, DVec3, Demand, DeviceState, Input, Pose, Tick, Twist, Wrench};
 
 /// Scales and rotation between the device frame and a model's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -196,6 +196,34 @@ impl Mapping {
         side(DVec3::X, half_sides_m.x) + side(DVec3::Y, half_sides_m.y) + side(DVec3::Z, half_sides_m.z)
     }
 
+    /// What a model is told of a tick: the motion in its own frame, and what is asked for. Real-time: bounded, no allocation.
+    #[inline(always)]
+    #[must_use]
+    pub fn input(&self, tick: &Tick, state: &DeviceState, demand: Demand) -> Input {
+        match self.model_from_device {
+            Turn::None => self.with_motion(tick, state, demand),
+            Turn::By(_) => self.turned_input(tick, state, demand),
+        }
+    }
+
+    #[inline(never)] // out of the way of the many mappings without a turn
+    fn turned_input(&self, tick: &Tick, state: &DeviceState, demand: Demand) -> Input {
+        self.with_motion(tick, state, demand)
+    }
+
+    #[inline(always)]
+    fn with_motion(&self, tick: &Tick, state: &DeviceState, demand: Demand) -> Input {
+        Input {
+            pose: self.pose_to_model(&state.pose),
+            twist: self.twist_to_model(&state.twist),
+            time_ns: tick.time_ns,
+            dt_ns: tick.dt_ns,
+            tick: tick.index,
+            buttons: state.buttons,
+            demand,
+        }
+    }
+
     /// Twist in the model frame. Real-time: bounded, no allocation.
     #[inline(always)]
     #[must_use]
@@ -208,9 +236,16 @@ impl Mapping {
     #[inline(always)]
     #[must_use]
     pub fn wrench_to_device(&self, wrench: &Wrench) -> Wrench {
-        let turn = self.model_from_device;
-        let force: DVec3 = turn.back(wrench.force()) * self.force_scale;
-        Wrench::new(force, turn.back(wrench.torque()) * self.torque_scale)
+        match self.model_from_device {
+            Turn::None => Wrench::new(wrench.force() * self.force_scale, wrench.torque() * self.torque_scale),
+            Turn::By(rotation) => self.turned_wrench_to_device(wrench, rotation.conjugate()),
+        }
+    }
+
+    #[inline(never)] // as `turned_input`
+    fn turned_wrench_to_device(&self, wrench: &Wrench, device_from_model: DQuat) -> Wrench {
+        let force: DVec3 = device_from_model * wrench.force() * self.force_scale;
+        Wrench::new(force, device_from_model * wrench.torque() * self.torque_scale)
     }
 }
 

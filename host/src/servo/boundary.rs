@@ -62,7 +62,7 @@ impl BoundaryWall {
 /// Where translation or rotation may be, and what it meets outside. Metres and newtons, or radians and newton metres.
 struct Ellipsoid {
     semi_axes: DVec3,
-    /// Their reciprocals; infinite on an axis without range.
+    /// Their reciprocals; the largest number on an axis without range.
     per_semi_axis: DVec3,
     /// Effort per way.
     stiffness: f64,
@@ -76,14 +76,15 @@ const SURELY_INSIDE: f64 = 1.0 - 1.0e-12;
 impl Ellipsoid {
     fn new(range: [f64; 3], margin: f64, stiffness: f64, damping: f64) -> Self {
         let semi_axes = (DVec3::from_array(range) - margin).max(DVec3::ZERO);
-        Self { semi_axes, per_semi_axis: semi_axes.recip(), stiffness, damping }
+        // The largest number times nothing is nothing: an axis without range cannot move and needs no wall.
+        let per_semi_axis = semi_axes.recip().min(DVec3::splat(f64::MAX));
+        Self { semi_axes, per_semi_axis, stiffness, damping }
     }
 
-    /// True only inside. An axis without range (zero times infinity at its centre) cannot move and needs no wall.
+    /// True only inside.
     #[inline]
     fn surely_holds(&self, at: DVec3) -> bool {
-        let scaled = DVec3::select(at.cmpeq(DVec3::ZERO), DVec3::ZERO, at * self.per_semi_axis);
-        scaled.length_squared() < SURELY_INSIDE // false for NaN
+        (at * self.per_semi_axis).length_squared() < SURELY_INSIDE // false for NaN
     }
 
     /// Spring and damper along the ray from the centre; `None` inside. Damping acts outwards only: the wall never

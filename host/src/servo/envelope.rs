@@ -40,8 +40,10 @@ impl Envelope {
     #[must_use]
     #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
     pub fn new(limits: &Limits, boundary: &Boundary, device: &Capabilities, period_ns: u64) -> Self {
-        let tighter =
-            |scene: [f64; 3], device: [f64; 3]| DVec3::from_array(scene).min(DVec3::from_array(device));
+        // A limit without end is the largest number: what is within a limit is finite.
+        let tighter = |scene: [f64; 3], device: [f64; 3]| {
+            DVec3::from_array(scene).min(DVec3::from_array(device)).min(DVec3::splat(f64::MAX))
+        };
         let slew_per_s = [
             limits.force_slew_n_per_s.min(device.max_force_slew_n_per_s),
             limits.torque_slew_nm_per_s.min(device.max_torque_slew_nm_per_s),
@@ -111,16 +113,15 @@ impl Envelope {
         let gated = *request * gate.models;
         let (force, torque) = (gated.force(), gated.torque());
         let [force_n, torque_nm] = self.most_change(tick);
-        // A request that is not finite is not so behind the gate either.
-        let passes = gated.is_finite()
-            && self.passivity.only_observes()
+        // A request that is not finite is not so behind the gate either, and within no limit.
+        let passes = self.passivity.only_observes()
             && is_within(state.twist.linear(), self.velocity_m_per_s)
             && is_within(state.twist.angular(), self.angular_velocity_rad_per_s)
             && self.wall.surely_holds(state)
             && is_within(force, self.max_force_n)
             && is_within(torque, self.max_torque_nm)
-            && step_short_of(self.last.force(), force, force_n).is_none()
-            && step_short_of(self.last.torque(), torque, torque_nm).is_none();
+            && is_step_within(self.last.force(), force, force_n)
+            && is_step_within(self.last.torque(), torque, torque_nm);
         passes.then_some(gated)
     }
 
@@ -259,12 +260,19 @@ fn shrink_into_box(vector: DVec3, half_sides: DVec3) -> DVec3 {
     if excess <= 1.0 { vector } else { (vector / excess).clamp(-half_sides, half_sides) }
 }
 
-/// The point `most` from `from` on the way to `to`; `None` if `to` is no farther than that.
+/// True if `to` is no farther than `most` from `from`.
 #[inline]
+fn is_step_within(from: DVec3, to: DVec3, most: f64) -> bool {
+    (to - from).length_squared() <= most * most
+}
+
+/// The point `most` from `from` on the way to `to`; `None` if `to` is no farther than that.
 fn step_short_of(from: DVec3, to: DVec3, most: f64) -> Option<DVec3> {
+    if is_step_within(from, to, most) {
+        return None;
+    }
     let way = to - from;
-    let squared = way.length_squared();
-    if squared <= most * most { None } else { Some(from + way * (most / squared.sqrt())) }
+    Some(from + way * (most / way.length()))
 }
 
 #[cfg(test)]

@@ -148,6 +148,16 @@ impl Coupled {
     }
 }
 
+#[inline(never)] // out of the way of the many scenes without couplings, as `add_all`
+fn step_all(couplings: &mut [Coupled], tick: &Tick, ports: &[Port]) {
+    couplings.iter_mut().for_each(|coupled| coupled.step(tick, ports));
+}
+
+#[inline(never)]
+fn add_all(couplings: &[Coupled], ports: &mut [Port]) {
+    couplings.iter().for_each(|coupled| coupled.add_to(ports));
+}
+
 /// Which device a model is on, and which of the models there it is.
 #[derive(Clone, Copy, Debug)]
 struct Whereabouts {
@@ -188,12 +198,16 @@ impl Forces {
     pub(crate) fn step(&mut self, tick: &Tick, ports: &mut [Port], heart: &Heartbeat) {
         let Self { stacks, couplings, .. } = self;
         // The couplings first: what is held now is what they and the models asked for last.
-        couplings.iter_mut().for_each(|coupled| coupled.step(tick, ports));
+        if !couplings.is_empty() {
+            step_all(couplings, tick, ports);
+        }
         for (stack, port) in stacks.iter_mut().zip(&mut *ports) {
             let (wrench, energy_j) = stack.step(tick, &port.state, heart, &mut port.events);
             (port.asked, port.by_models, port.energy_j) = (wrench, wrench, energy_j);
         }
-        couplings.iter().for_each(|coupled| coupled.add_to(ports));
+        if !couplings.is_empty() {
+            add_all(couplings, ports);
+        }
     }
 
     /// The models a model's number stands for, and its place among them.

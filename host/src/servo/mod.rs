@@ -153,8 +153,8 @@ impl Servo {
         let mut events = if *missed > 0 { Events::MISSED } else { Events::NONE };
 
         self.change_parameters(tick, &mut events);
-        let sample = self.read(tick);
-        self.follow(sample, tick, stop, &mut events);
+        let (sample, buttons) = self.read(tick);
+        self.follow(sample, buttons, tick, stop, &mut events);
         watch.lap(&self.stopwatch, &mut self.timing, Stage::Read);
 
         self.forces.step(tick, &mut self.ports, &self.heart);
@@ -225,20 +225,21 @@ impl Servo {
         }
     }
 
-    /// Newest samples of all devices; what the worst of them means for the run: the hand is not to be trusted to feel
-    /// one device while another is lost.
+    /// Newest samples of all devices; what the worst of them means for the run (the hand is not to be trusted to feel
+    /// one device while another is lost), and the buttons of all.
     #[inline]
-    fn read(&mut self, tick: &Tick) -> RunEvent {
-        let mut worst = RunEvent::SamplesBack;
+    fn read(&mut self, tick: &Tick) -> (RunEvent, u32) {
+        let (mut worst, mut buttons) = (RunEvent::SamplesBack, 0);
         for (device, (station, port)) in (0..).zip(self.stations.iter_mut().zip(&mut self.ports)) {
             self.heart.enter(tick.index, Place::DeviceRead(device));
             port.events = Events::NONE;
             let sample = station.read(tick, port);
-            if badness(sample) > badness(worst) {
+            buttons |= port.state.buttons;
+            if sample != RunEvent::SamplesBack && badness(sample) > badness(worst) {
                 worst = sample;
             }
         }
-        worst
+        (worst, buttons)
     }
 
     /// Sends what is to be sent to all devices.
@@ -255,7 +256,14 @@ impl Servo {
 
     /// Takes the run where the samples, the clock and everybody who may stop it lead.
     #[inline]
-    fn follow(&mut self, sample: RunEvent, tick: &Tick, stop: &StopSwitch, events: &mut Events) {
+    fn follow(
+        &mut self,
+        sample: RunEvent,
+        buttons: u32,
+        tick: &Tick,
+        stop: &StopSwitch,
+        events: &mut Events,
+    ) {
         // An active run with a sample goes on as it is.
         if (self.run, sample) != (RunState::Active, RunEvent::SamplesBack) {
             self.happen(RunEvent::Time, tick);
@@ -267,7 +275,6 @@ impl Servo {
         if self.heart.bitten().is_some() {
             self.happen(RunEvent::Failed(Cause::Watchdog), tick);
         }
-        let buttons = self.ports.iter().fold(0, |buttons, port| buttons | port.state.buttons);
         let pressed = buttons & self.config.emergency_buttons != 0;
         if let Some(source) = stop.emergency().or(pressed.then_some(EmergencySource::Button)) {
             self.happen(RunEvent::Emergency(source), tick);

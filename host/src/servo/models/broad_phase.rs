@@ -70,6 +70,8 @@ pub(super) struct BroadPhase {
     bounds: Box<[Option<Bounds>]>,
     /// Objects to look at in every tick, in order; never more than there are.
     always: Vec<u32>,
+    /// No object has a box, as in most scenes: each is near wherever the handle is.
+    is_boundless: bool,
     grid: Grid,
 }
 
@@ -98,7 +100,8 @@ impl BroadPhase {
         always.extend((0..).zip(&bounds).filter(|(_, bounds)| bounds.is_none()).map(|(object, _)| object));
         always.extend(large.iter().map(|(object, _)| *object));
         always.sort_unstable();
-        Self { bounds: bounds.into(), always, grid }
+        let is_boundless = bounds.iter().all(Option::is_none);
+        Self { bounds: bounds.into(), always, is_boundless, grid }
     }
 
     /// The objects that can act with the handle at `position_m`, in order of their numbers.
@@ -106,10 +109,14 @@ impl BroadPhase {
     /// Real-time: bounded by the objects that are near or may act anywhere; no allocation.
     #[inline]
     pub(super) fn near<'a>(&'a self, position_m: &'a [f64; 3]) -> Near<'a> {
+        if self.is_boundless {
+            let all = self.bounds.len();
+            return Near { next: 0, all, bounds: &[], in_cell: &[], always: &[], position_m };
+        }
         // Where no object has a place of its own there is no cell to look for.
         let in_cell =
             if self.grid.objects.is_empty() { &[] } else { self.grid.cell(DVec3::from_array(*position_m)) };
-        Near { bounds: &self.bounds, in_cell, always: &self.always, position_m }
+        Near { next: 0, all: 0, bounds: &self.bounds, in_cell, always: &self.always, position_m }
     }
 
     /// A live parameter has changed where an object can act: it is looked at in every tick from now on.
@@ -118,6 +125,7 @@ impl BroadPhase {
     pub(super) fn watch_always(&mut self, object: usize, bounds: Option<Bounds>) {
         let (Some(place), Ok(number)) = (self.bounds.get_mut(object), u32::try_from(object)) else { return };
         *place = bounds;
+        self.is_boundless &= bounds.is_none();
         if let Err(at) = self.always.binary_search(&number) {
             self.always.insert(at, number); // there is room: the list never holds an object twice
         }
@@ -152,7 +160,11 @@ impl BroadPhase {
 }
 
 /// Objects that can act where the handle is: see [`BroadPhase::near`].
+#[derive(Clone, Copy)]
 pub(super) struct Near<'a> {
+    /// Where all are near wherever the handle is: the next of them, and how many there are. Nothing else is looked at then.
+    next: usize,
+    all: usize,
     bounds: &'a [Option<Bounds>],
     /// Those of the cell, and those that are always looked at, not looked at yet.
     in_cell: &'a [u32],
@@ -162,6 +174,19 @@ pub(super) struct Near<'a> {
 }
 
 impl Near<'_> {
+    /// The next one whose box holds the handle, or that has none, and what is left. By value: the others stay in registers.
+    #[inline(never)] // out of the way of the many scenes without boxes
+    fn next_by_place(mut self) -> (Option<usize>, Self) {
+        while let Some(object) = self.next_to_look_at() {
+            let object = object as usize;
+            match self.bounds.get(object) {
+                Some(Some(bounds)) if !bounds.contains(DVec3::from_array(*self.position_m)) => {}
+                _ => return (Some(object), self),
+            }
+        }
+        (None, self)
+    }
+
     /// The smaller number first, and one that is in both lists once: sums do not depend on who sleeps.
     #[inline]
     fn next_to_look_at(&mut self) -> Option<u32> {
@@ -184,13 +209,16 @@ impl Iterator for Near<'_> {
 
     #[inline]
     fn next(&mut self) -> Option<usize> {
-        loop {
-            let object = self.next_to_look_at()? as usize;
-            match self.bounds.get(object) {
-                Some(Some(bounds)) if !bounds.contains(DVec3::from_array(*self.position_m)) => {}
-                _ => return Some(object),
-            }
+        if self.next < self.all {
+            self.next += 1;
+            return Some(self.next - 1);
         }
+        if self.bounds.is_empty() {
+            return None;
+        }
+        let (found, left) = self.next_by_place();
+        *self = left;
+        found
     }
 }
 

@@ -4,7 +4,7 @@
 //! stands beside it; whichever is nearer is felt first.
 
 use crate::mapping::Mapping;
-use flotor_hal::{DVec3, DeviceState, LoopConfig, Reach, Wrench};
+use flotor_hal::{DVec3, LoopConfig, Reach, Wrench};
 
 /// Damping of the wall, N·s/m: that of the device's own boundary mode (client program of the University of Utah).
 const DAMPING_NS_PER_M: f64 = 15.0;
@@ -36,25 +36,31 @@ impl EndWall {
         self.reach = if reach.is_bounded() { *reach } else { Reach::UNBOUNDED };
     }
 
-    /// Its push in the device frame; `None` within reach. Real-time: bounded, no allocation.
+    /// Its push in the device frame on a handle that is at `position_m` of the model; `None` within reach. Real-time: bounded, no
+    /// allocation.
     #[inline(always)] // as `Layer::step`
-    pub(super) fn push(&self, mapping: &Mapping, state: &DeviceState) -> Option<Wrench> {
-        let beyond_m = self.reach.beyond(mapping.pose_to_model(&state.pose).position());
-        if beyond_m == DVec3::ZERO || !beyond_m.is_finite() {
-            return None;
-        }
-        Some(self.push_back(beyond_m, mapping, state))
+    pub(super) fn push(
+        &self,
+        position_m: DVec3,
+        mapping: &Mapping,
+        velocity_m_per_s: DVec3,
+    ) -> Option<Wrench> {
+        let beyond_m = self.reach.beyond(position_m);
+        if beyond_m == DVec3::ZERO { None } else { self.push_back(beyond_m, mapping, velocity_m_per_s) }
     }
 
     #[cold]
-    fn push_back(&self, beyond_m: DVec3, mapping: &Mapping, state: &DeviceState) -> Wrench {
+    fn push_back(&self, beyond_m: DVec3, mapping: &Mapping, velocity_m_per_s: DVec3) -> Option<Wrench> {
+        if !beyond_m.is_finite() {
+            return None;
+        }
         let beyond_m = mapping.vector_to_device(beyond_m);
         let depth_m = beyond_m.length();
         let outward = beyond_m / depth_m;
         // Damping acts outwards only, as that of the boundary.
-        let leaving_m_per_s = state.twist.linear().dot(outward).max(0.0);
+        let leaving_m_per_s = velocity_m_per_s.dot(outward).max(0.0);
         let push_n = self.stiffness_n_per_m * depth_m + DAMPING_NS_PER_M * leaving_m_per_s;
-        Wrench::from_force(outward * -push_n)
+        Some(Wrench::from_force(outward * -push_n))
     }
 }
 
@@ -62,7 +68,7 @@ impl EndWall {
 mod tests {
     use super::*;
     use crate::mapping::MappingConfig;
-    use flotor_hal::{DQuat, Pose, Twist};
+    use flotor_hal::{DQuat, Pose};
 
     /// Ends a millimetre below home and nowhere else.
     fn wall_at(period_ns: u64) -> EndWall {
@@ -71,17 +77,16 @@ mod tests {
         EndWall::new(&reach, &LoopConfig { period_ns, seed: 0 }).expect("it ends")
     }
 
-    fn moving(position_m: DVec3, velocity_m_per_s: DVec3) -> DeviceState {
-        let pose = Pose::new(position_m, DQuat::IDENTITY);
-        DeviceState { pose, twist: Twist::new(velocity_m_per_s, DVec3::ZERO), ..DeviceState::HOME }
+    /// The push of a wall on a handle that is and moves along z of the device.
+    fn push(wall: &EndWall, mapping: &Mapping, z_m: f64, speed_m_per_s: f64) -> Option<Wrench> {
+        let position_m = mapping.pose_to_model(&Pose::new(DVec3::Z * z_m, DQuat::IDENTITY)).position();
+        wall.push(position_m, mapping, DVec3::Z * speed_m_per_s)
     }
 
     #[test]
     fn it_pushes_back_what_is_beyond_and_nothing_else() {
         let mapping = Mapping::new(&MappingConfig::default());
-        let push = |z_m: f64, speed: f64| {
-            wall_at(1_000_000).push(&mapping, &moving(DVec3::Z * z_m, DVec3::Z * speed))
-        };
+        let push = |z_m: f64, speed: f64| push(&wall_at(1_000_000), &mapping, z_m, speed);
         assert_eq!(push(-0.9e-3, -1.0), None);
         assert_eq!(push(9.0, 0.0), None);
         let force = |z_m, speed| push(z_m, speed).expect("it is beyond").force();
@@ -100,7 +105,7 @@ mod tests {
             ..MappingConfig::default()
         };
         let mapping = Mapping::new(&config);
-        let push = |z_m: f64| wall_at(1_000_000).push(&mapping, &moving(DVec3::Z * z_m, DVec3::ZERO));
+        let push = |z_m: f64| push(&wall_at(1_000_000), &mapping, z_m, 0.0);
         assert_eq!(push(0.4e-3), None);
         let force = push(0.7e-3).expect("it is beyond").force();
         assert!((force - DVec3::Z * -2.0).length() < 1.0e-9, "{force}");
@@ -117,6 +122,6 @@ mod tests {
         let mapping = Mapping::new(&MappingConfig::default());
         let mut wall = wall_at(1_000_000);
         wall.move_to(&Reach::UNBOUNDED);
-        assert_eq!(wall.push(&mapping, &moving(DVec3::Z * -1.0, DVec3::ZERO)), None);
+        assert_eq!(push(&wall, &mapping, -1.0, 0.0), None);
     }
 }

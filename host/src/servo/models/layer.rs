@@ -8,7 +8,8 @@ use crate::servo::engine::{Engine, Stepped};
 use crate::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
-    ActivityShape, DVec3, Demand, DeviceState, Input, LoopConfig, Memory, Output, StepStatus, Tick, Wrench,
+    ActivityShape, DVec3, Demand, DeviceState, Input, LoopConfig, Memory, Output, Pose, StepStatus, Tick,
+    Twist, Wrench,
 };
 
 /// How a model has behaved so far, in all its places.
@@ -178,13 +179,14 @@ impl Layer {
         let mut share = Share::NONE;
         for index in broad.near(&state.pose.position_m) {
             let Some(object) = objects.get_mut(index) else { continue };
+            let input = object.mapping.input(tick, state, terms.demand);
             let mut output = NO_ANSWER;
-            if !object.answer(tick, state, *terms, &mut output, health, events) {
+            if !object.answer(&input, terms.memory, &mut output, health, events) {
                 events.insert(Events::MODEL_FAULT);
                 continue;
             }
             share.wrench = share.wrench + object.mapping.wrench_to_device(&output.wrench);
-            if let Some(push) = object.end.as_ref().and_then(|end| end.push(&object.mapping, state)) {
+            if let Some(push) = object.push_of_end(&input.pose, &state.twist) {
                 events.insert(Events::BOUNDARY);
                 share.wrench = share.wrench + push;
             }
@@ -255,9 +257,8 @@ impl Object {
     #[inline(always)] // the one call of it in a tick
     fn answer(
         &mut self,
-        tick: &Tick,
-        state: &DeviceState,
-        terms: Terms,
+        input: &Input,
+        memory: Memory,
         output: &mut Output,
         health: &mut ModelHealth,
         events: &mut Events,
@@ -266,28 +267,25 @@ impl Object {
             return false;
         }
         // Where it was not stepped it has no history: it starts anew.
-        let was_asleep = self.stepped_at.is_some_and(|last| last + 1 != tick.index);
-        if was_asleep && terms.memory == Memory::PathDependent && self.model.reset() != CallStatus::Ok {
-            return self.fail(tick, health);
+        let was_asleep = self.stepped_at.is_some_and(|last| last + 1 != input.tick);
+        if was_asleep && memory == Memory::PathDependent && self.model.reset() != CallStatus::Ok {
+            return self.fail(input.tick, health);
         }
-        self.stepped_at = Some(tick.index);
-        let input = Input {
-            pose: self.mapping.pose_to_model(&state.pose),
-            twist: self.mapping.twist_to_model(&state.twist),
-            time_ns: tick.time_ns,
-            dt_ns: tick.dt_ns,
-            tick: tick.index,
-            buttons: state.buttons,
-            demand: terms.demand,
-        };
-        let stepped = self.model.step(&input, output);
+        self.stepped_at = Some(input.tick);
+        let stepped = self.model.step(input, output);
         if stepped == Stepped::Answered && output.wrench.is_finite() && output.status().is_some() {
             if self.model.may_be_late() {
                 self.last = Some(*output);
             }
             return true;
         }
-        self.go_without(stepped, tick, output, health, events)
+        self.go_without(stepped, input.tick, output, health, events)
+    }
+
+    /// The push of the wall where the model ends on a handle at a pose in its frame, if it is beyond.
+    #[inline(always)] // as `answer`
+    fn push_of_end(&self, pose: &Pose, twist: &Twist) -> Option<Wrench> {
+        self.end.as_ref()?.push(pose.position(), &self.mapping, twist.linear())
     }
 
     /// There is no answer that can be used; true if the one before may stand in for it.
@@ -295,7 +293,7 @@ impl Object {
     fn go_without(
         &mut self,
         stepped: Stepped,
-        tick: &Tick,
+        tick: u64,
         output: &mut Output,
         health: &mut ModelHealth,
         events: &mut Events,
@@ -303,13 +301,13 @@ impl Object {
         match stepped {
             Stepped::Answered => {
                 self.last = None;
-                health.reject(tick.index);
+                health.reject(tick);
                 false
             }
             // One tick may pass with the answer before; a second one in a row finds none.
             Stepped::Late => {
                 events.insert(Events::MODEL_OVERRUN);
-                health.late(tick.index);
+                health.late(tick);
                 let last = self.last.take();
                 *output = last.unwrap_or_default();
                 last.is_some()
@@ -317,15 +315,15 @@ impl Object {
             Stepped::Broken => self.fail(tick, health),
             Stepped::Gone => {
                 self.is_out = true;
-                health.lost_at.get_or_insert(tick.index);
+                health.lost_at.get_or_insert(tick);
                 false
             }
         }
     }
 
-    fn fail(&mut self, tick: &Tick, health: &mut ModelHealth) -> bool {
+    fn fail(&mut self, tick: u64, health: &mut ModelHealth) -> bool {
         self.is_out = true;
-        health.panicked_at.get_or_insert(tick.index);
+        health.panicked_at.get_or_insert(tick);
         false
     }
 }
