@@ -71,6 +71,24 @@ impl Rig {
         self.shared.lock().expect("nobody panics with it")
     }
 
+    /// Waits until the board knows something: bytes take the time the machine gives them.
+    fn until_board<T>(&self, knows: impl Fn(&EmulatedBoard) -> Option<T>) -> T {
+        let started = Instant::now();
+        while started.elapsed() < Duration::from_secs(10) {
+            let known = knows(&self.board().0);
+            if let Some(known) = known {
+                return known;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        panic!("the board does not know within ten seconds");
+    }
+
+    /// Waits until the board gives no force.
+    fn until_released(&self) {
+        self.until_board(|board| (board.force_n().map(DVec2::length) == Some(0.0)).then_some(()));
+    }
+
     fn open(&self) -> OpenedDevice {
         let plugin = Plugin::in_process(&flotor_haply::FLOTOR_ENTRY).expect("it is a plugin");
         let set = |key, value| Setting::parse(plugin.parameters(), key, value).expect("it is a parameter");
@@ -151,8 +169,7 @@ fn the_handle_is_where_the_hand_has_it_and_the_force_arrives() {
         (state.delivered.force() - DVec3::new(1.8, 2.4, 0.0)).length() < 1.0e-12
     });
     let opened = run.device.deactivate().expect("it comes back");
-    std::thread::sleep(Duration::from_millis(50));
-    assert_eq!(rig.board().0.force_n().map(DVec2::length), Some(0.0), "without force afterwards");
+    rig.until_released();
     drop(opened);
 }
 
@@ -166,7 +183,7 @@ fn it_declares_two_axes_and_can_be_activated_again() {
         let active = opened.activate(&CONFIG).map_err(|(_, refusal)| refusal).expect("it answers");
         opened = active.deactivate().expect("it comes back");
     }
-    let arms = *rig.board().0.arms().expect("the board was told about its arms");
+    let arms = rig.until_board(|board| board.arms().copied());
     assert_eq!(arms.map(|arm| arm.start_deg), [168.0, 12.0]);
 }
 
@@ -213,8 +230,7 @@ fn another_thread_takes_the_force_away_even_if_the_loop_never_comes_back() {
     run.until(&Wrench::from_force(DVec3::X), |_, state| state.delivered.force() == DVec3::X);
     std::thread::spawn(move || stopper.safe_stop()).join().expect("it does not panic");
     // No tick from here on.
-    std::thread::sleep(Duration::from_millis(100));
-    assert_eq!(rig.board().0.force_n().map(DVec2::length), Some(0.0));
+    rig.until_released();
     run.until(&Wrench::from_force(DVec3::X), |_, state| state.delivered == Wrench::ZERO);
 }
 

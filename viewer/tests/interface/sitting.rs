@@ -42,6 +42,7 @@ fn a_person_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_al
     assert_eq!(hears.recv_timeout(PATIENCE), Ok(Said::Window { window: WindowState::Open }));
     assert_eq!(host.request(None), Ask::Watch { every: 1 });
     host.run_ticks(100, Events::NONE);
+    until(&mut window, |window| !window.state().history().is_empty());
 
     let (mut headlines, mut seen) = (Vec::new(), 0);
     while !experiment.is_over() {
