@@ -183,7 +183,8 @@ mod tests {
         let said = missing.to_string();
         assert!(matches!(missing, WindowError::NoDisplay(_)) && said.contains("libX11.so.6"), "{said}");
 
-        let place = "event loop: os error at /a/winit/src/linux/mod.rs:757: neither DISPLAY nor the other is set.";
+        let place =
+            "event loop: os error at /a/winit/src/linux/mod.rs:757: neither DISPLAY nor the other is set.";
         assert_eq!(one_line(place), "neither DISPLAY nor the other is set");
 
         let broken = watched_over(|opened| {

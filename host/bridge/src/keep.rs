@@ -23,14 +23,25 @@ pub enum KeepError {
 }
 
 /// What came of a recording.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Kept {
     /// Ticks in the file.
     pub ticks: u64,
     /// Ticks that were lost on the way. The recording has a note at each gap.
     pub lost: u64,
-    /// How the run ended.
-    pub words: String,
+    /// How it ends.
+    pub end: RecordingEnd,
+}
+
+/// How a recording ends.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RecordingEnd {
+    /// The run is over; its words.
+    Over(String),
+    /// Whoever recorded has stopped.
+    Stopped,
+    /// The bridge went without a word.
+    Cut,
 }
 
 /// Records one remote run, from now to its end or until told to stop.
@@ -38,7 +49,7 @@ pub struct Kept {
 /// # Errors
 /// [`KeepError`].
 pub fn keep(remote: &Remote, file: &Path, stop: &AtomicBool) -> Result<Kept, KeepError> {
-    let mut kept = Kept { words: "stopped recording".to_owned(), ..Kept::default() };
+    let mut kept = Kept { ticks: 0, lost: 0, end: RecordingEnd::Stopped };
     let Some((_, run)) = remote.wait_for_run(stop)? else { return Ok(kept) };
     let mut recorder = Recorder::create(file, &run)?;
     while !stop.load(Ordering::Relaxed) {
@@ -62,11 +73,11 @@ pub fn keep(remote: &Remote, file: &Path, stop: &AtomicBool) -> Result<Kept, Kee
             }
             Some(Told::Change(change)) => recorder.change(&change)?,
             Some(Told::End(end)) => {
-                kept.words = end.words;
+                kept.end = RecordingEnd::Over(end.words);
                 break;
             }
             Some(Told::Gone) => {
-                "the bridge cannot be seen any more".clone_into(&mut kept.words);
+                kept.end = RecordingEnd::Cut;
                 break;
             }
         }

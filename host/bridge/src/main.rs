@@ -4,7 +4,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use flotor_bridge::access::{Members, write_keys};
 use flotor_bridge::attach::attach;
 use flotor_bridge::couple::couple;
-use flotor_bridge::keep::keep;
+use flotor_bridge::keep::{RecordingEnd, keep};
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkError, LinkOptions, open};
 use flotor_bridge::remote::{Remote, bridges};
@@ -197,13 +197,17 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
             let remote = Remote::listen(&open(&link, End::Visiting)?, &name)?;
             tell(&format!("waiting for a run of zenoh/{name} (Ctrl-C ends)"));
             let kept = keep(&remote, &file, &stop)?;
-            println!(
-                "{}: {} ticks, {} lost on the way; {}",
-                file.display(),
-                kept.ticks,
-                kept.lost,
-                kept.words
-            );
+            let words = match &kept.end {
+                RecordingEnd::Over(words) => words,
+                RecordingEnd::Stopped => "stopped recording",
+                RecordingEnd::Cut => "the bridge cannot be seen any more",
+            };
+            println!("{}: {} ticks, {} lost on the way; {words}", file.display(), kept.ticks, kept.lost);
+            if kept.end == RecordingEnd::Cut {
+                return Err(
+                    "the recording ends before the run has told its end; what had come is in the file".into(),
+                );
+            }
         }
         Command::Ask { name, wish } => {
             let remote = Remote::listen(&open(&link, End::Visiting)?, &name)?;

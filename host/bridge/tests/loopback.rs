@@ -4,7 +4,7 @@ mod common;
 
 use common::{Bridge, FakeHost, PATIENCE, SLOW, description, is_full_size, record, wait_until};
 use flotor_bridge::attach::attach;
-use flotor_bridge::keep::keep;
+use flotor_bridge::keep::{RecordingEnd, keep};
 use flotor_bridge::link::{End, LinkOptions, open};
 use flotor_bridge::remote::{Remote, Told, bridges};
 use flotor_bridge::status::State;
@@ -274,7 +274,7 @@ fn a_remote_run_is_recorded_whole_and_the_bridge_may_die() {
         host.end("enough");
         kept.join().unwrap()
     });
-    assert_eq!((kept.lost, kept.words.as_str()), (0, "enough"));
+    assert_eq!((kept.lost, kept.end), (0, RecordingEnd::Over("enough".to_owned())));
     let recording = Recording::open(&file).unwrap();
     assert_eq!(recording.run(), &description());
     let recorded: Vec<_> = recording
@@ -296,6 +296,6 @@ fn a_remote_run_is_recorded_whole_and_the_bridge_may_die() {
         host.ticks(0..100); // the host does not mind
         kept.join().unwrap()
     });
-    assert_eq!(kept.words, "the bridge cannot be seen any more");
+    assert_eq!(kept.end, RecordingEnd::Cut);
     assert!(Recording::open(&file).is_ok(), "what was recorded is there");
 }

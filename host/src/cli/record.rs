@@ -52,27 +52,41 @@ fn record_local(out: &Path) -> Result<(), CommandError> {
     let client =
         Client::find(&Directory::of_this_user()).map_err(|error| CommandError::Usage(error.to_string()))?;
     eprintln!("recording `{}` (Ctrl-C ends)", client.greeting().title);
-    let Kept { ticks, dropped, words } = keep(client, out, &stop)?;
+    let Kept { ticks, dropped, end } = keep(client, out, &stop)?;
     let lost = match dropped {
         0 => String::new(),
         dropped => format!(", {} {dropped} ticks the host could not hand over", style::warning("without")),
     };
+    let (RecordingEnd::Told(words) | RecordingEnd::Cut(words)) = &end;
     println!("{}: {ticks} ticks{lost}; {words}", out.display());
-    Ok(())
+    match end {
+        RecordingEnd::Told(_) => Ok(()),
+        RecordingEnd::Cut(_) => Err(CommandError::Failed(
+            "the recording ends before the run has told its end; what had come is in the file".to_owned(),
+        )),
+    }
 }
 
 /// What came of a recording.
 struct Kept {
     ticks: u64,
     dropped: u64,
-    words: String,
+    end: RecordingEnd,
+}
+
+/// How a recording of somebody else's run ends, in words.
+enum RecordingEnd {
+    /// The run is over, or whoever recorded has stopped.
+    Told(String),
+    /// The host went without a word.
+    Cut(String),
 }
 
 fn keep(mut client: Client, out: &Path, stop: &StopSwitch) -> Result<Kept, CommandError> {
     let mut recorder = Recorder::create(out, client.run())?;
     let gone = |error: LiveError| CommandError::Failed(error.to_string());
     client.asker().ask(Ask::Watch { every: 1 }).map_err(gone)?;
-    let mut kept = Kept { ticks: 0, dropped: 0, words: "stopped recording".to_owned() };
+    let mut kept = Kept { ticks: 0, dropped: 0, end: RecordingEnd::Told("stopped recording".to_owned()) };
     while !stop.is_stop_asked() {
         match client.next(LOOK_PERIOD) {
             Ok(None | Some(Event::Answer(_))) => {}
@@ -95,12 +109,12 @@ fn keep(mut client: Client, out: &Path, stop: &StopSwitch) -> Result<Kept, Comma
             }
             Ok(Some(Event::Change(change))) => recorder.change(&Change::from(&change))?,
             Ok(Some(Event::End(end))) => {
-                kept.words = end.words;
+                kept.end = RecordingEnd::Told(end.words);
                 break;
             }
             // What was recorded is good; that the host died belongs to it.
             Err(error) => {
-                kept.words = error.to_string();
+                kept.end = RecordingEnd::Cut(error.to_string());
                 break;
             }
         }
