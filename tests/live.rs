@@ -1,7 +1,7 @@
 //! Another program watches a run and talks to it; whatever it does, the run is the same.
 
 use flotor::live::{Announcement, Handles};
-use flotor::record::{Change, TraceDigest};
+use flotor::record::{Change, Recording, TraceDigest};
 use flotor::run_description::describe;
 use flotor::scene::Scene;
 use flotor::servo::{Clock, EmergencySource, StopSwitch};
@@ -15,6 +15,7 @@ use flotor_tests::TestSize;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::prepared;
+use rustix::process::{Pid, Signal, kill_process};
 use std::io::Write;
 use std::os::unix::net::UnixStream;
 use std::path::Path;
@@ -281,6 +282,28 @@ fn a_run_of_the_program_is_found_watched_and_stopped() {
     assert_eq!(running.wait().code, Some(exit_code::OK));
     assert_eq!(directory.runs(), [], "it cleans up after itself");
     assert!(matches!(Client::find(&directory), Err(LiveError::NoRun { .. })));
+}
+
+/// Who records a run that dies has what had come, and is told that it is not all.
+#[test]
+fn a_recording_of_a_run_that_is_killed_is_whole_so_far_and_ends_as_cut() {
+    let scratch = Scratch::default();
+    let runtime = scratch.path().display().to_string();
+    let of_user = |flotor: Flotor| flotor.env("XDG_RUNTIME_DIR", &runtime).start();
+    let running = of_user(Flotor::with(["run", "--duration", "60s"]));
+    let directory = Directory::at(scratch.path().join("flotor"));
+    patiently(|| Client::find(&directory).ok());
+    let file = scratch.path().join("cut.mcap");
+    let recording = of_user(Flotor::with(["record", "--out", &file.display().to_string()]));
+    patiently(|| file.metadata().ok().filter(|file| file.len() > 200_000)); // schemas, scene, and some ticks
+    let process = Pid::from_raw(running.id().cast_signed()).expect("a process has a number");
+    kill_process(process, Signal::KILL).expect("it is ours");
+    assert_eq!(running.wait().code, None, "ended by a signal");
+    let recorded = recording.wait();
+    assert_eq!(recorded.code, Some(exit_code::OTHER), "{recorded:?}");
+    assert!(recorded.stderr.contains("the recording ends before the run has told its end"), "{recorded:?}");
+    let ticks = Recording::open(&file).expect("it is finished").count();
+    assert!(ticks > 0 && recorded.stdout.contains(&format!("{ticks} ticks")), "{ticks}: {recorded:?}");
 }
 
 #[test]
