@@ -109,8 +109,8 @@ fn instructions(name: &str, within: &str) -> Option<f64> {
 }
 
 /// A whole tick with the spring: device, mapping, model, envelope, record into the trace ring. What was counted on x86-64
-/// (2703 and 3985) and a tenth, for other versions of compiler and libraries.
-const MOST_INSTRUCTIONS: [(&str, f64); 2] = [("scripted", 2970.0), ("simulated", 4380.0)];
+/// (2467 and 3712) and a tenth, for other versions of compiler and libraries.
+const MOST_INSTRUCTIONS: [(&str, f64); 2] = [("scripted", 2710.0), ("simulated", 4080.0)];
 
 #[test]
 fn a_whole_tick_stays_within_its_instructions() {
