@@ -38,7 +38,7 @@ impl BoundaryWall {
     }
 
     /// True only inside. Real-time: bounded, no allocation.
-    #[inline]
+    #[inline(always)]
     pub(super) fn surely_holds(&self, state: &DeviceState) -> bool {
         // A rotation vector is the axis times the angle, which is at most pi times the sine of its half.
         let at_most_rad = state.pose.orientation().xyz() * PI;
@@ -82,7 +82,7 @@ impl Ellipsoid {
     }
 
     /// True only inside.
-    #[inline]
+    #[inline(always)]
     fn surely_holds(&self, at: DVec3) -> bool {
         (at * self.per_semi_axis).length_squared() < SURELY_INSIDE // false for NaN
     }

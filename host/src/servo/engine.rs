@@ -32,7 +32,7 @@ pub(crate) enum Stepped {
 impl Engine {
     /// One step; `output` is only meaningful for [`Stepped::Answered`]. Real-time: bounded by the model or its patience, no
     /// allocation.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
         let answered = |status| match status {
             CallStatus::Ok => Stepped::Answered,

@@ -228,7 +228,7 @@ impl Envelope {
 }
 
 /// True if no part of a vector is larger than `most` of its axis, nor NaN.
-#[inline]
+#[inline(always)]
 fn is_within(vector: DVec3, most: DVec3) -> bool {
     vector.x.abs() <= most.x && vector.y.abs() <= most.y && vector.z.abs() <= most.z
 }
@@ -261,7 +261,7 @@ fn shrink_into_box(vector: DVec3, half_sides: DVec3) -> DVec3 {
 }
 
 /// True if `to` is no farther than `most` from `from`.
-#[inline]
+#[inline(always)]
 fn is_step_within(from: DVec3, to: DVec3, most: f64) -> bool {
     (to - from).length_squared() <= most * most
 }

@@ -29,7 +29,7 @@ impl Passivity {
 
     /// Books what has crossed the port since the last sample, while `held` was applied. Real-time: bounded, no
     /// allocation.
-    #[inline]
+    #[inline(always)]
     pub(super) fn observe(&mut self, state: &DeviceState, held: &Wrench) {
         self.energy_j += self.observer.gone_in_j(&state.pose, held);
     }

@@ -5,7 +5,7 @@ use super::forces::Port;
 use super::state::{Cause, Gate, RunEvent};
 use crate::trace::Events;
 use flotor_hal::abi::loader::ActiveDevice;
-use flotor_hal::{Axes, Conditions, Cycle, Fault, Tick};
+use flotor_hal::{Axes, Conditions, Cycle, Fault, Tick, instructions};
 
 /// Ticks without a new sample after which the force fades to zero: what is older than this is not where the
 /// hand is. At 1 kHz, 10 ms of a 10 Hz movement of 5 mm are 3 mm.
@@ -61,7 +61,10 @@ impl Station {
     /// What of the port's request may be sent. Real-time: bounded, no allocation.
     #[inline(never)] // registers of its own: in the tick as a whole there are none left
     pub(super) fn limit(&mut self, tick: &Tick, gate: Gate, port: &mut Port) {
-        port.commanded = self.envelope.apply(&port.asked, gate, &port.state, tick, &mut port.events);
+        port.commanded = instructions::best(
+            #[inline(always)]
+            || self.envelope.apply(&port.asked, gate, &port.state, tick, &mut port.events),
+        );
     }
 
     /// Sends it. What it means for the run, if anything. Real-time: bounded by the device, no allocation.
