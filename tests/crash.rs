@@ -123,8 +123,11 @@ fn an_observer_that_does_not_keep_up_never_holds_up_the_loop_and_what_is_lost_is
     let session = Session::prepare(&scene, &Registry::search(&[]), &options).expect("the demo starts");
     let mut stuck = Stuck { stays: Duration::from_millis(1500), seen: 0 };
     let outcome = session.run(&mut stuck, &StopSwitch::default()).expect("it runs");
-    // Ticks that this machine missed are counted too: together they are all there were to be.
-    assert_eq!((outcome.end, outcome.timing.ticks + outcome.timing.missed), (RunEnd::Finished, 20_000));
+    // Ticks that this machine missed are counted too: together they are all there were to be, and what passed beyond the end
+    // if the machine held up the last tick.
+    let passed = outcome.timing.ticks + outcome.timing.missed;
+    assert_eq!(outcome.end, RunEnd::Finished);
+    assert!((20_000..20_500).contains(&passed), "{passed}");
     // 15 000 ticks in 1.5 s, of which the ring holds 4096; a loaded machine misses some before they are dropped.
     assert!(outcome.dropped_records > 1000, "{} dropped", outcome.dropped_records);
     assert_eq!(stuck.seen + outcome.dropped_records, outcome.timing.ticks);
