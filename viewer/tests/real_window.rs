@@ -13,6 +13,7 @@ use egui_kittest::kittest::Queryable;
 use flotor_live::{Ask, Client, Directory, Event};
 use flotor_viewer::app::{Start, Viewer, Wanted};
 use flotor_viewer::palette::Look;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -81,7 +82,9 @@ fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
     let display = Display::start(folder.path());
     let mut window = alone("flotor-viewer", folder.path(), Some(&display));
     window.args(["--size", &format!("{}x{}", SIZE[0], SIZE[1])]);
-    let mut window = Owned(window.stderr(Stdio::null()).spawn().expect("the viewer starts"));
+    let said = folder.path().join("said");
+    let into = File::create(&said).expect("a scratch folder can be written to");
+    let mut window = Owned(window.stderr(into).spawn().expect("the viewer starts"));
     let xdotool = |arguments: &[&str]| {
         let output = Command::new("xdotool")
             .args(arguments)
@@ -91,7 +94,8 @@ fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
     };
     patiently("the window opens", || {
-        assert!(window.0.try_wait().expect("it is ours").is_none(), "the viewer ended by itself");
+        let ended = window.0.try_wait().expect("it is ours");
+        assert!(ended.is_none(), "{ended:?}: {}", std::fs::read_to_string(&said).unwrap_or_default());
         xdotool(&["search", "--onlyvisible", "--name", "Flotor"])
     });
 

@@ -55,7 +55,10 @@ impl Display {
     pub(crate) fn start(folder: &Path) -> Self {
         let size = format!("{}x{}x24", SIZE[0], SIZE[1]);
         let mut command = Command::new("Xvfb");
-        command.args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0", &size, "-fbdir"]).arg(folder);
+        // Without resets: when its last client leaves, and that may be a look for a window not open yet, a server begins anew,
+        // and turns away who comes meanwhile.
+        command.args(["-displayfd", "1", "-noreset", "-nolisten", "tcp", "-screen", "0", &size, "-fbdir"]);
+        command.arg(folder);
         let mut server = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("Xvfb starts");
         let mut number = String::new();
         let output = server.stdout.take().expect("a pipe was asked for");
