@@ -283,7 +283,8 @@ const PERSONALITY: &str = "FLOTOR_KERNEL_PERSONALITY";
 #[test]
 #[ignore = "the host of the other tests, in a process of its own: they start it"]
 fn a_process_that_is_the_host() {
-    let (Ok(role), Ok(address)) = (std::env::var(ROLE), std::env::var(PERSONALITY)) else { return };
+    let told = |name: &str| std::env::var(name).expect("the other tests start it, and say what it is to be");
+    let (role, address) = (told(ROLE), told(PERSONALITY));
     let personality = ALL.into_iter().find(|personality| personality.address() == address).unwrap();
     let (kind, address) = match personality {
         Personality::Hid => (Kind::Hid, address),
