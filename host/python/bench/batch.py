@@ -26,7 +26,10 @@ def main():
     outputs = np.empty(POSES, flotor.OUTPUT)
 
     target = Path(os.environ.get("CARGO_TARGET_DIR", Path(__file__).parent.parent / "target"))
-    yardstick = [target / "release/examples/batch_seconds", model.path, str(POSES), str(ROUNDS)]
+    program = target / "release/examples/batch_seconds"
+    if not program.is_file():
+        raise SystemExit(f"there is no {program}; in host/python, `cargo build --release --example batch_seconds` builds it")
+    yardstick = [program, model.path, str(POSES), str(ROUNDS)]
     rust_s, python_s = np.inf, np.inf
     for _ in range(ALTERNATIONS):  # alternating, so that a slow spell of the machine hits both
         rust_s = min(rust_s, float(subprocess.run(yardstick, check=True, capture_output=True, text=True).stdout))
