@@ -9,52 +9,35 @@
 //!
 //! Source: series of `asin² s` and `asin s / sqrt(1 - s²)` at `s = sin(angle / 2)`, NIST DLMF 4.24.
 
-use crate::real::Real;
+use crate::real::{Four, Real};
 
 /// `1 - cos` of 60 degrees: beyond it the measures are a continuation.
 pub const TRUSTED_VERSINE: f64 = 0.5;
 
+const TERMS: usize = 8;
+/// Of these, terms of the square: the twist is a quotient, and needs two more for the same accuracy.
 const SQUARE_TERMS: usize = 6;
-const TWIST_TERMS: usize = 8;
 
-/// `angle² = sum of c^n 2^(n+1) / (n² binomial(2n, n))` for `n = 1, 2, ...`, at `c = 1 - cos`.
-const SQUARE_SERIES: [f64; SQUARE_TERMS] = square_series();
-/// `angle / sin = sum of c^n 2^n n!² / (2n+1)!` for `n = 0, 1, ...`.
-const TWIST_SERIES: [f64; TWIST_TERMS] = twist_series();
+/// Both series by powers of `c = 1 - cos`, side by side: for three squares and a twist.
+///
+/// `angle² / c = sum of c^n 2^(n+2) / ((n+1)² binomial(2n+2, n+1))`, `angle / sin = sum of c^n 2^n n!² / (2n+1)!`, for
+/// `n = 0, 1, ...`, by the quotient of neighbours.
+const SERIES: [[f64; 4]; TERMS] = series();
 
 #[allow(clippy::cast_precision_loss)] // integers below twenty
-const fn square_series() -> [f64; SQUARE_TERMS] {
-    let mut coefficients = [2.0; SQUARE_TERMS];
-    let mut i = 1;
-    while i < SQUARE_TERMS {
-        let n = i as f64;
-        coefficients[i] = coefficients[i - 1] * n * n / ((n + 1.0) * (2.0 * n + 1.0));
+const fn series() -> [[f64; 4]; TERMS] {
+    let mut coefficients = [[0.0; 4]; TERMS];
+    let (mut square, mut twist) = (2.0, 1.0);
+    let mut i = 0;
+    while i < TERMS {
+        coefficients[i] =
+            if i < SQUARE_TERMS { [square, square, square, twist] } else { [0.0, 0.0, 0.0, twist] };
+        let n = (i + 1) as f64;
+        square = square * n * n / ((n + 1.0) * (2.0 * n + 1.0));
+        twist = twist * n / (2.0 * n + 1.0);
         i += 1;
     }
     coefficients
-}
-
-#[allow(clippy::cast_precision_loss)] // integers below twenty
-const fn twist_series() -> [f64; TWIST_TERMS] {
-    let mut coefficients = [1.0; TWIST_TERMS];
-    let mut i = 1;
-    while i < TWIST_TERMS {
-        let n = i as f64;
-        coefficients[i] = coefficients[i - 1] * n / (2.0 * n + 1.0);
-        i += 1;
-    }
-    coefficients
-}
-
-/// A polynomial and its derivative.
-#[inline(always)]
-fn polynomial<R: Real, const N: usize>(coefficients: &[f64; N], x: R) -> (R, R) {
-    let (mut value, mut slope) = (x.like(0.0), x.like(0.0));
-    for coefficient in coefficients.iter().rev() {
-        slope = slope * x + value;
-        value = value * x + *coefficient;
-    }
-    (value, slope)
 }
 
 /// Square of the angle between two directions.
@@ -66,16 +49,6 @@ pub struct SquaredAngle<R = f64> {
     pub slope: R,
 }
 
-impl<R: Real> SquaredAngle<R> {
-    /// From the versine `1 - cos angle`, 0 to 2. Real-time: bounded, no allocation, no branch.
-    #[inline(always)]
-    #[must_use]
-    pub fn from_versine(versine: R) -> Self {
-        let (quotient, quotient_slope) = polynomial(&SQUARE_SERIES, versine);
-        Self { value: versine * quotient, slope: quotient + versine * quotient_slope }
-    }
-}
-
 /// A signed angle of rotation about a known axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Twist<R = f64> {
@@ -85,15 +58,31 @@ pub struct Twist<R = f64> {
     pub slope: R,
 }
 
-impl<R: Real> Twist<R> {
-    /// From sine and versine `1 - cos` of the angle. Real-time: bounded, no allocation, no branch.
-    #[inline(always)]
-    #[must_use]
-    pub fn from_sine(sine: R, versine: R) -> Self {
-        let (quotient, quotient_slope) = polynomial(&TWIST_SERIES, versine);
-        let cosine = versine.like(1.0) - versine;
-        Self { value: sine * quotient, slope: cosine * quotient + sine * sine * quotient_slope }
-    }
+/// Squares of three angles from their versines `1 - cos`, 0 to 2, and a twist from its versine and sine. Real-time: bounded,
+/// no allocation, no branch.
+#[inline(always)]
+#[must_use]
+pub fn measures<R: Real>(
+    versines: [R; 3],
+    twist_versine: R,
+    twist_sine: R,
+) -> ([SquaredAngle<R>; 3], Twist<R>) {
+    let [a, b, c] = versines;
+    let versine = R::Four::of([a, b, c, twist_versine]);
+    let [quotient, slope] = versine.polynomials(&SERIES);
+    let unit = a.like(1.0);
+    let factor = R::Four::of([a, b, c, twist_sine]);
+    let cosine = R::Four::of([unit, unit, unit, unit - twist_versine]);
+    let sine_squared = R::Four::of([a, b, c, twist_sine * twist_sine]);
+    // No closures in here: the compiler would have to inline them before it may use wide registers.
+    let [a, b, c, twist] = (quotient * factor).numbers();
+    let [a_slope, b_slope, c_slope, twist_slope] = slope.mul_add(sine_squared, quotient * cosine).numbers();
+    let squares = [
+        SquaredAngle { value: a, slope: a_slope },
+        SquaredAngle { value: b, slope: b_slope },
+        SquaredAngle { value: c, slope: c_slope },
+    ];
+    (squares, Twist { value: twist, slope: twist_slope })
 }
 
 #[cfg(test)]
@@ -104,14 +93,25 @@ mod tests {
         2.0 * (0.5 * angle).sin().powi(2)
     }
 
+    /// Each of the three squares of the same versine, which must agree.
+    fn square(versine: f64) -> SquaredAngle {
+        let ([a, b, c], _) = measures([versine; 3], 0.3, 0.1);
+        assert_eq!([a, b], [b, c]);
+        a
+    }
+
+    fn twist(angle: f64) -> Twist {
+        measures([0.0, 0.4, 1.1], versine(angle), angle.sin()).1
+    }
+
     #[test]
     fn measures_are_the_angle_where_trusted() {
         for (angle, tolerance) in [(0.0, 1e-15), (1e-9, 1e-15), (0.1, 1e-15), (0.3, 1e-11), (1.04, 2e-5)] {
-            let squared = SquaredAngle::from_versine(versine(angle));
+            let squared = square(versine(angle));
             assert!((squared.value - angle * angle).abs() <= tolerance * angle * angle, "{angle}");
-            let twist = Twist::from_sine(angle.sin(), versine(angle));
-            assert!((twist.value - angle).abs() <= tolerance * angle, "{angle}");
-            assert_eq!(Twist::from_sine(-angle.sin(), versine(angle)).value, -twist.value);
+            let there = twist(angle);
+            assert!((there.value - angle).abs() <= tolerance * angle, "{angle}");
+            assert_eq!(twist(-angle).value, -there.value);
         }
         assert_eq!(
             versine(std::f64::consts::FRAC_PI_3).max(TRUSTED_VERSINE),
@@ -125,11 +125,9 @@ mod tests {
         let h = 1e-5;
         for step in 1..31 {
             let angle = 0.1 * f64::from(step);
-            let squared = |c| SquaredAngle::from_versine(c);
             let c = versine(angle);
-            let difference = (squared(c + h).value - squared(c - h).value) / (2.0 * h);
-            assert!((difference - squared(c).slope).abs() < 1e-8, "square at {angle}");
-            let twist = |w: f64| Twist::from_sine(w.sin(), versine(w));
+            let difference = (square(c + h).value - square(c - h).value) / (2.0 * h);
+            assert!((difference - square(c).slope).abs() < 1e-8, "square at {angle}");
             let difference = (twist(angle + h).value - twist(angle - h).value) / (2.0 * h);
             assert!((difference - twist(angle).slope).abs() < 1e-8, "twist at {angle}");
         }

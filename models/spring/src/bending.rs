@@ -40,8 +40,8 @@ pub(crate) fn levelled_argument<R: Real>(z: R) -> Levelled<R> {
 pub(crate) struct Bending {
     /// `2 alpha / L0`: bow stiffness without load.
     bow_nm_per_rad: f64,
-    /// `beta / (2 L0)`
-    shear_n_per_m: f64,
+    /// `6 alpha / L0`: sway stiffness without load, of a rod that does not shear.
+    sway_nm_per_rad: f64,
     /// `beta / (12 alpha)`: shear to bending stiffness.
     slenderness_per_m2: f64,
     /// `gamma / beta`
@@ -66,12 +66,19 @@ impl Bending {
         let free_length_m = spring.geometry().free_length_m;
         Self {
             bow_nm_per_rad: 2.0 * rigidities.alpha_n_m2 / free_length_m,
-            shear_n_per_m: rigidities.beta_n / (2.0 * free_length_m),
+            sway_nm_per_rad: 6.0 * rigidities.alpha_n_m2 / free_length_m,
             slenderness_per_m2: rigidities.beta_n / (12.0 * rigidities.alpha_n_m2),
             shear_compliance: rigidities.gamma_n / rigidities.beta_n,
             load_per_m2: rigidities.gamma_n / (4.0 * rigidities.alpha_n_m2),
             quartic,
         }
+    }
+
+    /// `Lam` (m). Where it is not positive, possible only for `G > E`, the rod has no shear stiffness left and there is no
+    /// bending. Real-time: bounded, no allocation.
+    #[inline(always)]
+    pub(crate) fn sheared_length_m<R: Real>(&self, length_m: R, shortening_m: R) -> R {
+        length_m + shortening_m * self.shear_compliance
     }
 
     /// Energy and derivatives at a chord length and shortening, and at the three squared angles. Real-time:
@@ -83,42 +90,47 @@ impl Bending {
         shortening_m: R,
         angles: &[SquaredAngle<R>; 3],
     ) -> BendingEnergy<R> {
-        let sheared_length_m = length_m + shortening_m * self.shear_compliance;
-        let sheared_slope = 1.0 - self.shear_compliance;
+        // First what needs no more than the length: it is done while the argument is on its way.
+        let form = self.quartic.form_at(length_m);
+        let sheared_length_m = self.sheared_length_m(length_m, shortening_m);
+        let sheared_slope = length_m.like(1.0 - self.shear_compliance);
         let argument = levelled_argument(shortening_m * sheared_length_m * self.load_per_m2);
         let z_by_length =
-            argument.slope * (shortening_m * sheared_slope - sheared_length_m) * self.load_per_m2;
+            argument.slope * shortening_m.mul_add(sheared_slope, -sheared_length_m) * self.load_per_m2;
         let stability = StabilityFunctions::at(argument.value);
 
-        let area_m2 = sheared_length_m * length_m;
-        let area_slope = sheared_length_m + length_m * sheared_slope;
-        let slenderness = self.slenderness_per_m2;
-        let inverse = (area_m2 * stability.sway * slenderness + 1.0).inverse();
+        // Shear to bending stiffness of the length, `Lam L beta / (12 alpha)`.
+        let shear = sheared_length_m * length_m * self.slenderness_per_m2;
+        let shear_slope = length_m.mul_add(sheared_slope, sheared_length_m) * self.slenderness_per_m2;
+        let inverse = shear.mul_add(stability.sway, shear.like(1.0)).inverse();
         let denominator_slope =
-            (area_slope * stability.sway + area_m2 * stability.sway_slope * z_by_length) * slenderness;
+            shear_slope.mul_add(stability.sway, shear * (stability.sway_slope * z_by_length));
 
-        let sway = area_m2 * inverse * self.shear_n_per_m;
-        let sway_slope = (area_slope * self.shear_n_per_m - sway * denominator_slope) * inverse;
+        let share = shear * inverse;
+        let share_slope = (-share).mul_add(denominator_slope, shear_slope) * inverse;
+        let (sway, sway_slope) = (share * self.sway_nm_per_rad, share_slope * self.sway_nm_per_rad);
         let bow = stability.bow * self.bow_nm_per_rad;
         let bow_slope = stability.bow_slope() * z_by_length * self.bow_nm_per_rad;
-        let writhe = area_m2 * stability.writhe * inverse * slenderness;
-        let writhe_numerator_slope =
-            (area_slope * stability.writhe + area_m2 * stability.writhe_slope() * z_by_length) * slenderness;
-        let writhe_slope = (writhe_numerator_slope - writhe * denominator_slope) * inverse;
+        let writhe = share * stability.writhe;
+        let writhe_slope =
+            share_slope.mul_add(stability.writhe, share * (stability.writhe_slope() * z_by_length));
 
         let squares = [angles[0].value, angles[1].value, angles[2].value];
         let QuarticEnergy { energy_j, by_squares, by_length } =
-            self.quartic.at(length_m, argument.value, z_by_length, squares);
+            self.quartic.at(&form, argument.value, z_by_length, squares);
         let (ends, plates) = ((squares[0] + squares[1]) * 0.5, squares[2] * 0.5);
         let (half_sway, carry, carry_slope) =
             (sway * 0.5, (sway - bow) * 0.5, (sway_slope - bow_slope) * 0.5);
         BendingEnergy {
-            energy_j: sway * ends - carry * plates + energy_j,
-            by_squares: [half_sway + by_squares[0], half_sway + by_squares[1], by_squares[2] - carry * 0.5],
-            by_length: sway_slope * ends - carry_slope * plates + by_length,
+            energy_j: sway.mul_add(ends, (-carry).mul_add(plates, energy_j)),
+            by_squares: [
+                half_sway + by_squares[0],
+                half_sway + by_squares[1],
+                carry.mul_add(carry.like(-0.5), by_squares[2]),
+            ],
+            by_length: sway_slope.mul_add(ends, (-carry_slope).mul_add(plates, by_length)),
             writhe,
             writhe_slope,
-            sheared_length_m,
             levelled: argument.bent,
         }
     }
@@ -136,9 +148,6 @@ pub(crate) struct BendingEnergy<R: Real> {
     pub(crate) writhe: R,
     /// Its derivative by the length of the chord.
     pub(crate) writhe_slope: R,
-    /// `Lam` (m). Where it is not positive, possible only for `G > E`, the rod has no shear stiffness left and
-    /// the rest means nothing.
-    pub(crate) sheared_length_m: R,
     /// Where the argument was kept short of the pole.
     pub(crate) levelled: R::Mask,
 }

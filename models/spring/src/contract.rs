@@ -1,6 +1,6 @@
 //! Between the contract's types and those of the laws.
 
-use flotor_hal::{Input, Output, StepStatus, Wrench, instructions};
+use flotor_hal::{Input, Output, StepStatus, Wrench};
 
 use crate::pose::Pose;
 use crate::response::{Demand, Law, Response};
@@ -31,9 +31,10 @@ pub(crate) fn demand(input: &Input) -> Demand {
 #[inline]
 #[must_use]
 pub fn step<L: Law>(law: &L, input: &Input) -> Output {
-    instructions::best(
+    law.respond_between(
         #[inline(always)]
-        || output(&law.respond_inline(&pose(input), demand(input))),
+        || (pose(input), demand(input)),
+        output,
     )
 }
 

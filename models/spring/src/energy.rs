@@ -30,7 +30,7 @@
 //! Derivation: the end stiffnesses are those of Haringx; the invariant form and the fourth order are this
 //! project's, in the book's chapter "The spring".
 
-use crate::angle::{SquaredAngle, TRUSTED_VERSINE, Twist};
+use crate::angle::{TRUSTED_VERSINE, measures};
 use crate::bending::{Bending, BendingEnergy};
 use crate::pose::{Coordinates, Pose, Span};
 use crate::real::{Real, Vector};
@@ -106,15 +106,16 @@ impl Law for EnergyForm {
         let Span { vector_m, length_m, shortening_m, usable } = at.span(self.free_length_m);
         let inverse_length = length_m.inverse();
         let directions = Directions::new(vector_m, length_m, inverse_length, at.orientation);
-        let [lower, upper, plates] = directions.versines;
-        // No closures in here: the compiler would have to inline them before it may use wide registers.
-        let angles = [
-            SquaredAngle::from_versine(lower),
-            SquaredAngle::from_versine(upper),
-            SquaredAngle::from_versine(plates),
-        ];
+        let sheared_length_m = self.bending.sheared_length_m(length_m, shortening_m);
+        let answered = usable & directions.overturn.above(LEAST_OVERTURN) & sheared_length_m.above(0.0);
+        // Told here, and not at the end: one pose alone need not be carried on for it.
+        if !R::any(answered) {
+            return Answer::none(length_m, answered);
+        }
+        let Directions { versines, twist_versine, twist_sine, .. } = directions;
+        let (angles, twist) = measures(versines, twist_versine, twist_sine);
         let bending = self.bending.at(length_m, shortening_m, &angles);
-        let BendingEnergy { by_squares, writhe, writhe_slope, sheared_length_m, levelled, .. } = bending;
+        let BendingEnergy { by_squares, writhe, writhe_slope, levelled, .. } = bending;
 
         let Directions { chord: e, upper: t, .. } = directions;
         // Derivatives by the versines of lower normal to chord, upper normal to chord, lower to upper normal.
@@ -122,15 +123,14 @@ impl Law for EnergyForm {
         let by_upper = by_squares[1] * angles[1].slope;
         let by_plates = by_squares[2] * angles[2].slope;
 
-        let twist = Twist::from_sine(directions.twist_sine, directions.twist_versine);
         // e.(k x t), with k = (0, 0, 1)
         let writhe_area = e.y * t.x - e.x * t.y;
-        let wound = twist.value + writhe * writhe_area;
+        let wound = writhe.mul_add(writhe_area, twist.value);
         let torsion_nm = wound * self.torsion_nm_per_rad;
-        let coupling_nm = torsion_nm * writhe;
+        let (coupling_nm, coupling_slope) = (torsion_nm * writhe, torsion_nm * writhe_slope);
 
         let by_length =
-            bending.by_length - shortening_m * self.axial_n_per_m + torsion_nm * writhe_slope * writhe_area;
+            coupling_slope.mul_add(writhe_area, bending.by_length) - shortening_m * self.axial_n_per_m;
         // Differences from e instead of k and t themselves: the projection removes e, and nothing is left to
         // cancel near rest.
         let zero = length_m.like(0.0);
@@ -157,7 +157,6 @@ impl Law for EnergyForm {
         } else {
             zero
         };
-        let answered = usable & directions.overturn.above(LEAST_OVERTURN) & sheared_length_m.above(0.0);
         Answer { force_n, torque_nm, energy_j, answered, trusted: directions.trusted(levelled) }
     }
 }

@@ -18,6 +18,8 @@
 //!
 //! Evaluation: power series of `G1` and `G2` at `z / 16`, recurrences for the rest, then two angle doublings.
 
+use flotor_hal::instructions;
+
 use crate::real::Real;
 
 /// Terms of the power series: at `z / 16 = -3.75` the first one left out is below 1e-17 of the sum.
@@ -45,10 +47,16 @@ fn sum<R: Real>(coefficients: &[f64; TERMS], w: R) -> R {
     let [c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10, c11] = *coefficients;
     let w2 = w * w;
     let w4 = w2 * w2;
-    let low = (w * c1 + c0) + (w * c3 + c2) * w2;
-    let middle = (w * c5 + c4) + (w * c7 + c6) * w2;
-    let high = (w * c9 + c8) + (w * c11 + c10) * w2;
-    low + (middle + high * w4) * w4
+    let low = four(w, w2, [c0, c1, c2, c3]);
+    let middle = four(w, w2, [c4, c5, c6, c7]);
+    let high = four(w, w2, [c8, c9, c10, c11]);
+    high.mul_add(w4, middle).mul_add(w4, low)
+}
+
+#[inline(always)]
+fn four<R: Real>(w: R, w2: R, [c0, c1, c2, c3]: [f64; 4]) -> R {
+    let (low, high) = (w.mul_add(w.like(c1), w.like(c0)), w.mul_add(w.like(c3), w.like(c2)));
+    high.mul_add(w2, low)
 }
 
 /// `C0`, `G0`, `G1`, `G2` at one argument.
@@ -71,6 +79,16 @@ impl EntireFunctions {
 
     /// Largest argument: two and a half half-waves, past every pole a spring can reach.
     pub const MAX_ARGUMENT: f64 = 60.0;
+
+    /// All four at one number, where nothing around it runs in the best instructions of the machine: without an instruction
+    /// for it, a product fused with a sum is a call. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn at_number(z: f64) -> Self {
+        instructions::best(
+            #[inline(always)]
+            || Self::at(z),
+        )
+    }
 }
 
 impl<R: Real> EntireFunctions<R> {
@@ -87,7 +105,7 @@ impl<R: Real> EntireFunctions<R> {
         // G0 and C0 by the recurrences, side by side.
         let (third, fifteenth) = (w * (1.0 / 3.0), w * (1.0 / 15.0));
         let next = fifteenth * g2;
-        let (g0, c0) = (g1 - next, (g1 - third * g1) - next);
+        let (g0, c0) = (g1 - next, g1.mul_add(-third, g1) - next);
         Self { c0, g0, g1, g2 }.doubled(w * 2.0).doubled(w * 8.0)
     }
 
@@ -97,10 +115,10 @@ impl<R: Real> EntireFunctions<R> {
         let Self { c0, g0, g1, g2 } = self;
         let square = g0 * g0;
         Self {
-            c0: twice_z.like(1.0) - twice_z * square,
+            c0: square.mul_add(-twice_z, square.like(1.0)),
             g0: g0 * c0,
-            g1: (c0 * g1 + square * 3.0) * 0.25,
-            g2: (c0 * g2 + g0 * g1 * 15.0) * 0.0625,
+            g1: c0.mul_add(g1, square * 3.0) * 0.25,
+            g2: c0.mul_add(g2, g0 * g1 * 15.0) * 0.0625,
         }
     }
 

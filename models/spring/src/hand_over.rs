@@ -157,7 +157,7 @@ impl Region {
         let (short, by_length_per_m) = if argument >= DEEP_ARGUMENT {
             (1.0, 0.0)
         } else {
-            let EntireFunctions { g0, g1, .. } = EntireFunctions::at(argument);
+            let EntireFunctions { g0, g1, .. } = EntireFunctions::at_number(argument);
             let passage = Passage::at(g0, FIRST, LAST);
             let argument_by_length = self.unit_per_m2 * ((1.0 - self.ratio) * shortening_m - sheared_m);
             // dG0/dz = -G1/6

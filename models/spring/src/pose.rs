@@ -96,6 +96,19 @@ pub struct Coordinates<R> {
     pub orientation: [R; 4],
 }
 
+impl Coordinates<f64> {
+    /// The same numbers as another kind of number. Real-time: bounded, no allocation, no branch.
+    #[inline(always)]
+    pub(crate) fn each<R>(&self, number: impl Fn(f64) -> R) -> Coordinates<R> {
+        let Vector { x, y, z } = self.position_m;
+        let [qx, qy, qz, qw] = self.orientation;
+        Coordinates {
+            position_m: Vector { x: number(x), y: number(y), z: number(z) },
+            orientation: [number(qx), number(qy), number(qz), number(qw)],
+        }
+    }
+}
+
 impl<R: Real> Coordinates<R> {
     /// The pose with zero for coordinates that are nothing, see [`DUST`]. Real-time: bounded, no allocation, no branch.
     #[inline(always)]

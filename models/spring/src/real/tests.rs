@@ -2,7 +2,7 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::{Real, Vector, Wide};
+use super::{Four, Lone, Real, Vector, Wide};
 
 /// Every kind of number: signs, zeros, subnormal, huge, not finite.
 const NUMBERS: [f64; 16] = [
@@ -25,9 +25,11 @@ const NUMBERS: [f64; 16] = [
 ];
 
 /// One of everything, over any number.
-fn everything<R: Real>(a: R, b: R) -> [R; 12] {
+fn everything<R: Real>(a: R, b: R) -> [R; 17] {
     let v = Vector::new(a, b, a + 1.5);
     let (big, small) = (a.above(0.5), b.below(0.5));
+    let (these, those) = (R::Four::of([a, b, a * b, a - b]), R::Four::like(a, &[0.5, -3.0, 1e-9, -0.0]));
+    let [first, second, third, fourth] = (these.mul_add(those, these) * those * b + these).numbers();
     [
         a + b,
         a - b,
@@ -41,7 +43,17 @@ fn everything<R: Real>(a: R, b: R) -> [R; 12] {
         R::select(big | b.finite(), a.map(f64::tanh), b),
         v.dot(v + v),
         v.cross(Vector::new(b, a, b) * a - v).x,
+        a.mul_add(b, a),
+        first,
+        second,
+        third,
+        fourth,
     ]
+}
+
+/// Not a number is one like any other.
+fn is_same(found: f64, expected: f64) -> bool {
+    found.to_bits() == expected.to_bits() || (found.is_nan() && expected.is_nan())
 }
 
 struct InLanes;
@@ -63,7 +75,7 @@ impl WithSimd for InLanes {
                         let index = group * S::F64_LANES + lane;
                         let scalar = everything(NUMBERS[index], other[index])[operation];
                         let found = pulp::bytemuck::cast_slice::<S::f64s, f64>(&[result.lanes()])[lane];
-                        let same = found.to_bits() == scalar.to_bits() || (found.is_nan() && scalar.is_nan());
+                        let same = is_same(found, scalar);
                         assert!(same, "operation {operation} of {} and {}", NUMBERS[index], other[index]);
                     }
                 }
@@ -79,6 +91,20 @@ fn lanes_hold_the_bits_of_the_scalar() {
     #[cfg(target_arch = "x86_64")]
     if let Some(avx2) = pulp::x86::V3::try_new() {
         Arch::V3(avx2).dispatch(InLanes);
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn a_number_alone_among_lanes_is_the_scalar() {
+    let Some(avx2) = pulp::x86::V3::try_new() else { return };
+    for a in NUMBERS {
+        for b in NUMBERS {
+            let alone = everything(Lone::new(avx2, a), Lone::new(avx2, b)).map(f64::from);
+            for (operation, (found, expected)) in alone.into_iter().zip(everything(a, b)).enumerate() {
+                assert!(is_same(found, expected), "operation {operation} of {a} and {b}");
+            }
+        }
     }
 }
 
