@@ -30,8 +30,6 @@ const SILENCE_S: f64 = 0.02;
 pub(crate) struct ModelStack {
     slots: Box<[Slot]>,
     broad: BroadPhase,
-    /// Layers that may still be fading out.
-    leaving: usize,
     /// Ascending; none if all layers have one priority, for then nobody is silenced.
     levels: Box<[Level]>,
 }
@@ -67,7 +65,7 @@ impl ModelStack {
             priorities.clear();
         }
         let level = |priority| Level { priority, gain: Fade::new(1.0, SILENCE_S), pushes: false };
-        Self { slots, broad, leaving: 0, levels: priorities.into_iter().map(level).collect() }
+        Self { slots, broad, levels: priorities.into_iter().map(level).collect() }
     }
 
     /// What the models together ask for at a state of the device, in the device frame, and the energy they store, J.
@@ -150,7 +148,6 @@ impl ModelStack {
     ) -> Option<Box<Layer>> {
         let Some(slot) = self.slots.get_mut(model) else { return Some(layer) };
         let pushed_out = slot.put(layer, generation, tick);
-        self.leaving += usize::from(pushed_out.is_none());
         self.rebound(model);
         pushed_out
     }
@@ -158,19 +155,8 @@ impl ModelStack {
     /// A layer that has faded out, and the number of its model in the scene. Real-time: bounded by the models, no allocation.
     #[inline]
     pub(crate) fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {
-        if self.leaving == 0 {
-            return None;
-        }
         let take = |slot: &mut Slot| Some((u32::try_from(slot.number).ok()?, slot.take_faded(tick)?));
-        let faded = self.slots.iter_mut().find_map(take);
-        self.leaving -= usize::from(faded.is_some());
-        faded
-    }
-
-    /// True if a layer may be fading out. Real-time: bounded, no allocation.
-    #[inline]
-    pub(crate) fn is_fading(&self) -> bool {
-        self.leaving > 0
+        self.slots.iter_mut().find_map(take)
     }
 
     /// A layer may act elsewhere now.
