@@ -177,26 +177,30 @@ impl Layer {
     ) -> Share {
         let Self { objects, broad, terms, .. } = self;
         let mut share = Share::NONE;
-        for index in broad.near(&state.pose.position_m) {
-            let Some(object) = objects.get_mut(index) else { continue };
-            let input = object.mapping.input(tick, state, terms.demand);
-            let mut output = NO_ANSWER;
-            if !object.answer(&input, terms.memory, &mut output, health, events) {
-                events.insert(Events::MODEL_FAULT);
-                continue;
-            }
-            share.wrench = share.wrench + object.mapping.wrench_to_device(&output.wrench);
-            if let Some(push) = object.push_of_end(&input.pose, &state.twist) {
-                events.insert(Events::BOUNDARY);
-                share.wrench = share.wrench + push;
-            }
-            if output.energy_j.is_finite() {
-                share.energy_j += output.energy_j * object.mapping.energy_scale();
-            }
-            if output.status() != Some(StepStatus::Ok) {
-                events.insert(Events::MODEL_DEGRADED);
-            }
-        }
+        broad.for_each_near(
+            objects,
+            &state.pose.position_m,
+            #[inline(always)] // as `step`
+            |object| {
+                let input = object.mapping.input(tick, state, terms.demand);
+                let mut output = NO_ANSWER;
+                if !object.answer(&input, terms.memory, &mut output, health, events) {
+                    events.insert(Events::MODEL_FAULT);
+                    return;
+                }
+                share.wrench = share.wrench + object.mapping.wrench_to_device(&output.wrench);
+                if let Some(push) = object.push_of_end(&input.pose, &state.twist) {
+                    events.insert(Events::BOUNDARY);
+                    share.wrench = share.wrench + push;
+                }
+                if output.energy_j.is_finite() {
+                    share.energy_j += output.energy_j * object.mapping.energy_scale();
+                }
+                if output.status() != Some(StepStatus::Ok) {
+                    events.insert(Events::MODEL_DEGRADED);
+                }
+            },
+        );
         share
     }
 

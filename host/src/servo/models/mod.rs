@@ -82,23 +82,27 @@ impl ModelStack {
         let Self { slots, broad, levels, .. } = self;
         levels.iter_mut().for_each(|level| level.pushes = false);
         let mut sum = Share::NONE;
-        for index in broad.near(&state.pose.position_m) {
-            let Some(slot) = slots.get_mut(index) else { continue };
-            let level = levels.iter_mut().find(|level| level.priority == slot.priority);
-            let is_silenced = level.as_ref().is_some_and(|level| level.gain.is_silent(tick.time_ns));
-            if is_silenced || slot.weight.is_silent(tick.time_ns) {
-                continue;
-            }
-            heart.enter(tick.index, Place::Model(slot.number));
-            let share = slot.step(tick, state, events);
-            let mut weight = slot.weight.at(tick.time_ns);
-            if let Some(level) = level {
-                level.pushes |= weight > 0.0 && share.wrench != Wrench::ZERO;
-                weight *= level.gain.at(tick.time_ns);
-            }
-            sum.wrench = sum.wrench + share.wrench * weight;
-            sum.energy_j += share.energy_j * weight;
-        }
+        broad.for_each_near(
+            slots,
+            &state.pose.position_m,
+            #[inline(always)] // as `Layer::step`
+            |slot| {
+                let level = levels.iter_mut().find(|level| level.priority == slot.priority);
+                let is_silenced = level.as_ref().is_some_and(|level| level.gain.is_silent(tick.time_ns));
+                if is_silenced || slot.weight.is_silent(tick.time_ns) {
+                    return;
+                }
+                heart.enter(tick.index, Place::Model(slot.number));
+                let share = slot.step(tick, state, events);
+                let mut weight = slot.weight.at(tick.time_ns);
+                if let Some(level) = level {
+                    level.pushes |= weight > 0.0 && share.wrench != Wrench::ZERO;
+                    weight *= level.gain.at(tick.time_ns);
+                }
+                sum.wrench = sum.wrench + share.wrench * weight;
+                sum.energy_j += share.energy_j * weight;
+            },
+        );
         heart.enter(tick.index, Place::Host);
         let mut is_silenced = false;
         for level in levels.iter_mut().rev() {
