@@ -289,7 +289,7 @@ impl Object {
     /// The push of the wall where the model ends on a handle at a pose in its frame, if it is beyond.
     #[inline(always)] // as `answer`
     fn push_of_end(&self, pose: &Pose, twist: &Twist) -> Option<Wrench> {
-        self.end.as_ref()?.push(pose.position(), &self.mapping, twist.linear())
+        self.end.as_ref()?.push(pose, &self.mapping, twist)
     }
 
     /// There is no answer that can be used; true if the one before may stand in for it.
