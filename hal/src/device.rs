@@ -185,7 +185,7 @@ impl DeviceState {
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        self.pose.doubt() + self.twist.doubt() == 0.0
+        self.pose.doubt() | self.twist.doubt() == 0
     }
 }
 

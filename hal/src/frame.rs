@@ -46,13 +46,13 @@ impl Pose {
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        self.doubt() == 0.0
+        self.doubt() == 0
     }
 
-    /// 0 if every number is finite, else NaN.
+    /// 0 if every number is finite.
     #[inline]
-    pub(crate) fn doubt(&self) -> f64 {
-        doubt(&self.position_m) + doubt(&self.orientation_xyzw)
+    pub(crate) fn doubt(&self) -> u64 {
+        doubt(&self.position_m) | doubt(&self.orientation_xyzw)
     }
 }
 
@@ -96,13 +96,13 @@ impl Twist {
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        self.doubt() == 0.0
+        self.doubt() == 0
     }
 
-    /// 0 if every number is finite, else NaN.
+    /// 0 if every number is finite.
     #[inline]
-    pub(crate) fn doubt(&self) -> f64 {
-        doubt(&self.linear_m_per_s) + doubt(&self.angular_rad_per_s)
+    pub(crate) fn doubt(&self) -> u64 {
+        doubt(&self.linear_m_per_s) | doubt(&self.angular_rad_per_s)
     }
 }
 
@@ -155,7 +155,7 @@ impl Wrench {
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        doubt(&self.force_n) + doubt(&self.torque_nm) == 0.0
+        doubt(&self.force_n) | doubt(&self.torque_nm) == 0
     }
 }
 
@@ -213,21 +213,12 @@ pub fn orientation_from_rotation_vector(rotation_rad: DVec3) -> DQuat {
     DQuat::from_xyzw(xyz.x, xyz.y, xyz.z, (0.5 * angle_rad).cos())
 }
 
-/// 0 if every number is finite, else NaN: that is what a number less itself is, and so is a sum of such differences. A few
-/// vector instructions, not a branch for each.
+/// 0 if every number is finite: a number less itself is 0 in all its bits, and one that is not finite leaves NaN. A few vector
+/// instructions, not a branch for each.
 #[inline]
 #[allow(clippy::eq_op)] // that is the point of it
-fn doubt<const N: usize>(values: &[f64; N]) -> f64 {
-    let [mut even, mut odd] = [0.0; 2];
-    let (pairs, rest) = values.as_chunks::<2>();
-    for [first, second] in pairs {
-        even += first - first;
-        odd += second - second;
-    }
-    for last in rest {
-        even += last - last;
-    }
-    even + odd
+fn doubt<const N: usize>(values: &[f64; N]) -> u64 {
+    values.iter().fold(0, |doubt, value| doubt | (value - value).to_bits())
 }
 
 #[cfg(test)]

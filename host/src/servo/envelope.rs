@@ -17,18 +17,18 @@ use super::state::Gate;
 use crate::port_energy::Controller;
 use crate::scene::{Boundary, Limits};
 use crate::trace::Events;
-use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Wrench};
+use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Twist, Wrench};
 
 /// Limits of force, torque and their change, and a wall at the edge of the range.
 pub struct Envelope {
-    max_force_n: DVec3,
-    max_torque_nm: DVec3,
+    /// The most that may be sent.
+    most: Wrench,
+    /// The fastest at which all that drives the handle on passes.
+    fastest: Twist,
     /// Fastest change of force (N/s) and torque (N·m/s).
     slew_per_s: [f64; 2],
     /// What that is in a period.
     most_change_in_a_period: [f64; 2],
-    velocity_m_per_s: DVec3,
-    angular_velocity_rad_per_s: DVec3,
     wall: BoundaryWall,
     passivity: Passivity,
     period_ns: u64,
@@ -51,12 +51,13 @@ impl Envelope {
         let max_force_n = tighter(limits.force_n, device.max_force_n);
         let max_torque_nm = tighter(limits.torque_nm, device.max_torque_nm);
         Self {
-            max_force_n,
-            max_torque_nm,
+            most: Wrench::new(max_force_n, max_torque_nm),
+            fastest: Twist {
+                linear_m_per_s: limits.velocity_m_per_s,
+                angular_rad_per_s: limits.angular_velocity_rad_per_s,
+            },
             slew_per_s,
             most_change_in_a_period: most_change(slew_per_s, period_ns),
-            velocity_m_per_s: DVec3::from_array(limits.velocity_m_per_s),
-            angular_velocity_rad_per_s: DVec3::from_array(limits.angular_velocity_rad_per_s),
             wall: BoundaryWall::new(boundary, device),
             // Damping the device is known to stand: that of its boundary.
             passivity: Passivity::new(
@@ -76,7 +77,7 @@ impl Envelope {
     /// The most that may reach the hand: force along each axis (N), torque about each (N·m).
     #[must_use]
     pub fn most(&self) -> [DVec3; 2] {
-        [self.max_force_n, self.max_torque_nm]
+        [self.most.force(), self.most.torque()]
     }
 
     /// The wrench that goes to the device for what the models ask. Real-time: bounded, no allocation.
@@ -115,11 +116,9 @@ impl Envelope {
         let [force_n, torque_nm] = self.most_change(tick);
         // A request that is not finite is not so behind the gate either, and within no limit.
         let passes = self.passivity.only_observes()
-            && is_within(state.twist.linear(), self.velocity_m_per_s)
-            && is_within(state.twist.angular(), self.angular_velocity_rad_per_s)
+            && is_not_faster(&state.twist, &self.fastest)
             && self.wall.surely_holds(state)
-            && is_within(force, self.max_force_n)
-            && is_within(torque, self.max_torque_nm)
+            && is_within(&gated, &self.most)
             && is_step_within(self.last.force(), force, force_n)
             && is_step_within(self.last.torque(), torque, torque_nm);
         passes.then_some(gated)
@@ -173,11 +172,11 @@ impl Envelope {
     /// Above the velocity limit fades out what drives the handle on, gone at twice the limit; what brakes it passes.
     #[inline]
     fn limit_speed(&self, wrench: &Wrench, state: &DeviceState, events: &mut Events) -> Wrench {
-        let (velocity, spin) = (state.twist.linear(), state.twist.angular());
-        let (most, most_spin) = (self.velocity_m_per_s, self.angular_velocity_rad_per_s);
-        if is_within(velocity, most) && is_within(spin, most_spin) {
+        if is_not_faster(&state.twist, &self.fastest) {
             return *wrench;
         }
+        let (velocity, spin) = (state.twist.linear(), state.twist.angular());
+        let (most, most_spin) = (self.fastest.linear(), self.fastest.angular());
         events.insert(Events::VELOCITY_LIMITED);
         let excess = (velocity.abs() / most).max_element();
         let spin_excess = (spin.abs() / most_spin).max_element();
@@ -187,18 +186,19 @@ impl Envelope {
 
     #[inline]
     fn limit(&self, wrench: &Wrench, events: &mut Events) -> Wrench {
-        if is_within(wrench.force(), self.max_force_n) && is_within(wrench.torque(), self.max_torque_nm) {
+        if is_within(wrench, &self.most) {
             return *wrench;
         }
-        let force = shrink_into_box(wrench.force(), self.max_force_n);
-        let torque = shrink_into_box(wrench.torque(), self.max_torque_nm);
+        let [max_force_n, max_torque_nm] = self.most();
+        let force = shrink_into_box(wrench.force(), max_force_n);
+        let torque = shrink_into_box(wrench.torque(), max_torque_nm);
         // On an axis that is not driven nothing is limited: pairing has said that nothing is felt there.
         let is_cut =
             |before: DVec3, after: DVec3, most: DVec3| (before.cmpne(after) & most.cmpne(DVec3::ZERO)).any();
-        if is_cut(wrench.force(), force, self.max_force_n) {
+        if is_cut(wrench.force(), force, max_force_n) {
             events.insert(Events::FORCE_LIMITED);
         }
-        if is_cut(wrench.torque(), torque, self.max_torque_nm) {
+        if is_cut(wrench.torque(), torque, max_torque_nm) {
             events.insert(Events::TORQUE_LIMITED);
         }
         Wrench::new(force, torque)
@@ -227,10 +227,23 @@ impl Envelope {
     }
 }
 
-/// True if no part of a vector is larger than `most` of its axis, nor NaN.
+/// True if no part of a wrench is larger than `most` of its axis, nor NaN.
 #[inline(always)]
-fn is_within(vector: DVec3, most: DVec3) -> bool {
-    vector.x.abs() <= most.x && vector.y.abs() <= most.y && vector.z.abs() <= most.z
+fn is_within(wrench: &Wrench, most: &Wrench) -> bool {
+    are_within(wrench.force_n, most.force_n) & are_within(wrench.torque_nm, most.torque_nm)
+}
+
+/// True if no part of a twist is larger than `most` of its axis, nor NaN.
+#[inline(always)]
+fn is_not_faster(twist: &Twist, most: &Twist) -> bool {
+    are_within(twist.linear_m_per_s, most.linear_m_per_s)
+        & are_within(twist.angular_rad_per_s, most.angular_rad_per_s)
+}
+
+/// Compares all axes side by side: nearly always none of them is beyond, and no branch would end it sooner.
+#[inline(always)]
+fn are_within([x, y, z]: [f64; 3], [most_x, most_y, most_z]: [f64; 3]) -> bool {
+    (x.abs() <= most_x) & (y.abs() <= most_y) & (z.abs() <= most_z)
 }
 
 /// The change in so many ns at rates per s.

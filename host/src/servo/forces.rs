@@ -171,6 +171,8 @@ pub(crate) struct Forces {
     stacks: Box<[ModelStack]>,
     /// By number of the model in the scene.
     models: Box<[Whereabouts]>,
+    /// Layers that may still be fading out.
+    leaving: usize,
     couplings: Box<[Coupled]>,
 }
 
@@ -188,6 +190,7 @@ impl Forces {
         Self {
             stacks: on_device.into_iter().map(ModelStack::new).collect(),
             models: models.into(),
+            leaving: 0,
             couplings: couplings.into(),
         }
     }
@@ -259,22 +262,29 @@ impl Forces {
     /// Real-time: bounded by the objects of the model, no allocation.
     pub(crate) fn replace(&mut self, replacement: Replacement, tick: &Tick) -> Option<Box<Layer>> {
         let Replacement { model, generation, layer } = replacement;
-        match self.stack_of(model as usize) {
+        let pushed_out = match self.stack_of(model as usize) {
             Some((stack, place)) => stack.replace(place, layer, generation, tick),
             None => Some(layer),
-        }
+        };
+        self.leaving += usize::from(pushed_out.is_none());
+        pushed_out
     }
 
-    /// True if a layer may be fading out. Real-time: bounded by the devices, no allocation.
+    /// True if a layer may be fading out. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn is_fading(&self) -> bool {
-        self.stacks.iter().any(ModelStack::is_fading)
+        self.leaving > 0
     }
 
     /// A layer that has faded out, and the number of its model. Real-time: bounded by the models, no allocation.
     #[inline]
     pub(crate) fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {
-        self.stacks.iter_mut().find_map(|stack| stack.take_faded(tick))
+        if !self.is_fading() {
+            return None;
+        }
+        let faded = self.stacks.iter_mut().find_map(|stack| stack.take_faded(tick));
+        self.leaving -= usize::from(faded.is_some());
+        faded
     }
 
     /// Every model with its health and what it said last, in the scene's order. Not real-time.

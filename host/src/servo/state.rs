@@ -125,7 +125,7 @@ impl RunState {
     pub const START: RunState = RunState::Ramping { since_ns: 0 };
 
     /// The state after an event at a time. Real-time: bounded, no allocation.
-    #[inline]
+    #[inline(never)] // out of the way of the many ticks in which nothing happens
     #[must_use]
     pub fn after(self, event: RunEvent, now_ns: u64, ramp_ns: u64) -> Self {
         match (self, event) {

@@ -32,7 +32,7 @@ impl Station {
     /// Newest sample into the port; an old one stays, a senseless one is never used. What it means for the run.
     ///
     /// Real-time: bounded by the device, no allocation.
-    #[inline]
+    #[inline(always)] // into what chooses the instructions
     pub(super) fn read(&mut self, tick: &Tick, port: &mut Port) -> RunEvent {
         let last = port.state;
         match self.device.read(tick, &mut port.state) {
@@ -61,20 +61,23 @@ impl Station {
     /// What of the port's request may be sent. Real-time: bounded, no allocation.
     #[inline(never)] // registers of its own: in the tick as a whole there are none left
     pub(super) fn limit(&mut self, tick: &Tick, gate: Gate, port: &mut Port) {
-        port.commanded = instructions::best(
+        instructions::best(
             #[inline(always)]
-            || self.envelope.apply(&port.asked, gate, &port.state, tick, &mut port.events),
+            || {
+                let Port { state, asked, commanded, events, .. } = port;
+                *commanded = self.envelope.apply(asked, gate, state, tick, events);
+            },
         );
     }
 
     /// Sends it. What it means for the run, if anything. Real-time: bounded by the device, no allocation.
-    #[inline]
+    #[inline(always)] // as `read`
     pub(super) fn write(&mut self, tick: &Tick, port: &mut Port) -> Option<RunEvent> {
         let Cycle::Fault(fault) = self.device.write(tick, &port.commanded) else { return None };
         Some(self.failed(fault, port))
     }
 
-    #[inline]
+    #[cold]
     fn failed(&mut self, fault: Fault, port: &mut Port) -> RunEvent {
         port.events.insert(Events::DEVICE_FAULT);
         self.fault.get_or_insert(fault);

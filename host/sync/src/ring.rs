@@ -112,7 +112,7 @@ impl<T: Words<N>, const N: usize> Sender<T, N> {
     /// # Errors
     /// [`Full`] if no slot is free. The record is dropped and counted in [`Receiver::dropped`]: what waits
     /// already is kept, so a recording has a gap and not a moved beginning.
-    #[inline]
+    #[inline(always)] // so that a record becomes words where its parts are, and is nowhere put together
     pub fn push(&mut self, record: &T) -> Result<(), Full> {
         if self.is_full(self.known_head) {
             // Acquire, pairs with the receiver's release store of `head`: it has finished reading the slots

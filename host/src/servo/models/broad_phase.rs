@@ -104,19 +104,38 @@ impl BroadPhase {
         Self { bounds: bounds.into(), always, is_boundless, grid }
     }
 
-    /// The objects that can act with the handle at `position_m`, in order of their numbers.
+    /// Shows `meet` those of all `objects` that can act with the handle at `position_m`, in order of their numbers.
+    ///
+    /// Real-time: bounded by the objects that are near or may act anywhere; no allocation.
+    #[inline(always)] // as `Layer::step`
+    pub(super) fn for_each_near<T>(
+        &self,
+        objects: &mut [T],
+        position_m: &[f64; 3],
+        mut meet: impl FnMut(&mut T),
+    ) {
+        if self.is_boundless {
+            for object in objects {
+                meet(object);
+            }
+            return;
+        }
+        for index in self.near(position_m) {
+            if let Some(object) = objects.get_mut(index) {
+                meet(object);
+            }
+        }
+    }
+
+    /// Numbers of the objects that can act with the handle at `position_m`, in order.
     ///
     /// Real-time: bounded by the objects that are near or may act anywhere; no allocation.
     #[inline]
-    pub(super) fn near<'a>(&'a self, position_m: &'a [f64; 3]) -> Near<'a> {
-        if self.is_boundless {
-            let all = self.bounds.len();
-            return Near { next: 0, all, bounds: &[], in_cell: &[], always: &[], position_m };
-        }
+    fn near<'a>(&'a self, position_m: &'a [f64; 3]) -> Near<'a> {
         // Where no object has a place of its own there is no cell to look for.
         let in_cell =
             if self.grid.objects.is_empty() { &[] } else { self.grid.cell(DVec3::from_array(*position_m)) };
-        Near { next: 0, all: 0, bounds: &self.bounds, in_cell, always: &self.always, position_m }
+        Near { bounds: &self.bounds, in_cell, always: &self.always, position_m }
     }
 
     /// A live parameter has changed where an object can act: it is looked at in every tick from now on.
@@ -159,34 +178,16 @@ impl BroadPhase {
     }
 }
 
-/// Objects that can act where the handle is: see [`BroadPhase::near`].
-#[derive(Clone, Copy)]
-pub(super) struct Near<'a> {
-    /// Where all are near wherever the handle is: the next of them, and how many there are. Nothing else is looked at then.
-    next: usize,
-    all: usize,
+/// Numbers of the objects that can act where the handle is: see [`BroadPhase::near`].
+struct Near<'a> {
     bounds: &'a [Option<Bounds>],
     /// Those of the cell, and those that are always looked at, not looked at yet.
     in_cell: &'a [u32],
     always: &'a [u32],
-    /// Only looked at where an object has bounds.
     position_m: &'a [f64; 3],
 }
 
 impl Near<'_> {
-    /// The next one whose box holds the handle, or that has none, and what is left. By value: the others stay in registers.
-    #[inline(never)] // out of the way of the many scenes without boxes
-    fn next_by_place(mut self) -> (Option<usize>, Self) {
-        while let Some(object) = self.next_to_look_at() {
-            let object = object as usize;
-            match self.bounds.get(object) {
-                Some(Some(bounds)) if !bounds.contains(DVec3::from_array(*self.position_m)) => {}
-                _ => return (Some(object), self),
-            }
-        }
-        (None, self)
-    }
-
     /// The smaller number first, and one that is in both lists once: sums do not depend on who sleeps.
     #[inline]
     fn next_to_look_at(&mut self) -> Option<u32> {
@@ -207,18 +208,17 @@ impl Near<'_> {
 impl Iterator for Near<'_> {
     type Item = usize;
 
-    #[inline]
+    /// The next one whose box holds the handle, or that has none.
+    #[inline(never)] // registers of its own: those who are shown the objects have none left
     fn next(&mut self) -> Option<usize> {
-        if self.next < self.all {
-            self.next += 1;
-            return Some(self.next - 1);
+        while let Some(object) = self.next_to_look_at() {
+            let object = object as usize;
+            match self.bounds.get(object) {
+                Some(Some(bounds)) if !bounds.contains(DVec3::from_array(*self.position_m)) => {}
+                _ => return Some(object),
+            }
         }
-        if self.bounds.is_empty() {
-            return None;
-        }
-        let (found, left) = self.next_by_place();
-        *self = left;
-        found
+        None
     }
 }
 
@@ -329,7 +329,10 @@ mod tests {
     }
 
     fn near(phase: &BroadPhase, position_m: DVec3) -> Vec<usize> {
-        phase.near(&position_m.to_array()).collect()
+        let mut objects: Vec<usize> = (0..phase.bounds.len()).collect();
+        let mut met = Vec::new();
+        phase.for_each_near(&mut objects, &position_m.to_array(), |object| met.push(*object));
+        met
     }
 
     /// Boxes of all sizes, some objects without one, and what comparing with each of them finds.
@@ -371,6 +374,14 @@ mod tests {
     fn a_handle_that_is_nowhere_wakes_only_what_acts_anywhere() {
         let bounds = vec![Some(Bounds::about(DVec3::ZERO, DVec3::ONE)), None];
         assert_eq!(near(&BroadPhase::new(bounds), DVec3::NAN), [1]);
+    }
+
+    #[test]
+    fn without_boxes_all_are_near_wherever_the_handle_is_until_one_gets_a_box() {
+        let mut phase = BroadPhase::new(vec![None; 3]);
+        assert_eq!(near(&phase, DVec3::NAN), [0, 1, 2]);
+        phase.watch_always(1, Some(Bounds::about(DVec3::ZERO, DVec3::ONE)));
+        assert_eq!(near(&phase, DVec3::X * 5.0), [0, 2]);
     }
 
     #[test]

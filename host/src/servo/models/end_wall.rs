@@ -4,7 +4,7 @@
 //! stands beside it; whichever is nearer is felt first.
 
 use crate::mapping::Mapping;
-use flotor_hal::{DVec3, LoopConfig, Reach, Wrench};
+use flotor_hal::{DVec3, LoopConfig, Pose, Reach, Twist, Wrench};
 
 /// Damping of the wall, N·s/m: that of the device's own boundary mode (client program of the University of Utah).
 const DAMPING_NS_PER_M: f64 = 15.0;
@@ -36,21 +36,19 @@ impl EndWall {
         self.reach = if reach.is_bounded() { *reach } else { Reach::UNBOUNDED };
     }
 
-    /// Its push in the device frame on a handle that is at `position_m` of the model; `None` within reach. Real-time: bounded, no
-    /// allocation.
+    /// Its push in the device frame on a handle at a pose in the model's frame that moves so in the device's; `None` within
+    /// reach. Real-time: bounded, no allocation.
     #[inline(always)] // as `Layer::step`
-    pub(super) fn push(
-        &self,
-        position_m: DVec3,
-        mapping: &Mapping,
-        velocity_m_per_s: DVec3,
-    ) -> Option<Wrench> {
-        let beyond_m = self.reach.beyond(position_m);
-        if beyond_m == DVec3::ZERO { None } else { self.push_back(beyond_m, mapping, velocity_m_per_s) }
+    pub(super) fn push(&self, pose: &Pose, mapping: &Mapping, twist: &Twist) -> Option<Wrench> {
+        if self.reach.beyond(pose.position()) == DVec3::ZERO {
+            return None;
+        }
+        self.push_back(pose, mapping, twist)
     }
 
     #[cold]
-    fn push_back(&self, beyond_m: DVec3, mapping: &Mapping, velocity_m_per_s: DVec3) -> Option<Wrench> {
+    fn push_back(&self, pose: &Pose, mapping: &Mapping, twist: &Twist) -> Option<Wrench> {
+        let beyond_m = self.reach.beyond(pose.position());
         if !beyond_m.is_finite() {
             return None;
         }
@@ -58,7 +56,7 @@ impl EndWall {
         let depth_m = beyond_m.length();
         let outward = beyond_m / depth_m;
         // Damping acts outwards only, as that of the boundary.
-        let leaving_m_per_s = velocity_m_per_s.dot(outward).max(0.0);
+        let leaving_m_per_s = twist.linear().dot(outward).max(0.0);
         let push_n = self.stiffness_n_per_m * depth_m + DAMPING_NS_PER_M * leaving_m_per_s;
         Some(Wrench::from_force(outward * -push_n))
     }
@@ -68,7 +66,7 @@ impl EndWall {
 mod tests {
     use super::*;
     use crate::mapping::MappingConfig;
-    use flotor_hal::{DQuat, Pose};
+    use flotor_hal::DQuat;
 
     /// Ends a millimetre below home and nowhere else.
     fn wall_at(period_ns: u64) -> EndWall {
@@ -79,8 +77,8 @@ mod tests {
 
     /// The push of a wall on a handle that is and moves along z of the device.
     fn push(wall: &EndWall, mapping: &Mapping, z_m: f64, speed_m_per_s: f64) -> Option<Wrench> {
-        let position_m = mapping.pose_to_model(&Pose::new(DVec3::Z * z_m, DQuat::IDENTITY)).position();
-        wall.push(position_m, mapping, DVec3::Z * speed_m_per_s)
+        let pose = mapping.pose_to_model(&Pose::new(DVec3::Z * z_m, DQuat::IDENTITY));
+        wall.push(&pose, mapping, &Twist::new(DVec3::Z * speed_m_per_s, DVec3::ZERO))
     }
 
     #[test]

@@ -144,16 +144,27 @@ impl Layer {
         events: &mut Events,
     ) -> Share {
         match self.budget.allowed(tick.time_ns) {
-            Allowed::Asked => {}
+            Allowed::Asked => self.ask_in_time(tick, state, health, events),
             Allowed::Fading(part) => {
                 events.insert(Events::MODEL_FAULT);
-                return Share { wrench: self.last.wrench * part, energy_j: self.last.energy_j * part };
+                Share { wrench: self.last.wrench * part, energy_j: self.last.energy_j * part }
             }
             Allowed::Nothing => {
                 events.insert(Events::MODEL_FAULT);
-                return Share::NONE;
+                Share::NONE
             }
         }
+    }
+
+    /// Asks its objects, and books the time that takes.
+    #[inline(always)] // as `step`
+    fn ask_in_time(
+        &mut self,
+        tick: &Tick,
+        state: &DeviceState,
+        health: &mut ModelHealth,
+        events: &mut Events,
+    ) -> Share {
         let begun_ns = self.budget.begin();
         let share = self.ask(tick, state, health, events);
         if let Some(begun_ns) = begun_ns {
@@ -177,26 +188,30 @@ impl Layer {
     ) -> Share {
         let Self { objects, broad, terms, .. } = self;
         let mut share = Share::NONE;
-        for index in broad.near(&state.pose.position_m) {
-            let Some(object) = objects.get_mut(index) else { continue };
-            let input = object.mapping.input(tick, state, terms.demand);
-            let mut output = NO_ANSWER;
-            if !object.answer(&input, terms.memory, &mut output, health, events) {
-                events.insert(Events::MODEL_FAULT);
-                continue;
-            }
-            share.wrench = share.wrench + object.mapping.wrench_to_device(&output.wrench);
-            if let Some(push) = object.push_of_end(&input.pose, &state.twist) {
-                events.insert(Events::BOUNDARY);
-                share.wrench = share.wrench + push;
-            }
-            if output.energy_j.is_finite() {
-                share.energy_j += output.energy_j * object.mapping.energy_scale();
-            }
-            if output.status() != Some(StepStatus::Ok) {
-                events.insert(Events::MODEL_DEGRADED);
-            }
-        }
+        broad.for_each_near(
+            objects,
+            &state.pose.position_m,
+            #[inline(always)] // as `step`
+            |object| {
+                let input = object.mapping.input(tick, state, terms.demand);
+                let mut output = NO_ANSWER;
+                if !object.answer(&input, terms.memory, &mut output, health, events) {
+                    events.insert(Events::MODEL_FAULT);
+                    return;
+                }
+                share.wrench = share.wrench + object.mapping.wrench_to_device(&output.wrench);
+                if let Some(push) = object.push_of_end(&input.pose, &state.twist) {
+                    events.insert(Events::BOUNDARY);
+                    share.wrench = share.wrench + push;
+                }
+                if output.energy_j.is_finite() {
+                    share.energy_j += output.energy_j * object.mapping.energy_scale();
+                }
+                if output.status() != Some(StepStatus::Ok) {
+                    events.insert(Events::MODEL_DEGRADED);
+                }
+            },
+        );
         share
     }
 
@@ -285,7 +300,7 @@ impl Object {
     /// The push of the wall where the model ends on a handle at a pose in its frame, if it is beyond.
     #[inline(always)] // as `answer`
     fn push_of_end(&self, pose: &Pose, twist: &Twist) -> Option<Wrench> {
-        self.end.as_ref()?.push(pose.position(), &self.mapping, twist.linear())
+        self.end.as_ref()?.push(pose, &self.mapping, twist)
     }
 
     /// There is no answer that can be used; true if the one before may stand in for it.

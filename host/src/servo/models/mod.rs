@@ -30,8 +30,6 @@ const SILENCE_S: f64 = 0.02;
 pub(crate) struct ModelStack {
     slots: Box<[Slot]>,
     broad: BroadPhase,
-    /// Layers that may still be fading out.
-    leaving: usize,
     /// Ascending; none if all layers have one priority, for then nobody is silenced.
     levels: Box<[Level]>,
 }
@@ -67,7 +65,7 @@ impl ModelStack {
             priorities.clear();
         }
         let level = |priority| Level { priority, gain: Fade::new(1.0, SILENCE_S), pushes: false };
-        Self { slots, broad, leaving: 0, levels: priorities.into_iter().map(level).collect() }
+        Self { slots, broad, levels: priorities.into_iter().map(level).collect() }
     }
 
     /// What the models together ask for at a state of the device, in the device frame, and the energy they store, J.
@@ -84,23 +82,27 @@ impl ModelStack {
         let Self { slots, broad, levels, .. } = self;
         levels.iter_mut().for_each(|level| level.pushes = false);
         let mut sum = Share::NONE;
-        for index in broad.near(&state.pose.position_m) {
-            let Some(slot) = slots.get_mut(index) else { continue };
-            let level = levels.iter_mut().find(|level| level.priority == slot.priority);
-            let is_silenced = level.as_ref().is_some_and(|level| level.gain.is_silent(tick.time_ns));
-            if is_silenced || slot.weight.is_silent(tick.time_ns) {
-                continue;
-            }
-            heart.enter(tick.index, Place::Model(slot.number));
-            let share = slot.step(tick, state, events);
-            let mut weight = slot.weight.at(tick.time_ns);
-            if let Some(level) = level {
-                level.pushes |= weight > 0.0 && share.wrench != Wrench::ZERO;
-                weight *= level.gain.at(tick.time_ns);
-            }
-            sum.wrench = sum.wrench + share.wrench * weight;
-            sum.energy_j += share.energy_j * weight;
-        }
+        broad.for_each_near(
+            slots,
+            &state.pose.position_m,
+            #[inline(always)] // as `Layer::step`
+            |slot| {
+                let level = levels.iter_mut().find(|level| level.priority == slot.priority);
+                let is_silenced = level.as_ref().is_some_and(|level| level.gain.is_silent(tick.time_ns));
+                if is_silenced || slot.weight.is_silent(tick.time_ns) {
+                    return;
+                }
+                heart.enter(tick.index, Place::Model(slot.number));
+                let share = slot.step(tick, state, events);
+                let mut weight = slot.weight.at(tick.time_ns);
+                if let Some(level) = level {
+                    level.pushes |= weight > 0.0 && share.wrench != Wrench::ZERO;
+                    weight *= level.gain.at(tick.time_ns);
+                }
+                sum.wrench = sum.wrench + share.wrench * weight;
+                sum.energy_j += share.energy_j * weight;
+            },
+        );
         heart.enter(tick.index, Place::Host);
         let mut is_silenced = false;
         for level in levels.iter_mut().rev() {
@@ -150,7 +152,6 @@ impl ModelStack {
     ) -> Option<Box<Layer>> {
         let Some(slot) = self.slots.get_mut(model) else { return Some(layer) };
         let pushed_out = slot.put(layer, generation, tick);
-        self.leaving += usize::from(pushed_out.is_none());
         self.rebound(model);
         pushed_out
     }
@@ -158,19 +159,8 @@ impl ModelStack {
     /// A layer that has faded out, and the number of its model in the scene. Real-time: bounded by the models, no allocation.
     #[inline]
     pub(crate) fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {
-        if self.leaving == 0 {
-            return None;
-        }
         let take = |slot: &mut Slot| Some((u32::try_from(slot.number).ok()?, slot.take_faded(tick)?));
-        let faded = self.slots.iter_mut().find_map(take);
-        self.leaving -= usize::from(faded.is_some());
-        faded
-    }
-
-    /// True if a layer may be fading out. Real-time: bounded, no allocation.
-    #[inline]
-    pub(crate) fn is_fading(&self) -> bool {
-        self.leaving > 0
+        self.slots.iter_mut().find_map(take)
     }
 
     /// A layer may act elsewhere now.

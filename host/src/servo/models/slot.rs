@@ -70,13 +70,16 @@ impl Slot {
     /// What it asks for at a state of the device. Real-time: bounded by the objects that are near, no allocation.
     #[inline(always)] // as `Layer::step`
     pub(super) fn step(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
-        let share = self.current.step(tick, state, &mut self.health, events);
-        if self.leaving.is_none() { share } else { self.mixed(share, tick, state, events) }
+        if self.leaving.is_some() {
+            return self.mixed(tick, state, events);
+        }
+        self.current.step(tick, state, &mut self.health, events)
     }
 
     /// The current layer's share mixed with that of the one that leaves. Real-time: as [`Self::step`].
     #[inline(never)] // out of the way of the many ticks in which nobody leaves
-    fn mixed(&mut self, share: Share, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
+    fn mixed(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
+        let share = self.current.step(tick, state, &mut self.health, events);
         let Some(leaving) = &mut self.leaving else { return share };
         let presence = self.presence.at(tick.time_ns);
         let before = leaving.step(tick, state, &mut self.health, events);
