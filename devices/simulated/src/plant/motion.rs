@@ -43,8 +43,15 @@ impl Motion {
             position_m: self.position_m,
             orientation: self.orientation,
             velocity_m_per_s: self.velocity_m_per_s,
-            angular_velocity_rad_per_s: self.orientation * self.spin_rad_per_s,
+            angular_velocity_rad_per_s: self.turned(self.spin_rad_per_s),
         }
+    }
+
+    /// A vector of the flotor frame in the device frame. Real-time: bounded, no allocation.
+    #[inline(always)]
+    pub(super) fn turned(&self, vector: DVec3) -> DVec3 {
+        // Upright, as most hands hold the flotor, the product would be the vector itself, bit for bit.
+        if self.orientation == DQuat::IDENTITY { vector } else { self.orientation * vector }
     }
 
     /// The same pose without velocity. Real-time: bounded, no allocation.

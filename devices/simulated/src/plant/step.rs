@@ -112,18 +112,16 @@ impl<'a> Step<'a> {
     fn is_balanced(&self, drive: &Drive) -> bool {
         let (body, start) = (self.body, self.start);
         let twisted = body.hand.rotational_stiffness_nm_per_rad != 0.0
-            && start.orientation != self.contact.intended_orientation
-            || self.contact.turning_rad_per_s != DVec3::ZERO;
-        if start.spin_rad_per_s != DVec3::ZERO || self.coils.torque_nm != DVec3::ZERO || twisted {
+            && start.orientation != self.contact.intended_orientation;
+        if twisted || axes([start.spin_rad_per_s, self.coils.torque_nm, self.contact.turning_rad_per_s]) != 0
+        {
             return false;
         }
         // Forces pass through a centre of mass that lies at the origin, or with them on one axis of the
         // device. (Where they do so on a slanted line, rounding would tell them apart from it anyhow.)
-        let arm = start.orientation * body.centre_of_mass_m;
-        let axes = |v: DVec3| v.cmpne(DVec3::ZERO).bitmask();
-        let forces =
-            axes(self.still_force()) | axes(drive.velocity) | axes(drive.acceleration) | axes(drive.jerk);
-        arm == DVec3::ZERO || (axes(arm) | forces).count_ones() <= 1
+        let arm = start.turned(body.centre_of_mass_m);
+        let forces = [self.still_force(), drive.velocity, drive.acceleration, drive.jerk];
+        arm == DVec3::ZERO || (axes([arm]) | axes(forces)).count_ones() <= 1
     }
 
     /// The motion at the end and the work done, whatever turns. Real-time: bounded, no allocation.
@@ -285,6 +283,14 @@ impl<'a> Step<'a> {
             * (end.velocity_m_per_s.length_squared() - self.start.velocity_m_per_s.length_squared());
         spring_j + damper_j - inertia_j + self.contact.force_n.dot(moved)
     }
+}
+
+/// The axes along which any of the vectors reaches, as bits.
+#[inline(always)]
+fn axes<const N: usize>(vectors: [DVec3; N]) -> u32 {
+    // Magnitudes do not cancel: their sum is zero where all of them are.
+    let reach = vectors.iter().fold(DVec3::ZERO, |sum, vector| sum + vector.abs());
+    reach.cmpne(DVec3::ZERO).bitmask()
 }
 
 impl Unknowns {
