@@ -122,18 +122,16 @@ impl Simulation {
     /// Splitting a tick changes nothing but rounding in translation and the Runge-Kutta error in rotation.
     /// Total: a wrench that is not finite counts as none. Real-time: bounded, no allocation.
     pub fn advance(&mut self, dt_ns: u64, coils: Wrench) -> Incidents {
-        self.advance_under(dt_ns, &coils)
+        let wrench_rejected = !coils.is_finite();
+        let coils = if wrench_rejected { &Wrench::ZERO } else { &coils };
+        Incidents { wrench_rejected, ..self.advance_under(dt_ns, coils) }
     }
 
-    /// [`Self::advance`] with a wrench that stays where it is: a copy would have to be in memory before the motion starts.
+    /// [`Self::advance`] with a finite wrench that stays where it is: a copy would have to be in memory before
+    /// the motion starts.
     #[inline(always)]
     pub(crate) fn advance_under(&mut self, dt_ns: u64, coils: &Wrench) -> Incidents {
-        let mut incidents = Incidents {
-            wrench_rejected: !coils.is_finite(),
-            cut_short: dt_ns > MAX_ADVANCE_NS,
-            ..Incidents::default()
-        };
-        let coils = if incidents.wrench_rejected { &Wrench::ZERO } else { coils };
+        let mut incidents = Incidents { cut_short: dt_ns > MAX_ADVANCE_NS, ..Incidents::default() };
         let end_ns = self.time_ns.saturating_add(dt_ns.min(MAX_ADVANCE_NS));
         while self.time_ns < end_ns {
             let (piece_ns, intention) = self.next_piece(end_ns);
