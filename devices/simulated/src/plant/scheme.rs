@@ -12,7 +12,6 @@ use super::{MAX_PIECE_NS, Wrench};
 use crate::ledger::Work;
 use crate::validation::InvalidParameter;
 use flotor_hal::glam::DVec3;
-use flotor_hal::instructions;
 
 /// Longest step of a turning flotor times the fastest rate of its rotation and, where the two are coupled, of
 /// its translation (pure number). The energy books of a firm hand that grips the flotor askew then close to
@@ -84,7 +83,27 @@ impl Scheme {
         &self.body
     }
 
-    /// Moves on by `piece_ns`; gives the new motion and the work done. Real-time: bounded, no allocation.
+    /// Moves on by `piece_ns` in one straight step, if that will do; gives the new motion and the work done.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[inline(always)]
+    pub(super) fn step(
+        &mut self,
+        from: &Motion,
+        piece_ns: u64,
+        coils: &Wrench,
+        contact: &Contact,
+    ) -> Option<(Motion, Work)> {
+        let (body, table) = self.prepared(piece_ns);
+        if table.straight.steps > 1 {
+            return None;
+        }
+        Step::new(body, &table.straight, coils, contact, from).straight()
+    }
+
+    /// Moves on by `piece_ns` in as many steps as it takes; gives the new motion and the work done.
+    ///
+    /// Real-time: bounded, no allocation.
     #[inline(always)]
     pub(super) fn advance(
         &mut self,
@@ -97,15 +116,16 @@ impl Scheme {
             return (*from, Work::default());
         }
         let (body, table) = self.prepared(piece_ns);
-        let straight = if table.straight.steps == 1 {
-            Step::new(body, &table.straight, coils, &contact, from).straight()
-        } else {
-            table.straight_steps(body, from, coils, contact)
-        };
-        let (motion, work) = match straight {
-            Some(done) => done,
-            None => table.turning_steps(body, from, coils, contact),
-        };
+        let straight = table.straight.march(from, contact, |contact, motion| {
+            Step::new(body, &table.straight, coils, contact, motion).straight()
+        });
+        let (motion, work) = straight
+            .or_else(|| {
+                table.turning.march(from, contact, |contact, motion| {
+                    Some(Step::new(body, &table.turning, coils, contact, motion).turning())
+                })
+            })
+            .unwrap_or((*from, Work::default()));
         (motion.settled(), work)
     }
 
@@ -135,38 +155,6 @@ impl Table {
         let turning =
             if turning <= f64::from(straight.steps) { straight } else { Grid::new(body, piece_ns, turning) };
         Self { piece_ns, straight, turning }
-    }
-
-    /// All straight steps, unless something turns the flotor. Real-time: bounded, no allocation.
-    #[inline(never)] // keeps the one step of most pieces small
-    fn straight_steps(
-        &self,
-        body: &Body,
-        from: &Motion,
-        coils: &Wrench,
-        contact: Contact,
-    ) -> Option<(Motion, Work)> {
-        instructions::best(
-            #[inline(always)]
-            || {
-                self.straight.march(
-                    from,
-                    contact,
-                    #[inline(always)]
-                    |contact, motion| Step::new(body, &self.straight, coils, contact, motion).straight(),
-                )
-            },
-        )
-    }
-
-    /// All turning steps. Real-time: bounded, no allocation.
-    #[inline(never)] // as above
-    fn turning_steps(&self, body: &Body, from: &Motion, coils: &Wrench, contact: Contact) -> (Motion, Work) {
-        self.turning
-            .march(from, contact, |contact, motion| {
-                Some(Step::new(body, &self.turning, coils, contact, motion).turning())
-            })
-            .unwrap_or((*from, Work::default()))
     }
 }
 
