@@ -36,6 +36,7 @@ use crate::ledger::{MechanicalEnergy, Work};
 use crate::validation::{Domain, InvalidParameter, number, vector};
 use body::Body;
 use flotor_hal::glam::{BVec3, DQuat, DVec3};
+use flotor_hal::instructions;
 use motion::{Contact, Motion};
 use scheme::Scheme;
 
@@ -297,15 +298,33 @@ impl Plant {
             }
             None => &mut self.free,
         };
-        let (motion, work) = scheme.advance(&self.motion, piece_ns, coils, contact);
-        if motion.is_physical() && work.is_finite() {
-            self.motion = motion;
-            Outcome::Moved(work)
-        } else {
-            self.motion = self.motion.at_rest();
-            Outcome::Stopped
+        match scheme.step(&self.motion, piece_ns, coils, &contact) {
+            Some((motion, work)) => {
+                let motion = motion.moving_settled();
+                let is_sound = motion.moves_physically() && work.is_finite();
+                self.motion.go_on(motion, work, is_sound)
+            }
+            None => advance_by_steps(&mut self.motion, scheme, piece_ns, coils, contact),
         }
     }
+}
+
+/// What one straight step is not enough for.
+#[inline(never)] // keeps the one step of most pieces small
+fn advance_by_steps(
+    motion: &mut Motion,
+    scheme: &mut Scheme,
+    piece_ns: u64,
+    coils: &Wrench,
+    contact: Contact,
+) -> Outcome {
+    instructions::best(
+        #[inline(always)]
+        || {
+            let (next, work) = scheme.advance(motion, piece_ns, coils, contact);
+            motion.go_on(next, work, next.is_physical() && work.is_finite())
+        },
+    )
 }
 
 #[cfg(test)]

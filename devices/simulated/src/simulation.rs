@@ -83,12 +83,13 @@ impl Simulation {
     /// If a parameter is not physical; the error names it.
     pub fn new(setup: &Setup) -> Result<Self, InvalidParameter> {
         let plant = plant(setup, &setup.start)?;
+        let wavering = Wavering::new(setup.hand.unsteadiness, setup.seed);
         Ok(Self {
             ledger: Ledger::open(plant.energy()),
             plant,
             time_ns: 0,
-            wavering: Wavering::new(setup.hand.unsteadiness, setup.seed),
-            stroke: Stroke::default(),
+            stroke: Stroke::at(0, &setup.hand.trajectory, &wavering),
+            wavering,
             setup: setup.clone(),
         })
     }
@@ -98,7 +99,7 @@ impl Simulation {
         self.plant.place(&self.setup.start);
         self.ledger = Ledger::open(self.plant.energy());
         self.time_ns = 0;
-        self.stroke = Stroke::default();
+        self.stroke = Stroke::at(0, &self.setup.hand.trajectory, &self.wavering);
     }
 
     /// Replaces the hand from now on; its trajectory keeps counting from the start of the run.
@@ -111,7 +112,7 @@ impl Simulation {
         let setup = Setup { hand, ..self.setup.clone() };
         self.plant = plant(&setup, &self.plant.state())?;
         self.wavering = Wavering::new(setup.hand.unsteadiness, setup.seed);
-        self.stroke = Stroke::default();
+        self.stroke = Stroke::at(self.time_ns, &setup.hand.trajectory, &self.wavering);
         self.setup = setup;
         Ok(())
     }
@@ -121,22 +122,19 @@ impl Simulation {
     /// Splitting a tick changes nothing but rounding in translation and the Runge-Kutta error in rotation.
     /// Total: a wrench that is not finite counts as none. Real-time: bounded, no allocation.
     pub fn advance(&mut self, dt_ns: u64, coils: Wrench) -> Incidents {
-        self.advance_under(dt_ns, &coils)
+        let wrench_rejected = !coils.is_finite();
+        let coils = if wrench_rejected { &Wrench::ZERO } else { &coils };
+        Incidents { wrench_rejected, ..self.advance_under(dt_ns, coils) }
     }
 
-    /// [`Self::advance`] with a wrench that stays where it is: a copy would have to be in memory before the motion starts.
+    /// [`Self::advance`] with a finite wrench that stays where it is: a copy would have to be in memory before
+    /// the motion starts.
     #[inline(always)]
     pub(crate) fn advance_under(&mut self, dt_ns: u64, coils: &Wrench) -> Incidents {
-        let mut incidents = Incidents {
-            wrench_rejected: !coils.is_finite(),
-            cut_short: dt_ns > MAX_ADVANCE_NS,
-            ..Incidents::default()
-        };
-        let coils = if incidents.wrench_rejected { &Wrench::ZERO } else { coils };
+        let mut incidents = Incidents { cut_short: dt_ns > MAX_ADVANCE_NS, ..Incidents::default() };
         let end_ns = self.time_ns.saturating_add(dt_ns.min(MAX_ADVANCE_NS));
         while self.time_ns < end_ns {
-            let piece_ns = self.piece_end_ns(end_ns) - self.time_ns;
-            let intention = self.drawn_intention();
+            let (piece_ns, intention) = self.next_piece(end_ns);
             match self.plant.advance(piece_ns, coils, intention.as_ref()) {
                 Outcome::Moved(work) => self.ledger.book(work, self.plant.energy()),
                 Outcome::Stopped => {
@@ -187,32 +185,21 @@ impl Simulation {
         &self.setup
     }
 
-    /// End of the piece that starts now: the tick's end, the next grid point, or the moment the hand lets go.
+    /// Length of the piece that starts now, ns, and what the hand means meanwhile; nothing while it is off the
+    /// handle. It lasts to the tick's end, the next grid point, or the moment the hand lets go.
     #[inline(always)]
-    fn piece_end_ns(&self, tick_end_ns: u64) -> u64 {
-        let grid_ns = (self.time_ns / GRID_NS + 1).saturating_mul(GRID_NS);
-        let end_ns = tick_end_ns.min(grid_ns);
-        match self.setup.hand.trajectory.release_ns() {
-            Some(release_ns) if release_ns > self.time_ns => end_ns.min(release_ns),
-            _ => end_ns,
-        }
-    }
-
-    /// The intention now as drawn through the grid; nothing while the hand is off the handle.
-    #[inline(always)]
-    fn drawn_intention(&mut self) -> Option<Intention> {
+    fn next_piece(&mut self, tick_end_ns: u64) -> (u64, Option<Intention>) {
         let trajectory = &self.setup.hand.trajectory;
-        if trajectory.release_ns().is_some_and(|release_ns| self.time_ns >= release_ns) {
-            return None;
+        if self.time_ns >= self.stroke.end_ns {
+            self.stroke.go_on(trajectory, &self.wavering);
         }
-        let index = self.time_ns / GRID_NS;
-        let stroke = if self.stroke.index == Some(index) {
-            self.stroke
+        let end_ns = tick_end_ns.min(self.stroke.end_ns);
+        let release_ns = trajectory.release_ns().unwrap_or(u64::MAX);
+        if self.time_ns < release_ns {
+            (end_ns.min(release_ns) - self.time_ns, self.stroke.drawn(self.time_ns))
         } else {
-            Stroke::after(&self.stroke, index, trajectory, &self.wavering)
-        };
-        self.stroke = stroke;
-        stroke.drawn(self.time_ns % GRID_NS)
+            (end_ns - self.time_ns, None)
+        }
     }
 }
 
@@ -224,47 +211,48 @@ fn plant(setup: &Setup, state: &State) -> Result<Plant, InvalidParameter> {
 }
 
 /// What the hand aims at between two grid points of the clock.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Stroke {
-    /// Number of the stroke that starts at `start`; none before the first.
-    index: Option<u64>,
+    start_ns: u64,
+    end_ns: u64,
     start: Option<Aim>,
     end: Option<Aim>,
 }
 
 impl Stroke {
-    /// Stroke number `index`. Consecutive strokes share a grid point, which is evaluated once.
-    #[inline(always)]
-    fn after(previous: &Self, index: u64, trajectory: &Trajectory, wavering: &Wavering) -> Self {
-        let follows = previous.index.is_some_and(|before| before.checked_add(1) == Some(index));
-        let start = if follows { previous.end } else { Self::first_aim(index, trajectory, wavering) };
-        let end = Self::aim(index.saturating_add(1), trajectory, wavering);
-        Self { index: Some(index), start, end }
+    /// The stroke under way at a time.
+    fn at(time_ns: u64, trajectory: &Trajectory, wavering: &Wavering) -> Self {
+        let start_ns = time_ns - time_ns % GRID_NS;
+        let end_ns = start_ns.saturating_add(GRID_NS);
+        let aim = |time_ns| Self::aim(time_ns, trajectory, wavering);
+        Self { start_ns, end_ns, start: aim(start_ns), end: aim(end_ns) }
     }
 
-    /// What an unsteady hand aims at at a grid point.
+    /// On to the next stroke, which starts where this one ends: their common grid point is evaluated once.
+    #[inline(never)] // what calls it would keep all its numbers in memory over the sine
+    fn go_on(&mut self, trajectory: &Trajectory, wavering: &Wavering) {
+        (self.start_ns, self.start) = (self.end_ns, self.end);
+        self.end_ns = self.end_ns.saturating_add(GRID_NS);
+        self.end = Self::aim(self.end_ns, trajectory, wavering);
+    }
+
+    /// What an unsteady hand aims at at a time.
     #[inline(always)]
-    fn aim(index: u64, trajectory: &Trajectory, wavering: &Wavering) -> Option<Aim> {
-        let time_ns = index.saturating_mul(GRID_NS);
+    fn aim(time_ns: u64, trajectory: &Trajectory, wavering: &Wavering) -> Option<Aim> {
         let aim = trajectory.aim(time_ns)?;
         Some(wavered(&aim, wavering, seconds(time_ns)))
     }
 
-    #[cold] // all others are the end of the stroke before
-    fn first_aim(index: u64, trajectory: &Trajectory, wavering: &Wavering) -> Option<Aim> {
-        Self::aim(index, trajectory, wavering)
-    }
-
-    /// The aim `elapsed_ns` after the start of the stroke, drawn straight to its end: position on the chord with
+    /// The aim at a time during the stroke, drawn straight to its end: position on the chord with
     /// its slope as velocity; orientation and force, which the plant takes as constant, halfway. Where the hand
     /// lets go before the end it stays.
     #[inline(always)]
-    fn drawn(&self, elapsed_ns: u64) -> Option<Intention> {
+    fn drawn(&self, time_ns: u64) -> Option<Intention> {
         let start = self.start?;
         let end = self.end.unwrap_or(start);
         let velocity_m_per_s = (end.pose.position_m - start.pose.position_m) / seconds(GRID_NS);
         let mut drawn = Intention {
-            position_m: start.pose.position_m + velocity_m_per_s * seconds(elapsed_ns),
+            position_m: start.pose.position_m + velocity_m_per_s * seconds(time_ns - self.start_ns),
             velocity_m_per_s,
             force_n: 0.5 * (start.force_n + end.force_n),
             yielding: start.yielding,

@@ -110,13 +110,14 @@ impl Body {
     pub(super) fn energy(&self, motion: &Motion) -> MechanicalEnergy {
         let (centre_m, spin) = (self.flotor.centre_of_mass_m, motion.spin_rad_per_s);
         let mut velocity = motion.velocity_m_per_s;
+        let mut turning_j = 0.0;
         if spin != DVec3::ZERO {
-            velocity += motion.orientation * spin.cross(centre_m);
+            velocity += motion.turned(spin.cross(centre_m));
+            turning_j = 0.5 * spin.dot(self.flotor.inertia_kg_m2 * spin);
         }
-        let height_m = motion.position_m.z + (motion.orientation * centre_m - centre_m).z;
+        let height_m = motion.position_m.z + (motion.turned(centre_m) - centre_m).z;
         MechanicalEnergy {
-            kinetic_j: 0.5 * self.flotor.mass_kg * velocity.length_squared()
-                + 0.5 * spin.dot(self.flotor.inertia_kg_m2 * spin),
+            kinetic_j: 0.5 * self.flotor.mass_kg * velocity.length_squared() + turning_j,
             potential_j: self.flotor.mass_kg * self.flotor.gravity_m_per_s2 * height_m,
         }
     }

@@ -1,7 +1,8 @@
 //! What the integrator carries from step to step: the motion of the flotor and the pull of the hand.
 
-use super::State;
+use super::{Outcome, State};
 use crate::hand::Intention;
+use crate::ledger::Work;
 use flotor_hal::glam::{DMat3, DQuat, DVec3};
 
 /// Beyond these the numbers are no flotor's: m, m/s and rad/s alike.
@@ -34,6 +35,7 @@ impl Motion {
             velocity_m_per_s: state.velocity_m_per_s,
             spin_rad_per_s: orientation.conjugate() * state.angular_velocity_rad_per_s,
         }
+        .settled()
     }
 
     /// What the outside sees. Real-time: bounded, no allocation.
@@ -43,8 +45,15 @@ impl Motion {
             position_m: self.position_m,
             orientation: self.orientation,
             velocity_m_per_s: self.velocity_m_per_s,
-            angular_velocity_rad_per_s: self.orientation * self.spin_rad_per_s,
+            angular_velocity_rad_per_s: self.turned(self.spin_rad_per_s),
         }
+    }
+
+    /// A vector of the flotor frame in the device frame. Real-time: bounded, no allocation.
+    #[inline(always)]
+    pub(super) fn turned(&self, vector: DVec3) -> DVec3 {
+        // Upright, as most hands hold the flotor, the product would be the vector itself, bit for bit.
+        if self.orientation == DQuat::IDENTITY { vector } else { self.orientation * vector }
     }
 
     /// The same pose without velocity. Real-time: bounded, no allocation.
@@ -52,28 +61,61 @@ impl Motion {
         Self { velocity_m_per_s: DVec3::ZERO, spin_rad_per_s: DVec3::ZERO, ..*self }
     }
 
+    /// Goes on as `next` if that `is_sound`, else stops.
+    #[inline(always)]
+    pub(super) fn go_on(&mut self, next: Self, work: Work, is_sound: bool) -> Outcome {
+        if is_sound {
+            *self = next;
+            Outcome::Moved(work)
+        } else {
+            *self = self.at_rest();
+            Outcome::Stopped
+        }
+    }
+
     /// False for NaN as well. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(super) fn is_physical(&self) -> bool {
-        let within = |v: DVec3| v.length_squared() <= PHYSICAL_LIMIT * PHYSICAL_LIMIT;
-        within(self.position_m)
-            && within(self.velocity_m_per_s)
-            && within(self.spin_rad_per_s)
-            && self.orientation.is_finite()
+        self.moves_physically() && within(self.spin_rad_per_s) && self.orientation.is_finite()
+    }
+
+    /// [`Self::is_physical`] of a motion that does not turn. Real-time: bounded, no allocation.
+    #[inline(always)]
+    pub(super) fn moves_physically(&self) -> bool {
+        within(self.position_m) && within(self.velocity_m_per_s)
     }
 
     /// The same motion with what is negligible set to zero. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(super) fn settled(&self) -> Self {
-        let settle = |x: f64| if x.abs() < NEGLIGIBLE { 0.0 } else { x };
         let q = self.orientation;
         Self {
-            position_m: self.position_m.map(settle),
             orientation: DQuat::from_xyzw(settle(q.x), settle(q.y), settle(q.z), settle(q.w)),
-            velocity_m_per_s: self.velocity_m_per_s.map(settle),
             spin_rad_per_s: self.spin_rad_per_s.map(settle),
+            ..self.moving_settled()
         }
     }
+
+    /// [`Self::settled`] of a motion that does not turn. Real-time: bounded, no allocation.
+    #[inline(always)]
+    pub(super) fn moving_settled(&self) -> Self {
+        Self {
+            position_m: self.position_m.map(settle),
+            velocity_m_per_s: self.velocity_m_per_s.map(settle),
+            ..*self
+        }
+    }
+}
+
+/// False for NaN as well.
+#[inline(always)]
+fn within(vector: DVec3) -> bool {
+    vector.length_squared() <= PHYSICAL_LIMIT * PHYSICAL_LIMIT
+}
+
+#[inline(always)]
+fn settle(number: f64) -> f64 {
+    if number.abs() < NEGLIGIBLE { 0.0 } else { number }
 }
 
 /// How the centre of mass lies from the origin and swings about it, device frame.

@@ -83,7 +83,27 @@ impl Scheme {
         &self.body
     }
 
-    /// Moves on by `piece_ns`; gives the new motion and the work done. Real-time: bounded, no allocation.
+    /// Moves on by `piece_ns` in one straight step, if that will do; gives the new motion and the work done.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[inline(always)]
+    pub(super) fn step(
+        &mut self,
+        from: &Motion,
+        piece_ns: u64,
+        coils: &Wrench,
+        contact: &Contact,
+    ) -> Option<(Motion, Work)> {
+        let (body, table) = self.prepared(piece_ns);
+        if table.straight.steps > 1 {
+            return None;
+        }
+        Step::new(body, &table.straight, coils, contact, from).straight()
+    }
+
+    /// Moves on by `piece_ns` in as many steps as it takes; gives the new motion and the work done.
+    ///
+    /// Real-time: bounded, no allocation.
     #[inline(always)]
     pub(super) fn advance(
         &mut self,
@@ -96,21 +116,16 @@ impl Scheme {
             return (*from, Work::default());
         }
         let (body, table) = self.prepared(piece_ns);
-        let straight = table.straight.march(
-            from,
-            contact,
-            #[inline(always)]
-            |contact, motion| Step::new(body, &table.straight, coils, contact, motion).straight(),
-        );
-        let (motion, work) = match straight {
-            Some(done) => done,
-            None => table
-                .turning
-                .march(from, contact, |contact, motion| {
+        let straight = table.straight.march(from, contact, |contact, motion| {
+            Step::new(body, &table.straight, coils, contact, motion).straight()
+        });
+        let (motion, work) = straight
+            .or_else(|| {
+                table.turning.march(from, contact, |contact, motion| {
                     Some(Step::new(body, &table.turning, coils, contact, motion).turning())
                 })
-                .unwrap_or((*from, Work::default())),
-        };
+            })
+            .unwrap_or((*from, Work::default()));
         (motion.settled(), work)
     }
 
@@ -121,9 +136,14 @@ impl Scheme {
             return (&self.body, &self.nominal);
         }
         if piece_ns != self.other.piece_ns {
-            self.other = Table::new(&self.body, piece_ns);
+            self.prepare(piece_ns);
         }
         (&self.body, &self.other)
+    }
+
+    #[cold] // pieces are of one or two lengths
+    fn prepare(&mut self, piece_ns: u64) {
+        self.other = Table::new(&self.body, piece_ns);
     }
 }
 

@@ -103,7 +103,7 @@ impl<'a> Step<'a> {
             velocity_m_per_s: later.velocity(&drive),
             ..*self.start
         };
-        Some((motion, self.work(&drive, &motion, displacement, DVec3::ZERO, &Power::NONE)))
+        Some((motion, self.work(&drive, &motion, displacement)))
     }
 
     /// True if the flotor does not turn and nothing turns it during the step: neither coils nor hand by a
@@ -112,18 +112,16 @@ impl<'a> Step<'a> {
     fn is_balanced(&self, drive: &Drive) -> bool {
         let (body, start) = (self.body, self.start);
         let twisted = body.hand.rotational_stiffness_nm_per_rad != 0.0
-            && start.orientation != self.contact.intended_orientation
-            || self.contact.turning_rad_per_s != DVec3::ZERO;
-        if start.spin_rad_per_s != DVec3::ZERO || self.coils.torque_nm != DVec3::ZERO || twisted {
+            && start.orientation != self.contact.intended_orientation;
+        if twisted || axes([start.spin_rad_per_s, self.coils.torque_nm, self.contact.turning_rad_per_s]) != 0
+        {
             return false;
         }
         // Forces pass through a centre of mass that lies at the origin, or with them on one axis of the
         // device. (Where they do so on a slanted line, rounding would tell them apart from it anyhow.)
-        let arm = start.orientation * body.centre_of_mass_m;
-        let axes = |v: DVec3| v.cmpne(DVec3::ZERO).bitmask();
-        let forces =
-            axes(self.still_force()) | axes(drive.velocity) | axes(drive.acceleration) | axes(drive.jerk);
-        arm == DVec3::ZERO || (axes(arm) | forces).count_ones() <= 1
+        let arm = start.turned(body.centre_of_mass_m);
+        let forces = [self.still_force(), drive.velocity, drive.acceleration, drive.jerk];
+        arm == DVec3::ZERO || (axes([arm]) | axes(forces)).count_ones() <= 1
     }
 
     /// The motion at the end and the work done, whatever turns. Real-time: bounded, no allocation.
@@ -248,22 +246,33 @@ impl<'a> Step<'a> {
             velocity_m_per_s: later.velocity(drive) + disturbance_velocity - swing.velocity,
             spin_rad_per_s: end.spin,
         };
-        (motion, self.work(drive, &motion, moved, swung, power))
+        (motion, self.work_of_turning(self.work(drive, &motion, moved), moved, swung, power))
     }
 
-    /// Work of a step in which the origin was displaced by `moved` and the centre of mass by `swung` more, m.
+    /// Work of a step in which the origin was displaced by `moved` (m), and the centre of mass with it.
     #[inline(always)]
-    fn work(&self, drive: &Drive, end: &Motion, moved: DVec3, swung: DVec3, mean: &Power) -> Work {
-        let (body, h) = (self.body, self.grid.step_s);
-        // Of the oscillator alone; what rotation adds is in `mean`.
+    fn work(&self, drive: &Drive, end: &Motion, moved: DVec3) -> Work {
+        let body = self.body;
         let velocity2 = self.grid.gramian.squared_velocity(drive);
+        Work {
+            coils_j: self.coils.force_n.dot(moved),
+            feed_forward_j: body.feed_forward_n * moved.z,
+            hand_j: self.hand_work_j(drive, end, moved, velocity2),
+            dissipated_j: body.drag.translational_ns_per_m * velocity2.element_sum(),
+        }
+    }
+
+    /// The same if the centre of mass was displaced by `swung` (m) more, and turning added the `mean` power.
+    #[inline(always)]
+    fn work_of_turning(&self, straight: Work, moved: DVec3, swung: DVec3, mean: &Power) -> Work {
+        let (body, h) = (self.body, self.grid.step_s);
         // The flotor's centre of mass swings farther than the common one, in proportion.
         let lifted_m = moved.z + swung.z * (1.0 + body.lift_lever);
         Work {
-            coils_j: self.coils.force_n.dot(moved) + mean.coils_w * h,
+            coils_j: straight.coils_j + mean.coils_w * h,
             feed_forward_j: body.feed_forward_n * lifted_m,
-            hand_j: self.hand_work_j(drive, end, moved, velocity2) + mean.hand_w * h,
-            dissipated_j: body.drag.translational_ns_per_m * velocity2.element_sum() + mean.drag_w * h,
+            hand_j: straight.hand_j + mean.hand_w * h,
+            dissipated_j: straight.dissipated_j + mean.drag_w * h,
         }
     }
 
@@ -285,6 +294,20 @@ impl<'a> Step<'a> {
             * (end.velocity_m_per_s.length_squared() - self.start.velocity_m_per_s.length_squared());
         spring_j + damper_j - inertia_j + self.contact.force_n.dot(moved)
     }
+}
+
+/// The axes along which any of the vectors reaches, as bits.
+#[inline(always)]
+fn axes<const N: usize>(vectors: [DVec3; N]) -> u32 {
+    let [mut x, mut y, mut z] = [0; 3];
+    for vector in vectors {
+        x |= vector.x.to_bits();
+        y |= vector.y.to_bits();
+        z |= vector.z.to_bits();
+    }
+    // All that zero may have is a sign.
+    let reaches = |bits: u64| u32::from(bits << 1 != 0);
+    reaches(x) | reaches(y) << 1 | reaches(z) << 2
 }
 
 impl Unknowns {
