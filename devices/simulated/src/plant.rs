@@ -289,6 +289,9 @@ impl Plant {
     /// set of response functions.
     #[inline(always)]
     pub fn advance(&mut self, piece_ns: u64, coils: &Wrench, hand: Option<&Intention>) -> Outcome {
+        if piece_ns == 0 {
+            return Outcome::Moved(Work::default());
+        }
         let piece_ns = piece_ns.min(MAX_PIECE_NS);
         let contact = hand.map_or(Contact::NONE, Contact::with);
         let scheme = match hand {
@@ -302,14 +305,25 @@ impl Plant {
             Some((motion, work)) => {
                 let motion = motion.moving_settled();
                 let is_sound = motion.moves_physically() && work.is_finite();
-                self.motion.go_on(motion, work, is_sound)
+                go_on(&mut self.motion, is_sound.then_some((motion, work)))
             }
             None => advance_by_steps(&mut self.motion, scheme, piece_ns, coils, contact),
         }
     }
 }
 
-/// What one straight step is not enough for.
+/// Goes on with a motion that is sound, else stops. Real-time: bounded, no allocation.
+#[inline(always)] // else a motion in registers goes to memory to be handed over
+fn go_on(motion: &mut Motion, next: Option<(Motion, Work)>) -> Outcome {
+    let Some((next, work)) = next else {
+        *motion = motion.at_rest();
+        return Outcome::Stopped;
+    };
+    *motion = next;
+    Outcome::Moved(work)
+}
+
+/// What one straight step is not enough for. Real-time: bounded, no allocation.
 #[inline(never)] // keeps the one step of most pieces small
 fn advance_by_steps(
     motion: &mut Motion,
@@ -322,7 +336,8 @@ fn advance_by_steps(
         #[inline(always)]
         || {
             let (next, work) = scheme.advance(motion, piece_ns, coils, contact);
-            motion.go_on(next, work, next.is_physical() && work.is_finite())
+            let is_sound = next.is_physical() && work.is_finite();
+            go_on(motion, is_sound.then_some((next, work)))
         },
     )
 }

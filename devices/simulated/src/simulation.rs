@@ -131,6 +131,7 @@ impl Simulation {
     /// the motion starts.
     #[inline(always)]
     pub(crate) fn advance_under(&mut self, dt_ns: u64, coils: &Wrench) -> Incidents {
+        debug_assert!(coils.is_finite());
         let mut incidents = Incidents { cut_short: dt_ns > MAX_ADVANCE_NS, ..Incidents::default() };
         let end_ns = self.time_ns.saturating_add(dt_ns.min(MAX_ADVANCE_NS));
         while self.time_ns < end_ns {

@@ -1,8 +1,7 @@
 //! What the integrator carries from step to step: the motion of the flotor and the pull of the hand.
 
-use super::{Outcome, State};
+use super::State;
 use crate::hand::Intention;
-use crate::ledger::Work;
 use flotor_hal::glam::{DMat3, DQuat, DVec3};
 
 /// Beyond these the numbers are no flotor's: m, m/s and rad/s alike.
@@ -26,7 +25,8 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// From what the outside sees. Real-time: bounded, no allocation.
+    /// From what the outside sees, settled: a straight step settles only what it changes. Real-time: bounded, no
+    /// allocation.
     pub(super) fn of(state: &State) -> Self {
         let orientation = state.orientation.normalize();
         Self {
@@ -52,25 +52,13 @@ impl Motion {
     /// A vector of the flotor frame in the device frame. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(super) fn turned(&self, vector: DVec3) -> DVec3 {
-        // Upright, as most hands hold the flotor, the product would be the vector itself, bit for bit.
+        // Upright, as most hands hold the flotor, the product would be the vector itself but for the sign of a zero.
         if self.orientation == DQuat::IDENTITY { vector } else { self.orientation * vector }
     }
 
     /// The same pose without velocity. Real-time: bounded, no allocation.
     pub(super) fn at_rest(&self) -> Self {
         Self { velocity_m_per_s: DVec3::ZERO, spin_rad_per_s: DVec3::ZERO, ..*self }
-    }
-
-    /// Goes on as `next` if that `is_sound`, else stops.
-    #[inline(always)]
-    pub(super) fn go_on(&mut self, next: Self, work: Work, is_sound: bool) -> Outcome {
-        if is_sound {
-            *self = next;
-            Outcome::Moved(work)
-        } else {
-            *self = self.at_rest();
-            Outcome::Stopped
-        }
     }
 
     /// False for NaN as well. Real-time: bounded, no allocation.

@@ -101,7 +101,8 @@ impl Scheme {
         Step::new(body, &table.straight, coils, contact, from).straight()
     }
 
-    /// Moves on by `piece_ns` in as many steps as it takes; gives the new motion and the work done.
+    /// Moves on by `piece_ns`, for which [`Self::step`] did not do, in as many steps as it takes; gives the new motion and
+    /// the work done.
     ///
     /// Real-time: bounded, no allocation.
     #[inline(always)]
@@ -112,14 +113,16 @@ impl Scheme {
         coils: &Wrench,
         contact: Contact,
     ) -> (Motion, Work) {
-        if piece_ns == 0 {
-            return (*from, Work::default());
-        }
         let (body, table) = self.prepared(piece_ns);
-        let straight = table.straight.march(from, contact, |contact, motion| {
-            Step::new(body, &table.straight, coils, contact, motion).straight()
-        });
-        let (motion, work) = straight
+        let straight = || {
+            table.straight.march(from, contact, |contact, motion| {
+                Step::new(body, &table.straight, coils, contact, motion).straight()
+            })
+        };
+        // One step was tried: it turns.
+        let (motion, work) = (table.straight.steps > 1)
+            .then(straight)
+            .flatten()
             .or_else(|| {
                 table.turning.march(from, contact, |contact, motion| {
                     Some(Step::new(body, &table.turning, coils, contact, motion).turning())
