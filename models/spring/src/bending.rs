@@ -123,11 +123,7 @@ impl Bending {
             (sway * 0.5, (sway - bow) * 0.5, (sway_slope - bow_slope) * 0.5);
         BendingEnergy {
             energy_j: sway.mul_add(ends, (-carry).mul_add(plates, energy_j)),
-            by_squares: [
-                half_sway + by_squares[0],
-                half_sway + by_squares[1],
-                carry.mul_add(carry.like(-0.5), by_squares[2]),
-            ],
+            by_squares: [half_sway + by_squares[0], half_sway + by_squares[1], by_squares[2] - carry * 0.5],
             by_length: sway_slope.mul_add(ends, (-carry_slope).mul_add(plates, by_length)),
             writhe,
             writhe_slope,

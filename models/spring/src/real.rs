@@ -1,7 +1,7 @@
 //! One formula for one pose and for several side by side.
 //!
-//! The laws of this crate are written once, over any [`Real`]: `f64` for the servo's one pose, [`Wide`] for a
-//! batch, several poses in the lanes of one vector register. Every operation rounds as IEEE 754 says, in the order
+//! The laws of this crate are written once, over any [`Real`]: [`Lone`] for the servo's one pose (`f64` on a machine without
+//! registers for four numbers), [`Wide`] for a batch, several poses in the lanes of one vector register. Every operation rounds as IEEE 754 says, in the order
 //! written, so a lane of a batch holds *the same bits* as the scalar law. A product and a sum are rounded once where it says
 //! [`Real::mul_add`], and nowhere else: the compiler fuses nothing by itself, and a machine that cannot fuse computes the
 //! same bits, if slowly. It is written where numbers follow each other along the axis of the spring, as the terms of a

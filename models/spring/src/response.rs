@@ -88,6 +88,16 @@ pub trait Law {
                 },
             );
         }
+        self.respond_plainly(ask, take)
+    }
+
+    /// The same on machines without better instructions. Real-time: as [`Self::respond_between`].
+    #[inline(never)] // its registers and its frame are no concern of the machines that have them
+    fn respond_plainly<T>(
+        &self,
+        ask: impl FnOnce() -> (Pose, Demand),
+        take: impl FnOnce(&Response) -> T,
+    ) -> T {
         let (pose, demand) = ask();
         take(&self.respond_with(&pose.coordinates(), &pose, demand))
     }

@@ -1,7 +1,8 @@
 //! What the laws cost, in instructions: the same on every machine of a kind, however busy it is.
 //!
 //! Callgrind (valgrind) counts while this test runs itself once more, and cuts its count each time a function begins that
-//! is there for nothing else. Bounds are quotients of two counts of one build. Without valgrind the test says so and passes.
+//! is there for nothing else. Bounds are quotients of two counts of one build, and in one case their
+//! difference. Without valgrind the test says so and passes.
 
 #[allow(dead_code)] // each test needs its part of the helpers
 mod sample;
@@ -163,8 +164,8 @@ fn laws_cost_their_share_of_the_printed_one() {
     }
     assert!(closed <= 0.6 * printed, "closed-form");
     assert!(energy <= 1.5 * printed, "energy");
-    // To look at the length first and find nothing to hand over, with the answer handed on: 43 counted, and a tenth.
-    assert!(handing_over - energy <= 48.0, "handing over where there is nothing to");
+    // To look at the length first and find nothing to hand over, with the answer handed on: 43 to 45 counted, and a tenth.
+    assert!(handing_over - energy <= 50.0, "handing over where there is nothing to");
     if cfg!(debug_assertions) {
         eprintln!("batches: skipped, a promise of optimised builds; `cargo test --release` checks it");
         return;

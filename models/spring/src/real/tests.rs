@@ -25,10 +25,16 @@ const NUMBERS: [f64; 16] = [
 ];
 
 /// One of everything, over any number.
-fn everything<R: Real>(a: R, b: R) -> [R; 17] {
+fn everything<R: Real>(a: R, b: R) -> [R; 21] {
     let v = Vector::new(a, b, a + 1.5);
     let (big, small) = (a.above(0.5), b.below(0.5));
     let (these, those) = (R::Four::of([a, b, a * b, a - b]), R::Four::like(a, &[0.5, -3.0, 1e-9, -0.0]));
+    // Terms of one and the same number up to the sixth power, of another only up to the first.
+    let series =
+        [[1.0, 0.1, -2.0, 0.5], [0.5, -0.1, 3.0, 0.25], [0.25, 0.0, 0.0, 0.125], [-1.0, 0.0, 0.0, 0.0]];
+    let [value, slope] = these.polynomials(&series);
+    let [p, _, q, _] = value.numbers();
+    let [_, r, _, s] = slope.numbers();
     let [first, second, third, fourth] = (these.mul_add(those, these) * those * b + these).numbers();
     [
         a + b,
@@ -48,6 +54,10 @@ fn everything<R: Real>(a: R, b: R) -> [R; 17] {
         second,
         third,
         fourth,
+        p,
+        q,
+        r,
+        s,
     ]
 }
 
