@@ -144,7 +144,18 @@ impl Layer {
         events: &mut Events,
     ) -> Share {
         match self.budget.allowed(tick.time_ns) {
-            Allowed::Asked => self.ask_in_time(tick, state, health, events),
+            Allowed::Asked => {
+                let begun_ns = self.budget.begin();
+                let share = self.ask(tick, state, health, events);
+                if let Some(begun_ns) = begun_ns {
+                    if self.budget.end(begun_ns, tick.index, tick.time_ns) {
+                        events.insert(Events::MODEL_OVERRUN);
+                        health.overrun = self.budget.overrun();
+                    }
+                    self.last = share;
+                }
+                share
+            }
             Allowed::Fading(part) => {
                 events.insert(Events::MODEL_FAULT);
                 Share { wrench: self.last.wrench * part, energy_j: self.last.energy_j * part }
@@ -154,27 +165,6 @@ impl Layer {
                 Share::NONE
             }
         }
-    }
-
-    /// Asks its objects, and books the time that takes.
-    #[inline(always)] // as `step`
-    fn ask_in_time(
-        &mut self,
-        tick: &Tick,
-        state: &DeviceState,
-        health: &mut ModelHealth,
-        events: &mut Events,
-    ) -> Share {
-        let begun_ns = self.budget.begin();
-        let share = self.ask(tick, state, health, events);
-        if let Some(begun_ns) = begun_ns {
-            if self.budget.end(begun_ns, tick.index, tick.time_ns) {
-                events.insert(Events::MODEL_OVERRUN);
-                health.overrun = self.budget.overrun();
-            }
-            self.last = share;
-        }
-        share
     }
 
     /// Asks all objects that can act where the handle is; the others are not called.
