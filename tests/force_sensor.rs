@@ -12,8 +12,9 @@ use std::time::Duration;
 /// How long the sensor takes for a reading: many ticks.
 const READING: Duration = Duration::from_millis(30);
 
-/// Runs a scene of half a second in real time, beside a sensor that answers `answers` questions with the number of each.
-fn run_beside_a_sensor(answers: u32) -> Watched {
+/// Runs a scene in real time, beside a sensor that answers `answers` questions with the number of each; it is borne for `timeout_ms`
+/// that an answer does not come.
+fn run_beside_a_sensor(answers: u32, duration_s: f64, timeout_ms: u32) -> Watched {
     let (mut ours, theirs) = TTYPort::pair().expect("the system has pseudo terminals");
     ours.set_timeout(Duration::from_secs(5)).expect("it is ours");
     let port = theirs.name().expect("a pseudo terminal has a path");
@@ -35,10 +36,10 @@ fn run_beside_a_sensor(answers: u32) -> Watched {
     let run = watch_on(
         Clock::Real,
         &format!(
-            "duration_s = 0.5\n[limits]\nwatchdog_ms = 1000\n\
+            "duration_s = {duration_s}\n[limits]\nwatchdog_ms = 60000\n\
              [[device]]\nname = \"handle\"\nplugin = \"simulated\"\n\
              [[device]]\nname = \"scale\"\nplugin = \"force-sensor\"\n[device.parameters]\nport = \"{port}\"\n\
-             timeout_ms = 100\n[[model]]\nplugin = \"spring\"\ndevice = \"handle\"\n"
+             timeout_ms = {timeout_ms}\n[[model]]\nplugin = \"spring\"\ndevice = \"handle\"\n"
         ),
     );
     drop(theirs); // the sensor's read ends
@@ -48,7 +49,7 @@ fn run_beside_a_sensor(answers: u32) -> Watched {
 
 #[test]
 fn a_slow_sensor_costs_the_handle_nothing() {
-    let run = run_beside_a_sensor(u32::MAX);
+    let run = run_beside_a_sensor(u32::MAX, 0.5, 10_000);
     assert_eq!(run.outcome.end, RunEnd::Finished);
     assert!(!run.records.iter().any(|record| record.events.intersects(Events::HOLDING)));
     let readings: Vec<f64> = run
@@ -63,6 +64,7 @@ fn a_slow_sensor_costs_the_handle_nothing() {
 
 #[test]
 fn a_sensor_that_falls_silent_is_a_fault() {
-    let run = run_beside_a_sensor(3);
+    // A machine may hold up the three answers; the run ends with the silence, long before its time.
+    let run = run_beside_a_sensor(3, 20.0, 1000);
     assert_eq!(run.outcome.end, RunEnd::DeviceFault(Fault::Timeout));
 }

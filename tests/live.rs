@@ -266,7 +266,8 @@ fn the_emergency_stop_of_a_watcher_is_one() {
 fn a_run_of_the_program_is_found_watched_and_stopped() {
     let scratch = Scratch::default();
     let runtime = scratch.path().display().to_string();
-    let running = Flotor::with(["run", "--duration", "60s"]).env("XDG_RUNTIME_DIR", &runtime).start();
+    let scene = scratch.patient_scene(flotor::scene::DEMO).display().to_string();
+    let running = Flotor::with(["run", &scene, "--duration", "60s"]).env("XDG_RUNTIME_DIR", &runtime).start();
     let directory = Directory::at(scratch.path().join("flotor"));
     let mut client = patiently(|| Client::find(&directory).ok());
     assert_eq!(client.greeting().process, running.id());
@@ -290,7 +291,8 @@ fn a_recording_of_a_run_that_is_killed_is_whole_so_far_and_ends_as_cut() {
     let scratch = Scratch::default();
     let runtime = scratch.path().display().to_string();
     let of_user = |flotor: Flotor| flotor.env("XDG_RUNTIME_DIR", &runtime).start();
-    let running = of_user(Flotor::with(["run", "--duration", "60s"]));
+    let scene = scratch.patient_scene(flotor::scene::DEMO).display().to_string();
+    let running = of_user(Flotor::with(["run", &scene, "--duration", "60s"]));
     let directory = Directory::at(scratch.path().join("flotor"));
     patiently(|| Client::find(&directory).ok());
     let file = scratch.path().join("cut.mcap");

@@ -76,7 +76,7 @@ impl Emulator {
     fn scene(&self, device: &str) -> String {
         let transport = if self.transport == "pty" { "serial" } else { self.transport };
         format!(
-            "rate_hz = 1000\nduration_s = 60\n[device]\nplugin = \"maglev\"\n[device.parameters]\ntransport = \"{transport}\"\n\
+            "rate_hz = 1000\nduration_s = 60\n[limits]\nwatchdog_ms = 60000\n[device]\nplugin = \"maglev\"\n[device.parameters]\ntransport = \"{transport}\"\n\
              address = \"{}\"\nwatchdog_ms = 700\ntimeout_ms = 8000\n{device}\n[[model]]\nplugin = \"spring\"\n",
             self.address
         )

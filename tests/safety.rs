@@ -26,6 +26,9 @@ fn scene(device: &str, model: &str, tables: &str) -> String {
     )
 }
 
+/// Limits of a run in real time that is not about the watchdog: it bears a machine on which nothing moves for a while.
+const PATIENT: &str = "[limits]\nwatchdog_ms = 60000";
+
 /// What the honest model asks for on the faulty device: 100 N/m times 1 mm, up.
 const HONEST_N: f64 = 0.1;
 
@@ -158,7 +161,7 @@ fn end(ran: &Ran) -> String {
 #[test]
 fn sigusr1_is_an_emergency_stop() {
     let scratch = Scratch::default();
-    let ran = run_in_real_time(&scratch, &scene("", "", ""), |process| signal("USR1", process));
+    let ran = run_in_real_time(&scratch, &scene("", "", PATIENT), |process| signal("USR1", process));
     assert_eq!((ran.code, end(&ran).as_str()), (Some(exit_code::DEVICE_FAULT), "emergency_stop"), "{ran:?}");
     assert!(last_line(&ran).starts_with("error: emergency stop (signal)"), "{ran:?}");
     assert!(scratch.path().join("stopped").exists(), "the device was told to stop");
@@ -167,13 +170,19 @@ fn sigusr1_is_an_emergency_stop() {
 #[test]
 fn sigint_ends_a_run_in_order() {
     let scratch = Scratch::default();
-    let ran = run_in_real_time(&scratch, &scene("", "", ""), |process| signal("INT", process));
+    let ran = run_in_real_time(&scratch, &scene("", "", PATIENT), |process| signal("INT", process));
     assert_eq!((ran.code, end(&ran).as_str()), (Some(exit_code::OK), "stopped"), "{ran:?}");
     let recording = flotor::record::Recording::open(&scratch.path().join("run.mcap")).expect("a recording");
     let records: Vec<TickRecord> = recording.map(|record| record.expect("whole")).collect();
-    let releasing = records.iter().filter(|record| record.events.intersects(Events::RELEASING)).count();
-    assert!(releasing > 100, "the force fades out over 0.2 s, not at once: {releasing} ticks");
-    assert_eq!(height_of_force(records.last().expect("ticks")), 0.0);
+    let is_releasing = |record: &&TickRecord| record.events.intersects(Events::RELEASING);
+    let (first, last) =
+        (records.iter().find(is_releasing).expect("it fades out"), records.last().expect("ticks"));
+    let took_ns = last.time_ns - first.time_ns;
+    assert!(took_ns >= 200_000_000, "the force fades out over 0.2 s, not at once: {took_ns} ns");
+    assert!(
+        records.iter().filter(is_releasing).is_sorted_by(|a, b| height_of_force(a) >= height_of_force(b))
+    );
+    assert_eq!(height_of_force(last), 0.0);
     assert!(scratch.path().join("stopped").exists(), "the device was told to stop");
 }
 
@@ -195,7 +204,7 @@ fn a_model_that_hangs_costs_the_run_and_is_named_and_the_device_is_stopped() {
 #[test]
 fn a_device_that_hangs_is_a_device_fault() {
     let scratch = Scratch::default();
-    let hangs = scene("fault = \"hangs-in-read\"\nat_tick = 400", "", "[limits]\nwatchdog_ms = 50");
+    let hangs = scene("fault = \"hangs-in-read\"\nat_tick = 400", "", "[limits]\nwatchdog_ms = 500");
     let ran = run_in_real_time(&scratch, &hangs, |_| ());
     assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:?}");
     assert!(last_line(&ran).starts_with("error: `device` did not come back from `read`"), "{ran:?}");
@@ -358,7 +367,7 @@ fn a_model_in_a_process_of_its_own_says_no_like_any_other() {
 /// The last force is held for one tick, then there is none: the device is safe two ticks after the model failed.
 fn assert_force_ends_within_two_ticks(run: &Watched, failed_at: u64) {
     for record in &run.records {
-        if record.tick + 1 < failed_at && record.events.intersects(Events::MODEL_OVERRUN) {
+        if record.tick < failed_at && record.events.intersects(Events::MODEL_OVERRUN) {
             continue; // a busy machine
         }
         match record.tick {

@@ -74,7 +74,7 @@ fn equal_runs_give_equal_bits_and_a_recording_replays() {
 fn on_a_real_clock_a_thread_computes_and_the_loop_never_waits() {
     let run = watch_on(
         Clock::Real,
-        "duration_s = 1\n[limits]\nramp_s = 0\n[device]\nplugin = \"simulated\"\n[device.parameters]\n\
+        "duration_s = 1\n[limits]\nramp_s = 0\nwatchdog_ms = 60000\n[device]\nplugin = \"simulated\"\n[device.parameters]\n\
          hand = \"oscillate\"\nhand_centre_mm = -2\nhand_amplitude_mm = 0.5\nhand_frequency_hz = 1\n\
          [[model]]\nplugin = \"membrane\"\n[model.field]\nrate_hz = 200\n",
     );

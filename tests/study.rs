@@ -343,7 +343,10 @@ const PERSON: [&str; 13] = [
 
 /// A study with a person whose lines are these.
 fn person(screen: &str, lines: &str, arguments: &[&str], out: &Path) -> Ran {
-    let arguments: Vec<&str> = PERSON.into_iter().chain([screen]).chain(arguments.iter().copied()).collect();
+    let folder = Scratch::default();
+    let scene = folder.patient_scene(flotor::scene::STUDY).display().to_string();
+    let more = [screen, "--scene", &scene];
+    let arguments: Vec<&str> = PERSON.into_iter().chain(more).chain(arguments.iter().copied()).collect();
     study(&arguments, out).reading(lines).run()
 }
 

@@ -32,6 +32,17 @@ impl Scratch {
         file
     }
 
+    /// Writes a scene for a run in real time into the folder: with a watchdog that bears a machine on which nothing moves for a
+    /// while. To be used where the test is not about that.
+    ///
+    /// # Panics
+    /// If it cannot be written, or has limits of its own.
+    #[must_use]
+    pub fn patient_scene(&self, scene: &str) -> PathBuf {
+        assert!(!scene.contains("[limits]"), "it has limits: they can say `watchdog_ms` themselves");
+        self.file("patient.toml", format!("{scene}\n[limits]\nwatchdog_ms = 60000\n"))
+    }
+
     /// Makes a folder in the folder.
     ///
     /// # Panics

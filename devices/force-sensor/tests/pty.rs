@@ -43,11 +43,16 @@ fn emulated(mut answers: Box<Answers>) -> Emulated {
 }
 
 impl Emulated {
+    /// By a host that waits for long: a machine may hold up every answer.
     fn open(&self) -> Result<OpenedDevice, String> {
+        self.open_waiting_ms(8000.0)
+    }
+
+    fn open_waiting_ms(&self, timeout_ms: f64) -> Result<OpenedDevice, String> {
         let plugin = Plugin::in_process(&flotor_force_sensor::FLOTOR_ENTRY).expect("it is a plugin");
         let settings = [
             Setting::parse(plugin.parameters(), "port", &self.path).expect("a path is a text"),
-            Setting::number(plugin.parameters(), "timeout_ms", 200.0).expect("it is a number"),
+            Setting::number(plugin.parameters(), "timeout_ms", timeout_ms).expect("it is a number"),
         ];
         plugin.open_device(&settings).map_err(|error| error.to_string())
     }
@@ -111,11 +116,13 @@ fn silence_nonsense_and_a_pulled_cable_are_faults() {
             if asked < 3 { Some("F 1\n".to_owned()) } else { last.map(str::to_owned) }
         }))
     };
-    for (last, fault) in
-        [(Some("E overload\n"), Fault::Protocol), (Some(""), Fault::Timeout), (None, Fault::Disconnected)]
-    {
+    for (last, fault, timeout_ms) in [
+        (Some("E overload\n"), Fault::Protocol, 8000.0),
+        (Some(""), Fault::Timeout, 2000.0),
+        (None, Fault::Disconnected, 8000.0),
+    ] {
         let sensor = script(last);
-        let (mut device, mut index) = (active(sensor.open().expect("it answers")), 0);
+        let (mut device, mut index) = (active(sensor.open_waiting_ms(timeout_ms).expect("it answers")), 0);
         assert_eq!(Emulated::next(&mut device, &mut index).0, Cycle::Fresh);
         assert_eq!(Emulated::next(&mut device, &mut index).0, Cycle::Fault(fault), "{last:?}");
     }
@@ -125,7 +132,8 @@ fn silence_nonsense_and_a_pulled_cable_are_faults() {
 fn what_is_no_sensor_is_refused_in_one_sentence() {
     let nonsense = emulated(Box::new(|| Some("hello\n".to_owned()))).open().err().unwrap_or_default();
     assert!(nonsense.contains("answers `hello` instead of a force like `F 1.234`"), "{nonsense}");
-    let silent = emulated(Box::new(|| Some(String::new()))).open().err().unwrap_or_default();
+    let silent = emulated(Box::new(|| Some(String::new())));
+    let silent = silent.open_waiting_ms(200.0).err().unwrap_or_default();
     assert!(silent.contains("does not answer within 200 ms"), "{silent}");
     let sensor = emulated(Box::new(|| Some("F 1\n".to_owned())));
     let held = sensor.open().expect("it answers");

@@ -160,10 +160,13 @@ fn the_handle_is_where_the_hand_has_it_and_the_force_arrives() {
         cycle == Cycle::Fresh && (state.pose.position() - there).length() < 1.0e-6
     });
     let pushed = Wrench::from_force(DVec3::new(1.5, -0.5, 7.0));
-    run.until(&pushed, |_, state| state.delivered.force() == DVec3::new(1.5, -0.5, 0.0));
-    // What the motors do at the angles the board is at is the force, turned into the board's frame.
-    let force_n = rig.board().0.force_n().expect("the linkage closes");
-    assert!((force_n - DVec2::new(-1.5, 0.5)).length() < 1.0e-5, "{force_n}");
+    // What the motors do at the angles the board is at is the force, turned into the board's frame. The board may be a tick or
+    // two behind what was said to be delivered.
+    run.until(&pushed, |_, state| {
+        let at_the_motors_n = rig.board().0.force_n().expect("the linkage closes");
+        state.delivered.force() == DVec3::new(1.5, -0.5, 0.0)
+            && (at_the_motors_n - DVec2::new(-1.5, 0.5)).length() < 1.0e-5
+    });
     // Not more than allowed, in the same direction.
     run.until(&Wrench::from_force(DVec3::new(30.0, 40.0, 0.0)), |_, state| {
         (state.delivered.force() - DVec3::new(1.8, 2.4, 0.0)).length() < 1.0e-12

@@ -226,8 +226,8 @@ mod tests {
 
     #[test]
     fn a_device_that_says_nothing_more_still_lets_the_loop_run_at_its_rate() {
-        let mut schedule = Schedule::start_paced(1_000_000);
         let started = std::time::Instant::now();
+        let mut schedule = Schedule::start_paced(1_000_000);
         for _ in 0..20 {
             assert!(schedule.wait(|_| SampleWait::TimedOut).is_some(), "it gives up at once");
         }

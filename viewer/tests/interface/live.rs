@@ -9,7 +9,6 @@ use flotor_live::{Ask, Outcome};
 use flotor_record::trace::Events;
 use flotor_viewer::app::{Start, Wanted};
 use flotor_viewer::panel::{Standing, Value};
-use std::time::Duration;
 
 #[test]
 fn without_a_run_the_window_says_what_to_do() {
@@ -52,9 +51,7 @@ fn warnings_say_what_and_what_to_do_and_stay_in_sight_a_while() {
     window.get_by_label("force limited"); // counted
     window.get_by_label("1 ticks");
     // Nothing comes any more, and the host has not said that it ended.
-    std::thread::sleep(Duration::from_millis(600));
-    window.run_steps(2);
-    window.get_by_label("no ticks come");
+    until(&mut window, |window| window.query_by_label("no ticks come").is_some());
     window.get_by_label_contains("Stale data");
 }
 

@@ -74,6 +74,15 @@ impl Display {
     pub(crate) fn picture(&self) -> Vec<u8> {
         std::fs::read(&self.screen).expect("the server keeps it")
     }
+
+    /// What is on it once that does not change for a while.
+    pub(crate) fn picture_at_rest(&self) -> Vec<u8> {
+        patiently("a picture that stays", || {
+            let picture = self.picture();
+            std::thread::sleep(Duration::from_millis(300));
+            (picture == self.picture()).then_some(picture)
+        })
+    }
 }
 
 /// A program of this workspace for a test: on this display or on none, and with no run and no choices of whoever runs the test.
@@ -85,6 +94,18 @@ pub(crate) fn alone(name: &str, folder: &Path, display: Option<&Display>) -> Com
     // A software adapter takes all processors if it may; the loop needs one.
     command.env("LP_NUM_THREADS", "1").stdin(Stdio::null());
     command
+}
+
+/// A scene of the host with a watchdog that bears a machine on which nothing moves for a while: beside a window that the processor
+/// draws, that is soon so.
+pub(crate) fn patient_scene(folder: &Path, name: &str) -> PathBuf {
+    let scene =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../host/scenes").join(name).with_extension("toml");
+    let scene = std::fs::read_to_string(scene).expect("it is there");
+    let file = folder.join("patient.toml");
+    std::fs::write(&file, scene + "\n[limits]\nwatchdog_ms = 60000\n")
+        .expect("a scratch folder can be written to");
+    file
 }
 
 /// Tries until it works.
