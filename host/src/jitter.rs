@@ -42,12 +42,26 @@ pub struct JitterReport {
     pub servo: LoopTiming,
     /// Sleep, spin, look at the clock.
     pub bare: LoopTiming,
+    /// How many ticks more the servo missed than the bare loop, and how far that is to be trusted.
+    pub missed_more: MissedMore,
     /// What the system granted to both.
     #[serde(skip)]
     pub real_time: RealTimeReport,
     /// Histograms of both, for a picture: lateness and how many ticks had it.
     #[serde(skip)]
     pub bins: [Vec<(u64, u64)>; 2],
+}
+
+/// A difference of counts between servo and bare loop.
+///
+/// On a shared machine a second without disturbance is followed by one with twenty missed ticks, whichever loop has its turn.
+/// How much the pairs of slices differ says how much of the difference may be that.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct MissedMore {
+    /// Servo less bare loop, ticks.
+    pub ticks: f64,
+    /// Standard error of that, ticks; none of a single pair.
+    pub standard_error: Option<f64>,
 }
 
 /// Runs servo and bare loop in turns for `slices` seconds each. `progress` is called after each pair.
@@ -67,8 +81,10 @@ pub fn measure(
             let real_time = enter_real_time();
             let window = SpinWindow::measure(period_ns);
             let (mut with_servo, mut bare) = (Tally::default(), Tally::default());
+            let mut pairs = Pairs::default();
             let mut done = 0;
             while done < slices && !stop.is_stop_asked() && stop.emergency().is_none() {
+                let missed_before = [with_servo.missed, bare.missed];
                 let mut schedule = Schedule::start_real(period_ns, window);
                 while schedule.next_time_ns() < SLICE_NS {
                     let Some(due) = schedule.wait(|_| SampleWait::NotPaced) else { break };
@@ -76,6 +92,8 @@ pub fn measure(
                     with_servo.count(due.lateness_ns.unwrap_or_default(), due.missed, period_ns);
                 }
                 bare_slice(&mut bare, period_ns, window);
+                let [servo_before, bare_before] = missed_before;
+                pairs.add(with_servo.missed - servo_before, bare.missed - bare_before);
                 done += 1;
                 progress(done);
             }
@@ -87,6 +105,7 @@ pub fn measure(
                 slices: done,
                 servo: with_servo.timing(),
                 bare: bare.timing(),
+                missed_more: pairs.missed_more(),
                 real_time,
                 bins: [with_servo.lateness.bins(), bare.lateness.bins()],
             }
@@ -118,6 +137,31 @@ fn bare_slice(tally: &mut Tally, period_ns: u64, window: SpinWindow) {
     }
 }
 
+/// What the slices of a pair differ by, over all pairs.
+#[derive(Default)]
+struct Pairs {
+    count: f64,
+    sum: f64,
+    sum_of_squares: f64,
+}
+
+impl Pairs {
+    #[allow(clippy::cast_precision_loss)] // ticks of a second
+    fn add(&mut self, servo: u64, bare: u64) {
+        let difference = servo as f64 - bare as f64;
+        self.count += 1.0;
+        self.sum += difference;
+        self.sum_of_squares += difference * difference;
+    }
+
+    /// The pairs are taken as independent of each other: the standard error of a sum of `n` is that of one times the root of `n`.
+    fn missed_more(&self) -> MissedMore {
+        let variance = (self.sum_of_squares - self.sum * self.sum / self.count) / (self.count - 1.0);
+        let standard_error = (self.count > 1.0).then(|| (self.count * variance.max(0.0)).sqrt());
+        MissedMore { ticks: self.sum, standard_error }
+    }
+}
+
 #[derive(Default)]
 struct Tally {
     lateness: Durations,
@@ -143,5 +187,31 @@ impl Tally {
             late_ticks: self.late,
             missed_ticks: self.missed,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of_pairs(pairs: &[(u64, u64)]) -> MissedMore {
+        let mut all = Pairs::default();
+        pairs.iter().for_each(|(servo, bare)| all.add(*servo, *bare));
+        all.missed_more()
+    }
+
+    #[test]
+    fn a_difference_is_worth_as_much_as_the_pairs_agree() {
+        assert_eq!(of_pairs(&[]), MissedMore { ticks: 0.0, standard_error: None });
+        assert_eq!(of_pairs(&[(5, 2)]), MissedMore { ticks: 3.0, standard_error: None });
+        // Always one more: nothing is in doubt, whatever both have in common.
+        let steady = of_pairs(&[(1, 0), (21, 20), (8, 7), (4, 3)]);
+        assert_eq!(steady, MissedMore { ticks: 4.0, standard_error: Some(0.0) });
+        // Differences 3, -1, -1, 3: a mean of 1, a variance of 16/3 each.
+        let wild = of_pairs(&[(3, 0), (0, 1), (6, 7), (5, 2)]);
+        assert_eq!(wild.ticks, 4.0);
+        assert!(
+            wild.standard_error.is_some_and(|error| (error - (4.0_f64 * 16.0 / 3.0).sqrt()).abs() < 1e-12)
+        );
     }
 }

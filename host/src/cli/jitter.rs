@@ -3,7 +3,7 @@
 use super::options::{duration_s, rate_hz};
 use super::stopping::stop_on_signals;
 use super::{CommandError, run, style};
-use crate::jitter::{JitterReport, LoopTiming, measure};
+use crate::jitter::{JitterReport, LoopTiming, MissedMore, measure};
 use crate::plot::{Axis, Figure, Panel, Series};
 use crate::registry::Registry;
 use crate::scene::Scene;
@@ -80,7 +80,13 @@ fn to_text(report: &JitterReport) -> String {
         "  {:<6}{:>10}{:>10}{:>10}{:>11}{:>10}{:>8}{:>8}",
         "", "p50", "p99", "p99.9", "max", "ticks", "late", "missed"
     );
-    [style::title(&title), head, row("servo", &report.servo), row("bare", &report.bare)].join("\n")
+    let mut lines = vec![style::title(&title), head, row("servo", &report.servo), row("bare", &report.bare)];
+    if let MissedMore { ticks, standard_error: Some(error) } = report.missed_more {
+        lines.push(format!(
+            "  missed, servo - bare: {ticks:+} ± {error:.0} (standard error, from how much the pairs differ)"
+        ));
+    }
+    lines.join("\n")
 }
 
 fn picture(report: &JitterReport) -> String {

@@ -186,14 +186,13 @@ mod tests {
 
     #[test]
     fn being_put_aside_at_random_does_not_either() {
-        for seed in 0..40_u64 {
-            let most_ns = [1_000, 30_000, 1_000_000][seed as usize % 3];
+        for (seed, most_ns) in (0..40).zip([1_000, 30_000, 1_000_000_u64].into_iter().cycle()) {
             let aside_ns = |reading: usize| {
                 // A hash (splitmix64's finisher, Steele et al. 2014): the same for the same reading.
                 let mut random = (reading as u64 + seed * 1_000_003).wrapping_mul(0x9e37_79b9_7f4a_7c15);
                 random = (random ^ (random >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
                 random ^= random >> 27;
-                if random % 6 == 0 { (random >> 32) % most_ns } else { 0 }
+                if random.is_multiple_of(6) { (random >> 32) % most_ns } else { 0 }
             };
             let error = Processor::new(&aside_ns).error();
             assert!(error <= CountLength::ENOUGH, "seed {seed}: {error}");
