@@ -107,15 +107,21 @@ impl Network {
         Self { hosts, proxy, stop, threads: vec![served, coupled] }
     }
 
-    /// Runs both hosts; `meanwhile` may do something to the way.
-    fn run(&self, program: &Path, scenes: [String; 2], duration_s: f64, meanwhile: impl FnOnce(&Proxy)) {
+    /// Runs both hosts; `meanwhile` may do something to them or to the way.
+    fn run(
+        &self,
+        program: &Path,
+        scenes: [String; 2],
+        duration_s: f64,
+        meanwhile: impl FnOnce(&[Child], &Proxy),
+    ) {
         let mut runs: Vec<Child> = (self.hosts.iter().zip(&scenes))
             .map(|(host, scene)| host.run(program, scene, duration_s))
             .collect();
         wait_until("both hosts run", || {
             self.hosts.iter().all(|host| !host.directory().couplings().is_empty())
         });
-        meanwhile(&self.proxy);
+        meanwhile(&runs, &self.proxy);
         for run in &mut runs {
             assert!(run.wait().unwrap().success(), "a run that ends in order");
         }
@@ -131,6 +137,20 @@ impl Drop for Network {
     }
 }
 
+/// What came out at a host's port while it missed ticks, J: its machine kept it from running, and the last force went on acting.
+/// No controller can have known.
+fn out_while_missing_j(records: &[TickRecord]) -> f64 {
+    let out_j = |pair: &[TickRecord]| (pair[0].port_energy_j - pair[1].port_energy_j).max(0.0);
+    records.windows(2).filter(|pair| pair[1].events.intersects(Events::MISSED)).map(out_j).sum()
+}
+
+/// The accounts of this end and of the other one, as it told, are overdrawn by no more than what came out while ticks were missed.
+fn assert_overdrawn_by_no_more(coupling: &Value, missing_j: [f64; 2]) {
+    for (end, missing_j) in missing_j.into_iter().enumerate() {
+        assert!(number(&coupling["lowest_j"][end]) >= -missing_j, "end {end}: {coupling}");
+    }
+}
+
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
 }
@@ -143,26 +163,28 @@ fn a_pair_over_zenoh_and_a_bad_way_is_stable_and_no_account_is_overdrawn() {
     for (hand, grip) in hands {
         let network = Network::start();
         let scenes = [scene(hand, grip), scene("hold", "relaxed")];
-        network.run(&program, scenes, 4.0, |_| {});
+        network.run(&program, scenes, 4.0, |_, _| {});
         let mut gone_in_j = 0.0;
-        for host in &network.hosts {
+        let records: Vec<Vec<TickRecord>> = network.hosts.iter().map(Host::records).collect();
+        let missing_j: Vec<f64> = records.iter().map(|records| out_while_missing_j(records)).collect();
+        for (index, (host, records)) in network.hosts.iter().zip(&records).enumerate() {
             let summary = host.summary();
             let coupling = &summary["couplings"][0];
             let link = &coupling["link"];
-            println!("{hand}, {grip}: {coupling}");
+            println!("{hand}, {grip}: {coupling}, out while missing ticks {missing_j:?} J");
             assert_eq!(summary["end"], "finished");
-            assert!(number(&coupling["lowest_j"][0]) >= 0.0 && number(&coupling["lowest_j"][1]) >= 0.0);
+            assert_overdrawn_by_no_more(coupling, [missing_j[index], missing_j[1 - index]]);
             assert!(number(&link["heard_ticks"]) > 100.0, "{link}");
             assert!(number(&link["longest_wait_ms"]) < WATCHDOG_MS, "{link}");
             assert_eq!(link["carried"]["refused"], 0);
             gone_in_j += number(&coupling["gone_in_j"][0]);
-            let fastest =
-                host.records().iter().map(|record| record.twist.linear().length()).fold(0.0, f64::max);
+            let fastest = records.iter().map(|record| record.twist.linear().length()).fold(0.0, f64::max);
             // A hand swings with up to 0.1 m/s or so; what drives itself gets to the boundary and past it.
             assert!(fastest < 0.5, "{fastest} m/s");
         }
         assert!(network.proxy.lost() > 0, "a way that loses nothing proves nothing");
-        assert!(gone_in_j >= -1.0e-12, "more came out at both ends than went in: {gone_in_j} J");
+        let missing_j: f64 = missing_j.iter().sum();
+        assert!(gone_in_j >= -missing_j - 1.0e-12, "more came out at both ends than went in: {gone_in_j} J");
     }
 }
 
@@ -171,7 +193,7 @@ fn a_cut_cable_leaves_both_devices_without_force_within_the_watchdog() {
     let Some(program) = program() else { return };
     let network = Network::start();
     let scenes = [scene("press", "firm"), scene("oscillate", "firm")];
-    network.run(&program, scenes, 5.0, |proxy| {
+    network.run(&program, scenes, 5.0, |_, proxy| {
         std::thread::sleep(Duration::from_millis(3000));
         proxy.cut();
     });
@@ -189,4 +211,32 @@ fn a_cut_cable_leaves_both_devices_without_force_within_the_watchdog() {
         assert!(first_silent < records.len(), "the cut is seen");
         assert!(last_felt < first_silent, "no force from the tick on that misses the partner");
     }
+}
+
+/// Whatever a host does, a force that was sent goes on acting while it is kept from running. The account knows of it afterwards.
+#[test]
+fn a_host_that_is_held_up_overdraws_by_what_came_out_meanwhile_and_no_more() {
+    let Some(program) = program() else { return };
+    let network = Network::start();
+    let scenes = [scene("oscillate", "firm"), scene("oscillate", "relaxed")];
+    network.run(&program, scenes, 4.0, |runs, _| {
+        for run in runs.iter().cycle().take(40) {
+            std::thread::sleep(Duration::from_millis(37)); // no part of a swing's period
+            signal("STOP", run);
+            std::thread::sleep(Duration::from_millis(40));
+            signal("CONT", run);
+        }
+    });
+    let missing_j = [0, 1].map(|index| out_while_missing_j(&network.hosts[index].records()));
+    for (index, host) in network.hosts.iter().enumerate() {
+        let summary = host.summary();
+        println!("{}, out while missing ticks {missing_j:?} J", summary["couplings"][0]);
+        assert_overdrawn_by_no_more(&summary["couplings"][0], [missing_j[index], missing_j[1 - index]]);
+    }
+    assert!(missing_j.iter().sum::<f64>() > 1.0e-6, "nothing came out: {missing_j:?}");
+}
+
+fn signal(name: &str, run: &Child) {
+    let sent = Command::new("kill").args([format!("-{name}"), run.id().to_string()]).status();
+    assert!(sent.expect("there is a kill command").success());
 }

@@ -88,7 +88,7 @@ impl Tank {
         self.level_j
     }
 
-    /// The lowest it ever was, J: with the controller on, never below zero.
+    /// The lowest it ever was, J: with the controller on, below zero only by what came out while ticks were missed.
     #[must_use]
     pub fn lowest_j(&self) -> f64 {
         self.lowest_j
