@@ -17,7 +17,8 @@ fn every_period_of_both_loops_is_a_tick_or_missed() {
     assert_eq!(report["slices"], 2);
     let mut missed = [0, 0];
     for (name, missed) in ["servo", "bare"].iter().zip(&mut missed) {
-        let count = |key: &str| report[name][key].as_i64().unwrap_or_else(|| panic!("{name}.{key}: {report}"));
+        let count =
+            |key: &str| report[name][key].as_i64().unwrap_or_else(|| panic!("{name}.{key}: {report}"));
         // Two slices of a second; the last tick of one may come after its end.
         let periods = count("ticks") + count("missed_ticks");
         assert!(periods >= 1000, "{name}: {periods} periods");

@@ -5,11 +5,6 @@ use std::fmt;
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 
-/// A window that has just opened (fonts, shaders, the first ticks) is at rest once no picture has been made for so long, or goes on
-/// making them: after so long at most.
-const QUIET: Duration = Duration::from_secs(1);
-const SETTLES: Duration = Duration::from_secs(4);
-
 /// What a window has cost over a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cost {
@@ -42,7 +37,10 @@ pub fn watch(context: &Context, duration: Duration, tells: Sender<Cost>) {
     let context = context.clone();
     let watching = move || {
         let pictures = || context.cumulative_frame_nr_for(ViewportId::ROOT);
-        settle(pictures);
+        let mut opening = Opening::at(Instant::now(), pictures());
+        while opening.goes_on(Instant::now(), pictures()) {
+            std::thread::sleep(LOOK_PERIOD);
+        }
         let (start, before, used) = (Instant::now(), pictures(), processor());
         std::thread::sleep(duration);
         let cost = Cost {
@@ -57,17 +55,44 @@ pub fn watch(context: &Context, duration: Duration, tells: Sender<Cost>) {
     let _ = std::thread::Builder::new().name("flotor-cost".to_owned()).spawn(watching);
 }
 
-/// Waits until the number of pictures stays what it is, or goes on growing.
-fn settle(pictures: impl Fn() -> u64) {
-    const LOOK_PERIOD: Duration = Duration::from_millis(50);
-    let opened = Instant::now();
-    let (mut last, mut since) = (pictures(), opened);
-    while since.elapsed() < QUIET && opened.elapsed() < SETTLES {
-        std::thread::sleep(LOOK_PERIOD);
-        let now = pictures();
-        if now != last {
-            (last, since) = (now, Instant::now());
+/// How often an opening window is looked at.
+const LOOK_PERIOD: Duration = Duration::from_millis(50);
+
+/// A window that has just opened: fonts, shaders, the first ticks. What it costs then is not what it costs.
+struct Opening {
+    opened: Instant,
+    first: u64,
+    /// Pictures so far, and when the last was made.
+    pictures: u64,
+    last: Instant,
+    /// The longest that any of them took to come.
+    longest: Duration,
+}
+
+impl Opening {
+    /// Pictures that no window makes while it opens; one that has, goes on making them.
+    const MOST_PICTURES: u64 = 60;
+    /// It is at rest when after the first there was none for so long, and for so many times as long as any of them took: on a
+    /// machine with much else to do that may be seconds.
+    const QUIET: Duration = Duration::from_secs(1);
+    const QUIET_TIMES: u32 = 3;
+    /// It has opened after so long in any case.
+    const LONGEST: Duration = Duration::from_secs(30);
+
+    fn at(now: Instant, pictures: u64) -> Self {
+        Self { opened: now, first: pictures, pictures, last: now, longest: Duration::ZERO }
+    }
+
+    /// True until it has opened.
+    fn goes_on(&mut self, now: Instant, pictures: u64) -> bool {
+        if pictures != self.pictures {
+            self.longest = self.longest.max(now - self.last);
+            (self.pictures, self.last) = (pictures, now);
         }
+        let made = pictures - self.first;
+        let is_quiet = made > 0 && now - self.last >= Self::QUIET.max(self.longest * Self::QUIET_TIMES);
+        let goes_on_for_good = made >= Self::MOST_PICTURES;
+        !is_quiet && !goes_on_for_good && now - self.opened < Self::LONGEST
     }
 }
 
@@ -83,4 +108,35 @@ fn resident_mib() -> Option<u64> {
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
     let kib: u64 = line.trim().trim_end_matches("kB").trim().parse().ok()?;
     Some(kib / 1024)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// When a window has opened that makes its pictures at these times, s.
+    fn opens_after_s(pictures_s: &[f64]) -> f64 {
+        let start = Instant::now();
+        let mut opening = Opening::at(start, 7);
+        let looks = (0..).map(|look| LOOK_PERIOD * look);
+        let opened = looks.skip_while(|time| {
+            let made = pictures_s.iter().filter(|picture_s| **picture_s <= time.as_secs_f64()).count();
+            opening.goes_on(start + *time, 7 + made as u64)
+        });
+        opened.map(|time| time.as_secs_f64()).next().expect("it does not take for ever")
+    }
+
+    #[test]
+    fn a_window_has_opened_when_it_rests_or_goes_on_for_good() {
+        let close = |a: f64, b: f64| (a - b).abs() < 2.5 * LOOK_PERIOD.as_secs_f64();
+        assert!(close(opens_after_s(&[]), 30.0));
+        assert!(close(opens_after_s(&[0.1, 0.2, 0.4]), 1.4));
+        // A busy machine: a picture every two seconds is no rest in between.
+        assert!(close(opens_after_s(&[0.9, 2.9, 4.9, 6.9]), 12.9));
+        let steadily =
+            |rate_hz: f64| (1..6000).map(|picture| f64::from(picture) / rate_hz).collect::<Vec<_>>();
+        assert!(close(opens_after_s(&steadily(60.0)), 1.0));
+        assert!(close(opens_after_s(&steadily(5.0)), 12.0));
+        assert!(close(opens_after_s(&steadily(0.9)), 30.0));
+    }
 }
