@@ -10,7 +10,7 @@ use flotor::trace::TickRecord;
 use flotor_tests::library::compile_c_file;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
-use flotor_tests::workspace_root;
+use flotor_tests::{holds_ticks, workspace_root};
 use std::ffi::OsStr;
 use std::path::Path;
 use std::process::Command;
@@ -36,7 +36,7 @@ fn a_killed_process_loses_at_most_a_second_of_its_recording() {
     let running = Flotor::with(arguments).start();
     // The first ticks in the file: the loop has been running since at least now.
     let started = Instant::now();
-    while !std::fs::metadata(&file).is_ok_and(|file| file.len() > 20_000) {
+    while !holds_ticks(&file) {
         assert!(started.elapsed() < Duration::from_secs(30), "there is no recording");
         std::thread::sleep(Duration::from_millis(5));
     }

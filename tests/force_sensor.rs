@@ -49,7 +49,7 @@ fn run_beside_a_sensor(answers: u32, duration_s: f64, timeout_ms: u32) -> Watche
 
 #[test]
 fn a_slow_sensor_costs_the_handle_nothing() {
-    let run = run_beside_a_sensor(u32::MAX, 0.5, 10_000);
+    let run = run_beside_a_sensor(u32::MAX, 3.0, 10_000);
     assert_eq!(run.outcome.end, RunEnd::Finished);
     assert!(!run.records.iter().any(|record| record.events.intersects(Events::HOLDING)));
     let readings: Vec<f64> = run

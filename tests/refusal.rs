@@ -528,12 +528,11 @@ fn validate_survives_a_plugin_that_ends_the_process_and_checks_the_other_rules()
 
 #[test]
 fn validate_survives_a_plugin_that_hangs() {
-    let arguments =
-        ["validate".into(), plugin_file(MODEL).into_os_string(), "--timeout".into(), "10s".into()];
+    let arguments = ["validate".into(), plugin_file(MODEL).into_os_string(), "--timeout".into(), "3s".into()];
     let ran = Flotor::with(arguments).env(fixture_faulty_model::FAULT_VARIABLE, "hangs").run();
     assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
     assert!(ran.stdout.contains("FAILED  finite-near-home"), "{ran:#?}");
-    assert!(ran.stdout.contains("it did not come back within 10s"), "{ran:#?}");
+    assert!(ran.stdout.contains("it did not come back within 3s"), "{ran:#?}");
 }
 
 /// One rule, asked in the process of its own that `flotor validate` starts for it.

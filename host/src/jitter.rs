@@ -60,7 +60,7 @@ pub struct JitterReport {
 pub struct MissedMore {
     /// Servo less bare loop, ticks.
     pub ticks: f64,
-    /// Standard error of that, ticks; none of a single pair.
+    /// Standard error of that, ticks: it grows with the root of the time; none of a single pair.
     pub standard_error: Option<f64>,
 }
 

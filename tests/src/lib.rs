@@ -9,6 +9,7 @@ pub mod scratch;
 pub mod tables;
 pub mod watched;
 
+use flotor::record::Recording;
 use std::path::{Path, PathBuf};
 
 /// The root of the workspace: the folder with the README.
@@ -65,6 +66,12 @@ pub fn plugin_folders() -> Vec<String> {
 #[must_use]
 pub fn crate_name_of(plugin_folder: &str) -> String {
     format!("flotor-{}", plugin_folder.rsplit('/').next().unwrap_or_default())
+}
+
+/// True once ticks have reached a recording that is being written: its loop runs.
+#[must_use]
+pub fn holds_ticks(recording: &Path) -> bool {
+    Recording::open(recording).is_ok_and(|mut recording| matches!(recording.next(), Some(Ok(_))))
 }
 
 /// How much work tests that scale may do.

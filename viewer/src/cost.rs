@@ -35,9 +35,10 @@ impl fmt::Display for Cost {
 /// Watches a window for a time on a thread of its own, tells what it cost, and closes it. Without a thread nobody is told.
 pub fn watch(context: &Context, duration: Duration, tells: Sender<Cost>) {
     let context = context.clone();
+    // In its first picture, which this thread may be making.
+    let mut opening = Opening::at(Instant::now(), context.cumulative_frame_nr_for(ViewportId::ROOT));
     let watching = move || {
         let pictures = || context.cumulative_frame_nr_for(ViewportId::ROOT);
-        let mut opening = Opening::at(Instant::now(), pictures());
         while opening.goes_on(Instant::now(), pictures()) {
             std::thread::sleep(LOOK_PERIOD);
         }

@@ -47,7 +47,8 @@ struct Arguments {
     /// Size of text and lines, 1 to 3 (default: 1; a window: as the last time)
     #[arg(long, value_parser = scale, value_name = "FACTOR")]
     scale: Option<f32>,
-    /// Say what the window costs over so many seconds, 1 to 3600, and close it then
+    /// Say what the window costs over so many seconds, 1 to 3600, once it has opened, which may take up to half a minute more, and
+    /// close it then
     #[arg(long, value_parser = seconds, value_name = "SECONDS", conflicts_with_all = ["screenshot", "sitting"])]
     measure: Option<Duration>,
 }

@@ -118,7 +118,7 @@ fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
             }
         }
         // One where the button went down, one where the mouse was moved to; before them perhaps those of an earlier pull.
-        let is_stiffer = changes.windows(2).any(|pair| pair[1].number > 1.2 * pair[0].number);
+        let is_stiffer = changes.last_chunk().is_some_and(|[at, to]| to.number > 1.2 * at.number);
         is_stiffer.then_some(changes)
     });
     for change in &changes {

@@ -89,10 +89,15 @@ impl Rig {
         self.until_board(|board| (board.force_n().map(DVec2::length) == Some(0.0)).then_some(()));
     }
 
+    /// By a host that waits for long: a machine may hold up every answer.
     fn open(&self) -> OpenedDevice {
+        self.open_waiting_ms("8000")
+    }
+
+    fn open_waiting_ms(&self, timeout_ms: &str) -> OpenedDevice {
         let plugin = Plugin::in_process(&flotor_haply::FLOTOR_ENTRY).expect("it is a plugin");
         let set = |key, value| Setting::parse(plugin.parameters(), key, value).expect("it is a parameter");
-        let settings = [set("port", &self.path), set("timeout_ms", "400")];
+        let settings = [set("port", &self.path), set("timeout_ms", timeout_ms)];
         plugin.open_device(&settings).unwrap_or_else(|error| panic!("{error}"))
     }
 }
@@ -116,7 +121,11 @@ struct Loop {
 
 impl Loop {
     fn start(rig: &Rig) -> Self {
-        let active = rig.open().activate(&CONFIG).map_err(|(_, refusal)| refusal).expect("it answers");
+        Self::of(rig.open())
+    }
+
+    fn of(opened: OpenedDevice) -> Self {
+        let active = opened.activate(&CONFIG).map_err(|(_, refusal)| refusal).expect("it answers");
         Self { device: active, index: 0, state: DeviceState::HOME, started: Instant::now() }
     }
 
@@ -216,7 +225,7 @@ fn lost_bytes_cost_samples_and_nothing_else() {
 #[test]
 fn a_silent_board_is_a_timeout_and_an_unplugged_one_is_gone() {
     let rig = Rig::start();
-    let mut run = Loop::start(&rig);
+    let mut run = Loop::of(rig.open_waiting_ms("1000"));
     rig.board().1 = Line::Dead;
     run.until(&Wrench::ZERO, |cycle, _| cycle == Cycle::Fault(Fault::Timeout));
     rig.board().1 = Line::Cut;
@@ -228,8 +237,7 @@ fn another_thread_takes_the_force_away_even_if_the_loop_never_comes_back() {
     let rig = Rig::start();
     let opened = rig.open();
     let stopper = opened.stopper();
-    let active = opened.activate(&CONFIG).map_err(|(_, refusal)| refusal).expect("it answers");
-    let mut run = Loop { device: active, index: 0, state: DeviceState::HOME, started: Instant::now() };
+    let mut run = Loop::of(opened);
     run.until(&Wrench::from_force(DVec3::X), |_, state| state.delivered.force() == DVec3::X);
     std::thread::spawn(move || stopper.safe_stop()).join().expect("it does not panic");
     // No tick from here on.

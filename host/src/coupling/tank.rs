@@ -88,7 +88,8 @@ impl Tank {
         self.level_j
     }
 
-    /// The lowest it ever was, J: with the controller on, below zero only by what came out while ticks were missed.
+    /// The lowest it ever was, J: with the controller on, below zero only by what came out while a force acted for
+    /// longer than a period, in ticks late or missed, or on a handle faster than was to be expected.
     #[must_use]
     pub fn lowest_j(&self) -> f64 {
         self.lowest_j

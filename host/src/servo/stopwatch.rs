@@ -103,7 +103,8 @@ impl CountLength {
             // From the middle of the one look to the middle of the other, twice.
             let twice_ns = (last.before_ns - first.before_ns) + (last.after_ns - first.after_ns);
             let doubt = (first.doubt_ns() + last.doubt_ns()) as f64 / twice_ns as f64;
-            // Counters of two cores may differ, and the process may have moved from the one to the other.
+            // Counters of two cores may differ, and the process may have moved from the one to the other. Only a difference of
+            // more than what has passed shows.
             if doubt < least_doubt && last.count > first.count {
                 (least_doubt, best) = (doubt, Self::of(twice_ns, 2 * (last.count - first.count)));
             }
@@ -220,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn a_counter_that_falls_behind_is_not_believed() {
+    fn a_counter_that_is_behind_its_beginning_is_not_believed() {
         let mut processor = Processor::new(&|_| 0);
         let mut looks = 0;
         let length = CountLength::measured(|| {
