@@ -78,7 +78,13 @@ fn a_mistake_in_c_is_told_in_one_line() {
     let wrong = [
         ("WITHOUT_STEP", "`flotor.force/1` lacks `step`; a plugin must offer it"),
         ("WITHOUT_TABLE", "`flotor.force/1` lacks its function table; a plugin must offer it"),
+        ("SHORT_TABLE", "`flotor.force/1` lacks part of its table; a plugin must offer it"),
+        ("MISALIGNED_TABLE", "`flotor.force/1` lacks an aligned table; a plugin must offer it"),
+        ("SHORT_EXTENSION", "`flotor.activity/1` lacks part of its table; a plugin must offer it"),
+        ("OTHER_KIND", "the metadata say model, the entry's `kind` is 2 (device); make both say the same"),
+        ("ODD_KIND", "the metadata say model, the entry's `kind` is 7 (unknown); make both say the same"),
         ("OTHER_SIZES", "`Input` has 136 bytes in the host and 144 in the plugin; rebuild the plugin"),
+        ("SHORT_ENTRY", "no plugin entry `flotor_entry_wall` in the library"),
         (
             "HIDDEN_ENTRY",
             "no plugin entry `flotor_entry_wall` in the library; export it with default visibility",

@@ -1,9 +1,11 @@
 /* A force model in C: a wall that pushes the hand up where it is below home. All a plugin needs is the header.
  *
- * WITHOUT_STEP, WITHOUT_TABLE, OTHER_SIZES, HIDDEN_ENTRY and ODD_ANSWERS make the mistakes a C author can make;
- * the tests expect each to be refused. CRASHES follows a null pointer from tick 50 on. */
+ * WITHOUT_STEP, WITHOUT_TABLE, SHORT_TABLE, MISALIGNED_TABLE, SHORT_EXTENSION, OTHER_SIZES, OTHER_KIND, ODD_KIND,
+ * SHORT_ENTRY, HIDDEN_ENTRY and ODD_ANSWERS make the mistakes a C author can make; the tests expect each to be
+ * refused. CRASHES follows a null pointer from tick 50 on. */
 #include "flotor.h"
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -65,7 +67,11 @@ static uint32_t step(FlotorInstance instance, const FlotorInput *input, FlotorOu
 #endif
 
 static const FlotorForceTable table = {
+#ifdef SHORT_TABLE
+    .size = offsetof(FlotorForceTable, last_message),
+#else
     .size = sizeof(FlotorForceTable),
+#endif
     .parameter_count = 1,
     .parameters = parameters,
     .info = {.id = FLOTOR_STR("fixture-c-wall"), .name = FLOTOR_STR("Wall"), .doc = FLOTOR_STR("A flat wall, in C"),
@@ -77,12 +83,31 @@ static const FlotorForceTable table = {
 #endif
 };
 
+#ifdef SHORT_EXTENSION
+static const FlotorActivityTable activity = {.size = offsetof(FlotorActivityTable, region)};
+#endif
+
+static int is(FlotorStr id, const char *name) {
+    return id.len == strlen(name) && memcmp(id.ptr, name, id.len) == 0;
+}
+
 static const void *get_interface(FlotorStr id) {
-    static const char force[] = FLOTOR_INTERFACE_FORCE;
 #ifdef WITHOUT_TABLE
     id.len = 0;
 #endif
-    return id.len == sizeof force - 1 && memcmp(id.ptr, force, id.len) == 0 ? &table : NULL;
+#ifdef SHORT_EXTENSION
+    if (is(id, FLOTOR_INTERFACE_ACTIVITY)) {
+        return &activity;
+    }
+#endif
+    if (!is(id, FLOTOR_INTERFACE_FORCE)) {
+        return NULL;
+    }
+#ifdef MISALIGNED_TABLE
+    return (const char *)&table + 4;
+#else
+    return &table;
+#endif
 }
 
 #ifdef HIDDEN_ENTRY
@@ -92,10 +117,20 @@ FLOTOR_EXPORT extern const FlotorEntry flotor_entry_wall;
 #endif
 const FlotorEntry flotor_entry_wall = {
     .magic = FLOTOR_MAGIC_BYTES,
+#ifdef SHORT_ENTRY
+    .size = offsetof(FlotorEntry, layout_proof),
+#else
     .size = sizeof(FlotorEntry),
+#endif
     .abi_major = FLOTOR_ABI_MAJOR,
     .abi_minor = FLOTOR_ABI_MINOR,
+#if defined(OTHER_KIND)
+    .kind = FlotorPluginKind_Device,
+#elif defined(ODD_KIND)
+    .kind = 7, /* no kind of the contract */
+#else
     .kind = FlotorPluginKind_Model,
+#endif
 #ifdef OTHER_SIZES
     .sizes = {.input = sizeof(FlotorInput) + 8, .output = sizeof(FlotorOutput)},
 #else

@@ -57,6 +57,16 @@ pub enum PluginKind {
 }
 
 impl PluginKind {
+    /// Reads a kind from the boundary; `None` for a code that this contract does not know.
+    #[must_use]
+    pub const fn from_code(code: u32) -> Option<Self> {
+        match code {
+            1 => Some(Self::Model),
+            2 => Some(Self::Device),
+            _ => None,
+        }
+    }
+
     /// The word in metadata and in lists.
     #[must_use]
     pub const fn word(self) -> &'static str {

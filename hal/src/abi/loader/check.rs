@@ -1,7 +1,7 @@
 //! Compares the contract as host and plugin were compiled, and says in one line what differs.
 
 use crate::abi::proof::{CONTRACT, EXTENSIONS, Layout};
-use crate::abi::{ContractSizes, Entry, Str};
+use crate::abi::{ContractSizes, Entry, LayoutProof, Str};
 use abi_stable::abi_stability::abi_checking::check_layout_compatibility;
 use abi_stable::library::AbiHeader;
 use abi_stable::type_layout::TLData;
@@ -21,8 +21,13 @@ pub(super) enum Proof {
 /// `entry` is a live entry whose magic, size and contract version were checked: its pointers may be followed.
 pub(super) unsafe fn contract(entry: &'static Entry) -> Result<Proof, String> {
     sizes(&entry.sizes)?;
-    // SAFETY: by the contract of this function the pointer is null or leads to a static of the plugin.
-    let Some(proof) = (unsafe { entry.layout_proof.as_ref() }) else { return Ok(Proof::Absent) };
+    if entry.layout_proof.is_null() {
+        return Ok(Proof::Absent);
+    }
+    // SAFETY: not null, so by the contract of this function a static proof of the plugin.
+    let Some(proof) = (unsafe { whole_proof(entry.layout_proof) }) else {
+        return Err("the plugin's layout proof is not whole".to_owned());
+    };
     // SAFETY: an `AbiHeader` is frozen by abi_stable for ever and says whether the rest can be read.
     let header = unsafe { proof.abi_stable_header.cast::<AbiHeader>().as_ref() };
     if !header.is_some_and(AbiHeader::is_valid) {
@@ -39,6 +44,23 @@ pub(super) unsafe fn contract(entry: &'static Entry) -> Result<Proof, String> {
         theirs(name).map_or(Ok(()), |theirs| same(name, ours, theirs))?;
     }
     Ok(Proof::Checked)
+}
+
+/// The proof at an address, if none of it is missing.
+///
+/// # Safety
+/// The address of a static proof, or of as much of one as the size it starts with says.
+unsafe fn whole_proof(address: *const LayoutProof) -> Option<&'static LayoutProof> {
+    if !address.is_aligned() {
+        return None;
+    }
+    // SAFETY: aligned, and every proof starts with its size, as this function demands.
+    let size = unsafe { (&raw const (*address).size).read() };
+    if (size as usize) < size_of::<LayoutProof>() {
+        return None;
+    }
+    // SAFETY: aligned and, by its own word, whole; a static of a plugin, which is never unloaded.
+    Some(unsafe { &*address })
 }
 
 fn same(name: &str, ours: &'static Layout, theirs: &'static Layout) -> Result<(), String> {

@@ -1,7 +1,7 @@
 //! A device a host may use, in two types: opened (it answers) and active (it moves hands).
 
 use super::Setting;
-use super::library::DeviceExtensions;
+use super::interfaces::DeviceExtensions;
 use super::model::refusal_from;
 use crate::abi::{CallStatus, DeviceTable, Instance, Message};
 use crate::{

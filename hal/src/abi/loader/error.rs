@@ -1,5 +1,6 @@
 //! Why a plugin was refused: one readable line with file, cause and remedy.
 
+use crate::abi::PluginKind;
 use crate::{Refusal, RefusalKind};
 use std::path::PathBuf;
 
@@ -87,6 +88,19 @@ pub enum LoadError {
         /// The name in the metadata.
         symbol: String,
     },
+    /// The entry is of another kind than the metadata say, or of none the contract knows.
+    #[error(
+        "{}: the metadata say {metadata}, the entry's `kind` is {entry} ({}); make both say the same and build \
+         the plugin again", path.display(), kind_word(*entry)
+    )]
+    OtherEntryKind {
+        /// The file.
+        path: PathBuf,
+        /// What the metadata say.
+        metadata: &'static str,
+        /// Code of the kind in the entry.
+        entry: u32,
+    },
     /// A struct of the contract differs between host and plugin.
     #[error("{}: the contract differs: {difference}; rebuild the plugin against this host's flotor-hal", path.display())]
     LayoutDiffers {
@@ -135,4 +149,8 @@ const fn advice(kind: RefusalKind) -> &'static str {
         RefusalKind::Broken => "; report this to the author of the plugin",
         RefusalKind::Parameter | RefusalKind::Unsupported | RefusalKind::Resource => "",
     }
+}
+
+fn kind_word(code: u32) -> &'static str {
+    PluginKind::from_code(code).map_or("unknown", PluginKind::word)
 }

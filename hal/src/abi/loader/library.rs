@@ -1,12 +1,9 @@
 //! A loaded plugin: a private copy of its file, opened once, never unloaded.
 
+use super::interfaces::Interface;
 use super::model::{Model, ModelTables};
 use super::{LoadError, Metadata, OpenedDevice, Setting, check, metadata_file};
-use crate::abi::{
-    ABI_MAJOR, ABI_MINOR, ActivityTable, CalibrationTable, CenterlineTable, DetailsTable, DevicePacingTable,
-    DeviceTable, EnergyLedgerTable, Entry, ForceTable, HOST_QUIET_PANICS, Host, LinearFieldTable, MAGIC,
-    PluginKind, ReachTable, Str, VariantTable, interface_ids, is_spoken,
-};
+use crate::abi::{ABI_MAJOR, ABI_MINOR, Entry, HOST_QUIET_PANICS, Host, MAGIC, PluginKind, is_spoken};
 use crate::{DeviceInfo, ModelInfo, Parameter};
 use object::ReadCache;
 use std::ffi::CString;
@@ -32,22 +29,13 @@ pub struct Plugin {
     proof: check::Proof,
 }
 
-#[derive(Clone, Copy)]
-enum Interface {
-    Model(ModelTables),
-    Device { device: &'static DeviceTable, extensions: DeviceExtensions },
-}
-
-/// What a device offers beyond the plain one.
-#[derive(Clone, Copy)]
-pub(super) struct DeviceExtensions {
-    pub(super) ledger: Option<&'static EnergyLedgerTable>,
-    pub(super) calibration: Option<&'static CalibrationTable>,
-    pub(super) pacing: Option<&'static DevicePacingTable>,
-}
-
 impl Plugin {
-    /// Loads a plugin from a file. Not real-time. Runs the plugin's code: the caller trusts the file.
+    /// Loads a plugin from a file. Not real-time; runs the plugin's code.
+    ///
+    /// That is trust in the file, as starting a program is: its code runs in this process, with all that the
+    /// process may do, from its initialisers on. The checks find mistakes of an author, not malice, and no
+    /// type vouches for what the code does; a caller that cannot trust a file has to leave it alone.
+    /// [`super::read_metadata`] runs none of it.
     ///
     /// # Errors
     /// [`LoadError`], with file, cause and remedy; the process survives all of them.
@@ -59,17 +47,24 @@ impl Plugin {
         let metadata = metadata_file::parse(path, &ReadCache::new(&copy), length)?;
         metadata.check_contract()?;
         let entry = open_private_copy(&metadata, copy)?;
-        Self::from_entry(metadata, entry, Runtime::Own)
+        // SAFETY: null, or what the metadata call the entry, in a library that is never unloaded; that code
+        // which bears the marks of a plugin keeps the contract is the trust that this function speaks of.
+        unsafe { Self::from_entry(metadata, entry, Runtime::Own) }
     }
 
-    /// Wraps a plugin that is linked into this program: for debuggers, sanitizers and tests. Not real-time.
+    /// Wraps a plugin that is linked into this program: for debuggers, sanitizers and tests. Not real-time;
+    /// runs the plugin's code.
+    ///
+    /// The entry is trusted as a file is by [`Self::load`]: its pointers are followed. Those of the export
+    /// macros keep the contract; whoever puts one together by hand sees to it, and no type does.
     ///
     /// # Errors
     /// [`LoadError`], as for a file.
     pub fn in_process(entry: &'static Entry) -> Result<Self, LoadError> {
         let metadata = Metadata {
             path: PathBuf::new(),
-            kind: PluginKind::Model,
+            // The entry's own word: there is no other. One that is unknown is refused in `from_entry`.
+            kind: PluginKind::from_code(entry.kind).unwrap_or(PluginKind::Model),
             id: String::new(),
             name: String::new(),
             doc: String::new(),
@@ -77,26 +72,35 @@ impl Plugin {
             abi: format!("{ABI_MAJOR}.{ABI_MINOR}"),
             entry: String::new(),
         };
-        let mut plugin = Self::from_entry(metadata, entry, Runtime::Shared)?;
-        let (kind, id, name, doc) = match plugin.interface {
+        // SAFETY: a whole entry, for ever; that it keeps the contract is the trust this function speaks of.
+        let mut plugin = unsafe { Self::from_entry(metadata, entry, Runtime::Shared) }?;
+        let (id, name, doc) = match plugin.interface {
             Interface::Model(ModelTables { force, .. }) => {
-                (PluginKind::Model, force.info.id(), force.info.name(), force.info.doc())
+                (force.info.id(), force.info.name(), force.info.doc())
             }
-            Interface::Device { device, .. } => {
-                (PluginKind::Device, device.info.id(), device.info.name(), device.info.doc())
-            }
+            Interface::Device { device, .. } => (device.info.id(), device.info.name(), device.info.doc()),
         };
         let (id, name, doc) = (id.to_owned(), name.to_owned(), doc.to_owned());
-        plugin.metadata = Metadata { kind, id, name, doc, ..plugin.metadata };
+        plugin.metadata = Metadata { id, name, doc, ..plugin.metadata };
         Ok(plugin)
     }
 
-    fn from_entry(metadata: Metadata, entry: &'static Entry, runtime: Runtime) -> Result<Self, LoadError> {
+    /// Checks an entry and what is behind it, each thing before anything relies on it.
+    ///
+    /// # Safety
+    /// `entry` is null or the address of eight bytes and more that stay for ever. If those are the magic,
+    /// there is an entry that keeps the contract it names: it has the bytes it says, and its pointers and
+    /// functions are what they are declared to be.
+    unsafe fn from_entry(
+        metadata: Metadata,
+        entry: *const Entry,
+        runtime: Runtime,
+    ) -> Result<Self, LoadError> {
         let path = &metadata.path;
-        let bad_entry = || LoadError::NoEntry { path: path.clone(), symbol: metadata.entry.clone() };
-        if entry.magic != MAGIC || (entry.size as usize) < size_of::<Entry>() {
-            return Err(bad_entry());
-        }
+        // SAFETY: as this function demands.
+        let Some(entry) = (unsafe { whole_entry(entry) }) else {
+            return Err(LoadError::NoEntry { path: path.clone(), symbol: metadata.entry.clone() });
+        };
         if !is_spoken(entry.abi_major, entry.abi_minor) {
             return Err(LoadError::OtherContract {
                 path: path.clone(),
@@ -104,7 +108,14 @@ impl Plugin {
                 ours: format!("{ABI_MAJOR}.{ABI_MINOR}"),
             });
         }
-        // SAFETY: magic, size and contract version were checked just above.
+        if PluginKind::from_code(entry.kind) != Some(metadata.kind) {
+            return Err(LoadError::OtherEntryKind {
+                path: path.clone(),
+                metadata: metadata.kind.word(),
+                entry: entry.kind,
+            });
+        }
+        // SAFETY: magic, size and contract version were checked just above; the rest this function demands.
         let proof = unsafe { check::contract(entry) };
         let proof =
             proof.map_err(|difference| LoadError::LayoutDiffers { path: path.clone(), difference })?;
@@ -114,7 +125,8 @@ impl Plugin {
             // SAFETY: `init` takes a host struct that is valid for the call; the contract says it does not unwind.
             unsafe { init(&raw const host) };
         }
-        let interface = find_interface(&metadata, entry)?;
+        // SAFETY: the plugin keeps the contract, as this function demands.
+        let interface = unsafe { Interface::find(path, entry, metadata.kind) }?;
         Ok(Self { metadata, interface, proof })
     }
 
@@ -204,27 +216,51 @@ fn file_in_memory(path: &Path) -> std::io::Result<File> {
 
 /// Opens a copy in memory, the very bytes that were checked, so that nobody can change the file under a running loop
 /// (an overwritten mapped library raises SIGBUS at the next call) and a rebuilt plugin at the same path is new code.
-fn open_private_copy(metadata: &Metadata, file: File) -> Result<&'static Entry, LoadError> {
+///
+/// Gives what the metadata call the entry, to be checked; null if there is no such symbol.
+fn open_private_copy(metadata: &Metadata, file: File) -> Result<*const Entry, LoadError> {
     let path = &metadata.path;
     let copy = format!("/proc/self/fd/{}", file.as_raw_fd());
 
     use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
     // RTLD_NOW: with lazy binding a missing symbol would kill the process in the middle of a tick.
-    // SAFETY: opening runs the library's initialisers; that this is trusted code is the contract of `load`.
+    // SAFETY: opening runs the library's initialisers. Nothing here makes that safe: it is the trust in the
+    // file that `load` speaks of.
     let library = unsafe { Library::open(Some(&copy), RTLD_NOW | RTLD_LOCAL) }.map_err(|cause| {
         LoadError::Link { path: path.clone(), cause: whole_cause(&cause).replace(&copy, "it") }
     })?;
     let symbol = metadata.entry.as_str();
-    // SAFETY: the symbol is only used as an address here; it is checked to be an `Entry` before it is trusted.
+    // SAFETY: the symbol is only used as an address here; it is checked to be an `Entry` before it is one to
+    // anybody.
     let found = unsafe { library.get::<*const Entry>(symbol.as_bytes()) }.map(|entry| entry.as_raw_ptr());
-    let address = found.unwrap_or(std::ptr::null_mut()).cast::<Entry>();
+    let address = found.unwrap_or(std::ptr::null_mut()).cast::<Entry>().cast_const();
     // Thread-local destructors make unloading unsound: a library stays for the life of the process. Its file
     // stays open too: the linker knows a library by its path, and a reused descriptor would be the same path.
     std::mem::forget((library, file));
-    // SAFETY: null, or a static of at least the magic's size in a library that is never unloaded; its content is
-    // compared with the magic first, and `from_entry` checks its size and version before any pointer is followed.
-    let entry = unsafe { address.as_ref() };
-    entry.ok_or_else(|| LoadError::NoEntry { path: path.clone(), symbol: symbol.to_owned() })
+    Ok(address)
+}
+
+/// The entry at an address, if there is one and none of it is missing.
+///
+/// # Safety
+/// As for [`Plugin::from_entry`].
+unsafe fn whole_entry(address: *const Entry) -> Option<&'static Entry> {
+    if address.is_null() || !address.is_aligned() {
+        return None;
+    }
+    // SAFETY: not null, hence eight bytes at the least, as this function demands; bytes need no alignment.
+    let magic = unsafe { address.cast::<[u8; 8]>().read() };
+    if magic != MAGIC {
+        return None;
+    }
+    // SAFETY: what has the magic is an entry, as this function demands, and every one says its size behind
+    // it.
+    let size = unsafe { (&raw const (*address).size).read() };
+    if (size as usize) < size_of::<Entry>() {
+        return None;
+    }
+    // SAFETY: not null, aligned and, by its own word, whole; it stays for ever, and any bits are an `Entry`.
+    Some(unsafe { &*address })
 }
 
 fn whole_cause(error: &dyn std::error::Error) -> String {
@@ -235,69 +271,4 @@ fn whole_cause(error: &dyn std::error::Error) -> String {
         source = cause.source();
     }
     text
-}
-
-fn find_interface(metadata: &Metadata, entry: &'static Entry) -> Result<Interface, LoadError> {
-    let missing =
-        |interface, missing| LoadError::MissingFunction { path: metadata.path.clone(), interface, missing };
-    let Some(get_interface) = entry.get_interface else {
-        return Err(missing("the entry", "`get_interface`"));
-    };
-    // SAFETY: an id with static lifetime; the contract of `get_interface` is to answer null or a static table.
-    let table = |id| unsafe { get_interface(Str::new(id)) };
-    if entry.kind == PluginKind::Device as u32 {
-        let id = interface_ids::DEVICE;
-        // SAFETY: the table behind this id is a `DeviceTable`, by the contract and the layout check.
-        let device = unsafe { table(id).cast::<DeviceTable>().as_ref() };
-        let device = device.filter(|table| table.size as usize >= size_of::<DeviceTable>());
-        let device = device.ok_or_else(|| missing(id, "its function table"))?;
-        let required = [
-            ("`open`", device.open.is_some()),
-            ("`close`", device.close.is_some()),
-            ("`capabilities`", device.capabilities.is_some()),
-            ("`activate`", device.activate.is_some()),
-            ("`deactivate`", device.deactivate.is_some()),
-            ("`read`", device.read.is_some()),
-            ("`write`", device.write.is_some()),
-            ("`safe_stop`", device.safe_stop.is_some()),
-        ];
-        if let Some((name, _)) = required.iter().find(|(_, present)| !present) {
-            return Err(missing(id, name));
-        }
-        // SAFETY: as above, for the extension's table.
-        let ledger = unsafe { table(interface_ids::ENERGY_LEDGER).cast::<EnergyLedgerTable>().as_ref() };
-        // SAFETY: as above, for the extension's table.
-        let calibration = unsafe { table(interface_ids::CALIBRATION).cast::<CalibrationTable>().as_ref() };
-        let calibration = calibration.filter(|table| table.size as usize >= size_of::<CalibrationTable>());
-        // SAFETY: as above, for the extension's table.
-        let pacing = unsafe { table(interface_ids::DEVICE_PACING).cast::<DevicePacingTable>().as_ref() };
-        let pacing = pacing.filter(|table| table.size as usize >= size_of::<DevicePacingTable>());
-        Ok(Interface::Device { device, extensions: DeviceExtensions { ledger, calibration, pacing } })
-    } else {
-        let id = interface_ids::FORCE;
-        // SAFETY: the table behind this id is a `ForceTable`, by the contract and the layout check.
-        let force = unsafe { table(id).cast::<ForceTable>().as_ref() };
-        let force = force.filter(|table| table.size as usize >= size_of::<ForceTable>());
-        let force = force.ok_or_else(|| missing(id, "its function table"))?;
-        let required = [
-            ("`create`", force.create.is_some()),
-            ("`destroy`", force.destroy.is_some()),
-            ("`step`", force.step.is_some()),
-        ];
-        if let Some((name, _)) = required.iter().find(|(_, present)| !present) {
-            return Err(missing(id, name));
-        }
-        // SAFETY: as above, for the tables of the extensions.
-        let (centerline, variant, details, activity, field, reach) = unsafe {
-            (
-                table(interface_ids::CENTERLINE).cast::<CenterlineTable>().as_ref(),
-                table(interface_ids::VARIANT).cast::<VariantTable>().as_ref(),
-                table(interface_ids::DETAILS).cast::<DetailsTable>().as_ref(),
-                table(interface_ids::ACTIVITY).cast::<ActivityTable>().as_ref(),
-                table(interface_ids::LINEAR_FIELD).cast::<LinearFieldTable>().as_ref(),
-                table(interface_ids::REACH).cast::<ReachTable>().as_ref(),
-            )
-        };
-        Ok(Interface::Model(ModelTables { force, centerline, variant, details, activity, field, reach }))
-    }
 }

@@ -2,13 +2,14 @@
 //! structs, and wrap its tables in types that cannot be called in the wrong order.
 //!
 //! Order of a load, each step cheaper and safer than the next:
-//! file -> ELF section with metadata -> contract version -> private copy -> `dlopen` -> entry -> sizes ->
-//! layouts -> interface table. Nothing of the plugin runs before `dlopen`, and a file that fails before it
+//! file -> ELF section with metadata -> contract version -> private copy -> `dlopen` -> entry -> kind ->
+//! sizes -> layouts -> interface table. Nothing of the plugin runs before `dlopen`, and a file that fails before it
 //! never gets that far: a truncated library would otherwise raise SIGBUS inside `dlopen`.
 
 mod check;
 mod device;
 mod error;
+mod interfaces;
 mod library;
 mod metadata_file;
 mod model;

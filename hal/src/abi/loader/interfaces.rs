@@ -1,0 +1,232 @@
+//! Finds the function tables behind an entry, and reads none that is shorter than the contract's.
+
+use super::LoadError;
+use super::model::ModelTables;
+use crate::abi::{
+    ActivityTable, CalibrationTable, CenterlineTable, DetailsTable, DevicePacingTable, DeviceTable,
+    EnergyLedgerTable, Entry, ForceTable, LinearFieldTable, PluginKind, ReachTable, Str, VariantTable,
+    interface_ids,
+};
+use std::ffi::c_void;
+use std::path::Path;
+
+/// The tables of a plugin, by its kind.
+#[derive(Clone, Copy)]
+pub(super) enum Interface {
+    Model(ModelTables),
+    Device { device: &'static DeviceTable, extensions: DeviceExtensions },
+}
+
+/// What a device offers beyond the plain one.
+#[derive(Clone, Copy)]
+pub(super) struct DeviceExtensions {
+    pub(super) ledger: Option<&'static EnergyLedgerTable>,
+    pub(super) calibration: Option<&'static CalibrationTable>,
+    pub(super) pacing: Option<&'static DevicePacingTable>,
+}
+
+impl Interface {
+    /// Asks a plugin for the tables of its kind. Not real-time; runs the plugin's code.
+    ///
+    /// # Errors
+    /// [`LoadError::MissingFunction`]: the interface or a required function of it is not there, or a table,
+    /// be it of an extension, is shorter than the contract's.
+    ///
+    /// # Safety
+    /// `entry` is the entry of a plugin that keeps the contract: `get_interface` answers any id with null or
+    /// with the address of a static that starts with its size in bytes and is the table of that id as far as
+    /// it goes.
+    pub(super) unsafe fn find(
+        path: &Path,
+        entry: &'static Entry,
+        kind: PluginKind,
+    ) -> Result<Self, LoadError> {
+        let Some(get_interface) = entry.get_interface else {
+            return Err(lack(path, "the entry", "`get_interface`"));
+        };
+        let offers = Offers { path, get_interface };
+        match kind {
+            PluginKind::Device => offers.device(),
+            PluginKind::Model => offers.model(),
+        }
+    }
+}
+
+type GetInterface = unsafe extern "C" fn(id: Str) -> *const c_void;
+
+/// What a plugin offers. Its function answers as [`Interface::find`] demands.
+struct Offers<'a> {
+    path: &'a Path,
+    get_interface: GetInterface,
+}
+
+impl Offers<'_> {
+    fn device(&self) -> Result<Interface, LoadError> {
+        let device: &'static DeviceTable = self.required()?;
+        let functions = [
+            ("`open`", device.open.is_some()),
+            ("`close`", device.close.is_some()),
+            ("`capabilities`", device.capabilities.is_some()),
+            ("`activate`", device.activate.is_some()),
+            ("`deactivate`", device.deactivate.is_some()),
+            ("`read`", device.read.is_some()),
+            ("`write`", device.write.is_some()),
+            ("`safe_stop`", device.safe_stop.is_some()),
+        ];
+        self.check_functions(DeviceTable::ID, &functions)?;
+        let extensions =
+            DeviceExtensions { ledger: self.table()?, calibration: self.table()?, pacing: self.table()? };
+        Ok(Interface::Device { device, extensions })
+    }
+
+    fn model(&self) -> Result<Interface, LoadError> {
+        let force: &'static ForceTable = self.required()?;
+        let functions = [
+            ("`create`", force.create.is_some()),
+            ("`destroy`", force.destroy.is_some()),
+            ("`step`", force.step.is_some()),
+        ];
+        self.check_functions(ForceTable::ID, &functions)?;
+        Ok(Interface::Model(ModelTables {
+            force,
+            centerline: self.table()?,
+            variant: self.table()?,
+            details: self.table()?,
+            activity: self.table()?,
+            field: self.table()?,
+            reach: self.table()?,
+        }))
+    }
+
+    fn required<T: Table>(&self) -> Result<&'static T, LoadError> {
+        self.table()?.ok_or_else(|| self.lacks(T::ID, "its function table"))
+    }
+
+    /// The table behind an id; `None` if the plugin does not offer it. A short one is a mistake and no older
+    /// contract: 1.0 fixed the sizes of all tables.
+    fn table<T: Table>(&self) -> Result<Option<&'static T>, LoadError> {
+        // SAFETY: the plugin keeps the contract ([`Interface::find`]), by which any id may be asked for; this
+        // one lives for ever.
+        let table = unsafe { (self.get_interface)(Str::new(T::ID)) }.cast::<T>();
+        if table.is_null() {
+            return Ok(None);
+        }
+        if !table.is_aligned() {
+            return Err(self.lacks(T::ID, "an aligned table"));
+        }
+        // SAFETY: not null, and aligned for a `T`, hence for the number it starts with ([`Table`]); so much
+        // of it is there, however short it is ([`Interface::find`]).
+        let size = unsafe { table.cast::<u32>().read() };
+        if (size as usize) < size_of::<T>() {
+            return Err(self.lacks(T::ID, "part of its table"));
+        }
+        // SAFETY: not null and aligned, as was seen above; a `T` by its id, whole by its own word, and a
+        // static of a library that is never unloaded ([`Interface::find`]); it takes any bits ([`Table`]).
+        Ok(Some(unsafe { &*table }))
+    }
+
+    fn check_functions(
+        &self,
+        interface: &'static str,
+        functions: &[(&'static str, bool)],
+    ) -> Result<(), LoadError> {
+        match functions.iter().find(|(_, present)| !present) {
+            Some(&(name, _)) => Err(self.lacks(interface, name)),
+            None => Ok(()),
+        }
+    }
+
+    fn lacks(&self, interface: &'static str, missing: &'static str) -> LoadError {
+        lack(self.path, interface, missing)
+    }
+}
+
+fn lack(path: &Path, interface: &'static str, missing: &'static str) -> LoadError {
+    LoadError::MissingFunction { path: path.into(), interface, missing }
+}
+
+/// A function table of the contract.
+///
+/// # Safety
+/// The type is `repr(C)`, starts with a `u32`, which is its size in bytes, and takes any bits. It is what
+/// plugins of this contract have behind `ID`.
+unsafe trait Table: Sized + 'static {
+    /// Id of the interface or extension.
+    const ID: &'static str;
+}
+
+macro_rules! tables {
+    ($($table:ident: $id:ident),+ $(,)?) => {$(
+        const _: () = assert!(std::mem::offset_of!($table, size) == 0, "a table starts with its size");
+
+        // SAFETY: the contract's table of this id: `repr(C)`, its size first (see above), and for the rest
+        // numbers, pointers, texts and functions that may be null.
+        unsafe impl Table for $table {
+            const ID: &'static str = interface_ids::$id;
+        }
+    )+};
+}
+
+tables! {
+    ForceTable: FORCE,
+    CenterlineTable: CENTERLINE,
+    VariantTable: VARIANT,
+    DetailsTable: DETAILS,
+    ActivityTable: ACTIVITY,
+    LinearFieldTable: LINEAR_FIELD,
+    ReachTable: REACH,
+    DeviceTable: DEVICE,
+    EnergyLedgerTable: ENERGY_LEDGER,
+    CalibrationTable: CALIBRATION,
+    DevicePacingTable: DEVICE_PACING,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One byte short of the shortest tables there are.
+    static SHORT: EnergyLedgerTable = EnergyLedgerTable { size: 15, reserved: 0, ledger: None };
+
+    extern "C" fn short(_: Str) -> *const c_void {
+        (&raw const SHORT).cast()
+    }
+
+    extern "C" fn askew(_: Str) -> *const c_void {
+        (&raw const SHORT).cast::<u8>().wrapping_add(4).cast()
+    }
+
+    extern "C" fn nothing(_: Str) -> *const c_void {
+        std::ptr::null()
+    }
+
+    fn refusal<T: Table>(get_interface: GetInterface) -> String {
+        match (Offers { path: Path::new("some.so"), get_interface }).table::<T>() {
+            Err(error) => error.to_string(),
+            Ok(_) => panic!("`{}` was taken for a table", T::ID),
+        }
+    }
+
+    fn is_held_to_its_length<T: Table>() {
+        let told = |what: &str| format!("some.so: `{}` lacks {what}; a plugin must offer it", T::ID);
+        assert_eq!(refusal::<T>(short), told("part of its table"));
+        assert_eq!(refusal::<T>(askew), told("an aligned table"));
+        let offers = Offers { path: Path::new("some.so"), get_interface: nothing };
+        assert!(offers.table::<T>().is_ok_and(|table| table.is_none()), "`{}` out of nothing", T::ID);
+    }
+
+    #[test]
+    fn no_table_is_read_that_is_shorter_than_the_contracts() {
+        is_held_to_its_length::<ForceTable>();
+        is_held_to_its_length::<CenterlineTable>();
+        is_held_to_its_length::<VariantTable>();
+        is_held_to_its_length::<DetailsTable>();
+        is_held_to_its_length::<ActivityTable>();
+        is_held_to_its_length::<LinearFieldTable>();
+        is_held_to_its_length::<ReachTable>();
+        is_held_to_its_length::<DeviceTable>();
+        is_held_to_its_length::<EnergyLedgerTable>();
+        is_held_to_its_length::<CalibrationTable>();
+        is_held_to_its_length::<DevicePacingTable>();
+    }
+}
