@@ -17,7 +17,7 @@ pub(crate) use parent::{Worker, WorkerOrder};
 
 use serde::{Deserialize, Serialize};
 
-/// What a worker says on its standard output, once, in one line of JSON.
+/// What a worker says in the memory both share, once, in one line of JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 enum Greeting {
     /// The model is made.

@@ -1,16 +1,17 @@
 //! The host's side: a model that lives in another process.
 
+use super::child::WHOLE;
 use super::exchange::{DEMANDS, NO_DEMAND, Order, wait_for_change};
 use super::memory::{SharedMemory, create_file};
 use super::{Greeting, Reply};
 use crate::servo::monotonic_ns;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{Demand, Input, LoopConfig, Memory, Output, Refusal, RefusalKind};
-use std::io::{self, BufRead, BufReader};
+use std::io;
 use std::os::fd::AsFd;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command};
 use std::sync::atomic::Ordering;
 
 /// What a worker is to be.
@@ -54,11 +55,8 @@ impl Worker {
         command.args(["--period-ns", &order.config.period_ns.to_string()]);
         command.args(["--seed", &order.config.seed.to_string()]);
         command.args(order.sets.iter().map(|(key, value)| format!("--set={key}={value}")));
-        let mut child = command.stdin(file).stdout(Stdio::piped()).spawn().map_err(no_worker)?;
-        let mut line = String::new();
-        if let Some(stdout) = child.stdout.take() {
-            BufReader::new(stdout).read_line(&mut line).map_err(no_worker)?;
-        }
+        // What a model prints goes where it does no harm, as long as it lives: to the host's errors.
+        let child = command.stdin(file).stdout(io::stderr()).spawn().map_err(no_worker)?;
         let mut worker = Self {
             child,
             memory,
@@ -70,7 +68,8 @@ impl Worker {
             serves: NO_DEMAND,
             remembers: Memory::PathDependent,
         };
-        match serde_json::from_str(&line) {
+        let greeting = worker.greeting();
+        match serde_json::from_str(&greeting) {
             Ok(Greeting::Ready { parameters, serves, remembers }) => {
                 worker.remembers = if remembers { Memory::PathDependent } else { Memory::Stateless };
                 worker.parameters = parameters;
@@ -83,10 +82,21 @@ impl Worker {
                 Err(Refusal { kind: RefusalKind::from_code(kind), reason })
             }
             Err(_) => {
+                // It may be there all the same, saying nothing that makes sense: nobody waits for that.
+                let _ = worker.child.kill();
                 let end = worker.child.wait().map_err(no_worker)?;
                 Err(Refusal::broken(format!("its process ended before the model was made ({end})")))
             }
         }
+    }
+
+    /// What the worker says first, once its model is made; nothing if its process ended before. Not real-time.
+    fn greeting(&mut self) -> String {
+        let child = &mut self.child;
+        let has_ended = || child.try_wait().is_ok_and(|end| end.is_some());
+        let Some((number, text)) = heard(&self.memory, has_ended) else { return String::new() };
+        self.number = number;
+        text
     }
 
     /// The value in force of a parameter when the model was made; NaN if it has none.
@@ -185,6 +195,34 @@ impl Drop for Worker {
         // It may hang: it is not asked to end. Nothing is lost with it.
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+/// How often a worker that says nothing is looked at, ns.
+const LOOK_NS: u64 = 20_000_000;
+
+/// Hears what a worker says before it is asked for anything, piece by piece, and takes each by asking under
+/// its number. The last number, and the whole; `None` if the worker ended before.
+pub(super) fn heard(memory: &SharedMemory, mut has_ended: impl FnMut() -> bool) -> Option<(u32, String)> {
+    let (mut number, mut text) = (0_u32, String::new());
+    loop {
+        // Looked at first: what was said before the end was said.
+        let is_over = has_ended();
+        if !memory.is_answered(number.wrapping_add(1)) {
+            if is_over {
+                return None;
+            }
+            wait_for_change(&memory.reply, number, LOOK_NS);
+            continue;
+        }
+        number = number.wrapping_add(1);
+        text.push_str(&memory.message());
+        let is_whole = memory.status() == WHOLE;
+        // The order is not looked at yet.
+        memory.ask(number, Order::Reset);
+        if is_whole {
+            return Some((number, text));
+        }
     }
 }
 
