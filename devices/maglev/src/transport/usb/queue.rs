@@ -54,21 +54,25 @@ struct Shared {
 
 /// Reads and a write on a claimed interface.
 pub(super) struct Queue {
-    handle: Arc<DeviceHandle<Context>>,
+    // Before the handle, in the order of dropping: freeing a transfer lets go of the device, in a live context.
     reads: Vec<Transfer>,
     write: Transfer,
+    handle: Arc<DeviceHandle<Context>>,
     shared: Arc<Shared>,
     packets: Receiver<Incoming>,
     events: Option<JoinHandle<()>>,
 }
 
-/// A transfer of libusb's with its buffer, both owned.
+/// A transfer of libusb's with its buffer, both owned, and what its end tells.
 struct Transfer {
     raw: NonNull<libusb_transfer>,
     buffer: NonNull<[u8; BUFFER_BYTES]>,
+    /// The `user_data` of the transfer: lives as long as it.
+    shared: Arc<Shared>,
 }
 
-// SAFETY: both pointers are owned by this value alone; libusb may be called from any thread.
+// SAFETY: both pointers are owned by this value alone, libusb may be called from any thread, and `Shared` is
+// `Sync`.
 unsafe impl Send for Transfer {}
 
 impl Queue {
@@ -92,9 +96,10 @@ impl Queue {
         let reads = reads.collect::<Result<Vec<_>, _>>()?;
         let write = make(endpoints.output, write_ended as Ended, WRITE_TIMEOUT_MS)?;
         // From here on the value itself waits for all that is in flight when it is dropped.
-        let mut queue = Self { handle, reads, write, shared, packets, events: None };
+        let mut queue = Self { reads, write, handle, shared, packets, events: None };
         for read in &queue.reads {
-            read.submit(&queue.shared)?;
+            // SAFETY: made above, and submitted here for the first time.
+            unsafe { read.submit() }?;
         }
         let (context, shared) = (queue.handle.context().clone(), Arc::clone(&queue.shared));
         let thread = std::thread::Builder::new().name("flotor-usb".to_owned());
@@ -120,7 +125,8 @@ impl Queue {
         // SAFETY: no write is in flight (`writing` was false), so libusb has no use of the buffer and nobody else has
         // it; it is longer than a frame.
         unsafe { self.write.buffer.cast::<[u8; FRAME_BYTES]>().write(*frame) };
-        self.write.submit(&self.shared).map_err(|_| {
+        // SAFETY: as above, no write is in flight.
+        unsafe { self.write.submit() }.map_err(|_| {
             self.shared.writing.store(false, Ordering::Release);
             LinkLost
         })
@@ -164,13 +170,9 @@ impl Drop for Queue {
             }
             let _ = self.handle.context().handle_events(Some(LOOK_AROUND));
         }
-        if self.shared.in_flight.load(Ordering::Acquire) == 0 {
-            for transfer in self.reads.drain(..).chain([self.write.take()]) {
-                transfer.free();
-            }
-        } else {
-            // A kernel that does not give transfers back: what it may still write to is never freed.
-            std::mem::forget((Arc::clone(&self.shared), Arc::clone(&self.handle)));
+        if self.shared.in_flight.load(Ordering::Acquire) != 0 {
+            // The transfers stay (see their `drop`), and so does the device they are on.
+            std::mem::forget(Arc::clone(&self.handle));
         }
     }
 }
@@ -195,7 +197,8 @@ impl Transfer {
         let buffer = NonNull::from(Box::leak(Box::new([0_u8; BUFFER_BYTES])));
         // A write is a frame, a read whatever comes.
         let length = if endpoint & 0x80 == 0 { FRAME_BYTES } else { BUFFER_BYTES };
-        // SAFETY: freshly allocated by libusb and nobody else's yet. The handle outlives the transfer: `Queue` has both.
+        // SAFETY: freshly allocated by libusb and nobody else's yet. The handle outlives the transfer:
+        // `Queue` drops it later.
         let fields = unsafe { &mut *raw.as_ptr() };
         fields.dev_handle = handle.as_raw();
         fields.endpoint = endpoint;
@@ -208,39 +211,46 @@ impl Transfer {
         fields.length = c_int::try_from(length).unwrap_or(0);
         fields.callback = ended;
         fields.user_data = Arc::as_ptr(shared).cast_mut().cast();
-        Ok(Self { raw, buffer })
+        Ok(Self { raw, buffer, shared: Arc::clone(shared) })
     }
 
-    fn submit(&self, shared: &Shared) -> Result<(), rusb::Error> {
-        shared.in_flight.fetch_add(1, Ordering::AcqRel);
-        // SAFETY: the transfer is filled and not in flight: `start` submits each read once, `send` checks `writing`.
+    /// Hands the transfer to libusb until it ends. Real-time: bounded, no allocation; one call of the system.
+    ///
+    /// # Safety
+    /// The transfer is not in flight.
+    unsafe fn submit(&self) -> Result<(), rusb::Error> {
+        self.shared.in_flight.fetch_add(1, Ordering::AcqRel);
+        // SAFETY: filled since `new`, and not in flight, as this function demands. It is counted as in flight
+        // until it has ended, and not freed before (`drop`).
         match unsafe { libusb_submit_transfer(self.raw.as_ptr()) } {
             0 => Ok(()),
             _ => {
-                shared.in_flight.fetch_sub(1, Ordering::AcqRel);
+                self.shared.in_flight.fetch_sub(1, Ordering::AcqRel);
                 Err(rusb::Error::Io)
             }
         }
     }
+}
 
-    fn free(self) {
-        // SAFETY: nothing is in flight (the caller has checked), so libusb has neither; both came from the allocators
-        // they go back to, and `self` is gone after this.
+impl Drop for Transfer {
+    fn drop(&mut self) {
+        if self.shared.in_flight.load(Ordering::Acquire) != 0 {
+            // A kernel that does not give transfers back: what it may still write to is never freed.
+            std::mem::forget(Arc::clone(&self.shared));
+            return;
+        }
+        // SAFETY: nothing is in flight, so libusb has neither; both are this value's alone and came from the
+        // allocators they go back to.
         unsafe {
             libusb_free_transfer(self.raw.as_ptr());
             drop(Box::from_raw(self.buffer.as_ptr()));
         }
     }
-
-    /// The transfer out of a place that is about to be dropped; what stays behind is never used again.
-    fn take(&self) -> Self {
-        Self { raw: self.raw, buffer: self.buffer }
-    }
 }
 
 extern "system" fn read_ended(transfer: *mut libusb_transfer) {
-    // SAFETY: libusb calls with the transfer it was given, whose `user_data` is the `Shared` of a `Queue` that is
-    // dropped only when nothing is in flight.
+    // SAFETY: libusb calls with the transfer it was given, whose `user_data` is the `Shared` that a
+    // `Transfer` keeps, and leaks if it is dropped while any is in flight.
     let (fields, shared) = unsafe { (&*transfer, &*(*transfer).user_data.cast::<Shared>()) };
     let length = usize::try_from(fields.actual_length).unwrap_or(0).min(BUFFER_BYTES);
     let incoming = match fields.status {
