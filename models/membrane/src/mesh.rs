@@ -108,9 +108,11 @@ impl Mesh {
             let mut words = text.split_whitespace();
             match words.next() {
                 Some("v") => {
-                    let numbers: Vec<f64> = words.take(3).filter_map(|word| word.parse().ok()).collect();
+                    // `nan` and `inf` are numbers to the parser, but no places.
+                    let finite = |word: &str| word.parse::<f64>().ok().filter(|number| number.is_finite());
+                    let numbers: Vec<f64> = words.take(3).filter_map(finite).collect();
                     let [x, y, z] = numbers[..] else {
-                        return Err(format!("line {line}: a vertex is `v X Y Z`"));
+                        return Err(format!("line {line}: a vertex is `v X Y Z`, three finite numbers"));
                     };
                     mesh.positions_m.push(DVec3::new(x, y, z));
                 }
@@ -195,6 +197,10 @@ mod tests {
     fn a_broken_mesh_file_names_the_line() {
         let error = |text: &str| Mesh::from_obj(text, 1.0, 1.0, 1.0).unwrap_err();
         assert!(error("v 0 0\n").starts_with("line 1: a vertex"));
+        for vertex in ["v nan 0 0", "v 0 inf 0", "v 0 0 -inf", "v 1e999 0 0"] {
+            let text = format!("v 0 0 0\n{vertex}\nv 0 1 0\n");
+            assert!(error(&text).starts_with("line 2: a vertex"), "{vertex}");
+        }
         assert!(error("v 0 0 0\nf 1 2 3\n").starts_with("line 2: `f`"));
         assert!(error("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").starts_with("there is nothing"));
         assert!(error("").starts_with("there is nothing"));
