@@ -2,9 +2,8 @@
 
 use super::options::{KeyValue, duration_s};
 use super::{CommandError, style, write_json};
-use crate::validate::{Finding, Verdict, check, validate};
+use crate::validate::{Check, Figures, Finding, Verdict, check, validate};
 use clap::Args;
-use flotor_hal::conformance::Rule;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -28,16 +27,22 @@ pub(crate) struct ValidateArguments {
     timeout: f64,
     /// Check one rule in this process, and print the verdict as JSON
     #[arg(long, hide = true, value_parser = rule)]
-    rule: Option<Rule>,
+    rule: Option<Check>,
+    /// Write the verdict into the file that is standard input instead
+    #[arg(long, hide = true, requires = "rule")]
+    deliver: bool,
 }
 
-fn rule(id: &str) -> Result<Rule, String> {
-    Rule::from_id(id).ok_or_else(|| format!("no rule `{id}`"))
+fn rule(id: &str) -> Result<Check, String> {
+    Check::from_id(id).ok_or_else(|| format!("no rule `{id}`"))
 }
 
 pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     if let Some(rule) = arguments.rule {
-        let verdict = Verdict { seen: check(&arguments.plugin, &arguments.sets, rule).err() };
+        let verdict = Verdict::of(check(&arguments.plugin, &arguments.sets, rule));
+        if arguments.deliver {
+            return verdict.deliver().map_err(|error| CommandError::Failed(error.to_string()));
+        }
         // On a line of its own, whatever the plugin has printed before.
         say!(
             "\n{}",
@@ -47,9 +52,9 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     }
     let program = std::env::current_exe()
         .map_err(|cause| CommandError::file(Path::new("flotor"), "cannot find this program", cause))?;
-    let one_rule = |rule: Rule| {
+    let one_rule = |rule: Check| {
         let mut command = Command::new(&program);
-        command.arg("validate").args(["--rule", rule.id()]).arg(&arguments.plugin);
+        command.arg("validate").args(["--rule", rule.id(), "--deliver"]).arg(&arguments.plugin);
         for (key, value) in arguments.sets.iter().map(KeyValue::pair) {
             command.arg("--set").arg(format!("{key}={value}"));
         }
@@ -80,5 +85,8 @@ fn print(finding: &Finding) {
         None if finding.unchecked.is_some() => say!("  ?       {rule:<20} {text}"),
         None => say!("  ok      {rule:<20} {text}"),
         Some(seen) => say!("  FAILED  {rule:<20} {text}\n          {seen}"),
+    }
+    if let Some(Figures { stiffness_n_per_m, damping_ns_per_m }) = finding.figures {
+        say!("          near home up to {stiffness_n_per_m:.6} N/m and {damping_ns_per_m:.6} N s/m");
     }
 }

@@ -1,21 +1,37 @@
 //! Checks a plugin against the rules of the contract, from outside, the way a host meets it: each rule in a process of
 //! its own, so that a plugin that crashes or hangs costs one rule.
 
+//!
+//! - `rule`: what is checked; `checks`: one of it, in this process.
+//! - `path`: where a model is asked; `model`, `live`, `passive`, `locked`: what is asked of it.
+//! - `device`: what is asked of a device.
+
 mod checks;
+mod device;
+mod live;
+mod locked;
+mod model;
+mod passive;
+mod path;
+mod rule;
 
 pub use checks::check;
+pub use rule::Check;
 
 use flotor_hal::abi::loader::read_metadata;
 use flotor_hal::conformance::Rule;
+use rustix::fs::{MemfdFlags, memfd_create};
 use serde::{Deserialize, Serialize};
-use std::io::{self, Read};
+use std::fs::File;
+use std::io::{self, Read, Seek, Write};
+use std::os::fd::AsFd;
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 /// Outcome of one rule.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
     /// Short name of the rule.
     pub rule: &'static str,
@@ -25,16 +41,29 @@ pub struct Finding {
     pub violation: Option<String>,
     /// Why it could not be checked here: what the plugin needs is not there.
     pub unchecked: Option<String>,
+    /// What was measured on the way.
+    pub figures: Option<Figures>,
+}
+
+/// What a model without memory measures near home. No contract limits it, but a person can tell newtons per metre from
+/// newtons per millimetre.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Figures {
+    /// Largest stiffness, N/m.
+    pub stiffness_n_per_m: f64,
+    /// Largest damping, N·s/m.
+    pub damping_ns_per_m: f64,
 }
 
 impl Finding {
-    fn new(rule: Rule, seen: Option<Seen>) -> Self {
+    fn new(check: Check, verdict: Verdict) -> Self {
+        let Verdict { seen, figures } = verdict;
         let (violation, unchecked) = match seen {
             None => (None, None),
             Some(Seen::Violation(seen)) => (Some(seen), None),
             Some(Seen::Missing(what)) => (None, Some(what)),
         };
-        Self { rule: rule.id(), text: rule.text(), violation, unchecked }
+        Self { rule: check.id(), text: check.text(), violation, unchecked, figures }
     }
 }
 
@@ -48,43 +77,72 @@ pub enum Seen {
     Missing(String),
 }
 
-/// What the process that checks one rule prints.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// What the process that checks one rule says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Verdict {
     /// `None` if the rule holds, else what was seen.
     pub(crate) seen: Option<Seen>,
+    /// What was measured on the way.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) figures: Option<Figures>,
+}
+
+impl Verdict {
+    /// The verdict on one rule, of this process.
+    pub(crate) fn of(checked: Result<Option<Figures>, Seen>) -> Self {
+        match checked {
+            Ok(figures) => Self { seen: None, figures },
+            Err(seen) => Self { seen: Some(seen), figures: None },
+        }
+    }
+
+    /// Writes it where the process that started this one looks for it: into the file that is standard input. What the
+    /// plugin prints, and however much, goes elsewhere.
+    ///
+    /// # Errors
+    /// Standard input is no such file.
+    pub(crate) fn deliver(&self) -> io::Result<()> {
+        let mut file = File::from(io::stdin().as_fd().try_clone_to_owned()?);
+        file.write_all(&serde_json::to_vec(self)?)
+    }
 }
 
 /// How often a process is looked at.
 const LOOK: Duration = Duration::from_millis(2);
 
 /// Checks a plugin file against every rule that applies; stops at the first that makes the rest pointless. Not
-/// real-time. A rule may take `patience`; `program` starts this program once more, to check one rule of the file and print a [`Verdict`].
+/// real-time. A rule may take `patience`; `program` starts this program once more, to check one rule of the file and
+/// to [deliver](Verdict::deliver) the verdict.
 #[must_use]
-pub(crate) fn validate(path: &Path, patience: Duration, program: impl Fn(Rule) -> Command) -> Vec<Finding> {
+pub(crate) fn validate(path: &Path, patience: Duration, program: impl Fn(Check) -> Command) -> Vec<Finding> {
     let mut findings = Vec::new();
-    let mut note = |rule: Rule, seen: Option<Seen>| {
-        let is_violated = matches!(seen, Some(Seen::Violation(_)));
-        findings.push(Finding::new(rule, seen));
+    let mut note = |check: Check, verdict: Verdict| {
+        let is_violated = matches!(verdict.seen, Some(Seen::Violation(_)));
+        findings.push(Finding::new(check, verdict));
         is_violated
     };
     // Reads the file and runs nothing of it.
+    let metadata = Check::Contract(Rule::Metadata);
     let kind = match read_metadata(path) {
-        Ok(metadata) => {
-            note(Rule::Metadata, None);
-            metadata.kind
+        Ok(known) => {
+            note(metadata, Verdict::of(Ok(None)));
+            known.kind
         }
         Err(error) => {
-            note(Rule::Metadata, Some(Seen::Violation(error.to_string())));
+            note(metadata, Verdict::of(Err(Seen::Violation(error.to_string()))));
             return findings;
         }
     };
-    let rules = Rule::ALL.into_iter().filter(|rule| *rule != Rule::Metadata && rule.applies_to(kind));
-    for rule in rules {
-        let outcome =
-            apart(program(rule), patience).unwrap_or_else(|error| Outcome::NotChecked(error.to_string()));
-        let stops = matches!(outcome, Outcome::Hung) || matches!(rule, Rule::Loads | Rule::Defaults);
-        if note(rule, outcome.seen(patience)) && stops {
+    for check in Check::all().filter(|check| *check != metadata && check.applies_to(kind)) {
+        let mut command = program(check);
+        if check == Check::SystemCalls {
+            let (name, value) = locked::C_LIBRARY;
+            command.env(name, value);
+        }
+        let outcome = apart(command, patience).unwrap_or_else(|error| Outcome::NotChecked(error.to_string()));
+        let is_fatal = matches!(check, Check::Contract(Rule::Loads | Rule::Defaults));
+        let stops = is_fatal || matches!(outcome, Outcome::Hung);
+        if note(check, outcome.verdict(check, patience)) && stops {
             break;
         }
     }
@@ -93,8 +151,7 @@ pub(crate) fn validate(path: &Path, patience: Duration, program: impl Fn(Rule) -
 
 /// How the check of one rule ended.
 enum Outcome {
-    Holds,
-    Not(Seen),
+    Told(Verdict),
     /// The process ended before there was a verdict.
     Died(ExitStatus),
     Hung,
@@ -102,35 +159,43 @@ enum Outcome {
 }
 
 impl Outcome {
-    fn seen(self, patience: Duration) -> Option<Seen> {
-        Some(Seen::Violation(match self {
-            Self::Holds => return None,
-            Self::Not(seen) => return Some(seen),
+    fn verdict(self, check: Check, patience: Duration) -> Verdict {
+        let words = match self {
+            Self::Told(verdict) => return verdict,
             Self::Died(end) => match end.signal() {
-                Some(signal) => format!("it ended the process by signal {signal}"),
+                Some(signal) => died_by(check, signal),
                 None => format!("it ended the process ({end})"),
             },
             Self::Hung => {
                 format!("it did not come back within {patience:?}; the rules after it were not checked")
             }
             Self::NotChecked(error) => format!("cannot be checked: {error}"),
-        }))
+        };
+        Verdict::of(Err(Seen::Violation(words)))
     }
+}
+
+fn died_by(check: Check, signal: i32) -> String {
+    if check == Check::SystemCalls && signal == locked::CAUGHT.as_raw() {
+        return "a step allocated, or called the system otherwise".to_owned();
+    }
+    // A thread that is locked in may not read the clock of the processor either.
+    let hint =
+        if check == Check::SystemCalls { "; a step that asks for the time does that here" } else { "" };
+    format!("it ended the process by signal {signal}{hint}")
 }
 
 /// Runs the check of one rule in a process of its own.
 fn apart(mut command: Command, patience: Duration) -> io::Result<Outcome> {
-    // What a plugin prints is its own business, not part of the verdict.
-    let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn()?;
+    // A file, not a pipe: nobody has to empty it. What a plugin prints is its own business.
+    let mut told = File::from(memfd_create("flotor-verdict", MemfdFlags::CLOEXEC)?);
+    let mut child = command.stdin(told.try_clone()?).stdout(Stdio::null()).stderr(Stdio::null()).spawn()?;
     let Some(end) = wait(&mut child, patience)? else { return Ok(Outcome::Hung) };
-    let mut text = String::new();
-    if let Some(mut stdout) = child.stdout.take() {
-        stdout.read_to_string(&mut text)?;
-    }
-    // The verdict is the last line; a plugin may have printed before.
-    let verdict = text.lines().last().and_then(|line| serde_json::from_str::<Verdict>(line).ok());
-    Ok(match verdict {
-        Some(verdict) if end.success() => verdict.seen.map_or(Outcome::Holds, Outcome::Not),
+    let mut text = Vec::new();
+    told.rewind()?;
+    told.read_to_end(&mut text)?;
+    Ok(match serde_json::from_slice(&text) {
+        Ok(verdict) if end.success() => Outcome::Told(verdict),
         _ => Outcome::Died(end),
     })
 }

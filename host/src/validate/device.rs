@@ -1,0 +1,182 @@
+//! Rules of a device: what it says of itself, its life, and its stop.
+
+use super::path::CONFIG;
+use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice};
+use flotor_hal::{Axes, Capabilities, Cycle, DVec3, DeviceState, Fault, Tick, Wrench};
+use std::time::{Duration, Instant};
+
+/// How long a device may take for what is to happen soon: a sample, a force, its end.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// Time between two ticks that wait for something, roughly.
+const TICK: Duration = Duration::from_millis(1);
+
+/// How far the length of a quaternion may be from one: rounding in single precision, ten times.
+const QUATERNION_TOLERANCE: f64 = 1.0e-6;
+
+pub(super) fn capabilities(device: OpenedDevice) -> Result<(), String> {
+    let mut device = device;
+    // What the host enforces, it has checked when this comes back.
+    let told = device.capabilities().map_err(|refusal| refusal.to_string())?;
+    let [slowest_hz, fastest_hz] = told.rate_hz;
+    if !slowest_hz.is_finite() || !fastest_hz.is_finite() || slowest_hz > fastest_hz {
+        return Err(format!("its rates are {slowest_hz} to {fastest_hz} Hz"));
+    }
+    let finite = [("resolution_m", told.resolution_m), ("latency_s", told.latency_s)];
+    if let Some((name, value)) = finite.into_iter().find(|(_, value)| !value.is_finite() || *value < 0.0) {
+        return Err(format!("its capability `{name}` is {value}"));
+    }
+    // Infinite is allowed: no stiffness is too much for it.
+    if told.max_stiffness_n_per_m.is_nan() || told.max_stiffness_n_per_m < 0.0 {
+        return Err(format!("its capability `max_stiffness_n_per_m` is {}", told.max_stiffness_n_per_m));
+    }
+    Ok(())
+}
+
+pub(super) fn lifecycle(device: OpenedDevice) -> Result<(), String> {
+    const TICKS: u64 = 100;
+    let mut opened = device;
+    for _ in 0..2 {
+        let mut running = Running::start(opened)?;
+        let started = Instant::now();
+        let mut has_sampled = false;
+        while running.ticks < TICKS || !has_sampled {
+            has_sampled |= running.turn(&Wrench::ZERO)? == Cycle::Fresh;
+            if running.ticks >= TICKS && !has_sampled {
+                if started.elapsed() > PATIENCE {
+                    return Err(format!("it is stale for ever: no sample within {PATIENCE:?}"));
+                }
+                std::thread::sleep(TICK);
+            }
+        }
+        opened = running.device.deactivate().ok_or("deactivate failed")?;
+    }
+    Ok(())
+}
+
+pub(super) fn safe_stop(device: OpenedDevice) -> Result<(), String> {
+    let mut device = device;
+    let push = push(&device.capabilities().map_err(|refusal| refusal.to_string())?);
+    let stopper = device.stopper();
+    let mut running = Running::start(device)?;
+    if push != Wrench::ZERO {
+        running.feel(&push)?;
+    }
+    std::thread::spawn(move || stopper.safe_stop()).join().map_err(|_| "safe_stop panicked".to_owned())?;
+    running.feel_nothing(&push)
+}
+
+/// What to push with: no more than a newton, along the first axis that is driven; nothing where none is.
+fn push(told: &Capabilities) -> Wrench {
+    let axes = [(Axes::Z, DVec3::Z), (Axes::X, DVec3::X), (Axes::Y, DVec3::Y)];
+    let limit_n = DVec3::from_array(told.max_force_n).min(DVec3::ONE);
+    let driven =
+        axes.into_iter().find(|(axis, unit)| told.actuated.contains(*axis) && limit_n.dot(*unit) > 0.0);
+    driven.map_or(Wrench::ZERO, |(_, unit)| Wrench::from_force(unit * limit_n))
+}
+
+/// A device in a loop without a model.
+struct Running {
+    device: ActiveDevice,
+    state: DeviceState,
+    ticks: u64,
+    has_pose: bool,
+}
+
+/// Why a tick could not be used.
+struct Trouble {
+    fault: Option<Fault>,
+    words: String,
+}
+
+impl From<Trouble> for String {
+    fn from(trouble: Trouble) -> Self {
+        trouble.words
+    }
+}
+
+impl Running {
+    fn start(device: OpenedDevice) -> Result<Self, String> {
+        let mut device = device;
+        // A sensor without a pose may leave it as it likes.
+        let has_pose = !device.capabilities().is_ok_and(|told| told.sensed == Axes::NONE);
+        let device = device.activate(&CONFIG).map_err(|(_, refusal)| refusal.to_string())?;
+        Ok(Self { device, state: DeviceState::HOME, ticks: 0, has_pose })
+    }
+
+    /// One tick: a sample, and a wrench.
+    fn turn(&mut self, wrench: &Wrench) -> Result<Cycle, Trouble> {
+        let index = self.ticks;
+        let dt_ns = if index == 0 { 0 } else { CONFIG.period_ns };
+        let tick = Tick { index, time_ns: index * CONFIG.period_ns, dt_ns };
+        self.ticks += 1;
+        let fault_of = |call: &str, fault: Fault| {
+            let words = format!("{call} at tick {index}: {}", fault.advice());
+            Trouble { fault: Some(fault), words }
+        };
+        let sampled = self.device.read(&tick, &mut self.state);
+        if let Cycle::Fault(fault) = sampled {
+            return Err(fault_of("read", fault));
+        }
+        let state = &self.state;
+        let nonsense = |words: String| Err(Trouble { fault: None, words });
+        if !state.is_finite() || !state.delivered.is_finite() {
+            return nonsense(format!("read at tick {index} gave {state:?}"));
+        }
+        let length = state.pose.orientation().length();
+        if self.has_pose && sampled == Cycle::Fresh && (length - 1.0).abs() > QUATERNION_TOLERANCE {
+            return nonsense(format!("read at tick {index} gave a quaternion of length {length}, not 1"));
+        }
+        if let Cycle::Fault(fault) = self.device.write(&tick, wrench) {
+            return Err(fault_of("write", fault));
+        }
+        Ok(sampled)
+    }
+
+    fn delivers(&self) -> bool {
+        self.state.delivered != Wrench::ZERO
+    }
+
+    /// Pushes until the device says that it does. One that never says so would pass every stop.
+    fn feel(&mut self, push: &Wrench) -> Result<(), String> {
+        let started = Instant::now();
+        while !self.delivers() {
+            if started.elapsed() > PATIENCE {
+                return Err(format!(
+                    "told to give {} N, it says for {PATIENCE:?} that it delivers nothing: whether it stops cannot be \
+                     seen",
+                    push.force()
+                ));
+            }
+            let _ = self.turn(push)?;
+            std::thread::sleep(TICK);
+        }
+        Ok(())
+    }
+
+    /// Goes on pushing a device that was stopped: it has to answer, and to give nothing.
+    fn feel_nothing(&mut self, push: &Wrench) -> Result<(), String> {
+        const SAMPLES: u64 = 20;
+        let started = Instant::now();
+        let mut at_rest = 0;
+        while at_rest < SAMPLES {
+            if started.elapsed() > PATIENCE {
+                return Err(match self.delivers() {
+                    true => format!("it still delivers {:?}", self.state.delivered),
+                    false => format!("it has given {at_rest} samples in {PATIENCE:?} since it was stopped"),
+                });
+            }
+            match self.turn(push) {
+                // A stop that says so is an answer, and gives no force.
+                Err(Trouble { fault: Some(Fault::EmergencyStop), .. }) => return Ok(()),
+                Err(trouble) => return Err(format!("after safe_stop, {}", trouble.words)),
+                Ok(Cycle::Fresh) if !self.delivers() => at_rest += 1,
+                Ok(Cycle::Fresh) => {
+                    at_rest = 0;
+                    std::thread::sleep(TICK);
+                }
+                Ok(_) => std::thread::sleep(TICK),
+            }
+        }
+        Ok(())
+    }
+}

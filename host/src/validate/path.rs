@@ -1,0 +1,133 @@
+//! Poses a model is asked at: at rest on a grid, and on the way along a smooth path.
+
+use flotor_hal::abi::CallStatus;
+use flotor_hal::abi::loader::Model;
+use flotor_hal::{DQuat, DVec3, Input, LoopConfig, Output, Pose, Twist, orientation_from_rotation_vector};
+
+/// Rate a plugin is checked at.
+pub(super) const CONFIG: LoopConfig = LoopConfig { period_ns: 1_000_000, seed: 1 };
+
+/// How fast the path is walked when it is walked fast: up to 0.8 m/s and 8 rad/s, what a hand does at its
+/// wildest.
+pub(super) const FAST: f64 = 20.0;
+
+/// Angular frequencies, rad/s, and sizes of the path. The frequencies have no common divisor, so that in a
+/// few seconds no pose comes twice.
+const POSITION_RAD_PER_S: DVec3 = DVec3::new(7.0, 11.0, 5.0);
+const ROTATION_RAD_PER_S: DVec3 = DVec3::new(3.0, 13.0, 2.0);
+const POSITION_M: f64 = 3.0e-3;
+const ROTATION_RAD: f64 = 0.03;
+
+/// Poses on a grid of `size_m` and `size_rad`, all 27 x 27 corners, edges and centres.
+pub(super) fn grid(size_m: f64, size_rad: f64) -> impl Iterator<Item = Pose> {
+    directions().flat_map(move |position| {
+        directions().map(move |rotation| {
+            let orientation = DQuat::from_scaled_axis(rotation * size_rad);
+            Pose::new(position * size_m, orientation)
+        })
+    })
+}
+
+/// Centre, corners, edges and sides of a cube of half-edge one.
+pub(super) fn directions() -> impl Iterator<Item = DVec3> {
+    let three = [-1.0, 0.0, 1.0];
+    let pairs = move || three.into_iter().flat_map(move |x| three.map(move |y| (x, y)));
+    pairs().flat_map(move |(x, y)| three.map(move |z| DVec3::new(x, y, z)))
+}
+
+/// A walk near home, as inputs of a loop.
+pub(super) fn walk(steps: u64) -> impl Iterator<Item = Input> {
+    walk_at(1.0, steps)
+}
+
+/// The same path, `speed` times as fast: the twist of each input is the derivative of its pose.
+pub(super) fn walk_at(speed: f64, steps: u64) -> impl Iterator<Item = Input> {
+    (0..steps).map(move |tick| {
+        #[allow(clippy::cast_precision_loss)] // a few thousand
+        let t = tick as f64 * 1.0e-3 * speed;
+        let (position_m, velocity_m_per_s) = swing(POSITION_RAD_PER_S, POSITION_M, t);
+        let (rotation_rad, rate_rad_per_s) = swing(ROTATION_RAD_PER_S, ROTATION_RAD, t);
+        let spin_rad_per_s = spin(rotation_rad, rate_rad_per_s * speed);
+        let dt_ns = if tick == 0 { 0 } else { CONFIG.period_ns };
+        Input {
+            tick,
+            time_ns: tick * CONFIG.period_ns,
+            dt_ns,
+            twist: Twist::new(velocity_m_per_s * speed, spin_rad_per_s),
+            ..Input::at_rest(Pose::new(position_m, orientation_from_rotation_vector(rotation_rad)))
+        }
+    })
+}
+
+/// Three sines of a size, and their derivative.
+fn swing(rad_per_s: DVec3, size: f64, t: f64) -> (DVec3, DVec3) {
+    let phase = rad_per_s * t;
+    let sines = DVec3::new(phase.x.sin(), phase.y.sin(), phase.z.sin());
+    let cosines = DVec3::new(phase.x.cos(), phase.y.cos(), phase.z.cos());
+    (sines * size, cosines * rad_per_s * size)
+}
+
+/// Angular velocity of an orientation whose rotation vector changes at a rate: the left Jacobian of the
+/// exponential (Chirikjian 2011, Stochastic Models, Information Theory, and Lie Groups 2, 10.86).
+fn spin(rotation_rad: DVec3, rate_rad_per_s: DVec3) -> DVec3 {
+    let angle = rotation_rad.length();
+    // 1/2 and 1/6 are the limits; what is left out is a billionth of them.
+    let (first, second) = if angle < 1.0e-4 {
+        (0.5, 1.0 / 6.0)
+    } else {
+        ((1.0 - angle.cos()) / angle.powi(2), (angle - angle.sin()) / angle.powi(3))
+    };
+    let across = rotation_rad.cross(rate_rad_per_s);
+    rate_rad_per_s + across * first + rotation_rad.cross(across) * second
+}
+
+/// One step; the answer, or what went wrong.
+pub(super) fn step(model: &mut Model, input: &Input) -> Result<Output, String> {
+    let mut output = Output::default();
+    match model.step(input, &mut output) {
+        CallStatus::Ok => Ok(output),
+        CallStatus::Panicked => Err(format!("{} it {}", place(input), model.last_message())),
+        other => Err(format!("{} it answered {other:?}", place(input))),
+    }
+}
+
+/// One step whose answer must be made of numbers.
+pub(super) fn finite(model: &mut Model, input: &Input) -> Result<Output, String> {
+    let output = step(model, input)?;
+    if output.wrench.is_finite() && !output.energy_j.is_infinite() && output.status().is_some() {
+        return Ok(output);
+    }
+    Err(format!("{} it answered {output:?}", place(input)))
+}
+
+fn place(input: &Input) -> String {
+    if input.twist == Twist::ZERO {
+        return format!("at {:?}", input.pose);
+    }
+    format!("at tick {}, {:?}, moving with {:?}", input.tick, input.pose, input.twist)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_hal::rotation_vector;
+
+    #[test]
+    fn the_twist_of_the_walk_is_the_derivative_of_its_pose() {
+        for speed in [1.0, FAST] {
+            let inputs: Vec<Input> = walk_at(speed, 2000).collect();
+            for window in inputs.windows(3) {
+                let [before, here, after] = window else { panic!("three of them") };
+                let turned = after.pose.orientation() * before.pose.orientation().inverse();
+                let velocity = (after.pose.position() - before.pose.position()) / 2.0e-3;
+                let spin = rotation_vector(turned) / 2.0e-3;
+                // A central difference is wrong by a sixth of the third derivative times the step squared.
+                let slack = |size: f64, rad_per_s: f64| size * (rad_per_s * speed).powi(3) * 1.0e-6;
+                let slack_m_per_s = slack(POSITION_M, POSITION_RAD_PER_S.length());
+                assert!((velocity - here.twist.linear()).length() <= slack_m_per_s, "tick {}", here.tick);
+                let slack_rad_per_s = slack(ROTATION_RAD, ROTATION_RAD_PER_S.length());
+                assert!((spin - here.twist.angular()).length() <= slack_rad_per_s, "tick {}", here.tick);
+            }
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! `flotor validate` finds every mistake of `c/bad/`, under the rule that is about it, and none in what is
+//! right. What a plugin prints, and however much, is in nobody's way: neither here nor in a run that keeps a
+//! model in a process.
+
+use flotor_tests::library::{compile_c_file, plugin_file};
+use flotor_tests::program::{Flotor, exit_code};
+use flotor_tests::scratch::Scratch;
+use flotor_tests::workspace_root;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Compiles `c/bad/NAME.c` with the mistakes asked for.
+fn compiled(scratch: &Scratch, name: &str, mistakes: &[&str]) -> PathBuf {
+    let library = scratch.path().join(format!("lib{name}.so"));
+    let source = workspace_root().join("tests/c/bad").join(name).with_extension("c");
+    compile_c_file(&source, mistakes, &library);
+    library
+}
+
+/// What is found about a plugin, but for the time budget: how long a step takes here and now says nothing.
+fn findings(library: &Path) -> Vec<Value> {
+    let arguments = ["validate".as_ref(), library.as_os_str(), "--json".as_ref()];
+    let ran = Flotor::with(arguments).run();
+    let mut all: Vec<Value> = serde_json::from_str(&ran.stdout).unwrap_or_else(|_| panic!("{ran:#?}"));
+    all.retain(|finding| finding["rule"] != "time-budget");
+    all
+}
+
+fn assert_found(name: &str, mistake: &str, rule: &str, words: &str) {
+    let all = findings(&compiled(&Scratch::default(), name, &[mistake]));
+    let found = all.iter().find(|finding| finding["rule"] == rule);
+    let found = found.unwrap_or_else(|| panic!("{mistake}: {rule} was not checked: {all:#?}"));
+    if let Some(reason) = found["unchecked"].as_str() {
+        println!("{mistake}: {rule} cannot be checked here: {reason}");
+        return;
+    }
+    let violation = found["violation"].as_str().unwrap_or_default();
+    assert!(violation.contains(words), "{mistake} under {rule}: {all:#?}");
+}
+
+fn assert_nothing_found(library: &Path) {
+    let all = findings(library);
+    let violated: Vec<&Value> = all.iter().filter(|finding| !finding["violation"].is_null()).collect();
+    assert!(violated.is_empty() && all.len() > 5, "{}: {all:#?}", library.display());
+}
+
+#[test]
+fn every_mistake_of_a_model_is_found_under_its_rule() {
+    let mistakes = [
+        ("NAN_IN_MOTION", "finite-in-motion", "NaN"),
+        ("NAN_IN_MOTION", "live-parameters", "NaN"),
+        ("CRASHES_IN_MOTION", "finite-in-motion", "by signal 11"),
+        ("INTEGRATES", "reset-repeats", "another answer after reset"),
+        ("LIVE_WITHOUT_SETTER", "live-parameters", "there is no `set_parameter`"),
+        ("ABORTS_WHEN_SET", "live-parameters", "by signal 6"),
+        ("REFUSES_WHEN_SET", "live-parameters", "refuses every live parameter"),
+        ("FORGETS_WHAT_IS_SET", "live-parameters", "is said to be 500"),
+        ("ACTS_OUTSIDE", "activity", "outside its region"),
+        ("NEGATIVE_DAMPING", "passive", "damping must take energy away"),
+        ("WHIRLS", "passive", "once round a circle in x and y"),
+        ("ALLOCATES", "no-system-calls", "a step allocated"),
+        ("OPENS_FILES", "no-system-calls", "a step allocated, or called the system"),
+        ("STARTS_THREADS", "no-system-calls", "a step allocated, or called the system"),
+        ("WRITES", "no-system-calls", "it read or wrote"),
+    ];
+    for (mistake, rule, words) in mistakes {
+        // Not every kernel counts what a thread writes.
+        if mistake == "WRITES" && !Path::new("/proc/self/io").exists() {
+            continue;
+        }
+        assert_found("model", mistake, rule, words);
+    }
+}
+
+#[test]
+fn every_mistake_of_a_device_is_found_under_its_rule() {
+    let mistakes = [
+        ("RATES_REVERSED", "capabilities", "10000 to 100 Hz"),
+        ("RATES_WITHOUT_END", "capabilities", "100 to inf Hz"),
+        ("NAN_STIFFNESS", "capabilities", "max_stiffness_n_per_m"),
+        ("NAN_LATENCY", "capabilities", "latency_s"),
+        ("NEGATIVE_RESOLUTION", "capabilities", "resolution_m"),
+        ("STALE", "lifecycle", "stale for ever"),
+        ("NO_QUATERNION", "lifecycle", "a quaternion of length 0"),
+        ("NAN_DELIVERED", "lifecycle", "NaN"),
+        ("FAULTS_AFTER_STOP", "safe-stop", "after safe_stop, read at tick"),
+        ("SILENT_AFTER_STOP", "safe-stop", "it has given 0 samples"),
+        ("IGNORES_STOP", "safe-stop", "it still delivers"),
+        ("IGNORES_STOP_IN_SILENCE", "safe-stop", "whether it stops cannot be seen"),
+    ];
+    for (mistake, rule, words) in mistakes {
+        assert_found("device", mistake, rule, words);
+    }
+}
+
+#[test]
+fn what_is_right_passes() {
+    let right = [
+        ("model", "NONE"),
+        ("model", "DAMPING"),
+        ("model", "INTEGRATES_AND_RESETS"),
+        ("model", "LOCAL"),
+        ("model", "PRINTS"),
+        ("device", "NONE"),
+        ("device", "STOPS_AS_EMERGENCY"),
+    ];
+    for (name, macro_name) in right {
+        assert_nothing_found(&compiled(&Scratch::default(), name, &[macro_name]));
+    }
+}
+
+#[test]
+fn a_model_that_gives_its_energy_back_with_interest_is_found_in_rust_too() {
+    let library = plugin_file("fixture-faulty-model");
+    let arguments = ["validate".as_ref(), library.as_os_str()];
+    let ran = Flotor::with(arguments).env(fixture_faulty_model::FAULT_VARIABLE, "pumps").run();
+    assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
+    assert!(ran.stdout.contains("FAILED  passive"), "{ran:#?}");
+}
+
+#[test]
+fn stiffness_and_damping_near_home_are_told() {
+    let all = findings(&compiled(&Scratch::default(), "model", &["DAMPING"]));
+    let passive = all.iter().find(|finding| finding["rule"] == "passive").expect("it is checked");
+    let told = |name: &str| passive["figures"][name].as_f64().unwrap_or(f64::NAN);
+    // 500 N/m and 5 N s/m, but for rounding in differences of a hundredth of a millimetre.
+    assert!((told("stiffness_n_per_m") - 500.0).abs() < 1.0e-6, "{passive:#?}");
+    assert!((told("damping_ns_per_m") - 5.0).abs() < 1.0e-6, "{passive:#?}");
+}
+
+#[test]
+fn a_model_in_a_process_of_its_own_may_print_whatever_it_likes() {
+    let scratch = Scratch::default();
+    let (device, model) = (compiled(&scratch, "device", &[]), compiled(&scratch, "model", &["PRINTS"]));
+    let scene = format!(
+        "duration_s = 0.02\n[device]\nplugin = {device:?}\n[[model]]\nplugin = {model:?}\nname = \"spring\"\n\
+         isolation = \"process\"\n"
+    );
+    let file = scratch.file("scene.toml", scene).display().to_string();
+    let ran = Flotor::with(["run", &file, "--clock", "virtual"]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    assert!(ran.stderr.contains("a model that says a lot"), "{ran:#?}");
+    assert!(!ran.stdout.contains("a model that says a lot"), "{ran:#?}");
+}
