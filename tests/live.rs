@@ -9,6 +9,7 @@ use flotor::session::{Observer, Outcome, RunEnd, RunOptions, Session};
 use flotor::trace::{RECORD_WORDS, TickRecord};
 use flotor_live::{
     Answer, Ask, Client, Directory, Event, LiveError, Outcome as ChangeOutcome, Publication, SetValue,
+    Subject,
 };
 use flotor_sync::Words;
 use flotor_tests::TestSize;
@@ -283,6 +284,46 @@ fn a_run_of_the_program_is_found_watched_and_stopped() {
     assert_eq!(running.wait().code, Some(exit_code::OK));
     assert_eq!(directory.runs(), [], "it cleans up after itself");
     assert!(matches!(Client::find(&directory), Err(LiveError::NoRun { .. })));
+}
+
+#[test]
+fn a_model_of_a_run_of_the_program_is_replaced_from_another_terminal() {
+    let scratch = Scratch::default();
+    let runtime = scratch.path().display().to_string();
+    // A fade that outlasts the test: what comes after the first has to wait.
+    let scene = scratch.patient_scene(&format!("{SCENE}[model.blend]\nfade_s = 60\n")).display().to_string();
+    let running = Flotor::with(["run", &scene, "--duration", "60s"]).env("XDG_RUNTIME_DIR", &runtime).start();
+    let directory = Directory::at(scratch.path().join("flotor"));
+    let mut client = patiently(|| Client::find(&directory).ok());
+    let swap = |arguments: &[&str]| {
+        let arguments = ["swap"].iter().chain(arguments);
+        Flotor::with(arguments).env("XDG_RUNTIME_DIR", &runtime).run()
+    };
+    let unknown = swap(&["sprng"]);
+    assert_eq!(unknown.code, Some(exit_code::OTHER), "{unknown:?}");
+    assert!(unknown.error().contains("did you mean `spring`?"), "{unknown:?}");
+    let no_plugin = scratch.file("libmine.so", b"not a plugin").display().to_string();
+    let refused = swap(&["spring", "--plugin", &no_plugin]);
+    assert_eq!(refused.code, Some(exit_code::OTHER), "{refused:?}");
+    let error = refused.error();
+    assert!(error.starts_with("[spring] it stays as it is: ") && error.contains("libmine.so"), "{error}");
+
+    let swapped = swap(&["spring", "--plugin", "wall", "--set", "friction=0.2"]);
+    assert_eq!(swapped.code, Some(exit_code::OK), "{swapped:?}");
+    assert!(swapped.stdout.starts_with("`spring` is `wall` "), "{swapped:?}");
+    let change = patiently(|| match client.next(Duration::from_millis(100)) {
+        Ok(Some(Event::Change(change))) => Some(change),
+        _ => None,
+    });
+    assert_eq!((change.subject, change.parameter.as_str()), (Subject::Plugin, "wall"));
+    assert_eq!(change.settings, [("friction".to_owned(), "0.2".to_owned())]);
+    assert!(swapped.stdout.ends_with(&format!("from tick {} on\n", change.tick)), "{swapped:?}");
+    assert_eq!(answer(&mut client, set("spring", "stiffness_n_per_m", "500")).refused, None, "it is a wall");
+    let busy = swap(&["spring"]);
+    assert_eq!(busy.code, Some(exit_code::OTHER), "{busy:?}");
+    assert!(busy.error().contains("still fading"), "{busy:?}");
+    assert_eq!(answer(&mut client, Ask::Stop).refused, None);
+    assert_eq!(running.wait().code, Some(exit_code::OK));
 }
 
 /// Who records a run that dies has what had come, and is told that it is not all.

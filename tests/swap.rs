@@ -42,6 +42,64 @@ fn a_scheduled_replacement_fades_in_without_a_jump_and_is_alone_then() {
 }
 
 #[test]
+fn a_replacement_while_the_one_before_still_fades_makes_no_jump_either() {
+    let swap = |at_s: f64, stiffness: u32| {
+        format!(
+            "[[change]]\nat_s = {at_s}\nswap = \"wall\"\nparameters = {{ stiffness_n_per_m = {stiffness} }}\n"
+        )
+    };
+    let scene = "duration_s = 2\n[limits]\nforce_slew_n_per_s = 3000\n\
+        [device]\nplugin = \"simulated\"\nparameters = { hand = \"press\" }\n\
+        [[model]]\nplugin = \"wall\"\nparameters = { stiffness_n_per_m = 1500 }\n[model.blend]\nfade_s = 0.2\n";
+    // The second comes a tenth into the fade of the first, and the last one before that is over.
+    let scene = [scene.to_owned(), swap(1.0, 0), swap(1.02, 100), swap(1.1, 0)].concat();
+    let swapped = watch(&scene);
+    assert_eq!(swapped.changes.len(), 3);
+    let force_n = |tick: usize| swapped.records[tick].model.force();
+    let before_n = force_n(999).length();
+    assert!(before_n > 2.0, "the hand leans on the wall: {before_n} N");
+    let largest_n = (1000..2000).map(|tick| (force_n(tick) - force_n(tick - 1)).length()).fold(0.0, f64::max);
+    // Over 200 ticks that is 0.02 N a tick; beside it the hand moves.
+    assert!(largest_n < 0.3, "{largest_n} N in a tick");
+    // Nothing of those that have gone is left.
+    assert_eq!(force_n(1301).length(), 0.0);
+}
+
+#[test]
+fn who_misbehaves_is_named_and_not_who_comes_after() {
+    let scratch = Scratch::default();
+    let [faulty, spring] =
+        ["fixture-faulty-model", "flotor-spring"].map(|name| plugin_file(name).display().to_string());
+    let faults = "parameters = { fault = \"nan\" }\n";
+    let swap = |at_s: f64, plugin: &str, parameters: &str| {
+        format!("[[change]]\nat_s = {at_s}\nswap = \"model\"\nplugin = {plugin:?}\n{parameters}")
+    };
+    let scene = |first: &str, swaps: &[String]| {
+        format!(
+            "duration_s = 1\n[device]\nplugin = \"simulated\"\n[[model]]\nname = \"model\"\nplugin = {first:?}\n{}{}",
+            if first == faulty { faults } else { "" },
+            swaps.concat()
+        )
+    };
+    let scenes = [
+        scene(&spring, &[swap(0.2, &faulty, faults), swap(0.5, &spring, "")]),
+        scene(&spring, &[swap(0.2, &faulty, faults)]),
+        scene(&faulty, &[swap(0.2, &spring, "")]),
+    ];
+    for text in scenes {
+        let file = scratch.file("scene.toml", &text).display().to_string();
+        let ran = Flotor::with(["run", &file, "--clock", "virtual"]).run();
+        assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{text}{ran:?}");
+        assert!(ran.error().starts_with(&format!("{faulty}: `model` ")), "{text}{ran:?}");
+    }
+    // And nobody where nobody did.
+    let good = scene(&spring, &[swap(0.2, &spring, "")]);
+    let file = scratch.file("scene.toml", good).display().to_string();
+    let ran = Flotor::with(["run", &file, "--clock", "virtual"]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+}
+
+#[test]
 fn a_recording_with_replacements_replays_bit_for_bit() {
     let scratch = Scratch::default();
     let recording = scratch.path().join("run.mcap").display().to_string();

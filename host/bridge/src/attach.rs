@@ -26,6 +26,9 @@ pub enum AttachError {
 impl Serve for Errand {
     /// Carries the request to the remote host, and its answer back.
     fn serve(&self, ask: Ask) -> Result<(), String> {
+        if matches!(ask, Ask::Swap { .. }) {
+            return Err("a model is swapped on the host's own machine, where its plugin's file is".to_owned());
+        }
         Wish::of_ask(ask).map_or(Ok(()), |wish| self.run(wish))
     }
 }

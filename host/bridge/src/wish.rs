@@ -101,7 +101,7 @@ impl Wish {
     #[must_use]
     pub fn of_ask(ask: Ask) -> Option<Self> {
         match ask {
-            Ask::Watch { .. } | Ask::LookAway => None,
+            Ask::Watch { .. } | Ask::LookAway | Ask::Swap { .. } => None,
             Ask::Set { values } => Some(Wish::Set { values }),
             Ask::Weight { model, weight } => Some(Wish::Weight { model, weight }),
             Ask::Stop => Some(Wish::Stop),

@@ -183,6 +183,18 @@ pub enum Ask {
         /// The new weight.
         weight: f64,
     },
+    /// Another plugin in place of a model, or the same one read and made anew, faded in while the old one fades out. It is
+    /// made before the answer comes.
+    Swap {
+        /// Its name in the scene.
+        model: String,
+        /// Id of a plugin, or the whole path of its file; without it the one of the scene, with the scene's settings.
+        #[serde(default)]
+        plugin: Option<String>,
+        /// Parameters set on top, each with its value as a person would type it.
+        #[serde(default)]
+        settings: Vec<(String, String)>,
+    },
     /// An orderly end: force fades out.
     Stop,
     /// The emergency stop: no force at once, and the run is over.
@@ -315,6 +327,13 @@ mod tests {
         let stop: Request =
             serde_json::from_str(r#"{"number":1,"ask":"emergency-stop","why":"later"}"#).unwrap();
         assert_eq!(stop.ask, Ask::EmergencyStop, "keys of a later protocol are left alone");
+        let swap: Request = serde_json::from_str(
+            r#"{"number":2,"ask":"swap","model":"spring","settings":[["gamma_n","9"]]}"#,
+        )
+        .unwrap();
+        let Ask::Swap { model, plugin, settings } = swap.ask else { panic!("something else was read") };
+        assert_eq!((model.as_str(), plugin), ("spring", None));
+        assert_eq!(settings, [("gamma_n".to_owned(), "9".to_owned())]);
         assert!(serde_json::from_str::<Request>(r#"{"number":1,"ask":"fly"}"#).is_err());
     }
 }

@@ -7,19 +7,25 @@
 //!
 //! What is said over the socket, and both its ends, are the crate `flotor_live`; here is what this host says of itself, and how it
 //! does what it is asked for. Nothing of it runs on the servo's thread. Not real-time.
+//!
+//! A model that somebody wants in place of another is loaded and made here, on a thread of its own, and goes to the loop when
+//! it is ready.
 
 mod carrier;
 
 pub use carrier::{Carried, Carrier, carry};
 
 use crate::record::{Change, RunDescription};
+use crate::registry::Registry;
+use crate::scene::Scene;
 use crate::servo::StopSwitch;
-use crate::session::{Controls, NewValue, Observer, PluginReport};
+use crate::session::{ControlError, Controls, NewValue, Observer, PluginReport};
 use crate::trace::TickRecord;
 use flotor_live::{
     Ask, Directory, Greeting, PROTOCOL, PanelPlugin, Publication, PublishError, Serve, WrenchLimits,
 };
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// What is said of a run before its first tick.
 #[derive(Clone, Copy, Debug)]
@@ -37,7 +43,7 @@ pub struct Announcement<'a> {
 /// What reaches a running loop from other threads.
 #[derive(Clone)]
 pub struct Handles {
-    /// Changes parameters and weights.
+    /// Changes parameters and weights, replaces models.
     pub controls: Controls,
     /// Ends the run.
     pub stop: StopSwitch,
@@ -52,7 +58,17 @@ pub fn publish(
     announcement: Announcement<'_>,
     handles: Handles,
 ) -> Result<Publication, PublishError> {
-    announce(directory, announcement, Arc::new(handles))
+    let folders = plugin_folders(&handles.controls, announcement.run);
+    announce(directory, announcement, Arc::new(Host { handles, folders, registry: Mutex::new(None) }))
+}
+
+/// The folders in which a run's scene has plugins looked for, as they were when it began.
+fn plugin_folders(controls: &Controls, run: &RunDescription) -> Vec<PathBuf> {
+    let file = controls.scene_file().unwrap_or(Path::new(""));
+    let base = file.parent().unwrap_or(Path::new(""));
+    // It has been read before.
+    let folders = Scene::parse(file, &run.scene_toml).map(|scene| scene.plugin_folders).unwrap_or_default();
+    folders.into_iter().map(|folder| base.join(folder)).collect()
 }
 
 /// Lets a prepared run be found and watched; what else may be asked of it is up to `host`.
@@ -114,8 +130,53 @@ impl<O: Observer> Observer for Watched<O> {
     }
 }
 
-impl Serve for Handles {
+/// What does as a watcher asks.
+struct Host {
+    handles: Handles,
+    /// Where the scene has plugins looked for.
+    folders: Vec<PathBuf>,
+    /// Searched when the first model is replaced; kept, so that a file that has not changed is not mapped once more.
+    registry: Mutex<Option<Registry>>,
+}
+
+impl Host {
+    /// On a thread of its own: the one that serves a watcher has too small a stack for plugins.
+    fn swap(
+        &self,
+        model: &str,
+        plugin: Option<&str>,
+        settings: &[(String, String)],
+    ) -> Result<(), ControlError> {
+        let refused = |problem: String| ControlError::Refused { model: model.to_owned(), problem };
+        let settings: Vec<(&str, &str)> = settings.iter().map(|(k, v)| (k.as_str(), v.as_str())).collect();
+        let make = || {
+            let mut registry = self.registry.lock().unwrap_or_else(PoisonError::into_inner);
+            let registry = registry.get_or_insert_with(|| Registry::search(&self.folders));
+            self.handles.controls.swap(registry, model, plugin, &settings)
+        };
+        std::thread::scope(|scope| {
+            let thread = std::thread::Builder::new().name("flotor-swap".to_owned());
+            let making = thread.spawn_scoped(scope, make);
+            let making =
+                making.map_err(|error| refused(format!("there is no thread to make it: {error}")))?;
+            making.join().unwrap_or_else(|_| Err(refused("making it panicked".to_owned())))
+        })
+    }
+}
+
+/// Why a model was not replaced, for whoever asked.
+fn swap_words(model: &str, error: &ControlError) -> String {
+    match error {
+        ControlError::Busy => {
+            format!("[{model}] what came in last is still fading; try again after a moment")
+        }
+        other => other.to_string(),
+    }
+}
+
+impl Serve for Host {
     fn serve(&self, ask: Ask) -> Result<(), String> {
+        let Handles { controls, stop } = &self.handles;
         match ask {
             Ask::Watch { .. } | Ask::LookAway => {} // the publication's own
             Ask::Set { values } => {
@@ -123,13 +184,17 @@ impl Serve for Handles {
                     .iter()
                     .map(|new| NewValue { plugin: &new.plugin, parameter: &new.parameter, value: &new.value })
                     .collect();
-                self.controls.set_parameters(&values).map_err(|error| error.to_string())?;
+                controls.set_parameters(&values).map_err(|error| error.to_string())?;
             }
             Ask::Weight { model, weight } => {
-                self.controls.set_weight(&model, weight).map_err(|error| error.to_string())?;
+                controls.set_weight(&model, weight).map_err(|error| error.to_string())?;
             }
-            Ask::Stop => self.stop.stop(),
-            Ask::EmergencyStop => self.stop.emergency_by_watcher(),
+            Ask::Swap { model, plugin, settings } => {
+                let swapped = self.swap(&model, plugin.as_deref(), &settings);
+                swapped.map_err(|error| swap_words(&model, &error))?;
+            }
+            Ask::Stop => stop.stop(),
+            Ask::EmergencyStop => stop.emergency_by_watcher(),
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 //! The same code runs in the servo and in a replay; that is why a replay can be bit-exact.
 
 use super::Heartbeat;
-use super::models::{Layer, ModelHealth, ModelStack, Replacement};
+use super::models::{Layer, LayerReport, ModelHealth, ModelStack, Replacement};
 use crate::coupling::{
     Account, Coupling, CouplingDescription, CouplingEnds, EndApart, Grip, Hearing, Line, Patience, Pull, Tank,
 };
@@ -287,7 +287,12 @@ impl Forces {
         faded
     }
 
-    /// Every model with its health and what it said last, in the scene's order. Not real-time.
+    /// What is known of every layer that is in place or fading out. Not real-time.
+    pub(crate) fn reports(&mut self) -> Vec<LayerReport> {
+        self.stacks.iter_mut().flat_map(ModelStack::reports).collect()
+    }
+
+    /// Of every model, health and last words of the layer in place, in the scene's order. Not real-time.
     pub(crate) fn health(&mut self) -> Vec<(ModelHealth, String)> {
         let mut stacks: Vec<_> = self.stacks.iter_mut().map(|stack| stack.health().into_iter()).collect();
         let next = |at: &Whereabouts| stacks.get_mut(at.device).and_then(Iterator::next);

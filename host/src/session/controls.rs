@@ -7,12 +7,14 @@ use crate::record::{Change, ChangeSubject};
 use crate::registry::Registry;
 use crate::scene::{ModelUse, is_named, nearest};
 use crate::servo::{
-    ChangeReport, ChangeSender, Clock, PLUGIN, ParameterChange, Replacement, ReportReceiver, WEIGHT, Workshop,
+    ChangeReport, ChangeSender, Clock, LayerReport, ModelHealth, PLUGIN, ParameterChange, Replacement,
+    ReportReceiver, WEIGHT, Workshop,
 };
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Setting, SettingError};
 use flotor_hal::{LoopConfig, Mutability, Parameter};
 use std::collections::VecDeque;
+use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Why the loop was not told.
@@ -107,20 +109,55 @@ struct Shared {
     workshop: Mutex<Supervised>,
 }
 
-/// The workshop, and which models have a replacement on its way or fading in.
+/// A plugin that had the place of a model for a part of a run, and did not behave.
+#[derive(Clone, Debug)]
+pub struct Misbehaved {
+    /// The plugin; its name is that of the model.
+    pub plugin: PluginReport,
+    /// What it did.
+    pub health: ModelHealth,
+    /// Its last words; may be empty.
+    pub words: String,
+}
+
+/// The workshop, which models have a replacement on its way or fading in, and who came back with a fault.
 struct Supervised {
     workshop: Workshop,
     busy: Vec<bool>,
+    /// With the number of the model and which of its plugins it was: of each file the first, so that there is an end to them.
+    misbehaved: Vec<(usize, u16, Misbehaved)>,
 }
 
 impl Supervised {
     /// Drops what the loop has handed back. Not real-time.
-    fn sweep(&mut self) {
-        while let Ok((model, layer)) = self.workshop.retired.pop() {
+    fn sweep(&mut self, parts: &Parts) {
+        while let Ok((model, mut layer)) = self.workshop.retired.pop() {
+            let number = model as usize;
+            let report = layer.report(number);
             drop(layer);
-            if let Some(busy) = self.busy.get_mut(model as usize) {
+            let generation = report.generation;
+            self.note(parts, report);
+            parts.forget(number, generation);
+            if let Some(busy) = self.busy.get_mut(number) {
                 *busy = false;
             }
+        }
+    }
+
+    /// Keeps what is to be said of a layer, if there is anything.
+    fn note(&mut self, parts: &Parts, report: LayerReport) {
+        let LayerReport { model, generation, health, words } = report;
+        if health.is_good() {
+            return;
+        }
+        let Some(plugin) = parts.plugin(model, generation) else { return };
+        let is_known = |(of, which, known): &(usize, u16, Misbehaved)| {
+            *of == model
+                && (*which == 0) == (generation == 0)
+                && known.plugin.metadata.path == plugin.metadata.path
+        };
+        if !self.misbehaved.iter().any(is_known) {
+            self.misbehaved.push((model, generation, Misbehaved { plugin, health, words }));
         }
     }
 }
@@ -133,7 +170,8 @@ impl Controls {
         (config, clock): (LoopConfig, Clock),
         workshop: Workshop,
     ) -> Self {
-        let workshop = Mutex::new(Supervised { workshop, busy: vec![false; models.len()] });
+        let supervised = Supervised { workshop, busy: vec![false; models.len()], misbehaved: Vec::new() };
+        let workshop = Mutex::new(supervised);
         Self { shared: Arc::new(Shared { parts, changes, models: models.to_vec(), config, clock, workshop }) }
     }
 
@@ -202,7 +240,7 @@ impl Controls {
             return Err(ControlError::Ended);
         }
         let mut supervised = workshop.lock().unwrap_or_else(PoisonError::into_inner);
-        supervised.sweep();
+        supervised.sweep(parts);
         if numbers.iter().any(|number| supervised.busy.get(*number).is_none_or(|busy| *busy)) {
             return Err(ControlError::Busy);
         }
@@ -232,40 +270,85 @@ impl Controls {
     /// Drops models the loop has handed back, unless somebody else is at it. Not real-time.
     pub(super) fn sweep(&self) {
         if let Ok(mut supervised) = self.shared.workshop.try_lock() {
-            supervised.sweep();
+            supervised.sweep(&self.shared.parts);
         }
+    }
+
+    /// How the plugins in place of the models have behaved in a run that is over, `left` being what is still in the loop:
+    /// health and last words of those it began with, in the scene's order, and of those that came later the ones that did
+    /// not behave. Not real-time.
+    pub(super) fn settle(&self, left: Vec<LayerReport>) -> (Vec<(ModelHealth, String)>, Vec<Misbehaved>) {
+        let Shared { parts, models, workshop, .. } = &*self.shared;
+        let mut supervised = workshop.lock().unwrap_or_else(PoisonError::into_inner);
+        supervised.sweep(parts);
+        let mut first = vec![(ModelHealth::default(), String::new()); models.len()];
+        for report in left {
+            if let (0, Some(first)) = (report.generation, first.get_mut(report.model)) {
+                *first = (report.health, report.words);
+            } else {
+                supervised.note(parts, report);
+            }
+        }
+        let mut later = Vec::new();
+        for (model, generation, misbehaved) in &supervised.misbehaved {
+            match first.get_mut(*model) {
+                Some(first) if *generation == 0 => *first = (misbehaved.health, misbehaved.words.clone()),
+                _ => later.push(misbehaved.clone()),
+            }
+        }
+        (first, later)
+    }
+
+    /// The file that names the models, for what it says relative to itself.
+    pub(crate) fn scene_file(&self) -> Option<&Path> {
+        self.shared.models.first().map(|model| model.plugin.location.file.as_path())
     }
 }
 
 /// A plugin of a run, and those that took its place.
 pub(super) struct Versions {
     first: PluginReport,
-    /// Those that may still be spoken of, in order of their generations.
-    later: VecDeque<(u16, PluginReport)>,
-    /// How many there have been after the first.
-    count: u16,
+    /// Those that may still be spoken of, in the order in which they came.
+    later: VecDeque<Version>,
+    /// The generation that was given last.
+    newest: u16,
+    /// Which one changes are checked against.
     current: u16,
+    /// The last that is known to have come in.
+    in_place: u16,
+}
+
+/// A plugin that took the place of another.
+struct Version {
+    generation: u16,
+    report: PluginReport,
+    /// The loop has handed it back.
+    is_back: bool,
 }
 
 impl Versions {
     fn get(&self, generation: u16) -> &PluginReport {
-        let is_meant = |(of, _): &&(u16, PluginReport)| *of == generation;
-        self.later.iter().find(is_meant).map_or(&self.first, |(_, report)| report)
+        let meant = self.later.iter().find(|version| version.generation == generation);
+        meant.map_or(&self.first, |version| &version.report)
     }
 
-    /// One more, and its generation.
+    /// One more, and its generation. After the last number comes that of the first replacement again: whose it was is
+    /// long forgotten then. 0 stays with the plugin of the scene.
     fn put_in(&mut self, report: PluginReport) -> u16 {
-        self.count = self.count.saturating_add(1);
-        self.current = self.count;
-        self.later.push_back((self.count, report));
-        self.count
+        self.newest = self.newest.checked_add(1).unwrap_or(1);
+        self.current = self.newest;
+        self.later.push_back(Version { generation: self.newest, report, is_back: false });
+        self.newest
     }
 
-    /// This one is in place: the one before may still be named by a change that was under way, older ones are not. So a
-    /// run may replace its models for ever.
-    fn forget_before(&mut self, generation: u16) {
-        while self.later.front().is_some_and(|(of, _)| of.saturating_add(1) < generation) {
+    /// Forgets those that nobody will speak of any more, so that a run may replace its models for ever. The one before
+    /// the one in place may still be named by a change that was under way; an older one by the loop, until it is back.
+    fn forget(&mut self) {
+        let in_place = self.later.iter().position(|version| version.generation == self.in_place);
+        let mut old = in_place.unwrap_or(0).saturating_sub(1);
+        while old > 0 && self.later.front().is_some_and(|version| version.is_back) {
             self.later.pop_front();
+            old -= 1;
         }
     }
 
@@ -308,8 +391,9 @@ impl Parts {
         let versions = |report: &PluginReport| Versions {
             first: report.clone(),
             later: VecDeque::new(),
-            count: 0,
+            newest: 0,
             current: 0,
+            in_place: 0,
         };
         Self { list: Arc::new(Mutex::new(plugins.iter().map(versions).collect())) }
     }
@@ -328,9 +412,27 @@ impl Parts {
     /// Which plugin of a place changes are checked against.
     pub(super) fn set_current(&self, plugin: u16, generation: u16) {
         if let Some(versions) = self.lock().get_mut(usize::from(plugin)) {
-            versions.current = generation;
-            versions.forget_before(generation);
+            (versions.current, versions.in_place) = (generation, generation);
+            versions.forget();
         }
+    }
+
+    /// The plugin that had this number among those in place of a model.
+    fn plugin(&self, model: usize, generation: u16) -> Option<PluginReport> {
+        let list = self.lock();
+        list.get(devices(&list) + model).map(|versions| versions.get(generation).clone())
+    }
+
+    /// The loop has handed back the one of this number: it may be forgotten.
+    fn forget(&self, model: usize, generation: u16) {
+        let mut list = self.lock();
+        let devices = devices(&list);
+        let Some(versions) = list.get_mut(devices + model) else { return };
+        let back = versions.later.iter_mut().find(|version| version.generation == generation);
+        if let Some(version) = back {
+            version.is_back = true;
+        }
+        versions.forget();
     }
 
     /// Changes are checked against the plugins a run begins with.

@@ -63,7 +63,7 @@ impl Serve for OnlyStop {
             Ask::Watch { .. } | Ask::LookAway => {} // the publication's own
             Ask::Stop => self.0.stop(),
             Ask::EmergencyStop => self.0.emergency_by_watcher(),
-            Ask::Set { .. } | Ask::Weight { .. } => {
+            Ask::Set { .. } | Ask::Weight { .. } | Ask::Swap { .. } => {
                 return Err("an experiment is under way: what is felt is its own to change".to_owned());
             }
         }

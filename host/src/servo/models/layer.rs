@@ -12,7 +12,7 @@ use flotor_hal::{
     Twist, Wrench,
 };
 
-/// How a model has behaved so far, in all its places.
+/// How a plugin in place of a model has behaved so far, in all its places.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ModelHealth {
     /// The tick at which it first panicked; from then on the instance that did is out.
@@ -32,6 +32,12 @@ pub struct ModelHealth {
 }
 
 impl ModelHealth {
+    /// True if there is nothing to be said.
+    #[must_use]
+    pub fn is_good(&self) -> bool {
+        *self == Self::default()
+    }
+
     fn reject(&mut self, tick: u64) {
         self.rejected_ticks += 1;
         self.first_rejected.get_or_insert(tick);
@@ -69,6 +75,18 @@ pub(super) struct Share {
 impl Share {
     /// Nothing. A constant: what `Default` derives for arrays goes through memory, and the tick waits for it.
     pub(super) const NONE: Share = Share { wrench: Wrench::ZERO, energy_j: 0.0 };
+
+    /// This part of it. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn times(self, part: f64) -> Self {
+        Self { wrench: self.wrench * part, energy_j: self.energy_j * part }
+    }
+
+    /// Both together. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn plus(self, other: Self) -> Self {
+        Self { wrench: self.wrench + other.wrench, energy_j: self.energy_j + other.energy_j }
+    }
 }
 
 /// What a model finds where it is to write its answer.
@@ -90,6 +108,21 @@ pub(crate) struct Layer {
     /// What it asked for last: it fades if the model took too long too often.
     last: Share,
     blend: Blend,
+    /// It stays with the layer: whoever takes its place is not to blame for it.
+    health: ModelHealth,
+    /// How often its model had been replaced when it was put in.
+    pub(super) generation: u16,
+}
+
+/// What is known of a layer when its time is over.
+pub(crate) struct LayerReport {
+    /// Number of its model in the scene.
+    pub(crate) model: usize,
+    /// Which of those that had that place it was.
+    pub(crate) generation: u16,
+    pub(crate) health: ModelHealth,
+    /// What it said last; may be empty.
+    pub(crate) words: String,
 }
 
 impl Layer {
@@ -118,6 +151,8 @@ impl Layer {
             budget,
             last: Share::NONE,
             blend: *blend,
+            health: ModelHealth::default(),
+            generation: 0,
         }
     }
 
@@ -136,21 +171,15 @@ impl Layer {
     ///
     /// Real-time: bounded by the objects that are near, no allocation.
     #[inline(always)] // so that the share goes on in registers, not as bytes just written
-    pub(super) fn step(
-        &mut self,
-        tick: &Tick,
-        state: &DeviceState,
-        health: &mut ModelHealth,
-        events: &mut Events,
-    ) -> Share {
+    pub(super) fn step(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
         match self.budget.allowed(tick.time_ns) {
             Allowed::Asked => {
                 let begun_ns = self.budget.begin();
-                let share = self.ask(tick, state, health, events);
+                let share = self.ask(tick, state, events);
                 if let Some(begun_ns) = begun_ns {
                     if self.budget.end(begun_ns, tick.index, tick.time_ns) {
                         events.insert(Events::MODEL_OVERRUN);
-                        health.overrun = self.budget.overrun();
+                        self.health.overrun = self.budget.overrun();
                     }
                     self.last = share;
                 }
@@ -158,7 +187,7 @@ impl Layer {
             }
             Allowed::Fading(part) => {
                 events.insert(Events::MODEL_FAULT);
-                Share { wrench: self.last.wrench * part, energy_j: self.last.energy_j * part }
+                self.last.times(part)
             }
             Allowed::Nothing => {
                 events.insert(Events::MODEL_FAULT);
@@ -169,14 +198,8 @@ impl Layer {
 
     /// Asks all objects that can act where the handle is; the others are not called.
     #[inline(always)] // as `step`
-    fn ask(
-        &mut self,
-        tick: &Tick,
-        state: &DeviceState,
-        health: &mut ModelHealth,
-        events: &mut Events,
-    ) -> Share {
-        let Self { objects, broad, terms, .. } = self;
+    fn ask(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
+        let Self { objects, broad, terms, health, .. } = self;
         let mut share = Share::NONE;
         broad.for_each_near(
             objects,
@@ -206,19 +229,13 @@ impl Layer {
     }
 
     /// Changes a live parameter of all its objects. Real-time: bounded by their number, no allocation.
-    pub(super) fn set_parameter(
-        &mut self,
-        tick: &Tick,
-        parameter: usize,
-        value: f64,
-        health: &mut ModelHealth,
-    ) -> CallStatus {
+    pub(super) fn set_parameter(&mut self, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
         let mut worst = CallStatus::Ok;
         for (index, object) in self.objects.iter_mut().enumerate() {
             let status = object.model.set_parameter(parameter, value);
             if status == CallStatus::Panicked {
                 object.is_out = true;
-                health.panicked_at.get_or_insert(tick.index);
+                self.health.panicked_at.get_or_insert(tick.index);
             }
             if status != CallStatus::Ok {
                 worst = status;
@@ -235,6 +252,17 @@ impl Layer {
             }
         }
         worst
+    }
+
+    /// How it has behaved so far.
+    pub(super) fn health(&self) -> ModelHealth {
+        self.health
+    }
+
+    /// What is known of it, in place of the model numbered `model`. Not real-time.
+    pub(crate) fn report(&mut self, model: usize) -> LayerReport {
+        let Self { generation, health, .. } = *self;
+        LayerReport { model, generation, health, words: self.last_message() }
     }
 
     /// What the first instance that has anything to say said last. Not real-time.

@@ -10,8 +10,8 @@ mod fade;
 mod layer;
 mod slot;
 
-pub(crate) use layer::Layer;
 pub use layer::ModelHealth;
+pub(crate) use layer::{Layer, LayerReport};
 
 use super::{Heartbeat, Place};
 use crate::trace::Events;
@@ -136,7 +136,7 @@ impl ModelStack {
     /// How often the model in place `model` was replaced. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn generation(&self, model: usize) -> Option<u16> {
-        self.slots.get(model).map(|slot| slot.generation)
+        self.slots.get(model).map(Slot::generation)
     }
 
     /// Puts another model in place of one, faded in from this tick on. What it pushes out, because it was still
@@ -171,8 +171,13 @@ impl ModelStack {
         }
     }
 
-    /// Every model with its health and what it said last. Not real-time.
+    /// Of every model, health and last words of the layer in place. Not real-time.
     pub(crate) fn health(&mut self) -> Vec<(ModelHealth, String)> {
-        self.slots.iter_mut().map(|slot| (slot.health, slot.last_message())).collect()
+        self.slots.iter_mut().map(Slot::health).collect()
+    }
+
+    /// What is known of every layer that is here. Not real-time.
+    pub(crate) fn reports(&mut self) -> impl Iterator<Item = LayerReport> {
+        self.slots.iter_mut().flat_map(Slot::reports)
     }
 }
