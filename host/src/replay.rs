@@ -3,13 +3,23 @@
 //! With nothing changed the wrench must come out bit for bit; with another parameter the difference shows what
 //! the change does to the same hand movement.
 
+mod apart;
+mod files;
+mod held;
+
+pub use apart::{Coverage, WhyApart};
+pub use files::named_files;
+pub use held::Held;
+
 use crate::coupling::{CouplingDescription, CouplingEnds, Patience};
 use crate::record::{Change, ChangeOutcome, ChangeSubject, ReadError, Recording, Role, RunDescription};
 use crate::registry::Registry;
 use crate::scene::{Isolation, Location, ModelUse, ParameterText, PluginUse};
 use crate::servo::{Clock, Coupled, Forces, Heartbeat, ModelHealth, Port, Replacement};
 use crate::session::{PluginReport, RunError, prepare_model};
-use crate::trace::TickRecord;
+use crate::trace::{Events, TickRecord};
+use apart::Evidence;
+use flotor_hal::abi::PluginKind;
 use flotor_hal::{DeviceState, LoopConfig, Tick, Wrench};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -49,8 +59,10 @@ pub struct Difference {
     pub ticks: u64,
     /// Ticks in which some bit of the wrench differs.
     pub differing_ticks: u64,
-    /// The first of them.
+    /// The first of them: before it, all is the same.
     pub first_tick: Option<u64>,
+    /// The last of them: after it, all is the same.
+    pub last_tick: Option<u64>,
     /// Largest difference of force, N.
     pub max_force_n: f64,
     /// Largest difference of torque, N·m.
@@ -59,6 +71,19 @@ pub struct Difference {
     pub rms_force_n: f64,
     /// Root mean square of the difference of torque, N·m.
     pub rms_torque_nm: f64,
+}
+
+/// What came of a replay.
+#[derive(Clone, Debug)]
+pub struct Compared {
+    /// How the wrench differs.
+    pub difference: Difference,
+    /// What of the run the recording holds.
+    pub coverage: Coverage,
+    /// Why it differs; if something was changed, why not only for that, as far as the recording tells.
+    pub why: Option<WhyApart>,
+    /// How each model has behaved now, and what it said last, in the scene's order.
+    pub health: Vec<(ModelHealth, String)>,
 }
 
 /// The models of a recording, ready to be asked again.
@@ -71,34 +96,24 @@ pub struct Replay<'r> {
     devices: usize,
     forces: Forces,
     plugins: Vec<PluginReport>,
-    /// Model and parameter that were set for this replay: they keep that value, whatever changed in the run.
-    held: Vec<(String, String)>,
-    /// Models that were given another plugin for this replay: they keep it.
-    exchanged: Vec<String>,
+    held: Held,
 }
 
 impl<'r> Replay<'r> {
     /// Opens a recording and creates its models as they were set, with changes on top. Not real-time.
     ///
     /// # Errors
-    /// [`ReplayError`]: the recording cannot be read, a plugin is missing or refuses the settings.
+    /// [`ReplayError`]: the recording cannot be read, a plugin is missing or refuses the settings, a file
+    /// that a setting names is not that of the run.
     pub fn open(
         path: &Path,
         registry: &'r Registry,
-        mut change: impl FnMut(&mut [ModelUse]),
+        change: impl FnOnce(&mut [ModelUse]) -> Held,
     ) -> Result<Self, ReplayError> {
         let recording = Recording::open(path)?;
-        let recorded = models_of(path, recording.run());
-        let mut uses = recorded.clone();
-        change(&mut uses);
-        let added = |(before, now): (&ModelUse, &ModelUse)| {
-            let added = now.plugin.parameters.get(before.plugin.parameters.len()..).unwrap_or_default();
-            added.iter().map(|set| (now.name.clone(), set.key.clone())).collect::<Vec<_>>()
-        };
-        let held = recorded.iter().zip(&uses).flat_map(added).collect();
-        let is_other = |(before, now): &(&ModelUse, &ModelUse)| before.plugin.plugin != now.plugin.plugin;
-        let exchanged =
-            recorded.iter().zip(&uses).filter(is_other).map(|(_, now)| now.name.clone()).collect();
+        let mut uses = models_of(path, recording.run());
+        let held = change(&mut uses);
+        use_recorded_files(&mut uses, &held, path, recording.run())?;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 100 Hz to 10 kHz
         let period_ns = (1.0e9 / recording.run().rate_hz).round() as u64;
         let config = LoopConfig { period_ns, seed: recording.run().seed };
@@ -118,7 +133,7 @@ impl<'r> Replay<'r> {
         let couplings = recording.run().couplings.iter();
         let couplings = couplings.map(|coupling| Coupled::new(coupling, period_s, NOBODY_TO_WAIT_FOR).0);
         let forces = Forces::new(devices, layers, couplings.collect());
-        Ok(Self { registry, config, recording, uses, devices, forces, plugins, held, exchanged })
+        Ok(Self { registry, config, recording, uses, devices, forces, plugins, held })
     }
 
     /// How the run was set up.
@@ -138,11 +153,9 @@ impl<'r> Replay<'r> {
     /// # Errors
     /// [`ReplayError`] at a damaged place, or if a plugin that was put in during the run is refused; what was compared
     /// before is lost with it.
-    pub fn compare(
-        mut self,
-        mut look: impl FnMut(&TickRecord, &Wrench),
-    ) -> Result<(Difference, Vec<(ModelHealth, String)>), ReplayError> {
+    pub fn compare(mut self, mut look: impl FnMut(&TickRecord, &Wrench)) -> Result<Compared, ReplayError> {
         let mut difference = Difference::default();
+        let mut evidence = Evidence::of(self.recording.run());
         let heart = Heartbeat::default(); // nobody waits for a replay
         let mut ports = vec![Port::REST; self.devices];
         let mut records: Vec<TickRecord> = Vec::with_capacity(self.devices);
@@ -165,12 +178,18 @@ impl<'r> Replay<'r> {
                 buttons: record.buttons,
                 ..DeviceState::HOME
             };
+            port.events = Events::NONE;
             if records.len() < self.devices {
                 continue;
             }
             let tick = Tick { index: record.tick, time_ns: record.time_ns, dt_ns: record.dt_ns };
             while self.forces.take_faded(&tick).is_some() {}
             self.forces.step(&tick, &mut ports, &heart);
+            evidence.look(tick.index, &records, &ports);
+            let is_other = |(record, port): (&TickRecord, &Port)| bits(&port.asked) != bits(&record.model);
+            if records.iter().zip(&ports).any(is_other) {
+                evidence.differs(tick.index, &records, &ports);
+            }
             for (port, record) in ports.iter_mut().zip(records.drain(..)) {
                 difference.add(&record, &port.asked);
                 look(&record, &port.asked);
@@ -178,8 +197,12 @@ impl<'r> Replay<'r> {
                 port.commanded = record.commanded;
             }
         }
+        if let Some(record) = records.first() {
+            evidence.coverage.break_off(record.tick);
+        }
         difference.finish();
-        Ok((difference, self.forces.health()))
+        let why = if self.held.is_nothing() { evidence.cause() } else { evidence.other_cause() };
+        Ok(Compared { difference, coverage: evidence.coverage, why, health: self.forces.health() })
     }
 }
 
@@ -199,8 +222,7 @@ impl<'r> Replay<'r> {
             ChangeSubject::Parameter => {}
         }
         let schema = self.plugins.get(model).map_or(&[][..], |plugin| plugin.schema);
-        let is_held =
-            self.held.iter().any(|(plugin, key)| *plugin == change.plugin && *key == change.parameter);
+        let is_held = self.held.keeps_parameter(&change.plugin, &change.parameter);
         let parameter = schema.iter().position(|parameter| parameter.id() == change.parameter);
         if let (Some(parameter), false, ChangeOutcome::Applied) = (parameter, is_held, change.outcome) {
             self.forces.set_parameter(model, &tick, parameter, change.number);
@@ -213,18 +235,20 @@ impl<'r> Replay<'r> {
         let (Some(used), Some(report)) = (self.uses.get(model), self.plugins.get_mut(model)) else {
             return Ok(());
         };
-        if self.exchanged.contains(&change.plugin) {
+        if self.held.keeps_plugin(&change.plugin) {
             return Ok(());
         }
         let settings: Vec<(&str, &str)> =
             change.settings.iter().map(|(k, v)| (k.as_str(), v.as_str())).collect();
-        let held = used
-            .plugin
-            .parameters
-            .iter()
-            .filter(|set| self.held.iter().any(|(plugin, key)| *plugin == used.name && *key == set.key));
         let mut other = used.replaced_by(Some(&change.parameter), &settings);
-        other.plugin.parameters.extend(held.cloned());
+        // What was set for the plugin before may mean nothing to this one. A plugin that cannot be had has no
+        // schema, and is complained about below.
+        let plugin = self.registry.load(&other.plugin.plugin, PluginKind::Model);
+        let schema = plugin.map_or(&[][..], |plugin| plugin.parameters());
+        let is_known = |key: &str| schema.iter().any(|parameter| parameter.id() == key);
+        let set = used.plugin.parameters.iter();
+        let kept = set.filter(|set| self.held.keeps_parameter(&used.name, &set.key) && is_known(&set.key));
+        other.plugin.parameters.extend(kept.cloned());
         let (layer, now) = prepare_model(self.registry, &other, &self.config, Clock::Virtual)?;
         *report = now;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a count
@@ -244,6 +268,7 @@ impl Difference {
         }
         self.differing_ticks += 1;
         self.first_tick.get_or_insert(record.tick);
+        self.last_tick = Some(record.tick);
         let force_n = (wrench.force() - record.model.force()).length();
         let torque_nm = (wrench.torque() - record.model.torque()).length();
         self.max_force_n = self.max_force_n.max(force_n);
@@ -270,6 +295,23 @@ fn bits(wrench: &Wrench) -> [u64; 6] {
     let [fx, fy, fz] = wrench.force_n;
     let [tx, ty, tz] = wrench.torque_nm;
     [fx, fy, fz, tx, ty, tz].map(f64::to_bits)
+}
+
+/// Finds the files that settings of the run named. What was set for this replay means what it says.
+fn use_recorded_files(
+    uses: &mut [ModelUse],
+    held: &Held,
+    path: &Path,
+    run: &RunDescription,
+) -> Result<(), RunError> {
+    let recorded = run.plugins.iter().filter(|plugin| plugin.role != Role::Device);
+    for (model, then) in uses.iter_mut().zip(recorded) {
+        let (name, plugin) = (&model.name, &mut model.plugin);
+        for set in plugin.parameters.iter_mut().filter(|set| !held.keeps_parameter(name, &set.key)) {
+            *set = files::as_recorded(set, name, &then.parameters, path)?;
+        }
+    }
+    Ok(())
 }
 
 /// The models of a recorded run as a scene would name them.

@@ -53,6 +53,6 @@ fn describe_plugin(used: &PluginUse, role: Role, report: &PluginReport) -> Plugi
         blend: Blend::default(),
         field: None,
         settings: settings.collect(),
-        parameters: report.parameters.clone(),
+        parameters: report.parameters.iter().cloned().chain(crate::replay::named_files(report)).collect(),
     }
 }

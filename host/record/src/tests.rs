@@ -447,3 +447,19 @@ fn the_digest_sees_every_bit_but_measured_times() {
         }
     }
 }
+
+#[test]
+fn a_file_beside_a_parameter_comes_back_and_its_content_tells_it_from_another() {
+    let file = TestFile::with("named-file", b"0,0\n6,4.08\n");
+    let named = NamedFile::read(&file.0).unwrap();
+    assert!(named.path.is_absolute() && named.hash_text().len() == "xxh3:".len() + 16, "{named:?}");
+    let pair = |key: &str, value: &str| (key.to_owned(), value.to_owned());
+    let mut parameters = vec![pair("curve", "c.csv"), pair("stiffness_scale", "1")];
+    assert_eq!(NamedFile::among(&parameters, "curve"), None, "a recording of an earlier version");
+    parameters.extend(named.to_parameters("curve"));
+    assert_eq!(NamedFile::among(&parameters, "curve"), Some(named.clone()));
+    assert_eq!(NamedFile::among(&parameters, "stiffness_scale"), None);
+    fs::write(&file.0, b"0,0\n6,4.09\n").unwrap();
+    assert_ne!(NamedFile::read(&file.0).unwrap().hash, named.hash);
+    assert!(NamedFile::read(&std::env::temp_dir()).is_err(), "a folder has no content");
+}

@@ -6,8 +6,7 @@ use crate::plot::{Axis, Figure, Panel, Series};
 use crate::record::Ending;
 use crate::record::Recording;
 use crate::registry::Registry;
-use crate::replay::{Difference, Replay, ReplayError};
-use crate::scene::ModelUse;
+use crate::replay::{Compared, Coverage, Difference, Held, Replay, ReplayError, WhyApart};
 use clap::Args;
 use flotor_hal::{DVec3, Wrench};
 use serde::Serialize;
@@ -43,12 +42,25 @@ pub(crate) struct ReplayArguments {
     plot: Option<PathBuf>,
 }
 
+impl ReplayArguments {
+    /// True if another wrench is what was asked for.
+    fn changes_anything(&self) -> bool {
+        !(self.sets.is_empty() && self.models.is_empty())
+    }
+}
+
 #[derive(Serialize)]
 struct Report {
     bit_exact: bool,
+    /// Of the whole run, as far as anybody can tell.
     complete: bool,
+    #[serde(skip)]
+    ending: Ending,
+    #[serde(flatten)]
+    coverage: Coverage,
     #[serde(flatten)]
     difference: Difference,
+    why_apart: Option<WhyApart>,
     recorded_s: f64,
     wall_s: f64,
 }
@@ -57,21 +69,22 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
     let mut unknown = None;
     let registry = Registry::search(&arguments.folders);
     let replay = Replay::open(&arguments.recording, &registry, |models| {
-        let others = arguments.models.iter().find_map(|other| replace(other, models).err());
-        unknown = others.or_else(|| arguments.sets.iter().find_map(|set| set.apply_to_models(models).err()));
+        Held::apply(models, &arguments.models, &arguments.sets).unwrap_or_else(|problem| {
+            unknown = Some(problem);
+            Held::default()
+        })
     });
     if let Some(problem) = unknown {
         return Err(CommandError::Usage(problem));
     }
     let replay = replay?;
-    let complete =
-        Recording::open(&arguments.recording).map_err(ReplayError::from)?.ending() == Ending::Finished;
+    let ending = Recording::open(&arguments.recording).map_err(ReplayError::from)?.ending();
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
     let progress = run::progress_bar((replay.run().duration_s * 1.0e3) as u64, "{percent:>3} %  replaying");
     let started = Instant::now();
     let mut samples = Vec::new();
     let mut end_ns = 0;
-    let (difference, health) = replay.compare(|record, wrench| {
+    let Compared { difference, coverage, why, health } = replay.compare(|record, wrench| {
         end_ns = record.time_ns;
         progress.set_position(record.time_ns / 1_000_000);
         if arguments.plot.is_some() {
@@ -83,8 +96,16 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
     #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
     let recorded_s = end_ns as f64 * 1.0e-9;
     let bit_exact = difference.is_bit_exact();
-    let report =
-        Report { bit_exact, complete, difference, recorded_s, wall_s: started.elapsed().as_secs_f64() };
+    let report = Report {
+        bit_exact,
+        complete: ending == Ending::Finished && coverage.is_whole(),
+        ending,
+        coverage,
+        difference,
+        why_apart: why,
+        recorded_s,
+        wall_s: started.elapsed().as_secs_f64(),
+    };
     tell(arguments, &report)?;
     if let Some(path) = &arguments.plot {
         std::fs::write(path, picture(&samples))
@@ -95,48 +116,73 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
             "a model of the recording stopped answering: {words}"
         )));
     }
-    if !bit_exact && arguments.sets.is_empty() && arguments.models.is_empty() {
-        let problem =
-            "nothing was changed, yet the wrench differs: another build of the plugin, or another machine";
-        return Err(CommandError::Failed(problem.to_owned()));
+    if !bit_exact && !arguments.changes_anything() {
+        let why = report.why_apart.unwrap_or(WhyApart::OtherBuild);
+        return Err(CommandError::Failed(format!("nothing was changed, yet the wrench differs: {why}")));
     }
     Ok(())
 }
 
-/// Another plugin in place of a model of the recording; it starts from its own defaults.
-fn replace(other: &KeyValue, models: &mut [ModelUse]) -> Result<(), String> {
-    let (name, plugin) = other.pair();
-    let names: Vec<String> = models.iter().map(|model| model.name.clone()).collect();
-    let model = models.iter_mut().find(|model| model.name == name).ok_or_else(|| {
-        format!("--model {name}={plugin}: the recording has no model `{name}` (it has {})", names.join(", "))
-    })?;
-    plugin.clone_into(&mut model.plugin.plugin);
-    model.plugin.parameters.clear();
-    Ok(())
+impl Report {
+    /// What came out, in a few words that claim no more than was compared.
+    fn verdict(&self) -> String {
+        match (self.difference.ticks, self.bit_exact, self.coverage.missing_ticks) {
+            (0, ..) => "there is no tick to compare".to_owned(),
+            (_, false, _) => "the wrench differs".to_owned(),
+            (_, true, 0) => "bit for bit the recorded wrench".to_owned(),
+            (_, true, missing) => format!("bit for bit the recorded wrench, but {missing} ticks are missing"),
+        }
+    }
+
+    /// Where the wrench is the same although it differs from one tick to another.
+    fn same_around(&self, first: u64, last: u64) -> String {
+        let Coverage { begins_at_tick, ends_at_tick, .. } = self.coverage;
+        let before = begins_at_tick.filter(|begin| *begin < first).map(|_| format!("before {first}"));
+        let after = ends_at_tick.filter(|end| *end > last).map(|_| format!("after {last}"));
+        let parts: Vec<String> = before.into_iter().chain(after).collect();
+        if parts.is_empty() { String::new() } else { format!("; bit for bit {}", parts.join(" and ")) }
+    }
+
+    /// What of the run is not in the recording.
+    fn gaps(&self) -> Vec<String> {
+        let Coverage { begins_at_tick, missing_ticks, first_missing_tick, .. } = self.coverage;
+        let late = begins_at_tick.filter(|first| *first > 0);
+        let late = late.map(|first| format!("the recording begins at tick {first}: the run was on by then"));
+        let missing = first_missing_tick.map(|first| {
+            format!("{missing_ticks} ticks are missing, from {first} on: their records were lost")
+        });
+        let cut = (self.ending == Ending::CutOff)
+            .then(|| "the recording breaks off: its process was killed or its disk full".to_owned());
+        [late, missing, cut].into_iter().flatten().collect()
+    }
 }
 
 fn tell(arguments: &ReplayArguments, report: &Report) -> Result<(), CommandError> {
     if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
-        let verdict = if report.bit_exact { "bit for bit the recorded wrench" } else { "the wrench differs" };
+        let verdict = report.verdict();
         say!("{}", style::title(&format!("{}: {verdict}", arguments.recording.display())));
         let Difference {
             ticks,
             differing_ticks,
             first_tick,
+            last_tick,
             max_force_n,
             max_torque_nm,
             rms_force_n,
             rms_torque_nm,
         } = &report.difference;
         say!("  {:<11}{ticks} ({:.3} s) in {:.3} s", "ticks", report.recorded_s, report.wall_s);
-        if let Some(first) = first_tick {
-            say!("  {:<11}{differing_ticks} ticks, the first is {first}", "differ");
+        if let (Some(first), Some(last)) = (first_tick, last_tick) {
+            let same = report.same_around(*first, *last);
+            say!("  {:<11}{differing_ticks} ticks, the first is {first}, the last {last}{same}", "differ");
             say!("  {:<11}max {max_force_n:.3e} N, rms {rms_force_n:.3e} N", "force");
             say!("  {:<11}max {max_torque_nm:.3e} N·m, rms {rms_torque_nm:.3e} N·m", "torque");
         }
-        if !report.complete {
-            say!("  {:<11}the recording breaks off: its process was killed or its disk full", "note");
+        // If nothing was changed, the error says why.
+        if let (Some(why), true) = (&report.why_apart, arguments.changes_anything()) {
+            say!("  {:<11}the wrench differs not only for what was changed: {why}", "note");
         }
+        report.gaps().iter().for_each(|gap| say!("  {:<11}{gap}", "note"));
     }
     arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, report))
 }

@@ -1,0 +1,239 @@
+//! What of a run a recording holds, and why a replay of it may come out differently although nothing was
+//! changed.
+
+use crate::record::{Clock, RunDescription};
+use crate::servo::Port;
+use crate::trace::{Events, TickRecord};
+use serde::Serialize;
+use std::fmt;
+
+/// The ticks of a run that can be compared. One that lost the record of a device cannot.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Coverage {
+    /// The first of them: above 0 if the recording began while the run was on. `None` if there is no tick.
+    pub begins_at_tick: Option<u64>,
+    /// The last of them.
+    pub ends_at_tick: Option<u64>,
+    /// Ticks after the first that are missing.
+    pub missing_ticks: u64,
+    /// The first of these.
+    pub first_missing_tick: Option<u64>,
+}
+
+impl Coverage {
+    /// Adds a tick that is there whole; how many are missing just before it.
+    fn add(&mut self, tick: u64) -> u64 {
+        let missing = self.ends_at_tick.map_or(0, |last| tick.saturating_sub(last).saturating_sub(1));
+        self.miss(missing);
+        self.begins_at_tick.get_or_insert(tick);
+        self.ends_at_tick = Some(tick);
+        missing
+    }
+
+    /// The recording ends in the middle of this tick.
+    pub(super) fn break_off(&mut self, tick: u64) {
+        self.miss(self.ends_at_tick.map_or(1, |last| tick.saturating_sub(last)));
+    }
+
+    fn miss(&mut self, ticks: u64) {
+        self.missing_ticks = self.missing_ticks.saturating_add(ticks);
+        if ticks > 0 {
+            let first = self.ends_at_tick.map_or(0, |last| last.saturating_add(1));
+            self.first_missing_tick.get_or_insert(first);
+        }
+    }
+
+    /// True if no tick is missing between the run's first and the last that is here.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        self.missing_ticks == 0 && !self.is_joined_late()
+    }
+
+    /// True if the recording began while the run was on.
+    #[must_use]
+    pub fn is_joined_late(&self) -> bool {
+        self.begins_at_tick.is_some_and(|first| first > 0)
+    }
+}
+
+/// Why a wrench does not come out again.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(tag = "cause", rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum WhyApart {
+    /// A model had a thread of its own, and nobody knows any more which field the loop had when.
+    FieldOnRealClock {
+        /// Its name.
+        model: String,
+    },
+    /// A model was not asked any more, or could not answer, because of the time it took or the process it was
+    /// in.
+    ModelOut {
+        /// The first tick of the run in which that made a difference.
+        tick: u64,
+    },
+    /// A model was late, and its answer before stood in for the one that was due.
+    ModelLate {
+        /// The first tick of the run in which that made a difference.
+        tick: u64,
+    },
+    /// Ticks are missing, and up to them the wrench came out bit for bit.
+    Gap {
+        /// The last tick before them.
+        after_tick: u64,
+        /// How many.
+        ticks: u64,
+    },
+    /// The recording began while the run was on.
+    JoinedLate {
+        /// Its first tick.
+        first_tick: u64,
+    },
+    /// Nothing in the recording tells.
+    OtherBuild,
+}
+
+impl fmt::Display for WhyApart {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::FieldOnRealClock { model } => write!(
+                f,
+                "`{model}` was computed beside the loop on the real clock, and when its fields came is not in the \
+                 recording"
+            ),
+            Self::ModelOut { tick } => write!(
+                f,
+                "in tick {tick} of the run a model was out, because it had taken too long or its process failed, and \
+                 here it is not"
+            ),
+            Self::ModelLate { tick } => write!(
+                f,
+                "in tick {tick} of the run the answer of a model came too late and the one before was used, and here \
+                 none is late"
+            ),
+            Self::Gap { after_tick, ticks } => write!(
+                f,
+                "{ticks} ticks are missing after tick {after_tick}, and with them what models and couplings remember"
+            ),
+            Self::JoinedLate { first_tick } => write!(
+                f,
+                "the recording begins at tick {first_tick} of the run: what had changed by then, and what models and \
+                 couplings remembered, is not in it"
+            ),
+            Self::OtherBuild => f.write_str("another build of the plugin, or another machine"),
+        }
+    }
+}
+
+/// What is gathered on the way, to tell the cause.
+pub(super) struct Evidence {
+    pub(super) coverage: Coverage,
+    /// A model with fields of unknown times.
+    field: Option<String>,
+    /// The last gap: the tick before it, and its ticks.
+    gap: Option<(u64, u64)>,
+    /// The first tick in which a model was out in the run alone.
+    out_at: Option<u64>,
+    /// Of the first tick that differs.
+    cause: Option<WhyApart>,
+}
+
+impl Evidence {
+    pub(super) fn of(run: &RunDescription) -> Self {
+        let is_timed = run.clock == Clock::Real;
+        let beside = run.plugins.iter().find(|plugin| is_timed && plugin.field.is_some());
+        Self {
+            coverage: Coverage::default(),
+            field: beside.map(|plugin| plugin.name.clone()),
+            gap: None,
+            out_at: None,
+            cause: None,
+        }
+    }
+
+    /// Looks at a tick, before it is compared: one record and one port for each device.
+    pub(super) fn look(&mut self, tick: u64, records: &[TickRecord], ports: &[Port]) {
+        let last = self.coverage.ends_at_tick;
+        let missing = self.coverage.add(tick);
+        if let (Some(after_tick), true) = (last, missing > 0) {
+            self.gap = Some((after_tick, missing));
+        }
+        if happened_then(Events::MODEL_FAULT, records, ports) {
+            self.out_at.get_or_insert(tick);
+        }
+    }
+
+    /// The tick looked at last differs. What it says of itself tells more than what lies before it: up to it
+    /// all was the same.
+    pub(super) fn differs(&mut self, tick: u64, records: &[TickRecord], ports: &[Port]) {
+        if self.cause.is_some() {
+            return;
+        }
+        let first_tick = self.coverage.begins_at_tick.filter(|_| self.coverage.is_joined_late());
+        let cause = if let Some(model) = &self.field {
+            WhyApart::FieldOnRealClock { model: model.clone() }
+        } else if happened_then(Events::MODEL_FAULT, records, ports) {
+            WhyApart::ModelOut { tick }
+        } else if happened_then(Events::MODEL_OVERRUN, records, ports) {
+            WhyApart::ModelLate { tick }
+        } else if let Some((after_tick, ticks)) = self.gap {
+            WhyApart::Gap { after_tick, ticks }
+        } else if let Some(first_tick) = first_tick {
+            WhyApart::JoinedLate { first_tick }
+        } else {
+            WhyApart::OtherBuild
+        };
+        self.cause = Some(cause);
+    }
+
+    /// Why the wrench differs although nothing was changed, if it does.
+    pub(super) fn cause(&self) -> Option<WhyApart> {
+        self.cause.clone()
+    }
+
+    /// Why it differs not only for what was changed, as far as the run itself tells.
+    pub(super) fn other_cause(&self) -> Option<WhyApart> {
+        let field = self.field.as_ref().map(|model| WhyApart::FieldOnRealClock { model: model.clone() });
+        field.or_else(|| self.out_at.map(|tick| WhyApart::ModelOut { tick })).filter(|_| self.cause.is_some())
+    }
+}
+
+/// True if something happened in a tick of the run and does not happen now: what a model does for itself
+/// happens again.
+fn happened_then(event: Events, records: &[TickRecord], ports: &[Port]) -> bool {
+    let then_only = |(record, port): (&TickRecord, &Port)| {
+        record.events.intersects(event) && !port.events.intersects(event)
+    };
+    records.iter().zip(ports).any(then_only)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn coverage(ticks: &[u64]) -> Coverage {
+        let mut coverage = Coverage::default();
+        ticks.iter().for_each(|tick| {
+            coverage.add(*tick);
+        });
+        coverage
+    }
+
+    #[test]
+    fn missing_ticks_are_counted_between_the_first_and_the_last() {
+        assert!(coverage(&[0, 1, 2]).is_whole() && coverage(&[]).is_whole());
+        let gaps = coverage(&[0, 1, 4, 5, 7]);
+        assert_eq!((gaps.missing_ticks, gaps.first_missing_tick, gaps.is_whole()), (3, Some(2), false));
+        let late = coverage(&[10, 11]);
+        assert_eq!((late.missing_ticks, late.is_joined_late(), late.is_whole()), (0, true, false));
+        let wild = coverage(&[u64::MAX, 3, u64::MAX]); // a damaged file: any number, no panic
+        assert_eq!(wild.missing_ticks, u64::MAX - 4);
+    }
+
+    #[test]
+    fn a_tick_that_is_there_in_part_is_missing() {
+        let mut broken = coverage(&[0, 1]);
+        broken.break_off(2);
+        assert_eq!((broken.missing_ticks, broken.first_missing_tick), (1, Some(2)));
+    }
+}

@@ -1,0 +1,59 @@
+//! The files that parameters of a recorded run named: the same ones again, or a word about it.
+
+use crate::record::NamedFile;
+use crate::scene::{Location, ParameterText, SceneError};
+use crate::session::PluginReport;
+use flotor_hal::{Parameter, ParameterKind};
+use std::path::{Path, PathBuf};
+
+/// What a description of a run keeps of the files a plugin was told about: it belongs beside the plugin's
+/// parameters. Files that cannot be read any more are left out. Not real-time.
+#[must_use]
+pub fn named_files(report: &PluginReport) -> Vec<(String, String)> {
+    let named = |parameter: &Parameter| {
+        let (_, value) = report.parameters.iter().find(|(id, _)| id == parameter.id())?;
+        let is_built_in = parameter.choices().iter().any(|name| name.as_str() == value);
+        if parameter.kind() != ParameterKind::File || is_built_in {
+            return None;
+        }
+        let file = NamedFile::read(Path::new(value)).ok()?;
+        Some(file.to_parameters(parameter.id()))
+    };
+    report.schema.iter().filter_map(named).flatten().collect()
+}
+
+/// A setting of the model `model`; if it named a file, with one that has the same content: where it was in
+/// the run, or beside the recording, for recordings travel.
+///
+/// # Errors
+/// No file has that content. `parameters` are those of the model's description.
+pub(super) fn as_recorded(
+    set: &ParameterText,
+    model: &str,
+    parameters: &[(String, String)],
+    recording: &Path,
+) -> Result<ParameterText, SceneError> {
+    let Some(then) = NamedFile::among(parameters, &set.key) else { return Ok(set.clone()) };
+    let folder = recording.parent().unwrap_or(Path::new(""));
+    let places: [PathBuf; 2] = [then.path.clone(), folder.join(&set.value)];
+    let found: Vec<NamedFile> = places.iter().filter_map(|path| NamedFile::read(path).ok()).collect();
+    if let Some(same) = found.iter().find(|file| file.hash == then.hash) {
+        return Ok(ParameterText { value: same.path.to_string_lossy().into_owned(), ..set.clone() });
+    }
+    let what = match found.first() {
+        Some(other) => format!(
+            "`{}` is not the file of the run: its content is {}, that of the run was {}",
+            other.path.display(),
+            other.hash_text(),
+            then.hash_text()
+        ),
+        None => format!("`{}` is not there any more ({})", then.path.display(), then.hash_text()),
+    };
+    let problem = format!(
+        "[{model}] `{key}`: {what}; put the file of the run beside the recording as `{written}`, or name another with \
+         `--set {model}.{key}=FILE`",
+        key = set.key,
+        written = set.value
+    );
+    Err(SceneError { location: Location { file: recording.into(), line: 0 }, problem })
+}
