@@ -16,7 +16,7 @@
 //! [`mod@file`] (what is kept) -> the device; [`verify`] asks the device again, [`picture`] draws it. [`thesis`] is
 //! the report's polynomial, as a baseline.
 //!
-//! Not real-time throughout.
+//! Not real-time, but for the thread that holds the handle in the rig.
 
 mod emulated_sensor;
 pub mod file;
@@ -62,6 +62,14 @@ pub enum CalibrationError {
         target_mm: f64,
         /// Where it does, mm.
         height_mm: f64,
+    },
+    /// The plan asks for more than the device gives: what is cut off would be fitted as a loss.
+    #[error("the plan pushes with {command_n} N, the device gives {most_n} N at most; plan smaller forces")]
+    TooStrong {
+        /// What the plan asks for, N.
+        command_n: f64,
+        /// What the device declares, N.
+        most_n: f64,
     },
     /// Somebody stopped it.
     #[error("stopped before it was done: the handle was let down, nothing was written")]

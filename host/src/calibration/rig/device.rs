@@ -1,9 +1,11 @@
 //! A real device with a force sensor on a serial port. Somebody, or something, lowers the sensor.
 
-use super::holder::{Holder, Holding, REST_M};
+use super::holder::{Guard, Holder, Holding, REST_M};
 use super::{PERIOD_NS, Rest, Rig};
 use crate::calibration::CalibrationError;
 use crate::calibration::sensor::ForceSensor;
+use crate::scene::{Boundary, Limits};
+use crate::servo::{Envelope, StopSwitch};
 use flotor_hal::abi::loader::{OpenedDevice, Plugin, Setting};
 use flotor_hal::{Fault, LoopConfig, Refusal, VerticalCalibration};
 use std::ops::ControlFlow;
@@ -28,6 +30,9 @@ pub struct DeviceRig<W> {
     /// Nothing while it is held, and after it was lost.
     opened: Option<OpenedDevice>,
     holder: Option<Holder>,
+    /// Most vertical force the device takes, N.
+    most_n: f64,
+    stop: StopSwitch,
     sensor: ForceSensor,
     /// How often the handle was found restless before it came to the rest that is being measured.
     restless: u64,
@@ -40,7 +45,8 @@ pub struct DeviceRig<W> {
 
 impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
     /// Opens the device. A stop counts if the handle rests within `close_m` of where it should, within `patience`;
-    /// until then `waiting` is told where it is, and then told nothing, once. When it breaks off, the handle is let down.
+    /// until then `waiting` is told where it is, and then told nothing, once. When it breaks off, the handle is let down;
+    /// at the emergency stop of `stop` the device is stopped.
     ///
     /// # Errors
     /// [`CalibrationError`] if the device refuses.
@@ -50,13 +56,17 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
         sensor: ForceSensor,
         close_m: f64,
         patience: Duration,
+        stop: StopSwitch,
         waiting: W,
     ) -> Result<Self, CalibrationError> {
         let mut opened = plugin.open_device(settings)?;
         let serial = opened.serial();
+        let [_, _, most_n] = opened.capabilities().map_err(CalibrationError::Refused)?.max_force_n;
         Ok(Self {
             opened: Some(opened),
             holder: None,
+            most_n,
+            stop,
             sensor,
             restless: 0,
             serial,
@@ -92,15 +102,29 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
     }
 
     fn holder(&mut self) -> Result<&mut Holder, CalibrationError> {
-        if let (None, Some(opened)) = (&self.holder, self.opened.take()) {
+        if let (None, Some(mut opened)) = (&self.holder, self.opened.take()) {
             let config = LoopConfig { period_ns: PERIOD_NS, seed: 0 };
+            let capabilities = opened.capabilities().map_err(CalibrationError::Refused)?;
+            let envelope = Envelope::new(&Limits::default(), &without_wall(), &capabilities, PERIOD_NS);
+            let guard = Guard { envelope, stopper: opened.stopper(), stop: self.stop.clone() };
             let active = opened.activate(&config).map_err(|(opened, refusal)| {
                 self.opened = Some(opened);
                 CalibrationError::Refused(refusal)
             })?;
-            self.holder = Some(Holder::start(active).map_err(CalibrationError::NoThread)?);
+            self.holder = Some(Holder::start(active, guard).map_err(CalibrationError::NoThread)?);
         }
         self.holder.as_mut().ok_or_else(lost)
+    }
+}
+
+/// What the handle rests against is the sensor; a wall would push beside it.
+fn without_wall() -> Boundary {
+    Boundary {
+        stiffness_n_per_m: 0.0,
+        damping_ns_per_m: 0.0,
+        stiffness_nm_per_rad: 0.0,
+        damping_nms_per_rad: 0.0,
+        ..Boundary::default()
     }
 }
 
@@ -111,6 +135,9 @@ fn lost() -> CalibrationError {
 impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {
     fn rest_at(&mut self, target_m: f64, command_n: &dyn Fn(f64) -> f64) -> Result<Rest, CalibrationError> {
         let (close_m, until, command_n) = (self.close_m, Instant::now() + self.patience, command_n(target_m));
+        if command_n > self.most_n {
+            return Err(CalibrationError::TooStrong { command_n, most_n: self.most_n });
+        }
         self.holder()?.push(command_n);
         loop {
             let report = self.holder()?.look()?;

@@ -1,11 +1,14 @@
 //! A thread that holds a levitating handle in the rig: every axis but the vertical locked, and along that a force.
 //!
 //! It goes on whatever the procedure does in the meantime: a device that is not spoken to lets go. Nothing in a tick
-//! allocates or waits for anybody.
+//! allocates or waits for anybody. As in a run, nothing reaches the device but through the envelope, a watchdog stops a
+//! device that does not come back, and the emergency stop is for both.
 
 use super::{AVERAGED_TICKS, Mean, PERIOD_NS, locked};
 use crate::calibration::CalibrationError;
-use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice};
+use crate::servo::{Envelope, Gate, Heartbeat, Place, StopSwitch, enter_real_time, start_watchdog};
+use crate::trace::Events;
+use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
 use flotor_hal::{Cycle, DeviceState, Fault, Tick};
 use flotor_sync::{Observer, Publisher, Words, latest};
 use std::thread::JoinHandle;
@@ -23,6 +26,13 @@ pub(super) const REST_M: f64 = 10.0e-6;
 const STEADY_N: f64 = 0.02;
 /// Damping that stops it, N·s/m (the locked axes').
 const BRAKE_NS_PER_M: f64 = 15.0;
+/// Ticks without a new sample after which there is no force: nobody knows where the handle is (10 ms, as in a run).
+const STALE_TICKS_LIMIT: u32 = 10;
+/// Time after which a device that does not come back is stopped, ns. No hand is held here: longer than in a run, so that a
+/// machine with other work does not end a calibration of an hour.
+const WATCHDOG_NS: u64 = 500_000_000;
+/// How often it is looked whether the thread is at its end.
+const LOOK_FOR_END: Duration = Duration::from_millis(1);
 
 /// What the thread is told.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -106,10 +116,18 @@ pub(super) enum Holding {
     Faulted(Fault),
 }
 
+/// What stands between the thread and the device, and who may stop both.
+pub(super) struct Guard {
+    pub(super) envelope: Envelope,
+    pub(super) stopper: Stopper,
+    pub(super) stop: StopSwitch,
+}
+
 /// The handle in the hands of the thread.
 pub(super) struct Holder {
     orders: Publisher<Order, ORDER_WORDS>,
     reports: Observer<Report, REPORT_WORDS>,
+    heart: Heartbeat,
     thread: Option<JoinHandle<ActiveDevice>>,
 }
 
@@ -118,12 +136,20 @@ impl Holder {
     ///
     /// # Errors
     /// What the system says about another thread.
-    pub(super) fn start(device: ActiveDevice) -> std::io::Result<Self> {
+    pub(super) fn start(device: ActiveDevice, guard: Guard) -> std::io::Result<Self> {
         let (orders, ordered) = latest(Order::Push(0.0));
         let (publisher, reports) = latest(Averages::default().report(Holding::Changing));
-        let hold = move || hold(device, &ordered, publisher);
+        let Guard { envelope, stopper, stop } = guard;
+        let heart = Heartbeat::default();
+        start_watchdog(heart.clone(), vec![stopper], stop.clone(), WATCHDOG_NS)?;
+        let thread_heart = heart.clone();
+        let hold = move || {
+            let device = hold(device, envelope, &thread_heart, &stop, &ordered, publisher);
+            thread_heart.finish();
+            device
+        };
         let thread = std::thread::Builder::new().name("flotor-rig".to_owned()).spawn(hold)?;
-        Ok(Self { orders, reports, thread: Some(thread) })
+        Ok(Self { orders, reports, heart, thread: Some(thread) })
     }
 
     /// Pushes up with so many N from now on.
@@ -142,6 +168,9 @@ impl Holder {
                 break report;
             }
         };
+        if self.heart.bitten().is_some() {
+            return Err(CalibrationError::Fault(Fault::Timeout));
+        }
         match report.state {
             Holding::Faulted(fault) => Err(CalibrationError::Fault(fault)),
             Holding::RanAway => Err(CalibrationError::RanAway { height_mm: report.height_m * 1.0e3 }),
@@ -156,7 +185,15 @@ impl Holder {
 
     fn stop(&mut self) -> Option<ActiveDevice> {
         self.orders.publish(&Order::End);
-        self.thread.take()?.join().ok()
+        let thread = self.thread.take()?;
+        while !thread.is_finished() {
+            // Stuck in the device, which the watchdog has stopped: it has to be left behind.
+            if self.heart.bitten().is_some() {
+                return None;
+            }
+            std::thread::sleep(LOOK_FOR_END);
+        }
+        thread.join().ok()
     }
 }
 
@@ -169,11 +206,14 @@ impl Drop for Holder {
 
 fn hold(
     mut device: ActiveDevice,
+    mut envelope: Envelope,
+    heart: &Heartbeat,
+    stop: &StopSwitch,
     orders: &Observer<Order, ORDER_WORDS>,
     mut reports: Publisher<Report, REPORT_WORDS>,
 ) -> ActiveDevice {
     // Refused, it holds all the same: a tick that comes too late shows in the force that was delivered.
-    let _ = crate::servo::enter_real_time();
+    let _ = enter_real_time(None);
     let period = Duration::from_nanos(PERIOD_NS);
     let started = Instant::now();
     let mut order = Order::Push(0.0);
@@ -181,6 +221,7 @@ fn hold(
     let mut state = DeviceState::HOME;
     let mut averages = Averages::default();
     let mut last_ns = 0;
+    let mut stale_ticks = 0_u32;
     for index in 0.. {
         #[allow(clippy::cast_possible_truncation)] // five hundred years
         let time_ns = started.elapsed().as_nanos() as u64;
@@ -200,18 +241,30 @@ fn hold(
             };
             averages.begin_anew();
         }
+        heart.enter(index, Place::DeviceRead(0));
         let read = device.read(&tick, &mut state);
+        stale_ticks = if read == Cycle::Fresh { 0 } else { stale_ticks.saturating_add(1) };
+        let gate = if stale_ticks > STALE_TICKS_LIMIT { Gate::SHUT } else { Gate::OPEN };
+        if gate == Gate::SHUT {
+            averages.begin_anew();
+        }
         if read == Cycle::Fresh {
             averages.add(state.pose.position().z, state.delivered.force().z);
         }
         let speed_m_per_s = state.twist.linear().z;
         ran_away |= speed_m_per_s.abs() > RUNAWAY_M_PER_S;
         let vertical_n = if ran_away { -BRAKE_NS_PER_M * speed_m_per_s } else { pushed_n };
-        let written = device.write(&tick, &locked(&state, vertical_n));
-        let fault = [read, written].into_iter().find_map(|cycle| match cycle {
+        let (asked, mut events) = (locked(&state, vertical_n), Events::NONE);
+        let commanded = envelope.apply(&asked, gate, &state, &tick, &mut events);
+        heart.enter(index, Place::DeviceWrite(0));
+        let written = device.write(&tick, &commanded);
+        heart.enter(index, Place::Waiting);
+        let faulted = [read, written].into_iter().find_map(|cycle| match cycle {
             Cycle::Fault(fault) => Some(fault),
             Cycle::Fresh | Cycle::Stale => None,
         });
+        // The watchdog has told the device by now, or will within a millisecond.
+        let fault = faulted.or(stop.emergency().map(|_| Fault::EmergencyStop));
         let doing = match fault {
             Some(fault) => Holding::Faulted(fault),
             None if ran_away => Holding::RanAway,

@@ -6,6 +6,7 @@ use crate::calibration::rig::{DeviceRig, SimulatedRig, Waiting};
 use crate::calibration::sensor::{ForceSensor, SERIAL_SENSOR};
 use crate::cli::stopping::stop_on_signals;
 use crate::registry::Registry;
+use crate::servo::StopSwitch;
 use clap::Args;
 use flotor_hal::abi::PluginKind;
 use indicatif::ProgressBar;
@@ -78,13 +79,15 @@ impl RigArguments {
         let (close_m, patience) = (self.tolerance_mm * 1.0e-3, Duration::from_secs_f64(self.patience));
         let progress = progress_bar(stops, "{pos}/{len}  {wide_bar}\n{msg}");
         progress.enable_steady_tick(REDRAWN);
-        let rig = DeviceRig::open(&plugin, &settings, sensor, close_m, patience, guide(&progress));
+        let stop = stop_on_signals();
+        let guide = guide(&progress, &stop);
+        let rig = DeviceRig::open(&plugin, &settings, sensor, close_m, patience, stop, guide);
         Ok((rig.map_err(refused)?, progress))
     }
 }
 
-fn guide(progress: &ProgressBar) -> Guide {
-    let (progress, stop) = (progress.clone(), stop_on_signals());
+fn guide(progress: &ProgressBar, stop: &StopSwitch) -> Guide {
+    let (progress, stop) = (progress.clone(), stop.clone());
     Box::new(move |waiting| {
         match waiting {
             Some(Waiting { target_m, height_m, command_n }) => {
