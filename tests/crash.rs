@@ -54,6 +54,36 @@ fn a_killed_process_loses_at_most_a_second_of_its_recording() {
     );
 }
 
+#[test]
+fn a_reader_that_has_gone_away_costs_neither_the_run_nor_its_recording() {
+    let scratch = Scratch::default();
+    let scene = scratch.file("scene.toml", flotor::scene::DEMO);
+    let (file, picture) = (scratch.path().join("run.mcap"), scratch.path().join("run.svg"));
+    let [run, clock, virtual_, duration, seconds] =
+        ["run", "--clock", "virtual", "--duration", "2s"].map(OsStr::new);
+    let [record, plot] = ["--record", "--plot"].map(OsStr::new);
+    let arguments = [
+        run,
+        scene.as_os_str(),
+        clock,
+        virtual_,
+        duration,
+        seconds,
+        record,
+        file.as_os_str(),
+        plot,
+        picture.as_os_str(),
+    ];
+    // The reader is gone before there is anything to read.
+    let to_nobody = "{ sleep 1; \"$@\"; echo \"code $?\" >&2; } | true";
+    let ran = Flotor::with(arguments).through_shell(to_nobody).run();
+    assert_eq!(ran.stderr, format!("code {}\n", exit_code::OK), "{ran:?}");
+    let (last_s, ending) = last_tick_s(&file);
+    assert_eq!(ending, Ending::Finished);
+    assert!((last_s - 1.999).abs() < 1.0e-9, "the last of two thousand ticks: {last_s} s");
+    assert!(picture.exists());
+}
+
 /// Bytes at which the disk is full. Plugins are copied when they are loaded, and the copy has to fit too: those in C take
 /// some twenty kilobytes. A tick takes some three hundred bytes of a recording, a quarter of a second goes out at once.
 const DISK_BYTES: u64 = 600_000;

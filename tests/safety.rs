@@ -1,6 +1,7 @@
 //! How a run ends when it must: every state of a run reached through real libraries, emergency stops from signal,
 //! button and device, and a watchdog that stops the device when a plugin does not come back.
 
+use flotor::record::{Ending, Recording};
 use flotor::servo::{Clock, EmergencySource, ModelHealth};
 use flotor::session::RunEnd;
 use flotor::trace::{Events, TickRecord};
@@ -10,7 +11,9 @@ use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::{Watched, watch, watch_on};
 use flotor_tests::{TestSize, holds_ticks, workspace_root};
-use std::path::Path;
+use rustix::process::{Pid, Signal, kill_process_group};
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -110,13 +113,16 @@ fn watch_in_real_time(scene: &str) -> Watched {
     watch_on(Clock::Real, scene)
 }
 
-/// Runs a scene in real time, for longer than any test waits; `meanwhile` gets the process id once it runs.
-fn run_in_real_time(scratch: &Scratch, scene: &str, meanwhile: impl FnOnce(u32)) -> Ran {
-    let _alone = alone();
+/// Where the runs of a test are recorded.
+fn recording_in(scratch: &Scratch) -> PathBuf {
+    scratch.path().join("run.mcap")
+}
+
+/// A run of a scene in real time, for longer than any test waits, with its report for machines in `json`.
+fn in_real_time(scratch: &Scratch, scene: &str, json: &OsStr) -> Flotor {
     let file = scratch.file("scene.toml", scene);
-    let recording = scratch.path().join("run.mcap");
-    let stop_file = scratch.path().join("stopped");
-    let arguments: [&std::ffi::OsStr; 8] = [
+    let recording = recording_in(scratch);
+    let arguments: [&OsStr; 8] = [
         "run".as_ref(),
         file.as_ref(),
         "--duration".as_ref(),
@@ -124,12 +130,24 @@ fn run_in_real_time(scratch: &Scratch, scene: &str, meanwhile: impl FnOnce(u32))
         "--record".as_ref(),
         recording.as_ref(),
         "--json".as_ref(),
-        "-".as_ref(),
+        json,
     ];
-    let running = Flotor::with(arguments).env("FIXTURE_STOP_FILE", &stop_file.display().to_string()).start();
-    wait_for(&recording);
+    let stop_file = scratch.path().join("stopped");
+    Flotor::with(arguments).env("FIXTURE_STOP_FILE", &stop_file.display().to_string())
+}
+
+/// Runs it to its end, alone; `meanwhile` gets the process id once the loop runs.
+fn run_meanwhile(scratch: &Scratch, flotor: Flotor, meanwhile: impl FnOnce(u32)) -> Ran {
+    let _alone = alone();
+    let running = flotor.start();
+    wait_for(&recording_in(scratch));
     meanwhile(running.id());
     running.wait()
+}
+
+/// Runs a scene in real time, for longer than any test waits; `meanwhile` gets the process id once it runs.
+fn run_in_real_time(scratch: &Scratch, scene: &str, meanwhile: impl FnOnce(u32)) -> Ran {
+    run_meanwhile(scratch, in_real_time(scratch, scene, "-".as_ref()), meanwhile)
 }
 
 /// Waits until a recording holds ticks: the loop runs then.
@@ -157,6 +175,13 @@ fn end(ran: &Ran) -> String {
     summary["end"].as_str().unwrap_or_default().to_owned()
 }
 
+/// Every tick of a recording that is whole.
+fn recorded(scratch: &Scratch) -> Vec<TickRecord> {
+    let recording = Recording::open(&recording_in(scratch)).expect("a recording");
+    assert_eq!(recording.ending(), Ending::Finished);
+    recording.map(|record| record.expect("whole")).collect()
+}
+
 #[test]
 fn sigusr1_is_an_emergency_stop() {
     let scratch = Scratch::default();
@@ -172,8 +197,7 @@ fn sigint_ends_a_run_in_order() {
     let slowly = format!("{PATIENT}\nramp_s = 1");
     let ran = run_in_real_time(&scratch, &scene("", "", &slowly), |process| signal("INT", process));
     assert_eq!((ran.code, end(&ran).as_str()), (Some(exit_code::OK), "stopped"), "{ran:?}");
-    let recording = flotor::record::Recording::open(&scratch.path().join("run.mcap")).expect("a recording");
-    let records: Vec<TickRecord> = recording.map(|record| record.expect("whole")).collect();
+    let records = recorded(&scratch);
     let is_releasing = |record: &&TickRecord| record.events.intersects(Events::RELEASING);
     let (first, last) =
         (records.iter().find(is_releasing).expect("it fades out"), records.last().expect("ticks"));
@@ -186,6 +210,117 @@ fn sigint_ends_a_run_in_order() {
     );
     assert_eq!(height_of_force(last), 0.0);
     assert!(scratch.path().join("stopped").exists(), "the device was told to stop");
+}
+
+#[test]
+fn whatever_a_terminal_sends_ends_a_run_in_order_and_nothing_suspends_it() {
+    for name in ["TERM", "HUP", "QUIT", "TSTP"] {
+        let scratch = Scratch::default();
+        // Whatever the tests were started with: a signal may be ignored, as by `nohup`.
+        let flotor = in_real_time(&scratch, &scene("", "", PATIENT), "-".as_ref());
+        let flotor = flotor.through_shell("exec env --default-signal=HUP \"$@\"");
+        let ran = run_meanwhile(&scratch, flotor, |process| {
+            signal(name, process);
+            // A run that is suspended all the same fails this test instead of holding it up.
+            std::thread::sleep(Duration::from_millis(500));
+            signal("CONT", process);
+        });
+        assert_eq!((ran.code, end(&ran).as_str()), (Some(exit_code::OK), "stopped"), "{name}: {ran:?}");
+        let records = recorded(&scratch);
+        assert!(records.iter().any(|record| record.events.intersects(Events::RELEASING)), "{name}");
+        assert_eq!(records.last().map(height_of_force), Some(0.0), "{name}");
+        assert!(scratch.path().join("stopped").exists(), "{name}: the device was told to stop");
+    }
+}
+
+/// Longer than signals may lie apart that are taken for one wish.
+const ANOTHER_WISH: Duration = Duration::from_millis(500);
+
+#[test]
+fn a_second_signal_is_an_emergency_stop() {
+    let scratch = Scratch::default();
+    let slowly = format!("{PATIENT}\nramp_s = 20");
+    let ran = run_in_real_time(&scratch, &scene("", "", &slowly), |process| {
+        signal("INT", process);
+        std::thread::sleep(ANOTHER_WISH);
+        signal("TERM", process);
+    });
+    assert_eq!((ran.code, end(&ran).as_str()), (Some(exit_code::DEVICE_FAULT), "emergency_stop"), "{ran:?}");
+    assert!(last_line(&ran).starts_with("error: emergency stop (signal)"), "{ran:?}");
+    let records = recorded(&scratch);
+    assert!(
+        records.iter().any(|record| record.events.intersects(Events::RELEASING)),
+        "the first was orderly"
+    );
+    assert!(scratch.path().join("stopped").exists(), "the device was told to stop");
+}
+
+#[test]
+fn a_third_signal_ends_a_process_whatever_holds_it_up() {
+    let scratch = Scratch::default();
+    // On the virtual clock nobody watches a loop: it hangs in its first tick for good.
+    let hangs = scene("", "fault = \"hangs\"", "");
+    let flotor = in_real_time(&scratch, &hangs, "-".as_ref()).through_shell("exec \"$@\" --clock virtual");
+    let _alone = alone();
+    let running = flotor.start();
+    let started = Instant::now();
+    while !recording_in(&scratch).exists() {
+        assert!(started.elapsed() < Duration::from_secs(20), "it does not come to its first tick");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    for _ in 0..3 {
+        std::thread::sleep(ANOTHER_WISH);
+        signal("INT", running.id());
+    }
+    assert_eq!(running.wait().code, Some(130));
+}
+
+#[test]
+fn a_run_that_is_to_outlive_its_terminal_does() {
+    let scratch = Scratch::default();
+    let flotor = in_real_time(&scratch, &scene("", "", PATIENT), "-".as_ref());
+    let mut seen_ns = 0;
+    // As `nohup` does.
+    let ran = run_meanwhile(&scratch, flotor.through_shell("trap '' HUP; exec \"$@\""), |process| {
+        let recording = Recording::open(&recording_in(&scratch)).expect("it holds ticks");
+        seen_ns = recording.map_while(Result::ok).last().expect("it holds ticks").time_ns;
+        signal("HUP", process);
+        std::thread::sleep(Duration::from_secs(2));
+        signal("INT", process);
+    });
+    assert_eq!((ran.code, end(&ran).as_str()), (Some(exit_code::OK), "stopped"), "{ran:?}");
+    let records = recorded(&scratch);
+    let released = records.iter().find(|record| record.events.intersects(Events::RELEASING));
+    let went_on_ns = released.expect("it fades out").time_ns - seen_ns;
+    assert!(went_on_ns > 1_500_000_000, "it let go {went_on_ns} ns after it was last seen");
+}
+
+#[test]
+fn an_emergency_stop_has_its_exit_code_also_where_the_report_cannot_be_written() {
+    let scratch = Scratch::default();
+    let json = scratch.path().join("missing").join("run.json");
+    let flotor = in_real_time(&scratch, &scene("", "", PATIENT), json.as_ref());
+    let ran = run_meanwhile(&scratch, flotor, |process| signal("USR1", process));
+    assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:?}");
+    let missing = format!("error: {}: cannot write the JSON: ", json.display());
+    assert!(ran.stderr.lines().any(|line| line.starts_with(&missing)), "{ran:?}");
+    assert!(last_line(&ran).starts_with("error: emergency stop (signal)"), "{ran:?}");
+    assert!(!recorded(&scratch).is_empty());
+}
+
+#[test]
+fn an_emergency_stop_has_its_exit_code_also_where_nobody_reads_the_report() {
+    let scratch = Scratch::default();
+    let stops = scene("fault = \"emergency-stop\"\nat_tick = 50", "", "");
+    for json in ["-", "/dev/null"] {
+        let flotor = in_real_time(&scratch, &stops, json.as_ref());
+        // The reader is gone before there is anything to read.
+        let to_nobody = "{ sleep 1; \"$@\" --clock virtual; echo \"code $?\" >&2; } | true";
+        let ran = flotor.through_shell(to_nobody).run();
+        assert_eq!(last_line(&ran), format!("code {}", exit_code::DEVICE_FAULT), "{ran:?}");
+        assert!(ran.stderr.contains("error: emergency stop (the device's own)"), "{ran:?}");
+        assert_eq!(recorded(&scratch).len(), 51);
+    }
 }
 
 #[test]
@@ -363,6 +498,22 @@ fn a_model_in_a_process_of_its_own_says_no_like_any_other() {
             Flotor::with(["run".as_ref(), file.as_os_str(), "--clock".as_ref(), "virtual".as_ref()]).run();
         assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:?}");
         assert!(ran.error().contains(words), "{ran:?}");
+    }
+}
+
+/// A terminal signals the whole group of processes.
+#[test]
+fn a_model_in_a_process_of_its_own_is_felt_until_the_run_has_ended_in_order() {
+    let patiently = format!("{PATIENT}\nramp_s = 1");
+    let scene = apart("", "", &patiently).replace("name = \"block\"", "name = \"block\"\nbudget_us = 1e6");
+    for signal in [Signal::INT, Signal::TSTP] {
+        let scratch = Scratch::default();
+        let flotor = in_real_time(&scratch, &scene, "-".as_ref()).through_shell("exec setsid \"$@\"");
+        let ran = run_meanwhile(&scratch, flotor, |process| {
+            let group = i32::try_from(process).ok().and_then(Pid::from_raw).expect("a process");
+            kill_process_group(group, signal).expect("it is ours");
+        });
+        assert_eq!((ran.code, end(&ran).as_str()), (Some(exit_code::OK), "stopped"), "{signal:?}: {ran:?}");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::bridge::{BRIDGE, Way, is_elsewhere};
 use super::stopping::stop_on_signals;
-use super::{CommandError, style};
+use super::{CommandError, first_error, report_line, style};
 use crate::record::{Change, Note, Recorder, Severity};
 use crate::servo::StopSwitch;
 use clap::Args;
@@ -58,13 +58,14 @@ fn record_local(out: &Path) -> Result<(), CommandError> {
         dropped => format!(", {} {dropped} ticks the host could not hand over", style::warning("without")),
     };
     let (RecordingEnd::Told(words) | RecordingEnd::Cut(words)) = &end;
-    println!("{}: {ticks} ticks{lost}; {words}", out.display());
-    match end {
+    let told = report_line(format_args!("{}: {ticks} ticks{lost}; {words}", out.display()));
+    let whole = match end {
         RecordingEnd::Told(_) => Ok(()),
         RecordingEnd::Cut(_) => Err(CommandError::Failed(
             "the recording ends before the run has told its end; what had come is in the file".to_owned(),
         )),
-    }
+    };
+    first_error([whole, told])
 }
 
 /// What came of a recording.
