@@ -559,3 +559,51 @@ fn each_rule_of_a_loop_sees_the_model_that_breaks_it() {
         assert!(told.contains(words), "{rule} with {fault}: {told}");
     }
 }
+
+// ---------------------------------------------------------------- what was meant
+
+/// What the program says of a scene.
+fn told_of(text: &str) -> String {
+    let scratch = Scratch::default();
+    let ran = Flotor::with(["run".as_ref(), scratch.file("scene.toml", text).as_os_str()]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+    ran.error().to_owned()
+}
+
+#[test]
+fn a_table_of_a_wrong_name_and_a_key_below_the_wrong_table_are_what_is_told() {
+    let rest = "plugin = \"simulated\"\n[[model]]\nplugin = \"spring\"\n";
+    let told = told_of(&format!("[devic]\n{rest}"));
+    assert!(told.ends_with("unknown key `devic`; did you mean `device`?"), "{told}");
+    let told = told_of(&format!("[device]\n{rest}rate_hz = 500\n"));
+    assert!(
+        told.ends_with("scene.toml:5: unknown key `model.rate_hz`; `rate_hz` belongs above all tables"),
+        "{told}"
+    );
+}
+
+#[test]
+fn an_id_is_looked_for_among_plugins_of_both_kinds_and_nothing_unlike_it_is_suggested() {
+    for (id, told) in [
+        ("simulatd", "no plugin `simulatd`; did you mean `simulated`?"),
+        ("sprang", "no plugin `sprang`; did you mean `spring`?"),
+        ("jelly", "no plugin `jelly`; `flotor plugins` lists"),
+    ] {
+        let ran = Flotor::with(["plugins", id]).run();
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+        assert!(ran.error().starts_with(told), "{id}: {ran:#?}");
+    }
+}
+
+#[test]
+fn emulate_helps_with_itself_until_a_name_is_given() {
+    for help in ["--help", "-h"] {
+        let ran = Flotor::with(["emulate", help]).run();
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+        assert!(ran.stdout.contains("flotor emulate <NAME>"), "{ran:#?}");
+    }
+    // There is no such emulator: who asks for its help is told so.
+    let ran = Flotor::with(["emulate", "nothing", "--help"]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+    assert!(ran.error().contains("flotor-nothing-emulator"), "{ran:#?}");
+}

@@ -91,11 +91,58 @@ fn wrong_types_and_ranges_say_what_would_be_right() {
         ),
         ("motion_scale = 1.6666666666666667", "motion_scale = 0", "`model.mapping.motion_scale` = 0"),
         ("title = ", "title ", "scene.toml:1: not valid TOML"),
+        (
+            "plugin = \"spring\"",
+            "plugin = \"spring\"\ndevice = []",
+            "scene.toml:9: `model.device` names no device; name one at least",
+        ),
+        (
+            "force_n = [30, 30, 60]",
+            "emergency_button = 1.7",
+            "scene.toml:14: `limits.emergency_button` is a whole number from 0 to 31",
+        ),
+        ("force_n = [30, 30, 60]", "emergency_button = 32", "is a whole number from 0 to 31"),
     ] {
         let complaint = spoiled(piece, wrong);
         assert!(complaint.contains(expected), "{complaint}");
         assert_eq!(complaint.lines().count(), 1, "{complaint}");
     }
+}
+
+#[test]
+fn a_watchdog_waits_for_three_periods_at_least() {
+    let with = |rate_hz: u32, watchdog_ms: &str| {
+        RIGHT
+            .replace("rate_hz = 1000", &format!("rate_hz = {rate_hz}"))
+            .replace("force_n = [30, 30, 60]", &format!("watchdog_ms = {watchdog_ms}"))
+    };
+    for (rate_hz, shortest) in [(1000, "3"), (100, "30"), (700, "4.29"), (10_000, "1")] {
+        let scene = Scene::parse(Path::new("scene.toml"), &with(rate_hz, shortest));
+        assert!(scene.is_ok(), "{rate_hz} Hz: {scene:?}");
+    }
+    for (rate_hz, short, legal) in
+        [(1000, "2.9", "3 to 60000"), (100, "20", "30 to 60000"), (700, "4", "4.29 to 60000")]
+    {
+        let expected = format!(
+            "scene.toml:14: `limits.watchdog_ms` = {short}: legal at {rate_hz} Hz is {legal}, \
+             three periods of the loop at least"
+        );
+        assert_eq!(complaint(&with(rate_hz, short)), expected);
+    }
+    // Another rate on the command line makes another limit.
+    let scratch = Scratch::default();
+    let scene = scratch.file("scene.toml", with(1000, "10"));
+    let at = |rate_hz: &str| {
+        let scene = scene.display().to_string();
+        Flotor::with(["run", &scene, "--clock", "virtual", "--duration", "10ms", "--rate", rate_hz]).run()
+    };
+    assert_eq!(at("300").code, Some(exit_code::OK));
+    let ran = at("200");
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    assert!(
+        ran.error().starts_with("--rate: `limits.watchdog_ms` = 10: legal at 200 Hz is 15 to"),
+        "{ran:?}"
+    );
 }
 
 #[test]

@@ -194,6 +194,23 @@ fn a_device_that_cannot_be_felt_is_refused() {
     assert!(!out.exists());
 }
 
+/// A weight pulls at a hand all the time. Subjects who feel it are not pulled out of the device's range; where a hand is
+/// told to be where it feels a spring, it is, and that is said with subject and trial.
+#[test]
+fn a_weight_is_felt_within_the_range() {
+    let scratch = Scratch::default();
+    let felt =
+        ["force", "--way", "felt", "--replications", "2", "--no-demo", "--feel", "300ms", "--subjects", "2"];
+    let ran = study(&felt, &scratch.path().join("held")).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    assert!(ran.stdout.contains("2 of 2 subjects complete"), "{ran:?}");
+    let low = ["--set", "device.hand_centre_mm=-4", "--set", "device.hand_amplitude_mm=6"];
+    let arguments: Vec<&str> = felt.into_iter().chain(low).collect();
+    let ran = study(&arguments, &scratch.path().join("dropped")).run();
+    assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:?}");
+    assert!(ran.stderr.contains("note: sub-0") && ran.stderr.contains(": trial "), "{ran:?}");
+}
+
 const SMALL: [&str; 8] = ["jnd", "--bases", "26", "--replications", "2", "--no-demo", "--feel", "50ms"];
 
 #[test]
@@ -457,6 +474,49 @@ fn a_measured_curve_is_a_stimulus_as_it_was_measured() {
         Flotor::with(["study", "spring", "real.csv", "--free-length-mm", "30", "--curve-scene", "real.toml"]);
     let ran = ran.inside(scratch.path()).run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "a measurement is never overwritten: {ran:?}");
+}
+
+/// 0.68 N/mm on the bench are 0.68 N/mm at the hand.
+#[test]
+fn a_fitted_spring_is_felt_as_stiff_as_the_real_one() {
+    let scratch = Scratch::default();
+    let path = |name: &str| scratch.path().join(name);
+    let rows: String = (0..=50)
+        .map(|step| format!("{},{}\n", 25.0 - 0.2 * f64::from(step), 0.136 * f64::from(step)))
+        .collect();
+    std::fs::write(path("bench.csv"), "length_mm,force_n\n".to_owned() + &rows).unwrap();
+    let ran =
+        Flotor::with(["study", "spring", "bench.csv", "--scene", "real.toml"]).inside(scratch.path()).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let scene = Scene::load(&path("real.toml")).unwrap();
+    let apparatus = Apparatus::check(scene, &magnitude_of("spring.gamma_n", [15.0, 17.0, 19.0])).unwrap();
+    let mut rig = Rig::start(&apparatus, (3, subject(2)), Kinematics::Summary, None, 4.0).unwrap();
+    let felt = rig.present_watched(&one(1, 17.0), &mut Steepness::default()).unwrap();
+    let found = felt.kinematics[0].felt_stiffness_n_per_m.unwrap();
+    // As above: a tenth of what people can tell.
+    assert!((found / 680.0 - 1.0).abs() < 0.01, "{found} N/m");
+}
+
+/// A table of compressions does not tell how long the spring is: its curve can be felt all the same, a fit by a law that
+/// counts in lengths cannot.
+#[test]
+fn a_curve_of_compressions_needs_no_free_length() {
+    let scratch = Scratch::default();
+    let rows: String =
+        (0..=60).map(|step| format!("{},{}\n", 0.5 * f64::from(step), 0.4 * f64::from(step))).collect();
+    std::fs::write(scratch.path().join("bench.csv"), "compression_mm,force_n\n".to_owned() + &rows).unwrap();
+    let spring = |option: &str| {
+        Flotor::with(["study", "spring", "bench.csv", option, "real.toml"]).inside(scratch.path()).run()
+    };
+    let ran = spring("--scene");
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    assert!(ran.error().contains("--free-length-mm"), "{ran:?}");
+    // Deeper than the 25 mm that the model draws by itself.
+    let ran = spring("--curve-scene");
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let ran = Flotor::with(["run", "real.toml", "--clock", "virtual", "--duration", "200ms"]);
+    let ran = ran.inside(scratch.path()).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
 }
 
 /// What is kept of a person's movements is up to `--kinematics`.

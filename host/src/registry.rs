@@ -47,15 +47,15 @@ struct Loaded {
 #[non_exhaustive]
 pub enum LookupError {
     /// No plugin has the id.
-    #[error("no {} plugin `{id}`{}{}; `flotor plugins` lists what there is, {PATH_VARIABLE} adds folders",
-        kind.word(),
+    #[error("no {}plugin `{id}`{}{}; `flotor plugins` lists what there is, {PATH_VARIABLE} adds folders",
+        kind.as_ref().map_or(String::new(), |kind| format!("{} ", kind.word())),
         nearest.as_ref().map_or(String::new(), |n| format!("; did you mean `{n}`?")),
         broken.as_ref().map_or(String::new(), |b| format!(" ({b})")))]
     Unknown {
         /// The id.
         id: String,
-        /// Model or device.
-        kind: PluginKind,
+        /// Model or device, if it matters.
+        kind: Option<PluginKind>,
         /// The most similar id of that kind.
         nearest: Option<String>,
         /// A file of that name that could not be read as a plugin.
@@ -186,14 +186,34 @@ impl Registry {
             }
             return Ok(self.open(&metadata.path)?);
         }
-        let same_kind = self.found.iter().filter(|known| known.kind == kind).map(|known| known.id.as_str());
-        let broken = self.broken.iter().map(ToString::to_string).find(|text| text.contains(id));
-        Err(LookupError::Unknown {
+        Err(self.unknown(id, Some(kind)))
+    }
+
+    /// Loads the plugin an id (or a path to a file) means, whatever it is a plugin for. Not real-time; runs the plugin's
+    /// code.
+    ///
+    /// # Errors
+    /// [`LookupError`]: unknown, with the nearest known id, or refused, with the reason.
+    pub fn load_any(&self, id: &str) -> Result<Plugin, LookupError> {
+        if let Some(linked) = self.linked.iter().find(|plugin| plugin.metadata().id == id) {
+            return Ok(linked.clone());
+        }
+        match self.found.iter().find(|known| known.id == id) {
+            Some(known) => self.load(id, known.kind),
+            None if id.contains(std::path::MAIN_SEPARATOR) => Ok(self.open(Path::new(id))?),
+            None => Err(self.unknown(id, None)),
+        }
+    }
+
+    /// That no plugin (of a kind) has an id, with the nearest that one has.
+    fn unknown(&self, id: &str, kind: Option<PluginKind>) -> LookupError {
+        let candidates = self.found.iter().filter(|known| kind.is_none_or(|kind| known.kind == kind));
+        LookupError::Unknown {
             id: id.to_owned(),
             kind,
-            nearest: nearest(id, same_kind).map(str::to_owned),
-            broken,
-        })
+            nearest: nearest(id, candidates.map(|known| known.id.as_str())).map(str::to_owned),
+            broken: self.broken.iter().map(ToString::to_string).find(|text| text.contains(id)),
+        }
     }
 
     /// Loads a file, or gives what was loaded before if the file is unchanged: libraries are never unloaded, and a

@@ -3,6 +3,7 @@
 mod machine;
 mod schema;
 
+use machine::has_machine;
 pub(crate) use machine::machine;
 pub(crate) use schema::SCHEMA;
 
@@ -16,6 +17,26 @@ use std::path::Path;
 const MM: f64 = 1.0e-3;
 const UM: f64 = 1.0e-6;
 const PERCENT: f64 = 1.0e-2;
+
+/// How the sentence of a parameter begins that has a say in preset `full` only.
+const OF_FULL: &str = "Full:";
+
+/// Refuses a value that would change nothing: one of the machine that preset `plain` leaves out.
+///
+/// # Errors
+/// Names the first of them, and the preset that has it.
+pub(crate) fn refuse_idle(settings: &Settings<'_>) -> Result<(), Refusal> {
+    if has_machine(settings) {
+        return Ok(());
+    }
+    let is_idle = |id: &str| SCHEMA.iter().any(|known| known.id() == id && known.doc().starts_with(OF_FULL));
+    settings.ids().find(|id| is_idle(id)).map_or(Ok(()), |id| {
+        Err(Refusal::parameter(format!(
+            "`{id}` has no say in preset `plain`, which leaves coils, sensors and faults out; set `preset` to `full` as \
+             well"
+        )))
+    })
+}
 
 /// The setup a set of values means; tick length and seed are filled in at activation. Not real-time.
 ///

@@ -1,7 +1,7 @@
 //! The simulation as a device plugin.
 
 use crate::machine::{Machine, MachineParameters};
-use crate::parameters::{SCHEMA, in_force, machine, setup};
+use crate::parameters::{SCHEMA, in_force, machine, refuse_idle, setup};
 use crate::plant::Wrench;
 use crate::sample_clock::SampleClock;
 use crate::simulation::{Setup, Simulation};
@@ -73,6 +73,7 @@ impl Device for SimulatedFlotor {
     type Stop = CoilSwitch;
 
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        refuse_idle(settings)?;
         let values = SCHEMA.iter().map(|parameter| settings.number_or_default(parameter.id())).collect();
         let opened = Self {
             setup: setup(settings)?,

@@ -2,7 +2,7 @@
 
 use super::CommandError;
 use super::companion::{Built, Companion};
-use clap::Args;
+use clap::{Args, Command};
 use std::ffi::OsString;
 
 /// Emulate the controller of a device, so that its plugin can be used without hardware.
@@ -13,19 +13,26 @@ use std::ffi::OsString;
     flotor emulate maglev\n  \
     flotor emulate maglev --transport pty --link /tmp/flotor-tty\n  \
     flotor emulate maglev --pace lockstep --set preset=full\n  \
-    flotor emulate maglev --help"
+    flotor emulate maglev --help                 options of that emulator",
+    // Behind NAME it is the emulator's.
+    disable_help_flag = true
 )]
 pub(crate) struct EmulateArguments {
     /// Id of the device's plugin
-    #[arg(value_name = "NAME")]
+    #[arg(allow_hyphen_values = true, value_name = "NAME")]
     device: String,
-    /// Arguments of the emulator
+    /// Arguments of the emulator; `flotor emulate NAME --help` lists them
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGUMENTS")]
     arguments: Vec<OsString>,
 }
 
 pub(crate) fn run(arguments: &EmulateArguments) -> Result<(), CommandError> {
     let EmulateArguments { device, arguments } = arguments;
+    if ["-h", "--help"].contains(&device.as_str()) {
+        let help = EmulateArguments::augment_args(Command::new("flotor emulate")).render_help().to_string();
+        say!("{}", help.trim_end());
+        return Ok(());
+    }
     let is_id = !device.is_empty() && device.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
     if !is_id {
         return Err(CommandError::Usage(format!("`{device}` is no id of a device")));

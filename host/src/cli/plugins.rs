@@ -102,12 +102,7 @@ struct Described<'a> {
 }
 
 fn describe(registry: &Registry, id: &str, json: bool) -> Result<(), CommandError> {
-    let kind = registry
-        .found()
-        .iter()
-        .find(|plugin| plugin.id == id)
-        .map_or(PluginKind::Model, |plugin| plugin.kind);
-    let plugin = registry.load(id, kind)?;
+    let plugin = registry.load_any(id)?;
     let parameters: Vec<Described<'_>> = plugin.parameters().iter().map(described).collect();
     if json {
         return write_json(Path::new("-"), &parameters);

@@ -9,7 +9,7 @@ mod spring;
 
 use super::options::{PluginKeyValue, duration_s};
 use super::stopping::stop_on_signals;
-use super::{CommandError, run, style};
+use super::{CommandError, remark, run, style};
 use crate::scene::Scene;
 use crate::session::{RunEnd, RunError};
 use crate::study::rig::{Rig, RunEnded, TrialFiles};
@@ -258,14 +258,14 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
         Task::Explore(arguments) => explore::run(arguments),
         Task::Spring(arguments) => spring::run(arguments),
         Task::Jnd(arguments) => {
-            carry_out(&arguments.common, Protocol::Jnd(arguments.protocol(&STIFFNESS)?), &[])
+            carry_out(&arguments.common, Protocol::Jnd(arguments.protocol(&STIFFNESS)?), None)
         }
         Task::Force(arguments) => {
             let protocol = Protocol::Jnd(arguments.jnd.protocol(&FORCE)?);
-            carry_out(&arguments.jnd.common, protocol, &[arguments.way.setting()?])
+            carry_out(&arguments.jnd.common, protocol, Some(arguments.way))
         }
         Task::Magnitude(arguments) => {
-            carry_out(&arguments.common, Protocol::Magnitude(arguments.protocol()?), &[])
+            carry_out(&arguments.common, Protocol::Magnitude(arguments.protocol()?), None)
         }
     }
 }
@@ -280,13 +280,15 @@ impl Common {
     }
 
     /// The scene with everything the command line says on top.
-    fn scene(&self, stimulus: &Stimulus) -> Result<Scene, CommandError> {
-        let scene = match &self.scene {
-            Some(path) => Scene::load(path),
-            None => Scene::study(&stimulus.model),
+    fn scene(&self, stimulus: &Stimulus, way: Option<ForceWay>) -> Result<Scene, CommandError> {
+        let (scene, hand) = match &self.scene {
+            Some(path) => (Scene::load(path), None),
+            None => (Scene::study(&stimulus.model), way.map(ForceWay::hand)),
         };
         let mut scene = scene.map_err(RunError::Scene)?;
+        set(&mut scene, hand.unwrap_or_default())?;
         self.sets.iter().try_for_each(|set| set.apply(&mut scene)).map_err(CommandError::Usage)?;
+        set(&mut scene, way.map(ForceWay::load).unwrap_or_default())?;
         Ok(scene)
     }
 
@@ -350,11 +352,16 @@ impl MagnitudeArguments {
     }
 }
 
-/// Checks everything, then carries the study out.
-fn carry_out(common: &Common, protocol: Protocol, sets: &[PluginKeyValue]) -> Result<(), CommandError> {
+/// Settings of an experiment, written as on the command line.
+fn set(scene: &mut Scene, texts: &[&str]) -> Result<(), CommandError> {
+    let apply = |text: &&str| text.parse::<PluginKeyValue>()?.apply(scene);
+    texts.iter().try_for_each(apply).map_err(CommandError::Usage)
+}
+
+/// Checks everything, then carries the study out; of a force, `way` says how it is felt.
+fn carry_out(common: &Common, protocol: Protocol, way: Option<ForceWay>) -> Result<(), CommandError> {
     protocol.check().map_err(|error| CommandError::Usage(error.to_string()))?;
-    let mut scene = common.scene(protocol.stimulus())?;
-    sets.iter().try_for_each(|set| set.apply(&mut scene)).map_err(CommandError::Usage)?;
+    let scene = common.scene(protocol.stimulus(), way)?;
     let apparatus = Apparatus::check(scene, &protocol).map_err(unfit)?;
     match (common.observer, common.apparatus) {
         (ObserverOption::Human, _) => person::sit(common, &protocol, &apparatus),
@@ -439,21 +446,26 @@ fn refused(error: CohortError) -> CommandError {
     match error {
         CohortError::Dataset(error @ DatasetError::File { .. }) => CommandError::Failed(error.to_string()),
         CohortError::Dataset(error) => CommandError::Usage(error.to_string()),
-        CohortError::Sitting { cause: ConductError::Outside(ref outside_error), .. } => {
-            outside(outside_error.as_ref(), &error)
-        }
+        CohortError::Sitting {
+            cause: ConductError::Outside(ref cause) | ConductError::Trial { ref cause, .. },
+            ..
+        } => outside(cause.as_ref(), &error),
         sitting => CommandError::Failed(sitting.to_string()),
     }
 }
 
-/// What an apparatus said, with the exit code of a device that faulted where it did.
+/// What an apparatus said, with the exit code of a device that faulted where it did. Errors of a device do not know of
+/// experiments: whose trial it was, and which, stands above them.
 fn outside(
     cause: &(dyn std::error::Error + Send + Sync + 'static),
     told: &dyn std::fmt::Display,
 ) -> CommandError {
-    match cause.downcast_ref::<RunEnded>() {
+    let error = match cause.downcast_ref::<RunEnded>() {
         Some(RunEnded(RunEnd::DeviceFault(fault))) => CommandError::DeviceFault(*fault),
         Some(RunEnded(RunEnd::EmergencyStop(source))) => CommandError::EmergencyStop(*source),
-        _ => CommandError::Failed(told.to_string()),
-    }
+        Some(RunEnded(RunEnd::Watchdog(stuck))) => CommandError::Watchdog(*stuck),
+        _ => return CommandError::Failed(told.to_string()),
+    };
+    remark(format_args!("{} {told}", style::warning("note:")));
+    error
 }

@@ -96,6 +96,11 @@ pub(super) fn of_model(
     };
     let location = value.location.clone();
     let names = value.one_or_more_texts()?;
+    if names.is_empty() {
+        let problem =
+            "`model.device` names no device; name one at least, or leave it out where there is only one";
+        return Err(SceneError { location, problem: problem.to_owned() });
+    }
     names.iter().map(|name| find(devices, name, &location)).collect()
 }
 

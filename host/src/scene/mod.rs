@@ -277,6 +277,18 @@ impl Scene {
         Self::read(&Source::new(file, text))
     }
 
+    /// Takes another rate than the scene was read with; `place` is what complaints call where it was said. Not
+    /// real-time.
+    ///
+    /// # Errors
+    /// [`SceneError`]: a limit that fits the old rate does not fit this one.
+    pub fn set_rate(&mut self, rate_hz: f64, place: &str) -> Result<(), SceneError> {
+        let place = Location { file: PathBuf::from(place), line: 0 };
+        legal_watchdog_s(self.limits.watchdog_s, rate_hz, place)?;
+        self.rate_hz = rate_hz;
+        Ok(())
+    }
+
     fn read(source: &Source<'_>) -> Result<Self, SceneError> {
         let mut root = source.parse()?;
         let title = root.take("title").map(|value| value.text()).transpose()?.unwrap_or_default();
@@ -288,7 +300,8 @@ impl Scene {
         let models = root.sections("model")?.into_iter().map(|section| model(section, &devices));
         let models = models.collect::<Result<Vec<_>, _>>()?.concat();
         devices::tell_apart(&models, &devices)?;
-        let limits = root.section("limits")?.map_or_else(|| Ok(Limits::default()), limits)?;
+        let limits = root.section("limits")?.map(|section| limits(section, rate_hz)).transpose()?;
+        let limits = limits.unwrap_or_default();
         let scene = Self {
             title,
             text: source.text().to_owned(),
@@ -419,7 +432,31 @@ fn frame_and_scales(section: &mut Section<'_>) -> Result<MappingConfig, SceneErr
 /// A scale of zero would make a device move nothing or feel nothing; a million is a unit mistaken.
 const SCALE: std::ops::RangeInclusive<f64> = 1.0e-6..=1.0e6;
 
-fn limits(mut section: Section<'_>) -> Result<Limits, SceneError> {
+/// Longest time a watchdog may wait, ms.
+const LONGEST_WATCHDOG_MS: f64 = 60_000.0;
+
+/// Periods a watchdog waits at least: one passes between two ticks of a loop that is well, a tick that begins
+/// late makes it two, and the watchdog's own looks come late as well.
+const WATCHDOG_PERIODS: f64 = 3.0;
+
+/// The time, if a loop that is well at this rate ticks more often; `place` is where it was said.
+fn legal_watchdog_s(watchdog_s: f64, rate_hz: f64, place: Location) -> Result<f64, SceneError> {
+    let least_ms = WATCHDOG_PERIODS * 1.0e3 / rate_hz;
+    // To a microsecond: milliseconds that were seconds in between are a rounding off.
+    let watchdog_ms = (watchdog_s * 1.0e6).round() / 1.0e3;
+    if watchdog_ms > least_ms - 1.0e-3 {
+        return Ok(watchdog_s);
+    }
+    // Upwards, so that what the message names is legal.
+    let least_ms = (least_ms * 100.0).ceil() / 100.0;
+    let problem = format!(
+        "`limits.watchdog_ms` = {watchdog_ms}: legal at {rate_hz} Hz is {least_ms} to {LONGEST_WATCHDOG_MS}, \
+         three periods of the loop at least"
+    );
+    Err(SceneError { location: place, problem })
+}
+
+fn limits(mut section: Section<'_>, rate_hz: f64) -> Result<Limits, SceneError> {
     let default = Limits::default();
     let limits = Limits {
         force_n: section.three("force_n", 0.0..=f64::INFINITY)?.unwrap_or(default.force_n),
@@ -438,13 +475,13 @@ fn limits(mut section: Section<'_>) -> Result<Limits, SceneError> {
             .unwrap_or(default.angular_velocity_rad_per_s),
         ramp_s: section.number("ramp_s", 0.0..=60.0)?.unwrap_or(default.ramp_s),
         watchdog_s: section
-            .number("watchdog_ms", 1.0..=60_000.0)?
-            .map_or(default.watchdog_s, |milliseconds| milliseconds * 1.0e-3),
+            .number_and_place("watchdog_ms", 1.0..=LONGEST_WATCHDOG_MS)?
+            .map_or(Ok(default.watchdog_s), |(ms, place)| legal_watchdog_s(ms * 1.0e-3, rate_hz, place))?,
         emergency_buttons: section
             .take("emergency_button")
-            .map(|value| value.number(0.0..=31.0))
+            .map(|value| value.whole(0..=31))
             .transpose()?
-            .map_or(default.emergency_buttons, button_mask),
+            .map_or(default.emergency_buttons, |button| 1 << button),
         passivity: section.take("passivity").map(passivity).transpose()?.unwrap_or(default.passivity),
     };
     section.finish()?;
@@ -457,13 +494,6 @@ fn isolation(value: Value<'_>) -> Result<Isolation, SceneError> {
 
 fn passivity(value: Value<'_>) -> Result<PassivityMode, SceneError> {
     value.one_of(&[("observe", PassivityMode::Observe), ("control", PassivityMode::Control)])
-}
-
-/// The bit of a button that is counted from 0.
-fn button_mask(button: f64) -> u32 {
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked: 0 to 31
-    let button = button as u32;
-    1 << button
 }
 
 fn boundary(mut section: Section<'_>) -> Result<Boundary, SceneError> {

@@ -49,7 +49,8 @@ impl Row {
 }
 
 /// The default grid: virtual damping from none to beyond its best at three delays, and single cases with more
-/// drag and a faster servo.
+/// drag and a faster servo. Its drag of 0.5 N s/m is a quarter of what the simulated flotor has by default: that is an
+/// estimate, and a device that nobody has measured may have less.
 #[must_use]
 pub fn default_cases() -> Vec<Case> {
     const VIRTUAL_DAMPING_NS_PER_M: [f64; 13] =

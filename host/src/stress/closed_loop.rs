@@ -8,8 +8,10 @@
 //! Not every loop can: a spring of stiffness `K` is stable only up to `K < b / (T/2 + t_d)` (Gil, Sanchez,
 //! Hulin, Preusche and Hirzinger, J. Comput. Inf. Sci. Eng. 9, 2009; without virtual damping). So a release
 //! that diverges although the model was nowhere steeper than that is the model's fault and fails; where the
-//! rule says so too, it is what the stiffness costs. The rule itself is checked near home: the model's wrench
-//! is scaled until the loop tips over, and the stiffness at which it does is reported beside the rule's.
+//! rule says so too, it is what the stiffness costs. A weight has nowhere to come to rest: what goes away
+//! under a pull that keeps its direction is carried off, which no loop could help, and is not judged. The
+//! rule itself is checked near home: the model's wrench is scaled until the loop tips over, and the stiffness
+//! at which it does is reported beside the rule's.
 
 use super::jacobian::Jacobian;
 use super::measure::{Measure, Verdict};
@@ -43,6 +45,8 @@ const LOST_M: f64 = 10.0;
 const GROWING: f64 = 1.01;
 /// Energy of motion, as a part of that at the start, below which a loop buzzes and does not diverge.
 const BUZZ: f64 = 0.05;
+/// Cosine of the angle to its first direction that a pull keeps to if it has one direction. What swings or circles has not.
+const STEADY: f64 = 0.5;
 /// Shortest motion in a tick that tells a stiffness, m: far above rounding.
 const MOVING_M: f64 = 1.0e-7;
 
@@ -71,6 +75,8 @@ impl Loop {
 /// What a release came to.
 struct Release {
     diverged: bool,
+    /// It went away under a pull that kept its direction.
+    carried_off: bool,
     settle_s: f64,
     peak_force_n: f64,
     buzz_n: f64,
@@ -88,6 +94,7 @@ fn release(subject: &mut Subject<'_>, conditions: Loop, start: Pose, random: &mu
     let mut way = VecDeque::from(vec![(start, plant.twist()); conditions.delay_ticks]);
     let mut held = Wrench::ZERO;
     let mut before: Option<(Pose, Wrench)> = None;
+    let (mut first_pull, mut steady) = (None, true);
     let mut forces_n = Vec::with_capacity(TICKS);
     let mut kinetic_j = [0.0; 4];
     let start_m = distance_m(Pose::HOME, start);
@@ -103,6 +110,8 @@ fn release(subject: &mut Subject<'_>, conditions: Loop, start: Pose, random: &mu
             }
         }
         before = Some((pose, wrench));
+        let first_pull = *first_pull.get_or_insert(wrench);
+        steady &= product_n2(&first_pull, &wrench) > STEADY * size_n(&first_pull) * size_n(&wrench);
         if conditions.dropped == 0.0 || random.unit() >= conditions.dropped {
             held = wrench * conditions.gain;
         }
@@ -121,8 +130,10 @@ fn release(subject: &mut Subject<'_>, conditions: Loop, start: Pose, random: &mu
     }
     let [first, _, third, last] = kinetic_j;
     let growing = last > GROWING * third && last > BUZZ * first;
+    let gone = lost || growing;
     Some(Release {
-        diverged: lost || growing,
+        diverged: gone && !steady,
+        carried_off: gone && steady,
         settle_s: if settled_tick < TICKS { settled_tick as f64 * PERIOD_S } else { f64::NAN },
         peak_force_n: forces_n.iter().map(|force| force.length()).fold(0.0, f64::max),
         buzz_n: buzz_n(&forces_n),
@@ -138,7 +149,12 @@ fn distance_m(from: Pose, to: Pose) -> f64 {
 
 /// Size of a wrench with torques at the lever arm, N.
 fn size_n(wrench: &Wrench) -> f64 {
-    (wrench.force().length_squared() + (wrench.torque() / LEVER_M).length_squared()).sqrt()
+    product_n2(wrench, wrench).sqrt()
+}
+
+/// Scalar product of two wrenches with torques at the lever arm, N².
+fn product_n2(one: &Wrench, other: &Wrench) -> f64 {
+    one.force().dot(other.force()) + (one.torque() / LEVER_M).dot(other.torque() / LEVER_M)
 }
 
 fn sensed(pose: Pose, quantum_m: f64) -> Pose {
@@ -216,10 +232,16 @@ impl Row {
         self.release.as_ref().is_some_and(|release| release.diverged)
     }
 
+    fn carried_off(&self) -> bool {
+        self.release.as_ref().is_some_and(|release| release.carried_off)
+    }
+
     /// True if the rule says this release must settle; 2 % are the rule's own error.
     fn must_settle(&self) -> bool {
         let steepest = self.release.as_ref().map_or(f64::INFINITY, |release| release.steepest_n_per_m);
-        self.conditions.is_clean() && steepest <= 0.98 * self.conditions.stiffest_n_per_m()
+        self.conditions.is_clean()
+            && !self.carried_off()
+            && steepest <= 0.98 * self.conditions.stiffest_n_per_m()
     }
 }
 
@@ -301,6 +323,7 @@ fn judge(rows: &[Row]) -> Measure {
     let surprises: Vec<&Row> = rows.iter().filter(|row| row.diverged() && row.must_settle()).collect();
     let answered = rows.iter().filter(|row| row.release.is_some()).count();
     let foretold = rows.iter().filter(|row| row.must_settle()).count();
+    let carried_off = rows.iter().filter(|row| row.carried_off()).count();
     let verdict = match (surprises.is_empty(), foretold) {
         (false, _) => Verdict::Fail,
         (true, 0) => Verdict::Note,
@@ -308,6 +331,7 @@ fn judge(rows: &[Row]) -> Measure {
     };
     let remark = match verdict {
         Verdict::Fail => "diverges although nowhere stiffer than the loop allows".to_owned(),
+        Verdict::Note if carried_off > 0 => "pulled away from everywhere: no place to settle at".to_owned(),
         Verdict::Note => "stiffer than every loop here allows: nothing to judge".to_owned(),
         Verdict::Pass => format!("{foretold} releases had to settle, and did"),
     };
@@ -325,6 +349,7 @@ fn judge(rows: &[Row]) -> Measure {
     }
     .with("releases", rows.len() as f64, "")
     .with("releases without answer", (rows.len() - answered) as f64, "")
+    .with("releases carried off", carried_off as f64, "")
     .unless_unanswered(answered as u64);
     for damping in DAMPINGS_NS_PER_M {
         let here = || rows.iter().filter(clean).filter(|row| row.conditions.damping_ns_per_m == damping);

@@ -271,6 +271,21 @@ fn a_soft_model_that_diverges_has_no_excuse() {
     assert!(measure(&report, "M2").value < 1000.0);
 }
 
+struct Weight;
+impl Law for Weight {
+    fn wrench(_pose: &Pose) -> Wrench {
+        Wrench::from_force(DVec3::Z * -3.0)
+    }
+}
+
+#[test]
+fn a_weight_is_carried_off_and_does_not_diverge() {
+    let report = stress::<Weight>();
+    assert_eq!(measure(&report, "M6").verdict, Verdict::Note, "{}", report.to_text());
+    assert_eq!(value(&report, "M6", "releases carried off"), value(&report, "M6", "releases"));
+    assert!(with(&report, Verdict::Fail).is_empty(), "{}", report.to_text());
+}
+
 struct Slow;
 impl Law for Slow {
     fn wrench(pose: &Pose) -> Wrench {

@@ -188,15 +188,15 @@ impl Cohort {
     ) -> Result<(), CohortError> {
         let Turn { subject, earlier, mut sitting, mut log } = turn;
         let failed = |cause| CohortError::Sitting { subject, cause };
-        let outside = |cause| failed(ConductError::Outside(cause));
-        let mut presenter = presenter(subject).map_err(outside)?;
+        let mut presenter = presenter(subject).map_err(|cause| failed(ConductError::Outside(cause)))?;
         // An apparatus has a past: presented with the same trials it comes to where it was, and what follows is, to
         // the bit, what would have followed.
         for trial in &earlier {
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            presenter.present(trial).map_err(outside)?;
+            let in_trial = |cause| failed(ConductError::Trial { trial: trial.number, cause });
+            presenter.present(trial).map_err(in_trial)?;
         }
         let mut respondent = Stoppable { subject: self.subject(subject), stop };
         conduct(&mut sitting, &mut log, presenter.as_mut(), &mut respondent, &mut |_| watch())

@@ -74,9 +74,17 @@ pub enum ConductError {
     /// The log.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The apparatus or the respondent.
+    /// The apparatus, before the first trial.
     #[error("{0}")]
     Outside(OutsideError),
+    /// The apparatus or the respondent, in a trial.
+    #[error("trial {trial}: {cause}")]
+    Trial {
+        /// Its number in the sitting.
+        trial: u32,
+        /// What was said.
+        cause: OutsideError,
+    },
     /// The respondent gave an answer that is none.
     #[error(transparent)]
     Answer(#[from] AnswerError),
@@ -94,9 +102,10 @@ pub fn conduct(
     watch: &mut dyn FnMut(&TrialEvent),
 ) -> Result<Ending, ConductError> {
     while let Some(trial) = sitting.next() {
-        let mut exploration = presenter.present(&trial).map_err(ConductError::Outside)?;
+        let outside = |cause| ConductError::Trial { trial: trial.number, cause };
+        let mut exploration = presenter.present(&trial).map_err(outside)?;
         let response = loop {
-            match respondent.respond(&trial, &exploration).map_err(ConductError::Outside)? {
+            match respondent.respond(&trial, &exploration).map_err(outside)? {
                 Reply::Answer { response, time_s } => {
                     exploration.response_time_s = time_s;
                     break response;

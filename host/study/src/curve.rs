@@ -35,10 +35,10 @@ pub struct SpringFit {
     pub stiffness_interval_n_per_m: [f64; 2],
     /// Compression at which the fitted line meets zero force, m: play of the fixture.
     pub offset_m: f64,
-    /// Length without load, m.
-    pub free_length_m: f64,
+    /// Length without load, m, if it is known.
+    pub free_length_m: Option<f64>,
     /// Compression rigidity, N: stiffness times free length.
-    pub gamma_n: f64,
+    pub gamma_n: Option<f64>,
     /// R² of the line over the fitted part.
     pub r_squared: f64,
     /// Points of the fitted part.
@@ -133,9 +133,8 @@ impl MeasuredCurve {
     /// Fits a linear spring to the middle of the deflection.
     ///
     /// # Errors
-    /// [`CurveError`]: too few points there, a free length nobody knows, a force that falls.
+    /// [`CurveError`]: too few points there, a force that falls.
     pub fn fit(&self) -> Result<SpringFit, CurveError> {
-        let free_length_m = self.free_length_m.ok_or(CurveError::NoFreeLength)?;
         let deepest_m = self.points.iter().map(|(x, _)| *x).fold(0.0, f64::max);
         let [from_m, to_m] = FITTED.map(|share| share * deepest_m);
         let middle = self.points.iter().filter(|(x, _)| (from_m..=to_m).contains(x));
@@ -150,8 +149,8 @@ impl MeasuredCurve {
             stiffness_n_per_m: line.slope,
             stiffness_interval_n_per_m: line.slope_interval,
             offset_m: -line.intercept / line.slope,
-            free_length_m,
-            gamma_n: line.slope * free_length_m,
+            free_length_m: self.free_length_m,
+            gamma_n: self.free_length_m.map(|length_m| line.slope * length_m),
             r_squared: line.r_squared,
             points: x.len(),
             nonlinearity: self.points.iter().map(off).fold(0.0, f64::max) / strongest_n,
@@ -240,8 +239,18 @@ mod tests {
         let fit = MeasuredCurve::parse(&text, None).unwrap().fit().unwrap();
         // Rounding of decimal numbers, and nothing else.
         assert!((fit.stiffness_n_per_m - 680.0).abs() < 1.0e-6, "{fit:?}");
-        assert!((fit.gamma_n - 17.0).abs() < 1.0e-7 && fit.offset_m.abs() < 1.0e-9);
+        assert!((fit.gamma_n.unwrap() - 17.0).abs() < 1.0e-7 && fit.offset_m.abs() < 1.0e-9);
         assert!((fit.nonlinearity - 10.0 / 16.8).abs() < 1.0e-9 && fit.points == 41);
+    }
+
+    /// A stiffness needs no free length; a rigidity does.
+    #[test]
+    fn compressions_alone_tell_the_stiffness_and_no_more() {
+        let rows: String = (0..=20).map(|step| format!("{step},{}\n", 0.5 * f64::from(step))).collect();
+        let fit = MeasuredCurve::parse(&("compression_mm,force_n\n".to_owned() + &rows), None);
+        let fit = fit.unwrap().fit().unwrap();
+        assert!((fit.stiffness_n_per_m - 500.0).abs() < 1.0e-6, "{fit:?}");
+        assert_eq!((fit.free_length_m, fit.gamma_n), (None, None));
     }
 
     /// Two strokes with friction between them and scatter on top: what is served lies in the middle, begins at nothing and
@@ -281,8 +290,6 @@ mod tests {
         assert!(refused("x,y\n1,2\n").starts_with("line 1: the header"));
         assert!(refused("length_mm,force_n\n1,2\n3;4\n").starts_with("line 3: two finite numbers"));
         assert!(refused("length_mm,force_n\n1,nan\n").starts_with("line 2"));
-        let curve = MeasuredCurve::parse("compression_mm,force_n\n0,0\n1,2\n", None).unwrap();
-        assert_eq!(curve.fit(), Err(CurveError::NoFreeLength));
         let few = MeasuredCurve::parse("compression_mm,force_n\n0,0\n1,2\n", Some(0.02)).unwrap();
         assert!(matches!(few.fit(), Err(CurveError::Statistics(_))));
         let falling = "compression_mm,force_n\n0,9\n4,5\n5,4\n6,3\n10,0\n";

@@ -14,11 +14,15 @@ use flotor_hal::Settings;
 
 /// What stands between controller and flotor; nothing with preset `plain`.
 pub(crate) fn machine(settings: &Settings<'_>) -> Option<MachineParameters> {
-    (settings.choice_or_default("preset") == 1).then(|| MachineParameters {
+    has_machine(settings).then(|| MachineParameters {
         actuation: actuation(settings),
         sensing: sensing(settings),
         fault: fault(settings),
     })
+}
+
+pub(super) fn has_machine(settings: &Settings<'_>) -> bool {
+    settings.choice_or_default("preset") == 1
 }
 
 fn actuation(settings: &Settings<'_>) -> ActuationParameters {

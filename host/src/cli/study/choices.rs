@@ -1,7 +1,5 @@
 //! Choices of a protocol as words of the command line.
 
-use crate::cli::CommandError;
-use crate::cli::options::PluginKeyValue;
 use crate::study::Kinematics;
 use clap::ValueEnum;
 use flotor_study::procedure::{Averaging, StepAtReversal};
@@ -199,12 +197,22 @@ pub(super) enum ForceWay {
 
 impl ForceWay {
     /// The setting of the load that makes it so.
-    pub(super) fn setting(self) -> Result<PluginKeyValue, CommandError> {
-        let text = match self {
-            Self::Felt => "load.kind=felt",
-            Self::Exerted => "load.kind=exerted",
-        };
-        text.parse().map_err(CommandError::Usage)
+    pub(super) fn load(self) -> &'static [&'static str] {
+        match self {
+            Self::Felt => &["load.kind=felt"],
+            Self::Exerted => &["load.kind=exerted"],
+        }
+    }
+
+    /// How the simulated hand of the built-in scene goes about it, where not as with a spring.
+    pub(super) fn hand(self) -> &'static [&'static str] {
+        match self {
+            // Nothing but the hand holds a weight up: the softest of hands (1.5 N/mm) gives way by 12 mm to the heaviest
+            // that the default bases can lead to (17.5 N), which is all the way there is below home. So it means to be above
+            // home, and lifts the weight a little.
+            Self::Felt => &["device.hand_centre_mm=4", "device.hand_amplitude_mm=3"],
+            Self::Exerted => &[],
+        }
     }
 }
 

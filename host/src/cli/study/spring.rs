@@ -3,9 +3,8 @@
 
 use crate::cli::{CommandError, style, write_json};
 use crate::plot::{Axis, Figure, Panel, Series};
-use crate::scene::STUDY;
 use clap::Args;
-use flotor_study::curve::{FITTED, MeasuredCurve, ServedCurve, SpringFit};
+use flotor_study::curve::{CurveError, FITTED, MeasuredCurve, ServedCurve, SpringFit};
 use std::path::{Path, PathBuf};
 
 #[derive(Args)]
@@ -20,7 +19,7 @@ pub(super) struct SpringArguments {
     /// Measured force over length or compression (CSV)
     #[arg(value_name = "FILE.csv")]
     curve: PathBuf,
-    /// Length without load (default: the longest in the table)
+    /// Length without load (default: the longest in the table; --scene needs it where the table has compressions)
     #[arg(long, value_name = "MM")]
     free_length_mm: Option<f64>,
     /// Diameter of the coil between wire centres, for the scene (default: spring 1 of the thesis)
@@ -50,6 +49,10 @@ pub(super) fn run(arguments: &SpringArguments) -> Result<(), CommandError> {
         MeasuredCurve::parse(&text, arguments.free_length_mm.map(|mm| mm * 1.0e-3)).map_err(refused)?;
     let fit = curve.fit().map_err(refused)?;
     let served = curve.served().map_err(refused)?;
+    let fitted = match &arguments.scene {
+        Some(path) => Some((path, scene(&fit, arguments.coil_diameter_mm).map_err(refused)?)),
+        None => None,
+    };
     if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
         say!("{}", style::title(&path.display().to_string()));
         say!("{}", to_text(&fit, &served));
@@ -57,8 +60,8 @@ pub(super) fn run(arguments: &SpringArguments) -> Result<(), CommandError> {
     if let Some(path) = &arguments.plot {
         write(path, &picture(&curve, &fit, &served))?;
     }
-    if let Some(path) = &arguments.scene {
-        write(path, &scene(&fit, arguments.coil_diameter_mm))?;
+    if let Some((path, text)) = fitted {
+        write(path, &text)?;
     }
     if let Some(path) = &arguments.curve_scene {
         let table = path.with_extension("csv");
@@ -71,7 +74,7 @@ pub(super) fn run(arguments: &SpringArguments) -> Result<(), CommandError> {
             return Err(CommandError::Usage(why));
         }
         write(&table, &served.to_table())?;
-        write(path, &curve_scene(&table, &fit, arguments.coil_diameter_mm))?;
+        write(path, &curve_scene(&table, &fit, &served, arguments.coil_diameter_mm))?;
     }
     arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &fit))
 }
@@ -86,10 +89,17 @@ fn write(path: &Path, text: &str) -> Result<(), CommandError> {
 
 fn to_text(fit: &SpringFit, served: &ServedCurve) -> String {
     let [low, high] = fit.stiffness_interval_n_per_m.map(|end| end * 1.0e-3);
+    let known = |value: Option<f64>, text: &dyn Fn(f64) -> String| {
+        value.map_or_else(|| "not known (--free-length-mm)".to_owned(), text)
+    };
     [
         format!("stiffness    {:.4} N/mm  (95 %: {low:.4} to {high:.4})", fit.stiffness_n_per_m * 1.0e-3),
-        format!("free length  {:.3} mm, play {:.3} mm", fit.free_length_m * 1.0e3, fit.offset_m * 1.0e3),
-        format!("gamma        {:.3} N", fit.gamma_n),
+        format!("play         {:.3} mm", fit.offset_m * 1.0e3),
+        format!(
+            "free length  {}",
+            known(fit.free_length_m, &|length_m: f64| format!("{:.3} mm", length_m * 1.0e3))
+        ),
+        format!("gamma        {}", known(fit.gamma_n, &|gamma_n: f64| format!("{gamma_n:.3} N"))),
         format!(
             "R²           {:.6} over {} points between 30 and 70 % of the deflection",
             fit.r_squared, fit.points
@@ -118,9 +128,9 @@ fn picture(curve: &MeasuredCurve, fit: &SpringFit, served: &ServedCurve) -> Stri
         );
     Figure::new("A real spring", Axis::linear("Compression", "mm"))
         .subtitle(format!(
-            "{:.4} N/mm, gamma {:.3} N, R² {:.5}",
+            "{:.4} N/mm{}, R² {:.5}",
             fit.stiffness_n_per_m * 1.0e-3,
-            fit.gamma_n,
+            fit.gamma_n.map_or_else(String::new, |gamma_n| format!(", gamma {gamma_n:.3} N")),
             fit.r_squared
         ))
         .panel_height_px(320.0)
@@ -128,27 +138,50 @@ fn picture(curve: &MeasuredCurve, fit: &SpringFit, served: &ServedCurve) -> Stri
         .to_svg()
 }
 
-/// The built-in scene of experiments with this spring in it.
-fn scene(fit: &SpringFit, coil_diameter_mm: Option<f64>) -> String {
-    let free_length_mm = fit.free_length_m * 1.0e3;
-    let coil = coil_diameter_mm.map_or(String::new(), |mm| format!("coil_diameter_mm = {mm}\n"));
-    let fitted = format!(
-        "mode = \"gamma\"\n# Fitted to a measured curve.\ngamma_n = {:.6}\nfree_length_mm = {free_length_mm:.6}\n{coil}",
-        fit.gamma_n
+/// The fitted spring by the law of the built-in scene of experiments.
+fn scene(fit: &SpringFit, coil_diameter_mm: Option<f64>) -> Result<String, CurveError> {
+    let (free_length_m, gamma_n) = fit.free_length_m.zip(fit.gamma_n).ok_or(CurveError::NoFreeLength)?;
+    let parameters = format!(
+        "preset = \"thesis-1\"\nvariant = \"energy\"\nmode = \"gamma\"\n# Fitted to a measured curve.\n\
+         gamma_n = {gamma_n:.6}\nfree_length_mm = {:.6}\n{}",
+        free_length_m * 1.0e3,
+        coil(coil_diameter_mm)
     );
-    STUDY.replace("mode = \"gamma\"\n", &fitted)
+    let head = "# A spring fitted to a real one; an experiment sets its stiffness gamma / L0 between trials.\n\
+                title = \"A real spring, fitted\"\n";
+    Ok(life_size(head, "spring", &parameters))
 }
 
-/// A scene with the curve itself in it, millimetre for millimetre and newton for newton.
-fn curve_scene(table: &Path, fit: &SpringFit, coil_diameter_mm: Option<f64>) -> String {
+/// How long a spring of unknown length is drawn, as a share of how far it was compressed: it was not solid then.
+const DRAWN: f64 = 1.5;
+
+/// The curve itself.
+fn curve_scene(table: &Path, fit: &SpringFit, served: &ServedCurve, coil_diameter_mm: Option<f64>) -> String {
     let table = table.file_name().unwrap_or_default().to_string_lossy();
-    let coil = coil_diameter_mm.map_or(String::new(), |mm| format!("coil_diameter_mm = {mm}\n"));
+    let deepest_m = served.knots.last().map_or(0.0, |(x_m, _)| *x_m);
+    let (note, length_m) = match fit.free_length_m {
+        Some(length_m) => ("", length_m),
+        None => ("# Not known, and for the drawing alone.\n", (DRAWN * deepest_m).max(1.0e-3)),
+    };
+    let parameters = format!(
+        "curve = {table:?}\n{note}free_length_mm = {:.6}\n{}",
+        length_m * 1.0e3,
+        coil(coil_diameter_mm)
+    );
+    let head = "# A real spring as it was measured; `stiffness_scale` makes it stiffer or softer as a whole.\n\
+                title = \"A real spring, as measured\"\n";
+    life_size(head, "measured", &parameters)
+}
+
+fn coil(diameter_mm: Option<f64>) -> String {
+    diameter_mm.map_or_else(String::new, |mm| format!("coil_diameter_mm = {mm}\n"))
+}
+
+/// A scene with a model millimetre for millimetre and newton for newton: scaled, it would not be the real spring any more.
+fn life_size(head: &str, plugin: &str, parameters: &str) -> String {
     format!(
-        "# A real spring as it was measured; `stiffness_scale` makes it stiffer or softer as a whole.\n\
-         title = \"A real spring, as measured\"\nrate_hz = 1000\n\n[device]\nplugin = \"simulated\"\n\n[[model]]\n\
-         plugin = \"measured\"\n\n[model.parameters]\ncurve = {table:?}\nfree_length_mm = {:.6}\n{coil}\n[model.mapping]\n\
-         motion_scale = 1.0\nforce_scale = 1.0\n",
-        fit.free_length_m * 1.0e3
+        "{head}rate_hz = 1000\n\n[device]\nplugin = \"simulated\"\n\n[[model]]\nplugin = \"{plugin}\"\n\n\
+         [model.parameters]\n{parameters}\n[model.mapping]\nmotion_scale = 1.0\nforce_scale = 1.0\n"
     )
 }
 
@@ -157,22 +190,36 @@ mod tests {
     use super::*;
     use crate::scene::Scene;
 
-    #[test]
-    fn a_fitted_spring_makes_a_scene() {
-        let fit = SpringFit {
+    fn fit(free_length_m: Option<f64>) -> SpringFit {
+        SpringFit {
             stiffness_n_per_m: 680.0,
             stiffness_interval_n_per_m: [679.0, 681.0],
             offset_m: 0.0,
-            free_length_m: 0.025,
-            gamma_n: 17.0,
+            free_length_m,
+            gamma_n: free_length_m.map(|length_m| 680.0 * length_m),
             r_squared: 1.0,
             points: 41,
             nonlinearity: 0.0,
-        };
-        let scene = Scene::parse(Path::new("real.toml"), &scene(&fit, Some(6.0))).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_fitted_spring_makes_a_scene_of_its_own_size() {
+        let text = scene(&fit(Some(0.025)), Some(6.0)).unwrap();
+        let scene = Scene::parse(Path::new("real.toml"), &text).unwrap();
         let parameters = &scene.models[0].plugin.parameters;
         let value =
             |key: &str| parameters.iter().find(|p| p.key == key).unwrap().value.parse::<f64>().unwrap();
         assert_eq!([value("gamma_n"), value("free_length_mm"), value("coil_diameter_mm")], [17.0, 25.0, 6.0]);
+        assert_eq!((scene.models[0].mapping.motion_scale, scene.models[0].mapping.force_scale), (1.0, 1.0));
+    }
+
+    #[test]
+    fn a_length_that_is_not_known_is_needed_for_the_fit_and_not_for_the_curve() {
+        assert_eq!(scene(&fit(None), None), Err(CurveError::NoFreeLength));
+        let served = ServedCurve { knots: vec![(0.0, 0.0), (0.02, 9.0)], rms_n: 0.0 };
+        let text = curve_scene(Path::new("real.csv"), &fit(None), &served, None);
+        assert!(text.contains("free_length_mm = 30.000000\n"), "{text}");
+        Scene::parse(Path::new("real.toml"), &text).unwrap();
     }
 }
