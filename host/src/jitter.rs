@@ -67,19 +67,20 @@ pub struct MissedMore {
 /// Runs servo and bare loop in turns for `slices` seconds each. `progress` is called after each pair.
 ///
 /// # Errors
-/// [`RunError::Thread`] if the loop's thread cannot be had.
+/// [`RunError::Thread`] if the loop's thread cannot be had, [`RunError::Plugin`] if a device refuses to be energised.
 pub fn measure(
     session: Session,
     slices: u64,
     stop: &StopSwitch,
     progress: impl Fn(u64) + Send,
 ) -> Result<JitterReport, RunError> {
-    let (mut servo, stoppers, period_ns) = session.into_loop();
+    let period_ns = session.period_ns();
     let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
-    let report = std::thread::scope(|scope| {
+    std::thread::scope(|scope| {
         let measured = thread.spawn_scoped(scope, move || {
-            let real_time = enter_real_time();
+            let real_time = enter_real_time(session.core());
             let window = SpinWindow::measure(period_ns);
+            let (mut servo, stoppers) = session.into_loop()?;
             let (mut with_servo, mut bare) = (Tally::default(), Tally::default());
             let mut pairs = Pairs::default();
             let mut done = 0;
@@ -87,7 +88,7 @@ pub fn measure(
                 let missed_before = [with_servo.missed, bare.missed];
                 let mut schedule = Schedule::start_real(period_ns, window);
                 while schedule.next_time_ns() < SLICE_NS {
-                    let Some(due) = schedule.wait(|_| SampleWait::NotPaced) else { break };
+                    let Ok(due) = schedule.wait(|_| SampleWait::NotPaced) else { break };
                     servo.tick(&due, stop, |_| ());
                     with_servo.count(due.lateness_ns.unwrap_or_default(), due.missed, period_ns);
                 }
@@ -97,9 +98,10 @@ pub fn measure(
                 done += 1;
                 progress(done);
             }
+            stoppers.iter().for_each(Stopper::safe_stop);
             #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
             let rate_hz = 1.0e9 / period_ns as f64;
-            JitterReport {
+            Ok(JitterReport {
                 rate_hz,
                 spin_window_ns: window.spin_ns,
                 slices: done,
@@ -108,13 +110,11 @@ pub fn measure(
                 missed_more: pairs.missed_more(),
                 real_time,
                 bins: [with_servo.lateness.bins(), bare.lateness.bins()],
-            }
+            })
         });
         let measured = measured.map_err(|_| RunError::Thread("could not be started"))?;
-        measured.join().map_err(|_| RunError::Thread("panicked"))
-    });
-    stoppers.iter().for_each(Stopper::safe_stop);
-    report
+        measured.join().map_err(|_| RunError::Thread("panicked"))?
+    })
 }
 
 /// The yardstick, written out on its own: it shares no line with the servo's schedule but the system call.

@@ -3,7 +3,7 @@
 use crate::coupling::{Account, CouplingDescription, Hearing};
 use crate::live::Carried;
 use crate::servo::{CouplingOutcome, ModelHealth, Overrun, Percentiles, Stage, Timing};
-use crate::session::{Observer, Outcome, PluginReport, RunEnd};
+use crate::session::{Misbehaved, Observer, Outcome, PluginReport, RunEnd};
 use crate::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, EnergyLedger};
 use serde::Serialize;
@@ -283,6 +283,7 @@ impl RunSummary {
                 RunEnd::Stopped => "stopped",
                 RunEnd::DeviceFault(_) => "device_fault",
                 RunEnd::EmergencyStop(_) => "emergency_stop",
+                RunEnd::TooFast(_) => "too_fast",
                 RunEnd::Watchdog(_) => "watchdog",
             },
             clock: facts.clock,
@@ -319,7 +320,9 @@ impl RunSummary {
             trace_digest: facts.trace_digest,
             dropped_records: outcome.dropped_records,
             wall_s: outcome.wall_s,
-            plugins: facts.plugins.iter().map(|plugin| plugin_summary(plugin, outcome)).collect(),
+            plugins: (facts.plugins.iter().map(|plugin| plugin_summary(plugin, outcome)))
+                .chain(outcome.misbehaved.iter().map(misbehaved_summary))
+                .collect(),
         }
     }
 
@@ -475,6 +478,15 @@ fn plugin_summary(plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
         Some((_, health, words)) => health_words(health, words),
         None => "ok".to_owned(),
     };
+    summary_of(plugin, health)
+}
+
+/// A plugin that was put in while the run was on.
+fn misbehaved_summary(Misbehaved { plugin, health, words }: &Misbehaved) -> PluginSummary {
+    summary_of(plugin, health_words(health, words))
+}
+
+fn summary_of(plugin: &PluginReport, health: String) -> PluginSummary {
     PluginSummary {
         name: plugin.name.clone(),
         id: plugin.metadata.id.clone(),

@@ -39,7 +39,8 @@ pub(crate) fn run_scene(
         scene.duration_s = legal("duration_s", duration_s, 0.0, 31_536_000.0)?;
     }
     if let Some(rate_hz) = rate_hz {
-        scene.rate_hz = legal("rate_hz", rate_hz, 100.0, 10_000.0)?;
+        let rate_hz = legal("rate_hz", rate_hz, 100.0, 10_000.0)?;
+        scene.set_rate(rate_hz, "rate_hz").map_err(refuse)?;
     }
     for setting in settings {
         let setting: PluginKeyValue = setting.parse().map_err(refuse)?;

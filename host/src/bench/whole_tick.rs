@@ -84,7 +84,9 @@ impl WholeTick {
         let registry = Registry::search(&[]).with_linked(&SCRIPTED_ENTRY)?;
         let scene = Scene::parse(Path::new("bench"), &device.scene(model))?;
         let options = RunOptions { clock: Clock::Virtual, seed: 1 };
-        let (servo, stoppers, period_ns) = Session::prepare(&scene, &registry, &options)?.into_loop();
+        let session = Session::prepare(&scene, &registry, &options)?;
+        let period_ns = session.period_ns();
+        let (servo, stoppers) = session.into_loop()?;
         let (sender, receiver) = flotor_sync::ring(2 * BATCH);
         let schedule = Schedule::start_virtual(period_ns);
         Ok(Self { servo, schedule, stoppers, stop: StopSwitch::default(), sender, receiver })
@@ -127,7 +129,7 @@ impl WholeTick {
         let Self { servo, schedule, stop, sender, .. } = self;
         servo.pause();
         for _ in 0..BATCH {
-            let Some(due) = schedule.wait(|_| SampleWait::NotPaced) else { return };
+            let Ok(due) = schedule.wait(|_| SampleWait::NotPaced) else { return };
             servo.tick(&due, stop, |record| {
                 let _ = sender.push(record); // it has room for two batches
             });

@@ -91,7 +91,7 @@ fn isolated_cores() -> Diagnosis {
         "" => Diagnosis::note(
             "isolated cores",
             "none",
-            "where other work competes, boot with `isolcpus=N nohz_full=N` and start with `taskset -c N flotor run`",
+            "where other work competes, boot with `isolcpus=N nohz_full=N` and start with `flotor run --core N`",
         ),
         cores => Diagnosis::good("isolated cores", cores),
     }

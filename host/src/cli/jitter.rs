@@ -1,13 +1,13 @@
 //! `flotor jitter`: lateness of the servo next to that of a bare loop.
 
-use super::options::{duration_s, rate_hz};
+use super::options::{core, duration_s, rate_hz};
 use super::stopping::stop_on_signals;
 use super::{CommandError, run, style};
 use crate::jitter::{JitterReport, LoopTiming, MissedMore, measure};
 use crate::plot::{Axis, Figure, Panel, Series};
 use crate::registry::Registry;
 use crate::scene::Scene;
-use crate::servo::Clock;
+use crate::servo::{Clock, Core};
 use crate::session::{RunError, RunOptions, Session};
 use crate::timing_picture::octaves;
 use clap::Args;
@@ -26,6 +26,9 @@ pub(crate) struct JitterArguments {
     /// Loop rate in Hz, 100 to 10000
     #[arg(long, value_parser = rate_hz, value_name = "HZ", default_value = "1000")]
     rate: f64,
+    /// Run both loops on this core
+    #[arg(long, value_parser = core, value_name = "N")]
+    core: Option<Core>,
     /// Write the result as JSON (- for standard output)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -39,6 +42,7 @@ pub(crate) fn run(arguments: &JitterArguments) -> Result<(), CommandError> {
     scene.rate_hz = arguments.rate;
     let options = RunOptions { clock: Clock::Real, seed: 0 };
     let session = Session::prepare(&scene, &Registry::search(&scene.plugin_folders), &options)?;
+    let session = session.on_core(arguments.core);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
     let slices = ((arguments.duration / 2.0).ceil() as u64).max(1);
     let progress = run::progress_bar(slices, "{percent:>3} %  pair {pos} of {len}");

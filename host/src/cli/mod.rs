@@ -1,6 +1,7 @@
 //! The `flotor` command: arguments in, exit code out.
 //!
-//! Exit codes are a contract: 0 ok, 2 usage or configuration, 3 a plugin was refused, 4 device fault, 1 else.
+//! Exit codes are a contract: 0 ok, 2 usage or configuration, 3 a plugin was refused, 4 device fault, 1 else;
+//! 130 after the third signal that asks for an end.
 
 /// Prints a line; a reader that has gone away (`flotor plugins | head`) ends the program without a word.
 macro_rules! say {
@@ -27,6 +28,7 @@ mod stability;
 mod stopping;
 mod stress;
 mod study;
+mod swap;
 mod sweep;
 mod validate;
 mod view;
@@ -39,7 +41,8 @@ use crate::session::RunError;
 use clap::{CommandFactory, Parser, Subcommand};
 use flotor_hal::Fault;
 use flotor_hal::abi::loader::LoadError;
-use std::path::PathBuf;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Haptics from plugins: force models and devices in a safe servo loop.
@@ -82,6 +85,8 @@ enum Command {
     Stress(stress::StressArguments),
     /// Record a run that is on, from now to its end
     Record(record::RecordArguments),
+    /// Replace a model of a run that is on, without a jump in the force
+    Swap(swap::SwapArguments),
     /// Put a running host on a network, or bring one from there to this machine
     Bridge(bridge::BridgeArguments),
     /// Sweep a model or a scene over parameters, poses and seeds into a Parquet table
@@ -138,6 +143,17 @@ pub(crate) enum CommandError {
          `flotor doctor`, or allow more with `[limits] watchdog_ms`", .0.tick
     )]
     Watchdog(Stuck),
+    /// The device sets the pace, and it is a faster one.
+    #[error(
+        "the device sends {samples_per_s} samples a second and sets the pace, the scene counts {rate_hz} ticks: every limit per \
+         second would be too high; set `rate_hz = {samples_per_s}`, or `pacing = \"host\"`"
+    )]
+    TooFast {
+        /// What the device sends.
+        samples_per_s: u32,
+        /// What the scene says.
+        rate_hz: f64,
+    },
     /// A plugin was refused.
     #[error("{0}")]
     PluginRefused(String),
@@ -185,7 +201,7 @@ impl From<crate::replay::ReplayError> for CommandError {
 }
 
 impl CommandError {
-    fn file(path: &std::path::Path, action: &'static str, cause: std::io::Error) -> Self {
+    fn file(path: &Path, action: &'static str, cause: std::io::Error) -> Self {
         Self::File { path: path.into(), action, cause }
     }
 
@@ -200,13 +216,17 @@ impl CommandError {
                 }
                 RunError::Hung { stuck, .. } => match stuck.place {
                     Place::Model(_) => 3,
-                    Place::DeviceRead(_) | Place::DeviceWrite(_) => 4,
+                    Place::DeviceWait(_) | Place::DeviceRead(_) | Place::DeviceWrite(_) => 4,
                     Place::Waiting | Place::Host => 1,
                 },
                 RunError::Thread(_) => 1,
             },
             Self::PluginRefused(_) => 3,
-            Self::DeviceFault(_) | Self::RunFault { .. } | Self::EmergencyStop(_) | Self::Watchdog(_) => 4,
+            Self::DeviceFault(_)
+            | Self::RunFault { .. }
+            | Self::EmergencyStop(_)
+            | Self::TooFast { .. }
+            | Self::Watchdog(_) => 4,
             Self::File { .. } | Self::Record(_) | Self::Failed(_) => 1,
         }
     }
@@ -251,6 +271,7 @@ pub fn main() -> ExitCode {
         Some(Command::Bench(arguments)) => bench::run(&arguments),
         Some(Command::Stress(arguments)) => stress::run(&arguments),
         Some(Command::Record(arguments)) => record::run(&arguments),
+        Some(Command::Swap(arguments)) => swap::run(&arguments),
         Some(Command::Bridge(arguments)) => bridge::run(&arguments),
         Some(Command::Sweep(arguments)) => sweep::run(&arguments),
         Some(Command::Study(arguments)) => study::run(&arguments),
@@ -258,9 +279,14 @@ pub fn main() -> ExitCode {
         Some(Command::Calibrate(arguments)) => calibrate::run(&arguments),
         Some(Command::Emulate(arguments)) => emulate::run(&arguments),
         Some(Command::Doctor(arguments)) => doctor::run(&arguments),
-        Some(Command::Worker(arguments)) => crate::worker::serve(&arguments).map_err(|error| {
-            CommandError::Usage(format!("`flotor worker` is started by `flotor run`: {error}"))
-        }),
+        Some(Command::Worker(arguments)) => {
+            // A terminal signals worker and host alike, and while force fades out the model is still asked. A
+            // worker ends with its host, so nobody listens to the switch.
+            let _ = stopping::stop_on_signals();
+            crate::worker::serve(&arguments).map_err(|error| {
+                CommandError::Usage(format!("`flotor worker` is started by `flotor run`: {error}"))
+            })
+        }
         Some(Command::Completions { shell }) => {
             clap_complete::generate(shell, &mut Arguments::command(), "flotor", &mut std::io::stdout());
             Ok(())
@@ -269,7 +295,7 @@ pub fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("{} {error}", style::error("error:"));
+            remark(format_args!("{} {error}", style::error("error:")));
             ExitCode::from(error.exit_code())
         }
     }
@@ -277,20 +303,42 @@ pub fn main() -> ExitCode {
 
 /// What `say!` does.
 fn print_line(line: std::fmt::Arguments<'_>) {
-    use std::io::Write;
     if let Err(error) = writeln!(std::io::stdout(), "{line}") {
         let gone = error.kind() == std::io::ErrorKind::BrokenPipe;
         std::process::exit(if gone { 0 } else { 1 });
     }
 }
 
+/// Prints a line where the command has more to do, or an exit code of its own: a reader that has gone away ends
+/// nothing.
+fn report_line(line: std::fmt::Arguments<'_>) -> Result<(), CommandError> {
+    match writeln!(std::io::stdout(), "{line}") {
+        Err(cause) if cause.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(CommandError::file(Path::new("standard output"), "cannot write the result", cause))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Prints a line on standard error. `eprintln!` panics where nobody reads it, and the exit code is lost then.
+fn remark(line: std::fmt::Arguments<'_>) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// The first error there is: it decides the exit code and is told last. What else went wrong is told here.
+fn first_error(results: impl IntoIterator<Item = Result<(), CommandError>>) -> Result<(), CommandError> {
+    let mut errors = results.into_iter().filter_map(Result::err);
+    let first = errors.next();
+    errors.for_each(|error| remark(format_args!("{} {error}", style::error("error:"))));
+    first.map_or(Ok(()), Err)
+}
+
 /// Writes a result for machines, `-` being standard output.
-fn write_json<T: serde::Serialize>(path: &std::path::Path, value: &T) -> Result<(), CommandError> {
+fn write_json<T: serde::Serialize>(path: &Path, value: &T) -> Result<(), CommandError> {
     let json =
         serde_json::to_string_pretty(value).map_err(|error| CommandError::Failed(error.to_string()))?;
     if path.as_os_str() == "-" {
-        say!("{json}");
-        return Ok(());
+        return report_line(format_args!("{json}"));
     }
     std::fs::write(path, json + "\n")
         .map_err(|cause| CommandError::file(path, "cannot write the JSON", cause))

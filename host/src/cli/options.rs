@@ -1,6 +1,7 @@
 //! Options several commands share, and how they are read.
 
 pub(crate) use crate::scene::{KeyValue, PluginKeyValue};
+use crate::servo::Core;
 use clap::ValueEnum;
 
 /// `--clock`
@@ -36,6 +37,12 @@ pub(crate) fn rate_hz(text: &str) -> Result<f64, String> {
     let rate: f64 =
         text.trim().trim_end_matches("Hz").trim().parse().map_err(|_| format!("`{text}` is no rate"))?;
     if (100.0..=10_000.0).contains(&rate) { Ok(rate) } else { Err("legal is 100 to 10000 Hz".to_owned()) }
+}
+
+/// A core of the machine.
+pub(crate) fn core(text: &str) -> Result<Core, String> {
+    let number = text.trim().parse().map_err(|_| format!("`{text}` is no number of a core"))?;
+    Core::new(number).ok_or_else(|| format!("the system has no name for a core {number}"))
 }
 
 #[cfg(test)]

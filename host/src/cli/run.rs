@@ -1,8 +1,8 @@
 //! `flotor run`: a scene in the servo loop, watched by whoever is asked for.
 
-use super::options::{ClockOption, PluginKeyValue, duration_s, rate_hz};
+use super::options::{ClockOption, PluginKeyValue, core, duration_s, rate_hz};
 use super::stopping::{Keys, stop_on_signals};
-use super::{CommandError, style};
+use super::{CommandError, first_error, remark, report_line, style, write_json};
 use crate::coupling::Line;
 use crate::live::{Announcement, Carried, Carrier, Handles, carry, publish};
 use crate::record::{Change, RecordError, Recorder, TraceDigest};
@@ -11,8 +11,8 @@ use crate::report::{RunFacts, RunSummary, Tally};
 use crate::run_description::describe;
 use crate::run_picture::RunPicture;
 use crate::scene::Scene;
-use crate::servo::Clock;
-use crate::session::{Observer, Outcome, RunEnd, RunError, RunOptions, Session};
+use crate::servo::{Clock, Core};
+use crate::session::{Observer, Outcome, PluginReport, RunEnd, RunError, RunOptions, Session};
 use crate::trace::TickRecord;
 use clap::Args;
 use flotor_live::{Directory, Publication};
@@ -40,6 +40,9 @@ pub(crate) struct RunArguments {
     /// Seed of everything random
     #[arg(long, default_value_t = 0, value_name = "N")]
     seed: u64,
+    /// Keep the loop on this core of the machine (real clock)
+    #[arg(long, value_parser = core, value_name = "N")]
+    core: Option<Core>,
     /// Record every tick to an MCAP file (opens in Foxglove, Rerun, Python)
     #[arg(long, value_name = "FILE.mcap")]
     record: Option<PathBuf>,
@@ -64,7 +67,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     };
     let options = RunOptions { clock, seed: arguments.seed };
     let registry = Registry::search(&scene.plugin_folders);
-    let mut session = Session::prepare(&scene, &registry, &options)?;
+    let mut session = Session::prepare(&scene, &registry, &options)?.on_core(arguments.core);
     let carriers = carriers(&mut session, clock)?;
     let plugins = session.plugins().to_vec();
     let description = describe(&scene, &options, &plugins);
@@ -92,14 +95,19 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let keys = (clock == Clock::Real).then(|| Keys::listen(&stop)).flatten();
     let outcome = session.run(&mut watchers, &stop);
     drop(keys);
-    let outcome = outcome?;
     watchers.progress.finish_and_clear();
+    let Watchers { tally, digest, recorder, failure, plot, publication, .. } = watchers;
+    // Before anything else that may go wrong: it cannot be made again.
+    let recorded = close(recorder, failure);
+    let outcome = match outcome {
+        Ok(outcome) => outcome,
+        Err(error) => return first_error([Err(error.into()), recorded]),
+    };
 
     let carried: Vec<(String, Carried)> =
         carriers.into_iter().map(|(name, carrier)| (name, carrier.finish())).collect();
-    let Watchers { tally, digest, recorder, failure, plot, publication, .. } = watchers;
     if let Some(publication) = publication {
-        publication.end(&end_words(&outcome));
+        publication.end(&end_words(&outcome, scene.rate_hz));
     }
     let facts = RunFacts {
         title: &scene.title,
@@ -112,18 +120,27 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         trace_digest: digest.finish(),
     };
     let summary = RunSummary::new(facts, &outcome, &tally);
-    tell(&arguments, &summary, &outcome.real_time.advice())?;
+    let drawn = match (&arguments.plot, plot) {
+        (Some(path), Some(plot)) => std::fs::write(path, plot.to_svg(&summary.one_line(), &outcome.timing))
+            .map_err(|cause| CommandError::file(path, "cannot write the plot", cause)),
+        _ => Ok(()),
+    };
+    let told = tell(&arguments, &summary, &outcome.real_time.advice());
+    let written = arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &summary));
+    // What became of the run is what scripts ask first; a file that is missing comes after.
+    first_error([verdict(&outcome, &plugins, &summary), recorded, drawn, told, written])
+}
 
-    // Files last, so that a full disk costs the file and not the report.
-    if let (Some(path), Some(plot)) = (&arguments.plot, plot) {
-        std::fs::write(path, plot.to_svg(&summary.one_line(), &outcome.timing))
-            .map_err(|cause| CommandError::file(path, "cannot write the plot", cause))?;
+/// Ends the recording, if there is one; `failure` is why it has ended before.
+fn close(recorder: Option<Recorder>, failure: Option<RecordError>) -> Result<(), CommandError> {
+    if let Some(failure) = failure {
+        return Err(failure.into());
     }
-    match (recorder, failure) {
-        (_, Some(failure)) => return Err(failure.into()),
-        (Some(recorder), None) => recorder.finish()?,
-        (None, None) => {}
-    }
+    recorder.map_or(Ok(()), Recorder::finish).map_err(CommandError::from)
+}
+
+/// What the end of the run means for the exit code.
+fn verdict(outcome: &Outcome, plugins: &[PluginReport], summary: &RunSummary) -> Result<(), CommandError> {
     match outcome.end {
         RunEnd::DeviceFault(fault) => {
             let (number, words) = outcome.faulted().unwrap_or_default();
@@ -132,8 +149,11 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
             Err(CommandError::RunFault { path, fault, words })
         }
         RunEnd::EmergencyStop(source) => Err(CommandError::EmergencyStop(source)),
+        RunEnd::TooFast(samples_per_s) => {
+            Err(CommandError::TooFast { samples_per_s, rate_hz: summary.rate_hz })
+        }
         RunEnd::Watchdog(stuck) => Err(CommandError::Watchdog(stuck)),
-        RunEnd::Finished | RunEnd::Stopped => broken_models(&summary),
+        RunEnd::Finished | RunEnd::Stopped => broken_models(summary),
     }
 }
 
@@ -148,7 +168,7 @@ fn scene(arguments: &RunArguments) -> Result<Scene, CommandError> {
         scene.duration_s = duration_s;
     }
     if let Some(rate_hz) = arguments.rate {
-        scene.rate_hz = rate_hz;
+        scene.set_rate(rate_hz, "--rate").map_err(RunError::Scene)?;
     }
     for set in &arguments.sets {
         set.apply(&mut scene).map_err(CommandError::Usage)?;
@@ -173,7 +193,7 @@ fn carriers(session: &mut Session, clock: Clock) -> Result<Vec<(String, Carrier)
 }
 
 /// How a run ended, for those who watched it.
-fn end_words(outcome: &Outcome) -> String {
+fn end_words(outcome: &Outcome, rate_hz: f64) -> String {
     match outcome.end {
         RunEnd::Finished => "the run is finished".to_owned(),
         RunEnd::Stopped => "the run was stopped in order".to_owned(),
@@ -185,6 +205,7 @@ fn end_words(outcome: &Outcome) -> String {
             )
         }
         RunEnd::EmergencyStop(source) => CommandError::EmergencyStop(source).to_string(),
+        RunEnd::TooFast(samples_per_s) => CommandError::TooFast { samples_per_s, rate_hz }.to_string(),
         RunEnd::Watchdog(stuck) => CommandError::Watchdog(stuck).to_string(),
     }
 }
@@ -199,15 +220,18 @@ fn broken_models(summary: &RunSummary) -> Result<(), CommandError> {
     })
 }
 
+/// The report for people, unless standard output is for the one for machines; advice on standard error.
 fn tell(arguments: &RunArguments, summary: &RunSummary, advice: &[String]) -> Result<(), CommandError> {
     let json_on_stdout = arguments.json.as_ref().is_some_and(|path| path.as_os_str() == "-");
-    if !json_on_stdout {
-        say!("{}\n{}", style::title(&summary.title), summary.to_text());
-    }
+    let told = if json_on_stdout {
+        Ok(())
+    } else {
+        report_line(format_args!("{}\n{}", style::title(&summary.title), summary.to_text()))
+    };
     for line in advice {
-        eprintln!("{} {line}", style::warning("note:"));
+        remark(format_args!("{} {line}", style::warning("note:")));
     }
-    arguments.json.as_ref().map_or(Ok(()), |path| super::write_json(path, summary))
+    told
 }
 
 /// Everybody who looks at every tick of a run.

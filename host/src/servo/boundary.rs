@@ -14,8 +14,10 @@ pub(super) struct BoundaryWall {
 }
 
 impl BoundaryWall {
-    /// A wall the boundary's margin inside the device's range. Not real-time.
-    pub(super) fn new(boundary: &Boundary, device: &Capabilities) -> Self {
+    /// A wall the boundary's margin inside the device's range, no stiffer than the device and a loop of this period render
+    /// stably. Not real-time.
+    #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
+    pub(super) fn new(boundary: &Boundary, device: &Capabilities, period_ns: u64) -> Self {
         let Boundary {
             margin_m,
             margin_rad,
@@ -24,6 +26,11 @@ impl BoundaryWall {
             stiffness_nm_per_rad,
             damping_nms_per_rad,
         } = *boundary;
+        let period_s = period_ns as f64 * 1.0e-9;
+        let stiffness_n_per_m = stiffness_n_per_m
+            .min(stable_stiffness(damping_ns_per_m, period_s))
+            .min(declared(device.max_stiffness_n_per_m));
+        let stiffness_nm_per_rad = stiffness_nm_per_rad.min(stable_stiffness(damping_nms_per_rad, period_s));
         Self {
             position: Ellipsoid::new(device.range_m, margin_m, stiffness_n_per_m, damping_ns_per_m),
             rotation: Ellipsoid::new(device.range_rad, margin_rad, stiffness_nm_per_rad, damping_nms_per_rad),
@@ -57,6 +64,17 @@ impl BoundaryWall {
         }
         Some(Wrench::new(force.unwrap_or(DVec3::ZERO), torque.unwrap_or(DVec3::ZERO)))
     }
+}
+
+/// Half of the stiffness that a damper keeps passive in a sampled loop, `B / (T / 2)` (Gil et al. 2009, without damping of
+/// the plant). A wall without a damper is what its scene says: only the device's own damping can hold it.
+fn stable_stiffness(damping: f64, period_s: f64) -> f64 {
+    if damping > 0.0 { damping / period_s } else { f64::INFINITY }
+}
+
+/// A limit, if the device declares one.
+fn declared(limit: f64) -> f64 {
+    if limit > 0.0 { limit } else { f64::INFINITY }
 }
 
 /// Where translation or rotation may be, and what it meets outside. Metres and newtons, or radians and newton metres.
@@ -128,7 +146,7 @@ mod tests {
     fn a_rotation_that_meets_a_wall_is_not_taken_for_inside() {
         let boundary = Boundary::default();
         let device = Capabilities { range_m: [1.0; 3], range_rad: [0.12, 3.0, 0.5], ..CAPABILITIES };
-        let wall = BoundaryWall::new(&boundary, &device);
+        let wall = BoundaryWall::new(&boundary, &device, 1_000_000);
         for step in 0..20_000_u32 {
             let turn = f64::from(step);
             let direction = DVec3::new((turn * 0.7).sin(), (turn * 1.3).cos(), (turn * 0.31).sin());
@@ -137,6 +155,23 @@ mod tests {
             state.pose = Pose::new(DVec3::ZERO, orientation_from_rotation_vector(rotation_rad));
             assert_eq!(wall.push(&state), wall.push_outside(&state), "{rotation_rad}");
         }
+    }
+
+    /// Force of the wall half a millimetre deep in it at a device and a rate, N.
+    fn push_n(device: &Capabilities, rate_hz: u64) -> f64 {
+        let wall = BoundaryWall::new(&Boundary::default(), device, 1_000_000_000 / rate_hz);
+        let mut state = DeviceState::HOME;
+        state.pose = Pose::new(DVec3::Z * 0.012, DeviceState::HOME.pose.orientation());
+        wall.push(&state).map_or(0.0, |push| -push.force().z)
+    }
+
+    #[test]
+    fn the_wall_is_as_stiff_as_device_and_rate_allow() {
+        let is = |found: f64, n: f64| assert!((found - n).abs() < 1.0e-9, "{found} is not {n}");
+        is(push_n(&CAPABILITIES, 1000), 5.0); // the default's 10 kN/m
+        is(push_n(&CAPABILITIES, 100), 0.75); // 15 N s/m / 10 ms
+        is(push_n(&Capabilities { max_stiffness_n_per_m: 450.0, ..CAPABILITIES }, 1000), 0.225);
+        is(push_n(&Capabilities { max_stiffness_n_per_m: 0.0, ..CAPABILITIES }, 1000), 5.0); // says nothing
     }
 
     const CAPABILITIES: Capabilities = Capabilities {

@@ -72,6 +72,7 @@ enum Pace {
 }
 
 /// A tick that is due, and how the machine kept to it.
+#[derive(Debug)]
 pub(crate) struct Due {
     pub(crate) tick: Tick,
     /// How long after its deadline it starts, ns; on the virtual clock nothing is ever late.
@@ -79,6 +80,26 @@ pub(crate) struct Due {
     /// Ticks skipped just before it.
     pub(crate) missed: u64,
 }
+
+/// Why there is no next tick on a device's pace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PaceLost {
+    /// It does not set the pace after all.
+    NotPaced,
+    /// Samples come faster than the loop counts time: every limit per time would be one too high.
+    TooFast {
+        /// So many so far.
+        samples: u64,
+        /// Since the start, ns.
+        elapsed_ns: u64,
+    },
+}
+
+/// How far the samples of a device that sets the pace may run ahead of the machine's clock, ns: what it may have kept for the
+/// loop before the start, or while that was held up.
+const AHEAD_NS: u64 = 250_000_000;
+/// And by which part of the time since the start: one in so many, 2 %. Two oscillators differ by far less.
+const AHEAD_SHARE: u64 = 50;
 
 /// How a wait ended on the machine's clock.
 #[derive(Clone, Copy)]
@@ -111,8 +132,11 @@ impl Schedule {
     }
 
     /// Waits for the next tick; `wait_for_sample` is how to wait for a device, for so many ns at most, if it is the
-    /// device that sets the pace. `None` if it turns out not to. Real-time: sleeps, then spins; no allocation.
-    pub(crate) fn wait(&mut self, wait_for_sample: impl FnOnce(u64) -> SampleWait) -> Option<Due> {
+    /// device that sets the pace. Real-time: sleeps, then spins; no allocation.
+    ///
+    /// # Errors
+    /// [`PaceLost`] if it turns out not to set it, or another one.
+    pub(crate) fn wait(&mut self, wait_for_sample: impl FnOnce(u64) -> SampleWait) -> Result<Due, PaceLost> {
         let woken = match self.pace {
             Pace::Virtual => None,
             Pace::Clock(window) => Some(self.wait_for_deadline(window)),
@@ -131,7 +155,7 @@ impl Schedule {
         self.last_slot = self.slot;
         self.slot += 1;
         self.next_index += 1;
-        Some(Due { tick, lateness_ns: woken.map(|woken| woken.late_ns), missed })
+        Ok(Due { tick, lateness_ns: woken.map(|woken| woken.late_ns), missed })
     }
 
     /// How long a tick waits for a sample. After that it runs without one: force has to fade out even if the device
@@ -157,9 +181,9 @@ impl Schedule {
     }
 
     /// A tick that a sample began, or that waited for one in vain.
-    fn follow(&mut self, last_ns: u64, waited: SampleWait) -> Option<Woken> {
+    fn follow(&mut self, last_ns: u64, waited: SampleWait) -> Result<Woken, PaceLost> {
         let periods = match waited {
-            SampleWait::NotPaced => return None,
+            SampleWait::NotPaced => return Err(PaceLost::NotPaced),
             SampleWait::Arrived { samples } => samples.max(1),
             SampleWait::TimedOut => {
                 // A device that gives up at once must not make the loop spin.
@@ -169,8 +193,12 @@ impl Schedule {
         };
         let now_ns = monotonic_ns();
         self.pace = Pace::Device { last_ns: now_ns };
+        let elapsed_ns = now_ns.saturating_sub(self.start_ns);
+        if self.next_time_ns() > elapsed_ns + elapsed_ns / AHEAD_SHARE + AHEAD_NS {
+            return Err(PaceLost::TooFast { samples: self.slot, elapsed_ns });
+        }
         let late_ns = now_ns.saturating_sub(last_ns + periods * self.period_ns);
-        Some(Woken { late_ns, missed: periods - 1 })
+        Ok(Woken { late_ns, missed: periods - 1 })
     }
 
     /// Waits for the end of the last tick's period; time since the start, ns. As for a tick, whole periods in which the loop was
@@ -181,6 +209,11 @@ impl Schedule {
             Pace::Clock(window) => self.next_time_ns() + self.wait_for_deadline(window).late_ns,
             Pace::Device { .. } => monotonic_ns() - self.start_ns,
         }
+    }
+
+    /// Number of the next tick, from 0 and without a gap.
+    pub(crate) fn next_index(&self) -> u64 {
+        self.next_index
     }
 
     /// Scheduled time of the next tick, ns.
@@ -229,14 +262,27 @@ mod tests {
         let started = std::time::Instant::now();
         let mut schedule = Schedule::start_paced(1_000_000);
         for _ in 0..20 {
-            assert!(schedule.wait(|_| SampleWait::TimedOut).is_some(), "it gives up at once");
+            assert!(schedule.wait(|_| SampleWait::TimedOut).is_ok(), "it gives up at once");
         }
         assert!(started.elapsed() >= std::time::Duration::from_millis(20), "twenty periods have passed");
     }
 
     #[test]
     fn a_device_that_does_not_pace_after_all_ends_the_loop() {
-        assert!(Schedule::start_paced(1_000_000).wait(|_| SampleWait::NotPaced).is_none());
+        let waited = Schedule::start_paced(1_000_000).wait(|_| SampleWait::NotPaced);
+        assert_eq!(waited.err(), Some(PaceLost::NotPaced));
+    }
+
+    #[test]
+    fn a_device_whose_samples_come_faster_than_time_is_counted_ends_the_loop() {
+        let mut schedule = Schedule::start_paced(1_000_000);
+        let ahead = (0..10_000).find_map(|_| schedule.wait(|_| SampleWait::Arrived { samples: 1 }).err());
+        // None of them waits: 250 ms and what the test takes are too far ahead.
+        let Some(PaceLost::TooFast { samples, elapsed_ns }) = ahead else { panic!("{ahead:?}") };
+        assert!(
+            samples * 1_000_000 > elapsed_ns + AHEAD_NS && samples >= 250,
+            "{samples} in {elapsed_ns} ns"
+        );
     }
 
     #[test]

@@ -58,7 +58,7 @@ impl Envelope {
             },
             slew_per_s,
             most_change_in_a_period: most_change(slew_per_s, period_ns),
-            wall: BoundaryWall::new(boundary, device),
+            wall: BoundaryWall::new(boundary, device, period_ns),
             // Damping the device is known to stand: that of its boundary.
             passivity: Passivity::new(
                 limits.passivity,

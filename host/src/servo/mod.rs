@@ -28,19 +28,19 @@ mod watchdog;
 pub use budget::Overrun;
 pub(crate) use budget::TimeBudget;
 pub use clock::{Clock, SpinWindow};
-pub(crate) use clock::{Due, Schedule, monotonic_ns, sleep_until};
+pub(crate) use clock::{Due, PaceLost, Schedule, monotonic_ns, sleep_until};
 pub(crate) use engine::{Engine, Stepped};
 pub use envelope::Envelope;
 pub(crate) use exchange::{Exchange, Workshop, exchange};
 pub use forces::CouplingOutcome;
 pub(crate) use forces::{Coupled, Forces, Port};
 pub use models::ModelHealth;
-pub(crate) use models::{Layer, Replacement};
+pub(crate) use models::{Layer, LayerReport, Replacement};
 pub(crate) use parameters::{
     ChangeReport, ChangeSender, PLUGIN, ParameterChange, ParameterQueue, ReportReceiver, ScheduledChange,
     WEIGHT,
 };
-pub use realtime::{Privilege, RealTimeReport};
+pub use realtime::{Core, Privilege, RealTimeReport};
 pub(crate) use realtime::{enter_real_time, enter_worker_priority, probe_real_time};
 pub use state::{Cause, EmergencySource, Gate, RunEvent, RunState};
 pub(crate) use station::Station;
@@ -52,7 +52,7 @@ pub use watchdog::{Place, Stuck};
 use crate::trace::{Events, TickRecord};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::ActiveDevice;
-use flotor_hal::{DVec3, Fault, Tick, instructions};
+use flotor_hal::{Fault, Tick, instructions};
 use stopwatch::{Moment, Stopwatch};
 use timing::STAGE_SAMPLING;
 
@@ -63,6 +63,8 @@ pub(crate) struct RunConfig {
     pub(crate) period_ns: u64,
     /// Time over which force fades in and out, ns.
     pub(crate) ramp_ns: u64,
+    /// Time without a tick after which force has to fade in again: the hand is not where it was, ns.
+    pub(crate) held_up_ns: u64,
     /// Buttons of the device that are emergency stops, one bit each.
     pub(crate) emergency_buttons: u32,
 }
@@ -99,6 +101,7 @@ impl Servo {
         parameters: ParameterQueue,
         exchange: Exchange,
         config: RunConfig,
+        heart: Heartbeat,
     ) -> Self {
         Self {
             ports: vec![Port::REST; stations.len()].into(),
@@ -107,7 +110,7 @@ impl Servo {
             parameters,
             exchange,
             config,
-            heart: Heartbeat::default(),
+            heart,
             run: RunState::START,
             timing: Timing::default(),
             stopwatch: Stopwatch::new(),
@@ -189,6 +192,19 @@ impl Servo {
         let compute_ns = self.stopwatch.between_ns(started, ended);
         self.account(*lateness_ns, compute_ns, *missed);
         Done { events, compute_ns }
+    }
+
+    /// Lets the force fade out from this tick on: the run will be over when it has. Real-time: bounded, no allocation.
+    pub(crate) fn release(&mut self, tick: &Tick) {
+        // Where there is no force the run just ends.
+        if self.run != RunState::Holding {
+            self.happen(RunEvent::StopAsked, tick);
+        }
+    }
+
+    /// Time over which force fades in and out, ns.
+    pub(crate) fn ramp_ns(&self) -> u64 {
+        self.config.ramp_ns
     }
 
     /// Something else than a tick has happened since the last one. Between two ticks on the virtual clock there is nothing
@@ -277,6 +293,9 @@ impl Servo {
         stop: &StopSwitch,
         events: &mut Events,
     ) {
+        if tick.dt_ns > self.config.held_up_ns {
+            self.happen(RunEvent::SamplesLost, tick);
+        }
         // An active run with a sample goes on as it is.
         if (self.run, sample) != (RunState::Active, RunEvent::SamplesBack) {
             self.happen(RunEvent::Time, tick);
@@ -315,12 +334,6 @@ impl Servo {
     pub(crate) fn into_timing(self) -> Timing {
         drop(self.stations);
         self.timing
-    }
-
-    /// The most that may reach a hand at any device: force along each axis (N), torque about each (N·m).
-    pub(crate) fn most(&self) -> [DVec3; 2] {
-        let most = self.stations.iter().map(|station| station.envelope.most());
-        most.fold([DVec3::ZERO; 2], |[force_n, torque_nm], [f, t]| [force_n.max(f), torque_nm.max(t)])
     }
 
     /// Where the run stands after the last tick.

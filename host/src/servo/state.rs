@@ -3,17 +3,20 @@
 //! ```text
 //!            ramp over            samples lost
 //!  Ramping ------------> Active ---------------> Holding
-//!     ^                    |                        |
-//!     |                    |      samples back      |
-//!     +--------------------|------------------------+
-//!                          |
-//!        any of the three: | stop asked          any but Stopped:
-//!                          v                       device fault, watchdog -> Faulted
-//!                      Releasing                   emergency stop         -> EmergencyStopped
-//!                          | ramp over
-//!                          v
-//!                       Stopped                  Stopped, Faulted, EmergencyStopped: nothing leads out
+//!   | ^                    |                      | |
+//!   | |                    |     samples back     | |
+//!   | +--------------------|----------------------+ |
+//!   |                      |                        |
+//!   +------- stop asked ---+                        | stop asked   any but Stopped:
+//!                          v                        |                device fault, watchdog -> Faulted
+//!                      Releasing                    |                emergency stop         -> EmergencyStopped
+//!                          | ramp over,             |
+//!                          v samples lost           |
+//!                       Stopped <-------------------+              Stopped, Faulted, EmergencyStopped:
+//!                                                                    nothing leads out
 //! ```
+//!
+//! While nobody knows where the hand is there is no force, and none to fade out: not the models', nor the boundary's.
 //!
 //! The last three are where a run ends. No event leads out of them, so that an emergency stop latches: force comes
 //! back only with a new run, which opens and activates the device anew. A fault may still become an emergency
@@ -27,7 +30,7 @@ use flotor_hal::Fault;
 pub enum EmergencySource {
     /// A key of the terminal.
     Key,
-    /// The signal `SIGUSR1`.
+    /// The signal `SIGUSR1`, or a second one that asks for an end.
     Signal,
     /// A program that watches the run: the viewer.
     Watcher,
@@ -147,7 +150,10 @@ impl RunState {
             }
             (Self::Ramping { .. } | Self::Active, RunEvent::SamplesLost) => Self::Holding,
             (Self::Holding, RunEvent::SamplesBack) => Self::Ramping { since_ns: now_ns },
-            (Self::Ramping { .. } | Self::Active | Self::Holding, RunEvent::StopAsked) => {
+            (Self::Releasing { .. }, RunEvent::SamplesLost) | (Self::Holding, RunEvent::StopAsked) => {
+                Self::Stopped
+            }
+            (Self::Ramping { .. } | Self::Active, RunEvent::StopAsked) => {
                 Self::Releasing { since_ns: now_ns, from: self.gate(now_ns, ramp_ns).models }
             }
             _ => self,
@@ -255,9 +261,9 @@ mod tests {
             [YOUNG, Holding, YOUNG, release(0.5), bitten, device, signal],
             [Active, Holding, GROWN, release(1.0), bitten, device, signal],
             [Active, Holding, Active, release(1.0), bitten, device, signal],
-            [Holding, Holding, again, release(0.0), bitten, device, signal],
-            [LEAVING, LEAVING, LEAVING, LEAVING, bitten, device, signal],
-            [Stopped, LEFT, LEFT, LEFT, bitten, device, signal],
+            [Holding, Holding, again, Stopped, bitten, device, signal],
+            [LEAVING, Stopped, LEAVING, LEAVING, bitten, device, signal],
+            [Stopped, Stopped, LEFT, LEFT, bitten, device, signal],
             [Stopped; 7],
             [FAULTED, FAULTED, FAULTED, FAULTED, FAULTED, FAULTED, signal],
             [PRESSED; 7],
@@ -302,6 +308,16 @@ mod tests {
         }
         assert_eq!((state, last), (RunState::Stopped, Gate::SHUT));
         assert!((highest - 0.5).abs() < 0.02, "{highest}");
+    }
+
+    /// Out of `Holding` nothing may push before there are samples again: the boundary would, on a pose that is old.
+    #[test]
+    fn a_gate_that_is_shut_opens_with_new_samples_only() {
+        for event in EVENTS {
+            let next = RunState::Holding.after(event, NOW_NS, RAMP_NS);
+            let is_shut = next.gate(NOW_NS, RAMP_NS) == Gate::SHUT;
+            assert_eq!(is_shut, event != RunEvent::SamplesBack, "{event:?}");
+        }
     }
 
     #[test]

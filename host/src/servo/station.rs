@@ -7,9 +7,11 @@ use crate::trace::Events;
 use flotor_hal::abi::loader::ActiveDevice;
 use flotor_hal::{Axes, Conditions, Cycle, Fault, Tick, instructions};
 
-/// Ticks without a new sample after which the force fades to zero: what is older than this is not where the
-/// hand is. At 1 kHz, 10 ms of a 10 Hz movement of 5 mm are 3 mm.
-const STALE_TICKS_LIMIT: u32 = 10;
+/// Time without a new sample after which there is no force: what is older than this is not where the hand is. In 10 ms a
+/// 10 Hz movement of 5 mm goes 3 mm.
+const STALE_LIMIT_NS: u64 = 10_000_000;
+/// Samples in a row that may be lost at any rate: one is no news.
+const STALE_TICKS_BORNE: u64 = 2;
 
 /// A device, and what nothing gets past on its way there.
 pub(crate) struct Station {
@@ -23,9 +25,9 @@ pub(crate) struct Station {
 }
 
 impl Station {
-    /// Not real-time.
-    pub(crate) fn new(device: ActiveDevice, envelope: Envelope, sensed: Axes) -> Self {
-        let stale_ticks_limit = if sensed == Axes::NONE { u32::MAX } else { STALE_TICKS_LIMIT };
+    /// A device in a loop of this period. Not real-time.
+    pub(crate) fn new(device: ActiveDevice, envelope: Envelope, sensed: Axes, period_ns: u64) -> Self {
+        let stale_ticks_limit = if sensed == Axes::NONE { u32::MAX } else { stale_ticks_limit(period_ns) };
         Self { device, envelope, stale_ticks_limit, stale_ticks: 0, fault: None }
     }
 
@@ -82,5 +84,23 @@ impl Station {
         port.events.insert(Events::DEVICE_FAULT);
         self.fault.get_or_insert(fault);
         RunEvent::Failed(Cause::Device(fault))
+    }
+}
+
+/// Ticks without a new sample that are borne in a loop of this period.
+fn stale_ticks_limit(period_ns: u64) -> u32 {
+    let ticks = (STALE_LIMIT_NS / period_ns.max(1)).max(STALE_TICKS_BORNE);
+    u32::try_from(ticks).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_is_too_old_after_the_same_time_at_any_rate() {
+        assert_eq!(stale_ticks_limit(100_000), 100); // 10 kHz: 10 ms
+        assert_eq!(stale_ticks_limit(1_000_000), 10); // 1 kHz: 10 ms
+        assert_eq!(stale_ticks_limit(10_000_000), 2); // 100 Hz: two, and no longer
     }
 }

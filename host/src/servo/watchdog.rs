@@ -18,6 +18,8 @@ use std::thread::JoinHandle;
 pub enum Place {
     /// Between two ticks.
     Waiting,
+    /// The wait for the next sample of a device that sets the pace, by its number.
+    DeviceWait(u16),
     /// The `read` of a device, by its number.
     DeviceRead(u16),
     /// A model's `step`, by its place in the scene.
@@ -29,8 +31,9 @@ pub enum Place {
 }
 
 impl Place {
-    /// Codes: 0 and 1, the devices' reads, their writes, the models.
-    const FIRST_READ: u64 = 2;
+    /// Codes: 0 and 1, the waits for devices, their reads, their writes, the models.
+    const FIRST_WAIT: u64 = 2;
+    const FIRST_READ: u64 = Self::FIRST_WAIT + MOST_DEVICES as u64;
     const FIRST_WRITE: u64 = Self::FIRST_READ + MOST_DEVICES as u64;
     const FIRST_MODEL: u64 = Self::FIRST_WRITE + MOST_DEVICES as u64;
 
@@ -39,6 +42,7 @@ impl Place {
     pub const fn call(self) -> &'static str {
         match self {
             Self::Waiting => "waiting",
+            Self::DeviceWait(_) => "`wait_for_sample`",
             Self::DeviceRead(_) => "`read`",
             Self::Model(_) => "`step`",
             Self::Host => "the tick",
@@ -51,6 +55,7 @@ impl Place {
         match self {
             Self::Waiting => 0,
             Self::Host => 1,
+            Self::DeviceWait(device) => Self::FIRST_WAIT + device as u64,
             Self::DeviceRead(device) => Self::FIRST_READ + device as u64,
             Self::DeviceWrite(device) => Self::FIRST_WRITE + device as u64,
             Self::Model(index) => Self::FIRST_MODEL + index as u64,
@@ -62,6 +67,7 @@ impl Place {
         match code {
             0 => Self::Waiting,
             1 => Self::Host,
+            wait @ Self::FIRST_WAIT..Self::FIRST_READ => Self::DeviceWait((wait - Self::FIRST_WAIT) as u16),
             read @ Self::FIRST_READ..Self::FIRST_WRITE => Self::DeviceRead((read - Self::FIRST_READ) as u16),
             write @ Self::FIRST_WRITE..Self::FIRST_MODEL => {
                 Self::DeviceWrite((write - Self::FIRST_WRITE) as u16)
@@ -192,6 +198,8 @@ mod tests {
         for place in [
             Place::Waiting,
             Place::Host,
+            Place::DeviceWait(0),
+            Place::DeviceWait(MOST_DEVICES - 1),
             Place::DeviceRead(0),
             Place::DeviceRead(MOST_DEVICES - 1),
             Place::DeviceWrite(0),

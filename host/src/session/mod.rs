@@ -3,9 +3,10 @@
 mod choice;
 mod controls;
 mod prepare;
+mod standby;
 mod steps;
 
-pub use controls::{ControlError, Controls, NewValue};
+pub use controls::{ControlError, Controls, Misbehaved, NewValue};
 pub(crate) use prepare::prepare_model;
 pub use steps::Steps;
 
@@ -14,8 +15,8 @@ use crate::record::Change;
 use crate::registry::{LookupError, Registry};
 use crate::scene::{MOST_DEVICES, Scene, SceneError};
 use crate::servo::{
-    Cause, Clock, Coupled, CouplingOutcome, EmergencySource, Envelope, Forces, Heartbeat, ModelHealth,
-    ParameterQueue, Place, RealTimeReport, RunConfig, RunState, Schedule, Servo, SpinWindow, Station,
+    Cause, Clock, Core, Coupled, CouplingOutcome, EmergencySource, Envelope, Forces, Heartbeat, ModelHealth,
+    PaceLost, ParameterQueue, Place, RealTimeReport, RunConfig, RunState, Schedule, Servo, SpinWindow,
     StopSwitch, Stuck, Timing, enter_real_time, exchange, start_watchdog,
 };
 use crate::trace::{RECORD_WORDS, TickRecord};
@@ -25,6 +26,7 @@ use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, Stopper};
 use flotor_hal::{DVec3, EnergyLedger, Fault, LoopConfig, Pacing, Parameter, SampleWait};
 use flotor_live::WrenchLimits;
 use prepare::Scheduled;
+use standby::Standby;
 use std::time::{Duration, Instant};
 
 /// How a scene is to be run.
@@ -101,8 +103,7 @@ pub trait Observer {
 
 /// A scene ready to run: everything loaded, paired and opened, nothing energised.
 pub struct Session {
-    servo: Servo,
-    stoppers: Vec<Stopper>,
+    standby: Standby,
     controls: Controls,
     changes: ChangeLog,
     clock: Clock,
@@ -110,6 +111,7 @@ pub struct Session {
     period_ns: u64,
     duration_ns: u64,
     watchdog_ns: u64,
+    core: Option<Core>,
     plugins: Vec<PluginReport>,
     lines: Vec<(String, Line)>,
 }
@@ -125,11 +127,24 @@ pub enum RunEnd {
     DeviceFault(Fault),
     /// The emergency stop was pressed.
     EmergencyStop(EmergencySource),
+    /// The device sets the pace, and it is a faster one than the scene says: this many samples a second.
+    TooFast(u32),
     /// A tick took so long that the watchdog stopped the device; then it came back.
     Watchdog(Stuck),
 }
 
 impl RunEnd {
+    /// What it means that a device does not set the pace it should.
+    fn without_pace(lost: PaceLost) -> Self {
+        match lost {
+            PaceLost::NotPaced => Self::DeviceFault(Fault::Broken),
+            PaceLost::TooFast { samples, elapsed_ns } => {
+                let per_s = samples.saturating_mul(1_000_000_000) / elapsed_ns.max(1);
+                Self::TooFast(u32::try_from(per_s).unwrap_or(u32::MAX))
+            }
+        }
+    }
+
     /// What the last state of a run means for those who asked for it.
     fn of(run: RunState, heart: &Heartbeat) -> Self {
         match (run, heart.bitten()) {
@@ -159,8 +174,10 @@ pub struct Outcome {
     pub devices: Vec<DeviceOutcome>,
     /// What has become of each coupling, in the scene's order.
     pub couplings: Vec<CouplingOutcome>,
-    /// Name, health and last words of each model.
+    /// Name, health and last words of each model the run began with.
     pub models: Vec<(String, ModelHealth, String)>,
+    /// Of the plugins that took the place of a model later, those that did not behave.
+    pub misbehaved: Vec<Misbehaved>,
 }
 
 impl Outcome {
@@ -198,7 +215,7 @@ impl Session {
     /// Loads, checks and opens everything a scene names, and nothing else. Not real-time.
     ///
     /// # Errors
-    /// [`RunError`]; nothing is energised before this has succeeded.
+    /// [`RunError`].
     pub fn prepare(scene: &Scene, registry: &Registry, options: &RunOptions) -> Result<Self, RunError> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 100 Hz to 10 kHz
         let period_ns = (1.0e9 / scene.rate_hz).round() as u64;
@@ -233,15 +250,11 @@ impl Session {
         let (exchange, workshop) = exchange(models.len(), replacements);
         let controls = Controls::new(parts.clone(), sender, &scene.models, (config, options.clock), workshop);
 
-        let stoppers: Vec<Stopper> = opened.iter().map(|opened| opened.device.stopper()).collect();
-        let activate = |opened: prepare::Opened| {
+        let devices = opened.into_iter().map(|opened| {
             let envelope = Envelope::new(&scene.limits, &scene.boundary, &opened.capabilities, period_ns);
-            let sensed = opened.capabilities.sensed;
-            Ok(Station::new(opened.activate(&config)?, envelope, sensed))
-        };
-        let stations = opened.into_iter().map(activate).collect::<Result<Vec<_>, RunError>>();
-        // If one says no, none stays energised.
-        let stations = stations.inspect_err(|_| stoppers.iter().for_each(Stopper::safe_stop))?;
+            (opened, envelope)
+        });
+        let devices: Vec<_> = devices.collect();
         #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
         let period_s = period_ns as f64 * 1.0e-9;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a minute
@@ -255,12 +268,11 @@ impl Session {
             lines.extend(line.map(|line| (coupling.name.clone(), line)));
             coupled
         });
-        let forces = Forces::new(stations.len(), models, couplings.collect());
-        let run = RunConfig { period_ns, ramp_ns, emergency_buttons: scene.limits.emergency_buttons };
-        let servo = Servo::new(stations, forces, parameters, exchange, run);
+        let forces = Forces::new(devices.len(), models, couplings.collect());
+        let emergency_buttons = scene.limits.emergency_buttons;
+        let run = RunConfig { period_ns, ramp_ns, held_up_ns: watchdog_ns, emergency_buttons };
         Ok(Self {
-            servo,
-            stoppers,
+            standby: Standby::new(devices, forces, parameters, exchange, config, run),
             controls,
             changes: ChangeLog::new(parts, reports),
             clock: options.clock,
@@ -268,14 +280,36 @@ impl Session {
             period_ns,
             duration_ns,
             watchdog_ns,
+            core: None,
             plugins,
             lines,
         })
     }
 
-    /// The loop itself, for whoever paces it differently; the stoppers must be used before it is dropped.
-    pub(crate) fn into_loop(self) -> (Servo, Vec<Stopper>, u64) {
-        (self.servo, self.stoppers, self.period_ns)
+    /// The same with the loop on this core, on the real clock.
+    #[must_use]
+    pub fn on_core(self, core: Option<Core>) -> Self {
+        Self { core, ..self }
+    }
+
+    /// The loop itself, its devices energised, for whoever paces it differently; the stoppers must be used before it is
+    /// dropped. Not real-time.
+    ///
+    /// # Errors
+    /// [`RunError::Plugin`] if a device says no; then none is energised.
+    pub(crate) fn into_loop(self) -> Result<(Servo, Vec<Stopper>), RunError> {
+        let stoppers = self.standby.stoppers();
+        Ok((self.standby.activate()?, stoppers))
+    }
+
+    /// The core the loop is to run on, if one is named.
+    pub(crate) fn core(&self) -> Option<Core> {
+        self.core
+    }
+
+    /// Nominal time between ticks, ns.
+    pub(crate) fn period_ns(&self) -> u64 {
+        self.period_ns
     }
 
     /// The plugins of this run with every parameter in force.
@@ -288,7 +322,7 @@ impl Session {
     #[must_use]
     pub fn limits(&self) -> WrenchLimits {
         let finite = |most: DVec3| most.to_array().map(|limit| limit.is_finite().then_some(limit));
-        let [force_n, torque_nm] = self.servo.most().map(finite);
+        let [force_n, torque_nm] = self.standby.most().map(finite);
         WrenchLimits { force_n, torque_nm }
     }
 
@@ -308,17 +342,16 @@ impl Session {
     /// Runs until the duration is over, somebody uses `stop`, or the device faults.
     ///
     /// # Errors
-    /// [`RunError::Thread`] if the servo's thread cannot be had, [`RunError::Hung`] if it does not come back: it is
-    /// left behind then, and the process should end soon.
+    /// [`RunError::Plugin`] if a device refuses to be energised, [`RunError::Thread`] if the servo's thread cannot be had,
+    /// [`RunError::Hung`] if it does not come back: it is left behind then, and the process should end soon.
     pub fn run(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Outcome, RunError> {
         let started = Instant::now();
-        let stoppers = self.stoppers.clone();
         let names: Vec<String> = self.plugins.iter().map(|plugin| plugin.name.clone()).collect();
+        let controls = self.controls.clone();
         let finished = match self.clock {
-            Clock::Virtual => self.run_virtual(observer, stop),
+            Clock::Virtual => self.run_virtual(observer, stop)?,
             Clock::Real => self.run_real(observer, stop)?,
         };
-        stoppers.iter().for_each(Stopper::safe_stop);
         let Finished { mut servo, end, elapsed_ns, dropped_records, real_time } = finished;
         let told = |(device, fault): (&mut ActiveDevice, Option<Fault>)| DeviceOutcome {
             fault,
@@ -327,7 +360,8 @@ impl Session {
         };
         let devices: Vec<DeviceOutcome> = servo.devices().map(told).collect();
         let couplings = servo.forces().coupling_outcomes();
-        let models = names.into_iter().skip(devices.len()).zip(servo.forces().health());
+        let (health, misbehaved) = controls.settle(servo.forces().reports());
+        let models = names.into_iter().skip(devices.len()).zip(health);
         let models = models.map(|(name, (health, words))| (name, health, words)).collect();
         let timing = servo.into_timing();
         let wall_s = started.elapsed().as_secs_f64();
@@ -341,18 +375,23 @@ impl Session {
             devices,
             couplings,
             models,
+            misbehaved,
         })
     }
 
     /// Same tick, no waiting: observers look between batches, so that a slow one slows the run and loses nothing.
-    fn run_virtual(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Finished {
-        let Session { servo, controls, mut changes, period_ns, duration_ns, .. } = self;
-        let mut runner = Runner::new(servo, Schedule::start_virtual(period_ns), duration_ns);
+    fn run_virtual(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Finished, RunError> {
+        let Session { standby, controls, mut changes, period_ns, duration_ns, .. } = self;
+        let stoppers = standby.stoppers();
+        let mut runner = Runner::new(standby.activate()?, Schedule::start_virtual(period_ns), duration_ns);
         // A tick may end a batch with a record for each device.
         let mut batch = Vec::with_capacity(VIRTUAL_BATCH + usize::from(MOST_DEVICES));
         while runner.end.is_none() {
             while batch.len() < VIRTUAL_BATCH && runner.end.is_none() {
                 runner.next(stop, |record| batch.push(*record));
+            }
+            if runner.end.is_some() {
+                stoppers.iter().for_each(Stopper::safe_stop);
             }
             for record in batch.drain(..) {
                 changes.up_to(record.tick, |change| observer.change(change));
@@ -361,21 +400,21 @@ impl Session {
             controls.sweep();
             runner.servo.pause();
         }
-        runner.finish(0, RealTimeReport::not_asked())
+        Ok(runner.finish(0, RealTimeReport::not_asked()))
     }
 
     /// The loop on a thread of its own; this one lets the observers look.
     fn run_real(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Finished, RunError> {
         let (mut sender, mut receiver) = flotor_sync::ring::<TickRecord, RECORD_WORDS>(RING_RECORDS);
         let Session {
-            servo,
-            stoppers,
+            standby,
             controls,
             mut changes,
             pacing,
             period_ns,
             duration_ns,
             watchdog_ns,
+            core,
             plugins,
             ..
         } = self;
@@ -383,19 +422,26 @@ impl Session {
             changes.up_to(record.tick, |change| observer.change(change));
             observer.observe(&record);
         };
-        let heart = servo.heart().clone();
+        let heart = standby.heart();
         let loop_stop = stop.clone();
         // Not scoped: a thread that is stuck in a plugin has to be left behind.
         let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
         let loop_heart = heart.clone();
         let servo_thread = thread.spawn(move || {
-            let real_time = enter_real_time();
-            let schedule = match pacing {
-                Pacing::Host => Schedule::start_real(period_ns, SpinWindow::measure(period_ns)),
-                Pacing::Device => Schedule::start_paced(period_ns),
+            let real_time = enter_real_time(core);
+            let spin = match pacing {
+                Pacing::Host => Some(SpinWindow::measure(period_ns)),
+                Pacing::Device => None,
             };
-            let watchdog = start_watchdog(loop_heart, stoppers, loop_stop.clone(), watchdog_ns);
-            let mut runner = Runner::new(servo, schedule, duration_ns);
+            // Last of all that takes time.
+            let stoppers = standby.stoppers();
+            let servo = standby.activate()?;
+            let schedule = match spin {
+                Some(window) => Schedule::start_real(period_ns, window),
+                None => Schedule::start_paced(period_ns),
+            };
+            let watchdog = start_watchdog(loop_heart, stoppers.clone(), loop_stop.clone(), watchdog_ns);
+            let mut runner = Runner::new(servo, schedule, duration_ns).releasing();
             // Without a watchdog nothing is moved.
             if watchdog.is_err() {
                 runner.end = Some(RunEnd::Stopped);
@@ -406,8 +452,11 @@ impl Session {
                     let _ = sender.push(record);
                 });
             }
+            // Here, whatever the thread that looks on is at, and while the watchdog still watches.
+            stoppers.iter().for_each(Stopper::safe_stop);
             runner.servo.heart().finish();
-            watchdog.map(|_| runner.finish(0, real_time))
+            watchdog.map_err(|_| RunError::Thread("got no watchdog"))?;
+            Ok::<_, RunError>(runner.finish(0, real_time))
         });
         let servo_thread = servo_thread.map_err(|_| RunError::Thread("could not be started"))?;
         let mut bitten = None;
@@ -422,8 +471,7 @@ impl Session {
             }
             std::thread::sleep(OBSERVER_PERIOD);
         }
-        let finished = servo_thread.join().map_err(|_| RunError::Thread("panicked"))?;
-        let finished = finished.map_err(|_| RunError::Thread("got no watchdog"))?;
+        let finished = servo_thread.join().map_err(|_| RunError::Thread("panicked"))??;
         receiver.drain(&mut look);
         Ok(Finished { dropped_records: receiver.dropped(), ..finished })
     }
@@ -435,7 +483,9 @@ fn hung(stuck: Stuck, plugins: &[PluginReport], limit_ns: u64) -> RunError {
     let devices = plugins.iter().filter(|plugin| plugin.metadata.kind == PluginKind::Device).count();
     let who = match stuck.place {
         Place::Model(index) => name(devices + index),
-        Place::DeviceRead(device) | Place::DeviceWrite(device) => name(device.into()),
+        Place::DeviceWait(device) | Place::DeviceRead(device) | Place::DeviceWrite(device) => {
+            name(device.into())
+        }
         Place::Host | Place::Waiting => "host".to_owned(),
     };
     RunError::Hung { who, stuck, limit_ns }
@@ -446,6 +496,8 @@ struct Runner {
     servo: Servo,
     schedule: Schedule,
     duration_ns: u64,
+    /// From when on force fades out because the duration will be over.
+    release_ns: u64,
     end: Option<RunEnd>,
 }
 
@@ -459,7 +511,13 @@ struct Finished {
 
 impl Runner {
     fn new(servo: Servo, schedule: Schedule, duration_ns: u64) -> Self {
-        Self { servo, schedule, duration_ns, end: None }
+        Self { servo, schedule, duration_ns, release_ns: u64::MAX, end: None }
+    }
+
+    /// The same with an end that a hand can bear: force is gone when the duration is over, and does not drop then. On the
+    /// virtual clock there is no hand.
+    fn releasing(self) -> Self {
+        Self { release_ns: self.duration_ns.saturating_sub(self.servo.ramp_ns()), ..self }
     }
 
     /// Waits for and runs the next tick, or sets `end`; `leave` gets what it leaves behind. Real-time: bounded, no
@@ -470,21 +528,32 @@ impl Runner {
             self.end = Some(RunEnd::Finished);
             return;
         }
-        let Self { servo, schedule, .. } = self;
+        let Self { servo, schedule, release_ns, .. } = self;
         // The first device sets the pace, if one does.
+        let next = schedule.next_index();
         let wait_for_sample = |timeout_ns| {
+            servo.heart().enter(next, Place::DeviceWait(0));
             servo
                 .devices()
                 .next()
                 .map_or(SampleWait::NotPaced, |(device, _)| device.wait_for_sample(timeout_ns))
         };
-        let Some(due) = schedule.wait(wait_for_sample) else {
-            self.end = Some(RunEnd::DeviceFault(Fault::Broken));
-            return;
+        let due = match schedule.wait(wait_for_sample) {
+            Ok(due) => due,
+            Err(lost) => {
+                self.end = Some(RunEnd::without_pace(lost));
+                return;
+            }
         };
+        if due.tick.time_ns >= *release_ns {
+            servo.release(&due.tick);
+        }
         servo.tick(&due, stop, leave);
         if servo.run().is_over() {
-            self.end = Some(RunEnd::of(servo.run(), servo.heart()));
+            let end = RunEnd::of(servo.run(), servo.heart());
+            // Lost samples end a release early; nobody has asked for one then.
+            let is_time_up = end == RunEnd::Stopped && !stop.is_stop_asked();
+            self.end = Some(if is_time_up { RunEnd::Finished } else { end });
         }
     }
 

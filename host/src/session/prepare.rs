@@ -7,8 +7,8 @@ use crate::calibration::file::{CalibrationFile, CalibrationFileError};
 use crate::mapping::Mapping;
 use crate::registry::{LookupError, Registry};
 use crate::scene::{
-    Alternative, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, ParameterText,
-    PluginUse, Scene, SceneError,
+    Alternative, Boundary, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse,
+    ParameterText, PluginUse, Scene, SceneError,
 };
 use crate::servo::{Clock, Engine, Layer, Replacement, ScheduledChange, TimeBudget};
 use crate::slow::SlowModel;
@@ -241,12 +241,32 @@ pub(super) fn pair(scene: &Scene, number: u16, device: &Capabilities, can_pace: 
             "it cannot set the pace of the loop; remove `pacing`, or say `pacing = \"host\"`".to_owned(),
         );
     }
+    mismatches.extend(boundless(&scene.boundary, device));
     let is_felt = scene.models.iter().any(|model| model.device == number)
         || scene.couplings.iter().any(|coupling| coupling.ends.here().iter().any(|end| end.device == number));
     if is_felt {
         mismatches.extend(unfelt(&scene.limits.force_n, device));
     }
     mismatches
+}
+
+/// A boundary so far inside the device's range that nothing is left of it: a spring to the centre.
+fn boundless(boundary: &Boundary, device: &Capabilities) -> Option<String> {
+    let narrowest = |range: [f64; 3]| {
+        let moving = range.into_iter().filter(|half_side| *half_side > 0.0);
+        moving.fold(f64::INFINITY, f64::min)
+    };
+    let (range_m, range_rad) = (narrowest(device.range_m), narrowest(device.range_rad));
+    let says = |key, margin: f64, range: f64, unit| {
+        format!(
+            "`{key} = {margin:.3}` leaves nothing of the {range:.3} {unit} the device moves around home; make it smaller"
+        )
+    };
+    if boundary.margin_m >= range_m {
+        return Some(says("margin_mm", boundary.margin_m * 1.0e3, range_m * 1.0e3, "mm"));
+    }
+    let (margin_deg, range_deg) = (boundary.margin_rad.to_degrees(), range_rad.to_degrees());
+    (margin_deg >= range_deg).then(|| says("margin_deg", margin_deg, range_deg, "degrees"))
 }
 
 /// Force that models would ask for and the device cannot give, unless the scene says that none is wanted there.
@@ -361,22 +381,33 @@ pub(super) fn schedule(
 mod tests {
     use super::*;
 
+    const DEVICE: Capabilities = Capabilities {
+        sensed: Axes::ALL,
+        actuated: Axes::ALL,
+        range_m: [0.01, 0.01, 0.0],
+        range_rad: [0.1; 3],
+        resolution_m: 0.0,
+        max_force_n: [3.0; 3],
+        max_torque_nm: [0.0; 3],
+        max_force_slew_n_per_s: f64::INFINITY,
+        max_torque_slew_nm_per_s: f64::INFINITY,
+        max_stiffness_n_per_m: 0.0,
+        rate_hz: [100.0, 10_000.0],
+        latency_s: 0.0,
+    };
+
     fn mismatch(wanted_n: [f64; 3], actuated: Axes, max_force_n: [f64; 3]) -> Option<String> {
-        let device = Capabilities {
-            sensed: Axes::ALL,
-            actuated,
-            range_m: [0.01; 3],
-            range_rad: [0.1; 3],
-            resolution_m: 0.0,
-            max_force_n,
-            max_torque_nm: [0.0; 3],
-            max_force_slew_n_per_s: f64::INFINITY,
-            max_torque_slew_nm_per_s: f64::INFINITY,
-            max_stiffness_n_per_m: 0.0,
-            rate_hz: [100.0, 10_000.0],
-            latency_s: 0.0,
-        };
-        unfelt(&wanted_n, &device)
+        unfelt(&wanted_n, &Capabilities { actuated, max_force_n, ..DEVICE })
+    }
+
+    #[test]
+    fn a_boundary_that_leaves_no_room_is_refused() {
+        let said = |boundary: Boundary| boundless(&boundary, &DEVICE);
+        assert_eq!(said(Boundary::default()), None); // an axis that does not move needs no room
+        let wide = said(Boundary { margin_m: 0.01, ..Boundary::default() }).expect("10 of 10 mm");
+        assert!(wide.contains("`margin_mm = 10.000`"), "{wide}");
+        let turned = said(Boundary { margin_rad: 0.2, ..Boundary::default() }).expect("0.2 of 0.1 rad");
+        assert!(turned.contains("`margin_deg = 11.459`"), "{turned}");
     }
 
     #[test]

@@ -24,8 +24,9 @@ impl Steps {
     /// [`RunError`]; nothing is energised before this has succeeded.
     pub fn prepare(scene: &Scene, registry: &Registry, seed: u64) -> Result<Self, RunError> {
         let session = Session::prepare(scene, registry, &RunOptions { clock: Clock::Virtual, seed })?;
-        let Session { servo, stoppers, controls, changes, period_ns, duration_ns, lines, .. } = session;
-        let runner = Runner::new(servo, Schedule::start_virtual(period_ns), duration_ns);
+        let Session { standby, controls, changes, period_ns, duration_ns, lines, .. } = session;
+        let stoppers = standby.stoppers();
+        let runner = Runner::new(standby.activate()?, Schedule::start_virtual(period_ns), duration_ns);
         Ok(Self { runner, controls, changes, stop: StopSwitch::default(), stoppers, lines })
     }
 

@@ -28,6 +28,9 @@ fn end_words(end: &RunEnd) -> String {
     match end {
         RunEnd::DeviceFault(fault) => format!("device fault, {}", fault.advice()),
         RunEnd::EmergencyStop(source) => format!("emergency stop ({})", source.word()),
+        RunEnd::TooFast(samples_per_s) => {
+            format!("the device sends {samples_per_s} samples a second, too many")
+        }
         RunEnd::Watchdog(_) => "a tick took longer than the watchdog allows".to_owned(),
         RunEnd::Finished | RunEnd::Stopped => "it was stopped".to_owned(),
     }
