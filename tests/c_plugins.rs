@@ -1,4 +1,4 @@
-//! Plugins written in C: compiled here from `c/` with the committed header, found by id, run in a scene, and refused
+//! Plugins written in C and C++: compiled here from `c/` with the committed header, found by id, run in a scene, and refused
 //! in one line where their author made a mistake. They carry no layouts, so only sizes stand between a C author's
 //! old header and the host.
 
@@ -12,6 +12,7 @@ use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::{Watched, watch};
 use flotor_tests::workspace_root;
 use std::path::PathBuf;
+use std::process::Command;
 
 /// Compiles `c/NAME.c` with the mistakes asked for.
 fn compiled(scratch: &Scratch, name: &str, mistakes: &[&str]) -> PathBuf {
@@ -71,6 +72,29 @@ fn plugins_in_c_pass_validation_and_are_found_by_id() {
         let ran = Flotor::with(["plugins", id]).searching(&[scratch.path()]).run();
         assert!(ran.stdout.contains("layouts checked by size only"), "{ran:#?}");
     }
+}
+
+/// The same contract in C++: tables made by functions, and an entry with the linkage of C.
+#[test]
+fn a_plugin_in_cpp_passes_validation() {
+    // A bare machine has a C compiler only.
+    if Command::new("c++").arg("--version").output().is_err() {
+        eprintln!("skipped: no c++ on this machine");
+        return;
+    }
+    let scratch = Scratch::default();
+    let library = scratch.path().join("libjelly.so");
+    let compiled = Command::new("c++")
+        .args(["-std=c++17", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O1", "-shared", "-fPIC", "-I"])
+        .arg(workspace_root().join("hal/include"))
+        .arg(workspace_root().join("tests/cpp/jelly.cpp"))
+        .arg("-o")
+        .arg(&library)
+        .output()
+        .expect("it was there just now");
+    assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
+    let ran = Flotor::with(["validate".as_ref(), library.as_os_str()]).run();
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(exit_code::OK), ""), "{ran:#?}");
 }
 
 #[test]

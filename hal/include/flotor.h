@@ -705,6 +705,54 @@ typedef struct FlotorDevicePacingTable {
     uint32_t (*wait_for_sample)(FlotorInstance instance, uint64_t timeout_ns, uint64_t *samples);
 } FlotorDevicePacingTable;
 
+// Wrench around a pose, in the model frame: `W(d) = W0 - K d`. 416 bytes.
+//
+// `d` is the displacement from the anchor: position in m, then the rotation vector of the turn from the anchor's
+// orientation, in rad. `K` is a stiffness: positive where the model pushes back.
+typedef struct FlotorLinearField {
+    // Where it holds exactly.
+    struct FlotorPose anchor;
+    // Wrench on the hand there.
+    struct FlotorWrench wrench;
+    // Rows: force x, y, z (N), torque x, y, z (N·m); columns: position x, y, z (m), rotation x, y, z (rad).
+    double stiffness[6][6];
+    // How far from the anchor it may be believed, m. Beyond, a host holds what it is at that distance.
+    double valid_m;
+    // The same of rotation, rad.
+    double valid_rad;
+    // Time of the loop it was computed for, ns.
+    uint64_t time_ns;
+} FlotorLinearField;
+
+// `flotor.linear-field/1`: see [`crate::FieldModel`].
+typedef struct FlotorLinearFieldTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // The field at an input, the time since the call before having passed; a [`super::CallStatus`] code. Not
+    // real-time, but bounded.
+    uint32_t (*linear_field)(FlotorInstance instance,
+                             const struct FlotorInput *input,
+                             struct FlotorLinearField *field);
+} FlotorLinearFieldTable;
+
+// The positions of the handle, in the model frame, that a model is made for: a box along its axes. 48 bytes.
+typedef struct FlotorReach {
+    double lower_m[3];
+    double upper_m[3];
+} FlotorReach;
+
+// `flotor.reach/1`: see [`crate::BoundedModel`]. Real-time.
+typedef struct FlotorReachTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // Where the instance ends, with the parameters now in force; a [`super::CallStatus`] code.
+    uint32_t (*reach)(FlotorInstance instance, struct FlotorReach *out);
+} FlotorReachTable;
+
 /* Names of interfaces and extensions. */
 #define FLOTOR_INTERFACE_FORCE "flotor.force/1"
 #define FLOTOR_INTERFACE_DEVICE "flotor.device/1"
@@ -712,6 +760,7 @@ typedef struct FlotorDevicePacingTable {
 #define FLOTOR_INTERFACE_VARIANT "flotor.variant/1"
 #define FLOTOR_INTERFACE_ACTIVITY "flotor.activity/1"
 #define FLOTOR_INTERFACE_LINEAR_FIELD "flotor.linear-field/1"
+#define FLOTOR_INTERFACE_REACH "flotor.reach/1"
 #define FLOTOR_INTERFACE_DETAILS "flotor.details/1"
 #define FLOTOR_INTERFACE_ENERGY_LEDGER "flotor.energy-ledger/1"
 #define FLOTOR_INTERFACE_DEVICE_PACING "flotor.device-pacing/1"
@@ -723,6 +772,17 @@ typedef struct FlotorDevicePacingTable {
 #else
 #define FLOTOR_STATIC_ASSERT _Static_assert
 #define FLOTOR_EXPORT __attribute__((visibility("default")))
+#endif
+
+/* Begins the definition of the entry, in C as in C++: `FLOTOR_ENTRY(flotor_entry_jelly) = { ... };` */
+#if defined(__cplusplus)
+#define FLOTOR_ENTRY(name) \
+    extern "C" { extern __attribute__((visibility("default"))) const FlotorEntry name; } \
+    const FlotorEntry name
+#else
+#define FLOTOR_ENTRY(name) \
+    extern __attribute__((visibility("default"))) const FlotorEntry name; \
+    const FlotorEntry name
 #endif
 
 /* Sets of outputs: `{FLOTOR_DEMAND_FORCE | FLOTOR_DEMAND_ENERGY}` makes a FlotorDemand. */
@@ -737,6 +797,10 @@ typedef struct FlotorDevicePacingTable {
 /* Sets of conditions: `{FLOTOR_CONDITIONS_SATURATED}` makes a FlotorConditions. */
 #define FLOTOR_CONDITIONS_SATURATED 1u
 #define FLOTOR_CONDITIONS_EXCESS_FORCE 2u
+/* What `shape` of a FlotorActivityRegion says. */
+#define FLOTOR_ACTIVITY_EVERYWHERE 0u
+#define FLOTOR_ACTIVITY_SPHERE 1u
+#define FLOTOR_ACTIVITY_BOX 2u
 /* What `read` and `write` of a device return; a fault is one of FlotorFault. */
 #define FLOTOR_CYCLE_FRESH 0u
 #define FLOTOR_CYCLE_STALE 1u
@@ -751,7 +815,7 @@ typedef struct FlotorDevicePacingTable {
 /* Text from a string literal. */
 #define FLOTOR_STR(literal) { (const uint8_t *)(literal), sizeof(literal) - 1 }
 /* What a host reads of the file without running it, in TOML: kind ("model" or "device"), id, name, doc, version,
- * abi ("0.1") and entry (the name of the exported FlotorEntry). */
+ * abi ("1.0") and entry (the name of the exported FlotorEntry). */
 #define FLOTOR_METADATA(text) \
     __attribute__((used, section(".flotor"))) static const char flotor_metadata[] = text
 

@@ -104,8 +104,7 @@ static const void *get_interface(FlotorStr id) {
     return id.len == sizeof device - 1 && memcmp(id.ptr, device, id.len) == 0 ? &table : NULL;
 }
 
-FLOTOR_EXPORT extern const FlotorEntry flotor_entry_post;
-const FlotorEntry flotor_entry_post = {
+FLOTOR_ENTRY(flotor_entry_post) = {
     .magic = FLOTOR_MAGIC_BYTES,
     .size = sizeof(FlotorEntry),
     .abi_major = FLOTOR_ABI_MAJOR,

@@ -160,8 +160,7 @@ static const void *get_interface(FlotorStr id) {
     return id.len == sizeof device - 1 && memcmp(id.ptr, device, id.len) == 0 ? &table : NULL;
 }
 
-FLOTOR_EXPORT extern const FlotorEntry flotor_entry_bad_device;
-const FlotorEntry flotor_entry_bad_device = {
+FLOTOR_ENTRY(flotor_entry_bad_device) = {
     .magic = FLOTOR_MAGIC_BYTES,
     .size = sizeof(FlotorEntry),
     .abi_major = FLOTOR_ABI_MAJOR,

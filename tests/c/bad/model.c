@@ -207,8 +207,7 @@ static const void *get_interface(FlotorStr id) {
     return is_called(id, FLOTOR_INTERFACE_FORCE) ? &table : NULL;
 }
 
-FLOTOR_EXPORT extern const FlotorEntry flotor_entry_bad_model;
-const FlotorEntry flotor_entry_bad_model = {
+FLOTOR_ENTRY(flotor_entry_bad_model) = {
     .magic = FLOTOR_MAGIC_BYTES,
     .size = sizeof(FlotorEntry),
     .abi_major = FLOTOR_ABI_MAJOR,

@@ -91,8 +91,7 @@ static const void *get_interface(FlotorStr id) {
     return id.len == sizeof force - 1 && memcmp(id.ptr, force, id.len) == 0 ? &table : NULL;
 }
 
-FLOTOR_EXPORT extern const FlotorEntry flotor_entry_your_name;
-const FlotorEntry flotor_entry_your_name = {
+FLOTOR_ENTRY(flotor_entry_your_name) = {
     .magic = FLOTOR_MAGIC_BYTES,
     .size = sizeof(FlotorEntry),
     .abi_major = FLOTOR_ABI_MAJOR,

@@ -1,0 +1,83 @@
+// A force model in C++: a jelly that gives way in every direction, and says where it can act.
+#include "flotor.h"
+#include <cmath>
+#include <cstring>
+#include <new>
+
+FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-cpp-jelly\"\nname = \"Jelly\"\ndoc = \"A soft block, in C++\"\n"
+                "version = \"0.1.0\"\nabi = \"1.0\"\nentry = \"flotor_entry_jelly\"\n");
+
+namespace {
+
+constexpr double stiffness_n_per_m = 300.0;
+constexpr double radius_m = 0.02;
+constexpr double farthest_m = 1.0e3;
+
+class Jelly {
+public:
+    // Real-time: bounded, no allocation.
+    uint32_t step(const FlotorInput &input, FlotorOutput &output) const {
+        output = FlotorOutput{};
+        for (int axis = 0; axis < 3; axis++) {
+            const double at_m = input.pose.position_m[axis];
+            // Also for what is no number: farther off its energy could be none.
+            if (!(std::fabs(at_m) < farthest_m)) {
+                output = FlotorOutput{};
+                output.status = FlotorStepStatus_InvalidInput;
+                return FlotorCallStatus_Ok;
+            }
+            output.wrench.force_n[axis] = -stiffness_n_per_m * at_m;
+            output.energy_j += 0.5 * stiffness_n_per_m * at_m * at_m;
+        }
+        return FlotorCallStatus_Ok;
+    }
+};
+
+uint32_t create(const FlotorParameterValue *, uint32_t, FlotorMessage *, FlotorInstance *out) {
+    *out = new (std::nothrow) Jelly;
+    return *out == nullptr ? uint32_t{FlotorRefusalKind_Resource} : 0u;
+}
+
+void destroy(FlotorInstance instance) {
+    delete static_cast<Jelly *>(instance);
+}
+
+uint32_t step(FlotorInstance instance, const FlotorInput *input, FlotorOutput *output) {
+    return static_cast<const Jelly *>(instance)->step(*input, *output);
+}
+
+uint32_t region(FlotorInstance, FlotorActivityRegion *out) {
+    *out = FlotorActivityRegion{FLOTOR_ACTIVITY_EVERYWHERE, 0, {0.0, 0.0, 0.0}, {radius_m, radius_m, radius_m}};
+    return FlotorCallStatus_Ok;
+}
+
+FlotorForceTable force_table() {
+    FlotorForceTable table{};
+    table.size = sizeof table;
+    table.info = {FLOTOR_STR("fixture-cpp-jelly"), FLOTOR_STR("Jelly"), FLOTOR_STR("A soft block, in C++"),
+                  {FLOTOR_DEMAND_FORCE | FLOTOR_DEMAND_TORQUE | FLOTOR_DEMAND_ENERGY}, FlotorMemory_Stateless};
+    table.create = create;
+    table.destroy = destroy;
+    table.step = step;
+    return table;
+}
+
+const FlotorForceTable force = force_table();
+const FlotorActivityTable activity = {sizeof(FlotorActivityTable), 0, region};
+
+const void *get_interface(FlotorStr id) {
+    const auto is = [&id](const char *name) {
+        return id.len == std::strlen(name) && std::memcmp(id.ptr, name, id.len) == 0;
+    };
+    if (is(FLOTOR_INTERFACE_FORCE)) {
+        return &force;
+    }
+    return is(FLOTOR_INTERFACE_ACTIVITY) ? &activity : nullptr;
+}
+
+} // namespace
+
+FLOTOR_ENTRY(flotor_entry_jelly) = {
+    FLOTOR_MAGIC_BYTES, sizeof(FlotorEntry), FLOTOR_ABI_MAJOR, FLOTOR_ABI_MINOR, FlotorPluginKind_Model, 0,
+    FLOTOR_CONTRACT_SIZES, nullptr, get_interface, nullptr,
+};
