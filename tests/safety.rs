@@ -1,7 +1,7 @@
 //! How a run ends when it must: every state of a run reached through real libraries, emergency stops from signal,
 //! button and device, and a watchdog that stops the device when a plugin does not come back.
 
-use flotor::record::{Ending, Recording};
+use flotor::record::{Ending, Recording, Severity};
 use flotor::servo::{Clock, EmergencySource, ModelHealth};
 use flotor::session::RunEnd;
 use flotor::trace::{Events, TickRecord};
@@ -305,7 +305,12 @@ fn an_emergency_stop_has_its_exit_code_also_where_the_report_cannot_be_written()
     let missing = format!("error: {}: cannot write the JSON: ", json.display());
     assert!(ran.stderr.lines().any(|line| line.starts_with(&missing)), "{ran:?}");
     assert!(last_line(&ran).starts_with("error: emergency stop (signal)"), "{ran:?}");
-    assert!(!recorded(&scratch).is_empty());
+    // Whoever opens the recording learns of it, too.
+    let mut recording = Recording::open(&recording_in(&scratch)).expect("a recording");
+    assert!(recording.by_ref().all(|record| record.is_ok()));
+    let told = recording.notes().last().expect("there is a note");
+    assert_eq!((told.severity, told.source.as_str()), (Severity::Error, "flotor"));
+    assert!(told.text.starts_with("emergency stop (signal)"), "{told:?}");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use super::stopping::{Keys, stop_on_signals};
 use super::{CommandError, first_error, remark, report_line, style, write_json};
 use crate::coupling::Line;
 use crate::live::{Announcement, Carried, Carrier, Handles, carry, publish};
-use crate::record::{Change, RecordError, Recorder, TraceDigest};
+use crate::record::{Change, Note, RecordError, Recorder, Severity, TraceDigest};
 use crate::registry::Registry;
 use crate::report::{RunFacts, RunSummary, Tally};
 use crate::run_description::describe;
@@ -97,11 +97,9 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     drop(keys);
     watchers.progress.finish_and_clear();
     let Watchers { tally, digest, recorder, failure, plot, publication, .. } = watchers;
-    // Before anything else that may go wrong: it cannot be made again.
-    let recorded = close(recorder, failure);
     let outcome = match outcome {
         Ok(outcome) => outcome,
-        Err(error) => return first_error([Err(error.into()), recorded]),
+        Err(error) => return first_error([Err(error.into()), close(recorder, failure, &[])]),
     };
 
     let carried: Vec<(String, Carried)> =
@@ -120,6 +118,8 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         trace_digest: digest.finish(),
     };
     let summary = RunSummary::new(facts, &outcome, &tally);
+    // Before anything else that may go wrong: it cannot be made again.
+    let recorded = close(recorder, failure, &notes(&outcome, &summary));
     let drawn = match (&arguments.plot, plot) {
         (Some(path), Some(plot)) => std::fs::write(path, plot.to_svg(&summary.one_line(), &outcome.timing))
             .map_err(|cause| CommandError::file(path, "cannot write the plot", cause)),
@@ -131,12 +131,39 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     first_error([verdict(&outcome, &plugins, &summary), recorded, drawn, told, written])
 }
 
-/// Ends the recording, if there is one; `failure` is why it has ended before.
-fn close(recorder: Option<Recorder>, failure: Option<RecordError>) -> Result<(), CommandError> {
+/// Ends the recording, if there is one, with these notes; `failure` is why it has ended before.
+fn close(
+    recorder: Option<Recorder>,
+    failure: Option<RecordError>,
+    notes: &[Note],
+) -> Result<(), CommandError> {
     if let Some(failure) = failure {
         return Err(failure.into());
     }
-    recorder.map_or(Ok(()), Recorder::finish).map_err(CommandError::from)
+    let Some(mut recorder) = recorder else { return Ok(()) };
+    notes.iter().try_for_each(|note| recorder.note(note))?;
+    Ok(recorder.finish()?)
+}
+
+/// What whoever opens the recording later has to know of the run: why it ended, who did not behave, what is missing.
+fn notes(outcome: &Outcome, summary: &RunSummary) -> Vec<Note> {
+    let note = |severity, source: &str, text: String| Note {
+        time_ns: outcome.elapsed_ns,
+        severity,
+        source: source.to_owned(),
+        text,
+    };
+    let mut notes = Vec::new();
+    if outcome.dropped_records > 0 {
+        let text = format!("{} ticks are missing: the recorder could not keep up", outcome.dropped_records);
+        notes.push(note(Severity::Warning, "flotor", text));
+    }
+    let ill = summary.plugins.iter().filter(|plugin| plugin.health != "ok");
+    notes.extend(ill.map(|plugin| note(Severity::Error, &plugin.name, plugin.health.clone())));
+    if !matches!(outcome.end, RunEnd::Finished | RunEnd::Stopped) {
+        notes.push(note(Severity::Error, "flotor", end_words(outcome, summary.rate_hz)));
+    }
+    notes
 }
 
 /// What the end of the run means for the exit code.
