@@ -16,7 +16,6 @@ pub(super) struct BoundaryWall {
 impl BoundaryWall {
     /// A wall the boundary's margin inside the device's range, no stiffer than the device and a loop of this period render
     /// stably. Not real-time.
-    #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
     pub(super) fn new(boundary: &Boundary, device: &Capabilities, period_ns: u64) -> Self {
         let Boundary {
             margin_m,
@@ -26,11 +25,10 @@ impl BoundaryWall {
             stiffness_nm_per_rad,
             damping_nms_per_rad,
         } = *boundary;
-        let period_s = period_ns as f64 * 1.0e-9;
         let stiffness_n_per_m = stiffness_n_per_m
-            .min(stable_stiffness(damping_ns_per_m, period_s))
+            .min(stable_stiffness(damping_ns_per_m, period_ns))
             .min(declared(device.max_stiffness_n_per_m));
-        let stiffness_nm_per_rad = stiffness_nm_per_rad.min(stable_stiffness(damping_nms_per_rad, period_s));
+        let stiffness_nm_per_rad = stiffness_nm_per_rad.min(stable_stiffness(damping_nms_per_rad, period_ns));
         Self {
             position: Ellipsoid::new(device.range_m, margin_m, stiffness_n_per_m, damping_ns_per_m),
             rotation: Ellipsoid::new(device.range_rad, margin_rad, stiffness_nm_per_rad, damping_nms_per_rad),
@@ -66,10 +64,16 @@ impl BoundaryWall {
     }
 }
 
-/// Half of the stiffness that a damper keeps passive in a sampled loop, `B / (T / 2)` (Gil et al. 2009, without damping of
-/// the plant). A wall without a damper is what its scene says: only the device's own damping can hold it.
-fn stable_stiffness(damping: f64, period_s: f64) -> f64 {
-    if damping > 0.0 { damping / period_s } else { f64::INFINITY }
+/// Share of the stiffness at which a sampled wall of a damping begins to add energy, `B / (T / 2)` (Gil et al. 2009, without
+/// damping of the plant).
+const STABILITY_MARGIN: f64 = 0.5;
+
+/// How stiff a wall of this damping may be in a loop of this period. One without a damper is what its scene says: only the
+/// device's own damping can hold it. Not real-time.
+#[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
+pub(super) fn stable_stiffness(damping: f64, period_ns: u64) -> f64 {
+    let half_a_period_s = 0.5 * period_ns as f64 * 1.0e-9;
+    if damping > 0.0 { STABILITY_MARGIN * damping / half_a_period_s } else { f64::INFINITY }
 }
 
 /// A limit, if the device declares one.

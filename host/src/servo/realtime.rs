@@ -59,7 +59,7 @@ pub struct RealTimeReport {
     pub fifo: Privilege,
     /// Memory locked against paging.
     pub memory_lock: Privilege,
-    /// A core of its own choice for the loop.
+    /// The core that was named for the loop.
     pub core: Privilege,
 }
 

@@ -4,6 +4,7 @@
 //! stands beside it; whichever is nearer is felt first.
 
 use crate::mapping::Mapping;
+use crate::servo::boundary::stable_stiffness;
 use flotor_hal::{DVec3, LoopConfig, Pose, Reach, Twist, Wrench};
 
 /// Damping of the wall, N·s/m: that of the device's own boundary mode (client program of the University of Utah).
@@ -11,9 +12,6 @@ const DAMPING_NS_PER_M: f64 = 15.0;
 
 /// Its stiffness at 1 kHz and faster, N/m: that of the [boundary](crate::scene::Boundary).
 const MOST_STIFFNESS_N_PER_M: f64 = 10_000.0;
-
-/// Share of the stiffness at which a sampled wall of that damping begins to add energy, `B / (T / 2)` (Gil et al. 2009).
-const STABILITY_MARGIN: f64 = 0.5;
 
 /// The wall of one object.
 pub(super) struct EndWall {
@@ -23,10 +21,8 @@ pub(super) struct EndWall {
 
 impl EndWall {
     /// A wall as stiff as the period allows; `None` for a model that has no end. Not real-time.
-    #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
     pub(super) fn new(reach: &Reach, config: &LoopConfig) -> Option<Self> {
-        let half_a_period_s = 0.5 * config.period_ns as f64 * 1.0e-9;
-        let stable_n_per_m = STABILITY_MARGIN * DAMPING_NS_PER_M / half_a_period_s;
+        let stable_n_per_m = stable_stiffness(DAMPING_NS_PER_M, config.period_ns);
         let stiffness_n_per_m = MOST_STIFFNESS_N_PER_M.min(stable_n_per_m);
         reach.is_bounded().then_some(Self { reach: *reach, stiffness_n_per_m })
     }
