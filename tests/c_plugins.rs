@@ -2,10 +2,10 @@
 //! in one line where their author made a mistake. They carry no layouts, so only sizes stand between a C author's
 //! old header and the host.
 
-use flotor::session::RunEnd;
-use flotor::trace::Events;
+use flotor_core::trace::Events;
 use flotor_hal::Wrench;
 use flotor_hal::abi::loader::Plugin;
+use flotor_session::RunEnd;
 use flotor_tests::library::compile_c_file;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;

@@ -1,10 +1,10 @@
 //! A running loop is changed from outside: a change comes at its tick and at once for all models, is
 //! told to observers before that tick, and a recording repeats it bit for bit.
 
-use flotor::record::{Change, ChangeOutcome};
-use flotor::servo::{Clock, StopSwitch};
-use flotor::session::{ControlError, Controls, NewValue, Observer};
-use flotor::trace::{Events, TickRecord};
+use flotor_core::trace::{Events, TickRecord};
+use flotor_core::{Change, ChangeOutcome};
+use flotor_servo::{Clock, StopSwitch};
+use flotor_session::{ControlError, Controls, NewValue, Observer};
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::{prepared, watch};

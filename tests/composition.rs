@@ -1,12 +1,12 @@
 //! Many models and objects in one scene: what is skipped changes no bit, what is mixed is mixed as asked, and what
 //! sleeps costs nothing.
 
-use flotor::mapping::{Mapping, MappingConfig};
-use flotor::scene::Scene;
-use flotor::trace::TickRecord;
+use flotor_core::mapping::{Mapping, MappingConfig};
+use flotor_core::trace::TickRecord;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{Model, Plugin, Setting};
 use flotor_hal::{Demand, Input, LoopConfig, Output, Wrench};
+use flotor_session::scene::Scene;
 use flotor_tests::watched::watch;
 use std::path::Path;
 

@@ -1,12 +1,12 @@
 //! A recording survives what ends the process, and the loop survives what ends a recording: SIGKILL, a full disk, a disk
 //! that does not keep up (for the loop, that is an observer like any other).
 
-use flotor::record::{Ending, Recording};
-use flotor::registry::Registry;
-use flotor::scene::Scene;
-use flotor::servo::{Clock, StopSwitch};
-use flotor::session::{Observer, RunEnd, RunOptions, Session};
-use flotor::trace::TickRecord;
+use flotor_core::trace::TickRecord;
+use flotor_record::{Ending, Recording};
+use flotor_servo::{Clock, StopSwitch};
+use flotor_session::registry::Registry;
+use flotor_session::scene::Scene;
+use flotor_session::{Observer, RunEnd, RunOptions, Session};
 use flotor_tests::library::compile_c_file;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
@@ -30,7 +30,7 @@ fn last_tick_s(file: &Path) -> (f64, Ending) {
 fn a_killed_process_loses_at_most_a_second_of_its_recording() {
     let scratch = Scratch::default();
     let file = scratch.path().join("run.mcap");
-    let scene = scratch.patient_scene(flotor::scene::DEMO);
+    let scene = scratch.patient_scene(flotor_session::scene::DEMO);
     let [run, duration, minute, record] = ["run", "--duration", "60s", "--record"].map(OsStr::new);
     let arguments = [run, scene.as_os_str(), duration, minute, record, file.as_os_str()];
     let running = Flotor::with(arguments).start();
@@ -57,7 +57,7 @@ fn a_killed_process_loses_at_most_a_second_of_its_recording() {
 #[test]
 fn a_reader_that_has_gone_away_costs_neither_the_run_nor_its_recording() {
     let scratch = Scratch::default();
-    let scene = scratch.file("scene.toml", flotor::scene::DEMO);
+    let scene = scratch.file("scene.toml", flotor_session::scene::DEMO);
     let (file, picture) = (scratch.path().join("run.mcap"), scratch.path().join("run.svg"));
     let [run, clock, virtual_, duration, seconds] =
         ["run", "--clock", "virtual", "--duration", "2s"].map(OsStr::new);
@@ -150,7 +150,7 @@ impl Observer for Stuck {
 
 #[test]
 fn an_observer_that_does_not_keep_up_never_holds_up_the_loop_and_what_is_lost_is_counted() {
-    let scene = flotor::scene::DEMO
+    let scene = flotor_session::scene::DEMO
         .replace("rate_hz = 1000", "rate_hz = 10000")
         .replace("duration_s = 10", "duration_s = 3")
         + "\n[limits]\nwatchdog_ms = 60000\n";

@@ -1,9 +1,9 @@
 //! Same binary, same seed, same inputs: the same bits. And what the virtual clock is for: speed.
 
-use flotor::record::TraceDigest;
-use flotor::servo::{Clock, StopSwitch};
-use flotor::session::{Observer, Session};
-use flotor::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
+use flotor_core::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
+use flotor_record::TraceDigest;
+use flotor_servo::{Clock, StopSwitch};
+use flotor_session::{Observer, Session};
 use flotor_sync::Words;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;

@@ -1,17 +1,17 @@
 //! How force begins and ends on the real clock: a device is energised right before its first tick and stopped right after
 //! its last one, and in between nothing drops.
 
-use flotor::record::Change;
-use flotor::registry::Registry;
-use flotor::scene::Scene;
-use flotor::servo::{Clock, EmergencySource, StopSwitch};
-use flotor::session::{Observer, RunEnd, RunOptions, Session};
-use flotor::trace::{Events, TickRecord};
+use flotor_core::Change;
+use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::abi::{Entry, device_entry};
 use flotor_hal::{
     ActiveDevice, Axes, Capabilities, Cycle, Device, DeviceInfo, DeviceState, LoopConfig, Refusal, SafeStop,
     Settings, Tick, Wrench,
 };
+use flotor_servo::{Clock, EmergencySource, StopSwitch};
+use flotor_session::registry::Registry;
+use flotor_session::scene::Scene;
+use flotor_session::{Observer, RunEnd, RunOptions, Session};
 use flotor_tests::watched::{watch, watch_on};
 use std::path::Path;
 use std::sync::Mutex;

@@ -1,9 +1,9 @@
 //! A force sensor beside a handle: a run has its readings, however slow it is, and ends when it falls silent.
 
-use flotor::servo::Clock;
-use flotor::session::RunEnd;
-use flotor::trace::Events;
+use flotor_core::trace::Events;
 use flotor_hal::Fault;
+use flotor_servo::Clock;
+use flotor_session::RunEnd;
 use flotor_tests::watched::{Watched, watch_on};
 use serialport::{SerialPort, TTYPort};
 use std::io::{Read, Write};

@@ -1,14 +1,14 @@
 //! A planar device over a serial port in a scene, in real time: an emulated board at a pseudo terminal.
 
-use flotor::registry::Registry;
-use flotor::scene::Scene;
-use flotor::servo::{Clock, StopSwitch};
-use flotor::session::{Observer, RunEnd, RunError, RunOptions, Session};
-use flotor::trace::{Events, TickRecord};
+use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::DVec3;
 use flotor_hal::glam::DVec2;
 use flotor_haply::emulator::EmulatedBoard;
 use flotor_haply::pantograph::Pantograph;
+use flotor_servo::{Clock, StopSwitch};
+use flotor_session::registry::Registry;
+use flotor_session::scene::Scene;
+use flotor_session::{Observer, RunEnd, RunError, RunOptions, Session};
 use flotor_tests::library::plugin_file;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::workspace_root;

@@ -1,16 +1,17 @@
 //! Another program watches a run and talks to it; whatever it does, the run is the same.
 
-use flotor::live::{Announcement, Handles};
-use flotor::record::{Change, Recording, TraceDigest};
-use flotor::run_description::describe;
-use flotor::scene::Scene;
-use flotor::servo::{Clock, EmergencySource, StopSwitch};
-use flotor::session::{Observer, Outcome, RunEnd, RunOptions, Session};
-use flotor::trace::{RECORD_WORDS, TickRecord};
+use flotor_core::Change;
+use flotor_core::trace::{RECORD_WORDS, TickRecord};
 use flotor_live::{
     Answer, Ask, Client, Directory, Event, LiveError, Outcome as ChangeOutcome, Publication, SetValue,
     Subject,
 };
+use flotor_record::{Recording, TraceDigest};
+use flotor_servo::{Clock, EmergencySource, StopSwitch};
+use flotor_session::live::{Announcement, Handles};
+use flotor_session::run_description::describe;
+use flotor_session::scene::Scene;
+use flotor_session::{Observer, Outcome, RunEnd, RunOptions, Session};
 use flotor_sync::Words;
 use flotor_tests::TestSize;
 use flotor_tests::program::{Flotor, exit_code};
@@ -55,7 +56,7 @@ fn publish(session: &Session, directory: &Directory, stop: &StopSwitch) -> Publi
     let announcement =
         Announcement { title: "Test", run: &run, plugins: session.plugins(), limits: session.limits() };
     let handles = Handles { controls: session.controls(), stop: stop.clone() };
-    let opened = flotor::live::publish(directory, announcement, handles);
+    let opened = flotor_session::live::publish(directory, announcement, handles);
     opened.expect("a scratch folder takes a socket")
 }
 
@@ -267,7 +268,7 @@ fn the_emergency_stop_of_a_watcher_is_one() {
 fn a_run_of_the_program_is_found_watched_and_stopped() {
     let scratch = Scratch::default();
     let runtime = scratch.path().display().to_string();
-    let scene = scratch.patient_scene(flotor::scene::DEMO).display().to_string();
+    let scene = scratch.patient_scene(flotor_session::scene::DEMO).display().to_string();
     let running = Flotor::with(["run", &scene, "--duration", "60s"]).env("XDG_RUNTIME_DIR", &runtime).start();
     let directory = Directory::at(scratch.path().join("flotor"));
     let mut client = patiently(|| Client::find(&directory).ok());
@@ -332,7 +333,7 @@ fn a_recording_of_a_run_that_is_killed_is_whole_so_far_and_ends_as_cut() {
     let scratch = Scratch::default();
     let runtime = scratch.path().display().to_string();
     let of_user = |flotor: Flotor| flotor.env("XDG_RUNTIME_DIR", &runtime).start();
-    let scene = scratch.patient_scene(flotor::scene::DEMO).display().to_string();
+    let scene = scratch.patient_scene(flotor_session::scene::DEMO).display().to_string();
     let running = of_user(Flotor::with(["run", &scene, "--duration", "60s"]));
     let directory = Directory::at(scratch.path().join("flotor"));
     patiently(|| Client::find(&directory).ok());

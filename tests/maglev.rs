@@ -1,7 +1,7 @@
 //! The maglev plugin against its emulated controller, in processes of their own, over real links: equal trajectories
 //! with the simulated flotor, and what happens when one side dies, hangs, or talks nonsense.
 
-use flotor::trace::Events;
+use flotor_core::trace::Events;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
 use flotor_tests::library::{build_folder, plugin_file};

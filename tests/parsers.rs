@@ -2,9 +2,9 @@
 //! loop, no half-read value. Files are whole ones with a few bytes, lines or lengths changed, which gets deeper than
 //! noise does; the seeds are fixed, so a failure comes back.
 
-use flotor::record::Recording;
-use flotor::scene::{DEMO, Scene};
 use flotor_hal::abi::loader::read_metadata;
+use flotor_record::Recording;
+use flotor_session::scene::{DEMO, Scene};
 use flotor_tests::TestSize;
 use flotor_tests::library::plugin_bytes;
 use flotor_tests::scratch::Scratch;
@@ -89,8 +89,9 @@ fn recordings() {
     let whole = scratch.path().join("whole.mcap");
     let mut scene = Scene::demo().expect("the demo is a scene");
     scene.duration_s = 0.05;
-    let registry = flotor::registry::Registry::search(&[flotor_tests::library::build_folder().join("deps")]);
-    flotor::headless::run(&scene, &registry, 1, Some(&whole)).expect("the demo runs");
+    let registry =
+        flotor_session::registry::Registry::search(&[flotor_tests::library::build_folder().join("deps")]);
+    flotor_session::headless::run(&scene, &registry, 1, Some(&whole)).expect("the demo runs");
     let whole = std::fs::read(whole).expect("it was just written");
     let file = scratch.path().join("wounded.mcap");
     let mut random = Random(2);

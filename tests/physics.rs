@@ -4,11 +4,11 @@
 //! The flotor is free: the hand is open, its centre of mass is on the axis in the handle, so that nothing but
 //! the spring turns it. Everything here is compared with a closed form.
 
-use flotor::report::{RunFacts, RunSummary, Tally};
-use flotor::session::{Observer, RunEnd};
-use flotor::trace::{Events, TickRecord};
+use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{DVec3, EnergyLedger, Input, Output, Pose};
+use flotor_session::report::{RunFacts, RunSummary, Tally};
+use flotor_session::{Observer, RunEnd};
 use flotor_tests::library::plugin_file;
 use flotor_tests::watched::{Watched, watch};
 

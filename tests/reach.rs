@@ -1,6 +1,6 @@
 //! A spring ends where its coils touch: there is a wall, where the mapping puts it, and it moves with the spring.
 
-use flotor::trace::{Events, TickRecord};
+use flotor_core::trace::{Events, TickRecord};
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::watch;

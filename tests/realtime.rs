@@ -4,14 +4,14 @@
 //! the plugins are counted linked into this test; the host is counted with the libraries it really loads.
 #![allow(unsafe_code)] // an allocator cannot be written without; tests/architecture.rs lists it
 
-use flotor::registry::Registry;
-use flotor::scene::Scene;
-use flotor::servo::{Clock, StopSwitch};
-use flotor::session::{ControlError, Controls, Observer, RunOptions, Session};
-use flotor::trace::TickRecord;
+use flotor_core::trace::TickRecord;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{Cycle, Demand, DeviceState, Input, LoopConfig, Output, Pose, Tick};
+use flotor_servo::{Clock, StopSwitch};
+use flotor_session::registry::Registry;
+use flotor_session::scene::Scene;
+use flotor_session::{ControlError, Controls, Observer, RunOptions, Session};
 use flotor_tests::TestSize;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -118,7 +118,7 @@ fn the_host_allocates_nothing_for_a_change_of_a_parameter_or_a_model() {
             }
         }
     }
-    let text = format!("{}{CHANGED}", flotor::scene::DEMO);
+    let text = format!("{}{CHANGED}", flotor_session::scene::DEMO);
     let scene = Scene::parse(std::path::Path::new("changed demo"), &text).expect("the demo is right");
     let options = RunOptions { clock: Clock::Virtual, seed: 1 };
     let session = Session::prepare(&scene, &Registry::search(&[]), &options).expect("the demo starts");

@@ -1,13 +1,12 @@
 //! The schemas inside a recording: up to date with `host/proto`, and enough for a stranger to read every field.
 
-use flotor::coupling::{CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, PassivityMode};
-use flotor::record::{
-    Change, ChangeOutcome, ChangeSubject, Note, PluginDescription, Recorder, Role, RunDescription, Severity,
-};
-use flotor::scene::{Blend, FieldTiming, MappingConfig};
-use flotor::servo::Clock;
-use flotor::trace::{Events, TickRecord};
+use flotor_core::coupling::{CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, PassivityMode};
+use flotor_core::mapping::{Blend, FieldTiming, MappingConfig};
+use flotor_core::trace::{Events, TickRecord};
+use flotor_core::{Change, ChangeOutcome, ChangeSubject};
 use flotor_hal::{Pose, Twist, Wrench};
+use flotor_record::{Note, PluginDescription, Recorder, Role, RunDescription, Severity};
+use flotor_servo::Clock;
 use prost_reflect::prost::Message;
 use prost_reflect::prost_types::FileDescriptorSet;
 use prost_reflect::{DescriptorPool, DynamicMessage, ReflectMessage, Value};

@@ -2,9 +2,9 @@
 //!
 //! After a change of one of them: `FLOTOR_WRITE_REFERENCE=1 cargo test -p flotor-tests --test reference`.
 
-use flotor::scene::{SectionReference, reference};
 use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{Mutability, Parameter, ParameterKind};
+use flotor_session::scene::{SectionReference, reference};
 use flotor_tests::library::plugin_file;
 use flotor_tests::{crate_name_of, plugin_folders, workspace_root};
 use std::fmt::Write;

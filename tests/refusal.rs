@@ -6,12 +6,12 @@
 //! look at every tick, and through the program, to look at the line and the exit code. A line on standard error
 //! is compared whole, so that no backtrace and no panic message of a plugin slips through.
 
-use flotor::servo::ModelHealth;
-use flotor::session::{Outcome, RunEnd};
-use flotor::trace::Events;
+use flotor_core::trace::Events;
 use flotor_hal::abi::loader::{LoadError, Plugin, Setting, read_metadata};
 use flotor_hal::abi::{ABI_MAJOR, ABI_MINOR, CallStatus, MAGIC};
 use flotor_hal::{Input, Output, Pose, Wrench};
+use flotor_servo::ModelHealth;
+use flotor_session::{Outcome, RunEnd};
 use flotor_tests::library::{compile_c, compile_c_file, patched, plugin_bytes, plugin_file};
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;

@@ -1,8 +1,9 @@
 //! A recording is asked again: what a person set for that stays set, the models find the files of the run,
 //! and a difference nobody asked for is explained by what the recording itself tells.
 
-use flotor::record::{Clock, NamedFile, Recorder, Recording, RunDescription};
-use flotor::trace::{Events, TickRecord};
+use flotor_core::Clock;
+use flotor_core::trace::{Events, TickRecord};
+use flotor_record::{NamedFile, Recorder, Recording, RunDescription};
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
 use serde_json::Value;

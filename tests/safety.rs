@@ -1,11 +1,11 @@
 //! How a run ends when it must: every state of a run reached through real libraries, emergency stops from signal,
 //! button and device, and a watchdog that stops the device when a plugin does not come back.
 
-use flotor::record::{Ending, Recording, Severity};
-use flotor::servo::{Clock, EmergencySource, ModelHealth};
-use flotor::session::RunEnd;
-use flotor::trace::{Events, TickRecord};
+use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::DVec3;
+use flotor_record::{Ending, Recording, Severity};
+use flotor_servo::{Clock, EmergencySource, ModelHealth};
+use flotor_session::RunEnd;
 use flotor_tests::library::{compile_c_file, plugin_file};
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
@@ -85,7 +85,7 @@ fn without_samples_there_is_no_force_and_with_them_it_fades_in_again() {
 #[test]
 fn a_handle_that_is_too_fast_is_driven_no_further() {
     // The demo's hand moves at up to some 0.1 m/s; half of it is too fast here.
-    let demo = flotor::scene::DEMO.replace("duration_s = 10", "duration_s = 2");
+    let demo = flotor_session::scene::DEMO.replace("duration_s = 10", "duration_s = 2");
     let run = watch(&format!("{demo}\n[limits]\nvelocity_m_per_s = 0.02\n"));
     let limited: Vec<&TickRecord> =
         run.records.iter().filter(|record| record.events.intersects(Events::VELOCITY_LIMITED)).collect();
@@ -568,7 +568,7 @@ fn a_model_that_creates_energy_is_seen_and_with_the_controller_gets_none_out() {
 fn a_spring_that_is_too_stiff_for_its_rate_is_seen_and_kept_passive() {
     // Twice the stiffest spring at 100 Hz: 2 (b + B) / T, with next to no damping in plant and hand.
     let stiff = |limits: &str| {
-        let demo = flotor::scene::DEMO.replace("rate_hz = 1000", "rate_hz = 100");
+        let demo = flotor_session::scene::DEMO.replace("rate_hz = 1000", "rate_hz = 100");
         watch(&format!("{}\n[limits]\n{limits}\n", demo.replace("force_scale = 1.0", "force_scale = 8.0")))
     };
     let free = lowest_port_energy_j(&stiff("ramp_s = 0"));

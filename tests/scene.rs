@@ -1,6 +1,6 @@
 //! What is wrong with a scene is said in one line: file, line, key, and the nearest right one.
 
-use flotor::scene::Scene;
+use flotor_session::scene::Scene;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use std::path::Path;

@@ -1,10 +1,10 @@
 //! The simulated flotor as a host meets it: hands that follow files, faults on purpose, parameters that are
 //! refused, and the same bits however it is run.
 
-use flotor::session::RunEnd;
-use flotor::trace::{Events, TickRecord};
+use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::abi::loader::{LoadError, OpenedDevice, Plugin, Setting};
 use flotor_hal::{Conditions, Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
+use flotor_session::RunEnd;
 use flotor_tests::TestSize;
 use flotor_tests::library::plugin_file;
 use flotor_tests::program::{Flotor, Ran, exit_code};

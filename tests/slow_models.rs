@@ -1,10 +1,10 @@
 //! A model beside the loop: the membrane at 200 Hz, its linear field evaluated at 1 kHz. No step above the slew limit, an
 //! error smaller than that of a force that is held, equal bits on the virtual clock, and what a thread of its own does when it breaks.
 
-use flotor::scene::Scene;
-use flotor::servo::Clock;
-use flotor::session::RunEnd;
-use flotor::trace::Events;
+use flotor_core::trace::Events;
+use flotor_servo::Clock;
+use flotor_session::RunEnd;
+use flotor_session::scene::Scene;
 use flotor_tests::field_error::{FieldError, Swing, field_error};
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;

@@ -3,12 +3,13 @@
 
 #![allow(clippy::unwrap_used, clippy::cast_precision_loss)] // tests may panic; counts
 
-use flotor::record::{Change, ChangeSubject, Recording};
-use flotor::scene::Scene;
-use flotor::session::Observer;
-use flotor::study::rig::{Rig, TrialFiles};
-use flotor::study::{Apparatus, Kinematics};
-use flotor::trace::{Events, TickRecord};
+use flotor_core::trace::{Events, TickRecord};
+use flotor_core::{Change, ChangeSubject};
+use flotor_record::Recording;
+use flotor_session::Observer;
+use flotor_session::scene::Scene;
+use flotor_study::apparatus::rig::{Rig, TrialFiles};
+use flotor_study::apparatus::{Apparatus, Kinematics};
 use flotor_study::log::SittingLog;
 use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Protocol, Stimulus, SubjectNumber};
 use flotor_study::sitting::Sitting;
@@ -77,9 +78,9 @@ fn magnitude_of(stimulus: &str, values: [f64; 3]) -> Protocol {
 
 fn scene(model: &str, settings: &[&str]) -> Scene {
     let mut scene = Scene::study(model).unwrap();
-    settings
-        .iter()
-        .for_each(|set| set.parse::<flotor::scene::PluginKeyValue>().unwrap().apply(&mut scene).unwrap());
+    settings.iter().for_each(|set| {
+        set.parse::<flotor_session::scene::PluginKeyValue>().unwrap().apply(&mut scene).unwrap()
+    });
     scene
 }
 
@@ -361,7 +362,7 @@ const PERSON: [&str; 13] = [
 /// A study with a person whose lines are these.
 fn person(screen: &str, lines: &str, arguments: &[&str], out: &Path) -> Ran {
     let folder = Scratch::default();
-    let scene = folder.patient_scene(flotor::scene::STUDY).display().to_string();
+    let scene = folder.patient_scene(flotor_session::scene::STUDY).display().to_string();
     let more = [screen, "--scene", &scene];
     let arguments: Vec<&str> = PERSON.into_iter().chain(more).chain(arguments.iter().copied()).collect();
     study(&arguments, out).reading(lines).run()

@@ -1,11 +1,11 @@
 //! A model is replaced while the loop runs: faded, recorded, bounded in memory, and nothing jumps.
 
-use flotor::record::{Change, ChangeOutcome, ChangeSubject};
-use flotor::registry::Registry;
-use flotor::servo::{Clock, StopSwitch};
-use flotor::session::{ControlError, Controls, Observer};
-use flotor::trace::{Events, TickRecord};
+use flotor_core::trace::{Events, TickRecord};
+use flotor_core::{Change, ChangeOutcome, ChangeSubject};
 use flotor_hal::abi::PluginKind;
+use flotor_servo::{Clock, StopSwitch};
+use flotor_session::registry::Registry;
+use flotor_session::{ControlError, Controls, Observer};
 use flotor_tests::TestSize;
 use flotor_tests::library::plugin_file;
 use flotor_tests::program::{Flotor, exit_code};

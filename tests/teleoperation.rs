@@ -1,13 +1,14 @@
 //! Several devices in one loop: alone they are as if alone, coupled they are stable in every hand, and no energy comes
 //! out that no hand put in.
 
-use flotor::record::Recording;
-use flotor::registry::Registry;
-use flotor::scene::{PassivityMode, Scene};
-use flotor::servo::{Clock, StopSwitch};
-use flotor::session::{RunEnd, RunOptions, Session};
-use flotor::trace::{Events, TickRecord};
+use flotor_core::coupling::PassivityMode;
+use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, Fault};
+use flotor_record::Recording;
+use flotor_servo::{Clock, StopSwitch};
+use flotor_session::registry::Registry;
+use flotor_session::scene::Scene;
+use flotor_session::{RunEnd, RunOptions, Session};
 use flotor_tests::TestSize;
 use flotor_tests::library::plugin_file;
 use flotor_tests::program::{Flotor, exit_code};
@@ -271,7 +272,7 @@ fn the_example_scene_is_the_coupling_that_is_measured_here() {
     assert_eq!((coupling.config.delay_ticks, coupling.config.passivity), (1, PassivityMode::Control));
     let options = RunOptions { clock: Clock::Virtual, seed: 1 };
     let session = Session::prepare(&scene, &Registry::search(&[]), &options).expect("it starts");
-    let mut nobody = flotor::report::Tally::default();
+    let mut nobody = flotor_session::report::Tally::default();
     assert!(session.run(&mut nobody, &StopSwitch::default()).is_ok());
 }
 

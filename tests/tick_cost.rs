@@ -9,9 +9,9 @@
 //! ```
 
 use flotor::bench::{BenchDevice, WholeTick};
-use flotor::servo::{Clock, StopSwitch};
-use flotor::session::Observer;
-use flotor::trace::TickRecord;
+use flotor_core::trace::TickRecord;
+use flotor_servo::{Clock, StopSwitch};
+use flotor_session::Observer;
 use flotor_tests::TestSize;
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::prepared;
@@ -91,7 +91,7 @@ fn callgrind(arguments: &[&str], workload: &str) -> Option<Output> {
 
 /// The loops whose instructions are counted: of a whole tick's bench, and of a scene.
 const BENCH_LOOP: &str = "flotor::bench::whole_tick::WholeTick::batch";
-const SCENE_LOOP: &str = "flotor::session::Session::run";
+const SCENE_LOOP: &str = "flotor_session::Session::run";
 
 /// Instructions a tick, or nothing where there is no valgrind.
 fn instructions(name: &str, within: &str) -> Option<f64> {
@@ -144,8 +144,8 @@ fn a_tick_that_replaces_a_model_does_next_to_nothing_for_it() {
     let ticks = 1_000;
     // Only what a tick does about changes is counted, and each time on its own.
     let arguments = [
-        "--toggle-collect=flotor::servo::Servo::apply_changes",
-        "--dump-before=flotor::servo::Servo::apply_changes",
+        "--toggle-collect=flotor_servo::Servo::apply_changes",
+        "--dump-before=flotor_servo::Servo::apply_changes",
         &format!("--callgrind-out-file={}", counts.display()),
     ];
     if callgrind(&arguments, &format!("replacing {ticks}")).is_none() {

@@ -3,13 +3,14 @@
 //! The same sessions, envelopes and ends as on two machines; what differs is who carries the news. The bridge's own tests carry
 //! it over Zenoh.
 
-use flotor::coupling::{Dispatch, Line};
-use flotor::registry::Registry;
-use flotor::scene::Scene;
-use flotor::servo::CouplingOutcome;
-use flotor::session::{Observer, RunEnd, Steps};
-use flotor::trace::{Events, TickRecord};
+use flotor_core::peer::Dispatch;
+use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, Fault};
+use flotor_servo::CouplingOutcome;
+use flotor_servo::coupling::Line;
+use flotor_session::registry::Registry;
+use flotor_session::scene::Scene;
+use flotor_session::{Observer, RunEnd, Steps};
 use flotor_tests::TestSize;
 use rayon::prelude::*;
 use std::path::Path;

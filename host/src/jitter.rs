@@ -4,13 +4,13 @@
 //! and spins: same spin window, same priority, same core, in alternating slices of a second, so that both meet
 //! the same neighbours. What the servo adds is the difference.
 
-use crate::servo::{
+use flotor_hal::SampleWait;
+use flotor_hal::abi::loader::Stopper;
+use flotor_servo::{
     Durations, Percentiles, RealTimeReport, Schedule, SpinWindow, StopSwitch, enter_real_time, monotonic_ns,
     sleep_until,
 };
-use crate::session::{RunError, Session};
-use flotor_hal::SampleWait;
-use flotor_hal::abi::loader::Stopper;
+use flotor_session::{RunError, Session};
 use serde::Serialize;
 
 /// Length of one slice, ns.

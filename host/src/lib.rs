@@ -27,31 +27,14 @@
 #![cfg_attr(rtsan, feature(sanitize))] // the step `blocking` of .ci/full
 
 pub mod bench;
-pub mod calibration;
 pub mod cli;
-pub mod coupling;
 pub mod evaluate;
-pub mod headless;
 pub mod jitter;
-pub mod live;
-pub mod plot;
-pub mod port_energy;
-pub mod registry;
 pub mod replay;
-pub mod report;
-pub mod run_description;
 pub mod run_picture;
 pub mod sampling;
 pub mod scaffold;
-pub mod scene;
-pub mod servo;
-pub mod session;
-pub(crate) mod slow;
 pub mod stability;
 pub mod stress;
-pub mod study;
 pub mod timing_picture;
 pub mod validate;
-pub(crate) mod worker;
-
-pub use flotor_record::{self as record, mapping, trace};

@@ -8,19 +8,20 @@ mod files;
 mod held;
 
 pub use apart::{Coverage, WhyApart};
-pub use files::named_files;
 pub use held::Held;
 
-use crate::coupling::{CouplingDescription, CouplingEnds, Patience};
-use crate::record::{Change, ChangeOutcome, ChangeSubject, ReadError, Recording, Role, RunDescription};
-use crate::registry::Registry;
-use crate::scene::{Isolation, Location, ModelUse, ParameterText, PluginUse};
-use crate::servo::{Clock, Coupled, Forces, Heartbeat, ModelHealth, Port, Replacement};
-use crate::session::{PluginReport, RunError, prepare_model};
-use crate::trace::{Events, TickRecord};
 use apart::Evidence;
+use flotor_core::coupling::{CouplingDescription, CouplingEnds};
+use flotor_core::trace::{Events, TickRecord};
+use flotor_core::{Change, ChangeOutcome, ChangeSubject};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::{DeviceState, LoopConfig, Tick, Wrench};
+use flotor_record::{ReadError, Recording, Role, RunDescription};
+use flotor_servo::coupling::Patience;
+use flotor_servo::{Clock, Coupled, Forces, Heartbeat, ModelHealth, Port, Replacement};
+use flotor_session::registry::Registry;
+use flotor_session::scene::{Isolation, Location, ModelUse, ParameterText, PluginUse};
+use flotor_session::{PluginReport, RunError, prepare_model};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -317,7 +318,7 @@ fn use_recorded_files(
 /// The models of a recorded run as a scene would name them.
 fn models_of(path: &Path, run: &RunDescription) -> Vec<ModelUse> {
     let location = Location { file: PathBuf::from(path), line: 0 };
-    let model = |plugin: &crate::record::PluginDescription| match plugin.role {
+    let model = |plugin: &flotor_record::PluginDescription| match plugin.role {
         Role::Device => None,
         Role::Model(mapping) => Some(ModelUse {
             name: plugin.name.clone(),

@@ -1,11 +1,11 @@
 //! A run as a picture: where the handle was, what it felt, what was stored and, in real time, how time was kept.
 
-use crate::plot::{Axis, Figure, Mark, Panel, Series};
-use crate::servo::Timing;
-use crate::session::Observer;
 use crate::timing_picture::panels;
-use crate::trace::{Events, TickRecord};
+use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, rotation_vector};
+use flotor_plot::{Axis, Figure, Mark, Panel, Series};
+use flotor_servo::Timing;
+use flotor_session::Observer;
 
 /// Collects the samples of a run; drawing happens at the end.
 pub struct RunPicture {

@@ -1,7 +1,7 @@
 //! How time was kept, as histograms: lateness and the stages of a tick.
 
-use crate::plot::{Axis, Bin, Panel, Series};
-use crate::servo::Timing;
+use flotor_plot::{Axis, Bin, Panel, Series};
+use flotor_servo::Timing;
 
 /// Ticks by lateness and by compute time, and every sixteenth tick by the time of its stages; each panel has its own,
 /// logarithmic axis of time. Not real-time.
@@ -69,9 +69,9 @@ mod tests {
         let mut timing = Timing::default();
         timing.lateness.record(2_000);
         timing.compute.record(900);
-        timing.stage(crate::servo::Stage::Models, 300);
-        let figure = crate::plot::Figure::new("Run", Axis::linear("Time", "s"));
-        let svg = panels(&timing).into_iter().fold(figure, crate::plot::Figure::panel).to_svg();
+        timing.stage(flotor_servo::Stage::Models, 300);
+        let figure = flotor_plot::Figure::new("Run", Axis::linear("Time", "s"));
+        let svg = panels(&timing).into_iter().fold(figure, flotor_plot::Figure::panel).to_svg();
         for name in ["lateness", "compute", "read", "models", "envelope", "write"] {
             assert!(svg.contains(name), "{name}");
         }

@@ -3,11 +3,11 @@
 //! Both scenes run in turns, some thousands of ticks at a time; of each the median of the whole tick counts, so that a
 //! neighbour on the machine hits both alike.
 
-use flotor::registry::Registry;
-use flotor::scene::Scene;
-use flotor::servo::{Clock, StopSwitch};
-use flotor::session::{Observer, RunOptions, Session};
-use flotor::trace::TickRecord;
+use flotor_core::trace::TickRecord;
+use flotor_servo::{Clock, StopSwitch};
+use flotor_session::registry::Registry;
+use flotor_session::scene::Scene;
+use flotor_session::{Observer, RunOptions, Session};
 use std::path::Path;
 
 const ALONE: &str = "duration_s = 5\n[device]\nplugin = \"simulated\"\n[[model]]\nplugin = \"spring\"\n";

@@ -8,8 +8,8 @@
 //! cargo run --release -p flotor-tests --example integrators -- integrators.svg > integrators.csv
 //! ```
 
-use flotor::plot::{Axis, Figure, Panel, Series};
 use flotor_hal::glam::{DQuat, DVec3};
+use flotor_plot::{Axis, Figure, Panel, Series};
 use flotor_simulated::hand::Impedance;
 use flotor_simulated::plant::{Drag, FeedForward, FlotorParameters, Plant, State, Wrench};
 use std::time::Instant;

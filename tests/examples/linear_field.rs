@@ -7,7 +7,7 @@
 //! cargo run --release -p flotor-tests --example linear_field -- field.svg > field.csv
 //! ```
 
-use flotor::plot::{Axis, Figure, Panel, Series};
+use flotor_plot::{Axis, Figure, Panel, Series};
 use flotor_tests::field_error::{FieldError, Swing, field_error};
 use std::error::Error;
 

@@ -9,8 +9,8 @@
 //! cargo run --release -p flotor-tests --example velocity_estimators -- velocity.svg > velocity.csv
 //! ```
 
-use flotor::plot::{Axis, Figure, Panel, Series};
 use flotor_hal::glam::DVec3;
+use flotor_plot::{Axis, Figure, Panel, Series};
 use flotor_simulated::hand::Pose;
 use flotor_simulated::plant::State;
 use flotor_simulated::sensing::velocity::EstimatorKind;

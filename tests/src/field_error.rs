@@ -2,7 +2,7 @@
 //! one run.
 
 use crate::watched::watch;
-use flotor::trace::{Events, TickRecord};
+use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{DVec3, Demand, Input, LoopConfig, Output};

@@ -9,7 +9,7 @@ pub mod scratch;
 pub mod tables;
 pub mod watched;
 
-use flotor::record::Recording;
+use flotor_record::Recording;
 use std::path::{Path, PathBuf};
 
 /// The root of the workspace: the folder with the README.

@@ -47,7 +47,7 @@ impl Flotor {
     #[must_use]
     pub fn with<I: AsRef<OsStr>>(arguments: impl IntoIterator<Item = I>) -> Self {
         let mut command = Command::new(program());
-        command.args(arguments).env_remove(flotor::registry::PATH_VARIABLE).env("NO_COLOR", "1");
+        command.args(arguments).env_remove(flotor_session::registry::PATH_VARIABLE).env("NO_COLOR", "1");
         // What a plugin's panic would do to a terminal must not depend on how the tests were started.
         command.env("RUST_BACKTRACE", "1");
         Self { command, input: String::new() }
@@ -60,7 +60,7 @@ impl Flotor {
     #[must_use]
     pub fn searching(mut self, folders: &[&Path]) -> Self {
         let path = std::env::join_paths(folders).expect("a scratch folder has a plain name");
-        self.command.env(flotor::registry::PATH_VARIABLE, path);
+        self.command.env(flotor_session::registry::PATH_VARIABLE, path);
         self
     }
 

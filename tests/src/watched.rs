@@ -1,12 +1,12 @@
 //! A scene run through the library on the virtual clock, with every tick kept.
 
 use crate::library::build_folder;
-use flotor::record::Change;
-use flotor::registry::Registry;
-use flotor::scene::Scene;
-use flotor::servo::{Clock, StopSwitch};
-use flotor::session::{Observer, Outcome, RunOptions, Session};
-use flotor::trace::TickRecord;
+use flotor_core::Change;
+use flotor_core::trace::TickRecord;
+use flotor_servo::{Clock, StopSwitch};
+use flotor_session::registry::Registry;
+use flotor_session::scene::Scene;
+use flotor_session::{Observer, Outcome, RunOptions, Session};
 use std::path::Path;
 
 /// All ticks of a run and what is known after it.

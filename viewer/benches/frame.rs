@@ -5,9 +5,9 @@
 use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use criterion::{Criterion, criterion_group, criterion_main};
 use egui_kittest::wgpu::{create_render_state, default_wgpu_setup};
+use flotor_core::mapping::{Blend, MappingConfig};
+use flotor_core::trace::{RECORD_WORDS, TickRecord};
 use flotor_hal::Pose;
-use flotor_record::mapping::{Blend, MappingConfig};
-use flotor_record::trace::{RECORD_WORDS, TickRecord};
 use flotor_record::{PluginDescription, Role, RunDescription};
 use flotor_sync::Words;
 use flotor_viewer::app::{Start, Viewer};

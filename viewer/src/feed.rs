@@ -1,8 +1,8 @@
 //! A running host, as the window sees it: a thread that reads, and what it has read since the last picture.
 
+use flotor_core::trace::TickRecord;
 use flotor_live::{Answer, Ask, Asker, ChangeMessage, Client, End, Event, Greeting, LiveError};
 use flotor_record::RunDescription;
-use flotor_record::trace::TickRecord;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

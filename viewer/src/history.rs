@@ -1,8 +1,9 @@
 //! What has been seen of a run: its description, and samples of its ticks in order.
 
+use flotor_core::Clock;
+use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, Pose, rotation_vector};
-use flotor_record::trace::{Events, TickRecord};
-use flotor_record::{Clock, Ending, Note, ReadError, Recording, RunDescription};
+use flotor_record::{Ending, Note, ReadError, Recording, RunDescription};
 use std::collections::VecDeque;
 use std::path::Path;
 

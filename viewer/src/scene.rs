@@ -280,7 +280,7 @@ const SCALE_PROBES: i32 = 32;
 mod tests {
     use super::*;
     use crate::palette::Look;
-    use flotor_record::trace::{RECORD_WORDS, TickRecord};
+    use flotor_core::trace::{RECORD_WORDS, TickRecord};
     use flotor_sync::Words;
 
     fn sample(force_n: DVec3) -> Sample {

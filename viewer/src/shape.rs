@@ -5,10 +5,10 @@
 //! double it, and nothing but the recorded parameters could be shown (docs/src/adr/0008-viewer-process.md).
 
 use crate::geometry::{Body, Curve, Strain};
+use flotor_core::mapping::Mapping;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
 use flotor_hal::{Input, Pose};
-use flotor_record::mapping::Mapping;
 use flotor_record::{PluginDescription, Role, RunDescription};
 use std::path::PathBuf;
 

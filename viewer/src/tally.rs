@@ -2,7 +2,7 @@
 
 use crate::history::Sample;
 use crate::scene::ArrowScale;
-use flotor_record::trace::Events;
+use flotor_core::trace::Events;
 
 /// Counts since the beginning of what was seen.
 #[derive(Clone, Debug, PartialEq)]

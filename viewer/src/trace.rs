@@ -82,7 +82,7 @@ mod tests {
     use super::*;
     use crate::decimate::min_max;
     use crate::history::{Keep, unknown_run};
-    use flotor_record::trace::{RECORD_WORDS, TickRecord};
+    use flotor_core::trace::{RECORD_WORDS, TickRecord};
     use flotor_sync::Words;
 
     const BUCKETS: usize = 100;

@@ -5,7 +5,7 @@ mod support;
 #[path = "interface/window.rs"]
 mod window;
 
-use flotor_record::trace::Events;
+use flotor_core::trace::Events;
 use flotor_viewer::history::{History, Keep};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use support::{spring_run, tick};

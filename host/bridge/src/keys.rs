@@ -10,7 +10,7 @@
 //! | `flotor/NAME/tick` | protobuf `flotor.Tick` | published, one a tick, after its pose |
 //! | `flotor/NAME/change` | protobuf `flotor.Change` | published |
 //! | `flotor/NAME/end` | JSON [`flotor_live::End`] | published |
-//! | `flotor/NAME/news/COUPLING` | a [`flotor_record::news::Dispatch`]: what this end of a coupling tells the other | published, best effort |
+//! | `flotor/NAME/news/COUPLING` | a [`flotor_core::peer::Dispatch`]: what this end of a coupling tells the other | published, best effort |
 //! | `flotor/NAME/couple/COUPLING` | the same, of the other end | put by who holds it |
 //! | `flotor/NAME/ask/...` | JSON [`crate::wish::Letter`] | a request, answered |
 //!

@@ -5,7 +5,7 @@ use crate::link::LinkError;
 use crate::status::Status;
 use crate::wish::{Letter, Wish};
 use flotor_live::{Answer, End, Greeting};
-use flotor_record::trace::TickRecord;
+use flotor_core::trace::TickRecord;
 use flotor_record::{Change, RunDescription, tick_from_messages};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -244,7 +244,7 @@ impl Ear {
                 return;
             }
             Some("tick") => self.tick(&payload, number),
-            Some("change") => Change::from_bytes(&payload, number.unwrap_or(0)).ok().map(Told::Change),
+            Some("change") => flotor_record::change_from_bytes(&payload, number.unwrap_or(0)).ok().map(Told::Change),
             Some("end") => self.end(&payload, number),
             _ => return,
         };

@@ -14,7 +14,7 @@ use flotor_bridge::serve::{Service, serve};
 use flotor_bridge::wish::Right;
 use flotor_live::Directory;
 use flotor_record::Recording;
-use flotor_record::trace::{Events, TickRecord};
+use flotor_core::trace::{Events, TickRecord};
 use proxy::Proxy;
 use serde_json::Value;
 use std::path::{Path, PathBuf};

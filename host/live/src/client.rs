@@ -3,8 +3,8 @@
 use crate::frame::{Frames, Kind, LongFrame, frame, ticks_from_payload};
 use crate::message::{Answer, Ask, ChangeMessage, End, Greeting, Request};
 use crate::{Directory, Found, PROTOCOL};
+use flotor_core::trace::TickRecord;
 use flotor_record::RunDescription;
-use flotor_record::trace::TickRecord;
 use std::io::{self, ErrorKind, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};

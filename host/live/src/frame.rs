@@ -1,6 +1,6 @@
 //! Frames: what cuts a stream of bytes into messages.
 
-use flotor_record::trace::{RECORD_WORDS, TickRecord};
+use flotor_core::trace::{RECORD_WORDS, TickRecord};
 use flotor_sync::Words;
 use std::io::{self, Read};
 

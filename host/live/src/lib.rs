@@ -33,7 +33,7 @@
 //! | 6 end | host | JSON [`End`]: how the run ended. Last |
 //! | 16 request | client | JSON [`Request`] |
 //!
-//! A record is what the digest of a run is made of ([`flotor_record::trace::TickRecord`]): tick, time (ns), time since the
+//! A record is what the digest of a run is made of ([`flotor_core::trace::TickRecord`]): tick, time (ns), time since the
 //! last tick (ns) as integers; position (3), quaternion xyzw (4), velocity (3), angular velocity (3), model's force and
 //! torque (6), commanded (6), delivered (6), stored energy, energy of the port as IEEE doubles; events (low half) and buttons
 //! (high half); lateness and compute time (ns). SI units, device frame, little endian.
@@ -45,7 +45,7 @@
 //! # Couplings
 //!
 //! A run with a coupling whose other end is on another host has a second socket, for datagrams: [`NewsSocket`] gives and takes what
-//! the ends tell each other ([`flotor_record::news`]).
+//! the ends tell each other ([`flotor_core::peer`]).
 //!
 //! Not real-time.
 

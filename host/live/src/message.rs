@@ -1,7 +1,7 @@
 //! What is said, as JSON.
 
+use flotor_core::{Change, ChangeOutcome, ChangeSubject};
 use flotor_hal::{Mutability, Parameter, ParameterKind};
-use flotor_record::{Change, ChangeOutcome, ChangeSubject};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 

@@ -10,7 +10,7 @@
 
 use crate::Directory;
 use crate::directory::{DirectoryError, lives, private};
-use flotor_record::news::{Dispatch, NoDispatch};
+use flotor_core::peer::{Dispatch, NoDispatch};
 use std::io::{self, ErrorKind};
 use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
@@ -190,7 +190,7 @@ fn is_passing(kind: ErrorKind) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flotor_record::news::{Account, News};
+    use flotor_core::peer::{Account, News};
 
     fn dispatch(tick: u64) -> Dispatch {
         let news = News { pose: flotor_hal::Pose::HOME, twist: flotor_hal::Twist::ZERO, told_j: 0.0 };

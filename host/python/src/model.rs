@@ -3,7 +3,7 @@
 use crate::error::refuse;
 use crate::rows::{InputRow, OutputRow};
 use flotor::evaluate::{Answer, Details, Evaluation, Handle, Travel};
-use flotor::registry::Registry;
+use flotor_session::registry::Registry;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::abi::{CallStatus, PluginKind};
 use flotor_hal::{DVec3, ParameterKind};

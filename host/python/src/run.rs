@@ -1,8 +1,8 @@
 //! Scenes in virtual time, and what plugins there are.
 
 use crate::error::refuse;
-use flotor::registry::Registry;
-use flotor::scene::{PluginKeyValue, Scene};
+use flotor_session::registry::Registry;
+use flotor_session::scene::{PluginKeyValue, Scene};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
@@ -49,7 +49,7 @@ pub(crate) fn run_scene(
     let mut folders = folders;
     folders.splice(0..0, scene.plugin_folders.iter().cloned());
     let registry = Registry::search(&folders);
-    let summary = py.detach(|| flotor::headless::run(&scene, &registry, seed, recording.as_deref()));
+    let summary = py.detach(|| flotor_session::headless::run(&scene, &registry, seed, recording.as_deref()));
     serde_json::to_string(&summary.map_err(refuse)?).map_err(refuse)
 }
 

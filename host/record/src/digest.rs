@@ -1,6 +1,6 @@
 //! A run in one line: equal digests, equal runs.
 
-use crate::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
+use flotor_core::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
 use flotor_sync::Words;
 use xxhash_rust::xxh3::Xxh3;
 

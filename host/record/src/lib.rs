@@ -34,30 +34,25 @@
 //!
 //! Not real-time, but for [`trace`], [`mapping`] and the words of [`news`]: records reach the rest through the trace ring.
 
-mod change;
 mod container;
-pub mod coupling;
+mod coupling;
 mod digest;
 mod files;
-pub mod mapping;
 mod messages;
-pub mod news;
 mod reader;
 mod run;
 mod schema;
-pub mod trace;
 mod writer;
 
 #[cfg(test)]
 mod tests;
 
-pub use change::{Change, ChangeOutcome, ChangeSubject};
 pub use container::Damage;
 pub use digest::TraceDigest;
 pub use files::NamedFile;
-pub use messages::{NoMessage, TickMessages, tick_from_messages};
+pub use messages::{NoMessage, TickMessages, change_from_bytes, change_to_bytes, tick_from_messages};
 pub use reader::{Ending, ReadError, Recording};
-pub use run::{Clock, NoRun, PluginDescription, Role, RunDescription};
+pub use run::{NoRun, PluginDescription, Role, RunDescription};
 pub use writer::{RecordError, Recorder};
 
 /// How bad it is, what a [`Note`] tells.

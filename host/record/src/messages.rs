@@ -1,8 +1,8 @@
 //! Ticks and changes as the messages of a recording, for those who carry them elsewhere than into a file.
 
-use crate::Change;
 use crate::schema::{Change as ChangeMessage, FrameTransform, Missing, Tick};
-use crate::trace::TickRecord;
+use flotor_core::Change;
+use flotor_core::trace::TickRecord;
 use prost::Message;
 
 /// Bytes that are no message of a recording, or not all of one.
@@ -52,28 +52,26 @@ pub fn tick_from_messages(pose: &[u8], tick: &[u8]) -> Result<TickRecord, NoMess
     Ok(record)
 }
 
-impl Change {
-    /// As the protobuf message `flotor.Change`, which has no time of its own. Not real-time.
-    #[must_use]
-    pub fn to_bytes(&self) -> Vec<u8> {
-        ChangeMessage::new(self).encode_to_vec()
-    }
+/// A change as the protobuf message `flotor.Change`, which has no time of its own. Not real-time.
+#[must_use]
+pub fn change_to_bytes(change: &Change) -> Vec<u8> {
+    ChangeMessage::new(change).encode_to_vec()
+}
 
-    /// From a protobuf message `flotor.Change` of this time. Not real-time.
-    ///
-    /// # Errors
-    /// [`NoMessage`]: it is none, or lacks something.
-    pub fn from_bytes(bytes: &[u8], time_ns: u64) -> Result<Self, NoMessage> {
-        let wrong = |reason: String| NoMessage { message: "flotor.Change", reason };
-        let message = ChangeMessage::decode(bytes).map_err(|cause| wrong(cause.to_string()))?;
-        message.change(time_ns).map_err(|Missing(part)| wrong(format!("it has no `{part}`")))
-    }
+/// A change from a protobuf message `flotor.Change` of this time, ns. Not real-time.
+///
+/// # Errors
+/// [`NoMessage`]: it is none, or lacks something.
+pub fn change_from_bytes(bytes: &[u8], time_ns: u64) -> Result<Change, NoMessage> {
+    let wrong = |reason: String| NoMessage { message: "flotor.Change", reason };
+    let message = ChangeMessage::decode(bytes).map_err(|cause| wrong(cause.to_string()))?;
+    message.change(time_ns).map_err(|Missing(part)| wrong(format!("it has no `{part}`")))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trace::RECORD_WORDS;
+    use flotor_core::trace::RECORD_WORDS;
     use flotor_sync::Words;
 
     /// A record in which every word is another number.

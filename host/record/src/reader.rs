@@ -2,8 +2,9 @@
 
 use crate::container::{Damage, Messages, TopicMessage};
 use crate::schema::{Change as ChangeMessage, FORMAT, FrameTransform, Log, Missing, Run, Tick, Topic};
-use crate::trace::TickRecord;
-use crate::{Change, Note, RunDescription};
+use crate::{Note, RunDescription};
+use flotor_core::Change;
+use flotor_core::trace::TickRecord;
 use flotor_hal::Pose;
 use mcap::{MAGIC, McapError};
 use prost::Message;

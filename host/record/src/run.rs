@@ -1,8 +1,9 @@
 //! What is known before a run begins, in a form that can be kept: enough to repeat it.
 
-use crate::coupling::CouplingDescription;
-use crate::mapping::{Blend, FieldTiming, MappingConfig};
 use crate::schema::{self, FORMAT, Mapping, Missing, Plugin, Run, Setting, Vector3};
+use flotor_core::Clock;
+use flotor_core::coupling::CouplingDescription;
+use flotor_core::mapping::{Blend, FieldTiming, MappingConfig};
 use prost::Message;
 use std::collections::BTreeMap;
 
@@ -10,15 +11,6 @@ use std::collections::BTreeMap;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no description of a run: {0}")]
 pub struct NoRun(String);
-
-/// Which clock drives the loop.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Clock {
-    /// The machine's monotonic clock.
-    Real,
-    /// No waiting: the next tick is due when the last one is done. Bit-exact.
-    Virtual,
-}
 
 /// How a run was set up.
 #[derive(Clone, Debug, PartialEq)]
@@ -110,7 +102,7 @@ impl RunDescription {
             clock: clock.into(),
             scene_toml: self.scene_toml.clone(),
             plugins: self.plugins.iter().map(PluginDescription::to_message).collect(),
-            couplings: self.couplings.iter().map(CouplingDescription::to_message).collect(),
+            couplings: self.couplings.iter().map(Into::into).collect(),
         }
     }
 
@@ -135,7 +127,7 @@ impl RunDescription {
             couplings: run
                 .couplings
                 .into_iter()
-                .map(CouplingDescription::from_message)
+                .map(CouplingDescription::try_from)
                 .collect::<Result<_, _>>()?,
         })
     }

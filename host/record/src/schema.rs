@@ -4,9 +4,10 @@
 //! every field. Every `f64` is an `Option` that is always filled: protobuf leaves out a plain field that equals its
 //! default, -0.0 equals 0.0, and a recording is bit-exact. On the wire it is the plain field of the schema.
 
-use crate::mapping::MappingConfig;
-use crate::trace::{Events, TickRecord};
-use crate::{Change as ParameterChange, ChangeOutcome, ChangeSubject, Note, Severity};
+use crate::{Note, Severity};
+use flotor_core::mapping::MappingConfig;
+use flotor_core::trace::{Events, TickRecord};
+use flotor_core::{Change as ParameterChange, ChangeOutcome, ChangeSubject};
 use flotor_hal::{Pose, Twist as TwistValue, Wrench as WrenchValue};
 use prost::{Enumeration, Message};
 use prost_types::Timestamp;

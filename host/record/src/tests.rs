@@ -1,7 +1,8 @@
 use super::schema::{DESCRIPTOR_SET, ENCODING, FORMAT, Topic};
 use super::*;
-use crate::mapping::{Blend, FieldTiming, MappingConfig};
-use crate::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
+use flotor_core::Clock;
+use flotor_core::mapping::{Blend, FieldTiming, MappingConfig};
+use flotor_core::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
 use flotor_sync::Words;
 use mcap::records::op;
 use prost::Message;

@@ -1,8 +1,9 @@
 //! Writes a recording: a chunk at a time, whole, at least every quarter of a second.
 
 use crate::schema::{Change as ChangeMessage, DESCRIPTOR_SET, ENCODING, FrameTransform, Log, Tick, Topic};
-use crate::trace::{Events, TickRecord};
-use crate::{Change, Note, RunDescription};
+use crate::{Note, RunDescription};
+use flotor_core::Change;
+use flotor_core::trace::{Events, TickRecord};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{McapError, McapResult, WriteOptions};
 use prost::Message;

@@ -5,13 +5,13 @@
 //! their own. The middle of many batches counts: a neighbour on the machine spoils some of them.
 
 use super::scripted::{SCRIPTED, SCRIPTED_ENTRY};
-use crate::registry::Registry;
-use crate::scene::Scene;
-use crate::servo::{Clock, Schedule, Servo, StopSwitch, monotonic_ns};
-use crate::session::{RunError, RunOptions, Session};
-use crate::trace::{RECORD_WORDS, TickRecord};
+use flotor_core::trace::{RECORD_WORDS, TickRecord};
 use flotor_hal::SampleWait;
 use flotor_hal::abi::loader::Stopper;
+use flotor_servo::{Clock, Schedule, Servo, StopSwitch, monotonic_ns};
+use flotor_session::registry::Registry;
+use flotor_session::scene::Scene;
+use flotor_session::{RunError, RunOptions, Session};
 use flotor_sync::{Receiver, Sender};
 use serde::Serialize;
 use std::path::Path;

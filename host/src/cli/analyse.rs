@@ -1,10 +1,10 @@
 //! `flotor analyse`: a study's data in, thresholds, effects and tests out.
 
 use super::{CommandError, style, write_json};
-use crate::study::report::html;
 use clap::{Args, ValueEnum};
 use flotor_statistics::anova::SumOfSquares;
 use flotor_study::analysis::{Analysis, AnalysisOptions, BlindedAnalysis, Estimator, SubjectRecord};
+use flotor_study::apparatus::report::html;
 use flotor_study::blinding::Codes;
 use flotor_study::dataset::{Dataset, DatasetError};
 use flotor_study::protocol::RatingScale;

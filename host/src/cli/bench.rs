@@ -5,10 +5,10 @@ use super::{CommandError, style, write_json};
 use crate::bench::{
     BenchDevice, Case, Effort, Hand, Plan, Progress, TellApart, TickCost, WholeTick, measure,
 };
-use crate::registry::Registry;
 use clap::{Args, ValueEnum};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Plugin, Setting};
+use flotor_session::registry::Registry;
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::path::PathBuf;

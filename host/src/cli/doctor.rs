@@ -1,9 +1,9 @@
 //! `flotor doctor`: what this machine lets a real-time loop hope for, and how to allow more.
 
 use super::{CommandError, style, write_json};
-use crate::registry::Registry;
-use crate::servo::{Privilege, RealTimeReport, probe_real_time};
 use clap::Args;
+use flotor_servo::{Privilege, RealTimeReport, probe_real_time};
+use flotor_session::registry::Registry;
 use serde::Serialize;
 use std::fs::read_to_string;
 use std::path::Path;

@@ -3,12 +3,12 @@
 use super::options::KeyValue;
 use super::{CommandError, style};
 use crate::evaluate::{Answer, Details, EvaluateError, Evaluation, Handle, Travel};
-use crate::registry::Registry;
-use crate::scene::nearest;
 use clap::Args;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{DVec3, Detail};
+use flotor_session::registry::Registry;
+use flotor_session::scene::nearest;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 

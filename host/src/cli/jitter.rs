@@ -4,13 +4,13 @@ use super::options::{core, duration_s, rate_hz};
 use super::stopping::stop_on_signals;
 use super::{CommandError, run, style};
 use crate::jitter::{JitterReport, LoopTiming, MissedMore, measure};
-use crate::plot::{Axis, Figure, Panel, Series};
-use crate::registry::Registry;
-use crate::scene::Scene;
-use crate::servo::{Clock, Core};
-use crate::session::{RunError, RunOptions, Session};
 use crate::timing_picture::octaves;
 use clap::Args;
+use flotor_plot::{Axis, Figure, Panel, Series};
+use flotor_servo::{Clock, Core};
+use flotor_session::registry::Registry;
+use flotor_session::scene::Scene;
+use flotor_session::{RunError, RunOptions, Session};
 use std::path::PathBuf;
 
 /// Measure how well the servo keeps time here.

@@ -32,15 +32,16 @@ mod swap;
 mod sweep;
 mod validate;
 mod view;
+mod worker;
 
 pub use reference::reference;
 
-use crate::registry::LookupError;
-use crate::servo::{EmergencySource, Place, Stuck};
-use crate::session::RunError;
 use clap::{CommandFactory, Parser, Subcommand};
 use flotor_hal::Fault;
 use flotor_hal::abi::loader::LoadError;
+use flotor_servo::{EmergencySource, Place, Stuck};
+use flotor_session::RunError;
+use flotor_session::registry::LookupError;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -103,7 +104,7 @@ enum Command {
     Doctor(doctor::DoctorArguments),
     /// A process that holds one force model, started by `run` for `isolation = "process"`
     #[command(hide = true)]
-    Worker(crate::worker::WorkerArguments),
+    Worker(worker::WorkerArguments),
     /// Print a completion script for a shell
     Completions {
         /// The shell
@@ -169,10 +170,10 @@ pub(crate) enum CommandError {
     },
     /// A recording could not be written or read.
     #[error(transparent)]
-    Record(#[from] crate::record::RecordError),
+    Record(#[from] flotor_record::RecordError),
     /// A recording could not be replayed.
     #[error(transparent)]
-    Read(#[from] crate::record::ReadError),
+    Read(#[from] flotor_record::ReadError),
     /// Something found wrong that the output has already told.
     #[error("{0}")]
     Failed(String),
@@ -219,7 +220,7 @@ impl CommandError {
                     Place::DeviceWait(_) | Place::DeviceRead(_) | Place::DeviceWrite(_) => 4,
                     Place::Waiting | Place::Host => 1,
                 },
-                RunError::Thread(_) => 1,
+                RunError::Thread(_) | _ => 1,
             },
             Self::PluginRefused(_) => 3,
             Self::DeviceFault(_)
@@ -279,14 +280,7 @@ pub fn main() -> ExitCode {
         Some(Command::Calibrate(arguments)) => calibrate::run(&arguments),
         Some(Command::Emulate(arguments)) => emulate::run(&arguments),
         Some(Command::Doctor(arguments)) => doctor::run(&arguments),
-        Some(Command::Worker(arguments)) => {
-            // A terminal signals worker and host alike, and while force fades out the model is still asked. A
-            // worker ends with its host, so nobody listens to the switch.
-            let _ = stopping::stop_on_signals();
-            crate::worker::serve(&arguments).map_err(|error| {
-                CommandError::Usage(format!("`flotor worker` is started by `flotor run`: {error}"))
-            })
-        }
+        Some(Command::Worker(arguments)) => worker::run(arguments),
         Some(Command::Completions { shell }) => {
             clap_complete::generate(shell, &mut Arguments::command(), "flotor", &mut std::io::stdout());
             Ok(())

@@ -1,10 +1,10 @@
 //! `flotor new`: the start of a plugin of one's own.
 
 use super::{CommandError, style};
-use crate::registry::Registry;
 use crate::scaffold::{ContractFolder, Language, PluginName, Scaffold, ScaffoldError, scaffold};
 use clap::{Args, ValueEnum};
 use flotor_hal::abi::PluginKind;
+use flotor_session::registry::Registry;
 use std::path::{Path, PathBuf};
 
 /// Start a plugin.

@@ -1,8 +1,8 @@
 //! Options several commands share, and how they are read.
 
-pub(crate) use crate::scene::{KeyValue, PluginKeyValue};
-use crate::servo::Core;
 use clap::ValueEnum;
+use flotor_servo::Core;
+pub(crate) use flotor_session::scene::{KeyValue, PluginKeyValue};
 
 /// `--clock`
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]

@@ -1,11 +1,11 @@
 //! `flotor plugins`: what is there, read from the files without running any of them.
 
 use super::{CommandError, style, write_json};
-use crate::registry::{PATH_VARIABLE, Registry};
 use clap::Args;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{Mutability, Parameter, ParameterKind};
+use flotor_session::registry::{PATH_VARIABLE, Registry};
 use serde::Serialize;
 use std::path::Path;
 

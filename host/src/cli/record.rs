@@ -3,10 +3,11 @@
 use super::bridge::{BRIDGE, Way, is_elsewhere};
 use super::stopping::stop_on_signals;
 use super::{CommandError, first_error, report_line, style};
-use crate::record::{Change, Note, Recorder, Severity};
-use crate::servo::StopSwitch;
 use clap::Args;
+use flotor_core::Change;
 use flotor_live::{Ask, Client, Directory, Event, LiveError};
+use flotor_record::{Note, Recorder, Severity};
+use flotor_servo::StopSwitch;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 

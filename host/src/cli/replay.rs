@@ -2,13 +2,13 @@
 
 use super::options::{KeyValue, PluginKeyValue};
 use super::{CommandError, run, style, write_json};
-use crate::plot::{Axis, Figure, Panel, Series};
-use crate::record::Ending;
-use crate::record::Recording;
-use crate::registry::Registry;
 use crate::replay::{Compared, Coverage, Difference, Held, Replay, ReplayError, WhyApart};
 use clap::Args;
 use flotor_hal::{DVec3, Wrench};
+use flotor_plot::{Axis, Figure, Panel, Series};
+use flotor_record::Ending;
+use flotor_record::Recording;
+use flotor_session::registry::Registry;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;

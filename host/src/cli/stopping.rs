@@ -4,7 +4,7 @@
 //! third ends the process.
 
 use super::style;
-use crate::servo::StopSwitch;
+use flotor_servo::StopSwitch;
 use rustix::process::getpgrp;
 use rustix::termios::{LocalModes, OptionalActions, Termios, isatty, tcgetattr, tcgetpgrp, tcsetattr};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGUSR1, SIGXFSZ};

@@ -3,10 +3,10 @@
 use super::eval::settings;
 use super::options::KeyValue;
 use super::{CommandError, style};
-use crate::registry::Registry;
 use crate::stress::{Progress, Reach, Size, StressOptions, StressReport, score};
 use clap::{Args, ValueEnum};
 use flotor_hal::abi::PluginKind;
+use flotor_session::registry::Registry;
 use indicatif::ProgressBar;
 use std::path::PathBuf;
 

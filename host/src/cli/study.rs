@@ -10,15 +10,15 @@ mod spring;
 use super::options::{PluginKeyValue, duration_s};
 use super::stopping::stop_on_signals;
 use super::{CommandError, remark, run, style};
-use crate::scene::Scene;
-use crate::session::{RunEnd, RunError};
-use crate::study::rig::{Rig, RunEnded, TrialFiles};
-use crate::study::{Apparatus, ApparatusError, Kinematics};
 use choices::{
     AveragingChoice, BoundaryChoice, FirstChoice, ForceWay, KinematicsOption, NoiseOption, OrderChoice,
     PresentationOption, ProcedureChoice, SideChoice, StepChoice, range,
 };
 use clap::{Args, Subcommand, ValueEnum};
+use flotor_session::scene::Scene;
+use flotor_session::{RunEnd, RunError};
+use flotor_study::apparatus::rig::{Rig, RunEnded, TrialFiles};
+use flotor_study::apparatus::{Apparatus, ApparatusError, Kinematics};
 use flotor_study::cohort::{Cohort, CohortError, Earlier};
 use flotor_study::conduct::{ConductError, Nothing, OutsideError, Presenter};
 use flotor_study::dataset::{Dataset, DatasetError};

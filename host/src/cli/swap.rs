@@ -2,9 +2,9 @@
 
 use super::CommandError;
 use super::options::KeyValue;
-use crate::scene::is_named;
 use clap::Args;
 use flotor_live::{Answer, Ask, ChangeMessage, Client, Directory, Event, LiveError, Subject};
+use flotor_session::scene::is_named;
 use std::path::MAIN_SEPARATOR;
 use std::time::{Duration, Instant};
 

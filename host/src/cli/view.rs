@@ -3,9 +3,9 @@
 use super::CommandError;
 use super::bridge::{BRIDGE, Way, is_elsewhere};
 use super::companion::{Built, Companion};
-use crate::record::Recording;
-use crate::registry::Registry;
 use clap::Args;
+use flotor_record::Recording;
+use flotor_session::registry::Registry;
 use rustix::process::{Pid, Signal, kill_process};
 use std::ffi::OsString;
 use std::path::PathBuf;

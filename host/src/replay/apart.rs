@@ -1,9 +1,10 @@
 //! What of a run a recording holds, and why a replay of it may come out differently although nothing was
 //! changed.
 
-use crate::record::{Clock, RunDescription};
-use crate::servo::Port;
-use crate::trace::{Events, TickRecord};
+use flotor_core::Clock;
+use flotor_core::trace::{Events, TickRecord};
+use flotor_record::RunDescription;
+use flotor_servo::Port;
 use serde::Serialize;
 use std::fmt;
 

@@ -1,26 +1,8 @@
 //! The files that parameters of a recorded run named: the same ones again, or a word about it.
 
-use crate::record::NamedFile;
-use crate::scene::{Location, ParameterText, SceneError};
-use crate::session::PluginReport;
-use flotor_hal::{Parameter, ParameterKind};
+use flotor_record::NamedFile;
+use flotor_session::scene::{Location, ParameterText, SceneError};
 use std::path::{Path, PathBuf};
-
-/// What a description of a run keeps of the files a plugin was told about: it belongs beside the plugin's
-/// parameters. Files that cannot be read any more are left out. Not real-time.
-#[must_use]
-pub fn named_files(report: &PluginReport) -> Vec<(String, String)> {
-    let named = |parameter: &Parameter| {
-        let (_, value) = report.parameters.iter().find(|(id, _)| id == parameter.id())?;
-        let is_built_in = parameter.choices().iter().any(|name| name.as_str() == value);
-        if parameter.kind() != ParameterKind::File || is_built_in {
-            return None;
-        }
-        let file = NamedFile::read(Path::new(value)).ok()?;
-        Some(file.to_parameters(parameter.id()))
-    };
-    report.schema.iter().filter_map(named).flatten().collect()
-}
 
 /// A setting of the model `model`; if it named a file, with one that has the same content: where it was in
 /// the run, or beside the recording, for recordings travel.

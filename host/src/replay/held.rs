@@ -1,6 +1,6 @@
 //! What is changed for a replay, and therefore does not change with the run.
 
-use crate::scene::{KeyValue, ModelUse, PluginKeyValue, is_named};
+use flotor_session::scene::{KeyValue, ModelUse, PluginKeyValue, is_named};
 
 /// What a replay gave the models of a recording: they keep it, whatever changed in the run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use super::measure::Decades;
 use super::{DAMPINGS_NS_PER_M, PERIOD_S, Size, StressReport};
-use crate::plot::{Axis, Bin, Figure, Mark, Panel, Series};
+use flotor_plot::{Axis, Bin, Figure, Mark, Panel, Series};
 
 /// The largest relative loop energy that passes, for the mark.
 const CONSERVATIVE: f64 = 1.0e-9;

@@ -5,7 +5,7 @@
 //! run asks the first poses of a full one. No sequence ever hits home exactly, or a coordinate plane, or a number
 //! that is not finite: those are [`Manifold`]s with names.
 
-use crate::sampling::Random;
+use flotor_core::Random;
 use flotor_hal::{DQuat, DVec3, Pose, Twist, orientation_from_rotation_vector, rotation_vector};
 use serde::Serialize;
 use std::f64::consts::PI;

@@ -3,11 +3,11 @@
 use super::path::CONFIG;
 use super::rule::Check;
 use super::{Figures, Seen, device, live, locked, model, passive};
-use crate::scene::KeyValue;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting, read_metadata};
 use flotor_hal::conformance::Rule;
 use flotor_hal::{Parameter, ParameterKind, RefusalKind};
+use flotor_session::scene::KeyValue;
 use std::path::Path;
 
 /// Checks one rule, of instances with these settings; what was measured on the way, if anything was. Not

@@ -25,6 +25,8 @@
 //! Nothing here is real-time.
 
 pub mod analysis;
+#[cfg(feature = "apparatus")]
+pub mod apparatus;
 pub mod bias;
 pub mod blinding;
 pub mod cohort;

@@ -4,7 +4,7 @@ use crate::design::Cell;
 use crate::plan::Plan;
 use crate::table::number;
 use crate::task::{Column, ColumnKind};
-use flotor::plot::{Axis, Figure, Panel, Series};
+use flotor_plot::{Axis, Figure, Panel, Series};
 
 /// Lines in a panel: more cannot be told apart.
 const MOST_LINES: usize = 6;

@@ -3,9 +3,9 @@
 use crate::design::{Cell, Design, Point};
 use crate::plan::{POSE_COLUMNS, Plan, PlanError, Question};
 use flotor::evaluate::{Answer, Details, Evaluation, Handle, Travel};
-use flotor::headless;
-use flotor::registry::Registry;
-use flotor::scene::{PluginKeyValue, Scene};
+use flotor_session::headless;
+use flotor_session::registry::Registry;
+use flotor_session::scene::{PluginKeyValue, Scene};
 use flotor_hal::DVec3;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Plugin, Setting};
@@ -65,10 +65,10 @@ pub enum SweepError {
     Plan(#[from] PlanError),
     /// A plugin is unknown or refused.
     #[error(transparent)]
-    Lookup(#[from] flotor::registry::LookupError),
+    Lookup(#[from] flotor_session::registry::LookupError),
     /// The scene is refused.
     #[error(transparent)]
-    Scene(#[from] flotor::scene::SceneError),
+    Scene(#[from] flotor_session::scene::SceneError),
     /// An axis names nothing, or its first value is refused.
     #[error("axis `{key}`: {problem}")]
     Axis {
@@ -309,11 +309,11 @@ impl Sweep {
         let first = self.plan.axes.first().map(|axis| axis.key.clone()).unwrap_or_default();
         let scene =
             self.scene_at(&point, scene).map_err(|problem| SweepError::Axis { key: first, problem })?;
-        let options = flotor::session::RunOptions { clock: flotor::servo::Clock::Virtual, seed: point.seed };
-        match flotor::session::Session::prepare(&scene, &Registry::search(folders), &options) {
+        let options = flotor_session::RunOptions { clock: flotor_servo::Clock::Virtual, seed: point.seed };
+        match flotor_session::Session::prepare(&scene, &Registry::search(folders), &options) {
             Ok(_) => Ok(()),
-            Err(flotor::session::RunError::Scene(error)) => Err(error.into()),
-            Err(flotor::session::RunError::Lookup(error)) => Err(error.into()),
+            Err(flotor_session::RunError::Scene(error)) => Err(error.into()),
+            Err(flotor_session::RunError::Lookup(error)) => Err(error.into()),
             // Anything else belongs to this point, and goes into its row.
             Err(_) => Ok(()),
         }

@@ -10,8 +10,8 @@ use crate::player::Player;
 use crate::scene::SceneBuilder;
 use crate::tally::Tally;
 use egui::Context;
+use flotor_core::trace::Events;
 use flotor_live::{ChangeMessage, Outcome, Subject};
-use flotor_record::trace::Events;
 use std::time::{Duration, Instant};
 
 /// How often a run is looked for while there is none.

@@ -5,8 +5,8 @@ use crate::feed::FeedState;
 use crate::history::Sample;
 use crate::player::Motion;
 use crate::ui::readout;
+use flotor_core::trace::Events;
 use flotor_record::Severity;
-use flotor_record::trace::Events;
 use std::time::Duration;
 
 /// How long something that happened in one tick stays in sight, s.

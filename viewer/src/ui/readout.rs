@@ -7,8 +7,9 @@ use crate::scene::SceneFacts;
 use crate::ui::plots::fixed;
 use crate::ui::style::{BODY_PT, SMALL_PT, TITLE_PT};
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, vec2};
-use flotor_record::trace::Events;
-use flotor_record::{Clock, RunDescription};
+use flotor_core::Clock;
+use flotor_core::trace::Events;
+use flotor_record::RunDescription;
 
 /// Distance of text from the edges, points.
 const MARGIN: f32 = 22.0;

@@ -7,8 +7,8 @@ use crate::ui::style::SMALL_PT;
 use egui::{
     Align, CollapsingHeader, CornerRadius, Layout, Rect, RichText, Role, Sense, Ui, WidgetInfo, vec2,
 };
+use flotor_core::trace::Events;
 use flotor_live::WrenchLimits;
-use flotor_record::trace::Events;
 
 /// Shows how much of each limit is used, and a line for everything that has happened.
 pub fn standing(ui: &mut Ui, sample: &Sample, limits: &WrenchLimits, tally: &Tally, palette: &Palette) {

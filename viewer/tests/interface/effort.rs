@@ -4,7 +4,7 @@ use super::window::{self, Window, live, recording, until};
 use crate::support::{plugin_file, spring_run, tick};
 use egui::{Key, vec2};
 use egui_kittest::kittest::Queryable;
-use flotor_record::trace::Events;
+use flotor_core::trace::Events;
 use flotor_viewer::app::Start;
 use flotor_viewer::history::{History, Keep};
 use std::time::Duration;

@@ -5,8 +5,8 @@ use super::window::{Window, live, until, until_fresh, window};
 use egui::Key;
 use egui::accesskit::Role;
 use egui_kittest::kittest::{NodeT, Queryable};
+use flotor_core::trace::Events;
 use flotor_live::{Ask, Outcome};
-use flotor_record::trace::Events;
 use flotor_viewer::app::{Start, Wanted};
 use flotor_viewer::panel::{Standing, Value};
 

@@ -3,8 +3,8 @@
 use crate::support::{FakeHost, PATIENCE, plugin_file, spring_run, tick};
 use egui::vec2;
 use egui_kittest::Harness;
+use flotor_core::trace::Events;
 use flotor_live::Ask;
-use flotor_record::trace::Events;
 use flotor_viewer::app::{Start, Viewer, Wanted};
 use flotor_viewer::history::{History, Keep};
 use flotor_viewer::palette::Look;

@@ -4,14 +4,15 @@
 
 pub(crate) mod display;
 
+use flotor_core::Clock;
+use flotor_core::mapping::{Blend, MappingConfig};
+use flotor_core::trace::{Events, RECORD_WORDS, TickRecord};
 use flotor_hal::abi::loader::Plugin;
 use flotor_live::{
     Answer, Ask, ChangeMessage, Directory, End, Frames, Greeting, Kind, Listener, Outcome, PROTOCOL,
     PanelPlugin, Request, SetValue, Subject, WrenchLimits, frame, ticks_to_payload,
 };
-use flotor_record::mapping::{Blend, MappingConfig};
-use flotor_record::trace::{Events, RECORD_WORDS, TickRecord};
-use flotor_record::{Clock, PluginDescription, Role, RunDescription};
+use flotor_record::{PluginDescription, Role, RunDescription};
 use flotor_sync::Words;
 use std::io::Write;
 use std::os::unix::net::UnixStream;

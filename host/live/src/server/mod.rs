@@ -12,8 +12,9 @@ mod outbox;
 mod watcher;
 
 use crate::{Ask, ChangeMessage, Directory, DirectoryError, End, Greeting, Kind, Listener, frame};
-use flotor_record::trace::TickRecord;
-use flotor_record::{Change, RunDescription};
+use flotor_core::Change;
+use flotor_core::trace::TickRecord;
+use flotor_record::RunDescription;
 use outbox::Outbox;
 use std::io::{self, ErrorKind};
 use std::os::unix::net::{UnixListener, UnixStream};

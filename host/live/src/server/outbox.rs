@@ -1,7 +1,7 @@
 //! What waits to be sent to one watcher: a queue of fixed length that drops and counts.
 
 use crate::{Kind, frame, ticks_to_payload};
-use flotor_record::trace::{Events, TickRecord};
+use flotor_core::trace::{Events, TickRecord};
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
@@ -178,7 +178,7 @@ impl Batch {
 mod tests {
     use super::*;
     use crate::{Frames, ticks_from_payload};
-    use flotor_record::trace::RECORD_WORDS;
+    use flotor_core::trace::RECORD_WORDS;
     use flotor_sync::Words;
 
     fn record(tick: u64, events: Events) -> TickRecord {

@@ -1,9 +1,11 @@
 //! `flotor calibrate import`: somebody else's numbers as a calibration file.
 
 use super::{CommandError, force_n, provenance, write_calibration};
-use crate::calibration::file::{CalibratedDevice, CalibrationFile, FORMAT, Quality, Source, VerticalCurve};
-use crate::calibration::thesis;
 use clap::Args;
+use flotor_calibration::thesis;
+use flotor_session::calibration_file::{
+    CalibratedDevice, CalibrationFile, FORMAT, Quality, Source, VerticalCurve,
+};
 use std::path::PathBuf;
 
 /// Make a calibration file of the report's polynomial, or of any other.

@@ -7,9 +7,9 @@ mod vertical;
 
 use super::run::progress_bar;
 use super::{CommandError, eval, options, style, write_json};
-use crate::calibration::CalibrationError;
-use crate::calibration::file::{CalibrationFile, Provenance, Source, today};
 use clap::{Args, Subcommand};
+use flotor_calibration::CalibrationError;
+use flotor_session::calibration_file::{CalibrationFile, Provenance, Source, today};
 use std::path::Path;
 
 /// Calibrate a device: measure, check, or take over somebody else's numbers.

@@ -2,13 +2,13 @@
 
 use super::options::{KeyValue, duration_s};
 use super::{CommandError, eval, progress_bar, refused};
-use crate::calibration::rig::{DeviceRig, SimulatedRig, Waiting};
-use crate::calibration::sensor::{ForceSensor, SERIAL_SENSOR};
 use crate::cli::stopping::stop_on_signals;
-use crate::registry::Registry;
-use crate::servo::StopSwitch;
 use clap::Args;
+use flotor_calibration::rig::{DeviceRig, SimulatedRig, Waiting};
+use flotor_calibration::sensor::{ForceSensor, SERIAL_SENSOR};
 use flotor_hal::abi::PluginKind;
+use flotor_servo::StopSwitch;
+use flotor_session::registry::Registry;
 use indicatif::ProgressBar;
 use std::ops::ControlFlow;
 use std::path::PathBuf;

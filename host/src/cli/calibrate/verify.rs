@@ -2,11 +2,11 @@
 
 use super::rig::RigArguments;
 use super::{CommandError, progress_bar, refused, style, write_json};
-use crate::calibration::file::{CalibrationFile, CalibrationFileError};
-use crate::calibration::procedure::{Plan, measure};
-use crate::calibration::verify::{ErrorCurve, PROBE_N};
 use clap::Args;
+use flotor_calibration::procedure::{Plan, measure};
+use flotor_calibration::verify::{ErrorCurve, PROBE_N};
 use flotor_hal::VerticalCalibration;
+use flotor_session::calibration_file::{CalibrationFile, CalibrationFileError};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 

@@ -2,15 +2,15 @@
 
 use super::rig::RigArguments;
 use super::{CommandError, force_n, progress_bar, provenance, refused, style, write_calibration, write_json};
-use crate::calibration::file::{
+use clap::Args;
+use flotor_calibration::fit::{Candidate, Fit, fit};
+use flotor_calibration::procedure::{Plan, Reading, measure};
+use flotor_calibration::verify::{ErrorCurve, PROBE_N};
+use flotor_calibration::{picture, thesis};
+use flotor_hal::VerticalCalibration;
+use flotor_session::calibration_file::{
     CalibratedDevice, CalibrationFile, FORMAT, Provenance, Quality, Source, VerticalCurve,
 };
-use crate::calibration::fit::{Candidate, Fit, fit};
-use crate::calibration::procedure::{Plan, Reading, measure};
-use crate::calibration::verify::{ErrorCurve, PROBE_N};
-use crate::calibration::{picture, thesis};
-use clap::Args;
-use flotor_hal::VerticalCalibration;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 

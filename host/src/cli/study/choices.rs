@@ -1,7 +1,7 @@
 //! Choices of a protocol as words of the command line.
 
-use crate::study::Kinematics;
 use clap::ValueEnum;
+use flotor_study::apparatus::Kinematics;
 use flotor_study::procedure::{Averaging, StepAtReversal};
 use flotor_study::protocol::{AtBoundary, ComparisonSide, FirstModality, PresentationOrder};
 use flotor_study::trial::Modality;

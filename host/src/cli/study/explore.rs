@@ -5,18 +5,18 @@ use super::front::lines_of;
 use crate::cli::options::PluginKeyValue;
 use crate::cli::stopping::stop_on_signals;
 use crate::cli::{CommandError, style};
-use crate::live::{Announcement, Handles, Watched, publish};
-use crate::record::{Change, ChangeOutcome};
-use crate::registry::Registry;
-use crate::run_description::describe;
-use crate::scene::Scene;
-use crate::servo::{Clock, StopSwitch};
-use crate::session::{ControlError, Controls, NewValue, Observer, RunError, RunOptions, Session};
-use crate::study::live::measured;
-use crate::trace::TickRecord;
 use clap::Args;
+use flotor_core::trace::TickRecord;
+use flotor_core::{Change, ChangeOutcome};
 use flotor_hal::{Parameter, ParameterKind};
 use flotor_live::Directory;
+use flotor_servo::{Clock, StopSwitch};
+use flotor_session::live::{Announcement, Handles, Watched, publish};
+use flotor_session::registry::Registry;
+use flotor_session::run_description::describe;
+use flotor_session::scene::Scene;
+use flotor_session::{ControlError, Controls, NewValue, Observer, RunError, RunOptions, Session};
+use flotor_study::apparatus::live::measured;
 use flotor_study::kinematics::{KinematicsMeter, StimulusKinematics};
 use std::io::{BufReader, stdin};
 use std::path::PathBuf;
@@ -96,13 +96,13 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
 
 fn end(
     stop: &StopSwitch,
-    run: std::thread::JoinHandle<Result<crate::session::Outcome, RunError>>,
+    run: std::thread::JoinHandle<Result<flotor_session::Outcome, RunError>>,
 ) -> Result<(), CommandError> {
     stop.stop();
     let outcome = run.join().map_err(|_| RunError::Thread("panicked"))??;
     match outcome.end {
-        crate::session::RunEnd::DeviceFault(fault) => Err(CommandError::DeviceFault(fault)),
-        crate::session::RunEnd::EmergencyStop(source) => Err(CommandError::EmergencyStop(source)),
+        flotor_session::RunEnd::DeviceFault(fault) => Err(CommandError::DeviceFault(fault)),
+        flotor_session::RunEnd::EmergencyStop(source) => Err(CommandError::EmergencyStop(source)),
         _ => Ok(()),
     }
 }
@@ -113,7 +113,7 @@ fn scene(arguments: &ExploreArguments) -> Result<Scene, CommandError> {
         Some(path) => Scene::load(path),
         None => Scene::parse(
             std::path::Path::new("built-in study"),
-            &crate::scene::STUDY
+            &flotor_session::scene::STUDY
                 .replace("mode = \"gamma\"", "mode = \"physical\"")
                 .replace("A spring to be judged", "A spring to explore"),
         ),

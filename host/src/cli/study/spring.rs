@@ -2,8 +2,8 @@
 //! or the curve itself.
 
 use crate::cli::{CommandError, style, write_json};
-use crate::plot::{Axis, Figure, Panel, Series};
 use clap::Args;
+use flotor_plot::{Axis, Figure, Panel, Series};
 use flotor_study::curve::{CurveError, FITTED, MeasuredCurve, ServedCurve, SpringFit};
 use std::path::{Path, PathBuf};
 
@@ -188,7 +188,7 @@ fn life_size(head: &str, plugin: &str, parameters: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Scene;
+    use flotor_session::scene::Scene;
 
     fn fit(free_length_m: Option<f64>) -> SpringFit {
         SpringFit {

@@ -1,7 +1,7 @@
 //! Screens and inputs as lines of JSON, for a window that is another program.
 
 use super::MOMENT;
-use crate::study::attend::FrontEnd;
+use flotor_study::apparatus::attend::FrontEnd;
 use flotor_study::conduct::OutsideError;
 use flotor_study::screen::{Input, Said, Screen, Told, Warning};
 use std::io::{ErrorKind, Write};

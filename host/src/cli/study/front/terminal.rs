@@ -2,7 +2,7 @@
 
 use super::{MOMENT, lines_of};
 use crate::cli::style;
-use crate::study::attend::FrontEnd;
+use flotor_study::apparatus::attend::FrontEnd;
 use flotor_study::conduct::OutsideError;
 use flotor_study::protocol::Quality;
 use flotor_study::screen::{Input, Pause, Question, Screen, TrialView};

@@ -3,8 +3,8 @@
 use super::{JsonLines, lines_of};
 use crate::cli::CommandError;
 use crate::cli::view::VIEWER;
-use crate::servo::StopSwitch;
-use crate::study::attend::FrontEnd;
+use flotor_servo::StopSwitch;
+use flotor_study::apparatus::attend::FrontEnd;
 use flotor_study::conduct::OutsideError;
 use flotor_study::screen::{Input, Screen};
 use rustix::process::{Pid, Signal, kill_process};

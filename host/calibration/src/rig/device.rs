@@ -1,0 +1,180 @@
+//! A real device with a force sensor on a serial port. Somebody, or something, lowers the sensor.
+
+use super::holder::{Guard, Holder, Holding, REST_M};
+use super::{PERIOD_NS, Rest, Rig};
+use crate::CalibrationError;
+use crate::sensor::ForceSensor;
+use flotor_core::limits::{Boundary, Limits};
+use flotor_hal::abi::loader::{OpenedDevice, Plugin, Setting};
+use flotor_hal::{Fault, LoopConfig, Refusal, VerticalCalibration};
+use flotor_servo::{Envelope, StopSwitch};
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+/// How often it is looked whether the handle rests where it should.
+const LOOK_AGAIN: Duration = Duration::from_millis(20);
+
+/// Where the sensor has to go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Waiting {
+    /// Where the handle should rest, m.
+    pub target_m: f64,
+    /// Where it is, m.
+    pub height_m: f64,
+    /// Upward force on the handle, N.
+    pub command_n: f64,
+}
+
+/// A device in the rig.
+pub struct DeviceRig<W> {
+    /// Nothing while it is held, and after it was lost.
+    opened: Option<OpenedDevice>,
+    holder: Option<Holder>,
+    /// Most vertical force the device takes, N.
+    most_n: f64,
+    stop: StopSwitch,
+    sensor: ForceSensor,
+    /// How often the handle was found restless before it came to the rest that is being measured.
+    restless: u64,
+    serial: String,
+    /// How far from its target a stop may be, m.
+    close_m: f64,
+    patience: Duration,
+    waiting: W,
+}
+
+impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
+    /// Opens the device. A stop counts if the handle rests within `close_m` of where it should, within `patience`;
+    /// until then `waiting` is told where it is, and then told nothing, once. When it breaks off, the handle is let down;
+    /// at the emergency stop of `stop` the device is stopped.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] if the device refuses.
+    pub fn open(
+        plugin: &Plugin,
+        settings: &[Setting],
+        sensor: ForceSensor,
+        close_m: f64,
+        patience: Duration,
+        stop: StopSwitch,
+        waiting: W,
+    ) -> Result<Self, CalibrationError> {
+        let mut opened = plugin.open_device(settings)?;
+        let serial = opened.serial();
+        let [_, _, most_n] = opened.capabilities().map_err(CalibrationError::Refused)?.max_force_n;
+        Ok(Self {
+            opened: Some(opened),
+            holder: None,
+            most_n,
+            stop,
+            sensor,
+            restless: 0,
+            serial,
+            close_m,
+            patience,
+            waiting,
+        })
+    }
+
+    /// Serial number of the device.
+    #[must_use]
+    pub fn serial(&self) -> &str {
+        &self.serial
+    }
+
+    /// Corrects the force by this from now on. The handle is let down before.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] if the device cannot be calibrated, or was lost.
+    pub fn calibrate(&mut self, calibration: &VerticalCalibration) -> Result<(), CalibrationError> {
+        if let Some(holder) = self.holder.take() {
+            self.opened = holder.end();
+        }
+        let opened = self.opened.as_mut().ok_or_else(lost)?;
+        opened.calibrate_vertical(calibration).map_err(CalibrationError::Refused)
+    }
+
+    fn tell(&mut self, waiting: Option<Waiting>) -> Result<(), CalibrationError> {
+        match (self.waiting)(waiting) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(CalibrationError::BrokenOff),
+        }
+    }
+
+    fn holder(&mut self) -> Result<&mut Holder, CalibrationError> {
+        if let (None, Some(mut opened)) = (&self.holder, self.opened.take()) {
+            let config = LoopConfig { period_ns: PERIOD_NS, seed: 0 };
+            let capabilities = opened.capabilities().map_err(CalibrationError::Refused)?;
+            let envelope = Envelope::new(&Limits::default(), &without_wall(), &capabilities, PERIOD_NS);
+            let guard = Guard { envelope, stopper: opened.stopper(), stop: self.stop.clone() };
+            let active = opened.activate(&config).map_err(|(opened, refusal)| {
+                self.opened = Some(opened);
+                CalibrationError::Refused(refusal)
+            })?;
+            self.holder = Some(Holder::start(active, guard).map_err(CalibrationError::NoThread)?);
+        }
+        self.holder.as_mut().ok_or_else(lost)
+    }
+}
+
+/// What the handle rests against is the sensor; a wall would push beside it.
+fn without_wall() -> Boundary {
+    Boundary {
+        stiffness_n_per_m: 0.0,
+        damping_ns_per_m: 0.0,
+        stiffness_nm_per_rad: 0.0,
+        damping_nms_per_rad: 0.0,
+        ..Boundary::default()
+    }
+}
+
+fn lost() -> CalibrationError {
+    CalibrationError::Refused(Refusal::resource("it was lost; plug it in and begin again"))
+}
+
+impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {
+    fn rest_at(&mut self, target_m: f64, command_n: &dyn Fn(f64) -> f64) -> Result<Rest, CalibrationError> {
+        let (close_m, until, command_n) = (self.close_m, Instant::now() + self.patience, command_n(target_m));
+        if command_n > self.most_n {
+            return Err(CalibrationError::TooStrong { command_n, most_n: self.most_n });
+        }
+        self.holder()?.push(command_n);
+        loop {
+            let report = self.holder()?.look()?;
+            let is_close = (report.height_m - target_m).abs() <= close_m;
+            if report.state == Holding::Steady(command_n) && is_close && report.moved_m <= REST_M {
+                self.tell(None)?;
+                self.restless = report.restless;
+                return Ok(Rest { height_m: report.height_m, delivered_n: report.delivered_n });
+            }
+            if Instant::now() > until {
+                let (target_mm, height_mm) = (target_m * 1.0e3, report.height_m * 1.0e3);
+                return Err(CalibrationError::NotReached { target_mm, height_mm });
+            }
+            self.tell(Some(Waiting { target_m, height_m: report.height_m, command_n }))?;
+            std::thread::sleep(LOOK_AGAIN);
+        }
+    }
+
+    fn still_rests(&mut self, rest: &Rest) -> Result<bool, CalibrationError> {
+        // What the handle did while the last reading was taken is in the mean that has begun, or in the next.
+        let (from, until) = (self.holder()?.look()?.means, Instant::now() + self.patience);
+        loop {
+            let report = self.holder()?.look()?;
+            if report.means >= from + 2 {
+                let is_there = (report.height_m - rest.height_m).abs() <= REST_M;
+                return Ok(is_there && report.restless == self.restless);
+            }
+            if Instant::now() > until {
+                return Err(CalibrationError::Fault(Fault::Timeout));
+            }
+            std::thread::sleep(LOOK_AGAIN);
+        }
+    }
+
+    fn read_force_n(&mut self, _: &Rest) -> Result<f64, CalibrationError> {
+        // Read while the handle is held: a fault in between says more than a strange force.
+        self.holder()?.look()?;
+        self.sensor.read_n()
+    }
+}

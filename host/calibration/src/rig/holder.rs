@@ -1,0 +1,339 @@
+//! A thread that holds a levitating handle in the rig: every axis but the vertical locked, and along that a force.
+//!
+//! It goes on whatever the procedure does in the meantime: a device that is not spoken to lets go. Nothing in a tick
+//! allocates or waits for anybody. As in a run, nothing reaches the device but through the envelope, a watchdog stops a
+//! device that does not come back, and the emergency stop is for both.
+
+use super::{AVERAGED_TICKS, Mean, PERIOD_NS, locked};
+use crate::CalibrationError;
+use flotor_core::trace::Events;
+use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
+use flotor_hal::{Cycle, DeviceState, Fault, Tick};
+use flotor_servo::{Envelope, Gate, Heartbeat, Place, StopSwitch, enter_real_time, start_watchdog};
+use flotor_sync::{Observer, Publisher, Words, latest};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Fastest change of the vertical force, N a tick: from nothing to 12 N in half a second.
+const RAMP_STEP_N: f64 = 0.024;
+/// A handle that moves faster is not held by a sensor, m/s: a hand's breadth per second.
+const RUNAWAY_M_PER_S: f64 = 0.1;
+/// Height of two means after each other that is the same height, m: what the device resolves (5 to 10 µm; Varadharajan
+/// 2007, section 2.2).
+pub(super) const REST_M: f64 = 10.0e-6;
+/// Delivered force of two means after each other that is the same force, N: the noise of the sensor. A single tick without
+/// the force, as a host that was held up makes, is five times that.
+const STEADY_N: f64 = 0.02;
+/// Damping that stops it, N·s/m (the locked axes').
+const BRAKE_NS_PER_M: f64 = 15.0;
+/// Ticks without a new sample after which there is no force: nobody knows where the handle is (10 ms, as in a run).
+const STALE_TICKS_LIMIT: u32 = 10;
+/// Time after which a device that does not come back is stopped, ns. No hand is held here: longer than in a run, so that a
+/// machine with other work does not end a calibration of an hour.
+const WATCHDOG_NS: u64 = 500_000_000;
+/// How often it is looked whether the thread is at its end.
+const LOOK_FOR_END: Duration = Duration::from_millis(1);
+
+/// What the thread is told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Order {
+    /// Push up with so many N.
+    Push(f64),
+    /// Let the force go, and end.
+    End,
+}
+
+const ORDER_WORDS: usize = 2;
+
+impl Words<ORDER_WORDS> for Order {
+    fn to_words(&self) -> [u64; ORDER_WORDS] {
+        match self {
+            Self::Push(force_n) => [0, force_n.to_bits()],
+            Self::End => [1, 0],
+        }
+    }
+
+    fn from_words(&[kind, force_bits]: &[u64; ORDER_WORDS]) -> Self {
+        if kind == 0 { Self::Push(f64::from_bits(force_bits)) } else { Self::End }
+    }
+}
+
+/// How the handle is doing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Report {
+    pub(super) state: Holding,
+    /// Height, mean of the last ticks, m.
+    pub(super) height_m: f64,
+    /// Difference of that to the mean before, m.
+    pub(super) moved_m: f64,
+    /// Vertical force the device says it delivers, likewise a mean, N.
+    pub(super) delivered_n: f64,
+    /// How often a mean was complete so far.
+    pub(super) means: u64,
+    /// How many of them were of another height or force than the one before.
+    pub(super) restless: u64,
+}
+
+const REPORT_WORDS: usize = 7;
+
+impl Words<REPORT_WORDS> for Report {
+    fn to_words(&self) -> [u64; REPORT_WORDS] {
+        let (kind, detail) = match self.state {
+            Holding::Changing => (0, 0),
+            Holding::Steady(force_n) => (1, force_n.to_bits()),
+            Holding::RanAway => (2, 0),
+            Holding::Faulted(fault) => (3, u64::from(fault as u32)),
+        };
+        let [height, moved, delivered] = [self.height_m, self.moved_m, self.delivered_n].map(f64::to_bits);
+        [kind, detail, height, moved, delivered, self.means, self.restless]
+    }
+
+    fn from_words(&[kind, detail, height, moved, delivered, means, restless]: &[u64; REPORT_WORDS]) -> Self {
+        let state = match kind {
+            0 => Holding::Changing,
+            1 => Holding::Steady(f64::from_bits(detail)),
+            2 => Holding::RanAway,
+            _ => {
+                let code = u32::try_from(detail).unwrap_or(u32::MAX);
+                Holding::Faulted(Fault::from_code(code).unwrap_or(Fault::Broken))
+            }
+        };
+        let [height_m, moved_m, delivered_n] = [height, moved, delivered].map(f64::from_bits);
+        Self { state, height_m, moved_m, delivered_n, means, restless }
+    }
+}
+
+/// What the thread is at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Holding {
+    /// The force is on its way to what was ordered, or was until just now.
+    Changing,
+    /// It has been this many N for a while.
+    Steady(f64),
+    /// The handle flew off and is braked, without force.
+    RanAway,
+    /// The device faulted.
+    Faulted(Fault),
+}
+
+/// What stands between the thread and the device, and who may stop both.
+pub(super) struct Guard {
+    pub(super) envelope: Envelope,
+    pub(super) stopper: Stopper,
+    pub(super) stop: StopSwitch,
+}
+
+/// The handle in the hands of the thread.
+pub(super) struct Holder {
+    orders: Publisher<Order, ORDER_WORDS>,
+    reports: Observer<Report, REPORT_WORDS>,
+    heart: Heartbeat,
+    thread: Option<JoinHandle<ActiveDevice>>,
+}
+
+impl Holder {
+    /// Starts holding, without vertical force. Not real-time.
+    ///
+    /// # Errors
+    /// What the system says about another thread.
+    pub(super) fn start(device: ActiveDevice, guard: Guard) -> std::io::Result<Self> {
+        let (orders, ordered) = latest(Order::Push(0.0));
+        let (publisher, reports) = latest(Averages::default().report(Holding::Changing));
+        let Guard { envelope, stopper, stop } = guard;
+        let heart = Heartbeat::default();
+        start_watchdog(heart.clone(), vec![stopper], stop.clone(), WATCHDOG_NS)?;
+        let thread_heart = heart.clone();
+        let hold = move || {
+            let device = hold(device, envelope, &thread_heart, &stop, &ordered, publisher);
+            thread_heart.finish();
+            device
+        };
+        let thread = std::thread::Builder::new().name("flotor-rig".to_owned()).spawn(hold)?;
+        Ok(Self { orders, reports, heart, thread: Some(thread) })
+    }
+
+    /// Pushes up with so many N from now on.
+    pub(super) fn push(&mut self, force_n: f64) {
+        self.orders.publish(&Order::Push(force_n));
+    }
+
+    /// How the handle is doing.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] if it is not held any more.
+    pub(super) fn look(&self) -> Result<Report, CalibrationError> {
+        let report = loop {
+            // A publish takes nanoseconds.
+            if let Some((_, report)) = self.reports.read() {
+                break report;
+            }
+        };
+        if self.heart.bitten().is_some() {
+            return Err(CalibrationError::Fault(Fault::Timeout));
+        }
+        match report.state {
+            Holding::Faulted(fault) => Err(CalibrationError::Fault(fault)),
+            Holding::RanAway => Err(CalibrationError::RanAway { height_mm: report.height_m * 1.0e3 }),
+            Holding::Changing | Holding::Steady(_) => Ok(report),
+        }
+    }
+
+    /// Lets the force go and the device land; the device, unless it has to be opened anew.
+    pub(super) fn end(mut self) -> Option<OpenedDevice> {
+        self.stop().and_then(ActiveDevice::deactivate)
+    }
+
+    fn stop(&mut self) -> Option<ActiveDevice> {
+        self.orders.publish(&Order::End);
+        let thread = self.thread.take()?;
+        while !thread.is_finished() {
+            // Stuck in the device, which the watchdog has stopped: it has to be left behind.
+            if self.heart.bitten().is_some() {
+                return None;
+            }
+            std::thread::sleep(LOOK_FOR_END);
+        }
+        thread.join().ok()
+    }
+}
+
+/// However the procedure ends, the handle is let down.
+impl Drop for Holder {
+    fn drop(&mut self) {
+        let _ = self.stop().and_then(ActiveDevice::deactivate);
+    }
+}
+
+fn hold(
+    mut device: ActiveDevice,
+    mut envelope: Envelope,
+    heart: &Heartbeat,
+    stop: &StopSwitch,
+    orders: &Observer<Order, ORDER_WORDS>,
+    mut reports: Publisher<Report, REPORT_WORDS>,
+) -> ActiveDevice {
+    // Refused, it holds all the same: a tick that comes too late shows in the force that was delivered.
+    let _ = enter_real_time(None);
+    let period = Duration::from_nanos(PERIOD_NS);
+    let started = Instant::now();
+    let mut order = Order::Push(0.0);
+    let (mut pushed_n, mut ran_away) = (0.0_f64, false);
+    let mut state = DeviceState::HOME;
+    let mut averages = Averages::default();
+    let mut last_ns = 0;
+    let mut stale_ticks = 0_u32;
+    for index in 0.. {
+        #[allow(clippy::cast_possible_truncation)] // five hundred years
+        let time_ns = started.elapsed().as_nanos() as u64;
+        let tick = Tick { index, time_ns, dt_ns: time_ns - last_ns };
+        last_ns = time_ns;
+        if let Some((_, newest)) = orders.read() {
+            order = newest;
+        }
+        let ordered_n = if let Order::Push(force_n) = order { force_n } else { 0.0 };
+        let left_n = ordered_n - pushed_n;
+        if left_n != 0.0 {
+            // The last step is what is left, so that it ends at what was ordered to the bit.
+            pushed_n = if left_n.abs() <= RAMP_STEP_N {
+                ordered_n
+            } else {
+                pushed_n + RAMP_STEP_N * left_n.signum()
+            };
+            averages.begin_anew();
+        }
+        heart.enter(index, Place::DeviceRead(0));
+        let read = device.read(&tick, &mut state);
+        stale_ticks = if read == Cycle::Fresh { 0 } else { stale_ticks.saturating_add(1) };
+        let gate = if stale_ticks > STALE_TICKS_LIMIT { Gate::SHUT } else { Gate::OPEN };
+        if gate == Gate::SHUT {
+            averages.begin_anew();
+        }
+        if read == Cycle::Fresh {
+            averages.add(state.pose.position().z, state.delivered.force().z);
+        }
+        let speed_m_per_s = state.twist.linear().z;
+        ran_away |= speed_m_per_s.abs() > RUNAWAY_M_PER_S;
+        let vertical_n = if ran_away { -BRAKE_NS_PER_M * speed_m_per_s } else { pushed_n };
+        let (asked, mut events) = (locked(&state, vertical_n), Events::NONE);
+        let commanded = envelope.apply(&asked, gate, &state, &tick, &mut events);
+        heart.enter(index, Place::DeviceWrite(0));
+        let written = device.write(&tick, &commanded);
+        heart.enter(index, Place::Waiting);
+        let faulted = [read, written].into_iter().find_map(|cycle| match cycle {
+            Cycle::Fault(fault) => Some(fault),
+            Cycle::Fresh | Cycle::Stale => None,
+        });
+        // The watchdog has told the device by now, or will within a millisecond.
+        let fault = faulted.or(stop.emergency().map(|_| Fault::EmergencyStop));
+        let doing = match fault {
+            Some(fault) => Holding::Faulted(fault),
+            None if ran_away => Holding::RanAway,
+            None if averages.are_full() => Holding::Steady(pushed_n),
+            None => Holding::Changing,
+        };
+        reports.publish(&averages.report(doing));
+        let is_let_go = order == Order::End && (pushed_n == 0.0 || ran_away);
+        if fault.is_some() || is_let_go {
+            break;
+        }
+        // Late ticks are skipped: there is nothing to catch up with.
+        let next = u32::try_from(time_ns / PERIOD_NS + 1).unwrap_or(u32::MAX);
+        std::thread::sleep((started + period * next).saturating_duration_since(Instant::now()));
+    }
+    device
+}
+
+/// Two means, one after the other: what both agree on is at rest.
+#[derive(Default)]
+struct Averages {
+    /// The last full one, and the one before; nothing until there are two.
+    full: Option<[(f64, f64); 2]>,
+    last: Option<(f64, f64)>,
+    height_m: Mean,
+    delivered_n: Mean,
+    samples: u64,
+    means: u64,
+    restless: u64,
+}
+
+impl Averages {
+    /// Forgets what was measured under another force.
+    fn begin_anew(&mut self) {
+        *self = Self { means: self.means, restless: self.restless, ..Self::default() };
+    }
+
+    fn are_full(&self) -> bool {
+        self.full.is_some()
+    }
+
+    fn add(&mut self, height_m: f64, delivered_n: f64) {
+        self.height_m.add(height_m);
+        self.delivered_n.add(delivered_n);
+        self.samples += 1;
+        if self.samples == AVERAGED_TICKS {
+            let mean = (self.height_m.value(), self.delivered_n.value());
+            self.full = self.last.map(|last| [mean, last]);
+            self.last = Some(mean);
+            (self.height_m, self.delivered_n, self.samples) = (Mean::default(), Mean::default(), 0);
+            self.means += 1;
+            let is_at_rest = self.full.is_some_and(|[(height_m, delivered_n), (before_m, before_n)]| {
+                (height_m - before_m).abs() <= REST_M && (delivered_n - before_n).abs() <= STEADY_N
+            });
+            self.restless += u64::from(!is_at_rest);
+        }
+    }
+
+    fn report(&self, state: Holding) -> Report {
+        let (means, restless) = (self.means, self.restless);
+        match self.full {
+            Some([(height_m, delivered_n), (before_m, _)]) => {
+                let moved_m = (height_m - before_m).abs();
+                Report { state, height_m, moved_m, delivered_n, means, restless }
+            }
+            None => {
+                let (height_m, moved_m) = (self.height_m.value(), f64::INFINITY);
+                Report { state, height_m, moved_m, delivered_n: 0.0, means, restless }
+            }
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! The simulated flotor under a simulated sensor.
+
+use super::{AVERAGED_TICKS, Mean, PERIOD_NS, Rest, Rig, locked};
+use crate::CalibrationError;
+use crate::emulated_sensor::EmulatedSensor;
+use crate::sensor::ForceSensor;
+use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting};
+use flotor_hal::{Cycle, DeviceState, LoopConfig, Refusal, Tick, VerticalCalibration};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use std::f64::consts::TAU;
+
+/// Weight of flotor, plates, screws and bolts in the report's rig, N (Varadharajan 2007, section 3.4).
+pub const RIG_WEIGHT_N: f64 = 8.58;
+/// Noise of the force sensor, N, root mean square.
+pub const SENSOR_NOISE_N: f64 = 0.02;
+
+/// Standard gravity, m/s² (ISO 80000-3).
+const GRAVITY_M_PER_S2: f64 = 9.806_65;
+/// Time the handle is given to come to rest, ticks. The slowest motion of the rig falls to 1/e within 10 of them.
+const SETTLE_TICKS: u64 = 200;
+/// The stand of the sensor, as the simulated hand: stiff and damped, N/m and N s/m.
+const STAND_STIFFNESS_N_PER_M: f64 = 20_000.0;
+const STAND_DAMPING_NS_PER_M: f64 = 250.0;
+/// More than this between two halves of the average is motion, m: twenty times the noise.
+const REST_M: f64 = 4.0e-6;
+/// How often the sensor is moved until the handle is where it should be, and how close that is, m.
+const ADJUSTMENTS: u32 = 3;
+const CLOSE_M: f64 = 2.0e-6;
+
+/// The simulated flotor under a simulated sensor. Its uneven field is reached as on any device: through the
+/// contract; its sensor as any sensor: over a serial line.
+pub struct SimulatedRig {
+    plugin: Plugin,
+    sensor_plugin: Plugin,
+    /// What the handle presses against, and the line it is read by; there from the first reading on.
+    sensor: Option<(EmulatedSensor, ForceSensor)>,
+    calibration: Option<VerticalCalibration>,
+    noise: Pcg64Mcg,
+    seed: u64,
+    /// Rests so far: each has noise of its own.
+    rests: u64,
+}
+
+impl SimulatedRig {
+    /// A rig around the plugin `simulated`, read by that of sensors on a serial line.
+    #[must_use]
+    pub fn new(plugin: Plugin, sensor_plugin: Plugin, seed: u64) -> Self {
+        let noise = Pcg64Mcg::seed_from_u64(seed);
+        Self { plugin, sensor_plugin, sensor: None, calibration: None, noise, seed, rests: 0 }
+    }
+
+    /// What the device corrects its force by from now on.
+    pub fn calibrate(&mut self, calibration: Option<VerticalCalibration>) {
+        self.calibration = calibration;
+    }
+
+    /// Serial number of the device.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] if it cannot be opened.
+    pub fn serial(&mut self) -> Result<String, CalibrationError> {
+        Ok(self.plugin.open_device(&self.settings(0.0)?)?.serial())
+    }
+
+    /// The flotor in the rig, with the sensor at a height. Gravity is compensated by nothing but the command.
+    fn settings(&self, sensor_m: f64) -> Result<Vec<Setting>, CalibrationError> {
+        let schema = self.plugin.parameters();
+        let settings = [
+            Setting::parse(schema, "preset", "full"),
+            Setting::parse(schema, "hand", "hold"),
+            Setting::number(schema, "mass_kg", RIG_WEIGHT_N / GRAVITY_M_PER_S2),
+            Setting::number(schema, "gravity_m_per_s2", GRAVITY_M_PER_S2),
+            Setting::number(schema, "feedforward_n", 0.0),
+            Setting::number(schema, "hand_mass_kg", 0.0),
+            Setting::number(schema, "hand_stiffness_n_per_m", STAND_STIFFNESS_N_PER_M),
+            Setting::number(schema, "hand_damping_ns_per_m", STAND_DAMPING_NS_PER_M),
+            Setting::number(schema, "hand_depth_mm", -sensor_m * 1.0e3),
+            Setting::number(schema, "start_z_mm", sensor_m * 1.0e3),
+        ];
+        Ok(settings.into_iter().collect::<Result<Vec<_>, _>>()?)
+    }
+
+    fn activate(&mut self, sensor_m: f64) -> Result<ActiveDevice, CalibrationError> {
+        let mut device = self.plugin.open_device(&self.settings(sensor_m)?)?;
+        if let Some(calibration) = &self.calibration {
+            device.calibrate_vertical(calibration).map_err(CalibrationError::Refused)?;
+        }
+        self.rests += 1;
+        let config = LoopConfig { period_ns: PERIOD_NS, seed: self.seed.wrapping_add(self.rests) };
+        device.activate(&config).map_err(|(_, refusal): (_, Refusal)| CalibrationError::Refused(refusal))
+    }
+
+    /// Lets the handle come to rest under a sensor at `sensor_m`.
+    fn settle(&mut self, sensor_m: f64, command_n: &dyn Fn(f64) -> f64) -> Result<Rest, CalibrationError> {
+        let mut device = self.activate(sensor_m)?;
+        let mut state = DeviceState::HOME;
+        let (mut first, mut second, mut delivered_n) = (Mean::default(), Mean::default(), Mean::default());
+        for index in 0..SETTLE_TICKS + AVERAGED_TICKS {
+            let dt_ns = if index == 0 { 0 } else { PERIOD_NS };
+            let tick = Tick { index, time_ns: index * PERIOD_NS, dt_ns };
+            if let Cycle::Fault(fault) = device.read(&tick, &mut state) {
+                return Err(CalibrationError::Fault(fault));
+            }
+            let height_m = state.pose.position().z;
+            if index >= SETTLE_TICKS {
+                let half = if index < SETTLE_TICKS + AVERAGED_TICKS / 2 { &mut first } else { &mut second };
+                half.add(height_m);
+                delivered_n.add(state.delivered.force().z);
+            }
+            if let Cycle::Fault(fault) = device.write(&tick, &locked(&state, command_n(height_m))) {
+                return Err(CalibrationError::Fault(fault));
+            }
+        }
+        let height_m = 0.5 * (first.value() + second.value());
+        let moved_m = (first.value() - second.value()).abs();
+        if moved_m > REST_M {
+            return Err(CalibrationError::Restless {
+                height_mm: height_m * 1.0e3,
+                moved_um: moved_m * 1.0e6,
+            });
+        }
+        Ok(Rest { height_m, delivered_n: delivered_n.value() })
+    }
+}
+
+impl Rig for SimulatedRig {
+    fn rest_at(&mut self, target_m: f64, command_n: &dyn Fn(f64) -> f64) -> Result<Rest, CalibrationError> {
+        let mut sensor_m = target_m;
+        let mut rest = self.settle(sensor_m, command_n)?;
+        // The stand gives way a little: it is moved until the handle is where it should be.
+        for _ in 0..ADJUSTMENTS {
+            let off_m = target_m - rest.height_m;
+            if off_m.abs() <= CLOSE_M {
+                break;
+            }
+            sensor_m += off_m;
+            rest = self.settle(sensor_m, command_n)?;
+        }
+        Ok(rest)
+    }
+
+    fn read_force_n(&mut self, rest: &Rest) -> Result<f64, CalibrationError> {
+        // At rest the sensor holds up what is delivered beyond the weight.
+        let true_n = rest.delivered_n - RIG_WEIGHT_N;
+        // Box and Muller 1958; 1 - u is never zero.
+        let [u, v] = [(); 2].map(|()| (self.noise.next_u64() >> 11) as f64 / (1_u64 << 53) as f64);
+        let noisy_n = true_n + SENSOR_NOISE_N * (-2.0 * (1.0 - u).ln()).sqrt() * (TAU * v).cos();
+        let (pressed, line) = match &mut self.sensor {
+            Some(sensor) => sensor,
+            none => {
+                let emulated = EmulatedSensor::start().map_err(CalibrationError::NoTerminal)?;
+                let line = ForceSensor::open(&self.sensor_plugin, emulated.port())?;
+                none.insert((emulated, line))
+            }
+        };
+        pressed.press(noisy_n);
+        line.read_n()
+    }
+}

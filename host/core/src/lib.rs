@@ -1,0 +1,26 @@
+//! Plain data and maths of a run: what servo, recording and observers share, without any of them.
+//!
+//! - [`trace`]: what a tick leaves behind.
+//! - [`mapping`]: between the device frame and a model's frame.
+//! - [`limits`]: limits of force and motion, the wall at the end of a device's range.
+//! - [`coupling`]: two devices held together; [`peer`]: what the two ends tell each other.
+//! - [`Change`]: a parameter that changed while the loop ran.
+//!
+//! Nothing here reads files, starts threads or talks to the system.
+#![forbid(unsafe_code)]
+
+mod change;
+mod clock;
+pub mod coupling;
+pub mod limits;
+pub mod mapping;
+pub mod peer;
+mod random;
+pub mod trace;
+
+pub use change::{Change, ChangeOutcome, ChangeSubject};
+pub use clock::Clock;
+pub use random::Random;
+
+/// Devices of a run at most.
+pub const MOST_DEVICES: u16 = 8;

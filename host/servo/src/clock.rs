@@ -1,0 +1,319 @@
+//! When ticks happen: on the machine's clock at absolute deadlines, or on a virtual clock without waiting.
+//!
+//! The schedule is the same for both: tick `k` belongs to time `k T`, and a tick whose whole period has
+//! passed is missed, counted and skipped, never caught up in a burst.
+
+pub use flotor_core::Clock;
+use flotor_hal::{SampleWait, Tick};
+use rustix::thread::{ClockId, clock_nanosleep_absolute};
+use rustix::time::{Timespec, clock_gettime};
+
+/// The final stretch before a deadline, which is spun and not slept: a sleeping thread wakes late.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SpinWindow {
+    /// Length of the stretch, ns.
+    pub spin_ns: u64,
+}
+
+impl SpinWindow {
+    /// Sleeps measured to find the window.
+    const SAMPLES: usize = 64;
+    /// Length of a measured sleep, ns: long enough for the core to go idle, as between ticks.
+    const SAMPLE_SLEEP_NS: u64 = 400_000;
+    /// Narrowest and widest window, ns: below, the spin could not absorb anything; above, it would burn the core.
+    const BOUNDS_NS: [u64; 2] = [20_000, 250_000];
+
+    /// Measures how late this thread wakes and takes the lateness of 19 in 20 wake-ups, plus a quarter; at most
+    /// half the period. Not real-time: some 30 ms. Call it on the loop's own thread, with its priority.
+    #[must_use]
+    pub fn measure(period_ns: u64) -> Self {
+        let mut lateness_ns = [0; Self::SAMPLES];
+        for sample in &mut lateness_ns {
+            let deadline = monotonic_ns() + Self::SAMPLE_SLEEP_NS;
+            sleep_until(deadline);
+            *sample = monotonic_ns().saturating_sub(deadline);
+        }
+        lateness_ns.sort_unstable();
+        let usual_ns = lateness_ns.get(Self::SAMPLES * 19 / 20).copied().unwrap_or_default();
+        let [narrowest, widest] = Self::BOUNDS_NS;
+        let spin_ns = (usual_ns + usual_ns / 4).clamp(narrowest, widest).min(period_ns / 2);
+        Self { spin_ns }
+    }
+}
+
+/// Nanoseconds of the monotonic clock. Real-time: bounded, no allocation (a vDSO call).
+#[inline]
+#[must_use]
+#[allow(clippy::cast_sign_loss)] // the monotonic clock starts at boot
+pub fn monotonic_ns() -> u64 {
+    let now = clock_gettime(ClockId::Monotonic);
+    now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
+}
+
+/// Gives one tick after the other, each when it is due.
+pub struct Schedule {
+    pace: Pace,
+    period_ns: u64,
+    start_ns: u64,
+    /// Number of periods since the start that the next tick belongs to.
+    slot: u64,
+    next_index: u64,
+    last_slot: u64,
+}
+
+/// What ticks wait for.
+enum Pace {
+    /// Nothing.
+    Virtual,
+    /// A deadline on the machine's clock.
+    Clock(SpinWindow),
+    /// The device's next sample; the last one came at this time.
+    Device { last_ns: u64 },
+}
+
+/// A tick that is due, and how the machine kept to it.
+#[derive(Debug)]
+pub struct Due {
+    pub tick: Tick,
+    /// How long after its deadline it starts, ns; on the virtual clock nothing is ever late.
+    pub lateness_ns: Option<u64>,
+    /// Ticks skipped just before it.
+    pub missed: u64,
+}
+
+/// Why there is no next tick on a device's pace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PaceLost {
+    /// It does not set the pace after all.
+    NotPaced,
+    /// Samples come faster than the loop counts time: every limit per time would be one too high.
+    TooFast {
+        /// So many so far.
+        samples: u64,
+        /// Since the start, ns.
+        elapsed_ns: u64,
+    },
+}
+
+/// How far the samples of a device that sets the pace may run ahead of the machine's clock, ns: what it may have kept for the
+/// loop before the start, or while that was held up.
+const AHEAD_NS: u64 = 250_000_000;
+/// And by which part of the time since the start: one in so many, 2 %. Two oscillators differ by far less.
+const AHEAD_SHARE: u64 = 50;
+
+/// How a wait ended on the machine's clock.
+#[derive(Clone, Copy)]
+struct Woken {
+    /// After the deadline of the first period that has not passed.
+    late_ns: u64,
+    /// Whole periods that passed before it, or samples nobody read.
+    missed: u64,
+}
+
+impl Schedule {
+    /// A schedule on the machine's clock, whose first tick is due one period from now.
+    pub fn start_real(period_ns: u64, window: SpinWindow) -> Self {
+        Self::start(Pace::Clock(window), period_ns, monotonic_ns() + period_ns)
+    }
+
+    /// A schedule without waiting, whose first tick is at time 0.
+    pub fn start_virtual(period_ns: u64) -> Self {
+        Self::start(Pace::Virtual, period_ns, 0)
+    }
+
+    /// A schedule of a device's samples; the first is expected one period from now.
+    pub fn start_paced(period_ns: u64) -> Self {
+        let now_ns = monotonic_ns();
+        Self::start(Pace::Device { last_ns: now_ns }, period_ns, now_ns)
+    }
+
+    fn start(pace: Pace, period_ns: u64, start_ns: u64) -> Self {
+        Self { pace, period_ns, start_ns, slot: 0, next_index: 0, last_slot: 0 }
+    }
+
+    /// Waits for the next tick; `wait_for_sample` is how to wait for a device, for so many ns at most, if it is the
+    /// device that sets the pace. Real-time: sleeps, then spins; no allocation.
+    ///
+    /// # Errors
+    /// [`PaceLost`] if it turns out not to set it, or another one.
+    pub fn wait(&mut self, wait_for_sample: impl FnOnce(u64) -> SampleWait) -> Result<Due, PaceLost> {
+        let woken = match self.pace {
+            Pace::Virtual => None,
+            Pace::Clock(window) => Some(self.wait_for_deadline(window)),
+            Pace::Device { last_ns } => {
+                let waited = wait_for_sample(Self::PATIENCE_PERIODS * self.period_ns);
+                Some(self.follow(last_ns, waited)?)
+            }
+        };
+        let missed = woken.map_or(0, |woken| woken.missed);
+        self.slot += missed;
+        let tick = Tick {
+            index: self.next_index,
+            time_ns: self.slot * self.period_ns,
+            dt_ns: (self.slot - self.last_slot) * self.period_ns,
+        };
+        self.last_slot = self.slot;
+        self.slot += 1;
+        self.next_index += 1;
+        Ok(Due { tick, lateness_ns: woken.map(|woken| woken.late_ns), missed })
+    }
+
+    /// How long a tick waits for a sample. After that it runs without one: force has to fade out even if the device
+    /// has nothing more to say.
+    const PATIENCE_PERIODS: u64 = 2;
+
+    /// Waits for the deadline of a tick on the machine's clock.
+    fn wait_for_deadline(&mut self, window: SpinWindow) -> Woken {
+        let deadline = self.start_ns + self.slot * self.period_ns;
+        let mut now = monotonic_ns();
+        if now + window.spin_ns < deadline {
+            sleep_until(deadline - window.spin_ns);
+            now = monotonic_ns();
+        }
+        while now < deadline {
+            std::hint::spin_loop();
+            now = monotonic_ns();
+        }
+        let late = now - deadline;
+        // Whole periods that have passed belong to ticks that nobody can use any more.
+        let missed = late / self.period_ns;
+        Woken { late_ns: late - missed * self.period_ns, missed }
+    }
+
+    /// A tick that a sample began, or that waited for one in vain.
+    fn follow(&mut self, last_ns: u64, waited: SampleWait) -> Result<Woken, PaceLost> {
+        let periods = match waited {
+            SampleWait::NotPaced => return Err(PaceLost::NotPaced),
+            SampleWait::Arrived { samples } => samples.max(1),
+            SampleWait::TimedOut => {
+                // A device that gives up at once must not make the loop spin.
+                sleep_until(last_ns + self.period_ns);
+                ((monotonic_ns() - last_ns) / self.period_ns).max(1)
+            }
+        };
+        let now_ns = monotonic_ns();
+        self.pace = Pace::Device { last_ns: now_ns };
+        let elapsed_ns = now_ns.saturating_sub(self.start_ns);
+        if self.next_time_ns() > elapsed_ns + elapsed_ns / AHEAD_SHARE + AHEAD_NS {
+            return Err(PaceLost::TooFast { samples: self.slot, elapsed_ns });
+        }
+        let late_ns = now_ns.saturating_sub(last_ns + periods * self.period_ns);
+        Ok(Woken { late_ns, missed: periods - 1 })
+    }
+
+    /// Waits for the end of the last tick's period; time since the start, ns. As for a tick, whole periods in which the loop was
+    /// held up count as passed over: the run was over before them.
+    pub fn finish(mut self) -> u64 {
+        match self.pace {
+            Pace::Virtual => self.next_time_ns(),
+            Pace::Clock(window) => self.next_time_ns() + self.wait_for_deadline(window).late_ns,
+            Pace::Device { .. } => monotonic_ns() - self.start_ns,
+        }
+    }
+
+    /// Number of the next tick, from 0 and without a gap.
+    pub fn next_index(&self) -> u64 {
+        self.next_index
+    }
+
+    /// Scheduled time of the next tick, ns.
+    pub fn next_time_ns(&self) -> u64 {
+        self.slot * self.period_ns
+    }
+}
+
+/// Sleeps until a time of the monotonic clock. Real-time: one system call.
+#[allow(clippy::cast_possible_wrap)] // seconds since boot
+pub fn sleep_until(deadline_ns: u64) {
+    let request = Timespec {
+        tv_sec: (deadline_ns / 1_000_000_000) as i64,
+        tv_nsec: (deadline_ns % 1_000_000_000) as i64,
+    };
+    // An interrupted sleep is as good as a short one: the spin afterwards looks at the clock.
+    let _ = clock_nanosleep_absolute(ClockId::Monotonic, &request);
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::disallowed_methods)] // a test may sleep and look at another clock
+    use super::*;
+
+    /// What a schedule does not ask for on a clock.
+    fn no_device(_: u64) -> SampleWait {
+        panic!("nobody is to be waited for")
+    }
+
+    fn wait(schedule: &mut Schedule) -> Due {
+        schedule.wait(no_device).expect("a tick is due")
+    }
+
+    #[test]
+    fn a_device_that_paces_gives_the_ticks_and_samples_nobody_read_are_missed() {
+        let mut schedule = Schedule::start_paced(1_000_000);
+        let mut next = |samples| schedule.wait(|_| SampleWait::Arrived { samples }).expect("a sample came");
+        assert_eq!(next(1).tick, Tick { index: 0, time_ns: 0, dt_ns: 0 });
+        assert_eq!(next(1).tick, Tick { index: 1, time_ns: 1_000_000, dt_ns: 1_000_000 });
+        let due = next(3);
+        assert_eq!((due.missed, due.tick), (2, Tick { index: 2, time_ns: 4_000_000, dt_ns: 3_000_000 }));
+    }
+
+    #[test]
+    fn a_device_that_says_nothing_more_still_lets_the_loop_run_at_its_rate() {
+        let started = std::time::Instant::now();
+        let mut schedule = Schedule::start_paced(1_000_000);
+        for _ in 0..20 {
+            assert!(schedule.wait(|_| SampleWait::TimedOut).is_ok(), "it gives up at once");
+        }
+        assert!(started.elapsed() >= std::time::Duration::from_millis(20), "twenty periods have passed");
+    }
+
+    #[test]
+    fn a_device_that_does_not_pace_after_all_ends_the_loop() {
+        let waited = Schedule::start_paced(1_000_000).wait(|_| SampleWait::NotPaced);
+        assert_eq!(waited.err(), Some(PaceLost::NotPaced));
+    }
+
+    #[test]
+    fn a_device_whose_samples_come_faster_than_time_is_counted_ends_the_loop() {
+        let mut schedule = Schedule::start_paced(1_000_000);
+        let ahead = (0..10_000).find_map(|_| schedule.wait(|_| SampleWait::Arrived { samples: 1 }).err());
+        // None of them waits: 250 ms and what the test takes are too far ahead.
+        let Some(PaceLost::TooFast { samples, elapsed_ns }) = ahead else { panic!("{ahead:?}") };
+        assert!(
+            samples * 1_000_000 > elapsed_ns + AHEAD_NS && samples >= 250,
+            "{samples} in {elapsed_ns} ns"
+        );
+    }
+
+    #[test]
+    fn virtual_ticks_are_evenly_spaced_from_zero() {
+        let mut schedule = Schedule::start_virtual(250_000);
+        let ticks: Vec<Tick> = (0..3).map(|_| wait(&mut schedule).tick).collect();
+        assert_eq!(ticks[0], Tick { index: 0, time_ns: 0, dt_ns: 0 });
+        assert_eq!(ticks[2], Tick { index: 2, time_ns: 500_000, dt_ns: 250_000 });
+    }
+
+    #[test]
+    fn a_loop_that_was_held_up_skips_what_is_past_and_counts_it() {
+        let period_ns = 1_000_000;
+        let mut schedule = Schedule::start_real(period_ns, SpinWindow { spin_ns: 50_000 });
+        let first = wait(&mut schedule);
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        let due = wait(&mut schedule);
+        assert!(due.missed >= 15, "{}", due.missed); // 20 periods passed; a loaded machine only adds to them
+        assert!(due.lateness_ns.is_some_and(|late_ns| late_ns < period_ns));
+        assert_eq!(due.tick.index, 1);
+        assert_eq!(due.tick.dt_ns, (due.missed + 1) * period_ns);
+        assert_eq!(due.tick.time_ns, first.tick.time_ns + due.tick.dt_ns);
+    }
+
+    #[test]
+    fn a_loop_that_was_held_up_at_its_end_ran_no_longer_for_it() {
+        let period_ns = 1_000_000;
+        let started_ns = monotonic_ns() - 20 * period_ns;
+        let mut schedule = Schedule::start(Pace::Clock(SpinWindow { spin_ns: 0 }), period_ns, started_ns);
+        schedule.slot = 5; // five ticks ran, then nothing for a time
+        let elapsed_ns = schedule.finish();
+        assert!((5 * period_ns..6 * period_ns).contains(&elapsed_ns), "{elapsed_ns}");
+    }
+}

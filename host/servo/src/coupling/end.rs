@@ -1,0 +1,246 @@
+//! One end of a coupling: pulls its handle to where the partner was when last heard of.
+
+use super::{CouplingConfig, PassivityMode, Pull, Tank};
+use crate::port_energy::{Controller, Expected, PortObserver};
+use flotor_core::mapping::{Mapping, MappingConfig};
+use flotor_core::peer::News;
+use flotor_hal::{DVec3, DeviceState, Pose, Twist, Wrench, rotation_vector};
+
+/// Energy that is never counted on, J: what a surprise of 20 µm costs at 1 N. With it in hand, a hand that starts faster
+/// than expected does not overdraw the account.
+const KEPT_BACK_J: f64 = 2.0e-5;
+
+/// One end.
+pub struct End {
+    config: CouplingConfig,
+    mapping: Mapping,
+    observer: PortObserver,
+    controller: Controller,
+    calm: Calm,
+    tank: Tank,
+    bounce: Bounce,
+    partner: Option<News>,
+}
+
+impl End {
+    /// An end at rest that has not heard of its partner; until it has, it asks for nothing. Not real-time.
+    ///
+    /// `mapping` leads from the device's frame to the shared one; `period_s` is the time between ticks.
+    #[must_use]
+    pub fn new(config: &CouplingConfig, mapping: &MappingConfig, period_s: f64) -> Self {
+        let mapping = Mapping::new(mapping);
+        // The damping of the coupling, as the hand feels it: what the pair is built to stand.
+        let controller = Controller {
+            damping_ns_per_m: config.damping_ns_per_m * mapping.stiffness_scale(),
+            damping_nms_per_rad: config.damping_nms_per_rad * mapping.energy_scale(),
+            period_s,
+        };
+        Self {
+            config: *config,
+            mapping,
+            observer: PortObserver::default(),
+            controller,
+            calm: Calm::new(period_s),
+            tank: Tank::default(),
+            bounce: Bounce::default(),
+            partner: None,
+        }
+    }
+
+    /// Books what has crossed the port since the last tick, while `held` was applied (both in the device frame).
+    ///
+    /// Real-time: bounded, no allocation.
+    #[inline]
+    pub fn observe(&mut self, state: &DeviceState, held: &Wrench) {
+        let gone_in_j = self.observer.gone_in_j(&state.pose, held);
+        self.tank.book(gone_in_j / self.mapping.energy_scale());
+        self.bounce.follow(&state.pose, held);
+        self.calm.follow(&state.twist);
+    }
+
+    /// What the partner is to know, with a part of the energy that is here. Once a tick. Real-time: bounded, no
+    /// allocation.
+    #[inline]
+    pub fn tell(&mut self, state: &DeviceState) -> News {
+        let told_j = self.tank.pass_on(self.bounce_j());
+        self.news(state, told_j)
+    }
+
+    /// The same without energy: to a partner that may not be there nothing is passed on. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn call(&self, state: &DeviceState) -> News {
+        self.news(state, self.tank.told_j())
+    }
+
+    #[inline]
+    fn news(&self, state: &DeviceState, told_j: f64) -> News {
+        News {
+            pose: self.mapping.pose_to_model(&state.pose),
+            twist: self.mapping.twist_to_model(&state.twist),
+            told_j,
+        }
+    }
+
+    /// Takes news in, the newest there is; that of ticks before may be missing. Real-time: bounded, no allocation.
+    #[inline]
+    pub fn hear(&mut self, news: &News) {
+        self.tank.hear(news.told_j);
+        self.partner = Some(*news);
+    }
+
+    /// Another partner tells from these news on, or the first. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn meet(&mut self, news: &News) {
+        self.tank.meet(news.told_j);
+    }
+
+    /// What this end asks for. Real-time: bounded, no allocation.
+    #[inline]
+    pub fn pull(&mut self, state: &DeviceState) -> Pull {
+        self.pull_part(state, 1.0)
+    }
+
+    /// A part of that, 0 to 1: it brings out no more than the whole would. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn pull_part(&mut self, state: &DeviceState, part: f64) -> Pull {
+        let whole = self.whole_pull(state);
+        let pull = Pull { wrench: whole.wrench * part, ..whole };
+        self.bounce.asked = pull.wrench;
+        pull
+    }
+
+    /// Nothing is asked for. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn let_go(&mut self) -> Pull {
+        self.bounce.asked = Wrench::ZERO;
+        Pull::default()
+    }
+
+    #[inline]
+    fn whole_pull(&mut self, state: &DeviceState) -> Pull {
+        let Some(partner) = &self.partner else { return Pull::default() };
+        let (pose, twist) =
+            (self.mapping.pose_to_model(&state.pose), self.mapping.twist_to_model(&state.twist));
+        let away = partner.pose.position() - pose.position();
+        let turned: DVec3 = rotation_vector(partner.pose.orientation() * pose.orientation().conjugate());
+        let config = &self.config;
+        let force = away * config.stiffness_n_per_m
+            + (partner.twist.linear() - twist.linear()) * config.damping_ns_per_m;
+        let torque = turned * config.stiffness_nm_per_rad
+            + (partner.twist.angular() - twist.angular()) * config.damping_nms_per_rad;
+        let wrench = self.mapping.wrench_to_device(&Wrench::new(force, torque));
+        let stored_j = 0.5
+            * (config.stiffness_n_per_m * away.length_squared()
+                + config.stiffness_nm_per_rad * turned.length_squared());
+        self.tank.limit(stored_j + config.reserve_j + self.bounce_j());
+        let scale = self.mapping.energy_scale();
+        let less = match config.passivity {
+            PassivityMode::Observe => None,
+            PassivityMode::Control => {
+                let available_j = (self.tank.level_j() - KEPT_BACK_J) * scale;
+                let change = wrench - self.bounce.asked;
+                let expected = self.calm.expected_with(&change);
+                self.controller.keep_within(available_j, &wrench, &state.twist, expected)
+            }
+        };
+        Pull { wrench: less.unwrap_or(wrench), energy_j: 0.5 * stored_j * scale, is_damped: less.is_some() }
+    }
+
+    /// What stands in walls, J, in the shared frame.
+    #[inline]
+    fn bounce_j(&self) -> f64 {
+        self.bounce.stored_j / self.mapping.energy_scale()
+    }
+
+    /// The energy account.
+    #[must_use]
+    pub fn tank(&self) -> &Tank {
+        &self.tank
+    }
+}
+
+/// What stands in springs that are not the coupling's: the walls at the boundary. It will come out at this end, and is not to be
+/// passed on before.
+#[derive(Clone, Copy, Debug, Default)]
+struct Bounce {
+    observer: PortObserver,
+    /// What the coupling asked for last, device frame.
+    asked: Wrench,
+    /// At most, J, as the device feels it.
+    stored_j: f64,
+}
+
+impl Bounce {
+    /// Less than this is the rounding of sums, N; a tenth of it in N·m.
+    const NOTHING_N: f64 = 1.0e-9;
+
+    /// What is held beyond what was asked for takes energy in and gives it back. Where nothing is, nothing stands in it.
+    #[inline]
+    fn follow(&mut self, pose: &Pose, held: &Wrench) {
+        let beyond = *held - self.asked;
+        let gone_in_j = self.observer.gone_in_j(pose, &beyond);
+        let is_nothing =
+            beyond.force().length() < Self::NOTHING_N && beyond.torque().length() < 0.1 * Self::NOTHING_N;
+        self.stored_j = if is_nothing { 0.0 } else { (self.stored_j + gone_in_j).max(0.0) };
+    }
+}
+
+/// How steadily a handle has moved of late: what is to be expected of its next sample.
+///
+/// A hand that rests or draws slowly can only feel a coupling whose account is still empty if a small surprise is
+/// expected of it; one that shakes is expected to go on.
+struct Calm {
+    period_s: f64,
+    last: Option<Twist>,
+    expected: Expected,
+}
+
+impl Calm {
+    /// What is expected of the calmest handle: twice the acceleration of tremor, 0.1 mm at 10 Hz, and the same at a lever
+    /// of a tenth of a metre.
+    const CALMEST: Expected = Expected { acceleration_m_per_s2: 0.8, acceleration_rad_per_s2: 8.0 };
+    /// The lightest handle and hand, kg and kg m²: a fifth and a tenth of the flotor alone (0.58 kg, 1e-3 kg m²).
+    const LIGHTEST_KG: f64 = 0.1;
+    const LIGHTEST_KG_M2: f64 = 1.0e-4;
+    /// How much more than of late may come at once.
+    const MORE: f64 = 2.0;
+    /// Time after which a third is left of what was seen, s.
+    const MEMORY_S: f64 = 0.05;
+
+    fn new(period_s: f64) -> Self {
+        Self { period_s, last: None, expected: Self::CALMEST }
+    }
+
+    #[inline]
+    fn follow(&mut self, twist: &Twist) {
+        let Some(last) = self.last.replace(*twist) else { return };
+        let Self { period_s, expected, .. } = self;
+        let kept = 1.0 - (*period_s / Self::MEMORY_S).min(1.0);
+        let after = |before: f64, change: DVec3, calmest: f64| {
+            (before * kept).max(Self::MORE * change.length() / *period_s).max(calmest)
+        };
+        *expected = Expected {
+            acceleration_m_per_s2: after(
+                expected.acceleration_m_per_s2,
+                twist.linear() - last.linear(),
+                Self::CALMEST.acceleration_m_per_s2,
+            ),
+            acceleration_rad_per_s2: after(
+                expected.acceleration_rad_per_s2,
+                twist.angular() - last.angular(),
+                Self::CALMEST.acceleration_rad_per_s2,
+            ),
+        };
+    }
+
+    /// With what a change of the wrench itself does to the handle.
+    #[inline]
+    fn expected_with(&self, change: &Wrench) -> Expected {
+        let Expected { acceleration_m_per_s2, acceleration_rad_per_s2 } = self.expected;
+        Expected {
+            acceleration_m_per_s2: acceleration_m_per_s2 + change.force().length() / Self::LIGHTEST_KG,
+            acceleration_rad_per_s2: acceleration_rad_per_s2
+                + change.torque().length() / Self::LIGHTEST_KG_M2,
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! Two devices held together by a virtual spring and damper: bilateral teleoperation.
+//!
+//! Each device has an [`End`]. An end hears from its partner where that is, how it moves and how much energy it has
+//! passed on ([`News`], some ticks old), and pulls its own handle there. It keeps an energy account ([`Tank`]): what its
+//! hand puts in, less what comes out, plus what the partner has passed on. As long as no account is overdrawn, nothing
+//! comes out of the pair that nobody has put in, *whatever the delay*, constant or not, and even if news gets lost: the
+//! energy passed on is told as a running total.
+//!
+//! ```text
+//!  hand  <-- wrench --  End   -- News: pose, twist, energy passed on -->  End  -- wrench -->  hand
+//!        -- motion -->  Tank  <-- News ---------------------------------  Tank <-- motion --
+//! ```
+//!
+//! Where frames and scales differ, both ends speak of one shared frame; the way there is a mapping like a model's.
+//! Energies are those of the shared frame.
+//!
+//! [`Coupling`] is both ends in one loop with a delay of whole ticks. [`EndApart`] is one end whose partner is on another host:
+//! the same end, the same news, which other threads carry ([`crate::live::carry`]).
+//!
+//! Sources: account and transfer of energy, M. Franken, S. Stramigioli, S. Misra, C. Secchi, A. Macchelli, "Bilateral
+//! telemanipulation with time delays: a two-layer approach combining passivity and transparency", IEEE Trans. Robotics
+//! 27(4), 2011, sections III and IV; controller at an end, see [`crate::port_energy`].
+#![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
+#![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
+
+mod apart;
+mod delay;
+mod end;
+mod tank;
+#[cfg(test)]
+mod tests;
+
+pub use apart::{EndApart, Hearing, Line, Patience};
+pub use end::End;
+pub use flotor_core::coupling::{
+    CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MOST_DELAY_TICKS, PassivityMode,
+};
+pub use flotor_core::peer::{Account, Dispatch, News};
+pub use tank::Tank;
+
+use delay::DelayLine;
+use flotor_hal::{DeviceState, Wrench};
+
+/// What happens at one of the devices of a coupling in a tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Grip<'a> {
+    /// Where the handle is and how it moves, device frame.
+    pub state: &'a DeviceState,
+    /// The wrench that was held since the last tick, as far as the coupling had asked for it, device frame.
+    pub held: Wrench,
+}
+
+/// What an end asks for in a tick.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pull {
+    /// Wrench on the hand, device frame.
+    pub wrench: Wrench,
+    /// This end's half of what the spring stores, scaled to the device, J.
+    pub energy_j: f64,
+    /// The controller has taken something away.
+    pub is_damped: bool,
+}
+
+/// Two ends in one loop.
+pub struct Coupling {
+    ends: [End; 2],
+    /// News on its way to the end of the same number.
+    ways: [DelayLine; 2],
+}
+
+impl Coupling {
+    /// A coupling at rest, with empty accounts; `period_s` is the time between ticks. Not real-time.
+    #[must_use]
+    pub fn new(config: &CouplingConfig, ends: &[CouplingEnd; 2], period_s: f64) -> Self {
+        Self {
+            ends: ends.map(|end| End::new(config, &end.mapping, period_s)),
+            ways: [(); 2].map(|()| DelayLine::new(config.delay_ticks)),
+        }
+    }
+
+    /// One tick: what both ends ask for. Real-time: bounded, no allocation.
+    #[inline]
+    pub fn step(&mut self, grips: [Grip<'_>; 2]) -> [Pull; 2] {
+        let Self { ends: [first, second], ways: [to_first, to_second] } = self;
+        let [at_first, at_second] = grips;
+        first.observe(at_first.state, &at_first.held);
+        second.observe(at_second.state, &at_second.held);
+        if let Some(news) = to_second.pass(first.tell(at_first.state)) {
+            second.hear(&news);
+        }
+        if let Some(news) = to_first.pass(second.tell(at_second.state)) {
+            first.hear(&news);
+        }
+        [first.pull(at_first.state), second.pull(at_second.state)]
+    }
+
+    /// The energy accounts of both ends.
+    #[must_use]
+    pub fn tanks(&self) -> [&Tank; 2] {
+        let [first, second] = &self.ends;
+        [first.tank(), second.tank()]
+    }
+}

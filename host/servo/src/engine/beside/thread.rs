@@ -1,0 +1,297 @@
+//! A model on a thread of its own, at a rate of its own.
+//!
+//! Loop and thread share two latest-value cells, a queue of orders and two flags; neither waits for the other.
+
+use super::Arrival;
+use crate::enter_worker_priority;
+use flotor_hal::abi::CallStatus;
+use flotor_hal::abi::loader::Model;
+use flotor_hal::{Demand, Input, LinearField, Pose, Refusal, Twist, Wrench};
+use flotor_sync::{Observer, Publisher, Words, latest};
+use rtrb::{Consumer, Producer, RingBuffer};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+/// Orders that fit between two fields.
+const ORDERS: usize = 64;
+
+/// What the loop knows of the handle at a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Look {
+    pose: Pose,
+    twist: Twist,
+    time_ns: u64,
+    tick: u64,
+    buttons: u32,
+}
+
+const LOOK_WORDS: usize = 7 + 6 + 3;
+
+impl Words<LOOK_WORDS> for Look {
+    fn to_words(&self) -> [u64; LOOK_WORDS] {
+        let [px, py, pz] = self.pose.position_m.map(f64::to_bits);
+        let [qx, qy, qz, qw] = self.pose.orientation_xyzw.map(f64::to_bits);
+        let [vx, vy, vz] = self.twist.linear_m_per_s.map(f64::to_bits);
+        let [wx, wy, wz] = self.twist.angular_rad_per_s.map(f64::to_bits);
+        [px, py, pz, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz, self.time_ns, self.tick, self.buttons.into()]
+    }
+
+    fn from_words(words: &[u64; LOOK_WORDS]) -> Self {
+        let [px, py, pz, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz, time_ns, tick, buttons] = *words;
+        let three = |numbers: [u64; 3]| numbers.map(f64::from_bits);
+        Self {
+            pose: Pose {
+                position_m: three([px, py, pz]),
+                orientation_xyzw: [qx, qy, qz, qw].map(f64::from_bits),
+            },
+            twist: Twist { linear_m_per_s: three([vx, vy, vz]), angular_rad_per_s: three([wx, wy, wz]) },
+            time_ns,
+            tick,
+            #[allow(clippy::cast_possible_truncation)] // the 32 bits written
+            buttons: buttons as u32,
+        }
+    }
+}
+
+/// A field on its way to the loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Sent(LinearField);
+
+const FIELD_WORDS: usize = 7 + 6 + 36 + 3;
+
+impl Words<FIELD_WORDS> for Sent {
+    fn to_words(&self) -> [u64; FIELD_WORDS] {
+        let Self(LinearField { anchor, wrench, stiffness, valid_m, valid_rad, time_ns }) = self;
+        let numbers = anchor.position_m.iter().chain(&anchor.orientation_xyzw);
+        let numbers =
+            numbers.chain(&wrench.force_n).chain(&wrench.torque_nm).chain(stiffness.iter().flatten());
+        let numbers = numbers.chain([valid_m, valid_rad]).map(|number| number.to_bits());
+        let mut words = [0; FIELD_WORDS];
+        words.iter_mut().zip(numbers.chain([*time_ns])).for_each(|(place, word)| *place = word);
+        words
+    }
+
+    fn from_words(words: &[u64; FIELD_WORDS]) -> Self {
+        let mut numbers = words.iter().map(|word| f64::from_bits(*word));
+        let mut next = || numbers.next().unwrap_or(f64::NAN);
+        let anchor = Pose {
+            position_m: std::array::from_fn(|_| next()),
+            orientation_xyzw: std::array::from_fn(|_| next()),
+        };
+        let wrench =
+            Wrench { force_n: std::array::from_fn(|_| next()), torque_nm: std::array::from_fn(|_| next()) };
+        let stiffness = std::array::from_fn(|_| std::array::from_fn(|_| next()));
+        let (valid_m, valid_rad) = (next(), next());
+        let time_ns = words.last().copied().unwrap_or(0);
+        Self(LinearField { anchor, wrench, stiffness, valid_m, valid_rad, time_ns })
+    }
+}
+
+/// What the model is to do before its next field.
+#[derive(Clone, Copy, Debug)]
+enum Order {
+    Set { index: usize, value: f64 },
+    Reset,
+}
+
+/// What both sides may look at.
+#[derive(Default)]
+struct Flags {
+    is_over: AtomicBool,
+    is_broken: AtomicBool,
+    last_words: OnceLock<String>,
+}
+
+/// The loop's end.
+pub(super) struct ModelThread {
+    looks: Publisher<Look, LOOK_WORDS>,
+    fields: Observer<Sent, FIELD_WORDS>,
+    orders: Producer<Order>,
+    flags: Arc<Flags>,
+    /// Version of the newest field taken.
+    taken: u64,
+    /// A field from before this time belongs to a past that was forgotten, ns.
+    forgotten_ns: u64,
+    now_ns: u64,
+}
+
+impl ModelThread {
+    /// Starts a thread that computes a field each period while the loop looks. Not real-time.
+    ///
+    /// # Errors
+    /// The system has no thread to give.
+    pub(super) fn start(model: Model, period_ns: u64) -> Result<Self, Refusal> {
+        let at_home = Look { pose: Pose::HOME, twist: Twist::ZERO, time_ns: 0, tick: 0, buttons: 0 };
+        let (looks, seen) = latest(at_home);
+        let (sent, fields) = latest(Sent(LinearField::NONE));
+        let (orders, obeyed) = RingBuffer::new(ORDERS);
+        let flags = Arc::new(Flags::default());
+        let computer = Computer {
+            demand: model.serves().limited_to(Demand::WRENCH),
+            model,
+            looks: seen,
+            fields: sent,
+            orders: obeyed,
+            flags: Arc::clone(&flags),
+            looked_ns: None,
+        };
+        let thread = std::thread::Builder::new().name("flotor-field".to_owned());
+        // Never joined: a model that hangs must not hold up whoever is rid of it.
+        let started = thread.spawn(move || computer.run(Duration::from_nanos(period_ns)));
+        started
+            .map_err(|error| Refusal::resource(format!("no thread for a model beside the loop: {error}")))?;
+        Ok(Self { looks, fields, orders, flags, taken: 0, forgotten_ns: 0, now_ns: 0 })
+    }
+
+    /// Says where the handle is and takes a new field, if there is one. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn look(&mut self, input: &Input) -> Arrival {
+        let Input { pose, twist, time_ns, tick, buttons, .. } = *input;
+        self.looks.publish(&Look { pose, twist, time_ns, tick, buttons });
+        self.now_ns = time_ns;
+        if self.flags.is_broken.load(Ordering::Acquire) {
+            return Arrival::Broken;
+        }
+        match self.fields.read() {
+            Some((version, Sent(field))) if version > self.taken => {
+                self.taken = version;
+                if field.time_ns < self.forgotten_ns { Arrival::Nothing } else { Arrival::Field(field) }
+            }
+            _ => Arrival::Nothing,
+        }
+    }
+
+    /// Real-time: bounded, no allocation.
+    pub(super) fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
+        self.order(Order::Set { index, value })
+    }
+
+    /// Real-time: bounded, no allocation.
+    pub(super) fn reset(&mut self) -> CallStatus {
+        self.forgotten_ns = self.now_ns.saturating_add(1);
+        self.order(Order::Reset)
+    }
+
+    fn order(&mut self, order: Order) -> CallStatus {
+        match self.orders.push(order) {
+            Ok(()) => CallStatus::Ok,
+            Err(_) => CallStatus::Unsupported,
+        }
+    }
+
+    /// What the model said when it broke. Not real-time.
+    pub(super) fn last_message(&self) -> String {
+        self.flags.last_words.get().cloned().unwrap_or_default()
+    }
+}
+
+impl Drop for ModelThread {
+    fn drop(&mut self) {
+        self.flags.is_over.store(true, Ordering::Release);
+    }
+}
+
+/// The thread's end.
+struct Computer {
+    model: Model,
+    demand: Demand,
+    looks: Observer<Look, LOOK_WORDS>,
+    fields: Publisher<Sent, FIELD_WORDS>,
+    orders: Consumer<Order>,
+    flags: Arc<Flags>,
+    looked_ns: Option<u64>,
+}
+
+impl Computer {
+    fn run(mut self, period: Duration) {
+        enter_worker_priority();
+        let (mut deadline, mut seen) = (Instant::now(), 0);
+        while !self.flags.is_over.load(Ordering::Acquire) {
+            let obeyed = self.obey();
+            let answered = match self.looks.read() {
+                Some((version, look)) if version > seen => {
+                    seen = version;
+                    self.answer(&look)
+                }
+                _ => CallStatus::Ok,
+            };
+            if obeyed == CallStatus::Panicked || answered != CallStatus::Ok {
+                let _ = self.flags.last_words.set(self.model.last_message());
+                self.flags.is_broken.store(true, Ordering::Release);
+                return;
+            }
+            // A period that is over is left out, not caught up.
+            let now = Instant::now();
+            deadline = (deadline + period).max(now);
+            std::thread::sleep(deadline - now);
+        }
+    }
+
+    fn obey(&mut self) -> CallStatus {
+        let mut worst = CallStatus::Ok;
+        while let Ok(order) = self.orders.pop() {
+            let status = match order {
+                Order::Set { index, value } => self.model.set_parameter(index, value),
+                Order::Reset => {
+                    self.looked_ns = None;
+                    self.model.reset()
+                }
+            };
+            if status == CallStatus::Panicked {
+                worst = status;
+            }
+        }
+        worst
+    }
+
+    fn answer(&mut self, look: &Look) -> CallStatus {
+        let Look { pose, twist, time_ns, tick, buttons } = *look;
+        let dt_ns = self.looked_ns.map_or(0, |before_ns| time_ns.saturating_sub(before_ns));
+        self.looked_ns = Some(time_ns);
+        let input = Input { pose, twist, time_ns, dt_ns, tick, buttons, demand: self.demand };
+        let mut field = LinearField::NONE;
+        let status = self.model.linear_field(&input, &mut field);
+        if status == CallStatus::Ok {
+            field.time_ns = time_ns;
+            self.fields.publish(&Sent(field));
+        }
+        status
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn looks_and_fields_cross_bit_for_bit() {
+        let mut number = 0.0;
+        let mut next = || {
+            number += 0.1;
+            number
+        };
+        let pose = Pose {
+            position_m: std::array::from_fn(|_| next()),
+            orientation_xyzw: std::array::from_fn(|_| next()),
+        };
+        let twist = Twist {
+            linear_m_per_s: std::array::from_fn(|_| next()),
+            angular_rad_per_s: std::array::from_fn(|_| next()),
+        };
+        let look = Look { pose, twist, time_ns: u64::MAX, tick: 7, buttons: u32::MAX };
+        assert_eq!(Look::from_words(&look.to_words()), look);
+        let field = LinearField {
+            anchor: pose,
+            wrench: Wrench {
+                force_n: std::array::from_fn(|_| next()),
+                torque_nm: std::array::from_fn(|_| next()),
+            },
+            stiffness: std::array::from_fn(|_| std::array::from_fn(|_| next())),
+            valid_m: f64::INFINITY,
+            valid_rad: next(),
+            time_ns: 12_345,
+        };
+        assert_eq!(Sent::from_words(&Sent(field).to_words()), Sent(field));
+    }
+}

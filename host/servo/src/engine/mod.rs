@@ -1,0 +1,141 @@
+//! Where a model runs: in the loop, beside it, or in a worker of its own.
+
+pub mod beside;
+pub mod process;
+
+use beside::SlowModel;
+use flotor_hal::abi::CallStatus;
+use flotor_hal::abi::loader::Model;
+use flotor_hal::{ActivityRegion, Demand, Input, Memory, Output, Reach};
+use process::{Reply, Worker};
+
+/// A model, wherever it runs.
+pub enum Engine {
+    /// In the loop: fastest, and what breaks the model may break the process.
+    Here(Model),
+    /// In a process of its own.
+    Apart(Worker),
+    /// Beside the loop, which evaluates its linear field.
+    Beside(Box<SlowModel>),
+}
+
+/// What came of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stepped {
+    /// There is an answer, not looked at yet.
+    Answered,
+    /// None in time; there may be one in a later tick.
+    Late,
+    /// The model broke: it panicked, or answered outside the contract.
+    Broken,
+    /// Its process has ended.
+    Gone,
+}
+
+impl Engine {
+    /// One step; `output` is only meaningful for [`Stepped::Answered`]. Real-time: bounded by the model or its patience, no
+    /// allocation.
+    #[inline(always)]
+    pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
+        let answered = |status| match status {
+            CallStatus::Ok => Stepped::Answered,
+            _ => Stepped::Broken,
+        };
+        match self {
+            Self::Here(model) => answered(model.step(input, output)),
+            Self::Apart(worker) => match worker.step(input) {
+                Reply::Answered((status, answer)) => {
+                    *output = answer;
+                    answered(status)
+                }
+                Reply::Late => Stepped::Late,
+                Reply::Gone => Stepped::Gone,
+            },
+            Self::Beside(model) => model.step(input, output),
+        }
+    }
+
+    /// True if a step may come back without an answer and have one in a later tick.
+    #[inline]
+    pub fn may_be_late(&self) -> bool {
+        !matches!(self, Self::Here(_))
+    }
+
+    /// Changes a live parameter at a tick boundary. Real-time: bounded by the model or its patience, no allocation.
+    pub fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
+        match self {
+            Self::Here(model) => model.set_parameter(index, value),
+            Self::Apart(worker) => match worker.set_parameter(index, value) {
+                Reply::Answered(status) => status,
+                // Not now: the next step tells whether it is late or gone.
+                Reply::Late | Reply::Gone => CallStatus::Unsupported,
+            },
+            Self::Beside(model) => model.set_parameter(index, value),
+        }
+    }
+
+    /// The value in force of a parameter before the loop starts; NaN if it has none. Not real-time.
+    pub fn parameter(&mut self, index: usize) -> f64 {
+        match self {
+            Self::Here(model) => model.parameter(index),
+            Self::Apart(worker) => worker.parameter(index),
+            Self::Beside(model) => model.parameter(index),
+        }
+    }
+
+    /// Which demands the model can serve.
+    pub fn serves(&self) -> Demand {
+        match self {
+            Self::Here(model) => model.serves(),
+            Self::Apart(worker) => worker.serves(),
+            Self::Beside(model) => model.serves(),
+        }
+    }
+
+    /// Forgets history. Real-time: bounded by the model or its patience, no allocation.
+    pub fn reset(&mut self) -> CallStatus {
+        match self {
+            Self::Here(model) => model.reset(),
+            Self::Apart(worker) => match worker.reset() {
+                Reply::Answered(status) => status,
+                // The next step tells whether it is late or gone.
+                Reply::Late | Reply::Gone => CallStatus::Ok,
+            },
+            Self::Beside(model) => model.reset(),
+        }
+    }
+
+    /// Where the model can act; one beside the loop or in a process of its own is always asked. Real-time: bounded, no allocation.
+    pub fn activity(&mut self) -> ActivityRegion {
+        match self {
+            Self::Here(model) => model.activity(),
+            Self::Apart(_) | Self::Beside(_) => ActivityRegion::EVERYWHERE,
+        }
+    }
+
+    /// Where the model ends; one beside the loop or in a process of its own has no end. Real-time: bounded, no allocation.
+    pub fn reach(&mut self) -> Reach {
+        match self {
+            Self::Here(model) => model.reach(),
+            Self::Apart(_) | Self::Beside(_) => Reach::UNBOUNDED,
+        }
+    }
+
+    /// Whether the answer depends on the path.
+    pub fn memory(&self) -> Memory {
+        match self {
+            Self::Here(model) => model.memory(),
+            Self::Apart(worker) => worker.memory(),
+            Self::Beside(model) => model.memory(),
+        }
+    }
+
+    /// What the model said last. Not real-time.
+    pub fn last_message(&mut self) -> String {
+        match self {
+            Self::Here(model) => model.last_message(),
+            Self::Apart(worker) => worker.last_message(),
+            Self::Beside(model) => model.last_message(),
+        }
+    }
+}

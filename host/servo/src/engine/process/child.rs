@@ -1,0 +1,176 @@
+//! The worker's side: the process that holds the model.
+
+use super::Greeting;
+use super::exchange::{self, Order, wait_for_change};
+use super::memory::{MESSAGE_BYTES, SharedMemory};
+use crate::enter_worker_priority;
+use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
+use flotor_hal::abi::{CallStatus, PluginKind};
+use flotor_hal::{LoopConfig, Memory, Output, Refusal, RefusalKind};
+use std::io;
+use std::os::fd::AsFd;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+/// How often a worker nobody asks anything looks whether its host is still there, ns.
+const HOST_CHECK_NS: u64 = 500_000_000;
+
+/// What a worker is started with. Standard input is the shared memory, which takes the greeting, too:
+/// standard output belongs to the plugin.
+#[derive(Clone, Debug)]
+pub struct WorkerArguments {
+    /// The plugin's shared library.
+    pub plugin: PathBuf,
+    /// Nominal time between ticks, ns.
+    pub period_ns: u64,
+    /// Seed of the run.
+    pub seed: u64,
+    /// Parameters of the model, `KEY=VALUE`.
+    pub sets: Vec<String>,
+}
+
+/// Loads the model, says so, and steps it as long as the host asks. Ends with the host.
+///
+/// # Errors
+/// Standard input is not the memory: nobody started this as a worker.
+pub fn serve(arguments: &WorkerArguments) -> io::Result<()> {
+    let memory = SharedMemory::map(io::stdin().as_fd())?;
+    let host = rustix::process::getppid();
+    let (greeting, model) = match prepare(arguments) {
+        Ok((model, parameters)) => {
+            let serves = exchange::DEMANDS.map(|demand| model.serves().contains(demand));
+            let remembers = model.memory() == Memory::PathDependent;
+            (Greeting::Ready { parameters, serves, remembers }, Some(model))
+        }
+        Err(refusal) => (Greeting::Refused { kind: refusal.kind as u32, reason: refusal.reason }, None),
+    };
+    let has_gone = || rustix::process::getppid() != host;
+    let greeted = greet(&memory, &serde_json::to_string(&greeting)?, has_gone);
+    let (Some(mut done), Some(mut model)) = (greeted, model) else { return Ok(()) };
+    enter_worker_priority();
+    loop {
+        let number = memory.request.load(Ordering::Acquire);
+        if number == done {
+            wait_for_change(&memory.request, done, HOST_CHECK_NS);
+            if has_gone() {
+                return Ok(());
+            }
+            continue;
+        }
+        let status = obey(&mut model, &memory);
+        if status == CallStatus::Panicked {
+            memory.put_message(&model.last_message());
+        }
+        memory.answer(number, status);
+        done = number;
+    }
+}
+
+fn obey(model: &mut Model, memory: &SharedMemory) -> CallStatus {
+    match memory.order() {
+        Some(Order::Step) => {
+            let mut output = Output::default();
+            let status = model.step(&memory.input(), &mut output);
+            memory.put_output(&output);
+            status
+        }
+        Some(Order::SetParameter) => {
+            let value = f64::from_bits(memory.value.load(Ordering::Relaxed));
+            let index = usize::try_from(memory.parameter.load(Ordering::Relaxed)).unwrap_or(usize::MAX);
+            model.set_parameter(index, value)
+        }
+        Some(Order::Reset) => model.reset(),
+        None => CallStatus::Unsupported,
+    }
+}
+
+type Prepared = (Model, Vec<Option<f64>>);
+
+fn prepare(arguments: &WorkerArguments) -> Result<Prepared, Refusal> {
+    let said_no = |error| match error {
+        LoadError::Refused { refusal, .. } => refusal,
+        other => Refusal { kind: RefusalKind::Broken, reason: other.to_string() },
+    };
+    let plugin = Plugin::load(&arguments.plugin).map_err(said_no)?;
+    if plugin.metadata().kind != PluginKind::Model {
+        return Err(Refusal::unsupported("only a model can be a worker"));
+    }
+    let schema = plugin.parameters();
+    let parse = |set: &String| {
+        let (key, value) = set.split_once('=').unwrap_or((set.as_str(), ""));
+        Setting::parse(schema, key, value).map_err(Refusal::parameter)
+    };
+    let settings: Vec<Setting> = arguments.sets.iter().map(parse).collect::<Result<_, _>>()?;
+    let mut model = plugin.create_model(&settings).map_err(said_no)?;
+    model.prepare(&LoopConfig { period_ns: arguments.period_ns, seed: arguments.seed })?;
+    let value = |index| Some(model.parameter(index)).filter(|value| value.is_finite());
+    let parameters = (0..schema.len()).map(value).collect();
+    Ok((model, parameters))
+}
+
+/// Says something to the host before it asks for anything, in pieces that fit into the message. Each has a
+/// number, and the next one is said once the host has asked under that number: the last of them, which
+/// requests are counted on from. `None` if the host has gone.
+fn greet(memory: &SharedMemory, text: &str, has_gone: impl Fn() -> bool) -> Option<u32> {
+    let (mut left, mut number) = (text, 0_u32);
+    loop {
+        let fits = (0..=MESSAGE_BYTES.min(left.len())).rev().find(|end| left.is_char_boundary(*end));
+        let (piece, rest) = left.split_at(fits.unwrap_or(0));
+        left = rest;
+        number = number.wrapping_add(1);
+        memory.put_message(piece);
+        memory.answer(number, if left.is_empty() { WHOLE } else { MORE_TO_COME });
+        loop {
+            let asked = memory.request.load(Ordering::Acquire);
+            // A host that has heard the last piece may be at its first request by now.
+            if asked.wrapping_sub(number) <= 1 {
+                break;
+            }
+            wait_for_change(&memory.request, asked, HOST_CHECK_NS);
+            if has_gone() {
+                return None;
+            }
+        }
+        if left.is_empty() {
+            memory.put_message(""); // from now on: a model's last words
+            return Some(number);
+        }
+    }
+}
+
+/// What stands beside the last piece of a greeting, and beside the others.
+pub(super) const WHOLE: CallStatus = CallStatus::Ok;
+const MORE_TO_COME: CallStatus = CallStatus::WrongPhase;
+
+#[cfg(test)]
+mod tests {
+    use super::super::memory::create_file;
+    use super::super::parent::heard;
+    use super::*;
+
+    #[test]
+    fn a_greeting_of_any_length_is_heard_as_it_was_said() {
+        for text in [String::new(), "x".repeat(MESSAGE_BYTES), "µ is longer than m. ".repeat(200)] {
+            let file = create_file().expect("an anonymous file");
+            let [here, there] = [0; 2].map(|_| SharedMemory::map(&file).expect("mapped"));
+            let said = text.clone();
+            let worker = std::thread::spawn(move || greet(&there, &said, || false));
+            let (number, told) = heard(&here, || false).expect("it says something");
+            assert_eq!(told, text);
+            assert_eq!(worker.join().expect("it greets"), Some(number));
+        }
+    }
+
+    #[test]
+    fn a_host_that_asks_at_once_is_not_waited_for() {
+        let memory = SharedMemory::map(create_file().expect("an anonymous file")).expect("mapped");
+        memory.request.store(2, Ordering::Release); // it has heard the one piece, and wants a step
+        assert_eq!(greet(&memory, "hello", || true), Some(1));
+    }
+
+    #[test]
+    fn a_greeting_that_nobody_hears_ends_with_the_host() {
+        let memory = SharedMemory::map(create_file().expect("an anonymous file")).expect("mapped");
+        assert_eq!(greet(&memory, "hello", || true), None);
+    }
+}

@@ -1,0 +1,554 @@
+//! The envelope: what stands between models and device, and what nothing gets past.
+//!
+//! Order: guard (a number that is not finite becomes zero) -> gate (the start-up ramp and the other
+//! [states of the run](super::state)) -> velocity limit -> [boundary wall](super::boundary) -> force and torque limits
+//! -> [passivity](super::passivity), and the limits once more if it took something away -> slew limit.
+//!
+//! The slew limit is last, so that no fault upstream, not even a model that vanishes, makes the force jump; the limits
+//! hold after it too, because the limited region is convex and the slew limit only moves along the line from the last
+//! wrench, which was inside, to the new one, which is.
+//!
+//! Nearly every tick is within all limits: each stage sees that first, by comparisons alone, and computes only when it
+//! has to act.
+
+use super::boundary::BoundaryWall;
+use super::passivity::Passivity;
+use super::state::Gate;
+use crate::port_energy::Controller;
+use flotor_core::limits::{Boundary, Limits};
+use flotor_core::trace::Events;
+use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Twist, Wrench};
+
+/// Limits of force, torque and their change, and a wall at the edge of the range.
+pub struct Envelope {
+    /// The most that may be sent.
+    most: Wrench,
+    /// The fastest at which all that drives the handle on passes.
+    fastest: Twist,
+    /// Fastest change of force (N/s) and torque (N·m/s).
+    slew_per_s: [f64; 2],
+    /// What that is in a period.
+    most_change_in_a_period: [f64; 2],
+    wall: BoundaryWall,
+    passivity: Passivity,
+    period_ns: u64,
+    last: Wrench,
+}
+
+impl Envelope {
+    /// Combines what the scene allows with what the device declares; the tighter wins. Not real-time.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
+    pub fn new(limits: &Limits, boundary: &Boundary, device: &Capabilities, period_ns: u64) -> Self {
+        // A limit without end is the largest number: what is within a limit is finite.
+        let tighter = |scene: [f64; 3], device: [f64; 3]| {
+            DVec3::from_array(scene).min(DVec3::from_array(device)).min(DVec3::splat(f64::MAX))
+        };
+        let slew_per_s = [
+            limits.force_slew_n_per_s.min(device.max_force_slew_n_per_s),
+            limits.torque_slew_nm_per_s.min(device.max_torque_slew_nm_per_s),
+        ];
+        let max_force_n = tighter(limits.force_n, device.max_force_n);
+        let max_torque_nm = tighter(limits.torque_nm, device.max_torque_nm);
+        Self {
+            most: Wrench::new(max_force_n, max_torque_nm),
+            fastest: Twist {
+                linear_m_per_s: limits.velocity_m_per_s,
+                angular_rad_per_s: limits.angular_velocity_rad_per_s,
+            },
+            slew_per_s,
+            most_change_in_a_period: most_change(slew_per_s, period_ns),
+            wall: BoundaryWall::new(boundary, device, period_ns),
+            // Damping the device is known to stand: that of its boundary.
+            passivity: Passivity::new(
+                limits.passivity,
+                Controller {
+                    damping_ns_per_m: boundary.damping_ns_per_m,
+                    damping_nms_per_rad: boundary.damping_nms_per_rad,
+                    period_s: period_ns as f64 * 1.0e-9,
+                },
+                [max_force_n, max_torque_nm],
+            ),
+            period_ns,
+            last: Wrench::ZERO,
+        }
+    }
+
+    /// The most that may reach the hand: force along each axis (N), torque about each (N·m).
+    #[must_use]
+    pub fn most(&self) -> [DVec3; 2] {
+        [self.most.force(), self.most.torque()]
+    }
+
+    /// The wrench that goes to the device for what the models ask. Real-time: bounded, no allocation.
+    ///
+    /// Nearly every tick is within all limits. That is found out by comparisons alone, with nothing written to memory on
+    /// the way; any doubt leads through all stages.
+    #[inline(always)] // so that the wrench comes in registers, not as bytes just written
+    pub fn apply(
+        &mut self,
+        request: &Wrench,
+        gate: Gate,
+        state: &DeviceState,
+        tick: &Tick,
+        events: &mut Events,
+    ) -> Wrench {
+        self.passivity.observe(state, &self.last);
+        let safe = match self.within_limits(request, gate, state, tick) {
+            Some(gated) => gated,
+            None => self.through_all_stages(*request, gate, state, tick, events),
+        };
+        self.last = safe;
+        safe
+    }
+
+    /// What the gate lets pass, if no stage after it would change it or tell anything about it.
+    #[inline(always)]
+    fn within_limits(
+        &self,
+        request: &Wrench,
+        gate: Gate,
+        state: &DeviceState,
+        tick: &Tick,
+    ) -> Option<Wrench> {
+        let gated = *request * gate.models;
+        let (force, torque) = (gated.force(), gated.torque());
+        let [force_n, torque_nm] = self.most_change(tick);
+        // A request that is not finite is not so behind the gate either, and within no limit.
+        let passes = self.passivity.only_observes()
+            && is_not_faster(&state.twist, &self.fastest)
+            && self.wall.surely_holds(state)
+            && is_within(&gated, &self.most)
+            && is_step_within(self.last.force(), force, force_n)
+            && is_step_within(self.last.torque(), torque, torque_nm);
+        passes.then_some(gated)
+    }
+
+    #[inline(never)]
+    fn through_all_stages(
+        &mut self,
+        request: Wrench,
+        gate: Gate,
+        state: &DeviceState,
+        tick: &Tick,
+        events: &mut Events,
+    ) -> Wrench {
+        let guarded = if request.is_finite() {
+            request
+        } else {
+            events.insert(Events::NOT_FINITE);
+            Wrench::ZERO
+        };
+        let gated = guarded * gate.models;
+        let driven = self.limit_speed(&gated, state, events);
+        let walled = match self.wall.push(state) {
+            None => driven,
+            Some(push) => {
+                events.insert(Events::BOUNDARY);
+                driven + push * gate.boundary
+            }
+        };
+        // Before the energy is looked at: what cannot be sent anyway may be too large to be squared.
+        let bounded = self.limit(&walled, events);
+        let limited = match self.passivity.guard(&bounded, state) {
+            None => bounded,
+            Some(less) => {
+                events.insert(Events::PASSIVITY_DAMPED);
+                // Damping may be more than an axis can give.
+                self.limit(&less, events)
+            }
+        };
+        self.slew(&limited, tick, events)
+    }
+
+    /// Energy the hand has put into the device's port so far less what has come out, J; negative: the loop has created
+    /// energy. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn port_energy_j(&self) -> f64 {
+        self.passivity.energy_j()
+    }
+
+    /// Above the velocity limit fades out what drives the handle on, gone at twice the limit; what brakes it passes.
+    #[inline]
+    fn limit_speed(&self, wrench: &Wrench, state: &DeviceState, events: &mut Events) -> Wrench {
+        if is_not_faster(&state.twist, &self.fastest) {
+            return *wrench;
+        }
+        let (velocity, spin) = (state.twist.linear(), state.twist.angular());
+        let (most, most_spin) = (self.fastest.linear(), self.fastest.angular());
+        events.insert(Events::VELOCITY_LIMITED);
+        let excess = (velocity.abs() / most).max_element();
+        let spin_excess = (spin.abs() / most_spin).max_element();
+        let force = without_drive(wrench.force(), velocity, excess);
+        Wrench::new(force, without_drive(wrench.torque(), spin, spin_excess))
+    }
+
+    #[inline]
+    fn limit(&self, wrench: &Wrench, events: &mut Events) -> Wrench {
+        if is_within(wrench, &self.most) {
+            return *wrench;
+        }
+        let [max_force_n, max_torque_nm] = self.most();
+        let force = shrink_into_box(wrench.force(), max_force_n);
+        let torque = shrink_into_box(wrench.torque(), max_torque_nm);
+        // On an axis that is not driven nothing is limited: pairing has said that nothing is felt there.
+        let is_cut =
+            |before: DVec3, after: DVec3, most: DVec3| (before.cmpne(after) & most.cmpne(DVec3::ZERO)).any();
+        if is_cut(wrench.force(), force, max_force_n) {
+            events.insert(Events::FORCE_LIMITED);
+        }
+        if is_cut(wrench.torque(), torque, max_torque_nm) {
+            events.insert(Events::TORQUE_LIMITED);
+        }
+        Wrench::new(force, torque)
+    }
+
+    #[inline]
+    fn slew(&self, wrench: &Wrench, tick: &Tick, events: &mut Events) -> Wrench {
+        let [force_n, torque_nm] = self.most_change(tick);
+        let force = step_short_of(self.last.force(), wrench.force(), force_n);
+        let torque = step_short_of(self.last.torque(), wrench.torque(), torque_nm);
+        if force.is_none() && torque.is_none() {
+            return *wrench;
+        }
+        events.insert(Events::SLEW_LIMITED);
+        Wrench::new(force.unwrap_or(wrench.force()), torque.unwrap_or(wrench.torque()))
+    }
+
+    /// How far force (N) and torque (N·m) may move in a tick. One after missed ticks may change no more than one on time:
+    /// the hand felt nothing in between.
+    #[inline]
+    fn most_change(&self, tick: &Tick) -> [f64; 2] {
+        if tick.dt_ns == 0 || tick.dt_ns >= self.period_ns {
+            return self.most_change_in_a_period;
+        }
+        most_change(self.slew_per_s, tick.dt_ns)
+    }
+}
+
+/// True if no part of a wrench is larger than `most` of its axis, nor NaN.
+#[inline(always)]
+fn is_within(wrench: &Wrench, most: &Wrench) -> bool {
+    are_within(wrench.force_n, most.force_n) & are_within(wrench.torque_nm, most.torque_nm)
+}
+
+/// True if no part of a twist is larger than `most` of its axis, nor NaN.
+#[inline(always)]
+fn is_not_faster(twist: &Twist, most: &Twist) -> bool {
+    are_within(twist.linear_m_per_s, most.linear_m_per_s)
+        & are_within(twist.angular_rad_per_s, most.angular_rad_per_s)
+}
+
+/// Compares all axes side by side: nearly always none of them is beyond, and no branch would end it sooner.
+#[inline(always)]
+fn are_within([x, y, z]: [f64; 3], [most_x, most_y, most_z]: [f64; 3]) -> bool {
+    (x.abs() <= most_x) & (y.abs() <= most_y) & (z.abs() <= most_z)
+}
+
+/// The change in so many ns at rates per s.
+#[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
+fn most_change(slew_per_s: [f64; 2], dt_ns: u64) -> [f64; 2] {
+    let dt_s = dt_ns as f64 * 1.0e-9;
+    slew_per_s.map(|per_s| per_s * dt_s)
+}
+
+/// A force without the part along the velocity that adds to it, which fades from all at an excess of 1 to nothing at 2.
+fn without_drive(force: DVec3, velocity: DVec3, excess: f64) -> DVec3 {
+    let along = velocity.normalize_or_zero();
+    let drive = force.dot(along).max(0.0);
+    // Only a request near the largest double gets here; what cannot be split is no force.
+    if drive.is_infinite() {
+        return DVec3::ZERO;
+    }
+    force - along * (drive * (excess - 1.0).clamp(0.0, 1.0))
+}
+
+/// The longest vector of the same direction inside the box, not longer than `vector`. Axes with a half side of zero are left
+/// out: what cannot be driven takes nothing from what can.
+fn shrink_into_box(vector: DVec3, half_sides: DVec3) -> DVec3 {
+    let vector = DVec3::select(half_sides.cmpeq(DVec3::ZERO), DVec3::ZERO, vector);
+    // 0/0 on such an axis is no excess.
+    let excess = (vector.abs() / half_sides).to_array().into_iter().fold(0.0, f64::max);
+    if excess <= 1.0 { vector } else { (vector / excess).clamp(-half_sides, half_sides) }
+}
+
+/// True if `to` is no farther than `most` from `from`.
+#[inline(always)]
+fn is_step_within(from: DVec3, to: DVec3, most: f64) -> bool {
+    (to - from).length_squared() <= most * most
+}
+
+/// The point `most` from `from` on the way to `to`; `None` if `to` is no farther than that.
+fn step_short_of(from: DVec3, to: DVec3, most: f64) -> Option<DVec3> {
+    if is_step_within(from, to, most) {
+        return None;
+    }
+    let way = to - from;
+    Some(from + way * (most / way.length()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_hal::{Axes, Pose};
+
+    const PERIOD_NS: u64 = 1_000_000;
+    const DEVICE: Capabilities = Capabilities {
+        sensed: Axes::ALL,
+        actuated: Axes::ALL,
+        range_m: [0.012; 3],
+        range_rad: [0.12; 3],
+        resolution_m: 0.0,
+        max_force_n: [40.0, 40.0, 100.0],
+        max_torque_nm: [5.0, 5.0, 10.0],
+        max_force_slew_n_per_s: 20_000.0,
+        max_torque_slew_nm_per_s: 2_000.0,
+        max_stiffness_n_per_m: 25_000.0,
+        rate_hz: [100.0, 10_000.0],
+        latency_s: 0.0,
+    };
+
+    fn envelope(limits: &Limits) -> Envelope {
+        Envelope::new(limits, &Boundary::default(), &DEVICE, PERIOD_NS)
+    }
+
+    fn tick(index: u64) -> Tick {
+        Tick { index, time_ns: index * PERIOD_NS, dt_ns: if index == 0 { 0 } else { PERIOD_NS } }
+    }
+
+    /// Runs one tick at home; the wrench and the events.
+    fn apply(envelope: &mut Envelope, request: Wrench, index: u64) -> (Wrench, Events) {
+        let mut events = Events::NONE;
+        let sent = envelope.apply(&request, Gate::OPEN, &DeviceState::HOME, &tick(index), &mut events);
+        (sent, events)
+    }
+
+    #[test]
+    fn what_is_within_all_limits_passes_unchanged() {
+        let request = Wrench::new(DVec3::new(1.0, -2.0, 3.0), DVec3::new(0.1, 0.2, -0.3));
+        let (sent, events) = apply(&mut envelope(&Limits::default()), request, 0);
+        assert_eq!(sent, request);
+        assert_eq!(events, Events::NONE);
+    }
+
+    #[test]
+    fn nothing_gets_past_limits_and_slew_whatever_a_model_asks() {
+        let limits = Limits { force_n: [30.0, 50.0, 50.0], torque_slew_nm_per_s: 500.0, ..Limits::default() };
+        let mut envelope = envelope(&limits);
+        // The tighter of scene and device.
+        let (most_n, most_nm) = (DVec3::new(30.0, 40.0, 50.0), DVec3::new(5.0, 5.0, 10.0));
+        let (slew_n, slew_nm) = (20.0, 0.5);
+        let wild = [0.0, 1.0, -1.0, 1.0e3, -1.0e3, 1.0e300, -1.0e300, 5.0e-324, f64::NAN, f64::INFINITY];
+        let mut last = Wrench::ZERO;
+        let mut state: u64 = 1; // a linear congruential generator (Knuth's MMIX) is random enough to pick wild values
+        for index in 0..100_000 {
+            let mut pick = || {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                wild[(state >> 33) as usize % wild.len()]
+            };
+            let request = Wrench { force_n: [pick(), pick(), pick()], torque_nm: [pick(), pick(), pick()] };
+            let (sent, _) = apply(&mut envelope, request, index);
+            // One rounding of the largest number involved.
+            let slack = 1.0 + 4.0 * f64::EPSILON;
+            assert!(sent.is_finite());
+            assert!(sent.force().abs().cmple(most_n * slack).all(), "{sent:?}");
+            assert!(sent.torque().abs().cmple(most_nm * slack).all(), "{sent:?}");
+            assert!((sent.force() - last.force()).length() <= slew_n * slack + 1.0e-13, "{sent:?} {last:?}");
+            assert!(
+                (sent.torque() - last.torque()).length() <= slew_nm * slack + 1.0e-14,
+                "{sent:?} {last:?}"
+            );
+            last = sent;
+        }
+    }
+
+    /// Whatever passes at once would pass all stages unchanged, and none would tell anything: at every limit, and for what
+    /// is no number.
+    #[test]
+    fn the_short_way_is_the_long_way() {
+        let boundless = Capabilities {
+            max_force_n: [f64::INFINITY; 3],
+            max_torque_nm: [f64::INFINITY; 3],
+            max_force_slew_n_per_s: f64::INFINITY,
+            max_torque_slew_nm_per_s: f64::INFINITY,
+            ..DEVICE
+        };
+        let limits = Limits { velocity_m_per_s: [1.0, 0.5, 1.0], ..Limits::default() };
+        let no_limits = Limits {
+            force_n: [f64::INFINITY; 3],
+            torque_nm: [f64::INFINITY; 3],
+            force_slew_n_per_s: f64::INFINITY,
+            torque_slew_nm_per_s: f64::INFINITY,
+            ..Limits::default()
+        };
+        let shares = [0.0, -0.0, 0.02, -0.04, 0.3, -0.6, 1.0, -1.0, 1.0 + f64::EPSILON, 1.0e300];
+        let nonsense = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
+        for (limits, device) in [(limits, DEVICE), (no_limits, boundless)] {
+            let mut envelope = Envelope::new(&limits, &Boundary::default(), &device, PERIOD_NS);
+            let mut random: u64 = 1; // Knuth's MMIX, as above
+            let (mut short, mut long) = (0, 0);
+            for index in 0..50_000 {
+                let mut bits = || {
+                    random = random
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1_442_695_040_888_963_407);
+                    (random >> 33) as usize
+                };
+                // Some ticks have a few numbers that are large, or none at all.
+                let is_wild = bits() % 4 == 0;
+                let mut three = |scale: f64| {
+                    [(); 3].map(|()| match (is_wild, bits() % 40) {
+                        (true, 0) => nonsense[bits() % nonsense.len()],
+                        (true, 1..5) => scale * shares[bits() % shares.len()],
+                        _ => scale * shares[bits() % 4],
+                    })
+                };
+                let request = Wrench { force_n: three(20.0), torque_nm: three(2.0) };
+                let position_m = three(0.0115);
+                let [x, y, z] = three(0.055);
+                let state = DeviceState {
+                    pose: Pose { position_m, orientation_xyzw: [x, y, z, 1.0] },
+                    twist: flotor_hal::Twist { linear_m_per_s: three(1.0), angular_rad_per_s: three(5.0) },
+                    ..DeviceState::HOME
+                };
+                let gate = Gate { models: [1.0, 0.5, 0.0][index % 3], boundary: 1.0 };
+                let (tick, mut events) = (tick(1), Events::NONE);
+                let passed = envelope.within_limits(&request, gate, &state, &tick);
+                let all = envelope.through_all_stages(request, gate, &state, &tick, &mut events);
+                if let Some(passed) = passed {
+                    let bits =
+                        |wrench: Wrench| [wrench.force_n, wrench.torque_nm].map(|v| v.map(f64::to_bits));
+                    assert_eq!(bits(passed), bits(all), "{request:?} {state:?}");
+                    assert_eq!(events, Events::NONE, "{request:?} {state:?}");
+                    short += 1;
+                } else {
+                    long += 1;
+                }
+                // Else a wild wrench would be followed for many ticks.
+                if !is_wild {
+                    envelope.last = all;
+                }
+            }
+            assert!(short > 1000 && long > 1000, "{short} {long}");
+        }
+    }
+
+    #[test]
+    fn a_planar_device_has_its_two_axes_limited_and_walled_as_any_other() {
+        let device = Capabilities {
+            range_m: [0.05, 0.04, 0.0],
+            max_force_n: [3.0, 3.0, 0.0],
+            range_rad: [0.0; 3],
+            max_torque_nm: [0.0; 3],
+            ..DEVICE
+        };
+        let mut envelope = Envelope::new(&Limits::default(), &Boundary::default(), &device, PERIOD_NS);
+        let (sent, events) = apply(&mut envelope, Wrench::new(DVec3::new(1.0, -2.0, 7.0), DVec3::X), 0);
+        assert_eq!(
+            sent,
+            Wrench::from_force(DVec3::new(1.0, -2.0, 0.0)),
+            "what cannot be driven costs nothing"
+        );
+        assert_eq!(events, Events::NONE);
+        let (sent, events) = apply(&mut envelope, Wrench::from_force(DVec3::new(30.0, 15.0, 900.0)), 1);
+        assert!((sent.force() - DVec3::new(3.0, 1.5, 0.0)).length() < 1.0e-12, "{sent:?}");
+        assert!(events.intersects(Events::FORCE_LIMITED));
+        // A millimetre beyond the wall along x: 10 N, of which 3 are allowed.
+        let mut state = DeviceState::HOME;
+        state.pose = Pose::new(DVec3::X * 0.0505, flotor_hal::DQuat::IDENTITY);
+        envelope.last = Wrench::ZERO;
+        let walled = envelope.apply(&Wrench::ZERO, Gate::OPEN, &state, &tick(1), &mut Events::NONE.clone());
+        assert!((walled.force() - DVec3::X * -3.0).length() < 1.0e-9, "{walled:?}");
+    }
+
+    #[test]
+    fn a_force_that_is_too_large_keeps_its_direction() {
+        let asked = DVec3::new(100.0, 50.0, 0.0);
+        let limits = Limits { force_n: [20.0; 3], ..Limits::default() };
+        let (sent, events) = apply(&mut envelope(&limits), Wrench::from_force(asked), 0);
+        assert!(sent.force().cross(asked).length() < 1.0e-12);
+        assert!(events.intersects(Events::FORCE_LIMITED));
+    }
+
+    #[test]
+    fn not_a_number_becomes_no_force_and_is_told() {
+        let request = Wrench { force_n: [0.0, f64::NAN, 1.0], torque_nm: [0.0; 3] };
+        let (sent, events) = apply(&mut envelope(&Limits::default()), request, 0);
+        assert_eq!(sent, Wrench::ZERO);
+        assert!(events.intersects(Events::NOT_FINITE));
+    }
+
+    #[test]
+    fn the_gate_scales_models_and_boundary() {
+        let mut envelope = envelope(&Limits::default());
+        let mut state = DeviceState::HOME;
+        state.pose = Pose::new(DVec3::new(0.0, 0.0, 0.0117), flotor_hal::DQuat::IDENTITY); // the wall pushes with 2 N
+        let mut sent = |models, boundary| {
+            let (gate, request) = (Gate { models, boundary }, Wrench::from_force(DVec3::X));
+            envelope.last = Wrench::ZERO;
+            envelope.apply(&request, gate, &state, &tick(1), &mut Events::NONE.clone()).force()
+        };
+        assert!((sent(0.5, 1.0) - DVec3::new(0.5, 0.0, -2.0)).length() < 1.0e-9);
+        assert!((sent(1.0, 0.5) - DVec3::new(1.0, 0.0, -1.0)).length() < 1.0e-9);
+        assert_eq!(sent(0.0, 0.0), DVec3::ZERO);
+    }
+
+    #[test]
+    fn nothing_drives_a_handle_on_that_is_too_fast_and_braking_is_left() {
+        let limits = Limits { velocity_m_per_s: [1.0, 0.5, 1.0], ..Limits::default() };
+        let mut envelope = envelope(&limits);
+        let mut sent = |velocity: DVec3, force: DVec3| {
+            let mut state = DeviceState::HOME;
+            state.twist.linear_m_per_s = velocity.to_array();
+            let mut events = Events::NONE;
+            envelope.last = Wrench::ZERO;
+            let sent = envelope.apply(&Wrench::from_force(force), Gate::OPEN, &state, &tick(1), &mut events);
+            (sent.force(), events.intersects(Events::VELOCITY_LIMITED))
+        };
+        let asked = DVec3::new(3.0, 4.0, 0.0);
+        assert_eq!(sent(DVec3::new(1.0, 0.0, 0.0), asked), (asked, false), "at the limit all passes");
+        assert_eq!(
+            sent(DVec3::new(1.5, 0.0, 0.0), asked),
+            (DVec3::new(1.5, 4.0, 0.0), true),
+            "half of the drive"
+        );
+        assert_eq!(sent(DVec3::new(2.0, 0.0, 0.0), asked), (DVec3::new(0.0, 4.0, 0.0), true), "none of it");
+        assert_eq!(sent(DVec3::new(-9.0, 0.0, 0.0), asked), (asked, true), "braking is left alone");
+        assert_eq!(
+            sent(DVec3::new(0.0, 0.75, 0.0), asked).0,
+            DVec3::new(3.0, 2.0, 0.0),
+            "each axis has its limit"
+        );
+    }
+
+    #[test]
+    fn the_wall_pushes_inwards_only_and_only_outside() {
+        let mut envelope = envelope(&Limits::default());
+        let mut push = |position_m: DVec3, velocity: DVec3| {
+            let mut state = DeviceState::HOME;
+            state.pose = Pose::new(position_m, flotor_hal::DQuat::IDENTITY);
+            state.twist.linear_m_per_s = velocity.to_array();
+            let mut events = Events::NONE;
+            envelope.last = Wrench::ZERO;
+            envelope.apply(&Wrench::ZERO, Gate::OPEN, &state, &tick(1), &mut events).force()
+        };
+        let inside = push(DVec3::new(0.0, 0.0, 0.0114), DVec3::Z);
+        assert_eq!(inside, DVec3::ZERO);
+        // 0.2 mm beyond the wall at 11.5 mm, 10 kN/m.
+        let outside = push(DVec3::new(0.0, 0.0, 0.0117), DVec3::ZERO);
+        assert!((outside - DVec3::new(0.0, 0.0, -2.0)).length() < 1.0e-9, "{outside}");
+        let leaving = push(DVec3::new(0.0, 0.0, 0.0117), DVec3::Z * 0.1);
+        assert!((leaving.z + 3.5).abs() < 1.0e-9, "damping resists going out: {leaving}");
+        let returning = push(DVec3::new(0.0, 0.0, 0.0117), DVec3::Z * -10.0);
+        assert!(
+            (returning.z + 2.0).abs() < 1.0e-9,
+            "and does not pull a handle out that comes back: {returning}"
+        );
+        let sideways = push(DVec3::new(0.00936, 0.0, 0.00702), DVec3::ZERO); // 11.7 mm at 3:4
+        assert!(
+            sideways.cross(DVec3::new(4.0, 0.0, 3.0)).length() < 1.0e-9,
+            "a sphere, not a box: {sideways}"
+        );
+    }
+}

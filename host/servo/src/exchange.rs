@@ -1,0 +1,81 @@
+//! How models come into a running loop and leave it: as owned boxes through wait-free queues, made and dropped elsewhere.
+//!
+//! The loop takes a model out of a queue and puts it in place between two ticks; what it replaces fades out and goes
+//! back through another queue. Nothing in the loop allocates or frees.
+
+use super::forces::Forces;
+use super::models::{Layer, Replacement};
+use flotor_hal::Tick;
+use rtrb::{Consumer, Producer, RingBuffer};
+
+/// A layer that is no longer needed, and the number of its model.
+pub type Retired = (u32, Box<Layer>);
+
+/// The loop's end.
+pub struct Exchange {
+    /// What the scene has scheduled, in order of time, ns; each place is emptied when its time comes.
+    schedule: Box<[(u64, Option<Replacement>)]>,
+    next: usize,
+    arriving: Consumer<Replacement>,
+    retired: Producer<Retired>,
+}
+
+/// The other end.
+pub struct Workshop {
+    pub leaving_for_the_loop: Producer<Replacement>,
+    pub retired: Consumer<Retired>,
+}
+
+/// Both ends, for a number of models. Not real-time.
+pub fn exchange(models: usize, mut schedule: Vec<(u64, Replacement)>) -> (Exchange, Workshop) {
+    schedule.sort_by_key(|(time_ns, _)| *time_ns); // stable: equal times keep the scene's order
+    // One of each model may be on its way in; on the way out there may be that one, the one before, and the scheduled.
+    let (leaving_for_the_loop, arriving) = RingBuffer::new(models.max(1));
+    let (retired, taken_back) = RingBuffer::new(2 * models + schedule.len() + 1);
+    let schedule = schedule.into_iter().map(|(time_ns, replacement)| (time_ns, Some(replacement))).collect();
+    let exchange = Exchange { schedule, next: 0, arriving, retired };
+    (exchange, Workshop { leaving_for_the_loop, retired: taken_back })
+}
+
+impl Exchange {
+    /// True if a replacement is due at this tick. Real-time: bounded, no allocation.
+    #[inline]
+    pub fn is_due(&self, tick: &Tick) -> bool {
+        let scheduled = self.schedule.get(self.next).is_some_and(|(time_ns, _)| *time_ns <= tick.time_ns);
+        scheduled || !self.arriving.is_empty()
+    }
+
+    /// Hands back what has faded out and puts in what is due; `told` hears of model and generation.
+    ///
+    /// Real-time: bounded by the models and what is scheduled, no allocation.
+    #[inline]
+    pub fn apply_due(&mut self, tick: &Tick, models: &mut Forces, mut told: impl FnMut(u32, u16)) {
+        while !self.retired.is_full()
+            && let Some(faded) = models.take_faded(tick)
+        {
+            let _ = self.retired.push(faded); // there is room
+        }
+        // Each replacement may push one out: it is only taken if that has somewhere to go.
+        while !self.retired.is_full()
+            && let Some(replacement) = self.due(tick)
+        {
+            let (model, generation) = (replacement.model, replacement.generation);
+            if let Some(pushed_out) = models.replace(replacement, tick) {
+                let _ = self.retired.push((model, pushed_out)); // there is room
+            }
+            told(model, generation);
+        }
+    }
+
+    /// The next replacement whose time has come.
+    #[inline]
+    fn due(&mut self, tick: &Tick) -> Option<Replacement> {
+        if let Some((time_ns, replacement)) = self.schedule.get_mut(self.next)
+            && *time_ns <= tick.time_ns
+        {
+            self.next += 1;
+            return replacement.take();
+        }
+        self.arriving.pop().ok()
+    }
+}

@@ -1,0 +1,296 @@
+//! Everything that asks for a wrench: the models of each device, and the couplings between devices.
+//!
+//! The same code runs in the servo and in a replay; that is why a replay can be bit-exact.
+
+use super::Heartbeat;
+use super::models::{Layer, LayerReport, ModelHealth, ModelStack, Replacement};
+use crate::coupling::{
+    Account, Coupling, CouplingDescription, CouplingEnds, EndApart, Grip, Hearing, Line, Patience, Pull, Tank,
+};
+use flotor_core::trace::Events;
+use flotor_hal::abi::CallStatus;
+use flotor_hal::{DeviceState, Tick, Wrench, instructions};
+
+/// What passes through the port of one device in a tick, device frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Port {
+    /// Where the handle is, as last known.
+    pub state: DeviceState,
+    /// The wrench that is held since the last tick.
+    pub commanded: Wrench,
+    /// What models and couplings ask for.
+    pub asked: Wrench,
+    /// Of this, what the models alone ask for.
+    by_models: Wrench,
+    /// Energy stored in models and couplings, J.
+    pub energy_j: f64,
+    /// What has happened in this tick.
+    pub events: Events,
+}
+
+impl Port {
+    /// A port at rest.
+    pub const REST: Port = Port {
+        state: DeviceState::HOME,
+        commanded: Wrench::ZERO,
+        asked: Wrench::ZERO,
+        by_models: Wrench::ZERO,
+        energy_j: 0.0,
+        events: Events::NONE,
+    };
+
+    /// What is held for the couplings: all that is not the models'. Exact where a device has no models; where it has,
+    /// what the envelope takes away counts as taken from the coupling.
+    #[inline]
+    fn held_for_couplings(&self) -> Wrench {
+        self.commanded - self.by_models
+    }
+
+    /// Adds what a coupling asks for.
+    #[inline]
+    fn add(&mut self, pull: &Pull) {
+        self.asked = self.asked + pull.wrench;
+        self.energy_j += pull.energy_j;
+        if pull.is_damped {
+            self.events.insert(Events::PASSIVITY_DAMPED);
+        }
+    }
+}
+
+/// What becomes of a coupling in a run: for reports.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CouplingOutcome {
+    /// The accounts of both ends; that of an end on another host as it was told last.
+    pub accounts: [Account; 2],
+    /// How an end on another host was heard.
+    pub hearing: Option<Hearing>,
+}
+
+/// A coupling and the devices of this run that it holds.
+pub enum Coupled {
+    /// Both ends are here.
+    Here { coupling: Box<Coupling>, devices: [usize; 2], pulls: [Pull; 2] },
+    /// The other end is on another host.
+    Apart { end: Box<EndApart>, device: usize, pull: Pull },
+}
+
+impl Coupled {
+    /// With the line on which news is to be carried to another host, if one end is there. Not real-time.
+    pub fn new(description: &CouplingDescription, period_s: f64, patience: Patience) -> (Self, Option<Line>) {
+        let CouplingDescription { config, ends, .. } = description;
+        match ends {
+            CouplingEnds::Here(ends) => {
+                let devices = ends.map(|end| usize::from(end.device));
+                let coupling = Box::new(Coupling::new(config, ends, period_s));
+                (Self::Here { coupling, devices, pulls: [Pull::default(); 2] }, None)
+            }
+            CouplingEnds::Apart(here) => {
+                let (end, line) = EndApart::new(config, here, period_s, patience);
+                let device = usize::from(here.device);
+                (Self::Apart { end: Box::new(end), device, pull: Pull::default() }, Some(line))
+            }
+        }
+    }
+
+    /// Asks the coupling. Real-time: bounded, no allocation.
+    #[inline]
+    fn step(&mut self, tick: &Tick, ports: &[Port]) {
+        let grip = |port: &'_ Port| (port.state, port.held_for_couplings());
+        match self {
+            Self::Here { coupling, devices, pulls } => {
+                let [Some(first), Some(second)] = devices.map(|device| ports.get(device).map(grip)) else {
+                    return;
+                };
+                *pulls = coupling.step([&first, &second].map(|(state, held)| Grip { state, held: *held }));
+            }
+            Self::Apart { end, device, pull } => {
+                let Some((state, held)) = ports.get(*device).map(grip) else { return };
+                *pull = end.step(tick, Grip { state: &state, held });
+            }
+        }
+    }
+
+    /// Adds what it asked for. Real-time: bounded, no allocation.
+    #[inline]
+    fn add_to(&self, ports: &mut [Port]) {
+        match self {
+            Self::Here { devices, pulls, .. } => {
+                for (device, pull) in devices.iter().zip(pulls) {
+                    let Some(port) = ports.get_mut(*device) else { continue };
+                    port.add(pull);
+                }
+            }
+            Self::Apart { end, device, pull } => {
+                let Some(port) = ports.get_mut(*device) else { return };
+                port.add(pull);
+                if end.is_alone() {
+                    port.events.insert(Events::PARTNER_SILENT);
+                }
+            }
+        }
+    }
+
+    /// Not real-time.
+    fn outcome(&self) -> CouplingOutcome {
+        match self {
+            Self::Here { coupling, .. } => {
+                CouplingOutcome { accounts: coupling.tanks().map(Tank::account), hearing: None }
+            }
+            Self::Apart { end, .. } => {
+                let hearing = end.hearing();
+                CouplingOutcome { accounts: [end.account(), hearing.partner], hearing: Some(hearing) }
+            }
+        }
+    }
+}
+
+#[inline(never)] // out of the way of the many scenes without couplings, as `add_all`
+fn step_all(couplings: &mut [Coupled], tick: &Tick, ports: &[Port]) {
+    couplings.iter_mut().for_each(|coupled| coupled.step(tick, ports));
+}
+
+#[inline(never)]
+fn add_all(couplings: &[Coupled], ports: &mut [Port]) {
+    couplings.iter().for_each(|coupled| coupled.add_to(ports));
+}
+
+/// Which device a model is on, and which of the models there it is.
+#[derive(Clone, Copy, Debug)]
+struct Whereabouts {
+    device: usize,
+    place: usize,
+}
+
+/// All models and couplings of a run.
+pub struct Forces {
+    /// The models of each device.
+    stacks: Box<[ModelStack]>,
+    /// By number of the model in the scene.
+    models: Box<[Whereabouts]>,
+    /// Layers that may still be fading out.
+    leaving: usize,
+    couplings: Box<[Coupled]>,
+}
+
+impl Forces {
+    /// `layers` are the scene's models, each with the device it is on. Not real-time.
+    pub fn new(devices: usize, layers: Vec<(usize, Layer)>, couplings: Vec<Coupled>) -> Self {
+        let mut on_device: Vec<Vec<(usize, Layer)>> =
+            std::iter::repeat_with(Vec::new).take(devices).collect();
+        let mut models = Vec::with_capacity(layers.len());
+        for (number, (device, layer)) in layers.into_iter().enumerate() {
+            let Some(stack) = on_device.get_mut(device) else { continue };
+            models.push(Whereabouts { device, place: stack.len() });
+            stack.push((number, layer));
+        }
+        Self {
+            stacks: on_device.into_iter().map(ModelStack::new).collect(),
+            models: models.into(),
+            leaving: 0,
+            couplings: couplings.into(),
+        }
+    }
+
+    /// What all of them ask for at the states of the ports, one for each device. Real-time: bounded by the models that
+    /// are near, no allocation.
+    #[inline(never)] // registers of its own: in the tick as a whole there are none left
+    pub fn step(&mut self, tick: &Tick, ports: &mut [Port], heart: &Heartbeat) {
+        instructions::best(
+            #[inline(always)]
+            || self.ask(tick, ports, heart),
+        );
+    }
+
+    #[inline(always)] // into what chooses the instructions
+    fn ask(&mut self, tick: &Tick, ports: &mut [Port], heart: &Heartbeat) {
+        let Self { stacks, couplings, .. } = self;
+        // The couplings first: what is held now is what they and the models asked for last.
+        if !couplings.is_empty() {
+            step_all(couplings, tick, ports);
+        }
+        for (stack, port) in stacks.iter_mut().zip(&mut *ports) {
+            let (wrench, energy_j) = stack.step(tick, &port.state, heart, &mut port.events);
+            (port.asked, port.by_models, port.energy_j) = (wrench, wrench, energy_j);
+        }
+        if !couplings.is_empty() {
+            add_all(couplings, ports);
+        }
+    }
+
+    /// The models a model's number stands for, and its place among them.
+    #[inline]
+    fn stack_of(&mut self, model: usize) -> Option<(&mut ModelStack, usize)> {
+        let Whereabouts { device, place } = *self.models.get(model)?;
+        Some((self.stacks.get_mut(device)?, place))
+    }
+
+    /// Changes a live parameter of the model numbered `model`. Real-time: bounded by its objects, no allocation.
+    pub fn set_parameter(&mut self, model: usize, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
+        match self.stack_of(model) {
+            Some((stack, place)) => stack.set_parameter(place, tick, parameter, value),
+            None => CallStatus::Unsupported,
+        }
+    }
+
+    /// Moves the weight of the model numbered `model` to a new value, at its rate. Real-time: bounded, no allocation.
+    pub fn set_weight(&mut self, model: usize, tick: &Tick, weight: f64) -> CallStatus {
+        match self.stack_of(model) {
+            Some((stack, place)) => stack.set_weight(place, tick, weight),
+            None => CallStatus::Unsupported,
+        }
+    }
+
+    /// How often the model numbered `model` was replaced. Real-time: bounded, no allocation.
+    #[inline]
+    pub fn generation(&mut self, model: usize) -> Option<u16> {
+        self.stack_of(model).and_then(|(stack, place)| stack.generation(place))
+    }
+
+    /// Puts another model in place of one, faded in from this tick on. What it pushes out, because it was still
+    /// fading, is returned: dropping it is not for the loop.
+    ///
+    /// Real-time: bounded by the objects of the model, no allocation.
+    pub fn replace(&mut self, replacement: Replacement, tick: &Tick) -> Option<Box<Layer>> {
+        let Replacement { model, generation, layer } = replacement;
+        let pushed_out = match self.stack_of(model as usize) {
+            Some((stack, place)) => stack.replace(place, layer, generation, tick),
+            None => Some(layer),
+        };
+        self.leaving += usize::from(pushed_out.is_none());
+        pushed_out
+    }
+
+    /// True if a layer may be fading out. Real-time: bounded, no allocation.
+    #[inline]
+    pub fn is_fading(&self) -> bool {
+        self.leaving > 0
+    }
+
+    /// A layer that has faded out, and the number of its model. Real-time: bounded by the models, no allocation.
+    #[inline]
+    pub fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {
+        if !self.is_fading() {
+            return None;
+        }
+        let faded = self.stacks.iter_mut().find_map(|stack| stack.take_faded(tick));
+        self.leaving -= usize::from(faded.is_some());
+        faded
+    }
+
+    /// What is known of every layer that is in place or fading out. Not real-time.
+    pub fn reports(&mut self) -> Vec<LayerReport> {
+        self.stacks.iter_mut().flat_map(ModelStack::reports).collect()
+    }
+
+    /// Of every model, health and last words of the layer in place, in the scene's order. Not real-time.
+    pub fn health(&mut self) -> Vec<(ModelHealth, String)> {
+        let mut stacks: Vec<_> = self.stacks.iter_mut().map(|stack| stack.health().into_iter()).collect();
+        let next = |at: &Whereabouts| stacks.get_mut(at.device).and_then(Iterator::next);
+        self.models.iter().filter_map(next).collect()
+    }
+
+    /// What has become of each coupling. Not real-time.
+    pub fn coupling_outcomes(&self) -> Vec<CouplingOutcome> {
+        self.couplings.iter().map(Coupled::outcome).collect()
+    }
+}

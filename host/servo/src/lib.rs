@@ -1,0 +1,54 @@
+//! The real-time core: one tick after the other, at a rate that is kept, inside limits that no plugin can bypass.
+//!
+//! - [`Servo`]: the tick; [`Clock`] decides when it happens, [`Envelope`] what may reach a hand.
+//! - [`coupling`]: two devices held together by a virtual spring, over any delay; [`port_energy`]: what crosses a port.
+//! - [`engine`]: where a model executes: in the loop, beside it at a rate of its own, or in a process of its own.
+//!
+//! Knows neither scenes nor files: whoever prepares a run hands over opened devices and prepared models.
+#![cfg_attr(rtsan, feature(sanitize))] // the step `blocking` of .ci/full
+
+mod boundary;
+mod budget;
+mod clock;
+pub mod coupling;
+pub mod engine;
+mod envelope;
+mod exchange;
+mod forces;
+mod models;
+mod parameters;
+mod passivity;
+pub mod port_energy;
+mod realtime;
+mod servo;
+mod state;
+mod station;
+mod stop;
+mod stopwatch;
+mod timing;
+mod watchdog;
+
+pub use budget::Overrun;
+pub use budget::TimeBudget;
+pub use clock::{Clock, SpinWindow};
+pub use clock::{Due, PaceLost, Schedule, monotonic_ns, sleep_until};
+pub use engine::{Engine, Stepped};
+pub use envelope::Envelope;
+pub use exchange::{Exchange, Workshop, exchange};
+pub use forces::CouplingOutcome;
+pub use forces::{Coupled, Forces, Port};
+pub use models::ModelHealth;
+pub use models::{Layer, LayerReport, Replacement};
+pub use parameters::{
+    ChangeReport, ChangeSender, PLUGIN, ParameterChange, ParameterQueue, ReportReceiver, ScheduledChange,
+    WEIGHT,
+};
+pub use realtime::{Core, Privilege, RealTimeReport};
+pub use realtime::{enter_real_time, enter_worker_priority, probe_real_time};
+pub use servo::{RunConfig, Servo};
+pub use state::{Cause, EmergencySource, Gate, RunEvent, RunState};
+pub use station::Station;
+pub use stop::StopSwitch;
+pub use timing::{Durations, Percentiles, Stage, Timing};
+pub use watchdog::{Heartbeat, start as start_watchdog};
+pub use watchdog::{Place, Stuck};

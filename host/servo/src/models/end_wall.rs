@@ -1,0 +1,121 @@
+//! The wall where a model ends: spring and damper that bring back a handle which is beyond it, and never pull.
+//!
+//! It belongs to the model's share: it fades, yields and goes with the model. The [boundary](crate) of the device
+//! stands beside it; whichever is nearer is felt first.
+
+use crate::boundary::stable_stiffness;
+use flotor_core::mapping::Mapping;
+use flotor_hal::{DVec3, LoopConfig, Pose, Reach, Twist, Wrench};
+
+/// Damping of the wall, N·s/m: that of the device's own boundary mode (client program of the University of Utah).
+const DAMPING_NS_PER_M: f64 = 15.0;
+
+/// Its stiffness at 1 kHz and faster, N/m: that of the [boundary](flotor_core::limits::Boundary).
+const MOST_STIFFNESS_N_PER_M: f64 = 10_000.0;
+
+/// The wall of one object.
+pub(super) struct EndWall {
+    reach: Reach,
+    stiffness_n_per_m: f64,
+}
+
+impl EndWall {
+    /// A wall as stiff as the period allows; `None` for a model that has no end. Not real-time.
+    pub(super) fn new(reach: &Reach, config: &LoopConfig) -> Option<Self> {
+        let stable_n_per_m = stable_stiffness(DAMPING_NS_PER_M, config.period_ns);
+        let stiffness_n_per_m = MOST_STIFFNESS_N_PER_M.min(stable_n_per_m);
+        reach.is_bounded().then_some(Self { reach: *reach, stiffness_n_per_m })
+    }
+
+    /// The model ends elsewhere now, or nowhere. Real-time: bounded, no allocation.
+    pub(super) fn move_to(&mut self, reach: &Reach) {
+        self.reach = if reach.is_bounded() { *reach } else { Reach::UNBOUNDED };
+    }
+
+    /// Its push in the device frame on a handle at a pose in the model's frame that moves so in the device's; `None` within
+    /// reach. Real-time: bounded, no allocation.
+    #[inline(always)] // as `Layer::step`
+    pub(super) fn push(&self, pose: &Pose, mapping: &Mapping, twist: &Twist) -> Option<Wrench> {
+        if self.reach.beyond(pose.position()) == DVec3::ZERO {
+            return None;
+        }
+        self.push_back(pose, mapping, twist)
+    }
+
+    #[cold]
+    fn push_back(&self, pose: &Pose, mapping: &Mapping, twist: &Twist) -> Option<Wrench> {
+        let beyond_m = self.reach.beyond(pose.position());
+        if !beyond_m.is_finite() {
+            return None;
+        }
+        let beyond_m = mapping.vector_to_device(beyond_m);
+        let depth_m = beyond_m.length();
+        let outward = beyond_m / depth_m;
+        // Damping acts outwards only, as that of the boundary.
+        let leaving_m_per_s = twist.linear().dot(outward).max(0.0);
+        let push_n = self.stiffness_n_per_m * depth_m + DAMPING_NS_PER_M * leaving_m_per_s;
+        Some(Wrench::from_force(outward * -push_n))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_core::mapping::MappingConfig;
+    use flotor_hal::DQuat;
+
+    /// Ends a millimetre below home and nowhere else.
+    fn wall_at(period_ns: u64) -> EndWall {
+        let inf = f64::INFINITY;
+        let reach = Reach::between([-inf, -inf, -1.0e-3], [inf; 3]);
+        EndWall::new(&reach, &LoopConfig { period_ns, seed: 0 }).expect("it ends")
+    }
+
+    /// The push of a wall on a handle that is and moves along z of the device.
+    fn push(wall: &EndWall, mapping: &Mapping, z_m: f64, speed_m_per_s: f64) -> Option<Wrench> {
+        let pose = mapping.pose_to_model(&Pose::new(DVec3::Z * z_m, DQuat::IDENTITY));
+        wall.push(&pose, mapping, &Twist::new(DVec3::Z * speed_m_per_s, DVec3::ZERO))
+    }
+
+    #[test]
+    fn it_pushes_back_what_is_beyond_and_nothing_else() {
+        let mapping = Mapping::new(&MappingConfig::default());
+        let push = |z_m: f64, speed: f64| push(&wall_at(1_000_000), &mapping, z_m, speed);
+        assert_eq!(push(-0.9e-3, -1.0), None);
+        assert_eq!(push(9.0, 0.0), None);
+        let force = |z_m, speed| push(z_m, speed).expect("it is beyond").force();
+        assert!((force(-1.2e-3, 0.0) - DVec3::Z * 2.0).length() < 1.0e-9);
+        assert!((force(-1.2e-3, -0.1).z - 3.5).abs() < 1.0e-9, "damping resists going on");
+        assert!((force(-1.2e-3, 10.0).z - 2.0).abs() < 1.0e-9, "and does not pull back in what comes back");
+        assert_eq!(push(f64::NAN, 0.0), None);
+    }
+
+    /// A model frame upside down, at twice the motion: the device meets the end above, after half the way.
+    #[test]
+    fn the_mapping_says_where_it_is() {
+        let config = MappingConfig {
+            motion_scale: 2.0,
+            rotation_xyzw: DQuat::from_rotation_x(std::f64::consts::PI).to_array(),
+            ..MappingConfig::default()
+        };
+        let mapping = Mapping::new(&config);
+        let push = |z_m: f64| push(&wall_at(1_000_000), &mapping, z_m, 0.0);
+        assert_eq!(push(0.4e-3), None);
+        let force = push(0.7e-3).expect("it is beyond").force();
+        assert!((force - DVec3::Z * -2.0).length() < 1.0e-9, "{force}");
+    }
+
+    #[test]
+    fn a_slow_loop_gets_a_softer_wall() {
+        let stiffness = [100_000, 500_000, 1_000_000, 10_000_000].map(|ns| wall_at(ns).stiffness_n_per_m);
+        assert_eq!(stiffness, [1.0e4, 1.0e4, 1.0e4, 1500.0]);
+    }
+
+    #[test]
+    fn a_model_may_end_elsewhere_after_a_change() {
+        let mapping = Mapping::new(&MappingConfig::default());
+        let mut wall = wall_at(1_000_000);
+        wall.move_to(&Reach::UNBOUNDED);
+        assert_eq!(push(&wall, &mapping, -1.0, 0.0), None);
+    }
+}

@@ -1,0 +1,362 @@
+//! One force model in all the places it is put: the unit that is mixed, faded and replaced.
+
+use super::broad_phase::{Bounds, BroadPhase};
+use super::end_wall::EndWall;
+use crate::budget::{Allowed, Overrun, TimeBudget};
+use crate::engine::{Engine, Stepped};
+use flotor_core::mapping::{Blend, Mapping};
+use flotor_core::trace::Events;
+use flotor_hal::abi::CallStatus;
+use flotor_hal::{
+    ActivityShape, DVec3, Demand, DeviceState, Input, LoopConfig, Memory, Output, Pose, StepStatus, Tick,
+    Twist, Wrench,
+};
+
+/// How a plugin in place of a model has behaved so far, in all its places.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ModelHealth {
+    /// The tick at which it first panicked; from then on the instance that did is out.
+    pub panicked_at: Option<u64>,
+    /// Ticks with an answer that was not finite or outside the contract; each counted as no force.
+    pub rejected_ticks: u64,
+    /// The first of them.
+    pub first_rejected: Option<u64>,
+    /// The tick at which its process was found to have ended; from then on it is out.
+    pub lost_at: Option<u64>,
+    /// Ticks without an answer in time from a process of its own.
+    pub late_ticks: u64,
+    /// The first of them.
+    pub first_late: Option<u64>,
+    /// How it was too slow, if it was taken out for that.
+    pub overrun: Option<Overrun>,
+}
+
+impl ModelHealth {
+    /// True if there is nothing to be said.
+    #[must_use]
+    pub fn is_good(&self) -> bool {
+        *self == Self::default()
+    }
+
+    fn reject(&mut self, tick: u64) {
+        self.rejected_ticks += 1;
+        self.first_rejected.get_or_insert(tick);
+    }
+
+    fn late(&mut self, tick: u64) {
+        self.late_ticks += 1;
+        self.first_late.get_or_insert(tick);
+    }
+}
+
+/// One instance of a model in one place.
+struct Object {
+    model: Engine,
+    mapping: Mapping,
+    /// The wall where the model ends, if it does.
+    end: Option<EndWall>,
+    /// The answer of the tick before, in its own frame, if it could be used and the next one may be late.
+    last: Option<Output>,
+    /// The tick it was stepped at last.
+    stepped_at: Option<u64>,
+    /// It panicked, or its process has ended: it is never called again.
+    is_out: bool,
+}
+
+/// What a layer asks for in a tick.
+#[derive(Clone, Copy)]
+pub(super) struct Share {
+    /// In the device frame, not weighted.
+    pub(super) wrench: Wrench,
+    /// Stored energy scaled to the device, J.
+    pub(super) energy_j: f64,
+}
+
+impl Share {
+    /// Nothing. A constant: what `Default` derives for arrays goes through memory, and the tick waits for it.
+    pub(super) const NONE: Share = Share { wrench: Wrench::ZERO, energy_j: 0.0 };
+
+    /// This part of it. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn times(self, part: f64) -> Self {
+        Self { wrench: self.wrench * part, energy_j: self.energy_j * part }
+    }
+
+    /// Both together. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn plus(self, other: Self) -> Self {
+        Self { wrench: self.wrench + other.wrench, energy_j: self.energy_j + other.energy_j }
+    }
+}
+
+/// What a model finds where it is to write its answer.
+const NO_ANSWER: Output = Output::new(Wrench::ZERO, 0.0, StepStatus::Ok);
+
+/// How all instances of a model are asked.
+#[derive(Clone, Copy)]
+struct Terms {
+    demand: Demand,
+    memory: Memory,
+}
+
+/// A model in all its places.
+pub struct Layer {
+    objects: Box<[Object]>,
+    broad: BroadPhase,
+    terms: Terms,
+    budget: TimeBudget,
+    /// What it asked for last: it fades if the model took too long too often.
+    last: Share,
+    blend: Blend,
+    /// It stays with the layer: whoever takes its place is not to blame for it.
+    health: ModelHealth,
+    /// How often its model had been replaced when it was put in.
+    pub(super) generation: u16,
+}
+
+/// What is known of a layer when its time is over.
+pub struct LayerReport {
+    /// Number of its model in the scene.
+    pub model: usize,
+    /// Which of those that had that place it was.
+    pub generation: u16,
+    pub health: ModelHealth,
+    /// What it said last; may be empty.
+    pub words: String,
+}
+
+impl Layer {
+    /// A model's instances, each with its mapping, and the time they may take together. Not real-time.
+    ///
+    /// Where a model ends, there is a wall as stiff as a loop of this `config` allows.
+    pub fn new(
+        instances: Vec<(Engine, Mapping)>,
+        blend: &Blend,
+        budget: TimeBudget,
+        config: &LoopConfig,
+    ) -> Self {
+        let served = |(model, _): &(Engine, Mapping)| Demand::ALL.limited_to(model.serves());
+        let demand = instances.first().map_or(Demand::ALL, served);
+        let object = |(mut model, mapping): (Engine, Mapping)| {
+            let end = EndWall::new(&model.reach(), config);
+            Object { model, mapping, end, last: None, stepped_at: None, is_out: false }
+        };
+        let mut objects: Box<[Object]> = instances.into_iter().map(object).collect();
+        let bounds = objects.iter_mut().map(Object::bounds).collect();
+        let memory = objects.first().map_or(Memory::Stateless, |object| object.model.memory());
+        Self {
+            objects,
+            broad: BroadPhase::new(bounds),
+            terms: Terms { demand, memory },
+            budget,
+            last: Share::NONE,
+            blend: *blend,
+            health: ModelHealth::default(),
+            generation: 0,
+        }
+    }
+
+    /// How it is mixed with the others.
+    pub(super) fn blend(&self) -> &Blend {
+        &self.blend
+    }
+
+    /// The box in the device frame in which any of its objects can act; `None` if that is everywhere. Real-time.
+    pub(super) fn bounds(&self) -> Option<Bounds> {
+        self.broad.hull()
+    }
+
+    /// What its objects ask for at a state of the device. A model that took too long too often is not asked any more:
+    /// what it asked for last fades.
+    ///
+    /// Real-time: bounded by the objects that are near, no allocation.
+    #[inline(always)] // so that the share goes on in registers, not as bytes just written
+    pub(super) fn step(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
+        match self.budget.allowed(tick.time_ns) {
+            Allowed::Asked => {
+                let begun_ns = self.budget.begin();
+                let share = self.ask(tick, state, events);
+                if let Some(begun_ns) = begun_ns {
+                    if self.budget.end(begun_ns, tick.index, tick.time_ns) {
+                        events.insert(Events::MODEL_OVERRUN);
+                        self.health.overrun = self.budget.overrun();
+                    }
+                    self.last = share;
+                }
+                share
+            }
+            Allowed::Fading(part) => {
+                events.insert(Events::MODEL_FAULT);
+                self.last.times(part)
+            }
+            Allowed::Nothing => {
+                events.insert(Events::MODEL_FAULT);
+                Share::NONE
+            }
+        }
+    }
+
+    /// Asks all objects that can act where the handle is; the others are not called.
+    #[inline(always)] // as `step`
+    fn ask(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
+        let Self { objects, broad, terms, health, .. } = self;
+        let mut share = Share::NONE;
+        broad.for_each_near(
+            objects,
+            &state.pose.position_m,
+            #[inline(always)] // as `step`
+            |object| {
+                let input = object.mapping.input(tick, state, terms.demand);
+                let mut output = NO_ANSWER;
+                if !object.answer(&input, terms.memory, &mut output, health, events) {
+                    events.insert(Events::MODEL_FAULT);
+                    return;
+                }
+                share.wrench = share.wrench + object.mapping.wrench_to_device(&output.wrench);
+                if let Some(push) = object.push_of_end(&input.pose, &state.twist) {
+                    events.insert(Events::BOUNDARY);
+                    share.wrench = share.wrench + push;
+                }
+                if output.energy_j.is_finite() {
+                    share.energy_j += output.energy_j * object.mapping.energy_scale();
+                }
+                if output.status() != Some(StepStatus::Ok) {
+                    events.insert(Events::MODEL_DEGRADED);
+                }
+            },
+        );
+        share
+    }
+
+    /// Changes a live parameter of all its objects. Real-time: bounded by their number, no allocation.
+    pub(super) fn set_parameter(&mut self, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
+        let mut worst = CallStatus::Ok;
+        for (index, object) in self.objects.iter_mut().enumerate() {
+            let status = object.model.set_parameter(parameter, value);
+            if status == CallStatus::Panicked {
+                object.is_out = true;
+                self.health.panicked_at.get_or_insert(tick.index);
+            }
+            if status != CallStatus::Ok {
+                worst = status;
+                continue;
+            }
+            if let Some(end) = &mut object.end {
+                end.move_to(&object.model.reach());
+            }
+            if self.broad.bounds(index).is_some() {
+                let bounds = object.bounds();
+                if bounds != self.broad.bounds(index) {
+                    self.broad.watch_always(index, bounds);
+                }
+            }
+        }
+        worst
+    }
+
+    /// How it has behaved so far.
+    pub(super) fn health(&self) -> ModelHealth {
+        self.health
+    }
+
+    /// What is known of it, in place of the model numbered `model`. Not real-time.
+    pub fn report(&mut self, model: usize) -> LayerReport {
+        let Self { generation, health, .. } = *self;
+        LayerReport { model, generation, health, words: self.last_message() }
+    }
+
+    /// What the first instance that has anything to say said last. Not real-time.
+    pub(super) fn last_message(&mut self) -> String {
+        let mut messages = self.objects.iter_mut().map(|object| object.model.last_message());
+        messages.find(|message| !message.is_empty()).unwrap_or_default()
+    }
+}
+
+impl Object {
+    /// The box in the device frame in which it can act; `None` if that is everywhere. Real-time: bounded, no
+    /// allocation.
+    fn bounds(&mut self) -> Option<Bounds> {
+        let region = self.model.activity();
+        let half_sides_m = match region.shape() {
+            ActivityShape::Everywhere => return None,
+            ActivityShape::Sphere => DVec3::splat(self.mapping.length_to_device(region.half_sides().x)),
+            ActivityShape::Box => self.mapping.half_sides_to_device(region.half_sides()),
+        };
+        Some(Bounds::about(self.mapping.position_to_device(region.center()), half_sides_m))
+    }
+
+    /// Asks the model; true if `output` is an answer that can be used, in the model's own frame. What is wrong with one
+    /// that cannot is booked in the health.
+    #[inline(always)] // the one call of it in a tick
+    fn answer(
+        &mut self,
+        input: &Input,
+        memory: Memory,
+        output: &mut Output,
+        health: &mut ModelHealth,
+        events: &mut Events,
+    ) -> bool {
+        if self.is_out {
+            return false;
+        }
+        // Where it was not stepped it has no history: it starts anew.
+        let was_asleep = self.stepped_at.is_some_and(|last| last + 1 != input.tick);
+        if was_asleep && memory == Memory::PathDependent && self.model.reset() != CallStatus::Ok {
+            return self.fail(input.tick, health);
+        }
+        self.stepped_at = Some(input.tick);
+        let stepped = self.model.step(input, output);
+        if stepped == Stepped::Answered && output.wrench.is_finite() && output.status().is_some() {
+            if self.model.may_be_late() {
+                self.last = Some(*output);
+            }
+            return true;
+        }
+        self.go_without(stepped, input.tick, output, health, events)
+    }
+
+    /// The push of the wall where the model ends on a handle at a pose in its frame, if it is beyond.
+    #[inline(always)] // as `answer`
+    fn push_of_end(&self, pose: &Pose, twist: &Twist) -> Option<Wrench> {
+        self.end.as_ref()?.push(pose, &self.mapping, twist)
+    }
+
+    /// There is no answer that can be used; true if the one before may stand in for it.
+    #[cold]
+    fn go_without(
+        &mut self,
+        stepped: Stepped,
+        tick: u64,
+        output: &mut Output,
+        health: &mut ModelHealth,
+        events: &mut Events,
+    ) -> bool {
+        match stepped {
+            Stepped::Answered => {
+                self.last = None;
+                health.reject(tick);
+                false
+            }
+            // One tick may pass with the answer before; a second one in a row finds none.
+            Stepped::Late => {
+                events.insert(Events::MODEL_OVERRUN);
+                health.late(tick);
+                let last = self.last.take();
+                *output = last.unwrap_or_default();
+                last.is_some()
+            }
+            Stepped::Broken => self.fail(tick, health),
+            Stepped::Gone => {
+                self.is_out = true;
+                health.lost_at.get_or_insert(tick);
+                false
+            }
+        }
+    }
+
+    fn fail(&mut self, tick: u64, health: &mut ModelHealth) -> bool {
+        self.is_out = true;
+        health.panicked_at.get_or_insert(tick);
+        false
+    }
+}

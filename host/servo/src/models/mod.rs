@@ -1,0 +1,177 @@
+//! All force models of a device: who is asked, and how the answers are put together.
+//!
+//! A scene's models are *layers*. Their wrenches add up, each by its weight; a layer that pushes silences those of
+//! lower priority; weights move at a steady rate, so that nothing jumps when one model gives way to another. A layer
+//! whose objects cannot act where the handle is, or whose weight is 0, is not asked at all.
+
+mod broad_phase;
+mod end_wall;
+mod fade;
+mod layer;
+mod slot;
+
+pub use layer::ModelHealth;
+pub use layer::{Layer, LayerReport};
+
+use super::{Heartbeat, Place};
+use broad_phase::BroadPhase;
+use fade::Fade;
+use flotor_core::trace::Events;
+use flotor_hal::abi::CallStatus;
+use flotor_hal::{DeviceState, Tick, Wrench};
+use layer::Share;
+use slot::Slot;
+
+/// Time in which a layer of higher priority silences the others, s: a hand's reaction takes longer, the slew limit
+/// need not act.
+const SILENCE_S: f64 = 0.02;
+
+/// All models of a device.
+pub struct ModelStack {
+    slots: Box<[Slot]>,
+    broad: BroadPhase,
+    /// Ascending; none if all layers have one priority, for then nobody is silenced.
+    levels: Box<[Level]>,
+}
+
+/// A model on its way into a running loop.
+pub struct Replacement {
+    /// Number of the model it replaces.
+    pub model: u32,
+    /// What changes of its parameters name it by.
+    pub generation: u16,
+    pub layer: Box<Layer>,
+}
+
+/// The layers of one priority.
+struct Level {
+    priority: u8,
+    gain: Fade,
+    /// A layer of it pushed in this tick.
+    pushes: bool,
+}
+
+impl ModelStack {
+    /// Not real-time.
+    ///
+    /// Each layer comes with the number of its model in the scene.
+    pub fn new(layers: Vec<(usize, Layer)>) -> Self {
+        let slots: Box<[Slot]> = layers.into_iter().map(|(number, layer)| Slot::new(number, layer)).collect();
+        let broad = BroadPhase::new(slots.iter().map(Slot::bounds).collect());
+        let mut priorities: Vec<u8> = slots.iter().map(|slot| slot.priority).collect();
+        priorities.sort_unstable();
+        priorities.dedup();
+        if priorities.len() == 1 {
+            priorities.clear();
+        }
+        let level = |priority| Level { priority, gain: Fade::new(1.0, SILENCE_S), pushes: false };
+        Self { slots, broad, levels: priorities.into_iter().map(level).collect() }
+    }
+
+    /// What the models together ask for at a state of the device, in the device frame, and the energy they store, J.
+    ///
+    /// Real-time: bounded by the models that are near, no allocation.
+    #[inline(always)] // as `Layer::step`
+    pub fn step(
+        &mut self,
+        tick: &Tick,
+        state: &DeviceState,
+        heart: &Heartbeat,
+        events: &mut Events,
+    ) -> (Wrench, f64) {
+        let Self { slots, broad, levels, .. } = self;
+        levels.iter_mut().for_each(|level| level.pushes = false);
+        let mut sum = Share::NONE;
+        broad.for_each_near(
+            slots,
+            &state.pose.position_m,
+            #[inline(always)] // as `Layer::step`
+            |slot| {
+                let level = levels.iter_mut().find(|level| level.priority == slot.priority);
+                let is_silenced = level.as_ref().is_some_and(|level| level.gain.is_silent(tick.time_ns));
+                if is_silenced || slot.weight.is_silent(tick.time_ns) {
+                    return;
+                }
+                heart.enter(tick.index, Place::Model(slot.number));
+                let share = slot.step(tick, state, events);
+                let mut weight = slot.weight.at(tick.time_ns);
+                if let Some(level) = level {
+                    level.pushes |= weight > 0.0 && share.wrench != Wrench::ZERO;
+                    weight *= level.gain.at(tick.time_ns);
+                }
+                sum.wrench = sum.wrench + share.wrench * weight;
+                sum.energy_j += share.energy_j * weight;
+            },
+        );
+        heart.enter(tick.index, Place::Host);
+        let mut is_silenced = false;
+        for level in levels.iter_mut().rev() {
+            level.gain.set_target(if is_silenced { 0.0 } else { 1.0 }, tick.time_ns);
+            is_silenced |= level.pushes;
+        }
+        (sum.wrench, sum.energy_j)
+    }
+
+    /// Changes a live parameter of the model in place `model`. Real-time: bounded by its objects, no allocation.
+    pub fn set_parameter(&mut self, model: usize, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
+        let Some(slot) = self.slots.get_mut(model) else { return CallStatus::Unsupported };
+        let status = slot.set_parameter(tick, parameter, value);
+        self.rebound(model);
+        status
+    }
+
+    /// Moves the weight of the model in place `model` to a new value, at its rate. Real-time: bounded, no allocation.
+    pub fn set_weight(&mut self, model: usize, tick: &Tick, weight: f64) -> CallStatus {
+        let Some(slot) = self.slots.get_mut(model) else { return CallStatus::Unsupported };
+        slot.weight.set_target(weight, tick.time_ns);
+        CallStatus::Ok
+    }
+
+    /// How often the model in place `model` was replaced. Real-time: bounded, no allocation.
+    #[inline]
+    pub fn generation(&self, model: usize) -> Option<u16> {
+        self.slots.get(model).map(Slot::generation)
+    }
+
+    /// Puts another model in place of one, faded in from this tick on. What it pushes out, because it was still
+    /// fading, is returned: dropping it is not for the loop.
+    ///
+    /// Real-time: bounded by the objects of the model, no allocation.
+    pub fn replace(
+        &mut self,
+        model: usize,
+        layer: Box<Layer>,
+        generation: u16,
+        tick: &Tick,
+    ) -> Option<Box<Layer>> {
+        let Some(slot) = self.slots.get_mut(model) else { return Some(layer) };
+        let pushed_out = slot.put(layer, generation, tick);
+        self.rebound(model);
+        pushed_out
+    }
+
+    /// A layer that has faded out, and the number of its model in the scene. Real-time: bounded by the models, no allocation.
+    #[inline]
+    pub fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {
+        let take = |slot: &mut Slot| Some((u32::try_from(slot.number).ok()?, slot.take_faded(tick)?));
+        self.slots.iter_mut().find_map(take)
+    }
+
+    /// A layer may act elsewhere now.
+    fn rebound(&mut self, model: usize) {
+        let bounds = self.slots.get(model).and_then(Slot::bounds);
+        if bounds != self.broad.bounds(model) {
+            self.broad.watch_always(model, bounds);
+        }
+    }
+
+    /// Of every model, health and last words of the layer in place. Not real-time.
+    pub fn health(&mut self) -> Vec<(ModelHealth, String)> {
+        self.slots.iter_mut().map(Slot::health).collect()
+    }
+
+    /// What is known of every layer that is here. Not real-time.
+    pub fn reports(&mut self) -> impl Iterator<Item = LayerReport> {
+        self.slots.iter_mut().flat_map(Slot::reports)
+    }
+}

@@ -1,0 +1,252 @@
+//! Changes of parameters between two ticks: what other threads sent, and what the scene has scheduled.
+//!
+//! A change is applied at a tick boundary, before the device is read, so that every model of the tick sees it.
+//! Changes that were sent together are applied together. For each one a report goes out, ahead of the record of
+//! its tick; nothing is ever applied that could not be reported, so a recording holds every change.
+
+use flotor_core::ChangeOutcome;
+use flotor_hal::Tick;
+use flotor_hal::abi::CallStatus;
+use flotor_sync::{Receiver, Sender, Words, inbox, ring};
+
+/// Changes other threads may have waiting at a time.
+const WAITING_CHANGES: usize = 256;
+
+/// Stands for the weight of a model where a parameter is named.
+pub const WEIGHT: u32 = u32::MAX;
+/// Stands for the plugin itself where a parameter is named.
+pub const PLUGIN: u32 = u32::MAX - 1;
+
+/// A new value for a parameter. The numbers come from a schema: see `session::Controls`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParameterChange {
+    /// Number of the plugin in the run: the devices, then the models, both in the scene's order.
+    pub plugin: u16,
+    /// How often the plugin was replaced when the change was made: a change is for what it was checked against.
+    pub generation: u16,
+    /// Index into the plugin's schema, [`WEIGHT`], or in a report [`PLUGIN`].
+    pub parameter: u32,
+    /// The value; for a choice, its index.
+    pub value: f64,
+}
+
+/// Words of a [`ParameterChange`].
+pub const CHANGE_WORDS: usize = 2;
+
+impl Words<CHANGE_WORDS> for ParameterChange {
+    #[inline]
+    fn to_words(&self) -> [u64; CHANGE_WORDS] {
+        let plugin = u64::from(self.plugin) | u64::from(self.generation) << 16;
+        [plugin | u64::from(self.parameter) << 32, self.value.to_bits()]
+    }
+
+    #[inline]
+    #[allow(clippy::cast_possible_truncation)] // parts of one word
+    fn from_words(&[place, value]: &[u64; CHANGE_WORDS]) -> Self {
+        Self {
+            plugin: place as u16,
+            generation: (place >> 16) as u16,
+            parameter: (place >> 32) as u32,
+            value: f64::from_bits(value),
+        }
+    }
+}
+
+/// What became of a change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChangeReport {
+    /// The tick it was applied before.
+    pub tick: u64,
+    /// The time of that tick, ns.
+    pub time_ns: u64,
+    pub change: ParameterChange,
+    pub outcome: ChangeOutcome,
+}
+
+/// What a call says about a change.
+#[inline]
+fn outcome(status: CallStatus) -> ChangeOutcome {
+    match status {
+        CallStatus::Ok => ChangeOutcome::Applied,
+        CallStatus::Panicked => ChangeOutcome::Broke,
+        CallStatus::OutOfRange | CallStatus::Unsupported | CallStatus::WrongPhase => ChangeOutcome::Refused,
+    }
+}
+
+/// Words of a [`ChangeReport`].
+pub const REPORT_WORDS: usize = 5;
+
+impl Words<REPORT_WORDS> for ChangeReport {
+    #[inline]
+    fn to_words(&self) -> [u64; REPORT_WORDS] {
+        let [place, value] = self.change.to_words();
+        [self.tick, self.time_ns, place, value, self.outcome as u64]
+    }
+
+    #[inline]
+    fn from_words(&[tick, time_ns, place, value, outcome]: &[u64; REPORT_WORDS]) -> Self {
+        let outcome = match outcome {
+            0 => ChangeOutcome::Applied,
+            1 => ChangeOutcome::Refused,
+            _ => ChangeOutcome::Broke,
+        };
+        Self { tick, time_ns, change: ParameterChange::from_words(&[place, value]), outcome }
+    }
+}
+
+/// A change at a time that was known beforehand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScheduledChange {
+    /// Applied before the first tick at this time or later, ns.
+    pub time_ns: u64,
+    pub change: ParameterChange,
+}
+
+/// Where changes are sent in.
+pub type ChangeSender = flotor_sync::InboxSender<ParameterChange, CHANGE_WORDS>;
+/// Where reports come out.
+pub type ReportReceiver = Receiver<ChangeReport, REPORT_WORDS>;
+
+/// The loop's end of it.
+pub struct ParameterQueue {
+    /// In order of time.
+    schedule: Box<[ScheduledChange]>,
+    /// The next of the schedule.
+    next: usize,
+    sent: Receiver<ParameterChange, CHANGE_WORDS>,
+    reports: Sender<ChangeReport, REPORT_WORDS>,
+}
+
+impl ParameterQueue {
+    /// A queue with a schedule; where changes are sent in, and where reports come out. Not real-time.
+    ///
+    /// `replacements` is the number of reports beside those of the schedule that must find room.
+    pub fn new(
+        mut schedule: Vec<ScheduledChange>,
+        replacements: usize,
+    ) -> (Self, ChangeSender, ReportReceiver) {
+        schedule.sort_by_key(|scheduled| scheduled.time_ns); // stable: equal times keep the scene's order
+        let (sender, sent) = inbox(WAITING_CHANGES);
+        // Room for the whole schedule and for twice what may wait, so that what is scheduled is never held up.
+        let (reports, receiver) = ring(schedule.len() + replacements + 2 * WAITING_CHANGES);
+        (Self { schedule: schedule.into(), next: 0, sent, reports }, sender, receiver)
+    }
+
+    /// How many changes wait at this moment. Real-time: bounded, no allocation.
+    #[inline]
+    pub fn waiting(&mut self) -> usize {
+        self.sent.waiting()
+    }
+
+    /// True if a scheduled change is due at this tick. Real-time: bounded, no allocation.
+    #[inline]
+    pub fn is_due(&self, tick: &Tick) -> bool {
+        self.schedule.get(self.next).is_some_and(|due| due.time_ns <= tick.time_ns)
+    }
+
+    /// Reports that a plugin was replaced. Real-time: bounded, no allocation.
+    pub fn report_replaced(&mut self, tick: &Tick, plugin: u16, generation: u16) {
+        let change = ParameterChange { plugin, generation, parameter: PLUGIN, value: f64::from(generation) };
+        let _ = self.reports.push(&ChangeReport {
+            tick: tick.index,
+            time_ns: tick.time_ns,
+            change,
+            outcome: ChangeOutcome::Applied,
+        });
+    }
+
+    /// Applies what is due at this tick, oldest first, and at most `waiting` of those that were sent; reports it; true
+    /// if there was anything.
+    ///
+    /// Real-time: bounded by the schedule, `waiting`, and `apply`; no allocation.
+    #[inline]
+    pub fn apply_due(
+        &mut self,
+        tick: &Tick,
+        waiting: usize,
+        mut apply: impl FnMut(&ParameterChange) -> CallStatus,
+    ) -> bool {
+        let Self { schedule, next, sent, reports } = self;
+        let mut any = false;
+        let mut take = |reports: &mut Sender<ChangeReport, REPORT_WORDS>, change: ParameterChange| {
+            any = true;
+            let outcome = outcome(apply(&change));
+            // It fits: the ring has room for the schedule, and what was sent is only looked at when all of it does.
+            let _ = reports.push(&ChangeReport { tick: tick.index, time_ns: tick.time_ns, change, outcome });
+        };
+        while let Some(due) = schedule.get(*next).filter(|due| due.time_ns <= tick.time_ns) {
+            take(reports, due.change);
+            *next += 1;
+        }
+        // Somebody must take the reports out for what was sent to go in; else it waits.
+        if waiting > 0 && reports.room() >= schedule.len() - *next + sent.capacity() {
+            (0..waiting).map_while(|_| sent.pop()).for_each(|change| take(reports, change));
+        }
+        any
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn change(value: f64) -> ParameterChange {
+        ParameterChange { plugin: 1, generation: 3, parameter: 2, value }
+    }
+
+    fn at(index: u64) -> Tick {
+        Tick { index, time_ns: index * 1_000_000, dt_ns: 1_000_000 }
+    }
+
+    /// Values applied at a tick.
+    fn applied(queue: &mut ParameterQueue, index: u64) -> Vec<f64> {
+        let mut values = Vec::new();
+        let waiting = queue.waiting();
+        let any = queue.apply_due(&at(index), waiting, |change| {
+            values.push(change.value);
+            CallStatus::Ok
+        });
+        assert_eq!(any, !values.is_empty());
+        values
+    }
+
+    #[test]
+    fn what_is_scheduled_comes_at_its_tick_or_the_next_and_once() {
+        let scheduled = |time_ns, value| ScheduledChange { time_ns, change: change(value) };
+        let schedule = vec![scheduled(2_000_001, 3.0), scheduled(1_000_000, 1.0), scheduled(1_000_000, 2.0)];
+        let (mut queue, _sender, mut reports) = ParameterQueue::new(schedule, 0);
+        let values: Vec<Vec<f64>> = (0..5).map(|index| applied(&mut queue, index)).collect();
+        assert_eq!(values, [vec![], vec![1.0, 2.0], vec![], vec![3.0], vec![]]);
+        let ticks: Vec<u64> = std::iter::from_fn(|| reports.pop()).map(|report| report.tick).collect();
+        assert_eq!(ticks, [1, 1, 3]);
+    }
+
+    #[test]
+    fn every_word_survives_and_so_does_every_outcome() {
+        for status in [CallStatus::Ok, CallStatus::OutOfRange, CallStatus::Panicked] {
+            let outcome = outcome(status);
+            let report = ChangeReport { tick: 7, time_ns: 8, change: change(-0.0), outcome };
+            let back = ChangeReport::from_words(&report.to_words());
+            assert_eq!(back, report);
+            assert!(back.change.value.is_sign_negative());
+        }
+    }
+
+    #[test]
+    fn nothing_is_applied_that_nobody_could_be_told_of() {
+        let (mut queue, sender, mut reports) = ParameterQueue::new(Vec::new(), 0);
+        let mut sent = 0;
+        let mut arrived = 0;
+        for index in 0..10 {
+            while sender.send_all(&[change(0.0)]).is_ok() {
+                sent += 1;
+            }
+            arrived += applied(&mut queue, index).len();
+        }
+        let mut reported = 0;
+        reports.drain(|_| reported += 1);
+        assert!(arrived < sent, "what nobody listens to waits: {arrived} of {sent}");
+        assert_eq!(arrived, reported);
+        assert_eq!(applied(&mut queue, 10).len(), sent - arrived, "and goes in when somebody listens again");
+    }
+}

@@ -1,0 +1,351 @@
+//! The servo: one tick after the other, `changes -> device -> mapping -> models -> envelope -> device`.
+//!
+//! A scene may have several devices: each has models and an envelope of its own, all share tick and state of the run.
+//!
+//! Nothing in a tick allocates, locks, formats or waits on another thread. What a tick leaves behind is a
+//! [`TickRecord`]; whoever watches gets it through a ring, off the loop.
+#![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
+#![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
+
+use crate::stopwatch::{Moment, Stopwatch};
+use crate::timing::STAGE_SAMPLING;
+use crate::{
+    Cause, Due, EmergencySource, Exchange, Forces, Heartbeat, ParameterQueue, Place, Port, RunEvent,
+    RunState, Stage, Station, StopSwitch, Timing, WEIGHT,
+};
+use flotor_core::trace::{Events, TickRecord};
+use flotor_hal::abi::CallStatus;
+use flotor_hal::abi::loader::ActiveDevice;
+use flotor_hal::{Fault, Tick, instructions};
+
+/// What the run itself is told, beside device, models and envelope.
+#[derive(Clone, Copy, Debug)]
+pub struct RunConfig {
+    /// Nominal time between ticks, ns.
+    pub period_ns: u64,
+    /// Time over which force fades in and out, ns.
+    pub ramp_ns: u64,
+    /// Time without a tick after which force has to fade in again: the hand is not where it was, ns.
+    pub held_up_ns: u64,
+    /// Buttons of the device that are emergency stops, one bit each.
+    pub emergency_buttons: u32,
+}
+
+/// The loop's state: devices with their envelopes, and all that asks for a wrench.
+pub struct Servo {
+    stations: Box<[Station]>,
+    /// Of the devices, in the same order.
+    ports: Box<[Port]>,
+    forces: Forces,
+    parameters: ParameterQueue,
+    exchange: Exchange,
+    config: RunConfig,
+    heart: Heartbeat,
+    run: RunState,
+    timing: Timing,
+    stopwatch: Stopwatch,
+    /// When the last tick ended, if nothing else has happened since.
+    ended: Option<Moment>,
+}
+
+/// What is known after a tick, beside the ports.
+struct Done {
+    /// Of the run, not of a device.
+    events: Events,
+    compute_ns: u64,
+}
+
+impl Servo {
+    /// Not real-time.
+    pub fn new(
+        stations: Vec<Station>,
+        forces: Forces,
+        parameters: ParameterQueue,
+        exchange: Exchange,
+        config: RunConfig,
+        heart: Heartbeat,
+    ) -> Self {
+        Self {
+            ports: vec![Port::REST; stations.len()].into(),
+            stations: stations.into(),
+            forces,
+            parameters,
+            exchange,
+            config,
+            heart,
+            run: RunState::START,
+            timing: Timing::default(),
+            stopwatch: Stopwatch::new(),
+            ended: None,
+        }
+    }
+
+    /// One tick; `leave` gets what it leaves behind, a record for each device. Real-time: bounded by devices and models,
+    /// no allocation.
+    #[inline]
+    #[cfg_attr(rtsan, sanitize(realtime = "nonblocking"))]
+    pub fn tick(&mut self, due: &Due, stop: &StopSwitch, leave: impl FnMut(&TickRecord)) {
+        instructions::best(
+            #[inline(always)]
+            || {
+                let done = self.advance(due, stop);
+                self.leave_records(due, done, leave);
+            },
+        );
+    }
+
+    /// A record of the tick for each device.
+    #[inline(always)] // as `advance`
+    fn leave_records(&self, due: &Due, done: Done, mut leave: impl FnMut(&TickRecord)) {
+        let Done { events, compute_ns } = done;
+        for (device, (station, port)) in (0..).zip(self.stations.iter().zip(&self.ports)) {
+            let Port { state, asked, commanded, energy_j, .. } = port;
+            let mut events = events;
+            events.insert(port.events);
+            leave(&TickRecord {
+                tick: due.tick.index,
+                device,
+                time_ns: due.tick.time_ns,
+                dt_ns: due.tick.dt_ns,
+                pose: state.pose,
+                twist: state.twist,
+                model: *asked,
+                commanded: *commanded,
+                delivered: state.delivered,
+                energy_j: *energy_j,
+                port_energy_j: station.envelope.port_energy_j(),
+                events,
+                buttons: state.buttons,
+                lateness_ns: due.lateness_ns.unwrap_or_default(),
+                compute_ns,
+            });
+        }
+    }
+
+    /// All of a tick but its records.
+    #[inline(always)] // into what chooses the instructions
+    fn advance(&mut self, due: &Due, stop: &StopSwitch) -> Done {
+        let Due { tick, lateness_ns, missed, .. } = due;
+        let started = self.ended.take().unwrap_or_else(|| self.stopwatch.now());
+        let mut watch = StageWatch::start(tick.index, started);
+        let mut events = if *missed > 0 { Events::MISSED } else { Events::NONE };
+
+        self.change_parameters(tick, &mut events);
+        let (sample, buttons) = self.read(tick);
+        self.follow(sample, buttons, tick, stop, &mut events);
+        watch.lap(&self.stopwatch, &mut self.timing, Stage::Read);
+
+        self.forces.step(tick, &mut self.ports, &self.heart);
+        watch.lap(&self.stopwatch, &mut self.timing, Stage::Models);
+
+        let gate = self.run.gate(tick.time_ns, self.config.ramp_ns);
+        for (station, port) in self.stations.iter_mut().zip(&mut self.ports) {
+            station.limit(tick, gate, port);
+        }
+        watch.lap(&self.stopwatch, &mut self.timing, Stage::Envelope);
+
+        self.write(tick);
+        self.heart.enter(tick.index, Place::Waiting);
+        watch.lap(&self.stopwatch, &mut self.timing, Stage::Write);
+
+        let ended = self.stopwatch.now();
+        // Between two ticks on the machine's clock there is a wait.
+        self.ended = lateness_ns.is_none().then_some(ended);
+        let compute_ns = self.stopwatch.between_ns(started, ended);
+        self.account(*lateness_ns, compute_ns, *missed);
+        Done { events, compute_ns }
+    }
+
+    /// Lets the force fade out from this tick on: the run will be over when it has. Real-time: bounded, no allocation.
+    pub fn release(&mut self, tick: &Tick) {
+        // Where there is no force the run just ends.
+        if self.run != RunState::Holding {
+            self.happen(RunEvent::StopAsked, tick);
+        }
+    }
+
+    /// Time over which force fades in and out, ns.
+    pub fn ramp_ns(&self) -> u64 {
+        self.config.ramp_ns
+    }
+
+    /// Something else than a tick has happened since the last one. Between two ticks on the virtual clock there is nothing
+    /// but the record of the first: one look at the stopwatch ends the one and begins the other.
+    #[inline]
+    pub fn pause(&mut self) {
+        self.ended = None;
+    }
+
+    /// What was to change before this tick does so now. Nearly always that is nothing.
+    #[inline(always)] // as `advance`
+    fn change_parameters(&mut self, tick: &Tick, events: &mut Events) {
+        let Self { forces, parameters, exchange, .. } = self;
+        // Looked at before the replacements: whoever sent one of these after a replacement has sent that too.
+        let waiting = parameters.waiting();
+        if waiting > 0 || parameters.is_due(tick) || exchange.is_due(tick) || forces.is_fading() {
+            self.apply_changes(tick, waiting, events);
+        }
+    }
+
+    #[inline(never)] // out of the way of the many ticks without
+    fn apply_changes(&mut self, tick: &Tick, waiting: usize, events: &mut Events) {
+        let Self { stations, forces, parameters, exchange, .. } = self;
+        let devices = stations.len();
+        let mut replaced = false;
+        exchange.apply_due(tick, forces, |model, generation| {
+            replaced = true;
+            let plugin = u16::try_from(model as usize + devices).unwrap_or(u16::MAX); // a run has fewer plugins
+            parameters.report_replaced(tick, plugin, generation);
+        });
+        let changed = parameters.apply_due(tick, waiting, |change| {
+            let (plugin, parameter) = (usize::from(change.plugin), change.parameter as usize);
+            if let Some(station) = stations.get_mut(plugin) {
+                return station.device.set_parameter(parameter, change.value);
+            }
+            let model = plugin - devices;
+            if change.parameter == WEIGHT {
+                forces.set_weight(model, tick, change.value)
+            } else if forces.generation(model) == Some(change.generation) {
+                forces.set_parameter(model, tick, parameter, change.value)
+            } else {
+                CallStatus::WrongPhase
+            }
+        });
+        if changed || replaced {
+            events.insert(Events::PARAMETER_CHANGED);
+        }
+    }
+
+    /// Newest samples of all devices; what the worst of them means for the run (the hand is not to be trusted to feel
+    /// one device while another is lost), and the buttons of all.
+    #[inline(always)] // as `advance`
+    fn read(&mut self, tick: &Tick) -> (RunEvent, u32) {
+        let (mut worst, mut buttons) = (RunEvent::SamplesBack, 0);
+        for (device, (station, port)) in (0..).zip(self.stations.iter_mut().zip(&mut self.ports)) {
+            self.heart.enter(tick.index, Place::DeviceRead(device));
+            port.events = Events::NONE;
+            let sample = station.read(tick, port);
+            buttons |= port.state.buttons;
+            if sample != RunEvent::SamplesBack && badness(sample) > badness(worst) {
+                worst = sample;
+            }
+        }
+        (worst, buttons)
+    }
+
+    /// Sends what is to be sent to all devices.
+    #[inline(always)] // as `advance`
+    fn write(&mut self, tick: &Tick) {
+        let Self { stations, ports, heart, run, config, .. } = self;
+        for (device, (station, port)) in (0..).zip(stations.iter_mut().zip(ports)) {
+            heart.enter(tick.index, Place::DeviceWrite(device));
+            if let Some(failed) = station.write(tick, port) {
+                *run = run.after(failed, tick.time_ns, config.ramp_ns);
+            }
+        }
+    }
+
+    /// Takes the run where the samples, the clock and everybody who may stop it lead.
+    #[inline(always)] // as `advance`
+    fn follow(
+        &mut self,
+        sample: RunEvent,
+        buttons: u32,
+        tick: &Tick,
+        stop: &StopSwitch,
+        events: &mut Events,
+    ) {
+        if tick.dt_ns > self.config.held_up_ns {
+            self.happen(RunEvent::SamplesLost, tick);
+        }
+        // An active run with a sample goes on as it is.
+        if (self.run, sample) != (RunState::Active, RunEvent::SamplesBack) {
+            self.happen(RunEvent::Time, tick);
+            self.happen(sample, tick);
+        }
+        if stop.is_stop_asked() {
+            self.happen(RunEvent::StopAsked, tick);
+        }
+        if self.heart.bitten().is_some() {
+            self.happen(RunEvent::Failed(Cause::Watchdog), tick);
+        }
+        let pressed = buttons & self.config.emergency_buttons != 0;
+        if let Some(source) = stop.emergency().or(pressed.then_some(EmergencySource::Button)) {
+            self.happen(RunEvent::Emergency(source), tick);
+        }
+        events.insert(self.run.events());
+    }
+
+    #[inline]
+    fn happen(&mut self, event: RunEvent, tick: &Tick) {
+        self.run = self.run.after(event, tick.time_ns, self.config.ramp_ns);
+    }
+
+    #[inline(always)] // as `advance`
+    fn account(&mut self, lateness_ns: Option<u64>, compute_ns: u64, missed: u64) {
+        self.timing.compute.record(compute_ns);
+        self.timing.ticks += 1;
+        self.timing.missed += missed;
+        if let Some(lateness_ns) = lateness_ns {
+            self.timing.lateness.record(lateness_ns);
+            self.timing.late += u64::from(lateness_ns > self.config.period_ns / 10);
+        }
+    }
+
+    /// Ends the loop: the devices are deactivated, what was measured remains. Not real-time.
+    pub fn into_timing(self) -> Timing {
+        drop(self.stations);
+        self.timing
+    }
+
+    /// Where the run stands after the last tick.
+    pub fn run(&self) -> RunState {
+        self.run
+    }
+
+    /// What the watchdog listens to.
+    pub fn heart(&self) -> &Heartbeat {
+        &self.heart
+    }
+
+    /// The devices, in order, each with the first fault it reported.
+    pub fn devices(&mut self) -> impl Iterator<Item = (&mut ActiveDevice, Option<Fault>)> {
+        self.stations.iter_mut().map(|station| (&mut station.device, station.fault))
+    }
+
+    pub fn forces(&mut self) -> &mut Forces {
+        &mut self.forces
+    }
+}
+
+/// Which of two devices' samples decides: the higher.
+#[inline]
+const fn badness(sample: RunEvent) -> u8 {
+    match sample {
+        RunEvent::Failed(_) => 3,
+        RunEvent::SamplesLost => 2,
+        RunEvent::Time => 1,
+        _ => 0,
+    }
+}
+
+/// Times the stages of every [`STAGE_SAMPLING`]th tick.
+struct StageWatch {
+    last: Option<Moment>,
+}
+
+impl StageWatch {
+    #[inline]
+    fn start(tick: u64, now: Moment) -> Self {
+        Self { last: tick.is_multiple_of(STAGE_SAMPLING).then_some(now) }
+    }
+
+    #[inline]
+    fn lap(&mut self, stopwatch: &Stopwatch, timing: &mut Timing, stage: Stage) {
+        if let Some(last) = self.last {
+            let now = stopwatch.now();
+            timing.stage(stage, stopwatch.between_ns(last, now));
+            self.last = Some(now);
+        }
+    }
+}

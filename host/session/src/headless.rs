@@ -1,0 +1,92 @@
+//! A scene in virtual time from start to end, with nobody watching: for sweeps, studies and other programs.
+
+use crate::registry::Registry;
+use crate::report::{RunFacts, RunSummary, Tally};
+use crate::run_description::describe;
+use crate::scene::Scene;
+use crate::{Observer, RunError, RunOptions, Session};
+use flotor_core::Change;
+use flotor_core::trace::TickRecord;
+use flotor_record::{RecordError, Recorder, TraceDigest};
+use flotor_servo::{Clock, StopSwitch};
+use std::path::Path;
+
+/// Why a scene did not run, or its recording is not whole.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum HeadlessError {
+    /// It did not start.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// It ran, and could not be recorded.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+}
+
+/// Runs a scene as fast as it goes; equal scenes and seeds give equal digests. Not real-time.
+///
+/// # Errors
+/// [`HeadlessError`]. A device that faults is no error: the summary says so in `end`.
+pub fn run(
+    scene: &Scene,
+    registry: &Registry,
+    seed: u64,
+    recording: Option<&Path>,
+) -> Result<RunSummary, HeadlessError> {
+    let options = RunOptions { clock: Clock::Virtual, seed };
+    let session = Session::prepare(scene, registry, &options)?;
+    let plugins = session.plugins().to_vec();
+    let recorder =
+        recording.map(|path| Recorder::create(path, &describe(scene, &options, &plugins))).transpose()?;
+    let mut watchers =
+        Watchers { tally: Tally::default(), digest: TraceDigest::new(), recorder, failure: None };
+    let outcome = session.run(&mut watchers, &StopSwitch::default())?;
+    let Watchers { tally, digest, recorder, failure } = watchers;
+    if let Some(failure) = failure {
+        return Err(failure.into());
+    }
+    if let Some(recorder) = recorder {
+        recorder.finish()?;
+    }
+    let facts = RunFacts {
+        title: &scene.title,
+        clock: "virtual",
+        seed,
+        rate_hz: scene.rate_hz,
+        plugins: &plugins,
+        couplings: &scene.couplings,
+        carried: &[],
+        trace_digest: digest.finish(),
+    };
+    Ok(RunSummary::new(facts, &outcome, &tally))
+}
+
+struct Watchers {
+    tally: Tally,
+    digest: TraceDigest,
+    recorder: Option<Recorder>,
+    failure: Option<RecordError>,
+}
+
+impl Watchers {
+    /// Writes into the recording, if there is one and it has not failed.
+    fn write(&mut self, write: impl FnOnce(&mut Recorder) -> Result<(), RecordError>) {
+        if self.failure.is_none()
+            && let Some(recorder) = &mut self.recorder
+        {
+            self.failure = write(recorder).err();
+        }
+    }
+}
+
+impl Observer for Watchers {
+    fn change(&mut self, change: &Change) {
+        self.write(|recorder| recorder.change(change));
+    }
+
+    fn observe(&mut self, record: &TickRecord) {
+        self.tally.observe(record);
+        self.digest.update(record);
+        self.write(|recorder| recorder.record(record));
+    }
+}

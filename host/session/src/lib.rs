@@ -1,0 +1,27 @@
+//! Embeds Flotor in a program: reads scenes, finds and loads plugins, runs sessions, records and reports them.
+//!
+//! ```text
+//! file -> Scene -> Session (plugins loaded, settings checked, devices paired) -> run
+//! ```
+//!
+//! - [`scene`]: what is to be run, read from TOML.
+//! - [`registry`]: where plugins are.
+//! - [`Session`]: from a scene to a run.
+//! - [`headless`]: a whole run in virtual time, recorded and reported.
+//! - [`report`]: what a run came to; [`run_description`]: all it takes to repeat it.
+//! - [`live`]: a running session, for other programs to watch and change.
+//! - [`calibration_file`]: the correction of a device's vertical force, as measured and kept.
+
+pub mod calibration_file;
+pub mod headless;
+pub mod live;
+pub mod registry;
+pub mod report;
+pub mod run_description;
+pub mod scene;
+mod session;
+
+pub use session::{
+    ControlError, Controls, DeviceOutcome, Misbehaved, NewValue, Observer, Outcome, PluginReport, RunEnd,
+    RunError, RunOptions, Session, Steps, prepare_model,
+};

@@ -1,0 +1,515 @@
+//! What a run says about itself: numbers for machines, a page for people.
+
+use crate::live::Carried;
+use crate::{Misbehaved, Observer, Outcome, PluginReport, RunEnd};
+use flotor_core::coupling::CouplingDescription;
+use flotor_core::peer::Account;
+use flotor_core::trace::{Events, TickRecord};
+use flotor_hal::{DVec3, EnergyLedger};
+use flotor_servo::coupling::Hearing;
+use flotor_servo::{CouplingOutcome, ModelHealth, Overrun, Percentiles, Stage, Timing};
+use serde::Serialize;
+
+/// Collects over a run what can only be seen tick by tick.
+#[derive(Default)]
+pub struct Tally {
+    /// By number of the device.
+    devices: Vec<DeviceTally>,
+    event_ticks: [u64; Events::NAMES.len()],
+    /// Events of the tick that is being told, at any device.
+    events: Events,
+    generated_peak_j: f64,
+    port_lowest_j: f64,
+}
+
+/// The same of one device.
+#[derive(Default)]
+struct DeviceTally {
+    peak_force_n: f64,
+    peak_torque_nm: f64,
+    last: Option<(TickRecord, f64)>,
+    work_j: f64,
+    generated_j: f64,
+    port_lowest_j: f64,
+}
+
+impl DeviceTally {
+    fn observe(&mut self, record: &TickRecord) {
+        self.peak_force_n = self.peak_force_n.max(record.commanded.force().length());
+        self.peak_torque_nm = self.peak_torque_nm.max(record.commanded.torque().length());
+        // Work of the models on the hand, with the wrench held over the tick as the device holds it.
+        let first_energy_j = match &self.last {
+            None => record.energy_j,
+            Some((last, first_energy_j)) => {
+                let moved = record.pose.position() - last.pose.position();
+                let turn = record.pose.orientation() * last.pose.orientation().conjugate();
+                let turned: DVec3 = flotor_hal::rotation_vector(turn);
+                self.work_j += last.model.force().dot(moved) + last.model.torque().dot(turned);
+                *first_energy_j
+            }
+        };
+        self.generated_j = self.work_j - (first_energy_j - record.energy_j);
+        self.port_lowest_j = self.port_lowest_j.min(record.port_energy_j);
+        self.last = Some((*record, first_energy_j));
+    }
+
+    fn port_energy_j(&self) -> f64 {
+        self.last.as_ref().map_or(0.0, |(record, _)| record.port_energy_j)
+    }
+}
+
+impl Tally {
+    /// Ticks in which each event happened, at any device.
+    fn event_ticks(&self) -> [u64; Events::NAMES.len()] {
+        std::array::from_fn(|bit| self.event_ticks[bit] + u64::from(self.events.bits() >> bit & 1))
+    }
+
+    /// Largest of a number of all devices.
+    fn largest(&self, number: impl Fn(&DeviceTally) -> f64) -> f64 {
+        self.devices.iter().map(number).fold(0.0, f64::max)
+    }
+}
+
+impl Observer for Tally {
+    fn observe(&mut self, record: &TickRecord) {
+        if record.device == 0 {
+            // The tick before is complete.
+            self.event_ticks = self.event_ticks();
+            self.events = Events::NONE;
+        }
+        self.events.insert(record.events);
+        let device = usize::from(record.device);
+        if self.devices.len() <= device {
+            self.devices.resize_with(device + 1, DeviceTally::default);
+        }
+        self.devices[device].observe(record);
+        if device + 1 == self.devices.len() {
+            let generated_j = self.devices.iter().map(|device| device.generated_j).sum();
+            self.generated_peak_j = self.generated_peak_j.max(generated_j);
+            let port_j = self.devices.iter().map(DeviceTally::port_energy_j).sum();
+            self.port_lowest_j = self.port_lowest_j.min(port_j);
+        }
+    }
+}
+
+/// A run in numbers. The names are a contract: scripts rely on them.
+#[derive(Clone, Debug, Serialize)]
+pub struct RunSummary {
+    /// Title of the scene.
+    pub title: String,
+    /// "finished", "stopped", "device_fault", "emergency_stop" or "watchdog".
+    pub end: &'static str,
+    /// "real" or "virtual".
+    pub clock: &'static str,
+    /// Seed of the run.
+    pub seed: u64,
+    /// Rate asked for, Hz.
+    pub rate_hz: f64,
+    /// Ticks run.
+    pub ticks: u64,
+    /// Ticks that started later than a tenth of the period.
+    pub late_ticks: u64,
+    /// Ticks skipped.
+    pub missed_ticks: u64,
+    /// Time from the first deadline to the end of the last period, s.
+    pub elapsed_s: f64,
+    /// Start of a tick after its deadline.
+    pub lateness_ns: Percentiles,
+    /// A whole tick.
+    pub compute_ns: Percentiles,
+    /// Parts of a tick, sampled.
+    pub stages_ns: StageSummary,
+    /// Largest force sent, N.
+    pub peak_force_n: f64,
+    /// Largest torque sent, N·m.
+    pub peak_torque_nm: f64,
+    /// Energy accounts, all devices together.
+    pub energy: EnergySummary,
+    /// Each device.
+    pub devices: Vec<DeviceSummary>,
+    /// Each coupling between devices.
+    pub couplings: Vec<CouplingSummary>,
+    /// Ticks in which each event happened, only those that did.
+    pub events: std::collections::BTreeMap<&'static str, u64>,
+    /// Digest of the trace without measured times: equal digests, equal runs.
+    pub trace_digest: String,
+    /// Records lost because an observer was too slow.
+    pub dropped_records: u64,
+    /// Wall-clock time, s.
+    pub wall_s: f64,
+    /// The plugins and every parameter in force.
+    pub plugins: Vec<PluginSummary>,
+}
+
+/// Parts of a tick.
+#[derive(Clone, Debug, Serialize)]
+pub struct StageSummary {
+    /// Reading the device.
+    pub read: Percentiles,
+    /// Mapping and models.
+    pub models: Percentiles,
+    /// Limiting.
+    pub envelope: Percentiles,
+    /// Writing the device.
+    pub write: Percentiles,
+}
+
+/// One device of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct DeviceSummary {
+    /// Name in the scene.
+    pub name: String,
+    /// Largest force sent, N.
+    pub peak_force_n: f64,
+    /// Largest torque sent, N·m.
+    pub peak_torque_nm: f64,
+    /// Lowest energy at its port, J; below zero where another device drives it.
+    pub port_lowest_j: f64,
+    /// Energy at its port at the end, J.
+    pub port_end_j: f64,
+}
+
+/// One coupling of a run: the energy accounts of its ends, in the frame they share.
+#[derive(Clone, Debug, Serialize)]
+pub struct CouplingSummary {
+    /// Name in the scene.
+    pub name: String,
+    /// The lowest the account of each end ever was, J: below zero, energy has come out that nobody had put in.
+    pub lowest_j: [f64; 2],
+    /// What the hand at each end has put in altogether less what came out, J.
+    pub gone_in_j: [f64; 2],
+    /// What has turned to heat at each end, J.
+    pub given_up_j: [f64; 2],
+    /// The way to the second end, if that is on another host; its numbers above are those it told last.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub link: Option<LinkSummary>,
+}
+
+/// How news crossed the way between two hosts.
+#[derive(Clone, Debug, Serialize)]
+pub struct LinkSummary {
+    /// Ticks in which there was news.
+    pub heard_ticks: u64,
+    /// How often there was none for as long as the watchdog waits: the coupling let go.
+    pub silences: u64,
+    /// The longest the coupling went by old news, ms; always less than the watchdog waits.
+    pub longest_wait_ms: f64,
+    /// What was carried.
+    pub carried: Carried,
+}
+
+/// Energy accounts of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct EnergySummary {
+    /// What the device's own account fails to explain, over its peak energy; absent without an account.
+    pub device_residual_relative: Option<f64>,
+    /// Largest mechanical energy of the device, J; absent without an account.
+    pub device_peak_j: Option<f64>,
+    /// Largest energy the sampled loop has put out beyond what the models had stored, J: a hold leaks.
+    pub loop_generated_j: f64,
+    /// Lowest energy at the ports of the devices together, J: how much more has come out at some time than had ever gone in.
+    pub port_lowest_j: f64,
+    /// Energy at the ports at the end, J: what the hands have put in altogether.
+    pub port_end_j: f64,
+}
+
+/// A plugin of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct PluginSummary {
+    /// Name in the scene.
+    pub name: String,
+    /// Id.
+    pub id: String,
+    /// "model" or "device".
+    pub kind: &'static str,
+    /// Version.
+    pub version: String,
+    /// File it was loaded from.
+    pub file: String,
+    /// "ok", or what happened to it.
+    pub health: String,
+    /// Every parameter with the value in force.
+    pub parameters: std::collections::BTreeMap<String, String>,
+}
+
+/// What a summary is made of, beyond the outcome.
+pub struct RunFacts<'a> {
+    /// Title of the scene.
+    pub title: &'a str,
+    /// "real" or "virtual".
+    pub clock: &'static str,
+    /// Seed.
+    pub seed: u64,
+    /// Rate asked for, Hz.
+    pub rate_hz: f64,
+    /// Plugins.
+    pub plugins: &'a [PluginReport],
+    /// What holds devices together.
+    pub couplings: &'a [CouplingDescription],
+    /// What was carried between hosts, by name of the coupling.
+    pub carried: &'a [(String, Carried)],
+    /// Digest of the trace.
+    pub trace_digest: String,
+}
+
+impl LinkSummary {
+    /// For people.
+    fn to_text(&self) -> String {
+        let Self { heard_ticks, silences, longest_wait_ms, carried } = self;
+        let Carried { lost, overtaken, refused, .. } = carried;
+        let silent = match silences {
+            0 => format!("never silent for longer than {longest_wait_ms:.0} ms"),
+            silences => format!("let go {silences} times, when nothing was heard"),
+        };
+        format!(
+            "heard in {heard_ticks} ticks, {silent}; {lost} lost, {overtaken} overtaken, {refused} refused"
+        )
+    }
+}
+
+impl RunSummary {
+    /// Puts together everything known after a run.
+    #[must_use]
+    pub fn new(facts: RunFacts<'_>, outcome: &Outcome, tally: &Tally) -> Self {
+        let Timing { ticks, late, missed, lateness, compute, stages: [read, models, envelope, write] } =
+            &outcome.timing;
+        let _ = Stage::Read; // the array above is in the order of `Stage`
+        let events = Events::NAMES.iter().copied().zip(tally.event_ticks());
+        let ledgers = || outcome.devices.iter().filter_map(|device| device.ledger);
+        #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
+        let elapsed_s = outcome.elapsed_ns as f64 * 1.0e-9;
+        Self {
+            title: facts.title.to_owned(),
+            end: match outcome.end {
+                RunEnd::Finished => "finished",
+                RunEnd::Stopped => "stopped",
+                RunEnd::DeviceFault(_) => "device_fault",
+                RunEnd::EmergencyStop(_) => "emergency_stop",
+                RunEnd::TooFast(_) => "too_fast",
+                RunEnd::Watchdog(_) => "watchdog",
+            },
+            clock: facts.clock,
+            seed: facts.seed,
+            rate_hz: facts.rate_hz,
+            ticks: *ticks,
+            late_ticks: *late,
+            missed_ticks: *missed,
+            elapsed_s,
+            lateness_ns: lateness.percentiles(),
+            compute_ns: compute.percentiles(),
+            stages_ns: StageSummary {
+                read: read.percentiles(),
+                models: models.percentiles(),
+                envelope: envelope.percentiles(),
+                write: write.percentiles(),
+            },
+            peak_force_n: tally.largest(|device| device.peak_force_n),
+            peak_torque_nm: tally.largest(|device| device.peak_torque_nm),
+            energy: EnergySummary {
+                device_residual_relative: ledgers()
+                    .map(relative_residual)
+                    .max_by(|a, b| a.abs().total_cmp(&b.abs())),
+                device_peak_j: ledgers().map(|ledger| ledger.peak_j).max_by(f64::total_cmp),
+                loop_generated_j: tally.generated_peak_j,
+                port_lowest_j: tally.port_lowest_j,
+                port_end_j: tally.devices.iter().map(DeviceTally::port_energy_j).sum(),
+            },
+            devices: facts.plugins.iter().zip(&tally.devices).map(device_summary).collect(),
+            couplings: (facts.couplings.iter().zip(&outcome.couplings))
+                .map(|(coupling, outcome)| coupling_summary(coupling, outcome, facts.carried))
+                .collect(),
+            events: events.filter(|(_, count)| *count > 0).collect(),
+            trace_digest: facts.trace_digest,
+            dropped_records: outcome.dropped_records,
+            wall_s: outcome.wall_s,
+            plugins: (facts.plugins.iter().map(|plugin| plugin_summary(plugin, outcome)))
+                .chain(outcome.misbehaved.iter().map(misbehaved_summary))
+                .collect(),
+        }
+    }
+
+    /// The run in one line, under the title of a picture.
+    #[must_use]
+    pub fn one_line(&self) -> String {
+        let plugins: Vec<&str> = self.plugins.iter().map(|plugin| plugin.id.as_str()).collect();
+        let (plugins, rate_hz, clock) = (plugins.join(" + "), self.rate_hz, self.clock);
+        format!(
+            "{plugins}, {rate_hz} Hz, {clock} clock, peak {:.2} N, digest {}",
+            self.peak_force_n, self.trace_digest
+        )
+    }
+
+    /// The page for people.
+    #[must_use]
+    pub fn to_text(&self) -> String {
+        let mut lines = Vec::new();
+        let clock = format!("{:.3} s at {} Hz, {} clock", self.elapsed_s, self.rate_hz, self.clock);
+        lines.push(format!("  {:<11}{clock}, {:.2} s wall", "ran", self.wall_s));
+        let counts = format!("{}   late {}   missed {}", self.ticks, self.late_ticks, self.missed_ticks);
+        lines.push(format!("  {:<11}{counts}", "ticks"));
+        if self.clock == "real" {
+            lines.push(format!("  {:<11}{}", "lateness", percentiles(&self.lateness_ns)));
+        }
+        lines.push(format!("  {:<11}{}", "compute", percentiles(&self.compute_ns)));
+        let StageSummary { read, models, envelope, write } = &self.stages_ns;
+        let (read, models, envelope, write) =
+            (duration(read.p50), duration(models.p50), duration(envelope.p50), duration(write.p50));
+        let medians = format!("read {read}   models {models}   envelope {envelope}   write {write}");
+        lines.push(format!("  {:<11}{medians}", "of which"));
+        let peaks = format!("{:.3} N   {:.4} N·m", self.peak_force_n, self.peak_torque_nm);
+        lines.push(format!("  {:<11}{peaks}", "peak"));
+        if let (Some(residual), Some(peak_j)) =
+            (self.energy.device_residual_relative, self.energy.device_peak_j)
+        {
+            let account = format!("peak {:.3} mJ, balanced to {:.1e} of it", peak_j * 1.0e3, residual.abs());
+            lines.push(format!("  {:<11}{account}", "energy"));
+        }
+        let [lowest_mj, end_mj] =
+            [self.energy.port_lowest_j, self.energy.port_end_j].map(|joule| joule * 1.0e3);
+        lines.push(format!("  {:<11}{end_mj:+.3} mJ at the end, {lowest_mj:+.3} mJ at the lowest", "port"));
+        if self.devices.len() > 1 {
+            for DeviceSummary { name, peak_force_n, peak_torque_nm, port_lowest_j, port_end_j } in
+                &self.devices
+            {
+                let [lowest_mj, end_mj] = [port_lowest_j, port_end_j].map(|joule| joule * 1.0e3);
+                let peaks = format!("peak {peak_force_n:.3} N   {peak_torque_nm:.4} N·m");
+                lines.push(format!("  {name:<11}{peaks}   port {end_mj:+.3} mJ, lowest {lowest_mj:+.3} mJ"));
+            }
+        }
+        for CouplingSummary { name, lowest_j, given_up_j, link, .. } in &self.couplings {
+            let [first, second] = lowest_j.map(|joule| joule * 1.0e3);
+            let heat_mj = given_up_j.iter().sum::<f64>() * 1.0e3;
+            let accounts =
+                format!("accounts never below {first:+.3} and {second:+.3} mJ, {heat_mj:.3} mJ to heat");
+            lines.push(format!("  {:<11}{name}: {accounts}", "coupling"));
+            lines.extend(link.iter().map(|link| format!("  {:<11}{name}: {}", "link", link.to_text())));
+        }
+        if !self.events.is_empty() {
+            let events: Vec<String> =
+                self.events.iter().map(|(name, count)| format!("{name} {count}")).collect();
+            lines.push(format!("  {:<11}{}", "events", events.join("   ")));
+        }
+        if self.dropped_records > 0 {
+            let dropped = format!(
+                "{} records that an observer was too slow for; the loop did not wait",
+                self.dropped_records
+            );
+            lines.push(format!("  {:<11}{dropped}", "dropped"));
+        }
+        for plugin in &self.plugins {
+            let health = if plugin.health == "ok" { String::new() } else { format!("  {}", plugin.health) };
+            lines.push(format!(
+                "  {:<11}{} {} ({}){health}",
+                plugin.kind, plugin.id, plugin.version, plugin.file
+            ));
+        }
+        lines.push(format!("  {:<11}{}", "digest", self.trace_digest));
+        lines.join("\n")
+    }
+}
+
+/// What a device's own account fails to explain, over its peak energy.
+fn relative_residual(ledger: EnergyLedger) -> f64 {
+    if ledger.peak_j > 0.0 { ledger.residual_j() / ledger.peak_j } else { ledger.residual_j() }
+}
+
+fn device_summary((plugin, tally): (&PluginReport, &DeviceTally)) -> DeviceSummary {
+    DeviceSummary {
+        name: plugin.name.clone(),
+        peak_force_n: tally.peak_force_n,
+        peak_torque_nm: tally.peak_torque_nm,
+        port_lowest_j: tally.port_lowest_j,
+        port_end_j: tally.port_energy_j(),
+    }
+}
+
+fn coupling_summary(
+    coupling: &CouplingDescription,
+    outcome: &CouplingOutcome,
+    carried: &[(String, Carried)],
+) -> CouplingSummary {
+    let each = |number: fn(&Account) -> f64| outcome.accounts.each_ref().map(number);
+    let carried = carried.iter().find(|(name, _)| *name == coupling.name).map(|(_, carried)| *carried);
+    #[allow(clippy::cast_precision_loss)] // for people
+    let link = |hearing: Hearing| LinkSummary {
+        heard_ticks: hearing.ticks,
+        silences: hearing.silences,
+        longest_wait_ms: hearing.longest_wait_ns as f64 * 1.0e-6,
+        carried: carried.unwrap_or_default(),
+    };
+    CouplingSummary {
+        name: coupling.name.clone(),
+        lowest_j: each(|account| account.lowest_j),
+        gone_in_j: each(|account| account.gone_in_j),
+        given_up_j: each(|account| account.given_up_j),
+        link: outcome.hearing.map(link),
+    }
+}
+
+/// What has happened to a model; "ok" if nothing.
+fn health_words(health: &ModelHealth, words: &str) -> String {
+    #[allow(clippy::cast_precision_loss)] // for people
+    let us = |ns: u64| ns as f64 * 1.0e-3;
+    if let Some(tick) = health.panicked_at {
+        return format!("panicked at tick {tick}, no force since: {words}");
+    }
+    if let Some(tick) = health.lost_at {
+        return format!("was lost at tick {tick}, no force since: {words}");
+    }
+    if let Some(Overrun { tick, longest_ns, limit_ns }) = health.overrun {
+        let (longest_us, limit_us) = (us(longest_ns), us(limit_ns));
+        return format!(
+            "took up to {longest_us:.0} µs a step, more than its {limit_us:.0} µs, and was faded out at tick {tick}"
+        );
+    }
+    if let Some(tick) = health.first_late {
+        return format!("gave no answer in time in {} ticks, the first at tick {tick}", health.late_ticks);
+    }
+    health.first_rejected.map_or_else(
+        || "ok".to_owned(),
+        |tick| {
+            let count = health.rejected_ticks;
+            format!("{count} answers were not finite, the first at tick {tick}; each counted as no force")
+        },
+    )
+}
+
+fn plugin_summary(plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
+    let model = outcome.models.iter().find(|(name, ..)| *name == plugin.name);
+    let health = match model {
+        Some((_, health, words)) => health_words(health, words),
+        None => "ok".to_owned(),
+    };
+    summary_of(plugin, health)
+}
+
+/// A plugin that was put in while the run was on.
+fn misbehaved_summary(Misbehaved { plugin, health, words }: &Misbehaved) -> PluginSummary {
+    summary_of(plugin, health_words(health, words))
+}
+
+fn summary_of(plugin: &PluginReport, health: String) -> PluginSummary {
+    PluginSummary {
+        name: plugin.name.clone(),
+        id: plugin.metadata.id.clone(),
+        kind: plugin.metadata.kind.word(),
+        version: plugin.metadata.version.clone(),
+        file: plugin.metadata.path.display().to_string(),
+        health,
+        parameters: plugin.parameters.iter().cloned().collect(),
+    }
+}
+
+fn percentiles(p: &Percentiles) -> String {
+    let [p50, p99, p999, max] = [p.p50, p.p99, p.p999, p.max].map(duration);
+    format!("p50 {p50}   p99 {p99}   p99.9 {p999}   max {max}")
+}
+
+#[allow(clippy::cast_precision_loss)] // for people
+fn duration(ns: u64) -> String {
+    match ns {
+        0..1_000 => format!("{ns} ns"),
+        1_000..1_000_000 => format!("{:.1} µs", ns as f64 * 1.0e-3),
+        _ => format!("{:.2} ms", ns as f64 * 1.0e-6),
+    }
+}

@@ -1,0 +1,75 @@
+//! What a prepared scene says about itself before it runs: the first message of a recording and of a live view.
+
+use crate::scene::{DeviceUse, ModelUse, PluginUse, Scene};
+use crate::{PluginReport, RunOptions};
+use flotor_core::mapping::Blend;
+use flotor_hal::{Parameter, ParameterKind};
+use flotor_record::{NamedFile, PluginDescription, Role, RunDescription};
+use std::path::Path;
+
+/// Puts together what is known of a run before it begins. Not real-time.
+///
+/// `plugins` are those of the prepared scene: the devices, then the models, both in the scene's order.
+#[must_use]
+pub fn describe(scene: &Scene, options: &RunOptions, plugins: &[PluginReport]) -> RunDescription {
+    let device = |(number, device): (u16, &DeviceUse)| {
+        (device.plugin.clone(), Role::Device, number, Vec::new(), Blend::default(), None)
+    };
+    let model = |model: &ModelUse| {
+        let role = Role::Model(model.mapping);
+        (model.plugin.clone(), role, model.device, model.places_m.clone(), model.blend, model.field)
+    };
+    let devices = (0..).zip(&scene.devices).map(device);
+    let plugins = devices.chain(scene.models.iter().map(model)).zip(plugins);
+    RunDescription {
+        flotor_version: env!("CARGO_PKG_VERSION").to_owned(),
+        rate_hz: scene.rate_hz,
+        duration_s: scene.duration_s,
+        seed: options.seed,
+        clock: options.clock,
+        scene_toml: scene.text.clone(),
+        plugins: plugins
+            .map(|((used, role, device, places_m, blend, field), report)| PluginDescription {
+                device,
+                places_m,
+                blend,
+                field,
+                ..describe_plugin(&used, role, report)
+            })
+            .collect(),
+        couplings: scene.couplings.clone(),
+    }
+}
+
+fn describe_plugin(used: &PluginUse, role: Role, report: &PluginReport) -> PluginDescription {
+    let file = report.metadata.path.file_name().unwrap_or_default();
+    let settings = used.parameters.iter().map(|parameter| (parameter.key.clone(), parameter.value.clone()));
+    PluginDescription {
+        name: report.name.clone(),
+        id: report.metadata.id.clone(),
+        version: report.metadata.version.clone(),
+        file: file.to_string_lossy().into_owned(),
+        role,
+        device: 0,
+        places_m: Vec::new(),
+        blend: Blend::default(),
+        field: None,
+        settings: settings.collect(),
+        parameters: report.parameters.iter().cloned().chain(named_files(report)).collect(),
+    }
+}
+
+/// What a description of a run keeps of the files a plugin was told about: it belongs beside the plugin's
+/// parameters. Files that cannot be read any more are left out. Not real-time.
+fn named_files(report: &PluginReport) -> Vec<(String, String)> {
+    let named = |parameter: &Parameter| {
+        let (_, value) = report.parameters.iter().find(|(id, _)| id == parameter.id())?;
+        let is_built_in = parameter.choices().iter().any(|name| name.as_str() == value);
+        if parameter.kind() != ParameterKind::File || is_built_in {
+            return None;
+        }
+        let file = NamedFile::read(Path::new(value)).ok()?;
+        Some(file.to_parameters(parameter.id()))
+    };
+    report.schema.iter().filter_map(named).flatten().collect()
+}

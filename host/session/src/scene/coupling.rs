@@ -1,0 +1,118 @@
+//! `[[coupling]]`: what holds two devices together.
+
+use super::devices::{self, DeviceUse};
+use super::reader::{SceneError, Section};
+use super::{Limits, frame_and_scales, passivity};
+use flotor_core::coupling::{
+    CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MOST_DELAY_TICKS, PassivityMode,
+};
+use flotor_core::mapping::MappingConfig;
+
+/// Every coupling, in the order written.
+pub(super) fn read(
+    sections: Vec<Section<'_>>,
+    devices: &[DeviceUse],
+    limits: &Limits,
+) -> Result<Vec<CouplingDescription>, SceneError> {
+    sections.into_iter().map(|section| coupling(section, devices, limits)).collect()
+}
+
+fn coupling(
+    mut section: Section<'_>,
+    devices: &[DeviceUse],
+    limits: &Limits,
+) -> Result<CouplingDescription, SceneError> {
+    let here = section.location();
+    let wrong = |problem: &str| SceneError { location: here.clone(), problem: problem.to_owned() };
+    let default = CouplingConfig::default();
+    let name = section.take("name").map(devices::name).transpose()?;
+    let partner = section.take("partner");
+    let partner =
+        partner.map(|value| value.one_of(&[("here", Partner::Here), ("elsewhere", Partner::Elsewhere)]));
+    let partner = partner.transpose()?.unwrap_or(Partner::Here);
+    let mut gain = |key, most, default| section.number(key, 0.0..=most).map(|value| value.unwrap_or(default));
+    let config = CouplingConfig {
+        stiffness_n_per_m: gain("stiffness_n_per_m", 1.0e5, default.stiffness_n_per_m)?,
+        damping_ns_per_m: gain("damping_ns_per_m", 1.0e3, default.damping_ns_per_m)?,
+        stiffness_nm_per_rad: gain("stiffness_nm_per_rad", 1.0e3, default.stiffness_nm_per_rad)?,
+        damping_nms_per_rad: gain("damping_nms_per_rad", 10.0, default.damping_nms_per_rad)?,
+        reserve_j: gain("reserve_mj", 1.0e6, default.reserve_j * 1.0e3)? * 1.0e-3,
+        delay_ticks: match (section.take("delay_ticks"), partner) {
+            (Some(value), Partner::Here) => value.whole(1..=MOST_DELAY_TICKS)?,
+            (Some(_), Partner::Elsewhere) => {
+                return Err(wrong("the way to another host has the delay it has; leave `delay_ticks` out"));
+            }
+            (None, _) => default.delay_ticks,
+        },
+        passivity: section.take("passivity").map(passivity).transpose()?.unwrap_or(default.passivity),
+    };
+    let ends = section.sections("end")?;
+    section.finish()?;
+    let ends = ends.into_iter().map(|section| end(section, devices)).collect::<Result<Vec<_>, _>>()?;
+    let ends = match (partner, ends.as_slice()) {
+        (Partner::Here, [first, second]) if first.device == second.device => {
+            return Err(wrong("a coupling holds two devices together, not one with itself"));
+        }
+        (Partner::Here, [first, second]) => CouplingEnds::Here([*first, *second]),
+        (Partner::Elsewhere, [here]) => CouplingEnds::Apart(*here),
+        (Partner::Here, _) => {
+            return Err(wrong(
+                "a coupling has two ends: `[[coupling.end]]` twice, each with its `device`; if one is on another host, \
+                 write `partner = \"elsewhere\"`",
+            ));
+        }
+        (Partner::Elsewhere, _) => {
+            return Err(wrong(
+                "with `partner = \"elsewhere\"` a coupling has one end here: `[[coupling.end]]` once",
+            ));
+        }
+    };
+    if limits.passivity == PassivityMode::Control {
+        return Err(wrong(
+            "`limits.passivity = \"control\"` keeps back what comes from the other device; leave it out: a coupling \
+             has an energy controller of its own",
+        ));
+    }
+    let named = |end: CouplingEnd| devices.get(usize::from(end.device)).map_or("", |device| &device.name);
+    let name = match (name, ends) {
+        (Some(name), CouplingEnds::Here(_)) => name,
+        (None, CouplingEnds::Here([first, second])) => format!("{}-{}", named(first), named(second)),
+        (Some(name), CouplingEnds::Apart(_)) if is_key(&name) => name,
+        (_, CouplingEnds::Apart(_)) => {
+            return Err(wrong(
+                "both hosts know the coupling by its `name`: lower-case letters, digits and hyphens, at most 40",
+            ));
+        }
+    };
+    Ok(CouplingDescription { name, config, ends })
+}
+
+/// Where the other end is.
+#[derive(Clone, Copy)]
+enum Partner {
+    /// In this scene.
+    Here,
+    /// In one on another host.
+    Elsewhere,
+}
+
+/// Whether a name can be a part of a network's key.
+fn is_key(name: &str) -> bool {
+    let legal = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+    (1..=40).contains(&name.len()) && name.chars().all(legal)
+}
+
+fn end(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<CouplingEnd, SceneError> {
+    let device = devices::number(devices, section.require("device")?)?;
+    let mapping = match section.section("mapping")? {
+        // No torque scale: energy must come out in the measure in which it went in.
+        Some(mut mapping) => {
+            let config = frame_and_scales(&mut mapping)?;
+            mapping.finish()?;
+            config
+        }
+        None => MappingConfig::default(),
+    };
+    section.finish()?;
+    Ok(CouplingEnd { device, mapping })
+}

@@ -1,0 +1,137 @@
+//! The devices of a scene, and which of them a model is on.
+
+use super::reader::{Location, SceneError, Section, Value, nearest};
+use super::{CalibrationUse, ModelUse, PluginUse, plugin_use};
+use flotor_core::MOST_DEVICES;
+
+/// Stands between the name of a model and that of its device where a model is on several.
+const ON: char = '@';
+
+/// A device in a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DeviceUse {
+    /// What `--set NAME.KEY=VALUE` and reports call it; "device" unless said otherwise.
+    pub name: String,
+    /// The plugin.
+    pub plugin: PluginUse,
+    /// The calibration file it corrects its vertical force by, if any.
+    pub calibration: Option<CalibrationUse>,
+}
+
+/// The devices, each with a name of its own.
+pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<DeviceUse>, SceneError> {
+    let missing = root.missing("device");
+    let sections = root.sections("device")?;
+    if sections.is_empty() {
+        return Err(missing);
+    }
+    let is_one = sections.len() == 1;
+    let mut devices: Vec<DeviceUse> = Vec::new();
+    for mut section in sections {
+        let here = section.location();
+        let name = section.take("name").map(name).transpose()?;
+        let name = match name {
+            Some(name) => name,
+            None if is_one => "device".to_owned(),
+            None => return Err(section.missing("name")),
+        };
+        if devices.iter().any(|device| device.name == name) {
+            let problem = format!("two devices are called `{name}`; give one another `name`");
+            return Err(SceneError { location: here, problem });
+        }
+        if devices.len() >= MOST_DEVICES.into() {
+            let problem = format!("a scene has at most {MOST_DEVICES} devices");
+            return Err(SceneError { location: here, problem });
+        }
+        let plugin = plugin_use(&mut section)?;
+        let calibration = section.take("calibration").map(|value| {
+            let location = value.location.clone();
+            Ok(CalibrationUse { file: value.text()?.into(), location })
+        });
+        devices.push(DeviceUse { name, plugin, calibration: calibration.transpose()? });
+        section.finish()?;
+    }
+    Ok(devices)
+}
+
+/// A name that can be told from that of a model on a device.
+pub(super) fn name(value: Value<'_>) -> Result<String, SceneError> {
+    let wrong = value.problem(format!("`{ON}` in a name stands between a model and its device"));
+    let name = value.text()?;
+    if name.contains(ON) { Err(wrong) } else { Ok(name) }
+}
+
+/// The number of the device of a name.
+pub(super) fn number(devices: &[DeviceUse], value: Value<'_>) -> Result<u16, SceneError> {
+    let location = value.location.clone();
+    find(devices, &value.text()?, &location)
+}
+
+fn find(devices: &[DeviceUse], name: &str, location: &Location) -> Result<u16, SceneError> {
+    (0..).zip(devices).find(|(_, device)| device.name == name).map(|(number, _)| number).ok_or_else(|| {
+        let names = || devices.iter().map(|device| device.name.as_str());
+        let hint = nearest(name, names()).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+        let problem = format!(
+            "there is no device `{name}`{hint} (there are {})",
+            names().collect::<Vec<_>>().join(", ")
+        );
+        SceneError { location: location.clone(), problem }
+    })
+}
+
+/// The devices a model is on: those it names, or the only one.
+pub(super) fn of_model(
+    devices: &[DeviceUse],
+    named: Option<Value<'_>>,
+    location: &Location,
+) -> Result<Vec<u16>, SceneError> {
+    let Some(value) = named else {
+        let problem = "the scene has several devices: say which the model is on, `device = \"NAME\"` or a list of names";
+        return match devices {
+            [_] => Ok(vec![0]),
+            _ => Err(SceneError { location: location.clone(), problem: problem.to_owned() }),
+        };
+    };
+    let location = value.location.clone();
+    let names = value.one_or_more_texts()?;
+    if names.is_empty() {
+        let problem =
+            "`model.device` names no device; name one at least, or leave it out where there is only one";
+        return Err(SceneError { location, problem: problem.to_owned() });
+    }
+    names.iter().map(|name| find(devices, name, &location)).collect()
+}
+
+/// What a model on one of several devices is called.
+pub(super) fn name_on(model: &str, device: &DeviceUse) -> String {
+    format!("{model}{ON}{}", device.name)
+}
+
+/// True if `asked` names this model: it alone, or on all the devices it is on.
+#[must_use]
+pub fn is_named(name: &str, asked: &str) -> bool {
+    name == asked || without_device(name) == asked
+}
+
+/// The name of a model, without the device it is on.
+#[must_use]
+pub fn without_device(name: &str) -> &str {
+    name.split_once(ON).map_or(name, |(model, _)| model)
+}
+
+/// Complains about two models, or a model and a device, of one name: `--set` and changes would reach only one.
+pub(super) fn tell_apart(models: &[ModelUse], devices: &[DeviceUse]) -> Result<(), SceneError> {
+    for (index, model) in models.iter().enumerate() {
+        let before = models.get(..index).unwrap_or_default();
+        let other = if before.iter().any(|other| other.name == model.name) {
+            "two models are"
+        } else if devices.iter().any(|device| device.name == model.name) {
+            "a device and a model are"
+        } else {
+            continue;
+        };
+        let problem = format!("{other} called `{}`; give one another `name`", model.name);
+        return Err(SceneError { location: model.plugin.location.clone(), problem });
+    }
+    Ok(())
+}

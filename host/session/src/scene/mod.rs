@@ -1,0 +1,438 @@
+//! A scene: which devices, which models, how they are mapped and limited. A TOML file; unknown keys are errors.
+
+mod change;
+mod coupling;
+mod devices;
+mod placement;
+mod reader;
+mod reference;
+mod setting;
+
+pub use change::{Alternative, ChangeUse, ChangeWhat};
+pub use devices::DeviceUse;
+pub use devices::{is_named, without_device};
+use flotor_core::coupling::{CouplingDescription, PassivityMode};
+use flotor_core::limits::{Boundary, Limits};
+use flotor_core::mapping::{Blend, FieldTiming, MappingConfig};
+pub use reader::{Location, SceneError};
+pub use reference::{KeyReference, SectionReference, reference};
+pub use setting::{KeyValue, PluginKeyValue};
+
+use flotor_hal::Pacing;
+pub use reader::nearest;
+use reader::{Section, Source, Value};
+use std::path::{Path, PathBuf};
+
+/// The scene `flotor` runs when none is named: spring 1 on the simulated flotor, held by a hand.
+pub const DEMO: &str = include_str!("../../../scenes/demo.toml");
+
+/// The scene of experiments: a spring to be judged, on the simulated flotor.
+pub const STUDY: &str = include_str!("../../../scenes/study.toml");
+
+/// A scene as read: complete, checked against itself, not yet against the plugins it names.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// What stands in the title of a report.
+    pub title: String,
+    /// The text it was read from, for recordings.
+    pub text: String,
+    /// Loop rate, Hz.
+    pub rate_hz: f64,
+    /// Who decides when a tick begins (real clock).
+    pub pacing: Pacing,
+    /// How long to run, s.
+    pub duration_s: f64,
+    /// Folders with plugins, searched first; relative to the scene's file.
+    pub plugin_folders: Vec<PathBuf>,
+    /// The devices, one at least.
+    pub devices: Vec<DeviceUse>,
+    /// The force models; their wrenches add up. One that is on several devices is here for each.
+    pub models: Vec<ModelUse>,
+    /// What holds devices together.
+    pub couplings: Vec<CouplingDescription>,
+    /// Limits, tighter than or equal to what the device declares.
+    pub limits: Limits,
+    /// Where the handle is pushed back.
+    pub boundary: Boundary,
+    /// What changes while the scene runs, in the order written.
+    pub changes: Vec<ChangeUse>,
+}
+
+/// A plugin and what it is told.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PluginUse {
+    /// Id of the plugin.
+    pub plugin: String,
+    /// Where it was named.
+    pub location: Location,
+    /// Parameters as written, checked later against the plugin's schema.
+    pub parameters: Vec<ParameterText>,
+}
+
+/// A calibration file as named.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CalibrationUse {
+    /// The file; relative to the scene's.
+    pub file: PathBuf,
+    /// Where it was named.
+    pub location: Location,
+}
+
+impl CalibrationUse {
+    /// The file, from where this process runs.
+    #[must_use]
+    pub fn path(&self) -> PathBuf {
+        match self.location.file.parent() {
+            Some(folder) if self.location.is_in_a_file() => folder.join(&self.file),
+            _ => self.file.clone(),
+        }
+    }
+}
+
+/// One parameter as written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParameterText {
+    /// Id of the parameter.
+    pub key: String,
+    /// Its value, as text.
+    pub value: String,
+    /// Where it was written.
+    pub location: Location,
+}
+
+/// A force model in a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelUse {
+    /// What `--set NAME.KEY=VALUE` and reports call it; the plugin's id unless said otherwise.
+    pub name: String,
+    /// The plugin.
+    pub plugin: PluginUse,
+    /// Number of the device it is on.
+    pub device: u16,
+    /// From device to model and back.
+    pub mapping: MappingConfig,
+    /// Where its homes are in the device frame, m: one instance of the model for each.
+    pub places_m: Vec<[f64; 3]>,
+    /// How it is mixed with the other models.
+    pub blend: Blend,
+    /// Where it runs.
+    pub isolation: Isolation,
+    /// When it is computed, if beside the loop; the loop evaluates its linear field.
+    pub field: Option<FieldTiming>,
+    /// Longest time a step may take, s; `None`: half a period in real time, anything on the virtual clock.
+    pub budget_s: Option<f64>,
+}
+
+/// What stands between a model and the host.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Isolation {
+    /// Nothing: the model runs in the loop's own thread.
+    #[default]
+    None,
+    /// A process of its own, which may hang or crash.
+    Process,
+}
+
+impl ModelUse {
+    /// The same place with another plugin, or with none named the same one. Another plugin starts from its own
+    /// defaults; `settings` come on top.
+    #[must_use]
+    pub fn replaced_by(&self, plugin: Option<&str>, settings: &[(&str, &str)]) -> Self {
+        let mut other = self.clone();
+        if let Some(plugin) = plugin {
+            plugin.clone_into(&mut other.plugin.plugin);
+            other.plugin.parameters.clear();
+        }
+        other.plugin.parameters.extend(settings.iter().map(|(key, value)| ParameterText {
+            key: (*key).to_owned(),
+            value: (*value).to_owned(),
+            location: Location { file: PathBuf::from("swap"), line: 0 },
+        }));
+        other
+    }
+}
+
+impl Scene {
+    /// The built-in demo.
+    ///
+    /// # Errors
+    /// None in practice: a test reads it.
+    pub fn demo() -> Result<Self, SceneError> {
+        Self::parse(Path::new("built-in demo"), DEMO)
+    }
+
+    /// The built-in scene of experiments; for another model than the spring, that model in the spring's place, at its
+    /// natural scale.
+    ///
+    /// # Errors
+    /// None in practice: a test reads it.
+    pub fn study(model: &str) -> Result<Self, SceneError> {
+        let mut scene = Self::parse(Path::new("built-in study"), STUDY)?;
+        if let Some(object) = scene.models.iter_mut().find(|object| object.name != model) {
+            *object = object.replaced_by(Some(model), &[]);
+            model.clone_into(&mut object.name);
+            object.mapping = MappingConfig::default();
+        }
+        Ok(scene)
+    }
+
+    /// Reads a scene file. Not real-time.
+    ///
+    /// # Errors
+    /// [`SceneError`] with file, line, key and remedy.
+    pub fn load(path: &Path) -> Result<Self, SceneError> {
+        let text = std::fs::read_to_string(path).map_err(|error| SceneError {
+            location: Location { file: path.into(), line: 0 },
+            problem: format!("cannot read the scene: {error}"),
+        })?;
+        let mut scene = Self::parse(path, &text)?;
+        let base = path.parent().unwrap_or(Path::new(""));
+        for folder in &mut scene.plugin_folders {
+            *folder = base.join(&*folder);
+        }
+        Ok(scene)
+    }
+
+    /// Reads a scene from text; `file` is what complaints call it.
+    ///
+    /// # Errors
+    /// [`SceneError`] with file, line, key and remedy.
+    pub fn parse(file: &Path, text: &str) -> Result<Self, SceneError> {
+        Self::read(&Source::new(file, text))
+    }
+
+    /// Takes another rate than the scene was read with; `place` is what complaints call where it was said. Not
+    /// real-time.
+    ///
+    /// # Errors
+    /// [`SceneError`]: a limit that fits the old rate does not fit this one.
+    pub fn set_rate(&mut self, rate_hz: f64, place: &str) -> Result<(), SceneError> {
+        let place = Location { file: PathBuf::from(place), line: 0 };
+        legal_watchdog_s(self.limits.watchdog_s, rate_hz, place)?;
+        self.rate_hz = rate_hz;
+        Ok(())
+    }
+
+    fn read(source: &Source<'_>) -> Result<Self, SceneError> {
+        let mut root = source.parse()?;
+        let title = root.take("title").map(|value| value.text()).transpose()?.unwrap_or_default();
+        let rate_hz = root.number("rate_hz", 100.0..=10_000.0)?.unwrap_or(1000.0);
+        let pacing = root.take("pacing").map(pacing).transpose()?.unwrap_or(Pacing::Host);
+        let duration_s = root.number("duration_s", 0.0..=31_536_000.0)?.unwrap_or(10.0);
+        let folders = root.take("plugin_folders").map(|value| value.texts()).transpose()?.unwrap_or_default();
+        let devices = devices::read(&mut root)?;
+        let models = root.sections("model")?.into_iter().map(|section| model(section, &devices));
+        let models = models.collect::<Result<Vec<_>, _>>()?.concat();
+        devices::tell_apart(&models, &devices)?;
+        let limits = root.section("limits")?.map(|section| limits(section, rate_hz)).transpose()?;
+        let limits = limits.unwrap_or_default();
+        let scene = Self {
+            title,
+            text: source.text().to_owned(),
+            rate_hz,
+            pacing,
+            duration_s,
+            plugin_folders: folders.into_iter().map(PathBuf::from).collect(),
+            couplings: coupling::read(root.sections("coupling")?, &devices, &limits)?,
+            devices,
+            models,
+            limits,
+            boundary: root.section("boundary")?.map_or_else(|| Ok(Boundary::default()), boundary)?,
+            changes: change::read(root.sections("change")?)?,
+        };
+        root.finish()?;
+        Ok(scene)
+    }
+}
+
+fn pacing(value: Value<'_>) -> Result<Pacing, SceneError> {
+    value.one_of(&[("host", Pacing::Host), ("device", Pacing::Device)])
+}
+
+/// A model, once for each device it is on.
+fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse>, SceneError> {
+    let plugin = plugin_use(&mut section)?;
+    let name = section.take("name").map(devices::name).transpose()?;
+    let on = devices::of_model(devices, section.take("device"), &plugin.location)?;
+    let (mapping, places_m) = match section.section("mapping")? {
+        Some(section) => mapping(section)?,
+        None => (MappingConfig::default(), vec![[0.0; 3]]),
+    };
+    let blend = section.section("blend")?.map_or_else(|| Ok(Blend::default()), blend)?;
+    let isolation = section.take("isolation").map(isolation).transpose()?.unwrap_or_default();
+    let budget_us = section.number("budget_us", 1.0..=1.0e6)?;
+    let field = section.section("field")?.map(|section| field(section, isolation)).transpose()?;
+    section.finish()?;
+    let name = name.unwrap_or_else(|| plugin.plugin.clone());
+    let model = ModelUse {
+        name,
+        plugin,
+        device: 0,
+        mapping,
+        places_m,
+        blend,
+        isolation,
+        field,
+        budget_s: budget_us.map(|microseconds| microseconds * 1.0e-6),
+    };
+    let only = on.len() == 1;
+    let on_device = |number: u16| {
+        let device = devices.get(usize::from(number)).filter(|_| !only);
+        let name = device.map_or_else(|| model.name.clone(), |device| devices::name_on(&model.name, device));
+        ModelUse { name, device: number, ..model.clone() }
+    };
+    Ok(on.into_iter().map(on_device).collect())
+}
+
+/// When a model beside the loop is computed.
+fn field(mut section: Section<'_>, isolation: Isolation) -> Result<FieldTiming, SceneError> {
+    let rate = section.require("rate_hz")?;
+    if isolation == Isolation::Process {
+        return Err(rate.problem(
+            "a model in a process of its own is asked in the loop; remove one of the two".to_owned(),
+        ));
+    }
+    let rate_hz = rate.number(1.0..=10_000.0)?;
+    let period_s = 1.0 / rate_hz;
+    let latency_s =
+        section.number("latency_ms", 0.0..=period_s * 1.0e3)?.map(|milliseconds| milliseconds * 1.0e-3);
+    section.finish()?;
+    // A model that takes all the time it has.
+    Ok(FieldTiming { rate_hz, latency_s: latency_s.unwrap_or(period_s) })
+}
+
+fn blend(mut section: Section<'_>) -> Result<Blend, SceneError> {
+    let default = Blend::default();
+    let priority = section.take("priority").map(|value| value.whole(0..=u8::MAX.into())).transpose()?;
+    let blend = Blend {
+        weight: section.number("weight", 0.0..=1.0)?.unwrap_or(default.weight),
+        priority: priority.and_then(|priority| u8::try_from(priority).ok()).unwrap_or(default.priority),
+        fade_s: section.number("fade_s", 0.0..=60.0)?.unwrap_or(default.fade_s),
+    };
+    section.finish()?;
+    Ok(blend)
+}
+
+fn plugin_use(section: &mut Section<'_>) -> Result<PluginUse, SceneError> {
+    let plugin = section.require("plugin")?;
+    let location = plugin.location.clone();
+    let parameters = section.section("parameters")?.map_or_else(|| Ok(Vec::new()), Section::into_texts)?;
+    let parameters =
+        parameters.into_iter().map(|(key, value, location)| ParameterText { key, value, location }).collect();
+    Ok(PluginUse { plugin: plugin.text()?, location, parameters })
+}
+
+/// Scales, rotation and places of a model.
+fn mapping(mut section: Section<'_>) -> Result<(MappingConfig, Vec<[f64; 3]>), SceneError> {
+    let torque_scale = section.number("torque_scale", SCALE)?;
+    let mapping = MappingConfig { torque_scale, ..frame_and_scales(&mut section)? };
+    let places_m = placement::read(&mut section)?;
+    section.finish()?;
+    Ok((mapping, places_m))
+}
+
+/// Rotation and scales, all but that of torque.
+fn frame_and_scales(section: &mut Section<'_>) -> Result<MappingConfig, SceneError> {
+    let default = MappingConfig::default();
+    let rotation =
+        section.take("rotation_xyzw").map(|value| (value.numbers::<4>(), value)).map(|(numbers, value)| {
+            let numbers = numbers?;
+            let norm = numbers.iter().map(|x| x * x).sum::<f64>().sqrt();
+            if (norm - 1.0).abs() > 1.0e-6 {
+                return Err(value.problem(format!(
+                    "a rotation is a unit quaternion [x, y, z, w]; this one has length {norm}"
+                )));
+            }
+            Ok(numbers.map(|x| x / norm))
+        });
+    Ok(MappingConfig {
+        rotation_xyzw: rotation.transpose()?.unwrap_or(default.rotation_xyzw),
+        motion_scale: section.number("motion_scale", SCALE)?.unwrap_or(default.motion_scale),
+        force_scale: section.number("force_scale", SCALE)?.unwrap_or(default.force_scale),
+        torque_scale: None,
+    })
+}
+
+/// A scale of zero would make a device move nothing or feel nothing; a million is a unit mistaken.
+const SCALE: std::ops::RangeInclusive<f64> = 1.0e-6..=1.0e6;
+
+/// Longest time a watchdog may wait, ms.
+const LONGEST_WATCHDOG_MS: f64 = 60_000.0;
+
+/// Periods a watchdog waits at least: one passes between two ticks of a loop that is well, a tick that begins
+/// late makes it two, and the watchdog's own looks come late as well.
+const WATCHDOG_PERIODS: f64 = 3.0;
+
+/// The time, if a loop that is well at this rate ticks more often; `place` is where it was said.
+fn legal_watchdog_s(watchdog_s: f64, rate_hz: f64, place: Location) -> Result<f64, SceneError> {
+    let least_ms = WATCHDOG_PERIODS * 1.0e3 / rate_hz;
+    // To a microsecond: milliseconds that were seconds in between are a rounding off.
+    let watchdog_ms = (watchdog_s * 1.0e6).round() / 1.0e3;
+    if watchdog_ms > least_ms - 1.0e-3 {
+        return Ok(watchdog_s);
+    }
+    // Upwards, so that what the message names is legal.
+    let least_ms = (least_ms * 100.0).ceil() / 100.0;
+    let problem = format!(
+        "`limits.watchdog_ms` = {watchdog_ms}: legal at {rate_hz} Hz is {least_ms} to {LONGEST_WATCHDOG_MS}, \
+         three periods of the loop at least"
+    );
+    Err(SceneError { location: place, problem })
+}
+
+fn limits(mut section: Section<'_>, rate_hz: f64) -> Result<Limits, SceneError> {
+    let default = Limits::default();
+    let limits = Limits {
+        force_n: section.three("force_n", 0.0..=f64::INFINITY)?.unwrap_or(default.force_n),
+        torque_nm: section.three("torque_nm", 0.0..=f64::INFINITY)?.unwrap_or(default.torque_nm),
+        force_slew_n_per_s: section
+            .number("force_slew_n_per_s", 1.0..=f64::INFINITY)?
+            .unwrap_or(default.force_slew_n_per_s),
+        torque_slew_nm_per_s: section
+            .number("torque_slew_nm_per_s", 0.01..=f64::INFINITY)?
+            .unwrap_or(default.torque_slew_nm_per_s),
+        velocity_m_per_s: section
+            .three("velocity_m_per_s", 1.0e-6..=f64::INFINITY)?
+            .unwrap_or(default.velocity_m_per_s),
+        angular_velocity_rad_per_s: section
+            .three("angular_velocity_rad_per_s", 1.0e-6..=f64::INFINITY)?
+            .unwrap_or(default.angular_velocity_rad_per_s),
+        ramp_s: section.number("ramp_s", 0.0..=60.0)?.unwrap_or(default.ramp_s),
+        watchdog_s: section
+            .number_and_place("watchdog_ms", 1.0..=LONGEST_WATCHDOG_MS)?
+            .map_or(Ok(default.watchdog_s), |(ms, place)| legal_watchdog_s(ms * 1.0e-3, rate_hz, place))?,
+        emergency_buttons: section
+            .take("emergency_button")
+            .map(|value| value.whole(0..=31))
+            .transpose()?
+            .map_or(default.emergency_buttons, |button| 1 << button),
+        passivity: section.take("passivity").map(passivity).transpose()?.unwrap_or(default.passivity),
+    };
+    section.finish()?;
+    Ok(limits)
+}
+
+fn isolation(value: Value<'_>) -> Result<Isolation, SceneError> {
+    value.one_of(&[("none", Isolation::None), ("process", Isolation::Process)])
+}
+
+fn passivity(value: Value<'_>) -> Result<PassivityMode, SceneError> {
+    value.one_of(&[("observe", PassivityMode::Observe), ("control", PassivityMode::Control)])
+}
+
+fn boundary(mut section: Section<'_>) -> Result<Boundary, SceneError> {
+    let default = Boundary::default();
+    let millimetres = section.number("margin_mm", 0.0..=100.0)?;
+    let degrees = section.number("margin_deg", 0.0..=90.0)?;
+    let mut gain = |key, range, default| section.number(key, range).map(|value| value.unwrap_or(default));
+    let boundary = Boundary {
+        margin_m: millimetres.map_or(default.margin_m, |mm| mm * 1.0e-3),
+        margin_rad: degrees.map_or(default.margin_rad, f64::to_radians),
+        stiffness_n_per_m: gain("stiffness_n_per_m", 0.0..=1.0e5, default.stiffness_n_per_m)?,
+        damping_ns_per_m: gain("damping_ns_per_m", 0.0..=1.0e3, default.damping_ns_per_m)?,
+        stiffness_nm_per_rad: gain("stiffness_nm_per_rad", 0.0..=1.0e3, default.stiffness_nm_per_rad)?,
+        damping_nms_per_rad: gain("damping_nms_per_rad", 0.0..=10.0, default.damping_nms_per_rad)?,
+    };
+    section.finish()?;
+    Ok(boundary)
+}

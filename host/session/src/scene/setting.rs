@@ -1,0 +1,157 @@
+//! Settings on top of a scene, as people write them: `spring.variant=energy`.
+
+use super::{DeviceUse, Location, ModelUse, ParameterText, Scene, is_named, nearest, without_device};
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// `KEY=VALUE`
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct KeyValue {
+    key: String,
+    value: String,
+}
+
+impl FromStr for KeyValue {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.split_once('=') {
+            Some((key, value)) if !key.trim().is_empty() => {
+                Ok(Self { key: key.trim().to_owned(), value: value.trim().to_owned() })
+            }
+            _ => Err(format!("`{text}` is not KEY=VALUE")),
+        }
+    }
+}
+
+impl KeyValue {
+    /// Key and value, as written.
+    #[must_use]
+    pub fn pair(&self) -> (&str, &str) {
+        (&self.key, &self.value)
+    }
+
+    /// As a parameter of a plugin.
+    pub fn parameter(&self) -> ParameterText {
+        let location = Location { file: PathBuf::from(format!("--set {}", self.key)), line: 0 };
+        ParameterText { key: self.key.clone(), value: self.value.clone(), location }
+    }
+}
+
+/// `PLUGIN.KEY=VALUE`
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PluginKeyValue {
+    plugin: String,
+    setting: KeyValue,
+}
+
+impl FromStr for PluginKeyValue {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong =
+            || format!("`{text}` is not PLUGIN.KEY=VALUE, like spring.variant=energy or device.preset=full");
+        let (key, value) = text.split_once('=').ok_or_else(wrong)?;
+        let (plugin, key) = key.split_once('.').ok_or_else(wrong)?;
+        let (plugin, key, value) = (plugin.trim(), key.trim(), value.trim());
+        if plugin.is_empty() || key.is_empty() {
+            return Err(wrong());
+        }
+        let setting = KeyValue { key: key.to_owned(), value: value.to_owned() };
+        Ok(Self { plugin: plugin.to_owned(), setting })
+    }
+}
+
+impl PluginKeyValue {
+    /// Plugin, key and value, as written.
+    pub(super) fn into_parts(self) -> (String, String, String) {
+        (self.plugin, self.setting.key, self.setting.value)
+    }
+
+    /// Adds the setting to what it names in a scene: a device, a model (on all its devices, or as `MODEL@DEVICE` on
+    /// one), a plugin's id; `device` is every device. Not real-time.
+    ///
+    /// # Errors
+    /// In words: no such plugin in the scene, with the nearest name there is.
+    pub fn apply(&self, scene: &mut Scene) -> Result<(), String> {
+        let Scene { devices, models, .. } = scene;
+        let of_name = |device: &DeviceUse| device.name == self.plugin || self.plugin == "device";
+        let of_id = |device: &DeviceUse| device.plugin.plugin == self.plugin;
+        let by_name = devices.iter().any(of_name);
+        let mut found = false;
+        for device in
+            devices.iter_mut().filter(|device| if by_name { of_name(device) } else { of_id(device) })
+        {
+            device.plugin.parameters.push(self.parameter());
+            found = true;
+        }
+        if found {
+            return Ok(());
+        }
+        let names: Vec<&str> =
+            devices.iter().flat_map(|device| [device.name.as_str(), device.plugin.plugin.as_str()]).collect();
+        self.apply_among(models, &names)
+    }
+
+    /// Adds the setting to the model it names: by its name in the scene, or by its plugin's id.
+    pub fn apply_to_models(&self, models: &mut [ModelUse]) -> Result<(), String> {
+        self.apply_among(models, &[])
+    }
+
+    fn apply_among(&self, models: &mut [ModelUse], others: &[&str]) -> Result<(), String> {
+        let by_name = |model: &ModelUse| is_named(&model.name, &self.plugin);
+        let first = models.iter().find(|model| model.plugin.plugin == self.plugin);
+        let name = match (models.iter().any(by_name), first) {
+            (true, _) => self.plugin.clone(),
+            (false, Some(first)) => without_device(&first.name).to_owned(),
+            (false, None) => return Err(self.unknown(models, others)),
+        };
+        for model in models.iter_mut().filter(|model| is_named(&model.name, &name)) {
+            model.plugin.parameters.push(self.parameter());
+        }
+        Ok(())
+    }
+
+    fn unknown(&self, models: &[ModelUse], others: &[&str]) -> String {
+        let names: Vec<&str> =
+            models.iter().map(|model| model.name.as_str()).chain(others.iter().copied()).collect();
+        let hint =
+            nearest(&self.plugin, names.iter().copied()).map(|name| format!("; did you mean `{name}`?"));
+        format!(
+            "--set {}.{}: there is no plugin `{}`{} (there are {})",
+            self.plugin,
+            self.setting.key,
+            self.plugin,
+            hint.unwrap_or_default(),
+            names.join(", ")
+        )
+    }
+
+    fn parameter(&self) -> ParameterText {
+        let mut parameter = self.setting.parameter();
+        parameter.location.file = PathBuf::from(format!("--set {}.{}", self.plugin, self.setting.key));
+        parameter
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_setting_needs_plugin_key_and_value() {
+        assert!("spring.variant=energy".parse::<PluginKeyValue>().is_ok());
+        for wrong in ["spring.variant", "variant=energy", ".variant=energy", "spring.=x", ""] {
+            assert!(wrong.parse::<PluginKeyValue>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn an_unknown_plugin_gets_a_suggestion() {
+        let mut scene = Scene::demo().unwrap();
+        let wrong: PluginKeyValue = "sprng.variant=energy".parse().unwrap();
+        assert!(wrong.apply(&mut scene).unwrap_err().contains("did you mean `spring`?"));
+        let device: PluginKeyValue = "device.preset=plain".parse().unwrap();
+        assert!(device.apply(&mut scene).is_ok());
+    }
+}

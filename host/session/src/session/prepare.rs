@@ -1,0 +1,428 @@
+//! From a scene to what a loop is made of: plugins loaded, their settings checked, everything paired.
+
+use super::choice::chosen;
+use super::controls::{ControlError, NewValue, Parts, understands};
+use super::{PluginReport, RunError};
+use crate::calibration_file::{CalibrationFile, CalibrationFileError};
+use crate::registry::{LookupError, Registry};
+use crate::scene::{
+    Alternative, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, ParameterText,
+    PluginUse, Scene, SceneError,
+};
+use flotor_core::limits::Boundary;
+use flotor_core::mapping::Mapping;
+use flotor_hal::abi::PluginKind;
+use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, OpenedDevice, Plugin, Setting};
+use flotor_hal::{Axes, Capabilities, LoopConfig, Pacing, Parameter, ParameterKind, Refusal};
+use flotor_servo::engine::beside::SlowModel;
+use flotor_servo::engine::process::{Worker, WorkerOrder};
+use flotor_servo::{Clock, Engine, Layer, Replacement, ScheduledChange, TimeBudget};
+use std::borrow::Cow;
+
+pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
+    registry.load(&plugin.plugin, kind).map_err(|error| match error {
+        LookupError::Unknown { .. } => {
+            SceneError { location: plugin.location.clone(), problem: error.to_string() }.into()
+        }
+        refused => refused.into(),
+    })
+}
+
+/// A plugin that said no.
+pub(super) fn refused(plugin: &Plugin, refusal: Refusal) -> RunError {
+    let Metadata { path, id, .. } = plugin.metadata().clone();
+    RunError::Plugin(LoadError::Refused { path, id, refusal })
+}
+
+/// Hands the numbers of a scene's calibration file to the device they were measured on. Not real-time.
+fn calibrate(
+    plugin: &Plugin,
+    device: &mut OpenedDevice,
+    calibration: &CalibrationUse,
+) -> Result<(), RunError> {
+    let path = calibration.path();
+    let wrong = |problem: CalibrationFileError| SceneError {
+        location: calibration.location.clone(),
+        problem: problem.to_string(),
+    };
+    let (file, curve) = CalibrationFile::load(&path).map_err(wrong)?;
+    let id = &plugin.metadata().id;
+    file.check_device(&path.display().to_string(), id, &device.serial()).map_err(wrong)?;
+    device.calibrate_vertical(&curve).map_err(|refusal| refused(plugin, refusal))
+}
+
+/// A device that is opened, not energised.
+pub(super) struct Opened {
+    plugin: Plugin,
+    pub(super) device: OpenedDevice,
+    pub(super) capabilities: Capabilities,
+}
+
+impl Opened {
+    /// Energises it. Not real-time.
+    pub(super) fn activate(self, config: &LoopConfig) -> Result<ActiveDevice, RunError> {
+        let Self { plugin, device, .. } = self;
+        device.activate(config).map_err(|(_, refusal)| refused(&plugin, refusal))
+    }
+}
+
+/// Loads and opens one device of a scene. Not real-time.
+pub(super) fn open_device(
+    registry: &Registry,
+    device: &DeviceUse,
+) -> Result<(Opened, PluginReport), RunError> {
+    let DeviceUse { name, plugin: used, calibration } = device;
+    let plugin = load(registry, used, PluginKind::Device)?;
+    let settings = settings(&plugin, name, &used.parameters)?;
+    let mut device = plugin.open_device(&settings)?;
+    let capabilities = device.capabilities().map_err(|refusal| refused(&plugin, refusal))?;
+    let report = PluginReport {
+        name: name.clone(),
+        metadata: plugin.metadata().clone(),
+        schema: plugin.parameters(),
+        settings: as_written(used),
+        parameters: in_force(&plugin, &settings, |index| device.parameter(index)),
+    };
+    if let Some(calibration) = calibration {
+        calibrate(&plugin, &mut device, calibration)?;
+    }
+    Ok((Opened { plugin, device, capabilities }, report))
+}
+
+/// Loads one model of a scene and creates it in all its places. Not real-time.
+pub fn prepare_model(
+    registry: &Registry,
+    model: &ModelUse,
+    config: &LoopConfig,
+    clock: Clock,
+) -> Result<(Layer, PluginReport), RunError> {
+    let plugin = load(registry, &model.plugin, PluginKind::Model)?;
+    let settings = settings(&plugin, &model.name, &model.plugin.parameters)?;
+    let budget_ns = budget_ns(model, clock, config.period_ns);
+    let mapping = Mapping::new(&model.mapping);
+    let instance = |place_m: &[f64; 3]| {
+        let engine = match (model.isolation, &model.field) {
+            (Isolation::None, None) => {
+                let mut instance = plugin.create_model(&settings)?;
+                instance.prepare(config).map_err(|refusal| refused(&plugin, refusal))?;
+                Engine::Here(instance)
+            }
+            (Isolation::None, Some(timing)) => {
+                let instance = plugin.create_model(&settings)?;
+                if !instance.has_linear_field() {
+                    let problem =
+                        "it has no linear field, so it can only run in the loop; remove `[model.field]`";
+                    return Err(complain(model, problem).into());
+                }
+                let slow = SlowModel::start(instance, plugin.parameters().len(), timing, config, clock);
+                Engine::Beside(Box::new(slow.map_err(|refusal| refused(&plugin, refusal))?))
+            }
+            (Isolation::Process, _) => {
+                let keys = model.plugin.parameters.iter().map(|parameter| parameter.key.clone());
+                let values = settings.iter().map(|setting| setting.display(plugin.parameters()));
+                let order = WorkerOrder {
+                    plugin: &plugin.metadata().path,
+                    sets: keys.zip(values).collect(),
+                    config: *config,
+                    patience_ns: budget_ns.unwrap_or(PATIENCE_NS),
+                };
+                Engine::Apart(Worker::start(&order).map_err(|refusal| refused(&plugin, refusal))?)
+            }
+        };
+        Ok((engine, mapping.at(*place_m)))
+    };
+    let mut instances = model.places_m.iter().map(instance).collect::<Result<Vec<_>, RunError>>()?;
+    let mut value = |index| instances.first_mut().map_or(f64::NAN, |(first, _)| first.parameter(index));
+    let budget = match (model.isolation, &model.field) {
+        (Isolation::None, None) => TimeBudget::new(budget_ns),
+        // Nobody waits for it any longer than that, or at all.
+        (Isolation::Process, _) | (_, Some(_)) => TimeBudget::default(),
+    };
+    let report = PluginReport {
+        name: model.name.clone(),
+        metadata: plugin.metadata().clone(),
+        schema: plugin.parameters(),
+        settings: as_written(&model.plugin),
+        parameters: in_force(&plugin, &settings, &mut value),
+    };
+    Ok((Layer::new(instances, &model.blend, budget, config), report))
+}
+
+/// What a scene says of a model that cannot be.
+fn complain(model: &ModelUse, problem: &str) -> SceneError {
+    SceneError { location: model.plugin.location.clone(), problem: format!("[{}] {problem}", model.name) }
+}
+
+/// How long a run on the virtual clock waits for a model in a process of its own before it counts as hung, ns.
+const PATIENCE_NS: u64 = 2_000_000_000;
+
+/// Longest time a step of a model may take, ns. On the virtual clock only if the scene says so: what a clock on the
+/// wall says would make two runs differ.
+fn budget_ns(model: &ModelUse, clock: Clock, period_ns: u64) -> Option<u64> {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked: at most a second
+    let told_ns = model.budget_s.map(|seconds| (seconds * 1.0e9).round() as u64);
+    let usual_ns = match clock {
+        Clock::Real => Some(period_ns / 2),
+        Clock::Virtual => None,
+    };
+    told_ns.or(usual_ns)
+}
+
+/// Checks what was written against what the plugin understands; complaints name file and line.
+pub(super) fn settings(
+    plugin: &Plugin,
+    name: &str,
+    parameters: &[ParameterText],
+) -> Result<Vec<Setting>, SceneError> {
+    let schema = plugin.parameters();
+    let check = |parameter: &ParameterText| {
+        let value = from_the_scene(schema, parameter);
+        Setting::parse(schema, &parameter.key, &value).map_err(|error| SceneError {
+            location: parameter.location.clone(),
+            problem: format!("[{name}] {error}"),
+        })
+    };
+    parameters.iter().map(check).collect()
+}
+
+/// The value as the plugin is to get it: files a scene names lie beside the scene, those of a command line where
+/// the command runs.
+fn from_the_scene<'t>(schema: &[Parameter], text: &'t ParameterText) -> Cow<'t, str> {
+    let ParameterText { key, value, location } = text;
+    let parameter = schema.iter().find(|parameter| parameter.id() == key);
+    let is_file = parameter.is_some_and(|parameter| {
+        let built_in = parameter.choices().iter().any(|name| name.as_str() == value);
+        parameter.kind() == ParameterKind::File && !built_in && !value.is_empty()
+    });
+    match location.file.parent() {
+        Some(folder) if is_file && location.is_in_a_file() => {
+            Cow::Owned(folder.join(value).to_string_lossy().into_owned())
+        }
+        _ => Cow::Borrowed(value),
+    }
+}
+
+/// Every parameter with its value in force, as text.
+pub(super) fn in_force(
+    plugin: &Plugin,
+    settings: &[Setting],
+    mut value: impl FnMut(usize) -> f64,
+) -> Vec<(String, String)> {
+    let schema = plugin.parameters();
+    let show = |(index, parameter): (usize, &Parameter)| {
+        let text = match parameter.kind() {
+            // Plugins answer with numbers: a text is in force if it was set.
+            ParameterKind::Text | ParameterKind::File => {
+                let set = settings.iter().rev().find(|setting| setting.index() == index);
+                set.map_or_else(String::new, |setting| setting.display(schema))
+            }
+            ParameterKind::Real | ParameterKind::Choice => {
+                let setting = Setting::number(schema, parameter.id(), value(index));
+                setting.map_or_else(|_| String::new(), |setting| setting.display(schema))
+            }
+        };
+        (parameter.id().to_owned(), text)
+    };
+    schema.iter().enumerate().map(show).collect()
+}
+
+/// What of a scene its device `number` cannot do; all at once, before anything is energised.
+pub(super) fn pair(scene: &Scene, number: u16, device: &Capabilities, can_pace: bool) -> Vec<String> {
+    let mut mismatches = Vec::new();
+    let [slowest, fastest] = device.rate_hz;
+    if scene.rate_hz < slowest || scene.rate_hz > fastest {
+        mismatches.push(format!(
+            "rate {} Hz, the device runs at {slowest} to {fastest} Hz; change `rate_hz`",
+            scene.rate_hz
+        ));
+    }
+    // The first device sets the pace, if one does.
+    if scene.pacing == Pacing::Device && number == 0 && !can_pace {
+        mismatches.push(
+            "it cannot set the pace of the loop; remove `pacing`, or say `pacing = \"host\"`".to_owned(),
+        );
+    }
+    mismatches.extend(boundless(&scene.boundary, device));
+    let is_felt = scene.models.iter().any(|model| model.device == number)
+        || scene.couplings.iter().any(|coupling| coupling.ends.here().iter().any(|end| end.device == number));
+    if is_felt {
+        mismatches.extend(unfelt(&scene.limits.force_n, device));
+    }
+    mismatches
+}
+
+/// A boundary so far inside the device's range that nothing is left of it: a spring to the centre.
+fn boundless(boundary: &Boundary, device: &Capabilities) -> Option<String> {
+    let narrowest = |range: [f64; 3]| {
+        let moving = range.into_iter().filter(|half_side| *half_side > 0.0);
+        moving.fold(f64::INFINITY, f64::min)
+    };
+    let (range_m, range_rad) = (narrowest(device.range_m), narrowest(device.range_rad));
+    let says = |key, margin: f64, range: f64, unit| {
+        format!(
+            "`{key} = {margin:.3}` leaves nothing of the {range:.3} {unit} the device moves around home; make it smaller"
+        )
+    };
+    if boundary.margin_m >= range_m {
+        return Some(says("margin_mm", boundary.margin_m * 1.0e3, range_m * 1.0e3, "mm"));
+    }
+    let (margin_deg, range_deg) = (boundary.margin_rad.to_degrees(), range_rad.to_degrees());
+    (margin_deg >= range_deg).then(|| says("margin_deg", margin_deg, range_deg, "degrees"))
+}
+
+/// Force that models would ask for and the device cannot give, unless the scene says that none is wanted there.
+fn unfelt(wanted_n: &[f64; 3], device: &Capabilities) -> Option<String> {
+    let axes = [(Axes::X, "x"), (Axes::Y, "y"), (Axes::Z, "z")];
+    let is_driven = axes.map(|(axis, _)| device.actuated.contains(axis));
+    let is_unfelt =
+        |index: usize| !is_driven[index] && wanted_n.get(index).is_some_and(|most_n| *most_n > 0.0);
+    let unfelt: Vec<&str> = (0..3).filter(|index| is_unfelt(*index)).map(|index| axes[index].1).collect();
+    if unfelt.is_empty() {
+        return None;
+    }
+    let accepted: Vec<String> = device
+        .max_force_n
+        .iter()
+        .zip(is_driven)
+        .map(|(most_n, is_driven)| if is_driven { most_n.to_string() } else { "0".to_owned() })
+        .collect();
+    let accepted = accepted.join(", ");
+    Some(if is_driven == [false; 3] {
+        format!(
+            "the device gives no force, so no model can be felt; `[limits] force_n = [{accepted}]` accepts that: models \
+             are computed, shown and recorded. Without a `[[model]]` it records poses"
+        )
+    } else {
+        format!(
+            "the device gives no force along {}, so that part of a model cannot be felt; `[limits] force_n = \
+             [{accepted}]` accepts that",
+            unfelt.join(" and ")
+        )
+    })
+}
+
+/// What a scene sets for a plugin, as written.
+pub(super) fn as_written(plugin: &PluginUse) -> Vec<(String, String)> {
+    plugin.parameters.iter().map(|parameter| (parameter.key.clone(), parameter.value.clone())).collect()
+}
+
+/// What a scene has scheduled, checked and made.
+pub(super) struct Scheduled {
+    pub(super) changes: Vec<ScheduledChange>,
+    pub(super) replacements: Vec<(u64, Replacement)>,
+}
+
+/// The changes a scene has scheduled, checked, and the models they put in, created; complaints name file and line.
+pub(super) fn schedule(
+    scene: &Scene,
+    parts: &Parts,
+    registry: &Registry,
+    config: &LoopConfig,
+    clock: Clock,
+) -> Result<Scheduled, RunError> {
+    let mut in_time: Vec<&ChangeUse> = scene.changes.iter().collect();
+    in_time.sort_by(|a, b| a.at_s.total_cmp(&b.at_s)); // stable: a change is checked against what is there then
+    let mut scheduled = Scheduled { changes: Vec::new(), replacements: Vec::new() };
+    // Of each model, what this seed might have got in its place instead of what it did get.
+    let mut passed_over = vec![Vec::new(); scene.models.len()];
+    for (draw, change) in (0..).zip(in_time) {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
+        let time_ns = (change.at_s * 1.0e9).round() as u64;
+        let complain = |key: &str, error: ControlError| SceneError {
+            location: change.location.clone(),
+            problem: format!("`{key}`: {error}"),
+        };
+        let checked = match &change.what {
+            ChangeWhat::Set { plugin, parameter: ParameterText { key, value, .. } } => {
+                let new = NewValue { plugin, parameter: key, value };
+                match parts.check(&new) {
+                    Ok(checked) => checked,
+                    // It is for another seed.
+                    Err(_) if passed_over.iter().flatten().any(|part| understands(part, &new)) => continue,
+                    Err(error) => return Err(complain("change.set", error).into()),
+                }
+            }
+            ChangeWhat::Weight { model, weight } => {
+                parts.check_weight(model, *weight).map_err(|error| complain("change.weight", error))?
+            }
+            ChangeWhat::Swap { model, by } => {
+                let choice = chosen(config.seed, draw, by.len());
+                for number in parts.models(model).map_err(|error| complain("change.swap", error))? {
+                    let Some(place) = scene.models.get(number) else { continue };
+                    let make = |Alternative { plugin, parameters }: &Alternative| {
+                        let mut other = place.replaced_by(plugin.as_deref(), &[]);
+                        other.plugin.location = change.location.clone();
+                        other.plugin.parameters.extend(parameters.iter().cloned());
+                        prepare_model(registry, &other, config, clock)
+                    };
+                    // All of them: what is wrong with one is to be known whatever the seed.
+                    let mut made = by.iter().map(make).collect::<Result<Vec<_>, _>>()?;
+                    if choice >= made.len() {
+                        continue;
+                    }
+                    let (layer, report) = made.swap_remove(choice);
+                    if let Some(others) = passed_over.get_mut(number) {
+                        *others = made.into_iter().map(|(_, report)| report).collect();
+                    }
+                    let generation = parts.put_in(number, report);
+                    let model = u32::try_from(number).unwrap_or(u32::MAX); // a scene has fewer models
+                    let replacement = Replacement { model, generation, layer: Box::new(layer) };
+                    scheduled.replacements.push((time_ns, replacement));
+                }
+                continue;
+            }
+        };
+        scheduled.changes.extend(checked.into_iter().map(|change| ScheduledChange { time_ns, change }));
+    }
+    parts.start_with_the_first();
+    Ok(scheduled)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DEVICE: Capabilities = Capabilities {
+        sensed: Axes::ALL,
+        actuated: Axes::ALL,
+        range_m: [0.01, 0.01, 0.0],
+        range_rad: [0.1; 3],
+        resolution_m: 0.0,
+        max_force_n: [3.0; 3],
+        max_torque_nm: [0.0; 3],
+        max_force_slew_n_per_s: f64::INFINITY,
+        max_torque_slew_nm_per_s: f64::INFINITY,
+        max_stiffness_n_per_m: 0.0,
+        rate_hz: [100.0, 10_000.0],
+        latency_s: 0.0,
+    };
+
+    fn mismatch(wanted_n: [f64; 3], actuated: Axes, max_force_n: [f64; 3]) -> Option<String> {
+        unfelt(&wanted_n, &Capabilities { actuated, max_force_n, ..DEVICE })
+    }
+
+    #[test]
+    fn a_boundary_that_leaves_no_room_is_refused() {
+        let said = |boundary: Boundary| boundless(&boundary, &DEVICE);
+        assert_eq!(said(Boundary::default()), None); // an axis that does not move needs no room
+        let wide = said(Boundary { margin_m: 0.01, ..Boundary::default() }).expect("10 of 10 mm");
+        assert!(wide.contains("`margin_mm = 10.000`"), "{wide}");
+        let turned = said(Boundary { margin_rad: 0.2, ..Boundary::default() }).expect("0.2 of 0.1 rad");
+        assert!(turned.contains("`margin_deg = 11.459`"), "{turned}");
+    }
+
+    #[test]
+    fn a_device_without_force_says_what_works_and_takes_its_word() {
+        let said = mismatch([f64::INFINITY; 3], Axes::NONE, [0.0; 3]).expect("nothing could be felt");
+        assert!(said.contains("gives no force") && said.contains("force_n = [0, 0, 0]"), "{said}");
+        assert_eq!(mismatch([0.0; 3], Axes::NONE, [0.0; 3]), None);
+        assert_eq!(mismatch([f64::INFINITY; 3], Axes::ALL, [3.0; 3]), None);
+    }
+
+    #[test]
+    fn a_planar_device_says_which_axis_is_missing_and_takes_its_word() {
+        let said = mismatch([f64::INFINITY; 3], Axes::PLANE, [3.0, 3.0, 0.0]).expect("z would not be felt");
+        assert!(said.contains("along z") && said.contains("force_n = [3, 3, 0]"), "{said}");
+        assert_eq!(mismatch([3.0, 3.0, 0.0], Axes::PLANE, [3.0, 3.0, 0.0]), None);
+    }
+}

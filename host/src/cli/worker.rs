@@ -1,0 +1,31 @@
+//! `flotor worker`: the process that holds one force model, started by `flotor run`.
+
+use super::{CommandError, stopping};
+use clap::Args;
+use flotor_servo::engine::process;
+use std::path::PathBuf;
+
+/// What a worker is started with. Standard input is the memory it shares with its host.
+#[derive(Args, Clone, Debug)]
+pub(super) struct WorkerArguments {
+    /// The plugin's shared library
+    plugin: PathBuf,
+    /// Nominal time between ticks, ns
+    #[arg(long)]
+    period_ns: u64,
+    /// Seed of the run
+    #[arg(long)]
+    seed: u64,
+    /// A parameter of the model, KEY=VALUE
+    #[arg(long = "set")]
+    sets: Vec<String>,
+}
+
+pub(super) fn run(arguments: WorkerArguments) -> Result<(), CommandError> {
+    // A terminal signals worker and host alike, and while force fades out the model is still asked. A
+    // worker ends with its host, so nobody listens to the switch.
+    let _ = stopping::stop_on_signals();
+    let WorkerArguments { plugin, period_ns, seed, sets } = arguments;
+    process::serve(&process::WorkerArguments { plugin, period_ns, seed, sets })
+        .map_err(|error| CommandError::Usage(format!("`flotor worker` is started by `flotor run`: {error}")))
+}

@@ -1,0 +1,168 @@
+//! The figures of a study: 17 and 18 of CMU-RI-TR-07-21 with this study's data, what lies behind them, and how people
+//! moved.
+
+use crate::analysis::{
+    JndAnalysis, KinematicMeasure, MagnitudeAnalysis, SubjectRecord, ThresholdCell, published,
+};
+use crate::log::TrialEvent;
+use crate::protocol::Stimulus;
+use crate::sitting::Verdict;
+use crate::trial::{Modality, Presented};
+use flotor_plot::{Axis, Bin, Figure, Panel, Series};
+use flotor_statistics::describe::MeanInterval;
+
+/// Height of a figure of one panel, px.
+const HEIGHT_PX: f64 = 340.0;
+
+/// The modalities with the words of the legends, in the colours they have everywhere.
+const MODALITIES: [(Modality, &str); 2] =
+    [(Modality::Vh, "vision + haptics"), (Modality::H, "haptics alone")];
+
+/// Figure 18: thresholds as bars over the base, a bar for each modality, with standard errors; what the report's Weber
+/// fractions come to at each base.
+pub(super) fn thresholds(analysis: &JndAnalysis, stimulus: &Stimulus) -> String {
+    let cells = |modality| analysis.thresholds.iter().filter(move |cell| cell.modality == modality);
+    let mut bases: Vec<f64> = cells(Modality::Vh).map(|cell| cell.base).collect();
+    bases.sort_by(f64::total_cmp);
+    let gap =
+        bases.windows(2).filter_map(|pair| Some(pair.get(1)? - pair.first()?)).fold(f64::INFINITY, f64::min);
+    // Two bars and their distance fill two thirds of the gap between bases.
+    let width = if gap.is_finite() { gap / 3.0 } else { bases.first().map_or(1.0, |base| base / 10.0) };
+    let centre = |slot: usize, base: f64| base + if slot == 0 { -0.5 * width } else { 0.5 * width };
+    let (name, unit) = stimulus.name_and_unit();
+    let mut panel = Panel::new(Axis::linear("Threshold", unit));
+    for (slot, (modality, name)) in MODALITIES.into_iter().enumerate() {
+        let bar = |cell: &ThresholdCell| Bin {
+            from: centre(slot, cell.base) - 0.46 * width,
+            to: centre(slot, cell.base) + 0.46 * width,
+            height: cell.threshold.mean,
+        };
+        panel = panel.series(Series::histogram(name, cells(modality).map(bar)).slot(slot));
+    }
+    for (slot, (modality, _)) in MODALITIES.into_iter().enumerate() {
+        let errors = cells(modality).flat_map(|cell| error_bar(centre(slot, cell.base), &cell.threshold));
+        panel = panel.series(Series::line("", errors).slot(3));
+    }
+    let report = MODALITIES.into_iter().enumerate().zip(published::WEBER).flat_map(|((slot, _), weber)| {
+        bases.iter().map(move |base| (centre(slot, *base), weber * base)).collect::<Vec<_>>()
+    });
+    panel = panel.series(Series::points("report: its Weber fraction times the base", report).slot(2));
+    Figure::new("Thresholds", Axis::linear(format!("Base {name}"), unit).levels(bases))
+        .subtitle("Mean over subjects; strokes: one standard error each way")
+        .panel_height_px(HEIGHT_PX)
+        .panel(panel)
+        .to_svg()
+}
+
+/// Every subject's Weber fraction in one modality against the other.
+pub(super) fn subjects(analysis: &JndAnalysis) -> String {
+    let mut points: Vec<(String, [Vec<f64>; 2])> = Vec::new();
+    for row in &analysis.responses {
+        if points.last().is_none_or(|(subject, _)| *subject != row.subject) {
+            points.push((row.subject.clone(), Default::default()));
+        }
+        if let Some((_, [vh, h])) = points.last_mut() {
+            let list = if row.modality == Modality::Vh { vh } else { h };
+            list.push(row.response / row.stimulus * 100.0);
+        }
+    }
+    let mean = flotor_statistics::describe::mean;
+    let points: Vec<(f64, f64)> = points.iter().map(|(_, [vh, h])| (mean(vh), mean(h))).collect();
+    let most = points.iter().flat_map(|(vh, h)| [*vh, *h]).fold(1.0, f64::max).ceil();
+    let [vh, h] = published::WEBER.map(|weber| weber * 100.0);
+    let panel = Panel::new(Axis::linear("Weber fraction, haptics alone", "%").range(0.0, most))
+        .series(Series::points("a subject", points).slot(0))
+        .series(Series::points("report, mean", [(vh, h)]).slot(2))
+        .series(Series::line("no difference", [(0.0, 0.0), (most, most)]).slot(3));
+    Figure::new("Subjects", Axis::linear("Weber fraction, vision + haptics", "%").range(0.0, most))
+        .subtitle("Above the line: worse without vision")
+        .panel_height_px(HEIGHT_PX)
+        .panel(panel)
+        .to_svg()
+}
+
+/// The tracks of the first subject.
+pub(super) fn tracks(record: &SubjectRecord) -> String {
+    let mut figure = Figure::new("Adaptive tracks", Axis::linear("Trial of the track", ""))
+        .subtitle(format!("{}: difference presented, one line per track", record.subject))
+        .columns(2)
+        .panel_height_px(200.0);
+    let difference = |event: &&TrialEvent| match (event.trial.presented, event.verdict) {
+        (Presented::Pair(pair), Verdict::Judged { .. }) => Some(pair.delta * 100.0),
+        _ => None,
+    };
+    let largest = record.counted().filter_map(|event| difference(&event)).fold(1.0, f64::max);
+    for (slot, (modality, name)) in MODALITIES.into_iter().enumerate() {
+        let y = Axis::linear("Difference", "% of the base").range(0.0, 1.05 * largest);
+        let mut panel = Panel::new(y).title(name);
+        for track in record.tracks.iter().filter(|track| track.modality == modality) {
+            let here = record.counted().filter(|event| event.trial.track == track.track);
+            let samples = (1_u32..).map(f64::from).zip(here.filter_map(|event| difference(&event)));
+            panel = panel.series(Series::steps("", samples).slot(slot));
+        }
+        figure = figure.panel(panel);
+    }
+    figure.to_svg()
+}
+
+/// Figure 17: mean ratings over the stimulus, with standard errors and the linear trend.
+pub(super) fn ratings(analysis: &MagnitudeAnalysis, stimulus: &Stimulus) -> String {
+    let cells = |modality| analysis.ratings.iter().filter(move |cell| cell.modality == modality);
+    let values: Vec<f64> = cells(Modality::Vh).map(|cell| cell.stimulus).collect();
+    let span = values.iter().fold(0.0_f64, |most, value| most.max(*value))
+        - values.iter().fold(f64::INFINITY, |least, value| least.min(*value));
+    // Beside each other, so that neither hides the other's error.
+    let beside = |slot: usize, x: f64| x + if slot == 0 { -0.004 * span } else { 0.004 * span };
+    let mut panel = Panel::new(Axis::linear("Rating, scaled", ""));
+    for (slot, (modality, name)) in MODALITIES.into_iter().enumerate() {
+        let errors = cells(modality).flat_map(|cell| error_bar(beside(slot, cell.stimulus), &cell.rating));
+        panel = panel.series(Series::line("", errors).slot(slot));
+        let points = cells(modality).map(|cell| (beside(slot, cell.stimulus), cell.rating.mean));
+        panel = panel.series(Series::points(name, points).slot(slot));
+    }
+    let trend = &analysis.trend;
+    let line = cells(Modality::Vh).map(|cell| (cell.stimulus, trend.intercept + trend.slope * cell.stimulus));
+    let label = format!("linear trend, R² {:.3} (report: {})", analysis.linear_r2, published::LINEAR_R2);
+    panel = panel.series(Series::line(label, line).slot(2));
+    let (name, unit) = stimulus.name_and_unit();
+    Figure::new("Perceived against real", Axis::linear(name, unit))
+        .subtitle("Mean over subjects; strokes: one standard error each way")
+        .panel_height_px(HEIGHT_PX)
+        .panel(panel)
+        .to_svg()
+}
+
+/// How people moved, over the stimulus; nothing where it was not measured.
+pub(super) fn movements(
+    measures: &[KinematicMeasure],
+    levels: &[f64],
+    stimulus: &Stimulus,
+) -> Option<String> {
+    if measures.is_empty() {
+        return None;
+    }
+    let (name, unit) = stimulus.name_and_unit();
+    let mut figure = Figure::new("Exploration", Axis::linear(name, unit))
+        .subtitle("Along the vertical; mean over subjects and modalities")
+        .columns(3)
+        .panel_height_px(170.0);
+    for measure in measures {
+        let (name, unit) = match measure.measure {
+            "mean speed" => ("Mean speed", "m/s"),
+            "mean acceleration" => ("Mean acceleration", "m/s²"),
+            _ => ("Mean force", "N"),
+        };
+        let mut points: Vec<(f64, f64)> = levels.iter().copied().zip(measure.means.iter().copied()).collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let panel = Panel::new(Axis::linear(name, unit))
+            .series(Series::line("", points.clone()).slot(0))
+            .series(Series::points("", points).slot(0));
+        figure = figure.panel(panel);
+    }
+    Some(figure.to_svg())
+}
+
+/// A vertical stroke of one standard error each way, and a break behind it.
+fn error_bar(x: f64, value: &MeanInterval) -> [(f64, f64); 3] {
+    [(x, value.mean - value.se), (x, value.mean + value.se), (x, f64::NAN)]
+}

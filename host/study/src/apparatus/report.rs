@@ -1,0 +1,260 @@
+//! A study on one page: figures 17 or 18 of CMU-RI-TR-07-21 with this study's data, and every number next to the
+//! report's. One HTML file that needs no other.
+
+use super::figures;
+use crate::analysis::{
+    Analysis, Estimator, JndAnalysis, KinematicMeasure, MagnitudeAnalysis, SubjectRecord, p_text, published,
+};
+use crate::log::Begin;
+use crate::protocol::{Protocol, Stimulus};
+use flotor_statistics::anova::Effect;
+use flotor_statistics::describe::MeanInterval;
+use std::fmt::Write;
+
+/// The page.
+///
+/// `begin` is the first line of any log of the study; `subjects` are the sittings that were analysed.
+#[must_use]
+pub fn html(begin: &Begin, subjects: &[SubjectRecord], analysis: &Analysis) -> String {
+    let stimulus = begin.protocol.stimulus();
+    let levels = begin.protocol.levels();
+    let mut page = Page::default();
+    let title = match analysis {
+        Analysis::Jnd(jnd) => {
+            jnd_page(&mut page, jnd, subjects, stimulus, levels);
+            format!("Just noticeable difference of {stimulus}")
+        }
+        Analysis::Magnitude(magnitude) => {
+            magnitude_page(&mut page, magnitude, stimulus, levels);
+            format!("Perceived magnitude of {stimulus}")
+        }
+    };
+    provenance(&mut page, begin);
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{title}</title>\n\
+         <meta name=\"viewport\" content=\"width=device-width\">\n<style>{STYLE}</style>\n</head>\n<body>\n\
+         <h1>{title}</h1>\n{body}</body>\n</html>\n",
+        title = escaped(&title),
+        body = page.text,
+    )
+}
+
+fn jnd_page(
+    page: &mut Page,
+    analysis: &JndAnalysis,
+    subjects: &[SubjectRecord],
+    stimulus: &Stimulus,
+    levels: &[f64],
+) {
+    let [vh, h] = [&analysis.weber_detail.vh, &analysis.weber_detail.h];
+    let how = match analysis.estimator {
+        Estimator::Procedure => "the mean of each track's last differences, or its posterior for QUEST+",
+        Estimator::Map => "the most likely observer in the light of all of a subject's answers at a base",
+    };
+    page.paragraph(&format!(
+        "{} subjects compared {:.1} pairs each. The Weber fraction was {} with vision and haptics and {} with haptics \
+         alone, t({}) = {:.2}, {}. Thresholds are {how}.",
+        analysis.subjects,
+        analysis.pairs_per_subject,
+        percent(vh),
+        percent(h),
+        analysis.t.df,
+        analysis.t.value,
+        p_text(analysis.t.p),
+    ));
+    page.figure(
+        &figures::thresholds(analysis, stimulus),
+        "Thresholds by base and modality, as figure 18 of CMU-RI-TR-07-21. Its bars are printed without numbers; the \
+         markers are its mean Weber fraction, 14.2 and 17.2 %, times the base.",
+    );
+    page.heading("Weber fractions");
+    page.table(&["", "this study", "95 % interval", "report"], |rows| {
+        for ((name, detail), published) in
+            [("Vision and haptics", vh), ("Haptics alone", h)].into_iter().zip(published::WEBER)
+        {
+            let [low, high] = detail.interval.map(|end| end * 100.0);
+            rows.row(&[
+                name.to_owned(),
+                percent(detail),
+                format!("{low:.1} to {high:.1} %"),
+                format!("{:.1} %", published * 100.0),
+            ]);
+        }
+        let t = &analysis.t;
+        let [low, high] = t.interval.map(|end| end * 100.0);
+        let here = format!("t({}) = {:.2}, {}", t.df, t.value, p_text(t.p));
+        rows.row(&[
+            "Difference".to_owned(),
+            here,
+            format!("{low:.1} to {high:.1} %"),
+            published::T.to_owned(),
+        ]);
+    });
+    page.heading("Effects on thresholds");
+    page.effects(&analysis.anova, &published::JND);
+    page.paragraph("Is the Weber fraction the same at every base? Within each modality, on fractions:");
+    let constancy =
+        [("Vision and haptics", &analysis.constancy.vh), ("Haptics alone", &analysis.constancy.h)];
+    let mut lines = Vec::new();
+    let mut beside = Vec::new();
+    for ((name, effect), report) in constancy.into_iter().zip(published::CONSTANCY) {
+        if let Some(effect) = effect {
+            lines.push(Effect { effect: name.to_owned(), ..effect.clone() });
+            beside.push((name, report));
+        }
+    }
+    page.effects(&lines, &beside);
+    page.figure(
+        &figures::subjects(analysis),
+        "Each subject's Weber fraction without vision against that with it.",
+    );
+    if let Some(first) = subjects.first() {
+        page.figure(&figures::tracks(first), "The adaptive tracks of one subject.");
+    }
+    movements(page, analysis.task, &analysis.kinematics, levels, stimulus);
+    if analysis.unfinished_tracks > 0 {
+        let count = analysis.unfinished_tracks;
+        page.paragraph(&format!("{count} tracks never came to a threshold and are left out."));
+    }
+}
+
+fn magnitude_page(page: &mut Page, analysis: &MagnitudeAnalysis, stimulus: &Stimulus, levels: &[f64]) {
+    let trend = &analysis.trend;
+    page.paragraph(&format!(
+        "{} subjects gave {} ratings each; {} presentations were repeated because the handle left its range. The mean \
+         rating rises linearly with the stimulus: R² = {:.3} (report: {}), F({}, {}) = {:.2}, {}.",
+        analysis.subjects,
+        analysis.trials_per_subject,
+        analysis.repeated,
+        analysis.linear_r2,
+        published::LINEAR_R2,
+        trend.df,
+        trend.error_df,
+        trend.f,
+        p_text(trend.p),
+    ));
+    page.figure(
+        &figures::ratings(analysis, stimulus),
+        "Mean ratings over the stimulus, as figure 17 of CMU-RI-TR-07-21.",
+    );
+    page.heading("Effects on ratings");
+    page.effects(&analysis.anova, &published::MAGNITUDE);
+    movements(page, analysis.task, &analysis.kinematics, levels, stimulus);
+}
+
+fn movements(
+    page: &mut Page,
+    task: &str,
+    measures: &[KinematicMeasure],
+    levels: &[f64],
+    stimulus: &Stimulus,
+) {
+    let Some(figure) = figures::movements(measures, levels, stimulus) else { return };
+    page.heading("How the stimuli were explored");
+    page.figure(&figure, "Mean speed, acceleration and force along the vertical (report: section 4.3).");
+    for measure in measures {
+        page.paragraph(&format!("Effects on {}:", measure.measure));
+        page.effects(&measure.anova, published::movement(task, measure.measure));
+    }
+}
+
+/// Everything needed to do it again.
+fn provenance(page: &mut Page, begin: &Begin) {
+    page.heading("Protocol and provenance");
+    let observer = if begin.observer.get("simulated").is_some() { "simulated observers" } else { "people" };
+    let procedure = match &begin.protocol {
+        Protocol::Jnd(_) => "flotor study jnd",
+        Protocol::Magnitude(_) => "flotor study magnitude",
+    };
+    page.paragraph(&format!(
+        "{procedure}, {observer}, seed {}, flotor {}, configuration {}.",
+        begin.seed,
+        begin.version,
+        begin.config_hash(),
+    ));
+    let settings = serde_json::to_string_pretty(&begin.protocol).unwrap_or_default();
+    let apparatus = serde_json::to_string_pretty(&begin.apparatus).unwrap_or_default();
+    for (name, text) in [("Protocol", settings), ("Apparatus", apparatus)] {
+        let _ =
+            writeln!(page.text, "<details><summary>{name}</summary><pre>{}</pre></details>", escaped(&text));
+    }
+}
+
+/// Reads on light and dark screens and on paper; tables as journals print them: three rules, no boxes.
+const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:58rem;margin:2rem auto;padding:0 1rem;\
+    color-scheme:light dark}h1{line-height:1.2}figure{margin:1.5rem 0}figcaption{font-size:.9rem;opacity:.8}\
+    svg{max-width:100%;height:auto}table{border-collapse:collapse;margin:1rem 0;font-variant-numeric:tabular-nums;\
+    border-top:2px solid;border-bottom:2px solid;font-size:.92rem}thead{border-bottom:1px solid}\
+    th,td{padding:.2rem .9rem .2rem 0;text-align:left;vertical-align:baseline}pre{overflow-x:auto;line-height:1.4}\
+    @media print{details{display:none}body{margin:0}}";
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+fn percent(value: &MeanInterval) -> String {
+    format!("{:.1} %", value.mean * 100.0)
+}
+
+/// A page in the making.
+#[derive(Default)]
+struct Page {
+    text: String,
+}
+
+impl Page {
+    fn heading(&mut self, text: &str) {
+        let _ = writeln!(self.text, "<h2>{}</h2>", escaped(text));
+    }
+
+    fn paragraph(&mut self, text: &str) {
+        let _ = writeln!(self.text, "<p>{}</p>", escaped(text));
+    }
+
+    fn figure(&mut self, svg: &str, caption: &str) {
+        let _ = writeln!(self.text, "<figure>{svg}<figcaption>{}</figcaption></figure>", escaped(caption));
+    }
+
+    fn table(&mut self, head: &[&str], fill: impl FnOnce(&mut Rows<'_>)) {
+        self.text.push_str("<table><thead><tr>");
+        head.iter().for_each(|cell| {
+            let _ = write!(self.text, "<th>{}</th>", escaped(cell));
+        });
+        self.text.push_str("</tr></thead><tbody>\n");
+        fill(&mut Rows(&mut self.text));
+        self.text.push_str("</tbody></table>\n");
+    }
+
+    fn effects(&mut self, effects: &[Effect], report: &[published::Published]) {
+        self.table(&["Effect", "F", "p", "ε (GG)", "p (GG)", "η² partial", "report"], |rows| {
+            for effect in effects {
+                let beside = report.iter().find(|(name, _)| *name == effect.effect);
+                let corrected = |value: fn(&flotor_statistics::anova::Sphericity) -> String| {
+                    effect.sphericity.as_ref().map_or(String::new(), value)
+                };
+                rows.row(&[
+                    effect.effect.replace(':', " × "),
+                    format!("F({}, {}) = {:.2}", effect.df, effect.error_df, effect.f),
+                    p_text(effect.p).replace("p = ", "").replace("p ", ""),
+                    corrected(|s| format!("{:.3}", s.epsilon_gg)),
+                    corrected(|s| p_text(s.p_gg).replace("p = ", "").replace("p ", "")),
+                    format!("{:.3}", effect.partial_eta_squared),
+                    beside.map_or(String::new(), |(_, text)| (*text).to_owned()),
+                ]);
+            }
+        });
+    }
+}
+
+/// Rows of a table in the making.
+struct Rows<'p>(&'p mut String);
+
+impl Rows<'_> {
+    fn row(&mut self, cells: &[String]) {
+        self.0.push_str("<tr>");
+        for cell in cells {
+            let _ = write!(self.0, "<td>{}</td>", escaped(cell));
+        }
+        self.0.push_str("</tr>\n");
+    }
+}

@@ -1,0 +1,189 @@
+//! Presents stimuli to a simulated observer: the servo loop on the virtual clock, with the simulated hand of that
+//! subject going up and down all the time.
+//!
+//! ```text
+//! object's weight   1 ──╮        ╭── 1        between two stimuli the object fades out, changes while nobody feels
+//!                       ╰── 0 ──╯             it, and fades in again: no step of force
+//!                          set
+//! ```
+
+use super::watch::Watch;
+use super::{Apparatus, Kinematics};
+use crate::conduct::{OutsideError, Presenter};
+use crate::kinematics::KinematicsMeter;
+use crate::protocol::SubjectNumber;
+use crate::trial::{Exploration, Trial};
+use flotor_record::Recorder;
+use flotor_servo::Clock;
+use flotor_session::scene::Scene;
+use flotor_session::{ControlError, Observer, RunEnd, RunError, Steps};
+use std::path::PathBuf;
+
+/// The run ended before the experiment did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the run ended during a trial: {}", end_words(.0))]
+pub struct RunEnded(pub RunEnd);
+
+fn end_words(end: &RunEnd) -> String {
+    match end {
+        RunEnd::DeviceFault(fault) => format!("device fault, {}", fault.advice()),
+        RunEnd::EmergencyStop(source) => format!("emergency stop ({})", source.word()),
+        RunEnd::TooFast(samples_per_s) => {
+            format!("the device sends {samples_per_s} samples a second, too many")
+        }
+        RunEnd::Watchdog(_) => "a tick took longer than the watchdog allows".to_owned(),
+        RunEnd::Finished | RunEnd::Stopped => "it was stopped".to_owned(),
+    }
+}
+
+/// The model did not take a stimulus although the check said it would.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the model refused {0}")]
+pub struct StimulusRefused(pub String);
+
+/// Where recordings of trials go: a file for each.
+#[derive(Clone, Debug)]
+pub struct TrialFiles {
+    folder: PathBuf,
+    prefix: String,
+}
+
+impl TrialFiles {
+    /// Files in a folder, which is made.
+    ///
+    /// # Errors
+    /// What the system said.
+    pub fn make(folder: PathBuf, prefix: String) -> std::io::Result<Self> {
+        std::fs::create_dir_all(&folder)?;
+        Ok(Self { folder, prefix })
+    }
+
+    /// The file of a trial.
+    #[must_use]
+    pub fn of(&self, trial: &Trial) -> PathBuf {
+        self.folder.join(format!("{}_trial-{:04}_motion.mcap", self.prefix, trial.number))
+    }
+}
+
+/// The apparatus of one simulated subject, in virtual time.
+pub struct Rig<'a> {
+    apparatus: &'a Apparatus,
+    scene: Scene,
+    seed: u64,
+    steps: Steps,
+    watch: Watch,
+    kinematics: Kinematics,
+    files: Option<TrialFiles>,
+    feel_ticks: u64,
+    fade_ticks: u64,
+}
+
+impl<'a> Rig<'a> {
+    /// Everything loaded and active; the object is there. Every stimulus will be felt for `feel_s`.
+    ///
+    /// # Errors
+    /// [`RunError`].
+    pub fn start(
+        apparatus: &'a Apparatus,
+        (seed, subject): (u64, SubjectNumber),
+        kinematics: Kinematics,
+        files: Option<TrialFiles>,
+        feel_s: f64,
+    ) -> Result<Self, RunError> {
+        let scene = apparatus.scene_with_hand(seed, subject);
+        // Subjects differ in their tremor, too.
+        let seed = seed.wrapping_mul(u64::from(SubjectNumber::MOST) + 1).wrapping_add(subject.get().into());
+        let steps = Steps::prepare(&scene, apparatus.registry(), seed)?;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // minutes at most
+        let ticks = |seconds: f64| (seconds * scene.rate_hz).ceil() as u64;
+        Ok(Self {
+            feel_ticks: ticks(feel_s),
+            // One more, for the tick a change waits for.
+            fade_ticks: ticks(apparatus.fade_s()) + 1,
+            apparatus,
+            seed,
+            steps,
+            watch: Watch::default(),
+            kinematics,
+            files,
+            scene,
+        })
+    }
+
+    /// The stimuli of a trial, each for its time, watched by somebody else too.
+    ///
+    /// # Errors
+    /// What the apparatus said.
+    pub fn present_watched(
+        &mut self,
+        trial: &Trial,
+        also: &mut dyn Observer,
+    ) -> Result<Exploration, OutsideError> {
+        if let (Kinematics::Full, Some(files)) = (self.kinematics, &self.files) {
+            let run = self.apparatus.describe(&self.scene, Clock::Virtual, self.seed);
+            self.watch.recorder = Some(Recorder::create(&files.of(trial), &run)?);
+        }
+        let mut exploration = Exploration::default();
+        for value in trial.presented.values() {
+            self.change_to(value, also)?;
+            self.watch.meter = Some(KinematicsMeter::default());
+            self.advance(self.feel_ticks, also)?;
+            if let Some(meter) = self.watch.meter.take() {
+                exploration.boundary_hit |= meter.out_of_range();
+                if self.kinematics != Kinematics::None {
+                    exploration.kinematics.extend(meter.finish());
+                }
+            }
+        }
+        exploration.missed_ticks = std::mem::take(&mut self.watch.missed_ticks);
+        self.watch.finish_recording()?;
+        Ok(exploration)
+    }
+
+    fn change_to(&mut self, value: f64, also: &mut dyn Observer) -> Result<(), OutsideError> {
+        let apparatus = self.apparatus;
+        apparatus.show(self.steps.controls(), false)?;
+        self.advance(self.fade_ticks, also)?;
+        // A model that was replaced is dropped after it has faded: only then another can be.
+        let mut busy = apparatus.set(self.steps.controls(), value);
+        if let Err(ControlError::Busy) = busy {
+            self.advance(self.fade_ticks, also)?;
+            busy = apparatus.set(self.steps.controls(), value);
+        }
+        busy?;
+        apparatus.show(self.steps.controls(), true)?;
+        self.advance(self.fade_ticks, also)?;
+        Ok(self.watch.refused.take().map_or(Ok(()), |what| Err(StimulusRefused(what)))?)
+    }
+
+    fn advance(&mut self, ticks: u64, also: &mut dyn Observer) -> Result<(), RunEnded> {
+        let mut both = Both(&mut self.watch, also);
+        (0..ticks).try_for_each(|_| self.steps.advance(&mut both)).map_err(RunEnded)
+    }
+}
+
+impl Presenter for Rig<'_> {
+    fn present(&mut self, trial: &Trial) -> Result<Exploration, OutsideError> {
+        self.present_watched(trial, &mut Nobody)
+    }
+}
+
+struct Both<'a>(&'a mut Watch, &'a mut dyn Observer);
+
+impl Observer for Both<'_> {
+    fn observe(&mut self, record: &flotor_core::trace::TickRecord) {
+        self.0.observe(record);
+        self.1.observe(record);
+    }
+
+    fn change(&mut self, change: &flotor_core::Change) {
+        self.0.change(change);
+        self.1.change(change);
+    }
+}
+
+struct Nobody;
+
+impl Observer for Nobody {
+    fn observe(&mut self, _: &flotor_core::trace::TickRecord) {}
+}
