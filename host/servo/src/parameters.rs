@@ -31,7 +31,7 @@ pub struct ParameterChange {
 }
 
 /// Words of a [`ParameterChange`].
-pub const CHANGE_WORDS: usize = 2;
+pub(crate) const CHANGE_WORDS: usize = 2;
 
 impl Words<CHANGE_WORDS> for ParameterChange {
     #[inline]
@@ -74,7 +74,7 @@ fn outcome(status: CallStatus) -> ChangeOutcome {
 }
 
 /// Words of a [`ChangeReport`].
-pub const REPORT_WORDS: usize = 5;
+pub(crate) const REPORT_WORDS: usize = 5;
 
 impl Words<REPORT_WORDS> for ChangeReport {
     #[inline]

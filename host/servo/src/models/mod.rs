@@ -27,7 +27,7 @@ use slot::Slot;
 const SILENCE_S: f64 = 0.02;
 
 /// All models of a device.
-pub struct ModelStack {
+pub(crate) struct ModelStack {
     slots: Box<[Slot]>,
     broad: BroadPhase,
     /// Ascending; none if all layers have one priority, for then nobody is silenced.
@@ -55,7 +55,7 @@ impl ModelStack {
     /// Not real-time.
     ///
     /// Each layer comes with the number of its model in the scene.
-    pub fn new(layers: Vec<(usize, Layer)>) -> Self {
+    pub(crate) fn new(layers: Vec<(usize, Layer)>) -> Self {
         let slots: Box<[Slot]> = layers.into_iter().map(|(number, layer)| Slot::new(number, layer)).collect();
         let broad = BroadPhase::new(slots.iter().map(Slot::bounds).collect());
         let mut priorities: Vec<u8> = slots.iter().map(|slot| slot.priority).collect();
@@ -72,7 +72,7 @@ impl ModelStack {
     ///
     /// Real-time: bounded by the models that are near, no allocation.
     #[inline(always)] // as `Layer::step`
-    pub fn step(
+    pub(crate) fn step(
         &mut self,
         tick: &Tick,
         state: &DeviceState,
@@ -113,7 +113,7 @@ impl ModelStack {
     }
 
     /// Changes a live parameter of the model in place `model`. Real-time: bounded by its objects, no allocation.
-    pub fn set_parameter(&mut self, model: usize, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
+    pub(crate) fn set_parameter(&mut self, model: usize, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
         let Some(slot) = self.slots.get_mut(model) else { return CallStatus::Unsupported };
         let status = slot.set_parameter(tick, parameter, value);
         self.rebound(model);
@@ -121,7 +121,7 @@ impl ModelStack {
     }
 
     /// Moves the weight of the model in place `model` to a new value, at its rate. Real-time: bounded, no allocation.
-    pub fn set_weight(&mut self, model: usize, tick: &Tick, weight: f64) -> CallStatus {
+    pub(crate) fn set_weight(&mut self, model: usize, tick: &Tick, weight: f64) -> CallStatus {
         let Some(slot) = self.slots.get_mut(model) else { return CallStatus::Unsupported };
         slot.weight.set_target(weight, tick.time_ns);
         CallStatus::Ok
@@ -129,7 +129,7 @@ impl ModelStack {
 
     /// How often the model in place `model` was replaced. Real-time: bounded, no allocation.
     #[inline]
-    pub fn generation(&self, model: usize) -> Option<u16> {
+    pub(crate) fn generation(&self, model: usize) -> Option<u16> {
         self.slots.get(model).map(Slot::generation)
     }
 
@@ -137,7 +137,7 @@ impl ModelStack {
     /// fading, is returned: dropping it is not for the loop.
     ///
     /// Real-time: bounded by the objects of the model, no allocation.
-    pub fn replace(
+    pub(crate) fn replace(
         &mut self,
         model: usize,
         layer: Box<Layer>,
@@ -152,7 +152,7 @@ impl ModelStack {
 
     /// A layer that has faded out, and the number of its model in the scene. Real-time: bounded by the models, no allocation.
     #[inline]
-    pub fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {
+    pub(crate) fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {
         let take = |slot: &mut Slot| Some((u32::try_from(slot.number).ok()?, slot.take_faded(tick)?));
         self.slots.iter_mut().find_map(take)
     }
@@ -166,12 +166,12 @@ impl ModelStack {
     }
 
     /// Of every model, health and last words of the layer in place. Not real-time.
-    pub fn health(&mut self) -> Vec<(ModelHealth, String)> {
+    pub(crate) fn health(&mut self) -> Vec<(ModelHealth, String)> {
         self.slots.iter_mut().map(Slot::health).collect()
     }
 
     /// What is known of every layer that is here. Not real-time.
-    pub fn reports(&mut self) -> impl Iterator<Item = LayerReport> {
+    pub(crate) fn reports(&mut self) -> impl Iterator<Item = LayerReport> {
         self.slots.iter_mut().flat_map(Slot::reports)
     }
 }
