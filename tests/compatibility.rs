@@ -10,7 +10,7 @@
 use flotor_core::trace::Events;
 use flotor_hal::Wrench;
 use flotor_hal::abi::{ABI_MAJOR, ABI_MINOR, is_spoken};
-use flotor_session::RunEnd;
+use flotor_servo::RunEnd;
 use flotor_tests::library::{compile_c_file, plugin_file};
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;

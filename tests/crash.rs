@@ -3,10 +3,11 @@
 
 use flotor_core::trace::TickRecord;
 use flotor_record::{Ending, Recording};
+use flotor_servo::RunEnd;
 use flotor_servo::{Clock, StopSwitch};
 use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
-use flotor_session::{Observer, RunEnd, RunOptions, Session};
+use flotor_session::{Observer, RunOptions, Session};
 use flotor_tests::library::compile_c_file;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;

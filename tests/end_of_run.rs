@@ -8,10 +8,11 @@ use flotor_hal::{
     ActiveDevice, Axes, Capabilities, Cycle, Device, DeviceInfo, DeviceState, LoopConfig, Refusal, SafeStop,
     Settings, Tick, Wrench,
 };
+use flotor_servo::RunEnd;
 use flotor_servo::{Clock, EmergencySource, StopSwitch};
 use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
-use flotor_session::{Observer, RunEnd, RunOptions, Session};
+use flotor_session::{Observer, RunOptions, Session};
 use flotor_tests::watched::{watch, watch_on};
 use std::path::Path;
 use std::sync::Mutex;

@@ -3,7 +3,7 @@
 use flotor_core::trace::Events;
 use flotor_hal::Fault;
 use flotor_servo::Clock;
-use flotor_session::RunEnd;
+use flotor_servo::RunEnd;
 use flotor_tests::watched::{Watched, watch_on};
 use serialport::{SerialPort, TTYPort};
 use std::io::{Read, Write};

@@ -7,11 +7,12 @@ use flotor_live::{
     Subject,
 };
 use flotor_record::{Recording, TraceDigest};
+use flotor_servo::RunEnd;
 use flotor_servo::{Clock, EmergencySource, StopSwitch};
 use flotor_session::live::{Announcement, Handles};
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
-use flotor_session::{Observer, Outcome, RunEnd, RunOptions, Session};
+use flotor_session::{Observer, Outcome, RunOptions, Session};
 use flotor_sync::Words;
 use flotor_tests::TestSize;
 use flotor_tests::program::{Flotor, exit_code};

@@ -7,8 +7,9 @@
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{DVec3, EnergyLedger, Input, Output, Pose};
+use flotor_servo::RunEnd;
+use flotor_session::Observer;
 use flotor_session::report::{RunFacts, RunSummary, Tally};
-use flotor_session::{Observer, RunEnd};
 use flotor_tests::library::plugin_file;
 use flotor_tests::watched::{Watched, watch};
 

@@ -4,8 +4,8 @@
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::DVec3;
 use flotor_record::{Ending, Recording, Severity};
+use flotor_servo::RunEnd;
 use flotor_servo::{Clock, EmergencySource, ModelHealth};
-use flotor_session::RunEnd;
 use flotor_tests::library::{compile_c_file, plugin_file};
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;

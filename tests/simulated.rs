@@ -4,7 +4,7 @@
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::abi::loader::{LoadError, OpenedDevice, Plugin, Setting};
 use flotor_hal::{Conditions, Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
-use flotor_session::RunEnd;
+use flotor_servo::RunEnd;
 use flotor_tests::TestSize;
 use flotor_tests::library::plugin_file;
 use flotor_tests::program::{Flotor, Ran, exit_code};

@@ -3,7 +3,7 @@
 
 use flotor_core::trace::Events;
 use flotor_servo::Clock;
-use flotor_session::RunEnd;
+use flotor_servo::RunEnd;
 use flotor_session::scene::Scene;
 use flotor_tests::field_error::{FieldError, Swing, field_error};
 use flotor_tests::program::{Flotor, exit_code};

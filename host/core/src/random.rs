@@ -10,6 +10,8 @@ pub struct Random {
 }
 
 impl Random {
+    /// Stream number `stream` of a seed.
+    #[must_use]
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut random = Self { state: seed ^ 0x6a09_e667_f3bc_c908 };
         random.state = random.bits() ^ stream.wrapping_mul(0xd134_2543_de82_ef95);
@@ -17,6 +19,7 @@ impl Random {
         random
     }
 
+    /// 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mixed = (self.state ^ self.state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -74,6 +74,7 @@ enum Pace {
 /// A tick that is due, and how the machine kept to it.
 #[derive(Debug)]
 pub struct Due {
+    /// Index, time and step of the tick.
     pub tick: Tick,
     /// How long after its deadline it starts, ns; on the virtual clock nothing is ever late.
     pub lateness_ns: Option<u64>,

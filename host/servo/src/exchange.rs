@@ -22,7 +22,9 @@ pub struct Exchange {
 
 /// The other end.
 pub struct Workshop {
+    /// Replacements for the loop.
     pub leaving_for_the_loop: Producer<Replacement>,
+    /// Layers the loop needs no longer.
     pub retired: Consumer<Retired>,
 }
 

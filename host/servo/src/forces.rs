@@ -69,9 +69,23 @@ pub struct CouplingOutcome {
 /// A coupling and the devices of this run that it holds.
 pub enum Coupled {
     /// Both ends are here.
-    Here { coupling: Box<Coupling>, devices: [usize; 2], pulls: [Pull; 2] },
+    Here {
+        /// Both ends.
+        coupling: Box<Coupling>,
+        /// Numbers of the devices.
+        devices: [usize; 2],
+        /// What the ends ask for.
+        pulls: [Pull; 2],
+    },
     /// The other end is on another host.
-    Apart { end: Box<EndApart>, device: usize, pull: Pull },
+    Apart {
+        /// The end here.
+        end: Box<EndApart>,
+        /// Number of its device.
+        device: usize,
+        /// What it asks for.
+        pull: Pull,
+    },
 }
 
 impl Coupled {

@@ -59,7 +59,9 @@ pub struct ChangeReport {
     pub tick: u64,
     /// The time of that tick, ns.
     pub time_ns: u64,
+    /// The change.
     pub change: ParameterChange,
+    /// What the plugin made of it.
     pub outcome: ChangeOutcome,
 }
 
@@ -99,6 +101,7 @@ impl Words<REPORT_WORDS> for ChangeReport {
 pub struct ScheduledChange {
     /// Applied before the first tick at this time or later, ns.
     pub time_ns: u64,
+    /// The change.
     pub change: ParameterChange,
 }
 

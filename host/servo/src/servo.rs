@@ -313,6 +313,7 @@ impl Servo {
         self.stations.iter_mut().map(|station| (&mut station.device, station.fault))
     }
 
+    /// All that asks for a wrench.
     pub fn forces(&mut self) -> &mut Forces {
         &mut self.forces
     }

@@ -22,6 +22,6 @@ pub mod scene;
 mod session;
 
 pub use session::{
-    ControlError, Controls, DeviceOutcome, Misbehaved, NewValue, Observer, Outcome, PluginReport, RunEnd,
-    RunError, RunOptions, Session, Steps, prepare_model,
+    ControlError, Controls, DeviceOutcome, Misbehaved, NewValue, Observer, Outcome, PluginReport, RunError,
+    RunOptions, Session, Steps, prepare_model,
 };

@@ -1,11 +1,12 @@
 //! What a run says about itself: numbers for machines, a page for people.
 
 use crate::live::Carried;
-use crate::{Misbehaved, Observer, Outcome, PluginReport, RunEnd};
+use crate::{Misbehaved, Observer, Outcome, PluginReport};
 use flotor_core::coupling::CouplingDescription;
 use flotor_core::peer::Account;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, EnergyLedger};
+use flotor_servo::RunEnd;
 use flotor_servo::coupling::Hearing;
 use flotor_servo::{CouplingOutcome, ModelHealth, Overrun, Percentiles, Stage, Timing};
 use serde::Serialize;

@@ -9,6 +9,7 @@ use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_live::{Directory, Publication};
 use flotor_record::{Note, RecordError, Recorder, Severity, TraceDigest};
+use flotor_servo::RunEnd;
 use flotor_servo::coupling::Line;
 use flotor_servo::{Clock, Core};
 use flotor_session::live::{Announcement, Carried, Carrier, Handles, carry, publish};
@@ -16,7 +17,7 @@ use flotor_session::registry::Registry;
 use flotor_session::report::{RunFacts, RunSummary, Tally};
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
-use flotor_session::{Observer, Outcome, PluginReport, RunEnd, RunError, RunOptions, Session};
+use flotor_session::{Observer, Outcome, PluginReport, RunError, RunOptions, Session};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::path::PathBuf;
 

@@ -15,8 +15,9 @@ use choices::{
     PresentationOption, ProcedureChoice, SideChoice, StepChoice, range,
 };
 use clap::{Args, Subcommand, ValueEnum};
+use flotor_servo::RunEnd;
+use flotor_session::RunError;
 use flotor_session::scene::Scene;
-use flotor_session::{RunEnd, RunError};
 use flotor_study::apparatus::rig::{Rig, RunEnded, TrialFiles};
 use flotor_study::apparatus::{Apparatus, ApparatusError, Kinematics};
 use flotor_study::cohort::{Cohort, CohortError, Earlier};

@@ -120,6 +120,7 @@ pub struct LayerReport {
     pub model: usize,
     /// Which of those that had that place it was.
     pub generation: u16,
+    /// How it behaved.
     pub health: ModelHealth,
     /// What it said last; may be empty.
     pub words: String,

@@ -40,6 +40,7 @@ pub struct Replacement {
     pub model: u32,
     /// What changes of its parameters name it by.
     pub generation: u16,
+    /// What takes its place.
     pub layer: Box<Layer>,
 }
 
@@ -113,7 +114,13 @@ impl ModelStack {
     }
 
     /// Changes a live parameter of the model in place `model`. Real-time: bounded by its objects, no allocation.
-    pub(crate) fn set_parameter(&mut self, model: usize, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
+    pub(crate) fn set_parameter(
+        &mut self,
+        model: usize,
+        tick: &Tick,
+        parameter: usize,
+        value: f64,
+    ) -> CallStatus {
         let Some(slot) = self.slots.get_mut(model) else { return CallStatus::Unsupported };
         let status = slot.set_parameter(tick, parameter, value);
         self.rebound(model);

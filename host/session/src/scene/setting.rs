@@ -94,6 +94,9 @@ impl PluginKeyValue {
     }
 
     /// Adds the setting to the model it names: by its name in the scene, or by its plugin's id.
+    ///
+    /// # Errors
+    /// No model, or more than one, has that name.
     pub fn apply_to_models(&self, models: &mut [ModelUse]) -> Result<(), String> {
         self.apply_among(models, &[])
     }

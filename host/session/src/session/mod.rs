@@ -3,7 +3,6 @@
 mod choice;
 mod controls;
 mod prepare;
-mod standby;
 mod steps;
 
 pub use controls::{ControlError, Controls, Misbehaved, NewValue};
@@ -18,16 +17,15 @@ use flotor_core::MOST_DEVICES;
 use flotor_core::trace::{RECORD_WORDS, TickRecord};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, Stopper};
-use flotor_hal::{DVec3, EnergyLedger, Fault, LoopConfig, Pacing, Parameter, SampleWait};
+use flotor_hal::{DVec3, EnergyLedger, Fault, LoopConfig, Pacing, Parameter};
 use flotor_live::WrenchLimits;
 use flotor_servo::coupling::{Line, Patience};
 use flotor_servo::{
-    Cause, Clock, Core, Coupled, CouplingOutcome, EmergencySource, Envelope, Forces, Heartbeat, ModelHealth,
-    PaceLost, ParameterQueue, Place, RealTimeReport, RunConfig, RunState, Schedule, Servo, SpinWindow,
-    StopSwitch, Stuck, Timing, enter_real_time, exchange, start_watchdog,
+    Clock, Core, Coupled, CouplingOutcome, Envelope, Forces, Guarded, Loop, ModelHealth, ParameterQueue,
+    Place, RealTimeReport, RunConfig, RunEnd, Schedule, Servo, SpinWindow, Standby, StopSwitch, Stuck,
+    Timing, enter_real_time, exchange, start_watchdog,
 };
-use prepare::Scheduled;
-use standby::Standby;
+use prepare::{Scheduled, activate};
 use std::time::{Duration, Instant};
 
 /// How a scene is to be run.
@@ -115,46 +113,6 @@ pub struct Session {
     core: Option<Core>,
     plugins: Vec<PluginReport>,
     lines: Vec<(String, Line)>,
-}
-
-/// How a run ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RunEnd {
-    /// The duration is over.
-    Finished,
-    /// Somebody asked it to stop.
-    Stopped,
-    /// The device faulted.
-    DeviceFault(Fault),
-    /// The emergency stop was pressed.
-    EmergencyStop(EmergencySource),
-    /// The device sets the pace, and it is a faster one than the scene says: this many samples a second.
-    TooFast(u32),
-    /// A tick took so long that the watchdog stopped the device; then it came back.
-    Watchdog(Stuck),
-}
-
-impl RunEnd {
-    /// What it means that a device does not set the pace it should.
-    fn without_pace(lost: PaceLost) -> Self {
-        match lost {
-            PaceLost::NotPaced => Self::DeviceFault(Fault::Broken),
-            PaceLost::TooFast { samples, elapsed_ns } => {
-                let per_s = samples.saturating_mul(1_000_000_000) / elapsed_ns.max(1);
-                Self::TooFast(u32::try_from(per_s).unwrap_or(u32::MAX))
-            }
-        }
-    }
-
-    /// What the last state of a run means for those who asked for it.
-    fn of(run: RunState, heart: &Heartbeat) -> Self {
-        match (run, heart.bitten()) {
-            (RunState::Faulted(Cause::Device(fault)), _) => Self::DeviceFault(fault),
-            (RunState::Faulted(Cause::Watchdog), Some(stuck)) => Self::Watchdog(stuck),
-            (RunState::EmergencyStopped(source), _) => Self::EmergencyStop(source),
-            _ => Self::Stopped,
-        }
-    }
 }
 
 /// What is known after a run.
@@ -253,7 +211,7 @@ impl Session {
 
         let devices = opened.into_iter().map(|opened| {
             let envelope = Envelope::new(&scene.limits, &scene.boundary, &opened.capabilities, period_ns);
-            (opened, envelope)
+            Guarded { device: opened.device, sensed: opened.capabilities.sensed, envelope }
         });
         let devices: Vec<_> = devices.collect();
         #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
@@ -300,7 +258,7 @@ impl Session {
     /// [`RunError::Plugin`] if a device says no; then none is energised.
     pub fn into_loop(self) -> Result<(Servo, Vec<Stopper>), RunError> {
         let stoppers = self.standby.stoppers();
-        Ok((self.standby.activate()?, stoppers))
+        Ok((activate(self.standby, &self.plugins)?, stoppers))
     }
 
     /// The core the loop is to run on, if one is named.
@@ -382,16 +340,17 @@ impl Session {
 
     /// Same tick, no waiting: observers look between batches, so that a slow one slows the run and loses nothing.
     fn run_virtual(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Finished, RunError> {
-        let Session { standby, controls, mut changes, period_ns, duration_ns, .. } = self;
+        let Session { standby, controls, mut changes, period_ns, duration_ns, plugins, .. } = self;
         let stoppers = standby.stoppers();
-        let mut runner = Runner::new(standby.activate()?, Schedule::start_virtual(period_ns), duration_ns);
+        let mut runner =
+            Loop::new(activate(standby, &plugins)?, Schedule::start_virtual(period_ns), duration_ns);
         // A tick may end a batch with a record for each device.
         let mut batch = Vec::with_capacity(VIRTUAL_BATCH + usize::from(MOST_DEVICES));
-        while runner.end.is_none() {
-            while batch.len() < VIRTUAL_BATCH && runner.end.is_none() {
-                runner.next(stop, |record| batch.push(*record));
+        while runner.end().is_none() {
+            while batch.len() < VIRTUAL_BATCH && runner.end().is_none() {
+                runner.advance(stop, |record| batch.push(*record));
             }
-            if runner.end.is_some() {
+            if runner.end().is_some() {
                 stoppers.iter().for_each(Stopper::safe_stop);
             }
             for record in batch.drain(..) {
@@ -399,9 +358,9 @@ impl Session {
                 observer.observe(&record);
             }
             controls.sweep();
-            runner.servo.pause();
+            runner.servo().pause();
         }
-        Ok(runner.finish(0, RealTimeReport::not_asked()))
+        Ok(Finished::of(runner, 0, RealTimeReport::not_asked()))
     }
 
     /// The loop on a thread of its own; this one lets the observers look.
@@ -427,7 +386,7 @@ impl Session {
         let loop_stop = stop.clone();
         // Not scoped: a thread that is stuck in a plugin has to be left behind.
         let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
-        let loop_heart = heart.clone();
+        let (loop_heart, loop_plugins) = (heart.clone(), plugins.clone());
         let servo_thread = thread.spawn(move || {
             let real_time = enter_real_time(core);
             let spin = match pacing {
@@ -436,28 +395,25 @@ impl Session {
             };
             // Last of all that takes time.
             let stoppers = standby.stoppers();
-            let servo = standby.activate()?;
+            let servo = activate(standby, &loop_plugins)?;
             let schedule = match spin {
                 Some(window) => Schedule::start_real(period_ns, window),
                 None => Schedule::start_paced(period_ns),
             };
             let watchdog = start_watchdog(loop_heart, stoppers.clone(), loop_stop.clone(), watchdog_ns);
-            let mut runner = Runner::new(servo, schedule, duration_ns).releasing();
+            let mut runner = Loop::new(servo, schedule, duration_ns).releasing();
             // Without a watchdog nothing is moved.
-            if watchdog.is_err() {
-                runner.end = Some(RunEnd::Stopped);
-            }
-            while runner.end.is_none() {
-                runner.next(&loop_stop, |record| {
+            while watchdog.is_ok() && runner.end().is_none() {
+                runner.advance(&loop_stop, |record| {
                     // A full ring is counted by the ring itself: observers never hold up the loop.
                     let _ = sender.push(record);
                 });
             }
             // Here, whatever the thread that looks on is at, and while the watchdog still watches.
             stoppers.iter().for_each(Stopper::safe_stop);
-            runner.servo.heart().finish();
+            runner.servo().heart().finish();
             watchdog.map_err(|_| RunError::Thread("got no watchdog"))?;
-            Ok::<_, RunError>(runner.finish(0, real_time))
+            Ok::<_, RunError>(Finished::of(runner, 0, real_time))
         });
         let servo_thread = servo_thread.map_err(|_| RunError::Thread("could not be started"))?;
         let mut bitten = None;
@@ -492,16 +448,6 @@ fn hung(stuck: Stuck, plugins: &[PluginReport], limit_ns: u64) -> RunError {
     RunError::Hung { who, stuck, limit_ns }
 }
 
-/// The loop proper, the same for both clocks.
-struct Runner {
-    servo: Servo,
-    schedule: Schedule,
-    duration_ns: u64,
-    /// From when on force fades out because the duration will be over.
-    release_ns: u64,
-    end: Option<RunEnd>,
-}
-
 struct Finished {
     servo: Servo,
     end: RunEnd,
@@ -510,57 +456,9 @@ struct Finished {
     real_time: RealTimeReport,
 }
 
-impl Runner {
-    fn new(servo: Servo, schedule: Schedule, duration_ns: u64) -> Self {
-        Self { servo, schedule, duration_ns, release_ns: u64::MAX, end: None }
-    }
-
-    /// The same with an end that a hand can bear: force is gone when the duration is over, and does not drop then. On the
-    /// virtual clock there is no hand.
-    fn releasing(self) -> Self {
-        Self { release_ns: self.duration_ns.saturating_sub(self.servo.ramp_ns()), ..self }
-    }
-
-    /// Waits for and runs the next tick, or sets `end`; `leave` gets what it leaves behind. Real-time: bounded, no
-    /// allocation.
-    #[inline]
-    fn next(&mut self, stop: &StopSwitch, leave: impl FnMut(&TickRecord)) {
-        if self.schedule.next_time_ns() >= self.duration_ns {
-            self.end = Some(RunEnd::Finished);
-            return;
-        }
-        let Self { servo, schedule, release_ns, .. } = self;
-        // The first device sets the pace, if one does.
-        let next = schedule.next_index();
-        let wait_for_sample = |timeout_ns| {
-            servo.heart().enter(next, Place::DeviceWait(0));
-            servo
-                .devices()
-                .next()
-                .map_or(SampleWait::NotPaced, |(device, _)| device.wait_for_sample(timeout_ns))
-        };
-        let due = match schedule.wait(wait_for_sample) {
-            Ok(due) => due,
-            Err(lost) => {
-                self.end = Some(RunEnd::without_pace(lost));
-                return;
-            }
-        };
-        if due.tick.time_ns >= *release_ns {
-            servo.release(&due.tick);
-        }
-        servo.tick(&due, stop, leave);
-        if servo.run().is_over() {
-            let end = RunEnd::of(servo.run(), servo.heart());
-            // Lost samples end a release early; nobody has asked for one then.
-            let is_time_up = end == RunEnd::Stopped && !stop.is_stop_asked();
-            self.end = Some(if is_time_up { RunEnd::Finished } else { end });
-        }
-    }
-
-    fn finish(self, dropped_records: u64, real_time: RealTimeReport) -> Finished {
-        let end = self.end.unwrap_or(RunEnd::Stopped);
-        let elapsed_ns = self.schedule.finish();
-        Finished { servo: self.servo, end, elapsed_ns, dropped_records, real_time }
+impl Finished {
+    fn of(ended: Loop, dropped_records: u64, real_time: RealTimeReport) -> Self {
+        let (servo, end, elapsed_ns) = ended.finish();
+        Self { servo, end, elapsed_ns, dropped_records, real_time }
     }
 }

@@ -12,11 +12,11 @@ use crate::scene::{
 use flotor_core::limits::Boundary;
 use flotor_core::mapping::Mapping;
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, OpenedDevice, Plugin, Setting};
+use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting};
 use flotor_hal::{Axes, Capabilities, LoopConfig, Pacing, Parameter, ParameterKind, Refusal};
 use flotor_servo::engine::beside::SlowModel;
 use flotor_servo::engine::process::{Worker, WorkerOrder};
-use flotor_servo::{Clock, Engine, Layer, Replacement, ScheduledChange, TimeBudget};
+use flotor_servo::{Clock, Engine, Layer, Replacement, ScheduledChange, Servo, Standby, TimeBudget};
 use std::borrow::Cow;
 
 pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
@@ -29,9 +29,17 @@ pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) ->
 }
 
 /// A plugin that said no.
-pub(super) fn refused(plugin: &Plugin, refusal: Refusal) -> RunError {
-    let Metadata { path, id, .. } = plugin.metadata().clone();
+pub(super) fn refused(metadata: &Metadata, refusal: Refusal) -> RunError {
+    let Metadata { path, id, .. } = metadata.clone();
     RunError::Plugin(LoadError::Refused { path, id, refusal })
+}
+
+/// Energises the devices of a run right before its first tick. Not real-time.
+pub(super) fn activate(standby: Standby, plugins: &[PluginReport]) -> Result<Servo, RunError> {
+    standby.activate().map_err(|(device, refusal)| match plugins.get(device) {
+        Some(report) => refused(&report.metadata, refusal),
+        None => RunError::Thread("names a device that the scene has not"),
+    })
 }
 
 /// Hands the numbers of a scene's calibration file to the device they were measured on. Not real-time.
@@ -48,22 +56,13 @@ fn calibrate(
     let (file, curve) = CalibrationFile::load(&path).map_err(wrong)?;
     let id = &plugin.metadata().id;
     file.check_device(&path.display().to_string(), id, &device.serial()).map_err(wrong)?;
-    device.calibrate_vertical(&curve).map_err(|refusal| refused(plugin, refusal))
+    device.calibrate_vertical(&curve).map_err(|refusal| refused(plugin.metadata(), refusal))
 }
 
 /// A device that is opened, not energised.
 pub(super) struct Opened {
-    plugin: Plugin,
     pub(super) device: OpenedDevice,
     pub(super) capabilities: Capabilities,
-}
-
-impl Opened {
-    /// Energises it. Not real-time.
-    pub(super) fn activate(self, config: &LoopConfig) -> Result<ActiveDevice, RunError> {
-        let Self { plugin, device, .. } = self;
-        device.activate(config).map_err(|(_, refusal)| refused(&plugin, refusal))
-    }
 }
 
 /// Loads and opens one device of a scene. Not real-time.
@@ -75,7 +74,7 @@ pub(super) fn open_device(
     let plugin = load(registry, used, PluginKind::Device)?;
     let settings = settings(&plugin, name, &used.parameters)?;
     let mut device = plugin.open_device(&settings)?;
-    let capabilities = device.capabilities().map_err(|refusal| refused(&plugin, refusal))?;
+    let capabilities = device.capabilities().map_err(|refusal| refused(plugin.metadata(), refusal))?;
     let report = PluginReport {
         name: name.clone(),
         metadata: plugin.metadata().clone(),
@@ -86,10 +85,13 @@ pub(super) fn open_device(
     if let Some(calibration) = calibration {
         calibrate(&plugin, &mut device, calibration)?;
     }
-    Ok((Opened { plugin, device, capabilities }, report))
+    Ok((Opened { device, capabilities }, report))
 }
 
 /// Loads one model of a scene and creates it in all its places. Not real-time.
+///
+/// # Errors
+/// [`RunError`]: the plugin is unknown, was refused, or said no.
 pub fn prepare_model(
     registry: &Registry,
     model: &ModelUse,
@@ -104,7 +106,7 @@ pub fn prepare_model(
         let engine = match (model.isolation, &model.field) {
             (Isolation::None, None) => {
                 let mut instance = plugin.create_model(&settings)?;
-                instance.prepare(config).map_err(|refusal| refused(&plugin, refusal))?;
+                instance.prepare(config).map_err(|refusal| refused(plugin.metadata(), refusal))?;
                 Engine::Here(instance)
             }
             (Isolation::None, Some(timing)) => {
@@ -115,7 +117,7 @@ pub fn prepare_model(
                     return Err(complain(model, problem).into());
                 }
                 let slow = SlowModel::start(instance, plugin.parameters().len(), timing, config, clock);
-                Engine::Beside(Box::new(slow.map_err(|refusal| refused(&plugin, refusal))?))
+                Engine::Beside(Box::new(slow.map_err(|refusal| refused(plugin.metadata(), refusal))?))
             }
             (Isolation::Process, _) => {
                 let keys = model.plugin.parameters.iter().map(|parameter| parameter.key.clone());
@@ -126,7 +128,7 @@ pub fn prepare_model(
                     config: *config,
                     patience_ns: budget_ns.unwrap_or(PATIENCE_NS),
                 };
-                Engine::Apart(Worker::start(&order).map_err(|refusal| refused(&plugin, refusal))?)
+                Engine::Apart(Worker::start(&order).map_err(|refusal| refused(plugin.metadata(), refusal))?)
             }
         };
         Ok((engine, mapping.at(*place_m)))

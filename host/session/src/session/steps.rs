@@ -1,15 +1,16 @@
 //! A run on the virtual clock that somebody else advances: for experiments, which decide between ticks what comes next.
 
-use super::{ChangeLog, Controls, Observer, RunEnd, RunError, RunOptions, Runner, Session};
+use super::prepare::activate;
+use super::{ChangeLog, Controls, Observer, RunError, RunOptions, Session};
 use crate::registry::Registry;
 use crate::scene::Scene;
 use flotor_hal::abi::loader::Stopper;
 use flotor_servo::coupling::Line;
-use flotor_servo::{Clock, CouplingOutcome, Schedule, StopSwitch};
+use flotor_servo::{Clock, CouplingOutcome, Loop, RunEnd, Schedule, StopSwitch};
 
 /// A run that goes on when it is told to. When it is dropped the devices are stopped.
 pub struct Steps {
-    runner: Runner,
+    runner: Loop,
     controls: Controls,
     changes: ChangeLog,
     stop: StopSwitch,
@@ -24,9 +25,9 @@ impl Steps {
     /// [`RunError`]; nothing is energised before this has succeeded.
     pub fn prepare(scene: &Scene, registry: &Registry, seed: u64) -> Result<Self, RunError> {
         let session = Session::prepare(scene, registry, &RunOptions { clock: Clock::Virtual, seed })?;
-        let Session { standby, controls, changes, period_ns, duration_ns, lines, .. } = session;
+        let Session { standby, controls, changes, period_ns, duration_ns, lines, plugins, .. } = session;
         let stoppers = standby.stoppers();
-        let runner = Runner::new(standby.activate()?, Schedule::start_virtual(period_ns), duration_ns);
+        let runner = Loop::new(activate(standby, &plugins)?, Schedule::start_virtual(period_ns), duration_ns);
         Ok(Self { runner, controls, changes, stop: StopSwitch::default(), stoppers, lines })
     }
 
@@ -45,7 +46,7 @@ impl Steps {
     /// What has become of each coupling so far, in the scene's order. Not real-time.
     #[must_use]
     pub fn couplings(&mut self) -> Vec<CouplingOutcome> {
-        self.runner.servo.forces().coupling_outcomes()
+        self.runner.servo().forces().coupling_outcomes()
     }
 
     /// One tick; the observer is told of it and of what changed before it. Not real-time: the observer is not.
@@ -54,12 +55,12 @@ impl Steps {
     /// How the run ended, if it did; then there was no tick.
     pub fn advance(&mut self, observer: &mut dyn Observer) -> Result<(), RunEnd> {
         let Self { runner, changes, stop, .. } = self;
-        runner.servo.pause();
-        runner.next(stop, |record| {
+        runner.servo().pause();
+        runner.advance(stop, |record| {
             changes.up_to(record.tick, |change| observer.change(change));
             observer.observe(record);
         });
-        self.runner.end.map_or(Ok(()), Err)
+        self.runner.end().map_or(Ok(()), Err)
     }
 }
 

@@ -101,8 +101,8 @@ fn end(
     stop.stop();
     let outcome = run.join().map_err(|_| RunError::Thread("panicked"))??;
     match outcome.end {
-        flotor_session::RunEnd::DeviceFault(fault) => Err(CommandError::DeviceFault(fault)),
-        flotor_session::RunEnd::EmergencyStop(source) => Err(CommandError::EmergencyStop(source)),
+        flotor_servo::RunEnd::DeviceFault(fault) => Err(CommandError::DeviceFault(fault)),
+        flotor_servo::RunEnd::EmergencyStop(source) => Err(CommandError::EmergencyStop(source)),
         _ => Ok(()),
     }
 }

@@ -15,8 +15,9 @@ use crate::protocol::SubjectNumber;
 use crate::trial::{Exploration, Trial};
 use flotor_record::Recorder;
 use flotor_servo::Clock;
+use flotor_servo::RunEnd;
 use flotor_session::scene::Scene;
-use flotor_session::{ControlError, Observer, RunEnd, RunError, Steps};
+use flotor_session::{ControlError, Observer, RunError, Steps};
 use std::path::PathBuf;
 
 /// The run ended before the experiment did.

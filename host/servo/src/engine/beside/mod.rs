@@ -50,7 +50,9 @@ enum Computing {
 /// What came of looking for a new field.
 #[allow(clippy::large_enum_variant)] // read where it is returned; a box would allocate in the loop
 pub enum Arrival {
+    /// A new field.
     Field(LinearField),
+    /// None yet.
     Nothing,
     /// The model broke: it panicked, or answered outside the contract.
     Broken,
