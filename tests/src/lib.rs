@@ -4,6 +4,7 @@
 
 pub mod field_error;
 pub mod library;
+pub mod process;
 pub mod program;
 pub mod scratch;
 pub mod tables;
