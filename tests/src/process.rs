@@ -1,4 +1,6 @@
 //! A process a test has started: it ends with the test, however the test ends.
+//!
+//! Needs nothing of this crate: the viewer and the bridge include this file with `#[path]`.
 
 use rustix::process::{Pid, Signal, kill_process};
 use std::ops::{Deref, DerefMut};
@@ -64,41 +66,5 @@ impl Drop for Owned {
             let _ = child.kill();
             let _ = child.wait();
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::program::Flotor;
-    use crate::scratch::Scratch;
-    use rustix::io::Errno;
-    use rustix::process::test_kill_process;
-    use std::panic::{AssertUnwindSafe, catch_unwind};
-
-    /// Fails as a test does that has started something, which has to be gone then.
-    fn assert_gone_after_a_failure<T>(start: impl FnOnce() -> T, pid: impl Fn(&T) -> Pid) {
-        let mut number = None;
-        let failed = catch_unwind(AssertUnwindSafe(|| {
-            let started = start();
-            number = Some(pid(&started));
-            assert_eq!(test_kill_process(pid(&started)), Ok(()), "it is there");
-            panic!("as a test does");
-        }));
-        assert!(failed.is_err());
-        assert_eq!(test_kill_process(number.expect("it was started")), Err(Errno::SRCH), "it is gone");
-    }
-
-    #[test]
-    fn a_process_is_gone_when_its_test_fails() {
-        assert_gone_after_a_failure(|| Owned::start(Command::new("sleep").arg("600")), Owned::pid);
-    }
-
-    #[test]
-    fn a_host_is_gone_when_its_test_fails() {
-        let scratch = Scratch::default();
-        let scene = scratch.patient_scene(flotor::scene::DEMO).display().to_string();
-        let start = || Flotor::with(["run", &scene, "--duration", "600s"]).start();
-        assert_gone_after_a_failure(start, |running| running.pid());
     }
 }

@@ -202,3 +202,38 @@ fn changed_since(source: &Path, built: SystemTime) -> bool {
         .and_then(|attributes| attributes.modified())
         .is_ok_and(|changed| changed > built)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scratch::Scratch;
+    use rustix::io::Errno;
+    use rustix::process::{Pid, test_kill_process};
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
+    /// Fails as a test does that has started something, which has to be gone then.
+    fn assert_gone_after_a_failure<T>(start: impl FnOnce() -> T, pid: impl Fn(&T) -> Pid) {
+        let mut number = None;
+        let failed = catch_unwind(AssertUnwindSafe(|| {
+            let started = start();
+            number = Some(pid(&started));
+            assert_eq!(test_kill_process(pid(&started)), Ok(()), "it is there");
+            panic!("as a test does");
+        }));
+        assert!(failed.is_err());
+        assert_eq!(test_kill_process(number.expect("it was started")), Err(Errno::SRCH), "it is gone");
+    }
+
+    #[test]
+    fn a_process_is_gone_when_its_test_fails() {
+        assert_gone_after_a_failure(|| Owned::start(Command::new("sleep").arg("600")), Owned::pid);
+    }
+
+    #[test]
+    fn a_host_is_gone_when_its_test_fails() {
+        let scratch = Scratch::default();
+        let scene = scratch.patient_scene(flotor::scene::DEMO).display().to_string();
+        let start = || Flotor::with(["run", &scene, "--duration", "600s"]).start();
+        assert_gone_after_a_failure(start, |running| running.pid());
+    }
+}
