@@ -9,6 +9,7 @@ use flotor_servo::RunEnd;
 use flotor_tests::library::compile_c_file;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
+use flotor_tests::tools::{Tool, required};
 use flotor_tests::watched::{Watched, watch};
 use flotor_tests::workspace_root;
 use std::path::PathBuf;
@@ -77,9 +78,7 @@ fn plugins_in_c_pass_validation_and_are_found_by_id() {
 /// The same contract in C++: tables made by functions, and an entry with the linkage of C.
 #[test]
 fn a_plugin_in_cpp_passes_validation() {
-    // A bare machine has a C compiler only.
-    if Command::new("c++").arg("--version").output().is_err() {
-        eprintln!("skipped: no c++ on this machine");
+    if !required(Tool::Cxx) {
         return;
     }
     let scratch = Scratch::default();

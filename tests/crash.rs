@@ -12,9 +12,9 @@ use flotor_tests::library::compile_c_file;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::{holds_ticks, workspace_root};
+use rustix::process::Signal;
 use std::ffi::OsStr;
 use std::path::Path;
-use std::process::Command;
 use std::time::{Duration, Instant};
 
 /// Time of the last tick of a recording, s, and how the file ends.
@@ -44,8 +44,7 @@ fn a_killed_process_loses_at_most_a_second_of_its_recording() {
     let seen = Instant::now();
     std::thread::sleep(Duration::from_millis(2300));
     let killed_s = seen.elapsed().as_secs_f64();
-    let killed = Command::new("kill").args(["-KILL", &running.id().to_string()]).status();
-    assert!(killed.expect("there is a kill command").success());
+    running.signal(Signal::KILL);
     assert_eq!(running.wait().code, None, "ended by a signal");
     let (last_s, ending) = last_tick_s(&file);
     assert_eq!(ending, Ending::CutOff);

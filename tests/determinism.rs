@@ -7,6 +7,7 @@ use flotor_session::{Observer, Session};
 use flotor_sync::Words;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
+use flotor_tests::tools::skipped;
 use flotor_tests::watched::{prepared, watch};
 use serde_json::Value;
 
@@ -161,7 +162,7 @@ fn speed(more: &[&str]) -> f64 {
 #[test]
 fn the_virtual_clock_is_200_times_real_time_100_with_preset_full_and_10_with_a_recording() {
     if cfg!(debug_assertions) {
-        eprintln!("skipped: this is a promise of optimised builds; `cargo test --release` checks it");
+        skipped("a promise of optimised builds; `cargo test --release` checks it");
         return;
     }
     let scratch = Scratch::default();

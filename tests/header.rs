@@ -2,6 +2,7 @@
 //!
 //! After a change of the contract: `FLOTOR_WRITE_HEADER=1 cargo test -p flotor-tests --test header`.
 
+use flotor_tests::tools::{Tool, required};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -103,9 +104,7 @@ fn a_c_compiler_takes_it_without_a_word() {
 
 #[test]
 fn a_cpp_compiler_takes_it_without_a_word() {
-    // A bare machine has a C compiler only; where there is a C++ compiler it must be content too.
-    if Command::new("c++").arg("--version").output().is_err() {
-        eprintln!("skipped: no c++ on this machine");
+    if !required(Tool::Cxx) {
         return;
     }
     compiles("c++", "-std=c++17", "user.cc");

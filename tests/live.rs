@@ -18,7 +18,7 @@ use flotor_tests::TestSize;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::prepared;
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::Signal;
 use std::io::Write;
 use std::os::unix::net::UnixStream;
 use std::path::Path;
@@ -341,8 +341,7 @@ fn a_recording_of_a_run_that_is_killed_is_whole_so_far_and_ends_as_cut() {
     let file = scratch.path().join("cut.mcap");
     let recording = of_user(Flotor::with(["record", "--out", &file.display().to_string()]));
     patiently(|| file.metadata().ok().filter(|file| file.len() > 200_000)); // schemas, scene, and some ticks
-    let process = Pid::from_raw(running.id().cast_signed()).expect("a process has a number");
-    kill_process(process, Signal::KILL).expect("it is ours");
+    running.signal(Signal::KILL);
     assert_eq!(running.wait().code, None, "ended by a signal");
     let recorded = recording.wait();
     assert_eq!(recorded.code, Some(exit_code::OTHER), "{recorded:?}");

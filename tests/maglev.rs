@@ -5,14 +5,15 @@ use flotor_core::trace::Events;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
 use flotor_tests::library::{build_folder, plugin_file};
+use flotor_tests::process::Owned;
 use flotor_tests::program::{Flotor, Ran, Running, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::watch;
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::Signal;
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, Stdio};
+use std::process::{ChildStdout, Command, Stdio};
 use std::time::Duration;
 
 fn program(name: &str) -> PathBuf {
@@ -27,7 +28,7 @@ fn program(name: &str) -> PathBuf {
 
 /// An emulated controller in a process of its own; ended with the test.
 struct Emulator {
-    child: Child,
+    child: Owned,
     lines: std::io::Lines<BufReader<ChildStdout>>,
     transport: &'static str,
     address: String,
@@ -46,7 +47,7 @@ impl Emulator {
     fn staying(transport: &'static str, at: &str, arguments: &[&str]) -> Self {
         let mut command = Command::new(program("flotor-maglev-emulator"));
         command.args(["--transport", transport, "--listen", at]).args(arguments);
-        let mut child = command.stdout(Stdio::piped()).spawn().expect("the emulator starts");
+        let mut child = Owned::start(command.stdout(Stdio::piped()));
         let output = child.stdout.take().expect("a pipe was asked for");
         let mut lines = BufReader::new(output).lines();
         let first = lines
@@ -83,24 +84,12 @@ impl Emulator {
     }
 
     /// Starts a host that runs the scene in real time.
-    fn host(&self, scratch: &Scratch) -> Child {
+    fn host(&self, scratch: &Scratch) -> Owned {
         let scene = scratch.file("maglev.toml", self.scene(""));
         let mut command = Command::new(program("flotor"));
         command.arg("run").arg(scene).env("NO_COLOR", "1").stdout(Stdio::null()).stderr(Stdio::piped());
-        command.spawn().expect("the host starts")
+        Owned::start(&mut command)
     }
-}
-
-impl Drop for Emulator {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-fn signal(child: &Child, signal: Signal) {
-    let pid = i32::try_from(child.id()).ok().and_then(Pid::from_raw).expect("a child has an id");
-    kill_process(pid, signal).expect("it is ours");
 }
 
 /// The number after `key=` in a line.
@@ -224,7 +213,7 @@ fn a_calibration_that_is_broken_off_lets_the_handle_down() {
     let running = start_calibrating(&emulator, &sensor, &["vertical", "--out", file.to_str().unwrap()]);
     emulator.wait_for(&["mode Levitating"]);
     std::thread::sleep(Duration::from_millis(300));
-    kill_process(Pid::from_raw(i32::try_from(running.id()).unwrap()).unwrap(), Signal::INT).unwrap();
+    running.signal(Signal::INT);
     let ran = running.wait();
     assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
     assert!(ran.error().contains("stopped before it was done"), "{}", ran.error());
@@ -267,7 +256,7 @@ fn a_killed_host_disarms_the_controller() {
         let (mut emulator, scratch) = (Emulator::start(transport, &[]), Scratch::default());
         let mut host = emulator.host(&scratch);
         emulator.wait_for(&["mode Levitating"]);
-        signal(&host, Signal::KILL);
+        host.signal(Signal::KILL);
         let line = emulator.wait_for(&["mode Disarmed", "link-lost"]);
         // Long before the watchdog of 700 ms could have seen anything.
         assert!(number(&line, "silence_us") < 700_000, "{transport}: {line}");
@@ -282,14 +271,14 @@ fn a_hung_host_loses_its_session_and_is_told_when_it_wakes_up() {
         let (mut emulator, scratch) = (Emulator::start(transport, &[]), Scratch::default());
         let host = emulator.host(&scratch);
         emulator.wait_for(&["mode Levitating"]);
-        signal(&host, Signal::STOP);
+        host.signal(Signal::STOP);
         let line = emulator.wait_for(&["mode Holding", "watchdog"]);
         // By the controller's own clock, which is what the bound is about: watchdog and two milliseconds.
         assert!((700_000..=702_000).contains(&number(&line, "silence_us")), "{transport}: {line}");
         emulator.wait_for(&["mode Landing"]);
         emulator.wait_for(&["mode Fault", "watchdog"]);
-        signal(&host, Signal::CONT);
-        let output = host.wait_with_output().expect("the host ends");
+        host.signal(Signal::CONT);
+        let output = host.output();
         let error = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(exit_code::DEVICE_FAULT), "{transport}: {error}");
         assert!(error.contains("device fault"), "{transport}: {error}");
@@ -304,8 +293,8 @@ fn a_controller_that_vanishes_is_a_fault_of_the_device() {
         emulator.wait_for(&["mode Levitating"]);
         // The host has to hear of it too, or it is not running yet.
         std::thread::sleep(Duration::from_millis(300));
-        signal(&emulator.child, Signal::KILL);
-        let output = host.wait_with_output().expect("the host ends");
+        emulator.child.signal(Signal::KILL);
+        let output = host.output();
         let error = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(exit_code::DEVICE_FAULT), "{transport}: {error}");
         assert!(error.contains("the device is gone; check cable and power"), "{transport}: {error}");
@@ -351,7 +340,7 @@ fn a_cable_pulled_in_mid_stroke_is_a_fault_at_once_and_the_next_use_begins_anew(
                 })
             };
             assert!((0..100).all(|_| tick(3.0).is_none()), "{transport}");
-            signal(&emulator.child, Signal::KILL);
+            emulator.child.signal(Signal::KILL);
             emulator.child.wait().expect("it was killed");
             // 20 ms are 20 ticks; counted, because this machine's clock is nobody's own.
             let ticks = (1..).find(|_| tick(3.0).is_some()).expect("the search has no end");

@@ -7,11 +7,11 @@ use flotor_record::{Ending, Recording, Severity};
 use flotor_servo::RunEnd;
 use flotor_servo::{Clock, EmergencySource, ModelHealth};
 use flotor_tests::library::{compile_c_file, plugin_file};
-use flotor_tests::program::{Flotor, Ran, exit_code};
+use flotor_tests::program::{Flotor, Ran, Running, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::{Watched, watch, watch_on};
 use flotor_tests::{TestSize, holds_ticks, workspace_root};
-use rustix::process::{Pid, Signal, kill_process_group};
+use rustix::process::{Signal, kill_process_group};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -136,17 +136,17 @@ fn in_real_time(scratch: &Scratch, scene: &str, json: &OsStr) -> Flotor {
     Flotor::with(arguments).env("FIXTURE_STOP_FILE", &stop_file.display().to_string())
 }
 
-/// Runs it to its end, alone; `meanwhile` gets the process id once the loop runs.
-fn run_meanwhile(scratch: &Scratch, flotor: Flotor, meanwhile: impl FnOnce(u32)) -> Ran {
+/// Runs it to its end, alone; `meanwhile` gets it once the loop runs.
+fn run_meanwhile(scratch: &Scratch, flotor: Flotor, meanwhile: impl FnOnce(&Running)) -> Ran {
     let _alone = alone();
     let running = flotor.start();
     wait_for(&recording_in(scratch));
-    meanwhile(running.id());
+    meanwhile(&running);
     running.wait()
 }
 
-/// Runs a scene in real time, for longer than any test waits; `meanwhile` gets the process id once it runs.
-fn run_in_real_time(scratch: &Scratch, scene: &str, meanwhile: impl FnOnce(u32)) -> Ran {
+/// Runs a scene in real time, for longer than any test waits; `meanwhile` gets it once it runs.
+fn run_in_real_time(scratch: &Scratch, scene: &str, meanwhile: impl FnOnce(&Running)) -> Ran {
     run_meanwhile(scratch, in_real_time(scratch, scene, "-".as_ref()), meanwhile)
 }
 
@@ -159,11 +159,6 @@ fn wait_for(recording: &Path) {
         }
         std::thread::sleep(Duration::from_millis(10));
     }
-}
-
-fn signal(name: &str, process: u32) {
-    let sent = std::process::Command::new("kill").args([format!("-{name}"), process.to_string()]).status();
-    assert!(sent.expect("there is a kill command").success());
 }
 
 fn last_line(ran: &Ran) -> &str {
@@ -185,7 +180,7 @@ fn recorded(scratch: &Scratch) -> Vec<TickRecord> {
 #[test]
 fn sigusr1_is_an_emergency_stop() {
     let scratch = Scratch::default();
-    let ran = run_in_real_time(&scratch, &scene("", "", PATIENT), |process| signal("USR1", process));
+    let ran = run_in_real_time(&scratch, &scene("", "", PATIENT), |running| running.signal(Signal::USR1));
     assert_eq!((ran.code, end(&ran).as_str()), (Some(exit_code::DEVICE_FAULT), "emergency_stop"), "{ran:?}");
     assert!(last_line(&ran).starts_with("error: emergency stop (signal)"), "{ran:?}");
     assert!(scratch.path().join("stopped").exists(), "the device was told to stop");
@@ -195,7 +190,7 @@ fn sigusr1_is_an_emergency_stop() {
 fn sigint_ends_a_run_in_order() {
     let scratch = Scratch::default();
     let slowly = format!("{PATIENT}\nramp_s = 1");
-    let ran = run_in_real_time(&scratch, &scene("", "", &slowly), |process| signal("INT", process));
+    let ran = run_in_real_time(&scratch, &scene("", "", &slowly), |running| running.signal(Signal::INT));
     assert_eq!((ran.code, end(&ran).as_str()), (Some(exit_code::OK), "stopped"), "{ran:?}");
     let records = recorded(&scratch);
     let is_releasing = |record: &&TickRecord| record.events.intersects(Events::RELEASING);
@@ -214,22 +209,22 @@ fn sigint_ends_a_run_in_order() {
 
 #[test]
 fn whatever_a_terminal_sends_ends_a_run_in_order_and_nothing_suspends_it() {
-    for name in ["TERM", "HUP", "QUIT", "TSTP"] {
+    for signal in [Signal::TERM, Signal::HUP, Signal::QUIT, Signal::TSTP] {
         let scratch = Scratch::default();
         // Whatever the tests were started with: a signal may be ignored, as by `nohup`.
         let flotor = in_real_time(&scratch, &scene("", "", PATIENT), "-".as_ref());
         let flotor = flotor.through_shell("exec env --default-signal=HUP \"$@\"");
-        let ran = run_meanwhile(&scratch, flotor, |process| {
-            signal(name, process);
+        let ran = run_meanwhile(&scratch, flotor, |running| {
+            running.signal(signal);
             // A run that is suspended all the same fails this test instead of holding it up.
             std::thread::sleep(Duration::from_millis(500));
-            signal("CONT", process);
+            running.signal(Signal::CONT);
         });
-        assert_eq!((ran.code, end(&ran).as_str()), (Some(exit_code::OK), "stopped"), "{name}: {ran:?}");
+        assert_eq!((ran.code, end(&ran).as_str()), (Some(exit_code::OK), "stopped"), "{signal:?}: {ran:?}");
         let records = recorded(&scratch);
-        assert!(records.iter().any(|record| record.events.intersects(Events::RELEASING)), "{name}");
-        assert_eq!(records.last().map(height_of_force), Some(0.0), "{name}");
-        assert!(scratch.path().join("stopped").exists(), "{name}: the device was told to stop");
+        assert!(records.iter().any(|record| record.events.intersects(Events::RELEASING)), "{signal:?}");
+        assert_eq!(records.last().map(height_of_force), Some(0.0), "{signal:?}");
+        assert!(scratch.path().join("stopped").exists(), "{signal:?}: the device was told to stop");
     }
 }
 
@@ -240,10 +235,10 @@ const ANOTHER_WISH: Duration = Duration::from_millis(500);
 fn a_second_signal_is_an_emergency_stop() {
     let scratch = Scratch::default();
     let slowly = format!("{PATIENT}\nramp_s = 20");
-    let ran = run_in_real_time(&scratch, &scene("", "", &slowly), |process| {
-        signal("INT", process);
+    let ran = run_in_real_time(&scratch, &scene("", "", &slowly), |running| {
+        running.signal(Signal::INT);
         std::thread::sleep(ANOTHER_WISH);
-        signal("TERM", process);
+        running.signal(Signal::TERM);
     });
     assert_eq!((ran.code, end(&ran).as_str()), (Some(exit_code::DEVICE_FAULT), "emergency_stop"), "{ran:?}");
     assert!(last_line(&ran).starts_with("error: emergency stop (signal)"), "{ran:?}");
@@ -270,7 +265,7 @@ fn a_third_signal_ends_a_process_whatever_holds_it_up() {
     }
     for _ in 0..3 {
         std::thread::sleep(ANOTHER_WISH);
-        signal("INT", running.id());
+        running.signal(Signal::INT);
     }
     assert_eq!(running.wait().code, Some(130));
 }
@@ -281,12 +276,12 @@ fn a_run_that_is_to_outlive_its_terminal_does() {
     let flotor = in_real_time(&scratch, &scene("", "", PATIENT), "-".as_ref());
     let mut seen_ns = 0;
     // As `nohup` does.
-    let ran = run_meanwhile(&scratch, flotor.through_shell("trap '' HUP; exec \"$@\""), |process| {
+    let ran = run_meanwhile(&scratch, flotor.through_shell("trap '' HUP; exec \"$@\""), |running| {
         let recording = Recording::open(&recording_in(&scratch)).expect("it holds ticks");
         seen_ns = recording.map_while(Result::ok).last().expect("it holds ticks").time_ns;
-        signal("HUP", process);
+        running.signal(Signal::HUP);
         std::thread::sleep(Duration::from_secs(2));
-        signal("INT", process);
+        running.signal(Signal::INT);
     });
     assert_eq!((ran.code, end(&ran).as_str()), (Some(exit_code::OK), "stopped"), "{ran:?}");
     let records = recorded(&scratch);
@@ -300,7 +295,7 @@ fn an_emergency_stop_has_its_exit_code_also_where_the_report_cannot_be_written()
     let scratch = Scratch::default();
     let json = scratch.path().join("missing").join("run.json");
     let flotor = in_real_time(&scratch, &scene("", "", PATIENT), json.as_ref());
-    let ran = run_meanwhile(&scratch, flotor, |process| signal("USR1", process));
+    let ran = run_meanwhile(&scratch, flotor, |running| running.signal(Signal::USR1));
     assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:?}");
     let missing = format!("error: {}: cannot write the JSON: ", json.display());
     assert!(ran.stderr.lines().any(|line| line.starts_with(&missing)), "{ran:?}");
@@ -514,9 +509,8 @@ fn a_model_in_a_process_of_its_own_is_felt_until_the_run_has_ended_in_order() {
     for signal in [Signal::INT, Signal::TSTP] {
         let scratch = Scratch::default();
         let flotor = in_real_time(&scratch, &scene, "-".as_ref()).through_shell("exec setsid \"$@\"");
-        let ran = run_meanwhile(&scratch, flotor, |process| {
-            let group = i32::try_from(process).ok().and_then(Pid::from_raw).expect("a process");
-            kill_process_group(group, signal).expect("it is ours");
+        let ran = run_meanwhile(&scratch, flotor, |running| {
+            kill_process_group(running.pid(), signal).expect("it is ours");
         });
         assert_eq!((ran.code, end(&ran).as_str()), (Some(exit_code::OK), "stopped"), "{signal:?}: {ran:?}");
     }

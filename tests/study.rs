@@ -17,8 +17,8 @@ use flotor_study::trial::{Exploration, Modality, Phase, Presented, Response, Tri
 use flotor_tests::TestSize;
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
+use rustix::process::Signal;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::time::{Duration, Instant};
 
 fn subject(number: u16) -> SubjectNumber {
@@ -276,9 +276,8 @@ fn kills_at_any_moment_lose_no_completed_trial() {
         let resumed: Vec<&str> = arguments.iter().copied().chain(["--resume"]).collect();
         let running = study(&resumed, &killed).start();
         std::thread::sleep(takes.mul_f64((random % 1000) as f64 / 1000.0).min(Duration::from_secs(5)));
-        let sent = Command::new("kill").args(["-KILL", &running.id().to_string()]).status();
-        let code = running.wait().code;
-        let came_in_time = sent.is_ok() && code.is_none();
+        running.signal(Signal::KILL);
+        let came_in_time = running.wait().code.is_none();
         interrupted += usize::from(came_in_time);
         if !came_in_time {
             takes = takes.mul_f64(0.8); // the machine was busier when it was measured

@@ -4,9 +4,11 @@
 
 pub mod field_error;
 pub mod library;
+pub mod process;
 pub mod program;
 pub mod scratch;
 pub mod tables;
+pub mod tools;
 pub mod watched;
 
 use flotor_record::Recording;

@@ -1,10 +1,12 @@
 //! The `flotor` program as a user meets it: arguments in; exit code, standard output and standard error out.
 
 use crate::library::build_folder;
+use crate::process::Owned;
 use std::ffi::OsStr;
 use std::io::Write;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::thread::JoinHandle;
 use std::time::SystemTime;
 
@@ -116,34 +118,36 @@ impl Flotor {
     #[must_use]
     pub fn start(mut self) -> Running {
         self.command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let mut child = self.command.spawn().expect("the program starts");
-        let (mut pipe, input) = (child.stdin.take().expect("a pipe was asked for"), self.input);
+        let mut process = Owned::start(&mut self.command);
+        let (mut pipe, input) = (process.stdin.take().expect("a pipe was asked for"), self.input);
         // On a thread of its own: neither side waits for the other to empty a full pipe.
         let writer = std::thread::spawn(move || pipe.write_all(input.as_bytes()));
-        Running { child, writer }
+        Running { process, writer }
     }
 }
 
-/// A call that has been started.
+/// A call that has been started: an [`Owned`] process.
 pub struct Running {
-    child: Child,
+    process: Owned,
     writer: JoinHandle<std::io::Result<()>>,
 }
 
-impl Running {
-    /// The process.
-    #[must_use]
-    pub fn id(&self) -> u32 {
-        self.child.id()
-    }
+impl Deref for Running {
+    type Target = Owned;
 
+    fn deref(&self) -> &Owned {
+        &self.process
+    }
+}
+
+impl Running {
     /// Waits for its end.
     ///
     /// # Panics
     /// If its output is not text.
     #[must_use]
     pub fn wait(self) -> Ran {
-        let output = self.child.wait_with_output().expect("the program ends");
+        let output = self.process.output();
         // A program that stops reading because its arguments are wrong closes the pipe: its business.
         let _ = self.writer.join().expect("the writer only writes");
         let text = |bytes| String::from_utf8(bytes).expect("the program writes text");
@@ -197,4 +201,39 @@ fn changed_since(source: &Path, built: SystemTime) -> bool {
     std::fs::metadata(source)
         .and_then(|attributes| attributes.modified())
         .is_ok_and(|changed| changed > built)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scratch::Scratch;
+    use rustix::io::Errno;
+    use rustix::process::{Pid, test_kill_process};
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
+    /// Fails as a test does that has started something, which has to be gone then.
+    fn assert_gone_after_a_failure<T>(start: impl FnOnce() -> T, pid: impl Fn(&T) -> Pid) {
+        let mut number = None;
+        let failed = catch_unwind(AssertUnwindSafe(|| {
+            let started = start();
+            number = Some(pid(&started));
+            assert_eq!(test_kill_process(pid(&started)), Ok(()), "it is there");
+            panic!("as a test does");
+        }));
+        assert!(failed.is_err());
+        assert_eq!(test_kill_process(number.expect("it was started")), Err(Errno::SRCH), "it is gone");
+    }
+
+    #[test]
+    fn a_process_is_gone_when_its_test_fails() {
+        assert_gone_after_a_failure(|| Owned::start(Command::new("sleep").arg("600")), Owned::pid);
+    }
+
+    #[test]
+    fn a_host_is_gone_when_its_test_fails() {
+        let scratch = Scratch::default();
+        let scene = scratch.patient_scene(flotor::scene::DEMO).display().to_string();
+        let start = || Flotor::with(["run", &scene, "--duration", "600s"]).start();
+        assert_gone_after_a_failure(start, |running| running.pid());
+    }
 }

@@ -2,12 +2,12 @@
 //! of itself. It watches, is killed, stands still, or the host is flooded beside it.
 //!
 //! The window needs `Xvfb` and a software adapter (`libgl1-mesa-dri` with `libegl1`, or `mesa-vulkan-drivers`). Where they are
-//! missing, the tests say so and pass, unless `FLOTOR_WINDOW_TESTS=require`.
+//! missing, the tests say so and pass, unless `FLOTOR_REQUIRE=display`.
 
 mod support;
 
 use flotor_live::{Ask, Client, Directory, SetValue};
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::Signal;
 use serde_json::Value;
 use std::io::Write;
 use std::os::unix::net::UnixStream;
@@ -16,7 +16,9 @@ use std::process::Stdio;
 use std::sync::LazyLock;
 use std::thread::JoinHandle;
 use std::time::Duration;
-use support::display::{Display, Owned, alone, are_installed, patiently};
+use support::display::{Display, alone, patiently};
+use support::process::Owned;
+use support::tools::{Tool, required};
 use tempfile::TempDir;
 
 /// What is read from the wall clock, and nothing else in a summary is: how fast the machine was.
@@ -26,19 +28,19 @@ const OF_THE_MACHINE: [&str; 3] = ["compute_ns", "stages_ns", "wall_s"];
 fn start_run(folder: &Path) -> Owned {
     let mut run = alone("flotor", folder, None);
     run.args(["run", "--clock", "virtual", "--seed", "7", "--duration", "2500s", "--json", "-"]);
-    Owned(run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts"))
+    Owned::start(run.stdout(Stdio::piped()).stderr(Stdio::piped()))
 }
 
 fn goes_on(run: &mut Owned) -> bool {
-    run.0.try_wait().expect("it is ours").is_none()
+    run.try_wait().expect("it is ours").is_none()
 }
 
 /// What a run says of itself in the end, without what the machine had to do with it.
 fn summary(run: &mut Owned) -> Value {
-    let (stdout, stderr) = (run.0.stdout.take(), run.0.stderr.take());
+    let (stdout, stderr) = (run.stdout.take(), run.stderr.take());
     let [said, errors] = [stdout.map(std::io::read_to_string), stderr.map(std::io::read_to_string)]
         .map(|text| text.expect("a pipe was asked for").expect("it is text"));
-    assert!(run.0.wait().expect("it is ours").success(), "{errors}");
+    assert!(run.wait().expect("it is ours").success(), "{errors}");
     let mut summary: Value = serde_json::from_str(&said).expect("it is JSON");
     let all = summary.as_object_mut().expect("an object");
     OF_THE_MACHINE.iter().for_each(|name| assert!(all.remove(*name).is_some(), "{name}"));
@@ -65,14 +67,14 @@ struct Watched {
 impl Watched {
     /// Opens a window that waits, starts a run, and holds it once the window has drawn it moving. `None` where there are no windows.
     fn begin() -> Option<Self> {
-        if !are_installed(&["Xvfb"]) {
+        if !required(Tool::Display) {
             return None;
         }
         let folder = tempfile::tempdir().expect("a scratch folder");
         let display = Display::start(folder.path());
         let empty = display.picture();
         let mut viewer = alone("flotor-viewer", folder.path(), Some(&display));
-        let mut viewer = Owned(viewer.stderr(Stdio::null()).spawn().expect("it starts"));
+        let mut viewer = Owned::start(viewer.stderr(Stdio::null()));
         let waiting = patiently("a window that waits for a run", || {
             assert!(goes_on(&mut viewer), "the viewer ended by itself");
             Some(display.picture_at_rest()).filter(|picture| *picture != empty)
@@ -95,9 +97,9 @@ impl Watched {
     /// busy the machine is, and a window does.
     fn work_until<T>(&mut self, what: &str, come_about: impl Fn(&Self) -> Option<T>) -> T {
         patiently(what, || {
-            signal(&self.run, Signal::CONT);
+            self.run.signal(Signal::CONT);
             std::thread::sleep(Duration::from_millis(1));
-            signal(&self.run, Signal::STOP);
+            self.run.signal(Signal::STOP);
             assert!(goes_on(&mut self.run), "the run was over before there was {what}");
             come_about(self)
         })
@@ -105,14 +107,9 @@ impl Watched {
 
     /// Lets the run, which was held in its midst, go on to its end; gives its summary.
     fn end(&mut self) -> Value {
-        signal(&self.run, Signal::CONT);
+        self.run.signal(Signal::CONT);
         summary(&mut self.run)
     }
-}
-
-fn signal(program: &Owned, signal: Signal) {
-    let number = i32::try_from(program.0.id()).ok().and_then(Pid::from_raw);
-    kill_process(number.expect("a process"), signal).expect("it is ours, and not waited for");
 }
 
 #[test]
@@ -125,19 +122,19 @@ fn a_viewer_that_watches_changes_nothing() {
 #[test]
 fn a_viewer_that_is_killed_changes_nothing() {
     let Some(mut watched) = Watched::begin() else { return };
-    signal(&watched.viewer, Signal::KILL);
-    assert!(!watched.viewer.0.wait().expect("it is ours").success());
+    watched.viewer.signal(Signal::KILL);
+    assert!(!watched.viewer.wait().expect("it is ours").success());
     assert_eq!(watched.end(), *UNWATCHED);
 }
 
 #[test]
 fn a_viewer_that_is_frozen_changes_nothing() {
     let Some(mut watched) = Watched::begin() else { return };
-    signal(&watched.viewer, Signal::STOP);
+    watched.viewer.signal(Signal::STOP);
     let frozen = watched.display.picture_at_rest(); // what it had drawn has reached the display
     assert_eq!(watched.end(), *UNWATCHED);
     assert!(watched.display.picture() == frozen, "it stood still to the end of the run");
-    signal(&watched.viewer, Signal::CONT);
+    watched.viewer.signal(Signal::CONT);
     patiently("thawed, it draws again", || Some(()).filter(|()| watched.display.picture() != frozen));
 }
 

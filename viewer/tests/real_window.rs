@@ -2,7 +2,7 @@
 //! follows; without a display, one line and the right exit code.
 //!
 //! The window needs `Xvfb`, `xdotool` and a software adapter (`libgl1-mesa-dri` with `libegl1`, or `mesa-vulkan-drivers`).
-//! Where they are missing, the test says so and passes, unless `FLOTOR_WINDOW_TESTS=require`.
+//! Where they are missing, the test says so and passes, unless `FLOTOR_REQUIRE=display`.
 
 mod support;
 
@@ -18,12 +18,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use support::PATIENCE;
-use support::display::{Display, Owned, SIZE, alone, are_installed, patient_scene, patiently};
-
-/// True if a virtual display and a hand for it are installed; says so if not.
-fn can_have_a_window() -> bool {
-    are_installed(&["Xvfb", "xdotool"])
-}
+use support::display::{Display, SIZE, alone, patient_scene, patiently};
+use support::process::Owned;
+use support::tools::{Tool, required};
 
 /// Where a slider lies in the window: the same interface without a display, on the same run.
 fn place_of_slider(directory: &Directory, name: &str) -> Rect {
@@ -68,7 +65,7 @@ fn without_drivers(view: &mut Command, empty: &Path) {
 
 #[test]
 fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
-    if !can_have_a_window() {
+    if !required(Tool::Display) {
         return;
     }
     let folder = tempfile::tempdir().expect("a scratch folder");
@@ -78,7 +75,7 @@ fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
         .args(["--duration", "10min", "--rate", "500"])
         .stderr(Stdio::null())
         .stdout(Stdio::null());
-    let _run = Owned(run.spawn().expect("it runs"));
+    let _run = Owned::start(&mut run);
     let directory = Directory::at(folder.path().join("flotor"));
     let mut client = patiently("the run is found", || Client::find(&directory).ok());
     let slider = place_of_slider(&directory, "gamma");
@@ -88,7 +85,7 @@ fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
     window.args(["--size", &format!("{}x{}", SIZE[0], SIZE[1])]);
     let said = folder.path().join("said");
     let into = File::create(&said).expect("a scratch folder can be written to");
-    let mut window = Owned(window.stderr(into).spawn().expect("the viewer starts"));
+    let mut window = Owned::start(window.stderr(into));
     let xdotool = |arguments: &[&str]| {
         let output = Command::new("xdotool")
             .args(arguments)
@@ -98,7 +95,7 @@ fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
     };
     patiently("the window opens", || {
-        let ended = window.0.try_wait().expect("it is ours");
+        let ended = window.try_wait().expect("it is ours");
         assert!(ended.is_none(), "{ended:?}: {}", std::fs::read_to_string(&said).unwrap_or_default());
         xdotool(&["search", "--onlyvisible", "--name", "Flotor"])
     });
@@ -135,7 +132,7 @@ fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
 /// the tables and the movements are there in the end.
 #[test]
 fn a_sitting_in_a_real_window_is_gone_through_by_keyboard() {
-    if !can_have_a_window() {
+    if !required(Tool::Display) {
         return;
     }
     let folder = tempfile::tempdir().expect("a scratch folder");
@@ -146,7 +143,7 @@ fn a_sitting_in_a_real_window_is_gone_through_by_keyboard() {
     study.arg("--scene").arg(patient_scene(folder.path(), "study"));
     study.args(["--demo", "2", "--noise", "off", "--out"]).arg(&out);
     study.stdout(Stdio::null()).stderr(Stdio::null());
-    let mut study = Owned(study.spawn().expect("the study starts"));
+    let mut study = Owned::start(&mut study);
     // Without a window manager nobody gives the window the keyboard. While it opens or closes there is none to be found: the
     // next attempt, or the end of the loop, tells.
     let press = |keys: &[&str]| {
@@ -156,7 +153,7 @@ fn a_sitting_in_a_real_window_is_gone_through_by_keyboard() {
     // A digit means something on a rating's screen only, Return on every screen: together they go through all of them.
     let until = Instant::now() + 15 * PATIENCE;
     let status = loop {
-        if let Some(status) = study.0.try_wait().expect("it is ours") {
+        if let Some(status) = study.try_wait().expect("it is ours") {
             break status;
         }
         assert!(Instant::now() < until, "the sitting does not come to its end");
@@ -208,7 +205,7 @@ fn without_a_display_there_is_one_line_and_exit_code_2() {
 /// it. Ten seconds at full size; the processor time, which other programs disturb, is printed and not asserted.
 #[test]
 fn a_window_that_nobody_touches_makes_no_picture() {
-    if !can_have_a_window() {
+    if !required(Tool::Display) {
         return;
     }
     let seconds = if std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size == "full") { "10" } else { "2" };
@@ -245,7 +242,7 @@ fn without_a_driver_there_is_one_line_and_pictures_all_the_same() {
     };
     let made = picture("without.png", false);
     assert!(made.starts_with(b"\x89PNG") && made == picture("with.png", true));
-    if !can_have_a_window() {
+    if !required(Tool::Display) {
         return;
     }
     let display = Display::start(folder.path());

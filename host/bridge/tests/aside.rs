@@ -4,17 +4,18 @@
 
 mod common;
 
+use common::process::Owned;
 use common::{free_port, is_full_size, program, wait_until};
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkOptions, open};
 use flotor_bridge::remote::{Remote, Told};
 use flotor_bridge::wish::{Letter, MOST_LETTER_BYTES, Refusal, Wish};
 use flotor_live::SetValue;
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::Signal;
 use serde_json::Value;
 use std::net::TcpStream;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 use zenoh::{Session, Wait};
@@ -51,7 +52,7 @@ impl Ran {
 
 /// A bridge in a process of its own, which ends with this value.
 struct Bridge {
-    process: Child,
+    process: Owned,
     endpoint: String,
 }
 
@@ -62,8 +63,7 @@ impl Bridge {
         let mut command = Command::new(env!("CARGO_BIN_EXE_flotor-bridge"));
         command.args(["serve", "--name", NAME, "--allow", "operate", "--listen", &endpoint]);
         command.env("XDG_RUNTIME_DIR", runtime);
-        let process = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
-        let process = process.expect("cargo built it");
+        let process = Owned::start(quiet(&mut command));
         wait_until("the bridge listens", || TcpStream::connect(("127.0.0.1", port)).is_ok());
         Self { process, endpoint }
     }
@@ -72,22 +72,15 @@ impl Bridge {
         let connect = vec![self.endpoint.clone()];
         open(&LinkOptions { connect, ..LinkOptions::default() }, End::Visiting).unwrap()
     }
-
-    fn signal(&self, signal: Signal) {
-        kill_process(Pid::from_child(&self.process), signal).expect("it is ours");
-    }
 }
 
-impl Drop for Bridge {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
+fn quiet(command: &mut Command) -> &mut Command {
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null())
 }
 
 /// The demo scene, run by the program under test.
 struct Run {
-    process: Child,
+    process: Owned,
     file: std::path::PathBuf,
 }
 
@@ -106,8 +99,7 @@ impl Run {
             "--json",
         ]);
         command.arg(&file).env("XDG_RUNTIME_DIR", runtime);
-        let process = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
-        Self { process: process.expect("the program starts"), file }
+        Self { process: Owned::start(quiet(&mut command)), file }
     }
 
     fn is_on(&mut self) -> bool {
@@ -166,8 +158,8 @@ fn run_with_bridge(program: &Path, clock: &str, duration_s: u64, fate: Fate) -> 
         wait_until("ticks of the run are heard", || heard.load(Ordering::Relaxed) > 0);
         match fate {
             Fate::Serves => {}
-            Fate::Killed => bridge.signal(Signal::KILL),
-            Fate::Stalled => bridge.signal(Signal::STOP),
+            Fate::Killed => bridge.process.signal(Signal::KILL),
+            Fate::Stalled => bridge.process.signal(Signal::STOP),
             Fate::Flooded => {
                 let (session, process) = (&session, run.process.id());
                 scope.spawn(move || flood(session, process, is_over));

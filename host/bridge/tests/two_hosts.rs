@@ -6,6 +6,7 @@ mod common;
 #[path = "common/proxy.rs"]
 mod proxy;
 
+use common::process::Owned;
 use common::{free_port, is_full_size, program, wait_until};
 use flotor_bridge::couple::couple;
 use flotor_bridge::keys::Name;
@@ -16,9 +17,10 @@ use flotor_live::Directory;
 use flotor_record::Recording;
 use flotor_core::trace::{Events, TickRecord};
 use proxy::Proxy;
+use rustix::process::Signal;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -36,16 +38,6 @@ fn scene(hand: &str, grip: &str, watchdog_ms: f64) -> String {
          [[coupling]]\nname = \"pair\"\npartner = \"elsewhere\"\nend = [{{ device = \"device\" }}]\n\
          [limits]\nwatchdog_ms = {watchdog_ms}\n"
     )
-}
-
-/// A process that ends with the test, even one that was stopped.
-struct Owned(Child);
-
-impl Drop for Owned {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
 }
 
 /// A host: a folder in which its run is found, and the run.
@@ -75,7 +67,7 @@ impl Host {
         command.arg("--record").arg(self.file("run.mcap")).arg("--json").arg(self.file("run.json"));
         command.env("XDG_RUNTIME_DIR", self.folder.path().join("runtime"));
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-        Owned(command.spawn().unwrap())
+        Owned::start(&mut command)
     }
 
     fn summary(&self) -> Value {
@@ -134,7 +126,7 @@ impl Network {
         });
         meanwhile(&runs, &self.proxy);
         for run in &mut runs {
-            assert!(run.0.wait().unwrap().success(), "a run that ends in order");
+            assert!(run.wait().unwrap().success(), "a run that ends in order");
         }
     }
 }
@@ -239,9 +231,9 @@ fn a_host_that_is_held_up_overdraws_by_what_came_out_meanwhile_and_no_more() {
     network.run(&program, scenes, 4.0, |runs, _| {
         for run in runs.iter().cycle().take(40) {
             std::thread::sleep(Duration::from_millis(37)); // no part of a swing's period
-            signal("STOP", run);
+            run.signal(Signal::STOP);
             std::thread::sleep(Duration::from_millis(40));
-            signal("CONT", run);
+            run.signal(Signal::CONT);
         }
     });
     let missing_j = [0, 1].map(|index| out_while_missing_j(&network.hosts[index].records()));
@@ -251,9 +243,4 @@ fn a_host_that_is_held_up_overdraws_by_what_came_out_meanwhile_and_no_more() {
         assert_overdrawn_by_no_more(&summary["couplings"][0], [missing_j[index], missing_j[1 - index]]);
     }
     assert!(missing_j.iter().sum::<f64>() > 1.0e-6, "nothing came out: {missing_j:?}");
-}
-
-fn signal(name: &str, run: &Owned) {
-    let sent = Command::new("kill").args([format!("-{name}"), run.0.id().to_string()]).status();
-    assert!(sent.expect("there is a kill command").success());
 }

@@ -78,7 +78,7 @@ fn tell(name: &PluginName, made: &Scaffold) {
     say!("\nNext:");
     for command in [
         &format!("cd {}", made.folder.display()),
-        made.build,
+        &made.build,
         &format!("flotor validate {}", made.library),
         "flotor run scene.toml --plot run.svg",
     ] {

@@ -35,8 +35,8 @@ impl ContractFolder {
 
     /// The path, for a manifest.
     pub(super) fn as_text(&self) -> Result<String, ScaffoldError> {
-        // Quotes and backslashes would end the text a manifest has it in; `$` and `#` mean something to make.
-        let text = self.0.to_str().filter(|text| !text.contains(['"', '\\', '$', '#', '\n']));
+        // Quotes and backslashes would end the text a manifest has it in; `$` and backquotes mean something to a shell.
+        let text = self.0.to_str().filter(|text| !text.contains(['"', '\\', '$', '`', '\n']));
         text.map(str::to_owned).ok_or_else(|| ScaffoldError::NotText(self.0.clone()))
     }
 

@@ -1,8 +1,8 @@
 //! `flotor new`: a plugin crate of its own that builds, validates and runs as it is.
 //!
 //! The templates are whole files that compile once `your-name` (the id), `your_name` (in symbols), `YourName` (the
-//! type) and `Your name` (for people) are replaced. A crate that is made lies anywhere: it has the path of the
-//! contract (`hal`) and a workspace of its own.
+//! type), `Your name` (for people) and what differs by language and place are replaced. A crate that is made lies
+//! anywhere: it has the path of the contract (`hal`) and a workspace of its own.
 
 mod contract;
 mod name;
@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 pub enum Language {
     /// A cargo crate.
     Rust,
-    /// One C file and a Makefile.
+    /// One C file.
     C,
 }
 
@@ -78,8 +78,8 @@ pub struct Scaffold {
     pub folder: PathBuf,
     /// Its files, relative to the folder, the one to edit first.
     pub files: Vec<&'static str>,
-    /// What builds it, in its folder.
-    pub build: &'static str,
+    /// The command that builds it, in its folder.
+    pub build: String,
     /// The library that comes out, relative to the folder.
     pub library: String,
 }
@@ -95,7 +95,7 @@ pub fn scaffold(
     language: Language,
     contract: &ContractFolder,
 ) -> Result<Scaffold, ScaffoldError> {
-    let text = Placeholders::new(name, contract)?;
+    let text = Placeholders::new(name, language, contract)?;
     let files = files(kind, language);
     if files.iter().any(|(path, source)| path.ends_with(".rs") && text.clashes_with(source)) {
         return Err(ScaffoldError::Clash { id: name.id().to_owned(), type_name: name.type_name() });
@@ -119,21 +119,17 @@ pub fn scaffold(
     Ok(Scaffold {
         folder,
         files: files.iter().map(|(path, _)| *path).collect(),
-        build: match language {
-            Language::Rust => "cargo build --release",
-            Language::C => "make",
-        },
-        library: format!("target/release/lib{}{}", name.symbol(), std::env::consts::DLL_SUFFIX),
+        build: text.fill(BUILD),
+        library: text.fill("path/to/library/libyour_name.so"),
     })
 }
 
 /// The files of a plugin: path and template, the one to edit first.
 fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'static str)] {
-    const IGNORE: (&str, &str) = (".gitignore", "/target\n");
+    const IGNORE: (&str, &str) = (".gitignore", "/target\n/lib*.so\n");
     const MODEL_SCENE: (&str, &str) = ("scene.toml", include_str!("templates/model-scene.toml"));
     const DEVICE_SCENE: (&str, &str) = ("scene.toml", include_str!("templates/device-scene.toml"));
     const MANIFEST: (&str, &str) = ("Cargo.toml", include_str!("templates/rust/manifest.toml"));
-    const MAKEFILE: (&str, &str) = ("Makefile", include_str!("templates/c/Makefile"));
     match (kind, language) {
         (PluginKind::Model, Language::Rust) => {
             &[("src/lib.rs", include_str!("templates/rust/model.rs")), MODEL_SCENE, MANIFEST, IGNORE]
@@ -142,20 +138,32 @@ fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'sta
             &[("src/lib.rs", include_str!("templates/rust/device.rs")), DEVICE_SCENE, MANIFEST, IGNORE]
         }
         (PluginKind::Model, Language::C) => {
-            &[("plugin.c", include_str!("templates/c/model.c")), MODEL_SCENE, MAKEFILE, IGNORE]
+            &[("plugin.c", include_str!("templates/c/model.c")), MODEL_SCENE, IGNORE]
         }
         (PluginKind::Device, Language::C) => {
-            &[("plugin.c", include_str!("templates/c/device.c")), DEVICE_SCENE, MAKEFILE, IGNORE]
+            &[("plugin.c", include_str!("templates/c/device.c")), DEVICE_SCENE, IGNORE]
         }
     }
 }
 
-/// What stands in the templates, and what comes instead.
-struct Placeholders([(&'static str, String); 6]);
+/// Stands for the command that builds a plugin.
+const BUILD: &str = "BUILD_COMMAND";
+
+/// What stands in the templates, and what comes instead; also in what came for those before.
+struct Placeholders([(&'static str, String); 8]);
 
 impl Placeholders {
-    fn new(name: &PluginName, contract: &ContractFolder) -> Result<Self, ScaffoldError> {
+    fn new(name: &PluginName, language: Language, contract: &ContractFolder) -> Result<Self, ScaffoldError> {
+        let (build, built_in) = match language {
+            Language::Rust => ("cargo build --release", "target/release"),
+            Language::C => (
+                "cc -std=c11 -O2 -Wall -Wextra -shared -fPIC -I\"path/to/hal/include\" -o libyour_name.so plugin.c -lm",
+                ".",
+            ),
+        };
         Ok(Self([
+            (BUILD, build.to_owned()),
+            ("path/to/library", built_in.to_owned()),
             ("your-name", name.id().to_owned()),
             ("your_name", name.symbol()),
             ("YourName", name.type_name()),
@@ -171,7 +179,7 @@ impl Placeholders {
 
     /// Whether the Rust template uses a type that the plugin's own would hide.
     fn clashes_with(&self, template: &str) -> bool {
-        let [_, _, (_, type_name), ..] = &self.0;
+        let [_, _, _, _, (_, type_name), ..] = &self.0;
         let code = template.lines().filter(|line| !line.trim_start().starts_with("//"));
         let mut words = code.flat_map(|line| line.split(|c: char| !c.is_alphanumeric() && c != '_'));
         words.any(|word| word == type_name)
@@ -209,9 +217,11 @@ mod tests {
     #[test]
     fn no_placeholder_is_left() {
         let contract = ContractFolder::found_by(None).expect("a test runs beside its sources");
-        let text = Placeholders::new(&PluginName::new("soft-wall").unwrap(), &contract).unwrap();
-        for kind in [PluginKind::Model, PluginKind::Device] {
-            for (path, template) in [Language::Rust, Language::C].into_iter().flat_map(|l| files(kind, l)) {
+        let name = PluginName::new("soft-wall").unwrap();
+        for language in [Language::Rust, Language::C] {
+            let text = Placeholders::new(&name, language, &contract).unwrap();
+            let kinds = [PluginKind::Model, PluginKind::Device];
+            for (path, template) in kinds.into_iter().flat_map(|kind| files(kind, language)) {
                 let filled = text.fill(template);
                 for placeholder in text.0.iter().map(|(placeholder, _)| placeholder) {
                     assert!(!filled.contains(placeholder), "{path} still says {placeholder}");
@@ -224,7 +234,8 @@ mod tests {
     fn a_type_of_the_contract_is_no_name() {
         let contract = ContractFolder::found_by(None).expect("a test runs beside its sources");
         let clashes = |name: &str, template: &str| {
-            Placeholders::new(&PluginName::new(name).unwrap(), &contract).unwrap().clashes_with(template)
+            let name = PluginName::new(name).unwrap();
+            Placeholders::new(&name, Language::Rust, &contract).unwrap().clashes_with(template)
         };
         assert!(clashes("wrench", include_str!("templates/rust/model.rs")));
         assert!(clashes("model-info", include_str!("templates/rust/model.rs")));

@@ -1,44 +1,20 @@
 //! A virtual display for tests of the real window, and the programs that run on it.
 
 use super::PATIENCE;
+use super::process::Owned;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// Width and height of display and window, pixels.
 pub(crate) const SIZE: [u16; 2] = [1280, 800];
-
-/// A process that ends with the test.
-pub(crate) struct Owned(pub(crate) Child);
-
-impl Drop for Owned {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
 
 /// A program of this workspace.
 pub(crate) fn program(name: &str) -> PathBuf {
     let file = Path::new(env!("CARGO_BIN_EXE_flotor-viewer")).with_file_name(name);
     assert!(file.is_file(), "{} is missing: run `cargo build` first", file.display());
     file
-}
-
-fn is_installed(name: &str) -> bool {
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    std::env::split_paths(&path).any(|folder| folder.join(name).is_file())
-}
-
-/// True if these programs are installed; says so if not, and fails where the window has to be tested.
-pub(crate) fn are_installed(programs: &[&str]) -> bool {
-    let missing: Vec<&&str> = programs.iter().filter(|name| !is_installed(name)).collect();
-    if !missing.is_empty() {
-        assert!(std::env::var("FLOTOR_WINDOW_TESTS").is_err(), "missing: {missing:?}");
-        eprintln!("skipped: {missing:?} not installed");
-    }
-    missing.is_empty()
 }
 
 /// A virtual display of the window's size.
@@ -59,15 +35,11 @@ impl Display {
         // and turns away who comes meanwhile.
         command.args(["-displayfd", "1", "-noreset", "-nolisten", "tcp", "-screen", "0", &size, "-fbdir"]);
         command.arg(folder);
-        let mut server = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("Xvfb starts");
+        let mut server = Owned::start(command.stdout(Stdio::piped()).stderr(Stdio::null()));
         let mut number = String::new();
         let output = server.stdout.take().expect("a pipe was asked for");
         BufReader::new(output).read_line(&mut number).expect("it says its number");
-        Self {
-            _server: Owned(server),
-            name: format!(":{}", number.trim()),
-            screen: folder.join("Xvfb_screen0"),
-        }
+        Self { _server: server, name: format!(":{}", number.trim()), screen: folder.join("Xvfb_screen0") }
     }
 
     /// What is on it now, as the server keeps it.

@@ -3,6 +3,12 @@
 #![allow(dead_code)] // each test program uses its part
 
 pub(crate) mod display;
+#[path = "../../../tests/src/process.rs"]
+#[allow(unreachable_pub)]
+pub(crate) mod process;
+#[path = "../../../tests/src/tools.rs"]
+#[allow(unreachable_pub)]
+pub(crate) mod tools;
 
 use flotor_core::Clock;
 use flotor_core::mapping::{Blend, MappingConfig};

@@ -2,6 +2,11 @@
 
 #![allow(dead_code)] // each test program uses its part
 
+#[path = "../../../../tests/src/process.rs"]
+pub mod process;
+#[path = "../../../../tests/src/tools.rs"]
+pub mod tools;
+
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkOptions, open};
 use flotor_bridge::remote::Remote;
@@ -172,7 +177,7 @@ impl Drop for Bridge {
 pub fn program() -> Option<PathBuf> {
     let program = std::env::var_os("FLOTOR").map(PathBuf::from);
     if program.is_none() {
-        println!("skipped: FLOTOR names no `flotor` program to run");
+        tools::skipped("FLOTOR names no `flotor` program to run");
     }
     // Tests run in the folder of their crate, who set it may have been elsewhere.
     program.map(|path| if path.exists() { path } else { Path::new("../..").join(path) })

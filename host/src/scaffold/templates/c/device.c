@@ -1,7 +1,9 @@
 /* Your name: a handle that goes up and down by itself. Put your hardware where the comments say so.
  *
  * A device is opened (it answers questions), then active (`read` and `write`, a thousand times a second), then
- * opened again. Metres, newtons, z up; the wrench is what the hand is to feel. */
+ * opened again. Metres, newtons, z up; the wrench is what the hand is to feel.
+ *
+ * Build it here: BUILD_COMMAND */
 #include "flotor.h"
 #include <math.h>
 #include <stdatomic.h>

@@ -1,6 +1,8 @@
 /* Your name: a floor at home height that pushes the hand up. Change `step`, build, and feel the difference.
  *
- * A step gets where the handle is (m, z up, home at the origin) and answers with the force on the hand (N). */
+ * A step gets where the handle is (m, z up, home at the origin) and answers with the force on the hand (N).
+ *
+ * Build it here: BUILD_COMMAND */
 #include "flotor.h"
 #include <math.h>
 #include <stdlib.h>
