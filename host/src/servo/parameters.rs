@@ -138,12 +138,6 @@ impl ParameterQueue {
         self.sent.waiting()
     }
 
-    /// True if a scheduled change is due at this tick. Real-time: bounded, no allocation.
-    #[inline]
-    pub(crate) fn is_due(&self, tick: &Tick) -> bool {
-        self.schedule.get(self.next).is_some_and(|due| due.time_ns <= tick.time_ns)
-    }
-
     /// Reports that a plugin was replaced. Real-time: bounded, no allocation.
     pub(crate) fn report_replaced(&mut self, tick: &Tick, plugin: u16, generation: u16) {
         let change = ParameterChange { plugin, generation, parameter: PLUGIN, value: f64::from(generation) };

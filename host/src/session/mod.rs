@@ -398,7 +398,6 @@ impl Session {
                 observer.observe(&record);
             }
             controls.sweep();
-            runner.servo.pause();
         }
         Ok(runner.finish(0, RealTimeReport::not_asked()))
     }
