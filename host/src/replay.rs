@@ -187,13 +187,14 @@ impl<'r> Replay<'r> {
             while self.forces.take_faded(&tick).is_some() {}
             self.forces.step(&tick, &mut ports, &heart);
             evidence.look(tick.index, &records, &ports);
-            let is_other = |(record, port): (&TickRecord, &Port)| bits(&port.asked) != bits(&record.model);
+            let is_other =
+                |(record, port): (&TickRecord, &Port)| bits(&port.requested) != bits(&record.model);
             if records.iter().zip(&ports).any(is_other) {
                 evidence.differs(tick.index, &records, &ports);
             }
             for (port, record) in ports.iter_mut().zip(records.drain(..)) {
-                difference.add(&record, &port.asked);
-                look(&record, &port.asked);
+                difference.add(&record, &port.requested);
+                look(&record, &port.requested);
                 // What was really held then.
                 port.commanded = record.commanded;
             }

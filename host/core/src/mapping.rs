@@ -79,7 +79,7 @@ impl Turn {
     }
 
     /// A vector of the device frame in the model frame.
-    #[inline(always)]
+    #[inline]
     fn there(self, vector: DVec3) -> DVec3 {
         match self {
             Self::None => vector,
@@ -88,7 +88,7 @@ impl Turn {
     }
 
     /// A vector of the model frame in the device frame.
-    #[inline(always)]
+    #[inline]
     fn back(self, vector: DVec3) -> DVec3 {
         match self {
             Self::None => vector,
@@ -97,7 +97,7 @@ impl Turn {
     }
 
     /// A rotation of the device frame in the model frame.
-    #[inline(always)]
+    #[inline]
     fn rotation_there(self, turned: DQuat) -> DQuat {
         match self {
             Self::None => turned,
@@ -158,7 +158,7 @@ impl Mapping {
     }
 
     /// Pose in the model frame. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     #[must_use]
     pub fn pose_to_model(&self, pose: &Pose) -> Pose {
         let turn = self.model_from_device;
@@ -197,22 +197,9 @@ impl Mapping {
     }
 
     /// What a model is told of a tick: the motion in its own frame, and what is asked for. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     #[must_use]
     pub fn input(&self, tick: &Tick, state: &DeviceState, demand: Demand) -> Input {
-        match self.model_from_device {
-            Turn::None => self.with_motion(tick, state, demand),
-            Turn::By(_) => self.turned_input(tick, state, demand),
-        }
-    }
-
-    #[inline(never)] // out of the way of the many mappings without a turn
-    fn turned_input(&self, tick: &Tick, state: &DeviceState, demand: Demand) -> Input {
-        self.with_motion(tick, state, demand)
-    }
-
-    #[inline(always)]
-    fn with_motion(&self, tick: &Tick, state: &DeviceState, demand: Demand) -> Input {
         Input {
             pose: self.pose_to_model(&state.pose),
             twist: self.twist_to_model(&state.twist),
@@ -225,7 +212,7 @@ impl Mapping {
     }
 
     /// Twist in the model frame. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     #[must_use]
     pub fn twist_to_model(&self, twist: &Twist) -> Twist {
         let turn = self.model_from_device;
@@ -233,19 +220,14 @@ impl Mapping {
     }
 
     /// Wrench in the device frame. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     #[must_use]
     pub fn wrench_to_device(&self, wrench: &Wrench) -> Wrench {
-        match self.model_from_device {
-            Turn::None => Wrench::new(wrench.force() * self.force_scale, wrench.torque() * self.torque_scale),
-            Turn::By(rotation) => self.turned_wrench_to_device(wrench, rotation.conjugate()),
-        }
-    }
-
-    #[inline(never)] // as `turned_input`
-    fn turned_wrench_to_device(&self, wrench: &Wrench, device_from_model: DQuat) -> Wrench {
-        let force: DVec3 = device_from_model * wrench.force() * self.force_scale;
-        Wrench::new(force, device_from_model * wrench.torque() * self.torque_scale)
+        let turn = self.model_from_device;
+        Wrench::new(
+            turn.back(wrench.force()) * self.force_scale,
+            turn.back(wrench.torque()) * self.torque_scale,
+        )
     }
 }
 

@@ -30,12 +30,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (parameters, _sender, _reports) = ParameterQueue::new(Vec::new(), 1);
     let (exchange, _workshop) = exchange(1, Vec::new());
     let forces = Forces::new(1, vec![(0, layer)], Vec::new());
-    let run = RunConfig {
-        period_ns: config.period_ns,
-        ramp_ns: 0,
-        held_up_ns: 100_000_000,
-        emergency_buttons: 0,
-    };
+    let run =
+        RunConfig { period_ns: config.period_ns, ramp_ns: 0, held_up_ns: 100_000_000, emergency_buttons: 0 };
     let standby = Standby::new(vec![device], forces, parameters, exchange, config, run);
 
     let stoppers = standby.stoppers();
@@ -43,7 +39,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut looped = Loop::new(servo, Schedule::start_virtual(config.period_ns), 1_000_000_000);
     let mut peak_n = 0.0_f64;
     while looped.end().is_none() {
-        looped.advance(&StopSwitch::default(), |record| peak_n = peak_n.max(record.commanded.force().length()));
+        looped
+            .advance(&StopSwitch::default(), |record| peak_n = peak_n.max(record.commanded.force().length()));
     }
     stoppers.iter().for_each(flotor_hal::abi::loader::Stopper::safe_stop);
     println!("ended as {:?}; largest force on the hand {peak_n:.3} N", looped.end());

@@ -43,14 +43,13 @@ impl BoundaryWall {
     }
 
     /// True only inside. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn surely_holds(&self, state: &DeviceState) -> bool {
         // A rotation vector is the axis times the angle, which is at most pi times the sine of its half.
         let at_most_rad = state.pose.orientation().xyz() * PI;
         self.position.surely_holds(state.pose.position()) && self.rotation.surely_holds(at_most_rad)
     }
 
-    #[cold]
     fn push_outside(&self, state: &DeviceState) -> Option<Wrench> {
         if !state.is_finite() {
             return None;
@@ -104,7 +103,7 @@ impl Ellipsoid {
     }
 
     /// True only inside.
-    #[inline(always)]
+    #[inline]
     fn surely_holds(&self, at: DVec3) -> bool {
         (at * self.per_semi_axis).length_squared() < SURELY_INSIDE // false for NaN
     }

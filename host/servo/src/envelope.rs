@@ -7,9 +7,6 @@
 //! The slew limit is last, so that no fault upstream, not even a model that vanishes, makes the force jump; the limits
 //! hold after it too, because the limited region is convex and the slew limit only moves along the line from the last
 //! wrench, which was inside, to the new one, which is.
-//!
-//! Nearly every tick is within all limits: each stage sees that first, by comparisons alone, and computes only when it
-//! has to act.
 
 use super::boundary::BoundaryWall;
 use super::passivity::Passivity;
@@ -22,13 +19,12 @@ use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Twist, Wrench};
 /// Limits of force, torque and their change, and a wall at the edge of the range.
 pub struct Envelope {
     /// The most that may be sent.
-    most: Wrench,
+    max_force_n: DVec3,
+    max_torque_nm: DVec3,
     /// The fastest at which all that drives the handle on passes.
-    fastest: Twist,
+    max_twist: Twist,
     /// Fastest change of force (N/s) and torque (N·m/s).
     slew_per_s: [f64; 2],
-    /// What that is in a period.
-    most_change_in_a_period: [f64; 2],
     wall: BoundaryWall,
     passivity: Passivity,
     period_ns: u64,
@@ -44,20 +40,19 @@ impl Envelope {
         let tighter = |scene: [f64; 3], device: [f64; 3]| {
             DVec3::from_array(scene).min(DVec3::from_array(device)).min(DVec3::splat(f64::MAX))
         };
-        let slew_per_s = [
-            limits.force_slew_n_per_s.min(device.max_force_slew_n_per_s),
-            limits.torque_slew_nm_per_s.min(device.max_torque_slew_nm_per_s),
-        ];
         let max_force_n = tighter(limits.force_n, device.max_force_n);
         let max_torque_nm = tighter(limits.torque_nm, device.max_torque_nm);
         Self {
-            most: Wrench::new(max_force_n, max_torque_nm),
-            fastest: Twist {
+            max_force_n,
+            max_torque_nm,
+            max_twist: Twist {
                 linear_m_per_s: limits.velocity_m_per_s,
                 angular_rad_per_s: limits.angular_velocity_rad_per_s,
             },
-            slew_per_s,
-            most_change_in_a_period: most_change(slew_per_s, period_ns),
+            slew_per_s: [
+                limits.force_slew_n_per_s.min(device.max_force_slew_n_per_s),
+                limits.torque_slew_nm_per_s.min(device.max_torque_slew_nm_per_s),
+            ],
             wall: BoundaryWall::new(boundary, device, period_ns),
             // Damping the device is known to stand: that of its boundary.
             passivity: Passivity::new(
@@ -77,14 +72,11 @@ impl Envelope {
     /// The most that may reach the hand: force along each axis (N), torque about each (N·m).
     #[must_use]
     pub fn most(&self) -> [DVec3; 2] {
-        [self.most.force(), self.most.torque()]
+        [self.max_force_n, self.max_torque_nm]
     }
 
     /// The wrench that goes to the device for what the models ask. Real-time: bounded, no allocation.
-    ///
-    /// Nearly every tick is within all limits. That is found out by comparisons alone, with nothing written to memory on
-    /// the way; any doubt leads through all stages.
-    #[inline(always)] // so that the wrench comes in registers, not as bytes just written
+    #[inline]
     pub fn apply(
         &mut self,
         request: &Wrench,
@@ -94,76 +86,19 @@ impl Envelope {
         events: &mut Events,
     ) -> Wrench {
         self.passivity.observe(state, &self.last);
-        let safe = match self.within_limits(request, gate, state, tick) {
-            Some(gated) => gated,
-            None => self.through_all_stages(*request, gate, state, tick, events),
-        };
-        self.last = safe;
-        safe
-    }
-
-    /// What the gate lets pass, if no stage after it would change it or tell anything about it.
-    #[inline(always)]
-    fn within_limits(
-        &self,
-        request: &Wrench,
-        gate: Gate,
-        state: &DeviceState,
-        tick: &Tick,
-    ) -> Option<Wrench> {
-        let gated = *request * gate.models;
-        let (force, torque) = (gated.force(), gated.torque());
-        let [force_n, torque_nm] = self.most_change(tick);
-        // A request that is not finite is not so behind the gate either, and within no limit.
-        let passes = self.passivity.only_observes()
-            && is_not_faster(&state.twist, &self.fastest)
-            && self.wall.surely_holds(state)
-            && is_within(&gated, &self.most)
-            && is_step_within(self.last.force(), force, force_n)
-            && is_step_within(self.last.torque(), torque, torque_nm);
-        passes.then_some(gated)
-    }
-
-    #[inline(never)]
-    fn through_all_stages(
-        &mut self,
-        request: Wrench,
-        gate: Gate,
-        state: &DeviceState,
-        tick: &Tick,
-        events: &mut Events,
-    ) -> Wrench {
-        let guarded = if request.is_finite() {
-            request
-        } else {
-            events.insert(Events::NOT_FINITE);
-            Wrench::ZERO
-        };
+        let guarded = guard(request, events);
         let gated = guarded * gate.models;
-        let driven = self.limit_speed(&gated, state, events);
-        let walled = match self.wall.push(state) {
-            None => driven,
-            Some(push) => {
-                events.insert(Events::BOUNDARY);
-                driven + push * gate.boundary
-            }
-        };
-        // Before the energy is looked at: what cannot be sent anyway may be too large to be squared.
-        let bounded = self.limit(&walled, events);
-        let limited = match self.passivity.guard(&bounded, state) {
-            None => bounded,
-            Some(less) => {
-                events.insert(Events::PASSIVITY_DAMPED);
-                // Damping may be more than an axis can give.
-                self.limit(&less, events)
-            }
-        };
-        self.slew(&limited, tick, events)
+        let driven = self.limit_velocity(gated, state, events);
+        let walled = self.add_boundary(driven, gate, state, events);
+        // Before passivity: what cannot be sent anyway may be too large to be squared.
+        let bounded = self.limit_wrench(walled, events);
+        let passive = self.limit_energy(bounded, state, events);
+        self.last = self.limit_slew(passive, tick, events);
+        self.last
     }
 
     /// Energy the hand has put into the device's port so far less what has come out, J; negative: the loop has created
     /// energy. Real-time: bounded, no allocation.
-    #[inline]
     #[must_use]
     pub fn port_energy_j(&self) -> f64 {
         self.passivity.energy_j()
@@ -171,86 +106,91 @@ impl Envelope {
 
     /// Above the velocity limit fades out what drives the handle on, gone at twice the limit; what brakes it passes.
     #[inline]
-    fn limit_speed(&self, wrench: &Wrench, state: &DeviceState, events: &mut Events) -> Wrench {
-        if is_not_faster(&state.twist, &self.fastest) {
-            return *wrench;
-        }
+    fn limit_velocity(&self, wrench: Wrench, state: &DeviceState, events: &mut Events) -> Wrench {
         let (velocity, spin) = (state.twist.linear(), state.twist.angular());
-        let (most, most_spin) = (self.fastest.linear(), self.fastest.angular());
+        let (max_velocity, max_spin) = (self.max_twist.linear(), self.max_twist.angular());
+        if is_within(velocity, max_velocity) && is_within(spin, max_spin) {
+            return wrench;
+        }
         events.insert(Events::VELOCITY_LIMITED);
-        let excess = (velocity.abs() / most).max_element();
-        let spin_excess = (spin.abs() / most_spin).max_element();
-        let force = without_drive(wrench.force(), velocity, excess);
-        Wrench::new(force, without_drive(wrench.torque(), spin, spin_excess))
+        // How many times the limit the fastest axis moves.
+        let excess = (velocity.abs() / max_velocity).max_element();
+        let spin_excess = (spin.abs() / max_spin).max_element();
+        Wrench::new(
+            without_drive(wrench.force(), velocity, excess),
+            without_drive(wrench.torque(), spin, spin_excess),
+        )
     }
 
+    /// Adds the push of the boundary wall.
     #[inline]
-    fn limit(&self, wrench: &Wrench, events: &mut Events) -> Wrench {
-        if is_within(wrench, &self.most) {
-            return *wrench;
+    fn add_boundary(&self, wrench: Wrench, gate: Gate, state: &DeviceState, events: &mut Events) -> Wrench {
+        let Some(push) = self.wall.push(state) else { return wrench };
+        events.insert(Events::BOUNDARY);
+        wrench + push * gate.boundary
+    }
+
+    /// Scales force and torque down into their limits.
+    #[inline]
+    fn limit_wrench(&self, wrench: Wrench, events: &mut Events) -> Wrench {
+        let (max_force, max_torque) = (self.max_force_n, self.max_torque_nm);
+        if is_within(wrench.force(), max_force) && is_within(wrench.torque(), max_torque) {
+            return wrench;
         }
-        let [max_force_n, max_torque_nm] = self.most();
-        let force = shrink_into_box(wrench.force(), max_force_n);
-        let torque = shrink_into_box(wrench.torque(), max_torque_nm);
+        let force = shrink_into_box(wrench.force(), max_force);
+        let torque = shrink_into_box(wrench.torque(), max_torque);
         // On an axis that is not driven nothing is limited: pairing has said that nothing is felt there.
         let is_cut =
             |before: DVec3, after: DVec3, most: DVec3| (before.cmpne(after) & most.cmpne(DVec3::ZERO)).any();
-        if is_cut(wrench.force(), force, max_force_n) {
+        if is_cut(wrench.force(), force, max_force) {
             events.insert(Events::FORCE_LIMITED);
         }
-        if is_cut(wrench.torque(), torque, max_torque_nm) {
+        if is_cut(wrench.torque(), torque, max_torque) {
             events.insert(Events::TORQUE_LIMITED);
         }
         Wrench::new(force, torque)
     }
 
+    /// Takes away what would bring out more energy than there is, if the scene asks for that.
     #[inline]
-    fn slew(&self, wrench: &Wrench, tick: &Tick, events: &mut Events) -> Wrench {
-        let [force_n, torque_nm] = self.most_change(tick);
+    fn limit_energy(&self, wrench: Wrench, state: &DeviceState, events: &mut Events) -> Wrench {
+        let Some(damped) = self.passivity.guard(&wrench, state) else { return wrench };
+        events.insert(Events::PASSIVITY_DAMPED);
+        // Damping may be more than an axis can give.
+        self.limit_wrench(damped, events)
+    }
+
+    /// Moves force and torque from those of the last tick no farther than the slew limit allows. A tick after missed ones
+    /// may change them no more than one on time: the hand felt nothing in between.
+    #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
+    #[inline]
+    fn limit_slew(&self, wrench: Wrench, tick: &Tick, events: &mut Events) -> Wrench {
+        let dt_ns = if tick.dt_ns == 0 { self.period_ns } else { tick.dt_ns.min(self.period_ns) };
+        let dt_s = dt_ns as f64 * 1.0e-9;
+        let [force_n, torque_nm] = self.slew_per_s.map(|per_s| per_s * dt_s);
         let force = step_short_of(self.last.force(), wrench.force(), force_n);
         let torque = step_short_of(self.last.torque(), wrench.torque(), torque_nm);
-        if force.is_none() && torque.is_none() {
-            return *wrench;
+        if force.is_some() || torque.is_some() {
+            events.insert(Events::SLEW_LIMITED);
         }
-        events.insert(Events::SLEW_LIMITED);
         Wrench::new(force.unwrap_or(wrench.force()), torque.unwrap_or(wrench.torque()))
     }
+}
 
-    /// How far force (N) and torque (N·m) may move in a tick. One after missed ticks may change no more than one on time:
-    /// the hand felt nothing in between.
-    #[inline]
-    fn most_change(&self, tick: &Tick) -> [f64; 2] {
-        if tick.dt_ns == 0 || tick.dt_ns >= self.period_ns {
-            return self.most_change_in_a_period;
-        }
-        most_change(self.slew_per_s, tick.dt_ns)
+/// A wrench that is not finite becomes none.
+#[inline]
+fn guard(request: &Wrench, events: &mut Events) -> Wrench {
+    if request.is_finite() {
+        return *request;
     }
+    events.insert(Events::NOT_FINITE);
+    Wrench::ZERO
 }
 
-/// True if no part of a wrench is larger than `most` of its axis, nor NaN.
-#[inline(always)]
-fn is_within(wrench: &Wrench, most: &Wrench) -> bool {
-    are_within(wrench.force_n, most.force_n) & are_within(wrench.torque_nm, most.torque_nm)
-}
-
-/// True if no part of a twist is larger than `most` of its axis, nor NaN.
-#[inline(always)]
-fn is_not_faster(twist: &Twist, most: &Twist) -> bool {
-    are_within(twist.linear_m_per_s, most.linear_m_per_s)
-        & are_within(twist.angular_rad_per_s, most.angular_rad_per_s)
-}
-
-/// Compares all axes side by side: nearly always none of them is beyond, and no branch would end it sooner.
-#[inline(always)]
-fn are_within([x, y, z]: [f64; 3], [most_x, most_y, most_z]: [f64; 3]) -> bool {
-    (x.abs() <= most_x) & (y.abs() <= most_y) & (z.abs() <= most_z)
-}
-
-/// The change in so many ns at rates per s.
-#[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
-fn most_change(slew_per_s: [f64; 2], dt_ns: u64) -> [f64; 2] {
-    let dt_s = dt_ns as f64 * 1.0e-9;
-    slew_per_s.map(|per_s| per_s * dt_s)
+/// True if no part of a vector is larger than `most` of its axis, nor NaN.
+#[inline]
+fn is_within(vector: DVec3, most: DVec3) -> bool {
+    vector.abs().cmple(most).all()
 }
 
 /// A force without the part along the velocity that adds to it, which fades from all at an excess of 1 to nothing at 2.
@@ -273,18 +213,12 @@ fn shrink_into_box(vector: DVec3, half_sides: DVec3) -> DVec3 {
     if excess <= 1.0 { vector } else { (vector / excess).clamp(-half_sides, half_sides) }
 }
 
-/// True if `to` is no farther than `most` from `from`.
-#[inline(always)]
-fn is_step_within(from: DVec3, to: DVec3, most: f64) -> bool {
-    (to - from).length_squared() <= most * most
-}
-
 /// The point `most` from `from` on the way to `to`; `None` if `to` is no farther than that.
 fn step_short_of(from: DVec3, to: DVec3, most: f64) -> Option<DVec3> {
-    if is_step_within(from, to, most) {
+    let way = to - from;
+    if way.length_squared() <= most * most {
         return None;
     }
-    let way = to - from;
     Some(from + way * (most / way.length()))
 }
 
@@ -360,77 +294,6 @@ mod tests {
                 "{sent:?} {last:?}"
             );
             last = sent;
-        }
-    }
-
-    /// Whatever passes at once would pass all stages unchanged, and none would tell anything: at every limit, and for what
-    /// is no number.
-    #[test]
-    fn the_short_way_is_the_long_way() {
-        let boundless = Capabilities {
-            max_force_n: [f64::INFINITY; 3],
-            max_torque_nm: [f64::INFINITY; 3],
-            max_force_slew_n_per_s: f64::INFINITY,
-            max_torque_slew_nm_per_s: f64::INFINITY,
-            ..DEVICE
-        };
-        let limits = Limits { velocity_m_per_s: [1.0, 0.5, 1.0], ..Limits::default() };
-        let no_limits = Limits {
-            force_n: [f64::INFINITY; 3],
-            torque_nm: [f64::INFINITY; 3],
-            force_slew_n_per_s: f64::INFINITY,
-            torque_slew_nm_per_s: f64::INFINITY,
-            ..Limits::default()
-        };
-        let shares = [0.0, -0.0, 0.02, -0.04, 0.3, -0.6, 1.0, -1.0, 1.0 + f64::EPSILON, 1.0e300];
-        let nonsense = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
-        for (limits, device) in [(limits, DEVICE), (no_limits, boundless)] {
-            let mut envelope = Envelope::new(&limits, &Boundary::default(), &device, PERIOD_NS);
-            let mut random: u64 = 1; // Knuth's MMIX, as above
-            let (mut short, mut long) = (0, 0);
-            for index in 0..50_000 {
-                let mut bits = || {
-                    random = random
-                        .wrapping_mul(6_364_136_223_846_793_005)
-                        .wrapping_add(1_442_695_040_888_963_407);
-                    (random >> 33) as usize
-                };
-                // Some ticks have a few numbers that are large, or none at all.
-                let is_wild = bits() % 4 == 0;
-                let mut three = |scale: f64| {
-                    [(); 3].map(|()| match (is_wild, bits() % 40) {
-                        (true, 0) => nonsense[bits() % nonsense.len()],
-                        (true, 1..5) => scale * shares[bits() % shares.len()],
-                        _ => scale * shares[bits() % 4],
-                    })
-                };
-                let request = Wrench { force_n: three(20.0), torque_nm: three(2.0) };
-                let position_m = three(0.0115);
-                let [x, y, z] = three(0.055);
-                let state = DeviceState {
-                    pose: Pose { position_m, orientation_xyzw: [x, y, z, 1.0] },
-                    twist: flotor_hal::Twist { linear_m_per_s: three(1.0), angular_rad_per_s: three(5.0) },
-                    ..DeviceState::HOME
-                };
-                let gate = Gate { models: [1.0, 0.5, 0.0][index % 3], boundary: 1.0 };
-                let (tick, mut events) = (tick(1), Events::NONE);
-                let passed = envelope.within_limits(&request, gate, &state, &tick);
-                let all = envelope.through_all_stages(request, gate, &state, &tick, &mut events);
-                if let Some(passed) = passed {
-                    let bits =
-                        |wrench: Wrench| [wrench.force_n, wrench.torque_nm].map(|v| v.map(f64::to_bits));
-                    assert_eq!(bits(passed), bits(all), "{request:?} {state:?}");
-                    assert_eq!(events, Events::NONE, "{request:?} {state:?}");
-                    short += 1;
-                } else {
-                    long += 1;
-                }
-                // Else a wild wrench would be followed for many ticks.
-                if !is_wild {
-                    envelope.last = all;
-                }
-            }
-            assert!(short > 1000 && long > 1000, "{short} {long}");
         }
     }
 

@@ -9,7 +9,7 @@ use flotor_hal::Tick;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 /// A layer that is no longer needed, and the number of its model.
-pub(crate) type Retired = (u32, Box<Layer>);
+pub type Retired = (u32, Box<Layer>);
 
 /// The loop's end.
 pub struct Exchange {
@@ -40,18 +40,11 @@ pub fn exchange(models: usize, mut schedule: Vec<(u64, Replacement)>) -> (Exchan
 }
 
 impl Exchange {
-    /// True if a replacement is due at this tick. Real-time: bounded, no allocation.
-    #[inline]
-    pub fn is_due(&self, tick: &Tick) -> bool {
-        let scheduled = self.schedule.get(self.next).is_some_and(|(time_ns, _)| *time_ns <= tick.time_ns);
-        scheduled || !self.arriving.is_empty()
-    }
-
-    /// Hands back what has faded out and puts in what is due; `told` hears of model and generation.
+    /// Hands back what has faded out and puts in what is due; `report` hears of model and generation.
     ///
     /// Real-time: bounded by the models and what is scheduled, no allocation.
     #[inline]
-    pub fn apply_due(&mut self, tick: &Tick, models: &mut Forces, mut told: impl FnMut(u32, u16)) {
+    pub fn apply_due(&mut self, tick: &Tick, models: &mut Forces, mut report: impl FnMut(u32, u16)) {
         while !self.retired.is_full()
             && let Some(faded) = models.take_faded(tick)
         {
@@ -65,7 +58,7 @@ impl Exchange {
             if let Some(pushed_out) = models.replace(replacement, tick) {
                 let _ = self.retired.push((model, pushed_out)); // there is room
             }
-            told(model, generation);
+            report(model, generation);
         }
     }
 

@@ -9,7 +9,7 @@ use crate::coupling::{
 };
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{DeviceState, Tick, Wrench, instructions};
+use flotor_hal::{DeviceState, Tick, Wrench};
 
 /// What passes through the port of one device in a tick, device frame.
 #[derive(Clone, Copy, Debug)]
@@ -19,7 +19,7 @@ pub struct Port {
     /// The wrench that is held since the last tick.
     pub commanded: Wrench,
     /// What models and couplings ask for.
-    pub asked: Wrench,
+    pub requested: Wrench,
     /// Of this, what the models alone ask for.
     by_models: Wrench,
     /// Energy stored in models and couplings, J.
@@ -33,7 +33,7 @@ impl Port {
     pub const REST: Port = Port {
         state: DeviceState::HOME,
         commanded: Wrench::ZERO,
-        asked: Wrench::ZERO,
+        requested: Wrench::ZERO,
         by_models: Wrench::ZERO,
         energy_j: 0.0,
         events: Events::NONE,
@@ -49,7 +49,7 @@ impl Port {
     /// Adds what a coupling asks for.
     #[inline]
     fn add(&mut self, pull: &Pull) {
-        self.asked = self.asked + pull.wrench;
+        self.requested = self.requested + pull.wrench;
         self.energy_j += pull.energy_j;
         if pull.is_damped {
             self.events.insert(Events::PASSIVITY_DAMPED);
@@ -158,16 +158,6 @@ impl Coupled {
     }
 }
 
-#[inline(never)] // out of the way of the many scenes without couplings, as `add_all`
-fn step_all(couplings: &mut [Coupled], tick: &Tick, ports: &[Port]) {
-    couplings.iter_mut().for_each(|coupled| coupled.step(tick, ports));
-}
-
-#[inline(never)]
-fn add_all(couplings: &[Coupled], ports: &mut [Port]) {
-    couplings.iter().for_each(|coupled| coupled.add_to(ports));
-}
-
 /// Which device a model is on, and which of the models there it is.
 #[derive(Clone, Copy, Debug)]
 struct Whereabouts {
@@ -181,8 +171,6 @@ pub struct Forces {
     stacks: Box<[ModelStack]>,
     /// By number of the model in the scene.
     models: Box<[Whereabouts]>,
-    /// Layers that may still be fading out.
-    leaving: usize,
     couplings: Box<[Coupled]>,
 }
 
@@ -200,35 +188,20 @@ impl Forces {
         Self {
             stacks: on_device.into_iter().map(ModelStack::new).collect(),
             models: models.into(),
-            leaving: 0,
             couplings: couplings.into(),
         }
     }
 
     /// What all of them ask for at the states of the ports, one for each device. Real-time: bounded by the models that
     /// are near, no allocation.
-    #[inline(never)] // registers of its own: in the tick as a whole there are none left
     pub fn step(&mut self, tick: &Tick, ports: &mut [Port], heart: &Heartbeat) {
-        instructions::best(
-            #[inline(always)]
-            || self.ask(tick, ports, heart),
-        );
-    }
-
-    #[inline(always)] // into what chooses the instructions
-    fn ask(&mut self, tick: &Tick, ports: &mut [Port], heart: &Heartbeat) {
-        let Self { stacks, couplings, .. } = self;
         // The couplings first: what is held now is what they and the models asked for last.
-        if !couplings.is_empty() {
-            step_all(couplings, tick, ports);
-        }
-        for (stack, port) in stacks.iter_mut().zip(&mut *ports) {
+        self.couplings.iter_mut().for_each(|coupled| coupled.step(tick, ports));
+        for (stack, port) in self.stacks.iter_mut().zip(&mut *ports) {
             let (wrench, energy_j) = stack.step(tick, &port.state, heart, &mut port.events);
-            (port.asked, port.by_models, port.energy_j) = (wrench, wrench, energy_j);
+            (port.requested, port.by_models, port.energy_j) = (wrench, wrench, energy_j);
         }
-        if !couplings.is_empty() {
-            add_all(couplings, ports);
-        }
+        self.couplings.iter().for_each(|coupled| coupled.add_to(ports));
     }
 
     /// The models a model's number stands for, and its place among them.
@@ -266,29 +239,16 @@ impl Forces {
     /// Real-time: bounded by the objects of the model, no allocation.
     pub fn replace(&mut self, replacement: Replacement, tick: &Tick) -> Option<Box<Layer>> {
         let Replacement { model, generation, layer } = replacement;
-        let pushed_out = match self.stack_of(model as usize) {
+        match self.stack_of(model as usize) {
             Some((stack, place)) => stack.replace(place, layer, generation, tick),
             None => Some(layer),
-        };
-        self.leaving += usize::from(pushed_out.is_none());
-        pushed_out
-    }
-
-    /// True if a layer may be fading out. Real-time: bounded, no allocation.
-    #[inline]
-    pub fn is_fading(&self) -> bool {
-        self.leaving > 0
+        }
     }
 
     /// A layer that has faded out, and the number of its model. Real-time: bounded by the models, no allocation.
     #[inline]
     pub fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {
-        if !self.is_fading() {
-            return None;
-        }
-        let faded = self.stacks.iter_mut().find_map(|stack| stack.take_faded(tick));
-        self.leaving -= usize::from(faded.is_some());
-        faded
+        self.stacks.iter_mut().find_map(|stack| stack.take_faded(tick))
     }
 
     /// What is known of every layer that is in place or fading out. Not real-time.

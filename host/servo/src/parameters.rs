@@ -31,7 +31,7 @@ pub struct ParameterChange {
 }
 
 /// Words of a [`ParameterChange`].
-pub(crate) const CHANGE_WORDS: usize = 2;
+pub const CHANGE_WORDS: usize = 2;
 
 impl Words<CHANGE_WORDS> for ParameterChange {
     #[inline]
@@ -76,7 +76,7 @@ fn outcome(status: CallStatus) -> ChangeOutcome {
 }
 
 /// Words of a [`ChangeReport`].
-pub(crate) const REPORT_WORDS: usize = 5;
+pub const REPORT_WORDS: usize = 5;
 
 impl Words<REPORT_WORDS> for ChangeReport {
     #[inline]
@@ -139,12 +139,6 @@ impl ParameterQueue {
     #[inline]
     pub fn waiting(&mut self) -> usize {
         self.sent.waiting()
-    }
-
-    /// True if a scheduled change is due at this tick. Real-time: bounded, no allocation.
-    #[inline]
-    pub fn is_due(&self, tick: &Tick) -> bool {
-        self.schedule.get(self.next).is_some_and(|due| due.time_ns <= tick.time_ns)
     }
 
     /// Reports that a plugin was replaced. Real-time: bounded, no allocation.

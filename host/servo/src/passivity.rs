@@ -29,15 +29,9 @@ impl Passivity {
 
     /// Books what has crossed the port since the last sample, while `held` was applied. Real-time: bounded, no
     /// allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn observe(&mut self, state: &DeviceState, held: &Wrench) {
         self.energy_j += self.observer.gone_in_j(&state.pose, held);
-    }
-
-    /// True if [`Self::guard`] never takes anything away. Real-time: bounded, no allocation.
-    #[inline]
-    pub(super) fn only_observes(&self) -> bool {
-        self.mode == PassivityMode::Observe
     }
 
     /// Energy the hand has put into the port so far less what has come out, J. Real-time: bounded, no allocation.

@@ -28,7 +28,7 @@ impl PortObserver {
     /// Energy that has gone in since the last sample, while `held` was applied, J; negative: it came out.
     ///
     /// Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub fn gone_in_j(&mut self, pose: &Pose, held: &Wrench) -> f64 {
         let now = (pose.position(), pose.orientation());
         let Some((position_m, orientation)) = self.last.replace(now) else { return 0.0 };
@@ -137,7 +137,6 @@ impl Side {
 
 /// Rotation vector of a rotation from one sample to the next, rad. The series of the arc sine up to its third power is
 /// exact to 1e-6 of the angle up to a tenth of a radian, which is 100 rad/s at 1 kHz; there is no arc tangent to wait for.
-#[inline(always)]
 fn small_rotation(rotation: DQuat) -> DVec3 {
     let sine = rotation.xyz();
     // q and -q are one rotation: the smaller one is that with w above zero.

@@ -16,7 +16,7 @@ use crate::{
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::ActiveDevice;
-use flotor_hal::{Fault, Tick, instructions};
+use flotor_hal::{Fault, Tick};
 
 /// What the run itself is told, beside device, models and envelope.
 #[derive(Clone, Copy, Debug)]
@@ -44,15 +44,6 @@ pub struct Servo {
     run: RunState,
     timing: Timing,
     stopwatch: Stopwatch,
-    /// When the last tick ended, if nothing else has happened since.
-    ended: Option<Moment>,
-}
-
-/// What is known after a tick, beside the ports.
-struct Done {
-    /// Of the run, not of a device.
-    events: Events,
-    compute_ns: u64,
 }
 
 impl Servo {
@@ -76,7 +67,6 @@ impl Servo {
             run: RunState::START,
             timing: Timing::default(),
             stopwatch: Stopwatch::new(),
-            ended: None,
         }
     }
 
@@ -85,22 +75,21 @@ impl Servo {
     #[inline]
     #[cfg_attr(rtsan, sanitize(realtime = "nonblocking"))]
     pub fn tick(&mut self, due: &Due, stop: &StopSwitch, leave: impl FnMut(&TickRecord)) {
-        instructions::best(
-            #[inline(always)]
-            || {
-                let done = self.advance(due, stop);
-                self.leave_records(due, done, leave);
-            },
-        );
+        let (events, compute_ns) = self.advance(due, stop);
+        self.leave_records(due, events, compute_ns, leave);
     }
 
     /// A record of the tick for each device.
-    #[inline(always)] // as `advance`
-    fn leave_records(&self, due: &Due, done: Done, mut leave: impl FnMut(&TickRecord)) {
-        let Done { events, compute_ns } = done;
+    fn leave_records(
+        &self,
+        due: &Due,
+        run_events: Events,
+        compute_ns: u64,
+        mut leave: impl FnMut(&TickRecord),
+    ) {
         for (device, (station, port)) in (0..).zip(self.stations.iter().zip(&self.ports)) {
-            let Port { state, asked, commanded, energy_j, .. } = port;
-            let mut events = events;
+            let Port { state, requested, commanded, energy_j, .. } = port;
+            let mut events = run_events;
             events.insert(port.events);
             leave(&TickRecord {
                 tick: due.tick.index,
@@ -109,7 +98,7 @@ impl Servo {
                 dt_ns: due.tick.dt_ns,
                 pose: state.pose,
                 twist: state.twist,
-                model: *asked,
+                model: *requested,
                 commanded: *commanded,
                 delivered: state.delivered,
                 energy_j: *energy_j,
@@ -122,15 +111,14 @@ impl Servo {
         }
     }
 
-    /// All of a tick but its records.
-    #[inline(always)] // into what chooses the instructions
-    fn advance(&mut self, due: &Due, stop: &StopSwitch) -> Done {
+    /// All of a tick but its records; what happened in the run, and how long it took, ns.
+    fn advance(&mut self, due: &Due, stop: &StopSwitch) -> (Events, u64) {
         let Due { tick, lateness_ns, missed, .. } = due;
-        let started = self.ended.take().unwrap_or_else(|| self.stopwatch.now());
+        let started = self.stopwatch.now();
         let mut watch = StageWatch::start(tick.index, started);
         let mut events = if *missed > 0 { Events::MISSED } else { Events::NONE };
 
-        self.change_parameters(tick, &mut events);
+        self.apply_changes(tick, &mut events);
         let (sample, buttons) = self.read(tick);
         self.follow(sample, buttons, tick, stop, &mut events);
         watch.lap(&self.stopwatch, &mut self.timing, Stage::Read);
@@ -148,19 +136,16 @@ impl Servo {
         self.heart.enter(tick.index, Place::Waiting);
         watch.lap(&self.stopwatch, &mut self.timing, Stage::Write);
 
-        let ended = self.stopwatch.now();
-        // Between two ticks on the machine's clock there is a wait.
-        self.ended = lateness_ns.is_none().then_some(ended);
-        let compute_ns = self.stopwatch.between_ns(started, ended);
+        let compute_ns = self.stopwatch.between_ns(started, self.stopwatch.now());
         self.account(*lateness_ns, compute_ns, *missed);
-        Done { events, compute_ns }
+        (events, compute_ns)
     }
 
     /// Lets the force fade out from this tick on: the run will be over when it has. Real-time: bounded, no allocation.
     pub fn release(&mut self, tick: &Tick) {
         // Where there is no force the run just ends.
         if self.run != RunState::Holding {
-            self.happen(RunEvent::StopAsked, tick);
+            self.change_state(RunEvent::StopAsked, tick);
         }
     }
 
@@ -169,28 +154,13 @@ impl Servo {
         self.config.ramp_ns
     }
 
-    /// Something else than a tick has happened since the last one. Between two ticks on the virtual clock there is nothing
-    /// but the record of the first: one look at the stopwatch ends the one and begins the other.
-    #[inline]
-    pub fn pause(&mut self) {
-        self.ended = None;
-    }
-
-    /// What was to change before this tick does so now. Nearly always that is nothing.
-    #[inline(always)] // as `advance`
-    fn change_parameters(&mut self, tick: &Tick, events: &mut Events) {
-        let Self { forces, parameters, exchange, .. } = self;
-        // Looked at before the replacements: whoever sent one of these after a replacement has sent that too.
-        let waiting = parameters.waiting();
-        if waiting > 0 || parameters.is_due(tick) || exchange.is_due(tick) || forces.is_fading() {
-            self.apply_changes(tick, waiting, events);
-        }
-    }
-
-    #[inline(never)] // out of the way of the many ticks without
-    fn apply_changes(&mut self, tick: &Tick, waiting: usize, events: &mut Events) {
+    /// What was to change before this tick does so now.
+    #[inline(never)] // its instructions are counted: tests/tick_cost.rs
+    fn apply_changes(&mut self, tick: &Tick, events: &mut Events) {
         let Self { stations, forces, parameters, exchange, .. } = self;
         let devices = stations.len();
+        // Looked at before the replacements: whoever sent one of these after a replacement has sent that too.
+        let waiting = parameters.waiting();
         let mut replaced = false;
         exchange.apply_due(tick, forces, |model, generation| {
             replaced = true;
@@ -218,7 +188,6 @@ impl Servo {
 
     /// Newest samples of all devices; what the worst of them means for the run (the hand is not to be trusted to feel
     /// one device while another is lost), and the buttons of all.
-    #[inline(always)] // as `advance`
     fn read(&mut self, tick: &Tick) -> (RunEvent, u32) {
         let (mut worst, mut buttons) = (RunEvent::SamplesBack, 0);
         for (device, (station, port)) in (0..).zip(self.stations.iter_mut().zip(&mut self.ports)) {
@@ -226,7 +195,7 @@ impl Servo {
             port.events = Events::NONE;
             let sample = station.read(tick, port);
             buttons |= port.state.buttons;
-            if sample != RunEvent::SamplesBack && badness(sample) > badness(worst) {
+            if severity(sample) > severity(worst) {
                 worst = sample;
             }
         }
@@ -234,7 +203,6 @@ impl Servo {
     }
 
     /// Sends what is to be sent to all devices.
-    #[inline(always)] // as `advance`
     fn write(&mut self, tick: &Tick) {
         let Self { stations, ports, heart, run, config, .. } = self;
         for (device, (station, port)) in (0..).zip(stations.iter_mut().zip(ports)) {
@@ -246,7 +214,6 @@ impl Servo {
     }
 
     /// Takes the run where the samples, the clock and everybody who may stop it lead.
-    #[inline(always)] // as `advance`
     fn follow(
         &mut self,
         sample: RunEvent,
@@ -256,32 +223,28 @@ impl Servo {
         events: &mut Events,
     ) {
         if tick.dt_ns > self.config.held_up_ns {
-            self.happen(RunEvent::SamplesLost, tick);
+            self.change_state(RunEvent::SamplesLost, tick);
         }
-        // An active run with a sample goes on as it is.
-        if (self.run, sample) != (RunState::Active, RunEvent::SamplesBack) {
-            self.happen(RunEvent::Time, tick);
-            self.happen(sample, tick);
-        }
+        self.change_state(RunEvent::Time, tick);
+        self.change_state(sample, tick);
         if stop.is_stop_asked() {
-            self.happen(RunEvent::StopAsked, tick);
+            self.change_state(RunEvent::StopAsked, tick);
         }
         if self.heart.bitten().is_some() {
-            self.happen(RunEvent::Failed(Cause::Watchdog), tick);
+            self.change_state(RunEvent::Failed(Cause::Watchdog), tick);
         }
         let pressed = buttons & self.config.emergency_buttons != 0;
         if let Some(source) = stop.emergency().or(pressed.then_some(EmergencySource::Button)) {
-            self.happen(RunEvent::Emergency(source), tick);
+            self.change_state(RunEvent::Emergency(source), tick);
         }
         events.insert(self.run.events());
     }
 
-    #[inline]
-    fn happen(&mut self, event: RunEvent, tick: &Tick) {
+    /// Moves the run to its state after an event.
+    fn change_state(&mut self, event: RunEvent, tick: &Tick) {
         self.run = self.run.after(event, tick.time_ns, self.config.ramp_ns);
     }
 
-    #[inline(always)] // as `advance`
     fn account(&mut self, lateness_ns: Option<u64>, compute_ns: u64, missed: u64) {
         self.timing.compute.record(compute_ns);
         self.timing.ticks += 1;
@@ -320,8 +283,7 @@ impl Servo {
 }
 
 /// Which of two devices' samples decides: the higher.
-#[inline]
-const fn badness(sample: RunEvent) -> u8 {
+const fn severity(sample: RunEvent) -> u8 {
     match sample {
         RunEvent::Failed(_) => 3,
         RunEvent::SamplesLost => 2,
@@ -336,12 +298,10 @@ struct StageWatch {
 }
 
 impl StageWatch {
-    #[inline]
     fn start(tick: u64, now: Moment) -> Self {
         Self { last: tick.is_multiple_of(STAGE_SAMPLING).then_some(now) }
     }
 
-    #[inline]
     fn lap(&mut self, stopwatch: &Stopwatch, timing: &mut Timing, stage: Stage) {
         if let Some(last) = self.last {
             let now = stopwatch.now();

@@ -128,12 +128,9 @@ impl RunState {
     pub const START: RunState = RunState::Ramping { since_ns: 0 };
 
     /// The state after an event at a time. Real-time: bounded, no allocation.
-    #[inline(never)] // out of the way of the many ticks in which nothing happens
     #[must_use]
     pub fn after(self, event: RunEvent, now_ns: u64, ramp_ns: u64) -> Self {
         match (self, event) {
-            (Self::Active, RunEvent::Time) => self,
-
             (Self::Stopped | Self::EmergencyStopped(_), _) => self,
             (_, RunEvent::Emergency(source)) => Self::EmergencyStopped(source),
             (Self::Faulted(_), _) => self,

@@ -127,7 +127,6 @@ impl WholeTick {
     #[inline(never)] // where a counter of instructions cuts
     fn batch(&mut self) {
         let Self { servo, schedule, stop, sender, .. } = self;
-        servo.pause();
         for _ in 0..BATCH {
             let Ok(due) = schedule.wait(|_| SampleWait::NotPaced) else { return };
             servo.tick(&due, stop, |record| {

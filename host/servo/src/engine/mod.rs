@@ -35,7 +35,6 @@ pub enum Stepped {
 impl Engine {
     /// One step; `output` is only meaningful for [`Stepped::Answered`]. Real-time: bounded by the model or its patience, no
     /// allocation.
-    #[inline(always)]
     pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
         let answered = |status| match status {
             CallStatus::Ok => Stepped::Answered,
@@ -56,7 +55,6 @@ impl Engine {
     }
 
     /// True if a step may come back without an answer and have one in a later tick.
-    #[inline]
     pub fn may_be_late(&self) -> bool {
         !matches!(self, Self::Here(_))
     }

@@ -34,18 +34,9 @@ impl EndWall {
 
     /// Its push in the device frame on a handle at a pose in the model's frame that moves so in the device's; `None` within
     /// reach. Real-time: bounded, no allocation.
-    #[inline(always)] // as `Layer::step`
     pub(super) fn push(&self, pose: &Pose, mapping: &Mapping, twist: &Twist) -> Option<Wrench> {
-        if self.reach.beyond(pose.position()) == DVec3::ZERO {
-            return None;
-        }
-        self.push_back(pose, mapping, twist)
-    }
-
-    #[cold]
-    fn push_back(&self, pose: &Pose, mapping: &Mapping, twist: &Twist) -> Option<Wrench> {
         let beyond_m = self.reach.beyond(pose.position());
-        if !beyond_m.is_finite() {
+        if beyond_m == DVec3::ZERO || !beyond_m.is_finite() {
             return None;
         }
         let beyond_m = mapping.vector_to_device(beyond_m);

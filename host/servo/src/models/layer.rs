@@ -8,8 +8,7 @@ use flotor_core::mapping::{Blend, Mapping};
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
-    ActivityShape, DVec3, Demand, DeviceState, Input, LoopConfig, Memory, Output, Pose, StepStatus, Tick,
-    Twist, Wrench,
+    ActivityShape, DVec3, Demand, DeviceState, Input, LoopConfig, Memory, Output, StepStatus, Tick, Wrench,
 };
 
 /// How a plugin in place of a model has behaved so far, in all its places.
@@ -73,7 +72,7 @@ pub(super) struct Share {
 }
 
 impl Share {
-    /// Nothing. A constant: what `Default` derives for arrays goes through memory, and the tick waits for it.
+    /// Nothing.
     pub(super) const NONE: Share = Share { wrench: Wrench::ZERO, energy_j: 0.0 };
 
     /// This part of it. Real-time: bounded, no allocation.
@@ -89,21 +88,12 @@ impl Share {
     }
 }
 
-/// What a model finds where it is to write its answer.
-const NO_ANSWER: Output = Output::new(Wrench::ZERO, 0.0, StepStatus::Ok);
-
-/// How all instances of a model are asked.
-#[derive(Clone, Copy)]
-struct Terms {
-    demand: Demand,
-    memory: Memory,
-}
-
 /// A model in all its places.
 pub struct Layer {
     objects: Box<[Object]>,
     broad: BroadPhase,
-    terms: Terms,
+    demand: Demand,
+    memory: Memory,
     budget: TimeBudget,
     /// What it asked for last: it fades if the model took too long too often.
     last: Share,
@@ -148,7 +138,8 @@ impl Layer {
         Self {
             objects,
             broad: BroadPhase::new(bounds),
-            terms: Terms { demand, memory },
+            demand,
+            memory,
             budget,
             last: Share::NONE,
             blend: *blend,
@@ -171,7 +162,7 @@ impl Layer {
     /// what it asked for last fades.
     ///
     /// Real-time: bounded by the objects that are near, no allocation.
-    #[inline(always)] // so that the share goes on in registers, not as bytes just written
+    #[inline]
     pub(super) fn step(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
         match self.budget.allowed(tick.time_ns) {
             Allowed::Asked => {
@@ -198,34 +189,29 @@ impl Layer {
     }
 
     /// Asks all objects that can act where the handle is; the others are not called.
-    #[inline(always)] // as `step`
+    #[inline]
     fn ask(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
-        let Self { objects, broad, terms, health, .. } = self;
+        let Self { objects, broad, demand, memory, health, .. } = self;
         let mut share = Share::NONE;
-        broad.for_each_near(
-            objects,
-            &state.pose.position_m,
-            #[inline(always)] // as `step`
-            |object| {
-                let input = object.mapping.input(tick, state, terms.demand);
-                let mut output = NO_ANSWER;
-                if !object.answer(&input, terms.memory, &mut output, health, events) {
-                    events.insert(Events::MODEL_FAULT);
-                    return;
-                }
-                share.wrench = share.wrench + object.mapping.wrench_to_device(&output.wrench);
-                if let Some(push) = object.push_of_end(&input.pose, &state.twist) {
-                    events.insert(Events::BOUNDARY);
-                    share.wrench = share.wrench + push;
-                }
-                if output.energy_j.is_finite() {
-                    share.energy_j += output.energy_j * object.mapping.energy_scale();
-                }
-                if output.status() != Some(StepStatus::Ok) {
-                    events.insert(Events::MODEL_DEGRADED);
-                }
-            },
-        );
+        broad.for_each_near(objects, state.pose.position(), |object| {
+            let input = object.mapping.input(tick, state, *demand);
+            let Some(output) = object.answer(&input, *memory, health, events) else {
+                events.insert(Events::MODEL_FAULT);
+                return;
+            };
+            share.wrench = share.wrench + object.mapping.wrench_to_device(&output.wrench);
+            let end = object.end.as_ref();
+            if let Some(push) = end.and_then(|end| end.push(&input.pose, &object.mapping, &state.twist)) {
+                events.insert(Events::BOUNDARY);
+                share.wrench = share.wrench + push;
+            }
+            if output.energy_j.is_finite() {
+                share.energy_j += output.energy_j * object.mapping.energy_scale();
+            }
+            if output.status() != Some(StepStatus::Ok) {
+                events.insert(Events::MODEL_DEGRADED);
+            }
+        });
         share
     }
 
@@ -286,19 +272,17 @@ impl Object {
         Some(Bounds::about(self.mapping.position_to_device(region.center()), half_sides_m))
     }
 
-    /// Asks the model; true if `output` is an answer that can be used, in the model's own frame. What is wrong with one
-    /// that cannot is booked in the health.
-    #[inline(always)] // the one call of it in a tick
+    /// Asks the model: its answer in its own frame, if there is one that can be used. What is wrong with one that cannot is
+    /// booked in the health.
     fn answer(
         &mut self,
         input: &Input,
         memory: Memory,
-        output: &mut Output,
         health: &mut ModelHealth,
         events: &mut Events,
-    ) -> bool {
+    ) -> Option<Output> {
         if self.is_out {
-            return false;
+            return None;
         }
         // Where it was not stepped it has no history: it starts anew.
         let was_asleep = self.stepped_at.is_some_and(|last| last + 1 != input.tick);
@@ -306,58 +290,37 @@ impl Object {
             return self.fail(input.tick, health);
         }
         self.stepped_at = Some(input.tick);
-        let stepped = self.model.step(input, output);
-        if stepped == Stepped::Answered && output.wrench.is_finite() && output.status().is_some() {
-            if self.model.may_be_late() {
-                self.last = Some(*output);
+        let mut output = Output::new(Wrench::ZERO, 0.0, StepStatus::Ok);
+        match self.model.step(input, &mut output) {
+            Stepped::Answered if output.wrench.is_finite() && output.status().is_some() => {
+                if self.model.may_be_late() {
+                    self.last = Some(output);
+                }
+                Some(output)
             }
-            return true;
-        }
-        self.go_without(stepped, input.tick, output, health, events)
-    }
-
-    /// The push of the wall where the model ends on a handle at a pose in its frame, if it is beyond.
-    #[inline(always)] // as `answer`
-    fn push_of_end(&self, pose: &Pose, twist: &Twist) -> Option<Wrench> {
-        self.end.as_ref()?.push(pose, &self.mapping, twist)
-    }
-
-    /// There is no answer that can be used; true if the one before may stand in for it.
-    #[cold]
-    fn go_without(
-        &mut self,
-        stepped: Stepped,
-        tick: u64,
-        output: &mut Output,
-        health: &mut ModelHealth,
-        events: &mut Events,
-    ) -> bool {
-        match stepped {
             Stepped::Answered => {
                 self.last = None;
-                health.reject(tick);
-                false
+                health.reject(input.tick);
+                None
             }
             // One tick may pass with the answer before; a second one in a row finds none.
             Stepped::Late => {
                 events.insert(Events::MODEL_OVERRUN);
-                health.late(tick);
-                let last = self.last.take();
-                *output = last.unwrap_or_default();
-                last.is_some()
+                health.late(input.tick);
+                self.last.take()
             }
-            Stepped::Broken => self.fail(tick, health),
+            Stepped::Broken => self.fail(input.tick, health),
             Stepped::Gone => {
                 self.is_out = true;
-                health.lost_at.get_or_insert(tick);
-                false
+                health.lost_at.get_or_insert(input.tick);
+                None
             }
         }
     }
 
-    fn fail(&mut self, tick: u64, health: &mut ModelHealth) -> bool {
+    fn fail(&mut self, tick: u64, health: &mut ModelHealth) -> Option<Output> {
         self.is_out = true;
         health.panicked_at.get_or_insert(tick);
-        false
+        None
     }
 }

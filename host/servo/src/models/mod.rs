@@ -72,7 +72,7 @@ impl ModelStack {
     /// What the models together ask for at a state of the device, in the device frame, and the energy they store, J.
     ///
     /// Real-time: bounded by the models that are near, no allocation.
-    #[inline(always)] // as `Layer::step`
+    #[inline]
     pub(crate) fn step(
         &mut self,
         tick: &Tick,
@@ -83,27 +83,22 @@ impl ModelStack {
         let Self { slots, broad, levels, .. } = self;
         levels.iter_mut().for_each(|level| level.pushes = false);
         let mut sum = Share::NONE;
-        broad.for_each_near(
-            slots,
-            &state.pose.position_m,
-            #[inline(always)] // as `Layer::step`
-            |slot| {
-                let level = levels.iter_mut().find(|level| level.priority == slot.priority);
-                let is_silenced = level.as_ref().is_some_and(|level| level.gain.is_silent(tick.time_ns));
-                if is_silenced || slot.weight.is_silent(tick.time_ns) {
-                    return;
-                }
-                heart.enter(tick.index, Place::Model(slot.number));
-                let share = slot.step(tick, state, events);
-                let mut weight = slot.weight.at(tick.time_ns);
-                if let Some(level) = level {
-                    level.pushes |= weight > 0.0 && share.wrench != Wrench::ZERO;
-                    weight *= level.gain.at(tick.time_ns);
-                }
-                sum.wrench = sum.wrench + share.wrench * weight;
-                sum.energy_j += share.energy_j * weight;
-            },
-        );
+        broad.for_each_near(slots, state.pose.position(), |slot| {
+            let level = levels.iter_mut().find(|level| level.priority == slot.priority);
+            let is_silenced = level.as_ref().is_some_and(|level| level.gain.is_silent(tick.time_ns));
+            if is_silenced || slot.weight.is_silent(tick.time_ns) {
+                return;
+            }
+            heart.enter(tick.index, Place::Model(slot.number));
+            let share = slot.step(tick, state, events);
+            let mut weight = slot.weight.at(tick.time_ns);
+            if let Some(level) = level {
+                level.pushes |= weight > 0.0 && share.wrench != Wrench::ZERO;
+                weight *= level.gain.at(tick.time_ns);
+            }
+            sum.wrench = sum.wrench + share.wrench * weight;
+            sum.energy_j += share.energy_j * weight;
+        });
         heart.enter(tick.index, Place::Host);
         let mut is_silenced = false;
         for level in levels.iter_mut().rev() {

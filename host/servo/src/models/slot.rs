@@ -77,7 +77,7 @@ impl Slot {
     /// The layer that has faded out, if there is one. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn take_faded(&mut self, tick: &Tick) -> Option<Box<Layer>> {
-        if self.presence.at(tick.time_ns) < 1.0 {
+        if self.leaving.is_none() || self.presence.at(tick.time_ns) < 1.0 {
             return None;
         }
         (self.rest, self.gap) = (None, None);
@@ -96,19 +96,11 @@ impl Slot {
     }
 
     /// What it asks for at a state of the device. Real-time: bounded by the objects that are near, no allocation.
-    #[inline(always)] // as `Layer::step`
+    #[inline]
     pub(super) fn step(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
-        if self.leaving.is_some() {
-            return self.mixed(tick, state, events);
-        }
-        self.current.step(tick, state, events)
-    }
-
-    /// The current layer's share mixed with that of the one that leaves. Real-time: as [`Self::step`].
-    #[inline(never)] // out of the way of the many ticks in which nobody leaves
-    fn mixed(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
         let share = self.current.step(tick, state, events);
         let Some(leaving) = &mut self.leaving else { return share };
+        // The current layer mixed with the one that leaves.
         let presence = self.presence.at(tick.time_ns);
         let mut before = leaving.step(tick, state, events);
         if let Some(rest) = self.rest {

@@ -358,7 +358,6 @@ impl Session {
                 observer.observe(&record);
             }
             controls.sweep();
-            runner.servo().pause();
         }
         Ok(Finished::of(runner, 0, RealTimeReport::not_asked()))
     }

@@ -55,7 +55,6 @@ impl Steps {
     /// How the run ended, if it did; then there was no tick.
     pub fn advance(&mut self, observer: &mut dyn Observer) -> Result<(), RunEnd> {
         let Self { runner, changes, stop, .. } = self;
-        runner.servo().pause();
         runner.advance(stop, |record| {
             changes.up_to(record.tick, |change| observer.change(change));
             observer.observe(record);
