@@ -16,6 +16,8 @@ use std::path::Path;
 enum Role {
     Contract,
     Plugin,
+    /// The other end of a device's link, without hardware.
+    Emulator,
     Sync,
     Record,
     /// What host and watchers say to each other.
@@ -44,6 +46,7 @@ impl Role {
             "viewer" => Self::Viewer,
             "tests" => Self::Tests,
             _ if folder.starts_with("tests/fixtures/") => Self::Fixture,
+            _ if folder.starts_with("devices/") && folder.ends_with("/emulator") => Self::Emulator,
             _ if folder.starts_with("devices/") || folder.starts_with("models/") => Self::Plugin,
             _ => return None,
         })
@@ -55,6 +58,7 @@ impl Role {
             Self::Contract | Self::Sync | Self::Statistics => &[],
             Self::Study => &[Self::Statistics],
             Self::Plugin | Self::Fixture => &[Self::Contract],
+            Self::Emulator => &[Self::Contract, Self::Plugin],
             // The plugins only as paths, so that one `cargo run` builds them; no line of the host names them.
             Self::Host => &[
                 Self::Contract,
@@ -76,6 +80,7 @@ impl Role {
                 Self::Statistics,
                 Self::Study,
                 Self::Plugin,
+                Self::Emulator,
                 Self::Host,
                 Self::Viewer,
                 Self::Fixture,
@@ -136,6 +141,10 @@ fn wrong_dependencies(members: &[Member]) -> Vec<String> {
                     member.name, member.role, used.name, used.role
                 ));
             }
+            let is_foreign = used.role == Role::Plugin && member.name != format!("{}-emulator", used.name);
+            if member.role == Role::Emulator && is_foreign {
+                complaints.push(format!("{} uses {}, which it does not emulate", member.name, used.name));
+            }
             let loads = used.features.iter().any(|feature| feature == "loader");
             let is_plugin = matches!(member.role, Role::Plugin | Role::Fixture);
             if is_plugin && used.kind == DependencyKind::Normal && loads {
@@ -176,6 +185,9 @@ fn a_plugin_that_uses_the_host_is_noticed() {
     assert_eq!(wrong_dependencies(&plugin(vec![used("flotor-hal", Role::Contract, &["loader"])])).len(), 1);
     assert_eq!(wrong_dependencies(&plugin(vec![used("flotor", Role::Host, &[])])).len(), 1);
     assert_eq!(wrong_dependencies(&plugin(vec![used("flotor-spring", Role::Plugin, &[])])).len(), 1);
+    let emulator = |uses| [Member { name: "flotor-wall-emulator".to_owned(), role: Role::Emulator, uses }];
+    assert_eq!(wrong_dependencies(&emulator(vec![used("flotor-wall", Role::Plugin, &[])])).len(), 0);
+    assert_eq!(wrong_dependencies(&emulator(vec![used("flotor-spring", Role::Plugin, &[])])).len(), 1);
 }
 
 // ---------------------------------------------------------------- code, as tokens
