@@ -4,10 +4,11 @@
 //! Each rule is a function from facts to complaints, so that it is tested twice: on the workspace, where it
 //! must find nothing, and on a made-up offence, which it must find.
 
-use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
+use cargo_metadata::{Metadata, MetadataCommand};
 use flotor_tests::{files_under, workspace_root};
 use proc_macro2::{TokenStream, TokenTree};
 use std::path::Path;
+use std::process::Command;
 
 // ---------------------------------------------------------------- dependencies point one way
 
@@ -16,6 +17,8 @@ use std::path::Path;
 enum Role {
     Contract,
     Plugin,
+    /// The other end of a device's link, without hardware.
+    Emulator,
     Sync,
     Record,
     /// What host and watchers say to each other.
@@ -44,6 +47,7 @@ impl Role {
             "viewer" => Self::Viewer,
             "tests" => Self::Tests,
             _ if folder.starts_with("tests/fixtures/") => Self::Fixture,
+            _ if folder.starts_with("devices/") && folder.ends_with("/emulator") => Self::Emulator,
             _ if folder.starts_with("devices/") || folder.starts_with("models/") => Self::Plugin,
             _ => return None,
         })
@@ -55,6 +59,7 @@ impl Role {
             Self::Contract | Self::Sync | Self::Statistics => &[],
             Self::Study => &[Self::Statistics],
             Self::Plugin | Self::Fixture => &[Self::Contract],
+            Self::Emulator => &[Self::Contract, Self::Plugin],
             // The plugins only as paths, so that one `cargo run` builds them; no line of the host names them.
             Self::Host => &[
                 Self::Contract,
@@ -76,6 +81,7 @@ impl Role {
                 Self::Statistics,
                 Self::Study,
                 Self::Plugin,
+                Self::Emulator,
                 Self::Host,
                 Self::Viewer,
                 Self::Fixture,
@@ -95,8 +101,6 @@ struct Member {
 struct Use {
     name: String,
     role: Role,
-    kind: DependencyKind,
-    features: Vec<String>,
 }
 
 fn workspace_members(metadata: &Metadata) -> Vec<Member> {
@@ -113,19 +117,14 @@ fn workspace_members(metadata: &Metadata) -> Vec<Member> {
         let own_folder = package.manifest_path.as_std_path().parent().unwrap_or(Path::new(""));
         let uses = package.dependencies.iter().filter_map(|dependency| {
             let folder = dependency.path.as_ref()?.as_std_path();
-            Some(Use {
-                name: dependency.name.clone(),
-                role: role(&dependency.name, folder),
-                kind: dependency.kind,
-                features: dependency.features.clone(),
-            })
+            Some(Use { name: dependency.name.clone(), role: role(&dependency.name, folder) })
         });
         Member { name: package.name.to_string(), role: role(&package.name, own_folder), uses: uses.collect() }
     };
     metadata.workspace_packages().into_iter().map(member).collect()
 }
 
-/// Dependencies that point the wrong way, and plugins that would carry the loader.
+/// Dependencies that point the wrong way.
 fn wrong_dependencies(members: &[Member]) -> Vec<String> {
     let mut complaints = Vec::new();
     for member in members {
@@ -136,10 +135,9 @@ fn wrong_dependencies(members: &[Member]) -> Vec<String> {
                     member.name, member.role, used.name, used.role
                 ));
             }
-            let loads = used.features.iter().any(|feature| feature == "loader");
-            let is_plugin = matches!(member.role, Role::Plugin | Role::Fixture);
-            if is_plugin && used.kind == DependencyKind::Normal && loads {
-                complaints.push(format!("{} pulls the loader; it belongs to hosts and tests", member.name));
+            let is_foreign = used.role == Role::Plugin && member.name != format!("{}-emulator", used.name);
+            if member.role == Role::Emulator && is_foreign {
+                complaints.push(format!("{} uses {}, which it does not emulate", member.name, used.name));
             }
         }
     }
@@ -165,17 +163,61 @@ fn dependencies_point_one_way() {
 
 #[test]
 fn a_plugin_that_uses_the_host_is_noticed() {
-    let used = |name: &str, role, features: &[&str]| Use {
-        name: name.to_owned(),
-        role,
-        kind: DependencyKind::Normal,
-        features: features.iter().map(ToString::to_string).collect(),
+    let complaints = |user: &str, user_role, used: &str, role| {
+        let uses = vec![Use { name: used.to_owned(), role }];
+        wrong_dependencies(&[Member { name: user.to_owned(), role: user_role, uses }]).len()
     };
-    let plugin = |uses| [Member { name: "flotor-wall".to_owned(), role: Role::Plugin, uses }];
-    assert_eq!(wrong_dependencies(&plugin(vec![used("flotor-hal", Role::Contract, &[])])).len(), 0);
-    assert_eq!(wrong_dependencies(&plugin(vec![used("flotor-hal", Role::Contract, &["loader"])])).len(), 1);
-    assert_eq!(wrong_dependencies(&plugin(vec![used("flotor", Role::Host, &[])])).len(), 1);
-    assert_eq!(wrong_dependencies(&plugin(vec![used("flotor-spring", Role::Plugin, &[])])).len(), 1);
+    assert_eq!(complaints("flotor-wall", Role::Plugin, "flotor-hal", Role::Contract), 0);
+    assert_eq!(complaints("flotor-wall", Role::Plugin, "flotor", Role::Host), 1);
+    assert_eq!(complaints("flotor-wall", Role::Plugin, "flotor-spring", Role::Plugin), 1);
+    assert_eq!(complaints("flotor-wall", Role::Plugin, "flotor-wall-emulator", Role::Emulator), 1);
+    assert_eq!(complaints("flotor-wall-emulator", Role::Emulator, "flotor-wall", Role::Plugin), 0);
+    assert_eq!(complaints("flotor-wall-emulator", Role::Emulator, "flotor-spring", Role::Plugin), 1);
+}
+
+/// Crates a plugin is made of that belong to hosts and programs, and the contract with its loader. The lines are those of
+/// [`made_of`].
+fn carried_by_mistake(plugin: &str, made_of: &str) -> Vec<String> {
+    let is_wrong = |line: &&str| {
+        let (name, features) = line.split_once(' ').unwrap_or((line, ""));
+        name == "clap" || name == "flotor_hal" && features.split(',').any(|feature| feature == "loader")
+    };
+    made_of.lines().filter(is_wrong).map(|line| format!("{plugin} carries {line}")).collect()
+}
+
+/// What cargo builds this crate of when nothing else is built: a line a crate, its name and its features. `cargo metadata`
+/// merges the features of the whole workspace.
+fn made_of(name: &str) -> String {
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args("tree --offline --edges normal --prefix none -p".split(' '));
+    cargo.args([name, "--format", "{lib} {f}"]).current_dir(workspace_root());
+    let output = cargo.output().expect("cargo starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("names are text")
+}
+
+#[test]
+fn plugins_carry_neither_loader_nor_command_line() {
+    let plugins = workspace_members(&metadata()).into_iter();
+    for plugin in plugins.filter(|member| matches!(member.role, Role::Plugin | Role::Fixture)) {
+        let made_of = made_of(&plugin.name);
+        assert!(made_of.lines().any(|line| line.starts_with("flotor_hal ")), "{made_of}");
+        assert_eq!(carried_by_mistake(&plugin.name, &made_of), Vec::<String>::new());
+    }
+}
+
+#[test]
+fn a_plugin_that_carries_the_loader_is_noticed() {
+    let carried = |made_of| carried_by_mistake("flotor-wall", made_of).len();
+    assert_eq!(carried("flotor_wall default\nflotor_hal default,instructions\nglam f64,std"), 0);
+    assert_eq!(carried("flotor_wall default\nflotor_hal default,loader\nglam f64,std"), 1);
+    assert_eq!(carried("flotor_wall default\nflotor_hal \nclap std"), 1);
+    // With features by default, as cargo resolves them: an emulator has every right to both.
+    let emulator = carried_by_mistake("flotor-maglev-emulator", &made_of("flotor-maglev-emulator"));
+    assert!(
+        ["clap", "flotor_hal"].iter().all(|name| emulator.iter().any(|line| line.contains(name))),
+        "{emulator:?}"
+    );
 }
 
 // ---------------------------------------------------------------- code, as tokens

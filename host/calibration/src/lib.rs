@@ -18,7 +18,6 @@
 //!
 //! Not real-time, but for the thread that holds the handle in the rig.
 
-mod emulated_sensor;
 pub mod fit;
 mod least_squares;
 pub mod picture;
@@ -93,9 +92,6 @@ pub enum CalibrationError {
     /// The force sensor does not say how large the force is.
     #[error("the force sensor faulted: {}", .0.advice())]
     Sensor(Fault),
-    /// There is no pseudo terminal for the sensor of the simulated rig.
-    #[error("the simulated force sensor needs a pseudo terminal: {0}")]
-    NoTerminal(std::io::Error),
     /// The readings do not determine a curve.
     #[error("{readings} readings at {heights} heights and {forces} forces are too few: {needed}")]
     TooFew {

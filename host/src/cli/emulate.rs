@@ -37,7 +37,7 @@ pub(crate) fn run(arguments: &EmulateArguments) -> Result<(), CommandError> {
     if !is_id {
         return Err(CommandError::Usage(format!("`{device}` is no id of a device")));
     }
-    let (program, build) =
-        (format!("flotor-{device}-emulator"), format!("cargo build --release -p flotor-{device}"));
+    let program = format!("flotor-{device}-emulator");
+    let build = format!("cargo build --release -p {program}");
     Companion { program: &program, built: Built::WithThis, build: &build }.become_with(arguments)
 }

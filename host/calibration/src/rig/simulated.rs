@@ -2,8 +2,6 @@
 
 use super::{AVERAGED_TICKS, Mean, PERIOD_NS, Rest, Rig, locked};
 use crate::CalibrationError;
-use crate::emulated_sensor::EmulatedSensor;
-use crate::sensor::ForceSensor;
 use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting};
 use flotor_hal::{Cycle, DeviceState, LoopConfig, Refusal, Tick, VerticalCalibration};
 use rand_core::{Rng, SeedableRng};
@@ -28,13 +26,9 @@ const REST_M: f64 = 4.0e-6;
 const ADJUSTMENTS: u32 = 3;
 const CLOSE_M: f64 = 2.0e-6;
 
-/// The simulated flotor under a simulated sensor. Its uneven field is reached as on any device: through the
-/// contract; its sensor as any sensor: over a serial line.
+/// The simulated flotor under a simulated sensor. Its uneven field is reached as on any device: through the contract.
 pub struct SimulatedRig {
     plugin: Plugin,
-    sensor_plugin: Plugin,
-    /// What the handle presses against, and the line it is read by; there from the first reading on.
-    sensor: Option<(EmulatedSensor, ForceSensor)>,
     calibration: Option<VerticalCalibration>,
     noise: Pcg64Mcg,
     seed: u64,
@@ -43,11 +37,10 @@ pub struct SimulatedRig {
 }
 
 impl SimulatedRig {
-    /// A rig around the plugin `simulated`, read by that of sensors on a serial line.
+    /// A rig around the plugin `simulated`.
     #[must_use]
-    pub fn new(plugin: Plugin, sensor_plugin: Plugin, seed: u64) -> Self {
-        let noise = Pcg64Mcg::seed_from_u64(seed);
-        Self { plugin, sensor_plugin, sensor: None, calibration: None, noise, seed, rests: 0 }
+    pub fn new(plugin: Plugin, seed: u64) -> Self {
+        Self { plugin, calibration: None, noise: Pcg64Mcg::seed_from_u64(seed), seed, rests: 0 }
     }
 
     /// What the device corrects its force by from now on.
@@ -145,16 +138,6 @@ impl Rig for SimulatedRig {
         let true_n = rest.delivered_n - RIG_WEIGHT_N;
         // Box and Muller 1958; 1 - u is never zero.
         let [u, v] = [(); 2].map(|()| (self.noise.next_u64() >> 11) as f64 / (1_u64 << 53) as f64);
-        let noisy_n = true_n + SENSOR_NOISE_N * (-2.0 * (1.0 - u).ln()).sqrt() * (TAU * v).cos();
-        let (pressed, line) = match &mut self.sensor {
-            Some(sensor) => sensor,
-            none => {
-                let emulated = EmulatedSensor::start().map_err(CalibrationError::NoTerminal)?;
-                let line = ForceSensor::open(&self.sensor_plugin, emulated.port())?;
-                none.insert((emulated, line))
-            }
-        };
-        pressed.press(noisy_n);
-        line.read_n()
+        Ok(true_n + SENSOR_NOISE_N * (-2.0 * (1.0 - u).ln()).sqrt() * (TAU * v).cos())
     }
 }

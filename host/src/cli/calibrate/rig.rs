@@ -63,9 +63,7 @@ impl RigArguments {
 
     pub(super) fn simulated_rig(&self) -> Result<SimulatedRig, CommandError> {
         let registry = Registry::search(&self.folders);
-        let plugin = registry.load(SIMULATED, PluginKind::Device)?;
-        let sensor_plugin = registry.load(SERIAL_SENSOR, PluginKind::Device)?;
-        Ok(SimulatedRig::new(plugin, sensor_plugin, self.seed))
+        Ok(SimulatedRig::new(registry.load(SIMULATED, PluginKind::Device)?, self.seed))
     }
 
     /// The device and its sensor, and a bar over so many stops that says where the sensor has to go.

@@ -1,7 +1,7 @@
 //! The device on its bus without a kernel: what a host controller would send, by hand.
 
 use super::{Gadget, Personality};
-use crate::transport::{Incoming, LinkLost};
+use flotor_maglev::transport::{Incoming, LinkLost};
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
@@ -144,7 +144,7 @@ fn a_serial_port_is_used_while_dtr_is_set() {
     let (mut host, gadget) = Host::with(Personality::Serial);
     assert_eq!(host.control([0x21, 0x22, 3, 0, 0, 0, 0, 0]).0, 0);
     let mut link = gadget.wait_for_host(SOON).unwrap();
-    let (coded, length) = crate::protocol::stream::coded(&[5; 64]);
+    let (coded, length) = flotor_maglev::protocol::stream::coded(&[5; 64]);
     host.submit(1, u32::try_from(length).unwrap(), [0; 8], &coded[..length]);
     host.answer(false);
     assert_eq!(link.wait(SOON), Ok(Incoming::Packet([5; 64])));

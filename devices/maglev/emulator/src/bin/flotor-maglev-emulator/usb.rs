@@ -2,8 +2,8 @@
 
 use super::{Arguments, say, tell};
 use crate::plant::LoadedPlant;
-use flotor_maglev::emulator::Emulator;
-use flotor_maglev::gadget::{Gadget, Personality};
+use flotor_maglev_emulator::Emulator;
+use flotor_maglev_emulator::gadget::{Gadget, Personality};
 use std::error::Error;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;

@@ -1,10 +1,10 @@
 //! The state machine.
 
 use super::limits::{LimitConfig, Load};
-use crate::protocol::{
+use flotor_hal::{DVec3, Pose, Twist, Wrench};
+use flotor_maglev::protocol::{
     Answer, AnswerFrame, Condition, Description, Intake, Mode, Rejection, Request, RequestFrame, Status,
 };
-use flotor_hal::{DVec3, Pose, Twist, Wrench};
 
 /// What a controller is made of.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,9 +2,9 @@
 
 use super::bus::{Attachment, Bus};
 use super::personality::Personality;
-use crate::protocol::FRAME_BYTES;
-use crate::transport::stream::StreamLink;
-use crate::transport::{Incoming, LinkLost, Transport};
+use flotor_maglev::protocol::FRAME_BYTES;
+use flotor_maglev::transport::stream::StreamLink;
+use flotor_maglev::transport::{Incoming, LinkLost, Transport};
 use std::io::{self, ErrorKind, Read, Write};
 use std::sync::Arc;
 use std::time::Duration;

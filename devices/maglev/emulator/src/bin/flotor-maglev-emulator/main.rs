@@ -2,18 +2,17 @@
 //! over the simulated flotor. `flotor emulate maglev` starts it.
 
 mod plant;
-#[cfg(feature = "serial")]
 mod rig;
 #[cfg(target_os = "linux")]
 mod usb;
 
 use clap::{Parser, ValueEnum};
 use flotor_hal::abi::loader::Setting;
-use flotor_maglev::emulator::{Emulator, Event, Pace, controller_config};
-#[cfg(target_os = "linux")]
-use flotor_maglev::gadget::Personality;
 use flotor_maglev::transport::stream::StreamLink;
 use flotor_maglev::transport::tcp::prepared;
+#[cfg(target_os = "linux")]
+use flotor_maglev_emulator::gadget::Personality;
+use flotor_maglev_emulator::{Emulator, Event, Pace, controller_config};
 use plant::LoadedPlant;
 use std::error::Error;
 use std::io::Write;
@@ -118,16 +117,23 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let parse = |key: &str, value: &str| {
         Setting::parse(plugin.parameters(), key, value).map_err(|error| error.to_string())
     };
-    let mut settings = rig_settings(arguments)?
-        .iter()
-        .map(|(key, value)| parse(key, value))
-        .collect::<Result<Vec<_>, String>>()?;
+    let mut settings = Vec::new();
+    if let Some(link) = &arguments.calibration_rig {
+        for (key, value) in rig::settings(link, arguments.rig_step_mm, arguments.rig_stop_s)? {
+            settings.push(parse(key, &value)?);
+        }
+    }
     for text in &arguments.sets {
         let (key, value) = text.split_once('=').ok_or_else(|| format!("--set {text} is not KEY=VALUE"))?;
         settings.push(parse(key.trim(), value.trim())?);
     }
     let (mut plant, capabilities) = LoadedPlant::open(plugin, settings, arguments.seed)?;
-    sense_force(&mut plant, arguments)?;
+    if let Some(link) = &arguments.calibration_rig {
+        let force = rig::SensedForce::default();
+        let port = rig::serve(link, force.clone())?;
+        plant.sense(force)?;
+        say(&format!("force-sensor {}", port.display()));
+    }
     let config = controller_config(&capabilities, pace, &arguments.serial);
     let mut emulator = Emulator::new(config, pace, plant);
     match arguments.transport {
@@ -143,42 +149,6 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         TransportOption::Cdc => usb::serve(&mut emulator, arguments, Personality::Serial),
     }
 }
-
-#[cfg(feature = "serial")]
-fn rig_settings(arguments: &Arguments) -> Result<Vec<(&'static str, String)>, Box<dyn Error>> {
-    match &arguments.calibration_rig {
-        Some(link) => rig::settings(link, arguments.rig_step_mm, arguments.rig_stop_s),
-        None => Ok(Vec::new()),
-    }
-}
-
-#[cfg(feature = "serial")]
-fn sense_force(plant: &mut LoadedPlant, arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    if let Some(link) = &arguments.calibration_rig {
-        let force = rig::SensedForce::default();
-        let port = rig::serve(link, force.clone())?;
-        plant.sense(force)?;
-        say(&format!("force-sensor {}", port.display()));
-    }
-    Ok(())
-}
-
-#[cfg(not(feature = "serial"))]
-fn rig_settings(arguments: &Arguments) -> Result<Vec<(&'static str, String)>, Box<dyn Error>> {
-    match arguments.calibration_rig {
-        Some(_) => Err(WITHOUT_TERMINALS.into()),
-        None => Ok(Vec::new()),
-    }
-}
-
-#[cfg(not(feature = "serial"))]
-fn sense_force(_: &mut LoadedPlant, _: &Arguments) -> Result<(), Box<dyn Error>> {
-    Ok(())
-}
-
-#[cfg(not(feature = "serial"))]
-const WITHOUT_TERMINALS: &str =
-    "this program was built without pseudo terminals; build it with --features serial";
 
 fn step_mm(text: &str) -> Result<f64, String> {
     within(text, 0.1, 7.0, "mm")
@@ -198,7 +168,6 @@ fn within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> 
 }
 
 /// A symbolic link by this name. Only a link is replaced, never somebody's file.
-#[cfg_attr(not(feature = "serial"), allow(dead_code))]
 fn link_to(target: &Path, link: &Path) -> Result<(), Box<dyn Error>> {
     if link.is_symlink() {
         std::fs::remove_file(link)?;
@@ -222,7 +191,6 @@ fn serve_tcp(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Res
     }
 }
 
-#[cfg(feature = "serial")]
 fn serve_pty(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     use serialport::{SerialPort, TTYPort};
     use std::time::Duration;
@@ -249,11 +217,6 @@ fn serve_pty(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Res
             return Ok(());
         }
     }
-}
-
-#[cfg(not(feature = "serial"))]
-fn serve_pty(_: &mut Emulator<LoadedPlant>, _: &Arguments) -> Result<(), Box<dyn Error>> {
-    Err(WITHOUT_TERMINALS.into())
 }
 
 /// One line an event, at once: somebody may be waiting for it.

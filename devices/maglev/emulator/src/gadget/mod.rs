@@ -24,8 +24,8 @@ mod tests;
 
 pub use personality::Personality;
 
-use crate::transport::Transport;
 use bus::Bus;
+use flotor_maglev::transport::Transport;
 use std::io;
 use std::net::Shutdown;
 use std::os::unix::net::UnixStream;

@@ -3,16 +3,12 @@
 //! The plant is whatever gives samples and takes wrenches; the program `flotor-maglev-emulator` loads the simulated
 //! flotor for it through the plugin contract. Authors of other plugins can use this module as it is: a link, a
 //! plant, and [`Emulator::serve`].
-//!
-//! **Two paces.** In *real time* a cycle runs each period of the machine's clock, whatever the host does, as on
-//! hardware. In *lockstep* a cycle runs for each command, so that a host on a virtual clock gets the same run every
-//! time, bit for bit.
 
 use crate::controller::{Controller, ControllerConfig, LimitConfig, Reply, Sample};
-use crate::protocol::description::serial_bytes;
-use crate::protocol::{Condition, Description, Mode, Rejections};
-use crate::transport::{Incoming, LinkLost, Transport};
 use flotor_hal::{Capabilities, Wrench};
+use flotor_maglev::protocol::description::serial_bytes;
+use flotor_maglev::protocol::{Condition, Description, Mode, Rejections};
+use flotor_maglev::transport::{Incoming, LinkLost, Transport};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -28,9 +24,10 @@ pub trait Plant {
 /// Who says when a cycle runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// The machine's clock.
+    /// The machine's clock: a cycle each period, whatever the host does, as on hardware.
     RealTime,
-    /// The host's commands.
+    /// The host's commands: a cycle for each, so that a host on a virtual clock gets the same run every time, bit for
+    /// bit.
     Lockstep,
 }
 

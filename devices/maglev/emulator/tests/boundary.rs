@@ -5,10 +5,10 @@
 
 use flotor_hal::{Axes, Capabilities, DQuat, DVec3, DeviceState, Pose, Twist, Wrench};
 use flotor_maglev::boundary::Walls;
-use flotor_maglev::controller::{Controller, Sample};
-use flotor_maglev::emulator::{Pace, controller_config};
 use flotor_maglev::facts;
 use flotor_maglev::protocol::{Condition, Mode, Request, RequestFrame};
+use flotor_maglev_emulator::controller::{Controller, Sample};
+use flotor_maglev_emulator::{Pace, controller_config};
 
 const PERIOD_US: u64 = 1000;
 const PERIOD_S: f64 = 1.0e-3;

@@ -10,11 +10,11 @@ use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Plugin, Setting};
 use flotor_hal::{
     Axes, Capabilities, Cycle, DVec3, DeviceState, Fault, LoopConfig, Pose, Tick, Twist, Wrench,
 };
-use flotor_maglev::controller::Sample;
-use flotor_maglev::emulator::{Emulator, Event, Pace, Plant, controller_config};
-use flotor_maglev::gadget::{Gadget, Personality};
 use flotor_maglev::protocol::{Answer, AnswerFrame, Condition, Mode, Request, RequestFrame};
 use flotor_maglev::transport::{self, Incoming, Kind, LinkLost, OpenError, Transport};
+use flotor_maglev_emulator::controller::Sample;
+use flotor_maglev_emulator::gadget::{Gadget, Personality};
+use flotor_maglev_emulator::{Emulator, Event, Pace, Plant, controller_config};
 use rustix::process::{Pid, Signal, kill_process};
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, Stdio};

@@ -3,8 +3,8 @@
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting, read_metadata};
 use flotor_hal::{Capabilities, Cycle, DeviceState, Fault, LoopConfig, Tick, Wrench};
-use flotor_maglev::controller::Sample;
-use flotor_maglev::emulator::Plant;
+use flotor_maglev_emulator::Plant;
+use flotor_maglev_emulator::controller::Sample;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
@@ -47,7 +47,6 @@ pub(crate) struct LoadedPlant {
     time_ns: u64,
     state: DeviceState,
     /// What carries and weighs the moving part, N, and who feels the rest; nothing without a force sensor.
-    #[cfg(feature = "serial")]
     sensor: Option<(f64, crate::rig::SensedForce)>,
 }
 
@@ -66,7 +65,6 @@ impl LoadedPlant {
             tick: 0,
             time_ns: 0,
             state: DeviceState::HOME,
-            #[cfg(feature = "serial")]
             sensor: None,
         };
         plant.device = Some(plant.activate()?);
@@ -74,7 +72,6 @@ impl LoadedPlant {
     }
 
     /// Presses on a force sensor from now on: with what is delivered beyond the weight, as at rest.
-    #[cfg(feature = "serial")]
     pub(crate) fn sense(&mut self, force: crate::rig::SensedForce) -> Result<(), Box<dyn Error>> {
         let mut opened = self.plugin.open_device(&self.settings)?;
         let mut number = |id: &str| {
@@ -103,7 +100,6 @@ impl Plant for LoadedPlant {
         self.time_ns += dt_ns;
         let tick = Tick { index: self.tick, time_ns: self.time_ns, dt_ns };
         let read = device.read(&tick, &mut self.state);
-        #[cfg(feature = "serial")]
         if let Some((carried_n, force)) = &self.sensor {
             force.press(self.state.delivered.force().z + carried_n);
         }

@@ -1,6 +1,6 @@
 //! What the device claims to be: descriptors (USB 2.0, chapter 9; HID 1.11; CDC PSTN 1.2).
 
-use crate::protocol::FRAME_BYTES;
+use flotor_maglev::protocol::FRAME_BYTES;
 
 /// Vendor of all of them: pid.codes, whose first sixteen products are reserved for tests.
 pub const VENDOR: u16 = 0x1209;

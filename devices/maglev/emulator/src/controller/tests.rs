@@ -2,9 +2,9 @@
 #![allow(clippy::cast_possible_truncation)] // random bytes
 
 use super::{Controller, ControllerConfig, LimitConfig, Reply, Sample};
-use crate::emulator::{Pace, controller_config};
-use crate::protocol::{Condition, Mode, Request, RequestFrame};
+use crate::{Pace, controller_config};
 use flotor_hal::{Axes, Capabilities, DQuat, DVec3, Pose, Twist, Wrench};
+use flotor_maglev::protocol::{Condition, Mode, Request, RequestFrame};
 
 const CYCLE_US: u64 = 1000;
 const WATCHDOG_US: u32 = 8000;
