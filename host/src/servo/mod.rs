@@ -3,7 +3,7 @@
 //! A scene may have several devices: each has models and an envelope of its own, all share tick and state of the run.
 //!
 //! Nothing in a tick allocates, locks, formats or waits on another thread. What a tick leaves behind is a
-//! [`TickRecord`]; whoever watches gets it through a ring, off the loop.
+//! [`TickRecord`]; whoever watches gets it through a queue, off the loop.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
@@ -17,6 +17,7 @@ mod forces;
 mod models;
 mod parameters;
 mod passivity;
+mod queue;
 mod realtime;
 mod state;
 mod station;
@@ -40,6 +41,7 @@ pub(crate) use parameters::{
     ChangeReport, ChangeSender, PLUGIN, ParameterChange, ParameterQueue, ReportReceiver, ScheduledChange,
     WEIGHT,
 };
+pub(crate) use queue::{drain, queue};
 pub use realtime::{Core, Privilege, RealTimeReport};
 pub(crate) use realtime::{enter_real_time, enter_worker_priority, probe_real_time};
 pub use state::{Cause, EmergencySource, Gate, RunEvent, RunState};

@@ -17,9 +17,9 @@ use crate::scene::{MOST_DEVICES, Scene, SceneError};
 use crate::servo::{
     Cause, Clock, Core, Coupled, CouplingOutcome, EmergencySource, Envelope, Forces, Heartbeat, ModelHealth,
     PaceLost, ParameterQueue, Place, RealTimeReport, RunConfig, RunState, Schedule, Servo, SpinWindow,
-    StopSwitch, Stuck, Timing, enter_real_time, exchange, start_watchdog,
+    StopSwitch, Stuck, Timing, drain, enter_real_time, exchange, queue, start_watchdog,
 };
-use crate::trace::{RECORD_WORDS, TickRecord};
+use crate::trace::TickRecord;
 use controls::{ChangeLog, Parts};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, Stopper};
@@ -405,7 +405,7 @@ impl Session {
 
     /// The loop on a thread of its own; this one lets the observers look.
     fn run_real(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Finished, RunError> {
-        let (mut sender, mut receiver) = flotor_sync::ring::<TickRecord, RECORD_WORDS>(RING_RECORDS);
+        let (mut sender, mut receiver) = queue(RING_RECORDS);
         let Session {
             standby,
             controls,
@@ -446,22 +446,21 @@ impl Session {
             if watchdog.is_err() {
                 runner.end = Some(RunEnd::Stopped);
             }
+            // A full queue drops records and counts them: observers never hold up the loop.
+            let mut dropped_records = 0;
             while runner.end.is_none() {
-                runner.next(&loop_stop, |record| {
-                    // A full ring is counted by the ring itself: observers never hold up the loop.
-                    let _ = sender.push(record);
-                });
+                runner.next(&loop_stop, |record| dropped_records += u64::from(sender.push(*record).is_err()));
             }
             // Here, whatever the thread that looks on is at, and while the watchdog still watches.
             stoppers.iter().for_each(Stopper::safe_stop);
             runner.servo.heart().finish();
             watchdog.map_err(|_| RunError::Thread("got no watchdog"))?;
-            Ok::<_, RunError>(runner.finish(0, real_time))
+            Ok::<_, RunError>(runner.finish(dropped_records, real_time))
         });
         let servo_thread = servo_thread.map_err(|_| RunError::Thread("could not be started"))?;
         let mut bitten = None;
         while !servo_thread.is_finished() {
-            receiver.drain(&mut look);
+            drain(&mut receiver, &mut look);
             controls.sweep();
             bitten = bitten.or_else(|| heart.bitten().map(|stuck| (stuck, Instant::now())));
             if let Some((stuck, since)) = bitten
@@ -472,8 +471,8 @@ impl Session {
             std::thread::sleep(OBSERVER_PERIOD);
         }
         let finished = servo_thread.join().map_err(|_| RunError::Thread("panicked"))??;
-        receiver.drain(&mut look);
-        Ok(Finished { dropped_records: receiver.dropped(), ..finished })
+        drain(&mut receiver, &mut look);
+        Ok(finished)
     }
 }
 
