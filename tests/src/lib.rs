@@ -7,6 +7,7 @@ pub mod library;
 pub mod program;
 pub mod scratch;
 pub mod tables;
+pub mod tools;
 pub mod watched;
 
 use flotor::record::Recording;
