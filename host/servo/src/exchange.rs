@@ -9,7 +9,7 @@ use flotor_hal::Tick;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 /// A layer that is no longer needed, and the number of its model.
-pub type Retired = (u32, Box<Layer>);
+pub(crate) type Retired = (u32, Box<Layer>);
 
 /// The loop's end.
 pub struct Exchange {

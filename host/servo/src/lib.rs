@@ -19,6 +19,7 @@ mod models;
 mod parameters;
 mod passivity;
 pub mod port_energy;
+mod queue;
 mod realtime;
 mod run;
 mod servo;
@@ -45,6 +46,7 @@ pub use parameters::{
     ChangeReport, ChangeSender, PLUGIN, ParameterChange, ParameterQueue, ReportReceiver, ScheduledChange,
     WEIGHT,
 };
+pub use queue::{drain, queue};
 pub use realtime::{Core, Privilege, RealTimeReport};
 pub use realtime::{enter_real_time, enter_worker_priority, probe_real_time};
 pub use run::{Loop, RunEnd};

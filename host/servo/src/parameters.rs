@@ -4,10 +4,11 @@
 //! Changes that were sent together are applied together. For each one a report goes out, ahead of the record of
 //! its tick; nothing is ever applied that could not be reported, so a recording holds every change.
 
+use super::queue::queue;
 use flotor_core::ChangeOutcome;
 use flotor_hal::Tick;
 use flotor_hal::abi::CallStatus;
-use flotor_sync::{Receiver, Sender, Words, inbox, ring};
+use rtrb::{Consumer, Producer};
 
 /// Changes other threads may have waiting at a time.
 const WAITING_CHANGES: usize = 256;
@@ -28,28 +29,6 @@ pub struct ParameterChange {
     pub parameter: u32,
     /// The value; for a choice, its index.
     pub value: f64,
-}
-
-/// Words of a [`ParameterChange`].
-pub const CHANGE_WORDS: usize = 2;
-
-impl Words<CHANGE_WORDS> for ParameterChange {
-    #[inline]
-    fn to_words(&self) -> [u64; CHANGE_WORDS] {
-        let plugin = u64::from(self.plugin) | u64::from(self.generation) << 16;
-        [plugin | u64::from(self.parameter) << 32, self.value.to_bits()]
-    }
-
-    #[inline]
-    #[allow(clippy::cast_possible_truncation)] // parts of one word
-    fn from_words(&[place, value]: &[u64; CHANGE_WORDS]) -> Self {
-        Self {
-            plugin: place as u16,
-            generation: (place >> 16) as u16,
-            parameter: (place >> 32) as u32,
-            value: f64::from_bits(value),
-        }
-    }
 }
 
 /// What became of a change.
@@ -75,27 +54,6 @@ fn outcome(status: CallStatus) -> ChangeOutcome {
     }
 }
 
-/// Words of a [`ChangeReport`].
-pub const REPORT_WORDS: usize = 5;
-
-impl Words<REPORT_WORDS> for ChangeReport {
-    #[inline]
-    fn to_words(&self) -> [u64; REPORT_WORDS] {
-        let [place, value] = self.change.to_words();
-        [self.tick, self.time_ns, place, value, self.outcome as u64]
-    }
-
-    #[inline]
-    fn from_words(&[tick, time_ns, place, value, outcome]: &[u64; REPORT_WORDS]) -> Self {
-        let outcome = match outcome {
-            0 => ChangeOutcome::Applied,
-            1 => ChangeOutcome::Refused,
-            _ => ChangeOutcome::Broke,
-        };
-        Self { tick, time_ns, change: ParameterChange::from_words(&[place, value]), outcome }
-    }
-}
-
 /// A change at a time that was known beforehand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScheduledChange {
@@ -106,9 +64,9 @@ pub struct ScheduledChange {
 }
 
 /// Where changes are sent in.
-pub type ChangeSender = flotor_sync::InboxSender<ParameterChange, CHANGE_WORDS>;
+pub type ChangeSender = Producer<ParameterChange>;
 /// Where reports come out.
-pub type ReportReceiver = Receiver<ChangeReport, REPORT_WORDS>;
+pub type ReportReceiver = Consumer<ChangeReport>;
 
 /// The loop's end of it.
 pub struct ParameterQueue {
@@ -116,8 +74,8 @@ pub struct ParameterQueue {
     schedule: Box<[ScheduledChange]>,
     /// The next of the schedule.
     next: usize,
-    sent: Receiver<ParameterChange, CHANGE_WORDS>,
-    reports: Sender<ChangeReport, REPORT_WORDS>,
+    sent: Consumer<ParameterChange>,
+    reports: Producer<ChangeReport>,
 }
 
 impl ParameterQueue {
@@ -129,22 +87,22 @@ impl ParameterQueue {
         replacements: usize,
     ) -> (Self, ChangeSender, ReportReceiver) {
         schedule.sort_by_key(|scheduled| scheduled.time_ns); // stable: equal times keep the scene's order
-        let (sender, sent) = inbox(WAITING_CHANGES);
+        let (sender, sent) = queue(WAITING_CHANGES);
         // Room for the whole schedule and for twice what may wait, so that what is scheduled is never held up.
-        let (reports, receiver) = ring(schedule.len() + replacements + 2 * WAITING_CHANGES);
+        let (reports, receiver) = queue(schedule.len() + replacements + 2 * WAITING_CHANGES);
         (Self { schedule: schedule.into(), next: 0, sent, reports }, sender, receiver)
     }
 
     /// How many changes wait at this moment. Real-time: bounded, no allocation.
     #[inline]
     pub fn waiting(&mut self) -> usize {
-        self.sent.waiting()
+        self.sent.slots()
     }
 
     /// Reports that a plugin was replaced. Real-time: bounded, no allocation.
     pub fn report_replaced(&mut self, tick: &Tick, plugin: u16, generation: u16) {
         let change = ParameterChange { plugin, generation, parameter: PLUGIN, value: f64::from(generation) };
-        let _ = self.reports.push(&ChangeReport {
+        let _ = self.reports.push(ChangeReport {
             tick: tick.index,
             time_ns: tick.time_ns,
             change,
@@ -165,19 +123,19 @@ impl ParameterQueue {
     ) -> bool {
         let Self { schedule, next, sent, reports } = self;
         let mut any = false;
-        let mut take = |reports: &mut Sender<ChangeReport, REPORT_WORDS>, change: ParameterChange| {
+        let mut take = |reports: &mut Producer<ChangeReport>, change: ParameterChange| {
             any = true;
             let outcome = outcome(apply(&change));
-            // It fits: the ring has room for the schedule, and what was sent is only looked at when all of it does.
-            let _ = reports.push(&ChangeReport { tick: tick.index, time_ns: tick.time_ns, change, outcome });
+            // It fits: the queue has room for the schedule, and what was sent is only looked at when all of it does.
+            let _ = reports.push(ChangeReport { tick: tick.index, time_ns: tick.time_ns, change, outcome });
         };
         while let Some(due) = schedule.get(*next).filter(|due| due.time_ns <= tick.time_ns) {
             take(reports, due.change);
             *next += 1;
         }
         // Somebody must take the reports out for what was sent to go in; else it waits.
-        if waiting > 0 && reports.room() >= schedule.len() - *next + sent.capacity() {
-            (0..waiting).map_while(|_| sent.pop()).for_each(|change| take(reports, change));
+        if waiting > 0 && reports.slots() >= schedule.len() - *next + sent.buffer().capacity() {
+            (0..waiting).map_while(|_| sent.pop().ok()).for_each(|change| take(reports, change));
         }
         any
     }
@@ -185,6 +143,7 @@ impl ParameterQueue {
 
 #[cfg(test)]
 mod tests {
+    use super::super::queue::drain;
     use super::*;
 
     fn change(value: f64) -> ParameterChange {
@@ -214,34 +173,23 @@ mod tests {
         let (mut queue, _sender, mut reports) = ParameterQueue::new(schedule, 0);
         let values: Vec<Vec<f64>> = (0..5).map(|index| applied(&mut queue, index)).collect();
         assert_eq!(values, [vec![], vec![1.0, 2.0], vec![], vec![3.0], vec![]]);
-        let ticks: Vec<u64> = std::iter::from_fn(|| reports.pop()).map(|report| report.tick).collect();
+        let ticks: Vec<u64> = std::iter::from_fn(|| reports.pop().ok()).map(|report| report.tick).collect();
         assert_eq!(ticks, [1, 1, 3]);
     }
 
     #[test]
-    fn every_word_survives_and_so_does_every_outcome() {
-        for status in [CallStatus::Ok, CallStatus::OutOfRange, CallStatus::Panicked] {
-            let outcome = outcome(status);
-            let report = ChangeReport { tick: 7, time_ns: 8, change: change(-0.0), outcome };
-            let back = ChangeReport::from_words(&report.to_words());
-            assert_eq!(back, report);
-            assert!(back.change.value.is_sign_negative());
-        }
-    }
-
-    #[test]
     fn nothing_is_applied_that_nobody_could_be_told_of() {
-        let (mut queue, sender, mut reports) = ParameterQueue::new(Vec::new(), 0);
+        let (mut queue, mut sender, mut reports) = ParameterQueue::new(Vec::new(), 0);
         let mut sent = 0;
         let mut arrived = 0;
         for index in 0..10 {
-            while sender.send_all(&[change(0.0)]).is_ok() {
+            while sender.push(change(0.0)).is_ok() {
                 sent += 1;
             }
             arrived += applied(&mut queue, index).len();
         }
         let mut reported = 0;
-        reports.drain(|_| reported += 1);
+        drain(&mut reports, |_| reported += 1);
         assert!(arrived < sent, "what nobody listens to waits: {arrived} of {sent}");
         assert_eq!(arrived, reported);
         assert_eq!(applied(&mut queue, 10).len(), sent - arrived, "and goes in when somebody listens again");

@@ -3,7 +3,7 @@
 //! A scene may have several devices: each has models and an envelope of its own, all share tick and state of the run.
 //!
 //! Nothing in a tick allocates, locks, formats or waits on another thread. What a tick leaves behind is a
-//! [`TickRecord`]; whoever watches gets it through a ring, off the loop.
+//! [`TickRecord`]; whoever watches gets it through a queue, off the loop.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 

@@ -5,14 +5,14 @@
 //! their own. The middle of many batches counts: a neighbour on the machine spoils some of them.
 
 use super::scripted::{SCRIPTED, SCRIPTED_ENTRY};
-use flotor_core::trace::{RECORD_WORDS, TickRecord};
+use flotor_core::trace::TickRecord;
 use flotor_hal::SampleWait;
 use flotor_hal::abi::loader::Stopper;
-use flotor_servo::{Clock, Schedule, Servo, StopSwitch, monotonic_ns};
+use flotor_servo::{Clock, Schedule, Servo, StopSwitch, drain, monotonic_ns, queue};
 use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
 use flotor_session::{RunError, RunOptions, Session};
-use flotor_sync::{Receiver, Sender};
+use rtrb::{Consumer, Producer};
 use serde::Serialize;
 use std::path::Path;
 
@@ -71,8 +71,8 @@ pub struct WholeTick {
     schedule: Schedule,
     stoppers: Vec<Stopper>,
     stop: StopSwitch,
-    sender: Sender<TickRecord, RECORD_WORDS>,
-    receiver: Receiver<TickRecord, RECORD_WORDS>,
+    sender: Producer<TickRecord>,
+    receiver: Consumer<TickRecord>,
 }
 
 impl WholeTick {
@@ -87,7 +87,7 @@ impl WholeTick {
         let session = Session::prepare(&scene, &registry, &options)?;
         let period_ns = session.period_ns();
         let (servo, stoppers) = session.into_loop()?;
-        let (sender, receiver) = flotor_sync::ring(2 * BATCH);
+        let (sender, receiver) = queue(2 * BATCH);
         let schedule = Schedule::start_virtual(period_ns);
         Ok(Self { servo, schedule, stoppers, stop: StopSwitch::default(), sender, receiver })
     }
@@ -96,7 +96,7 @@ impl WholeTick {
     pub fn run(&mut self, ticks: usize) {
         for _ in 0..ticks.div_ceil(BATCH) {
             self.batch();
-            self.receiver.drain(|_| ());
+            drain(&mut self.receiver, |_| ());
         }
     }
 
@@ -109,7 +109,7 @@ impl WholeTick {
             let started_ns = monotonic_ns();
             self.batch();
             times_ns.push(monotonic_ns() - started_ns);
-            self.receiver.drain(|_| ());
+            drain(&mut self.receiver, |_| ());
         }
         times_ns.sort_unstable();
         #[allow(clippy::cast_precision_loss)] // microseconds
@@ -130,7 +130,7 @@ impl WholeTick {
         for _ in 0..BATCH {
             let Ok(due) = schedule.wait(|_| SampleWait::NotPaced) else { return };
             servo.tick(&due, stop, |record| {
-                let _ = sender.push(record); // it has room for two batches
+                let _ = sender.push(*record); // it has room for two batches
             });
         }
     }

@@ -1,23 +1,14 @@
-//! How the servo talks to the rest of the program without ever waiting for it.
+//! The newest value of something, from one thread to others, without either waiting.
 //!
 //! The servo runs a thousand times a second or more and may not be held up: not by a mutex another thread
-//! holds, not by the allocator, not by the kernel. This crate is the whole of what it shares with others.
-//!
-//! | from -> to | carried by | if the reader is slow |
-//! |---|---|---|
-//! | servo -> viewer: the state now | [`latest`] | it misses values, never the newest |
-//! | servo -> recorder, plot, digest: every tick | [`ring`] | records that find no room are counted |
-//! | panels, experiment -> servo: commands | [`inbox`] | the sender is told that there is no room |
-//!
-//! [`latest`] makes a latest-value cell, [`ring`] a first-in-first-out queue of fixed size, [`inbox`] a ring with
-//! any number of senders, which wait for each other but never make the servo wait. The servo drains its commands
-//! at tick boundaries, which is bounded by the number of slots; what was sent together arrives together.
+//! holds, not by the allocator, not by the kernel. [`latest`] makes a latest-value cell: a reader that is slow misses
+//! values, never the newest. Where every record counts (ticks for the recorder, commands for the servo) the host uses a
+//! bounded queue of the crate `rtrb`.
 //!
 //! A *record* is any plain value that can be written as a fixed number of 64-bit words: see [`Words`].
 //!
 //! ```
-//! use flotor_sync::{Words, latest, ring};
-//! use std::time::Duration;
+//! use flotor_sync::{Words, latest};
 //!
 //! #[derive(Clone, Copy, Debug, PartialEq)]
 //! struct Sample {
@@ -34,28 +25,13 @@
 //!     }
 //! }
 //!
-//! let home = Sample { tick: 0, force_n: 0.0 };
-//! let (mut state, viewer) = latest(home);
-//! let (mut trace, mut recorder) = ring(1024);
-//!
+//! let (mut state, viewer) = latest(Sample { tick: 0, force_n: 0.0 });
 //! let servo = std::thread::spawn(move || {
 //!     for tick in 1..=100 {
-//!         let sample = Sample { tick, force_n: 0.5 };
-//!         state.publish(&sample);
-//!         let _ = trace.push(&sample); // a full ring counts the loss itself
+//!         state.publish(&Sample { tick, force_n: 0.5 });
 //!     }
 //! });
-//!
-//! let mut recorded = Vec::new();
-//! while !recorder.is_abandoned() {
-//!     recorder.drain(|sample| recorded.push(sample));
-//!     std::thread::sleep(Duration::from_millis(1)); // polling would take cache lines from the servo
-//! }
-//! recorder.drain(|sample| recorded.push(sample)); // what came in just before the sender went
 //! servo.join().expect("the servo ends in order");
-//!
-//! assert_eq!(recorded.len(), 100);
-//! assert_eq!(recorder.dropped(), 0);
 //! assert_eq!(viewer.read(), Some((100, Sample { tick: 100, force_n: 0.5 })));
 //! ```
 //!
@@ -87,13 +63,9 @@
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 #![forbid(unsafe_code)]
 
-mod inbox;
 mod latest;
-mod ring;
 mod shim;
 mod words;
 
-pub use inbox::{InboxSender, inbox};
 pub use latest::{Observer, Publisher, latest};
-pub use ring::{Full, Receiver, Sender, ring};
 pub use words::Words;

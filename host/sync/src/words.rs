@@ -30,7 +30,7 @@ impl<const N: usize> Words<N> for [u64; N] {
     }
 }
 
-/// Room for one record. All accesses are relaxed: the owner's index or sequence says when they count.
+/// Room for one record. All accesses are relaxed: the owner's sequence says when they count.
 #[derive(Debug)]
 pub(crate) struct AtomicWords<const N: usize> {
     words: [AtomicU64; N],

@@ -101,12 +101,19 @@ pub struct Controls {
 
 struct Shared {
     parts: Parts,
-    changes: ChangeSender,
+    /// Panels and scripts wait here for each other; the loop never touches this lock.
+    changes: Mutex<ChangeSender>,
     /// The models as the scene has them: where a replacement goes, and how it is mixed.
     models: Vec<ModelUse>,
     config: LoopConfig,
     clock: Clock,
     workshop: Mutex<Supervised>,
+}
+
+impl Shared {
+    fn changes(&self) -> MutexGuard<'_, ChangeSender> {
+        self.changes.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// A plugin that had the place of a model for a part of a run, and did not behave.
@@ -171,7 +178,7 @@ impl Controls {
         workshop: Workshop,
     ) -> Self {
         let supervised = Supervised { workshop, busy: vec![false; models.len()], misbehaved: Vec::new() };
-        let workshop = Mutex::new(supervised);
+        let (changes, workshop) = (Mutex::new(changes), Mutex::new(supervised));
         Self { shared: Arc::new(Shared { parts, changes, models: models.to_vec(), config, clock, workshop }) }
     }
 
@@ -212,11 +219,12 @@ impl Controls {
     }
 
     fn send(&self, checked: &[ParameterChange]) -> Result<(), ControlError> {
-        let changes = &self.shared.changes;
+        let mut changes = self.shared.changes();
         if changes.is_abandoned() {
             return Err(ControlError::Ended);
         }
-        changes.send_all(checked).map_err(|flotor_sync::Full| ControlError::Busy)
+        // All or none, and the loop sees them at once.
+        changes.push_entire_slice(checked).map_err(|_| ControlError::Busy)
     }
 
     /// Puts another plugin, or the same one built anew, in place of a model: it is loaded and created here, and fades
@@ -234,9 +242,9 @@ impl Controls {
         plugin: Option<&str>,
         settings: &[(&str, &str)],
     ) -> Result<(), ControlError> {
-        let Shared { parts, changes, models, config, clock, workshop } = &*self.shared;
+        let Shared { parts, models, config, clock, workshop, .. } = &*self.shared;
         let numbers = parts.models(model)?;
-        if changes.is_abandoned() {
+        if self.shared.changes().is_abandoned() {
             return Err(ControlError::Ended);
         }
         let mut supervised = workshop.lock().unwrap_or_else(PoisonError::into_inner);
@@ -535,7 +543,7 @@ fn devices(plugins: &[Versions]) -> usize {
 pub(super) struct ChangeLog {
     parts: Parts,
     reports: ReportReceiver,
-    /// Taken out of the ring, and of a later tick than was asked for.
+    /// Taken out of the queue, and of a later tick than was asked for.
     waiting: Option<ChangeReport>,
 }
 
@@ -546,7 +554,7 @@ impl ChangeLog {
 
     /// Hands on all changes up to a tick.
     pub(super) fn up_to(&mut self, tick: u64, mut look: impl FnMut(&Change)) {
-        while let Some(report) = self.waiting.take().or_else(|| self.reports.pop()) {
+        while let Some(report) = self.waiting.take().or_else(|| self.reports.pop().ok()) {
             if report.tick > tick {
                 self.waiting = Some(report);
                 return;

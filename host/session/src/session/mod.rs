@@ -14,7 +14,7 @@ use crate::scene::{Scene, SceneError};
 use controls::{ChangeLog, Parts};
 use flotor_core::Change;
 use flotor_core::MOST_DEVICES;
-use flotor_core::trace::{RECORD_WORDS, TickRecord};
+use flotor_core::trace::TickRecord;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, Stopper};
 use flotor_hal::{DVec3, EnergyLedger, Fault, LoopConfig, Pacing, Parameter};
@@ -23,7 +23,7 @@ use flotor_servo::coupling::{Line, Patience};
 use flotor_servo::{
     Clock, Core, Coupled, CouplingOutcome, Envelope, Forces, Guarded, Loop, ModelHealth, ParameterQueue,
     Place, RealTimeReport, RunConfig, RunEnd, Schedule, Servo, SpinWindow, Standby, StopSwitch, Stuck,
-    Timing, enter_real_time, exchange, start_watchdog,
+    Timing, drain, enter_real_time, exchange, queue, start_watchdog,
 };
 use prepare::{Scheduled, activate};
 use std::time::{Duration, Instant};
@@ -364,7 +364,7 @@ impl Session {
 
     /// The loop on a thread of its own; this one lets the observers look.
     fn run_real(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Finished, RunError> {
-        let (mut sender, mut receiver) = flotor_sync::ring::<TickRecord, RECORD_WORDS>(RING_RECORDS);
+        let (mut sender, mut receiver) = queue(RING_RECORDS);
         let Session {
             standby,
             controls,
@@ -402,22 +402,23 @@ impl Session {
             let watchdog = start_watchdog(loop_heart, stoppers.clone(), loop_stop.clone(), watchdog_ns);
             let mut runner = Loop::new(servo, schedule, duration_ns).releasing();
             // Without a watchdog nothing is moved.
+            // A full queue drops records and counts them: observers never hold up the loop.
+            let mut dropped_records = 0;
             while watchdog.is_ok() && runner.end().is_none() {
                 runner.advance(&loop_stop, |record| {
-                    // A full ring is counted by the ring itself: observers never hold up the loop.
-                    let _ = sender.push(record);
+                    dropped_records += u64::from(sender.push(*record).is_err())
                 });
             }
             // Here, whatever the thread that looks on is at, and while the watchdog still watches.
             stoppers.iter().for_each(Stopper::safe_stop);
             runner.servo().heart().finish();
             watchdog.map_err(|_| RunError::Thread("got no watchdog"))?;
-            Ok::<_, RunError>(Finished::of(runner, 0, real_time))
+            Ok::<_, RunError>(Finished::of(runner, dropped_records, real_time))
         });
         let servo_thread = servo_thread.map_err(|_| RunError::Thread("could not be started"))?;
         let mut bitten = None;
         while !servo_thread.is_finished() {
-            receiver.drain(&mut look);
+            drain(&mut receiver, &mut look);
             controls.sweep();
             bitten = bitten.or_else(|| heart.bitten().map(|stuck| (stuck, Instant::now())));
             if let Some((stuck, since)) = bitten
@@ -428,8 +429,8 @@ impl Session {
             std::thread::sleep(OBSERVER_PERIOD);
         }
         let finished = servo_thread.join().map_err(|_| RunError::Thread("panicked"))??;
-        receiver.drain(&mut look);
-        Ok(Finished { dropped_records: receiver.dropped(), ..finished })
+        drain(&mut receiver, &mut look);
+        Ok(finished)
     }
 }
 
