@@ -8,7 +8,7 @@
 //! FLOTOR_TEST_SIZE=full cargo test --release -p flotor-tests --test tick_cost -- --nocapture
 //! ```
 
-use flotor::bench::{BenchDevice, WholeTick};
+use flotor::lab::bench::{BenchDevice, WholeTick};
 use flotor::servo::{Clock, StopSwitch};
 use flotor::session::Observer;
 use flotor::trace::TickRecord;
@@ -90,7 +90,7 @@ fn callgrind(arguments: &[&str], workload: &str) -> Option<Output> {
 }
 
 /// The loops whose instructions are counted: of a whole tick's bench, and of a scene.
-const BENCH_LOOP: &str = "flotor::bench::whole_tick::WholeTick::batch";
+const BENCH_LOOP: &str = "flotor::lab::bench::whole_tick::WholeTick::batch";
 const SCENE_LOOP: &str = "flotor::session::Session::run";
 
 /// Instructions a tick, or nothing where there is no valgrind.

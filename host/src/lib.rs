@@ -13,12 +13,9 @@
 //! - [`servo`]: the tick, the clock, the envelope; the only real-time module.
 //! - [`coupling`]: two devices held together by a virtual spring, over any delay; [`port_energy`]: what crosses a port.
 //! - [`calibration`]: how much of a commanded force arrives.
-//! - [`stability`]: how stiff a spring the servo can render.
 //! - [`scaffold`]: the start of somebody's own plugin.
-//! - [`mod@bench`]: what an evaluation costs, and how wrong it is.
 //! - [`study`]: the results of a perception experiment, as a page.
-//! - [`stress`]: how far a force model can be trusted with a hand.
-//! - [`sampling`]: points that cover a space evenly.
+//! - [`lab`]: measurements: what a model, a device, a loop and a recording are worth.
 //! - [`live`]: a running host, for other programs to watch and change.
 //! - [`headless`]: a whole run in virtual time for other programs.
 //! - [`trace`]: what a tick leaves behind; [`mod@record`] writes it down, [`plot`] draws it.
@@ -26,32 +23,26 @@
 
 #![cfg_attr(rtsan, feature(sanitize))] // the step `blocking` of .ci/full
 
-pub mod bench;
 pub mod calibration;
 pub mod cli;
 pub mod coupling;
-pub mod evaluate;
 pub mod headless;
-pub mod jitter;
+pub mod lab;
 pub mod live;
 pub mod plot;
 pub mod port_energy;
+pub mod recorded_files;
 pub mod registry;
-pub mod replay;
 pub mod report;
 pub mod run_description;
 pub mod run_picture;
-pub mod sampling;
 pub mod scaffold;
 pub mod scene;
 pub mod servo;
 pub mod session;
 pub(crate) mod slow;
-pub mod stability;
-pub mod stress;
 pub mod study;
 pub mod timing_picture;
-pub mod validate;
 pub(crate) mod worker;
 
 pub use flotor_record::{self as record, mapping, trace};

@@ -53,6 +53,11 @@ fn describe_plugin(used: &PluginUse, role: Role, report: &PluginReport) -> Plugi
         blend: Blend::default(),
         field: None,
         settings: settings.collect(),
-        parameters: report.parameters.iter().cloned().chain(crate::replay::named_files(report)).collect(),
+        parameters: report
+            .parameters
+            .iter()
+            .cloned()
+            .chain(crate::recorded_files::named_files(report))
+            .collect(),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::options::KeyValue;
 use super::{CommandError, style, write_json};
-use crate::bench::{
+use crate::lab::bench::{
     BenchDevice, Case, Effort, Hand, Plan, Progress, TellApart, TickCost, WholeTick, measure,
 };
 use crate::registry::Registry;

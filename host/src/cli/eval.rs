@@ -2,7 +2,7 @@
 
 use super::options::KeyValue;
 use super::{CommandError, style};
-use crate::evaluate::{Answer, Details, EvaluateError, Evaluation, Handle, Travel};
+use crate::lab::evaluate::{Answer, Details, EvaluateError, Evaluation, Handle, Travel};
 use crate::registry::Registry;
 use crate::scene::nearest;
 use clap::Args;

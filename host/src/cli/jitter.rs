@@ -3,7 +3,7 @@
 use super::options::{core, duration_s, rate_hz};
 use super::stopping::stop_on_signals;
 use super::{CommandError, run, style};
-use crate::jitter::{JitterReport, LoopTiming, MissedMore, measure};
+use crate::lab::jitter::{JitterReport, LoopTiming, MissedMore, measure};
 use crate::plot::{Axis, Figure, Panel, Series};
 use crate::registry::Registry;
 use crate::scene::Scene;

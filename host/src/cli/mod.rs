@@ -190,12 +190,12 @@ impl From<LoadError> for CommandError {
     }
 }
 
-impl From<crate::replay::ReplayError> for CommandError {
-    fn from(error: crate::replay::ReplayError) -> Self {
+impl From<crate::lab::replay::ReplayError> for CommandError {
+    fn from(error: crate::lab::replay::ReplayError) -> Self {
         match error {
-            crate::replay::ReplayError::Read(error) => Self::Read(error),
-            crate::replay::ReplayError::Run(error) => Self::Run(error),
-            error @ crate::replay::ReplayError::Apart { .. } => Self::Usage(error.to_string()),
+            crate::lab::replay::ReplayError::Read(error) => Self::Read(error),
+            crate::lab::replay::ReplayError::Run(error) => Self::Run(error),
+            error @ crate::lab::replay::ReplayError::Apart { .. } => Self::Usage(error.to_string()),
         }
     }
 }

@@ -2,11 +2,11 @@
 
 use super::options::{KeyValue, PluginKeyValue};
 use super::{CommandError, run, style, write_json};
+use crate::lab::replay::{Compared, Coverage, Difference, Held, Replay, ReplayError, WhyApart};
 use crate::plot::{Axis, Figure, Panel, Series};
 use crate::record::Ending;
 use crate::record::Recording;
 use crate::registry::Registry;
-use crate::replay::{Compared, Coverage, Difference, Held, Replay, ReplayError, WhyApart};
 use clap::Args;
 use flotor_hal::{DVec3, Wrench};
 use serde::Serialize;

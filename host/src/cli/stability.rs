@@ -2,10 +2,10 @@
 
 use super::options::rate_hz;
 use super::{CommandError, run, style, write_json};
+use crate::lab::stability::theory::{Plant, Rendering, exact_limit_n_per_m, gil_limit_n_per_m};
+use crate::lab::stability::{Case, Grip, LoopError, Row, default_cases, measure};
 use crate::plot::{Axis, Figure, Panel, Series};
 use crate::registry::Registry;
-use crate::stability::theory::{Plant, Rendering, exact_limit_n_per_m, gil_limit_n_per_m};
-use crate::stability::{Case, Grip, LoopError, Row, default_cases, measure};
 use clap::Args;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::Plugin;

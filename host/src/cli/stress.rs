@@ -3,8 +3,8 @@
 use super::eval::settings;
 use super::options::KeyValue;
 use super::{CommandError, style};
+use crate::lab::stress::{Progress, Reach, Size, StressOptions, StressReport, score};
 use crate::registry::Registry;
-use crate::stress::{Progress, Reach, Size, StressOptions, StressReport, score};
 use clap::{Args, ValueEnum};
 use flotor_hal::abi::PluginKind;
 use indicatif::ProgressBar;

@@ -2,7 +2,7 @@
 
 use super::options::{KeyValue, duration_s};
 use super::{CommandError, style, write_json};
-use crate::validate::{Check, Figures, Finding, Verdict, check, validate};
+use crate::lab::validate::{Check, Figures, Finding, Verdict, check, validate};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::Command;

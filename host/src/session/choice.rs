@@ -5,7 +5,7 @@
 //! nobody can tell from his seed what he felt. Source: M. Zelen, "The randomization and stratification of patients to
 //! clinical trials", J. Chronic Diseases 27, 1974, section 4 (blocks).
 
-use crate::sampling::Random;
+use super::random::Random;
 
 /// Which of so many alternatives a seed gets; `draw` tells several choices of one run apart. Not real-time.
 pub(super) fn chosen(seed: u64, draw: u64, alternatives: usize) -> usize {

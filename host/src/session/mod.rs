@@ -3,11 +3,13 @@
 mod choice;
 mod controls;
 mod prepare;
+mod random;
 mod standby;
 mod steps;
 
 pub use controls::{ControlError, Controls, Misbehaved, NewValue};
 pub(crate) use prepare::prepare_model;
+pub use random::Random;
 pub use steps::Steps;
 
 use crate::coupling::{Line, Patience};

@@ -2,7 +2,7 @@
 
 use crate::design::{Cell, Design, Point};
 use crate::plan::{POSE_COLUMNS, Plan, PlanError, Question};
-use flotor::evaluate::{Answer, Details, Evaluation, Handle, Travel};
+use flotor::lab::evaluate::{Answer, Details, Evaluation, Handle, Travel};
 use flotor::headless;
 use flotor::registry::Registry;
 use flotor::scene::{PluginKeyValue, Scene};

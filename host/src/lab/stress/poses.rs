@@ -1,11 +1,11 @@
 //! Where a model is asked: evenly through the workspace, and on the sets of measure zero where formulas
 //! break.
 //!
-//! Even coverage is [Sobol's sequence](crate::sampling): any first part of it covers the space evenly, so a short
+//! Even coverage is [Sobol's sequence](crate::lab::sampling): any first part of it covers the space evenly, so a short
 //! run asks the first poses of a full one. No sequence ever hits home exactly, or a coordinate plane, or a number
 //! that is not finite: those are [`Manifold`]s with names.
 
-use crate::sampling::Random;
+use crate::lab::sampling::Random;
 use flotor_hal::{DQuat, DVec3, Pose, Twist, orientation_from_rotation_vector, rotation_vector};
 use serde::Serialize;
 use std::f64::consts::PI;

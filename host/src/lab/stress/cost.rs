@@ -10,7 +10,7 @@ use super::measure::{Decades, Measure, Verdict, Worst};
 use super::poses::Manifold;
 use super::subject::Subject;
 use super::{Setup, WIDER};
-use crate::sampling::{Random, Sobol};
+use crate::lab::sampling::{Random, Sobol};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{Demand, Input, Memory, Output, Pose};

@@ -20,7 +20,7 @@ use super::poses::at;
 use super::subject::{PERIOD_NS, Subject};
 use super::sweep::sweep;
 use super::{DAMPINGS_NS_PER_M, LEVER_M, PERIOD_S, Setup};
-use crate::sampling::Random;
+use crate::lab::sampling::Random;
 use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{DVec3, Memory, Pose, Wrench, rotation_vector};
 use std::collections::VecDeque;

@@ -8,7 +8,7 @@ use super::poses::Manifold;
 use super::subject::{PERIOD_NS, Subject};
 use super::sweep::sweep;
 use super::{Setup, WIDER};
-use crate::sampling::{Random, Sobol};
+use crate::lab::sampling::{Random, Sobol};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{LoadError, Model};
 use flotor_hal::{Input, Memory, Output, Pose, Twist};

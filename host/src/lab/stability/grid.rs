@@ -109,7 +109,7 @@ fn row(plugin: &Plugin, case: &Case) -> Result<Row, LoopError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stability::theory::Plant;
+    use crate::lab::stability::theory::Plant;
 
     /// Limits of a free 580 g flotor to five digits, computed with other software from the definition: period in
     /// ns, delay, drag, virtual damping, stiffness.

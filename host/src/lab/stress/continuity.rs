@@ -15,7 +15,7 @@ use super::poses::{Reach, at};
 use super::subject::Subject;
 use super::sweep::sweep;
 use super::{LEVER_M, Setup, WIDER};
-use crate::sampling::{Random, Sobol};
+use crate::lab::sampling::{Random, Sobol};
 use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{DVec3, Pose, Wrench};
 use serde::Serialize;

@@ -10,7 +10,7 @@ use super::poses::Manifold;
 use super::subject::{Subject, Trouble, TroubleKind};
 use super::sweep::sweep;
 use super::{Setup, WIDER};
-use crate::sampling::{Random, Sobol};
+use crate::lab::sampling::{Random, Sobol};
 use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{Demand, Input, Memory, Pose, StepStatus, Twist};
 

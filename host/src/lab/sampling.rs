@@ -1,10 +1,10 @@
-//! Points that cover a space evenly, and random numbers: the same for the same seed, in any order of work.
+//! Points that cover a space evenly: the same for the same seed, in any order of work.
 //!
 //! Even coverage is Sobol's sequence (I. M. Sobol, USSR Comput. Math. 7(4), 1967) with the direction numbers
 //! of S. Joe and F. Y. Kuo (SIAM J. Sci. Comput. 30, 2008), its points shifted by the seed: any first part of it
 //! covers the space evenly.
 
-use flotor_hal::DVec3;
+pub(crate) use crate::session::Random;
 
 /// Dimensions of the sequence: one per degree of freedom.
 pub const DIMENSIONS: usize = 6;
@@ -59,55 +59,6 @@ impl Sobol {
             let bits = set.fold(self.shift[dimension], |sum, (_, direction)| sum ^ direction);
             (f64::from(bits) + 0.5) / 4_294_967_296.0
         })
-    }
-}
-
-/// Random numbers for what has more dimensions than the sequence: SplitMix64 (Steele, Lea and Flood, OOPSLA
-/// 2014). Each `stream` of a seed is independent of the others, so work can be done in any order.
-#[derive(Clone, Debug)]
-pub(crate) struct Random {
-    state: u64,
-}
-
-impl Random {
-    pub(crate) fn new(seed: u64, stream: u64) -> Self {
-        let mut random = Self { state: seed ^ 0x6a09_e667_f3bc_c908 };
-        random.state = random.bits() ^ stream.wrapping_mul(0xd134_2543_de82_ef95);
-        random.bits();
-        random
-    }
-
-    pub(crate) fn bits(&mut self) -> u64 {
-        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (self.state ^ self.state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        mixed ^ mixed >> 31
-    }
-
-    /// Uniform in 0..1.
-    #[allow(clippy::cast_precision_loss)] // 53 bits fit
-    pub(crate) fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / 9_007_199_254_740_992.0
-    }
-
-    /// Uniform in -1..1.
-    pub(crate) fn symmetric(&mut self) -> f64 {
-        2.0 * self.unit() - 1.0
-    }
-
-    /// A vector in the cube -1..1.
-    pub(crate) fn vector(&mut self) -> DVec3 {
-        DVec3::new(self.symmetric(), self.symmetric(), self.symmetric())
-    }
-
-    /// A unit vector.
-    pub(crate) fn direction(&mut self) -> DVec3 {
-        loop {
-            let inside = self.vector();
-            if (1.0e-3..=1.0).contains(&inside.length_squared()) {
-                return inside.normalize();
-            }
-        }
     }
 }
 

@@ -27,7 +27,7 @@ pub fn named_files(report: &PluginReport) -> Vec<(String, String)> {
 ///
 /// # Errors
 /// No file has that content. `parameters` are those of the model's description.
-pub(super) fn as_recorded(
+pub fn as_recorded(
     set: &ParameterText,
     model: &str,
     parameters: &[(String, String)],

@@ -14,7 +14,7 @@ use super::jacobian::Jacobian;
 use super::measure::{Decades, Measure, Verdict, Worst};
 use super::sweep::sweep;
 use super::{DAMPINGS_NS_PER_M, LEVER_M, PERIOD_S, Setup};
-use crate::sampling::Sobol;
+use crate::lab::sampling::Sobol;
 use flotor_hal::abi::loader::LoadError;
 
 const NAME: &str = "Lipschitz constant and reciprocity";

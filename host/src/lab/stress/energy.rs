@@ -17,7 +17,7 @@ use super::paths::ClosedPath;
 use super::subject::Subject;
 use super::sweep::sweep;
 use super::{DAMPINGS_NS_PER_M, LEVER_M, Setup};
-use crate::sampling::Random;
+use crate::lab::sampling::Random;
 use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{DVec3, Memory, Pose, Twist, rotation_vector};
 

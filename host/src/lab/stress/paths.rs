@@ -1,7 +1,7 @@
 //! Smooth closed motions of the handle: random Fourier series in position and rotation vector.
 
 use super::poses::{Reach, at};
-use crate::sampling::Random;
+use crate::lab::sampling::Random;
 use flotor_hal::{DVec3, Pose};
 use std::f64::consts::TAU;
 

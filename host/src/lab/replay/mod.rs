@@ -4,15 +4,14 @@
 //! the change does to the same hand movement.
 
 mod apart;
-mod files;
 mod held;
 
 pub use apart::{Coverage, WhyApart};
-pub use files::named_files;
 pub use held::Held;
 
 use crate::coupling::{CouplingDescription, CouplingEnds, Patience};
 use crate::record::{Change, ChangeOutcome, ChangeSubject, ReadError, Recording, Role, RunDescription};
+use crate::recorded_files::as_recorded;
 use crate::registry::Registry;
 use crate::scene::{Isolation, Location, ModelUse, ParameterText, PluginUse};
 use crate::servo::{Clock, Coupled, Forces, Heartbeat, ModelHealth, Port, Replacement};
@@ -308,7 +307,7 @@ fn use_recorded_files(
     for (model, then) in uses.iter_mut().zip(recorded) {
         let (name, plugin) = (&model.name, &mut model.plugin);
         for set in plugin.parameters.iter_mut().filter(|set| !held.keeps_parameter(name, &set.key)) {
-            *set = files::as_recorded(set, name, &then.parameters, path)?;
+            *set = as_recorded(set, name, &then.parameters, path)?;
         }
     }
     Ok(())
