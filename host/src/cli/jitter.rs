@@ -2,7 +2,7 @@
 
 use super::options::{core, duration_s, rate_hz};
 use super::stopping::stop_on_signals;
-use super::{CommandError, run, style};
+use super::{CommandError, run, style, tell, write_text};
 use crate::lab::jitter::{JitterReport, LoopTiming, MissedMore, measure};
 use crate::plot::{Axis, Figure, Panel, Series};
 use crate::registry::Registry;
@@ -50,20 +50,11 @@ pub(crate) fn run(arguments: &JitterArguments) -> Result<(), CommandError> {
     let report = measure(session, slices, &stop, |done| progress.set_position(done))?;
     progress.finish_and_clear();
 
-    if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
-        say!("{}", to_text(&report));
-    }
     for line in report.real_time.advice() {
         eprintln!("{} {line}", style::warning("note:"));
     }
-    if let Some(path) = &arguments.json {
-        super::write_json(path, &report)?;
-    }
-    if let Some(path) = &arguments.plot {
-        let written = std::fs::write(path, picture(&report));
-        written.map_err(|cause| CommandError::file(path, "cannot write the plot", cause))?;
-    }
-    Ok(())
+    tell(arguments.json.as_deref(), &report, || to_text(&report))?;
+    write_text(arguments.plot.as_deref(), || picture(&report))
 }
 
 fn to_text(report: &JitterReport) -> String {

@@ -344,6 +344,48 @@ fn write_json<T: serde::Serialize>(path: &Path, value: &T) -> Result<(), Command
         .map_err(|cause| CommandError::file(path, "cannot write the JSON", cause))
 }
 
+/// Tells a result: as text to people, unless standard output is asked for the JSON for machines.
+fn tell<T: serde::Serialize>(
+    json: Option<&Path>,
+    value: &T,
+    text: impl FnOnce() -> String,
+) -> Result<(), CommandError> {
+    if json.is_none_or(|path| path.as_os_str() != "-") {
+        say!("{}", text());
+    }
+    json.map_or(Ok(()), |path| write_json(path, value))
+}
+
+/// Writes a picture or a table where it is asked for, `-` being standard output.
+fn write_text(path: Option<&Path>, text: impl FnOnce() -> String) -> Result<(), CommandError> {
+    let Some(path) = path else { return Ok(()) };
+    if path.as_os_str() == "-" {
+        return report_line(format_args!("{}", text().trim_end()));
+    }
+    std::fs::write(path, text()).map_err(|cause| CommandError::file(path, "cannot write the result", cause))
+}
+
+/// A line on a terminal that says how a measurement comes along; nothing in a pipe.
+struct ProgressLine(indicatif::ProgressBar);
+
+impl ProgressLine {
+    fn new() -> Self {
+        Self(run::progress_bar(0, "{msg:<44} {wide_bar} {percent:>3} %  {elapsed}"))
+    }
+}
+
+impl crate::lab::Progress for ProgressLine {
+    fn begin(&self, name: &str, steps: u64) {
+        self.0.set_length(steps);
+        self.0.set_position(0);
+        self.0.set_message(name.to_owned());
+    }
+
+    fn advance(&self, steps: u64) {
+        self.0.inc(steps);
+    }
+}
+
 /// Colours, on terminals only.
 mod style {
     use std::io::IsTerminal;

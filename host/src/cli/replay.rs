@@ -1,7 +1,7 @@
 //! `flotor replay`: the models of a recording once more, as they were or changed.
 
 use super::options::{KeyValue, PluginKeyValue};
-use super::{CommandError, run, style, write_json};
+use super::{CommandError, run, style, write_json, write_text};
 use crate::lab::replay::{Compared, Coverage, Difference, Held, Replay, ReplayError, WhyApart};
 use crate::plot::{Axis, Figure, Panel, Series};
 use crate::record::Ending;
@@ -107,10 +107,7 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
         wall_s: started.elapsed().as_secs_f64(),
     };
     tell(arguments, &report)?;
-    if let Some(path) = &arguments.plot {
-        std::fs::write(path, picture(&samples))
-            .map_err(|cause| CommandError::file(path, "cannot write the plot", cause))?;
-    }
+    write_text(arguments.plot.as_deref(), || picture(&samples))?;
     if let Some((_, words)) = health.iter().find(|(health, _)| health.panicked_at.is_some()) {
         return Err(CommandError::PluginRefused(format!(
             "a model of the recording stopped answering: {words}"

@@ -1,7 +1,8 @@
 //! `flotor stability`: the stiffest spring that stays stable on the simulated device, next to theory.
 
 use super::options::rate_hz;
-use super::{CommandError, run, style, write_json};
+use super::{CommandError, run, style, tell, write_json, write_text};
+use crate::lab::report::{table, to_csv};
 use crate::lab::stability::theory::{Plant, Rendering, exact_limit_n_per_m, gil_limit_n_per_m};
 use crate::lab::stability::{Case, Grip, LoopError, Row, default_cases, measure};
 use crate::plot::{Axis, Figure, Panel, Series};
@@ -10,7 +11,7 @@ use clap::Args;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::Plugin;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Find the stiffest virtual spring that stays stable.
 #[derive(Args)]
@@ -72,27 +73,21 @@ pub(crate) fn run(arguments: &StabilityArguments) -> Result<(), CommandError> {
     progress.finish_and_clear();
 
     let worst_deviation = rows.iter().map(|row| row.deviation().abs()).fold(0.0, f64::max);
-    let to_stdout = [&arguments.json, &arguments.csv]
-        .iter()
-        .any(|path| path.as_ref().is_some_and(|p| p.as_os_str() == "-"));
-    if !to_stdout {
-        say!("{}", to_text(&rows, worst_deviation));
+    let version = &plugin.metadata().version;
+    let report = Report { device: DEVICE, version, rows: &rows, worst_deviation };
+    // A table for machines on standard output is all that is there.
+    let csv = arguments.csv.as_deref();
+    if csv.is_none_or(|path| path.as_os_str() != "-") {
+        tell(arguments.json.as_deref(), &report, || to_text(&rows, worst_deviation))?;
+    } else if let Some(path) = &arguments.json {
+        write_json(path, &report)?;
     }
-    if let Some(path) = &arguments.json {
-        let version = &plugin.metadata().version;
-        write_json(path, &Report { device: DEVICE, version, rows: &rows, worst_deviation })?;
+    write_text(csv, || to_csv([], &rows))?;
+    if arguments.plot.is_none() {
+        return Ok(());
     }
-    if let Some(path) = &arguments.csv {
-        write_csv(path, &rows).map_err(|error| {
-            CommandError::file(path, "cannot write the rows", std::io::Error::other(error))
-        })?;
-    }
-    if let Some(path) = &arguments.plot {
-        let picture = picture(&plugin, &cases, &rows)?;
-        std::fs::write(path, picture)
-            .map_err(|cause| CommandError::file(path, "cannot write the plot", cause))?;
-    }
-    Ok(())
+    let picture = picture(&plugin, &cases, &rows)?;
+    write_text(arguments.plot.as_deref(), || picture)
 }
 
 /// The product of all lists given, or the default grid.
@@ -138,39 +133,20 @@ fn refused(error: LoopError) -> CommandError {
 
 fn to_text(rows: &[Row], worst_deviation: f64) -> String {
     let title = style::title("largest stable stiffness in N/m");
-    let head = format!(
-        "  {:>8}{:>7}{:>9}{:>9}{:>12}{:>12}{:>10}{:>12}{:>12}",
-        "T in ms", "delay", "b", "B", "simulated", "exact", "differ", "Gil", "passive"
-    );
+    let head = ["T in ms", "delay", "b", "B", "simulated", "exact", "differ", "Gil", "passive"];
     let line = |row: &Row| {
-        format!(
-            "  {:>8}{:>7}{:>9}{:>9}{:>12.1}{:>12.1}{:>9.3}%{:>12.1}{:>12.1}",
-            row.period_s * 1.0e3,
-            row.delay_ticks,
-            row.plant_damping_ns_per_m,
-            row.virtual_damping_ns_per_m,
-            row.k_max_n_per_m,
-            row.exact_n_per_m,
-            row.deviation() * 100.0,
-            row.gil_n_per_m,
-            row.passive_n_per_m
-        )
+        let [simulated, exact, gil, passive] =
+            [row.k_max_n_per_m, row.exact_n_per_m, row.gil_n_per_m, row.passive_n_per_m]
+                .map(|limit| format!("{limit:.1}"));
+        let [period_ms, b, virtual_b] =
+            [row.period_s * 1.0e3, row.plant_damping_ns_per_m, row.virtual_damping_ns_per_m]
+                .map(|number| number.to_string());
+        let differ = format!("{:.3}%", row.deviation() * 100.0);
+        [period_ms, row.delay_ticks.to_string(), b, virtual_b, simulated, exact, differ, gil, passive]
     };
     let foot =
         format!("worst difference between simulated and exact limit: {:.3} %", worst_deviation * 100.0);
-    let lines = rows.iter().map(line);
-    [title, head].into_iter().chain(lines).chain([foot]).collect::<Vec<_>>().join("\n")
-}
-
-fn write_csv(path: &Path, rows: &[Row]) -> Result<(), csv::Error> {
-    let output: Box<dyn std::io::Write> = if path.as_os_str() == "-" {
-        Box::new(std::io::stdout().lock())
-    } else {
-        Box::new(std::fs::File::create(path)?)
-    };
-    let mut writer = csv::Writer::from_writer(output);
-    rows.iter().try_for_each(|row| writer.serialize(row))?;
-    Ok(writer.flush()?)
+    [vec![title], table(head, rows.iter().map(line)), vec![foot]].concat().join("\n")
 }
 
 /// A panel for each combination of period and drag, a line and points for each delay in it.

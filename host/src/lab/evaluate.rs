@@ -4,14 +4,13 @@
 //! hand would: along a straight line in position and rotation vector, in small steps, then held until it has
 //! converged. Where every pose is reached from home the ways are independent, and all processors walk them.
 
+use super::PERIOD_NS;
+use super::subject::{Subject, steps, walk};
+use super::trajectory::at;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
-use flotor_hal::{
-    DVec3, Demand, Input, Memory, Output, Pose, StepStatus, Wrench, orientation_from_rotation_vector,
-};
-use std::num::NonZeroUsize;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
+use flotor_hal::{DVec3, Demand, Input, Memory, Output, Pose, StepStatus, Twist, Wrench};
+use rayon::prelude::*;
 
 /// Position and rotation vector of a handle in the model frame, m and rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +26,7 @@ impl Handle {
     pub const HOME: Handle = Handle { position_m: DVec3::ZERO, rotation_rad: DVec3::ZERO };
 
     fn pose(self) -> Pose {
-        Pose::new(self.position_m, orientation_from_rotation_vector(self.rotation_rad))
+        at(self.position_m, self.rotation_rad)
     }
 
     fn is_finite(self) -> bool {
@@ -80,16 +79,8 @@ pub enum EvaluateError {
     },
 }
 
-/// Largest step of a handle on its way, m.
-const STEP_M: f64 = 0.05e-3;
-/// Largest turn of a handle on its way, rad.
-const STEP_RAD: f64 = 0.002;
 /// Longest way that is walked in steps; a pose farther away is approached in as many, larger ones.
 const MOST_STEPS: f64 = 1.0e5;
-/// Ticks a handle is held at a pose for the model to converge.
-const MOST_HOLDS: usize = 2000;
-/// Time between steps, ns.
-const PERIOD_NS: u64 = 1_000_000;
 /// Poses evaluated per call of a model without history.
 const BATCH: usize = 1024;
 
@@ -105,7 +96,7 @@ pub struct Evaluation<'a> {
     pub details: Details,
 }
 
-impl Evaluation<'_> {
+impl<'a> Evaluation<'a> {
     /// Answers for all handles, in order, the same however many processors walk. `on_answer` is called once for each
     /// answer, in no particular order and from any of them. Not real-time.
     ///
@@ -117,70 +108,44 @@ impl Evaluation<'_> {
         on_answer: &(dyn Fn() + Sync),
     ) -> Result<Vec<Answer>, EvaluateError> {
         let mut walker = self.walker()?;
-        match (walker.model.memory(), self.travel) {
+        match (walker.subject.memory(), self.travel) {
             (Memory::Stateless, _) => walker.evaluate_directly(handles, on_answer),
             (Memory::PathDependent, Travel::Successive) => {
                 let walk = |handle: &Handle| walker.walk_to(*handle).inspect(|_| on_answer());
                 handles.iter().map(walk).collect()
             }
-            (Memory::PathDependent, Travel::FromHome) => self.walk_all(handles, on_answer),
+            (Memory::PathDependent, Travel::FromHome) => {
+                let walk = |slot: &mut Option<Walker<'a>>, handle: &Handle| {
+                    let walker = match slot {
+                        Some(walker) => walker,
+                        None => slot.insert(self.walker()?),
+                    };
+                    walker.go_home();
+                    walker.walk_to(*handle).inspect(|_| on_answer())
+                };
+                handles.par_iter().map_init(|| None, walk).collect()
+            }
         }
     }
 
-    fn walker(&self) -> Result<Walker, EvaluateError> {
-        let model = self.plugin.create_model(self.settings)?;
-        let demand = Demand::ALL.limited_to(model.serves());
-        Ok(Walker { model, demand, details: self.details, at: Handle::HOME, tick: 0 })
-    }
-
-    /// Each processor takes the next handle nobody has taken yet, with a model of its own.
-    fn walk_all(
-        &self,
-        handles: &[Handle],
-        on_answer: &(dyn Fn() + Sync),
-    ) -> Result<Vec<Answer>, EvaluateError> {
-        let (next, answered) = (AtomicUsize::new(0), Mutex::new(Vec::with_capacity(handles.len())));
-        let work = || {
-            let mut walker = self.walker()?;
-            loop {
-                let index = next.fetch_add(1, Ordering::Relaxed);
-                let Some(handle) = handles.get(index) else { return Ok(()) };
-                walker.go_home();
-                let answer = walker.walk_to(*handle)?;
-                if let Ok(mut answered) = answered.lock() {
-                    answered.push((index, answer));
-                }
-                on_answer();
-            }
-        };
-        let processors = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-        std::thread::scope(|scope| {
-            let workers: Vec<_> = (0..processors.min(handles.len())).map(|_| scope.spawn(work)).collect();
-            workers.into_iter().try_for_each(|worker| {
-                let died = || Err(EvaluateError::Broke { words: "its thread died".to_owned() });
-                worker.join().unwrap_or_else(|_| died())
-            })
-        })?;
-        let mut answered = answered.into_inner().unwrap_or_default();
-        answered.sort_unstable_by_key(|(index, _)| *index);
-        Ok(answered.into_iter().map(|(_, answer)| answer).collect())
+    fn walker(&self) -> Result<Walker<'a>, EvaluateError> {
+        let subject = Subject::new(self.plugin, self.settings, 0)?;
+        Ok(Walker { subject, details: self.details, at: Handle::HOME })
     }
 }
 
 /// One handle, and the model that is asked where it is.
-struct Walker {
-    model: Model,
-    demand: Demand,
+struct Walker<'a> {
+    subject: Subject<'a>,
     details: Details,
     at: Handle,
-    tick: u64,
 }
 
-impl Walker {
+impl Walker<'_> {
     /// As if it had never moved.
     fn go_home(&mut self) {
-        self.model.reset();
-        (self.at, self.tick) = (Handle::HOME, 0);
+        self.subject.restart();
+        self.at = Handle::HOME;
     }
 
     fn evaluate_directly(
@@ -191,7 +156,7 @@ impl Walker {
         if self.details == Details::Asked {
             // They are about the last step: one pose at a time.
             let ask = |handle: &Handle| {
-                let output = self.step(*handle)?;
+                let output = self.step(handle.pose())?;
                 on_answer();
                 self.answer(*handle, &output)
             };
@@ -200,11 +165,8 @@ impl Walker {
         let mut answers = Vec::with_capacity(handles.len());
         let mut outputs = vec![Output::default(); BATCH];
         for batch in handles.chunks(BATCH) {
-            let inputs: Vec<Input> = batch
-                .iter()
-                .map(|handle| Input { demand: self.demand, ..Input::at_rest(handle.pose()) })
-                .collect();
-            let status = self.model.step_batch(&inputs, &mut outputs);
+            let inputs: Vec<Input> = batch.iter().map(|handle| self.subject.at_rest(handle.pose())).collect();
+            let status = self.subject.model().step_batch(&inputs, &mut outputs);
             self.check(status)?;
             for (handle, output) in batch.iter().zip(&outputs) {
                 answers.push(self.answer(*handle, output)?);
@@ -218,44 +180,22 @@ impl Walker {
     fn walk_to(&mut self, target: Handle) -> Result<Answer, EvaluateError> {
         if !target.is_finite() {
             // Nowhere to walk to: the model gets to see the pose once and says what it thinks of it.
-            let output = self.step(target)?;
+            let output = self.step(target.pose())?;
             return self.answer(target, &output);
         }
         let (from, way_m) = (self.at, target.position_m - self.at.position_m);
         let way_rad = target.rotation_rad - from.rotation_rad;
-        let steps = (way_m.length() / STEP_M).max(way_rad.length() / STEP_RAD).ceil().clamp(1.0, MOST_STEPS);
-        let mut step = 1.0;
-        while step < steps {
-            let part = step / steps;
-            let between = Handle {
-                position_m: from.position_m + way_m * part,
-                rotation_rad: from.rotation_rad + way_rad * part,
-            };
-            self.step(between)?;
-            step += 1.0;
-        }
+        let between = |part: f64| at(from.position_m + way_m * part, from.rotation_rad + way_rad * part);
         self.at = target;
-        let mut output = self.step(target)?;
-        for _ in 0..MOST_HOLDS {
-            if output.status() != Some(StepStatus::NotConverged) {
-                break;
-            }
-            output = self.step(target)?;
-        }
+        let steps = steps(way_m, way_rad).clamp(1.0, MOST_STEPS);
+        let output = walk(steps, between, target.pose(), |pose| self.step(pose))?;
         self.answer(target, &output)
     }
 
-    fn step(&mut self, handle: Handle) -> Result<Output, EvaluateError> {
-        let input = Input {
-            time_ns: self.tick * PERIOD_NS,
-            dt_ns: PERIOD_NS,
-            tick: self.tick,
-            demand: self.demand,
-            ..Input::at_rest(handle.pose())
-        };
-        self.tick += 1;
+    fn step(&mut self, pose: Pose) -> Result<Output, EvaluateError> {
+        let input = self.subject.input(pose, Twist::ZERO, PERIOD_NS);
         let mut output = Output::default();
-        let status = self.model.step(&input, &mut output);
+        let status = self.subject.model().step(&input, &mut output);
         self.check(status)?;
         Ok(output)
     }
@@ -263,14 +203,14 @@ impl Walker {
     fn check(&mut self, status: CallStatus) -> Result<(), EvaluateError> {
         match status {
             CallStatus::Ok => Ok(()),
-            _ => Err(EvaluateError::Broke { words: self.model.last_message() }),
+            _ => Err(EvaluateError::Broke { words: self.subject.model().last_message() }),
         }
     }
 
     fn answer(&mut self, handle: Handle, output: &Output) -> Result<Answer, EvaluateError> {
         let details = self.read_details()?;
         let no_answer = if handle.is_finite() { StepStatus::OutOfDomain } else { StepStatus::InvalidInput };
-        let serves_energy = self.demand.contains(Demand::ENERGY);
+        let serves_energy = self.subject.model().serves().contains(Demand::ENERGY);
         Ok(match output.status() {
             Some(status) if output.wrench.is_finite() => Answer {
                 wrench: output.wrench,
@@ -283,11 +223,12 @@ impl Walker {
     }
 
     fn read_details(&mut self) -> Result<Vec<Option<f64>>, EvaluateError> {
-        if self.details == Details::Omitted || self.model.details().is_empty() {
+        let count = self.subject.model().details().len();
+        if self.details == Details::Omitted || count == 0 {
             return Ok(Vec::new());
         }
-        let mut values = vec![f64::NAN; self.model.details().len()];
-        let status = self.model.read_details(&mut values);
+        let mut values = vec![f64::NAN; count];
+        let status = self.subject.model().read_details(&mut values);
         self.check(status)?;
         Ok(values.into_iter().map(|value| value.is_finite().then_some(value)).collect())
     }

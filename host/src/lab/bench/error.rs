@@ -1,9 +1,9 @@
 //! How far answers lie from the reference's.
 
-use super::PERIOD_NS;
-use flotor_hal::abi::CallStatus;
+use crate::lab::PERIOD_NS;
+use crate::lab::subject::call;
 use flotor_hal::abi::loader::Model;
-use flotor_hal::{Demand, Input, Output, Pose, StepStatus, Wrench};
+use flotor_hal::{Demand, Input, Pose, StepStatus, Wrench};
 use serde::Serialize;
 
 /// Answers a model may need at the first pose until it has converged, ticks.
@@ -68,11 +68,10 @@ pub(super) fn answer(model: &mut Model, pose: Pose, tick: u64) -> Option<Wrench>
         demand: Demand::WRENCH.limited_to(model.serves()),
         ..Input::at_rest(pose)
     };
-    let mut output = Output::default();
-    let status = model.step(&input, &mut output);
+    let output = call(model, &input).ok()?;
     let sound =
         matches!(output.status(), Some(StepStatus::Ok | StepStatus::Clamped | StepStatus::NotConverged));
-    (status == CallStatus::Ok && sound && output.wrench.is_finite()).then_some(output.wrench)
+    (sound && output.wrench.is_finite()).then_some(output.wrench)
 }
 
 #[cfg(test)]

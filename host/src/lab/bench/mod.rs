@@ -31,9 +31,10 @@ pub use report::{ApartRow, BenchReport, CaseRow};
 pub use stopwatch::Times;
 pub use whole_tick::{BenchDevice, TickCost, WholeTick};
 
-use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
-use flotor_hal::{Demand, LoopConfig};
-use std::cell::Cell;
+use super::subject::prepared;
+use super::{Progress, Size};
+use flotor_hal::Demand;
+use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
 
 /// One setting of the model.
 #[derive(Clone, Debug)]
@@ -44,30 +45,11 @@ pub struct Case {
     pub settings: Vec<Setting>,
 }
 
-/// How much is timed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Effort {
-    /// Seconds: enough for a median.
-    Short,
-    /// Minutes: enough for p99.9.
-    Full,
-}
-
-impl Effort {
-    /// Length of the path, ticks.
-    const fn ticks(self) -> usize {
-        match self {
-            Self::Short => 2_000,
-            Self::Full => 20_000,
-        }
-    }
-
-    /// How often the path is walked.
-    const fn rounds(self) -> usize {
-        match self {
-            Self::Short => 5,
-            Self::Full => 9,
-        }
+/// Length of the path, ticks, and how often it is walked: enough for a median, or for p99.9.
+const fn extent(size: Size) -> (usize, usize) {
+    match size {
+        Size::Short => (2_000, 5),
+        Size::Full => (20_000, 9),
     }
 }
 
@@ -85,7 +67,7 @@ pub struct Plan {
     /// Calls to tell apart.
     pub apart: Option<TellApart>,
     /// How much is timed.
-    pub effort: Effort,
+    pub size: Size,
 }
 
 /// Calls to tell apart by a detail of the answer.
@@ -97,15 +79,6 @@ pub struct TellApart {
     pub walks: Vec<(Case, Hand)>,
 }
 
-/// Hears how far the work is.
-pub trait Progress {
-    /// A piece of work begins, after `done` of `all` pieces.
-    fn begin(&self, name: &str, done: usize, all: usize);
-}
-
-/// Rate of the path, and of every tick that is timed.
-const PERIOD_NS: u64 = 1_000_000;
-
 /// Force only, force and torque, and all that a case serves.
 const DEMANDS: [(&str, Demand); 3] =
     [("force", Demand::FORCE), ("wrench", Demand::WRENCH), ("all", Demand::ALL)];
@@ -115,30 +88,25 @@ const DEMANDS: [(&str, Demand); 3] =
 /// # Errors
 /// [`LoadError`] if the plugin refuses a case or the reference.
 pub fn measure(plugin: &Plugin, plan: &Plan, progress: &dyn Progress) -> Result<BenchReport, LoadError> {
-    let Plan { cases, yardstick, reference, hand, apart, effort } = plan;
-    let walks = apart.as_ref().map_or(&[][..], |apart| &apart.walks);
-    let comparisons = if reference.is_some() { 2 * cases.len() } else { 0 };
-    let all = comparisons + DEMANDS.len() * effort.rounds() + walks.len();
-    let done = Cell::new(0);
-    let begin = |name: &str| progress.begin(name, done.replace(done.get() + 1), all);
-
-    let path = hand.poses(effort.ticks());
+    let Plan { cases, yardstick, reference, hand, apart, size } = plan;
+    let (ticks, rounds) = extent(*size);
+    let path = hand.poses(ticks);
     let mut models = cases.iter().map(|case| create(plugin, case)).collect::<Result<Vec<_>, _>>()?;
     let mut distances = vec![None; cases.len()];
     let mut losses = Vec::new();
     if let Some(case) = reference {
         let mut exact = create(plugin, case)?;
+        progress.begin("errors", cases.len() as u64);
         let truth = error::walk(&mut exact, &path);
         for ((case, model), distance) in cases.iter().zip(&mut models).zip(&mut distances) {
-            begin(&format!("error: {}", case.name));
             *distance = Some(Distance::between(&error::walk(model, &path), &truth));
-            begin(&format!("at the hand: {}", case.name));
             losses.push((case.name.clone(), reach_hand::losses(&mut exact, model, *hand, Sampling::FULL)));
+            progress.advance(1);
         }
     }
     let [force, wrench, everything] = DEMANDS.map(|(name, demand)| {
-        let hear = || begin(&format!("times: {name}"));
-        stopwatch::in_turns(&mut models, *yardstick, &path, demand, effort.rounds(), hear)
+        progress.begin(&format!("times: {name}"), rounds as u64);
+        stopwatch::in_turns(&mut models, *yardstick, &path, demand, rounds, || progress.advance(1))
     });
     let times = force.into_iter().zip(wrench).zip(everything);
     let rows = cases.iter().zip(distances).zip(times).map(|((case, distance), ((force, wrench), all))| {
@@ -147,16 +115,17 @@ pub fn measure(plugin: &Plugin, plan: &Plan, progress: &dyn Progress) -> Result<
     let rows = rows.collect();
     let mut told_apart = Vec::new();
     if let Some(TellApart { detail, walks }) = apart {
+        progress.begin(detail, walks.len() as u64);
         for (case, hand) in walks {
-            begin(&format!("{detail}: {}", case.name));
             let mut model = create(plugin, case)?;
-            let apart = apart::apart(&mut model, detail, &hand.poses(effort.ticks()), effort.rounds());
+            let apart = apart::apart(&mut model, detail, &hand.poses(ticks), rounds);
             told_apart.extend(apart.map(|apart| ApartRow {
                 name: case.name.clone(),
                 depth_m: hand.depth_m,
                 detail: detail.clone(),
                 apart,
             }));
+            progress.advance(1);
         }
     }
     Ok(BenchReport {
@@ -171,12 +140,6 @@ pub fn measure(plugin: &Plugin, plan: &Plan, progress: &dyn Progress) -> Result<
     })
 }
 
-fn create(plugin: &Plugin, case: &Case) -> Result<flotor_hal::abi::loader::Model, LoadError> {
-    let mut model = plugin.create_model(&case.settings)?;
-    let refused = |refusal| {
-        let metadata = plugin.metadata().clone();
-        LoadError::Refused { path: metadata.path, id: metadata.id, refusal }
-    };
-    model.prepare(&LoopConfig { period_ns: PERIOD_NS, seed: 0 }).map_err(refused)?;
-    Ok(model)
+fn create(plugin: &Plugin, case: &Case) -> Result<Model, LoadError> {
+    prepared(plugin, &case.settings, 0)
 }

@@ -7,8 +7,9 @@
 
 use super::error::answer;
 use super::path::Hand;
+use crate::lab::trajectory::{Trajectory, sensed};
 use flotor_hal::abi::loader::Model;
-use flotor_hal::{DVec3, Pose, orientation_from_rotation_vector, rotation_vector};
+use flotor_hal::{DVec3, Pose};
 use serde::Serialize;
 
 /// How a device samples a hand.
@@ -29,12 +30,7 @@ impl Sampling {
     const NONE: Sampling = Sampling { delay_ticks: 0, quantum_m: 0.0, quantum_rad: 0.0 };
 
     fn sees(self, pose: Pose) -> Pose {
-        let step = |vector: DVec3, quantum: f64| match quantum > 0.0 {
-            true => (vector / quantum).round() * quantum,
-            false => vector,
-        };
-        let turn = step(rotation_vector(pose.orientation()), self.quantum_rad);
-        Pose::new(step(pose.position(), self.quantum_m), orientation_from_rotation_vector(turn))
+        sensed(pose, self.quantum_m, self.quantum_rad)
     }
 }
 
@@ -75,19 +71,21 @@ pub(super) fn losses(exact: &mut Model, used: &mut Model, hand: Hand, sampling: 
 
 /// The reference's force at every moment.
 struct Truth {
-    hand: Hand,
+    hand: Trajectory,
     forces_n: Vec<Option<DVec3>>,
 }
 
 impl Truth {
     fn new(exact: &mut Model, hand: Hand) -> Self {
         exact.reset();
+        let hand = hand.trajectory();
         let forces = (0..TICKS * MOMENTS).map(|moment| {
             #[allow(clippy::cast_precision_loss)] // a few thousand
             let time_s = moment as f64 / MOMENTS as f64 * 1.0e-3;
-            answer(exact, hand.at(time_s), moment).map(|wrench| wrench.force())
+            answer(exact, hand.pose(time_s), moment).map(|wrench| wrench.force())
         });
-        Self { hand, forces_n: forces.collect() }
+        let forces_n = forces.collect();
+        Self { hand, forces_n }
     }
 
     fn at(&self, moment: u64) -> Option<DVec3> {
@@ -96,7 +94,7 @@ impl Truth {
 
     /// Error at the moments of sampling themselves.
     fn at_samples(&self, model: &mut Model, sampling: Sampling) -> f64 {
-        let answers = answers(model, self.hand, sampling);
+        let answers = answers(model, &self.hand, sampling);
         let errors =
             (0..).zip(answers).map(|(tick, force)| Some((force? - self.at(tick * MOMENTS)?).length()));
         root_mean_square(errors.skip(SETTLED))
@@ -104,7 +102,7 @@ impl Truth {
 
     /// Error at every moment, of a force that is held, from `delay_ticks` after its sample.
     fn held(&self, model: &mut Model, sampling: Sampling) -> f64 {
-        let answers = answers(model, self.hand, sampling);
+        let answers = answers(model, &self.hand, sampling);
         let errors = (0..TICKS * MOMENTS).map(|moment| {
             let sample = (moment / MOMENTS).checked_sub(sampling.delay_ticks)?;
             let held = answers.get(usize::try_from(sample).ok()?).copied().flatten()?;
@@ -118,11 +116,11 @@ impl Truth {
 /// Ticks at the start that are not counted: a model with memory finds its branch.
 const SETTLED: usize = 20;
 
-fn answers(model: &mut Model, hand: Hand, sampling: Sampling) -> Vec<Option<DVec3>> {
+fn answers(model: &mut Model, hand: &Trajectory, sampling: Sampling) -> Vec<Option<DVec3>> {
     model.reset();
     let answers = (0..TICKS).map(|tick| {
         #[allow(clippy::cast_precision_loss)] // a few thousand
-        let seen = sampling.sees(hand.at(tick as f64 * 1.0e-3));
+        let seen = sampling.sees(hand.pose(tick as f64 * 1.0e-3));
         answer(model, seen, tick).map(|wrench| wrench.force())
     });
     answers.collect()

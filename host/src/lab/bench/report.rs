@@ -1,6 +1,7 @@
 //! The measurements as a table, as CSV, as a picture.
 
 use super::{Apart, DEMANDS, Distance, Losses, Speed, Times};
+use crate::lab::report::{table, to_csv};
 use crate::plot::{Axis, Figure, Mark, Panel, Series};
 use serde::Serialize;
 
@@ -49,6 +50,20 @@ pub struct ApartRow {
     pub apart: Apart,
 }
 
+/// Errors of a case in a line of CSV.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Errors {
+    Known(Distance),
+    Unknown([(); 5]),
+}
+
+/// A row of a table: a name and numbers.
+fn named<const N: usize, const M: usize>(name: &str, numbers: [f64; M]) -> [String; N] {
+    let mut cells = std::iter::once(name.to_owned()).chain(numbers.map(|number| format!("{number:.1e}")));
+    std::array::from_fn(|_| cells.next().unwrap_or_default())
+}
+
 impl BenchReport {
     /// The tables for people.
     #[must_use]
@@ -64,123 +79,90 @@ impl BenchReport {
 
     fn times(&self) -> Vec<String> {
         let yardstick = self.yardstick.as_deref().unwrap_or("itself");
-        let mut lines = vec![
-            format!(
-                "  Times of a tick with force and torque, ns; all cases in turns, share is that of {yardstick}, median of turns"
-            ),
-            format!(
-                "  {:<24}{:>9}{:>8}{:>9}{:>10}{:>9}{:>12}{:>9}{:>7}",
-                "case", "mean", "share", "median", "p99.9", "cold", "force only", "batch", "gain"
-            ),
-        ];
-        lines.extend(self.rows.iter().map(|CaseRow { name, times: [force, wrench, _], .. }| {
-            let batch = wrench.batch_ns.map_or_else(String::new, |ns| format!("{ns:.0}"));
-            let gain = wrench.batch_gain.map_or_else(String::new, |gain| format!("{gain:.1}"));
-            format!(
-                "  {name:<24}{:>9.0}{:>8.2}{:>9.0}{:>10.0}{:>9.0}{:>12.0}{batch:>9}{gain:>7}",
+        let title = format!(
+            "  Times of a tick with force and torque, ns; all cases in turns, share is that of {yardstick}, median of turns"
+        );
+        let rows = self.rows.iter().map(|CaseRow { name, times: [force, wrench, _], .. }| {
+            let [mean, median, p999, cold, force] = [
                 wrench.mean_ns,
-                wrench.of_yardstick,
                 wrench.warm_median_ns,
                 wrench.warm_p999_ns,
                 wrench.cold_median_ns,
-                force.mean_ns
-            )
-        }));
-        lines
+                force.mean_ns,
+            ]
+            .map(|ns| format!("{ns:.0}"));
+            let share = format!("{:.2}", wrench.of_yardstick);
+            let batch = wrench.batch_ns.map_or_else(String::new, |ns| format!("{ns:.0}"));
+            let gain = wrench.batch_gain.map_or_else(String::new, |gain| format!("{gain:.1}"));
+            [name.clone(), mean, share, median, p999, cold, force, batch, gain]
+        });
+        let head = ["case", "mean", "share", "median", "p99.9", "cold", "force only", "batch", "gain"];
+        [vec![title], table(head, rows)].concat()
     }
 
     fn errors(&self) -> Vec<String> {
         let Some(reference) = &self.reference else { return Vec::new() };
-        let mut lines = vec![
-            format!("  Errors against {reference}"),
-            format!(
-                "  {:<24}{:>13}{:>13}{:>15}{:>15}",
-                "case", "force max N", "rms N", "torque max N m", "rms N m"
-            ),
-        ];
-        lines.extend(self.rows.iter().filter_map(|CaseRow { name, distance, .. }| {
+        let rows = self.rows.iter().filter_map(|CaseRow { name, distance, .. }| {
             let Distance { force_max_n, force_rms_n, torque_max_nm, torque_rms_nm, .. } = (*distance)?;
-            Some(format!(
-                "  {name:<24}{force_max_n:>13.1e}{force_rms_n:>13.1e}{torque_max_nm:>15.1e}{torque_rms_nm:>15.1e}"
-            ))
-        }));
-        lines
+            Some(named(name, [force_max_n, force_rms_n, torque_max_nm, torque_rms_nm]))
+        });
+        let head = ["case", "force max N", "rms N", "torque max N m", "rms N m"];
+        [vec![format!("  Errors against {reference}")], table(head, rows)].concat()
     }
 
     fn at_the_hand(&self) -> Vec<String> {
         if self.losses.is_empty() {
             return Vec::new();
         }
-        let mut lines = vec![
-            "  Error of the force at the hand, rms, N: 1 kHz, one tick late, 5 µm sensor".to_owned(),
-            format!(
-                "  {:<24}{:>11}{:>11}{:>13}{:>11}{:>11}",
-                "case", "model", "hold", "hold, delay", "sensor", "all"
-            ),
-        ];
-        lines.extend(self.losses.iter().map(|(name, l)| {
-            format!(
-                "  {name:<24}{:>11.1e}{:>11.1e}{:>13.1e}{:>11.1e}{:>11.1e}",
-                l.model_n, l.hold_n, l.delay_n, l.quantum_n, l.all_n
-            )
-        }));
-        lines
+        let title = "  Error of the force at the hand, rms, N: 1 kHz, one tick late, 5 µm sensor";
+        let rows = self.losses.iter().map(|(name, losses)| {
+            let Losses { model_n, hold_n, delay_n, quantum_n, all_n } = *losses;
+            named(name, [model_n, hold_n, delay_n, quantum_n, all_n])
+        });
+        let head = ["case", "model", "hold", "hold, delay", "sensor", "all"];
+        [vec![title.to_owned()], table(head, rows)].concat()
     }
 
     fn told_apart(&self) -> Vec<String> {
         let Some(ApartRow { detail, .. }) = self.apart.first() else { return Vec::new() };
-        let mut lines = vec![
-            format!("  Calls with {detail} above zero, and the others: times, ns"),
-            format!(
-                "  {:<24}{:>10}{:>9}{:>11}{:>9}{:>13}{:>9}",
-                "case", "depth mm", "share %", "mean", "p99", "others: mean", "p99"
-            ),
-        ];
         let two = |speed: Option<Speed>| match speed {
             Some(Speed { mean_ns, p99_ns }) => [format!("{mean_ns:.0}"), format!("{p99_ns:.0}")],
             None => ["-".to_owned(), "-".to_owned()],
         };
-        lines.extend(self.apart.iter().map(|ApartRow { name, depth_m, apart, .. }| {
+        let rows = self.apart.iter().map(|ApartRow { name, depth_m, apart, .. }| {
             let ([mean, p99], [others, others_p99]) = (two(apart.above), two(apart.others));
-            format!(
-                "  {name:<24}{:>10.1}{:>9.1}{mean:>11}{p99:>9}{others:>13}{others_p99:>9}",
-                depth_m * 1e3,
-                apart.share * 100.0
-            )
-        }));
-        lines
+            let [depth, share] = [depth_m * 1e3, apart.share * 100.0].map(|number| format!("{number:.1}"));
+            [name.clone(), depth, share, mean, p99, others, others_p99]
+        });
+        let title = format!("  Calls with {detail} above zero, and the others: times, ns");
+        let head = ["case", "depth mm", "share %", "mean", "p99", "others: mean", "p99"];
+        [vec![title], table(head, rows)].concat()
     }
 
     /// One line a case and demand, for other programs.
     #[must_use]
     pub fn to_csv(&self) -> String {
-        let mut lines = vec![
-            "case,demand,mean_ns,of_yardstick,batch_ns,batch_gain,warm_median_ns,warm_p999_ns,cold_median_ns,cold_p999_ns,\
-             force_max_n,force_rms_n,torque_max_nm,torque_rms_nm,unanswered,hand_rms_n"
-                .to_owned(),
-        ];
-        for row in &self.rows {
-            let errors = row.distance.map_or_else(
-                || ",,,,".to_owned(),
-                |d| {
-                    let Distance { force_max_n, force_rms_n, torque_max_nm, torque_rms_nm, unanswered } = d;
-                    format!(
-                        "{force_max_n:e},{force_rms_n:e},{torque_max_nm:e},{torque_rms_nm:e},{unanswered}"
+        const ERRORS: [&str; 6] =
+            ["force_max_n", "force_rms_n", "torque_max_nm", "torque_rms_nm", "unanswered", "hand_rms_n"];
+        let times = "case,demand,mean_ns,of_yardstick,batch_ns,batch_gain,warm_median_ns,warm_p999_ns,cold_median_ns,\
+            cold_p999_ns";
+        to_csv(
+            times.split(',').chain(ERRORS),
+            self.rows.iter().flat_map(|CaseRow { name, distance, times }| {
+                let losses = self.losses.iter().find(|(other, _)| other == name);
+                let hand_rms_n = losses.map(|(_, losses)| losses.all_n);
+                let rows = DEMANDS.iter().zip(times);
+                rows.map(move |((demand, _), times)| {
+                    (
+                        name,
+                        demand,
+                        times,
+                        distance.map_or(Errors::Unknown([(); 5]), Errors::Known),
+                        hand_rms_n,
                     )
-                },
-            );
-            let at_hand = self.losses.iter().find(|(name, _)| *name == row.name);
-            let at_hand = at_hand.map_or_else(String::new, |(_, losses)| format!("{:e}", losses.all_n));
-            for ((demand, _), t) in DEMANDS.iter().zip(&row.times) {
-                let batch_ns = t.batch_ns.map_or_else(String::new, |ns| format!("{ns:.1}"));
-                let batch_gain = t.batch_gain.map_or_else(String::new, |gain| format!("{gain:.3}"));
-                lines.push(format!(
-                    "\"{}\",{demand},{:.1},{:.4},{batch_ns},{batch_gain},{:.1},{:.1},{:.1},{:.1},{errors},{at_hand}",
-                    row.name, t.mean_ns, t.of_yardstick, t.warm_median_ns, t.warm_p999_ns, t.cold_median_ns, t.cold_p999_ns
-                ));
-            }
-        }
-        lines.join("\n") + "\n"
+                })
+            }),
+        )
     }
 
     /// Error over time, a point a case: the further down and left, the better.

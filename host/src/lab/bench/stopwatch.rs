@@ -4,7 +4,7 @@
 //! so on to the end of it, round after round. What disturbs one slice disturbs its neighbours too, and quotients of
 //! neighbouring slices are those of a quiet machine.
 
-use super::PERIOD_NS;
+use crate::lab::PERIOD_NS;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Input, Memory, Output, Pose};
 use serde::Serialize;
@@ -48,14 +48,14 @@ struct Clocked {
     cold_ns: Vec<f64>,
 }
 
-/// Times models along a path, all of them in turns. `hear` is told of every round.
+/// Times models along a path, all of them in turns. `done` is called after every round.
 pub(super) fn in_turns(
     models: &mut [Model],
     yardstick: usize,
     path: &[Pose],
     demand: Demand,
     rounds: usize,
-    mut hear: impl FnMut(),
+    done: impl Fn(),
 ) -> Vec<Times> {
     let mut cases: Vec<_> = models
         .iter_mut()
@@ -64,7 +64,6 @@ pub(super) fn in_turns(
     let overhead_ns = overhead_ns();
     let mut outputs = [Output::default(); SLICE_TICKS];
     for _ in 0..rounds {
-        hear();
         cases.iter_mut().for_each(|(_, model, _)| _ = model.reset());
         for start in (0..path.len()).step_by(SLICE_TICKS) {
             for (inputs, model, clocked) in &mut cases {
@@ -93,6 +92,7 @@ pub(super) fn in_turns(
                 clocked.cold_ns.push(call_ns(overhead_ns, model, input));
             }
         }
+        done();
     }
     let slices = path.len().div_ceil(SLICE_TICKS);
     let yardstick_ns = cases.get(yardstick).map_or_else(Vec::new, |(_, _, clocked)| clocked.walks_ns.clone());

@@ -16,11 +16,13 @@
 use super::jacobian::Jacobian;
 use super::measure::{Measure, Verdict};
 use super::plant::Plant;
-use super::poses::at;
-use super::subject::{PERIOD_NS, Subject};
 use super::sweep::sweep;
 use super::{DAMPINGS_NS_PER_M, LEVER_M, PERIOD_S, Setup};
+use crate::lab::PERIOD_NS;
 use crate::lab::sampling::Random;
+use crate::lab::subject::Subject;
+use crate::lab::tally::Worst;
+use crate::lab::trajectory::{at, sensed};
 use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{DVec3, Memory, Pose, Wrench, rotation_vector};
 use std::collections::VecDeque;
@@ -67,6 +69,13 @@ impl Loop {
         self.damping_ns_per_m / (PERIOD_S * (0.5 + self.delay_ticks as f64))
     }
 
+    fn sees(&self, pose: Pose) -> Pose {
+        match self.quantum_m > 0.0 {
+            true => sensed(pose, self.quantum_m, self.quantum_m / LEVER_M),
+            false => pose,
+        }
+    }
+
     fn is_clean(&self) -> bool {
         self.quantum_m == 0.0 && self.dropped == 0.0
     }
@@ -100,7 +109,7 @@ fn release(subject: &mut Subject<'_>, conditions: Loop, start: Pose, random: &mu
     let start_m = distance_m(Pose::HOME, start);
     let (mut settled_tick, mut steepest, mut lost) = (0, 0.0, false);
     for tick in 0..TICKS {
-        way.push_back((sensed(plant.pose(), conditions.quantum_m), plant.twist()));
+        way.push_back((conditions.sees(plant.pose()), plant.twist()));
         let (pose, twist) = way.pop_front()?;
         let wrench = subject.advance(pose, twist, PERIOD_NS).ok()?.wrench;
         if let Some((from, last)) = before {
@@ -155,16 +164,6 @@ fn size_n(wrench: &Wrench) -> f64 {
 /// Scalar product of two wrenches with torques at the lever arm, N².
 fn product_n2(one: &Wrench, other: &Wrench) -> f64 {
     one.force().dot(other.force()) + (one.torque() / LEVER_M).dot(other.torque() / LEVER_M)
-}
-
-fn sensed(pose: Pose, quantum_m: f64) -> Pose {
-    if quantum_m == 0.0 {
-        return pose;
-    }
-    let quantum_rad = quantum_m / LEVER_M;
-    let position_m = (pose.position() / quantum_m).round() * quantum_m;
-    let rotation_rad = (rotation_vector(pose.orientation()) / quantum_rad).round() * quantum_rad;
-    at(position_m, rotation_rad)
 }
 
 /// Samples of the last second or so that buzz is taken from.
@@ -253,10 +252,9 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     let rows = sweep(setup, NAME, setup.effort.releases * count, |subject, block| {
         let mut random = Random::new(setup.options.seed, block / count);
         let start = at(random.vector() * reach.position_m, random.vector() * reach.rotation_rad);
-        let conditions = usize::try_from(block % count).ok().and_then(|index| loops.get(index).copied())?;
-        Some(Row { conditions, start, release: release(subject, conditions, start, &mut random) })
+        let conditions = loops[usize::try_from(block % count).unwrap_or(0)];
+        vec![Row { conditions, start, release: release(subject, conditions, start, &mut random) }]
     })?;
-    let rows: Vec<Row> = rows.into_iter().flatten().collect();
     let mut measure = judge(&rows);
     for limit in limits(setup)? {
         measure = measure.with(format!("stiffness limit, {}", limit.name), limit.seen_n_per_m, "N/m").with(
@@ -294,7 +292,7 @@ fn limits(setup: &Setup<'_>) -> Result<Vec<Limit>, LoadError> {
         let rule_n_per_m = clean.stiffest_n_per_m();
         let name = format!("b = {damping_ns_per_m} N s/m, delay {delay_ticks}");
         let seen_n_per_m = limit(subject, clean, start).unwrap_or(f64::NAN);
-        Limit { name, seen_n_per_m, rule_n_per_m }
+        vec![Limit { name, seen_n_per_m, rule_n_per_m }]
     })
 }
 
@@ -320,67 +318,58 @@ fn limit(subject: &mut Subject<'_>, clean: Loop, start: Pose) -> Option<f64> {
 
 #[allow(clippy::cast_precision_loss)] // a few thousand releases
 fn judge(rows: &[Row]) -> Measure {
-    let surprises: Vec<&Row> = rows.iter().filter(|row| row.diverged() && row.must_settle()).collect();
-    let answered = rows.iter().filter(|row| row.release.is_some()).count();
-    let foretold = rows.iter().filter(|row| row.must_settle()).count();
-    let carried_off = rows.iter().filter(|row| row.carried_off()).count();
-    let verdict = match (surprises.is_empty(), foretold) {
-        (false, _) => Verdict::Fail,
-        (true, 0) => Verdict::Note,
-        (true, _) => Verdict::Pass,
+    let count = |is: &dyn Fn(&Row) -> bool| rows.iter().filter(|row| is(row)).count() as u64;
+    let is_surprise = |row: &Row| row.diverged() && row.must_settle();
+    let surprises = count(&is_surprise);
+    let answered = count(&|row| row.release.is_some());
+    let foretold = count(&Row::must_settle);
+    let carried_off = count(&Row::carried_off);
+    let (verdict, remark) = match (surprises, foretold) {
+        (1.., _) => (Verdict::Fail, "diverges although nowhere stiffer than the loop allows".to_owned()),
+        (0, 0) if carried_off > 0 => {
+            (Verdict::Note, "pulled away from everywhere: no place to settle at".to_owned())
+        }
+        (0, 0) => (Verdict::Note, "stiffer than every loop here allows: nothing to judge".to_owned()),
+        _ => (Verdict::Pass, format!("{foretold} releases had to settle, and did")),
     };
-    let remark = match verdict {
-        Verdict::Fail => "diverges although nowhere stiffer than the loop allows".to_owned(),
-        Verdict::Note if carried_off > 0 => "pulled away from everywhere: no place to settle at".to_owned(),
-        Verdict::Note => "stiffer than every loop here allows: nothing to judge".to_owned(),
-        Verdict::Pass => format!("{foretold} releases had to settle, and did"),
+    let pose = rows.iter().find(|row| is_surprise(row)).map(|row| row.start);
+    let worst = Worst { value: surprises as f64, pose };
+    let mut measure = Measure { verdict, ..Measure::of(["M6", NAME, ""], &worst, [0.0, 0.0], remark) }
+        .count("releases", rows.len() as u64)
+        .count("releases without answer", rows.len() as u64 - answered)
+        .count("releases carried off", carried_off)
+        .unless_unanswered(answered);
+    let largest = |is: &dyn Fn(&Row) -> bool, pick: fn(&Release) -> f64| {
+        let releases = rows.iter().filter(|row| is(row)).filter_map(|row| row.release.as_ref());
+        releases.map(pick).fold(0.0, |a: f64, b| if b.is_nan() { b } else { a.max(b) })
     };
-    let clean = |row: &&Row| row.conditions.is_clean() && row.conditions.delay_ticks == 0;
-    let mut measure = Measure {
-        id: "M6",
-        name: NAME,
-        value: surprises.len() as f64,
-        unit: "",
-        bound: Some(0.0),
-        verdict,
-        pose: surprises.first().map(|row| row.start.into()),
-        remark,
-        values: Vec::new(),
-    }
-    .with("releases", rows.len() as f64, "")
-    .with("releases without answer", (rows.len() - answered) as f64, "")
-    .with("releases carried off", carried_off as f64, "")
-    .unless_unanswered(answered as u64);
     for damping in DAMPINGS_NS_PER_M {
-        let here = || rows.iter().filter(clean).filter(|row| row.conditions.damping_ns_per_m == damping);
-        let of = |pick: fn(&Release) -> f64| here().filter_map(|row| row.release.as_ref()).map(pick);
+        let here = |row: &Row| {
+            let Loop { damping_ns_per_m, delay_ticks, .. } = row.conditions;
+            row.conditions.is_clean() && delay_ticks == 0 && damping_ns_per_m == damping
+        };
         let name = |what: &str| format!("{what}, b = {damping} N s/m");
-        let settle_s =
-            of(|release| release.settle_s).fold(0.0, |a, b| if b.is_nan() { b } else { f64::max(a, b) });
         measure = measure
-            .with(name("longest settling"), settle_s, "s")
-            .with(name("peak force"), of(|release| release.peak_force_n).fold(0.0, f64::max), "N")
-            .with(
-                name("steepest on the way"),
-                of(|release| release.steepest_n_per_m).fold(0.0, f64::max),
-                "N/m",
-            );
+            .with(name("longest settling"), largest(&here, |release| release.settle_s), "s")
+            .with(name("peak force"), largest(&here, |release| release.peak_force_n), "N")
+            .with(name("steepest on the way"), largest(&here, |release| release.steepest_n_per_m), "N/m");
     }
+    let diverged =
+        |is: &dyn Fn(&Row) -> bool| count(&|row| is(row) && row.diverged()) as f64 / count(is).max(1) as f64;
     for delay in DELAYS_TICKS {
-        let here = || rows.iter().filter(|row| row.conditions.delay_ticks == delay);
-        let share = here().filter(|row| row.diverged()).count() as f64 / here().count().max(1) as f64;
+        let share = diverged(&|row| row.conditions.delay_ticks == delay);
         measure = measure.with(format!("share diverged, delay {delay}"), share, "");
     }
     for quantum_m in QUANTA_M {
-        let here = |row: &&Row| row.conditions.quantum_m == quantum_m && row.conditions.dropped == 0.0;
-        let calm = rows.iter().filter(here).filter(|row| !row.diverged());
-        let buzz = calm.filter_map(|row| row.release.as_ref()).map(|release| release.buzz_n);
-        let quantum_um = quantum_m * 1.0e6;
-        measure = measure.with(format!("buzz, {quantum_um} µm"), buzz.fold(0.0, f64::max), "N");
+        let calm = |row: &Row| {
+            let Loop { quantum_m: quantum, dropped, .. } = row.conditions;
+            quantum == quantum_m && dropped == 0.0 && !row.diverged()
+        };
+        let buzz_n = largest(&calm, |release| release.buzz_n.max(0.0));
+        measure = measure.with(format!("buzz, {} µm", quantum_m * 1.0e6), buzz_n, "N");
     }
     for dropped in DROPS {
-        let here = || rows.iter().filter(|row| row.conditions.dropped == dropped);
-        let share = here().filter(|row| row.diverged()).count() as f64 / here().count().max(1) as f64;
+        let share = diverged(&|row| row.conditions.dropped == dropped);
         measure = measure.with(format!("share diverged, {} % dropped", dropped * 100.0), share, "");
     }
     measure

@@ -10,12 +10,14 @@
 //! Length of a piece: that of the motion with angles as lengths at the device's lever arm
 //! ([`super::LEVER_M`]).
 
-use super::measure::{Measure, Quantity, Verdict, Worst};
-use super::poses::{Reach, at};
-use super::subject::Subject;
+use super::measure::{Measure, Verdict};
+use super::poses::Reach;
 use super::sweep::sweep;
 use super::{LEVER_M, Setup, WIDER};
 use crate::lab::sampling::{Random, Sobol};
+use crate::lab::subject::Subject;
+use crate::lab::tally::{Worst, tally};
+use crate::lab::trajectory::at;
 use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{DVec3, Pose, Wrench};
 use serde::Serialize;
@@ -49,23 +51,17 @@ pub struct Jump {
     pub torque_nm: f64,
 }
 
-#[derive(Clone, Copy)]
-struct Jumps {
-    force: [Worst; PIECES_MM.len()],
-    torque: [Worst; PIECES_MM.len()],
-    /// Largest force over the shortest piece inside the workspace itself, without the margin around it.
-    inside: Worst,
-    pieces: u64,
+tally! {
+    struct Jumps {
+        force: [Worst; PIECES_MM.len()],
+        torque: [Worst; PIECES_MM.len()],
+        /// Largest force over the shortest piece inside the workspace itself, without the margin around it.
+        inside: Worst,
+        pieces: u64,
+    }
 }
 
 impl Jumps {
-    const NONE: Self = Self {
-        force: [Worst::NONE; PIECES_MM.len()],
-        torque: [Worst::NONE; PIECES_MM.len()],
-        inside: Worst::NONE,
-        pieces: 0,
-    };
-
     fn offer(&mut self, reach: Reach, level: usize, change: Wrench, pose: Pose) {
         if level == PIECES_MM.len() - 1 && reach.holds(pose) {
             self.inside.offer(change.force().length(), pose);
@@ -73,15 +69,6 @@ impl Jumps {
         self.pieces += 1;
         self.force[level].offer(change.force().length(), pose);
         self.torque[level].offer(change.torque().length(), pose);
-    }
-
-    fn merge(&mut self, later: &Self) {
-        self.inside.merge(later.inside);
-        self.pieces += later.pieces;
-        for level in 0..PIECES_MM.len() {
-            self.force[level].merge(later.force[level]);
-            self.torque[level].merge(later.torque[level]);
-        }
     }
 }
 
@@ -102,9 +89,9 @@ impl Line {
 /// Crosses the workspace on straight lines and closes in on whatever stands out.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Vec<Jump>), LoadError> {
     let sobol = Sobol::new(setup.options.seed);
-    let parts = sweep(setup, NAME, setup.effort.lines, |subject, block| {
+    let total = sweep(setup, NAME, setup.effort.lines, |subject, block| {
         let line = line(setup, &sobol, block);
-        let mut jumps = Jumps::NONE;
+        let mut jumps = Jumps::default();
         let first_m = PIECES_MM[0] * 1.0e-3;
         let start_m = -0.5 * first_m * PIECES_PER_LINE as f64;
         let changes = changes(subject, &line, start_m, first_m, PIECES_PER_LINE);
@@ -118,8 +105,6 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Vec<Jump>), LoadErr
         }
         jumps
     })?;
-    let mut total = Jumps::NONE;
-    parts.iter().for_each(|part| total.merge(part));
     Ok((judge(&total), curve(&total)))
 }
 
@@ -230,8 +215,7 @@ fn judge(total: &Jumps) -> Measure {
     let last = PIECES_MM.len() - 1;
     let (force, torque) = (total.force[last], total.torque[last]);
     let of_force = Verdict::of(force.value, FELT_N * HARMLESS, FELT_N);
-    let of_torque = Verdict::of(torque.value, FELT_NM * HARMLESS, FELT_NM);
-    let verdict = of_force.and(of_torque);
+    let verdict = of_force.max(Verdict::of(torque.value, FELT_NM * HARMLESS, FELT_NM));
     // The graver of the two is the one that is shown.
     let torque_is_graver = torque.value / FELT_NM > force.value / FELT_N;
     let (worst, unit, felt) = if torque_is_graver { (torque, "N·m", FELT_NM) } else { (force, "N", FELT_N) };
@@ -242,27 +226,17 @@ fn judge(total: &Jumps) -> Measure {
             PIECES_MM[last], total.inside.value
         ),
     };
-    let mut measure = Measure {
-        id: "M1",
-        name: NAME,
-        value: worst.value,
-        unit,
-        bound: Some(felt * HARMLESS),
-        verdict,
-        pose: worst.record(),
-        remark,
-        values: Vec::new(),
-    };
-    let named = |what: &str, length_mm: f64, value, unit| Quantity {
-        name: format!("{what} over {length_mm:.0e} mm"),
-        value,
-        unit,
-    };
-    for jump in curve(total) {
-        measure.values.push(named("force jump", jump.length_mm, jump.force_n, "N"));
-        measure.values.push(named("torque jump", jump.length_mm, jump.torque_nm, "N·m"));
+    let mut measure = Measure::of(["M1", NAME, unit], &worst, [felt * HARMLESS, felt], remark);
+    measure.verdict = verdict;
+    for Jump { length_mm, force_n, torque_nm } in curve(total) {
+        measure = measure.with(format!("force jump over {length_mm:.0e} mm"), force_n, "N").with(
+            format!("torque jump over {length_mm:.0e} mm"),
+            torque_nm,
+            "N·m",
+        );
     }
-    let measure = measure.with("force jump over 1e-8 mm inside the workspace", total.inside.value, "N");
-    #[allow(clippy::cast_precision_loss)] // a count below 2^53
-    measure.with("pieces", total.pieces as f64, "").unless_unanswered(total.pieces)
+    measure
+        .with("force jump over 1e-8 mm inside the workspace", total.inside.value, "N")
+        .count("pieces", total.pieces)
+        .unless_unanswered(total.pieces)
 }

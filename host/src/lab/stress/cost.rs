@@ -6,14 +6,15 @@
 //! counts against the bound, while percentiles and the worst are reported as they were seen. That a call
 //! allocates nothing cannot be seen from outside the plugin; the plugin's own tests have to say it.
 
-use super::measure::{Decades, Measure, Verdict, Worst};
-use super::poses::Manifold;
-use super::subject::Subject;
+use super::measure::Measure;
+use super::poses::mixed;
 use super::{Setup, WIDER};
 use crate::lab::sampling::{Random, Sobol};
+use crate::lab::subject::Subject;
+use crate::lab::tally::{Decades, Worst};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::LoadError;
-use flotor_hal::{Demand, Input, Memory, Output, Pose};
+use flotor_hal::{Memory, Output, Pose};
 use hdrhistogram::Histogram;
 use std::time::Instant;
 
@@ -22,8 +23,6 @@ const NAME: &str = "cost of a call";
 const TENTH_OF_A_TICK_NS: f64 = 100_000.0;
 /// Times each pose is asked.
 const REPEATS: usize = 3;
-/// Every how many poses one is taken from a manifold.
-const MANIFOLD_EVERY: u64 = 8;
 /// Poses between two updates of the progress line.
 const CHUNK: u64 = 1024;
 
@@ -31,21 +30,14 @@ const CHUNK: u64 = 1024;
 pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Decades), LoadError> {
     let chunks = setup.effort.timed_poses.div_ceil(CHUNK);
     setup.progress.begin(NAME, chunks);
-    let mut subject = Subject::new(setup)?;
+    let mut subject = setup.subject()?;
     let mut stopwatch = Stopwatch::new();
     let sobol = Sobol::new(setup.options.seed);
     let mut random = Random::new(setup.options.seed, 0);
     let reach = setup.options.reach.scaled(WIDER);
     for chunk in 0..chunks {
         for index in chunk * CHUNK..(chunk + 1) * CHUNK {
-            let pose = if index.is_multiple_of(MANIFOLD_EVERY) {
-                let number = index / MANIFOLD_EVERY;
-                let manifold = usize::try_from(number).unwrap_or(0) % Manifold::ALL.len();
-                Manifold::ALL[manifold].sample(reach, &mut random, number).0
-            } else {
-                reach.pose(sobol.point(index))
-            };
-            stopwatch.time(&mut subject, pose);
+            stopwatch.time(&mut subject, mixed(reach, &sobol, &mut random, index));
         }
         setup.progress.advance(1);
     }
@@ -68,7 +60,7 @@ impl Stopwatch {
             overhead_ns: overhead_ns(),
             calls: calls.unwrap_or_else(|_| unreachable!("constant, legal bounds")),
             spread: Decades::default(),
-            slowest: Worst::NONE,
+            slowest: Worst::default(),
         }
     }
 
@@ -104,14 +96,13 @@ impl Stopwatch {
             subject.restart();
             let mut calls_ns = Vec::new();
             let mut begin = Instant::now();
-            let arrival = subject.walk(pose, &mut |_| {
+            let arrival = subject.walk(pose, &mut || {
                 calls_ns.push(net_ns(begin));
                 begin = Instant::now();
             });
             return arrival.is_ok().then_some(calls_ns);
         }
-        let demand = Demand::ALL.limited_to(subject.model().serves());
-        let input = Input { demand, ..Input::at_rest(pose) };
+        let input = subject.at_rest(pose);
         let mut output = Output::default();
         let begin = Instant::now();
         let call = subject.model().step(std::hint::black_box(&input), std::hint::black_box(&mut output));
@@ -125,25 +116,14 @@ impl Stopwatch {
 
     #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
     fn judge(&self) -> Measure {
-        let judged_ns = self.slowest.value;
-        Measure {
-            id: "M7",
-            name: NAME,
-            value: judged_ns,
-            unit: "ns",
-            bound: Some(TENTH_OF_A_TICK_NS),
-            verdict: Verdict::of(judged_ns, TENTH_OF_A_TICK_NS, TENTH_OF_A_TICK_NS),
-            pose: self.slowest.record(),
-            remark: "best of three at its slowest pose; whether it allocates cannot be seen from outside"
-                .to_owned(),
-            values: Vec::new(),
-        }
-        .with("p50", self.calls.value_at_quantile(0.5) as f64, "ns")
-        .with("p99.9", self.calls.value_at_quantile(0.999) as f64, "ns")
-        .with("p99.999", self.calls.value_at_quantile(0.99999) as f64, "ns")
-        .with("max, interruptions included", self.calls.max() as f64, "ns")
-        .with("calls", self.calls.len() as f64, "")
-        .with("clock, taken off", self.overhead_ns as f64, "ns")
+        let remark = "best of three at its slowest pose; whether it allocates cannot be seen from outside";
+        Measure::of(["M7", NAME, "ns"], &self.slowest, [TENTH_OF_A_TICK_NS; 2], remark)
+            .with("p50", self.calls.value_at_quantile(0.5) as f64, "ns")
+            .with("p99.9", self.calls.value_at_quantile(0.999) as f64, "ns")
+            .with("p99.999", self.calls.value_at_quantile(0.99999) as f64, "ns")
+            .with("max, interruptions included", self.calls.max() as f64, "ns")
+            .count("calls", self.calls.len())
+            .with("clock, taken off", self.overhead_ns as f64, "ns")
     }
 }
 

@@ -3,12 +3,14 @@
 //! From a second instance, after a reset, and through the batch call. The digest of all answers is printed,
 //! so that runs on two machines or of two builds can be compared by eye.
 
-use super::measure::{Measure, PoseRecord, Verdict};
-use super::poses::Manifold;
-use super::subject::{PERIOD_NS, Subject};
+use super::measure::Measure;
+use super::poses::mixed;
 use super::sweep::sweep;
 use super::{Setup, WIDER};
+use crate::lab::PERIOD_NS;
 use crate::lab::sampling::{Random, Sobol};
+use crate::lab::subject::{Subject, call};
+use crate::lab::tally::{Worst, tally};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{LoadError, Model};
 use flotor_hal::{Input, Memory, Output, Pose, Twist};
@@ -17,8 +19,6 @@ use xxhash_rust::xxh3::Xxh3;
 const NAME: &str = "determinism";
 /// Poses of one block; each block makes a second instance.
 const BLOCK: u64 = 2048;
-/// Every how many poses one is taken from a manifold.
-const MANIFOLD_EVERY: u64 = 8;
 
 /// Bits of an answer.
 type Bits = [u64; 8];
@@ -26,41 +26,39 @@ type Bits = [u64; 8];
 /// Ways to ask again, in the order of [`Tally::differing`].
 const AGAIN: [&str; 3] = ["second instance", "after reset", "batch"];
 
-struct Tally {
-    compared: u64,
-    differing: [u64; AGAIN.len()],
-    first: Option<(Pose, &'static str)>,
-    digest: u64,
+tally! {
+    struct Tally {
+        compared: u64,
+        differing: [u64; AGAIN.len()],
+        first: Option<(Pose, &'static str)>,
+        /// Of the answers of each block.
+        digests: Vec<u64>,
+        refused: Option<LoadError>,
+    }
 }
 
 /// Asks the same poses four ways.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     let sobol = Sobol::new(setup.options.seed);
     let blocks = setup.effort.compared_poses.div_ceil(BLOCK);
-    let tallies = sweep(setup, NAME, blocks, |subject, block| -> Result<Tally, LoadError> {
+    let total = sweep(setup, NAME, blocks, |subject, block| {
         let inputs = inputs(setup, &sobol, subject, block);
-        let mut other = Subject::new(setup)?;
+        let mut other = match setup.subject() {
+            Ok(other) => other,
+            Err(refused) => return Tally { refused: Some(refused), ..Tally::default() },
+        };
         let reference = singly(subject.model(), &inputs);
         let second = singly(other.model(), &inputs);
         subject.model().reset();
         let reset = singly(subject.model(), &inputs);
         other.model().reset();
         let batch = batch(other.model(), &inputs);
-        Ok(compare(&inputs, &reference, [&second, &reset, &batch]))
+        compare(&inputs, &reference, [&second, &reset, &batch])
     })?;
-    let mut total = Tally { compared: 0, differing: [0; AGAIN.len()], first: None, digest: 0 };
-    let mut digest = Xxh3::new();
-    for tally in tallies {
-        let tally = tally?;
-        total.compared += tally.compared;
-        for (sum, count) in total.differing.iter_mut().zip(tally.differing) {
-            *sum += count;
-        }
-        total.first = total.first.or(tally.first);
-        digest.update(&tally.digest.to_le_bytes());
+    match total.refused {
+        Some(refused) => Err(refused),
+        None => Ok(judge(&total)),
     }
-    total.digest = digest.digest();
-    Ok(judge(&total))
 }
 
 /// Evenly spread poses and some of the manifolds; a walk from home for a model with memory.
@@ -75,15 +73,7 @@ fn inputs(setup: &Setup<'_>, sobol: &Sobol, subject: &mut Subject<'_>, block: u6
             let outward = sobol.point(block).map(|unit| 0.5 + (unit - 0.5) * part);
             return subject.input(reach.pose(outward), Twist::ZERO, PERIOD_NS);
         }
-        let pose = if index.is_multiple_of(MANIFOLD_EVERY) {
-            let number = index / MANIFOLD_EVERY;
-            Manifold::ALL[usize::try_from(number).unwrap_or(0) % Manifold::ALL.len()]
-                .sample(reach, &mut random, number)
-                .0
-        } else {
-            reach.pose(sobol.point(index))
-        };
-        subject.input(pose, Twist::ZERO, PERIOD_NS)
+        subject.input(mixed(reach, sobol, &mut random, index), Twist::ZERO, PERIOD_NS)
     };
     (block * BLOCK..(block + 1) * BLOCK).map(&mut input).collect()
 }
@@ -92,11 +82,8 @@ fn inputs(setup: &Setup<'_>, sobol: &Sobol, subject: &mut Subject<'_>, block: u6
 const UNANSWERED: Bits = [0x0bad_0bad_0bad_0bad; 8];
 
 fn singly(model: &mut Model, inputs: &[Input]) -> Vec<Bits> {
-    let ask = |input: &Input| {
-        let mut output = Output::default();
-        if model.step(input, &mut output) == CallStatus::Ok { bits(&output) } else { UNANSWERED }
-    };
-    inputs.iter().map(ask).collect()
+    let mut ask = |input: &Input| call(model, input).map_or(UNANSWERED, |output| bits(&output));
+    inputs.iter().map(&mut ask).collect()
 }
 
 fn batch(model: &mut Model, inputs: &[Input]) -> Vec<Bits> {
@@ -119,7 +106,7 @@ fn bits(output: &Output) -> Bits {
 }
 
 fn compare(inputs: &[Input], reference: &[Bits], again: [&[Bits]; AGAIN.len()]) -> Tally {
-    let mut tally = Tally { compared: 0, differing: [0; AGAIN.len()], first: None, digest: 0 };
+    let mut tally = Tally::default();
     let mut digest = Xxh3::new();
     for (index, (input, expected)) in inputs.iter().zip(reference).enumerate() {
         // A model that broke answers nothing from there on, to anybody; M0 tells that story.
@@ -135,31 +122,24 @@ fn compare(inputs: &[Input], reference: &[Bits], again: [&[Bits]; AGAIN.len()]) 
             }
         }
     }
-    tally.digest = digest.digest();
+    tally.digests.push(digest.digest());
     tally
 }
 
-#[allow(clippy::cast_precision_loss)] // counts below 2^53
+#[allow(clippy::cast_precision_loss)] // a count below 2^53
 fn judge(total: &Tally) -> Measure {
-    let differing = total.differing.iter().sum::<u64>() as f64;
-    let mut remark = format!("digest {:016x}", total.digest);
+    let mut digest = Xxh3::new();
+    total.digests.iter().for_each(|block| digest.update(&block.to_le_bytes()));
+    let mut remark = format!("digest {:016x}", digest.digest());
     if let Some((_, way)) = total.first {
         remark = format!("first by {way}; {remark}");
     }
-    let mut measure = Measure {
-        id: "M8",
-        name: NAME,
-        value: differing,
-        unit: "",
-        bound: Some(0.0),
-        verdict: Verdict::of(differing, 0.0, 0.0),
-        pose: total.first.map(|(pose, _)| PoseRecord::from(pose)),
-        remark,
-        values: Vec::new(),
-    }
-    .with("poses compared", total.compared as f64, "");
+    let value = total.differing.iter().sum::<u64>() as f64;
+    let differing = Worst { value, pose: total.first.map(|(pose, _)| pose) };
+    let mut measure =
+        Measure::of(["M8", NAME, ""], &differing, [0.0, 0.0], remark).count("poses compared", total.compared);
     for (way, count) in AGAIN.iter().zip(total.differing) {
-        measure = measure.with(format!("differing, {way}"), count as f64, "");
+        measure = measure.count(format!("differing, {way}"), count);
     }
     measure.unless_unanswered(total.compared)
 }

@@ -12,12 +12,13 @@
 //! zero. How much device damping would eat that energy up tells what the model asks of a device; Colgate and
 //! Schenkel (1997) bound it by `K T / 2` for a spring, a model that pumps needs more.
 
-use super::measure::{Decades, Measure, Verdict, Worst};
-use super::paths::ClosedPath;
-use super::subject::Subject;
+use super::measure::{Measure, Verdict};
 use super::sweep::sweep;
 use super::{DAMPINGS_NS_PER_M, LEVER_M, Setup};
 use crate::lab::sampling::Random;
+use crate::lab::subject::Subject;
+use crate::lab::tally::{Decades, Worst, tally};
+use crate::lab::trajectory::Trajectory;
 use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{DVec3, Memory, Pose, Twist, rotation_vector};
 
@@ -65,17 +66,17 @@ impl Lap {
 }
 
 /// Power of the model on the hand along a lap, at evenly spaced samples.
-fn powers(subject: &mut Subject<'_>, path: &ClosedPath, samples: usize) -> Option<Vec<f64>> {
+fn powers(subject: &mut Subject<'_>, path: &Trajectory, samples: usize) -> Option<Vec<f64>> {
     let sample = |index: usize| {
         let part = index as f64 / samples as f64;
-        let wrench = subject.ask(path.pose(part)).ok()?.wrench;
-        let (motion_m, turn_rad) = path.motion(part);
+        let (pose, motion_m, turn_rad) = path.at(part);
+        let wrench = subject.ask(pose).ok()?.wrench;
         Some(wrench.force().dot(motion_m) + wrench.torque().dot(turn_rad))
     };
     (0..samples).map(sample).collect()
 }
 
-fn lap(subject: &mut Subject<'_>, path: &ClosedPath) -> Option<Lap> {
+fn lap(subject: &mut Subject<'_>, path: &Trajectory) -> Option<Lap> {
     if subject.memory() == Memory::PathDependent {
         // The first lap forgets where it came from, the second counts. Steps are short as they are.
         powers(subject, path, 4096)?;
@@ -93,22 +94,23 @@ fn lap(subject: &mut Subject<'_>, path: &ClosedPath) -> Option<Lap> {
     last
 }
 
-#[derive(Default)]
-struct LoopTally {
-    laps: u64,
-    unanswered: u64,
-    beyond: u64,
-    rough: u64,
-    worst: Option<(f64, Pose)>,
-    most_j: f64,
-    relative: Decades,
+tally! {
+    struct LoopTally {
+        laps: u64,
+        unanswered: u64,
+        beyond: u64,
+        rough: u64,
+        worst: Worst,
+        most_j: f64,
+        relative: Decades,
+    }
 }
 
 /// Around closed motions; with the distribution of relative work for the picture.
 pub(super) fn measure_loops(setup: &Setup<'_>) -> Result<(Measure, Decades), LoadError> {
-    let tallies = sweep(setup, LOOPS, setup.effort.loops, |subject, block| {
+    let total = sweep(setup, LOOPS, setup.effort.loops, |subject, block| {
         let mut random = Random::new(setup.options.seed, block);
-        let path = ClosedPath::random(&mut random, setup.options.reach);
+        let path = Trajectory::random(&mut random, setup.options.reach.sizes());
         let mut tally = LoopTally { laps: 1, ..LoopTally::default() };
         let Some(lap) = lap(subject, &path) else {
             tally.unanswered = 1;
@@ -125,28 +127,14 @@ pub(super) fn measure_loops(setup: &Setup<'_>) -> Result<(Measure, Decades), Loa
         tally.beyond = u64::from(relative > CONSERVATIVE);
         tally.rough = u64::from(!lap.is_settled());
         tally.most_j = made_j.max(0.0);
-        tally.worst = Some((relative, path.pose(0.0)));
+        tally.worst.offer(relative, path.pose(0.0));
         tally
     })?;
-    let mut total = LoopTally::default();
-    let mut worst = Worst::NONE;
-    for tally in &tallies {
-        total.laps += tally.laps;
-        total.unanswered += tally.unanswered;
-        total.beyond += tally.beyond;
-        total.rough += tally.rough;
-        total.most_j = total.most_j.max(tally.most_j);
-        total.relative.merge(&tally.relative);
-        if let Some((relative, pose)) = tally.worst {
-            worst.offer(relative, pose);
-        }
-    }
-    Ok((judge_loops(&total, &worst), total.relative))
+    Ok((judge_loops(&total), total.relative))
 }
 
-#[allow(clippy::cast_precision_loss)] // counts below 2^53
-fn judge_loops(total: &LoopTally, worst: &Worst) -> Measure {
-    let verdict = Verdict::of(worst.value, CONSERVATIVE, CONSERVATIVE);
+fn judge_loops(total: &LoopTally) -> Measure {
+    let verdict = Verdict::of(total.worst.value, CONSERVATIVE, CONSERVATIVE);
     let remark = match verdict {
         Verdict::Fail => format!(
             "{} of {} loops make energy, up to {:.3} mJ a lap; the pose is where the worst starts",
@@ -156,23 +144,13 @@ fn judge_loops(total: &LoopTally, worst: &Worst) -> Measure {
         ),
         _ => format!("{} loops", total.laps),
     };
-    Measure {
-        id: "M4",
-        name: LOOPS,
-        value: worst.value,
-        unit: "",
-        bound: Some(CONSERVATIVE),
-        verdict,
-        pose: worst.record(),
-        remark,
-        values: Vec::new(),
-    }
-    .with("loops", total.laps as f64, "")
-    .with("loops beyond the bound", total.beyond as f64, "")
-    .with("loops where the work does not settle", total.rough as f64, "")
-    .with("loops without answer", total.unanswered as f64, "")
-    .with("largest work of a lap", total.most_j, "J")
-    .unless_unanswered(total.laps - total.unanswered)
+    Measure::of(["M4", LOOPS, ""], &total.worst, [CONSERVATIVE, CONSERVATIVE], remark)
+        .count("loops", total.laps)
+        .count("loops beyond the bound", total.beyond)
+        .count("loops where the work does not settle", total.rough)
+        .count("loops without answer", total.unanswered)
+        .with("largest work of a lap", total.most_j, "J")
+        .unless_unanswered(total.laps - total.unanswered)
 }
 
 const OBSERVER: &str = "sampled energy";
@@ -183,39 +161,44 @@ const LAP_NS: u64 = 1_000_000_000;
 /// Laps of a motion.
 const LAPS: u64 = 2;
 
-/// What the observer saw along one motion at one period.
-#[derive(Clone, Copy)]
-struct Seen {
-    /// Least energy taken from the hand since the start, J.
-    least_j: f64,
-    /// Damping that would have eaten up what whole laps gave away, N s/m, and where the observer was lowest.
-    damping: Worst,
+tally! {
+    /// What the observer saw along a motion at one period.
+    struct Seen {
+        /// Most energy given to the hand since the start, J.
+        given_j: f64,
+        /// Damping that would have eaten up what whole laps gave away, N s/m, and where the observer was lowest.
+        damping: Worst,
+    }
 }
 
-impl Seen {
-    const NOTHING: Self = Self { least_j: 0.0, damping: Worst::NONE };
+tally! {
+    struct Observed {
+        seen: [Seen; PERIODS_NS.len()],
+        motions: u64,
+        unanswered: u64,
+    }
 }
 
 /// Takes the handle along a motion and keeps the account of a zero-order hold.
 ///
 /// The account may be below zero on the way and mean nothing: what was stored at home was the model's to
 /// give. Only whole laps, which end where they started, tell what was made.
-fn observe(subject: &mut Subject<'_>, path: &ClosedPath, period_ns: u64) -> Option<Seen> {
+fn observe(subject: &mut Subject<'_>, path: &Trajectory, period_ns: u64) -> Option<Seen> {
     subject.restart();
     let period_s = period_ns as f64 * 1.0e-9;
     let ticks_per_lap = LAP_NS / period_ns;
     let pose_at = |tick: u64| path.pose((tick % ticks_per_lap) as f64 / ticks_per_lap as f64);
     let mut before = pose_at(0);
     let mut held = subject.advance(before, Twist::ZERO, 0).ok()?.wrench;
-    let mut seen = Seen::NOTHING;
+    let mut seen = Seen::default();
     let (mut taken_j, mut motion, mut lowest) = (0.0, 0.0, before);
     for tick in 1..=LAPS * ticks_per_lap {
         let here = pose_at(tick);
         let (shift_m, turn_rad) = moved(before, here);
         taken_j -= held.force().dot(shift_m) + held.torque().dot(turn_rad);
         motion += (shift_m.length_squared() + (turn_rad * LEVER_M).length_squared()) / period_s;
-        if taken_j < seen.least_j {
-            (seen.least_j, lowest) = (taken_j, here);
+        if -taken_j > seen.given_j {
+            (seen.given_j, lowest) = (-taken_j, here);
         }
         if tick.is_multiple_of(ticks_per_lap) {
             seen.damping.offer(-taken_j / motion, lowest);
@@ -234,55 +217,36 @@ fn moved(from: Pose, to: Pose) -> (DVec3, DVec3) {
 
 /// Along hand-driven motions from home, at three periods.
 pub(super) fn measure_observer(setup: &Setup<'_>) -> Result<Measure, LoadError> {
-    let parts = sweep(setup, OBSERVER, setup.effort.hand_paths, |subject, block| {
+    let total = sweep(setup, OBSERVER, setup.effort.hand_paths, |subject, block| {
         let mut random = Random::new(setup.options.seed, block);
-        let path = ClosedPath::random(&mut random, setup.options.reach).starting_at_home();
-        PERIODS_NS.map(|period_ns| observe(subject, &path, period_ns))
-    })?;
-    let mut total = [Seen::NOTHING; PERIODS_NS.len()];
-    let mut unanswered = 0;
-    for part in &parts {
-        for (sum, seen) in total.iter_mut().zip(part) {
-            match seen {
-                Some(seen) => {
-                    sum.least_j = sum.least_j.min(seen.least_j);
-                    sum.damping.merge(seen.damping);
-                }
-                None => unanswered += 1,
-            }
+        let path = Trajectory::random(&mut random, setup.options.reach.sizes()).starting_at_home();
+        let mut observed = Observed::default();
+        for (sum, period_ns) in observed.seen.iter_mut().zip(PERIODS_NS) {
+            let seen = observe(subject, &path, period_ns);
+            observed.motions += 1;
+            observed.unanswered += u64::from(seen.is_none());
+            *sum = seen.unwrap_or_default();
         }
-    }
-    Ok(judge_observer(&total, parts.len(), unanswered))
+        observed
+    })?;
+    Ok(judge_observer(&total))
 }
 
-#[allow(clippy::cast_precision_loss)] // counts below 2^53
-fn judge_observer(total: &[Seen; PERIODS_NS.len()], paths: usize, unanswered: u64) -> Measure {
-    let slowest = total[PERIODS_NS.len() - 1];
-    let [lightly, heavily] = DAMPINGS_NS_PER_M;
-    let mut measure = Measure {
-        id: "M5",
-        name: OBSERVER,
-        value: slowest.damping.value,
-        unit: "N s/m",
-        bound: Some(lightly),
-        verdict: Verdict::of(slowest.damping.value, lightly, heavily),
-        pose: slowest.damping.record(),
-        remark: "device damping that eats up what holding the force gives away, 1 kHz".to_owned(),
-        values: Vec::new(),
-    };
-    for (period_ns, seen) in PERIODS_NS.iter().zip(total) {
+#[allow(clippy::cast_precision_loss)] // milliseconds
+fn judge_observer(total: &Observed) -> Measure {
+    let [.., slowest] = &total.seen;
+    let remark = "device damping that eats up what holding the force gives away, 1 kHz";
+    let mut measure = Measure::of(["M5", OBSERVER, "N s/m"], &slowest.damping, DAMPINGS_NS_PER_M, remark);
+    for (period_ns, seen) in PERIODS_NS.iter().zip(&total.seen) {
         let period_ms = *period_ns as f64 * 1.0e-6;
-        measure = measure.with(format!("least observed energy, T = {period_ms} ms"), seen.least_j, "J").with(
-            format!("damping needed, T = {period_ms} ms"),
-            seen.damping.value,
-            "N s/m",
-        );
+        measure = measure
+            .with(format!("least observed energy, T = {period_ms} ms"), 0.0 - seen.given_j, "J")
+            .with(format!("damping needed, T = {period_ms} ms"), seen.damping.value, "N s/m");
     }
-    let observed = (paths * PERIODS_NS.len()) as u64;
     measure
-        .with("motions", observed as f64, "")
-        .with("motions without answer", unanswered as f64, "")
-        .unless_unanswered(observed - unanswered)
+        .count("motions", total.motions)
+        .count("motions without answer", total.unanswered)
+        .unless_unanswered(total.motions - total.unanswered)
 }
 
 #[cfg(test)]

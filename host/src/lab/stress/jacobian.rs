@@ -5,7 +5,7 @@
 //! stiffness in N/m.
 
 use super::LEVER_M;
-use super::subject::Subject;
+use crate::lab::subject::Subject;
 use flotor_hal::{DVec3, Pose, Wrench, orientation_from_rotation_vector};
 
 /// A 6 x 6 matrix, rows first.

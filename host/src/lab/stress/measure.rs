@@ -1,11 +1,11 @@
 //! What a measure says: values, the bound it is judged by, a verdict, and where the worst was seen.
 
+use crate::lab::tally::Worst;
 use flotor_hal::{Pose, rotation_vector};
 use serde::Serialize;
-use std::collections::BTreeMap;
 
 /// Judgement of one measure.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// Within the bound.
@@ -35,19 +35,6 @@ impl Verdict {
             Verdict::Note
         } else {
             Verdict::Fail
-        }
-    }
-
-    /// The graver of two.
-    pub(super) fn and(self, other: Self) -> Self {
-        if self.gravity() >= other.gravity() { self } else { other }
-    }
-
-    const fn gravity(self) -> u8 {
-        match self {
-            Verdict::Pass => 0,
-            Verdict::Note => 1,
-            Verdict::Fail => 2,
         }
     }
 }
@@ -102,11 +89,30 @@ pub struct Measure {
 }
 
 impl Measure {
+    /// The worst that was seen: it passes up to `bound` and fails beyond `limit`.
+    pub(super) fn of(
+        [id, name, unit]: [&'static str; 3],
+        worst: &Worst,
+        [bound, limit]: [f64; 2],
+        remark: impl Into<String>,
+    ) -> Self {
+        let (value, verdict) = (worst.value, Verdict::of(worst.value, bound, limit));
+        let (pose, remark) = (worst.pose.map(PoseRecord::from), remark.into());
+        Self { id, name, value, unit, bound: Some(bound), verdict, pose, remark, values: Vec::new() }
+    }
+
     /// Adds a further number.
     #[must_use]
     pub(super) fn with(mut self, name: impl Into<String>, value: f64, unit: &'static str) -> Self {
         self.values.push(Quantity { name: name.into(), value, unit });
         self
+    }
+
+    /// Adds a count.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss)] // below 2^53
+    pub(super) fn count(self, name: impl Into<String>, count: u64) -> Self {
+        self.with(name, count as f64, "")
     }
 
     /// A measure that got no answer from the model has shown nothing: a note, whatever the number.
@@ -118,78 +124,5 @@ impl Measure {
             "the model gave no answer to judge".clone_into(&mut self.remark);
         }
         self
-    }
-}
-
-/// The largest value so far, and the pose it was seen at. Of equals the first stays, so results do not depend
-/// on how work was split.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Worst {
-    pub(super) value: f64,
-    pub(super) pose: Option<Pose>,
-}
-
-impl Worst {
-    pub(super) const NONE: Self = Self { value: 0.0, pose: None };
-
-    pub(super) fn offer(&mut self, value: f64, pose: Pose) {
-        if value > self.value {
-            *self = Self { value, pose: Some(pose) };
-        }
-    }
-
-    pub(super) fn merge(&mut self, later: Self) {
-        if later.value > self.value {
-            *self = later;
-        }
-    }
-
-    pub(super) fn record(&self) -> Option<PoseRecord> {
-        self.pose.map(PoseRecord::from)
-    }
-}
-
-/// How often a positive quantity fell into each twentieth of a decade.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Decades(BTreeMap<i32, u64>);
-
-/// Bins per decade.
-const BINS_PER_DECADE: f64 = 20.0;
-/// What is smaller counts as this: below rounding of anything that is measured here.
-const SMALLEST: f64 = 1.0e-18;
-
-impl Decades {
-    /// Counts one value.
-    pub(super) fn count(&mut self, value: f64) {
-        if value.is_nan() {
-            return;
-        }
-        #[allow(clippy::cast_possible_truncation)] // a few thousand at most
-        let bin = (value.clamp(SMALLEST, f64::MAX).log10() * BINS_PER_DECADE).floor() as i32;
-        *self.0.entry(bin).or_default() += 1;
-    }
-
-    pub(super) fn merge(&mut self, later: &Self) {
-        for (bin, count) in &later.0 {
-            *self.0.entry(*bin).or_default() += count;
-        }
-    }
-
-    /// Lower edge, upper edge and count of every bin from the first to the last that counted something.
-    #[must_use]
-    pub fn bins(&self) -> Vec<(f64, f64, u64)> {
-        let (Some((first, _)), Some((last, _))) = (self.0.first_key_value(), self.0.last_key_value()) else {
-            return Vec::new();
-        };
-        let edge = |bin: i32| 10.0_f64.powf(f64::from(bin) / BINS_PER_DECADE);
-        let bins = *first..=*last;
-        bins.map(|bin| (edge(bin), edge(bin + 1), self.0.get(&bin).copied().unwrap_or(0))).collect()
-    }
-}
-
-impl Serialize for Decades {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let filled = self.bins().into_iter().filter(|(.., count)| *count > 0);
-        serializer.collect_seq(filled)
     }
 }

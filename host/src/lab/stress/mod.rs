@@ -14,8 +14,8 @@
 //! | M8 `determinism` | same poses, same bits? | |
 //!
 //! Each measure is made on instances of its own through the plugin contract, with nothing known about the
-//! model but what the contract says. Data flows one way: `poses` and `paths` say where, `subject` asks,
-//! `sweep` shares the work between two threads, each measure's module judges, `report` and `picture`
+//! model but what the contract says. Data flows one way: `poses` and [`trajectory`](super::trajectory) say where, [`subject`](super::subject) asks,
+//! `sweep` shares the work between the processors, each measure's module judges, `report` and `picture`
 //! show.
 //!
 //! Not real-time: everything here allocates and takes its time.
@@ -27,27 +27,27 @@ mod determinism;
 mod energy;
 mod jacobian;
 mod measure;
-mod paths;
 mod picture;
 mod plant;
 mod poses;
 mod report;
 mod stiffness;
-mod subject;
 mod sweep;
 mod totality;
 
 #[cfg(test)]
 mod tests;
 
+pub use super::tally::Decades;
 pub use continuity::Jump;
-pub use measure::{Decades, Measure, PoseRecord, Quantity, Verdict};
+pub use measure::{Measure, PoseRecord, Quantity, Verdict};
 pub use poses::Reach;
 pub use report::{Distributions, StressReport};
 
+use super::subject::Subject;
+use super::{Progress, Size};
 use flotor_hal::Memory;
 use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
-use serde::Serialize;
 
 /// Period of the loop the score has in mind, s.
 const PERIOD_S: f64 = 1.0e-3;
@@ -58,16 +58,6 @@ const DAMPINGS_NS_PER_M: [f64; 2] = [0.5, 2.0];
 const LEVER_M: f64 = 0.0939;
 /// How much wider than the workspace the model is asked: a hand overshoots, a sensor lies.
 const WIDER: f64 = 1.5;
-
-/// How much is asked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Size {
-    /// A hundredth, for a daily check: the first poses of a full run.
-    Short,
-    /// Ten million poses and more.
-    Full,
-}
 
 /// What to ask for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,19 +76,6 @@ impl Default for StressOptions {
     }
 }
 
-/// Told how the score comes along, from two threads. `()` does not listen.
-pub trait Progress: Sync {
-    /// A measure of so many steps begins.
-    fn begin(&self, name: &str, steps: u64);
-    /// So many more steps are done.
-    fn advance(&self, steps: u64);
-}
-
-impl Progress for () {
-    fn begin(&self, _name: &str, _steps: u64) {}
-    fn advance(&self, _steps: u64) {}
-}
-
 /// Everything the measures share.
 struct Setup<'a> {
     plugin: &'a Plugin,
@@ -106,6 +83,12 @@ struct Setup<'a> {
     options: StressOptions,
     effort: Effort,
     progress: &'a dyn Progress,
+}
+
+impl<'a> Setup<'a> {
+    fn subject(&self) -> Result<Subject<'a>, LoadError> {
+        Subject::new(self.plugin, self.settings, self.options.seed)
+    }
 }
 
 /// How often each measure asks.
@@ -167,8 +150,7 @@ const fn at_least(count: u64, least: u64) -> u64 {
     if count < least { least } else { count }
 }
 
-/// Scores a model with these settings. Not real-time; takes seconds (short) to minutes (full), on two
-/// threads.
+/// Scores a model with these settings. Not real-time; takes seconds (short) to minutes (full), on all processors.
 ///
 /// # Errors
 /// [`LoadError`] if the plugin is no model or refuses the settings. A model that breaks while it is measured

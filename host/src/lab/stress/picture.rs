@@ -1,7 +1,6 @@
 //! The score as a picture: jumps over piece length, gains over the workspace, loop energies, call times.
 
-use super::measure::Decades;
-use super::{DAMPINGS_NS_PER_M, PERIOD_S, Size, StressReport};
+use super::{DAMPINGS_NS_PER_M, Decades, PERIOD_S, StressReport};
 use crate::plot::{Axis, Bin, Figure, Mark, Panel, Series};
 
 /// The largest relative loop energy that passes, for the mark.
@@ -11,10 +10,6 @@ impl StressReport {
     /// Draws the score. Not real-time.
     #[must_use]
     pub fn to_svg(&self) -> String {
-        let size = match self.size {
-            Size::Short => "short",
-            Size::Full => "full",
-        };
         let verdicts: Vec<String> = self
             .measures
             .iter()
@@ -24,7 +19,7 @@ impl StressReport {
             self.settings.iter().map(|(key, value)| format!("{key}={value}")).collect();
         let title = format!("Stability score of {} {}: {:.2}", self.model, settings.join(" "), self.score);
         Figure::new(title, Axis::log("Length of a piece", "mm"))
-            .subtitle(format!("{size}, seed {}; {}", self.seed, verdicts.join(", ")))
+            .subtitle(format!("{}, seed {}; {}", self.size.word(), self.seed, verdicts.join(", ")))
             .columns(2)
             .panel_height_px(220.0)
             .panel(self.jumps())

@@ -5,8 +5,9 @@
 //! run asks the first poses of a full one. No sequence ever hits home exactly, or a coordinate plane, or a number
 //! that is not finite: those are [`Manifold`]s with names.
 
-use crate::lab::sampling::Random;
-use flotor_hal::{DQuat, DVec3, Pose, Twist, orientation_from_rotation_vector, rotation_vector};
+use crate::lab::sampling::{Random, Sobol};
+use crate::lab::trajectory::at;
+use flotor_hal::{DQuat, DVec3, Pose, Twist, rotation_vector};
 use serde::Serialize;
 use std::f64::consts::PI;
 
@@ -32,6 +33,11 @@ impl Reach {
         Self { position_m: self.position_m * factor, rotation_rad: self.rotation_rad * factor }
     }
 
+    /// Along the axes and about them, m and rad.
+    pub(super) fn sizes(self) -> [f64; 2] {
+        [self.position_m, self.rotation_rad]
+    }
+
     /// True if a pose lies in the workspace.
     pub(super) fn holds(self, pose: Pose) -> bool {
         let rotation_rad = rotation_vector(pose.orientation());
@@ -44,11 +50,6 @@ impl Reach {
         let [x, y, z, rx, ry, rz] = unit.map(|u| 2.0 * u - 1.0);
         at(DVec3::new(x, y, z) * self.position_m, DVec3::new(rx, ry, rz) * self.rotation_rad)
     }
-}
-
-/// The pose at a position and a rotation vector, m and rad.
-pub(super) fn at(position_m: DVec3, rotation_rad: DVec3) -> Pose {
-    Pose::new(position_m, orientation_from_rotation_vector(rotation_rad))
 }
 
 /// Sets of poses where a formula may break and no even coverage would find it.
@@ -117,6 +118,19 @@ impl Manifold {
         };
         (pose, Twist::ZERO)
     }
+}
+
+/// Every how many poses one is of a manifold.
+const MANIFOLD_EVERY: u64 = 8;
+
+/// Pose number `index` of an even coverage that now and then has one of the manifolds, in turns.
+pub(super) fn mixed(reach: Reach, sobol: &Sobol, random: &mut Random, index: u64) -> Pose {
+    if !index.is_multiple_of(MANIFOLD_EVERY) {
+        return reach.pose(sobol.point(index));
+    }
+    let number = index / MANIFOLD_EVERY;
+    let manifold = usize::try_from(number).unwrap_or(0) % Manifold::ALL.len();
+    Manifold::ALL[manifold].sample(reach, random, number).0
 }
 
 fn anywhere(reach: Reach, random: &mut Random) -> Pose {

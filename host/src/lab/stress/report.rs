@@ -1,9 +1,9 @@
 //! The score as a whole: numbers for machines, a table for people.
 
 use super::continuity::Jump;
-use super::measure::{Decades, Measure, PoseRecord, Verdict};
+use super::measure::{Measure, PoseRecord, Verdict};
 use super::poses::Reach;
-use super::{Setup, Size};
+use super::{Decades, Setup, Size};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -73,11 +73,7 @@ impl StressReport {
             self.settings.iter().map(|(key, value)| format!("{key}={value}")).collect();
         let settings =
             if settings.is_empty() { String::new() } else { format!(" ({})", settings.join(", ")) };
-        let size = match self.size {
-            Size::Short => "short",
-            Size::Full => "full",
-        };
-        format!("{} {}{settings}, {size}, seed {}", self.model, self.version, self.seed)
+        format!("{} {}{settings}, {}, seed {}", self.model, self.version, self.size.word(), self.seed)
     }
 
     /// The table for people.

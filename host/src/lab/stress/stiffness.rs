@@ -11,10 +11,11 @@
 //! doubt about counts.
 
 use super::jacobian::Jacobian;
-use super::measure::{Decades, Measure, Verdict, Worst};
+use super::measure::Measure;
 use super::sweep::sweep;
 use super::{DAMPINGS_NS_PER_M, LEVER_M, PERIOD_S, Setup};
 use crate::lab::sampling::Sobol;
+use crate::lab::tally::{Decades, Worst, tally};
 use flotor_hal::abi::loader::LoadError;
 
 const NAME: &str = "Lipschitz constant and reciprocity";
@@ -26,52 +27,24 @@ const RECIPROCAL: f64 = 1.0e-6;
 /// shortest difference, and M1 is the one to tell.
 const ROUGH: f64 = 0.1;
 
-struct Tally {
-    poses: u64,
-    unanswered: u64,
-    /// Gains of the whole and of the blocks force-shift, force-turn, torque-shift, torque-turn, N/m.
-    gain: Worst,
-    blocks: [f64; 4],
-    renderable: [u64; DAMPINGS_NS_PER_M.len()],
-    gains: Decades,
-    asymmetry: Worst,
-    /// Largest relative uncertainty of a derivative.
-    uncertain: f64,
-    /// Poses where the differences do not settle: no derivative there.
-    rough: u64,
+tally! {
+    struct Tally {
+        poses: u64,
+        unanswered: u64,
+        /// Gains of the whole and of the blocks force-shift, force-turn, torque-shift, torque-turn, N/m.
+        gain: Worst,
+        blocks: [f64; 4],
+        renderable: [u64; DAMPINGS_NS_PER_M.len()],
+        gains: Decades,
+        asymmetry: Worst,
+        /// Largest relative uncertainty of a derivative.
+        uncertain: f64,
+        /// Poses where the differences do not settle: no derivative there.
+        rough: u64,
+    }
 }
 
 impl Tally {
-    fn new() -> Self {
-        Self {
-            poses: 0,
-            unanswered: 0,
-            gain: Worst::NONE,
-            blocks: [0.0; 4],
-            renderable: [0; DAMPINGS_NS_PER_M.len()],
-            gains: Decades::default(),
-            asymmetry: Worst::NONE,
-            uncertain: 0.0,
-            rough: 0,
-        }
-    }
-
-    fn merge(&mut self, later: &Self) {
-        self.poses += later.poses;
-        self.unanswered += later.unanswered;
-        self.gain.merge(later.gain);
-        for (here, there) in self.blocks.iter_mut().zip(later.blocks) {
-            *here = here.max(there);
-        }
-        for (here, there) in self.renderable.iter_mut().zip(later.renderable) {
-            *here += there;
-        }
-        self.gains.merge(&later.gains);
-        self.asymmetry.merge(later.asymmetry);
-        self.uncertain = self.uncertain.max(later.uncertain);
-        self.rough += later.rough;
-    }
-
     fn take(&mut self, jacobian: &Jacobian, pose: flotor_hal::Pose) {
         let norm = jacobian.norm();
         // Both the derivative and its transpose are that uncertain.
@@ -110,8 +83,8 @@ fn stiffest_n_per_m(damping_ns_per_m: f64) -> f64 {
 pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Measure, Decades), LoadError> {
     let sobol = Sobol::new(setup.options.seed);
     let blocks = setup.effort.jacobians.div_ceil(BLOCK);
-    let parts = sweep(setup, NAME, blocks, |subject, block| {
-        let mut tally = Tally::new();
+    let total = sweep(setup, NAME, blocks, |subject, block| {
+        let mut tally = Tally::default();
         for index in block * BLOCK..(block + 1) * BLOCK {
             let pose = setup.options.reach.pose(sobol.point(index));
             tally.poses += 1;
@@ -122,8 +95,6 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Measure, Decades), 
         }
         tally
     })?;
-    let mut total = Tally::new();
-    parts.iter().for_each(|part| total.merge(part));
     Ok((lipschitz(&total), reciprocity(&total), total.gains))
 }
 
@@ -136,43 +107,24 @@ fn lipschitz(total: &Tally) -> Measure {
         share(0),
         share(1)
     );
-    Measure {
-        id: "M2",
-        name: "Lipschitz constant",
-        value: total.gain.value,
-        unit: "N/m",
-        bound: Some(stiffest_n_per_m(lightly)),
-        verdict: Verdict::of(total.gain.value, stiffest_n_per_m(lightly), stiffest_n_per_m(heavily)),
-        pose: total.gain.record(),
-        remark,
-        values: Vec::new(),
-    }
-    .with("force by shift", total.blocks[0], "N/m")
-    .with("force by turn", total.blocks[1] * LEVER_M, "N/rad")
-    .with("torque by shift", total.blocks[2] * LEVER_M, "N·m/m")
-    .with("torque by turn", total.blocks[3] * LEVER_M * LEVER_M, "N·m/rad")
-    .with(format!("renderable share, b = {lightly} N s/m"), share(0), "")
-    .with(format!("renderable share, b = {heavily} N s/m"), share(1), "")
-    .with("poses", total.poses as f64, "")
-    .with("poses without answer", total.unanswered as f64, "")
-    .with("poses without derivative", total.rough as f64, "")
-    .unless_unanswered(total.judged())
+    let bounds = DAMPINGS_NS_PER_M.map(stiffest_n_per_m);
+    Measure::of(["M2", "Lipschitz constant", "N/m"], &total.gain, bounds, remark)
+        .with("force by shift", total.blocks[0], "N/m")
+        .with("force by turn", total.blocks[1] * LEVER_M, "N/rad")
+        .with("torque by shift", total.blocks[2] * LEVER_M, "N·m/m")
+        .with("torque by turn", total.blocks[3] * LEVER_M * LEVER_M, "N·m/rad")
+        .with(format!("renderable share, b = {lightly} N s/m"), share(0), "")
+        .with(format!("renderable share, b = {heavily} N s/m"), share(1), "")
+        .count("poses", total.poses)
+        .count("poses without answer", total.unanswered)
+        .count("poses without derivative", total.rough)
+        .unless_unanswered(total.judged())
 }
 
-#[allow(clippy::cast_precision_loss)] // counts below 2^53
 fn reciprocity(total: &Tally) -> Measure {
-    Measure {
-        id: "M3",
-        name: "reciprocity",
-        value: total.asymmetry.value,
-        unit: "",
-        bound: Some(RECIPROCAL),
-        verdict: Verdict::of(total.asymmetry.value, RECIPROCAL, RECIPROCAL),
-        pose: total.asymmetry.record(),
-        remark: format!("beyond the {:.0e} that differences leave uncertain", total.uncertain),
-        values: Vec::new(),
-    }
-    .with("poses", total.judged() as f64, "")
-    .with("uncertainty taken off, at most", total.uncertain, "")
-    .unless_unanswered(total.judged())
+    let remark = format!("beyond the {:.0e} that differences leave uncertain", total.uncertain);
+    Measure::of(["M3", "reciprocity", ""], &total.asymmetry, [RECIPROCAL, RECIPROCAL], remark)
+        .count("poses", total.judged())
+        .with("uncertainty taken off, at most", total.uncertain, "")
+        .unless_unanswered(total.judged())
 }

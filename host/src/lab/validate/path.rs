@@ -1,8 +1,10 @@
 //! Poses a model is asked at: at rest on a grid, and on the way along a smooth path.
 
+use crate::lab::subject::call;
+use crate::lab::trajectory::{Series, Trajectory};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
-use flotor_hal::{DQuat, DVec3, Input, LoopConfig, Output, Pose, Twist, orientation_from_rotation_vector};
+use flotor_hal::{DQuat, DVec3, Input, LoopConfig, Output, Pose, Twist};
 
 /// Rate a plugin is checked at.
 pub(super) const CONFIG: LoopConfig = LoopConfig { period_ns: 1_000_000, seed: 1 };
@@ -42,53 +44,25 @@ pub(super) fn walk(steps: u64) -> impl Iterator<Item = Input> {
 
 /// The same path, `speed` times as fast: the twist of each input is the derivative of its pose.
 pub(super) fn walk_at(speed: f64, steps: u64) -> impl Iterator<Item = Input> {
+    let path = Trajectory {
+        position: Series::sines(DVec3::splat(POSITION_M), POSITION_RAD_PER_S),
+        rotation: Series::sines(DVec3::splat(ROTATION_RAD), ROTATION_RAD_PER_S),
+    };
     (0..steps).map(move |tick| {
         #[allow(clippy::cast_precision_loss)] // a few thousand
-        let t = tick as f64 * 1.0e-3 * speed;
-        let (position_m, velocity_m_per_s) = swing(POSITION_RAD_PER_S, POSITION_M, t);
-        let (rotation_rad, rate_rad_per_s) = swing(ROTATION_RAD_PER_S, ROTATION_RAD, t);
-        let spin_rad_per_s = spin(rotation_rad, rate_rad_per_s * speed);
+        let (pose, shift_m, turn_rad) = path.at(tick as f64 * 1.0e-3 * speed);
         let dt_ns = if tick == 0 { 0 } else { CONFIG.period_ns };
-        Input {
-            tick,
-            time_ns: tick * CONFIG.period_ns,
-            dt_ns,
-            twist: Twist::new(velocity_m_per_s * speed, spin_rad_per_s),
-            ..Input::at_rest(Pose::new(position_m, orientation_from_rotation_vector(rotation_rad)))
-        }
+        let twist = Twist::new(shift_m * speed, turn_rad * speed);
+        Input { tick, time_ns: tick * CONFIG.period_ns, dt_ns, twist, ..Input::at_rest(pose) }
     })
-}
-
-/// Three sines of a size, and their derivative.
-fn swing(rad_per_s: DVec3, size: f64, t: f64) -> (DVec3, DVec3) {
-    let phase = rad_per_s * t;
-    let sines = DVec3::new(phase.x.sin(), phase.y.sin(), phase.z.sin());
-    let cosines = DVec3::new(phase.x.cos(), phase.y.cos(), phase.z.cos());
-    (sines * size, cosines * rad_per_s * size)
-}
-
-/// Angular velocity of an orientation whose rotation vector changes at a rate: the left Jacobian of the
-/// exponential (Chirikjian 2011, Stochastic Models, Information Theory, and Lie Groups 2, 10.86).
-fn spin(rotation_rad: DVec3, rate_rad_per_s: DVec3) -> DVec3 {
-    let angle = rotation_rad.length();
-    // 1/2 and 1/6 are the limits; what is left out is a billionth of them.
-    let (first, second) = if angle < 1.0e-4 {
-        (0.5, 1.0 / 6.0)
-    } else {
-        ((1.0 - angle.cos()) / angle.powi(2), (angle - angle.sin()) / angle.powi(3))
-    };
-    let across = rotation_rad.cross(rate_rad_per_s);
-    rate_rad_per_s + across * first + rotation_rad.cross(across) * second
 }
 
 /// One step; the answer, or what went wrong.
 pub(super) fn step(model: &mut Model, input: &Input) -> Result<Output, String> {
-    let mut output = Output::default();
-    match model.step(input, &mut output) {
-        CallStatus::Ok => Ok(output),
-        CallStatus::Panicked => Err(format!("{} it {}", place(input), model.last_message())),
-        other => Err(format!("{} it answered {other:?}", place(input))),
-    }
+    call(model, input).map_err(|status| match status {
+        CallStatus::Panicked => format!("{} it {}", place(input), model.last_message()),
+        other => format!("{} it answered {other:?}", place(input)),
+    })
 }
 
 /// One step whose answer must be made of numbers.
