@@ -58,7 +58,6 @@ pub(crate) fn run(arguments: &JitterArguments) -> Result<(), CommandError> {
 }
 
 fn to_text(report: &JitterReport) -> String {
-    #[allow(clippy::cast_precision_loss)] // for people
     let us = |ns: u64| format!("{:.2}", ns as f64 * 1.0e-3);
     let row = |name: &str, timing: &LoopTiming| {
         let LoopTiming { lateness_ns: l, ticks, late_ticks, missed_ticks } = timing;

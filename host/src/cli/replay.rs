@@ -93,7 +93,6 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
     })?;
     progress.finish_and_clear();
 
-    #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
     let recorded_s = end_ns as f64 * 1.0e-9;
     let bit_exact = difference.is_bit_exact();
     let report = Report {
@@ -193,7 +192,6 @@ struct Sample {
 
 /// The force that was and that would be, and how they differ along every axis.
 fn picture(samples: &[Sample]) -> String {
-    #[allow(clippy::cast_precision_loss)] // for a picture
     let line = |value: &dyn Fn(&Sample) -> f64| -> Vec<(f64, f64)> {
         samples.iter().map(|sample| (sample.time_ns as f64 * 1.0e-9, value(sample))).collect()
     };

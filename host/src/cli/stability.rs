@@ -175,7 +175,6 @@ fn stiffness_panel(
         members.iter().filter_map(|index| Some((cases.get(*index)?, rows.get(*index)?))).collect();
     let Some((first, _)) = within.first() else { return Ok(Panel::new(Axis::log("Stiffness", "N/m"))) };
     let plant = first.plant(plugin).map_err(refused)?;
-    #[allow(clippy::cast_precision_loss)] // at most 10 ms
     let period_s = first.period_ns as f64 * 1.0e-9;
     let title = format!("T = {} ms, b = {} N s/m", period_s * 1.0e3, first.plant_damping_ns_per_m);
     let most = within.iter().map(|(case, _)| case.virtual_damping_ns_per_m).fold(0.0, f64::max);

@@ -99,7 +99,6 @@ pub fn measure(
                 progress(done);
             }
             stoppers.iter().for_each(Stopper::safe_stop);
-            #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
             let rate_hz = 1.0e9 / period_ns as f64;
             Ok(JitterReport {
                 rate_hz,
@@ -146,7 +145,6 @@ struct Pairs {
 }
 
 impl Pairs {
-    #[allow(clippy::cast_precision_loss)] // ticks of a second
     fn add(&mut self, servo: u64, bare: u64) {
         let difference = servo as f64 - bare as f64;
         self.count += 1.0;

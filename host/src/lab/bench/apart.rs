@@ -45,14 +45,12 @@ pub(super) fn apart(model: &mut Model, detail: &str, path: &[Pose], rounds: usiz
         let times_ns = ticks.iter().filter(|(_, is_above)| *is_above == kind).map(|(ns, _)| *ns);
         Speed::of(&mut times_ns.collect::<Vec<_>>())
     };
-    #[allow(clippy::cast_precision_loss)] // thousands
     let share = ticks.iter().filter(|(_, is_above)| *is_above).count() as f64 / ticks.len().max(1) as f64;
     Some(Apart { share, above: of(true), others: of(false) })
 }
 
 impl Speed {
     fn of(times_ns: &mut [f64]) -> Option<Self> {
-        #[allow(clippy::cast_precision_loss)] // thousands
         let mean_ns = times_ns.iter().sum::<f64>() / times_ns.len() as f64;
         (!times_ns.is_empty()).then(|| Self { mean_ns, p99_ns: quantile(times_ns, 0.99) })
     }

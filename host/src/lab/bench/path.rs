@@ -37,7 +37,6 @@ impl Hand {
     /// The poses of the first ticks, at 1 kHz.
     pub(super) fn poses(self, ticks: usize) -> Vec<Pose> {
         let trajectory = self.trajectory();
-        #[allow(clippy::cast_precision_loss)] // far fewer than 2^53 ticks
         (0..ticks).map(|tick| trajectory.pose(tick as f64 * 1.0e-3)).collect()
     }
 }

@@ -80,7 +80,6 @@ impl Truth {
         exact.reset();
         let hand = hand.trajectory();
         let forces = (0..TICKS * MOMENTS).map(|moment| {
-            #[allow(clippy::cast_precision_loss)] // a few thousand
             let time_s = moment as f64 / MOMENTS as f64 * 1.0e-3;
             answer(exact, hand.pose(time_s), moment).map(|wrench| wrench.force())
         });
@@ -119,7 +118,6 @@ const SETTLED: usize = 20;
 fn answers(model: &mut Model, hand: &Trajectory, sampling: Sampling) -> Vec<Option<DVec3>> {
     model.reset();
     let answers = (0..TICKS).map(|tick| {
-        #[allow(clippy::cast_precision_loss)] // a few thousand
         let seen = sampling.sees(hand.pose(tick as f64 * 1.0e-3));
         answer(model, seen, tick).map(|wrench| wrench.force())
     });

@@ -109,7 +109,6 @@ impl Device for Scripted {
     }
 
     fn activate(self, config: &LoopConfig) -> Result<Following, (Self, Refusal)> {
-        #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
         let period_s = config.period_ns as f64 * 1.0e-9;
         Ok(Following { at: Phase::of(0.0), step: Phase::of(TAU * SCRIPT_HZ * period_s) })
     }

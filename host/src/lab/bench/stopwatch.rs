@@ -139,7 +139,6 @@ fn batch(model: &mut Model, inputs: &[Input], outputs: &mut [Output]) {
     black_box(outputs);
 }
 
-#[allow(clippy::cast_precision_loss)] // nanoseconds of seconds
 fn per_pose_ns(inputs: &[Input], work: impl FnOnce(&[Input])) -> f64 {
     let begin = Instant::now();
     work(black_box(inputs));
@@ -156,7 +155,6 @@ pub(super) fn call_ns(overhead_ns: f64, model: &mut Model, input: &Input) -> f64
     ns
 }
 
-#[allow(clippy::cast_precision_loss)] // nanoseconds of seconds
 fn net_ns(overhead_ns: f64, call: impl FnOnce()) -> f64 {
     let begin = Instant::now();
     call();
@@ -174,7 +172,6 @@ fn mean_of_fastest(times_ns: &[f64], slices: usize) -> f64 {
     let fastest = |slice: usize| {
         times_ns.iter().skip(slice).step_by(slices.max(1)).copied().fold(f64::INFINITY, f64::min)
     };
-    #[allow(clippy::cast_precision_loss)] // hundreds
     let count = slices as f64;
     (0..slices).map(fastest).sum::<f64>() / count
 }
@@ -188,7 +185,7 @@ fn median_quotient(numbers: &[f64], by: &[f64]) -> f64 {
 /// The value a part of the samples lies below; NaN of nothing.
 pub(super) fn quantile(samples: &mut [f64], part: f64) -> f64 {
     samples.sort_by(f64::total_cmp);
-    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let index = (samples.len() as f64 * part) as usize;
     samples.get(index.min(samples.len().saturating_sub(1))).copied().unwrap_or(f64::NAN)
 }

@@ -112,7 +112,6 @@ impl WholeTick {
             self.receiver.drain(|_| ());
         }
         times_ns.sort_unstable();
-        #[allow(clippy::cast_precision_loss)] // microseconds
         let per_tick = |index: usize| {
             times_ns.get(index.min(times_ns.len() - 1)).copied().unwrap_or_default() as f64 / BATCH as f64
         };

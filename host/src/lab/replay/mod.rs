@@ -124,7 +124,6 @@ impl<'r> Replay<'r> {
             plugins.push(report);
         }
         let devices = recording.run().devices().count();
-        #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
         let period_s = period_ns as f64 * 1.0e-9;
         if let Some(coupling) = recording.run().couplings.iter().find(|coupling| is_apart(coupling)) {
             return Err(ReplayError::Apart { coupling: coupling.name.clone() });
@@ -277,7 +276,6 @@ impl Difference {
     }
 
     fn finish(&mut self) {
-        #[allow(clippy::cast_precision_loss)] // 2^53 ticks are 285 000 years
         let ticks = self.ticks.max(1) as f64;
         self.rms_force_n = (self.rms_force_n / ticks).sqrt();
         self.rms_torque_nm = (self.rms_torque_nm / ticks).sqrt();

@@ -226,7 +226,6 @@ struct Window {
 }
 
 impl Window {
-    #[allow(clippy::cast_precision_loss)] // some ten thousand ticks
     fn new(length: u64) -> Self {
         Self { step: TAU / length as f64, phase: 0.0, weight: 0.0, sum: 0.0 }
     }
@@ -243,7 +242,6 @@ impl Window {
     }
 }
 
-#[allow(clippy::cast_precision_loss)] // at most 10 ms
 fn seconds(time_ns: u64) -> f64 {
     time_ns as f64 * 1.0e-9
 }

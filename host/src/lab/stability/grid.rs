@@ -87,7 +87,6 @@ pub fn measure(plugin: &Plugin, cases: &[Case], done: impl Fn() + Sync) -> Resul
 }
 
 fn row(plugin: &Plugin, case: &Case) -> Result<Row, LoopError> {
-    #[allow(clippy::cast_precision_loss)] // at most 10 ms
     let period_s = case.period_ns as f64 * 1.0e-9;
     let Case { delay_ticks, plant_damping_ns_per_m, virtual_damping_ns_per_m, quantum_m, grip, .. } = *case;
     let rendering = Rendering { period_s, delay_ticks, virtual_damping_ns_per_m };

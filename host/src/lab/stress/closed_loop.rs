@@ -316,7 +316,6 @@ fn limit(subject: &mut Subject<'_>, clean: Loop, start: Pose) -> Option<f64> {
     Some(stiffness * (stable * unstable).sqrt())
 }
 
-#[allow(clippy::cast_precision_loss)] // a few thousand releases
 fn judge(rows: &[Row]) -> Measure {
     let count = |is: &dyn Fn(&Row) -> bool| rows.iter().filter(|row| is(row)).count() as u64;
     let is_surprise = |row: &Row| row.diverged() && row.must_settle();

@@ -81,7 +81,6 @@ impl Stopwatch {
             }
         }
         for call_ns in shortest_ns {
-            #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
             let call_ns = call_ns as f64;
             self.spread.count(call_ns);
             self.slowest.offer(call_ns, pose);
@@ -114,7 +113,6 @@ impl Stopwatch {
         Some(vec![call_ns])
     }
 
-    #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
     fn judge(&self) -> Measure {
         let remark = "best of three at its slowest pose; whether it allocates cannot be seen from outside";
         Measure::of(["M7", NAME, "ns"], &self.slowest, [TENTH_OF_A_TICK_NS; 2], remark)

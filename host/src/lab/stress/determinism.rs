@@ -68,7 +68,6 @@ fn inputs(setup: &Setup<'_>, sobol: &Sobol, subject: &mut Subject<'_>, block: u6
     let mut input = |index: u64| {
         if subject.memory() == Memory::PathDependent {
             // Straight out to a pose of the block's own, in as many ticks as the block has.
-            #[allow(clippy::cast_precision_loss)]
             let part = (index % BLOCK) as f64 / BLOCK as f64;
             let outward = sobol.point(block).map(|unit| 0.5 + (unit - 0.5) * part);
             return subject.input(reach.pose(outward), Twist::ZERO, PERIOD_NS);
@@ -126,7 +125,6 @@ fn compare(inputs: &[Input], reference: &[Bits], again: [&[Bits]; AGAIN.len()]) 
     tally
 }
 
-#[allow(clippy::cast_precision_loss)] // a count below 2^53
 fn judge(total: &Tally) -> Measure {
     let mut digest = Xxh3::new();
     total.digests.iter().for_each(|block| digest.update(&block.to_le_bytes()));

@@ -232,7 +232,6 @@ pub(super) fn measure_observer(setup: &Setup<'_>) -> Result<Measure, LoadError> 
     Ok(judge_observer(&total))
 }
 
-#[allow(clippy::cast_precision_loss)] // milliseconds
 fn judge_observer(total: &Observed) -> Measure {
     let [.., slowest] = &total.seen;
     let remark = "device damping that eats up what holding the force gives away, 1 kHz";

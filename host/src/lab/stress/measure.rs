@@ -110,7 +110,6 @@ impl Measure {
 
     /// Adds a count.
     #[must_use]
-    #[allow(clippy::cast_precision_loss)] // below 2^53
     pub(super) fn count(self, name: impl Into<String>, count: u64) -> Self {
         self.with(name, count as f64, "")
     }

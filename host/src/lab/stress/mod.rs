@@ -108,46 +108,27 @@ struct Effort {
 impl Effort {
     /// For a model without history about 2e8 calls in full. One with history is walked, some hundred calls
     /// between two poses, and gets a hundredth of the poses.
-    const fn of(size: Size, memory: Memory) -> Self {
-        let full = Self {
-            sobol_poses: 10_000_000,
-            poses_per_manifold: 160_000,
-            lines: 40_000,
-            jacobians: 400_000,
-            loops: 20_000,
-            hand_paths: 4_000,
-            releases: 100,
-            timed_poses: 4_000_000,
-            compared_poses: 1_000_000,
-        };
-        let walked = match memory {
-            Memory::Stateless => full,
-            Memory::PathDependent => full.divided_by(100),
-        };
-        match size {
-            Size::Full => walked,
-            Size::Short => walked.divided_by(100),
-        }
+    fn of(size: Size, memory: Memory) -> Self {
+        let by_size = if size == Size::Full { 1 } else { 100 };
+        Self::part(by_size * if memory == Memory::Stateless { 1 } else { 100 })
     }
 
-    const fn divided_by(self, by: u64) -> Self {
+    /// Of the full effort one part in so many.
+    fn part(by: u64) -> Self {
+        // Fewer than the least would be no measurement.
+        let part = |full: u64, least: u64| (full / by).max(least);
         Self {
-            sobol_poses: self.sobol_poses / by,
-            poses_per_manifold: self.poses_per_manifold / by,
-            lines: at_least(self.lines / by, 16),
-            jacobians: at_least(self.jacobians / by, 32),
-            loops: at_least(self.loops / by, 10),
-            hand_paths: at_least(self.hand_paths / by, 4),
-            releases: at_least(self.releases / by, 2),
-            timed_poses: self.timed_poses / by,
-            compared_poses: self.compared_poses / by,
+            sobol_poses: part(10_000_000, 0),
+            poses_per_manifold: part(160_000, 0),
+            lines: part(40_000, 16),
+            jacobians: part(400_000, 32),
+            loops: part(20_000, 10),
+            hand_paths: part(4_000, 4),
+            releases: part(100, 2),
+            timed_poses: part(4_000_000, 0),
+            compared_poses: part(1_000_000, 0),
         }
     }
-}
-
-/// Fewer would be no measurement.
-const fn at_least(count: u64, least: u64) -> u64 {
-    if count < least { least } else { count }
 }
 
 /// Scores a model with these settings. Not real-time; takes seconds (short) to minutes (full), on all processors.

@@ -66,7 +66,6 @@ impl StressReport {
 }
 
 fn histogram(decades: &Decades) -> Series {
-    #[allow(clippy::cast_precision_loss)] // counts, drawn
     let bins = decades.bins().into_iter().map(|(from, to, count)| Bin { from, to, height: count as f64 });
     Series::histogram("", bins.filter(|bin| bin.height > 0.0))
 }

@@ -3,7 +3,7 @@
 //!
 //! Even coverage is [Sobol's sequence](crate::lab::sampling): any first part of it covers the space evenly, so a short
 //! run asks the first poses of a full one. No sequence ever hits home exactly, or a coordinate plane, or a number
-//! that is not finite: those are [`Manifold`]s with names.
+//! that is not finite: those are [`MANIFOLDS`] with names.
 
 use crate::lab::sampling::{Random, Sobol};
 use crate::lab::trajectory::at;
@@ -52,72 +52,24 @@ impl Reach {
     }
 }
 
-/// Sets of poses where a formula may break and no even coverage would find it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Manifold {
-    /// Home itself, with every sign of zero and both quaternions.
-    Home,
-    /// 1e-15 to 1e-3 m and rad from home, logarithmically even.
-    Tiny,
-    /// On spheres of exactly 10^-k m around home, and a rounding beside them.
-    Shell,
-    /// One coordinate of six, the others exactly zero.
-    Axis,
-    /// One or two coordinates exactly zero.
-    Plane,
-    /// Any rotation up to half a turn, and exactly that.
-    LargeRotation,
-    /// Coordinates too small for full precision.
-    Denormal,
-    /// Coordinates up to 1e300.
-    Huge,
-    /// NaN and infinity in pose or twist, quaternions that are not of unit length.
-    Malformed,
-}
+/// Sample so much of a set: a pose and a twist.
+type Sample = fn(Reach, &mut Random, u64) -> (Pose, Twist);
 
-impl Manifold {
-    pub(super) const ALL: [Manifold; 9] = [
-        Manifold::Home,
-        Manifold::Tiny,
-        Manifold::Shell,
-        Manifold::Axis,
-        Manifold::Plane,
-        Manifold::LargeRotation,
-        Manifold::Denormal,
-        Manifold::Huge,
-        Manifold::Malformed,
-    ];
+/// Sets of poses where a formula may break and no even coverage would find it, with the words of a report.
+pub(super) const MANIFOLDS: [(&str, Sample); 9] = [
+    ("home", |_, _, index| still(home(index))),
+    ("tiny displacements", |_, random, index| still(tiny(random, index))),
+    ("shells around home", |_, random, index| still(shell(random, index))),
+    ("axes", |reach, random, index| still(axis(reach, random, index))),
+    ("coordinate planes", |reach, random, index| still(plane(reach, random, index))),
+    ("large rotations", |reach, random, index| still(large_rotation(reach, random, index))),
+    ("denormals", |_, random, _| still(denormal(random))),
+    ("huge coordinates", |_, random, _| still(huge(random))),
+    ("malformed input", malformed),
+];
 
-    /// The words of a report.
-    pub(super) const fn name(self) -> &'static str {
-        match self {
-            Manifold::Home => "home",
-            Manifold::Tiny => "tiny displacements",
-            Manifold::Shell => "shells around home",
-            Manifold::Axis => "axes",
-            Manifold::Plane => "coordinate planes",
-            Manifold::LargeRotation => "large rotations",
-            Manifold::Denormal => "denormals",
-            Manifold::Huge => "huge coordinates",
-            Manifold::Malformed => "malformed input",
-        }
-    }
-
-    /// Sample number `index`: a pose and a twist.
-    pub(super) fn sample(self, reach: Reach, random: &mut Random, index: u64) -> (Pose, Twist) {
-        let pose = match self {
-            Manifold::Home => home(index),
-            Manifold::Tiny => tiny(random, index),
-            Manifold::Shell => shell(random, index),
-            Manifold::Axis => axis(reach, random, index),
-            Manifold::Plane => plane(reach, random, index),
-            Manifold::LargeRotation => large_rotation(reach, random, index),
-            Manifold::Denormal => denormal(random),
-            Manifold::Huge => huge(random),
-            Manifold::Malformed => return malformed(reach, random, index),
-        };
-        (pose, Twist::ZERO)
-    }
+fn still(pose: Pose) -> (Pose, Twist) {
+    (pose, Twist::ZERO)
 }
 
 /// Every how many poses one is of a manifold.
@@ -129,8 +81,8 @@ pub(super) fn mixed(reach: Reach, sobol: &Sobol, random: &mut Random, index: u64
         return reach.pose(sobol.point(index));
     }
     let number = index / MANIFOLD_EVERY;
-    let manifold = usize::try_from(number).unwrap_or(0) % Manifold::ALL.len();
-    Manifold::ALL[manifold].sample(reach, random, number).0
+    let (_, sample) = MANIFOLDS[usize::try_from(number).unwrap_or(0) % MANIFOLDS.len()];
+    sample(reach, random, number).0
 }
 
 fn anywhere(reach: Reach, random: &mut Random) -> Pose {
@@ -142,6 +94,7 @@ fn decades(random: &mut Random, from: f64, to: f64) -> f64 {
     10.0_f64.powf(from + (to - from) * random.unit())
 }
 
+/// Home itself, with every sign of zero and both quaternions.
 fn home(index: u64) -> Pose {
     let sign = |bit: u32| if index >> bit & 1 == 1 { -1.0 } else { 1.0 };
     Pose {
@@ -150,6 +103,7 @@ fn home(index: u64) -> Pose {
     }
 }
 
+/// 1e-15 to 1e-3 m and rad from home, logarithmically even.
 fn tiny(random: &mut Random, index: u64) -> Pose {
     let position_m = random.direction() * decades(random, -15.0, -3.0);
     let rotation_rad = random.direction() * decades(random, -15.0, -3.0);
@@ -160,6 +114,7 @@ fn tiny(random: &mut Random, index: u64) -> Pose {
     }
 }
 
+/// On spheres of exactly 10^-k m around home, and a rounding beside them.
 fn shell(random: &mut Random, index: u64) -> Pose {
     #[allow(clippy::cast_possible_truncation)] // 1..=15
     let exponent = 1 + (index % 15) as i32;
@@ -174,6 +129,7 @@ fn shell(random: &mut Random, index: u64) -> Pose {
     at(position_m, rotation_rad)
 }
 
+/// One coordinate of six, the others exactly zero.
 fn axis(reach: Reach, random: &mut Random, index: u64) -> Pose {
     let only = [DVec3::X, DVec3::Y, DVec3::Z][(index % 3) as usize] * random.symmetric();
     match index / 3 % 2 {
@@ -182,6 +138,7 @@ fn axis(reach: Reach, random: &mut Random, index: u64) -> Pose {
     }
 }
 
+/// One or two coordinates exactly zero.
 fn plane(reach: Reach, random: &mut Random, index: u64) -> Pose {
     let (mut position_m, mut rotation_rad) =
         (random.vector() * reach.position_m, random.vector() * reach.rotation_rad);
@@ -198,6 +155,7 @@ fn plane(reach: Reach, random: &mut Random, index: u64) -> Pose {
     at(position_m, rotation_rad)
 }
 
+/// Any rotation up to half a turn, and exactly that.
 fn large_rotation(reach: Reach, random: &mut Random, index: u64) -> Pose {
     let axis = match index / 4 % 4 {
         0 => DVec3::X,
@@ -214,6 +172,7 @@ fn large_rotation(reach: Reach, random: &mut Random, index: u64) -> Pose {
     at(random.vector() * reach.position_m, axis * angle_rad)
 }
 
+/// Coordinates too small for full precision.
 fn denormal(random: &mut Random) -> Pose {
     // The smallest normal number is 2.2e-308.
     let mut number =
@@ -221,12 +180,14 @@ fn denormal(random: &mut Random) -> Pose {
     Pose { position_m: [number(), number(), number()], orientation_xyzw: [number(), number(), number(), 1.0] }
 }
 
+/// Coordinates up to 1e300.
 fn huge(random: &mut Random) -> Pose {
     let mut number = || random.symmetric() * decades(random, 0.0, 300.0);
     let position_m = DVec3::new(number(), number(), number());
     at(position_m, random.direction() * PI * random.unit())
 }
 
+/// NaN and infinity in pose or twist, quaternions that are not of unit length.
 fn malformed(reach: Reach, random: &mut Random, index: u64) -> (Pose, Twist) {
     let bad = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -f64::NAN][(index % 4) as usize];
     let mut pose = anywhere(reach, random);
@@ -256,15 +217,19 @@ mod tests {
         let reach = Reach::default();
         let mut random = Random::new(1, 1);
         for index in 0..1000 {
-            let mut pose = |manifold: Manifold| manifold.sample(reach, &mut random, index).0;
-            assert_eq!(pose(Manifold::Home).position(), DVec3::ZERO);
-            assert!(pose(Manifold::Tiny).position().length() <= 1.001e-3);
-            let plane = pose(Manifold::Plane);
+            let mut sample = |name: &str| {
+                let named = MANIFOLDS.iter().find(|(other, _)| *other == name);
+                named.map(|(_, sample)| sample(reach, &mut random, index)).expect("a manifold")
+            };
+            let mut pose = |name: &str| sample(name).0;
+            assert_eq!(pose("home").position(), DVec3::ZERO);
+            assert!(pose("tiny displacements").position().length() <= 1.001e-3);
+            let plane = pose("coordinate planes");
             let zeros = plane.position_m.iter().chain(&plane.orientation_xyzw).filter(|n| **n == 0.0);
             assert!(zeros.count() >= 1);
-            assert!(pose(Manifold::Denormal).position().length() < 4.0e-308);
-            assert!(pose(Manifold::Huge).is_finite());
-            let (pose, twist) = Manifold::Malformed.sample(reach, &mut random, index);
+            assert!(pose("denormals").position().length() < 4.0e-308);
+            assert!(pose("huge coordinates").is_finite());
+            let (pose, twist) = sample("malformed input");
             let unit = (pose.orientation().length() - 1.0).abs() < 1.0e-6;
             assert!(!(pose.is_finite() && twist.is_finite() && unit));
         }

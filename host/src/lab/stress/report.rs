@@ -44,7 +44,6 @@ pub struct Distributions {
 }
 
 impl StressReport {
-    #[allow(clippy::cast_precision_loss)] // nine measures
     pub(super) fn new(setup: &Setup<'_>, measures: Vec<Measure>, distributions: Distributions) -> Self {
         let schema = setup.plugin.parameters();
         let named = |setting: &flotor_hal::abi::loader::Setting| {

@@ -98,7 +98,6 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Measure, Decades), 
     Ok((lipschitz(&total), reciprocity(&total), total.gains))
 }
 
-#[allow(clippy::cast_precision_loss)] // counts below 2^53
 fn lipschitz(total: &Tally) -> Measure {
     let share = |index: usize| total.renderable[index] as f64 / total.judged().max(1) as f64;
     let [lightly, heavily] = DAMPINGS_NS_PER_M;

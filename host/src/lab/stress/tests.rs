@@ -1,6 +1,6 @@
 //! Small laws with one known flaw each: the measures meant for it fail, and no other.
 
-use super::{Effort, Measure, Setup, Size, StressOptions, StressReport, Verdict, measure_all};
+use super::{Effort, Measure, Setup, StressOptions, StressReport, Verdict, measure_all};
 use flotor_hal::abi::loader::Plugin;
 use flotor_hal::abi::model_entry;
 use flotor_hal::{
@@ -40,7 +40,8 @@ impl<L: Law> ForceModel for Lawful<L> {
 /// A fraction of a short run: every kind of pose, some of each.
 fn stress<L: Law>() -> StressReport {
     let plugin = Plugin::in_process(Box::leak(Box::new(model_entry::<Lawful<L>>()))).unwrap();
-    let effort = Effort { releases: 1, ..Effort::of(Size::Short, L::MEMORY).divided_by(10) };
+    let effort =
+        Effort { releases: 1, ..Effort::part(if L::MEMORY == Memory::Stateless { 1_000 } else { 100_000 }) };
     let options = StressOptions::default();
     measure_all(&Setup { plugin: &plugin, settings: &[], options, effort, progress: &() }).unwrap()
 }

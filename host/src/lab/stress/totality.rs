@@ -6,7 +6,7 @@
 //! code gives NaN at the exact rest pose, 0/0 in its moments.
 
 use super::measure::Measure;
-use super::poses::Manifold;
+use super::poses::MANIFOLDS;
 use super::sweep::sweep;
 use super::{Setup, WIDER};
 use crate::lab::PERIOD_NS;
@@ -71,13 +71,13 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     let sobol = Sobol::new(setup.options.seed);
     let even_blocks = setup.effort.sobol_poses.div_ceil(BLOCK);
     let blocks_per_manifold = setup.effort.poses_per_manifold.div_ceil(BLOCK);
-    let manifolds = Manifold::ALL.len() as u64;
+    let manifolds = MANIFOLDS.len() as u64;
     // The manifolds first: what breaks there, breaks at once.
     let manifold_blocks = blocks_per_manifold * manifolds;
 
     let total = sweep(setup, NAME, manifold_blocks + even_blocks, |subject, block| {
         let mut tally = Tally::default();
-        let manifold = Manifold::ALL[usize::try_from(block % manifolds).unwrap_or(0)];
+        let (name, sample) = MANIFOLDS[usize::try_from(block % manifolds).unwrap_or(0)];
         let mut random = Random::new(setup.options.seed, block);
         let is_even = block >= manifold_blocks;
         let from = if is_even { block - manifold_blocks } else { block / manifolds } * BLOCK;
@@ -85,8 +85,8 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
             if is_even {
                 tally.ask(subject, reach.pose(sobol.point(index)), Twist::ZERO, "workspace");
             } else {
-                let (pose, twist) = manifold.sample(reach, &mut random, index);
-                tally.ask(subject, pose, twist, manifold.name());
+                let (pose, twist) = sample(reach, &mut random, index);
+                tally.ask(subject, pose, twist, name);
             }
             if tally.troubles() >= ENOUGH_TROUBLES {
                 break;
@@ -97,7 +97,6 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     Ok(judge(&total))
 }
 
-#[allow(clippy::cast_precision_loss)] // a count below 2^53
 fn judge(total: &Tally) -> Measure {
     let asked = format!("{} poses, {} of them out of the model's domain", total.asked, total.out_of_domain);
     let remark = total.first.as_ref().map_or(asked, |(trouble, place)| {

@@ -47,7 +47,6 @@ pub(super) fn passive(model: &mut Model) -> Result<Option<Figures>, String> {
 const COORDINATES: [&str; 6] = ["x", "y", "z", "rotation about x", "rotation about y", "rotation about z"];
 
 fn on_circle(plane: [usize; 2], index: usize) -> Pose {
-    #[allow(clippy::cast_precision_loss)] // a thousand
     let angle = TAU * (index % POINTS) as f64 / POINTS as f64;
     let coordinates: [f64; 6] = std::array::from_fn(|axis| {
         let size = if axis < 3 { RADIUS_M } else { RADIUS_RAD };

@@ -49,7 +49,6 @@ pub(super) fn walk_at(speed: f64, steps: u64) -> impl Iterator<Item = Input> {
         rotation: Series::sines(DVec3::splat(ROTATION_RAD), ROTATION_RAD_PER_S),
     };
     (0..steps).map(move |tick| {
-        #[allow(clippy::cast_precision_loss)] // a few thousand
         let (pose, shift_m, turn_rad) = path.at(tick as f64 * 1.0e-3 * speed);
         let dt_ns = if tick == 0 { 0 } else { CONFIG.period_ns };
         let twist = Twist::new(shift_m * speed, turn_rad * speed);
