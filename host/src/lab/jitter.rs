@@ -5,7 +5,7 @@
 //! the same neighbours. What the servo adds is the difference.
 
 use crate::servo::{
-    Durations, Percentiles, RealTimeReport, Schedule, SpinWindow, StopSwitch, enter_real_time, monotonic_ns,
+    Percentiles, RealTimeReport, Schedule, SpinWindow, StopSwitch, Timing, enter_real_time, monotonic_ns,
     sleep_until,
 };
 use crate::session::{RunError, Session};
@@ -81,7 +81,7 @@ pub fn measure(
             let real_time = enter_real_time(session.core());
             let window = SpinWindow::measure(period_ns);
             let (mut servo, stoppers) = session.into_loop()?;
-            let (mut with_servo, mut bare) = (Tally::default(), Tally::default());
+            let (mut with_servo, mut bare) = (Timing::default(), Timing::default());
             let mut pairs = Pairs::default();
             let mut done = 0;
             while done < slices && !stop.is_stop_asked() && stop.emergency().is_none() {
@@ -90,7 +90,7 @@ pub fn measure(
                 while schedule.next_time_ns() < SLICE_NS {
                     let Ok(due) = schedule.wait(|_| SampleWait::NotPaced) else { break };
                     servo.tick(&due, stop, |_| ());
-                    with_servo.count(due.lateness_ns.unwrap_or_default(), due.missed, period_ns);
+                    count(&mut with_servo, due.lateness_ns.unwrap_or_default(), due.missed, period_ns);
                 }
                 bare_slice(&mut bare, period_ns, window);
                 let [servo_before, bare_before] = missed_before;
@@ -104,8 +104,8 @@ pub fn measure(
                 rate_hz,
                 spin_window_ns: window.spin_ns,
                 slices: done,
-                servo: with_servo.timing(),
-                bare: bare.timing(),
+                servo: (&with_servo).into(),
+                bare: (&bare).into(),
                 missed_more: pairs.missed_more(),
                 real_time,
                 bins: [with_servo.lateness.bins(), bare.lateness.bins()],
@@ -117,7 +117,7 @@ pub fn measure(
 }
 
 /// The yardstick, written out on its own: it shares no line with the servo's schedule but the system call.
-fn bare_slice(tally: &mut Tally, period_ns: u64, window: SpinWindow) {
+fn bare_slice(timing: &mut Timing, period_ns: u64, window: SpinWindow) {
     let start_ns = monotonic_ns() + period_ns;
     let mut slot = 0;
     while slot * period_ns < SLICE_NS {
@@ -131,7 +131,7 @@ fn bare_slice(tally: &mut Tally, period_ns: u64, window: SpinWindow) {
             now_ns = monotonic_ns();
         }
         let missed = (now_ns - deadline_ns) / period_ns;
-        tally.count((now_ns - deadline_ns) % period_ns, missed, period_ns);
+        count(timing, (now_ns - deadline_ns) % period_ns, missed, period_ns);
         slot += 1 + missed;
     }
 }
@@ -160,31 +160,19 @@ impl Pairs {
     }
 }
 
-#[derive(Default)]
-struct Tally {
-    lateness: Durations,
-    ticks: u64,
-    late: u64,
-    missed: u64,
+/// Counts a tick.
+fn count(timing: &mut Timing, lateness_ns: u64, missed: u64, period_ns: u64) {
+    timing.lateness.record(lateness_ns);
+    timing.ticks += 1;
+    timing.missed += missed;
+    timing.late += u64::from(lateness_ns > period_ns / 10);
 }
 
-impl Tally {
-    fn count(&mut self, lateness_ns: u64, missed: u64, period_ns: u64) {
-        self.lateness.record(lateness_ns);
-        self.ticks += 1;
-        self.missed += missed;
-        if lateness_ns > period_ns / 10 {
-            self.late += 1;
-        }
-    }
-
-    fn timing(&self) -> LoopTiming {
-        LoopTiming {
-            lateness_ns: self.lateness.percentiles(),
-            ticks: self.ticks,
-            late_ticks: self.late,
-            missed_ticks: self.missed,
-        }
+impl From<&Timing> for LoopTiming {
+    fn from(timing: &Timing) -> Self {
+        let Timing { lateness, ticks, late, missed, .. } = timing;
+        let lateness_ns = lateness.percentiles();
+        Self { lateness_ns, ticks: *ticks, late_ticks: *late, missed_ticks: *missed }
     }
 }
 

@@ -20,6 +20,7 @@ pub mod report;
 pub mod sampling;
 pub mod stability;
 pub mod stress;
+mod stopwatch;
 mod subject;
 mod tally;
 mod trajectory;

@@ -1,7 +1,8 @@
 //! Calls told apart by a detail of the answer: a model that solves for some poses and evaluates a formula for the
 //! others has two speeds, and a mean of both says nothing about either.
 
-use super::stopwatch::{call_ns, inputs, overhead_ns, quantile};
+use super::times::{call_ns, inputs};
+use crate::lab::stopwatch::{overhead_ns, quantile};
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Pose};
 use serde::Serialize;

@@ -6,7 +6,7 @@
 //! machine does. An error is the distance from a reference that walks the same path: another setting of the same model,
 //! computed in this run, not a table.
 //!
-//! - `path`: the motion. `stopwatch`: the times. `apart`: times of two kinds of calls. `error`: the distance from the
+//! - `path`: the motion. `times`: the times. `apart`: times of two kinds of calls. `error`: the distance from the
 //!   reference.
 //! - `reach_hand`: the whole loop: what of the reference's force reaches a hand, through sampling and delay.
 //! - `report`: table, CSV and picture.
@@ -20,7 +20,7 @@ mod path;
 mod reach_hand;
 mod report;
 pub mod scripted;
-mod stopwatch;
+mod times;
 mod whole_tick;
 
 pub use apart::{Apart, Speed};
@@ -28,7 +28,7 @@ pub use error::Distance;
 pub use path::Hand;
 pub use reach_hand::{Losses, Sampling};
 pub use report::{ApartRow, BenchReport, CaseRow};
-pub use stopwatch::Times;
+pub use times::Times;
 pub use whole_tick::{BenchDevice, TickCost, WholeTick};
 
 use super::subject::prepared;
@@ -106,7 +106,7 @@ pub fn measure(plugin: &Plugin, plan: &Plan, progress: &dyn Progress) -> Result<
     }
     let [force, wrench, everything] = DEMANDS.map(|(name, demand)| {
         progress.begin(&format!("times: {name}"), rounds as u64);
-        stopwatch::in_turns(&mut models, *yardstick, &path, demand, rounds, || progress.advance(1))
+        times::in_turns(&mut models, *yardstick, &path, demand, rounds, || progress.advance(1))
     });
     let times = force.into_iter().zip(wrench).zip(everything);
     let rows = cases.iter().zip(distances).zip(times).map(|((case, distance), ((force, wrench), all))| {

@@ -10,6 +10,7 @@ use super::measure::Measure;
 use super::poses::mixed;
 use super::{Setup, WIDER};
 use crate::lab::sampling::{Random, Sobol};
+use crate::lab::stopwatch::{net_ns, overhead_ns};
 use crate::lab::subject::Subject;
 use crate::lab::tally::{Decades, Worst};
 use flotor_hal::abi::CallStatus;
@@ -45,7 +46,7 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Decades), LoadError
 }
 
 struct Stopwatch {
-    overhead_ns: u64,
+    overhead_ns: f64,
     calls: Histogram<u64>,
     spread: Decades,
     /// Longest of the shortest times, and the pose that was asked for or walked to.
@@ -66,12 +67,11 @@ impl Stopwatch {
 
     /// Times every call that reaching a pose takes, several times over.
     fn time(&mut self, subject: &mut Subject<'_>, pose: Pose) {
-        let mut shortest_ns: Vec<u64> = Vec::new();
+        let mut shortest_ns: Vec<f64> = Vec::new();
         for _ in 0..REPEATS {
             let Some(calls_ns) = self.once(subject, pose) else { return };
-            for call_ns in &calls_ns {
-                self.calls.saturating_record(*call_ns);
-            }
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at least 1 ns; saturates
+            calls_ns.iter().for_each(|call_ns| self.calls.saturating_record(*call_ns as u64));
             if shortest_ns.is_empty() {
                 shortest_ns = calls_ns;
             } else {
@@ -81,7 +81,6 @@ impl Stopwatch {
             }
         }
         for call_ns in shortest_ns {
-            let call_ns = call_ns as f64;
             self.spread.count(call_ns);
             self.slowest.offer(call_ns, pose);
         }
@@ -89,8 +88,8 @@ impl Stopwatch {
 
     /// One call for a model without history, the ticks of a walk from home for one with it; nothing if the
     /// model panics, for what a panic costs is not what a call costs.
-    fn once(&self, subject: &mut Subject<'_>, pose: Pose) -> Option<Vec<u64>> {
-        let net_ns = |begin: Instant| nanoseconds(begin).saturating_sub(self.overhead_ns).max(1);
+    fn once(&self, subject: &mut Subject<'_>, pose: Pose) -> Option<Vec<f64>> {
+        let net_ns = |begin| net_ns(self.overhead_ns, begin).max(1.0);
         if subject.memory() == Memory::PathDependent {
             subject.restart();
             let mut calls_ns = Vec::new();
@@ -121,17 +120,6 @@ impl Stopwatch {
             .with("p99.999", self.calls.value_at_quantile(0.99999) as f64, "ns")
             .with("max, interruptions included", self.calls.max() as f64, "ns")
             .count("calls", self.calls.len())
-            .with("clock, taken off", self.overhead_ns as f64, "ns")
+            .with("clock, taken off", self.overhead_ns, "ns")
     }
-}
-
-fn nanoseconds(begin: Instant) -> u64 {
-    u64::try_from(begin.elapsed().as_nanos()).unwrap_or(u64::MAX)
-}
-
-/// What reading the clock twice costs: the median of many.
-fn overhead_ns() -> u64 {
-    let mut samples: Vec<u64> = (0..1001).map(|_| nanoseconds(Instant::now())).collect();
-    samples.sort_unstable();
-    samples.get(500).copied().unwrap_or(0)
 }

@@ -69,11 +69,7 @@ impl Check {
     pub const fn applies_to(self, kind: PluginKind) -> bool {
         match self {
             Self::Contract(rule) => rule.applies_to(kind),
-            Self::FiniteInMotion
-            | Self::LiveParameters
-            | Self::Activity
-            | Self::Passive
-            | Self::SystemCalls => matches!(kind, PluginKind::Model),
+            _ => matches!(kind, PluginKind::Model),
         }
     }
 }

@@ -5,6 +5,7 @@
 //! neighbouring slices are those of a quiet machine.
 
 use crate::lab::PERIOD_NS;
+use crate::lab::stopwatch::{net_ns, overhead_ns, quantile};
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Input, Memory, Output, Pose};
 use serde::Serialize;
@@ -148,23 +149,11 @@ fn per_pose_ns(inputs: &[Input], work: impl FnOnce(&[Input])) -> f64 {
 /// One call, ns, what the clock costs taken off.
 pub(super) fn call_ns(overhead_ns: f64, model: &mut Model, input: &Input) -> f64 {
     let mut output = Output::default();
-    let ns = net_ns(overhead_ns, || {
-        model.step(black_box(input), &mut output);
-    });
-    black_box(&output);
-    ns
-}
-
-fn net_ns(overhead_ns: f64, call: impl FnOnce()) -> f64 {
     let begin = Instant::now();
-    call();
-    (begin.elapsed().as_nanos() as f64 - overhead_ns).max(0.0)
-}
-
-/// What reading the clock twice costs: the median of many.
-pub(super) fn overhead_ns() -> f64 {
-    let mut samples: Vec<f64> = (0..1001).map(|_| net_ns(0.0, || {})).collect();
-    quantile(&mut samples, 0.5)
+    model.step(black_box(input), &mut output);
+    let call_ns = net_ns(overhead_ns, begin);
+    black_box(&output);
+    call_ns
 }
 
 /// Mean over the slices of a round, each taken from the round in which it was fastest.
@@ -180,14 +169,6 @@ fn mean_of_fastest(times_ns: &[f64], slices: usize) -> f64 {
 fn median_quotient(numbers: &[f64], by: &[f64]) -> f64 {
     let mut quotients: Vec<f64> = numbers.iter().zip(by).map(|(number, by)| number / by).collect();
     quantile(&mut quotients, 0.5)
-}
-
-/// The value a part of the samples lies below; NaN of nothing.
-pub(super) fn quantile(samples: &mut [f64], part: f64) -> f64 {
-    samples.sort_by(f64::total_cmp);
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    let index = (samples.len() as f64 * part) as usize;
-    samples.get(index.min(samples.len().saturating_sub(1))).copied().unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]
