@@ -148,22 +148,16 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
         }
         None => 0,
     };
+    let spring_walks = || {
+        let walks = SPRING_WALKS.iter().map(|(text, mm)| Ok((case(text)?, Hand { depth_m: mm / 1e3 })));
+        walks.collect::<Result<_, CommandError>>()
+    };
     let apart = match (&arguments.apart, is_spring) {
-        (Some(detail), _) => {
-            let walks = cases.iter().map(|case| (case.clone(), hand)).collect();
-            Some(TellApart { detail: detail.clone(), walks })
-        }
-        (None, true) => {
-            let walks = SPRING_WALKS
-                .iter()
-                .map(|(text, depth_mm)| Ok((case(text)?, Hand { depth_m: depth_mm / 1e3 })));
-            Some(TellApart {
-                detail: SPRING_APART.to_owned(),
-                walks: walks.collect::<Result<_, CommandError>>()?,
-            })
-        }
+        (Some(detail), _) => Some((detail.clone(), cases.iter().map(|case| (case.clone(), hand)).collect())),
+        (None, true) => Some((SPRING_APART.to_owned(), spring_walks()?)),
         (None, false) => None,
     };
+    let apart = apart.map(|(detail, walks)| TellApart { detail, walks });
     let reference = reference.map(case).transpose()?;
     let line = ProgressLine::new();
     let plan = Plan { cases, yardstick, reference, hand, apart, size: arguments.size };

@@ -103,24 +103,22 @@ fn cases(arguments: &StabilityArguments) -> Vec<Case> {
         let period_ns = (1.0e9 / rate_hz).round() as u64;
         for delay_ticks in given_or(delay, 0) {
             for plant_damping_ns_per_m in given_or(damping, 0.5) {
-                for virtual_damping_ns_per_m in given_or(virtual_damping, 0.0) {
-                    cases.push(Case {
-                        period_ns,
-                        delay_ticks,
-                        plant_damping_ns_per_m,
-                        virtual_damping_ns_per_m,
-                        quantum_m,
-                        grip: *grip,
-                    });
-                }
+                cases.extend(given_or(virtual_damping, 0.0).map(|virtual_damping_ns_per_m| Case {
+                    period_ns,
+                    delay_ticks,
+                    plant_damping_ns_per_m,
+                    virtual_damping_ns_per_m,
+                    quantum_m,
+                    grip: *grip,
+                }));
             }
         }
     }
     cases
 }
 
-fn given_or<T: Copy>(list: &[T], default: T) -> Vec<T> {
-    if list.is_empty() { vec![default] } else { list.to_vec() }
+fn given_or<T: Copy>(list: &[T], default: T) -> impl Iterator<Item = T> {
+    list.iter().copied().chain(list.is_empty().then_some(default))
 }
 
 fn refused(error: LoopError) -> CommandError {
@@ -154,27 +152,23 @@ fn picture(plugin: &Plugin, cases: &[Case], rows: &[Row]) -> Result<String, Comm
     let mut figure = Figure::new("Largest stable stiffness", Axis::linear("Virtual damping", "N s/m"))
         .subtitle("points: simulated flotor; lines: exact limit of the sampled loop, and Gil's rule")
         .panel_height_px(320.0);
-    for panel in groups(cases, |case| (case.period_ns, case.plant_damping_ns_per_m.to_bits())) {
+    let pairs: Vec<(&Case, &Row)> = cases.iter().zip(rows).collect();
+    for (index, first) in cases.iter().enumerate() {
+        let is_alike = |case: &Case| {
+            case.period_ns == first.period_ns && case.plant_damping_ns_per_m == first.plant_damping_ns_per_m
+        };
+        let within: Vec<_> = pairs.iter().copied().filter(|(case, _)| is_alike(case)).collect();
+        let is_new = !cases.iter().take(index).any(is_alike);
         // A curve needs points; single cases are in the table.
-        if panel.len() < 3 && cases.len() > panel.len() {
-            continue;
+        if is_new && (within.len() >= 3 || cases.len() == within.len()) {
+            figure = figure.panel(stiffness_panel(first, first.plant(plugin).map_err(refused)?, &within));
         }
-        figure = figure.panel(stiffness_panel(plugin, cases, rows, &panel)?);
     }
     Ok(figure.to_svg())
 }
 
-fn stiffness_panel(
-    plugin: &Plugin,
-    cases: &[Case],
-    rows: &[Row],
-    members: &[usize],
-) -> Result<Panel, CommandError> {
+fn stiffness_panel(first: &Case, plant: Plant, within: &[(&Case, &Row)]) -> Panel {
     const CURVE_POINTS: u32 = 120;
-    let within: Vec<(&Case, &Row)> =
-        members.iter().filter_map(|index| Some((cases.get(*index)?, rows.get(*index)?))).collect();
-    let Some((first, _)) = within.first() else { return Ok(Panel::new(Axis::log("Stiffness", "N/m"))) };
-    let plant = first.plant(plugin).map_err(refused)?;
     let period_s = first.period_ns as f64 * 1.0e-9;
     let title = format!("T = {} ms, b = {} N s/m", period_s * 1.0e3, first.plant_damping_ns_per_m);
     let most = within.iter().map(|(case, _)| case.virtual_damping_ns_per_m).fold(0.0, f64::max);
@@ -208,35 +202,19 @@ fn stiffness_panel(
                     .slot(slot + delays.len()),
             );
     }
-    Ok(panel)
-}
-
-/// Indices of the cases that share a key, in the order the keys first appear.
-fn groups<K: PartialEq>(cases: &[Case], key: impl Fn(&Case) -> K) -> Vec<Vec<usize>> {
-    let mut groups: Vec<(K, Vec<usize>)> = Vec::new();
-    for (index, case) in cases.iter().enumerate() {
-        let key = key(case);
-        match groups.iter_mut().find(|(known, _)| *known == key) {
-            Some((_, members)) => members.push(index),
-            None => groups.push((key, vec![index])),
-        }
-    }
-    groups.into_iter().map(|(_, members)| members).collect()
+    panel
 }
 
 fn damping(text: &str) -> Result<f64, String> {
-    number_within(text, 0.0, 100_000.0, "N s/m")
+    number_within(text, 100_000.0, "N s/m")
 }
 
 fn quantum_um(text: &str) -> Result<f64, String> {
-    number_within(text, 0.0, 100.0, "µm")
+    number_within(text, 100.0, "µm")
 }
 
-fn number_within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> {
+/// A number from zero on.
+fn number_within(text: &str, most: f64, unit: &str) -> Result<f64, String> {
     let number: f64 = text.trim().parse().map_err(|_| format!("`{text}` is no number"))?;
-    if (least..=most).contains(&number) {
-        Ok(number)
-    } else {
-        Err(format!("legal is {least} to {most} {unit}"))
-    }
+    (0.0..=most).contains(&number).then_some(number).ok_or_else(|| format!("legal is 0 to {most} {unit}"))
 }

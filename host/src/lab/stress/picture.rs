@@ -15,9 +15,7 @@ impl StressReport {
             .iter()
             .map(|measure| format!("{} {}", measure.id, measure.verdict.word()))
             .collect();
-        let settings: Vec<String> =
-            self.settings.iter().map(|(key, value)| format!("{key}={value}")).collect();
-        let title = format!("Stability score of {} {}: {:.2}", self.model, settings.join(" "), self.score);
+        let title = format!("Stability score of {} {}: {:.2}", self.model, self.settings_text(), self.score);
         Figure::new(title, Axis::log("Length of a piece", "mm"))
             .subtitle(format!("{}, seed {}; {}", self.size.word(), self.seed, verdicts.join(", ")))
             .columns(2)

@@ -68,11 +68,14 @@ impl StressReport {
     /// What was scored, in one line.
     #[must_use]
     pub fn subject(&self) -> String {
-        let settings: Vec<String> =
-            self.settings.iter().map(|(key, value)| format!("{key}={value}")).collect();
-        let settings =
-            if settings.is_empty() { String::new() } else { format!(" ({})", settings.join(", ")) };
+        let settings = self.settings_text();
+        let settings = if settings.is_empty() { settings } else { format!(" ({settings})") };
         format!("{} {}{settings}, {}, seed {}", self.model, self.version, self.size.word(), self.seed)
+    }
+
+    pub(super) fn settings_text(&self) -> String {
+        let settings: Vec<String> = self.settings.iter().map(|(key, value)| format!("{key}={value}")).collect();
+        settings.join(", ")
     }
 
     /// The table for people.

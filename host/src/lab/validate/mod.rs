@@ -96,6 +96,10 @@ impl Verdict {
         }
     }
 
+    fn violated(seen: String) -> Self {
+        Self { seen: Some(Seen::Violation(seen)), figures: None }
+    }
+
     /// Writes it where the process that started this one looks for it: into the file that is standard input. What the
     /// plugin prints, and however much, goes elsewhere.
     ///
@@ -123,59 +127,36 @@ pub(crate) fn validate(path: &Path, patience: Duration, program: impl Fn(Check) 
     };
     // Reads the file and runs nothing of it.
     let metadata = Check::Contract(Rule::Metadata);
-    let kind = match read_metadata(path) {
-        Ok(known) => {
-            note(metadata, Verdict::of(Ok(None)));
-            known.kind
-        }
-        Err(error) => {
-            note(metadata, Verdict::of(Err(Seen::Violation(error.to_string()))));
-            return findings;
-        }
-    };
+    let read = read_metadata(path);
+    let verdict = read.as_ref().map(|_| None).map_err(|error| Seen::Violation(error.to_string()));
+    note(metadata, Verdict::of(verdict));
+    let Ok(kind) = read.map(|known| known.kind) else { return findings };
     for check in Check::all().filter(|check| *check != metadata && check.applies_to(kind)) {
         let mut command = program(check);
         if check == Check::SystemCalls {
             let (name, value) = locked::C_LIBRARY;
             command.env(name, value);
         }
-        let outcome = apart(command, patience).unwrap_or_else(|error| Outcome::NotChecked(error.to_string()));
+        let outcome = apart(check, command, patience);
         let is_fatal = matches!(check, Check::Contract(Rule::Loads | Rule::Defaults));
-        let stops = is_fatal || matches!(outcome, Outcome::Hung);
-        if note(check, outcome.verdict(check, patience)) && stops {
+        let stops = is_fatal || matches!(outcome, Ok(None));
+        let verdict = match outcome {
+            Ok(Some(verdict)) => verdict,
+            Ok(None) => Verdict::violated(format!(
+                "it did not come back within {patience:?}; the rules after it were not checked"
+            )),
+            Err(error) => Verdict::violated(format!("cannot be checked: {error}")),
+        };
+        if note(check, verdict) && stops {
             break;
         }
     }
     findings
 }
 
-/// How the check of one rule ended.
-enum Outcome {
-    Told(Verdict),
-    /// The process ended before there was a verdict.
-    Died(ExitStatus),
-    Hung,
-    NotChecked(String),
-}
-
-impl Outcome {
-    fn verdict(self, check: Check, patience: Duration) -> Verdict {
-        let words = match self {
-            Self::Told(verdict) => return verdict,
-            Self::Died(end) => match end.signal() {
-                Some(signal) => died_by(check, signal),
-                None => format!("it ended the process ({end})"),
-            },
-            Self::Hung => {
-                format!("it did not come back within {patience:?}; the rules after it were not checked")
-            }
-            Self::NotChecked(error) => format!("cannot be checked: {error}"),
-        };
-        Verdict::of(Err(Seen::Violation(words)))
-    }
-}
-
-fn died_by(check: Check, signal: i32) -> String {
+/// What an end before there was a verdict says.
+fn died(check: Check, end: ExitStatus) -> String {
+    let Some(signal) = end.signal() else { return format!("it ended the process ({end})") };
     if check == Check::SystemCalls && signal == locked::CAUGHT.as_raw() {
         return "a step allocated, or called the system otherwise".to_owned();
     }
@@ -185,19 +166,19 @@ fn died_by(check: Check, signal: i32) -> String {
     format!("it ended the process by signal {signal}{hint}")
 }
 
-/// Runs the check of one rule in a process of its own.
-fn apart(mut command: Command, patience: Duration) -> io::Result<Outcome> {
+/// Runs the check of one rule in a process of its own; `None` if it took too long.
+fn apart(check: Check, mut command: Command, patience: Duration) -> io::Result<Option<Verdict>> {
     // A file, not a pipe: nobody has to empty it. What a plugin prints is its own business.
     let mut told = File::from(memfd_create("flotor-verdict", MemfdFlags::CLOEXEC)?);
     let mut child = command.stdin(told.try_clone()?).stdout(Stdio::null()).stderr(Stdio::null()).spawn()?;
-    let Some(end) = wait(&mut child, patience)? else { return Ok(Outcome::Hung) };
+    let Some(end) = wait(&mut child, patience)? else { return Ok(None) };
     let mut text = Vec::new();
     told.rewind()?;
     told.read_to_end(&mut text)?;
-    Ok(match serde_json::from_slice(&text) {
-        Ok(verdict) if end.success() => Outcome::Told(verdict),
-        _ => Outcome::Died(end),
-    })
+    Ok(Some(match serde_json::from_slice(&text) {
+        Ok(verdict) if end.success() => verdict,
+        _ => Verdict::violated(died(check, end)),
+    }))
 }
 
 /// Waits for the end of a process; `None` if it took too long and was ended.
