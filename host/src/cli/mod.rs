@@ -195,7 +195,7 @@ impl From<crate::lab::replay::ReplayError> for CommandError {
         match error {
             crate::lab::replay::ReplayError::Read(error) => Self::Read(error),
             crate::lab::replay::ReplayError::Run(error) => Self::Run(error),
-            error @ crate::lab::replay::ReplayError::Apart { .. } => Self::Usage(error.to_string()),
+            other => Self::Usage(other.to_string()),
         }
     }
 }

@@ -2,10 +2,9 @@
 
 use super::options::{KeyValue, PluginKeyValue};
 use super::{CommandError, run, style, write_json, write_text};
-use crate::lab::replay::{Compared, Coverage, Difference, Held, Replay, ReplayError, WhyApart};
+use crate::lab::replay::{Compared, Coverage, Difference, Replay, WhyApart};
 use crate::plot::{Axis, Figure, Panel, Series};
 use crate::record::Ending;
-use crate::record::Recording;
 use crate::registry::Registry;
 use clap::Args;
 use flotor_hal::{DVec3, Wrench};
@@ -66,25 +65,14 @@ struct Report {
 }
 
 pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
-    let mut unknown = None;
     let registry = Registry::search(&arguments.folders);
-    let replay = Replay::open(&arguments.recording, &registry, |models| {
-        Held::apply(models, &arguments.models, &arguments.sets).unwrap_or_else(|problem| {
-            unknown = Some(problem);
-            Held::default()
-        })
-    });
-    if let Some(problem) = unknown {
-        return Err(CommandError::Usage(problem));
-    }
-    let replay = replay?;
-    let ending = Recording::open(&arguments.recording).map_err(ReplayError::from)?.ending();
+    let replay = Replay::open(&arguments.recording, &registry, &arguments.models, &arguments.sets)?;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
     let progress = run::progress_bar((replay.run().duration_s * 1.0e3) as u64, "{percent:>3} %  replaying");
     let started = Instant::now();
     let mut samples = Vec::new();
     let mut end_ns = 0;
-    let Compared { difference, coverage, why, health } = replay.compare(|record, wrench| {
+    let Compared { difference, coverage, why, ending, health } = replay.compare(|record, wrench| {
         end_ns = record.time_ns;
         progress.set_position(record.time_ns / 1_000_000);
         if arguments.plot.is_some() {
@@ -157,22 +145,14 @@ fn tell(arguments: &ReplayArguments, report: &Report) -> Result<(), CommandError
     if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
         let verdict = report.verdict();
         say!("{}", style::title(&format!("{}: {verdict}", arguments.recording.display())));
-        let Difference {
-            ticks,
-            differing_ticks,
-            first_tick,
-            last_tick,
-            max_force_n,
-            max_torque_nm,
-            rms_force_n,
-            rms_torque_nm,
-        } = &report.difference;
-        say!("  {:<11}{ticks} ({:.3} s) in {:.3} s", "ticks", report.recorded_s, report.wall_s);
-        if let (Some(first), Some(last)) = (first_tick, last_tick) {
-            let same = report.same_around(*first, *last);
-            say!("  {:<11}{differing_ticks} ticks, the first is {first}, the last {last}{same}", "differ");
-            say!("  {:<11}max {max_force_n:.3e} N, rms {rms_force_n:.3e} N", "force");
-            say!("  {:<11}max {max_torque_nm:.3e} N·m, rms {rms_torque_nm:.3e} N·m", "torque");
+        let d = &report.difference;
+        say!("  {:<11}{} ({:.3} s) in {:.3} s", "ticks", d.ticks, report.recorded_s, report.wall_s);
+        if let (Some(first), Some(last)) = (d.first_tick, d.last_tick) {
+            let same = report.same_around(first, last);
+            let differ = d.differing_ticks;
+            say!("  {:<11}{differ} ticks, the first is {first}, the last {last}{same}", "differ");
+            say!("  {:<11}max {:.3e} N, rms {:.3e} N", "force", d.max_force_n, d.rms_force_n);
+            say!("  {:<11}max {:.3e} N·m, rms {:.3e} N·m", "torque", d.max_torque_nm, d.rms_torque_nm);
         }
         // If nothing was changed, the error says why.
         if let (Some(why), true) = (&report.why_apart, arguments.changes_anything()) {

@@ -15,12 +15,13 @@
 pub mod bench;
 pub mod evaluate;
 pub mod jitter;
+mod plant;
 pub mod replay;
 pub mod report;
 pub mod sampling;
 pub mod stability;
-pub mod stress;
 mod stopwatch;
+pub mod stress;
 mod subject;
 mod tally;
 mod trajectory;

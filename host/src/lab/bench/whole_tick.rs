@@ -5,9 +5,10 @@
 //! their own. The middle of many batches counts: a neighbour on the machine spoils some of them.
 
 use super::scripted::{SCRIPTED, SCRIPTED_ENTRY};
+use crate::lab::stopwatch::{net_ns, quantile};
 use crate::registry::Registry;
 use crate::scene::Scene;
-use crate::servo::{Clock, Schedule, Servo, StopSwitch, monotonic_ns};
+use crate::servo::{Clock, Schedule, Servo, StopSwitch};
 use crate::session::{RunError, RunOptions, Session};
 use crate::trace::{RECORD_WORDS, TickRecord};
 use flotor_hal::SampleWait;
@@ -15,6 +16,7 @@ use flotor_hal::abi::loader::Stopper;
 use flotor_sync::{Receiver, Sender};
 use serde::Serialize;
 use std::path::Path;
+use std::time::Instant;
 
 /// Ticks that are timed together: some 20 µs, short against a time slice of the system.
 const BATCH: usize = 64;
@@ -104,22 +106,16 @@ impl WholeTick {
     #[must_use]
     pub fn time(&mut self, batches: usize) -> TickCost {
         self.run(WARM_UP);
-        let mut times_ns: Vec<u64> = Vec::with_capacity(batches);
-        for _ in 0..batches.max(1) {
-            let started_ns = monotonic_ns();
+        let batch = |_| {
+            let begin = Instant::now();
             self.batch();
-            times_ns.push(monotonic_ns() - started_ns);
+            let tick_ns = net_ns(0.0, begin) / BATCH as f64;
             self.receiver.drain(|_| ());
-        }
-        times_ns.sort_unstable();
-        let per_tick = |index: usize| {
-            times_ns.get(index.min(times_ns.len() - 1)).copied().unwrap_or_default() as f64 / BATCH as f64
+            tick_ns
         };
-        TickCost {
-            median_ns: per_tick(times_ns.len() / 2),
-            fastest_ns: per_tick(0),
-            p99_ns: per_tick(times_ns.len() * 99 / 100),
-        }
+        let mut times_ns: Vec<f64> = (0..batches.max(1)).map(batch).collect();
+        let [median_ns, fastest_ns, p99_ns] = [0.5, 0.0, 0.99].map(|part| quantile(&mut times_ns, part));
+        TickCost { median_ns, fastest_ns, p99_ns }
     }
 
     /// A batch of ticks, each with its record pushed. Real-time: bounded, no allocation.

@@ -4,7 +4,7 @@ use crate::scene::{KeyValue, ModelUse, PluginKeyValue, is_named};
 
 /// What a replay gave the models of a recording: they keep it, whatever changed in the run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Held {
+pub(super) struct Held {
     /// Names of models and parameters.
     parameters: Vec<(String, String)>,
     /// Names of models that were given a plugin.
@@ -17,7 +17,7 @@ impl Held {
     ///
     /// # Errors
     /// In words: the recording has no such model.
-    pub fn apply(
+    pub(super) fn apply(
         models: &mut [ModelUse],
         others: &[KeyValue],
         sets: &[PluginKeyValue],
@@ -35,8 +35,7 @@ impl Held {
     }
 
     /// True if nothing was changed.
-    #[must_use]
-    pub fn is_nothing(&self) -> bool {
+    pub(super) fn is_nothing(&self) -> bool {
         self.parameters.is_empty() && self.plugins.is_empty()
     }
 

@@ -7,13 +7,15 @@ mod apart;
 mod held;
 
 pub use apart::{Coverage, WhyApart};
-pub use held::Held;
+use held::Held;
 
 use crate::coupling::{CouplingDescription, CouplingEnds, Patience};
-use crate::record::{Change, ChangeOutcome, ChangeSubject, ReadError, Recording, Role, RunDescription};
+use crate::record::{Change, ChangeOutcome, ChangeSubject, Ending, ReadError, Recording, Role, RunDescription};
 use crate::recorded_files::as_recorded;
 use crate::registry::Registry;
-use crate::scene::{Isolation, Location, ModelUse, ParameterText, PluginUse};
+use crate::scene::{
+    Isolation, KeyValue, Location, ModelUse, ParameterText, PluginKeyValue, PluginUse,
+};
 use crate::servo::{Clock, Coupled, Forces, Heartbeat, ModelHealth, Port, Replacement};
 use crate::session::{PluginReport, RunError, prepare_model};
 use crate::trace::{Events, TickRecord};
@@ -42,6 +44,9 @@ pub enum ReplayError {
         /// Its name.
         coupling: String,
     },
+    /// What is to be changed is not there.
+    #[error("{0}")]
+    Change(String),
 }
 
 /// Of couplings whose ends are both here.
@@ -81,6 +86,8 @@ pub struct Compared {
     pub coverage: Coverage,
     /// Why it differs; if something was changed, why not only for that, as far as the recording tells.
     pub why: Option<WhyApart>,
+    /// Whether the recording has the run's end.
+    pub ending: Ending,
     /// How each model has behaved now, and what it said last, in the scene's order.
     pub health: Vec<(ModelHealth, String)>,
 }
@@ -99,19 +106,20 @@ pub struct Replay<'r> {
 }
 
 impl<'r> Replay<'r> {
-    /// Opens a recording and creates its models as they were set, with changes on top. Not real-time.
+    /// Opens a recording and creates its models as they were set, with other models and settings on top. Not real-time.
     ///
     /// # Errors
-    /// [`ReplayError`]: the recording cannot be read, a plugin is missing or refuses the settings, a file
+    /// [`ReplayError`]: the recording cannot be read, a model to be changed is not in it, a plugin is missing or refuses the settings, a file
     /// that a setting names is not that of the run.
     pub fn open(
         path: &Path,
         registry: &'r Registry,
-        change: impl FnOnce(&mut [ModelUse]) -> Held,
+        models: &[KeyValue],
+        sets: &[PluginKeyValue],
     ) -> Result<Self, ReplayError> {
         let recording = Recording::open(path)?;
         let mut uses = models_of(path, recording.run());
-        let held = change(&mut uses);
+        let held = Held::apply(&mut uses, models, sets).map_err(ReplayError::Change)?;
         use_recorded_files(&mut uses, &held, path, recording.run())?;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 100 Hz to 10 kHz
         let period_ns = (1.0e9 / recording.run().rate_hz).round() as u64;
@@ -200,7 +208,8 @@ impl<'r> Replay<'r> {
         }
         difference.finish();
         let why = if self.held.is_nothing() { evidence.cause() } else { evidence.other_cause() };
-        Ok(Compared { difference, coverage: evidence.coverage, why, health: self.forces.health() })
+        let (ending, health) = (self.recording.ending(), self.forces.health());
+        Ok(Compared { difference, coverage: evidence.coverage, why, ending, health })
     }
 }
 

@@ -10,19 +10,9 @@
 //!   9:011005): a linear rule for little damping, short delay and fast sampling.
 
 use super::search::largest_stable;
+pub use crate::lab::plant::Plant;
 use std::convert::Infallible;
 use std::f64::consts::PI;
-
-/// A mass on a damper and perhaps a spring: one axis of the device with the hand that holds it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plant {
-    /// Mass of all that moves, kg.
-    pub mass_kg: f64,
-    /// Damping of the device and the hand, N s/m.
-    pub damping_ns_per_m: f64,
-    /// Stiffness of the hand, N/m.
-    pub stiffness_n_per_m: f64,
-}
 
 /// How the spring is rendered.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,60 +83,10 @@ struct HeldPlant {
 }
 
 impl HeldPlant {
-    /// Exact: the state `(x, x', u)` of a held force obeys a linear equation with constant coefficients, whose
-    /// exponential over a period holds both the free motion and the answer to the force.
     fn new(plant: &Plant, period_s: f64) -> Self {
-        let [[xx, xv, xu], [vx, vv, vu], _] = exponential([
-            [0.0, period_s, 0.0],
-            [
-                -plant.stiffness_n_per_m / plant.mass_kg * period_s,
-                -plant.damping_ns_per_m / plant.mass_kg * period_s,
-                period_s / plant.mass_kg,
-            ],
-            [0.0; 3],
-        ]);
+        let [[xx, xv, xu], [vx, vv, vu]] = plant.held(period_s);
         Self { a0: xx * vv - xv * vx, a1: -(xx + vv), b0: xv * vu - vv * xu, b1: xu }
     }
-}
-
-type Matrix = [[f64; 3]; 3];
-
-/// Exponential of a small matrix by scaling, Taylor series and squaring (Moler and Van Loan 2003, method 3).
-fn exponential(matrix: Matrix) -> Matrix {
-    /// Halved until no entry exceeds 2^-4, where 14 terms leave less than 1e-16.
-    const LARGEST_ENTRY: f64 = 0.0625;
-    const TERMS: u32 = 14;
-    let largest = matrix.iter().flatten().fold(0.0_f64, |largest, entry| largest.max(entry.abs()));
-    let mut halvings = 0;
-    let mut scale = 1.0;
-    while largest * scale > LARGEST_ENTRY && halvings < 64 {
-        (halvings, scale) = (halvings + 1, 0.5 * scale);
-    }
-    let scaled = matrix.map(|row| row.map(|entry| entry * scale));
-    let mut sum = IDENTITY;
-    for term in (1..=TERMS).rev() {
-        // Horner: I + A/1 (I + A/2 (I + ...)).
-        sum = product(&scaled, &sum);
-        for (row, unit) in sum.iter_mut().zip(IDENTITY) {
-            for (entry, one) in row.iter_mut().zip(unit) {
-                *entry = *entry / f64::from(term) + one;
-            }
-        }
-    }
-    (0..halvings).fold(sum, |root, _| product(&root, &root))
-}
-
-const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-
-fn product(left: &Matrix, right: &Matrix) -> Matrix {
-    let [first, second, third] = right;
-    left.map(|[a, b, c]| {
-        let mut row = [0.0; 3];
-        for (((entry, x), y), z) in row.iter_mut().zip(first).zip(second).zip(third) {
-            *entry = a * x + b * y + c * z;
-        }
-        row
-    })
 }
 
 /// Characteristic polynomial of the loop, lowest power first:

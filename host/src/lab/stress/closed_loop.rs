@@ -1,6 +1,6 @@
 //! M6, closed loop: the model on a device that is let go.
 //!
-//! The plainest device (a mass on a damper per axis, [`super::plant`]) is released away from home and left to
+//! The plainest device (a mass on a damper per axis, [`crate::lab::plant`]) is released away from home and left to
 //! the model: with light and heavy damping, 0 to 3 ticks of delay, quantised sensing and ticks whose wrench
 //! is lost. What comes out are settling time, peak force and buzz (force between 50 and 500 Hz), and whether
 //! it settles at all.
@@ -15,10 +15,10 @@
 
 use super::jacobian::Jacobian;
 use super::measure::{Measure, Verdict};
-use super::plant::Plant;
 use super::sweep::sweep;
 use super::{DAMPINGS_NS_PER_M, LEVER_M, PERIOD_S, Setup};
 use crate::lab::PERIOD_NS;
+use crate::lab::plant::Flotor;
 use crate::lab::sampling::Random;
 use crate::lab::subject::Subject;
 use crate::lab::tally::Worst;
@@ -99,7 +99,7 @@ fn release(subject: &mut Subject<'_>, conditions: Loop, start: Pose, random: &mu
     if subject.memory() == Memory::PathDependent {
         subject.ask(start).ok()?;
     }
-    let mut plant = Plant::at_rest(start, conditions.damping_ns_per_m, PERIOD_S);
+    let mut plant = Flotor::at_rest(start, conditions.damping_ns_per_m, LEVER_M, PERIOD_S);
     let mut way = VecDeque::from(vec![(start, plant.twist()); conditions.delay_ticks]);
     let mut held = Wrench::ZERO;
     let mut before: Option<(Pose, Wrench)> = None;

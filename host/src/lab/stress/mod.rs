@@ -28,7 +28,6 @@ mod energy;
 mod jacobian;
 mod measure;
 mod picture;
-mod plant;
 mod poses;
 mod report;
 mod stiffness;

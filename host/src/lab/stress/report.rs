@@ -74,7 +74,8 @@ impl StressReport {
     }
 
     pub(super) fn settings_text(&self) -> String {
-        let settings: Vec<String> = self.settings.iter().map(|(key, value)| format!("{key}={value}")).collect();
+        let settings: Vec<String> =
+            self.settings.iter().map(|(key, value)| format!("{key}={value}")).collect();
         settings.join(", ")
     }
 

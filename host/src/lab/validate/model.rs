@@ -67,15 +67,11 @@ pub(super) fn reset_repeats(model: &mut Model) -> Result<(), String> {
 pub(super) fn time_budget(model: &mut Model) -> Result<(), String> {
     const STEPS: usize = 1000;
     let mut took_ns = Vec::with_capacity(STEPS);
-    let mut output = Output::default();
     for input in walk(STEPS as u64) {
         let started = Instant::now();
-        let status = model.step(&input, &mut output);
-        took_ns.push(started.elapsed().as_nanos());
         // Failing is quick: it would pass.
-        if status != CallStatus::Ok {
-            return Err(format!("tick {} was answered {status:?}", input.tick));
-        }
+        step(model, &input)?;
+        took_ns.push(started.elapsed().as_nanos());
     }
     took_ns.sort_unstable();
     let usual_ns = took_ns.get(STEPS * 99 / 100).copied().unwrap_or_default();
@@ -91,11 +87,7 @@ fn walked(models: &mut [&mut Model]) -> Result<Vec<Vec<Wrench>>, String> {
     let mut wrenches = vec![Vec::new(); models.len()];
     for input in walk(500) {
         for (model, wrenches) in models.iter_mut().zip(&mut wrenches) {
-            let mut output = Output::default();
-            match model.step(&input, &mut output) {
-                CallStatus::Ok => wrenches.push(output.wrench),
-                other => return Err(format!("tick {} was answered {other:?}", input.tick)),
-            }
+            wrenches.push(step(model, &input)?.wrench);
         }
     }
     Ok(wrenches)
