@@ -5,7 +5,7 @@
 //! converged. Where every pose is reached from home the ways are independent, and all processors walk them.
 
 use super::PERIOD_NS;
-use super::subject::{Subject, steps, walk};
+use super::subject::{Subject, call, steps, walk};
 use super::trajectory::at;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
@@ -166,8 +166,9 @@ impl Walker<'_> {
         let mut outputs = vec![Output::default(); BATCH];
         for batch in handles.chunks(BATCH) {
             let inputs: Vec<Input> = batch.iter().map(|handle| self.subject.at_rest(handle.pose())).collect();
-            let status = self.subject.model().step_batch(&inputs, &mut outputs);
-            self.check(status)?;
+            if self.subject.model().step_batch(&inputs, &mut outputs) != CallStatus::Ok {
+                return Err(self.broke());
+            }
             for (handle, output) in batch.iter().zip(&outputs) {
                 answers.push(self.answer(*handle, output)?);
                 on_answer();
@@ -194,17 +195,11 @@ impl Walker<'_> {
 
     fn step(&mut self, pose: Pose) -> Result<Output, EvaluateError> {
         let input = self.subject.input(pose, Twist::ZERO, PERIOD_NS);
-        let mut output = Output::default();
-        let status = self.subject.model().step(&input, &mut output);
-        self.check(status)?;
-        Ok(output)
+        call(self.subject.model(), &input).map_err(|_| self.broke())
     }
 
-    fn check(&mut self, status: CallStatus) -> Result<(), EvaluateError> {
-        match status {
-            CallStatus::Ok => Ok(()),
-            _ => Err(EvaluateError::Broke { words: self.subject.model().last_message() }),
-        }
+    fn broke(&mut self) -> EvaluateError {
+        EvaluateError::Broke { words: self.subject.model().last_message() }
     }
 
     fn answer(&mut self, handle: Handle, output: &Output) -> Result<Answer, EvaluateError> {
@@ -228,8 +223,9 @@ impl Walker<'_> {
             return Ok(Vec::new());
         }
         let mut values = vec![f64::NAN; count];
-        let status = self.subject.model().read_details(&mut values);
-        self.check(status)?;
+        if self.subject.model().read_details(&mut values) != CallStatus::Ok {
+            return Err(self.broke());
+        }
         Ok(values.into_iter().map(|value| value.is_finite().then_some(value)).collect())
     }
 }

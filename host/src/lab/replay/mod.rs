@@ -10,12 +10,12 @@ pub use apart::{Coverage, WhyApart};
 use held::Held;
 
 use crate::coupling::{CouplingDescription, CouplingEnds, Patience};
-use crate::record::{Change, ChangeOutcome, ChangeSubject, Ending, ReadError, Recording, Role, RunDescription};
+use crate::record::{
+    Change, ChangeOutcome, ChangeSubject, Ending, ReadError, Recording, Role, RunDescription,
+};
 use crate::recorded_files::as_recorded;
 use crate::registry::Registry;
-use crate::scene::{
-    Isolation, KeyValue, Location, ModelUse, ParameterText, PluginKeyValue, PluginUse,
-};
+use crate::scene::{Isolation, KeyValue, Location, ModelUse, ParameterText, PluginKeyValue, PluginUse};
 use crate::servo::{Clock, Coupled, Forces, Heartbeat, ModelHealth, Port, Replacement};
 use crate::session::{PluginReport, RunError, prepare_model};
 use crate::trace::{Events, TickRecord};

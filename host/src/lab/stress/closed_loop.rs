@@ -249,7 +249,7 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     let loops = loops();
     let count = loops.len() as u64;
     let reach = setup.options.reach.scaled(NEAR);
-    let rows = sweep(setup, NAME, setup.effort.releases * count, |subject, block| {
+    let rows = sweep(setup, NAME, setup.share(100, 2) * count, |subject, block| {
         let mut random = Random::new(setup.options.seed, block / count);
         let start = at(random.vector() * reach.position_m, random.vector() * reach.rotation_rad);
         let conditions = loops[usize::try_from(block % count).unwrap_or(0)];

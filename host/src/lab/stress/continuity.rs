@@ -89,7 +89,7 @@ impl Line {
 /// Crosses the workspace on straight lines and closes in on whatever stands out.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Vec<Jump>), LoadError> {
     let sobol = Sobol::new(setup.options.seed);
-    let total = sweep(setup, NAME, setup.effort.lines, |subject, block| {
+    let total = sweep(setup, NAME, setup.share(40_000, 16), |subject, block| {
         let line = line(setup, &sobol, block);
         let mut jumps = Jumps::default();
         let first_m = PIECES_MM[0] * 1.0e-3;

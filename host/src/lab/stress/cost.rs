@@ -29,7 +29,7 @@ const CHUNK: u64 = 1024;
 
 /// Times calls; with the distribution for the picture, ns.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Decades), LoadError> {
-    let chunks = setup.effort.timed_poses.div_ceil(CHUNK);
+    let chunks = setup.share(4_000_000, 0).div_ceil(CHUNK);
     setup.progress.begin(NAME, chunks);
     let mut subject = setup.subject()?;
     let mut stopwatch = Stopwatch::new();

@@ -40,7 +40,7 @@ tally! {
 /// Asks the same poses four ways.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     let sobol = Sobol::new(setup.options.seed);
-    let blocks = setup.effort.compared_poses.div_ceil(BLOCK);
+    let blocks = setup.share(1_000_000, 0).div_ceil(BLOCK);
     let total = sweep(setup, NAME, blocks, |subject, block| {
         let inputs = inputs(setup, &sobol, subject, block);
         let mut other = match setup.subject() {

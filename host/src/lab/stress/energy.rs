@@ -108,7 +108,7 @@ tally! {
 
 /// Around closed motions; with the distribution of relative work for the picture.
 pub(super) fn measure_loops(setup: &Setup<'_>) -> Result<(Measure, Decades), LoadError> {
-    let total = sweep(setup, LOOPS, setup.effort.loops, |subject, block| {
+    let total = sweep(setup, LOOPS, setup.share(20_000, 10), |subject, block| {
         let mut random = Random::new(setup.options.seed, block);
         let path = Trajectory::random(&mut random, setup.options.reach.sizes());
         let mut tally = LoopTally { laps: 1, ..LoopTally::default() };
@@ -217,7 +217,7 @@ fn moved(from: Pose, to: Pose) -> (DVec3, DVec3) {
 
 /// Along hand-driven motions from home, at three periods.
 pub(super) fn measure_observer(setup: &Setup<'_>) -> Result<Measure, LoadError> {
-    let total = sweep(setup, OBSERVER, setup.effort.hand_paths, |subject, block| {
+    let total = sweep(setup, OBSERVER, setup.share(4_000, 4), |subject, block| {
         let mut random = Random::new(setup.options.seed, block);
         let path = Trajectory::random(&mut random, setup.options.reach.sizes()).starting_at_home();
         let mut observed = Observed::default();

@@ -80,54 +80,27 @@ struct Setup<'a> {
     plugin: &'a Plugin,
     settings: &'a [Setting],
     options: StressOptions,
-    effort: Effort,
+    /// Of the full effort one part in so many.
+    part: u64,
     progress: &'a dyn Progress,
 }
 
 impl<'a> Setup<'a> {
+    /// How often to ask, of so often in a full run: fewer than the least would be no measurement.
+    fn share(&self, full: u64, least: u64) -> u64 {
+        (full / self.part).max(least)
+    }
+
     fn subject(&self) -> Result<Subject<'a>, LoadError> {
         Subject::new(self.plugin, self.settings, self.options.seed)
     }
 }
 
-/// How often each measure asks.
-#[derive(Clone, Copy, Debug)]
-struct Effort {
-    sobol_poses: u64,
-    poses_per_manifold: u64,
-    lines: u64,
-    jacobians: u64,
-    loops: u64,
-    hand_paths: u64,
-    releases: u64,
-    timed_poses: u64,
-    compared_poses: u64,
-}
-
-impl Effort {
-    /// For a model without history about 2e8 calls in full. One with history is walked, some hundred calls
-    /// between two poses, and gets a hundredth of the poses.
-    fn of(size: Size, memory: Memory) -> Self {
-        let by_size = if size == Size::Full { 1 } else { 100 };
-        Self::part(by_size * if memory == Memory::Stateless { 1 } else { 100 })
-    }
-
-    /// Of the full effort one part in so many.
-    fn part(by: u64) -> Self {
-        // Fewer than the least would be no measurement.
-        let part = |full: u64, least: u64| (full / by).max(least);
-        Self {
-            sobol_poses: part(10_000_000, 0),
-            poses_per_manifold: part(160_000, 0),
-            lines: part(40_000, 16),
-            jacobians: part(400_000, 32),
-            loops: part(20_000, 10),
-            hand_paths: part(4_000, 4),
-            releases: part(100, 2),
-            timed_poses: part(4_000_000, 0),
-            compared_poses: part(1_000_000, 0),
-        }
-    }
+/// In full about 2e8 calls for a model without history. One with history is walked, some hundred calls between two
+/// poses, and gets a hundredth of the poses.
+fn part(size: Size, memory: Memory) -> u64 {
+    let by_size = if size == Size::Full { 1 } else { 100 };
+    by_size * if memory == Memory::Stateless { 1 } else { 100 }
 }
 
 /// Scores a model with these settings. Not real-time; takes seconds (short) to minutes (full), on all processors.
@@ -142,8 +115,7 @@ pub fn score(
     progress: &dyn Progress,
 ) -> Result<StressReport, LoadError> {
     let memory = plugin.create_model(settings)?.memory();
-    let effort = Effort::of(options.size, memory);
-    measure_all(&Setup { plugin, settings, options: *options, effort, progress })
+    measure_all(&Setup { plugin, settings, options: *options, part: part(options.size, memory), progress })
 }
 
 fn measure_all(setup: &Setup<'_>) -> Result<StressReport, LoadError> {

@@ -82,7 +82,7 @@ fn stiffest_n_per_m(damping_ns_per_m: f64) -> f64 {
 /// Both measures, and the gains over the workspace for the picture.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Measure, Decades), LoadError> {
     let sobol = Sobol::new(setup.options.seed);
-    let blocks = setup.effort.jacobians.div_ceil(BLOCK);
+    let blocks = setup.share(400_000, 32).div_ceil(BLOCK);
     let total = sweep(setup, NAME, blocks, |subject, block| {
         let mut tally = Tally::default();
         for index in block * BLOCK..(block + 1) * BLOCK {

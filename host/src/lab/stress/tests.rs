@@ -1,6 +1,6 @@
 //! Small laws with one known flaw each: the measures meant for it fail, and no other.
 
-use super::{Effort, Measure, Setup, StressOptions, StressReport, Verdict, measure_all};
+use super::{Measure, Setup, Size, StressOptions, StressReport, Verdict, measure_all};
 use flotor_hal::abi::loader::Plugin;
 use flotor_hal::abi::model_entry;
 use flotor_hal::{
@@ -43,7 +43,7 @@ fn stress<L: Law>() -> StressReport {
     let effort =
         Effort { releases: 1, ..Effort::part(if L::MEMORY == Memory::Stateless { 1_000 } else { 100_000 }) };
     let options = StressOptions::default();
-    measure_all(&Setup { plugin: &plugin, settings: &[], options, effort, progress: &() }).unwrap()
+    measure_all(&Setup { plugin: &plugin, settings: &[], options, part, progress: &() }).unwrap()
 }
 
 fn measure<'a>(report: &'a StressReport, id: &str) -> &'a Measure {

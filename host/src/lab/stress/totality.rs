@@ -69,8 +69,8 @@ impl Tally {
 pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     let reach = setup.options.reach.scaled(WIDER);
     let sobol = Sobol::new(setup.options.seed);
-    let even_blocks = setup.effort.sobol_poses.div_ceil(BLOCK);
-    let blocks_per_manifold = setup.effort.poses_per_manifold.div_ceil(BLOCK);
+    let even_blocks = setup.share(10_000_000, 0).div_ceil(BLOCK);
+    let blocks_per_manifold = setup.share(160_000, 0).div_ceil(BLOCK);
     let manifolds = MANIFOLDS.len() as u64;
     // The manifolds first: what breaks there, breaks at once.
     let manifold_blocks = blocks_per_manifold * manifolds;
