@@ -13,12 +13,9 @@
 //! - [`servo`]: the tick, the clock, the envelope; the only real-time module.
 //! - [`coupling`]: two devices held together by a virtual spring, over any delay; [`port_energy`]: what crosses a port.
 //! - [`calibration`]: how much of a commanded force arrives.
-//! - [`stability`]: how stiff a spring the servo can render.
 //! - [`scaffold`]: the start of somebody's own plugin.
-//! - [`mod@bench`]: what an evaluation costs, and how wrong it is.
 //! - [`study`]: the results of a perception experiment, as a page.
-//! - [`stress`]: how far a force model can be trusted with a hand.
-//! - [`sampling`]: points that cover a space evenly.
+//! - [`lab`]: measurements: what a model, a device, a loop and a recording are worth.
 //! - [`live`]: a running host, for other programs to watch and change.
 //! - [`headless`]: a whole run in virtual time for other programs.
 //! - [`trace`]: what a tick leaves behind; [`mod@record`] writes it down, [`plot`] draws it.
@@ -26,15 +23,7 @@
 
 #![cfg_attr(rtsan, feature(sanitize))] // the step `blocking` of .ci/full
 
-pub mod bench;
 pub mod cli;
-pub mod evaluate;
-pub mod jitter;
-pub mod replay;
 pub mod run_picture;
-pub mod sampling;
 pub mod scaffold;
-pub mod stability;
-pub mod stress;
 pub mod timing_picture;
-pub mod validate;

@@ -232,7 +232,7 @@ mod tests {
     #[test]
     fn a_host_is_gone_when_its_test_fails() {
         let scratch = Scratch::default();
-        let scene = scratch.patient_scene(flotor::scene::DEMO).display().to_string();
+        let scene = scratch.patient_scene(flotor_session::scene::DEMO).display().to_string();
         let start = || Flotor::with(["run", &scene, "--duration", "600s"]).start();
         assert_gone_after_a_failure(start, |running| running.pid());
     }

@@ -2,7 +2,7 @@
 
 use crate::error::refuse;
 use crate::rows::{InputRow, OutputRow};
-use flotor::evaluate::{Answer, Details, Evaluation, Handle, Travel};
+use flotor_lab::evaluate::{Answer, Details, Evaluation, Handle, Travel};
 use flotor_session::registry::Registry;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::abi::{CallStatus, PluginKind};

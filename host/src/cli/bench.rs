@@ -1,26 +1,16 @@
 //! `flotor bench`: work against precision of a force model's settings, and the cost of the loop around it.
 
 use super::options::KeyValue;
-use super::{CommandError, style, write_json};
-use crate::bench::{
-    BenchDevice, Case, Effort, Hand, Plan, Progress, TellApart, TickCost, WholeTick, measure,
-};
-use clap::{Args, ValueEnum};
+use super::{CommandError, ProgressLine, style, tell, write_text};
+use clap::Args;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Plugin, Setting};
+use flotor_lab::Size;
+use flotor_lab::bench::{BenchDevice, Case, Hand, Plan, TellApart, TickCost, WholeTick, measure};
+use flotor_lab::report::table;
 use flotor_session::registry::Registry;
-use indicatif::ProgressBar;
 use serde::Serialize;
 use std::path::PathBuf;
-
-/// `--size`
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum SizeOption {
-    /// Seconds
-    Short,
-    /// Minutes: p99.9 means something
-    Full,
-}
 
 /// Measure what an evaluation costs and how wrong it is, for many settings of a force model.
 #[derive(Args)]
@@ -62,7 +52,7 @@ pub(crate) struct BenchArguments {
     tick: bool,
     /// How much to time
     #[arg(long, value_enum, default_value = "short")]
-    size: SizeOption,
+    size: Size,
     /// Write every measurement as CSV
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
@@ -117,22 +107,24 @@ struct TickRow {
 /// `--tick`
 fn time_ticks(arguments: &BenchArguments) -> Result<(), CommandError> {
     let batches = match arguments.size {
-        SizeOption::Short => 2_000,
-        SizeOption::Full => 50_000,
+        Size::Short => 2_000,
+        Size::Full => 50_000,
     };
     let row = |device: BenchDevice| {
         let cost = WholeTick::prepare(device, &arguments.model)?.time(batches);
         Ok(TickRow { device, cost })
     };
     let rows = BenchDevice::ALL.into_iter().map(row).collect::<Result<Vec<_>, CommandError>>()?;
-    if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
-        let title = format!("a tick with `{}`, trace on, virtual clock", arguments.model);
-        say!("{}", style::title(&format!("{title:<46}   median     p99  fastest, ns")));
-        for TickRow { device, cost: TickCost { median_ns, p99_ns, fastest_ns } } in &rows {
-            say!("  {:<46}  {median_ns:>6.0}  {p99_ns:>6.0}   {fastest_ns:>6.0}", device.name());
-        }
-    }
-    arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &rows))
+    let text = || {
+        let title = format!("a tick with `{}`, trace on, virtual clock: ns", arguments.model);
+        let cells =
+            rows.iter().map(|TickRow { device, cost: TickCost { median_ns, p99_ns, fastest_ns } }| {
+                let [median, p99, fastest] = [median_ns, p99_ns, fastest_ns].map(|ns| format!("{ns:.0}"));
+                [device.name().to_owned(), median, p99, fastest]
+            });
+        [vec![style::title(&title)], table(["", "median", "p99", "fastest"], cells)].concat().join("\n")
+    };
+    tell(arguments.json.as_deref(), &rows, text)
 }
 
 fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
@@ -156,43 +148,26 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
         }
         None => 0,
     };
+    let spring_walks = || {
+        let walks = SPRING_WALKS.iter().map(|(text, mm)| Ok((case(text)?, Hand { depth_m: mm / 1e3 })));
+        walks.collect::<Result<_, CommandError>>()
+    };
     let apart = match (&arguments.apart, is_spring) {
-        (Some(detail), _) => {
-            let walks = cases.iter().map(|case| (case.clone(), hand)).collect();
-            Some(TellApart { detail: detail.clone(), walks })
-        }
-        (None, true) => {
-            let walks = SPRING_WALKS
-                .iter()
-                .map(|(text, depth_mm)| Ok((case(text)?, Hand { depth_m: depth_mm / 1e3 })));
-            Some(TellApart {
-                detail: SPRING_APART.to_owned(),
-                walks: walks.collect::<Result<_, CommandError>>()?,
-            })
-        }
+        (Some(detail), _) => Some((detail.clone(), cases.iter().map(|case| (case.clone(), hand)).collect())),
+        (None, true) => Some((SPRING_APART.to_owned(), spring_walks()?)),
         (None, false) => None,
     };
+    let apart = apart.map(|(detail, walks)| TellApart { detail, walks });
     let reference = reference.map(case).transpose()?;
-    let effort = match arguments.size {
-        SizeOption::Short => Effort::Short,
-        SizeOption::Full => Effort::Full,
-    };
-    let line = ProgressLine(super::run::progress_bar(1, "{msg:<44} {wide_bar} {elapsed}"));
-    let plan = Plan { cases, yardstick, reference, hand, apart, effort };
+    let line = ProgressLine::new();
+    let plan = Plan { cases, yardstick, reference, hand, apart, size: arguments.size };
     let report = measure(&plugin, &plan, &line)?;
     line.0.finish_and_clear();
 
-    let json_on_stdout = arguments.json.as_ref().is_some_and(|path| path.as_os_str() == "-");
-    if !json_on_stdout {
-        say!("{}\n{}", style::title(&format!("{} {}", report.model, report.version)), report.to_text());
-    }
-    for (path, text) in [(&arguments.csv, report.to_csv()), (&arguments.plot, report.to_svg())] {
-        if let Some(path) = path {
-            std::fs::write(path, text)
-                .map_err(|cause| CommandError::file(path, "cannot write the measurements", cause))?;
-        }
-    }
-    arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &report))
+    let title = || style::title(&format!("{} {}", report.model, report.version));
+    tell(arguments.json.as_deref(), &report, || format!("{}\n{}", title(), report.to_text()))?;
+    write_text(arguments.csv.as_deref(), || report.to_csv())?;
+    write_text(arguments.plot.as_deref(), || report.to_svg())
 }
 
 /// A case from `KEY=VALUE,KEY=VALUE` on top of what every case starts from.
@@ -216,15 +191,4 @@ fn case(plugin: &Plugin, sets: &[KeyValue], text: &str) -> Result<Case, CommandE
     let values: Vec<String> = own.iter().map(word).collect();
     let name = if values.is_empty() { "defaults".to_owned() } else { values.join(" ") };
     Ok(Case { name, settings: settings.collect::<Result<_, _>>()? })
-}
-
-/// A progress line on a terminal, nothing in a pipe.
-struct ProgressLine(ProgressBar);
-
-impl Progress for ProgressLine {
-    fn begin(&self, name: &str, done: usize, all: usize) {
-        self.0.set_length(all as u64);
-        self.0.set_position(done as u64);
-        self.0.set_message(name.to_owned());
-    }
 }

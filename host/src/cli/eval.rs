@@ -1,15 +1,15 @@
 //! `flotor eval`: poses in, wrenches out, as CSV.
 
 use super::options::KeyValue;
-use super::{CommandError, style};
-use crate::evaluate::{Answer, Details, EvaluateError, Evaluation, Handle, Travel};
+use super::{CommandError, style, write_text};
 use clap::Args;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{DVec3, Detail};
+use flotor_lab::evaluate::{Answer, Details, EvaluateError, Evaluation, Handle, Travel};
+use flotor_lab::report::to_csv;
 use flotor_session::registry::Registry;
 use flotor_session::scene::nearest;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Evaluate a force model at poses from a CSV file.
@@ -70,13 +70,7 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
         }
     })?;
     bar.finish_and_clear();
-    match write_answers(&arguments.out, &ids, &answers, details) {
-        // A reader that has enough closes the pipe.
-        Err(cause) if cause.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-        written => {
-            written.map_err(|cause| CommandError::file(&arguments.out, "cannot write the wrenches", cause))
-        }
-    }
+    write_text(Some(&arguments.out), || csv_text(&ids, &answers, details))
 }
 
 /// Checks `--set KEY=VALUE` against the schema of a plugin.
@@ -159,24 +153,17 @@ fn columns(path: &Path, header: &csv::StringRecord) -> Result<[usize; 6], Comman
     Ok(columns)
 }
 
-fn write_answers(path: &Path, ids: &[String], answers: &[Answer], details: &[Detail]) -> std::io::Result<()> {
-    let output: Box<dyn Write> = if path.as_os_str() == "-" {
-        Box::new(std::io::stdout().lock())
-    } else {
-        Box::new(std::fs::File::create(path)?)
-    };
-    let mut writer = csv::Writer::from_writer(output);
+fn csv_text(ids: &[String], answers: &[Answer], details: &[Detail]) -> String {
     let always = ["id", "fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm", "energy_j", "status"];
-    writer.write_record(always.into_iter().chain(details.iter().map(Detail::id)))?;
-    for (id, answer) in ids.iter().zip(answers) {
-        let [fx, fy, fz] = answer.wrench.force_n.map(shortest);
-        let [tx, ty, tz] = answer.wrench.torque_nm.map(shortest);
+    let head = always.into_iter().chain(details.iter().map(Detail::id));
+    let row = |(id, answer): (&String, &Answer)| -> Vec<String> {
+        let numbers = answer.wrench.force_n.into_iter().chain(answer.wrench.torque_nm).map(shortest);
         let energy = answer.energy_j.map(shortest).unwrap_or_default();
-        let always = [id, &fx, &fy, &fz, &tx, &ty, &tz, &energy, answer.status.word()];
         let known = details.iter().zip(&answer.details).map(|(detail, value)| written(detail, *value));
-        writer.write_record(always.into_iter().map(str::to_owned).chain(known))?;
-    }
-    writer.flush()
+        let others = [energy, answer.status.word().to_owned()].into_iter().chain(known);
+        std::iter::once(id.clone()).chain(numbers).chain(others).collect()
+    };
+    to_csv(head, ids.iter().zip(answers).map(row))
 }
 
 /// A detail as its column says it.

@@ -2,10 +2,11 @@
 
 use super::options::{core, duration_s, rate_hz};
 use super::stopping::stop_on_signals;
-use super::{CommandError, run, style};
-use crate::jitter::{JitterReport, LoopTiming, MissedMore, measure};
+use super::{CommandError, run, style, tell, write_text};
 use crate::timing_picture::octaves;
 use clap::Args;
+use flotor_lab::jitter::{JitterReport, LoopTiming, MissedMore, measure};
+use flotor_lab::report::table;
 use flotor_plot::{Axis, Figure, Panel, Series};
 use flotor_servo::{Clock, Core};
 use flotor_session::registry::Registry;
@@ -50,29 +51,20 @@ pub(crate) fn run(arguments: &JitterArguments) -> Result<(), CommandError> {
     let report = measure(session, slices, &stop, |done| progress.set_position(done))?;
     progress.finish_and_clear();
 
-    if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
-        say!("{}", to_text(&report));
-    }
     for line in report.real_time.advice() {
         eprintln!("{} {line}", style::warning("note:"));
     }
-    if let Some(path) = &arguments.json {
-        super::write_json(path, &report)?;
-    }
-    if let Some(path) = &arguments.plot {
-        let written = std::fs::write(path, picture(&report));
-        written.map_err(|cause| CommandError::file(path, "cannot write the plot", cause))?;
-    }
-    Ok(())
+    tell(arguments.json.as_deref(), &report, || to_text(&report))?;
+    write_text(arguments.plot.as_deref(), || picture(&report))
 }
 
 fn to_text(report: &JitterReport) -> String {
-    #[allow(clippy::cast_precision_loss)] // for people
     let us = |ns: u64| format!("{:.2}", ns as f64 * 1.0e-3);
     let row = |name: &str, timing: &LoopTiming| {
         let LoopTiming { lateness_ns: l, ticks, late_ticks, missed_ticks } = timing;
-        let (p50, p99, p999, max) = (us(l.p50), us(l.p99), us(l.p999), us(l.max));
-        format!("  {name:<6}{p50:>10}{p99:>10}{p999:>10}{max:>11}{ticks:>10}{late_ticks:>8}{missed_ticks:>8}")
+        let [p50, p99, p999, max] = [l.p50, l.p99, l.p999, l.max].map(us);
+        let [ticks, late, missed] = [ticks, late_ticks, missed_ticks].map(u64::to_string);
+        [name.to_owned(), p50, p99, p999, max, ticks, late, missed]
     };
     let title = format!(
         "lateness in µs at {} Hz, {} s each in turns, the last {} µs spun",
@@ -80,11 +72,9 @@ fn to_text(report: &JitterReport) -> String {
         report.slices,
         us(report.spin_window_ns)
     );
-    let head = format!(
-        "  {:<6}{:>10}{:>10}{:>10}{:>11}{:>10}{:>8}{:>8}",
-        "", "p50", "p99", "p99.9", "max", "ticks", "late", "missed"
-    );
-    let mut lines = vec![style::title(&title), head, row("servo", &report.servo), row("bare", &report.bare)];
+    let head = ["", "p50", "p99", "p99.9", "max", "ticks", "late", "missed"];
+    let mut lines = vec![style::title(&title)];
+    lines.extend(table(head, [row("servo", &report.servo), row("bare", &report.bare)]));
     if let MissedMore { ticks, standard_error: Some(error) } = report.missed_more {
         lines.push(format!(
             "  missed, servo - bare: {ticks:+} ± {error:.0} (standard error, from how much the pairs differ)"

@@ -191,12 +191,12 @@ impl From<LoadError> for CommandError {
     }
 }
 
-impl From<crate::replay::ReplayError> for CommandError {
-    fn from(error: crate::replay::ReplayError) -> Self {
+impl From<flotor_lab::replay::ReplayError> for CommandError {
+    fn from(error: flotor_lab::replay::ReplayError) -> Self {
         match error {
-            crate::replay::ReplayError::Read(error) => Self::Read(error),
-            crate::replay::ReplayError::Run(error) => Self::Run(error),
-            error @ crate::replay::ReplayError::Apart { .. } => Self::Usage(error.to_string()),
+            flotor_lab::replay::ReplayError::Read(error) => Self::Read(error),
+            flotor_lab::replay::ReplayError::Run(error) => Self::Run(error),
+            other => Self::Usage(other.to_string()),
         }
     }
 }
@@ -336,6 +336,48 @@ fn write_json<T: serde::Serialize>(path: &Path, value: &T) -> Result<(), Command
     }
     std::fs::write(path, json + "\n")
         .map_err(|cause| CommandError::file(path, "cannot write the JSON", cause))
+}
+
+/// Tells a result: as text to people, unless standard output is asked for the JSON for machines.
+fn tell<T: serde::Serialize>(
+    json: Option<&Path>,
+    value: &T,
+    text: impl FnOnce() -> String,
+) -> Result<(), CommandError> {
+    if json.is_none_or(|path| path.as_os_str() != "-") {
+        say!("{}", text());
+    }
+    json.map_or(Ok(()), |path| write_json(path, value))
+}
+
+/// Writes a picture or a table where it is asked for, `-` being standard output.
+fn write_text(path: Option<&Path>, text: impl FnOnce() -> String) -> Result<(), CommandError> {
+    let Some(path) = path else { return Ok(()) };
+    if path.as_os_str() == "-" {
+        return report_line(format_args!("{}", text().trim_end()));
+    }
+    std::fs::write(path, text()).map_err(|cause| CommandError::file(path, "cannot write the result", cause))
+}
+
+/// A line on a terminal that says how a measurement comes along; nothing in a pipe.
+struct ProgressLine(indicatif::ProgressBar);
+
+impl ProgressLine {
+    fn new() -> Self {
+        Self(run::progress_bar(0, "{msg:<44} {wide_bar} {percent:>3} %  {elapsed}"))
+    }
+}
+
+impl flotor_lab::Progress for ProgressLine {
+    fn begin(&self, name: &str, steps: u64) {
+        self.0.set_length(steps);
+        self.0.set_position(0);
+        self.0.set_message(name.to_owned());
+    }
+
+    fn advance(&self, steps: u64) {
+        self.0.inc(steps);
+    }
 }
 
 /// Colours, on terminals only.

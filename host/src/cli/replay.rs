@@ -1,13 +1,12 @@
 //! `flotor replay`: the models of a recording once more, as they were or changed.
 
 use super::options::{KeyValue, PluginKeyValue};
-use super::{CommandError, run, style, write_json};
-use crate::replay::{Compared, Coverage, Difference, Held, Replay, ReplayError, WhyApart};
+use super::{CommandError, run, style, write_json, write_text};
 use clap::Args;
 use flotor_hal::{DVec3, Wrench};
+use flotor_lab::replay::{Compared, Coverage, Difference, Replay, WhyApart};
 use flotor_plot::{Axis, Figure, Panel, Series};
 use flotor_record::Ending;
-use flotor_record::Recording;
 use flotor_session::registry::Registry;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -66,25 +65,14 @@ struct Report {
 }
 
 pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
-    let mut unknown = None;
     let registry = Registry::search(&arguments.folders);
-    let replay = Replay::open(&arguments.recording, &registry, |models| {
-        Held::apply(models, &arguments.models, &arguments.sets).unwrap_or_else(|problem| {
-            unknown = Some(problem);
-            Held::default()
-        })
-    });
-    if let Some(problem) = unknown {
-        return Err(CommandError::Usage(problem));
-    }
-    let replay = replay?;
-    let ending = Recording::open(&arguments.recording).map_err(ReplayError::from)?.ending();
+    let replay = Replay::open(&arguments.recording, &registry, &arguments.models, &arguments.sets)?;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
     let progress = run::progress_bar((replay.run().duration_s * 1.0e3) as u64, "{percent:>3} %  replaying");
     let started = Instant::now();
     let mut samples = Vec::new();
     let mut end_ns = 0;
-    let Compared { difference, coverage, why, health } = replay.compare(|record, wrench| {
+    let Compared { difference, coverage, why, ending, health } = replay.compare(|record, wrench| {
         end_ns = record.time_ns;
         progress.set_position(record.time_ns / 1_000_000);
         if arguments.plot.is_some() {
@@ -93,7 +81,6 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
     })?;
     progress.finish_and_clear();
 
-    #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
     let recorded_s = end_ns as f64 * 1.0e-9;
     let bit_exact = difference.is_bit_exact();
     let report = Report {
@@ -107,10 +94,7 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
         wall_s: started.elapsed().as_secs_f64(),
     };
     tell(arguments, &report)?;
-    if let Some(path) = &arguments.plot {
-        std::fs::write(path, picture(&samples))
-            .map_err(|cause| CommandError::file(path, "cannot write the plot", cause))?;
-    }
+    write_text(arguments.plot.as_deref(), || picture(&samples))?;
     if let Some((_, words)) = health.iter().find(|(health, _)| health.panicked_at.is_some()) {
         return Err(CommandError::PluginRefused(format!(
             "a model of the recording stopped answering: {words}"
@@ -161,22 +145,14 @@ fn tell(arguments: &ReplayArguments, report: &Report) -> Result<(), CommandError
     if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
         let verdict = report.verdict();
         say!("{}", style::title(&format!("{}: {verdict}", arguments.recording.display())));
-        let Difference {
-            ticks,
-            differing_ticks,
-            first_tick,
-            last_tick,
-            max_force_n,
-            max_torque_nm,
-            rms_force_n,
-            rms_torque_nm,
-        } = &report.difference;
-        say!("  {:<11}{ticks} ({:.3} s) in {:.3} s", "ticks", report.recorded_s, report.wall_s);
-        if let (Some(first), Some(last)) = (first_tick, last_tick) {
-            let same = report.same_around(*first, *last);
-            say!("  {:<11}{differing_ticks} ticks, the first is {first}, the last {last}{same}", "differ");
-            say!("  {:<11}max {max_force_n:.3e} N, rms {rms_force_n:.3e} N", "force");
-            say!("  {:<11}max {max_torque_nm:.3e} N·m, rms {rms_torque_nm:.3e} N·m", "torque");
+        let d = &report.difference;
+        say!("  {:<11}{} ({:.3} s) in {:.3} s", "ticks", d.ticks, report.recorded_s, report.wall_s);
+        if let (Some(first), Some(last)) = (d.first_tick, d.last_tick) {
+            let same = report.same_around(first, last);
+            let differ = d.differing_ticks;
+            say!("  {:<11}{differ} ticks, the first is {first}, the last {last}{same}", "differ");
+            say!("  {:<11}max {:.3e} N, rms {:.3e} N", "force", d.max_force_n, d.rms_force_n);
+            say!("  {:<11}max {:.3e} N·m, rms {:.3e} N·m", "torque", d.max_torque_nm, d.rms_torque_nm);
         }
         // If nothing was changed, the error says why.
         if let (Some(why), true) = (&report.why_apart, arguments.changes_anything()) {
@@ -196,7 +172,6 @@ struct Sample {
 
 /// The force that was and that would be, and how they differ along every axis.
 fn picture(samples: &[Sample]) -> String {
-    #[allow(clippy::cast_precision_loss)] // for a picture
     let line = |value: &dyn Fn(&Sample) -> f64| -> Vec<(f64, f64)> {
         samples.iter().map(|sample| (sample.time_ns as f64 * 1.0e-9, value(sample))).collect()
     };

@@ -1,16 +1,17 @@
 //! `flotor stability`: the stiffest spring that stays stable on the simulated device, next to theory.
 
 use super::options::rate_hz;
-use super::{CommandError, run, style, write_json};
-use crate::stability::theory::{Plant, Rendering, exact_limit_n_per_m, gil_limit_n_per_m};
-use crate::stability::{Case, Grip, LoopError, Row, default_cases, measure};
+use super::{CommandError, run, style, tell, write_json, write_text};
 use clap::Args;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::Plugin;
+use flotor_lab::report::{table, to_csv};
+use flotor_lab::stability::theory::{Plant, Rendering, exact_limit_n_per_m, gil_limit_n_per_m};
+use flotor_lab::stability::{Case, Grip, LoopError, Row, default_cases, measure};
 use flotor_plot::{Axis, Figure, Panel, Series};
 use flotor_session::registry::Registry;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Find the stiffest virtual spring that stays stable.
 #[derive(Args)]
@@ -72,27 +73,21 @@ pub(crate) fn run(arguments: &StabilityArguments) -> Result<(), CommandError> {
     progress.finish_and_clear();
 
     let worst_deviation = rows.iter().map(|row| row.deviation().abs()).fold(0.0, f64::max);
-    let to_stdout = [&arguments.json, &arguments.csv]
-        .iter()
-        .any(|path| path.as_ref().is_some_and(|p| p.as_os_str() == "-"));
-    if !to_stdout {
-        say!("{}", to_text(&rows, worst_deviation));
+    let version = &plugin.metadata().version;
+    let report = Report { device: DEVICE, version, rows: &rows, worst_deviation };
+    // A table for machines on standard output is all that is there.
+    let csv = arguments.csv.as_deref();
+    if csv.is_none_or(|path| path.as_os_str() != "-") {
+        tell(arguments.json.as_deref(), &report, || to_text(&rows, worst_deviation))?;
+    } else if let Some(path) = &arguments.json {
+        write_json(path, &report)?;
     }
-    if let Some(path) = &arguments.json {
-        let version = &plugin.metadata().version;
-        write_json(path, &Report { device: DEVICE, version, rows: &rows, worst_deviation })?;
+    write_text(csv, || to_csv([], &rows))?;
+    if arguments.plot.is_none() {
+        return Ok(());
     }
-    if let Some(path) = &arguments.csv {
-        write_csv(path, &rows).map_err(|error| {
-            CommandError::file(path, "cannot write the rows", std::io::Error::other(error))
-        })?;
-    }
-    if let Some(path) = &arguments.plot {
-        let picture = picture(&plugin, &cases, &rows)?;
-        std::fs::write(path, picture)
-            .map_err(|cause| CommandError::file(path, "cannot write the plot", cause))?;
-    }
-    Ok(())
+    let picture = picture(&plugin, &cases, &rows)?;
+    write_text(arguments.plot.as_deref(), || picture)
 }
 
 /// The product of all lists given, or the default grid.
@@ -108,24 +103,22 @@ fn cases(arguments: &StabilityArguments) -> Vec<Case> {
         let period_ns = (1.0e9 / rate_hz).round() as u64;
         for delay_ticks in given_or(delay, 0) {
             for plant_damping_ns_per_m in given_or(damping, 0.5) {
-                for virtual_damping_ns_per_m in given_or(virtual_damping, 0.0) {
-                    cases.push(Case {
-                        period_ns,
-                        delay_ticks,
-                        plant_damping_ns_per_m,
-                        virtual_damping_ns_per_m,
-                        quantum_m,
-                        grip: *grip,
-                    });
-                }
+                cases.extend(given_or(virtual_damping, 0.0).map(|virtual_damping_ns_per_m| Case {
+                    period_ns,
+                    delay_ticks,
+                    plant_damping_ns_per_m,
+                    virtual_damping_ns_per_m,
+                    quantum_m,
+                    grip: *grip,
+                }));
             }
         }
     }
     cases
 }
 
-fn given_or<T: Copy>(list: &[T], default: T) -> Vec<T> {
-    if list.is_empty() { vec![default] } else { list.to_vec() }
+fn given_or<T: Copy>(list: &[T], default: T) -> impl Iterator<Item = T> {
+    list.iter().copied().chain(list.is_empty().then_some(default))
 }
 
 fn refused(error: LoopError) -> CommandError {
@@ -138,39 +131,20 @@ fn refused(error: LoopError) -> CommandError {
 
 fn to_text(rows: &[Row], worst_deviation: f64) -> String {
     let title = style::title("largest stable stiffness in N/m");
-    let head = format!(
-        "  {:>8}{:>7}{:>9}{:>9}{:>12}{:>12}{:>10}{:>12}{:>12}",
-        "T in ms", "delay", "b", "B", "simulated", "exact", "differ", "Gil", "passive"
-    );
+    let head = ["T in ms", "delay", "b", "B", "simulated", "exact", "differ", "Gil", "passive"];
     let line = |row: &Row| {
-        format!(
-            "  {:>8}{:>7}{:>9}{:>9}{:>12.1}{:>12.1}{:>9.3}%{:>12.1}{:>12.1}",
-            row.period_s * 1.0e3,
-            row.delay_ticks,
-            row.plant_damping_ns_per_m,
-            row.virtual_damping_ns_per_m,
-            row.k_max_n_per_m,
-            row.exact_n_per_m,
-            row.deviation() * 100.0,
-            row.gil_n_per_m,
-            row.passive_n_per_m
-        )
+        let [simulated, exact, gil, passive] =
+            [row.k_max_n_per_m, row.exact_n_per_m, row.gil_n_per_m, row.passive_n_per_m]
+                .map(|limit| format!("{limit:.1}"));
+        let [period_ms, b, virtual_b] =
+            [row.period_s * 1.0e3, row.plant_damping_ns_per_m, row.virtual_damping_ns_per_m]
+                .map(|number| number.to_string());
+        let differ = format!("{:.3}%", row.deviation() * 100.0);
+        [period_ms, row.delay_ticks.to_string(), b, virtual_b, simulated, exact, differ, gil, passive]
     };
     let foot =
         format!("worst difference between simulated and exact limit: {:.3} %", worst_deviation * 100.0);
-    let lines = rows.iter().map(line);
-    [title, head].into_iter().chain(lines).chain([foot]).collect::<Vec<_>>().join("\n")
-}
-
-fn write_csv(path: &Path, rows: &[Row]) -> Result<(), csv::Error> {
-    let output: Box<dyn std::io::Write> = if path.as_os_str() == "-" {
-        Box::new(std::io::stdout().lock())
-    } else {
-        Box::new(std::fs::File::create(path)?)
-    };
-    let mut writer = csv::Writer::from_writer(output);
-    rows.iter().try_for_each(|row| writer.serialize(row))?;
-    Ok(writer.flush()?)
+    [vec![title], table(head, rows.iter().map(line)), vec![foot]].concat().join("\n")
 }
 
 /// A panel for each combination of period and drag, a line and points for each delay in it.
@@ -178,28 +152,23 @@ fn picture(plugin: &Plugin, cases: &[Case], rows: &[Row]) -> Result<String, Comm
     let mut figure = Figure::new("Largest stable stiffness", Axis::linear("Virtual damping", "N s/m"))
         .subtitle("points: simulated flotor; lines: exact limit of the sampled loop, and Gil's rule")
         .panel_height_px(320.0);
-    for panel in groups(cases, |case| (case.period_ns, case.plant_damping_ns_per_m.to_bits())) {
+    let pairs: Vec<(&Case, &Row)> = cases.iter().zip(rows).collect();
+    for (index, first) in cases.iter().enumerate() {
+        let is_alike = |case: &Case| {
+            case.period_ns == first.period_ns && case.plant_damping_ns_per_m == first.plant_damping_ns_per_m
+        };
+        let within: Vec<_> = pairs.iter().copied().filter(|(case, _)| is_alike(case)).collect();
+        let is_new = !cases.iter().take(index).any(is_alike);
         // A curve needs points; single cases are in the table.
-        if panel.len() < 3 && cases.len() > panel.len() {
-            continue;
+        if is_new && (within.len() >= 3 || cases.len() == within.len()) {
+            figure = figure.panel(stiffness_panel(first, first.plant(plugin).map_err(refused)?, &within));
         }
-        figure = figure.panel(stiffness_panel(plugin, cases, rows, &panel)?);
     }
     Ok(figure.to_svg())
 }
 
-fn stiffness_panel(
-    plugin: &Plugin,
-    cases: &[Case],
-    rows: &[Row],
-    members: &[usize],
-) -> Result<Panel, CommandError> {
+fn stiffness_panel(first: &Case, plant: Plant, within: &[(&Case, &Row)]) -> Panel {
     const CURVE_POINTS: u32 = 120;
-    let within: Vec<(&Case, &Row)> =
-        members.iter().filter_map(|index| Some((cases.get(*index)?, rows.get(*index)?))).collect();
-    let Some((first, _)) = within.first() else { return Ok(Panel::new(Axis::log("Stiffness", "N/m"))) };
-    let plant = first.plant(plugin).map_err(refused)?;
-    #[allow(clippy::cast_precision_loss)] // at most 10 ms
     let period_s = first.period_ns as f64 * 1.0e-9;
     let title = format!("T = {} ms, b = {} N s/m", period_s * 1.0e3, first.plant_damping_ns_per_m);
     let most = within.iter().map(|(case, _)| case.virtual_damping_ns_per_m).fold(0.0, f64::max);
@@ -233,35 +202,19 @@ fn stiffness_panel(
                     .slot(slot + delays.len()),
             );
     }
-    Ok(panel)
-}
-
-/// Indices of the cases that share a key, in the order the keys first appear.
-fn groups<K: PartialEq>(cases: &[Case], key: impl Fn(&Case) -> K) -> Vec<Vec<usize>> {
-    let mut groups: Vec<(K, Vec<usize>)> = Vec::new();
-    for (index, case) in cases.iter().enumerate() {
-        let key = key(case);
-        match groups.iter_mut().find(|(known, _)| *known == key) {
-            Some((_, members)) => members.push(index),
-            None => groups.push((key, vec![index])),
-        }
-    }
-    groups.into_iter().map(|(_, members)| members).collect()
+    panel
 }
 
 fn damping(text: &str) -> Result<f64, String> {
-    number_within(text, 0.0, 100_000.0, "N s/m")
+    number_within(text, 100_000.0, "N s/m")
 }
 
 fn quantum_um(text: &str) -> Result<f64, String> {
-    number_within(text, 0.0, 100.0, "µm")
+    number_within(text, 100.0, "µm")
 }
 
-fn number_within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> {
+/// A number from zero on.
+fn number_within(text: &str, most: f64, unit: &str) -> Result<f64, String> {
     let number: f64 = text.trim().parse().map_err(|_| format!("`{text}` is no number"))?;
-    if (least..=most).contains(&number) {
-        Ok(number)
-    } else {
-        Err(format!("legal is {least} to {most} {unit}"))
-    }
+    (0.0..=most).contains(&number).then_some(number).ok_or_else(|| format!("legal is 0 to {most} {unit}"))
 }

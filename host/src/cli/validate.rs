@@ -2,8 +2,8 @@
 
 use super::options::{KeyValue, duration_s};
 use super::{CommandError, style, write_json};
-use crate::validate::{Check, Figures, Finding, Verdict, check, validate};
 use clap::Args;
+use flotor_lab::validate::{Check, Figures, Finding, Verdict, check, validate};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;

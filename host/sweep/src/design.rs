@@ -1,7 +1,7 @@
 //! From axes to points: which value each axis has in row number `i`.
 
 use crate::plan::{Axis, Layout, Plan, Scale, Values};
-use flotor::sampling::Sobol;
+use flotor_lab::sampling::Sobol;
 use serde::{Deserialize, Serialize};
 
 /// A value in a row: of an axis, or of an answer.

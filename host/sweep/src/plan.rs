@@ -242,7 +242,7 @@ impl Plan {
             ));
         }
         if let Layout::Sobol { .. } = self.layout {
-            let most = flotor::sampling::DIMENSIONS;
+            let most = flotor_lab::sampling::DIMENSIONS;
             if self.axes.len() > most {
                 return Err(format!("{} axes; Sobol's sequence here has {most} dimensions", self.axes.len()));
             }

@@ -2,7 +2,7 @@
 
 use crate::design::{Cell, Design, Point};
 use crate::plan::{POSE_COLUMNS, Plan, PlanError, Question};
-use flotor::evaluate::{Answer, Details, Evaluation, Handle, Travel};
+use flotor_lab::evaluate::{Answer, Details, Evaluation, Handle, Travel};
 use flotor_session::headless;
 use flotor_session::registry::Registry;
 use flotor_session::scene::{PluginKeyValue, Scene};

@@ -5,12 +5,12 @@
 #[path = "../../../models/spring/tests/sample/mod.rs"]
 mod sample;
 
-use flotor::bench::{BenchDevice, WholeTick};
-use flotor::servo::{Clock, StopSwitch};
-use flotor::session::Observer;
-use flotor::trace::TickRecord;
+use flotor_core::trace::TickRecord;
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::{Demand as Demanded, DeviceState, Input, Output, Tick};
+use flotor_lab::bench::{BenchDevice, WholeTick};
+use flotor_servo::{Clock, StopSwitch};
+use flotor_session::Observer;
 use flotor_simulated::machine::{Machine, MachineParameters};
 use flotor_simulated::plant::{State, Wrench};
 use flotor_simulated::simulation::{Setup, Simulation};

@@ -1,0 +1,58 @@
+//! Calls told apart by a detail of the answer: a model that solves for some poses and evaluates a formula for the
+//! others has two speeds, and a mean of both says nothing about either.
+
+use super::times::{call_ns, inputs};
+use crate::stopwatch::{overhead_ns, quantile};
+use flotor_hal::abi::loader::Model;
+use flotor_hal::{Demand, Pose};
+use serde::Serialize;
+
+/// Calls for which a detail is above zero, and the others.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Apart {
+    /// Share of the ticks for which it is above zero, 0 to 1.
+    pub share: f64,
+    /// Those calls; `None` if there are none.
+    pub above: Option<Speed>,
+    /// The others; `None` if there are none.
+    pub others: Option<Speed>,
+}
+
+/// How long calls take, ns; of every tick the fastest walk.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Speed {
+    /// Mean.
+    pub mean_ns: f64,
+    /// One in a hundred takes longer.
+    pub p99_ns: f64,
+}
+
+/// Walks along the path, force and torque demanded; `None` for a model without that detail.
+pub(super) fn apart(model: &mut Model, detail: &str, path: &[Pose], rounds: usize) -> Option<Apart> {
+    let index = model.details().iter().position(|known| known.id() == detail)?;
+    let mut details = vec![f64::NAN; model.details().len()];
+    let inputs = inputs(path, Demand::WRENCH.limited_to(model.serves()));
+    let mut ticks = vec![(f64::INFINITY, false); inputs.len()];
+    let overhead_ns = overhead_ns();
+    for _ in 0..rounds {
+        model.reset();
+        for (input, (fastest_ns, is_above)) in inputs.iter().zip(&mut ticks) {
+            *fastest_ns = call_ns(overhead_ns, model, input).min(*fastest_ns);
+            model.read_details(&mut details);
+            *is_above = details.get(index).is_some_and(|value| *value > 0.0);
+        }
+    }
+    let of = |kind: bool| {
+        let times_ns = ticks.iter().filter(|(_, is_above)| *is_above == kind).map(|(ns, _)| *ns);
+        Speed::of(&mut times_ns.collect::<Vec<_>>())
+    };
+    let share = ticks.iter().filter(|(_, is_above)| *is_above).count() as f64 / ticks.len().max(1) as f64;
+    Some(Apart { share, above: of(true), others: of(false) })
+}
+
+impl Speed {
+    fn of(times_ns: &mut [f64]) -> Option<Self> {
+        let mean_ns = times_ns.iter().sum::<f64>() / times_ns.len() as f64;
+        (!times_ns.is_empty()).then(|| Self { mean_ns, p99_ns: quantile(times_ns, 0.99) })
+    }
+}

@@ -1,0 +1,92 @@
+//! How far answers lie from the reference's.
+
+use crate::PERIOD_NS;
+use crate::subject::call;
+use flotor_hal::abi::loader::Model;
+use flotor_hal::{Demand, Input, Pose, StepStatus, Wrench};
+use serde::Serialize;
+
+/// Answers a model may need at the first pose until it has converged, ticks.
+const SETTLING_TICKS: u64 = 500;
+
+/// Error of a case along the path. Poses where either has no answer are counted, not compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Distance {
+    /// Largest error of the force, N.
+    pub force_max_n: f64,
+    /// Root mean square of the force's error, N.
+    pub force_rms_n: f64,
+    /// Largest error of the torque, N·m.
+    pub torque_max_nm: f64,
+    /// Root mean square of the torque's error, N·m.
+    pub torque_rms_nm: f64,
+    /// Poses without a sound answer of both.
+    pub unanswered: usize,
+}
+
+impl Distance {
+    /// Between the answers of a case and those of the reference.
+    pub(super) fn between(answers: &[Option<Wrench>], truth: &[Option<Wrench>]) -> Self {
+        let mut distance = Self::default();
+        let mut compared = 0.0_f64;
+        for pair in answers.iter().zip(truth) {
+            let (Some(answer), Some(truth)) = pair else {
+                distance.unanswered += 1;
+                continue;
+            };
+            let force_n = (answer.force() - truth.force()).length();
+            let torque_nm = (answer.torque() - truth.torque()).length();
+            distance.force_max_n = distance.force_max_n.max(force_n);
+            distance.torque_max_nm = distance.torque_max_nm.max(torque_nm);
+            distance.force_rms_n += force_n * force_n;
+            distance.torque_rms_nm += torque_nm * torque_nm;
+            compared += 1.0;
+        }
+        distance.force_rms_n = (distance.force_rms_n / compared.max(1.0)).sqrt();
+        distance.torque_rms_nm = (distance.torque_rms_nm / compared.max(1.0)).sqrt();
+        distance
+    }
+}
+
+/// Answers tick by tick, after settling at the first pose; `None` where a model has none.
+pub(super) fn walk(model: &mut Model, path: &[Pose]) -> Vec<Option<Wrench>> {
+    model.reset();
+    if let Some(first) = path.first() {
+        for tick in 0..SETTLING_TICKS {
+            let _ = answer(model, *first, tick);
+        }
+    }
+    (SETTLING_TICKS..).zip(path).map(|(tick, pose)| answer(model, *pose, tick)).collect()
+}
+
+/// The answer at a pose, if it is one.
+pub(super) fn answer(model: &mut Model, pose: Pose, tick: u64) -> Option<Wrench> {
+    let input = Input {
+        time_ns: tick * PERIOD_NS,
+        dt_ns: PERIOD_NS,
+        tick,
+        demand: Demand::WRENCH.limited_to(model.serves()),
+        ..Input::at_rest(pose)
+    };
+    let output = call(model, &input).ok()?;
+    let sound =
+        matches!(output.status(), Some(StepStatus::Ok | StepStatus::Clamped | StepStatus::NotConverged));
+    (sound && output.wrench.is_finite()).then_some(output.wrench)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_hal::DVec3;
+
+    #[test]
+    fn distances_are_of_vectors_and_skip_what_is_missing() {
+        let at = |force: [f64; 3]| Some(Wrench::from_force(DVec3::from_array(force)));
+        let answers = [at([3.0, 4.0, 0.0]), None, at([0.0; 3])];
+        let truth = [at([0.0; 3]), at([1.0; 3]), at([0.0; 3])];
+        let distance = Distance::between(&answers, &truth);
+        assert_eq!(distance.force_max_n, 5.0);
+        assert_eq!(distance.force_rms_n, (25.0_f64 / 2.0).sqrt());
+        assert_eq!(distance.unanswered, 1);
+    }
+}

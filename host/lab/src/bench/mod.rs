@@ -1,0 +1,145 @@
+//! Work against precision: what an evaluation of a force model costs, and how wrong it is, for many settings of it.
+//!
+//! Every case goes along one smooth path (1 to 3 Hz in all six coordinates, 1 kHz) and is timed four ways: without
+//! interruption (the mean of a tick), in a batch, call by call (median and p99.9), and cold (after a reset, each call at
+//! another pose). All cases take turns, so that what is told of one against another does not depend on what else the
+//! machine does. An error is the distance from a reference that walks the same path: another setting of the same model,
+//! computed in this run, not a table.
+//!
+//! - `path`: the motion. `times`: the times. `apart`: times of two kinds of calls. `error`: the distance from the
+//!   reference.
+//! - `reach_hand`: the whole loop: what of the reference's force reaches a hand, through sampling and delay.
+//! - `report`: table, CSV and picture.
+//! - `whole_tick`: what the loop around a model costs with it, on a [`scripted`] device and on the simulated flotor.
+//!
+//! Not real-time.
+
+mod apart;
+mod error;
+mod path;
+mod reach_hand;
+mod report;
+pub mod scripted;
+mod times;
+mod whole_tick;
+
+pub use apart::{Apart, Speed};
+pub use error::Distance;
+pub use path::Hand;
+pub use reach_hand::{Losses, Sampling};
+pub use report::{ApartRow, BenchReport, CaseRow};
+pub use times::Times;
+pub use whole_tick::{BenchDevice, TickCost, WholeTick};
+
+use super::subject::prepared;
+use super::{Progress, Size};
+use flotor_hal::Demand;
+use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
+
+/// One setting of the model.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// What the table calls it.
+    pub name: String,
+    /// Its settings.
+    pub settings: Vec<Setting>,
+}
+
+/// Length of the path, ticks, and how often it is walked: enough for a median, or for p99.9.
+const fn extent(size: Size) -> (usize, usize) {
+    match size {
+        Size::Short => (2_000, 5),
+        Size::Full => (20_000, 9),
+    }
+}
+
+/// What is measured.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The cases.
+    pub cases: Vec<Case>,
+    /// Which of them the times of the others are compared with.
+    pub yardstick: usize,
+    /// The case errors are measured against.
+    pub reference: Option<Case>,
+    /// The motion.
+    pub hand: Hand,
+    /// Calls to tell apart.
+    pub apart: Option<TellApart>,
+    /// How much is timed.
+    pub size: Size,
+}
+
+/// Calls to tell apart by a detail of the answer.
+#[derive(Clone, Debug)]
+pub struct TellApart {
+    /// Id of the detail; what counts is whether it is above zero.
+    pub detail: String,
+    /// In which cases, each along its motion.
+    pub walks: Vec<(Case, Hand)>,
+}
+
+/// Force only, force and torque, and all that a case serves.
+const DEMANDS: [(&str, Demand); 3] =
+    [("force", Demand::FORCE), ("wrench", Demand::WRENCH), ("all", Demand::ALL)];
+
+/// Measures what is planned.
+///
+/// # Errors
+/// [`LoadError`] if the plugin refuses a case or the reference.
+pub fn measure(plugin: &Plugin, plan: &Plan, progress: &dyn Progress) -> Result<BenchReport, LoadError> {
+    let Plan { cases, yardstick, reference, hand, apart, size } = plan;
+    let (ticks, rounds) = extent(*size);
+    let path = hand.poses(ticks);
+    let mut models = cases.iter().map(|case| create(plugin, case)).collect::<Result<Vec<_>, _>>()?;
+    let mut distances = vec![None; cases.len()];
+    let mut losses = Vec::new();
+    if let Some(case) = reference {
+        let mut exact = create(plugin, case)?;
+        progress.begin("errors", cases.len() as u64);
+        let truth = error::walk(&mut exact, &path);
+        for ((case, model), distance) in cases.iter().zip(&mut models).zip(&mut distances) {
+            *distance = Some(Distance::between(&error::walk(model, &path), &truth));
+            losses.push((case.name.clone(), reach_hand::losses(&mut exact, model, *hand, Sampling::FULL)));
+            progress.advance(1);
+        }
+    }
+    let [force, wrench, everything] = DEMANDS.map(|(name, demand)| {
+        progress.begin(&format!("times: {name}"), rounds as u64);
+        times::in_turns(&mut models, *yardstick, &path, demand, rounds, || progress.advance(1))
+    });
+    let times = force.into_iter().zip(wrench).zip(everything);
+    let rows = cases.iter().zip(distances).zip(times).map(|((case, distance), ((force, wrench), all))| {
+        CaseRow { name: case.name.clone(), distance, times: [force, wrench, all] }
+    });
+    let rows = rows.collect();
+    let mut told_apart = Vec::new();
+    if let Some(TellApart { detail, walks }) = apart {
+        progress.begin(detail, walks.len() as u64);
+        for (case, hand) in walks {
+            let mut model = create(plugin, case)?;
+            let apart = apart::apart(&mut model, detail, &hand.poses(ticks), rounds);
+            told_apart.extend(apart.map(|apart| ApartRow {
+                name: case.name.clone(),
+                depth_m: hand.depth_m,
+                detail: detail.clone(),
+                apart,
+            }));
+            progress.advance(1);
+        }
+    }
+    Ok(BenchReport {
+        model: plugin.metadata().id.clone(),
+        version: plugin.metadata().version.clone(),
+        reference: reference.as_ref().map(|case| case.name.clone()),
+        yardstick: cases.get(*yardstick).map(|case| case.name.clone()),
+        ticks: path.len(),
+        rows,
+        losses,
+        apart: told_apart,
+    })
+}
+
+fn create(plugin: &Plugin, case: &Case) -> Result<Model, LoadError> {
+    prepared(plugin, &case.settings, 0)
+}

@@ -1,0 +1,162 @@
+//! A device that costs next to nothing: its handle follows a script, whatever it is told.
+//!
+//! With it a bench times the loop and not a simulated plant. It is linked in and behind the same function table as a
+//! device from a file.
+
+use flotor_hal::abi::{Entry, device_entry};
+use flotor_hal::{
+    ActiveDevice, Axes, Capabilities, Cycle, DVec3, Device, DeviceInfo, DeviceState, LoopConfig, Pose,
+    Refusal, SafeStop, Settings, Tick, Twist, Wrench,
+};
+use std::f64::consts::TAU;
+
+/// What a scene calls it.
+pub const SCRIPTED: &str = "scripted";
+
+/// The device as a plugin that is linked in.
+pub static SCRIPTED_ENTRY: Entry = device_entry::<Scripted>();
+
+/// How often the script repeats itself, Hz.
+const SCRIPT_HZ: f64 = 1.0;
+/// Amplitudes of x and y and of z about its mean, m, and that mean: as the path of the benches, within the range of the
+/// thesis's spring.
+const AMPLITUDE_M: DVec3 = DVec3::new(1.5e-3, 1.2e-3, 3.0e-3);
+const MEAN_Z_M: f64 = -4.0e-3;
+/// Amplitudes of the tilts and of the yaw, rad.
+const AMPLITUDE_RAD: DVec3 = DVec3::new(0.030, 0.025, 0.035);
+
+/// The device, opened.
+struct Scripted;
+
+/// The device, active: where it is on its script, as cosine and sine, and how far it goes in a period.
+struct Following {
+    at: Phase,
+    step: Phase,
+}
+
+/// A phase of the script. Turning it on costs four multiplications, a sine of the time ten times as much.
+#[derive(Clone, Copy)]
+struct Phase {
+    cos: f64,
+    sin: f64,
+}
+
+impl Phase {
+    fn of(angle_rad: f64) -> Self {
+        let (sin, cos) = angle_rad.sin_cos();
+        Self { cos, sin }
+    }
+
+    #[inline]
+    fn turned(self, by: Self) -> Self {
+        Self { cos: self.cos * by.cos - self.sin * by.sin, sin: self.sin * by.cos + self.cos * by.sin }
+    }
+
+    /// Where the handle is, and how fast.
+    #[inline]
+    fn state(self) -> (Pose, Twist) {
+        let Self { cos, sin } = self;
+        let twice = self.turned(self);
+        // x and the first tilt once in a period of the script, y and the second twice, z and the yaw once.
+        let (wave, slope) = (DVec3::new(sin, twice.sin, cos), DVec3::new(cos, 2.0 * twice.cos, -sin));
+        let rate = TAU * SCRIPT_HZ;
+        let half = AMPLITUDE_RAD * wave * 0.5;
+        let w = (1.0 - half.length_squared()).sqrt();
+        let orientation_xyzw = [half.x, half.y, half.z, w];
+        let position_m = (AMPLITUDE_M * wave + DVec3::Z * MEAN_Z_M).to_array();
+        // The angular velocity to first order in the tilts, which are small.
+        let twist = Twist::new(AMPLITUDE_M * slope * rate, AMPLITUDE_RAD * slope * rate);
+        (Pose { position_m, orientation_xyzw }, twist)
+    }
+}
+
+/// Nothing moves, so nothing has to be stopped.
+struct NothingMoves;
+
+impl SafeStop for NothingMoves {
+    fn safe_stop(&self) {}
+}
+
+impl Device for Scripted {
+    const INFO: DeviceInfo = DeviceInfo::new(SCRIPTED, "Scripted device", "A handle that follows a script");
+    type Active = Following;
+    type Stop = NothingMoves;
+
+    fn open(_: &Settings<'_>) -> Result<Self, Refusal> {
+        Ok(Self)
+    }
+
+    /// Range and limits of the machine of the thesis.
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            sensed: Axes::ALL,
+            actuated: Axes::ALL,
+            range_m: [0.012; 3],
+            range_rad: [0.12; 3],
+            resolution_m: 0.0,
+            max_force_n: [55.0, 55.0, 140.0],
+            max_torque_nm: [6.3, 6.3, 12.2],
+            max_force_slew_n_per_s: f64::INFINITY,
+            max_torque_slew_nm_per_s: f64::INFINITY,
+            max_stiffness_n_per_m: 25.0e3,
+            rate_hz: [100.0, 10_000.0],
+            latency_s: 0.0,
+        }
+    }
+
+    fn stopper(&self) -> NothingMoves {
+        NothingMoves
+    }
+
+    fn activate(self, config: &LoopConfig) -> Result<Following, (Self, Refusal)> {
+        let period_s = config.period_ns as f64 * 1.0e-9;
+        Ok(Following { at: Phase::of(0.0), step: Phase::of(TAU * SCRIPT_HZ * period_s) })
+    }
+}
+
+impl ActiveDevice for Following {
+    type Opened = Scripted;
+
+    #[inline]
+    fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
+        (state.pose, state.twist) = self.at.state();
+        state.sampled_ns = tick.time_ns;
+        self.at = self.at.turned(self.step);
+        Cycle::Fresh
+    }
+
+    #[inline]
+    fn write(&mut self, _: &Tick, _: &Wrench) -> Cycle {
+        Cycle::Fresh
+    }
+
+    fn deactivate(self) -> Scripted {
+        Scripted
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_script_is_smooth_and_its_velocity_is_its_slope() {
+        let config = LoopConfig { period_ns: 1_000_000, seed: 0 };
+        let Ok(mut device) = Scripted.activate(&config) else { panic!("it needs nothing") };
+        let mut next = || {
+            let mut state = DeviceState::HOME;
+            assert_eq!(device.read(&Tick::default(), &mut state), Cycle::Fresh);
+            state
+        };
+        let mut before = next();
+        for _ in 0..3000 {
+            let now = next();
+            assert!((now.pose.orientation().length() - 1.0).abs() < 1.0e-12);
+            let moved = now.pose.position() - before.pose.position();
+            let mean = (now.twist.linear() + before.twist.linear()) * 0.5e-3;
+            // Trapezoid: half a derivative more, cubed in the step.
+            assert!((moved - mean).length() < 1.0e-9, "{moved} and {mean}");
+            before = now;
+        }
+    }
+}

@@ -1,0 +1,231 @@
+//! A force model at given poses, without a loop or a device.
+//!
+//! A model without history is asked directly, in batches. One with history is taken to each pose the way a
+//! hand would: along a straight line in position and rotation vector, in small steps, then held until it has
+//! converged. Where every pose is reached from home the ways are independent, and all processors walk them.
+
+use super::PERIOD_NS;
+use super::subject::{Subject, call, steps, walk};
+use super::trajectory::at;
+use flotor_hal::abi::CallStatus;
+use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
+use flotor_hal::{DVec3, Demand, Input, Memory, Output, Pose, StepStatus, Twist, Wrench};
+use rayon::prelude::*;
+
+/// Position and rotation vector of a handle in the model frame, m and rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Handle {
+    /// Position relative to home, m.
+    pub position_m: DVec3,
+    /// Rotation vector, rad.
+    pub rotation_rad: DVec3,
+}
+
+impl Handle {
+    /// The home pose.
+    pub const HOME: Handle = Handle { position_m: DVec3::ZERO, rotation_rad: DVec3::ZERO };
+
+    fn pose(self) -> Pose {
+        at(self.position_m, self.rotation_rad)
+    }
+
+    fn is_finite(self) -> bool {
+        self.position_m.is_finite() && self.rotation_rad.is_finite()
+    }
+}
+
+/// What a model answers at a pose. All numbers are finite.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Answer {
+    /// Force and torque on the hand, N and N·m; zero where there is no answer.
+    pub wrench: Wrench,
+    /// Stored energy, J, if the model has one.
+    pub energy_j: Option<f64>,
+    /// What the model says about the answer.
+    pub status: StepStatus,
+    /// What else it knows, in the order of its [`flotor_hal::Detail`]s; empty where nobody asked.
+    pub details: Vec<Option<f64>>,
+}
+
+/// Whether poses are independent or successive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Travel {
+    /// Each pose is reached from home.
+    FromHome,
+    /// Each pose is reached from the one before.
+    Successive,
+}
+
+/// Whether a model is asked for what it knows beside the wrench.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Details {
+    /// Wrench, energy and status only.
+    Omitted,
+    /// Its details as well.
+    Asked,
+}
+
+/// Why there are no answers.
+#[derive(Debug, thiserror::Error)]
+pub enum EvaluateError {
+    /// The model could not be made.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// It panicked; nothing more can be asked of it.
+    #[error("the model stopped answering: {words}")]
+    Broke {
+        /// What it said.
+        words: String,
+    },
+}
+
+/// Longest way that is walked in steps; a pose farther away is approached in as many, larger ones.
+const MOST_STEPS: f64 = 1.0e5;
+/// Poses evaluated per call of a model without history.
+const BATCH: usize = 1024;
+
+/// A model to be asked, and how.
+pub struct Evaluation<'a> {
+    /// The plugin.
+    pub plugin: &'a Plugin,
+    /// Its settings.
+    pub settings: &'a [Setting],
+    /// Whether poses are independent or successive.
+    pub travel: Travel,
+    /// Whether it is asked for more than the wrench.
+    pub details: Details,
+}
+
+impl<'a> Evaluation<'a> {
+    /// Answers for all handles, in order, the same however many processors walk. `on_answer` is called once for each
+    /// answer, in no particular order and from any of them. Not real-time.
+    ///
+    /// # Errors
+    /// [`EvaluateError`] if the model refuses its settings or panics.
+    pub fn answers(
+        &self,
+        handles: &[Handle],
+        on_answer: &(dyn Fn() + Sync),
+    ) -> Result<Vec<Answer>, EvaluateError> {
+        let mut walker = self.walker()?;
+        match (walker.subject.memory(), self.travel) {
+            (Memory::Stateless, _) => walker.evaluate_directly(handles, on_answer),
+            (Memory::PathDependent, Travel::Successive) => {
+                let walk = |handle: &Handle| walker.walk_to(*handle).inspect(|_| on_answer());
+                handles.iter().map(walk).collect()
+            }
+            (Memory::PathDependent, Travel::FromHome) => {
+                let walk = |slot: &mut Option<Walker<'a>>, handle: &Handle| {
+                    let walker = match slot {
+                        Some(walker) => walker,
+                        None => slot.insert(self.walker()?),
+                    };
+                    walker.go_home();
+                    walker.walk_to(*handle).inspect(|_| on_answer())
+                };
+                handles.par_iter().map_init(|| None, walk).collect()
+            }
+        }
+    }
+
+    fn walker(&self) -> Result<Walker<'a>, EvaluateError> {
+        let subject = Subject::new(self.plugin, self.settings, 0)?;
+        Ok(Walker { subject, details: self.details, at: Handle::HOME })
+    }
+}
+
+/// One handle, and the model that is asked where it is.
+struct Walker<'a> {
+    subject: Subject<'a>,
+    details: Details,
+    at: Handle,
+}
+
+impl Walker<'_> {
+    /// As if it had never moved.
+    fn go_home(&mut self) {
+        self.subject.restart();
+        self.at = Handle::HOME;
+    }
+
+    fn evaluate_directly(
+        &mut self,
+        handles: &[Handle],
+        on_answer: &(dyn Fn() + Sync),
+    ) -> Result<Vec<Answer>, EvaluateError> {
+        if self.details == Details::Asked {
+            // They are about the last step: one pose at a time.
+            let ask = |handle: &Handle| {
+                let output = self.step(handle.pose())?;
+                on_answer();
+                self.answer(*handle, &output)
+            };
+            return handles.iter().map(ask).collect();
+        }
+        let mut answers = Vec::with_capacity(handles.len());
+        let mut outputs = vec![Output::default(); BATCH];
+        for batch in handles.chunks(BATCH) {
+            let inputs: Vec<Input> = batch.iter().map(|handle| self.subject.at_rest(handle.pose())).collect();
+            if self.subject.model().step_batch(&inputs, &mut outputs) != CallStatus::Ok {
+                return Err(self.broke());
+            }
+            for (handle, output) in batch.iter().zip(&outputs) {
+                answers.push(self.answer(*handle, output)?);
+                on_answer();
+            }
+        }
+        Ok(answers)
+    }
+
+    /// Takes the handle from where it is to a pose and holds it there until the model has converged.
+    fn walk_to(&mut self, target: Handle) -> Result<Answer, EvaluateError> {
+        if !target.is_finite() {
+            // Nowhere to walk to: the model gets to see the pose once and says what it thinks of it.
+            let output = self.step(target.pose())?;
+            return self.answer(target, &output);
+        }
+        let (from, way_m) = (self.at, target.position_m - self.at.position_m);
+        let way_rad = target.rotation_rad - from.rotation_rad;
+        let between = |part: f64| at(from.position_m + way_m * part, from.rotation_rad + way_rad * part);
+        self.at = target;
+        let steps = steps(way_m, way_rad).clamp(1.0, MOST_STEPS);
+        let output = walk(steps, between, target.pose(), |pose| self.step(pose))?;
+        self.answer(target, &output)
+    }
+
+    fn step(&mut self, pose: Pose) -> Result<Output, EvaluateError> {
+        let input = self.subject.input(pose, Twist::ZERO, PERIOD_NS);
+        call(self.subject.model(), &input).map_err(|_| self.broke())
+    }
+
+    fn broke(&mut self) -> EvaluateError {
+        EvaluateError::Broke { words: self.subject.model().last_message() }
+    }
+
+    fn answer(&mut self, handle: Handle, output: &Output) -> Result<Answer, EvaluateError> {
+        let details = self.read_details()?;
+        let no_answer = if handle.is_finite() { StepStatus::OutOfDomain } else { StepStatus::InvalidInput };
+        let serves_energy = self.subject.model().serves().contains(Demand::ENERGY);
+        Ok(match output.status() {
+            Some(status) if output.wrench.is_finite() => Answer {
+                wrench: output.wrench,
+                energy_j: (serves_energy && output.energy_j.is_finite()).then_some(output.energy_j),
+                status,
+                details,
+            },
+            _ => Answer { wrench: Wrench::ZERO, energy_j: None, status: no_answer, details },
+        })
+    }
+
+    fn read_details(&mut self) -> Result<Vec<Option<f64>>, EvaluateError> {
+        let count = self.subject.model().details().len();
+        if self.details == Details::Omitted || count == 0 {
+            return Ok(Vec::new());
+        }
+        let mut values = vec![f64::NAN; count];
+        if self.subject.model().read_details(&mut values) != CallStatus::Ok {
+            return Err(self.broke());
+        }
+        Ok(values.into_iter().map(|value| value.is_finite().then_some(value)).collect())
+    }
+}

@@ -1,0 +1,203 @@
+//! How well this machine lets the servo keep time, next to the best a bare loop can do.
+//!
+//! Lateness on a shared machine is mostly the machine's. So the servo is compared with a loop that only sleeps
+//! and spins: same spin window, same priority, same core, in alternating slices of a second, so that both meet
+//! the same neighbours. What the servo adds is the difference.
+
+use flotor_hal::SampleWait;
+use flotor_hal::abi::loader::Stopper;
+use flotor_servo::{
+    Percentiles, RealTimeReport, Schedule, SpinWindow, StopSwitch, Timing, enter_real_time, monotonic_ns,
+    sleep_until,
+};
+use flotor_session::{RunError, Session};
+use serde::Serialize;
+
+/// Length of one slice, ns.
+const SLICE_NS: u64 = 1_000_000_000;
+
+/// How one of the two loops kept time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct LoopTiming {
+    /// Start of a tick after its deadline.
+    pub lateness_ns: Percentiles,
+    /// Ticks run.
+    pub ticks: u64,
+    /// Ticks that started later than a tenth of the period.
+    pub late_ticks: u64,
+    /// Ticks skipped because their whole period had passed.
+    pub missed_ticks: u64,
+}
+
+/// Servo and bare loop side by side.
+#[derive(Clone, Debug, Serialize)]
+pub struct JitterReport {
+    /// Rate of both, Hz.
+    pub rate_hz: f64,
+    /// The final stretch before a deadline that both spin, ns.
+    pub spin_window_ns: u64,
+    /// Slices of each.
+    pub slices: u64,
+    /// The servo with its device, models and envelope.
+    pub servo: LoopTiming,
+    /// Sleep, spin, look at the clock.
+    pub bare: LoopTiming,
+    /// How many ticks more the servo missed than the bare loop, and how far that is to be trusted.
+    pub missed_more: MissedMore,
+    /// What the system granted to both.
+    #[serde(skip)]
+    pub real_time: RealTimeReport,
+    /// Histograms of both, for a picture: lateness and how many ticks had it.
+    #[serde(skip)]
+    pub bins: [Vec<(u64, u64)>; 2],
+}
+
+/// A difference of counts between servo and bare loop.
+///
+/// On a shared machine a second without disturbance is followed by one with twenty missed ticks, whichever loop has its turn.
+/// How much the pairs of slices differ says how much of the difference may be that.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct MissedMore {
+    /// Servo less bare loop, ticks.
+    pub ticks: f64,
+    /// Standard error of that, ticks: it grows with the root of the time; none of a single pair.
+    pub standard_error: Option<f64>,
+}
+
+/// Runs servo and bare loop in turns for `slices` seconds each. `progress` is called after each pair.
+///
+/// # Errors
+/// [`RunError::Thread`] if the loop's thread cannot be had, [`RunError::Plugin`] if a device refuses to be energised.
+pub fn measure(
+    session: Session,
+    slices: u64,
+    stop: &StopSwitch,
+    progress: impl Fn(u64) + Send,
+) -> Result<JitterReport, RunError> {
+    let period_ns = session.period_ns();
+    let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
+    std::thread::scope(|scope| {
+        let measured = thread.spawn_scoped(scope, move || {
+            let real_time = enter_real_time(session.core());
+            let window = SpinWindow::measure(period_ns);
+            let (mut servo, stoppers) = session.into_loop()?;
+            let (mut with_servo, mut bare) = (Timing::default(), Timing::default());
+            let mut pairs = Pairs::default();
+            let mut done = 0;
+            while done < slices && !stop.is_stop_asked() && stop.emergency().is_none() {
+                let missed_before = [with_servo.missed, bare.missed];
+                let mut schedule = Schedule::start_real(period_ns, window);
+                while schedule.next_time_ns() < SLICE_NS {
+                    let Ok(due) = schedule.wait(|_| SampleWait::NotPaced) else { break };
+                    servo.tick(&due, stop, |_| ());
+                    count(&mut with_servo, due.lateness_ns.unwrap_or_default(), due.missed, period_ns);
+                }
+                bare_slice(&mut bare, period_ns, window);
+                let [servo_before, bare_before] = missed_before;
+                pairs.add(with_servo.missed - servo_before, bare.missed - bare_before);
+                done += 1;
+                progress(done);
+            }
+            stoppers.iter().for_each(Stopper::safe_stop);
+            let rate_hz = 1.0e9 / period_ns as f64;
+            Ok(JitterReport {
+                rate_hz,
+                spin_window_ns: window.spin_ns,
+                slices: done,
+                servo: (&with_servo).into(),
+                bare: (&bare).into(),
+                missed_more: pairs.missed_more(),
+                real_time,
+                bins: [with_servo.lateness.bins(), bare.lateness.bins()],
+            })
+        });
+        let measured = measured.map_err(|_| RunError::Thread("could not be started"))?;
+        measured.join().map_err(|_| RunError::Thread("panicked"))?
+    })
+}
+
+/// The yardstick, written out on its own: it shares no line with the servo's schedule but the system call.
+fn bare_slice(timing: &mut Timing, period_ns: u64, window: SpinWindow) {
+    let start_ns = monotonic_ns() + period_ns;
+    let mut slot = 0;
+    while slot * period_ns < SLICE_NS {
+        let deadline_ns = start_ns + slot * period_ns;
+        if monotonic_ns() + window.spin_ns < deadline_ns {
+            sleep_until(deadline_ns - window.spin_ns);
+        }
+        let mut now_ns = monotonic_ns();
+        while now_ns < deadline_ns {
+            std::hint::spin_loop();
+            now_ns = monotonic_ns();
+        }
+        let missed = (now_ns - deadline_ns) / period_ns;
+        count(timing, (now_ns - deadline_ns) % period_ns, missed, period_ns);
+        slot += 1 + missed;
+    }
+}
+
+/// What the slices of a pair differ by, over all pairs.
+#[derive(Default)]
+struct Pairs {
+    count: f64,
+    sum: f64,
+    sum_of_squares: f64,
+}
+
+impl Pairs {
+    fn add(&mut self, servo: u64, bare: u64) {
+        let difference = servo as f64 - bare as f64;
+        self.count += 1.0;
+        self.sum += difference;
+        self.sum_of_squares += difference * difference;
+    }
+
+    /// The pairs are taken as independent of each other: the standard error of a sum of `n` is that of one times the root of `n`.
+    fn missed_more(&self) -> MissedMore {
+        let variance = (self.sum_of_squares - self.sum * self.sum / self.count) / (self.count - 1.0);
+        let standard_error = (self.count > 1.0).then(|| (self.count * variance.max(0.0)).sqrt());
+        MissedMore { ticks: self.sum, standard_error }
+    }
+}
+
+/// Counts a tick.
+fn count(timing: &mut Timing, lateness_ns: u64, missed: u64, period_ns: u64) {
+    timing.lateness.record(lateness_ns);
+    timing.ticks += 1;
+    timing.missed += missed;
+    timing.late += u64::from(lateness_ns > period_ns / 10);
+}
+
+impl From<&Timing> for LoopTiming {
+    fn from(timing: &Timing) -> Self {
+        let Timing { lateness, ticks, late, missed, .. } = timing;
+        let lateness_ns = lateness.percentiles();
+        Self { lateness_ns, ticks: *ticks, late_ticks: *late, missed_ticks: *missed }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of_pairs(pairs: &[(u64, u64)]) -> MissedMore {
+        let mut all = Pairs::default();
+        pairs.iter().for_each(|(servo, bare)| all.add(*servo, *bare));
+        all.missed_more()
+    }
+
+    #[test]
+    fn a_difference_is_worth_as_much_as_the_pairs_agree() {
+        assert_eq!(of_pairs(&[]), MissedMore { ticks: 0.0, standard_error: None });
+        assert_eq!(of_pairs(&[(5, 2)]), MissedMore { ticks: 3.0, standard_error: None });
+        // Always one more: nothing is in doubt, whatever both have in common.
+        let steady = of_pairs(&[(1, 0), (21, 20), (8, 7), (4, 3)]);
+        assert_eq!(steady, MissedMore { ticks: 4.0, standard_error: Some(0.0) });
+        // Differences 3, -1, -1, 3: a mean of 1, a variance of 16/3 each.
+        let wild = of_pairs(&[(3, 0), (0, 1), (6, 7), (5, 2)]);
+        assert_eq!(wild.ticks, 4.0);
+        assert!(
+            wild.standard_error.is_some_and(|error| (error - (4.0_f64 * 16.0 / 3.0).sqrt()).abs() < 1e-12)
+        );
+    }
+}

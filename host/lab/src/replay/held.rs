@@ -1,0 +1,69 @@
+//! What is changed for a replay, and therefore does not change with the run.
+
+use flotor_session::scene::{KeyValue, ModelUse, PluginKeyValue, is_named};
+
+/// What a replay gave the models of a recording: they keep it, whatever changed in the run.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Held {
+    /// Names of models and parameters.
+    parameters: Vec<(String, String)>,
+    /// Names of models that were given a plugin.
+    plugins: Vec<String>,
+}
+
+impl Held {
+    /// Puts `others` in place of models of the recording, then sets parameters of what is there. A model that
+    /// is on several devices is meant on all of them, or by its full name on one. Not real-time.
+    ///
+    /// # Errors
+    /// In words: the recording has no such model.
+    pub(super) fn apply(
+        models: &mut [ModelUse],
+        others: &[KeyValue],
+        sets: &[PluginKeyValue],
+    ) -> Result<Self, String> {
+        let plugins = others.iter().map(|other| exchange(other, models)).collect::<Result<Vec<_>, _>>()?;
+        // Counted only now: a model that was exchanged has lost the settings of the run.
+        let recorded: Vec<usize> = models.iter().map(|model| model.plugin.parameters.len()).collect();
+        sets.iter().try_for_each(|set| set.apply_to_models(models))?;
+        let mut parameters = Vec::new();
+        for (model, recorded) in models.iter().zip(recorded) {
+            let set = model.plugin.parameters.get(recorded..).unwrap_or_default();
+            parameters.extend(set.iter().map(|set| (model.name.clone(), set.key.clone())));
+        }
+        Ok(Self { parameters, plugins: plugins.concat() })
+    }
+
+    /// True if nothing was changed.
+    pub(super) fn is_nothing(&self) -> bool {
+        self.parameters.is_empty() && self.plugins.is_empty()
+    }
+
+    /// True if the parameter keeps its value.
+    pub(super) fn keeps_parameter(&self, model: &str, parameter: &str) -> bool {
+        self.parameters.iter().any(|(name, key)| name == model && key == parameter)
+    }
+
+    /// True if the model keeps its plugin.
+    pub(super) fn keeps_plugin(&self, model: &str) -> bool {
+        self.plugins.iter().any(|name| name == model)
+    }
+}
+
+/// Another plugin in place of a model, from its own defaults; the names of the models it now stands for.
+fn exchange(other: &KeyValue, models: &mut [ModelUse]) -> Result<Vec<String>, String> {
+    let (asked, plugin) = other.pair();
+    let mut exchanged = Vec::new();
+    for model in models.iter_mut().filter(|model| is_named(&model.name, asked)) {
+        *model = model.replaced_by(Some(plugin), &[]);
+        exchanged.push(model.name.clone());
+    }
+    if exchanged.is_empty() {
+        let names: Vec<&str> = models.iter().map(|model| model.name.as_str()).collect();
+        let names = names.join(", ");
+        return Err(format!(
+            "--model {asked}={plugin}: the recording has no model `{asked}` (it has {names})"
+        ));
+    }
+    Ok(exchanged)
+}

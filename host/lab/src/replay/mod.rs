@@ -1,0 +1,357 @@
+//! A recorded run once more, without its device: the models are asked again at the recorded poses.
+//!
+//! With nothing changed the wrench must come out bit for bit; with another parameter the difference shows what
+//! the change does to the same hand movement.
+
+mod apart;
+mod files;
+mod held;
+
+pub use apart::{Coverage, WhyApart};
+use held::Held;
+
+use apart::Evidence;
+use files::as_recorded;
+use flotor_core::coupling::{CouplingDescription, CouplingEnds};
+use flotor_core::trace::{Events, TickRecord};
+use flotor_core::{Change, ChangeOutcome, ChangeSubject};
+use flotor_hal::abi::PluginKind;
+use flotor_hal::{DeviceState, LoopConfig, Tick, Wrench};
+use flotor_record::{Ending, ReadError, Recording, Role, RunDescription};
+use flotor_servo::coupling::Patience;
+use flotor_servo::{Clock, Coupled, Forces, Heartbeat, ModelHealth, Port, Replacement};
+use flotor_session::registry::Registry;
+use flotor_session::scene::{
+    Isolation, KeyValue, Location, ModelUse, ParameterText, PluginKeyValue, PluginUse,
+};
+use flotor_session::{PluginReport, RunError, prepare_model};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Why a replay failed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReplayError {
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A model cannot be had.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// What another host told is not in the recording.
+    #[error(
+        "the coupling `{coupling}` was held by another host too, and what that one told is not in the recording: \
+         only runs whose couplings have both ends here can be replayed"
+    )]
+    Apart {
+        /// Its name.
+        coupling: String,
+    },
+    /// What is to be changed is not there.
+    #[error("{0}")]
+    Change(String),
+}
+
+/// Of couplings whose ends are both here.
+const NOBODY_TO_WAIT_FOR: Patience = Patience { silence_ns: 0, fade_ns: 0 };
+
+fn is_apart(coupling: &CouplingDescription) -> bool {
+    matches!(coupling.ends, CouplingEnds::Apart(_))
+}
+
+/// How the replayed wrench differs from the recorded one.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Difference {
+    /// Ticks compared.
+    pub ticks: u64,
+    /// Ticks in which some bit of the wrench differs.
+    pub differing_ticks: u64,
+    /// The first of them: before it, all is the same.
+    pub first_tick: Option<u64>,
+    /// The last of them: after it, all is the same.
+    pub last_tick: Option<u64>,
+    /// Largest difference of force, N.
+    pub max_force_n: f64,
+    /// Largest difference of torque, N·m.
+    pub max_torque_nm: f64,
+    /// Root mean square of the difference of force, N.
+    pub rms_force_n: f64,
+    /// Root mean square of the difference of torque, N·m.
+    pub rms_torque_nm: f64,
+}
+
+/// What came of a replay.
+#[derive(Clone, Debug)]
+pub struct Compared {
+    /// How the wrench differs.
+    pub difference: Difference,
+    /// What of the run the recording holds.
+    pub coverage: Coverage,
+    /// Why it differs; if something was changed, why not only for that, as far as the recording tells.
+    pub why: Option<WhyApart>,
+    /// Whether the recording has the run's end.
+    pub ending: Ending,
+    /// How each model has behaved now, and what it said last, in the scene's order.
+    pub health: Vec<(ModelHealth, String)>,
+}
+
+/// The models of a recording, ready to be asked again.
+pub struct Replay<'r> {
+    registry: &'r Registry,
+    config: LoopConfig,
+    recording: Recording,
+    uses: Vec<ModelUse>,
+    /// Number of devices.
+    devices: usize,
+    forces: Forces,
+    plugins: Vec<PluginReport>,
+    held: Held,
+}
+
+impl<'r> Replay<'r> {
+    /// Opens a recording and creates its models as they were set, with other models and settings on top. Not real-time.
+    ///
+    /// # Errors
+    /// [`ReplayError`]: the recording cannot be read, a model to be changed is not in it, a plugin is missing or refuses the settings, a file
+    /// that a setting names is not that of the run.
+    pub fn open(
+        path: &Path,
+        registry: &'r Registry,
+        models: &[KeyValue],
+        sets: &[PluginKeyValue],
+    ) -> Result<Self, ReplayError> {
+        let recording = Recording::open(path)?;
+        let mut uses = models_of(path, recording.run());
+        let held = Held::apply(&mut uses, models, sets).map_err(ReplayError::Change)?;
+        use_recorded_files(&mut uses, &held, path, recording.run())?;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 100 Hz to 10 kHz
+        let period_ns = (1.0e9 / recording.run().rate_hz).round() as u64;
+        let config = LoopConfig { period_ns, seed: recording.run().seed };
+        let mut layers = Vec::new();
+        let mut plugins = Vec::new();
+        for model in &uses {
+            let (layer, report) = prepare_model(registry, model, &config, Clock::Virtual)?;
+            layers.push((usize::from(model.device), layer));
+            plugins.push(report);
+        }
+        let devices = recording.run().devices().count();
+        let period_s = period_ns as f64 * 1.0e-9;
+        if let Some(coupling) = recording.run().couplings.iter().find(|coupling| is_apart(coupling)) {
+            return Err(ReplayError::Apart { coupling: coupling.name.clone() });
+        }
+        let couplings = recording.run().couplings.iter();
+        let couplings = couplings.map(|coupling| Coupled::new(coupling, period_s, NOBODY_TO_WAIT_FOR).0);
+        let forces = Forces::new(devices, layers, couplings.collect());
+        Ok(Self { registry, config, recording, uses, devices, forces, plugins, held })
+    }
+
+    /// How the run was set up.
+    #[must_use]
+    pub fn run(&self) -> &RunDescription {
+        self.recording.run()
+    }
+
+    /// The models with every parameter now in force.
+    #[must_use]
+    pub fn plugins(&self) -> &[PluginReport] {
+        &self.plugins
+    }
+
+    /// Asks the models at every recorded pose. `look` gets the recorded tick and the wrench that came out now.
+    ///
+    /// # Errors
+    /// [`ReplayError`] at a damaged place, or if a plugin that was put in during the run is refused; what was compared
+    /// before is lost with it.
+    pub fn compare(mut self, mut look: impl FnMut(&TickRecord, &Wrench)) -> Result<Compared, ReplayError> {
+        let mut difference = Difference::default();
+        let mut evidence = Evidence::of(self.recording.run());
+        let heart = Heartbeat::default(); // nobody waits for a replay
+        let mut ports = vec![Port::REST; self.devices];
+        let mut records: Vec<TickRecord> = Vec::with_capacity(self.devices);
+        while let Some(record) = self.recording.next() {
+            let record = record?;
+            // A tick that lost a record on its way into the recording cannot be compared.
+            if records.first().is_some_and(|first| first.tick != record.tick) {
+                records.clear();
+            }
+            records.push(record);
+            let [.., record] = records.as_slice() else { continue };
+            // The changes before a tick come with its first record.
+            for change in self.recording.take_changes() {
+                self.repeat(&change)?;
+            }
+            let Some(port) = ports.get_mut(usize::from(record.device)) else { continue };
+            port.state = DeviceState {
+                pose: record.pose,
+                twist: record.twist,
+                buttons: record.buttons,
+                ..DeviceState::HOME
+            };
+            port.events = Events::NONE;
+            if records.len() < self.devices {
+                continue;
+            }
+            let tick = Tick { index: record.tick, time_ns: record.time_ns, dt_ns: record.dt_ns };
+            while self.forces.take_faded(&tick).is_some() {}
+            self.forces.step(&tick, &mut ports, &heart);
+            evidence.look(tick.index, &records, &ports);
+            let is_other =
+                |(record, port): (&TickRecord, &Port)| bits(&port.requested) != bits(&record.model);
+            if records.iter().zip(&ports).any(is_other) {
+                evidence.differs(tick.index, &records, &ports);
+            }
+            for (port, record) in ports.iter_mut().zip(records.drain(..)) {
+                difference.add(&record, &port.requested);
+                look(&record, &port.requested);
+                // What was really held then.
+                port.commanded = record.commanded;
+            }
+        }
+        if let Some(record) = records.first() {
+            evidence.coverage.break_off(record.tick);
+        }
+        difference.finish();
+        let why = if self.held.is_nothing() { evidence.cause() } else { evidence.other_cause() };
+        let (ending, health) = (self.recording.ending(), self.forces.health());
+        Ok(Compared { difference, coverage: evidence.coverage, why, ending, health })
+    }
+}
+
+impl<'r> Replay<'r> {
+    /// Changes a parameter as it changed in the run. Not if it is held at another value, and not of a model that
+    /// has no such parameter: what that does to the wrench is the answer.
+    fn repeat(&mut self, change: &Change) -> Result<(), ReplayError> {
+        let names = |plugin: &PluginReport| plugin.name == change.plugin;
+        let Some(model) = self.plugins.iter().position(names) else { return Ok(()) }; // a device
+        let tick = Tick { index: change.tick, time_ns: change.time_ns, dt_ns: 0 };
+        match change.subject {
+            ChangeSubject::Weight => {
+                self.forces.set_weight(model, &tick, change.number);
+                return Ok(());
+            }
+            ChangeSubject::Plugin => return self.replace(model, change, &tick),
+            ChangeSubject::Parameter => {}
+        }
+        let schema = self.plugins.get(model).map_or(&[][..], |plugin| plugin.schema);
+        let is_held = self.held.keeps_parameter(&change.plugin, &change.parameter);
+        let parameter = schema.iter().position(|parameter| parameter.id() == change.parameter);
+        if let (Some(parameter), false, ChangeOutcome::Applied) = (parameter, is_held, change.outcome) {
+            self.forces.set_parameter(model, &tick, parameter, change.number);
+        }
+        Ok(())
+    }
+
+    /// Puts another plugin in place of a model as in the run; not if the model was replaced for this replay.
+    fn replace(&mut self, model: usize, change: &Change, tick: &Tick) -> Result<(), ReplayError> {
+        let (Some(used), Some(report)) = (self.uses.get(model), self.plugins.get_mut(model)) else {
+            return Ok(());
+        };
+        if self.held.keeps_plugin(&change.plugin) {
+            return Ok(());
+        }
+        let settings: Vec<(&str, &str)> =
+            change.settings.iter().map(|(k, v)| (k.as_str(), v.as_str())).collect();
+        let mut other = used.replaced_by(Some(&change.parameter), &settings);
+        // What was set for the plugin before may mean nothing to this one. A plugin that cannot be had has no
+        // schema, and is complained about below.
+        let plugin = self.registry.load(&other.plugin.plugin, PluginKind::Model);
+        let schema = plugin.map_or(&[][..], |plugin| plugin.parameters());
+        let is_known = |key: &str| schema.iter().any(|parameter| parameter.id() == key);
+        let set = used.plugin.parameters.iter();
+        let kept = set.filter(|set| self.held.keeps_parameter(&used.name, &set.key) && is_known(&set.key));
+        other.plugin.parameters.extend(kept.cloned());
+        let (layer, now) = prepare_model(self.registry, &other, &self.config, Clock::Virtual)?;
+        *report = now;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a count
+        let generation = change.number as u16;
+        let model = u32::try_from(model).unwrap_or(u32::MAX);
+        drop(self.forces.replace(Replacement { model, generation, layer: Box::new(layer) }, tick));
+        Ok(())
+    }
+}
+
+impl Difference {
+    /// Adds one tick; the root mean squares hold sums until [`Self::finish`].
+    fn add(&mut self, record: &TickRecord, wrench: &Wrench) {
+        self.ticks += 1;
+        if bits(wrench) == bits(&record.model) {
+            return;
+        }
+        self.differing_ticks += 1;
+        self.first_tick.get_or_insert(record.tick);
+        self.last_tick = Some(record.tick);
+        let force_n = (wrench.force() - record.model.force()).length();
+        let torque_nm = (wrench.torque() - record.model.torque()).length();
+        self.max_force_n = self.max_force_n.max(force_n);
+        self.max_torque_nm = self.max_torque_nm.max(torque_nm);
+        self.rms_force_n += force_n * force_n;
+        self.rms_torque_nm += torque_nm * torque_nm;
+    }
+
+    fn finish(&mut self) {
+        let ticks = self.ticks.max(1) as f64;
+        self.rms_force_n = (self.rms_force_n / ticks).sqrt();
+        self.rms_torque_nm = (self.rms_torque_nm / ticks).sqrt();
+    }
+
+    /// True if every bit of every tick came out again.
+    #[must_use]
+    pub fn is_bit_exact(&self) -> bool {
+        self.differing_ticks == 0
+    }
+}
+
+fn bits(wrench: &Wrench) -> [u64; 6] {
+    let [fx, fy, fz] = wrench.force_n;
+    let [tx, ty, tz] = wrench.torque_nm;
+    [fx, fy, fz, tx, ty, tz].map(f64::to_bits)
+}
+
+/// Finds the files that settings of the run named. What was set for this replay means what it says.
+fn use_recorded_files(
+    uses: &mut [ModelUse],
+    held: &Held,
+    path: &Path,
+    run: &RunDescription,
+) -> Result<(), RunError> {
+    let recorded = run.plugins.iter().filter(|plugin| plugin.role != Role::Device);
+    for (model, then) in uses.iter_mut().zip(recorded) {
+        let (name, plugin) = (&model.name, &mut model.plugin);
+        for set in plugin.parameters.iter_mut().filter(|set| !held.keeps_parameter(name, &set.key)) {
+            *set = as_recorded(set, name, &then.parameters, path)?;
+        }
+    }
+    Ok(())
+}
+
+/// The models of a recorded run as a scene would name them.
+fn models_of(path: &Path, run: &RunDescription) -> Vec<ModelUse> {
+    let location = Location { file: PathBuf::from(path), line: 0 };
+    let model = |plugin: &flotor_record::PluginDescription| match plugin.role {
+        Role::Device => None,
+        Role::Model(mapping) => Some(ModelUse {
+            name: plugin.name.clone(),
+            plugin: PluginUse {
+                plugin: plugin.id.clone(),
+                location: location.clone(),
+                parameters: plugin
+                    .settings
+                    .iter()
+                    .map(|(key, value)| ParameterText {
+                        key: key.clone(),
+                        value: value.clone(),
+                        location: location.clone(),
+                    })
+                    .collect(),
+            },
+            device: plugin.device,
+            mapping,
+            places_m: plugin.places_m.clone(),
+            blend: plugin.blend,
+            isolation: Isolation::None, // nobody is held by a replay
+            field: plugin.field,
+            budget_s: None,
+        }),
+    };
+    run.plugins.iter().filter_map(model).collect()
+}

@@ -1,0 +1,270 @@
+//! M4 and M5: whether the model makes energy out of nothing.
+//!
+//! **M4, loop energy.** The hand takes the handle around random closed motions in all six dimensions. The
+//! work of the model's force on the hand over a lap, relative to all work exchanged, is zero for a force that
+//! comes from an energy; what is not zero can be pumped. The rectangle rule on a closed smooth motion
+//! converges faster than any power of the step, so 1e-9 can be told from zero; what it leaves uncertain is
+//! taken off.
+//!
+//! **M5, sampled energy.** A loop holds each force for a period, so even an honest spring gives back a little
+//! more than it took: along a hand-driven motion from home, the passivity observer of a zero-order hold, `E_n
+//! = E_(n-1) - f_(n-1) . (x_n - x_(n-1))` (Ryu, Kim and Hannaford, IEEE T-RA 20, 2004), ends every lap below
+//! zero. How much device damping would eat that energy up tells what the model asks of a device; Colgate and
+//! Schenkel (1997) bound it by `K T / 2` for a spring, a model that pumps needs more.
+
+use super::measure::{Measure, Verdict};
+use super::sweep::sweep;
+use super::{DAMPINGS_NS_PER_M, LEVER_M, Setup};
+use crate::sampling::Random;
+use crate::subject::Subject;
+use crate::tally::{Decades, Worst, tally};
+use crate::trajectory::Trajectory;
+use flotor_hal::abi::loader::LoadError;
+use flotor_hal::{DVec3, Memory, Pose, Twist, rotation_vector};
+
+const LOOPS: &str = "loop energy";
+/// Relative work that counts as none.
+const CONSERVATIVE: f64 = 1.0e-9;
+/// Samples of a lap: doubled from the first to the last until the work has settled.
+const SAMPLES: [usize; 7] = [256, 512, 1024, 2048, 4096, 8192, 16384];
+/// Relative change between two numbers of samples that counts as settled.
+const SETTLED: f64 = 1.0e-12;
+/// Steps a lap may cross: a motion of three harmonics meets a plane six times, and there may be two of them.
+const MOST_STEPS: f64 = 12.0;
+
+/// The work of one lap.
+struct Lap {
+    /// Work on the hand, J.
+    net_j: f64,
+    /// All work exchanged, J.
+    gross_j: f64,
+    /// What the samples leave uncertain about the work on the hand, J.
+    uncertain_j: f64,
+}
+
+impl Lap {
+    /// From the power at evenly spaced samples, J per lap.
+    fn from_powers(powers: &[f64]) -> Self {
+        let mean =
+            |numbers: &mut dyn Iterator<Item = f64>, count: usize| numbers.sum::<f64>() / count.max(1) as f64;
+        let net_j = mean(&mut powers.iter().copied(), powers.len());
+        let gross_j = mean(&mut powers.iter().map(|power| power.abs()), powers.len());
+        let every_other_j = mean(&mut powers.iter().step_by(2).copied(), powers.len() / 2);
+        let change_j = (net_j - every_other_j).abs();
+        if change_j <= SETTLED * gross_j {
+            return Self { net_j, gross_j, uncertain_j: 0.0 };
+        }
+        // Not smooth. Each step between two samples puts the rule off by up to its height times the interval.
+        let heights = powers.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+        let steps_j = MOST_STEPS * heights.fold(0.0, f64::max) / powers.len() as f64;
+        Self { net_j, gross_j, uncertain_j: (2.0 * change_j).max(steps_j) }
+    }
+
+    fn is_settled(&self) -> bool {
+        self.uncertain_j == 0.0
+    }
+}
+
+/// Power of the model on the hand along a lap, at evenly spaced samples.
+fn powers(subject: &mut Subject<'_>, path: &Trajectory, samples: usize) -> Option<Vec<f64>> {
+    let sample = |index: usize| {
+        let part = index as f64 / samples as f64;
+        let (pose, motion_m, turn_rad) = path.at(part);
+        let wrench = subject.ask(pose).ok()?.wrench;
+        Some(wrench.force().dot(motion_m) + wrench.torque().dot(turn_rad))
+    };
+    (0..samples).map(sample).collect()
+}
+
+fn lap(subject: &mut Subject<'_>, path: &Trajectory) -> Option<Lap> {
+    if subject.memory() == Memory::PathDependent {
+        // The first lap forgets where it came from, the second counts. Steps are short as they are.
+        powers(subject, path, 4096)?;
+        return Some(Lap::from_powers(&powers(subject, path, 4096)?));
+    }
+    let mut last = None;
+    for samples in SAMPLES {
+        let lap = Lap::from_powers(&powers(subject, path, samples)?);
+        let settled = lap.is_settled();
+        last = Some(lap);
+        if settled {
+            break;
+        }
+    }
+    last
+}
+
+tally! {
+    struct LoopTally {
+        laps: u64,
+        unanswered: u64,
+        beyond: u64,
+        rough: u64,
+        worst: Worst,
+        most_j: f64,
+        relative: Decades,
+    }
+}
+
+/// Around closed motions; with the distribution of relative work for the picture.
+pub(super) fn measure_loops(setup: &Setup<'_>) -> Result<(Measure, Decades), LoadError> {
+    let total = sweep(setup, LOOPS, setup.share(20_000, 10), |subject, block| {
+        let mut random = Random::new(setup.options.seed, block);
+        let path = Trajectory::random(&mut random, setup.options.reach.sizes());
+        let mut tally = LoopTally { laps: 1, ..LoopTally::default() };
+        let Some(lap) = lap(subject, &path) else {
+            tally.unanswered = 1;
+            return tally;
+        };
+        // A model with memory may eat energy (friction), never give it; one without can be run backwards.
+        let made_j = match subject.memory() {
+            Memory::Stateless => lap.net_j.abs(),
+            Memory::PathDependent => lap.net_j,
+        };
+        let relative =
+            if lap.gross_j > 0.0 { (made_j - lap.uncertain_j).max(0.0) / lap.gross_j } else { 0.0 };
+        tally.relative.count(relative);
+        tally.beyond = u64::from(relative > CONSERVATIVE);
+        tally.rough = u64::from(!lap.is_settled());
+        tally.most_j = made_j.max(0.0);
+        tally.worst.offer(relative, path.pose(0.0));
+        tally
+    })?;
+    Ok((judge_loops(&total), total.relative))
+}
+
+fn judge_loops(total: &LoopTally) -> Measure {
+    let verdict = Verdict::of(total.worst.value, CONSERVATIVE, CONSERVATIVE);
+    let remark = match verdict {
+        Verdict::Fail => format!(
+            "{} of {} loops make energy, up to {:.3} mJ a lap; the pose is where the worst starts",
+            total.beyond,
+            total.laps,
+            total.most_j * 1.0e3
+        ),
+        _ => format!("{} loops", total.laps),
+    };
+    Measure::of(["M4", LOOPS, ""], &total.worst, [CONSERVATIVE, CONSERVATIVE], remark)
+        .count("loops", total.laps)
+        .count("loops beyond the bound", total.beyond)
+        .count("loops where the work does not settle", total.rough)
+        .count("loops without answer", total.unanswered)
+        .with("largest work of a lap", total.most_j, "J")
+        .unless_unanswered(total.laps - total.unanswered)
+}
+
+const OBSERVER: &str = "sampled energy";
+/// Periods of the loop, ns: 4, 2 and 1 kHz.
+const PERIODS_NS: [u64; 3] = [250_000, 500_000, 1_000_000];
+/// A lap of the hand takes a second; with three harmonics it moves at 1 to 3 Hz, as hands do.
+const LAP_NS: u64 = 1_000_000_000;
+/// Laps of a motion.
+const LAPS: u64 = 2;
+
+tally! {
+    /// What the observer saw along a motion at one period.
+    struct Seen {
+        /// Most energy given to the hand since the start, J.
+        given_j: f64,
+        /// Damping that would have eaten up what whole laps gave away, N s/m, and where the observer was lowest.
+        damping: Worst,
+    }
+}
+
+tally! {
+    struct Observed {
+        seen: [Seen; PERIODS_NS.len()],
+        motions: u64,
+        unanswered: u64,
+    }
+}
+
+/// Takes the handle along a motion and keeps the account of a zero-order hold.
+///
+/// The account may be below zero on the way and mean nothing: what was stored at home was the model's to
+/// give. Only whole laps, which end where they started, tell what was made.
+fn observe(subject: &mut Subject<'_>, path: &Trajectory, period_ns: u64) -> Option<Seen> {
+    subject.restart();
+    let period_s = period_ns as f64 * 1.0e-9;
+    let ticks_per_lap = LAP_NS / period_ns;
+    let pose_at = |tick: u64| path.pose((tick % ticks_per_lap) as f64 / ticks_per_lap as f64);
+    let mut before = pose_at(0);
+    let mut held = subject.advance(before, Twist::ZERO, 0).ok()?.wrench;
+    let mut seen = Seen::default();
+    let (mut taken_j, mut motion, mut lowest) = (0.0, 0.0, before);
+    for tick in 1..=LAPS * ticks_per_lap {
+        let here = pose_at(tick);
+        let (shift_m, turn_rad) = moved(before, here);
+        taken_j -= held.force().dot(shift_m) + held.torque().dot(turn_rad);
+        motion += (shift_m.length_squared() + (turn_rad * LEVER_M).length_squared()) / period_s;
+        if -taken_j > seen.given_j {
+            (seen.given_j, lowest) = (-taken_j, here);
+        }
+        if tick.is_multiple_of(ticks_per_lap) {
+            seen.damping.offer(-taken_j / motion, lowest);
+        }
+        let twist = Twist::new(shift_m / period_s, turn_rad / period_s);
+        held = subject.advance(here, twist, period_ns).ok()?.wrench;
+        before = here;
+    }
+    Some(seen)
+}
+
+fn moved(from: Pose, to: Pose) -> (DVec3, DVec3) {
+    let turn = to.orientation() * from.orientation().conjugate();
+    (to.position() - from.position(), rotation_vector(turn))
+}
+
+/// Along hand-driven motions from home, at three periods.
+pub(super) fn measure_observer(setup: &Setup<'_>) -> Result<Measure, LoadError> {
+    let total = sweep(setup, OBSERVER, setup.share(4_000, 4), |subject, block| {
+        let mut random = Random::new(setup.options.seed, block);
+        let path = Trajectory::random(&mut random, setup.options.reach.sizes()).starting_at_home();
+        let mut observed = Observed::default();
+        for (sum, period_ns) in observed.seen.iter_mut().zip(PERIODS_NS) {
+            let seen = observe(subject, &path, period_ns);
+            observed.motions += 1;
+            observed.unanswered += u64::from(seen.is_none());
+            *sum = seen.unwrap_or_default();
+        }
+        observed
+    })?;
+    Ok(judge_observer(&total))
+}
+
+fn judge_observer(total: &Observed) -> Measure {
+    let [.., slowest] = &total.seen;
+    let remark = "device damping that eats up what holding the force gives away, 1 kHz";
+    let mut measure = Measure::of(["M5", OBSERVER, "N s/m"], &slowest.damping, DAMPINGS_NS_PER_M, remark);
+    for (period_ns, seen) in PERIODS_NS.iter().zip(&total.seen) {
+        let period_ms = *period_ns as f64 * 1.0e-6;
+        measure = measure
+            .with(format!("least observed energy, T = {period_ms} ms"), 0.0 - seen.given_j, "J")
+            .with(format!("damping needed, T = {period_ms} ms"), seen.damping.value, "N s/m");
+    }
+    measure
+        .count("motions", total.motions)
+        .count("motions without answer", total.unanswered)
+        .unless_unanswered(total.motions - total.unanswered)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    #[test]
+    fn a_smooth_lap_is_settled_and_a_step_is_not_mistaken_for_work() {
+        let powers =
+            |f: &dyn Fn(f64) -> f64| -> Vec<f64> { (0..1024).map(|i| f(f64::from(i) / 1024.0)).collect() };
+        let smooth = Lap::from_powers(&powers(&|part| (TAU * part).sin() * (1.0 + (TAU * part).cos())));
+        assert!(smooth.is_settled() && smooth.net_j.abs() < 1.0e-15);
+        // Plus one over part of the way, minus one over as much: no net work, but no grid hits both edges
+        // alike.
+        let steps = |part: f64| {
+            f64::from((0.1234..0.3456).contains(&part)) - f64::from((0.5..0.7222).contains(&part))
+        };
+        let stepped = Lap::from_powers(&powers(&steps));
+        assert!(!stepped.is_settled() && stepped.net_j.abs() <= stepped.uncertain_j, "{}", stepped.net_j);
+    }
+}

@@ -1,0 +1,203 @@
+//! Rules of a force model: numbers, repeatability, time, threads, energy, activity.
+
+use super::checks::Subject;
+use super::path::{CONFIG, FAST, directions, finite, grid, step, walk, walk_at};
+use flotor_hal::abi::CallStatus;
+use flotor_hal::abi::loader::Model;
+use flotor_hal::{
+    ActivityRegion, ActivityShape, DQuat, DVec3, Demand, Input, Memory, Output, Pose, Twist, Wrench,
+};
+use std::time::Instant;
+
+fn finite_at(model: &mut Model, pose: Pose) -> Result<(), String> {
+    finite(model, &Input::at_rest(pose)).map(|_| ())
+}
+
+pub(super) fn near_home(model: &mut Model) -> Result<(), String> {
+    finite_at(model, Pose::HOME)?;
+    for size_m in [1.0e-12, 1.0e-6, 1.0e-3, 5.0e-3] {
+        grid(size_m, size_m * 10.0).try_for_each(|pose| finite_at(model, pose))?;
+    }
+    Ok(())
+}
+
+pub(super) fn finite_in_motion(model: &mut Model) -> Result<(), String> {
+    for speed in [1.0, FAST] {
+        walk_at(speed, 3000).try_for_each(|input| finite(model, &input).map(|_| ()))?;
+    }
+    Ok(())
+}
+
+pub(super) fn not_finite(model: &mut Model) -> Result<(), String> {
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for axis in 0..7 {
+            let mut pose = Pose::HOME;
+            let numbers = pose.position_m.iter_mut().chain(&mut pose.orientation_xyzw);
+            numbers.skip(axis).take(1).for_each(|number| *number = bad);
+            finite_at(model, pose)?;
+        }
+    }
+    finite_at(model, Pose::HOME) // and it still works afterwards
+}
+
+pub(super) fn far_poses(model: &mut Model) -> Result<(), String> {
+    for size_m in [0.03, 1.0, 1.0e9, 1.0e300] {
+        grid(size_m, 3.0).try_for_each(|pose| finite_at(model, pose))?;
+    }
+    Ok(())
+}
+
+pub(super) fn reset_repeats(model: &mut Model) -> Result<(), String> {
+    // In motion first, with the time of a loop: what is integrated shows there and nowhere else.
+    let run = |model: &mut Model| -> Result<Vec<Output>, String> {
+        let at_rest = grid(2.0e-3, 0.05).map(Input::at_rest);
+        walk(500).chain(at_rest).map(|input| step(model, &input)).collect()
+    };
+    let first = run(model)?;
+    match model.reset() {
+        CallStatus::Ok => {}
+        other => return Err(format!("reset was answered {other:?}")),
+    }
+    let second = run(model)?;
+    let differs = first.iter().zip(&second).position(|(a, b)| a.wrench != b.wrench);
+    differs
+        .map_or(Ok(()), |index| Err(format!("pose {index} of the same walk gave another answer after reset")))
+}
+
+pub(super) fn time_budget(model: &mut Model) -> Result<(), String> {
+    const STEPS: usize = 1000;
+    let mut took_ns = Vec::with_capacity(STEPS);
+    for input in walk(STEPS as u64) {
+        let started = Instant::now();
+        // Failing is quick: it would pass.
+        step(model, &input)?;
+        took_ns.push(started.elapsed().as_nanos());
+    }
+    took_ns.sort_unstable();
+    let usual_ns = took_ns.get(STEPS * 99 / 100).copied().unwrap_or_default();
+    let limit_ns = u128::from(CONFIG.period_ns / 2);
+    if usual_ns <= limit_ns {
+        return Ok(());
+    }
+    Err(format!("one step in a hundred takes more than {} µs, of {} µs", usual_ns / 1000, limit_ns / 1000))
+}
+
+/// Wrenches of a walk; two models may be walked in turns.
+fn walked(models: &mut [&mut Model]) -> Result<Vec<Vec<Wrench>>, String> {
+    let mut wrenches = vec![Vec::new(); models.len()];
+    for input in walk(500) {
+        for (model, wrenches) in models.iter_mut().zip(&mut wrenches) {
+            wrenches.push(step(model, &input)?.wrench);
+        }
+    }
+    Ok(wrenches)
+}
+
+pub(super) fn independent(subject: &Subject) -> Result<(), String> {
+    let make = || subject.prepared_model();
+    let alone = walked(&mut [&mut make()?])?;
+    let alone = alone.first().cloned().unwrap_or_default();
+    let in_turns = walked(&mut [&mut make()?, &mut make()?])?;
+    if in_turns.iter().any(|wrenches| *wrenches != alone) {
+        return Err("two instances stepped in turns answer otherwise than one alone".to_owned());
+    }
+    // Made here, used there: a loop has a thread of its own.
+    let elsewhere: Vec<_> = [make()?, make()?]
+        .map(|mut model| std::thread::spawn(move || walked(&mut [&mut model])))
+        .into_iter()
+        .map(|thread| thread.join().map_err(|_| "a thread panicked".to_owned())?)
+        .collect::<Result<_, String>>()?;
+    if elsewhere.iter().flatten().any(|wrenches| *wrenches != alone) {
+        return Err("two instances stepped on two threads answer otherwise than one alone".to_owned());
+    }
+    Ok(())
+}
+
+pub(super) fn no_threads(model: &mut Model) -> Result<(), String> {
+    let threads = || std::fs::read_dir("/proc/self/task").map_or(0, Iterator::count);
+    let before = threads();
+    let _ = walked(&mut [model])?;
+    let after = threads();
+    if after <= before { Ok(()) } else { Err(format!("{} threads more after 500 steps", after - before)) }
+}
+
+/// Compares force and energy over steps of a micrometre at poses of a walk. A kink in the law may lie between
+/// two of them, so that a few may differ, but not one in ten.
+pub(super) fn energy_gradient(model: &mut Model) -> Result<(), String> {
+    const STEP_M: f64 = 1.0e-6;
+    const TOLERATED: usize = 10;
+    if model.memory() != Memory::Stateless || !model.serves().contains(Demand::ENERGY) {
+        return Ok(());
+    }
+    let mut seen: Vec<(f64, f64)> = Vec::new();
+    for input in walk(2000).step_by(20) {
+        for axis in DVec3::AXES {
+            let at = |model: &mut Model, along: f64| {
+                let position = input.pose.position() + axis * along;
+                step(model, &Input::at_rest(Pose::new(position, input.pose.orientation())))
+            };
+            let [ahead, here, behind] = [at(model, STEP_M)?, at(model, 0.0)?, at(model, -STEP_M)?];
+            let gradient_n = (ahead.energy_j - behind.energy_j) / (2.0 * STEP_M);
+            if gradient_n.is_finite() {
+                seen.push((here.wrench.force().dot(axis), -gradient_n));
+            }
+        }
+    }
+    let largest_n = seen.iter().fold(0.0, |largest: f64, (force_n, _)| largest.max(force_n.abs()));
+    // Rounding of the energy over the step, and the curvature of the law, are far below a hundredth of the
+    // force.
+    let differs = |(force_n, gradient_n): &&(f64, f64)| (force_n - gradient_n).abs() > 0.01 * largest_n;
+    let different = seen.iter().filter(differs).count();
+    if different * TOLERATED <= seen.len() {
+        return Ok(());
+    }
+    let example = seen.iter().find(differs).map_or(String::new(), |(force_n, gradient_n)| {
+        format!(": {force_n:.4} N where the energy's gradient says {gradient_n:.4} N")
+    });
+    Err(format!("force and energy disagree in {different} of {} places{example}", seen.len()))
+}
+
+/// Asks around the region in which the model says it acts: a host does not ask there, and takes zero for
+/// granted.
+pub(super) fn activity(model: &mut Model) -> Result<(), String> {
+    let region = model.activity();
+    if region.shape() == ActivityShape::Everywhere {
+        return Ok(());
+    }
+    let turned = DQuat::from_scaled_axis(DVec3::new(0.1, -0.2, 0.05));
+    let mut ticks = 0..;
+    for position_m in around(&region).filter(|position_m| !region.contains(*position_m)) {
+        let outwards = (position_m - region.center()).normalize_or_zero();
+        for velocity_m_per_s in [DVec3::ZERO, outwards * 0.1, outwards * -0.1] {
+            // From the middle each time: what was felt inside must be over outside.
+            for pose in [Pose::new(region.center(), DQuat::IDENTITY), Pose::new(position_m, turned)] {
+                let tick = ticks.next().unwrap_or(0);
+                let twist = Twist::new(velocity_m_per_s, DVec3::ZERO);
+                let (time_ns, dt_ns) = (tick * CONFIG.period_ns, CONFIG.period_ns);
+                let input = Input { tick, time_ns, dt_ns, twist, ..Input::at_rest(pose) };
+                let output = finite(model, &input)?;
+                let acts = output.wrench != Wrench::ZERO || output.energy_j.abs() > 0.0;
+                if acts && !region.contains(pose.position()) {
+                    return Err(format!(
+                        "at {position_m} m, outside its region, it answered {:?} and {} J",
+                        output.wrench, output.energy_j
+                    ));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Positions around a region: a hair outside, a little, and far.
+fn around(region: &ActivityRegion) -> impl Iterator<Item = DVec3> {
+    let (center_m, half_m, shape) = (region.center(), region.half_sides(), region.shape());
+    directions().filter(|direction| *direction != DVec3::ZERO).flat_map(move |direction| {
+        [1.0e-9, 1.0e-3, 1.0].map(move |gap| {
+            // Relative as well: a hair of a large region is more than rounding takes away.
+            let outside_m = half_m * (1.0 + gap) + DVec3::splat(gap);
+            let direction = if shape == ActivityShape::Sphere { direction.normalize() } else { direction };
+            center_m + direction * outside_m
+        })
+    })
+}

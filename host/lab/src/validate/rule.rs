@@ -1,0 +1,88 @@
+//! What is checked: the rules of the contract, and what this host finds out beside them.
+
+use flotor_hal::abi::PluginKind;
+use flotor_hal::conformance::Rule;
+
+/// One thing that is checked of a plugin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Check {
+    /// A rule of the contract's own list.
+    Contract(Rule),
+    /// A handle that moves gets finite numbers as well.
+    FiniteInMotion,
+    /// Live parameters can be set, answer in time and are reported back.
+    LiveParameters,
+    /// Outside the region that a model declares it does nothing.
+    Activity,
+    /// A law without memory gives out no energy.
+    Passive,
+    /// A step computes and does nothing else.
+    SystemCalls,
+}
+
+impl Check {
+    /// What this host checks beside the contract's list, in this order.
+    const OF_THE_HOST: [Self; 5] =
+        [Self::FiniteInMotion, Self::LiveParameters, Self::Activity, Self::Passive, Self::SystemCalls];
+
+    /// Everything, in the order it is checked.
+    pub fn all() -> impl Iterator<Item = Self> {
+        Rule::ALL.into_iter().map(Self::Contract).chain(Self::OF_THE_HOST)
+    }
+
+    /// Short name in reports.
+    #[must_use]
+    pub const fn id(self) -> &'static str {
+        match self {
+            Self::Contract(rule) => rule.id(),
+            Self::FiniteInMotion => "finite-in-motion",
+            Self::LiveParameters => "live-parameters",
+            Self::Activity => "activity",
+            Self::Passive => "passive",
+            Self::SystemCalls => "no-system-calls",
+        }
+    }
+
+    /// What is demanded, for people.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Contract(rule) => rule.text(),
+            Self::FiniteInMotion => "where the handle moves, slowly and fast, the wrench is finite",
+            Self::LiveParameters => {
+                "live parameters can be set, answer in time and report the value in force"
+            }
+            Self::Activity => "outside the region a model declares, wrench and energy are zero",
+            Self::Passive => "a model without memory gives out no energy on a closed path or there and back",
+            Self::SystemCalls => "a step allocates nothing, starts no thread and calls nothing of the system",
+        }
+    }
+
+    /// The check with a short name, if there is one.
+    #[must_use]
+    pub fn from_id(id: &str) -> Option<Self> {
+        Self::all().find(|check| check.id() == id)
+    }
+
+    /// Whether it is about plugins of this kind.
+    #[must_use]
+    pub const fn applies_to(self, kind: PluginKind) -> bool {
+        match self {
+            Self::Contract(rule) => rule.applies_to(kind),
+            _ => matches!(kind, PluginKind::Model),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_check_is_found_by_its_own_name() {
+        for check in Check::all() {
+            assert_eq!(Check::from_id(check.id()), Some(check));
+        }
+        assert_eq!(Check::from_id("no such rule"), None);
+    }
+}
