@@ -79,17 +79,17 @@ pub enum Seen {
 
 /// What the process that checks one rule says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Verdict {
+pub struct Verdict {
     /// `None` if the rule holds, else what was seen.
-    pub(crate) seen: Option<Seen>,
+    pub seen: Option<Seen>,
     /// What was measured on the way.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) figures: Option<Figures>,
+    pub figures: Option<Figures>,
 }
 
 impl Verdict {
     /// The verdict on one rule, of this process.
-    pub(crate) fn of(checked: Result<Option<Figures>, Seen>) -> Self {
+    pub fn of(checked: Result<Option<Figures>, Seen>) -> Self {
         match checked {
             Ok(figures) => Self { seen: None, figures },
             Err(seen) => Self { seen: Some(seen), figures: None },
@@ -105,7 +105,7 @@ impl Verdict {
     ///
     /// # Errors
     /// Standard input is no such file.
-    pub(crate) fn deliver(&self) -> io::Result<()> {
+    pub fn deliver(&self) -> io::Result<()> {
         let mut file = File::from(io::stdin().as_fd().try_clone_to_owned()?);
         file.write_all(&serde_json::to_vec(self)?)
     }
@@ -118,7 +118,7 @@ const LOOK: Duration = Duration::from_millis(2);
 /// real-time. A rule may take `patience`; `program` starts this program once more, to check one rule of the file and
 /// to [deliver](Verdict::deliver) the verdict.
 #[must_use]
-pub(crate) fn validate(path: &Path, patience: Duration, program: impl Fn(Check) -> Command) -> Vec<Finding> {
+pub fn validate(path: &Path, patience: Duration, program: impl Fn(Check) -> Command) -> Vec<Finding> {
     let mut findings = Vec::new();
     let mut note = |check: Check, verdict: Verdict| {
         let is_violated = matches!(verdict.seen, Some(Seen::Violation(_)));
