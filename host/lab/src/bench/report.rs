@@ -181,31 +181,34 @@ impl BenchReport {
         };
         let torque = Panel::new(Axis::log("Torque, rms error", "N·m"));
         // The reference itself has no error, and no place on a logarithmic axis.
-        let with_errors = self.rows.iter().filter_map(|row| {
-            row.distance.filter(|distance| distance.force_rms_n > 0.0).map(|distance| (row, distance))
-        });
-        let (mut panels, mut in_batches) = ((force, torque), (Vec::new(), Vec::new()));
-        for (CaseRow { name, times: [_, wrench, _], .. }, Distance { force_rms_n, torque_rms_nm, .. }) in
-            with_errors
-        {
-            let (force, torque) = panels;
-            panels = (
-                force.series(Series::points(name.clone(), [(wrench.mean_ns, force_rms_n)])),
-                // One legend is enough.
-                torque.series(Series::points("", [(wrench.mean_ns, torque_rms_nm)])),
+        let with_errors: Vec<(&CaseRow, Distance)> = self
+            .rows
+            .iter()
+            .filter_map(|row| Some((row, row.distance.filter(|distance| distance.force_rms_n > 0.0)?)))
+            .collect();
+        // One legend is enough.
+        let drawn = |panel: Panel, has_legend: bool, error: fn(&Distance) -> f64| {
+            let name = |name: &str| if has_legend { name.to_owned() } else { String::new() };
+            let in_batches =
+                with_errors.iter().filter_map(|(CaseRow { times: [_, wrench, _], .. }, distance)| {
+                    Some((wrench.batch_ns?, error(distance)))
+                });
+            let cases = with_errors.iter().fold(
+                panel,
+                |panel, (CaseRow { name: case, times: [_, wrench, _], .. }, distance)| {
+                    panel.series(Series::points(name(case), [(wrench.mean_ns, error(distance))]))
+                },
             );
-            in_batches.0.extend(wrench.batch_ns.map(|ns| (ns, force_rms_n)));
-            in_batches.1.extend(wrench.batch_ns.map(|ns| (ns, torque_rms_nm)));
-        }
-        let (force, torque) = panels;
+            cases.series(Series::points(name("in a batch"), in_batches))
+        };
         Figure::new(title, Axis::log("Time of a tick with force and torque, or of a pose in a batch", "ns"))
             .subtitle(format!(
                 "{} ticks of a smooth path of 1 to 3 Hz at 1 kHz; {against}; a tick has 1 000 000 ns",
                 self.ticks
             ))
             .panel_height_px(220.0)
-            .panel(force.series(Series::points("in a batch", in_batches.0)))
-            .panel(torque.series(Series::points("", in_batches.1)))
+            .panel(drawn(force, true, |distance| distance.force_rms_n))
+            .panel(drawn(torque, false, |distance| distance.torque_rms_nm))
             .to_svg()
     }
 }

@@ -6,7 +6,6 @@ use flotor_core::trace::{Events, TickRecord};
 use flotor_record::RunDescription;
 use flotor_servo::Port;
 use serde::Serialize;
-use std::fmt;
 
 /// The ticks of a run that can be compared. One that lost the record of a device cannot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -58,27 +57,40 @@ impl Coverage {
 }
 
 /// Why a wrench does not come out again.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, thiserror::Error)]
 #[serde(tag = "cause", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum WhyApart {
     /// A model had a thread of its own, and nobody knows any more which field the loop had when.
+    #[error(
+        "`{model}` was computed beside the loop on the real clock, and when its fields came is not in the recording"
+    )]
     FieldOnRealClock {
         /// Its name.
         model: String,
     },
     /// A model was not asked any more, or could not answer, because of the time it took or the process it was
     /// in.
+    #[error(
+        "in tick {tick} of the run a model was out, because it had taken too long or its process failed, and here it is \
+         not"
+    )]
     ModelOut {
         /// The first tick of the run in which that made a difference.
         tick: u64,
     },
     /// A model was late, and its answer before stood in for the one that was due.
+    #[error(
+        "in tick {tick} of the run the answer of a model came too late and the one before was used, and here none is late"
+    )]
     ModelLate {
         /// The first tick of the run in which that made a difference.
         tick: u64,
     },
     /// Ticks are missing, and up to them the wrench came out bit for bit.
+    #[error(
+        "{ticks} ticks are missing after tick {after_tick}, and with them what models and couplings remember"
+    )]
     Gap {
         /// The last tick before them.
         after_tick: u64,
@@ -86,47 +98,21 @@ pub enum WhyApart {
         ticks: u64,
     },
     /// The recording began while the run was on.
+    #[error(
+        "the recording begins at tick {first_tick} of the run: what had changed by then, and what models and couplings \
+         remembered, is not in it"
+    )]
     JoinedLate {
         /// Its first tick.
         first_tick: u64,
     },
     /// Nothing in the recording tells.
+    #[error("another build of the plugin, or another machine")]
     OtherBuild,
 }
 
-impl fmt::Display for WhyApart {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::FieldOnRealClock { model } => write!(
-                f,
-                "`{model}` was computed beside the loop on the real clock, and when its fields came is not in the \
-                 recording"
-            ),
-            Self::ModelOut { tick } => write!(
-                f,
-                "in tick {tick} of the run a model was out, because it had taken too long or its process failed, and \
-                 here it is not"
-            ),
-            Self::ModelLate { tick } => write!(
-                f,
-                "in tick {tick} of the run the answer of a model came too late and the one before was used, and here \
-                 none is late"
-            ),
-            Self::Gap { after_tick, ticks } => write!(
-                f,
-                "{ticks} ticks are missing after tick {after_tick}, and with them what models and couplings remember"
-            ),
-            Self::JoinedLate { first_tick } => write!(
-                f,
-                "the recording begins at tick {first_tick} of the run: what had changed by then, and what models and \
-                 couplings remembered, is not in it"
-            ),
-            Self::OtherBuild => f.write_str("another build of the plugin, or another machine"),
-        }
-    }
-}
-
 /// What is gathered on the way, to tell the cause.
+#[derive(Default)]
 pub(super) struct Evidence {
     pub(super) coverage: Coverage,
     /// A model with fields of unknown times.
@@ -143,13 +129,7 @@ impl Evidence {
     pub(super) fn of(run: &RunDescription) -> Self {
         let is_timed = run.clock == Clock::Real;
         let beside = run.plugins.iter().find(|plugin| is_timed && plugin.field.is_some());
-        Self {
-            coverage: Coverage::default(),
-            field: beside.map(|plugin| plugin.name.clone()),
-            gap: None,
-            out_at: None,
-            cause: None,
-        }
+        Self { field: beside.map(|plugin| plugin.name.clone()), ..Self::default() }
     }
 
     /// Looks at a tick, before it is compared: one record and one port for each device.

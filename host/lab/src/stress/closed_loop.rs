@@ -187,14 +187,11 @@ fn buzz_n(forces_n: &[DVec3]) -> f64 {
     let slow_bins = (0..BUZZ_WINDOW).take_while(|bin| *bin as f64 / (count * PERIOD_S) < BUZZ_FROM_HZ);
     let slow: f64 = slow_bins
         .map(|bin| {
-            let turning = circle.iter().cycle().step_by(bin.max(1));
-            let turning = turning.map(|(sine, cosine)| if bin == 0 { (0.0, 1.0) } else { (*sine, *cosine) });
-            let (real, imaginary) = windowed.iter().zip(turning).fold(
-                (DVec3::ZERO, DVec3::ZERO),
-                |(real, imaginary), (force, (sine, cosine))| {
-                    (real + *force * cosine, imaginary + *force * sine)
-                },
-            );
+            let (real, imaginary) =
+                (0..BUZZ_WINDOW).fold((DVec3::ZERO, DVec3::ZERO), |(real, imaginary), step| {
+                    let (sine, cosine) = circle[bin * step % BUZZ_WINDOW];
+                    (real + windowed[step] * cosine, imaginary + windowed[step] * sine)
+                });
             // Every frequency but zero stands for itself and its mirror image.
             let images = if bin == 0 { 1.0 } else { 2.0 };
             images * (real.length_squared() + imaginary.length_squared()) / (count * count)
@@ -256,21 +253,16 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
         vec![Row { conditions, start, release: release(subject, conditions, start, &mut random) }]
     })?;
     let mut measure = judge(&rows);
-    for limit in limits(setup)? {
-        measure = measure.with(format!("stiffness limit, {}", limit.name), limit.seen_n_per_m, "N/m").with(
-            format!("stiffness limit by the rule, {}", limit.name),
-            limit.rule_n_per_m,
+    let mut limits = limits(setup)?;
+    limits.sort_by(|(a, ..), (b, ..)| a.cmp(b));
+    for (name, seen_n_per_m, rule_n_per_m) in limits {
+        measure = measure.with(format!("stiffness limit, {name}"), seen_n_per_m, "N/m").with(
+            format!("stiffness limit by the rule, {name}"),
+            rule_n_per_m,
             "N/m",
         );
     }
     Ok(measure)
-}
-
-/// Where the loop tips over near home.
-struct Limit {
-    name: String,
-    seen_n_per_m: f64,
-    rule_n_per_m: f64,
 }
 
 /// Halvings of the search: two decades to a thousandth.
@@ -278,21 +270,15 @@ const HALVINGS: usize = 12;
 /// Start of the search for the limit, as a part of the workspace: small enough to be linear.
 const LINEAR: f64 = 1.0e-3;
 
-fn limits(setup: &Setup<'_>) -> Result<Vec<Limit>, LoadError> {
-    let cases: Vec<(f64, usize)> = DAMPINGS_NS_PER_M
-        .into_iter()
-        .flat_map(|damping| DELAYS_TICKS.map(|delay_ticks| (damping, delay_ticks)))
-        .collect();
+/// Where each clean loop tips over near home: what it is, N/m as seen, and by the rule.
+fn limits(setup: &Setup<'_>) -> Result<Vec<(String, f64, f64)>, LoadError> {
+    let clean: Vec<Loop> = loops().into_iter().filter(Loop::is_clean).collect();
     let reach = setup.options.reach.scaled(LINEAR);
     let start = at(DVec3::ONE * reach.position_m, DVec3::ONE * reach.rotation_rad);
-    sweep(setup, "stiffness limits", cases.len() as u64, |subject, block| {
-        let index = usize::try_from(block).unwrap_or(0);
-        let (damping_ns_per_m, delay_ticks) = cases[index];
-        let clean = Loop { damping_ns_per_m, delay_ticks, quantum_m: 0.0, dropped: 0.0, gain: 1.0 };
-        let rule_n_per_m = clean.stiffest_n_per_m();
-        let name = format!("b = {damping_ns_per_m} N s/m, delay {delay_ticks}");
-        let seen_n_per_m = limit(subject, clean, start).unwrap_or(f64::NAN);
-        vec![Limit { name, seen_n_per_m, rule_n_per_m }]
+    sweep(setup, "stiffness limits", clean.len() as u64, |subject, block| {
+        let clean = clean[usize::try_from(block).unwrap_or(0)];
+        let name = format!("b = {} N s/m, delay {}", clean.damping_ns_per_m, clean.delay_ticks);
+        vec![(name, limit(subject, clean, start).unwrap_or(f64::NAN), clean.stiffest_n_per_m())]
     })
 }
 
