@@ -2,6 +2,7 @@
 
 use crate::plot::{Axis, Bin, Panel, Series};
 use crate::servo::Timing;
+use flotor_hal::math;
 
 /// Ticks by lateness and by compute time, and every sixteenth tick by the time of its stages; each panel has its own,
 /// logarithmic axis of time. Not real-time.
@@ -31,7 +32,7 @@ pub(crate) fn octaves(bins: &[(u64, u64)]) -> Vec<Bin> {
         #[allow(clippy::cast_precision_loss)] // for a picture
         let us = *ns as f64 * 1.0e-3;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most some two hundred bins
-        let index = (4.0 * (us / FIRST_US).max(1.0).log2()).floor() as usize;
+        let index = (4.0 * math::log2((us / FIRST_US).max(1.0))).floor() as usize;
         if heights.len() <= index {
             heights.resize(index + 1, 0.0);
         }

@@ -1,6 +1,6 @@
 //! The motion every case goes along: smooth, in all six coordinates, never at rest for long.
 
-use flotor_hal::{DVec3, Pose, orientation_from_rotation_vector};
+use flotor_hal::{DVec3, Pose, math, orientation_from_rotation_vector};
 use std::f64::consts::TAU;
 
 /// Amplitude and frequency of a coordinate, m or rad and Hz. Within ±4 mm and ±2°, at 1 to 3 Hz: what a hand
@@ -27,7 +27,7 @@ impl Hand {
     /// Pose at a time, s.
     pub(super) fn at(self, time_s: f64) -> Pose {
         let [x, y, z, rx, ry, rz] =
-            COORDINATES.map(|(amplitude, frequency_hz)| amplitude * (TAU * frequency_hz * time_s).sin());
+            COORDINATES.map(|(amplitude, frequency_hz)| amplitude * math::sin(TAU * frequency_hz * time_s));
         let position_m = DVec3::new(x, y, z - self.depth_m);
         Pose::new(position_m, orientation_from_rotation_vector(DVec3::new(rx, ry, rz)))
     }

@@ -9,7 +9,7 @@ use crate::coupling::{
 };
 use crate::trace::Events;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{DeviceState, Tick, Wrench, instructions};
+use flotor_hal::{DeviceState, Tick, Wrench};
 
 /// What passes through the port of one device in a tick, device frame.
 #[derive(Clone, Copy, Debug)]
@@ -199,14 +199,6 @@ impl Forces {
     /// are near, no allocation.
     #[inline(never)] // registers of its own: in the tick as a whole there are none left
     pub(crate) fn step(&mut self, tick: &Tick, ports: &mut [Port], heart: &Heartbeat) {
-        instructions::best(
-            #[inline(always)]
-            || self.ask(tick, ports, heart),
-        );
-    }
-
-    #[inline(always)] // into what chooses the instructions
-    fn ask(&mut self, tick: &Tick, ports: &mut [Port], heart: &Heartbeat) {
         let Self { stacks, couplings, .. } = self;
         // The couplings first: what is held now is what they and the models asked for last.
         if !couplings.is_empty() {

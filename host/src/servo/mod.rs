@@ -52,7 +52,7 @@ pub use watchdog::{Place, Stuck};
 use crate::trace::{Events, TickRecord};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::ActiveDevice;
-use flotor_hal::{Fault, Tick, instructions};
+use flotor_hal::{Fault, Tick};
 use stopwatch::{Moment, Stopwatch};
 use timing::STAGE_SAMPLING;
 
@@ -123,17 +123,12 @@ impl Servo {
     #[inline]
     #[cfg_attr(rtsan, sanitize(realtime = "nonblocking"))]
     pub(crate) fn tick(&mut self, due: &Due, stop: &StopSwitch, leave: impl FnMut(&TickRecord)) {
-        instructions::best(
-            #[inline(always)]
-            || {
-                let done = self.advance(due, stop);
-                self.leave_records(due, done, leave);
-            },
-        );
+        let done = self.advance(due, stop);
+        self.leave_records(due, done, leave);
     }
 
     /// A record of the tick for each device.
-    #[inline(always)] // as `advance`
+    #[inline]
     fn leave_records(&self, due: &Due, done: Done, mut leave: impl FnMut(&TickRecord)) {
         let Done { events, compute_ns } = done;
         for (device, (station, port)) in (0..).zip(self.stations.iter().zip(&self.ports)) {
@@ -161,7 +156,7 @@ impl Servo {
     }
 
     /// All of a tick but its records.
-    #[inline(always)] // into what chooses the instructions
+    #[inline]
     fn advance(&mut self, due: &Due, stop: &StopSwitch) -> Done {
         let Due { tick, lateness_ns, missed, .. } = due;
         let started = self.ended.take().unwrap_or_else(|| self.stopwatch.now());
@@ -215,7 +210,7 @@ impl Servo {
     }
 
     /// What was to change before this tick does so now. Nearly always that is nothing.
-    #[inline(always)] // as `advance`
+    #[inline]
     fn change_parameters(&mut self, tick: &Tick, events: &mut Events) {
         let Self { forces, parameters, exchange, .. } = self;
         // Looked at before the replacements: whoever sent one of these after a replacement has sent that too.
@@ -256,7 +251,7 @@ impl Servo {
 
     /// Newest samples of all devices; what the worst of them means for the run (the hand is not to be trusted to feel
     /// one device while another is lost), and the buttons of all.
-    #[inline(always)] // as `advance`
+    #[inline]
     fn read(&mut self, tick: &Tick) -> (RunEvent, u32) {
         let (mut worst, mut buttons) = (RunEvent::SamplesBack, 0);
         for (device, (station, port)) in (0..).zip(self.stations.iter_mut().zip(&mut self.ports)) {
@@ -272,7 +267,7 @@ impl Servo {
     }
 
     /// Sends what is to be sent to all devices.
-    #[inline(always)] // as `advance`
+    #[inline]
     fn write(&mut self, tick: &Tick) {
         let Self { stations, ports, heart, run, config, .. } = self;
         for (device, (station, port)) in (0..).zip(stations.iter_mut().zip(ports)) {
@@ -284,7 +279,7 @@ impl Servo {
     }
 
     /// Takes the run where the samples, the clock and everybody who may stop it lead.
-    #[inline(always)] // as `advance`
+    #[inline]
     fn follow(
         &mut self,
         sample: RunEvent,
@@ -319,7 +314,7 @@ impl Servo {
         self.run = self.run.after(event, tick.time_ns, self.config.ramp_ns);
     }
 
-    #[inline(always)] // as `advance`
+    #[inline]
     fn account(&mut self, lateness_ns: Option<u64>, compute_ns: u64, missed: u64) {
         self.timing.compute.record(compute_ns);
         self.timing.ticks += 1;

@@ -5,7 +5,7 @@ use super::forces::Port;
 use super::state::{Cause, Gate, RunEvent};
 use crate::trace::Events;
 use flotor_hal::abi::loader::ActiveDevice;
-use flotor_hal::{Axes, Conditions, Cycle, Fault, Tick, instructions};
+use flotor_hal::{Axes, Conditions, Cycle, Fault, Tick};
 
 /// Time without a new sample after which there is no force: what is older than this is not where the hand is. In 10 ms a
 /// 10 Hz movement of 5 mm goes 3 mm.
@@ -34,7 +34,7 @@ impl Station {
     /// Newest sample into the port; an old one stays, a senseless one is never used. What it means for the run.
     ///
     /// Real-time: bounded by the device, no allocation.
-    #[inline(always)] // into what chooses the instructions
+    #[inline]
     pub(super) fn read(&mut self, tick: &Tick, port: &mut Port) -> RunEvent {
         let last = port.state;
         match self.device.read(tick, &mut port.state) {
@@ -63,17 +63,12 @@ impl Station {
     /// What of the port's request may be sent. Real-time: bounded, no allocation.
     #[inline(never)] // registers of its own: in the tick as a whole there are none left
     pub(super) fn limit(&mut self, tick: &Tick, gate: Gate, port: &mut Port) {
-        instructions::best(
-            #[inline(always)]
-            || {
-                let Port { state, asked, commanded, events, .. } = port;
-                *commanded = self.envelope.apply(asked, gate, state, tick, events);
-            },
-        );
+        let Port { state, asked, commanded, events, .. } = port;
+        *commanded = self.envelope.apply(asked, gate, state, tick, events);
     }
 
     /// Sends it. What it means for the run, if anything. Real-time: bounded by the device, no allocation.
-    #[inline(always)] // as `read`
+    #[inline]
     pub(super) fn write(&mut self, tick: &Tick, port: &mut Port) -> Option<RunEvent> {
         let Cycle::Fault(fault) = self.device.write(tick, &port.commanded) else { return None };
         Some(self.failed(fault, port))

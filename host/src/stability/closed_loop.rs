@@ -13,7 +13,7 @@
 use super::search::largest_stable;
 use super::theory::Plant;
 use flotor_hal::abi::loader::{ActiveDevice, LoadError, OpenedDevice, Plugin, Setting, SettingError};
-use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Refusal, Tick, Wrench};
+use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Refusal, Tick, Wrench, math};
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
@@ -232,7 +232,7 @@ impl Window {
     }
 
     fn add(&mut self, sample: f64) {
-        let weight = 1.0 - self.phase.cos();
+        let weight = 1.0 - math::cos(self.phase);
         self.phase += self.step;
         self.weight += weight;
         self.sum += weight * sample * sample;

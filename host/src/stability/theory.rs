@@ -10,6 +10,7 @@
 //!   9:011005): a linear rule for little damping, short delay and fast sampling.
 
 use super::search::largest_stable;
+use flotor_hal::math;
 use std::convert::Infallible;
 use std::f64::consts::PI;
 
@@ -62,8 +63,8 @@ pub fn passive_limit_n_per_m(damping_ns_per_m: f64, rendering: &Rendering) -> f6
     for index in 1..=FREQUENCIES {
         let angle = PI * f64::from(index) / f64::from(FREQUENCIES);
         // Real part of (1 - e^-ja)^n e^-jda over 2 (1 - cos a), for the spring (n = 1) and the damper (n = 2).
-        let cosine = |ticks: f64| (angle * (delay + ticks)).cos();
-        let scale = 2.0 * (1.0 - angle.cos());
+        let cosine = |ticks: f64| math::cos(angle * (delay + ticks));
+        let scale = 2.0 * (1.0 - math::cos(angle));
         let of_spring = period_s * (cosine(0.0) - cosine(1.0)) / scale;
         let of_damper = (cosine(0.0) - 2.0 * cosine(1.0) + cosine(2.0)) / scale;
         let left = damping_ns_per_m - virtual_damping_ns_per_m * of_damper;

@@ -2,7 +2,7 @@
 
 use super::poses::{Reach, at};
 use crate::sampling::Random;
-use flotor_hal::{DVec3, Pose};
+use flotor_hal::{DVec3, Pose, math};
 use std::f64::consts::TAU;
 
 /// Harmonics of a motion: enough to turn in every plane of the six dimensions at once.
@@ -35,7 +35,7 @@ impl Series {
         let terms = self.cosines.iter().zip(&self.sines).enumerate();
         terms.fold(self.mean, |sum, (index, (cosine, sine))| {
             let angle = TAU * part * (index + 1) as f64;
-            sum + *cosine * angle.cos() + *sine * angle.sin()
+            sum + *cosine * math::cos(angle) + *sine * math::sin(angle)
         })
     }
 
@@ -45,7 +45,7 @@ impl Series {
         terms.fold(DVec3::ZERO, |sum, (index, (cosine, sine))| {
             let rate = TAU * (index + 1) as f64;
             let angle = rate * part;
-            sum + (*sine * angle.cos() - *cosine * angle.sin()) * rate
+            sum + (*sine * math::cos(angle) - *cosine * math::sin(angle)) * rate
         })
     }
 }
@@ -88,7 +88,7 @@ fn turning(rotation_rad: DVec3, slope_rad: DVec3) -> DVec3 {
     let (first, second) = if angle < 1.0e-2 {
         (0.5 - square / 24.0 * (1.0 - square / 30.0), 1.0 / 6.0 - square / 120.0 * (1.0 - square / 42.0))
     } else {
-        ((1.0 - angle.cos()) / square, (angle - angle.sin()) / (square * angle))
+        ((1.0 - math::cos(angle)) / square, (angle - math::sin(angle)) / (square * angle))
     };
     let across = rotation_rad.cross(slope_rad);
     slope_rad + across * first + rotation_rad.cross(across) * second

@@ -3,7 +3,7 @@
 //! alone.
 
 use super::LEVER_M;
-use flotor_hal::{DVec3, Pose, Twist, Wrench, orientation_from_rotation_vector};
+use flotor_hal::{DVec3, Pose, Twist, Wrench, math, orientation_from_rotation_vector};
 
 /// The thesis's flotor, kg (Varadharajan 2007, section 3.2).
 const MASS_KG: f64 = 0.58;
@@ -37,7 +37,7 @@ impl Hold {
     /// `m v' + b v = F`, solved over `period_s`.
     fn new(inertia: f64, damping: f64, period_s: f64) -> Self {
         let rate = damping / inertia;
-        let lost = -(-rate * period_s).exp_m1();
+        let lost = -math::exp_m1(-rate * period_s);
         let coast_s = lost / rate;
         Self {
             decay: 1.0 - lost,

@@ -2,7 +2,9 @@
 
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
-use flotor_hal::{DQuat, DVec3, Input, LoopConfig, Output, Pose, Twist, orientation_from_rotation_vector};
+use flotor_hal::{
+    DQuat, DVec3, Input, LoopConfig, Output, Pose, Twist, math, orientation_from_rotation_vector,
+};
 
 /// Rate a plugin is checked at.
 pub(super) const CONFIG: LoopConfig = LoopConfig { period_ns: 1_000_000, seed: 1 };
@@ -62,8 +64,8 @@ pub(super) fn walk_at(speed: f64, steps: u64) -> impl Iterator<Item = Input> {
 /// Three sines of a size, and their derivative.
 fn swing(rad_per_s: DVec3, size: f64, t: f64) -> (DVec3, DVec3) {
     let phase = rad_per_s * t;
-    let sines = DVec3::new(phase.x.sin(), phase.y.sin(), phase.z.sin());
-    let cosines = DVec3::new(phase.x.cos(), phase.y.cos(), phase.z.cos());
+    let sines = DVec3::new(math::sin(phase.x), math::sin(phase.y), math::sin(phase.z));
+    let cosines = DVec3::new(math::cos(phase.x), math::cos(phase.y), math::cos(phase.z));
     (sines * size, cosines * rad_per_s * size)
 }
 
@@ -75,7 +77,7 @@ fn spin(rotation_rad: DVec3, rate_rad_per_s: DVec3) -> DVec3 {
     let (first, second) = if angle < 1.0e-4 {
         (0.5, 1.0 / 6.0)
     } else {
-        ((1.0 - angle.cos()) / angle.powi(2), (angle - angle.sin()) / angle.powi(3))
+        ((1.0 - math::cos(angle)) / math::powi(angle, 2), (angle - math::sin(angle)) / math::powi(angle, 3))
     };
     let across = rotation_rad.cross(rate_rad_per_s);
     rate_rad_per_s + across * first + rotation_rad.cross(across) * second

@@ -2,6 +2,7 @@
 
 use crate::plan::{Axis, Layout, Plan, Scale, Values};
 use flotor::sampling::Sobol;
+use flotor_hal::math;
 use serde::{Deserialize, Serialize};
 
 /// A value in a row: of an axis, or of an answer.
@@ -95,7 +96,7 @@ impl Values {
     fn at(&self, part: f64) -> f64 {
         match self {
             Self::Range { from, to, scale: Scale::Linear, .. } => from + (to - from) * part,
-            Self::Range { from, to, scale: Scale::Log, .. } => from * (to / from).powf(part),
+            Self::Range { from, to, scale: Scale::Log, .. } => from * math::pow(to / from, part),
             Self::Numbers(_) | Self::Words(_) => f64::NAN,
         }
     }

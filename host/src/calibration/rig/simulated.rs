@@ -5,7 +5,7 @@ use crate::calibration::CalibrationError;
 use crate::calibration::emulated_sensor::EmulatedSensor;
 use crate::calibration::sensor::ForceSensor;
 use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting};
-use flotor_hal::{Cycle, DeviceState, LoopConfig, Refusal, Tick, VerticalCalibration};
+use flotor_hal::{Cycle, DeviceState, LoopConfig, Refusal, Tick, VerticalCalibration, math};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
@@ -145,7 +145,7 @@ impl Rig for SimulatedRig {
         let true_n = rest.delivered_n - RIG_WEIGHT_N;
         // Box and Muller 1958; 1 - u is never zero.
         let [u, v] = [(); 2].map(|()| (self.noise.next_u64() >> 11) as f64 / (1_u64 << 53) as f64);
-        let noisy_n = true_n + SENSOR_NOISE_N * (-2.0 * (1.0 - u).ln()).sqrt() * (TAU * v).cos();
+        let noisy_n = true_n + SENSOR_NOISE_N * (-2.0 * math::ln(1.0 - u)).sqrt() * math::cos(TAU * v);
         let (pressed, line) = match &mut self.sensor {
             Some(sensor) => sensor,
             none => {
