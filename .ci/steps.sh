@@ -32,8 +32,8 @@ summary() {
 }
 
 # What the tests use beyond Rust and a C compiler, by Debian's names: valgrind counts instructions, Xvfb and xdotool hold
-# and push a real window, drawn by Mesa; QEMU, busybox and cpio make the small virtual machine.
-debian_packages="valgrind xvfb xdotool libegl1 libgl1-mesa-dri libxkbcommon-x11-0 qemu-system-x86 busybox-static cpio"
+# and push a real window, drawn by Mesa; QEMU emulates other processors, and with busybox and cpio a small virtual machine.
+debian_packages="valgrind xvfb xdotool libegl1 libgl1-mesa-dri libxkbcommon-x11-0 qemu-user qemu-system-x86 busybox-static cpio"
 
 # Installs what is missing where that is possible; elsewhere the tests that need it say that they were skipped.
 machine() {
@@ -103,6 +103,19 @@ blocking() {
         echo "a model that starts threads in a step was not noticed"
         return 1
     fi
+}
+
+# One set of bits: the golden digests, optimised, on the processor at hand and on emulated ones with AVX2 and without AVX.
+bits() {
+    local runner
+    for runner in "" "qemu-x86_64 -cpu Haswell" "qemu-x86_64 -cpu qemu64"; do
+        if ! command -v "${runner%% *}" >/dev/null && [ -n "$runner" ]; then
+            echo "skipped: there is no ${runner%% *} to emulate processors with"
+            return 0
+        fi
+        echo "on ${runner:-the processor at hand}:"
+        FLOTOR_RUNNER=$runner cargo test --release -p flotor-tests --test golden -- --nocapture
+    done
 }
 
 # The Python wheel as a user installs it, and its tests against the command: models, runs, sweeps on threads and Dask.

@@ -321,6 +321,68 @@ fn unlisted_unsafe_and_stale_entries_are_noticed() {
     assert!(complaints[1].contains("tests/alloc.rs"));
 }
 
+// ---------------------------------------------------------------- the same bits everywhere
+
+/// Methods of floating-point numbers whose last bit the system's library or the compiler chooses, or that are slow where the
+/// processor has no instruction for them.
+const UNPORTABLE: &[&str] = &[
+    "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cbrt", "cos", "cosh", "exp", "exp2",
+    "exp_m1", "hypot", "ln", "ln_1p", "log", "log10", "log2", "mul_add", "powf", "powi", "sin", "sin_cos",
+    "sinh", "tan", "tanh",
+];
+
+/// Parts of paths whose numbers nobody compares bit by bit: pictures and tests.
+const UNCOMPARED: &[&str] = &["viewer/", "plot/", "tests/", "tests.rs", "benches/", "examples/", "fuzz/"];
+
+/// Calls of such methods, and mentions of them as functions of a type, outside the tests of the file.
+fn unportable(tokens: TokenStream) -> Vec<String> {
+    let tokens: Vec<TokenTree> = tokens.into_iter().collect();
+    let text = |place: Option<usize>| {
+        place.and_then(|at| tokens.get(at)).map(ToString::to_string).unwrap_or_default()
+    };
+    let mut found = Vec::new();
+    for (at, token) in tokens.iter().enumerate() {
+        let before = |steps: usize| text(at.checked_sub(steps));
+        match token {
+            TokenTree::Group(_) if before(2) == "mod" && before(3).replace(' ', "") == "[cfg(test)]" => {}
+            TokenTree::Group(group) => found.extend(unportable(group.stream())),
+            TokenTree::Ident(name) if UNPORTABLE.contains(&name.to_string().as_str()) => {
+                let is_call = before(1) == "." && text(Some(at + 1)).starts_with('(');
+                if is_call || ["f64", "f32"].contains(&before(3).as_str()) {
+                    found.push(name.to_string());
+                }
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
+#[test]
+fn numbers_that_count_come_from_portable_functions() {
+    for file in files_under("", "rs").expect("the workspace can be read") {
+        let name = file.display().to_string();
+        if UNCOMPARED.iter().any(|part| name.contains(part)) {
+            continue;
+        }
+        let source = std::fs::read_to_string(workspace_root().join(&file)).expect("a source file is text");
+        let found = unportable(source.parse().expect("it is made of tokens"));
+        assert!(found.is_empty(), "{name} uses {found:?} of `f64`: take those of `flotor_hal::math`");
+    }
+}
+
+#[test]
+fn an_unportable_function_is_noticed() {
+    let offends = |source: &str| unportable(source.parse().expect("these are tokens")).len();
+    assert_eq!(offends("fn f() { g(x.sin(), y.map(f64::tanh)) }"), 2);
+    assert_eq!(
+        offends(
+            "fn f() { math::sin(x) + angle.sin + x.sqrt() } #[cfg(test)] mod tests { fn f() { x.sin() } }"
+        ),
+        0
+    );
+}
+
 // ---------------------------------------------------------------- manifests
 
 /// Dependencies of `[workspace.dependencies]` that nobody gives a reason for: in a comment at the end of the

@@ -4,6 +4,7 @@
 //! The structs are `#[repr(C)]` arrays of `f64`, so a C plugin sees the same bytes; the methods give
 //! [`glam`] types to authors who write Rust. glam itself never crosses the boundary: its minors are breaking.
 
+use crate::math;
 use glam::{DQuat, DVec3};
 
 /// Position and orientation of the handle. 56 bytes.
@@ -196,7 +197,8 @@ pub fn rotation_vector(orientation: DQuat) -> DVec3 {
     let cos_half = orientation.w * sign;
     let sin_half = axis_sin_half.length();
     // 2 atan2(s, c) / s -> 2 / c as s -> 0; below 1e-8 the next term s^2 / 3 is under one rounding.
-    let factor = if sin_half < 1.0e-8 { 2.0 / cos_half } else { 2.0 * sin_half.atan2(cos_half) / sin_half };
+    let factor =
+        if sin_half < 1.0e-8 { 2.0 / cos_half } else { 2.0 * math::atan2(sin_half, cos_half) / sin_half };
     axis_sin_half * factor
 }
 
@@ -208,9 +210,9 @@ pub fn rotation_vector(orientation: DQuat) -> DVec3 {
 pub fn orientation_from_rotation_vector(rotation_rad: DVec3) -> DQuat {
     let angle_rad = rotation_rad.length();
     // sin(a / 2) / a -> 1 / 2; below 1e-8 the next term a^2 / 48 is under one rounding.
-    let factor = if angle_rad < 1.0e-8 { 0.5 } else { (0.5 * angle_rad).sin() / angle_rad };
+    let factor = if angle_rad < 1.0e-8 { 0.5 } else { math::sin(0.5 * angle_rad) / angle_rad };
     let xyz = rotation_rad * factor;
-    DQuat::from_xyzw(xyz.x, xyz.y, xyz.z, (0.5 * angle_rad).cos())
+    DQuat::from_xyzw(xyz.x, xyz.y, xyz.z, math::cos(0.5 * angle_rad))
 }
 
 /// 0 if every number is finite: a number less itself is 0 in all its bits, and one that is not finite leaves NaN. A few vector

@@ -34,8 +34,7 @@ mod detail;
 mod device;
 mod field;
 mod frame;
-#[cfg(feature = "instructions")]
-pub mod instructions;
+pub mod math;
 mod model;
 mod pacing;
 mod parameter;

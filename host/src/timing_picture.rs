@@ -1,5 +1,6 @@
 //! How time was kept, as histograms: lateness and the stages of a tick.
 
+use flotor_hal::math;
 use flotor_plot::{Axis, Bin, Panel, Series};
 use flotor_servo::Timing;
 
@@ -31,7 +32,7 @@ pub(crate) fn octaves(bins: &[(u64, u64)]) -> Vec<Bin> {
         #[allow(clippy::cast_precision_loss)] // for a picture
         let us = *ns as f64 * 1.0e-3;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most some two hundred bins
-        let index = (4.0 * (us / FIRST_US).max(1.0).log2()).floor() as usize;
+        let index = (4.0 * math::log2((us / FIRST_US).max(1.0))).floor() as usize;
         if heights.len() <= index {
             heights.resize(index + 1, 0.0);
         }

@@ -14,6 +14,7 @@
 //! The frame is the board's: x to the left of the user, y towards the user, the motors at the far side.
 
 use flotor_hal::glam::{DMat2, DVec2};
+use flotor_hal::math;
 
 /// Lengths of the linkage, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,7 +72,7 @@ impl Pantograph {
             let distance_m = from_motor.length();
             let (l, outer) = (self.inner_m, self.outer_m);
             let cosine = (l * l + distance_m * distance_m - outer * outer) / (2.0 * l * distance_m);
-            (cosine.abs() <= 1.0).then(|| from_motor.to_angle() + side * cosine.acos())
+            (cosine.abs() <= 1.0).then(|| from_motor.to_angle() + side * math::acos(cosine))
         };
         Some([angle(handle_m, 1.0)?, angle(handle_m - DVec2::X * self.base_m, -1.0)?])
     }

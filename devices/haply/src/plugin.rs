@@ -8,6 +8,7 @@ use flotor_hal::glam::DVec2;
 use flotor_hal::{
     ActiveDevice, Axes, Capabilities, Conditions, Cycle, DQuat, DVec3, Device, DeviceInfo, DeviceState,
     Fault, LoopConfig, Parameter, Pose, Refusal, SafeStop, Settings, Tick, Twist, Wrench, export_device,
+    math,
 };
 use serialport::TTYPort;
 use std::f64::consts::TAU;
@@ -297,7 +298,7 @@ impl DrivenDevice {
                 #[allow(clippy::cast_precision_loss)] // at most seconds
                 let dt_s = (time_ns - before_ns) as f64 * 1.0e-9;
                 // A first-order low pass, exact for a difference that is held over the interval.
-                let share = 1.0 - (-TAU * self.opened.cutoff_hz * dt_s).exp();
+                let share = 1.0 - math::exp(-TAU * self.opened.cutoff_hz * dt_s);
                 self.state.twist.linear().lerp((position_m - before_m) / dt_s, share)
             }
             _ => DVec3::ZERO,

@@ -6,6 +6,7 @@
 
 use crate::noise::{Noise, Stream};
 use crate::validation::{Check, Domain, InvalidParameter, number};
+use flotor_hal::math;
 
 /// What breaks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,7 +74,7 @@ impl Faults {
         let FaultPlan { kind, start_ns, duration_ns, rate_per_s } = self.plan?;
         let active = if rate_per_s > 0.0 {
             // At least one episode in dt_s, if they come independently of each other.
-            let chance = -(-rate_per_s * dt_s).exp_m1();
+            let chance = -math::exp_m1(-rate_per_s * dt_s);
             if self.noise.uniform() < chance {
                 self.until_ns = time_ns.saturating_add(duration_ns);
             }

@@ -1,5 +1,7 @@
 //! First-order lags: what is left of a difference after a while.
 
+use flotor_hal::math;
+
 /// Anything that closes a gap at a rate in proportion to it: an amplifier, a warming coil, a low-pass.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lag {
@@ -26,7 +28,7 @@ impl Lag {
     #[inline]
     pub(crate) fn closed(&mut self, dt_s: f64) -> f64 {
         if dt_s != self.dt_s {
-            (self.dt_s, self.closed) = (dt_s, -(-dt_s / self.lag_s).exp_m1());
+            (self.dt_s, self.closed) = (dt_s, -math::exp_m1(-dt_s / self.lag_s));
         }
         self.closed
     }

@@ -4,6 +4,7 @@
 //! Every user of noise draws from a stream of its own: switching one source on or off leaves the others as
 //! they were.
 
+use flotor_hal::math;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
@@ -45,8 +46,8 @@ impl Noise {
     /// Real-time: bounded, no allocation.
     pub(crate) fn normal_pair(&mut self) -> [f64; 2] {
         // 1 - u is never zero, so the logarithm is finite.
-        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        let (sin, cos) = (TAU * self.uniform()).sin_cos();
+        let radius = (-2.0 * math::ln(1.0 - self.uniform())).sqrt();
+        let (sin, cos) = math::sin_cos(TAU * self.uniform());
         [radius * cos, radius * sin]
     }
 }

@@ -36,7 +36,6 @@ use crate::ledger::{MechanicalEnergy, Work};
 use crate::validation::{Domain, InvalidParameter, number, vector};
 use body::Body;
 use flotor_hal::glam::{BVec3, DQuat, DVec3};
-use flotor_hal::instructions;
 use motion::{Contact, Motion};
 use scheme::Scheme;
 
@@ -332,14 +331,9 @@ fn advance_by_steps(
     coils: &Wrench,
     contact: Contact,
 ) -> Outcome {
-    instructions::best(
-        #[inline(always)]
-        || {
-            let (next, work) = scheme.advance(motion, piece_ns, coils, contact);
-            let is_sound = next.is_physical() && work.is_finite();
-            go_on(motion, is_sound.then_some((next, work)))
-        },
-    )
+    let (next, work) = scheme.advance(motion, piece_ns, coils, contact);
+    let is_sound = next.is_physical() && work.is_finite();
+    go_on(motion, is_sound.then_some((next, work)))
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use crate::workspace::{
 use flotor_hal::{
     ActiveDevice, Axes, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState, EnergyLedger,
     Fault, LoopConfig, Pacing, Parameter, Pose, Refusal, SafeStop, SampleWait, Settings, Tick, Twist,
-    VerticalCalibration, export_device, instructions,
+    VerticalCalibration, export_device,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -169,11 +169,29 @@ impl SimulatedFlotor {
 impl ActiveDevice for RunningFlotor {
     type Opened = SimulatedFlotor;
 
+    /// Moves the flotor under the wrench of the last write and takes a sample.
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
-        instructions::best(
-            #[inline(always)]
-            || self.sample(tick, state),
-        )
+        let coils = if self.is_stopped() { &Wrench::ZERO } else { &self.held };
+        if let Some(machine) = &mut self.machine {
+            let cycle = machine.cycle(&mut self.simulation, tick, coils, state);
+            self.height_m = state.pose.position().z;
+            return cycle;
+        }
+        let incidents = self.simulation.advance_under(tick.dt_ns, coils);
+        let flotor = self.simulation.state();
+        *state = DeviceState {
+            pose: Pose::new(flotor.position_m, flotor.orientation),
+            twist: Twist::new(flotor.velocity_m_per_s, flotor.angular_velocity_rad_per_s),
+            delivered: flotor_hal::Wrench::new(coils.force_n, coils.torque_nm),
+            sampled_ns: tick.time_ns,
+            conditions: if self.is_limited { Conditions::SATURATED } else { Conditions::NONE },
+            ..DeviceState::HOME
+        };
+        let range = SensorRange::of(flotor.position_m, flotor.orientation);
+        if incidents.stopped || range == SensorRange::Outside {
+            return Cycle::Fault(Fault::SensorOutOfRange);
+        }
+        Cycle::Fresh
     }
 
     fn write(&mut self, _tick: &Tick, wrench: &flotor_hal::Wrench) -> Cycle {
@@ -219,32 +237,6 @@ impl ActiveDevice for RunningFlotor {
 }
 
 impl RunningFlotor {
-    /// Moves the flotor under the wrench of the last write and takes a sample.
-    #[inline(always)] // into what chooses the instructions
-    fn sample(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
-        let coils = if self.is_stopped() { &Wrench::ZERO } else { &self.held };
-        if let Some(machine) = &mut self.machine {
-            let cycle = machine.cycle(&mut self.simulation, tick, coils, state);
-            self.height_m = state.pose.position().z;
-            return cycle;
-        }
-        let incidents = self.simulation.advance_under(tick.dt_ns, coils);
-        let flotor = self.simulation.state();
-        *state = DeviceState {
-            pose: Pose::new(flotor.position_m, flotor.orientation),
-            twist: Twist::new(flotor.velocity_m_per_s, flotor.angular_velocity_rad_per_s),
-            delivered: flotor_hal::Wrench::new(coils.force_n, coils.torque_nm),
-            sampled_ns: tick.time_ns,
-            conditions: if self.is_limited { Conditions::SATURATED } else { Conditions::NONE },
-            ..DeviceState::HOME
-        };
-        let range = SensorRange::of(flotor.position_m, flotor.orientation);
-        if incidents.stopped || range == SensorRange::Outside {
-            return Cycle::Fault(Fault::SensorOutOfRange);
-        }
-        Cycle::Fresh
-    }
-
     fn is_stopped(&self) -> bool {
         self.opened.stopped.load(Ordering::Acquire)
     }

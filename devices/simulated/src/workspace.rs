@@ -3,6 +3,7 @@
 //! Source throughout: Varadharajan 2007 (CMU-RI-TR-07-21), section 2, unless a constant says otherwise.
 
 use flotor_hal::glam::{DQuat, DVec3};
+use flotor_hal::math;
 
 /// Translation the sensors see, in all directions about the origin, m (thesis section 2: ±12 mm).
 pub const TRANSLATION_RANGE_M: f64 = 12.0e-3;
@@ -44,7 +45,7 @@ impl SensorRange {
         // |w| is the cosine of half the angle: comparing cosines needs no arc cosine. NaN fails both
         // comparisons.
         let within_translation = position_m.length_squared() <= TRANSLATION_RANGE_M * TRANSLATION_RANGE_M;
-        let within_rotation = orientation.w.abs() >= (0.5 * ROTATION_RANGE_RAD).cos();
+        let within_rotation = orientation.w.abs() >= math::cos(0.5 * ROTATION_RANGE_RAD);
         if within_translation && within_rotation { Self::Inside } else { Self::Outside }
     }
 }

@@ -16,7 +16,7 @@
 use super::CalibrationError;
 use super::least_squares::{Solution, solve};
 use super::procedure::Reading;
-use flotor_hal::{CALIBRATION_COEFFICIENTS, VerticalCalibration};
+use flotor_hal::{CALIBRATION_COEFFICIENTS, VerticalCalibration, math};
 
 /// Highest degree that is tried. One less than there is room for: the cross-validated curve has to bend down again.
 pub const MAX_DEGREE: usize = CALIBRATION_COEFFICIENTS - 2;
@@ -200,7 +200,7 @@ fn cross_validate(readings: &[Reading], stops: &[u64], scale: &Scale, degree: us
     let square = mean(squares.iter().copied());
     #[allow(clippy::cast_precision_loss)] // some ten heights
     let count = squares.len() as f64;
-    let spread = (mean(squares.iter().map(|value| (value - square).powi(2))) / (count - 1.0)).sqrt();
+    let spread = (mean(squares.iter().map(|value| math::powi(value - square, 2))) / (count - 1.0)).sqrt();
     let error_n = square.sqrt();
     // The error of a square root: that of what is under it, over twice the root.
     Some(Candidate { degree, error_n, standard_error_n: spread / (2.0 * error_n) })

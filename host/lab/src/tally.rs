@@ -1,6 +1,6 @@
 //! What the parts of a long measurement found, put together in the order of the parts: the same whoever did which.
 
-use flotor_hal::Pose;
+use flotor_hal::{Pose, math};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -101,7 +101,7 @@ impl Decades {
             return;
         }
         #[allow(clippy::cast_possible_truncation)] // a few thousand at most
-        let bin = (value.clamp(SMALLEST, f64::MAX).log10() * BINS_PER_DECADE).floor() as i32;
+        let bin = (math::log10(value.clamp(SMALLEST, f64::MAX)) * BINS_PER_DECADE).floor() as i32;
         *self.0.entry(bin).or_default() += 1;
     }
 
@@ -111,7 +111,7 @@ impl Decades {
         let (Some((first, _)), Some((last, _))) = (self.0.first_key_value(), self.0.last_key_value()) else {
             return Vec::new();
         };
-        let edge = |bin: i32| 10.0_f64.powf(f64::from(bin) / BINS_PER_DECADE);
+        let edge = |bin: i32| math::pow(10.0, f64::from(bin) / BINS_PER_DECADE);
         let bins = *first..=*last;
         bins.map(|bin| (edge(bin), edge(bin + 1), self.0.get(&bin).copied().unwrap_or(0))).collect()
     }

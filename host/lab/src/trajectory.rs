@@ -1,7 +1,7 @@
 //! Smooth motions of a handle: sums of sines in position and rotation vector.
 
 use super::sampling::Random;
-use flotor_hal::{DVec3, Pose, orientation_from_rotation_vector, rotation_vector};
+use flotor_hal::{DVec3, Pose, math, orientation_from_rotation_vector, rotation_vector};
 use std::array::from_fn;
 use std::f64::consts::{SQRT_2, TAU};
 
@@ -113,7 +113,7 @@ fn turning(rotation_rad: DVec3, slope_rad: DVec3) -> DVec3 {
     let (first, second) = if angle < 1.0e-2 {
         (0.5 - square / 24.0 * (1.0 - square / 30.0), 1.0 / 6.0 - square / 120.0 * (1.0 - square / 42.0))
     } else {
-        ((1.0 - angle.cos()) / square, (angle - angle.sin()) / (square * angle))
+        ((1.0 - math::cos(angle)) / square, (angle - math::sin(angle)) / (square * angle))
     };
     let across = rotation_rad.cross(slope_rad);
     slope_rad + across * first + rotation_rad.cross(across) * second

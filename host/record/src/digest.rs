@@ -10,7 +10,8 @@ const DIGEST_WORDS: usize = RECORD_WORDS - TIMING_WORDS;
 /// Streaming xxh3-64 over what every tick left behind, measured times left out.
 ///
 /// The hash runs over the 64-bit words of each record, little endian, in the order of [`TickRecord`], so it
-/// depends neither on the machine nor on how records arrive. It tells runs apart; it is no protection against malice.
+/// depends neither on the machine nor on how records arrive. Every NaN counts as the same and zero has no sign: processors and
+/// compilers choose these as they please. It tells runs apart; it is no protection against malice.
 #[derive(Clone, Default)]
 pub struct TraceDigest {
     hash: Xxh3,
@@ -29,7 +30,7 @@ impl TraceDigest {
         let mut bytes = [0; DIGEST_WORDS * size_of::<u64>()];
         // The shorter side ends the walk: the timing words at the end find no place.
         for (place, word) in bytes.chunks_exact_mut(size_of::<u64>()).zip(record.to_words()) {
-            place.copy_from_slice(&word.to_le_bytes());
+            place.copy_from_slice(&canonical(word).to_le_bytes());
         }
         self.hash.update(&bytes);
         self.ticks += 1;
@@ -39,5 +40,14 @@ impl TraceDigest {
     #[must_use]
     pub fn finish(&self) -> String {
         format!("xxh3:{:016x}-{}", self.hash.digest(), self.ticks)
+    }
+}
+
+/// The word of a number as all machines have it; no count or flag of a record is as large as those that change.
+fn canonical(word: u64) -> u64 {
+    match f64::from_bits(word) {
+        number if number.is_nan() => f64::NAN.to_bits(),
+        0.0 => 0,
+        _ => word,
     }
 }

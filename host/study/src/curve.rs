@@ -183,7 +183,10 @@ impl MeasuredCurve {
         let forces = never_falling(&weighted);
         let inner = means.iter().zip(forces).map(|((_, x_m, _), force_n)| (*x_m, force_n));
         let knots: Vec<(f64, f64)> = std::iter::once((0.0, 0.0)).chain(inner).collect();
-        let square = |(x_m, force_n): &(f64, f64)| (force_n - between(&knots, *x_m)).powi(2);
+        let square = |(x_m, force_n): &(f64, f64)| {
+            let apart_n = force_n - between(&knots, *x_m);
+            apart_n * apart_n
+        };
         let squares: Vec<f64> = self.points.iter().map(square).collect();
         Ok(ServedCurve { rms_n: mean(&squares).sqrt(), knots })
     }

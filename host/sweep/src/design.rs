@@ -1,6 +1,7 @@
 //! From axes to points: which value each axis has in row number `i`.
 
 use crate::plan::{Axis, Layout, Plan, Scale, Values};
+use flotor_hal::math;
 use flotor_lab::sampling::Sobol;
 use serde::{Deserialize, Serialize};
 
@@ -95,7 +96,7 @@ impl Values {
     fn at(&self, part: f64) -> f64 {
         match self {
             Self::Range { from, to, scale: Scale::Linear, .. } => from + (to - from) * part,
-            Self::Range { from, to, scale: Scale::Log, .. } => from * (to / from).powf(part),
+            Self::Range { from, to, scale: Scale::Log, .. } => from * math::pow(to / from, part),
             Self::Numbers(_) | Self::Words(_) => f64::NAN,
         }
     }

@@ -14,7 +14,7 @@
 use flotor_hal::abi::Str;
 use flotor_hal::{
     DVec3, Demand, ForceModel, Input, ModelInfo, OutOfRange, Output, Parameter, Refusal, Settings,
-    StepStatus, Wrench,
+    StepStatus, Wrench, math,
 };
 
 /// Farther from home than this there is no handle, m: the energy there is that at the edge, and the answer says so.
@@ -55,8 +55,8 @@ impl Load {
             Kind::Exerted => {
                 let depth = -height_m / self.onset_m;
                 // ln cosh x without overflow: x + ln((1 + exp(-2x)) / 2).
-                let log_cosh = depth + (-2.0 * depth).exp().ln_1p() - std::f64::consts::LN_2;
-                (self.force_n * depth.tanh(), self.force_n * self.onset_m * log_cosh)
+                let log_cosh = depth + math::ln_1p(math::exp(-2.0 * depth)) - std::f64::consts::LN_2;
+                (self.force_n * math::tanh(depth), self.force_n * self.onset_m * log_cosh)
             }
         }
     }

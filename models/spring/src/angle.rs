@@ -9,32 +9,25 @@
 //!
 //! Source: series of `asin² s` and `asin s / sqrt(1 - s²)` at `s = sin(angle / 2)`, NIST DLMF 4.24.
 
-use crate::real::{Four, Real};
+use crate::real::{Real, polynomial};
 
 /// `1 - cos` of 60 degrees: beyond it the measures are a continuation.
 pub const TRUSTED_VERSINE: f64 = 0.5;
 
-const TERMS: usize = 8;
-/// Of these, terms of the square: the twist is a quotient, and needs two more for the same accuracy.
-const SQUARE_TERMS: usize = 6;
+/// `angle² / c` by powers of `c = 1 - cos`: `2^(n+2) / ((n+1)² binomial(2n+2, n+1))` for `n = 0, 1, ...`.
+const SQUARE_SERIES: [f64; 6] = series(2.0, true);
+/// `angle / sin` by powers of `c`: `2^n n!² / (2n+1)!`. It is a quotient, and needs two more terms for the same accuracy.
+const TWIST_SERIES: [f64; 8] = series(1.0, false);
 
-/// Both series by powers of `c = 1 - cos`, side by side: for three squares and a twist.
-///
-/// `angle² / c = sum of c^n 2^(n+2) / ((n+1)² binomial(2n+2, n+1))`, `angle / sin = sum of c^n 2^n n!² / (2n+1)!`, for
-/// `n = 0, 1, ...`, by the quotient of neighbours.
-const SERIES: [[f64; 4]; TERMS] = series();
-
+/// Either series, by the quotient of neighbours.
 #[allow(clippy::cast_precision_loss)] // integers below twenty
-const fn series() -> [[f64; 4]; TERMS] {
-    let mut coefficients = [[0.0; 4]; TERMS];
-    let (mut square, mut twist) = (2.0, 1.0);
-    let mut i = 0;
+const fn series<const TERMS: usize>(first: f64, is_square: bool) -> [f64; TERMS] {
+    let mut coefficients = [first; TERMS];
+    let mut i = 1;
     while i < TERMS {
-        coefficients[i] =
-            if i < SQUARE_TERMS { [square, square, square, twist] } else { [0.0, 0.0, 0.0, twist] };
-        let n = (i + 1) as f64;
-        square = square * n * n / ((n + 1.0) * (2.0 * n + 1.0));
-        twist = twist * n / (2.0 * n + 1.0);
+        let n = i as f64;
+        let quotient = if is_square { n * n / (n + 1.0) } else { n };
+        coefficients[i] = coefficients[i - 1] * quotient / (2.0 * n + 1.0);
         i += 1;
     }
     coefficients
@@ -68,21 +61,20 @@ pub fn measures<R: Real>(
     twist_sine: R,
 ) -> ([SquaredAngle<R>; 3], Twist<R>) {
     let [a, b, c] = versines;
-    let versine = R::Four::of([a, b, c, twist_versine]);
-    let [quotient, slope] = versine.polynomials(&SERIES);
-    let unit = a.like(1.0);
-    let factor = R::Four::of([a, b, c, twist_sine]);
-    let cosine = R::Four::of([unit, unit, unit, unit - twist_versine]);
-    let sine_squared = R::Four::of([a, b, c, twist_sine * twist_sine]);
+    let [quotient, slope] = polynomial(twist_versine, &TWIST_SERIES);
+    let twist_slope =
+        slope * (twist_sine * twist_sine) + quotient * (twist_versine.like(1.0) - twist_versine);
     // No closures in here: the compiler would have to inline them before it may use wide registers.
-    let [a, b, c, twist] = (quotient * factor).numbers();
-    let [a_slope, b_slope, c_slope, twist_slope] = slope.mul_add(sine_squared, quotient * cosine).numbers();
-    let squares = [
-        SquaredAngle { value: a, slope: a_slope },
-        SquaredAngle { value: b, slope: b_slope },
-        SquaredAngle { value: c, slope: c_slope },
-    ];
-    (squares, Twist { value: twist, slope: twist_slope })
+    (
+        [squared_angle(a), squared_angle(b), squared_angle(c)],
+        Twist { value: quotient * twist_sine, slope: twist_slope },
+    )
+}
+
+#[inline(always)]
+fn squared_angle<R: Real>(versine: R) -> SquaredAngle<R> {
+    let [quotient, slope] = polynomial(versine, &SQUARE_SERIES);
+    SquaredAngle { value: quotient * versine, slope: slope * versine + quotient }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! Poses come one after the other; a vector register wants the same component of several. So as many poses as two
 //! registers have lanes are read, half a pose a register, and turned over inside the registers, four by four, into one
 //! register a component; the law runs over them; and the answers are turned back and written, in one pass and with nothing
-//! in memory between. The law is the very code the servo runs, over [`Wide`] instead of [`Lone`](crate::real::Lone): the
+//! in memory between. The law is the very code the servo runs, over [`Wide`] instead of `f64`: the
 //! results, and the status of every pose, are those of single steps, *bit for bit*.
 //!
 //! The instruction set is found when the [`Batch`] is made (AVX-512, AVX2, NEON, or one number at a time).

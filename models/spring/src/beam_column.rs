@@ -13,6 +13,7 @@
 use crate::entire::EntireFunctions;
 use crate::real::Real;
 use crate::rigidity::Rigidities;
+use flotor_hal::math;
 
 /// Quotients of entire functions at one argument, with `x = sqrt z`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,7 +64,7 @@ impl<R: Real> StabilityFunctions<R> {
     fn in_strong_tension(z: R) -> Self {
         // Lanes that are not in tension have no root; their numbers are not used.
         let x = (-z).sqrt();
-        let bow = x / x.map(f64::tanh);
+        let bow = x / x.map(math::tanh);
         let sway = (z.like(1.0) - bow) * 3.0 / z;
         let writhe = writhe(bow, sway);
         Self { bow, sway, writhe, sway_slope: (writhe - sway) / z }

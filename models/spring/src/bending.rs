@@ -96,24 +96,22 @@ impl Bending {
         let sheared_slope = length_m.like(1.0 - self.shear_compliance);
         let argument = levelled_argument(shortening_m * sheared_length_m * self.load_per_m2);
         let z_by_length =
-            argument.slope * shortening_m.mul_add(sheared_slope, -sheared_length_m) * self.load_per_m2;
+            argument.slope * (shortening_m * sheared_slope - sheared_length_m) * self.load_per_m2;
         let stability = StabilityFunctions::at(argument.value);
 
         // Shear to bending stiffness of the length, `Lam L beta / (12 alpha)`.
         let shear = sheared_length_m * length_m * self.slenderness_per_m2;
-        let shear_slope = length_m.mul_add(sheared_slope, sheared_length_m) * self.slenderness_per_m2;
-        let inverse = shear.mul_add(stability.sway, shear.like(1.0)).inverse();
-        let denominator_slope =
-            shear_slope.mul_add(stability.sway, shear * (stability.sway_slope * z_by_length));
+        let shear_slope = (length_m * sheared_slope + sheared_length_m) * self.slenderness_per_m2;
+        let inverse = (shear * stability.sway + 1.0).inverse();
+        let denominator_slope = shear_slope * stability.sway + shear * (stability.sway_slope * z_by_length);
 
         let share = shear * inverse;
-        let share_slope = (-share).mul_add(denominator_slope, shear_slope) * inverse;
+        let share_slope = (shear_slope - share * denominator_slope) * inverse;
         let (sway, sway_slope) = (share * self.sway_nm_per_rad, share_slope * self.sway_nm_per_rad);
         let bow = stability.bow * self.bow_nm_per_rad;
         let bow_slope = stability.bow_slope() * z_by_length * self.bow_nm_per_rad;
         let writhe = share * stability.writhe;
-        let writhe_slope =
-            share_slope.mul_add(stability.writhe, share * (stability.writhe_slope() * z_by_length));
+        let writhe_slope = share_slope * stability.writhe + share * (stability.writhe_slope() * z_by_length);
 
         let squares = [angles[0].value, angles[1].value, angles[2].value];
         let QuarticEnergy { energy_j, by_squares, by_length } =
@@ -122,9 +120,9 @@ impl Bending {
         let (half_sway, carry, carry_slope) =
             (sway * 0.5, (sway - bow) * 0.5, (sway_slope - bow_slope) * 0.5);
         BendingEnergy {
-            energy_j: sway.mul_add(ends, (-carry).mul_add(plates, energy_j)),
+            energy_j: sway * ends + (energy_j - carry * plates),
             by_squares: [half_sway + by_squares[0], half_sway + by_squares[1], by_squares[2] - carry * 0.5],
-            by_length: sway_slope.mul_add(ends, (-carry_slope).mul_add(plates, by_length)),
+            by_length: sway_slope * ends + (by_length - carry_slope * plates),
             writhe,
             writhe_slope,
             levelled: argument.bent,

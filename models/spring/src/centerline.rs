@@ -8,6 +8,7 @@
 //! (where the bending energy levels off short of buckling, so does the shape).
 
 use flotor_hal::glam::{DQuat, DVec3};
+use flotor_hal::math;
 
 use crate::bending::levelled_argument;
 use crate::entire::EntireFunctions;
@@ -88,7 +89,7 @@ impl Centerline {
             upright_to_chord,
             sway_rad: 0.5 * (upper_lean + lower_lean),
             bow_rad: 0.5 * (upper_lean - lower_lean),
-            twist_rad: 2.0 * (rest.z * rest.w.signum()).atan2(rest.w.abs()),
+            twist_rad: 2.0 * math::atan2(rest.z * rest.w.signum(), rest.w.abs()),
             shape: Shape::new(spring.rigidities(), free_length_m, chord.length_m, argument)?,
         })
     }
@@ -117,7 +118,7 @@ fn lean(from: DVec3, to: DVec3) -> Option<DVec3> {
     let (cosine, across) = (from.dot(to), to - from.dot(to) * from);
     let sine = across.length();
     if sine > 0.0 {
-        Some(across * (sine.atan2(cosine) / sine))
+        Some(across * (math::atan2(sine, cosine) / sine))
     } else {
         (cosine > 0.0).then_some(DVec3::ZERO)
     }

@@ -25,17 +25,10 @@ pub(crate) fn demand(input: &Input) -> Demand {
 }
 
 /// A step of a law that answers from the pose alone. Real-time: bounded, no allocation.
-///
-/// In one go: a pose that is copied first has to be on its way to memory before the law can start on it, and so has all
-/// that the step before has done.
 #[inline]
 #[must_use]
 pub fn step<L: Law>(law: &L, input: &Input) -> Output {
-    law.respond_between(
-        #[inline(always)]
-        || (pose(input), demand(input)),
-        output,
-    )
+    output(&law.respond_at(&pose(input), demand(input)))
 }
 
 /// The answer of a step.

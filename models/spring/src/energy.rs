@@ -125,12 +125,11 @@ impl Law for EnergyForm {
 
         // e.(k x t), with k = (0, 0, 1)
         let writhe_area = e.y * t.x - e.x * t.y;
-        let wound = writhe.mul_add(writhe_area, twist.value);
+        let wound = writhe * writhe_area + twist.value;
         let torsion_nm = wound * self.torsion_nm_per_rad;
         let (coupling_nm, coupling_slope) = (torsion_nm * writhe, torsion_nm * writhe_slope);
 
-        let by_length =
-            coupling_slope.mul_add(writhe_area, bending.by_length) - shortening_m * self.axial_n_per_m;
+        let by_length = coupling_slope * writhe_area + bending.by_length - shortening_m * self.axial_n_per_m;
         // Differences from e instead of k and t themselves: the projection removes e, and nothing is left to
         // cancel near rest.
         let zero = length_m.like(0.0);

@@ -18,8 +18,6 @@
 //!
 //! Evaluation: power series of `G1` and `G2` at `z / 16`, recurrences for the rest, then two angle doublings.
 
-use flotor_hal::instructions;
-
 use crate::real::Real;
 
 /// Terms of the power series: at `z / 16 = -3.75` the first one left out is below 1e-17 of the sum.
@@ -50,13 +48,12 @@ fn sum<R: Real>(coefficients: &[f64; TERMS], w: R) -> R {
     let low = four(w, w2, [c0, c1, c2, c3]);
     let middle = four(w, w2, [c4, c5, c6, c7]);
     let high = four(w, w2, [c8, c9, c10, c11]);
-    high.mul_add(w4, middle).mul_add(w4, low)
+    (high * w4 + middle) * w4 + low
 }
 
 #[inline(always)]
 fn four<R: Real>(w: R, w2: R, [c0, c1, c2, c3]: [f64; 4]) -> R {
-    let (low, high) = (w.mul_add(w.like(c1), w.like(c0)), w.mul_add(w.like(c3), w.like(c2)));
-    high.mul_add(w2, low)
+    (w * c3 + c2) * w2 + (w * c1 + c0)
 }
 
 /// `C0`, `G0`, `G1`, `G2` at one argument.
@@ -79,16 +76,6 @@ impl EntireFunctions {
 
     /// Largest argument: two and a half half-waves, past every pole a spring can reach.
     pub const MAX_ARGUMENT: f64 = 60.0;
-
-    /// All four at one number, where nothing around it runs in the best instructions of the machine: without an instruction
-    /// for it, a product fused with a sum is a call. Real-time: bounded, no allocation.
-    #[must_use]
-    pub fn at_number(z: f64) -> Self {
-        instructions::best(
-            #[inline(always)]
-            || Self::at(z),
-        )
-    }
 }
 
 impl<R: Real> EntireFunctions<R> {
@@ -105,7 +92,7 @@ impl<R: Real> EntireFunctions<R> {
         // G0 and C0 by the recurrences, side by side.
         let (third, fifteenth) = (w * (1.0 / 3.0), w * (1.0 / 15.0));
         let next = fifteenth * g2;
-        let (g0, c0) = (g1 - next, g1.mul_add(-third, g1) - next);
+        let (g0, c0) = (g1 - next, g1 - third * g1 - next);
         Self { c0, g0, g1, g2 }.doubled(w * 2.0).doubled(w * 8.0)
     }
 
@@ -115,10 +102,10 @@ impl<R: Real> EntireFunctions<R> {
         let Self { c0, g0, g1, g2 } = self;
         let square = g0 * g0;
         Self {
-            c0: square.mul_add(-twice_z, square.like(1.0)),
+            c0: square.like(1.0) - square * twice_z,
             g0: g0 * c0,
-            g1: c0.mul_add(g1, square * 3.0) * 0.25,
-            g2: c0.mul_add(g2, g0 * g1 * 15.0) * 0.0625,
+            g1: (c0 * g1 + square * 3.0) * 0.25,
+            g2: (c0 * g2 + g0 * g1 * 15.0) * 0.0625,
         }
     }
 

@@ -21,6 +21,7 @@
 use std::f64::consts::PI;
 
 use flotor_hal::glam::DVec3;
+use flotor_hal::math;
 
 use crate::contact::AxialContact;
 use crate::energy::EnergyForm;
@@ -107,7 +108,7 @@ impl Passage {
         let passed = ((quantity - from) / (to - from)).clamp(0.0, 1.0);
         Self {
             value: passed * passed * passed * (10.0 + passed * (6.0 * passed - 15.0)),
-            slope: 30.0 * (passed * (1.0 - passed)).powi(2) / (to - from),
+            slope: 30.0 * math::powi(passed * (1.0 - passed), 2) / (to - from),
         }
     }
 }
@@ -129,7 +130,7 @@ impl Region {
             let root = discriminant.sqrt();
             let first = 2.0 * FIRST_ARGUMENT / (load * (1.0 + root));
             let last = if excess > 0.5 { ((1.0 + root) / (2.0 * excess)).min(1.0) } else { 1.0 };
-            [last, first].map(|compression| (free_length_m * (1.0 - compression)).powi(2))
+            [last, first].map(|compression| math::powi(free_length_m * (1.0 - compression), 2))
         };
         Self { free_length_m, ratio, unit_per_m2, squares_m2, largest_argument }
     }
@@ -157,7 +158,7 @@ impl Region {
         let (short, by_length_per_m) = if argument >= DEEP_ARGUMENT {
             (1.0, 0.0)
         } else {
-            let EntireFunctions { g0, g1, .. } = EntireFunctions::at_number(argument);
+            let EntireFunctions { g0, g1, .. } = EntireFunctions::at(argument);
             let passage = Passage::at(g0, FIRST, LAST);
             let argument_by_length = self.unit_per_m2 * ((1.0 - self.ratio) * shortening_m - sheared_m);
             // dG0/dz = -G1/6

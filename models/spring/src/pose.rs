@@ -4,6 +4,7 @@
 //! plate is fixed at z = -L0. A rotation turns the upper plate from its rest orientation.
 
 use flotor_hal::glam::{DQuat, DVec3};
+use flotor_hal::math;
 
 use crate::arctangent;
 use crate::real::{Real, Vector};
@@ -96,19 +97,6 @@ pub struct Coordinates<R> {
     pub orientation: [R; 4],
 }
 
-impl Coordinates<f64> {
-    /// The same numbers as another kind of number. Real-time: bounded, no allocation, no branch.
-    #[inline(always)]
-    pub(crate) fn each<R>(&self, number: impl Fn(f64) -> R) -> Coordinates<R> {
-        let Vector { x, y, z } = self.position_m;
-        let [qx, qy, qz, qw] = self.orientation;
-        Coordinates {
-            position_m: Vector { x: number(x), y: number(y), z: number(z) },
-            orientation: [number(qx), number(qy), number(qz), number(qw)],
-        }
-    }
-}
-
 impl<R: Real> Coordinates<R> {
     /// The pose with zero for coordinates that are nothing, see [`DUST`]. Real-time: bounded, no allocation, no branch.
     #[inline(always)]
@@ -184,7 +172,7 @@ fn or_zero<R: Real>(number: R) -> R {
 /// Unit quaternion of a rotation vector.
 pub(crate) fn quaternion(rotation_rad: DVec3) -> DQuat {
     let angle = rotation_rad.length();
-    let (sine, cosine) = (0.5 * angle).sin_cos();
+    let (sine, cosine) = math::sin_cos(0.5 * angle);
     let scale = if angle > 0.0 { sine / angle } else { 0.5 };
     let axis = rotation_rad * scale;
     DQuat::from_xyzw(axis.x, axis.y, axis.z, cosine)

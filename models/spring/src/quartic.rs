@@ -39,12 +39,13 @@
 use std::f64::consts::PI;
 
 use flotor_hal::glam::DVec4;
+use flotor_hal::math;
 
 use crate::beam_column::Column;
 use crate::bending::{KNEE, REACH};
 use crate::entire::EntireFunctions;
 use crate::level::{Levelled, level_above, level_below};
-use crate::real::{Four, Real};
+use crate::real::{Real, polynomial};
 use crate::rigidity::{Rigidities, Spring};
 use crate::shape::Shape;
 
@@ -89,18 +90,16 @@ pub(crate) struct QuarticEnergy<R = f64> {
 
 /// The four coefficients at one length.
 #[derive(Clone, Copy)]
-pub(crate) struct QuarticForm<R: Real> {
-    /// `(c0, c1, c2, c3)`
-    coefficients: R::Four,
-    /// Their derivatives by the length.
-    by_length: R::Four,
+pub(crate) struct QuarticForm<R> {
+    /// `(c0, c1, c2, c3)`, each with its derivative by the length.
+    coefficients: [[R; 2]; 4],
 }
 
 /// The four coefficients of one spring as functions of the length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Quartic {
     /// Powers of the length mapped to -1..1, for `(c0, c1, c2, c3)`, each per newton of `gamma`.
-    powers: [[f64; 4]; TERMS],
+    powers: [[f64; TERMS]; 4],
     gamma_n: f64,
     shortest: Limit,
     longest: Limit,
@@ -117,8 +116,7 @@ struct Limit {
 
 impl Quartic {
     /// Fits the coefficients. They are proportional to the rigidities, and are fitted for those of a spring with
-    /// `gamma` of one newton. Real-time: bounded (tens of microseconds; ten times
-    /// that on a machine that fuses no products), no allocation.
+    /// `gamma` of one newton. Real-time: bounded (tens of microseconds), no allocation.
     pub(crate) fn new(spring: &Spring) -> Self {
         let free_length_m = spring.geometry().free_length_m;
         let rigidities = &spring.rigidities_per_gamma();
@@ -129,9 +127,9 @@ impl Quartic {
         let longest = longest.min(LONGEST).min(longest_with_shape(rigidities));
         let margin = MARGIN.min(0.5 * (longest - 1.0));
         let (middle, half_width) = (0.5 * (longest + shortest), 0.5 * (longest - shortest));
+        let powers = fit(|mapped| coefficients(rigidities, free_length_m, middle + half_width * mapped));
         Self {
-            powers: fit(|mapped| coefficients(rigidities, free_length_m, middle + half_width * mapped))
-                .map(|powers| powers.to_array()),
+            powers: std::array::from_fn(|which| powers.map(|powers| powers[which])),
             gamma_n: spring.rigidities().gamma_n,
             shortest: Limit { knee_m: knee * free_length_m, reach_m: (knee - shortest) * free_length_m },
             longest: Limit { knee_m: (longest - margin) * free_length_m, reach_m: margin * free_length_m },
@@ -156,7 +154,7 @@ impl Quartic {
         z_by_length: R,
         squares: [R; 3],
     ) -> QuarticEnergy<R> {
-        let QuarticForm { coefficients: form, by_length: form_by_length } = *form;
+        let [[c0, c0_slope], [c1, c1_slope], [c2, c2_slope], [c3, c3_slope]] = form.coefficients;
         let pole = (z.like(POLE) - z).inverse() * POLE;
         let magnification = pole + 1.0;
         let by_argument = pole * pole * (1.0 / POLE);
@@ -168,26 +166,24 @@ impl Quartic {
         let bow = magnified * across;
         let mixed = magnification * along;
 
-        let monomials = R::Four::of([sway * sway, sway * bow, mixed * mixed, bow * bow]);
-        let value: R = sum(form * monomials);
+        let (sway2, both, mixed2, bow2) = (sway * sway, sway * bow, mixed * mixed, bow * bow);
+        let value = (c0 * sway2 + c1 * both) + (c2 * mixed2 + c3 * bow2);
+        let value_slope = (c0_slope * sway2 + c1_slope * both) + (c2_slope * mixed2 + c3_slope * bow2);
         // Fades with the square of the magnified amplitude: the error it makes is of order eight.
         let amplitude = (sway + bow) * (1.0 / FADING_SQUARE);
-        let fading = amplitude.mul_add(amplitude, amplitude.like(1.0)).inverse();
+        let fading = (amplitude * amplitude + 1.0).inverse();
         let weight = fading * self.gamma_n;
         let by_amplitude = amplitude * (fading * weight) * value * (-2.0 / FADING_SQUARE);
 
-        let [sway2, sway_bow, mixed2, bow2]: [R; 4] = form.numbers();
-        let (sway_twice, bow_twice) = (sway * 2.0, bow * 2.0);
-        let by_sway = weight.mul_add(sway2.mul_add(sway_twice, sway_bow * bow), by_amplitude);
-        let by_bow = weight.mul_add(sway_bow.mul_add(sway, bow2 * bow_twice), by_amplitude);
-        let by_mixed = weight * (mixed2 * mixed) * 2.0;
-        let by_magnification = by_bow.mul_add(magnification * across * 2.0, by_mixed * along);
+        let by_sway = weight * (c0 * (sway * 2.0) + c1 * bow) + by_amplitude;
+        let by_bow = weight * (c1 * sway + c3 * (bow * 2.0)) + by_amplitude;
+        let by_mixed = weight * (c2 * mixed) * 2.0;
+        let by_magnification = by_bow * (magnification * across * 2.0) + by_mixed * along;
         let (half, quarter) = (by_sway * 0.5, magnification * by_mixed * 0.25);
         QuarticEnergy {
             energy_j: weight * value,
-            by_squares: [half - quarter, half + quarter, magnified.mul_add(by_bow, -by_sway) * 0.25],
-            by_length: weight
-                .mul_add(sum(form_by_length * monomials), by_magnification * (by_argument * z_by_length)),
+            by_squares: [half - quarter, half + quarter, (magnified * by_bow - by_sway) * 0.25],
+            by_length: weight * value_slope + by_magnification * (by_argument * z_by_length),
         }
     }
 
@@ -199,29 +195,14 @@ impl Quartic {
         let Levelled { value, slope, .. } = level_above(below.value, longest.knee_m, longest.reach_m);
         let slope = slope * below.slope * self.mapping_per_m;
         let mapped = (value - self.middle_m) * self.mapping_per_m;
-        let square = mapped * mapped;
-        // Even and odd powers apart: short dependency chains.
-        let (pairs, _) = self.powers.as_chunks::<2>();
-        let [mut even, mut odd, mut even_slope, mut odd_slope] = [R::Four::like(mapped, &[0.0; 4]); 4];
-        let squares = R::Four::of([square; 4]);
-        for [even_powers, odd_powers] in pairs.iter().rev() {
-            even_slope = even_slope.mul_add(squares, even);
-            odd_slope = odd_slope.mul_add(squares, odd);
-            even = even.mul_add(squares, R::Four::like(mapped, even_powers));
-            odd = odd.mul_add(squares, R::Four::like(mapped, odd_powers));
+        let [p0, p1, p2, p3] = &self.powers;
+        let mut coefficients =
+            [polynomial(mapped, p0), polynomial(mapped, p1), polynomial(mapped, p2), polynomial(mapped, p3)];
+        for [_, by_length] in &mut coefficients {
+            *by_length = *by_length * slope;
         }
-        let lengths = R::Four::of([mapped; 4]);
-        QuarticForm {
-            coefficients: odd.mul_add(lengths, even),
-            by_length: odd_slope.mul_add(lengths, even_slope).mul_add(lengths + lengths, odd) * slope,
-        }
+        QuarticForm { coefficients }
     }
-}
-
-#[inline(always)]
-fn sum<R: Real>(terms: R::Four) -> R {
-    let [a, b, c, d] = terms.numbers();
-    (a + b) + (c + d)
 }
 
 /// Relative length at which the argument is `z`, the longer one of two; `None` if it is never reached.
@@ -247,7 +228,7 @@ fn fit(function: impl Fn(f64) -> DVec4) -> [DVec4; TERMS] {
     let mut chebyshev = [DVec4::ZERO; TERMS];
     for node in 0..TERMS {
         let angle = PI * (node as f64 + 0.5) / terms;
-        let mapped = angle.cos();
+        let mapped = math::cos(angle);
         let value = function(mapped) * (2.0 / terms);
         // T(n+1) = 2 x T(n) - T(n-1)
         let (mut current, mut next) = (1.0, mapped);

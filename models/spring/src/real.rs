@@ -1,11 +1,8 @@
 //! One formula for one pose and for several side by side.
 //!
-//! The laws of this crate are written once, over any [`Real`]: [`Lone`] for the servo's one pose (`f64` on a machine without
-//! registers for four numbers), [`Wide`] for a batch, several poses in the lanes of one vector register. Every operation rounds as IEEE 754 says, in the order
-//! written, so a lane of a batch holds *the same bits* as the scalar law. A product and a sum are rounded once where it says
-//! [`Real::mul_add`], and nowhere else: the compiler fuses nothing by itself, and a machine that cannot fuse computes the
-//! same bits, if slowly. It is written where numbers follow each other along the axis of the spring, as the terms of a
-//! series, and not where two components stand side by side: a law that rounds `x y - y x` in two ways is not symmetric.
+//! The laws of this crate are written once, over any [`Real`]: `f64` for the servo's one pose, [`Wide`] for a batch, several
+//! poses in the lanes of one vector register. Every operation rounds as IEEE 754 says, in the order written, and no product is
+//! fused with a sum, so a lane of a batch holds *the same bits* as the scalar law, on every machine.
 //!
 //! A comparison gives a mask, a truth value per lane. What is rare (strong tension, levelling, a plate below the
 //! other) stands behind `if R::any(mask)`: for one pose an ordinary branch, for several a branch taken when one of
@@ -13,13 +10,9 @@
 //!
 //! The lanes come from the crate `pulp`, which finds the instruction set of the machine at run time.
 
-mod four;
-
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Sub};
 
 use pulp::Simd;
-
-pub use four::{Each, Four, Lone};
 
 /// A real number, or one in each lane. Everything on it is real-time: bounded, no allocation.
 pub trait Real:
@@ -35,9 +28,6 @@ pub trait Real:
 {
     /// A truth value per lane.
     type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask>;
-
-    /// Four of them.
-    type Four: Four<Self>;
 
     /// The same value in as many lanes as `self` has.
     #[must_use]
@@ -71,10 +61,6 @@ pub trait Real:
     #[must_use]
     fn map(self, function: impl Fn(f64) -> f64) -> Self;
 
-    /// Its product with a factor and the sum with a term, rounded once.
-    #[must_use]
-    fn mul_add(self, factor: Self, term: Self) -> Self;
-
     /// One over it.
     #[inline(always)]
     #[must_use]
@@ -106,7 +92,6 @@ pub trait Real:
 
 impl Real for f64 {
     type Mask = bool;
-    type Four = Each<Self>;
 
     #[inline(always)]
     fn like(self, value: f64) -> Self {
@@ -116,11 +101,6 @@ impl Real for f64 {
     #[inline(always)]
     fn sqrt(self) -> Self {
         self.sqrt()
-    }
-
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        self.mul_add(factor, term)
     }
 
     #[inline(always)]
@@ -238,7 +218,6 @@ lane_operator!(Add add add_f64s, Sub sub sub_f64s, Mul mul mul_f64s, Div div div
 
 impl<S: Simd> Real for Wide<S> {
     type Mask = WideMask<S>;
-    type Four = Each<Self>;
 
     #[inline(always)]
     fn like(self, value: f64) -> Self {
@@ -248,11 +227,6 @@ impl<S: Simd> Real for Wide<S> {
     #[inline(always)]
     fn sqrt(self) -> Self {
         Self { lanes: self.simd.sqrt_f64s(self.lanes), ..self }
-    }
-
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        Self { lanes: self.simd.mul_add_f64s(self.lanes, factor.lanes, term.lanes), ..self }
     }
 
     #[inline(always)]
@@ -356,7 +330,6 @@ pair_operator_by_number!(Add add, Sub sub, Mul mul);
 
 impl<R: Real> Real for Pair<R> {
     type Mask = Pair<R::Mask>;
-    type Four = Each<Self>;
 
     #[inline(always)]
     fn like(self, value: f64) -> Self {
@@ -366,11 +339,6 @@ impl<R: Real> Real for Pair<R> {
     #[inline(always)]
     fn sqrt(self) -> Self {
         Self(self.0.sqrt(), self.1.sqrt())
-    }
-
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        Self(self.0.mul_add(factor.0, term.0), self.1.mul_add(factor.1, term.1))
     }
 
     #[inline(always)]
@@ -402,6 +370,24 @@ impl<R: Real> Real for Pair<R> {
     fn map(self, function: impl Fn(f64) -> f64) -> Self {
         Self(self.0.map(&function), self.1.map(&function))
     }
+}
+
+/// A polynomial, by powers from the constant on, and its derivative: four terms or more, an even number. Even and odd powers
+/// apart: short dependency chains. Real-time: bounded, no allocation, no branch.
+#[inline(always)]
+pub(crate) fn polynomial<R: Real, const TERMS: usize>(x: R, powers: &[f64; TERMS]) -> [R; 2] {
+    let square = x * x;
+    let (mut even_slope, mut odd_slope) = (x.like(powers[TERMS - 2]), x.like(powers[TERMS - 1]));
+    let (mut even, mut odd) =
+        (even_slope * square + powers[TERMS - 4], odd_slope * square + powers[TERMS - 3]);
+    let (lower, _) = powers[..TERMS - 4].as_chunks::<2>();
+    for [even_power, odd_power] in lower.iter().rev() {
+        even_slope = even_slope * square + even;
+        odd_slope = odd_slope * square + odd;
+        even = even * square + *even_power;
+        odd = odd * square + *odd_power;
+    }
+    [odd * x + even, (odd_slope * x + even_slope) * (x + x) + odd]
 }
 
 /// Three components, a [`Real`] each.

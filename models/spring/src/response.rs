@@ -3,7 +3,7 @@
 use flotor_hal::glam::DVec3;
 
 use crate::pose::{Coordinates, Pose};
-use crate::real::{Lone, Real, Vector};
+use crate::real::{Real, Vector};
 use crate::validity::Validity;
 
 /// Outputs the caller needs; each level includes those before it. What is not demanded is not computed.
@@ -58,75 +58,19 @@ pub trait Law {
     /// The response at one pose. Real-time: bounded, no allocation.
     #[inline]
     fn respond_at(&self, pose: &Pose, demand: Demand) -> Response {
-        self.respond_between(
-            #[inline(always)]
-            || (*pose, demand),
-            #[inline(always)]
-            |response| *response,
-        )
-    }
-
-    /// The response at one pose, from where that is asked for to what becomes of it with the best instructions of the
-    /// machine. Real-time: bounded by what asks and takes, no allocation.
-    #[inline(always)]
-    fn respond_between<T>(
-        &self,
-        ask: impl FnOnce() -> (Pose, Demand),
-        take: impl FnOnce(&Response) -> T,
-    ) -> T {
-        #[cfg(target_arch = "x86_64")]
-        if let Some(avx2) = pulp::x86::V3::try_new() {
-            return avx2.vectorize(
-                #[inline(always)]
-                || {
-                    let (pose, demand) = ask();
-                    let at = pose.coordinates().each(
-                        #[inline(always)]
-                        |number| Lone::new(avx2, number),
-                    );
-                    take(&self.respond_with(&at, &pose, demand))
-                },
-            );
-        }
-        self.respond_plainly(ask, take)
-    }
-
-    /// The same on machines without better instructions. Real-time: as [`Self::respond_between`].
-    #[inline(never)] // its registers and its frame are no concern of the machines that have them
-    fn respond_plainly<T>(
-        &self,
-        ask: impl FnOnce() -> (Pose, Demand),
-        take: impl FnOnce(&Response) -> T,
-    ) -> T {
-        let (pose, demand) = ask();
-        take(&self.respond_with(&pose.coordinates(), &pose, demand))
-    }
-
-    /// The response at a pose whose coordinates are these. Real-time: bounded, no allocation.
-    #[inline(always)]
-    fn respond_with<R: Real<Mask = bool> + Into<f64>>(
-        &self,
-        at: &Coordinates<R>,
-        pose: &Pose,
-        demand: Demand,
-    ) -> Response {
-        let Answer { force_n, torque_nm, energy_j, answered, trusted } = self.answer(at, demand);
+        let Answer { force_n, torque_nm, energy_j, answered, trusted } =
+            self.answer(&pose.coordinates(), demand);
         if !answered {
             return Response::none(pose.why_unanswered());
         }
         let has_energy = Self::HAS_ENERGY && demand >= Demand::WrenchAndEnergy;
         Response {
-            force_n: dvec3(force_n),
-            torque_nm: dvec3(torque_nm),
-            energy_j: if has_energy { Some(energy_j.into()) } else { None },
+            force_n: DVec3::new(force_n.x, force_n.y, force_n.z),
+            torque_nm: DVec3::new(torque_nm.x, torque_nm.y, torque_nm.z),
+            energy_j: has_energy.then_some(energy_j),
             validity: if trusted { Validity::Ok } else { Validity::Clamped },
         }
     }
-}
-
-#[inline(always)]
-fn dvec3<R: Into<f64>>(Vector { x, y, z }: Vector<R>) -> DVec3 {
-    DVec3::new(x.into(), y.into(), z.into())
 }
 
 /// Answer of a [`Law`] before it is packed into a [`Response`].

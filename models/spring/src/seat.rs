@@ -21,6 +21,7 @@
 //! and Saunders (2014).
 
 use flotor_hal::glam::{DMat2, DQuat, DVec2, DVec3};
+use flotor_hal::math;
 
 use crate::centerline::Section;
 use crate::held::HeldSpring;
@@ -289,7 +290,7 @@ impl Seat {
         }
         let along = base.direction.extend(0.0);
         let across = DVec3::new(-along.y, along.x, 0.0);
-        let (sine, cosine) = base.angle_rad.sin_cos();
+        let (sine, cosine) = math::sin_cos(base.angle_rad);
         let (chord, versine) = (sine / base.angle_rad, (1.0 - cosine) / base.angle_rad);
         let by_angle =
             self.rim_radius_m * (sine * force_n.dot(along) + cosine * force_n.z) - moment_nm.dot(across);
@@ -329,7 +330,7 @@ impl Base {
     fn new(tilt_rad: DVec2, rim_radius_m: f64) -> Self {
         let angle_rad = tilt_rad.length();
         let direction = if angle_rad > 0.0 { tilt_rad / angle_rad } else { DVec2::ZERO };
-        let (sine, cosine) = angle_rad.sin_cos();
+        let (sine, cosine) = math::sin_cos(angle_rad);
         Self {
             direction,
             angle_rad,

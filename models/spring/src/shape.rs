@@ -57,20 +57,20 @@ impl Shape {
         let alpha = rigidities.alpha_n_m2 * scale * if z == true_z { 1.0 } else { true_z / z };
         let softening = 1.0 + rigidities.gamma_n * (1.0 - scale) / beta;
 
-        let EntireFunctions { g0, g1, .. } = EntireFunctions::at_number(z);
+        let EntireFunctions { g0, g1, .. } = EntireFunctions::at(z);
         let sway = 0.5 * softening * length_m * g0
             / (g0 / beta + softening * length_m * length_m * g1 / (12.0 * alpha));
         let shear = 2.0 * sway / (length_m * beta);
         let parabola = softening * sway * length_m / alpha;
-        let cosine = (shear / softening - parabola * EntireFunctions::at_number(0.25 * z).h() / 12.0) / g0;
+        let cosine = (shear / softening - parabola * EntireFunctions::at(0.25 * z).h() / 12.0) / g0;
         Some(Self { z, g0, softening, cosine, parabola, shear })
     }
 
     /// Lean of the section at `u`, from -1/2 to 1/2: of the sway (`S`) and of the bow (`D`).
     pub(crate) fn lean(&self, u: f64) -> [Lean; 2] {
         let square = u * u;
-        let inner = EntireFunctions::at_number(self.z * square);
-        let outer = EntireFunctions::at_number(4.0 * self.z * square);
+        let inner = EntireFunctions::at(self.z * square);
+        let outer = EntireFunctions::at(4.0 * self.z * square);
         let sway = Lean {
             value: self.cosine * outer.c0 + self.parabola * square * (inner.g0 * inner.g0),
             slope: u * outer.g0 * (2.0 * self.parabola - 4.0 * self.z * self.cosine),
@@ -80,7 +80,7 @@ impl Shape {
 
     /// Offset from the chord at `u`, in chord lengths per radian: of the sway and of the bow.
     pub(crate) fn offset(&self, u: f64) -> [f64; 2] {
-        let at = |position: f64| EntireFunctions::at_number(self.z * position * position);
+        let at = |position: f64| EntireFunctions::at(self.z * position * position);
         let (above, below) = (0.5 - u, 0.5 + u);
         let curved = self.cosine * at(2.0 * u).g0 + self.parabola * u * u * at(u).h() / 3.0;
         [

@@ -29,6 +29,7 @@
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use flotor_hal::glam::DVec3;
+use flotor_hal::math;
 
 use crate::pose::Pose;
 use crate::precision::Precision;
@@ -240,8 +241,8 @@ impl<T: CFloat> Printed<T> {
         }
         let pitch = T::store(-at.rotation_rad.x);
         let roll = T::store(at.rotation_rad.y);
-        let lower_z = T::store((shear_x / vertical).wide().atan());
-        let lower_x = T::store((shear_z / vertical).wide().atan());
+        let lower_z = T::store(math::atan((shear_x / vertical).wide()));
+        let lower_x = T::store(math::atan((shear_z / vertical).wide()));
         let z = EndAngles { upper: lower_z - roll, lower: lower_z };
         let x = EndAngles { upper: lower_x - pitch, lower: lower_x };
         let reaction = if l > l0 && l > zero {
@@ -259,7 +260,7 @@ impl<T: CFloat> Printed<T> {
         let [one, two] = [1.0, 2.0].map(T::store);
         let p = gamma * (l0 - l) / l0;
         let q = T::store((-(p / alpha) * (one + p / beta)).wide().sqrt());
-        let tanh = (q * l / two).wide().tanh();
+        let tanh = math::tanh((q * l / two).wide());
         let (hx, hz) = if l.wide() < l0.wide() + WINDOW_MM {
             self.limit(l, z, x)
         } else {
@@ -276,7 +277,7 @@ impl<T: CFloat> Printed<T> {
         if demand < Demand::Wrench {
             return Reaction { p, hx, hz, m1z: zero, m1x: zero };
         }
-        let sinh = (q * l).wide().sinh();
+        let sinh = math::sinh((q * l).wide());
         let moment =
             |h: T, upper: T| T::store((((h / p + upper) * alpha * q).wide() + (h * l).wide() / sinh) / tanh);
         Reaction { p, hx, hz, m1z: moment(hx, z.upper), m1x: moment(hz, x.upper) }
@@ -287,7 +288,7 @@ impl<T: CFloat> Printed<T> {
         let [one, two] = [1.0, 2.0].map(T::store);
         let p = gamma * (l0 - l) / l0;
         let q = T::store(((p / alpha) * (one + p / beta)).wide().sqrt());
-        let tan = (q * l / two).wide().tan();
+        let tan = math::tan((q * l / two).wide());
         let (hx, hz) = if l.wide() > l0.wide() - WINDOW_MM {
             self.limit(l, z, x)
         } else {
@@ -301,7 +302,7 @@ impl<T: CFloat> Printed<T> {
         if demand < Demand::Wrench {
             return Reaction { p, hx, hz, m1z: zero, m1x: zero };
         }
-        let sin = (q * l).wide().sin();
+        let sin = math::sin((q * l).wide());
         let moment =
             |h: T, upper: T| T::store(((alpha * q * (h / p + upper)).wide() - (h * l).wide() / sin) / tan);
         Reaction { p, hx, hz, m1z: moment(hx, z.upper), m1x: moment(hz, x.upper) }
@@ -324,7 +325,7 @@ impl<T: CFloat> Reaction<T> {
     fn on_hand(&self, l: T, z: EndAngles<T>, x: EndAngles<T>, demand: Demand) -> Outputs<T> {
         let Self { p, hx, hz, m1z, m1x } = *self;
         let turn = |h: T, along: T, lower: T| {
-            let (sin, cos) = lower.wide().sin_cos();
+            let (sin, cos) = math::sin_cos(lower.wide());
             (T::store(h.wide() * cos + along.wide() * sin), T::store(along.wide() * cos - h.wide() * sin))
         };
         let (force_x, inter_force_y) = turn(hx, p, z.lower);

@@ -25,6 +25,7 @@
 use std::f64::consts::{PI, TAU};
 
 use flotor_hal::glam::{DMat3, DVec3};
+use flotor_hal::math;
 
 use crate::pose::Pose;
 use crate::response::{Demand, Response};
@@ -112,7 +113,7 @@ struct Section {
 impl Section {
     fn new(geometry: &Geometry, material: &Material) -> Self {
         let d = geometry.wire_diameter_m;
-        let (area_m2, second_moment_m4) = (0.25 * PI * d * d, PI * d.powi(4) / 64.0);
+        let (area_m2, second_moment_m4) = (0.25 * PI * d * d, PI * math::powi(d, 4) / 64.0);
         let coil_radius_m = 0.5 * geometry.coil_diameter_m;
         let climb_m_per_rad = geometry.free_length_m / (TAU * geometry.active_coils);
         Self {
@@ -122,7 +123,7 @@ impl Section {
             tension_n: material.youngs_modulus_pa * area_m2,
             coil_radius_m,
             climb_m_per_rad,
-            arc_m_per_rad: coil_radius_m.hypot(climb_m_per_rad),
+            arc_m_per_rad: math::hypot(coil_radius_m, climb_m_per_rad),
         }
     }
 }
@@ -159,7 +160,7 @@ impl Compliance {
         for node in 0..NODES {
             let (t, weight) = gauss_legendre(NODES, node);
             let angle = 0.5 * (1.0 + t) * arc_rad;
-            let (sine, cosine) = angle.sin_cos();
+            let (sine, cosine) = math::sin_cos(angle);
             let radius = section.coil_radius_m;
             let tangent =
                 DVec3::new(-radius * sine, radius * cosine, section.climb_m_per_rad) / section.arc_m_per_rad;

@@ -1,6 +1,7 @@
 //! The solids: convex, with their top at the origin and the rest below.
 
 use flotor_hal::DVec3;
+use flotor_hal::math;
 
 /// A solid whose highest point is the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,8 +85,9 @@ impl Shape {
             Self::Sphere { radius_m } => {
                 // r sin(a) = mu (R - r cos(a)) for the angle a between proxy and handle, seen from the centre.
                 let share = (handle_m - self.centre_m()).length() / radius_m;
-                let sine = mu / (share * mu.hypot(1.0));
-                let sticks_up_to_rad = if sine < 1.0 { sine.asin() - mu.atan() } else { f64::INFINITY };
+                let sine = mu / (share * math::hypot(mu, 1.0));
+                let sticks_up_to_rad =
+                    if sine < 1.0 { math::asin(sine) - math::atan(mu) } else { f64::INFINITY };
                 let angle_rad = proxy.normal.angle_between(nearest.normal);
                 if angle_rad <= sticks_up_to_rad {
                     return *proxy;

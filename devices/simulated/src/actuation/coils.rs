@@ -10,6 +10,7 @@ use crate::linear::{Matrix6, Vector6, inverse, product};
 use crate::plant::Wrench;
 use crate::validation::{Domain, InvalidParameter, number};
 use flotor_hal::glam::DVec3;
+use flotor_hal::math;
 use std::f64::consts::PI;
 
 /// Number of coils.
@@ -47,10 +48,10 @@ impl CoilGeometry {
     fn places(&self) -> [(DVec3, DVec3); COILS] {
         let place = |index: usize| {
             let azimuth = (index % 3) as f64 * (2.0 * PI / 3.0);
-            let (sin_azimuth, cos_azimuth) = azimuth.sin_cos();
+            let (sin_azimuth, cos_azimuth) = math::sin_cos(azimuth);
             let along_meridian = index < 3;
             let angle = if along_meridian { self.meridian_ring_rad } else { self.parallel_ring_rad };
-            let (sin, cos) = angle.sin_cos();
+            let (sin, cos) = math::sin_cos(angle);
             let position = self.radius_m * DVec3::new(sin * cos_azimuth, sin * sin_azimuth, -cos);
             let direction = if along_meridian {
                 DVec3::new(cos * cos_azimuth, cos * sin_azimuth, sin)

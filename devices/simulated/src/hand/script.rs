@@ -33,7 +33,7 @@ pub use reader::ScriptError;
 
 use super::{Aim, Grip, Pose, minimum_jerk};
 use flotor_hal::glam::{BVec3, DVec3};
-use flotor_hal::orientation_from_rotation_vector;
+use flotor_hal::{math, orientation_from_rotation_vector};
 use std::f64::consts::TAU;
 use std::path::Path;
 use std::sync::Arc;
@@ -165,12 +165,12 @@ impl Leg {
             Movement::Oscillate { amplitude, frequency_hz } => {
                 let fade_s = (1.0 / frequency_hz).min(0.5 * duration_s);
                 let share = minimum_jerk(elapsed_s, fade_s) * minimum_jerk(duration_s - elapsed_s, fade_s);
-                let swing = share * (TAU * frequency_hz * elapsed_s).sin();
+                let swing = share * math::sin(TAU * frequency_hz * elapsed_s);
                 Aim::at(self.from.moved(&amplitude, swing).pose())
             }
             Movement::Push { .. } if is_over => Aim::at(self.from.pose()),
             Movement::Push { force_n, frequency_hz } => {
-                let pulse = 0.5 - 0.5 * (TAU * frequency_hz * elapsed_s).cos();
+                let pulse = 0.5 - 0.5 * math::cos(TAU * frequency_hz * elapsed_s);
                 let yielding = self.yielding();
                 Aim { force_n: force_n * pulse, yielding, ..Aim::at(self.from.pose()) }
             }

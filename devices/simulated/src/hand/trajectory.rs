@@ -6,6 +6,7 @@
 use super::{Recording, Script};
 use crate::validation::{Check, Domain, InvalidParameter, number, vector};
 use flotor_hal::glam::{BVec3, DQuat, DVec3};
+use flotor_hal::math;
 use std::f64::consts::TAU;
 
 /// A position and an orientation in the device frame.
@@ -161,7 +162,7 @@ impl Trajectory {
             }
             Self::Release { from, at_ns } => (time_ns < *at_ns).then_some(Aim::at(*from)),
             Self::Oscillate { centre_m, amplitude_m, frequency_hz, onset_s } => {
-                let full_m = centre_m - amplitude_m * (TAU * frequency_hz * time_s).sin();
+                let full_m = centre_m - amplitude_m * math::sin(TAU * frequency_hz * time_s);
                 Some(Aim::below_home(-minimum_jerk(time_s, *onset_s) * full_m))
             }
             Self::Scripted(script) => script.aim(time_ns),

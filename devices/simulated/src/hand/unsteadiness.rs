@@ -15,6 +15,7 @@
 use crate::noise::{Noise, Stream};
 use crate::validation::{Check, Domain, number};
 use flotor_hal::glam::DVec3;
+use flotor_hal::math;
 use std::f64::consts::{SQRT_2, TAU};
 
 /// Band of tremor, Hz (see the module).
@@ -97,7 +98,7 @@ impl Waves {
         Self([(); SINES].map(|()| {
             // A random place in each of the parts, so that the sum does not repeat itself.
             let frequency_hz =
-                lowest_hz * (highest_hz / lowest_hz).powf((share + noise.uniform()) / SINES as f64);
+                lowest_hz * math::pow(highest_hz / lowest_hz, (share + noise.uniform()) / SINES as f64);
             share += 1.0;
             Sine { rate_per_s: TAU * frequency_hz, phase: TAU * noise.uniform() }
         }))
@@ -105,7 +106,7 @@ impl Waves {
 
     /// Mean square 1 over a long time.
     fn at(&self, time_s: f64) -> f64 {
-        let sum: f64 = self.0.iter().map(|sine| (sine.rate_per_s * time_s + sine.phase).sin()).sum();
+        let sum: f64 = self.0.iter().map(|sine| math::sin(sine.rate_per_s * time_s + sine.phase)).sum();
         sum * (SQRT_2 / (SINES as f64).sqrt())
     }
 }

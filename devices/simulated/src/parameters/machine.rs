@@ -10,7 +10,7 @@ use crate::machine::MachineParameters;
 use crate::sensing::SensingParameters;
 use crate::sensing::optics::OpticsGeometry;
 use crate::sensing::velocity::EstimatorKind;
-use flotor_hal::Settings;
+use flotor_hal::{Settings, math};
 
 /// What stands between controller and flotor; nothing with preset `plain`.
 pub(crate) fn machine(settings: &Settings<'_>) -> Option<MachineParameters> {
@@ -67,8 +67,10 @@ fn estimator(settings: &Settings<'_>) -> EstimatorKind {
         1 => EstimatorKind::Difference,
         2 => EstimatorKind::Kalman {
             // Steps are noise, too: evenly distributed over their width.
-            noise_m: (value("sensor_noise_um") * UM)
-                .hypot(value("sensor_resolution_um") * UM / 12.0_f64.sqrt()),
+            noise_m: math::hypot(
+                value("sensor_noise_um") * UM,
+                value("sensor_resolution_um") * UM / 12.0_f64.sqrt(),
+            ),
             acceleration_m_per_s2: value("velocity_acceleration_m_per_s2"),
         },
         _ => EstimatorKind::LowPass { bandwidth_hz: value("velocity_bandwidth_hz") },

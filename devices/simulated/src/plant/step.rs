@@ -26,7 +26,6 @@ use super::translation::Drive;
 use super::{Wrench, rotation};
 use crate::ledger::Work;
 use flotor_hal::glam::{DQuat, DVec3};
-use flotor_hal::instructions;
 
 /// One step: everything that is fixed during it.
 pub(super) struct Step<'a> {
@@ -127,14 +126,6 @@ impl<'a> Step<'a> {
     /// The motion at the end and the work done, whatever turns. Real-time: bounded, no allocation.
     #[inline(never)] // keeps the straight step, in whose place it would be inlined, small
     pub(super) fn turning(&self) -> (Motion, Work) {
-        instructions::best(
-            #[inline(always)]
-            || self.turn(),
-        )
-    }
-
-    #[inline(always)] // into what chooses the instructions
-    fn turn(&self) -> (Motion, Work) {
         let swing = Swing::new(self.start.orientation, self.start.spin_rad_per_s, self.body.centre_of_mass_m);
         let drive = self.drive(self.start.velocity_m_per_s + swing.velocity);
         let mut slopes = [Unknowns::ZERO; STAGES];

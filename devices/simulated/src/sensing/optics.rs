@@ -20,6 +20,7 @@
 use crate::hand::Pose;
 use crate::validation::{Domain, InvalidParameter, number};
 use flotor_hal::glam::{DMat3, DQuat, DVec3};
+use flotor_hal::math;
 use std::f64::consts::PI;
 
 /// Most rounds of the iteration: from home six find any pose the cells can see.
@@ -107,7 +108,7 @@ impl Optics {
             number("led_2_deg and led_3_deg", azimuth, Domain::Finite)?;
         }
         let eyes = geometry.diode_azimuths_rad.map(|azimuth| {
-            let (sin, cos) = azimuth.sin_cos();
+            let (sin, cos) = math::sin_cos(azimuth);
             let radius = DVec3::new(cos, sin, 0.0);
             Eye { diode: radius * geometry.diode_radius_m, radius, tangent: DVec3::new(-sin, cos, 0.0) }
         });
@@ -212,7 +213,7 @@ impl Optics {
         let (u2, v2) = self.rows(second, pose.position_m, &attitude);
         let (u3, v3) = self.rows(third, pose.position_m, &attitude);
         let matrix = |a, b, c| DMat3::from_cols(a, b, c).transpose();
-        let size = self.magnification().powi(3) * self.geometry.diode_radius_m;
+        let size = math::powi(self.magnification(), 3) * self.geometry.diode_radius_m;
         Equations::new(
             [matrix(u1.0, u2.0, u3.0), matrix(u1.1, u2.1, u3.1)],
             [matrix(v1.0, v2.0, v3.0), matrix(v1.1, v2.1, v3.1)],

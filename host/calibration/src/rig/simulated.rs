@@ -3,7 +3,7 @@
 use super::{AVERAGED_TICKS, Mean, PERIOD_NS, Rest, Rig, locked};
 use crate::CalibrationError;
 use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting};
-use flotor_hal::{Cycle, DeviceState, LoopConfig, Refusal, Tick, VerticalCalibration};
+use flotor_hal::{Cycle, DeviceState, LoopConfig, Refusal, Tick, VerticalCalibration, math};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
@@ -138,6 +138,6 @@ impl Rig for SimulatedRig {
         let true_n = rest.delivered_n - RIG_WEIGHT_N;
         // Box and Muller 1958; 1 - u is never zero.
         let [u, v] = [(); 2].map(|()| (self.noise.next_u64() >> 11) as f64 / (1_u64 << 53) as f64);
-        Ok(true_n + SENSOR_NOISE_N * (-2.0 * (1.0 - u).ln()).sqrt() * (TAU * v).cos())
+        Ok(true_n + SENSOR_NOISE_N * (-2.0 * math::ln(1.0 - u)).sqrt() * math::cos(TAU * v))
     }
 }

@@ -6,7 +6,7 @@
 use flotor_hal::abi::{Entry, device_entry};
 use flotor_hal::{
     ActiveDevice, Axes, Capabilities, Cycle, DVec3, Device, DeviceInfo, DeviceState, LoopConfig, Pose,
-    Refusal, SafeStop, Settings, Tick, Twist, Wrench,
+    Refusal, SafeStop, Settings, Tick, Twist, Wrench, math,
 };
 use std::f64::consts::TAU;
 
@@ -43,7 +43,7 @@ struct Phase {
 
 impl Phase {
     fn of(angle_rad: f64) -> Self {
-        let (sin, cos) = angle_rad.sin_cos();
+        let (sin, cos) = math::sin_cos(angle_rad);
         Self { cos, sin }
     }
 

@@ -13,7 +13,7 @@
 use super::search::largest_stable;
 use super::theory::Plant;
 use flotor_hal::abi::loader::{ActiveDevice, LoadError, OpenedDevice, Plugin, Setting, SettingError};
-use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Refusal, Tick, Wrench};
+use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Refusal, Tick, Wrench, math};
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
@@ -231,7 +231,7 @@ impl Window {
     }
 
     fn add(&mut self, sample: f64) {
-        let weight = 1.0 - self.phase.cos();
+        let weight = 1.0 - math::cos(self.phase);
         self.phase += self.step;
         self.weight += weight;
         self.sum += weight * sample * sample;
@@ -268,7 +268,7 @@ mod tests {
             (from..from + length).for_each(|index| window.add(sample(index)));
             window.mean_square()
         };
-        let measured = (window(length) / window(0)).ln() / (2.0 * WINDOW_S);
+        let measured = math::ln(window(length) / window(0)) / (2.0 * WINDOW_S);
         // Ripple of a Hann window over n = 52 periods: about 1 / (8 n^3) of the mean square, so 1e-6 / 16 s.
         assert!((measured - rate_per_s).abs() < 1.0e-6, "{measured}");
     }

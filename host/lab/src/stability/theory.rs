@@ -11,6 +11,7 @@
 
 use super::search::largest_stable;
 pub use crate::plant::Plant;
+use flotor_hal::math;
 use std::convert::Infallible;
 use std::f64::consts::PI;
 
@@ -52,8 +53,8 @@ pub fn passive_limit_n_per_m(damping_ns_per_m: f64, rendering: &Rendering) -> f6
     for index in 1..=FREQUENCIES {
         let angle = PI * f64::from(index) / f64::from(FREQUENCIES);
         // Real part of (1 - e^-ja)^n e^-jda over 2 (1 - cos a), for the spring (n = 1) and the damper (n = 2).
-        let cosine = |ticks: f64| (angle * (delay + ticks)).cos();
-        let scale = 2.0 * (1.0 - angle.cos());
+        let cosine = |ticks: f64| math::cos(angle * (delay + ticks));
+        let scale = 2.0 * (1.0 - math::cos(angle));
         let of_spring = period_s * (cosine(0.0) - cosine(1.0)) / scale;
         let of_damper = (cosine(0.0) - 2.0 * cosine(1.0) + cosine(2.0)) / scale;
         let left = damping_ns_per_m - virtual_damping_ns_per_m * of_damper;
@@ -136,11 +137,11 @@ mod tests {
     fn the_exponential_of_a_damped_mass_is_the_textbook_hold() {
         let (period_s, damping) = (1.0e-3, 15.0);
         let rate = damping / MASS_KG;
-        let decay = (-rate * period_s).exp();
+        let decay = math::exp(-rate * period_s);
         let held = HeldPlant::new(&flotor(damping), period_s);
         // Roots of the denominator are 1 and the decay; rounding of numbers of order one.
         assert!((held.a0 - decay).abs() < 4.0e-16 && (held.a1 + 1.0 + decay).abs() < 4.0e-16);
-        let moved = (period_s + (-rate * period_s).exp_m1() / rate) / damping;
+        let moved = (period_s + math::exp_m1(-rate * period_s) / rate) / damping;
         // The textbook form cancels: rate T = 0.026, so it loses four digits.
         assert!((held.b1 / moved - 1.0).abs() < 1.0e-11, "{} {moved}", held.b1);
     }

@@ -24,7 +24,7 @@ use crate::subject::Subject;
 use crate::tally::Worst;
 use crate::trajectory::{at, sensed};
 use flotor_hal::abi::loader::LoadError;
-use flotor_hal::{DVec3, Memory, Pose, Wrench, rotation_vector};
+use flotor_hal::{DVec3, Memory, Pose, Wrench, math, rotation_vector};
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
@@ -180,7 +180,7 @@ fn buzz_n(forces_n: &[DVec3]) -> f64 {
     let count = BUZZ_WINDOW as f64;
     let mean = last.iter().copied().sum::<DVec3>() / count;
     let circle: Vec<(f64, f64)> =
-        (0..BUZZ_WINDOW).map(|step| (TAU * step as f64 / count).sin_cos()).collect();
+        (0..BUZZ_WINDOW).map(|step| math::sin_cos(TAU * step as f64 / count)).collect();
     let windowed: Vec<DVec3> =
         last.iter().zip(&circle).map(|(force, (_, cosine))| (*force - mean) * (0.5 - 0.5 * cosine)).collect();
     let whole = windowed.iter().map(|force| force.length_squared()).sum::<f64>() / count;

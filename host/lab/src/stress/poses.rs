@@ -7,7 +7,7 @@
 
 use crate::sampling::{Random, Sobol};
 use crate::trajectory::at;
-use flotor_hal::{DQuat, DVec3, Pose, Twist, rotation_vector};
+use flotor_hal::{DQuat, DVec3, Pose, Twist, math, rotation_vector};
 use serde::Serialize;
 use std::f64::consts::PI;
 
@@ -91,7 +91,7 @@ fn anywhere(reach: Reach, random: &mut Random) -> Pose {
 
 /// Uniform in the exponent.
 fn decades(random: &mut Random, from: f64, to: f64) -> f64 {
-    10.0_f64.powf(from + (to - from) * random.unit())
+    math::pow(10.0, from + (to - from) * random.unit())
 }
 
 /// Home itself, with every sign of zero and both quaternions.
@@ -119,7 +119,7 @@ fn shell(random: &mut Random, index: u64) -> Pose {
     #[allow(clippy::cast_possible_truncation)] // 1..=15
     let exponent = 1 + (index % 15) as i32;
     let rounding = [0.0, f64::EPSILON, -f64::EPSILON][(index / 15 % 3) as usize];
-    let radius_m = 10.0_f64.powi(-exponent) * (1.0 + rounding);
+    let radius_m = math::powi(10.0, -exponent) * (1.0 + rounding);
     let position_m = match index / 45 % 3 {
         0 => random.direction(),
         1 => DVec3::Z,

@@ -14,7 +14,7 @@ use super::Figures;
 use super::path::{FAST, finite, walk_at};
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{
-    DVec3, Input, Memory, Pose, Twist, Wrench, orientation_from_rotation_vector, rotation_vector,
+    DVec3, Input, Memory, Pose, Twist, Wrench, math, orientation_from_rotation_vector, rotation_vector,
 };
 use std::f64::consts::TAU;
 
@@ -51,7 +51,7 @@ fn on_circle(plane: [usize; 2], index: usize) -> Pose {
     let coordinates: [f64; 6] = std::array::from_fn(|axis| {
         let size = if axis < 3 { RADIUS_M } else { RADIUS_RAD };
         let [first, second] = plane.map(|along| if along == axis { size } else { 0.0 });
-        first * angle.cos() + second * angle.sin()
+        first * math::cos(angle) + second * math::sin(angle)
     });
     let [x, y, z, a, b, c] = coordinates;
     Pose::new(DVec3::new(x, y, z), orientation_from_rotation_vector(DVec3::new(a, b, c)))

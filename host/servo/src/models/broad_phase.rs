@@ -10,7 +10,7 @@
 //!
 //! Source: C. Ericson, "Real-Time Collision Detection", 2005, section 7.1 (uniform grids).
 
-use flotor_hal::DVec3;
+use flotor_hal::{DVec3, math};
 
 /// Cells an object's box may lie in before it is looked at in every tick instead.
 const MOST_CELLS_OF_AN_OBJECT: usize = 64;
@@ -151,7 +151,7 @@ impl Grid {
         let hull = hull.unwrap_or(Bounds { low_m: DVec3::ZERO, high_m: DVec3::ZERO });
         let extent_m = (hull.high_m - hull.low_m).to_array();
         #[allow(clippy::cast_precision_loss)] // a number of objects
-        let most = MOST_CELLS_OF_AN_AXIS.min((boxed.len() as f64).cbrt().ceil() * 2.0);
+        let most = MOST_CELLS_OF_AN_AXIS.min(math::cbrt(boxed.len() as f64).ceil() * 2.0);
         let counts = [0, 1, 2].map(|axis| {
             let mut sides_m: Vec<f64> =
                 boxed.iter().map(|bounds| (bounds.high_m - bounds.low_m)[axis]).collect();

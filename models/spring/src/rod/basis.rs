@@ -10,6 +10,7 @@
 //! Source: integrated Legendre (Lobatto) shape functions, Szabó and Babuška, *Finite Element Analysis*
 //! (1991), chapter 3; Gauss-Legendre quadrature, NIST DLMF 3.5(v).
 
+use flotor_hal::math;
 use std::f64::consts::PI;
 
 /// `K` bubbles and `Q` quadrature stations on the rod, arc length scaled to 0..1.
@@ -107,7 +108,7 @@ pub(crate) fn gauss_legendre(count: usize, i: usize) -> (f64, f64) {
         (0..count).for_each(|_| polynomial.advance());
         polynomial
     };
-    let mut node = -(PI * (i as f64 + 0.75) / (count as f64 + 0.5)).cos();
+    let mut node = -math::cos(PI * (i as f64 + 0.75) / (count as f64 + 0.5));
     // From this estimate Newton's method doubles the digits: 3, 6, 12, all; one more round for the last bit.
     for _ in 0..5 {
         let polynomial = legendre(node);

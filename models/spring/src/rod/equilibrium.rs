@@ -10,7 +10,6 @@
 //! (pseudo-transient continuation, the damped flow); Morse index by inertia, see [`super::matrix`].
 
 use flotor_hal::glam::{DVec2, DVec3};
-use flotor_hal::instructions;
 
 use super::curve::Curve;
 use super::functional::{Curvature, Functional, Ratios, Reaction, Shape, Value, joined};
@@ -273,10 +272,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         let mut outcome = Outcome::Failed;
         for _ in 0..self.effort.most_steps {
             let longest = self.stride.step.min(way_left);
-            let value = instructions::best(
-                #[inline(always)]
-                || self.functional.value(&self.shape, plate),
-            );
+            let value = self.functional.value(&self.shape, plate);
             self.work.evaluations += 1;
             let bent = distance(&self.shape, &self.matrix.shape);
             let fall = self.functional.eigenvalue_fall(plate.distance(&self.matrix.plate), bent);
@@ -284,10 +280,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
                 if self.work.matrices == self.effort.most_matrices {
                     break;
                 }
-                let curvature = instructions::best(
-                    #[inline(always)]
-                    || self.functional.curvature(&value),
-                );
+                let curvature = self.functional.curvature(&value);
                 self.work.matrices += 1;
                 if self.keep(&curvature, plate, &value.slope) > 0 {
                     return self.slide(&value, &curvature, longest, demand);

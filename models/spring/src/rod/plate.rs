@@ -6,6 +6,7 @@
 //! from the vertical to d) (turn about the vertical by psi)`.
 
 use flotor_hal::glam::{DVec2, DVec3};
+use flotor_hal::math;
 
 use crate::pose::{DUST, Pose};
 
@@ -46,7 +47,7 @@ impl Plate {
         Some(Self {
             displacement: (pose.position_m / free_length_m).map(or_zero),
             lean: (DVec2::new(q.x * q.z + q.w * q.y, q.y * q.z - q.w * q.x) / upright).map(or_zero),
-            turn_rad: or_zero(2.0 * (sign * q.z).atan2(sign * q.w)),
+            turn_rad: or_zero(2.0 * math::atan2(sign * q.z, sign * q.w)),
         })
     }
 

@@ -1,6 +1,6 @@
 //! What the coils are never asked for, whatever the host says.
 
-use flotor_hal::{DVec3, Wrench};
+use flotor_hal::{DVec3, Wrench, math};
 
 /// Limits of the controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,7 +104,7 @@ impl Load {
     /// Bears a wrench for a time; true if that was too much for too long.
     pub fn bear(&mut self, wrench: &Wrench, dt_s: f64, limits: &LimitConfig) -> bool {
         let share = limits.share(wrench);
-        self.mean_square += (share * share - self.mean_square) * -(-dt_s / limits.load_time_s).exp_m1();
+        self.mean_square += (share * share - self.mean_square) * -math::exp_m1(-dt_s / limits.load_time_s);
         self.mean_square > limits.continuous_load * limits.continuous_load
     }
 }

@@ -3,7 +3,7 @@
 //! A device is opened (it answers questions), then active (`read` and `write`, a thousand times a second), then
 //! opened again. Metres, newtons, z up; the wrench is what the hand is to feel.
 
-use flotor_hal::{
+use flotor_hal::{math, 
     ActiveDevice, Axes, Capabilities, Cycle, DQuat, DVec3, Device, DeviceInfo, DeviceState, LoopConfig, Parameter,
     Pose, Refusal, SafeStop, Settings, Tick, Twist, Wrench,
 };
@@ -73,7 +73,7 @@ impl ActiveDevice for ActiveYourName {
 
     // The newest sample, without waiting: no allocation, no lock. Nothing new is `Cycle::Stale`.
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
-        let (sin, cos) = (TAU * FREQUENCY_HZ * tick.time_ns as f64 * 1.0e-9).sin_cos();
+        let (sin, cos) = math::sin_cos(TAU * FREQUENCY_HZ * tick.time_ns as f64 * 1.0e-9);
         let speed_m_per_s = self.device.amplitude_m * TAU * FREQUENCY_HZ * cos;
         state.pose = Pose::new(DVec3::Z * self.device.amplitude_m * sin, DQuat::IDENTITY);
         state.twist = Twist::new(DVec3::Z * speed_m_per_s, DVec3::ZERO);
