@@ -4,10 +4,10 @@
 //! The flotor is free: the hand is open, its centre of mass is on the axis in the handle, so that nothing but
 //! the spring turns it. Everything here is compared with a closed form.
 
+use flotor::registry::load_file;
 use flotor::report::{RunFacts, RunSummary, Tally};
 use flotor::session::{Observer, RunEnd};
 use flotor::trace::{Events, TickRecord};
-use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{DVec3, EnergyLedger, Input, Output, Pose};
 use flotor_tests::library::plugin_file;
 use flotor_tests::watched::{Watched, watch};
@@ -210,7 +210,7 @@ fn excursion(watched: &Watched) -> f64 {
 
 /// Stiffness against sideways motion of the level plate at a height, felt by the hand, N/m.
 fn sideways_stiffness_n_per_m(z_mm: f64) -> f64 {
-    let plugin = Plugin::load(&plugin_file("flotor-spring")).expect("the spring is a plugin");
+    let plugin = load_file(&plugin_file("flotor-spring")).expect("the spring is a plugin");
     let mut model = plugin.create_model(&[]).expect("a spring can be made of defaults");
     // Small enough for the cubic term (1e-8 of the linear one), large enough for rounding.
     let across_m = 1.0e-6;

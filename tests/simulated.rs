@@ -1,9 +1,10 @@
 //! The simulated flotor as a host meets it: hands that follow files, faults on purpose, parameters that are
 //! refused, and the same bits however it is run.
 
+use flotor::registry::load_file;
 use flotor::session::RunEnd;
 use flotor::trace::{Events, TickRecord};
-use flotor_hal::abi::loader::{LoadError, OpenedDevice, Plugin, Setting};
+use flotor_hal::abi::loader::{LoadError, OpenedDevice, Setting};
 use flotor_hal::{Conditions, Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
 use flotor_tests::TestSize;
 use flotor_tests::library::plugin_file;
@@ -297,7 +298,7 @@ fn bad_parameters_are_refused_before_anything_moves_with_the_reason() {
 
 /// The flotor in this process, with these settings.
 fn opened(settings: &[(&str, &str)]) -> Result<OpenedDevice, LoadError> {
-    let plugin = Plugin::load(&plugin_file("flotor-simulated"))?;
+    let plugin = load_file(&plugin_file("flotor-simulated"))?;
     let parse = |(id, value): &(&str, &str)| Setting::parse(plugin.parameters(), id, value).expect("legal");
     plugin.open_device(&settings.iter().map(parse).collect::<Vec<_>>())
 }

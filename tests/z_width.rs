@@ -5,6 +5,7 @@
 //! weight (no gravity compensation), the wall's top so high that it rests at home: within the small swings judged here
 //! contact is never lost, and the limit is that of the linear loop, [`exact_limit_n_per_m`].
 
+use flotor::registry::load_file;
 use flotor::stability::theory::{Plant, Rendering, exact_limit_n_per_m};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{Plugin, Setting};
@@ -92,7 +93,7 @@ impl Loop {
 
 #[test]
 fn the_stiffest_quiet_wall_is_the_one_theory_names() {
-    let load = |package| Plugin::load(&plugin_file(package)).unwrap_or_else(|error| panic!("{error}"));
+    let load = |package| load_file(&plugin_file(package)).unwrap_or_else(|error| panic!("{error}"));
     let cases = [
         (1_000_000_u32, 2.0),
         (1_000_000, 5.0),

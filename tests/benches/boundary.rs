@@ -5,6 +5,7 @@
 
 use criterion::{Criterion, criterion_group};
 use fixture_yardstick_model::{Yardstick, wrench};
+use flotor::registry::load_file;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{Model, Plugin};
 use flotor_hal::{Input, Output, Pose};
@@ -21,7 +22,7 @@ const TURNS: usize = 501;
 type PlainFn = fn(&Yardstick, &Input, &mut Output);
 
 fn model() -> Model {
-    let plugin = Plugin::load(&plugin_file("fixture-yardstick-model")).expect("the yardstick loads");
+    let plugin = load_file(&plugin_file("fixture-yardstick-model")).expect("the yardstick loads");
     plugin.create_model(&[]).expect("the yardstick needs no settings")
 }
 

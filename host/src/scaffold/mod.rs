@@ -10,7 +10,7 @@ mod name;
 pub use contract::ContractFolder;
 pub use name::{NameError, PluginName};
 
-use flotor_hal::abi::{ABI_MAJOR, ABI_MINOR, PluginKind};
+use flotor_hal::abi::PluginKind;
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -151,7 +151,7 @@ fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'sta
 }
 
 /// What stands in the templates, and what comes instead.
-struct Placeholders([(&'static str, String); 6]);
+struct Placeholders([(&'static str, String); 5]);
 
 impl Placeholders {
     fn new(name: &PluginName, contract: &ContractFolder) -> Result<Self, ScaffoldError> {
@@ -161,7 +161,6 @@ impl Placeholders {
             ("YourName", name.type_name()),
             ("Your name", name.title()),
             ("path/to/hal", contract.as_text()?),
-            ("MAJOR.MINOR", format!("{ABI_MAJOR}.{ABI_MINOR}")),
         ]))
     }
 

@@ -4,7 +4,7 @@ use crate::slow::SlowModel;
 use crate::worker::{Reply, Worker};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
-use flotor_hal::{ActivityRegion, Demand, Input, Memory, Output, Reach};
+use flotor_hal::{ActiveRegion, Demand, Input, Memory, Output, WorkspaceBounds};
 
 /// A model, wherever it runs.
 pub(crate) enum Engine {
@@ -103,18 +103,18 @@ impl Engine {
     }
 
     /// Where the model can act; one beside the loop or in a process of its own is always asked. Real-time: bounded, no allocation.
-    pub(crate) fn activity(&mut self) -> ActivityRegion {
+    pub(crate) fn active_region(&mut self) -> ActiveRegion {
         match self {
-            Self::Here(model) => model.activity(),
-            Self::Apart(_) | Self::Beside(_) => ActivityRegion::EVERYWHERE,
+            Self::Here(model) => model.active_region(),
+            Self::Apart(_) | Self::Beside(_) => ActiveRegion::EVERYWHERE,
         }
     }
 
     /// Where the model ends; one beside the loop or in a process of its own has no end. Real-time: bounded, no allocation.
-    pub(crate) fn reach(&mut self) -> Reach {
+    pub(crate) fn workspace_bounds(&mut self) -> WorkspaceBounds {
         match self {
-            Self::Here(model) => model.reach(),
-            Self::Apart(_) | Self::Beside(_) => Reach::UNBOUNDED,
+            Self::Here(model) => model.workspace_bounds(),
+            Self::Apart(_) | Self::Beside(_) => WorkspaceBounds::UNBOUNDED,
         }
     }
 

@@ -13,7 +13,7 @@ pub use steps::Steps;
 use crate::coupling::{Line, Patience};
 use crate::record::Change;
 use crate::registry::{LookupError, Registry};
-use crate::scene::{MOST_DEVICES, Scene, SceneError};
+use crate::scene::{MOST_DEVICES, Pacing, Scene, SceneError};
 use crate::servo::{
     Cause, Clock, Core, Coupled, CouplingOutcome, EmergencySource, Envelope, Forces, Heartbeat, ModelHealth,
     PaceLost, ParameterQueue, Place, RealTimeReport, RunConfig, RunState, Schedule, Servo, SpinWindow,
@@ -23,7 +23,7 @@ use crate::trace::{RECORD_WORDS, TickRecord};
 use controls::{ChangeLog, Parts};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, Stopper};
-use flotor_hal::{DVec3, EnergyLedger, Fault, LoopConfig, Pacing, Parameter, SampleWait};
+use flotor_hal::{DVec3, EnergyLedger, Fault, LoopConfig, Parameter, SampleWait};
 use flotor_live::WrenchLimits;
 use prepare::Scheduled;
 use standby::Standby;

@@ -7,7 +7,7 @@ use crate::calibration::file::{CalibrationFile, CalibrationFileError};
 use crate::mapping::Mapping;
 use crate::registry::{LookupError, Registry};
 use crate::scene::{
-    Alternative, Boundary, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse,
+    Alternative, Boundary, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, Pacing,
     ParameterText, PluginUse, Scene, SceneError,
 };
 use crate::servo::{Clock, Engine, Layer, Replacement, ScheduledChange, TimeBudget};
@@ -15,7 +15,7 @@ use crate::slow::SlowModel;
 use crate::worker::{Worker, WorkerOrder};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, OpenedDevice, Plugin, Setting};
-use flotor_hal::{Axes, Capabilities, LoopConfig, Pacing, Parameter, ParameterKind, Refusal};
+use flotor_hal::{Axes, Capabilities, LoopConfig, Parameter, ParameterKind, Refusal};
 use std::borrow::Cow;
 
 pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
@@ -118,7 +118,7 @@ pub(crate) fn prepare_model(
             }
             (Isolation::Process, _) => {
                 let keys = model.plugin.parameters.iter().map(|parameter| parameter.key.clone());
-                let values = settings.iter().map(|setting| setting.display(plugin.parameters()));
+                let values = settings.iter().map(|setting| setting.display());
                 let order = WorkerOrder {
                     plugin: &plugin.metadata().path,
                     sets: keys.zip(values).collect(),
@@ -213,11 +213,11 @@ pub(super) fn in_force(
             // Plugins answer with numbers: a text is in force if it was set.
             ParameterKind::Text | ParameterKind::File => {
                 let set = settings.iter().rev().find(|setting| setting.index() == index);
-                set.map_or_else(String::new, |setting| setting.display(schema))
+                set.map_or_else(String::new, |setting| setting.display())
             }
             ParameterKind::Real | ParameterKind::Choice => {
                 let setting = Setting::number(schema, parameter.id(), value(index));
-                setting.map_or_else(|_| String::new(), |setting| setting.display(schema))
+                setting.map_or_else(|_| String::new(), |setting| setting.display())
             }
         };
         (parameter.id().to_owned(), text)

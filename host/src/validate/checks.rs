@@ -3,6 +3,7 @@
 use super::path::CONFIG;
 use super::rule::Check;
 use super::{Figures, Seen, device, live, locked, model, passive};
+use crate::registry::load_file;
 use crate::scene::KeyValue;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting, read_metadata};
@@ -20,7 +21,7 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
     if wanted == Check::Contract(Rule::Metadata) {
         return read_metadata(path).map(|_| None).map_err(|error| Seen::Violation(words(error)));
     }
-    let plugin = Plugin::load(path).map_err(|error| Seen::Violation(words(error)))?;
+    let plugin = load_file(path).map_err(|error| Seen::Violation(words(error)))?;
     let parse = |set: &KeyValue| {
         let (key, value) = set.pair();
         Setting::parse(plugin.parameters(), key, value).map_err(|error| Seen::Missing(error.to_string()))

@@ -3,9 +3,10 @@
 use super::Greeting;
 use super::exchange::{self, Order, wait_for_change};
 use super::memory::{MESSAGE_BYTES, SharedMemory};
+use crate::registry::load_file;
 use crate::servo::enter_worker_priority;
 use clap::Args;
-use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
+use flotor_hal::abi::loader::{LoadError, Model, Setting};
 use flotor_hal::abi::{CallStatus, PluginKind};
 use flotor_hal::{LoopConfig, Memory, Output, Refusal, RefusalKind};
 use std::io;
@@ -95,7 +96,7 @@ fn prepare(arguments: &WorkerArguments) -> Result<Prepared, Refusal> {
         LoadError::Refused { refusal, .. } => refusal,
         other => Refusal { kind: RefusalKind::Broken, reason: other.to_string() },
     };
-    let plugin = Plugin::load(&arguments.plugin).map_err(said_no)?;
+    let plugin = load_file(&arguments.plugin).map_err(said_no)?;
     if plugin.metadata().kind != PluginKind::Model {
         return Err(Refusal::unsupported("only a model can be a worker"));
     }

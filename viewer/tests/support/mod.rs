@@ -4,7 +4,6 @@
 
 pub(crate) mod display;
 
-use flotor_hal::abi::loader::Plugin;
 use flotor_live::{
     Answer, Ask, ChangeMessage, Directory, End, Frames, Greeting, Kind, Listener, Outcome, PROTOCOL,
     PanelPlugin, Request, SetValue, Subject, WrenchLimits, frame, ticks_to_payload,
@@ -32,7 +31,7 @@ pub(crate) fn plugin_file(name: &str) -> PathBuf {
 /// A run of a spring that nobody computes: what `flotor run` would say of it.
 pub(crate) fn spring_run(settings: &[(&str, &str)]) -> (RunDescription, Vec<PanelPlugin>) {
     let file = plugin_file("spring");
-    let plugin = Plugin::load(&file).expect("the spring loads");
+    let plugin = flotor_viewer::shape::load_file(&file).expect("the spring loads");
     let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
     let settings: Vec<(String, String)> = settings.iter().map(owned).collect();
     let parse = |(key, value): &(String, String)| {

@@ -1,7 +1,7 @@
 //! Reads what a file says about itself without running any of it.
 
 use super::LoadError;
-use crate::abi::{ABI_MAJOR, ABI_MINOR, PluginKind, is_spoken, metadata};
+use crate::abi::{CONTRACT, PluginKind, metadata};
 use object::elf::FileHeader64;
 use object::read::elf::{ElfFile64, FileHeader, ProgramHeader, SectionHeader};
 use object::{Endianness, Object, ObjectSection, ReadCache, ReadRef};
@@ -23,7 +23,7 @@ pub struct Metadata {
     pub doc: String,
     /// Version of the plugin.
     pub version: String,
-    /// Contract it was built for, "major.minor".
+    /// Contract it was built for, as [`CONTRACT`].
     pub abi: String,
     /// Name of the exported entry.
     pub entry: String,
@@ -58,15 +58,12 @@ impl Metadata {
     /// Checks that the plugin was built for the contract this host speaks.
     ///
     /// # Errors
-    /// [`LoadError::OtherContract`], unless [`is_spoken`].
+    /// [`LoadError::OtherContract`], unless it is [`CONTRACT`].
     pub fn check_contract(&self) -> Result<(), LoadError> {
-        let number = |digits: &str| digits.parse::<u16>().ok();
-        let theirs = self.abi.split_once('.').and_then(|(major, minor)| number(major).zip(number(minor)));
-        if theirs.is_some_and(|(major, minor)| is_spoken(major, minor)) {
+        if self.abi == CONTRACT {
             return Ok(());
         }
-        let ours = format!("{ABI_MAJOR}.{ABI_MINOR}");
-        Err(LoadError::OtherContract { path: self.path.clone(), theirs: self.abi.clone(), ours })
+        Err(LoadError::OtherContract { path: self.path.clone(), theirs: self.abi.clone() })
     }
 }
 
