@@ -273,6 +273,16 @@ const UNSAFE: &[(&str, &str)] = &[
         "hal/src/abi/",
         "the binary contract: function tables across shared libraries, the export macros, the loader",
     ),
+    ("hal/src/extension/", "the function tables of the extensions"),
+    (
+        "host/src/registry.rs",
+        "the one place of the host that loads a plugin file, for which the user vouches",
+    ),
+    ("viewer/src/shape.rs", "the one place of the viewer that loads a plugin file"),
+    (
+        "devices/maglev/src/bin/flotor-maglev-emulator/plant.rs",
+        "the emulator loads the plugin that is its plant",
+    ),
     (
         "devices/maglev/src/transport/usb/queue.rs",
         "USB transfers that wait on the bus while the loop runs: rusb wraps only those that block",

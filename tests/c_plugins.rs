@@ -1,11 +1,12 @@
 //! Plugins written in C and C++: compiled here from `c/` with the committed header, found by id, run in a scene, and refused
-//! in one line where their author made a mistake. They carry no layouts, so only sizes stand between a C author's
-//! old header and the host.
+//! in one line where their author made a mistake. The header gives them the contract's layout table, so that
+//! an author's old header is found out as an old SDK is.
 
 use flotor_core::trace::Events;
 use flotor_hal::Wrench;
 use flotor_hal::abi::loader::Plugin;
 use flotor_servo::RunEnd;
+use flotor_session::registry::load_file;
 use flotor_tests::library::compile_c_file;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
@@ -66,12 +67,15 @@ fn plugins_in_c_pass_validation_and_are_found_by_id() {
     let scratch = Scratch::default();
     for (name, id) in [("wall", "fixture-c-wall"), ("post", "fixture-c-post")] {
         let library = compiled(&scratch, name, &[]);
-        let plugin = Plugin::load(&library).unwrap_or_else(|error| panic!("{error}"));
-        assert!(!plugin.layouts_proven(), "C carries no layouts to compare");
+        let plugin = load_file(&library).unwrap_or_else(|error| panic!("{error}"));
+        assert!(
+            !plugin.layouts_proven(),
+            "C carries the contract's layout table, and no proof by abi_stable"
+        );
         let ran = Flotor::with(["validate".as_ref(), library.as_os_str()]).run();
         assert_eq!((ran.code, ran.stderr.as_str()), (Some(exit_code::OK), ""), "{ran:#?}");
         let ran = Flotor::with(["plugins", id]).searching(&[scratch.path()]).run();
-        assert!(ran.stdout.contains("layouts checked by size only"), "{ran:#?}");
+        assert!(ran.stdout.contains("layouts compared"), "{ran:#?}");
     }
 }
 
@@ -103,10 +107,14 @@ fn a_mistake_in_c_is_told_in_one_line() {
         ("WITHOUT_TABLE", "`flotor.force/1` lacks its function table; a plugin must offer it"),
         ("SHORT_TABLE", "`flotor.force/1` lacks part of its table; a plugin must offer it"),
         ("MISALIGNED_TABLE", "`flotor.force/1` lacks an aligned table; a plugin must offer it"),
-        ("SHORT_EXTENSION", "`flotor.activity/1` lacks part of its table; a plugin must offer it"),
+        ("SHORT_EXTENSION", "`flotor.active-region/1` lacks part of its table; a plugin must offer it"),
         ("OTHER_KIND", "the metadata say model, the entry's `kind` is 2 (device); make both say the same"),
         ("ODD_KIND", "the metadata say model, the entry's `kind` is 7 (unknown); make both say the same"),
-        ("OTHER_SIZES", "`Input` has 136 bytes in the host and 144 in the plugin; rebuild the plugin"),
+        (
+            "WITHOUT_LAYOUTS",
+            "the plugin carries no layout table; rebuild the plugin against this host's flotor-hal",
+        ),
+        ("OTHER_CANDIDATE", "built for plugin contract 1.0, this host speaks 1.0-rc; rebuild the plugin"),
         ("SHORT_ENTRY", "no plugin entry `flotor_entry_wall` in the library"),
         (
             "HIDDEN_ENTRY",

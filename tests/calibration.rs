@@ -1,6 +1,7 @@
 //! Calibrating the simulated flotor through the command line: the error falls, files are checked, nothing depends on
 //! luck.
 
+use flotor_session::registry::load_file;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::{TestSize, library::plugin_file};
@@ -137,7 +138,7 @@ fn what_cannot_be_is_refused_in_one_line() {
 fn the_extension_checks_what_it_is_given() {
     use flotor_hal::VerticalCalibration;
     use flotor_hal::abi::loader::{Plugin, Setting};
-    let plugin = Plugin::load(&plugin_file("flotor-simulated")).expect("the simulated flotor loads");
+    let plugin = load_file(&plugin_file("flotor-simulated")).expect("the simulated flotor loads");
     let full = [Setting::parse(plugin.parameters(), "preset", "full").expect("the preset exists")];
     let mut device = plugin.open_device(&full).expect("it opens");
     assert_eq!(device.serial(), "simulated");

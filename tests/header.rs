@@ -2,33 +2,24 @@
 //!
 //! After a change of the contract: `FLOTOR_WRITE_HEADER=1 cargo test -p flotor-tests --test header`.
 
+use flotor_hal::abi::{CONTRACT, FieldLayout, LAYOUTS};
 use flotor_tests::tools::{Tool, required};
+use flotor_tests::{files_under, workspace_root};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Sources of the contract, those that hold structs first used first.
-const SOURCES: [&str; 21] = [
+/// Sources of the contract beside the extensions, those that hold structs first used first.
+const SOURCES: [&str; 10] = [
     "frame.rs",
     "refusal.rs",
     "parameter.rs",
     "model.rs",
-    "shape.rs",
-    "activity.rs",
-    "field.rs",
-    "reach.rs",
-    "variant.rs",
-    "detail.rs",
     "device.rs",
-    "calibration.rs",
     "abi/text.rs",
+    "abi/layout.rs",
     "abi/entry.rs",
-    "abi/force.rs",
-    "abi/field.rs",
-    "abi/reach.rs",
+    "abi/model.rs",
     "abi/device.rs",
-    "abi/calibration.rs",
-    "abi/metadata.rs",
-    "abi/mod.rs",
 ];
 
 fn hal() -> PathBuf {
@@ -38,12 +29,49 @@ fn hal() -> PathBuf {
 fn generate() -> String {
     let config = cbindgen::Config::from_file(hal().join("cbindgen.toml"))
         .expect("hal/cbindgen.toml is a configuration");
-    let sources = SOURCES.iter().fold(cbindgen::Builder::new().with_config(config), |builder, source| {
-        builder.with_src(hal().join("src").join(source))
+    let extensions = files_under("hal/src/extension", "rs").expect("there are extensions");
+    let sources = SOURCES.iter().map(|source| Path::new("hal/src").join(source)).chain(extensions);
+    let sources = sources.fold(cbindgen::Builder::new().with_config(config), |builder, source| {
+        builder.with_src(workspace_root().join(source))
     });
     let mut header = Vec::new();
     sources.generate().expect("the contract can be said in C").write(&mut header);
-    without_struct_constants(&String::from_utf8(header).expect("a header is text"))
+    let header = without_struct_constants(&String::from_utf8(header).expect("a header is text"));
+    header.replace("GENERATED_NAMES", &names()).replace("GENERATED_LAYOUTS", &layouts())
+}
+
+/// Version of the contract, and the ids of interfaces and extensions as the sources name them.
+fn names() -> String {
+    let mut text = format!(
+        "/* Version of the contract, for the metadata. */\n#define FLOTOR_CONTRACT \"{CONTRACT}\"\n\
+         /* Names of interfaces and extensions. */"
+    );
+    for id in interface_ids() {
+        let name = id["flotor.".len()..id.len() - "/1".len()].replace('-', "_").to_uppercase();
+        text += &format!("\n#define FLOTOR_INTERFACE_{name} \"{id}\"");
+    }
+    text
+}
+
+fn interface_ids() -> Vec<String> {
+    let mut ids = Vec::new();
+    for file in files_under("hal/src", "rs").expect("the contract has sources") {
+        let source = std::fs::read_to_string(workspace_root().join(file)).expect("a source is text");
+        ids.extend(source.lines().filter_map(|line| {
+            Some(line.strip_prefix("table!(")?.split_once(": \"")?.1.split_once('"')?.0.to_owned())
+        }));
+    }
+    ids
+}
+
+/// The rows of the contract's layout table, for a C compiler to fill in.
+fn layouts() -> String {
+    let row = |row: &FieldLayout| match row.name().split_once('.') {
+        None => format!("    FLOTOR_STRUCT({}),", row.name()),
+        Some((name, "default")) => format!("    FLOTOR_FIELD_CALLED({name}, \"default\", default_),"), // a word of C
+        Some((name, field)) => format!("    FLOTOR_FIELD({name}, {field}),"),
+    };
+    LAYOUTS.iter().map(row).collect::<Vec<_>>().join("\n")
 }
 
 /// cbindgen makes compound literals of the associated constants of structs. No static table of a C plugin may hold

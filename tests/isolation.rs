@@ -10,7 +10,7 @@ const DEADLY: &str = r#"
 #include "flotor.h"
 #include <stdlib.h>
 FLOTOR_METADATA("kind = \"model\"\nid = \"deadly\"\nname = \"Deadly\"\ndoc = \"Ends the process\"\n"
-                "version = \"0.1.0\"\nabi = \"0.1\"\nentry = \"flotor_entry_deadly\"\n");
+                "version = \"0.1.0\"\nabi = \"1.0-rc\"\nentry = \"flotor_entry_deadly\"\n");
 __attribute__((constructor)) static void at_load(void) { abort(); }
 "#;
 

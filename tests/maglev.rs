@@ -4,6 +4,7 @@
 use flotor_core::trace::Events;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
+use flotor_session::registry::load_file;
 use flotor_tests::library::{build_folder, plugin_file};
 use flotor_tests::process::Owned;
 use flotor_tests::program::{Flotor, Ran, Running, exit_code};
@@ -303,7 +304,7 @@ fn a_controller_that_vanishes_is_a_fault_of_the_device() {
 
 #[test]
 fn a_cable_pulled_in_mid_stroke_is_a_fault_at_once_and_the_next_use_begins_anew() {
-    let plugin = Plugin::load(&plugin_file("flotor-maglev")).expect("it loads");
+    let plugin = load_file(&plugin_file("flotor-maglev")).expect("it loads");
     let config = LoopConfig { period_ns: 1_000_000, seed: 1 };
     let scratch = Scratch::default();
     for transport in ["tcp", "pty"] {

@@ -9,6 +9,7 @@ use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{DVec3, EnergyLedger, Input, Output, Pose};
 use flotor_servo::RunEnd;
 use flotor_session::Observer;
+use flotor_session::registry::load_file;
 use flotor_session::report::{RunFacts, RunSummary, Tally};
 use flotor_tests::library::plugin_file;
 use flotor_tests::watched::{Watched, watch};
@@ -211,7 +212,7 @@ fn excursion(watched: &Watched) -> f64 {
 
 /// Stiffness against sideways motion of the level plate at a height, felt by the hand, N/m.
 fn sideways_stiffness_n_per_m(z_mm: f64) -> f64 {
-    let plugin = Plugin::load(&plugin_file("flotor-spring")).expect("the spring is a plugin");
+    let plugin = load_file(&plugin_file("flotor-spring")).expect("the spring is a plugin");
     let mut model = plugin.create_model(&[]).expect("a spring can be made of defaults");
     // Small enough for the cubic term (1e-8 of the linear one), large enough for rounding.
     let across_m = 1.0e-6;

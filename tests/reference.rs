@@ -4,6 +4,7 @@
 
 use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{Mutability, Parameter, ParameterKind};
+use flotor_session::registry::load_file;
 use flotor_session::scene::{SectionReference, reference};
 use flotor_tests::library::plugin_file;
 use flotor_tests::{crate_name_of, plugin_folders, workspace_root};
@@ -102,7 +103,7 @@ fn parameters() {
          marked live may change while the loop runs.\n\n"
     );
     for folder in plugin_folders() {
-        let plugin = Plugin::load(&plugin_file(&crate_name_of(&folder))).expect("it is built and loads");
+        let plugin = load_file(&plugin_file(&crate_name_of(&folder))).expect("it is built and loads");
         let metadata = plugin.metadata();
         let _ = write!(text, "## `{}`\n\n{}: {}.\n\n", metadata.id, metadata.kind.word(), metadata.doc);
         text.push_str("| Parameter | Unit | Legal | Default | | |\n|---|---|---|---|---|---|\n");

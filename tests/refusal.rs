@@ -13,6 +13,7 @@ use flotor_hal::{Input, Output, Pose, Wrench};
 use flotor_servo::ModelHealth;
 use flotor_servo::RunEnd;
 use flotor_session::Outcome;
+use flotor_session::registry::load_file;
 use flotor_tests::library::{compile_c, compile_c_file, patched, plugin_bytes, plugin_file};
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
@@ -112,12 +113,20 @@ const WRONG_FILES: &[WrongFile] = &[
     WrongFile {
         name: "another contract, said by the metadata",
         make: |scratch| {
-            let ours = format!("abi = \"{ABI_MAJOR}.{ABI_MINOR}\"");
-            let theirs = format!("abi = \"{}.{ABI_MINOR}\"", ABI_MAJOR + 8);
-            let bytes = patched(plugin_bytes(MODEL), ours.as_bytes(), theirs.as_bytes());
+            let bytes = patched(plugin_bytes(MODEL), b"abi = \"1.0-rc\"", b"abi = \"9.0-rc\"");
             scratch.file("other_contract.so", bytes)
         },
-        cause: "built for plugin contract 9.0, this host speaks 1.0",
+        cause: "built for plugin contract 9.0-rc, this host speaks 1.0-rc",
+        remedy: "rebuild the plugin against this version",
+    },
+    WrongFile {
+        name: "a plugin of the contract that was frozen before its candidate",
+        make: |scratch| {
+            let library = scratch.path().join("frozen.so");
+            compile_c(&METADATA_IN_C.replace("1.0-rc", "1.0"), &library);
+            library
+        },
+        cause: "built for plugin contract 1.0, this host speaks 1.0-rc",
         remedy: "rebuild the plugin against this version",
     },
     WrongFile {
@@ -126,7 +135,7 @@ const WRONG_FILES: &[WrongFile] = &[
             let bytes = patched(plugin_bytes(MODEL), &entry_head(ABI_MAJOR), &entry_head(ABI_MAJOR + 8));
             scratch.file("other_entry.so", bytes)
         },
-        cause: "built for plugin contract 9.0, this host speaks 1.0",
+        cause: "built for plugin contract 9.0-rc, this host speaks 1.0-rc",
         remedy: "rebuild the plugin against this version",
     },
     WrongFile {
@@ -152,8 +161,23 @@ const WRONG_FILES: &[WrongFile] = &[
     },
     WrongFile {
         name: "a struct with two fields exchanged",
-        make: |_| plugin_file("fixture-changed-struct"),
-        cause: "`Input` has `time_ns: u64` in the host where the plugin has `tick: u64`",
+        make: |scratch| {
+            let header =
+                std::fs::read_to_string(workspace_root().join("hal/include/flotor.h")).expect("a header");
+            let (before, input) = header.split_once("typedef struct FlotorInput {").expect("it is there");
+            let (input, after) = input.split_once("} FlotorInput;").expect("it ends");
+            let input =
+                input.replace("time_ns;", "TICK;").replace("tick;", "time_ns;").replace("TICK;", "tick;");
+            scratch.file(
+                "flotor.h",
+                format!("{before}typedef struct FlotorInput {{{input}}} FlotorInput;{after}"),
+            );
+            let wall = std::fs::read(workspace_root().join("tests/c/wall.c")).expect("a source");
+            let library = scratch.path().join("exchanged.so");
+            compile_c_file(&scratch.file("wall.c", wall), &[], &library);
+            library
+        },
+        cause: "`Input.time_ns` is at byte 104 (8 bytes) in the host and at byte 120 (8 bytes) in the plugin",
         remedy: "rebuild the plugin against this host's flotor-hal",
     },
 ];
@@ -161,7 +185,7 @@ const WRONG_FILES: &[WrongFile] = &[
 /// The metadata section of a plugin, written by hand.
 const METADATA_IN_C: &str = "__attribute__((section(\".flotor\"), used))\n\
     static const char metadata[] = \"kind = \\\"model\\\"\\nid = \\\"wall\\\"\\nversion = \\\"1.0\\\"\\n\"\n\
-    \"abi = \\\"0.1\\\"\\nentry = \\\"flotor_entry_wall\\\"\\n\";\n";
+    \"abi = \\\"1.0-rc\\\"\\nentry = \\\"flotor_entry_wall\\\"\\n\";\n";
 
 /// The first bytes of an entry: magic, size, contract version.
 fn entry_head(abi_major: u16) -> Vec<u8> {
@@ -188,7 +212,7 @@ fn assert_tells(line: &str, file: &Path, wrong: &WrongFile) {
 }
 
 fn refused(file: &Path) -> LoadError {
-    match Plugin::load(file) {
+    match load_file(file) {
         Err(error) => error,
         Ok(plugin) => panic!("{:?} was loaded", plugin.metadata()),
     }
@@ -197,6 +221,45 @@ fn refused(file: &Path) -> LoadError {
 #[test]
 fn the_loader_refuses_every_wrong_file_in_one_line() {
     for_every_wrong_file(|wrong, file| assert_tells(&refused(file).to_string(), file, wrong));
+}
+
+/// abi_stable is the second proof: one that cannot be read proves nothing, and refuses nothing.
+#[test]
+fn a_proof_by_another_abi_stable_is_no_proof_and_no_refusal() {
+    let scratch = Scratch::default();
+    let header = |minor: u32| {
+        let mut bytes = b"abi stable library for Rust".to_vec();
+        bytes.resize(32, 0);
+        [bytes.as_slice(), &0_u32.to_ne_bytes(), &minor.to_ne_bytes()].concat()
+    };
+    let file = scratch.file("other_proof.so", patched(plugin_bytes(MODEL), &header(11), &header(12)));
+    let (ours, other) = (load_file(&plugin_file(MODEL)).unwrap(), load_file(&file).unwrap());
+    assert_eq!((ours.layouts_proven(), other.layouts_proven()), (true, false));
+    other.create_model(&[]).expect("it works as any other");
+}
+
+/// An index means a parameter of one schema only.
+#[test]
+fn a_setting_made_for_another_plugin_is_refused_in_one_line() {
+    let (model, spring) =
+        (load_file(&plugin_file(MODEL)).unwrap(), load_file(&plugin_file("flotor-spring")).unwrap());
+    let setting = Setting::parse(spring.parameters(), "seat", "free").unwrap();
+    let Err(refused) = model.create_model(&[setting]) else { panic!("a setting of the spring was taken") };
+    let told = "the setting `seat` was made for another plugin; make it for this one's parameters";
+    assert!(refused.to_string().ends_with(told), "{refused}");
+}
+
+/// The plugin is in C and follows every index it gets.
+#[test]
+fn an_index_that_no_parameter_has_does_not_reach_the_plugin() {
+    let scratch = Scratch::default();
+    let library = scratch.path().join("libindices.so");
+    compile_c_file(&workspace_root().join("tests/c/bad/model.c"), &["FOLLOWS_INDICES"], &library);
+    let mut model = load_file(&library).unwrap().create_model(&[]).unwrap();
+    for index in [1_usize, 1 << 20, u32::MAX as usize, usize::MAX] {
+        assert_eq!(model.set_parameter(index, 1.0), CallStatus::OutOfRange);
+        assert!(model.parameter(index).is_nan());
+    }
 }
 
 #[test]
@@ -225,7 +288,7 @@ fn a_plugin_cut_off_anywhere_is_refused_before_any_of_it_is_mapped() {
     let whole = plugin_bytes(MODEL);
     let file = Scratch::default();
     let path = file.file("cut.so", &whole);
-    assert!(Plugin::load(&path).is_ok(), "the file is a good one before it is cut");
+    assert!(load_file(&path).is_ok(), "the file is a good one before it is cut");
     // Every page, because that is how a file is mapped; every byte of the headers at both ends.
     let pages = (0..whole.len()).step_by(4096);
     let ends = (0..64).flat_map(|byte| [byte, whole.len() - 1 - byte]);
@@ -397,7 +460,7 @@ fn a_model_that_panics_when_it_is_freed_harms_nobody() {
 
 #[test]
 fn a_dead_model_never_answers_again() {
-    let plugin = Plugin::load(&plugin_file(MODEL)).expect("a good file");
+    let plugin = load_file(&plugin_file(MODEL)).expect("a good file");
     let setting = |key, value| Setting::parse(plugin.parameters(), key, value).expect("a legal setting");
     let settings = [setting("fault", "panics-in-step"), setting("at_tick", "1")];
     let mut model = plugin.create_model(&settings).expect("it is made");

@@ -4,8 +4,9 @@
 //! Nothing is tuned on the tables, which hold a quarter of the rows their authors computed.
 
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{Model, Plugin, Setting};
+use flotor_hal::abi::loader::{Model, Setting};
 use flotor_hal::{DVec3, Demand, Input, Output, Pose, StepStatus, orientation_from_rotation_vector};
+use flotor_session::registry::load_file;
 use flotor_tests::TestSize;
 use flotor_tests::library::plugin_file;
 use flotor_tests::tables::{Answer, Row, compared, evaluate, number, rod_pose, rod_wrench, spring, table};
@@ -199,7 +200,7 @@ fn the_wire_brings_the_torques_nearer_to_those_of_a_helix() {
 // ---------------------------------------------------------------- any pose, any way
 
 fn model(sets: &[(&str, &str)]) -> Model {
-    let plugin = Plugin::load(&plugin_file("flotor-spring")).expect("the spring loads");
+    let plugin = load_file(&plugin_file("flotor-spring")).expect("the spring loads");
     let setting =
         |(id, value): &(&str, &str)| Setting::parse(plugin.parameters(), id, value).expect("a setting");
     plugin.create_model(&sets.iter().map(setting).collect::<Vec<_>>()).expect("a spring")

@@ -5,6 +5,7 @@ use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::abi::loader::{LoadError, OpenedDevice, Plugin, Setting};
 use flotor_hal::{Conditions, Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
 use flotor_servo::RunEnd;
+use flotor_session::registry::load_file;
 use flotor_tests::TestSize;
 use flotor_tests::library::plugin_file;
 use flotor_tests::program::{Flotor, Ran, exit_code};
@@ -297,7 +298,7 @@ fn bad_parameters_are_refused_before_anything_moves_with_the_reason() {
 
 /// The flotor in this process, with these settings.
 fn opened(settings: &[(&str, &str)]) -> Result<OpenedDevice, LoadError> {
-    let plugin = Plugin::load(&plugin_file("flotor-simulated"))?;
+    let plugin = load_file(&plugin_file("flotor-simulated"))?;
     let parse = |(id, value): &(&str, &str)| Setting::parse(plugin.parameters(), id, value).expect("legal");
     plugin.open_device(&settings.iter().map(parse).collect::<Vec<_>>())
 }

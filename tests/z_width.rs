@@ -9,6 +9,7 @@ use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{Cycle, DeviceState, Input, LoopConfig, Output, Tick};
 use flotor_lab::stability::theory::{Plant, Rendering, exact_limit_n_per_m};
+use flotor_session::registry::load_file;
 use flotor_tests::TestSize;
 use flotor_tests::library::plugin_file;
 
@@ -92,7 +93,7 @@ impl Loop {
 
 #[test]
 fn the_stiffest_quiet_wall_is_the_one_theory_names() {
-    let load = |package| Plugin::load(&plugin_file(package)).unwrap_or_else(|error| panic!("{error}"));
+    let load = |package| load_file(&plugin_file(package)).unwrap_or_else(|error| panic!("{error}"));
     let cases = [
         (1_000_000_u32, 2.0),
         (1_000_000, 5.0),

@@ -3,15 +3,16 @@
  * SI units everywhere: m, rad, s, N, N m, J; time in integer nanoseconds. Right-handed frames, z up.
  * A wrench is the force and torque on the hand. Orientation is a unit quaternion [x, y, z, w].
  * A plugin exports one FlotorEntry and one FLOTOR_METADATA text; see the book, "Plugin contract".
+ *
+ * What the host passes by pointer is initialised, out parameters too, and the callee's for the call. One instance is used
+ * by one thread at a time, except `safe_stop`, which may come from any thread; `get_interface`, `create` and `open` may
+ * come from several threads at once. The host checks indices and values of parameters before a plugin sees them.
  */
 #ifndef FLOTOR_H
 #define FLOTOR_H
 
 #include <stdint.h>
 #include <stddef.h>
-
-// Number of coefficients a calibration has room for: a polynomial of degree seven.
-#define FLOTOR_CALIBRATION_COEFFICIENTS 8
 
 // Bytes a [`Message`] holds.
 #define FLOTOR_MESSAGE_BYTES 508
@@ -22,8 +23,14 @@
 // Minor version of the contract. A later one only adds.
 #define FLOTOR_ABI_MINOR 0
 
+// 1 for the release candidate of that version, 0 once it is released.
+#define FLOTOR_ABI_CANDIDATE 1
+
 // [`Host::flags`] bit: the plugin has its own Rust runtime and may silence its panic hook.
 #define FLOTOR_HOST_QUIET_PANICS 1
+
+// Number of coefficients a calibration has room for: a polynomial of degree seven.
+#define FLOTOR_CALIBRATION_COEFFICIENTS 8
 
 // Status of one call through a table.
 enum FlotorCallStatus
@@ -56,9 +63,9 @@ enum FlotorPluginKind
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-    // Offers [`interface_ids::FORCE`].
+    // Offers `flotor.force/1`.
     FlotorPluginKind_Model = 1,
-    // Offers [`interface_ids::DEVICE`].
+    // Offers `flotor.device/1`.
     FlotorPluginKind_Device = 2,
 };
 #ifndef __cplusplus
@@ -212,21 +219,15 @@ typedef uint32_t FlotorFault;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// Sizes of the data structs as the plugin was compiled: the cheapest check, and the one C plugins have too.
-typedef struct FlotorContractSizes {
-    // Bytes of [`crate::Input`].
-    uint32_t input;
-    // Bytes of [`crate::Output`].
-    uint32_t output;
-    // Bytes of [`crate::DeviceState`].
-    uint32_t device_state;
-    // Bytes of [`crate::Capabilities`].
-    uint32_t capabilities;
-    // Bytes of [`crate::Parameter`].
-    uint32_t parameter;
-    // Bytes of [`crate::ParameterValue`].
-    uint32_t parameter_value;
-} FlotorContractSizes;
+// One row of the layout table: a field, or a struct as a whole.
+typedef struct FlotorFieldLayout {
+    // `Struct.field`, or `Struct` for the whole of it; filled up with zeros.
+    uint8_t name[FlotorNAME_BYTES];
+    // Where the field begins in its struct, bytes; 0 for a struct.
+    uint32_t offset;
+    // Its size, bytes.
+    uint32_t size;
+} FlotorFieldLayout;
 
 // What a host tells a plugin once, before anything else.
 typedef struct FlotorHost {
@@ -249,7 +250,7 @@ typedef struct FlotorStr {
     size_t len;
 } FlotorStr;
 
-// Lets a host compare layouts field by field; absent (null) in C plugins.
+// A second, independent proof of layouts, by abi_stable; absent (null) in C plugins and in a plain build.
 typedef struct FlotorLayoutProof {
     // Bytes of this struct.
     uint32_t size;
@@ -262,6 +263,14 @@ typedef struct FlotorLayoutProof {
 } FlotorLayoutProof;
 
 // The exported static `flotor_entry_<crate>`: plain data, readable before any plugin code runs.
+//
+// Its fields are private: in Rust only [`super::model_entry`] and [`super::device_entry`] make one, so that each that a safe
+// program can have keeps the contract.
+//
+// ```compile_fail,E0451
+// use flotor_hal::abi::{Entry, MAGIC};
+// let forged = Entry { magic: MAGIC, kind: 1, ..unreachable!() };
+// ```
 typedef struct FlotorEntry {
     // [`MAGIC`].
     uint8_t magic[8];
@@ -273,30 +282,34 @@ typedef struct FlotorEntry {
     uint16_t abi_minor;
     // [`PluginKind`].
     uint32_t kind;
+    // [`ABI_CANDIDATE`] of the contract the plugin was built for.
+    uint32_t abi_candidate;
+    // The layout table of the plugin's build.
+    const struct FlotorFieldLayout *layouts;
+    // Number of its rows.
+    uint32_t layout_count;
     // Reserved, 0.
     uint32_t reserved;
-    // Sizes of the data structs in the plugin's build.
-    struct FlotorContractSizes sizes;
     // Called once after loading. May be null.
     void (*init)(const struct FlotorHost *host);
     // Interface id to its table, or null if not offered.
     const void *(*get_interface)(struct FlotorStr id);
-    // Layouts for the host to check, or null.
+    // A second proof of the layouts, or null.
     const struct FlotorLayoutProof *layout_proof;
 } FlotorEntry;
 
-// A constant list of texts.
-typedef struct FlotorStrList {
+// A constant list of words, made by [`crate::choices!`].
+typedef struct FlotorChoices {
     const struct FlotorStr *ptr;
     size_t len;
-} FlotorStrList;
+} FlotorChoices;
 
 // One entry of a plugin's schema. Built with [`Parameter::real`], [`Parameter::choice`], [`Parameter::text`].
 typedef struct FlotorParameter {
     struct FlotorStr id;
     struct FlotorStr unit;
     struct FlotorStr doc;
-    struct FlotorStrList choices;
+    struct FlotorChoices choices;
     uint32_t kind;
     uint32_t mutability;
     double min;
@@ -306,7 +319,7 @@ typedef struct FlotorParameter {
 
 // Which outputs a scene needs from a step; what is not demanded need not be computed.
 //
-// Shape is not among them: it is an extension ([`crate::CenterlineModel`]) that observers call off the loop.
+// Shape is not among them: it is an extension ([`crate::extension::centerline`]) that observers call off the loop.
 typedef struct FlotorDemand {
     uint32_t bits;
 } FlotorDemand;
@@ -438,96 +451,6 @@ typedef struct FlotorForceTable {
     void (*last_message)(FlotorInstance instance, struct FlotorMessage *message);
 } FlotorForceTable;
 
-// How to draw the body around its centreline: a tube, or a wire wound about it. 40 bytes.
-typedef struct FlotorCenterlineInfo {
-    // Radius of the drawn tube or wire, m.
-    double tube_radius_m;
-    // Radius of the helix the wire follows about the centreline, m; 0 draws a plain tube.
-    double helix_radius_m;
-    // Turns of the helix over the whole length; 0 for a plain tube.
-    double helix_turns;
-    // Radius of the end plates, m; 0 for none.
-    double plate_radius_m;
-    // How many points describe the centreline well.
-    uint32_t suggested_points;
-    uint32_t reserved;
-} FlotorCenterlineInfo;
-
-// `flotor.centerline/1`: see [`crate::CenterlineModel`]. Not real-time.
-typedef struct FlotorCenterlineTable {
-    // Bytes of this table as the plugin knows it.
-    uint32_t size;
-    // Reserved, 0.
-    uint32_t reserved;
-    // How to draw the body.
-    uint32_t (*info)(FlotorInstance instance, struct FlotorCenterlineInfo *out);
-    // Fills up to `capacity` points; how many are valid goes to `count`.
-    uint32_t (*centerline)(FlotorInstance instance,
-                           const struct FlotorInput *input,
-                           struct FlotorPose *points,
-                           uint32_t capacity,
-                           uint32_t *count);
-} FlotorCenterlineTable;
-
-// What one instance serves and whether it remembers; the same for its whole life. 8 bytes.
-typedef struct FlotorVariantInfo {
-    struct FlotorDemand serves;
-    uint32_t memory;
-} FlotorVariantInfo;
-
-// `flotor.variant/1`: see [`crate::VariantModel`]. Not real-time.
-typedef struct FlotorVariantTable {
-    // Bytes of this table as the plugin knows it.
-    uint32_t size;
-    // Reserved, 0.
-    uint32_t reserved;
-    // About an instance, with the settings it was created with.
-    uint32_t (*info)(FlotorInstance instance, struct FlotorVariantInfo *out);
-} FlotorVariantTable;
-
-// The positions of the handle, in the model frame, at which a model may act. 56 bytes.
-//
-// Outside the region wrench and stored energy are **zero at every orientation and velocity**, and the model has
-// **no history**: the first step inside is as after [`ForceModel::reset`]. The region may be larger than
-// necessary, never smaller; the host checks nothing and skips the step.
-typedef struct FlotorActivityRegion {
-    uint32_t shape;
-    uint32_t reserved;
-    double center_m[3];
-    double half_sides_m[3];
-} FlotorActivityRegion;
-
-// `flotor.activity/1`: see [`crate::LocalModel`]. Real-time.
-typedef struct FlotorActivityTable {
-    // Bytes of this table as the plugin knows it.
-    uint32_t size;
-    // Reserved, 0.
-    uint32_t reserved;
-    // Where the instance can act, with the parameters now in force.
-    uint32_t (*region)(FlotorInstance instance, struct FlotorActivityRegion *out);
-} FlotorActivityTable;
-
-// One number about an answer. Built with [`Detail::number`], [`Detail::word`] or [`Detail::flag`].
-typedef struct FlotorDetail {
-    struct FlotorStr id;
-    struct FlotorStr unit;
-    struct FlotorStr doc;
-    struct FlotorStrList words;
-} FlotorDetail;
-
-// `flotor.details/1`: see [`crate::DetailedModel`].
-typedef struct FlotorDetailsTable {
-    // Bytes of this table as the plugin knows it.
-    uint32_t size;
-    // Number of details.
-    uint32_t detail_count;
-    // What there is to know, constant.
-    const struct FlotorDetail *details;
-    // Writes the numbers of the last step into `capacity` places, `detail_count` at most; NaN where there is none.
-    // Real-time: no allocation, lock, system call or unwinding.
-    uint32_t (*values)(FlotorInstance instance, double *values, uint32_t capacity);
-} FlotorDetailsTable;
-
 // What a device says about itself; constant, readable without opening it.
 typedef struct FlotorDeviceInfo {
     struct FlotorStr id;
@@ -641,69 +564,95 @@ typedef struct FlotorDeviceTable {
     void (*last_message)(FlotorInstance instance, struct FlotorMessage *message);
 } FlotorDeviceTable;
 
-// Account of the mechanical energy of a device with a known plant (a simulation), J since activation. 56 bytes.
+// How to draw the body around its centreline: a tube, or a wire wound about it. 40 bytes.
+typedef struct FlotorCenterlineInfo {
+    // Radius of the drawn tube or wire, m.
+    double tube_radius_m;
+    // Radius of the helix the wire follows about the centreline, m; 0 draws a plain tube.
+    double helix_radius_m;
+    // Turns of the helix over the whole length; 0 for a plain tube.
+    double helix_turns;
+    // Radius of the end plates, m; 0 for none.
+    double plate_radius_m;
+    // How many points describe the centreline well.
+    uint32_t suggested_points;
+    uint32_t reserved;
+} FlotorCenterlineInfo;
+
+// `flotor.centerline/1`: see [`CenterlineModel`]. Not real-time.
+typedef struct FlotorCenterlineTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // How to draw the body.
+    uint32_t (*info)(FlotorInstance instance, struct FlotorCenterlineInfo *out);
+    // Fills up to `capacity` points; how many are valid goes to `count`.
+    uint32_t (*centerline)(FlotorInstance instance,
+                           const struct FlotorInput *input,
+                           struct FlotorPose *points,
+                           uint32_t capacity,
+                           uint32_t *count);
+} FlotorCenterlineTable;
+
+// What one instance serves and whether it remembers; the same for its whole life. 8 bytes.
+typedef struct FlotorVariantInfo {
+    struct FlotorDemand serves;
+    uint32_t memory;
+} FlotorVariantInfo;
+
+// `flotor.variant/1`: see [`VariantModel`]. Not real-time.
+typedef struct FlotorVariantTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // About an instance, with the settings it was created with; a [`crate::abi::CallStatus`] code.
+    uint32_t (*info)(FlotorInstance instance, struct FlotorVariantInfo *out);
+} FlotorVariantTable;
+
+// The positions of the handle, in the model frame, at which a model may act. 56 bytes.
 //
-// Extension `flotor.energy-ledger/1`. Every term is integrated on its own, none is the difference of others:
-// `stored_j - initial_j = actuators_j + feedforward_j + hand_j - dissipated_j` is a check, not a definition.
-typedef struct FlotorEnergyLedger {
-    // Kinetic and potential energy now.
-    double stored_j;
-    // Kinetic and potential energy at activation.
-    double initial_j;
-    // Work done by the actuators for the commanded wrench.
-    double actuators_j;
-    // Work done by the actuators for gravity compensation.
-    double feedforward_j;
-    // Work done by the hand.
-    double hand_j;
-    // Energy turned into heat by damping.
-    double dissipated_j;
-    // Largest mechanical energy (kinetic plus potential above its lowest point) so far: the scale of an error.
-    double peak_j;
-} FlotorEnergyLedger;
+// Outside the region wrench and stored energy are **zero at every orientation and velocity**, and the model has
+// **no history**: the first step inside is as after [`ForceModel::reset`]. The region may be larger than
+// necessary, never smaller; the host checks nothing and skips the step.
+typedef struct FlotorActiveRegion {
+    uint32_t shape;
+    uint32_t reserved;
+    double center_m[3];
+    double half_sides_m[3];
+} FlotorActiveRegion;
 
-// `flotor.energy-ledger/1`: see [`EnergyLedger`].
-typedef struct FlotorEnergyLedgerTable {
+// `flotor.active-region/1`: see [`ActiveRegionModel`]. Real-time.
+typedef struct FlotorActiveRegionTable {
     // Bytes of this table as the plugin knows it.
     uint32_t size;
     // Reserved, 0.
     uint32_t reserved;
-    // The account since activation. Real-time.
-    uint32_t (*ledger)(FlotorInstance instance, struct FlotorEnergyLedger *out);
-} FlotorEnergyLedgerTable;
+    // Where the instance can act, with the parameters now in force; a [`crate::abi::CallStatus`] code.
+    uint32_t (*region)(FlotorInstance instance, struct FlotorActiveRegion *out);
+} FlotorActiveRegionTable;
 
-// Delivered over commanded vertical force as a polynomial of the height. 80 bytes.
-typedef struct FlotorVerticalCalibration {
-    double range_m[2];
-    double coefficients[FLOTOR_CALIBRATION_COEFFICIENTS];
-} FlotorVerticalCalibration;
+// One number about an answer. Built with [`Detail::number`], [`Detail::word`] or [`Detail::flag`].
+typedef struct FlotorDetail {
+    struct FlotorStr id;
+    struct FlotorStr unit;
+    struct FlotorStr doc;
+    struct FlotorChoices words;
+} FlotorDetail;
 
-// `flotor.calibration/1`: see [`VerticalCalibration`]. Both calls belong to the opened phase.
-typedef struct FlotorCalibrationTable {
+// `flotor.details/1`: see [`DetailsModel`].
+typedef struct FlotorDetailsTable {
     // Bytes of this table as the plugin knows it.
     uint32_t size;
-    // Reserved, 0.
-    uint32_t reserved;
-    // Serial number of the piece of hardware, empty if it has none; a [`super::CallStatus`] code. Not real-time.
-    uint32_t (*serial)(FlotorInstance instance, struct FlotorMessage *serial);
-    // Corrects the total vertical command from the next activation on; 0 or a [`crate::RefusalKind`] with the
-    // reason in the message. Not real-time.
-    uint32_t (*calibrate_vertical)(FlotorInstance instance,
-                                   const struct FlotorVerticalCalibration *calibration,
-                                   struct FlotorMessage *message);
-} FlotorCalibrationTable;
-
-// `flotor.device-pacing/1`: offered by a device that can set the pace, see [`crate::Pacing`].
-typedef struct FlotorDevicePacingTable {
-    // Bytes of this table as the plugin knows it.
-    uint32_t size;
-    // Reserved, 0.
-    uint32_t reserved;
-    // Blocks until the device has a sample that no earlier wait has told of, or until `timeout_ns` have passed;
-    // writes the number of samples taken since the last wait that found any, 0 after a wait in vain. Returns a
-    // [`super::CallStatus`] code. Real-time but for the waiting: no allocation.
-    uint32_t (*wait_for_sample)(FlotorInstance instance, uint64_t timeout_ns, uint64_t *samples);
-} FlotorDevicePacingTable;
+    // Number of details.
+    uint32_t detail_count;
+    // What there is to know, constant.
+    const struct FlotorDetail *details;
+    // Writes the numbers of the last step into `capacity` places, `detail_count` at most; NaN where there is none.
+    // Real-time: no allocation, lock, system call or unwinding.
+    uint32_t (*values)(FlotorInstance instance, double *values, uint32_t capacity);
+} FlotorDetailsTable;
 
 // Wrench around a pose, in the model frame: `W(d) = W0 - K d`. 416 bytes.
 //
@@ -724,13 +673,13 @@ typedef struct FlotorLinearField {
     uint64_t time_ns;
 } FlotorLinearField;
 
-// `flotor.linear-field/1`: see [`crate::FieldModel`].
+// `flotor.linear-field/1`: see [`LinearFieldModel`].
 typedef struct FlotorLinearFieldTable {
     // Bytes of this table as the plugin knows it.
     uint32_t size;
     // Reserved, 0.
     uint32_t reserved;
-    // The field at an input, the time since the call before having passed; a [`super::CallStatus`] code. Not
+    // The field at an input, the time since the call before having passed; a [`crate::abi::CallStatus`] code. Not
     // real-time, but bounded.
     uint32_t (*linear_field)(FlotorInstance instance,
                              const struct FlotorInput *input,
@@ -738,43 +687,108 @@ typedef struct FlotorLinearFieldTable {
 } FlotorLinearFieldTable;
 
 // The positions of the handle, in the model frame, that a model is made for: a box along its axes. 48 bytes.
-typedef struct FlotorReach {
+typedef struct FlotorWorkspaceBounds {
     double lower_m[3];
     double upper_m[3];
-} FlotorReach;
+} FlotorWorkspaceBounds;
 
-// `flotor.reach/1`: see [`crate::BoundedModel`]. Real-time.
-typedef struct FlotorReachTable {
+// `flotor.workspace-bounds/1`: see [`WorkspaceBoundsModel`]. Real-time.
+typedef struct FlotorWorkspaceBoundsTable {
     // Bytes of this table as the plugin knows it.
     uint32_t size;
     // Reserved, 0.
     uint32_t reserved;
-    // Where the instance ends, with the parameters now in force; a [`super::CallStatus`] code.
-    uint32_t (*reach)(FlotorInstance instance, struct FlotorReach *out);
-} FlotorReachTable;
+    // Where the instance ends, with the parameters now in force; a [`crate::abi::CallStatus`] code.
+    uint32_t (*bounds)(FlotorInstance instance, struct FlotorWorkspaceBounds *out);
+} FlotorWorkspaceBoundsTable;
 
+// Account of the mechanical energy of a device with a known plant (a simulation), J since activation. 56 bytes.
+//
+// Every term is integrated on its own, none is the difference of others:
+// `stored_j - initial_j = actuators_j + feedforward_j + hand_j - dissipated_j` is a check, not a definition.
+typedef struct FlotorEnergyLedger {
+    // Kinetic and potential energy now.
+    double stored_j;
+    // Kinetic and potential energy at activation.
+    double initial_j;
+    // Work done by the actuators for the commanded wrench.
+    double actuators_j;
+    // Work done by the actuators for gravity compensation.
+    double feedforward_j;
+    // Work done by the hand.
+    double hand_j;
+    // Energy turned into heat by damping.
+    double dissipated_j;
+    // Largest mechanical energy (kinetic plus potential above its lowest point) so far: the scale of an error.
+    double peak_j;
+} FlotorEnergyLedger;
+
+// `flotor.energy-ledger/1`: see [`EnergyLedgerDevice`].
+typedef struct FlotorEnergyLedgerTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // The account since activation; a [`crate::abi::CallStatus`] code. Real-time.
+    uint32_t (*ledger)(FlotorInstance instance, struct FlotorEnergyLedger *out);
+} FlotorEnergyLedgerTable;
+
+// Delivered over commanded vertical force as a polynomial of the height. 80 bytes.
+typedef struct FlotorVerticalCalibration {
+    double range_m[2];
+    double coefficients[FLOTOR_CALIBRATION_COEFFICIENTS];
+} FlotorVerticalCalibration;
+
+// `flotor.calibration/1`: see [`CalibrationDevice`]. Both calls belong to the opened phase.
+typedef struct FlotorCalibrationTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // Serial number of the piece of hardware, empty if it has none; a [`crate::abi::CallStatus`] code. Not real-time.
+    uint32_t (*serial)(FlotorInstance instance, struct FlotorMessage *serial);
+    // Corrects the total vertical command from the next activation on; 0 or a [`crate::RefusalKind`] with the
+    // reason in the message. Not real-time.
+    uint32_t (*calibrate_vertical)(FlotorInstance instance,
+                                   const struct FlotorVerticalCalibration *calibration,
+                                   struct FlotorMessage *message);
+} FlotorCalibrationTable;
+
+// `flotor.pacing/1`: see [`PacingDevice`].
+typedef struct FlotorPacingTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // Blocks until the device has a sample that no earlier wait has told of, or until `timeout_ns` have passed;
+    // writes the number of samples taken since the last wait that found any, 0 after a wait in vain. Returns a
+    // [`crate::abi::CallStatus`] code. Real-time but for the waiting: no allocation.
+    uint32_t (*wait_for_sample)(FlotorInstance instance, uint64_t timeout_ns, uint64_t *samples);
+} FlotorPacingTable;
+
+/* Version of the contract, for the metadata. */
+#define FLOTOR_CONTRACT "1.0-rc"
 /* Names of interfaces and extensions. */
-#define FLOTOR_INTERFACE_FORCE "flotor.force/1"
 #define FLOTOR_INTERFACE_DEVICE "flotor.device/1"
+#define FLOTOR_INTERFACE_FORCE "flotor.force/1"
+#define FLOTOR_INTERFACE_ACTIVE_REGION "flotor.active-region/1"
+#define FLOTOR_INTERFACE_CALIBRATION "flotor.calibration/1"
 #define FLOTOR_INTERFACE_CENTERLINE "flotor.centerline/1"
-#define FLOTOR_INTERFACE_VARIANT "flotor.variant/1"
-#define FLOTOR_INTERFACE_ACTIVITY "flotor.activity/1"
-#define FLOTOR_INTERFACE_LINEAR_FIELD "flotor.linear-field/1"
-#define FLOTOR_INTERFACE_REACH "flotor.reach/1"
 #define FLOTOR_INTERFACE_DETAILS "flotor.details/1"
 #define FLOTOR_INTERFACE_ENERGY_LEDGER "flotor.energy-ledger/1"
-#define FLOTOR_INTERFACE_DEVICE_PACING "flotor.device-pacing/1"
-#define FLOTOR_INTERFACE_CALIBRATION "flotor.calibration/1"
+#define FLOTOR_INTERFACE_LINEAR_FIELD "flotor.linear-field/1"
+#define FLOTOR_INTERFACE_PACING "flotor.pacing/1"
+#define FLOTOR_INTERFACE_VARIANT "flotor.variant/1"
+#define FLOTOR_INTERFACE_WORKSPACE_BOUNDS "flotor.workspace-bounds/1"
 
 #if defined(__cplusplus)
-#define FLOTOR_STATIC_ASSERT static_assert
 #define FLOTOR_EXPORT extern "C" __attribute__((visibility("default")))
 #else
-#define FLOTOR_STATIC_ASSERT _Static_assert
 #define FLOTOR_EXPORT __attribute__((visibility("default")))
 #endif
 
-/* Begins the definition of the entry, in C as in C++: `FLOTOR_ENTRY(flotor_entry_jelly) = { ... };` */
+/* Begins the definition of the entry, in C as in C++:
+ * `FLOTOR_ENTRY(flotor_entry_jelly) = { FLOTOR_ENTRY_HEAD(FlotorPluginKind_Model), NULL, get_interface, NULL };` */
 #if defined(__cplusplus)
 #define FLOTOR_ENTRY(name) \
     extern "C" { extern __attribute__((visibility("default"))) const FlotorEntry name; } \
@@ -784,6 +798,10 @@ typedef struct FlotorReachTable {
     extern __attribute__((visibility("default"))) const FlotorEntry name; \
     const FlotorEntry name
 #endif
+/* Everything of an entry before its functions. */
+#define FLOTOR_ENTRY_HEAD(kind) \
+    FLOTOR_MAGIC_BYTES, sizeof(FlotorEntry), FLOTOR_ABI_MAJOR, FLOTOR_ABI_MINOR, (kind), FLOTOR_ABI_CANDIDATE, \
+    flotor_layouts, FLOTOR_LAYOUT_COUNT, 0
 
 /* Sets of outputs: `{FLOTOR_DEMAND_FORCE | FLOTOR_DEMAND_ENERGY}` makes a FlotorDemand. */
 #define FLOTOR_DEMAND_FORCE 1u
@@ -797,10 +815,10 @@ typedef struct FlotorReachTable {
 /* Sets of conditions: `{FLOTOR_CONDITIONS_SATURATED}` makes a FlotorConditions. */
 #define FLOTOR_CONDITIONS_SATURATED 1u
 #define FLOTOR_CONDITIONS_EXCESS_FORCE 2u
-/* What `shape` of a FlotorActivityRegion says. */
-#define FLOTOR_ACTIVITY_EVERYWHERE 0u
-#define FLOTOR_ACTIVITY_SPHERE 1u
-#define FLOTOR_ACTIVITY_BOX 2u
+/* What `shape` of a FlotorActiveRegion says. */
+#define FLOTOR_REGION_EVERYWHERE 0u
+#define FLOTOR_REGION_SPHERE 1u
+#define FLOTOR_REGION_BOX 2u
 /* What `read` and `write` of a device return; a fault is one of FlotorFault. */
 #define FLOTOR_CYCLE_FRESH 0u
 #define FLOTOR_CYCLE_STALE 1u
@@ -808,22 +826,230 @@ typedef struct FlotorReachTable {
 
 /* First eight bytes of an entry. */
 #define FLOTOR_MAGIC_BYTES { 'F', 'L', 'O', 'T', 'O', 'R', '\r', '\n' }
-/* Sizes of the data structs as this header sees them: the host compares them with its own. */
-#define FLOTOR_CONTRACT_SIZES \
-    { sizeof(FlotorInput), sizeof(FlotorOutput), sizeof(FlotorDeviceState), sizeof(FlotorCapabilities), \
-      sizeof(FlotorParameter), sizeof(FlotorParameterValue) }
 /* Text from a string literal. */
 #define FLOTOR_STR(literal) { (const uint8_t *)(literal), sizeof(literal) - 1 }
 /* What a host reads of the file without running it, in TOML: kind ("model" or "device"), id, name, doc, version,
- * abi ("1.0") and entry (the name of the exported FlotorEntry). */
+ * abi (FLOTOR_CONTRACT) and entry (the name of the exported FlotorEntry). */
 #define FLOTOR_METADATA(text) \
     __attribute__((used, section(".flotor"))) static const char flotor_metadata[] = text
 
-/* The layouts both sides agreed on. */
-FLOTOR_STATIC_ASSERT(sizeof(FlotorInput) == 136 && offsetof(FlotorInput, time_ns) == 104, "FlotorInput");
-FLOTOR_STATIC_ASSERT(sizeof(FlotorOutput) == 64 && offsetof(FlotorOutput, status) == 56, "FlotorOutput");
-FLOTOR_STATIC_ASSERT(sizeof(FlotorDeviceState) == 168 && offsetof(FlotorDeviceState, sampled_ns) == 152, "FlotorDeviceState");
-FLOTOR_STATIC_ASSERT(sizeof(FlotorMessage) == 512, "FlotorMessage");
-FLOTOR_STATIC_ASSERT(sizeof(FlotorTick) == 24, "FlotorTick");
+/* The layout table: every struct and every field as this compiler lays them out. The host compares it with its own. */
+#define FLOTOR_STRUCT(name) { #name, 0, sizeof(Flotor##name) }
+#define FLOTOR_FIELD(name, field) \
+    { #name "." #field, offsetof(Flotor##name, field), sizeof(((Flotor##name *)0)->field) }
+#define FLOTOR_FIELD_CALLED(name, text, field) \
+    { #name "." text, offsetof(Flotor##name, field), sizeof(((Flotor##name *)0)->field) }
+__attribute__((unused)) static const FlotorFieldLayout flotor_layouts[] = {
+    FLOTOR_STRUCT(Str),
+    FLOTOR_FIELD(Str, ptr),
+    FLOTOR_FIELD(Str, len),
+    FLOTOR_STRUCT(Choices),
+    FLOTOR_FIELD(Choices, ptr),
+    FLOTOR_FIELD(Choices, len),
+    FLOTOR_STRUCT(Message),
+    FLOTOR_FIELD(Message, len),
+    FLOTOR_FIELD(Message, text),
+    FLOTOR_STRUCT(Pose),
+    FLOTOR_FIELD(Pose, position_m),
+    FLOTOR_FIELD(Pose, orientation_xyzw),
+    FLOTOR_STRUCT(Twist),
+    FLOTOR_FIELD(Twist, linear_m_per_s),
+    FLOTOR_FIELD(Twist, angular_rad_per_s),
+    FLOTOR_STRUCT(Wrench),
+    FLOTOR_FIELD(Wrench, force_n),
+    FLOTOR_FIELD(Wrench, torque_nm),
+    FLOTOR_STRUCT(Parameter),
+    FLOTOR_FIELD(Parameter, id),
+    FLOTOR_FIELD(Parameter, unit),
+    FLOTOR_FIELD(Parameter, doc),
+    FLOTOR_FIELD(Parameter, choices),
+    FLOTOR_FIELD(Parameter, kind),
+    FLOTOR_FIELD(Parameter, mutability),
+    FLOTOR_FIELD(Parameter, min),
+    FLOTOR_FIELD(Parameter, max),
+    FLOTOR_FIELD_CALLED(Parameter, "default", default_),
+    FLOTOR_STRUCT(ParameterValue),
+    FLOTOR_FIELD(ParameterValue, index),
+    FLOTOR_FIELD(ParameterValue, reserved),
+    FLOTOR_FIELD(ParameterValue, number),
+    FLOTOR_FIELD(ParameterValue, text),
+    FLOTOR_STRUCT(Demand),
+    FLOTOR_FIELD(Demand, bits),
+    FLOTOR_STRUCT(Input),
+    FLOTOR_FIELD(Input, pose),
+    FLOTOR_FIELD(Input, twist),
+    FLOTOR_FIELD(Input, time_ns),
+    FLOTOR_FIELD(Input, dt_ns),
+    FLOTOR_FIELD(Input, tick),
+    FLOTOR_FIELD(Input, buttons),
+    FLOTOR_FIELD(Input, demand),
+    FLOTOR_STRUCT(Output),
+    FLOTOR_FIELD(Output, wrench),
+    FLOTOR_FIELD(Output, energy_j),
+    FLOTOR_FIELD(Output, status),
+    FLOTOR_FIELD(Output, reserved),
+    FLOTOR_STRUCT(ModelInfo),
+    FLOTOR_FIELD(ModelInfo, id),
+    FLOTOR_FIELD(ModelInfo, name),
+    FLOTOR_FIELD(ModelInfo, doc),
+    FLOTOR_FIELD(ModelInfo, serves),
+    FLOTOR_FIELD(ModelInfo, memory),
+    FLOTOR_STRUCT(LoopConfig),
+    FLOTOR_FIELD(LoopConfig, period_ns),
+    FLOTOR_FIELD(LoopConfig, seed),
+    FLOTOR_STRUCT(Tick),
+    FLOTOR_FIELD(Tick, index),
+    FLOTOR_FIELD(Tick, time_ns),
+    FLOTOR_FIELD(Tick, dt_ns),
+    FLOTOR_STRUCT(DeviceState),
+    FLOTOR_FIELD(DeviceState, pose),
+    FLOTOR_FIELD(DeviceState, twist),
+    FLOTOR_FIELD(DeviceState, delivered),
+    FLOTOR_FIELD(DeviceState, sampled_ns),
+    FLOTOR_FIELD(DeviceState, buttons),
+    FLOTOR_FIELD(DeviceState, conditions),
+    FLOTOR_STRUCT(Conditions),
+    FLOTOR_FIELD(Conditions, bits),
+    FLOTOR_STRUCT(Axes),
+    FLOTOR_FIELD(Axes, bits),
+    FLOTOR_STRUCT(Capabilities),
+    FLOTOR_FIELD(Capabilities, sensed),
+    FLOTOR_FIELD(Capabilities, actuated),
+    FLOTOR_FIELD(Capabilities, range_m),
+    FLOTOR_FIELD(Capabilities, range_rad),
+    FLOTOR_FIELD(Capabilities, resolution_m),
+    FLOTOR_FIELD(Capabilities, max_force_n),
+    FLOTOR_FIELD(Capabilities, max_torque_nm),
+    FLOTOR_FIELD(Capabilities, max_force_slew_n_per_s),
+    FLOTOR_FIELD(Capabilities, max_torque_slew_nm_per_s),
+    FLOTOR_FIELD(Capabilities, max_stiffness_n_per_m),
+    FLOTOR_FIELD(Capabilities, rate_hz),
+    FLOTOR_FIELD(Capabilities, latency_s),
+    FLOTOR_STRUCT(DeviceInfo),
+    FLOTOR_FIELD(DeviceInfo, id),
+    FLOTOR_FIELD(DeviceInfo, name),
+    FLOTOR_FIELD(DeviceInfo, doc),
+    FLOTOR_STRUCT(Host),
+    FLOTOR_FIELD(Host, size),
+    FLOTOR_FIELD(Host, abi_major),
+    FLOTOR_FIELD(Host, abi_minor),
+    FLOTOR_FIELD(Host, flags),
+    FLOTOR_FIELD(Host, reserved),
+    FLOTOR_STRUCT(FieldLayout),
+    FLOTOR_FIELD(FieldLayout, name),
+    FLOTOR_FIELD(FieldLayout, offset),
+    FLOTOR_FIELD(FieldLayout, size),
+    FLOTOR_STRUCT(ForceTable),
+    FLOTOR_FIELD(ForceTable, size),
+    FLOTOR_FIELD(ForceTable, parameter_count),
+    FLOTOR_FIELD(ForceTable, parameters),
+    FLOTOR_FIELD(ForceTable, info),
+    FLOTOR_FIELD(ForceTable, create),
+    FLOTOR_FIELD(ForceTable, destroy),
+    FLOTOR_FIELD(ForceTable, prepare),
+    FLOTOR_FIELD(ForceTable, step),
+    FLOTOR_FIELD(ForceTable, step_batch),
+    FLOTOR_FIELD(ForceTable, set_parameter),
+    FLOTOR_FIELD(ForceTable, parameter),
+    FLOTOR_FIELD(ForceTable, reset),
+    FLOTOR_FIELD(ForceTable, last_message),
+    FLOTOR_STRUCT(DeviceTable),
+    FLOTOR_FIELD(DeviceTable, size),
+    FLOTOR_FIELD(DeviceTable, parameter_count),
+    FLOTOR_FIELD(DeviceTable, parameters),
+    FLOTOR_FIELD(DeviceTable, info),
+    FLOTOR_FIELD(DeviceTable, open),
+    FLOTOR_FIELD(DeviceTable, close),
+    FLOTOR_FIELD(DeviceTable, capabilities),
+    FLOTOR_FIELD(DeviceTable, activate),
+    FLOTOR_FIELD(DeviceTable, deactivate),
+    FLOTOR_FIELD(DeviceTable, read),
+    FLOTOR_FIELD(DeviceTable, write),
+    FLOTOR_FIELD(DeviceTable, safe_stop),
+    FLOTOR_FIELD(DeviceTable, set_parameter),
+    FLOTOR_FIELD(DeviceTable, parameter),
+    FLOTOR_FIELD(DeviceTable, last_message),
+    FLOTOR_STRUCT(ActiveRegion),
+    FLOTOR_FIELD(ActiveRegion, shape),
+    FLOTOR_FIELD(ActiveRegion, reserved),
+    FLOTOR_FIELD(ActiveRegion, center_m),
+    FLOTOR_FIELD(ActiveRegion, half_sides_m),
+    FLOTOR_STRUCT(ActiveRegionTable),
+    FLOTOR_FIELD(ActiveRegionTable, size),
+    FLOTOR_FIELD(ActiveRegionTable, reserved),
+    FLOTOR_FIELD(ActiveRegionTable, region),
+    FLOTOR_STRUCT(CenterlineInfo),
+    FLOTOR_FIELD(CenterlineInfo, tube_radius_m),
+    FLOTOR_FIELD(CenterlineInfo, helix_radius_m),
+    FLOTOR_FIELD(CenterlineInfo, helix_turns),
+    FLOTOR_FIELD(CenterlineInfo, plate_radius_m),
+    FLOTOR_FIELD(CenterlineInfo, suggested_points),
+    FLOTOR_FIELD(CenterlineInfo, reserved),
+    FLOTOR_STRUCT(CenterlineTable),
+    FLOTOR_FIELD(CenterlineTable, size),
+    FLOTOR_FIELD(CenterlineTable, reserved),
+    FLOTOR_FIELD(CenterlineTable, info),
+    FLOTOR_FIELD(CenterlineTable, centerline),
+    FLOTOR_STRUCT(Detail),
+    FLOTOR_FIELD(Detail, id),
+    FLOTOR_FIELD(Detail, unit),
+    FLOTOR_FIELD(Detail, doc),
+    FLOTOR_FIELD(Detail, words),
+    FLOTOR_STRUCT(DetailsTable),
+    FLOTOR_FIELD(DetailsTable, size),
+    FLOTOR_FIELD(DetailsTable, detail_count),
+    FLOTOR_FIELD(DetailsTable, details),
+    FLOTOR_FIELD(DetailsTable, values),
+    FLOTOR_STRUCT(LinearField),
+    FLOTOR_FIELD(LinearField, anchor),
+    FLOTOR_FIELD(LinearField, wrench),
+    FLOTOR_FIELD(LinearField, stiffness),
+    FLOTOR_FIELD(LinearField, valid_m),
+    FLOTOR_FIELD(LinearField, valid_rad),
+    FLOTOR_FIELD(LinearField, time_ns),
+    FLOTOR_STRUCT(LinearFieldTable),
+    FLOTOR_FIELD(LinearFieldTable, size),
+    FLOTOR_FIELD(LinearFieldTable, reserved),
+    FLOTOR_FIELD(LinearFieldTable, linear_field),
+    FLOTOR_STRUCT(VariantInfo),
+    FLOTOR_FIELD(VariantInfo, serves),
+    FLOTOR_FIELD(VariantInfo, memory),
+    FLOTOR_STRUCT(VariantTable),
+    FLOTOR_FIELD(VariantTable, size),
+    FLOTOR_FIELD(VariantTable, reserved),
+    FLOTOR_FIELD(VariantTable, info),
+    FLOTOR_STRUCT(WorkspaceBounds),
+    FLOTOR_FIELD(WorkspaceBounds, lower_m),
+    FLOTOR_FIELD(WorkspaceBounds, upper_m),
+    FLOTOR_STRUCT(WorkspaceBoundsTable),
+    FLOTOR_FIELD(WorkspaceBoundsTable, size),
+    FLOTOR_FIELD(WorkspaceBoundsTable, reserved),
+    FLOTOR_FIELD(WorkspaceBoundsTable, bounds),
+    FLOTOR_STRUCT(VerticalCalibration),
+    FLOTOR_FIELD(VerticalCalibration, range_m),
+    FLOTOR_FIELD(VerticalCalibration, coefficients),
+    FLOTOR_STRUCT(CalibrationTable),
+    FLOTOR_FIELD(CalibrationTable, size),
+    FLOTOR_FIELD(CalibrationTable, reserved),
+    FLOTOR_FIELD(CalibrationTable, serial),
+    FLOTOR_FIELD(CalibrationTable, calibrate_vertical),
+    FLOTOR_STRUCT(EnergyLedger),
+    FLOTOR_FIELD(EnergyLedger, stored_j),
+    FLOTOR_FIELD(EnergyLedger, initial_j),
+    FLOTOR_FIELD(EnergyLedger, actuators_j),
+    FLOTOR_FIELD(EnergyLedger, feedforward_j),
+    FLOTOR_FIELD(EnergyLedger, hand_j),
+    FLOTOR_FIELD(EnergyLedger, dissipated_j),
+    FLOTOR_FIELD(EnergyLedger, peak_j),
+    FLOTOR_STRUCT(EnergyLedgerTable),
+    FLOTOR_FIELD(EnergyLedgerTable, size),
+    FLOTOR_FIELD(EnergyLedgerTable, reserved),
+    FLOTOR_FIELD(EnergyLedgerTable, ledger),
+    FLOTOR_STRUCT(PacingTable),
+    FLOTOR_FIELD(PacingTable, size),
+    FLOTOR_FIELD(PacingTable, reserved),
+    FLOTOR_FIELD(PacingTable, wait_for_sample),
+};
+#define FLOTOR_LAYOUT_COUNT (sizeof flotor_layouts / sizeof *flotor_layouts)
 
 #endif /* FLOTOR_H */

@@ -4,10 +4,20 @@
 //! opened again. The two are different types, so that a real-time call before activation does not compile.
 
 use crate::abi::Str;
-use crate::{
-    LoopConfig, OutOfRange, Pacing, Parameter, Pose, Refusal, SampleWait, Settings, Twist,
-    VerticalCalibration, Wrench,
-};
+use crate::abi::layout::layout;
+use crate::{LoopConfig, OutOfRange, Parameter, Pose, Refusal, Settings, Twist, Wrench};
+
+layout! {
+    Tick { index, time_ns, dt_ns }
+    DeviceState { pose, twist, delivered, sampled_ns, buttons, conditions }
+    Conditions { bits }
+    Axes { bits }
+    Capabilities {
+        sensed, actuated, range_m, range_rad, resolution_m, max_force_n, max_torque_nm, max_force_slew_n_per_s,
+        max_torque_slew_nm_per_s, max_stiffness_n_per_m, rate_hz, latency_s,
+    }
+    DeviceInfo { id, name, doc }
+}
 
 /// One tick as a device and a host see it. 24 bytes.
 #[repr(C)]
@@ -271,39 +281,6 @@ impl Capabilities {
     };
 }
 
-/// Account of the mechanical energy of a device with a known plant (a simulation), J since activation. 56 bytes.
-///
-/// Extension `flotor.energy-ledger/1`. Every term is integrated on its own, none is the difference of others:
-/// `stored_j - initial_j = actuators_j + feedforward_j + hand_j - dissipated_j` is a check, not a definition.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
-pub struct EnergyLedger {
-    /// Kinetic and potential energy now.
-    pub stored_j: f64,
-    /// Kinetic and potential energy at activation.
-    pub initial_j: f64,
-    /// Work done by the actuators for the commanded wrench.
-    pub actuators_j: f64,
-    /// Work done by the actuators for gravity compensation.
-    pub feedforward_j: f64,
-    /// Work done by the hand.
-    pub hand_j: f64,
-    /// Energy turned into heat by damping.
-    pub dissipated_j: f64,
-    /// Largest mechanical energy (kinetic plus potential above its lowest point) so far: the scale of an error.
-    pub peak_j: f64,
-}
-
-impl EnergyLedger {
-    /// What the account fails to explain, J.
-    #[must_use]
-    pub fn residual_j(&self) -> f64 {
-        let explained = self.actuators_j + self.feedforward_j + self.hand_j - self.dissipated_j;
-        self.stored_j - self.initial_j - explained
-    }
-}
-
 /// What a device says about itself; constant, readable without opening it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
@@ -361,8 +338,6 @@ pub trait Device: Sized + Send + 'static {
     const INFO: DeviceInfo;
     /// What the device can be told.
     const PARAMETERS: &'static [Parameter] = &[];
-    /// Whether it can set the pace of the loop.
-    const PACING: Pacing = Pacing::Host;
     /// The same device, energised.
     type Active: ActiveDevice<Opened = Self>;
     /// How another thread stops it.
@@ -379,21 +354,6 @@ pub trait Device: Sized + Send + 'static {
 
     /// The handle by which another thread stops it; asked once, right after opening.
     fn stopper(&self) -> Self::Stop;
-
-    /// Serial number of the piece of hardware; empty if it has none.
-    fn serial(&self) -> String {
-        String::new()
-    }
-
-    /// Corrects the total vertical command, gravity compensation included, from the next activation on. The
-    /// numbers are already checked.
-    ///
-    /// # Errors
-    /// A [`Refusal`] if there is nothing to correct.
-    fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
-        let _ = calibration;
-        Err(Refusal::unsupported("this device takes no calibration of the vertical force"))
-    }
 
     /// Energises the device; it starts at zero wrench.
     ///
@@ -426,19 +386,6 @@ pub trait ActiveDevice: Send + 'static {
     fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
         let _ = index;
         Err(OutOfRange { min: f64::NAN, max: f64::NAN, value })
-    }
-
-    /// Blocks until there is a sample that no earlier wait has told of, or until `timeout_ns` have passed. Asked before
-    /// each `read` of a run that the device paces, which takes [`Device::PACING`] to say so. Real-time but for the
-    /// waiting: no allocation.
-    fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
-        let _ = timeout_ns;
-        SampleWait::NotPaced
-    }
-
-    /// Energy account of the plant, where there is one to know. Real-time.
-    fn energy_ledger(&self) -> Option<EnergyLedger> {
-        None
     }
 
     /// Zero wrench, then opened again. Not real-time; cannot fail.

@@ -4,8 +4,15 @@
 //! The structs are `#[repr(C)]` arrays of `f64`, so a C plugin sees the same bytes; the methods give
 //! [`glam`] types to authors who write Rust. glam itself never crosses the boundary: its minors are breaking.
 
+use crate::abi::layout::layout;
 use crate::math;
 use glam::{DQuat, DVec3};
+
+layout! {
+    Pose { position_m, orientation_xyzw }
+    Twist { linear_m_per_s, angular_rad_per_s }
+    Wrench { force_n, torque_nm }
+}
 
 /// Position and orientation of the handle. 56 bytes.
 #[repr(C)]

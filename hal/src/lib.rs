@@ -23,41 +23,38 @@
 //! # Writing a plugin
 //!
 //! Implement [`ForceModel`] or [`Device`] and write [`export_model!`] or [`export_device!`]; set
-//! `crate-type = ["cdylib", "rlib"]`. The trait's documentation has a whole model in twenty lines. You never
+//! `crate-type = ["cdylib", "rlib"]`. What else a plugin may offer is in [`extension`]. The trait's documentation has a whole model in twenty lines. You never
 //! see the binary contract; it is in [`abi`], and C authors get it as `include/flotor.h`.
 
 pub mod abi;
-mod activity;
-mod calibration;
 pub mod conformance;
-mod detail;
 mod device;
-mod field;
+pub mod extension;
 mod frame;
 pub mod math;
 mod model;
-mod pacing;
 mod parameter;
-mod reach;
 mod refusal;
-mod shape;
-mod variant;
 
-pub use activity::{ActivityRegion, ActivityShape, LocalModel};
-pub use calibration::{CALIBRATION_COEFFICIENTS, InvalidCalibration, VerticalCalibration};
-pub use detail::{Detail, DetailedModel};
+pub use abi::Choices;
 pub use device::{
-    ActiveDevice, Axes, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState, EnergyLedger,
-    Fault, NothingToStop, SafeStop, Tick,
+    ActiveDevice, Axes, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState, Fault,
+    NothingToStop, SafeStop, Tick,
 };
-pub use field::{FieldModel, LinearField};
+pub use extension::active_region::{ActiveRegion, ActiveRegionModel, RegionShape};
+pub use extension::calibration::{
+    CALIBRATION_COEFFICIENTS, CalibrationDevice, InvalidCalibration, VerticalCalibration,
+};
+pub use extension::centerline::{CenterlineInfo, CenterlineModel};
+pub use extension::details::{Detail, DetailsModel};
+pub use extension::energy_ledger::{EnergyLedger, EnergyLedgerDevice};
+pub use extension::linear_field::{LinearField, LinearFieldModel};
+pub use extension::pacing::{PacingDevice, SampleWait};
+pub use extension::variant::{VariantInfo, VariantModel};
+pub use extension::workspace_bounds::{WorkspaceBounds, WorkspaceBoundsModel};
 pub use frame::{Pose, Twist, Wrench, orientation_from_rotation_vector, rotation_vector};
 pub use glam;
 pub use glam::{DMat3, DQuat, DVec3};
 pub use model::{Demand, ForceModel, Input, LoopConfig, Memory, ModelInfo, Output, StepStatus};
-pub use pacing::{Pacing, SampleWait};
 pub use parameter::{Mutability, OutOfRange, Parameter, ParameterKind, ParameterValue, Settings};
-pub use reach::{BoundedModel, Reach};
 pub use refusal::{Refusal, RefusalKind};
-pub use shape::{CenterlineInfo, CenterlineModel};
-pub use variant::{VariantInfo, VariantModel};

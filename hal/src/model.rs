@@ -1,11 +1,20 @@
 //! Force models: what an author implements, and the data of one step.
 
 use crate::abi::Str;
+use crate::abi::layout::layout;
 use crate::{OutOfRange, Parameter, Pose, Refusal, Settings, Twist, Wrench};
+
+layout! {
+    Demand { bits }
+    Input { pose, twist, time_ns, dt_ns, tick, buttons, demand }
+    Output { wrench, energy_j, status, reserved }
+    ModelInfo { id, name, doc, serves, memory }
+    LoopConfig { period_ns, seed }
+}
 
 /// Which outputs a scene needs from a step; what is not demanded need not be computed.
 ///
-/// Shape is not among them: it is an extension ([`crate::CenterlineModel`]) that observers call off the loop.
+/// Shape is not among them: it is an extension ([`crate::extension::centerline`]) that observers call off the loop.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]

@@ -4,8 +4,27 @@
 //! sees them, so an author only checks what a range cannot say (that values fit together). Values travel by
 //! index into the schema, not by name: setting one in a running loop costs no string comparison.
 
-use crate::abi::{Str, StrList};
+use crate::abi::layout::layout;
+use crate::abi::{Choices, Str};
 use std::fmt;
+
+layout! {
+    Parameter { id, unit, doc, choices, kind, mutability, min, max, default }
+    ParameterValue { index, reserved, number, text }
+}
+
+/// A constant list of words for [`Parameter::choice`], [`Parameter::file`] and [`crate::extension::details::Detail::word`]:
+/// `choices!["plane", "sphere"]`, or `choices!(= WORDS)` for a constant `&[&str]`.
+#[macro_export]
+macro_rules! choices {
+    () => { $crate::Choices::EMPTY };
+    (= $words:expr) => {{
+        const WORDS: &[&str] = $words;
+        const LIST: [$crate::abi::Str; WORDS.len()] = $crate::abi::Str::all(WORDS);
+        $crate::Choices::new(&LIST)
+    }};
+    ($($word:literal),+ $(,)?) => { $crate::choices!(= &[$($word),+]) };
+}
 
 /// How a parameter's number is to be read.
 #[repr(u32)]
@@ -40,7 +59,7 @@ pub struct Parameter {
     pub(crate) id: Str,
     pub(crate) unit: Str,
     pub(crate) doc: Str,
-    pub(crate) choices: StrList,
+    pub(crate) choices: Choices,
     pub(crate) kind: u32,
     pub(crate) mutability: u32,
     pub(crate) min: f64,
@@ -63,7 +82,7 @@ impl Parameter {
             id: Str::new(id),
             unit: Str::new(unit),
             doc: Str::new(doc),
-            choices: StrList::EMPTY,
+            choices: Choices::EMPTY,
             kind: ParameterKind::Real as u32,
             mutability: Mutability::Fixed as u32,
             min,
@@ -77,25 +96,21 @@ impl Parameter {
     /// # Panics
     /// In the compiler (schemas are constants), if `default` is not an index.
     #[must_use]
-    pub const fn choice(
-        id: &'static str,
-        choices: &'static [Str],
-        default: usize,
-        doc: &'static str,
-    ) -> Self {
-        assert!(default < choices.len(), "the default must be one of the choices");
-        let mut parameter = Self::real(id, "", 0.0, (choices.len() - 1) as f64, default as f64, doc);
-        parameter.choices = StrList::new(choices);
+    pub const fn choice(id: &'static str, choices: Choices, default: usize, doc: &'static str) -> Self {
+        let count = choices.as_slice().len();
+        assert!(default < count, "the default must be one of the choices");
+        let mut parameter = Self::real(id, "", 0.0, (count - 1) as f64, default as f64, doc);
+        parameter.choices = choices;
         parameter.kind = ParameterKind::Choice as u32;
         parameter
     }
 
     /// A file, or one of `built_in` by its name; none by default.
     #[must_use]
-    pub const fn file(id: &'static str, built_in: &'static [Str], doc: &'static str) -> Self {
+    pub const fn file(id: &'static str, built_in: Choices, doc: &'static str) -> Self {
         let mut parameter = Self::text(id, doc);
         parameter.kind = ParameterKind::File as u32;
-        parameter.choices = StrList::new(built_in);
+        parameter.choices = built_in;
         parameter
     }
 
@@ -276,10 +291,9 @@ impl<'a> Settings<'a> {
 mod tests {
     use super::*;
 
-    const VARIANTS: [Str; 2] = [Str::new("fast"), Str::new("exact")];
     const SCHEMA: &[Parameter] = &[
         Parameter::real("stiffness_n_per_m", "N/m", 0.0, 100.0, 10.0, "Stiffness").live(),
-        Parameter::choice("variant", &VARIANTS, 1, "Law"),
+        Parameter::choice("variant", choices!["fast", "exact"], 1, "Law"),
         Parameter::text("file", "Mesh"),
     ];
 

@@ -8,6 +8,7 @@ use fixture_yardstick_model::{Yardstick, wrench};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{Model, Plugin};
 use flotor_hal::{Input, Output, Pose};
+use flotor_session::registry::load_file;
 use flotor_tests::library::plugin_file;
 use std::hint::black_box;
 use std::time::Instant;
@@ -21,7 +22,7 @@ const TURNS: usize = 501;
 type PlainFn = fn(&Yardstick, &Input, &mut Output);
 
 fn model() -> Model {
-    let plugin = Plugin::load(&plugin_file("fixture-yardstick-model")).expect("the yardstick loads");
+    let plugin = load_file(&plugin_file("fixture-yardstick-model")).expect("the yardstick loads");
     plugin.create_model(&[]).expect("the yardstick needs no settings")
 }
 

@@ -7,7 +7,7 @@
 #include <string.h>
 
 FLOTOR_METADATA("kind = \"device\"\nid = \"fixture-c-post\"\nname = \"Post\"\ndoc = \"A handle that does not move, in C\"\n"
-                "version = \"0.1.0\"\nabi = \"1.0\"\nentry = \"flotor_entry_post\"\n");
+                "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_post\"\n");
 
 typedef struct {
     FlotorWrench held;
@@ -105,11 +105,6 @@ static const void *get_interface(FlotorStr id) {
 }
 
 FLOTOR_ENTRY(flotor_entry_post) = {
-    .magic = FLOTOR_MAGIC_BYTES,
-    .size = sizeof(FlotorEntry),
-    .abi_major = FLOTOR_ABI_MAJOR,
-    .abi_minor = FLOTOR_ABI_MINOR,
-    .kind = FlotorPluginKind_Device,
-    .sizes = FLOTOR_CONTRACT_SIZES,
+    FLOTOR_ENTRY_HEAD(FlotorPluginKind_Device),
     .get_interface = get_interface,
 };

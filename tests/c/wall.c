@@ -1,6 +1,6 @@
 /* A force model in C: a wall that pushes the hand up where it is below home. All a plugin needs is the header.
  *
- * WITHOUT_STEP, WITHOUT_TABLE, SHORT_TABLE, MISALIGNED_TABLE, SHORT_EXTENSION, OTHER_SIZES, OTHER_KIND, ODD_KIND,
+ * WITHOUT_STEP, WITHOUT_TABLE, SHORT_TABLE, MISALIGNED_TABLE, SHORT_EXTENSION, WITHOUT_LAYOUTS, OTHER_CANDIDATE, OTHER_KIND, ODD_KIND,
  * SHORT_ENTRY, HIDDEN_ENTRY and ODD_ANSWERS make the mistakes a C author can make; the tests expect each to be
  * refused. CRASHES follows a null pointer from tick 50 on. */
 #include "flotor.h"
@@ -10,7 +10,7 @@
 #include <string.h>
 
 FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-c-wall\"\nname = \"Wall\"\ndoc = \"A flat wall, in C\"\n"
-                "version = \"0.1.0\"\nabi = \"1.0\"\nentry = \"flotor_entry_wall\"\n");
+                "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_wall\"\n");
 
 typedef struct {
     double stiffness_n_per_m;
@@ -84,7 +84,7 @@ static const FlotorForceTable table = {
 };
 
 #ifdef SHORT_EXTENSION
-static const FlotorActivityTable activity = {.size = offsetof(FlotorActivityTable, region)};
+static const FlotorActiveRegionTable activity = {.size = offsetof(FlotorActiveRegionTable, region)};
 #endif
 
 static int is(FlotorStr id, const char *name) {
@@ -96,7 +96,7 @@ static const void *get_interface(FlotorStr id) {
     id.len = 0;
 #endif
 #ifdef SHORT_EXTENSION
-    if (is(id, FLOTOR_INTERFACE_ACTIVITY)) {
+    if (is(id, FLOTOR_INTERFACE_ACTIVE_REGION)) {
         return &activity;
     }
 #endif
@@ -131,10 +131,14 @@ const FlotorEntry flotor_entry_wall = {
 #else
     .kind = FlotorPluginKind_Model,
 #endif
-#ifdef OTHER_SIZES
-    .sizes = {.input = sizeof(FlotorInput) + 8, .output = sizeof(FlotorOutput)},
+#ifdef OTHER_CANDIDATE
+    .abi_candidate = 0, /* the 1.0 that was frozen before its candidate */
 #else
-    .sizes = FLOTOR_CONTRACT_SIZES,
+    .abi_candidate = FLOTOR_ABI_CANDIDATE,
+#endif
+#ifndef WITHOUT_LAYOUTS
+    .layouts = flotor_layouts,
+    .layout_count = FLOTOR_LAYOUT_COUNT,
 #endif
     .get_interface = get_interface,
 };

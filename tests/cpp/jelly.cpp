@@ -5,7 +5,7 @@
 #include <new>
 
 FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-cpp-jelly\"\nname = \"Jelly\"\ndoc = \"A soft block, in C++\"\n"
-                "version = \"0.1.0\"\nabi = \"1.0\"\nentry = \"flotor_entry_jelly\"\n");
+                "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_jelly\"\n");
 
 namespace {
 
@@ -46,8 +46,8 @@ uint32_t step(FlotorInstance instance, const FlotorInput *input, FlotorOutput *o
     return static_cast<const Jelly *>(instance)->step(*input, *output);
 }
 
-uint32_t region(FlotorInstance, FlotorActivityRegion *out) {
-    *out = FlotorActivityRegion{FLOTOR_ACTIVITY_EVERYWHERE, 0, {0.0, 0.0, 0.0}, {radius_m, radius_m, radius_m}};
+uint32_t region(FlotorInstance, FlotorActiveRegion *out) {
+    *out = FlotorActiveRegion{FLOTOR_REGION_EVERYWHERE, 0, {0.0, 0.0, 0.0}, {radius_m, radius_m, radius_m}};
     return FlotorCallStatus_Ok;
 }
 
@@ -63,7 +63,7 @@ FlotorForceTable force_table() {
 }
 
 const FlotorForceTable force = force_table();
-const FlotorActivityTable activity = {sizeof(FlotorActivityTable), 0, region};
+const FlotorActiveRegionTable activity = {sizeof(FlotorActiveRegionTable), 0, region};
 
 const void *get_interface(FlotorStr id) {
     const auto is = [&id](const char *name) {
@@ -72,12 +72,11 @@ const void *get_interface(FlotorStr id) {
     if (is(FLOTOR_INTERFACE_FORCE)) {
         return &force;
     }
-    return is(FLOTOR_INTERFACE_ACTIVITY) ? &activity : nullptr;
+    return is(FLOTOR_INTERFACE_ACTIVE_REGION) ? &activity : nullptr;
 }
 
 } // namespace
 
 FLOTOR_ENTRY(flotor_entry_jelly) = {
-    FLOTOR_MAGIC_BYTES, sizeof(FlotorEntry), FLOTOR_ABI_MAJOR, FLOTOR_ABI_MINOR, FlotorPluginKind_Model, 0,
-    FLOTOR_CONTRACT_SIZES, nullptr, get_interface, nullptr,
+    FLOTOR_ENTRY_HEAD(FlotorPluginKind_Model), nullptr, get_interface, nullptr,
 };

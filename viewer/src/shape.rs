@@ -10,7 +10,7 @@ use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
 use flotor_hal::{Input, Pose};
 use flotor_record::{PluginDescription, Role, RunDescription};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A model that can be drawn.
 pub struct Shape {
@@ -68,6 +68,17 @@ pub fn shapes_of(run: &RunDescription, plugin_files: &[PathBuf]) -> (Vec<Shape>,
     (shapes, errors)
 }
 
+/// Loads a plugin file; runs its code.
+///
+/// # Errors
+/// [`LoadError`], with file, cause and remedy.
+#[allow(unsafe_code)] // listed in tests/architecture.rs
+pub fn load_file(file: &Path) -> Result<Plugin, LoadError> {
+    // SAFETY: whoever watches a run vouches for its plugins, which are those the host runs or that lie in folders of the
+    // viewer's command line.
+    unsafe { Plugin::load(file) }
+}
+
 impl Shape {
     /// The shape of a model of a run; none if it has none.
     fn load(
@@ -80,7 +91,7 @@ impl Shape {
             flotor_hal::abi::loader::read_metadata(file).is_ok_and(|metadata| metadata.id == *id)
         };
         let no_plugin = || ShapeError::NoPlugin { name: name.clone(), id: id.clone() };
-        let plugin = Plugin::load(plugin_files.iter().find(is_it).ok_or_else(no_plugin)?)?;
+        let plugin = load_file(plugin_files.iter().find(is_it).ok_or_else(no_plugin)?)?;
         let parse = |(key, value): &(String, String)| {
             Setting::parse(plugin.parameters(), key, value)
                 .map_err(|error| ShapeError::Setting { name: name.clone(), problem: error.to_string() })

@@ -3,12 +3,11 @@
 use crate::board::{Board, LinkLost, NoAnswer};
 use crate::pantograph::{Pantograph, Posture};
 use crate::protocol::{Arm, Direction, torques};
-use flotor_hal::abi::Str;
 use flotor_hal::glam::DVec2;
 use flotor_hal::{
-    ActiveDevice, Axes, Capabilities, Conditions, Cycle, DQuat, DVec3, Device, DeviceInfo, DeviceState,
-    Fault, LoopConfig, Parameter, Pose, Refusal, SafeStop, Settings, Tick, Twist, Wrench, export_device,
-    math,
+    ActiveDevice, Axes, Capabilities, Choices, Conditions, Cycle, DQuat, DVec3, Device, DeviceInfo,
+    DeviceState, Fault, LoopConfig, Parameter, Pose, Refusal, SafeStop, Settings, Tick, Twist, Wrench,
+    choices, export_device, math,
 };
 use serialport::TTYPort;
 use std::f64::consts::TAU;
@@ -33,11 +32,11 @@ const RANGE_M: [f64; 3] = [0.05, 0.04, 0.0];
 /// Stiffness of the wall in the maker's first example, N/m.
 const MAX_STIFFNESS_N_PER_M: f64 = 450.0;
 
-const VERSIONS: [Str; 2] = [Str::new("v2"), Str::new("v3")];
+const VERSIONS: Choices = choices!["v2", "v3"];
 
 const SCHEMA: &[Parameter] = &[
     Parameter::text("port", "Where the board is, as /dev/ttyACM0 or a path below /dev/serial/by-id"),
-    Parameter::choice("hardware", &VERSIONS, 1, "Version of the device: v2 of metal, v3 of plastic (3.1)"),
+    Parameter::choice("hardware", VERSIONS, 1, "Version of the device: v2 of metal, v3 of plastic (3.1)"),
     Parameter::real("max_force_n", "N", 0.0, 10.0, 3.0, "Largest force on the hand"),
     Parameter::real(
         "velocity_cutoff_hz",

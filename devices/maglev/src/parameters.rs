@@ -3,28 +3,27 @@
 use crate::boundary::{Walls, thesis_nm_per_rad};
 use crate::facts;
 use crate::transport::Kind;
-use flotor_hal::abi::Str;
-use flotor_hal::{Parameter, Settings};
+use flotor_hal::{Choices, Parameter, Settings, choices};
 use std::time::Duration;
 
-const TRANSPORTS: [Str; 4] = [Str::new("tcp"), Str::new("serial"), Str::new("usb"), Str::new("hid")];
-const PACES: [Str; 2] = [Str::new("real"), Str::new("lockstep")];
-const GRAVITY: [Str; 2] = [Str::new("off"), Str::new("defy")];
-const WALLS: [Str; 3] = [Str::new("off"), Str::new("maker"), Str::new("thesis")];
+const TRANSPORTS: Choices = choices!["tcp", "serial", "usb", "hid"];
+const PACES: Choices = choices!["real", "lockstep"];
+const GRAVITY: Choices = choices!["off", "defy"];
+const WALLS: Choices = choices!["off", "maker", "thesis"];
 
 /// Where an emulator listens unless told otherwise.
 const DEFAULT_ADDRESS: &str = "127.0.0.1:5678";
 
 /// The schema.
 pub(crate) const SCHEMA: &[Parameter] = &[
-    Parameter::choice("transport", &TRANSPORTS, 0, "How the controller is reached"),
+    Parameter::choice("transport", TRANSPORTS, 0, "How the controller is reached"),
     Parameter::text(
         "address",
         "Where: host:port (default 127.0.0.1:5678), a serial port's path, or vendor:product in hex (usb, hid)",
     ),
     Parameter::choice(
         "pace",
-        &PACES,
+        PACES,
         0,
         "real: answers are taken as they come; lockstep: each tick waits for its answer (virtual clock, emulator)",
     ),
@@ -55,14 +54,14 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     ),
     Parameter::choice(
         "gravity",
-        &GRAVITY,
+        GRAVITY,
         0,
         "Weight of what moves: off: carried by the controller or the scene; defy: found at take-off, and carried",
     ),
     Parameter::real("landing_ms", "ms", 0.0, 10_000.0, 0.0, "Time in which the handle is let down at the end"),
     Parameter::choice(
         "walls",
-        &WALLS,
+        WALLS,
         0,
         "Walls of the device, inside those of the scene: off, maker's, report's",
     ),

@@ -8,8 +8,8 @@ use crate::protocol::{Condition, Description, Mode, Rejections, Request, Status}
 use crate::transport::{self, Kind, LinkLost};
 use crate::warning::ExcessForce;
 use flotor_hal::{
-    ActiveDevice, Axes, Capabilities, Conditions, Cycle, DQuat, DVec3, Device, DeviceInfo, DeviceState,
-    Fault, LoopConfig, OutOfRange, Parameter, Pose, Refusal, SafeStop, Settings, Tick, Twist,
+    ActiveDevice, Axes, CalibrationDevice, Capabilities, Conditions, Cycle, DQuat, DVec3, Device, DeviceInfo,
+    DeviceState, Fault, LoopConfig, OutOfRange, Parameter, Pose, Refusal, SafeStop, Settings, Tick, Twist,
     VerticalCalibration, Wrench, export_device,
 };
 use std::sync::Arc;
@@ -111,15 +111,6 @@ impl Device for MaglevDevice {
         CoilSwitch(Arc::clone(&self.stopped))
     }
 
-    fn serial(&self) -> String {
-        self.description.serial_text()
-    }
-
-    fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
-        self.calibration = *calibration;
-        Ok(())
-    }
-
     fn activate(mut self, config: &LoopConfig) -> Result<LevitatingDevice, (Self, Refusal)> {
         match self.take_off(config) {
             Ok((first, weight_n)) => {
@@ -147,6 +138,17 @@ impl Device for MaglevDevice {
 
     fn parameter(&self, index: usize) -> f64 {
         self.values.get(index)
+    }
+}
+
+impl CalibrationDevice for MaglevDevice {
+    fn serial(&self) -> String {
+        self.description.serial_text()
+    }
+
+    fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
+        self.calibration = *calibration;
+        Ok(())
     }
 }
 
@@ -372,4 +374,4 @@ fn fault(status: &Status) -> Option<Fault> {
     Some(found.map_or(Fault::Protocol, |(_, fault)| *fault))
 }
 
-export_device!(MaglevDevice);
+export_device!(MaglevDevice, calibration);

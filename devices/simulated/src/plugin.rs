@@ -11,9 +11,9 @@ use crate::workspace::{
     TRANSLATION_RANGE_M,
 };
 use flotor_hal::{
-    ActiveDevice, Axes, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState, EnergyLedger,
-    Fault, LoopConfig, Pacing, Parameter, Pose, Refusal, SafeStop, SampleWait, Settings, Tick, Twist,
-    VerticalCalibration, export_device,
+    ActiveDevice, Axes, CalibrationDevice, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState,
+    EnergyLedger, EnergyLedgerDevice, Fault, LoopConfig, PacingDevice, Parameter, Pose, Refusal, SafeStop,
+    SampleWait, Settings, Tick, Twist, VerticalCalibration, export_device,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -68,7 +68,6 @@ impl Device for SimulatedFlotor {
     const INFO: DeviceInfo =
         DeviceInfo::new("simulated", "Simulated flotor", "A 580 g levitated flotor held by a simulated hand");
     const PARAMETERS: &'static [Parameter] = SCHEMA;
-    const PACING: Pacing = Pacing::Device;
     type Active = RunningFlotor;
     type Stop = CoilSwitch;
 
@@ -119,20 +118,6 @@ impl Device for SimulatedFlotor {
         CoilSwitch(Arc::clone(&self.stopped))
     }
 
-    fn serial(&self) -> String {
-        Self::INFO.id().to_owned()
-    }
-
-    fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
-        if self.machine.is_none() {
-            let reason =
-                "preset plain has an even field, so there is nothing to calibrate; set preset = \"full\"";
-            return Err(Refusal::unsupported(reason));
-        }
-        self.calibration = *calibration;
-        Ok(())
-    }
-
     fn activate(self, config: &LoopConfig) -> Result<RunningFlotor, (Self, Refusal)> {
         match self.start(config.period_ns, config.seed) {
             Ok((simulation, machine)) => {
@@ -154,6 +139,22 @@ impl Device for SimulatedFlotor {
 
     fn parameter(&self, index: usize) -> f64 {
         in_force(&self.setup, &self.values, index)
+    }
+}
+
+impl CalibrationDevice for SimulatedFlotor {
+    fn serial(&self) -> String {
+        Self::INFO.id().to_owned()
+    }
+
+    fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
+        if self.machine.is_none() {
+            let reason =
+                "preset plain has an even field, so there is nothing to calibrate; set preset = \"full\"";
+            return Err(Refusal::unsupported(reason));
+        }
+        self.calibration = *calibration;
+        Ok(())
     }
 }
 
@@ -213,14 +214,22 @@ impl ActiveDevice for RunningFlotor {
         Cycle::Fresh
     }
 
+    fn deactivate(self) -> SimulatedFlotor {
+        self.opened
+    }
+}
+
+impl PacingDevice for RunningFlotor {
     fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
         self.samples.wait(Duration::from_nanos(timeout_ns))
     }
+}
 
-    fn energy_ledger(&self) -> Option<EnergyLedger> {
+impl EnergyLedgerDevice for RunningFlotor {
+    fn energy_ledger(&self) -> EnergyLedger {
         let ledger = self.simulation.ledger();
         let work = ledger.work();
-        Some(EnergyLedger {
+        EnergyLedger {
             stored_j: ledger.energy().total_j(),
             initial_j: ledger.start().total_j(),
             actuators_j: work.coils_j,
@@ -228,11 +237,7 @@ impl ActiveDevice for RunningFlotor {
             hand_j: work.hand_j,
             dissipated_j: work.dissipated_j,
             peak_j: ledger.peak_j(),
-        })
-    }
-
-    fn deactivate(self) -> SimulatedFlotor {
-        self.opened
+        }
     }
 }
 
@@ -242,4 +247,4 @@ impl RunningFlotor {
     }
 }
 
-export_device!(SimulatedFlotor);
+export_device!(SimulatedFlotor, calibration, pacing, energy_ledger);

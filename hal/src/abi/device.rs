@@ -1,9 +1,16 @@
-//! Function tables of devices: `flotor.device/1` and `flotor.energy-ledger/1`.
+//! `flotor.device/1`: the function table of a device, and how a [`Device`] becomes one: phases are types inside.
 
-use super::{Instance, Message};
+use super::entry::{CallStatus, Entry, Instance, PluginKind};
+use super::instance::{self, Plugged, call, fill, from_any_thread, refusable};
+use super::interface::{Extensions, Interface, find, table};
+use super::layout::layout;
+use super::{Message, Str};
 use crate::{
-    Capabilities, DeviceInfo, DeviceState, EnergyLedger, LoopConfig, Parameter, ParameterValue, Tick, Wrench,
+    ActiveDevice, Capabilities, Cycle, Device, DeviceInfo, DeviceState, Fault, LoopConfig, Parameter,
+    ParameterValue, Refusal, SafeStop, Settings, Tick, Wrench,
 };
+use std::ffi::c_void;
+use std::marker::PhantomData;
 
 /// `flotor.device/1`. `open` and `activate` return 0 or a [`crate::RefusalKind`] and say why in the message;
 /// `read` and `write` return the code of a [`crate::Cycle`]; the others a [`super::CallStatus`] code.
@@ -54,20 +61,193 @@ pub struct DeviceTable {
     pub last_message: Option<unsafe extern "C" fn(instance: Instance, message: *mut Message)>,
 }
 
-// SAFETY: an immutable static table; its pointers lead to immutable statics and code.
-unsafe impl Sync for DeviceTable {}
-// SAFETY: as for `Sync`.
-unsafe impl Send for DeviceTable {}
+layout! {
+    DeviceTable {
+        size, parameter_count, parameters, info, open, close, capabilities, activate, deactivate, read, write,
+        safe_stop, set_parameter, parameter, last_message,
+    }
+}
+table!(DeviceTable: "flotor.device/1");
 
-/// `flotor.energy-ledger/1`: see [`EnergyLedger`].
-#[repr(C)]
-#[derive(Clone, Copy)]
-#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
-pub struct EnergyLedgerTable {
-    /// Bytes of this table as the plugin knows it.
-    pub size: u32,
-    /// Reserved, 0.
-    pub reserved: u32,
-    /// The account since activation. Real-time.
-    pub ledger: Option<unsafe extern "C" fn(instance: Instance, out: *mut EnergyLedger) -> u32>,
+/// A device as the tables see it.
+pub(crate) struct DevicePlug<D>(PhantomData<D>);
+
+/// Where a device is in its life.
+pub(crate) enum Phase<D: Device> {
+    Opened(D),
+    Active(D::Active),
+    /// Only while it goes from one to the other.
+    Between,
+}
+
+impl<D: Device> Phase<D> {
+    pub(crate) fn opened(&mut self) -> Result<&mut D, CallStatus> {
+        match self {
+            Self::Opened(device) => Ok(device),
+            Self::Active(_) | Self::Between => Err(CallStatus::WrongPhase),
+        }
+    }
+
+    #[inline]
+    pub(crate) fn active(&mut self) -> Result<&mut D::Active, CallStatus> {
+        match self {
+            Self::Active(device) => Ok(device),
+            Self::Opened(_) | Self::Between => Err(CallStatus::WrongPhase),
+        }
+    }
+
+    fn activate(&mut self, config: &LoopConfig) -> Result<(), Refusal> {
+        let (next, answer) = match std::mem::replace(self, Self::Between) {
+            Self::Opened(device) => match device.activate(config) {
+                Ok(active) => (Self::Active(active), Ok(())),
+                Err((device, refusal)) => (Self::Opened(device), Err(refusal)),
+            },
+            other => (other, Err(not_opened())),
+        };
+        *self = next;
+        answer
+    }
+
+    fn deactivate(&mut self) -> Result<(), CallStatus> {
+        let (next, answer) = match std::mem::replace(self, Self::Between) {
+            Self::Active(active) => (Self::Opened(active.deactivate()), Ok(())),
+            other => (other, Err(CallStatus::WrongPhase)),
+        };
+        *self = next;
+        answer
+    }
+}
+
+/// What a call that belongs to the opened phase is told in another.
+pub(crate) fn not_opened() -> Refusal {
+    Refusal::broken("the device is not in the opened phase")
+}
+
+impl<D: Device> Plugged for DevicePlug<D> {
+    type State = Phase<D>;
+    type Shared = D::Stop;
+    const PARAMETERS: &'static [Parameter] = D::PARAMETERS;
+
+    fn make(settings: &Settings<'_>) -> Result<(Phase<D>, D::Stop), Refusal> {
+        let device = D::open(settings)?;
+        let stop = device.stopper();
+        Ok((Phase::Opened(device), stop))
+    }
+}
+
+unsafe extern "C" fn capabilities<D: Device>(instance: Instance, out: *mut Capabilities) -> u32 {
+    // SAFETY: the contract of every table call: a live instance, used by one thread, and pointers to initialised
+    // values that are the callee's for the call.
+    unsafe { fill::<DevicePlug<D>, _>(instance, out, |phase| Ok(phase.opened()?.capabilities())) }
+}
+
+unsafe extern "C" fn activate<D: Device>(
+    instance: Instance,
+    config: *const LoopConfig,
+    message: *mut Message,
+) -> u32 {
+    // SAFETY: as in `capabilities`.
+    unsafe { refusable::<DevicePlug<D>>(instance, message, |phase| phase.activate(&*config)) }
+}
+
+unsafe extern "C" fn deactivate<D: Device>(instance: Instance) -> u32 {
+    // SAFETY: as in `capabilities`.
+    unsafe { call::<DevicePlug<D>>(instance, Phase::deactivate) }
+}
+
+/// Runs one cycle of an active device; the code of its [`Cycle`].
+///
+/// # Safety
+/// As for every table call.
+#[inline]
+unsafe fn cycle<D: Device>(instance: Instance, body: impl FnOnce(&mut D::Active) -> Cycle) -> u32 {
+    let mut cycle = Cycle::Fault(Fault::Broken);
+    // SAFETY: by the contract of this function.
+    let _ = unsafe {
+        call::<DevicePlug<D>>(instance, |phase| {
+            cycle = body(phase.active()?);
+            Ok(())
+        })
+    };
+    cycle.code()
+}
+
+unsafe extern "C" fn read<D: Device>(instance: Instance, tick: *const Tick, state: *mut DeviceState) -> u32 {
+    // SAFETY: as in `capabilities`.
+    unsafe { cycle::<D>(instance, |device| device.read(&*tick, &mut *state)) }
+}
+
+unsafe extern "C" fn write<D: Device>(instance: Instance, tick: *const Tick, wrench: *const Wrench) -> u32 {
+    // SAFETY: as in `capabilities`.
+    unsafe { cycle::<D>(instance, |device| device.write(&*tick, &*wrench)) }
+}
+
+unsafe extern "C" fn safe_stop<D: Device>(instance: Instance) {
+    // SAFETY: the contract of `safe_stop`: a live instance, on any thread.
+    unsafe { from_any_thread::<DevicePlug<D>>(instance, SafeStop::safe_stop) };
+}
+
+unsafe extern "C" fn set_parameter<D: Device>(instance: Instance, index: u32, value: f64) -> u32 {
+    let set = |phase: &mut Phase<D>| {
+        phase.active()?.set_parameter(index as usize, value).map_err(|_| CallStatus::OutOfRange)
+    };
+    // SAFETY: as in `capabilities`.
+    unsafe { instance::set_parameter::<DevicePlug<D>>(instance, index, value, set) }
+}
+
+unsafe extern "C" fn parameter<D: Device>(instance: Instance, index: u32) -> f64 {
+    let ask =
+        |phase: &mut Phase<D>| phase.opened().map_or(f64::NAN, |device| device.parameter(index as usize));
+    // SAFETY: as in `capabilities`.
+    unsafe { instance::parameter::<DevicePlug<D>>(instance, ask) }
+}
+
+#[allow(clippy::cast_possible_truncation)] // table sizes and parameter counts are small
+const fn table<D: Device>() -> Interface<D> {
+    Interface::of(
+        const {
+            &DeviceTable {
+                size: size_of::<DeviceTable>() as u32,
+                parameter_count: D::PARAMETERS.len() as u32,
+                parameters: D::PARAMETERS.as_ptr(),
+                info: D::INFO,
+                open: Some(instance::create::<DevicePlug<D>>),
+                close: Some(instance::destroy::<DevicePlug<D>>),
+                capabilities: Some(capabilities::<D>),
+                activate: Some(activate::<D>),
+                deactivate: Some(deactivate::<D>),
+                read: Some(read::<D>),
+                write: Some(write::<D>),
+                safe_stop: Some(safe_stop::<D>),
+                set_parameter: Some(set_parameter::<D>),
+                parameter: Some(parameter::<D>),
+                last_message: Some(instance::last_message::<DevicePlug<D>>),
+            }
+        },
+    )
+}
+
+unsafe extern "C" fn get_interface<D: Device, E: Extensions<D>>(id: Str) -> *const c_void {
+    find::<D, E>(&const { table::<D>() }, id)
+}
+
+/// The entry of a device plugin without extensions.
+#[must_use]
+pub const fn device_entry<D: Device>() -> Entry {
+    device_entry_with::<D, ()>()
+}
+
+/// The entry of a device plugin with extensions; [`crate::export_device!`] makes a static of it.
+#[must_use]
+pub const fn device_entry_with<D: Device, E: Extensions<D>>() -> Entry {
+    Entry::of(PluginKind::Device, get_interface::<D, E>)
+}
+
+/// Makes a [`crate::Device`] a plugin: `export_device!(SpaceMouse);`. The extensions that it implements are listed behind it
+/// by their names in [`crate::extension`]: `export_device!(SimulatedFlotor, calibration, pacing);`. One per crate.
+#[macro_export]
+macro_rules! export_device {
+    ($device:ty $(, $extension:ident)* $(,)?) => {
+        $crate::export_plugin!($device, Device, Device, device_entry_with $(, $extension)*);
+    };
 }

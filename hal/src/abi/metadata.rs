@@ -3,7 +3,7 @@
 //! The text is assembled at compile time by `export_model!` and `export_device!`; a C plugin writes it with
 //! one macro of the header. It survives `strip` and the linker's garbage collection.
 
-use super::{ABI_MAJOR, ABI_MINOR, PluginKind};
+use super::{CONTRACT, PluginKind};
 
 /// Name of the ELF section.
 pub const SECTION: &str = ".flotor";
@@ -45,12 +45,6 @@ impl<const N: usize> Writer<N> {
         self
     }
 
-    const fn digit(self, value: u16) -> Self {
-        assert!(value < 10, "extend this when a version reaches 10");
-        const DIGITS: [&str; 10] = ["0", "1", "2", "3", "4", "5", "6", "7", "8", "9"];
-        self.text(DIGITS[value as usize])
-    }
-
     const fn line(self, key: &str, value: &str) -> Self {
         let bytes = value.as_bytes();
         let mut i = 0;
@@ -70,11 +64,7 @@ const fn write<const N: usize>(facts: &Facts) -> Writer<N> {
         .line("name", facts.name)
         .line("doc", facts.doc)
         .line("version", facts.version)
-        .text("abi = \"")
-        .digit(ABI_MAJOR)
-        .text(".")
-        .digit(ABI_MINOR)
-        .text("\"\n")
+        .line("abi", CONTRACT)
         .line("entry", facts.entry)
 }
 
@@ -93,19 +83,26 @@ pub const fn render<const N: usize>(facts: &Facts) -> [u8; N] {
 /// What both export macros share: the entry static and the metadata section.
 #[doc(hidden)]
 #[macro_export]
-macro_rules! export_entry {
-    ($entry:expr, $kind:expr, $id:expr, $name:expr, $doc:expr) => {
+macro_rules! export_plugin {
+    ($plugin:ty, $trait:ident, $kind:ident, $entry:ident $(, $extension:ident)*) => {
         /// The plugin's entry: found by name in the shared library, or linked directly into a test.
         // One symbol per crate, so that several plugins can be linked into one binary.
         #[unsafe(export_name = concat!("flotor_entry_", env!("CARGO_CRATE_NAME")))]
-        pub static FLOTOR_ENTRY: $crate::abi::Entry = $entry;
+        pub static FLOTOR_ENTRY: $crate::abi::Entry = {
+            struct Offered;
+            impl $crate::abi::Extensions<$plugin> for Offered {
+                const LIST: &'static [$crate::abi::Interface<$plugin>] =
+                    &[$($crate::extension::$extension::offer::<$plugin>()),*];
+            }
+            $crate::abi::$entry::<$plugin, Offered>()
+        };
 
         const _: () = {
             const FACTS: $crate::abi::metadata::Facts = $crate::abi::metadata::Facts {
-                kind: $kind,
-                id: $id,
-                name: $name,
-                doc: $doc,
+                kind: $crate::abi::PluginKind::$kind,
+                id: <$plugin as $crate::$trait>::INFO.id(),
+                name: <$plugin as $crate::$trait>::INFO.name(),
+                doc: <$plugin as $crate::$trait>::INFO.doc(),
                 version: env!("CARGO_PKG_VERSION"),
                 entry: concat!("flotor_entry_", env!("CARGO_CRATE_NAME")),
             };
@@ -134,7 +131,7 @@ mod tests {
         };
         const TEXT: [u8; length(&FACTS)] = render(&FACTS);
         let expected = "kind = \"model\"\nid = \"floor\"\nname = \"Floor\"\ndoc = \"A flat floor\"\n\
-                        version = \"1.2.3\"\nabi = \"1.0\"\nentry = \"flotor_entry_floor\"\n";
+                        version = \"1.2.3\"\nabi = \"1.0-rc\"\nentry = \"flotor_entry_floor\"\n";
         assert_eq!(std::str::from_utf8(&TEXT), Ok(expected));
     }
 }

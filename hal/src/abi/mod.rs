@@ -4,47 +4,39 @@
 //! `export_*!` line. C authors include `include/flotor.h`, which is generated from these files.
 //!
 //! Rules, for both sides:
-//! - Data structs are frozen per interface revision; function tables only grow at their end and carry `size`.
+//! - Data structs are closed per interface revision; function tables only grow at their end and carry `size`.
 //! - Nothing unwinds across the boundary: the trampolines here catch panics.
 //! - Whoever allocates frees. Text is borrowed: for ever in info structs, for the call in arguments.
+//! - What a host passes by pointer is initialised, out parameters too.
 //! - One instance is used by one thread at a time, except `safe_stop`, which may come from any thread.
+//! - `get_interface`, `create` and `open` may come from several threads at once: what instances share, a plugin locks.
 //! - Unknown interface ids get null; null function pointers mean "not offered".
 //! - Libraries are never unloaded.
 //!
-//! This module and its children are the only place of the crate with `unsafe` code.
+//! This module and [`crate::extension`] are the only places of the crate with `unsafe` code.
 #![allow(unsafe_code)]
 
-mod calibration;
 mod device;
 mod entry;
-mod export_device;
-mod export_model;
-mod field;
-mod force;
+pub(crate) mod instance;
+pub(crate) mod interface;
+pub(crate) mod layout;
 pub mod metadata;
-mod pacing;
+mod model;
 mod panics;
-#[cfg(feature = "layout-proof")]
-pub mod proof;
-mod reach;
 mod text;
 
 #[cfg(feature = "loader")]
 pub mod loader;
 
-pub use calibration::CalibrationTable;
-pub use device::{DeviceTable, EnergyLedgerTable};
+pub(crate) use device::{DevicePlug, not_opened};
+pub use device::{DeviceTable, device_entry, device_entry_with};
 pub use entry::{
-    ABI_MAJOR, ABI_MINOR, CallStatus, ContractSizes, Entry, HOST_QUIET_PANICS, Host, Instance, LayoutProof,
-    MAGIC, PluginKind, interface_ids, is_spoken,
+    ABI_CANDIDATE, ABI_MAJOR, ABI_MINOR, CONTRACT, CallStatus, Entry, HOST_QUIET_PANICS, Host, Instance,
+    LayoutProof, MAGIC, PluginKind,
 };
-pub use export_device::device_entry;
-pub use export_model::{
-    Extensions, WithActivity, WithCenterline, WithDetails, WithField, WithReach, WithVariant, model_entry,
-    model_entry_with,
-};
-pub use field::LinearFieldTable;
-pub use force::{ActivityTable, CenterlineTable, DetailsTable, ForceTable, VariantTable};
-pub use pacing::DevicePacingTable;
-pub use reach::ReachTable;
-pub use text::{MESSAGE_BYTES, Message, Str, StrList};
+pub use interface::{Extensions, Interface};
+pub use layout::{FieldLayout, LAYOUTS};
+pub(crate) use model::ModelPlug;
+pub use model::{ForceTable, model_entry, model_entry_with};
+pub use text::{Choices, MESSAGE_BYTES, Message, Str};

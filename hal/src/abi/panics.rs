@@ -24,7 +24,8 @@ struct Place {
 
 /// Called by the host after loading. A library of its own has a Rust runtime of its own: there the default
 /// hook would print from inside the servo and walk the stack for tens of milliseconds, so it is replaced by
-/// one that only notes the place. Linked into another program, the hook belongs to that program.
+/// one that only notes the place. Linked into another program, the hook belongs to that program. A plugin built with
+/// `-C prefer-dynamic` may share the host's runtime, which nothing here can see: it silences the host's panics too.
 pub(super) unsafe extern "C" fn init(host: *const Host) {
     // SAFETY: the contract of `init`: null or a valid host struct for the call.
     let flags = unsafe { host.as_ref() }.map_or(0, |host| host.flags);

@@ -1,5 +1,6 @@
 //! Text across the boundary: pointer and length, never null-terminated, never owned by the receiver.
 
+use super::layout::layout;
 use std::fmt;
 
 /// Borrowed UTF-8 text. In a schema or an info struct it lives as long as the process (plugins are never
@@ -26,6 +27,19 @@ impl Str {
     #[must_use]
     pub const fn new(text: &'static str) -> Self {
         Self { ptr: text.as_ptr(), len: text.len() }
+    }
+
+    /// Constant words as texts; [`crate::choices!`] uses it.
+    #[doc(hidden)]
+    #[must_use]
+    pub const fn all<const N: usize>(words: &[&'static str]) -> [Str; N] {
+        assert!(words.len() == N);
+        let (mut texts, mut i) = ([Str::EMPTY; N], 0);
+        while i < N {
+            texts[i] = Str::new(words[i]);
+            i += 1;
+        }
+        texts
     }
 
     /// Text lent for the duration of a call.
@@ -58,23 +72,23 @@ impl fmt::Debug for Str {
     }
 }
 
-/// A constant list of texts.
+/// A constant list of words, made by [`crate::choices!`].
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
-pub struct StrList {
+pub struct Choices {
     ptr: *const Str,
     len: usize,
 }
 
 // SAFETY: like `Str`, a shared borrow of immutable static data.
-unsafe impl Sync for StrList {}
+unsafe impl Sync for Choices {}
 // SAFETY: as for `Sync`: it owns nothing.
-unsafe impl Send for StrList {}
+unsafe impl Send for Choices {}
 
-impl StrList {
+impl Choices {
     /// No texts.
-    pub const EMPTY: StrList = StrList { ptr: std::ptr::null(), len: 0 };
+    pub const EMPTY: Choices = Choices { ptr: std::ptr::null(), len: 0 };
 
     /// A list that lives as long as the process.
     #[must_use]
@@ -85,15 +99,15 @@ impl StrList {
     /// The texts.
     #[must_use]
     pub const fn as_slice(&self) -> &[Str] {
-        if self.ptr.is_null() {
+        if self.ptr.is_null() || self.len > isize::MAX as usize / size_of::<Str>() {
             return &[];
         }
-        // SAFETY: not null; `new` stored pointer and length of one static slice, a plugin's own data likewise.
+        // SAFETY: not null, not larger than memory; `new` stored pointer and length of one static slice, a plugin's own data likewise.
         unsafe { std::slice::from_raw_parts(self.ptr, self.len) }
     }
 }
 
-impl fmt::Debug for StrList {
+impl fmt::Debug for Choices {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Debug::fmt(self.as_slice(), f)
     }
@@ -142,6 +156,12 @@ impl Message {
     }
 }
 
+layout! {
+    Str { ptr, len }
+    Choices { ptr, len }
+    Message { len, text }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -165,8 +185,10 @@ mod tests {
     }
 
     #[test]
-    fn null_text_reads_as_empty() {
+    fn null_and_more_than_memory_read_as_empty() {
         let text = Str { ptr: std::ptr::null(), len: 7 };
         assert_eq!(text.as_str(), "");
+        let words = Choices { ptr: &raw const text, len: usize::MAX / 8 };
+        assert!(words.as_slice().is_empty());
     }
 }

@@ -2,7 +2,6 @@
 //!
 //! Usage: batch_seconds PLUGIN.so POSES ROUNDS
 
-use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{DVec3, Input, Output, Pose, orientation_from_rotation_vector};
 use std::path::Path;
 use std::time::Instant;
@@ -13,7 +12,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         return Err("usage: batch_seconds PLUGIN.so POSES ROUNDS".into());
     };
     let (poses, rounds): (u32, u32) = (poses.parse()?, rounds.parse()?);
-    let mut model = Plugin::load(Path::new(plugin))?.create_model(&[])?;
+    let mut model = flotor_session::registry::load_file(Path::new(plugin))?.create_model(&[])?;
     // The same path as in `bench/batch.py`: a sine of 10 mm, a little shear and tilt.
     let inputs: Vec<Input> = (0..poses)
         .map(|i| {

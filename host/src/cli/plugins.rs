@@ -143,7 +143,7 @@ fn print_description(plugin: &Plugin, parameters: &[Described<'_>]) {
     let metadata = plugin.metadata();
     say!("{} {} - {}", style::title(&metadata.id), metadata.version, metadata.doc);
     say!("{}, contract {}, layouts {}", metadata.path.display(), metadata.abi, {
-        if plugin.layouts_proven() { "proven" } else { "checked by size only" }
+        if plugin.layouts_proven() { "compared and proven" } else { "compared" }
     });
     for parameter in parameters {
         let range = match parameter.kind {

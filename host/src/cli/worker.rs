@@ -3,6 +3,7 @@
 use super::{CommandError, stopping};
 use clap::Args;
 use flotor_servo::engine::process;
+use flotor_session::registry::load_file;
 use std::path::PathBuf;
 
 /// What a worker is started with. Standard input is the memory it shares with its host.
@@ -26,6 +27,6 @@ pub(super) fn run(arguments: WorkerArguments) -> Result<(), CommandError> {
     // worker ends with its host, so nobody listens to the switch.
     let _ = stopping::stop_on_signals();
     let WorkerArguments { plugin, period_ns, seed, sets } = arguments;
-    process::serve(&process::WorkerArguments { plugin, period_ns, seed, sets })
+    process::serve(&process::WorkerArguments { plugin, period_ns, seed, sets }, load_file)
         .map_err(|error| CommandError::Usage(format!("`flotor worker` is started by `flotor run`: {error}")))
 }

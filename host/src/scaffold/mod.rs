@@ -10,7 +10,7 @@ mod name;
 pub use contract::ContractFolder;
 pub use name::{NameError, PluginName};
 
-use flotor_hal::abi::{ABI_MAJOR, ABI_MINOR, PluginKind};
+use flotor_hal::abi::PluginKind;
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -150,7 +150,7 @@ fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'sta
 const BUILD: &str = "BUILD_COMMAND";
 
 /// What stands in the templates, and what comes instead; also in what came for those before.
-struct Placeholders([(&'static str, String); 8]);
+struct Placeholders([(&'static str, String); 7]);
 
 impl Placeholders {
     fn new(name: &PluginName, language: Language, contract: &ContractFolder) -> Result<Self, ScaffoldError> {
@@ -169,7 +169,6 @@ impl Placeholders {
             ("YourName", name.type_name()),
             ("Your name", name.title()),
             ("path/to/hal", contract.as_text()?),
-            ("MAJOR.MINOR", format!("{ABI_MAJOR}.{ABI_MINOR}")),
         ]))
     }
 

@@ -11,16 +11,15 @@
 //! with depth `d = -z` below home and an onset `d0` that keeps the law smooth. Both have an energy, `F z` and
 //! `F d0 ln cosh(d / d0)`, so nothing is gained on a way there and back.
 
-use flotor_hal::abi::Str;
 use flotor_hal::{
-    DVec3, Demand, ForceModel, Input, ModelInfo, OutOfRange, Output, Parameter, Refusal, Settings,
-    StepStatus, Wrench, math,
+    Choices, DVec3, Demand, ForceModel, Input, ModelInfo, OutOfRange, Output, Parameter, Refusal, Settings,
+    StepStatus, Wrench, choices, math,
 };
 
 /// Farther from home than this there is no handle, m: the energy there is that at the edge, and the answer says so.
 const REACH_M: f64 = 1.0;
 
-const KINDS: [Str; 2] = [Str::new("felt"), Str::new("exerted")];
+const KINDS: Choices = choices!["felt", "exerted"];
 
 /// How the force comes about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,7 +66,7 @@ impl ForceModel for Load {
         ModelInfo::new("load", "Load", "A force to be held or to be overcome").serving(Demand::ALL);
 
     const PARAMETERS: &'static [Parameter] = &[
-        Parameter::choice("kind", &KINDS, 0, "A weight that pulls down, or a resistance to pushing down"),
+        Parameter::choice("kind", KINDS, 0, "A weight that pulls down, or a resistance to pushing down"),
         Parameter::real("force_n", "N", 0.0, 100.0, 3.0, "The force").live(),
         Parameter::real(
             "onset_mm",

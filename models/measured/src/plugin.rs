@@ -4,7 +4,7 @@ use crate::curve::Curve;
 use crate::table;
 use flotor_hal::{
     CenterlineInfo, CenterlineModel, DQuat, DVec3, Demand, ForceModel, Input, ModelInfo, OutOfRange, Output,
-    Parameter, Pose, Refusal, Settings, StepStatus, Wrench,
+    Parameter, Pose, Refusal, Settings, StepStatus, Wrench, choices,
 };
 
 /// Without a table: spring 1 of the report, 0.68 N/mm, straight over 12 mm.
@@ -49,7 +49,11 @@ impl ForceModel for Measured {
             .serving(Demand::ALL);
 
     const PARAMETERS: &'static [Parameter] = &[
-        Parameter::file("curve", &[], "Table compression_mm,force_n; without one, a straight 0.68 N/mm"),
+        Parameter::file(
+            "curve",
+            choices![],
+            "Table compression_mm,force_n; without one, a straight 0.68 N/mm",
+        ),
         Parameter::real(
             "stiffness_scale",
             "1",

@@ -4,8 +4,8 @@ use crate::mesh::{Mesh, Sheet};
 use crate::network::{Network, Surroundings};
 use crate::touch::Touch;
 use flotor_hal::{
-    DVec3, FieldModel, ForceModel, Input, LinearField, Memory, ModelInfo, OutOfRange, Output, Parameter,
-    Refusal, Settings, StepStatus, Wrench,
+    DVec3, ForceModel, Input, LinearField, LinearFieldModel, Memory, ModelInfo, OutOfRange, Output,
+    Parameter, Refusal, Settings, StepStatus, Wrench, choices,
 };
 
 /// Farther from home than this there is no handle, m: the answer is that at the edge, and says so.
@@ -53,7 +53,7 @@ const SCHEMA: &[Parameter] = &[
     ),
     Parameter::file(
         "file",
-        &[],
+        choices![],
         "A mesh instead of the sheet: Wavefront OBJ, metres, z up; the border is held",
     ),
 ];
@@ -188,7 +188,7 @@ impl ForceModel for Membrane {
 /// How far the ball is moved to feel the slope, over the distance of two masses: several come into contact on the way.
 const PROBE_SHARE: f64 = 0.125;
 
-impl FieldModel for Membrane {
+impl LinearFieldModel for Membrane {
     fn linear_field(&mut self, input: &Input) -> LinearField {
         let Ok((handle_m, _)) = Self::reached(input) else { return LinearField::NONE };
         let (centre_m, time_s) = (self.centre_m(handle_m), input.dt_s().min(LONGEST_TIME_S));
@@ -201,4 +201,4 @@ impl FieldModel for Membrane {
 /// Steps until a sheet has come to rest under gravity, before it is taken as it is.
 const MOST_SETTLING_STEPS: usize = 20_000;
 
-flotor_hal::export_model!(Membrane, field);
+flotor_hal::export_model!(Membrane, linear_field);

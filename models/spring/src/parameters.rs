@@ -14,8 +14,7 @@ use crate::preset::Preset;
 use crate::rigidity::{Geometry, Material, Spring, Stiffness};
 use crate::rod::Accuracy;
 use crate::seat::Friction;
-use flotor_hal::abi::Str;
-use flotor_hal::{OutOfRange, Parameter, Refusal, Settings};
+use flotor_hal::{Choices, OutOfRange, Parameter, Refusal, Settings, choices};
 
 /// Which law answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,21 +76,14 @@ impl Mode {
     }
 }
 
-const PRESETS: [Str; 4] =
-    [Str::new("thesis-1"), Str::new("thesis-2"), Str::new("thesis-3"), Str::new("slender")];
+const PRESETS: Choices = choices!["thesis-1", "thesis-2", "thesis-3", "slender"];
 /// Names of [`Variant::ALL`].
-const VARIANTS: [Str; 5] = [
-    Str::new("thesis"),
-    Str::new("closed-form"),
-    Str::new("current-length"),
-    Str::new("energy"),
-    Str::new("rod"),
-];
-const PRECISIONS: [Str; 2] = [Str::new("f64"), Str::new("f32")];
-const ACCURACIES: [Str; 2] = [Str::new("servo"), Str::new("tight")];
-const SEATS: [Str; 2] = [Str::new("fixed"), Str::new("free")];
-const OFF_ON: [Str; 2] = [Str::new("off"), Str::new("on")];
-const MODES: [Str; 4] = [Str::new("gamma"), Str::new("alpha"), Str::new("beta"), Str::new("physical")];
+const VARIANTS: Choices = choices!["thesis", "closed-form", "current-length", "energy", "rod"];
+const PRECISIONS: Choices = choices!["f64", "f32"];
+const ACCURACIES: Choices = choices!["servo", "tight"];
+const SEATS: Choices = choices!["fixed", "free"];
+const OFF_ON: Choices = choices!["off", "on"];
+const MODES: Choices = choices!["gamma", "alpha", "beta", "physical"];
 
 const MM: f64 = 1.0e-3;
 const MPA: f64 = 1.0e6;
@@ -100,16 +92,16 @@ const N_MM2: f64 = 1.0e-6;
 /// The schema. Defaults are those of preset `thesis-1`; another preset brings its own. What kind of spring it is
 /// is fixed, its numbers are live.
 pub(crate) const SCHEMA: &[Parameter] = &[
-    Parameter::choice("preset", &PRESETS, 0, "Spring of the thesis, or a slender one that buckles"),
+    Parameter::choice("preset", PRESETS, 0, "Spring of the thesis, or a slender one that buckles"),
     Parameter::choice(
         "variant",
-        &VARIANTS,
+        VARIANTS,
         3,
         "Law: the thesis's code, its law without jumps, that corrected, conservative in 3D, or the exact rod",
     ),
-    Parameter::choice("precision", &PRECISIONS, 0, "Storage of numbers (variants thesis and closed-form)"),
-    Parameter::choice("accuracy", &ACCURACIES, 0, "For the servo, or for reference (variant rod)"),
-    Parameter::choice("seat", &SEATS, 0, "Lower plate held, or free to roll up and lift off (energy, rod)"),
+    Parameter::choice("precision", PRECISIONS, 0, "Storage of numbers (variants thesis and closed-form)"),
+    Parameter::choice("accuracy", ACCURACIES, 0, "For the servo, or for reference (variant rod)"),
+    Parameter::choice("seat", SEATS, 0, "Lower plate held, or free to roll up and lift off (energy, rod)"),
     Parameter::real(
         "seat_friction",
         "1",
@@ -119,15 +111,15 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "Friction under a free seat; at 10 nothing slides",
     )
     .live(),
-    Parameter::choice("hand_over", &OFF_ON, 1, "Near buckling to the rod, as one energy (variant energy)"),
-    Parameter::choice("coil_contact", &OFF_ON, 0, "Coils that meet press on each other (energy, rod)"),
+    Parameter::choice("hand_over", OFF_ON, 1, "Near buckling to the rod, as one energy (variant energy)"),
+    Parameter::choice("coil_contact", OFF_ON, 0, "Coils that meet press on each other (energy, rod)"),
     Parameter::choice(
         "wire",
-        &OFF_ON,
+        OFF_ON,
         0,
         "Twist under compression and off-axis ends of the wire (energy, rod)",
     ),
-    Parameter::choice("mode", &MODES, 0, "Which constant rules the stiffness; the others follow from it"),
+    Parameter::choice("mode", MODES, 0, "Which constant rules the stiffness; the others follow from it"),
     Parameter::real("free_length_mm", "mm", 1.0, 1000.0, 25.0, "Distance of the end plates without load")
         .live(),
     Parameter::real("coil_diameter_mm", "mm", 0.5, 200.0, 6.07, "Diameter of the coil between wire centres")

@@ -6,12 +6,11 @@ use crate::contract;
 use crate::parameters::{Choice, SCHEMA, Switch};
 use crate::prepared::{Insight, Prepared};
 use crate::rod::Branch;
-use flotor_hal::abi::Str;
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::{
-    BoundedModel, CenterlineInfo, CenterlineModel, Demand, Detail, DetailedModel, ForceModel, Input, Memory,
-    ModelInfo, OutOfRange, Output, Parameter, Reach, Refusal, Settings, VariantInfo, VariantModel,
-    export_model,
+    CenterlineInfo, CenterlineModel, Choices, Demand, Detail, DetailsModel, ForceModel, Input, Memory,
+    ModelInfo, OutOfRange, Output, Parameter, Refusal, Settings, VariantInfo, VariantModel, WorkspaceBounds,
+    WorkspaceBoundsModel, choices, export_model,
 };
 
 /// The spring: what it is, and the law that answers.
@@ -74,13 +73,13 @@ impl VariantModel for SpringModel {
     }
 }
 
-const BRANCHES: [Str; 2] = [Str::new("unbuckled"), Str::new("buckled")];
+const BRANCHES: Choices = choices!["unbuckled", "buckled"];
 
-impl DetailedModel for SpringModel {
+impl DetailsModel for SpringModel {
     const DETAILS: &'static [Detail] = &[
         Detail::word(
             "branch",
-            &BRANCHES,
+            BRANCHES,
             "Whether the plates are closer than where a straight rod buckles (rod)",
         ),
         Detail::flag("stable", "Whether the shape is a minimum of the stored energy (rod)"),
@@ -126,19 +125,19 @@ impl CenterlineModel for SpringModel {
     }
 }
 
-impl BoundedModel for SpringModel {
+impl WorkspaceBoundsModel for SpringModel {
     /// Down to where all coils touch: no law without contact knows of that.
-    fn reach(&self) -> Reach {
+    fn workspace_bounds(&self) -> WorkspaceBounds {
         if self.choice.coil_contact == Switch::On {
-            return Reach::UNBOUNDED;
+            return WorkspaceBounds::UNBOUNDED;
         }
         let geometry = self.choice.spring.geometry();
         let solid_m = geometry.solid_length_m() - geometry.free_length_m;
-        Reach::between([f64::NEG_INFINITY, f64::NEG_INFINITY, solid_m], [f64::INFINITY; 3])
+        WorkspaceBounds::between([f64::NEG_INFINITY, f64::NEG_INFINITY, solid_m], [f64::INFINITY; 3])
     }
 }
 
-export_model!(SpringModel, centerline, variant, details, reach);
+export_model!(SpringModel, centerline, variant, details, workspace_bounds);
 
 #[cfg(test)]
 mod tests;

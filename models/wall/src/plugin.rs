@@ -2,16 +2,15 @@
 
 use crate::proxy::{Proxy, Surface};
 use crate::shape::Shape;
-use flotor_hal::abi::Str;
 use flotor_hal::{
-    ActivityRegion, DVec3, Demand, ForceModel, Input, LocalModel, Memory, ModelInfo, OutOfRange, Output,
-    Parameter, Refusal, Settings, StepStatus, Wrench,
+    ActiveRegion, ActiveRegionModel, Choices, DVec3, Demand, ForceModel, Input, Memory, ModelInfo,
+    OutOfRange, Output, Parameter, Refusal, Settings, StepStatus, Wrench, choices,
 };
 
 /// Farther from home than this there is no handle, m: the answer is that at the edge, and says so.
 const REACH_M: f64 = 1.0;
 
-const SHAPES: [Str; 3] = [Str::new("plane"), Str::new("sphere"), Str::new("box")];
+const SHAPES: Choices = choices!["plane", "sphere", "box"];
 
 /// A stiff wall, sphere or box; the handle is a point.
 pub struct Wall {
@@ -39,7 +38,7 @@ impl ForceModel for Wall {
         )
         .live(),
         Parameter::real("friction", "1", 0.0, 10.0, 0.0, "Coefficient of friction").live(),
-        Parameter::choice("shape", &SHAPES, 0, "Which solid: below a plane, a ball, or a cube"),
+        Parameter::choice("shape", SHAPES, 0, "Which solid: below a plane, a ball, or a cube"),
         Parameter::real("size_mm", "mm", 0.1, 1000.0, 10.0, "Radius of the ball, half the edge of the cube"),
         Parameter::real("height_mm", "mm", -100.0, 100.0, 0.0, "Top of the solid above home"),
     ];
@@ -108,17 +107,17 @@ impl ForceModel for Wall {
     }
 }
 
-impl LocalModel for Wall {
+impl ActiveRegionModel for Wall {
     /// A ball acts inside only and knows nothing outside. Plane and cube have no bounded region: the one has no
     /// bounds, the other remembers from which side the handle came.
-    fn activity(&self) -> ActivityRegion {
+    fn active_region(&self) -> ActiveRegion {
         match self.shape {
             Shape::Sphere { radius_m } => {
-                ActivityRegion::sphere([0.0, 0.0, self.height_m - radius_m], radius_m)
+                ActiveRegion::sphere([0.0, 0.0, self.height_m - radius_m], radius_m)
             }
-            Shape::Plane | Shape::Cube { .. } => ActivityRegion::EVERYWHERE,
+            Shape::Plane | Shape::Cube { .. } => ActiveRegion::EVERYWHERE,
         }
     }
 }
 
-flotor_hal::export_model!(Wall, activity);
+flotor_hal::export_model!(Wall, active_region);

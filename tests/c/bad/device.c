@@ -8,7 +8,7 @@
 #include <string.h>
 
 FLOTOR_METADATA("kind = \"device\"\nid = \"fixture-c-bad-device\"\nname = \"Bad device\"\ndoc = \"A post with a mistake\"\n"
-                "version = \"0.1.0\"\nabi = \"1.0\"\nentry = \"flotor_entry_bad_device\"\n");
+                "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_bad_device\"\n");
 
 #ifndef RATES
 #define RATES {100.0, 10000.0}
@@ -161,11 +161,6 @@ static const void *get_interface(FlotorStr id) {
 }
 
 FLOTOR_ENTRY(flotor_entry_bad_device) = {
-    .magic = FLOTOR_MAGIC_BYTES,
-    .size = sizeof(FlotorEntry),
-    .abi_major = FLOTOR_ABI_MAJOR,
-    .abi_minor = FLOTOR_ABI_MINOR,
-    .kind = FlotorPluginKind_Device,
-    .sizes = FLOTOR_CONTRACT_SIZES,
+    FLOTOR_ENTRY_HEAD(FlotorPluginKind_Device),
     .get_interface = get_interface,
 };

@@ -9,7 +9,7 @@
 #include <string.h>
 
 FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-c-bad-model\"\nname = \"Bad model\"\ndoc = \"A spring with a mistake\"\n"
-                "version = \"0.1.0\"\nabi = \"1.0\"\nentry = \"flotor_entry_bad_model\"\n");
+                "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_bad_model\"\n");
 
 #if defined(INTEGRATES) || defined(INTEGRATES_AND_RESETS)
 #define MEMORY FlotorMemory_PathDependent
@@ -135,6 +135,11 @@ static uint32_t step(FlotorInstance instance, const FlotorInput *input, FlotorOu
 #ifndef LIVE_WITHOUT_SETTER
 static uint32_t set_parameter(FlotorInstance instance, uint32_t index, double value) {
     Spring *spring = instance;
+#ifdef FOLLOWS_INDICES
+    if (index >= sizeof parameters / sizeof *parameters) {
+        abort(); /* what an array out of bounds may do */
+    }
+#endif
     if (index != 0 || !(value >= parameters[0].min && value <= parameters[0].max)) {
         return FlotorCallStatus_OutOfRange;
     }
@@ -154,6 +159,11 @@ static uint32_t set_parameter(FlotorInstance instance, uint32_t index, double va
 
 static double parameter(FlotorInstance instance, uint32_t index) {
     const Spring *spring = instance;
+#ifdef FOLLOWS_INDICES
+    if (index != 0) {
+        abort();
+    }
+#endif
     return index == 0 ? spring->stiffness_n_per_m : NAN;
 }
 
@@ -185,13 +195,13 @@ static const FlotorForceTable table = {
 };
 
 #if defined(LOCAL) || defined(ACTS_OUTSIDE)
-static uint32_t region(FlotorInstance instance, FlotorActivityRegion *out) {
+static uint32_t region(FlotorInstance instance, FlotorActiveRegion *out) {
     (void)instance;
-    *out = (FlotorActivityRegion){.shape = 1, .half_sides_m = {0.002, 0.002, 0.002}};
+    *out = (FlotorActiveRegion){.shape = 1, .half_sides_m = {0.002, 0.002, 0.002}};
     return FlotorCallStatus_Ok;
 }
 
-static const FlotorActivityTable activity_table = {.size = sizeof(FlotorActivityTable), .region = region};
+static const FlotorActiveRegionTable activity_table = {.size = sizeof(FlotorActiveRegionTable), .region = region};
 #endif
 
 static bool is_called(FlotorStr id, const char *name) {
@@ -200,7 +210,7 @@ static bool is_called(FlotorStr id, const char *name) {
 
 static const void *get_interface(FlotorStr id) {
 #if defined(LOCAL) || defined(ACTS_OUTSIDE)
-    if (is_called(id, FLOTOR_INTERFACE_ACTIVITY)) {
+    if (is_called(id, FLOTOR_INTERFACE_ACTIVE_REGION)) {
         return &activity_table;
     }
 #endif
@@ -208,11 +218,6 @@ static const void *get_interface(FlotorStr id) {
 }
 
 FLOTOR_ENTRY(flotor_entry_bad_model) = {
-    .magic = FLOTOR_MAGIC_BYTES,
-    .size = sizeof(FlotorEntry),
-    .abi_major = FLOTOR_ABI_MAJOR,
-    .abi_minor = FLOTOR_ABI_MINOR,
-    .kind = FlotorPluginKind_Model,
-    .sizes = FLOTOR_CONTRACT_SIZES,
+    FLOTOR_ENTRY_HEAD(FlotorPluginKind_Model),
     .get_interface = get_interface,
 };

@@ -2,9 +2,8 @@
 
 use crate::feed::{Feed, FeedState};
 use crate::panel::{Panel, Use};
-use crate::shape::{Shape, shapes_of};
+use crate::shape::{Shape, load_file, shapes_of};
 use egui::Context;
-use flotor_hal::abi::loader::Plugin;
 use flotor_live::{Client, Directory, LiveError, PanelPlugin};
 use flotor_record::RunDescription;
 use std::path::PathBuf;
@@ -122,7 +121,7 @@ impl Parts {
             let file = files.iter().find(|file| {
                 flotor_hal::abi::loader::read_metadata(file).is_ok_and(|metadata| metadata.id == id)
             });
-            file.and_then(|file| Plugin::load(file).ok()).map_or(&[][..], |plugin| plugin.parameters())
+            file.and_then(|file| load_file(file).ok()).map_or(&[][..], |plugin| plugin.parameters())
         };
         let panels = run.plugins.iter().map(|plugin| {
             let file = PathBuf::from(&plugin.file);

@@ -39,7 +39,7 @@ pub(crate) fn plugin_file(name: &str) -> PathBuf {
 /// A run of a spring that nobody computes: what `flotor run` would say of it.
 pub(crate) fn spring_run(settings: &[(&str, &str)]) -> (RunDescription, Vec<PanelPlugin>) {
     let file = plugin_file("spring");
-    let plugin = Plugin::load(&file).expect("the spring loads");
+    let plugin = flotor_viewer::shape::load_file(&file).expect("the spring loads");
     let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
     let settings: Vec<(String, String)> = settings.iter().map(owned).collect();
     let parse = |(key, value): &(String, String)| {

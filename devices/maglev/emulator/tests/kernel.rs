@@ -186,13 +186,9 @@ impl Drop for Controller {
 
 // ---------------------------------------------------------------- the host's side
 
-/// The plugin as the host loads it.
+/// The plugin behind its tables.
 fn plugin() -> Plugin {
-    let program = std::env::current_exe().unwrap();
-    let folders = program.ancestors().skip(1).take(2);
-    let mut files = folders.map(|folder| folder.join("libflotor_maglev.so"));
-    let file = files.find(|file| file.is_file()).expect("the plugin was built beside this test");
-    Plugin::load(&file).expect("it loads")
+    Plugin::in_process(&flotor_maglev::FLOTOR_ENTRY).expect("it is a plugin")
 }
 
 fn opened(plugin: &Plugin, kind: Kind, address: &str) -> OpenedDevice {

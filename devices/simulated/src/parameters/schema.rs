@@ -2,48 +2,38 @@
 
 use crate::hand::Script;
 use crate::plant::FlotorParameters;
-use flotor_hal::Parameter;
-use flotor_hal::abi::Str;
+use flotor_hal::{Choices, Parameter, choices};
 
 /// How much of the machine is simulated.
-const PRESETS: [Str; 2] = [Str::new("plain"), Str::new("full")];
+const PRESETS: Choices = choices!["plain", "full"];
 
 /// Whose flotor.
-const FLOTORS: [Str; 2] = [Str::new("thesis"), Str::new("utah")];
+const FLOTORS: Choices = choices!["thesis", "utah"];
 
 /// What the hand does.
-const HANDS: [Str; 5] =
-    [Str::new("oscillate"), Str::new("press"), Str::new("release"), Str::new("hold"), Str::new("open")];
+const HANDS: Choices = choices!["oscillate", "press", "release", "hold", "open"];
 
 /// Scripts that need no file.
-const SCRIPTS: [Str; Script::NAMES.len()] = {
-    let mut names = [Str::new(""); Script::NAMES.len()];
-    let mut index = 0;
-    while index < names.len() {
-        names[index] = Str::new(Script::NAMES[index]);
-        index += 1;
-    }
-    names
-};
+const SCRIPTS: Choices = choices!(= &Script::NAMES);
 
 /// How the hand holds.
-const GRIPS: [Str; 2] = [Str::new("firm"), Str::new("relaxed")];
+const GRIPS: Choices = choices!["firm", "relaxed"];
 
 /// How velocity is estimated.
-const ESTIMATORS: [Str; 3] = [Str::new("low-pass"), Str::new("difference"), Str::new("kalman")];
+const ESTIMATORS: Choices = choices!["low-pass", "difference", "kalman"];
 
 /// What breaks.
-const FAULTS: [Str; 10] = [
-    Str::new("none"),
-    Str::new("sensor-loss"),
-    Str::new("late-sample"),
-    Str::new("duplicate-sample"),
-    Str::new("dropped-sample"),
-    Str::new("stuck-axis"),
-    Str::new("coil-open"),
-    Str::new("over-temperature"),
-    Str::new("cable-pull"),
-    Str::new("clock-jitter"),
+const FAULTS: Choices = choices![
+    "none",
+    "sensor-loss",
+    "late-sample",
+    "duplicate-sample",
+    "dropped-sample",
+    "stuck-axis",
+    "coil-open",
+    "over-temperature",
+    "cable-pull",
+    "clock-jitter"
 ];
 
 const DEMO: FlotorParameters = FlotorParameters::THESIS;
@@ -52,13 +42,13 @@ const DEMO: FlotorParameters = FlotorParameters::THESIS;
 pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::choice(
         "preset",
-        &PRESETS,
+        PRESETS,
         0,
         "How much of the machine is simulated: plain is rigid body, gravity, drag and hand; full adds coils and sensors",
     ),
     Parameter::choice(
         "flotor",
-        &FLOTORS,
+        FLOTORS,
         0,
         "Whose flotor: mass and centre of mass of the thesis or of the Utah device",
     ),
@@ -115,15 +105,15 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         DEMO.drag.rotational_nms_per_rad,
         "Eddy-current drag on rotation",
     ),
-    Parameter::choice("hand", &HANDS, 0, "What the hand does"),
+    Parameter::choice("hand", HANDS, 0, "What the hand does"),
     Parameter::file(
         "hand_script",
-        &SCRIPTS,
+        SCRIPTS,
         "What the hand does, movement by movement: a TOML file or a built-in script; comes before hand",
     ),
     Parameter::file(
         "hand_recording",
-        &[],
+        choices![],
         "What the hand means to do: the path of a handle in a recording (.mcap) or a table (.csv)",
     ),
     Parameter::real(
@@ -144,7 +134,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     ),
     Parameter::choice(
         "hand_grip",
-        &GRIPS,
+        GRIPS,
         0,
         "How the hand holds: impedance from the literature; unless set, as the script says",
     ),
@@ -289,7 +279,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "Full: bandwidth of the cells (0: no limit; the device as a whole has 125)",
     ),
     Parameter::real("sensor_latency_ticks", "1", 0.0, 32.0, 1.0, "Full: ticks from a sample to its arrival"),
-    Parameter::choice("velocity", &ESTIMATORS, 0, "Full: how velocity is estimated from the poses"),
+    Parameter::choice("velocity", ESTIMATORS, 0, "Full: how velocity is estimated from the poses"),
     Parameter::real(
         "velocity_bandwidth_hz",
         "Hz",
@@ -306,7 +296,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         2.0,
         "Full: acceleration the Kalman estimate expects",
     ),
-    Parameter::choice("fault", &FAULTS, 0, "Full: what breaks"),
+    Parameter::choice("fault", FAULTS, 0, "Full: what breaks"),
     Parameter::real("fault_time_s", "s", 0.0, 3600.0, 1.0, "Full: when it breaks"),
     Parameter::real("fault_duration_s", "s", 0.0, 3600.0, 0.01, "Full: for how long"),
     Parameter::real(

@@ -1,112 +1,175 @@
 //! Compares the contract as host and plugin were compiled, and says in one line what differs.
 
-use crate::abi::proof::{CONTRACT, EXTENSIONS, Layout};
-use crate::abi::{ContractSizes, Entry, LayoutProof, Str};
-use abi_stable::abi_stability::abi_checking::check_layout_compatibility;
-use abi_stable::library::AbiHeader;
-use abi_stable::type_layout::TLData;
+use crate::abi::layout::CORE_COUNT;
+use crate::abi::{Entry, FieldLayout, LAYOUTS};
 
-/// Whether a plugin carried a layout proof.
+/// Whether the layouts, which the tables say are equal, were proven a second time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Proof {
-    /// Every layout was compared.
-    Checked,
-    /// None to compare (a C plugin): sizes only.
-    Absent,
+    /// abi_stable found the same, with all signatures of functions.
+    #[cfg_attr(not(feature = "layout-proof"), allow(dead_code))]
+    Proven,
+    /// Host or plugin carries no such proof, or the plugin's was made by another abi_stable.
+    NotProven,
 }
 
-/// Compares sizes and, where the plugin carries them, layouts.
+/// Compares the layout tables and, where both sides carry one, the second proofs.
 ///
 /// # Safety
 /// `entry` is a live entry whose magic, size and contract version were checked: its pointers may be followed.
 pub(super) unsafe fn contract(entry: &'static Entry) -> Result<Proof, String> {
-    sizes(&entry.sizes)?;
-    if entry.layout_proof.is_null() {
-        return Ok(Proof::Absent);
+    if entry.layouts.is_null() || !entry.layouts.is_aligned() || entry.layout_count == 0 {
+        return Err("the plugin carries no layout table".to_owned());
     }
-    // SAFETY: not null, so by the contract of this function a static proof of the plugin.
-    let Some(proof) = (unsafe { whole_proof(entry.layout_proof) }) else {
-        return Err("the plugin's layout proof is not whole".to_owned());
+    // SAFETY: the contract of an entry: a static array of so many rows.
+    let theirs = unsafe { std::slice::from_raw_parts(entry.layouts, entry.layout_count as usize) };
+    match difference(&LAYOUTS, theirs) {
+        Some(difference) => Err(difference),
+        // SAFETY: as for this function.
+        None => unsafe { second_proof(entry) },
+    }
+}
+
+/// First row that differs. A struct of an extension that one side does not know is none: it is not offered, or not asked
+/// for.
+fn difference(ours: &[FieldLayout], theirs: &[FieldLayout]) -> Option<String> {
+    let named = |rows: &'_ [FieldLayout], name: &str| rows.iter().copied().find(|row| row.name() == name);
+    let at = |row: FieldLayout| match row.name().contains('.') {
+        true => format!("at byte {} ({} bytes)", row.offset, row.size),
+        false => format!("{} bytes", row.size),
     };
+    for (number, our) in ours.iter().enumerate() {
+        match named(theirs, our.name()) {
+            Some(their) if their == *our => {}
+            Some(their) => {
+                let (ours, theirs) = (at(*our), at(their));
+                return Some(format!("`{}` is {ours} in the host and {theirs} in the plugin", our.name()));
+            }
+            None if number < CORE_COUNT || named(theirs, our.struct_name()).is_some() => {
+                return Some(format!("the plugin knows no `{}`", our.name()));
+            }
+            None => {}
+        }
+    }
+    let known = |row: &&FieldLayout| named(ours, row.struct_name()).is_some();
+    let unknown = theirs.iter().filter(known).find(|row| named(ours, row.name()).is_none());
+    unknown.map(|row| format!("the host knows no `{}`", row.name()))
+}
+
+#[cfg(not(feature = "layout-proof"))]
+unsafe fn second_proof(_: &'static Entry) -> Result<Proof, String> {
+    Ok(Proof::NotProven)
+}
+
+/// # Safety
+/// As for [`contract`].
+#[cfg(feature = "layout-proof")]
+unsafe fn second_proof(entry: &'static Entry) -> Result<Proof, String> {
+    use crate::abi::Str;
+    use crate::abi::layout::proof::types;
+    use abi_stable::library::AbiHeader;
+    use abi_stable::type_layout::TypeLayout;
+
+    // SAFETY: a plugin's proof is null or a static of it.
+    let Some(proof) = (unsafe { whole_proof(entry.layout_proof) }) else { return Ok(Proof::NotProven) };
     // SAFETY: an `AbiHeader` is frozen by abi_stable for ever and says whether the rest can be read.
     let header = unsafe { proof.abi_stable_header.cast::<AbiHeader>().as_ref() };
-    if !header.is_some_and(AbiHeader::is_valid) {
-        return Err("the plugin's layout proof was made by another abi_stable".to_owned());
+    let (true, Some(layout_of)) = (header.is_some_and(AbiHeader::is_valid), proof.layout_of) else {
+        return Ok(Proof::NotProven);
+    };
+    for (name, ours) in types() {
+        // SAFETY: a plugin's `layout_of` takes a name and gives null or a static of the abi_stable just checked.
+        match unsafe { layout_of(Str::new(name)).cast::<TypeLayout>().as_ref() } {
+            Some(theirs) => same(name, ours, theirs)?,
+            None => return Ok(Proof::NotProven),
+        }
     }
-    let Some(layout_of) = proof.layout_of else { return Err("the layout proof has no layouts".to_owned()) };
-    // SAFETY: a plugin's `layout_of` takes a name and gives null or a static of the abi_stable just checked.
-    let theirs = |name| unsafe { layout_of(Str::new(name)).cast::<Layout>().as_ref() };
-    for (name, ours) in CONTRACT {
-        let theirs = theirs(name).ok_or_else(|| format!("the plugin knows no `{name}`"))?;
-        same(name, ours, theirs)?;
-    }
-    for (name, ours) in EXTENSIONS {
-        theirs(name).map_or(Ok(()), |theirs| same(name, ours, theirs))?;
-    }
-    Ok(Proof::Checked)
+    Ok(Proof::Proven)
 }
 
 /// The proof at an address, if none of it is missing.
 ///
 /// # Safety
-/// The address of a static proof, or of as much of one as the size it starts with says.
-unsafe fn whole_proof(address: *const LayoutProof) -> Option<&'static LayoutProof> {
-    if !address.is_aligned() {
+/// Null, or the address of a static proof, or of as much of one as the size it starts with says.
+#[cfg(feature = "layout-proof")]
+unsafe fn whole_proof(address: *const crate::abi::LayoutProof) -> Option<&'static crate::abi::LayoutProof> {
+    if address.is_null() || !address.is_aligned() {
         return None;
     }
     // SAFETY: aligned, and every proof starts with its size, as this function demands.
     let size = unsafe { (&raw const (*address).size).read() };
-    if (size as usize) < size_of::<LayoutProof>() {
+    if (size as usize) < size_of::<crate::abi::LayoutProof>() {
         return None;
     }
     // SAFETY: aligned and, by its own word, whole; a static of a plugin, which is never unloaded.
     Some(unsafe { &*address })
 }
 
-fn same(name: &str, ours: &'static Layout, theirs: &'static Layout) -> Result<(), String> {
-    if let Some(difference) = field_difference(name, ours, theirs) {
-        return Err(difference);
-    }
-    check_layout_compatibility(ours, theirs)
+#[cfg(feature = "layout-proof")]
+fn same(
+    name: &str,
+    ours: &'static abi_stable::type_layout::TypeLayout,
+    theirs: &'static abi_stable::type_layout::TypeLayout,
+) -> Result<(), String> {
+    abi_stable::abi_stability::abi_checking::check_layout_compatibility(ours, theirs)
         .map_err(|_| format!("`{name}` has another layout or other function signatures in the plugin"))
 }
 
-fn sizes(theirs: &ContractSizes) -> Result<(), String> {
-    let ours = ContractSizes::of_this_build();
-    let pairs = [
-        ("Input", ours.input, theirs.input),
-        ("Output", ours.output, theirs.output),
-        ("DeviceState", ours.device_state, theirs.device_state),
-        ("Capabilities", ours.capabilities, theirs.capabilities),
-        ("Parameter", ours.parameter, theirs.parameter),
-        ("ParameterValue", ours.parameter_value, theirs.parameter_value),
-    ];
-    match pairs.iter().find(|(_, ours, theirs)| ours != theirs) {
-        None => Ok(()),
-        Some((name, ours, theirs)) => {
-            Err(format!("`{name}` has {ours} bytes in the host and {theirs} in the plugin"))
-        }
-    }
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// First field that differs. abi_stable's own report of a mismatch is hundreds of lines long.
-fn field_difference(name: &str, ours: &'static Layout, theirs: &'static Layout) -> Option<String> {
-    let (TLData::Struct { fields: our_fields }, TLData::Struct { fields: their_fields }) =
-        (ours.data(), theirs.data())
-    else {
-        return None;
-    };
-    for (ours, theirs) in our_fields.iter().zip(their_fields.iter()) {
-        let (our_type, their_type) = (ours.full_type().to_string(), theirs.full_type().to_string());
-        if ours.name() != theirs.name() || our_type != their_type {
-            return Some(format!(
-                "`{name}` has `{}: {our_type}` in the host where the plugin has `{}: {their_type}`",
-                ours.name(),
-                theirs.name()
-            ));
-        }
+    fn row(name: &str, offset: usize, size: usize) -> FieldLayout {
+        FieldLayout::new(name, offset, size)
     }
-    let (our_count, their_count) = (our_fields.len(), their_fields.len());
-    (our_count != their_count)
-        .then(|| format!("`{name}` has {our_count} fields in the host and {their_count} in the plugin"))
+
+    #[test]
+    fn a_table_is_equal_to_itself_and_names_what_differs() {
+        assert_eq!(difference(&LAYOUTS, &LAYOUTS), None);
+        let mut theirs = LAYOUTS;
+        for their in &mut theirs {
+            match their.name() {
+                "Input.time_ns" => *their = row("Input.time_ns", 120, 8),
+                "Input.tick" => *their = row("Input.tick", 104, 8),
+                _ => {}
+            }
+        }
+        let told =
+            "`Input.time_ns` is at byte 104 (8 bytes) in the host and at byte 120 (8 bytes) in the plugin";
+        assert_eq!(difference(&LAYOUTS, &theirs).as_deref(), Some(told));
+    }
+
+    #[test]
+    fn a_field_is_missed_on_both_sides() {
+        let without =
+            |name: &str| -> Vec<_> { LAYOUTS.into_iter().filter(|row| row.name() != name).collect() };
+        let told = difference(&LAYOUTS, &without("Wrench.torque_nm"));
+        assert_eq!(told.as_deref(), Some("the plugin knows no `Wrench.torque_nm`"));
+        let told = difference(&without("PacingTable.wait_for_sample"), &LAYOUTS);
+        assert_eq!(told.as_deref(), Some("the host knows no `PacingTable.wait_for_sample`"));
+        let core: Vec<_> = LAYOUTS.into_iter().take(CORE_COUNT).collect();
+        assert_eq!(difference(&LAYOUTS, &core), None, "a plugin that knows no extension");
+        assert!(difference(&LAYOUTS, &core[1..]).is_some(), "a plugin that does not know `Str`");
+    }
+
+    /// abi_stable sees what the table does not: the same bytes, and a function that takes something else.
+    #[cfg(feature = "layout-proof")]
+    #[test]
+    fn the_second_proof_sees_signatures() {
+        use abi_stable::StableAbi;
+
+        mod theirs {
+            #[repr(C)]
+            #[derive(abi_stable::StableAbi)]
+            pub(super) struct PacingTable {
+                size: u32,
+                reserved: u32,
+                wait_for_sample: Option<unsafe extern "C" fn(crate::abi::Instance, u32, *mut u64) -> u32>,
+            }
+        }
+        let ours = crate::extension::pacing::PacingTable::LAYOUT;
+        assert_eq!(same("PacingTable", ours, ours), Ok(()));
+        let told = "`PacingTable` has another layout or other function signatures in the plugin";
+        assert_eq!(same("PacingTable", ours, theirs::PacingTable::LAYOUT), Err(told.to_owned()));
+    }
 }

@@ -1,14 +1,14 @@
 //! A device a host may use, in two types: opened (it answers) and active (it moves hands).
 
-use super::Setting;
-use super::interfaces::DeviceExtensions;
 use super::model::refusal_from;
+use super::setting::{Setting, index_of, live_index, to_raw};
 use crate::abi::{CallStatus, DeviceTable, Instance, Message};
-use crate::{
-    Axes, Capabilities, Cycle, DeviceState, EnergyLedger, LoopConfig, Parameter, ParameterValue, Refusal,
-    SampleWait, Tick, VerticalCalibration, Wrench,
-};
+use crate::extension::DeviceExtensions;
+use crate::{Axes, Capabilities, Cycle, DeviceState, LoopConfig, Parameter, Refusal, Tick, Wrench};
 use std::sync::Arc;
+
+/// A function that writes one answer.
+type Ask<T> = unsafe extern "C" fn(Instance, *mut T) -> u32;
 
 /// One opened instance; closed when the last handle is gone.
 struct Handle {
@@ -74,8 +74,7 @@ impl OpenedDevice {
         settings: &[Setting],
     ) -> Result<Self, Refusal> {
         // SAFETY: `settings` outlives the call, and the plugin keeps no copy past it (contract).
-        let values: Vec<ParameterValue> =
-            settings.iter().map(|setting| unsafe { setting.to_raw() }).collect();
+        let values = unsafe { to_raw(settings, parameters) }?;
         let Some(open) = table.open else { return Err(Refusal::broken("its table has lost a function")) };
         let mut message = Message::default();
         let mut instance = std::ptr::null_mut();
@@ -98,9 +97,8 @@ impl OpenedDevice {
     /// The value in force of the parameter at `index`, presets resolved; NaN if unknown.
     #[must_use]
     pub fn parameter(&mut self, index: usize) -> f64 {
-        let (Some(parameter), Ok(index)) = (self.handle.table.parameter, u32::try_from(index)) else {
-            return f64::NAN;
-        };
+        let Some(parameter) = self.handle.table.parameter else { return f64::NAN };
+        let Some(index) = index_of(self.handle.parameters, index) else { return f64::NAN };
         // SAFETY: a live instance, used by this thread only (`&mut`).
         unsafe { parameter(self.handle.instance, index) }
     }
@@ -110,51 +108,12 @@ impl OpenedDevice {
     /// # Errors
     /// A [`Refusal`] if the plugin failed or answered numbers that make no sense.
     pub fn capabilities(&mut self) -> Result<Capabilities, Refusal> {
-        let Some(ask) = self.handle.table.capabilities else {
-            return Err(Refusal::broken("its table has lost a function"));
-        };
-        let mut capabilities = UNKNOWN;
-        // SAFETY: a live instance, used by this thread only (`&mut`), an out pointer valid for the call.
-        let code = unsafe { ask(self.handle.instance, &raw mut capabilities) };
-        if code != CallStatus::Ok as u32 {
+        let ask = self.handle.table.capabilities;
+        let Some(capabilities) = self.asked(ask, UNKNOWN) else {
             return Err(Refusal::broken(self.last_message()));
-        }
+        };
         check_capabilities(&capabilities)?;
         Ok(capabilities)
-    }
-
-    /// Whether the device can set the pace of the loop.
-    #[must_use]
-    pub fn can_pace(&self) -> bool {
-        self.handle.extensions.pacing.is_some_and(|table| table.wait_for_sample.is_some())
-    }
-
-    /// Serial number of the piece of hardware; empty if it has none or does not say.
-    #[must_use]
-    pub fn serial(&mut self) -> String {
-        let mut serial = Message::default();
-        if let Some(ask) = self.handle.extensions.calibration.and_then(|table| table.serial) {
-            // SAFETY: a live instance, used by this thread only (`&mut`), an out pointer valid for the call.
-            let code = unsafe { ask(self.handle.instance, &raw mut serial) };
-            if code != CallStatus::Ok as u32 {
-                return String::new();
-            }
-        }
-        serial.as_str().to_owned()
-    }
-
-    /// Corrects the total vertical command from the next activation on.
-    ///
-    /// # Errors
-    /// A [`Refusal`] if the device takes no calibration.
-    pub fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
-        let calibrate = self.handle.extensions.calibration.and_then(|table| table.calibrate_vertical);
-        let Some(calibrate) = calibrate else {
-            return Err(Refusal::unsupported("this device takes no calibration of the vertical force"));
-        };
-        let mut message = Message::default();
-        // SAFETY: a live instance, used by this thread only (`&mut`), pointers valid for the call.
-        refusal_from(unsafe { calibrate(self.handle.instance, calibration, &raw mut message) }, &message)
     }
 
     /// The handle by which another thread stops the device.
@@ -184,6 +143,19 @@ impl OpenedDevice {
         }
     }
 
+    pub(crate) fn extensions(&self) -> &DeviceExtensions {
+        &self.handle.extensions
+    }
+
+    pub(crate) fn instance(&self) -> Instance {
+        self.handle.instance
+    }
+
+    /// What a function of this device's tables writes; `None` if there is no such function or it failed.
+    pub(crate) fn asked<T>(&mut self, ask: Option<Ask<T>>, answer: T) -> Option<T> {
+        asked(self.handle.instance, ask, answer)
+    }
+
     fn last_message(&mut self) -> String {
         let mut message = Message::default();
         if let Some(last_message) = self.handle.table.last_message {
@@ -210,40 +182,27 @@ impl ActiveDevice {
     }
 
     /// Changes a live parameter, by its index in the schema, at a tick boundary (for a choice, `value` is its index).
-    /// The plugin checks it once more. Real-time: bounded, no allocation.
+    /// It is checked against the schema here, and by the plugin once more. Real-time: bounded, no allocation.
     pub fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
-        let Ok(index) = u32::try_from(index) else { return CallStatus::OutOfRange };
-        let Some(set_parameter) = self.handle.as_ref().and_then(|handle| handle.table.set_parameter) else {
-            return CallStatus::Unsupported;
-        };
+        let Some(handle) = &self.handle else { return CallStatus::Unsupported };
+        let Some(set_parameter) = handle.table.set_parameter else { return CallStatus::Unsupported };
+        let Some(index) = live_index(handle.parameters, index, value) else { return CallStatus::OutOfRange };
         // SAFETY: as in `read`.
         let code = unsafe { set_parameter(self.instance, index, value) };
         CallStatus::from_code(code)
     }
 
-    /// Waits for the device's next sample, for `timeout_ns` at most. Real-time but for the waiting: no allocation.
-    pub fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
-        let pacing = self.handle.as_ref().and_then(|handle| handle.extensions.pacing);
-        let Some(wait) = pacing.and_then(|table| table.wait_for_sample) else { return SampleWait::NotPaced };
-        let mut samples = 0;
-        // SAFETY: as in `read`; the out pointer is valid for the call.
-        let code = unsafe { wait(self.instance, timeout_ns, &raw mut samples) };
-        match CallStatus::from_code(code) {
-            CallStatus::Ok if samples > 0 => SampleWait::Arrived { samples },
-            CallStatus::Unsupported => SampleWait::NotPaced,
-            // A device that broke says so in its next `read`.
-            _ => SampleWait::TimedOut,
-        }
+    pub(crate) fn extensions(&self) -> Option<&DeviceExtensions> {
+        Some(&self.handle.as_ref()?.extensions)
     }
 
-    /// Energy account of the plant, where there is one. Real-time: bounded, no allocation.
-    #[must_use]
-    pub fn energy_ledger(&mut self) -> Option<EnergyLedger> {
-        let ask = self.handle.as_ref()?.extensions.ledger?.ledger?;
-        let mut ledger = EnergyLedger::default();
-        // SAFETY: as in `read`; the out pointer is valid for the call.
-        let code = unsafe { ask(self.instance, &raw mut ledger) };
-        (code == CallStatus::Ok as u32).then_some(ledger)
+    pub(crate) fn instance(&self) -> Instance {
+        self.instance
+    }
+
+    /// What a function of this device's tables writes; `None` if there is no such function or it failed.
+    pub(crate) fn asked<T>(&mut self, ask: Option<Ask<T>>, answer: T) -> Option<T> {
+        asked(self.instance, ask, answer)
     }
 
     /// What the device said when a call failed. Not real-time.
@@ -274,6 +233,13 @@ impl Drop for ActiveDevice {
             let _ = deactivate(&handle);
         }
     }
+}
+
+/// Asks the owner's instance, of whose table the function is; both `asked` above have it by `&mut`.
+fn asked<T>(instance: Instance, ask: Option<Ask<T>>, mut answer: T) -> Option<T> {
+    // SAFETY: a live instance, used by this thread only, an out pointer valid for the call.
+    let code = unsafe { ask?(instance, &raw mut answer) };
+    (code == CallStatus::Ok as u32).then_some(answer)
 }
 
 fn deactivate(handle: &Handle) -> CallStatus {

@@ -1,6 +1,6 @@
 //! Why a plugin was refused: one readable line with file, cause and remedy.
 
-use crate::abi::PluginKind;
+use crate::abi::{CONTRACT, PluginKind};
 use crate::{Refusal, RefusalKind};
 use std::path::PathBuf;
 
@@ -53,7 +53,7 @@ pub enum LoadError {
     },
     /// Built for another contract.
     #[error(
-        "{}: built for plugin contract {theirs}, this host speaks {ours}; rebuild the plugin against this \
+        "{}: built for plugin contract {theirs}, this host speaks {CONTRACT}; rebuild the plugin against this \
          version", path.display()
     )]
     OtherContract {
@@ -61,8 +61,6 @@ pub enum LoadError {
         path: PathBuf,
         /// Contract of the plugin.
         theirs: String,
-        /// Contract of the host.
-        ours: String,
     },
     /// The dynamic linker refused.
     #[error("{}: the system cannot link the library: {cause}; install what is missing or rebuild the plugin", path.display())]

@@ -2,11 +2,9 @@
 
 use super::LoadError;
 use super::model::ModelTables;
-use crate::abi::{
-    ActivityTable, CalibrationTable, CenterlineTable, DetailsTable, DevicePacingTable, DeviceTable,
-    EnergyLedgerTable, Entry, ForceTable, LinearFieldTable, PluginKind, ReachTable, Str, VariantTable,
-    interface_ids,
-};
+use crate::abi::interface::Table;
+use crate::abi::{DeviceTable, Entry, ForceTable, PluginKind, Str};
+use crate::extension::{DeviceExtensions, ModelExtensions};
 use std::ffi::c_void;
 use std::path::Path;
 
@@ -15,14 +13,6 @@ use std::path::Path;
 pub(super) enum Interface {
     Model(ModelTables),
     Device { device: &'static DeviceTable, extensions: DeviceExtensions },
-}
-
-/// What a device offers beyond the plain one.
-#[derive(Clone, Copy)]
-pub(super) struct DeviceExtensions {
-    pub(super) ledger: Option<&'static EnergyLedgerTable>,
-    pub(super) calibration: Option<&'static CalibrationTable>,
-    pub(super) pacing: Option<&'static DevicePacingTable>,
 }
 
 impl Interface {
@@ -55,7 +45,7 @@ impl Interface {
 type GetInterface = unsafe extern "C" fn(id: Str) -> *const c_void;
 
 /// What a plugin offers. Its function answers as [`Interface::find`] demands.
-struct Offers<'a> {
+pub(crate) struct Offers<'a> {
     path: &'a Path,
     get_interface: GetInterface,
 }
@@ -74,8 +64,7 @@ impl Offers<'_> {
             ("`safe_stop`", device.safe_stop.is_some()),
         ];
         self.check_functions(DeviceTable::ID, &functions)?;
-        let extensions =
-            DeviceExtensions { ledger: self.table()?, calibration: self.table()?, pacing: self.table()? };
+        let extensions = DeviceExtensions::of(self)?;
         Ok(Interface::Device { device, extensions })
     }
 
@@ -87,15 +76,7 @@ impl Offers<'_> {
             ("`step`", force.step.is_some()),
         ];
         self.check_functions(ForceTable::ID, &functions)?;
-        Ok(Interface::Model(ModelTables {
-            force,
-            centerline: self.table()?,
-            variant: self.table()?,
-            details: self.table()?,
-            activity: self.table()?,
-            field: self.table()?,
-            reach: self.table()?,
-        }))
+        Ok(Interface::Model(ModelTables { force, extensions: ModelExtensions::of(self)? }))
     }
 
     fn required<T: Table>(&self) -> Result<&'static T, LoadError> {
@@ -103,8 +84,8 @@ impl Offers<'_> {
     }
 
     /// The table behind an id; `None` if the plugin does not offer it. A short one is a mistake and no older
-    /// contract: 1.0 fixed the sizes of all tables.
-    fn table<T: Table>(&self) -> Result<Option<&'static T>, LoadError> {
+    /// contract: this one fixed the sizes of all tables.
+    pub(crate) fn table<T: Table>(&self) -> Result<Option<&'static T>, LoadError> {
         // SAFETY: the plugin keeps the contract ([`Interface::find`]), by which any id may be asked for; this
         // one lives for ever.
         let table = unsafe { (self.get_interface)(Str::new(T::ID)) }.cast::<T>();
@@ -145,45 +126,14 @@ fn lack(path: &Path, interface: &'static str, missing: &'static str) -> LoadErro
     LoadError::MissingFunction { path: path.into(), interface, missing }
 }
 
-/// A function table of the contract.
-///
-/// # Safety
-/// The type is `repr(C)`, starts with a `u32`, which is its size in bytes, and takes any bits. It is what
-/// plugins of this contract have behind `ID`.
-unsafe trait Table: Sized + 'static {
-    /// Id of the interface or extension.
-    const ID: &'static str;
-}
-
-macro_rules! tables {
-    ($($table:ident: $id:ident),+ $(,)?) => {$(
-        const _: () = assert!(std::mem::offset_of!($table, size) == 0, "a table starts with its size");
-
-        // SAFETY: the contract's table of this id: `repr(C)`, its size first (see above), and for the rest
-        // numbers, pointers, texts and functions that may be null.
-        unsafe impl Table for $table {
-            const ID: &'static str = interface_ids::$id;
-        }
-    )+};
-}
-
-tables! {
-    ForceTable: FORCE,
-    CenterlineTable: CENTERLINE,
-    VariantTable: VARIANT,
-    DetailsTable: DETAILS,
-    ActivityTable: ACTIVITY,
-    LinearFieldTable: LINEAR_FIELD,
-    ReachTable: REACH,
-    DeviceTable: DEVICE,
-    EnergyLedgerTable: ENERGY_LEDGER,
-    CalibrationTable: CALIBRATION,
-    DevicePacingTable: DEVICE_PACING,
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::extension::{
+        active_region::ActiveRegionTable, calibration::CalibrationTable, centerline::CenterlineTable,
+        details::DetailsTable, energy_ledger::EnergyLedgerTable, linear_field::LinearFieldTable,
+        pacing::PacingTable, variant::VariantTable, workspace_bounds::WorkspaceBoundsTable,
+    };
 
     /// One byte short of the shortest tables there are.
     static SHORT: EnergyLedgerTable = EnergyLedgerTable { size: 15, reserved: 0, ledger: None };
@@ -221,12 +171,12 @@ mod tests {
         is_held_to_its_length::<CenterlineTable>();
         is_held_to_its_length::<VariantTable>();
         is_held_to_its_length::<DetailsTable>();
-        is_held_to_its_length::<ActivityTable>();
+        is_held_to_its_length::<ActiveRegionTable>();
         is_held_to_its_length::<LinearFieldTable>();
-        is_held_to_its_length::<ReachTable>();
+        is_held_to_its_length::<WorkspaceBoundsTable>();
         is_held_to_its_length::<DeviceTable>();
         is_held_to_its_length::<EnergyLedgerTable>();
         is_held_to_its_length::<CalibrationTable>();
-        is_held_to_its_length::<DevicePacingTable>();
+        is_held_to_its_length::<PacingTable>();
     }
 }

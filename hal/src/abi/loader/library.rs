@@ -3,7 +3,9 @@
 use super::interfaces::Interface;
 use super::model::{Model, ModelTables};
 use super::{LoadError, Metadata, OpenedDevice, Setting, check, metadata_file};
-use crate::abi::{ABI_MAJOR, ABI_MINOR, Entry, HOST_QUIET_PANICS, Host, MAGIC, PluginKind, is_spoken};
+use crate::abi::{
+    ABI_CANDIDATE, ABI_MAJOR, ABI_MINOR, CONTRACT, Entry, HOST_QUIET_PANICS, Host, MAGIC, PluginKind,
+};
 use crate::{DeviceInfo, ModelInfo, Parameter};
 use object::ReadCache;
 use std::ffi::CString;
@@ -32,31 +34,36 @@ pub struct Plugin {
 impl Plugin {
     /// Loads a plugin from a file. Not real-time; runs the plugin's code.
     ///
-    /// That is trust in the file, as starting a program is: its code runs in this process, with all that the
-    /// process may do, from its initialisers on. The checks find mistakes of an author, not malice, and no
-    /// type vouches for what the code does; a caller that cannot trust a file has to leave it alone.
-    /// [`super::read_metadata`] runs none of it.
+    /// The checks find mistakes of an author, not malice. [`super::read_metadata`] runs none of the code.
+    ///
+    /// ```compile_fail,E0133
+    /// # use flotor_hal::abi::loader::Plugin;
+    /// let plugin = Plugin::load("libjelly.so".as_ref()); // needs `unsafe`: nothing vouches for the file
+    /// ```
     ///
     /// # Errors
     /// [`LoadError`], with file, cause and remedy; the process survives all of them.
-    pub fn load(path: &Path) -> Result<Self, LoadError> {
+    ///
+    /// # Safety
+    /// The caller trusts the file, as whoever starts a program does: its code runs in this process, with all that the
+    /// process may do, from its initialisers on, and what bears the marks of a plugin keeps the contract.
+    pub unsafe fn load(path: &Path) -> Result<Self, LoadError> {
         let (mut original, _) = metadata_file::open_regular(path)?;
         let copy_error = |cause: std::io::Error| LoadError::Copy { path: path.into(), cause };
         let mut copy = file_in_memory(path).map_err(copy_error)?;
         let length = std::io::copy(&mut original, &mut copy).map_err(copy_error)?;
         let metadata = metadata_file::parse(path, &ReadCache::new(&copy), length)?;
         metadata.check_contract()?;
-        let entry = open_private_copy(&metadata, copy)?;
-        // SAFETY: null, or what the metadata call the entry, in a library that is never unloaded; that code
-        // which bears the marks of a plugin keeps the contract is the trust that this function speaks of.
+        // SAFETY: the caller trusts the file.
+        let entry = unsafe { open_private_copy(&metadata, copy) }?;
+        // SAFETY: null, or what the metadata call the entry, in a library that is never unloaded; that it keeps the
+        // contract is the caller's trust in the file.
         unsafe { Self::from_entry(metadata, entry, Runtime::Own) }
     }
 
     /// Wraps a plugin that is linked into this program: for debuggers, sanitizers and tests. Not real-time;
-    /// runs the plugin's code.
-    ///
-    /// The entry is trusted as a file is by [`Self::load`]: its pointers are followed. Those of the export
-    /// macros keep the contract; whoever puts one together by hand sees to it, and no type does.
+    /// runs the plugin's code. Safe, because only the functions behind the export macros make an [`Entry`], each for the
+    /// type whose instances its tables take.
     ///
     /// # Errors
     /// [`LoadError`], as for a file.
@@ -69,10 +76,11 @@ impl Plugin {
             name: String::new(),
             doc: String::new(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            abi: format!("{ABI_MAJOR}.{ABI_MINOR}"),
+            abi: CONTRACT.to_owned(),
             entry: String::new(),
         };
-        // SAFETY: a whole entry, for ever; that it keeps the contract is the trust this function speaks of.
+        // SAFETY: a whole entry, for ever; in safe code it comes from `model_entry` or `device_entry`, which make
+        // none that breaks the contract.
         let mut plugin = unsafe { Self::from_entry(metadata, entry, Runtime::Shared) }?;
         let (id, name, doc) = match plugin.interface {
             Interface::Model(ModelTables { force, .. }) => {
@@ -101,11 +109,12 @@ impl Plugin {
         let Some(entry) = (unsafe { whole_entry(entry) }) else {
             return Err(LoadError::NoEntry { path: path.clone(), symbol: metadata.entry.clone() });
         };
-        if !is_spoken(entry.abi_major, entry.abi_minor) {
+        let theirs = (entry.abi_major, entry.abi_minor, entry.abi_candidate);
+        if theirs != (ABI_MAJOR, ABI_MINOR, ABI_CANDIDATE) {
+            let candidate = if entry.abi_candidate == 0 { "" } else { "-rc" };
             return Err(LoadError::OtherContract {
                 path: path.clone(),
-                theirs: format!("{}.{}", entry.abi_major, entry.abi_minor),
-                ours: format!("{ABI_MAJOR}.{ABI_MINOR}"),
+                theirs: format!("{}.{}{candidate}", entry.abi_major, entry.abi_minor),
             });
         }
         if PluginKind::from_code(entry.kind) != Some(metadata.kind) {
@@ -136,10 +145,10 @@ impl Plugin {
         &self.metadata
     }
 
-    /// True if the layouts of all contract types were compared; false for C plugins (sizes only).
+    /// Whether abi_stable proved the layouts a second time; the contract's own layout tables are always compared.
     #[must_use]
     pub fn layouts_proven(&self) -> bool {
-        self.proof == check::Proof::Checked
+        self.proof == check::Proof::Proven
     }
 
     /// What the plugin can be told.
@@ -218,14 +227,16 @@ fn file_in_memory(path: &Path) -> std::io::Result<File> {
 /// (an overwritten mapped library raises SIGBUS at the next call) and a rebuilt plugin at the same path is new code.
 ///
 /// Gives what the metadata call the entry, to be checked; null if there is no such symbol.
-fn open_private_copy(metadata: &Metadata, file: File) -> Result<*const Entry, LoadError> {
+///
+/// # Safety
+/// As for [`Plugin::load`].
+unsafe fn open_private_copy(metadata: &Metadata, file: File) -> Result<*const Entry, LoadError> {
     let path = &metadata.path;
     let copy = format!("/proc/self/fd/{}", file.as_raw_fd());
 
     use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
     // RTLD_NOW: with lazy binding a missing symbol would kill the process in the middle of a tick.
-    // SAFETY: opening runs the library's initialisers. Nothing here makes that safe: it is the trust in the
-    // file that `load` speaks of.
+    // SAFETY: opening runs the library's initialisers, which the caller trusts.
     let library = unsafe { Library::open(Some(&copy), RTLD_NOW | RTLD_LOCAL) }.map_err(|cause| {
         LoadError::Link { path: path.clone(), cause: whole_cause(&cause).replace(&copy, "it") }
     })?;

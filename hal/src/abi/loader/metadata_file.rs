@@ -1,7 +1,7 @@
 //! Reads what a file says about itself without running any of it.
 
 use super::LoadError;
-use crate::abi::{ABI_MAJOR, ABI_MINOR, PluginKind, is_spoken, metadata};
+use crate::abi::{CONTRACT, PluginKind, metadata};
 use object::elf::FileHeader64;
 use object::read::elf::{ElfFile64, FileHeader, ProgramHeader, SectionHeader};
 use object::{Endianness, Object, ObjectSection, ReadCache, ReadRef};
@@ -23,7 +23,7 @@ pub struct Metadata {
     pub doc: String,
     /// Version of the plugin.
     pub version: String,
-    /// Contract it was built for, "major.minor".
+    /// Contract it was built for, as [`CONTRACT`].
     pub abi: String,
     /// Name of the exported entry.
     pub entry: String,
@@ -58,15 +58,12 @@ impl Metadata {
     /// Checks that the plugin was built for the contract this host speaks.
     ///
     /// # Errors
-    /// [`LoadError::OtherContract`], unless [`is_spoken`].
+    /// [`LoadError::OtherContract`], unless it is [`CONTRACT`].
     pub fn check_contract(&self) -> Result<(), LoadError> {
-        let number = |digits: &str| digits.parse::<u16>().ok();
-        let theirs = self.abi.split_once('.').and_then(|(major, minor)| number(major).zip(number(minor)));
-        if theirs.is_some_and(|(major, minor)| is_spoken(major, minor)) {
+        if self.abi == CONTRACT {
             return Ok(());
         }
-        let ours = format!("{ABI_MAJOR}.{ABI_MINOR}");
-        Err(LoadError::OtherContract { path: self.path.clone(), theirs: self.abi.clone(), ours })
+        Err(LoadError::OtherContract { path: self.path.clone(), theirs: self.abi.clone() })
     }
 }
 
@@ -90,13 +87,12 @@ pub(super) fn parse<'d>(path: &Path, data: impl ReadRef<'d>, length: u64) -> Res
     let text = section.data().map_err(not_a_library)?;
     let bad = |cause: String| LoadError::BadMetadata { path: path.into(), cause };
     let text = std::str::from_utf8(text).map_err(|cause| bad(cause.to_string()))?;
-    let table: toml::Table = text
-        .trim_end_matches('\0')
-        .parse()
-        .map_err(|cause: toml::de::Error| bad(cause.message().to_owned()))?;
+    let pairs = text.trim_end_matches('\0').lines().map(str::trim).filter(|line| !line.is_empty());
+    let pairs: Option<Vec<(&str, &str)>> = pairs.map(key_and_value).collect();
+    let pairs = pairs.ok_or_else(|| bad("a line is not `key = \"value\"`".to_owned()))?;
     let value = |key: &str| {
-        let found = table.get(key).and_then(toml::Value::as_str).filter(|text| !text.is_empty());
-        found.map(str::to_owned).ok_or_else(|| bad(format!("`{key}` is missing")))
+        let found = pairs.iter().find(|(name, text)| *name == key && !text.is_empty());
+        found.map(|(_, text)| (*text).to_owned()).ok_or_else(|| bad(format!("`{key}` is missing")))
     };
     let kind = match value("kind")?.as_str() {
         "model" => PluginKind::Model,
@@ -113,6 +109,13 @@ pub(super) fn parse<'d>(path: &Path, data: impl ReadRef<'d>, length: u64) -> Res
         abi: value("abi")?,
         entry: value("entry")?,
     })
+}
+
+/// A line `key = "value"`, the one form of TOML that metadata use.
+fn key_and_value(line: &str) -> Option<(&str, &str)> {
+    let (key, value) = line.split_once('=')?;
+    let value = value.trim().strip_prefix('"')?.strip_suffix('"')?;
+    (!value.contains(['"', '\\'])).then_some((key.trim(), value))
 }
 
 /// Bytes a file needs to hold its section headers.

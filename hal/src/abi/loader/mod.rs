@@ -3,7 +3,7 @@
 //!
 //! Order of a load, each step cheaper and safer than the next:
 //! file -> ELF section with metadata -> contract version -> private copy -> `dlopen` -> entry -> kind ->
-//! sizes -> layouts -> interface table. Nothing of the plugin runs before `dlopen`, and a file that fails before it
+//! layouts -> interface table. Nothing of the plugin runs before `dlopen`, and a file that fails before it
 //! never gets that far: a truncated library would otherwise raise SIGBUS inside `dlopen`.
 
 mod check;
@@ -17,7 +17,9 @@ mod setting;
 
 pub use device::{ActiveDevice, OpenedDevice, Stopper};
 pub use error::LoadError;
+pub(crate) use interfaces::Offers;
 pub use library::Plugin;
 pub use metadata_file::{Metadata, read_metadata};
-pub use model::{Centerline, Model};
+pub use model::Model;
+pub(crate) use model::refusal_from;
 pub use setting::{Setting, SettingError};

@@ -1,13 +1,14 @@
 //! What a person typed (`spring.gamma_n=17`) into what a plugin understands, checked against its schema.
 
 use crate::abi::Str;
-use crate::{OutOfRange, Parameter, ParameterKind, ParameterValue};
+use crate::{Mutability, OutOfRange, Parameter, ParameterKind, ParameterValue, Refusal};
 
-/// One checked value for one parameter of one schema.
-#[derive(Clone, Debug, PartialEq)]
+/// One checked value for one parameter of one plugin's schema. A plugin takes no setting of another's.
+#[derive(Clone, Debug)]
 pub struct Setting {
-    pub(super) index: u32,
-    pub(super) number: f64,
+    parameter: &'static Parameter,
+    index: u32,
+    number: f64,
     text: String,
 }
 
@@ -64,7 +65,7 @@ impl Setting {
         let (index, parameter) = find(schema, id)?;
         match parameter.kind() {
             ParameterKind::Text | ParameterKind::File => {
-                Ok(Self { index, number: 0.0, text: value.to_owned() })
+                Ok(Self { parameter, index, number: 0.0, text: value.to_owned() })
             }
             ParameterKind::Choice => {
                 let names = parameter.choices();
@@ -75,7 +76,7 @@ impl Setting {
                     choices: names.iter().map(|name| name.as_str().to_owned()).collect(),
                 })?;
                 #[allow(clippy::cast_precision_loss)] // a handful of choices
-                Ok(Self { index, number: choice as f64, text: String::new() })
+                Ok(Self { parameter, index, number: choice as f64, text: String::new() })
             }
             ParameterKind::Real => {
                 let number = value.trim().parse::<f64>().map_err(|_| SettingError::NotANumber {
@@ -99,7 +100,7 @@ impl Setting {
             unit: parameter.unit().to_owned(),
             range,
         })?;
-        Ok(Self { index, number, text: String::new() })
+        Ok(Self { parameter, index, number, text: String::new() })
     }
 
     /// Index of the parameter in its schema.
@@ -117,26 +118,52 @@ impl Setting {
     /// The value as a person would type it.
     #[must_use]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked indices of a few choices
-    pub fn display(&self, schema: &'static [Parameter]) -> String {
-        let Some(parameter) = schema.get(self.index()) else { return String::new() };
-        match parameter.kind() {
+    pub fn display(&self) -> String {
+        match self.parameter.kind() {
             ParameterKind::Text | ParameterKind::File => self.text.clone(),
             ParameterKind::Choice => {
-                parameter.choices().get(self.number as usize).map_or("", Str::as_str).to_owned()
+                self.parameter.choices().get(self.number as usize).map_or("", Str::as_str).to_owned()
             }
             ParameterKind::Real => self.number.to_string(),
         }
     }
+}
 
-    /// The form that crosses the boundary.
-    ///
-    /// # Safety
-    /// The result must not outlive `self`.
-    pub(super) unsafe fn to_raw(&self) -> ParameterValue {
-        // SAFETY: by the contract of this function nothing borrowed here outlives `self`.
-        let text = unsafe { Str::borrowed(&self.text) };
-        ParameterValue { index: self.index, reserved: 0, number: self.number, text }
-    }
+/// The form that crosses the boundary.
+///
+/// # Errors
+/// A [`Refusal`] if one of them was made for another schema: its index would mean another parameter, or none.
+///
+/// # Safety
+/// The result must not outlive `settings`.
+pub(super) unsafe fn to_raw(
+    settings: &[Setting],
+    schema: &'static [Parameter],
+) -> Result<Vec<ParameterValue>, Refusal> {
+    let raw = |setting: &Setting| {
+        if !schema.get(setting.index()).is_some_and(|own| std::ptr::eq(own, setting.parameter)) {
+            let id = setting.parameter.id();
+            return Err(Refusal::parameter(format!(
+                "the setting `{id}` was made for another plugin; make it for this one's parameters"
+            )));
+        }
+        // SAFETY: by the contract of this function nothing borrowed here outlives the setting.
+        let text = unsafe { Str::borrowed(&setting.text) };
+        Ok(ParameterValue { index: setting.index, reserved: 0, number: setting.number, text })
+    };
+    settings.iter().map(raw).collect()
+}
+
+/// The index that crosses the boundary, if the schema has it.
+pub(super) fn index_of(schema: &[Parameter], index: usize) -> Option<u32> {
+    u32::try_from(index).ok().filter(|_| index < schema.len())
+}
+
+/// The same of a live parameter that may take a value.
+pub(super) fn live_index(schema: &[Parameter], index: usize, value: f64) -> Option<u32> {
+    let parameter = schema.get(index)?;
+    let is_legal = parameter.mutability() == Mutability::Live && parameter.check(value).is_ok();
+    index_of(schema, index).filter(|_| is_legal)
 }
 
 fn find(schema: &'static [Parameter], id: &str) -> Result<(u32, &'static Parameter), SettingError> {

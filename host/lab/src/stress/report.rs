@@ -48,7 +48,7 @@ impl StressReport {
         let schema = setup.plugin.parameters();
         let named = |setting: &flotor_hal::abi::loader::Setting| {
             let parameter = schema.get(setting.index())?;
-            Some((parameter.id().to_owned(), setting.display(schema)))
+            Some((parameter.id().to_owned(), setting.display()))
         };
         let passed = measures.iter().filter(|measure| measure.verdict == Verdict::Pass).count();
         let metadata = setup.plugin.metadata();

@@ -8,6 +8,7 @@ use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Model, OpenedDevice, Plugin, Setting, read_metadata};
 use flotor_hal::conformance::Rule;
 use flotor_hal::{Parameter, ParameterKind, RefusalKind};
+use flotor_session::registry::load_file;
 use flotor_session::scene::KeyValue;
 use std::path::Path;
 
@@ -22,7 +23,7 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
         return Ok(None);
     }
     let told = |error: LoadError| error.to_string();
-    let plugin = Plugin::load(path)?;
+    let plugin = load_file(path)?;
     let parse = |set: &KeyValue| {
         let (key, value) = set.pair();
         Setting::parse(plugin.parameters(), key, value).map_err(|error| Seen::Missing(error.to_string()))

@@ -5,7 +5,7 @@ use super::path::{CONFIG, FAST, directions, finite, grid, step, walk, walk_at};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{
-    ActivityRegion, ActivityShape, DQuat, DVec3, Demand, Input, Memory, Output, Pose, Twist, Wrench,
+    ActiveRegion, DQuat, DVec3, Demand, Input, Memory, Output, Pose, RegionShape, Twist, Wrench,
 };
 use std::time::Instant;
 
@@ -160,8 +160,8 @@ pub(super) fn energy_gradient(model: &mut Model) -> Result<(), String> {
 /// Asks around the region in which the model says it acts: a host does not ask there, and takes zero for
 /// granted.
 pub(super) fn activity(model: &mut Model) -> Result<(), String> {
-    let region = model.activity();
-    if region.shape() == ActivityShape::Everywhere {
+    let region = model.active_region();
+    if region.shape() == RegionShape::Everywhere {
         return Ok(());
     }
     let turned = DQuat::from_scaled_axis(DVec3::new(0.1, -0.2, 0.05));
@@ -190,13 +190,13 @@ pub(super) fn activity(model: &mut Model) -> Result<(), String> {
 }
 
 /// Positions around a region: a hair outside, a little, and far.
-fn around(region: &ActivityRegion) -> impl Iterator<Item = DVec3> {
+fn around(region: &ActiveRegion) -> impl Iterator<Item = DVec3> {
     let (center_m, half_m, shape) = (region.center(), region.half_sides(), region.shape());
     directions().filter(|direction| *direction != DVec3::ZERO).flat_map(move |direction| {
         [1.0e-9, 1.0e-3, 1.0].map(move |gap| {
             // Relative as well: a hair of a large region is more than rounding takes away.
             let outside_m = half_m * (1.0 + gap) + DVec3::splat(gap);
-            let direction = if shape == ActivityShape::Sphere { direction.normalize() } else { direction };
+            let direction = if shape == RegionShape::Sphere { direction.normalize() } else { direction };
             center_m + direction * outside_m
         })
     })

@@ -6,7 +6,7 @@ pub mod process;
 use beside::SlowModel;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
-use flotor_hal::{ActivityRegion, Demand, Input, Memory, Output, Reach};
+use flotor_hal::{ActiveRegion, Demand, Input, Memory, Output, WorkspaceBounds};
 use process::{Reply, Worker};
 
 /// A model, wherever it runs.
@@ -104,18 +104,18 @@ impl Engine {
     }
 
     /// Where the model can act; one beside the loop or in a process of its own is always asked. Real-time: bounded, no allocation.
-    pub fn activity(&mut self) -> ActivityRegion {
+    pub fn active_region(&mut self) -> ActiveRegion {
         match self {
-            Self::Here(model) => model.activity(),
-            Self::Apart(_) | Self::Beside(_) => ActivityRegion::EVERYWHERE,
+            Self::Here(model) => model.active_region(),
+            Self::Apart(_) | Self::Beside(_) => ActiveRegion::EVERYWHERE,
         }
     }
 
     /// Where the model ends; one beside the loop or in a process of its own has no end. Real-time: bounded, no allocation.
-    pub fn reach(&mut self) -> Reach {
+    pub fn workspace_bounds(&mut self) -> WorkspaceBounds {
         match self {
-            Self::Here(model) => model.reach(),
-            Self::Apart(_) | Self::Beside(_) => Reach::UNBOUNDED,
+            Self::Here(model) => model.workspace_bounds(),
+            Self::Apart(_) | Self::Beside(_) => WorkspaceBounds::UNBOUNDED,
         }
     }
 

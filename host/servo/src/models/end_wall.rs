@@ -5,7 +5,7 @@
 
 use crate::boundary::stable_stiffness;
 use flotor_core::mapping::Mapping;
-use flotor_hal::{DVec3, LoopConfig, Pose, Reach, Twist, Wrench};
+use flotor_hal::{DVec3, LoopConfig, Pose, Twist, WorkspaceBounds, Wrench};
 
 /// Damping of the wall, N·s/m: that of the device's own boundary mode (client program of the University of Utah).
 const DAMPING_NS_PER_M: f64 = 15.0;
@@ -15,27 +15,27 @@ const MOST_STIFFNESS_N_PER_M: f64 = 10_000.0;
 
 /// The wall of one object.
 pub(super) struct EndWall {
-    reach: Reach,
+    bounds: WorkspaceBounds,
     stiffness_n_per_m: f64,
 }
 
 impl EndWall {
     /// A wall as stiff as the period allows; `None` for a model that has no end. Not real-time.
-    pub(super) fn new(reach: &Reach, config: &LoopConfig) -> Option<Self> {
+    pub(super) fn new(bounds: &WorkspaceBounds, config: &LoopConfig) -> Option<Self> {
         let stable_n_per_m = stable_stiffness(DAMPING_NS_PER_M, config.period_ns);
         let stiffness_n_per_m = MOST_STIFFNESS_N_PER_M.min(stable_n_per_m);
-        reach.is_bounded().then_some(Self { reach: *reach, stiffness_n_per_m })
+        bounds.is_bounded().then_some(Self { bounds: *bounds, stiffness_n_per_m })
     }
 
     /// The model ends elsewhere now, or nowhere. Real-time: bounded, no allocation.
-    pub(super) fn move_to(&mut self, reach: &Reach) {
-        self.reach = if reach.is_bounded() { *reach } else { Reach::UNBOUNDED };
+    pub(super) fn move_to(&mut self, bounds: &WorkspaceBounds) {
+        self.bounds = if bounds.is_bounded() { *bounds } else { WorkspaceBounds::UNBOUNDED };
     }
 
     /// Its push in the device frame on a handle at a pose in the model's frame that moves so in the device's; `None` within
-    /// reach. Real-time: bounded, no allocation.
+    /// bounds. Real-time: bounded, no allocation.
     pub(super) fn push(&self, pose: &Pose, mapping: &Mapping, twist: &Twist) -> Option<Wrench> {
-        let beyond_m = self.reach.beyond(pose.position());
+        let beyond_m = self.bounds.beyond(pose.position());
         if beyond_m == DVec3::ZERO || !beyond_m.is_finite() {
             return None;
         }
@@ -58,8 +58,8 @@ mod tests {
     /// Ends a millimetre below home and nowhere else.
     fn wall_at(period_ns: u64) -> EndWall {
         let inf = f64::INFINITY;
-        let reach = Reach::between([-inf, -inf, -1.0e-3], [inf; 3]);
-        EndWall::new(&reach, &LoopConfig { period_ns, seed: 0 }).expect("it ends")
+        let bounds = WorkspaceBounds::between([-inf, -inf, -1.0e-3], [inf; 3]);
+        EndWall::new(&bounds, &LoopConfig { period_ns, seed: 0 }).expect("it ends")
     }
 
     /// The push of a wall on a handle that is and moves along z of the device.
@@ -106,7 +106,7 @@ mod tests {
     fn a_model_may_end_elsewhere_after_a_change() {
         let mapping = Mapping::new(&MappingConfig::default());
         let mut wall = wall_at(1_000_000);
-        wall.move_to(&Reach::UNBOUNDED);
+        wall.move_to(&WorkspaceBounds::UNBOUNDED);
         assert_eq!(push(&wall, &mapping, -1.0, 0.0), None);
     }
 }

@@ -8,7 +8,7 @@ use flotor_core::mapping::{Blend, Mapping};
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
-    ActivityShape, DVec3, Demand, DeviceState, Input, LoopConfig, Memory, Output, StepStatus, Tick, Wrench,
+    DVec3, Demand, DeviceState, Input, LoopConfig, Memory, Output, RegionShape, StepStatus, Tick, Wrench,
 };
 
 /// How a plugin in place of a model has behaved so far, in all its places.
@@ -129,7 +129,7 @@ impl Layer {
         let served = |(model, _): &(Engine, Mapping)| Demand::ALL.limited_to(model.serves());
         let demand = instances.first().map_or(Demand::ALL, served);
         let object = |(mut model, mapping): (Engine, Mapping)| {
-            let end = EndWall::new(&model.reach(), config);
+            let end = EndWall::new(&model.workspace_bounds(), config);
             Object { model, mapping, end, last: None, stepped_at: None, is_out: false }
         };
         let mut objects: Box<[Object]> = instances.into_iter().map(object).collect();
@@ -229,7 +229,7 @@ impl Layer {
                 continue;
             }
             if let Some(end) = &mut object.end {
-                end.move_to(&object.model.reach());
+                end.move_to(&object.model.workspace_bounds());
             }
             if self.broad.bounds(index).is_some() {
                 let bounds = object.bounds();
@@ -263,11 +263,11 @@ impl Object {
     /// The box in the device frame in which it can act; `None` if that is everywhere. Real-time: bounded, no
     /// allocation.
     fn bounds(&mut self) -> Option<Bounds> {
-        let region = self.model.activity();
+        let region = self.model.active_region();
         let half_sides_m = match region.shape() {
-            ActivityShape::Everywhere => return None,
-            ActivityShape::Sphere => DVec3::splat(self.mapping.length_to_device(region.half_sides().x)),
-            ActivityShape::Box => self.mapping.half_sides_to_device(region.half_sides()),
+            RegionShape::Everywhere => return None,
+            RegionShape::Sphere => DVec3::splat(self.mapping.length_to_device(region.half_sides().x)),
+            RegionShape::Box => self.mapping.half_sides_to_device(region.half_sides()),
         };
         Some(Bounds::about(self.mapping.position_to_device(region.center()), half_sides_m))
     }

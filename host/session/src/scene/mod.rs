@@ -18,7 +18,6 @@ pub use reader::{Location, SceneError};
 pub use reference::{KeyReference, SectionReference, reference};
 pub use setting::{KeyValue, PluginKeyValue};
 
-use flotor_hal::Pacing;
 pub use reader::nearest;
 use reader::{Section, Source, Value};
 use std::path::{Path, PathBuf};
@@ -243,6 +242,15 @@ impl Scene {
         root.finish()?;
         Ok(scene)
     }
+}
+
+/// Who decides when a tick begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pacing {
+    /// The host's clock; `read` gives the newest sample, whenever it was taken.
+    Host,
+    /// The first device; its next sample is waited for before each `read`.
+    Device,
 }
 
 fn pacing(value: Value<'_>) -> Result<Pacing, SceneError> {

@@ -514,7 +514,7 @@ impl Parts {
             (Some(part), parameter) => {
                 let id = part.schema.get(parameter as usize).map_or("", Parameter::id);
                 let setting = Setting::number(part.schema, id, change.value);
-                let shown = setting.map_or_else(|_| String::new(), |setting| setting.display(part.schema));
+                let shown = setting.map_or_else(|_| String::new(), |setting| setting.display());
                 (ChangeSubject::Parameter, id.to_owned(), shown)
             }
             (None, _) => (ChangeSubject::Parameter, String::new(), String::new()),

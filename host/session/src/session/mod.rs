@@ -10,14 +10,14 @@ pub use prepare::prepare_model;
 pub use steps::Steps;
 
 use crate::registry::{LookupError, Registry};
-use crate::scene::{Scene, SceneError};
+use crate::scene::{Pacing, Scene, SceneError};
 use controls::{ChangeLog, Parts};
 use flotor_core::Change;
 use flotor_core::MOST_DEVICES;
 use flotor_core::trace::TickRecord;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, Stopper};
-use flotor_hal::{DVec3, EnergyLedger, Fault, LoopConfig, Pacing, Parameter};
+use flotor_hal::{DVec3, EnergyLedger, Fault, LoopConfig, Parameter};
 use flotor_live::WrenchLimits;
 use flotor_servo::coupling::{Line, Patience};
 use flotor_servo::{

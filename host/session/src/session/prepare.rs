@@ -6,14 +6,14 @@ use super::{PluginReport, RunError};
 use crate::calibration_file::{CalibrationFile, CalibrationFileError};
 use crate::registry::{LookupError, Registry};
 use crate::scene::{
-    Alternative, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, ParameterText,
-    PluginUse, Scene, SceneError,
+    Alternative, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, Pacing,
+    ParameterText, PluginUse, Scene, SceneError,
 };
 use flotor_core::limits::Boundary;
 use flotor_core::mapping::Mapping;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting};
-use flotor_hal::{Axes, Capabilities, LoopConfig, Pacing, Parameter, ParameterKind, Refusal};
+use flotor_hal::{Axes, Capabilities, LoopConfig, Parameter, ParameterKind, Refusal};
 use flotor_servo::engine::beside::SlowModel;
 use flotor_servo::engine::process::{Worker, WorkerOrder};
 use flotor_servo::{Clock, Engine, Layer, Replacement, ScheduledChange, Servo, Standby, TimeBudget};
@@ -121,7 +121,7 @@ pub fn prepare_model(
             }
             (Isolation::Process, _) => {
                 let keys = model.plugin.parameters.iter().map(|parameter| parameter.key.clone());
-                let values = settings.iter().map(|setting| setting.display(plugin.parameters()));
+                let values = settings.iter().map(|setting| setting.display());
                 let order = WorkerOrder {
                     plugin: &plugin.metadata().path,
                     sets: keys.zip(values).collect(),
@@ -216,11 +216,11 @@ pub(super) fn in_force(
             // Plugins answer with numbers: a text is in force if it was set.
             ParameterKind::Text | ParameterKind::File => {
                 let set = settings.iter().rev().find(|setting| setting.index() == index);
-                set.map_or_else(String::new, |setting| setting.display(schema))
+                set.map_or_else(String::new, |setting| setting.display())
             }
             ParameterKind::Real | ParameterKind::Choice => {
                 let setting = Setting::number(schema, parameter.id(), value(index));
-                setting.map_or_else(|_| String::new(), |setting| setting.display(schema))
+                setting.map_or_else(|_| String::new(), |setting| setting.display())
             }
         };
         (parameter.id().to_owned(), text)

@@ -197,20 +197,23 @@ impl Transfer {
         let buffer = NonNull::from(Box::leak(Box::new([0_u8; BUFFER_BYTES])));
         // A write is a frame, a read whatever comes.
         let length = if endpoint & 0x80 == 0 { FRAME_BYTES } else { BUFFER_BYTES };
-        // SAFETY: freshly allocated by libusb and nobody else's yet. The handle outlives the transfer:
-        // `Queue` drops it later.
-        let fields = unsafe { &mut *raw.as_ptr() };
-        fields.dev_handle = handle.as_raw();
-        fields.endpoint = endpoint;
-        fields.transfer_type = match kind {
-            TransferType::Interrupt => LIBUSB_TRANSFER_TYPE_INTERRUPT,
-            _ => LIBUSB_TRANSFER_TYPE_BULK,
-        };
-        fields.timeout = timeout_ms;
-        fields.buffer = buffer.as_ptr().cast();
-        fields.length = c_int::try_from(length).unwrap_or(0);
-        fields.callback = ended;
-        fields.user_data = Arc::as_ptr(shared).cast_mut().cast();
+        let fields = raw.as_ptr();
+        // SAFETY: freshly allocated by libusb and nobody else's yet. Each field is written in place: the zeros in between
+        // are no `libusb_transfer` that a reference could lead to, as its callback is never null. The handle outlives the
+        // transfer: `Queue` drops it later.
+        unsafe {
+            (&raw mut (*fields).dev_handle).write(handle.as_raw());
+            (&raw mut (*fields).endpoint).write(endpoint);
+            (&raw mut (*fields).transfer_type).write(match kind {
+                TransferType::Interrupt => LIBUSB_TRANSFER_TYPE_INTERRUPT,
+                _ => LIBUSB_TRANSFER_TYPE_BULK,
+            });
+            (&raw mut (*fields).timeout).write(timeout_ms);
+            (&raw mut (*fields).buffer).write(buffer.as_ptr().cast());
+            (&raw mut (*fields).length).write(c_int::try_from(length).unwrap_or(0));
+            (&raw mut (*fields).callback).write(ended);
+            (&raw mut (*fields).user_data).write(Arc::as_ptr(shared).cast_mut().cast());
+        }
         Ok(Self { raw, buffer, shared: Arc::clone(shared) })
     }
 

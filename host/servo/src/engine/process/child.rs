@@ -9,7 +9,7 @@ use flotor_hal::abi::{CallStatus, PluginKind};
 use flotor_hal::{LoopConfig, Memory, Output, Refusal, RefusalKind};
 use std::io;
 use std::os::fd::AsFd;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 /// How often a worker nobody asks anything looks whether its host is still there, ns.
@@ -29,14 +29,17 @@ pub struct WorkerArguments {
     pub sets: Vec<String>,
 }
 
+/// How a plugin's file is loaded: by whoever vouches for it.
+pub type LoadFile = fn(&Path) -> Result<Plugin, LoadError>;
+
 /// Loads the model, says so, and steps it as long as the host asks. Ends with the host.
 ///
 /// # Errors
 /// Standard input is not the memory: nobody started this as a worker.
-pub fn serve(arguments: &WorkerArguments) -> io::Result<()> {
+pub fn serve(arguments: &WorkerArguments, load: LoadFile) -> io::Result<()> {
     let memory = SharedMemory::map(io::stdin().as_fd())?;
     let host = rustix::process::getppid();
-    let (greeting, model) = match prepare(arguments) {
+    let (greeting, model) = match prepare(arguments, load) {
         Ok((model, parameters)) => {
             let serves = exchange::DEMANDS.map(|demand| model.serves().contains(demand));
             let remembers = model.memory() == Memory::PathDependent;
@@ -86,12 +89,12 @@ fn obey(model: &mut Model, memory: &SharedMemory) -> CallStatus {
 
 type Prepared = (Model, Vec<Option<f64>>);
 
-fn prepare(arguments: &WorkerArguments) -> Result<Prepared, Refusal> {
+fn prepare(arguments: &WorkerArguments, load: LoadFile) -> Result<Prepared, Refusal> {
     let said_no = |error| match error {
         LoadError::Refused { refusal, .. } => refusal,
         other => Refusal { kind: RefusalKind::Broken, reason: other.to_string() },
     };
-    let plugin = Plugin::load(&arguments.plugin).map_err(said_no)?;
+    let plugin = load(&arguments.plugin).map_err(said_no)?;
     if plugin.metadata().kind != PluginKind::Model {
         return Err(Refusal::unsupported("only a model can be a worker"));
     }

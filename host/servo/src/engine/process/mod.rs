@@ -12,7 +12,7 @@ mod exchange;
 mod memory;
 mod parent;
 
-pub use child::{WorkerArguments, serve};
+pub use child::{LoadFile, WorkerArguments, serve};
 pub use parent::{Worker, WorkerOrder};
 
 use serde::{Deserialize, Serialize};

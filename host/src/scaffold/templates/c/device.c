@@ -17,7 +17,7 @@
 
 /* Read without running the plugin: `flotor plugins` and scenes find it by this. */
 FLOTOR_METADATA("kind = \"device\"\nid = \"" ID "\"\nname = \"" NAME "\"\ndoc = \"" DOC "\"\n"
-                "version = \"0.1.0\"\nabi = \"MAJOR.MINOR\"\nentry = \"flotor_entry_your_name\"\n");
+                "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_your_name\"\n");
 
 /* One turn a second, in rad/s. */
 static const double OMEGA_RAD_PER_S = 6.283185307179586;
@@ -137,11 +137,6 @@ static const void *get_interface(FlotorStr id) {
 }
 
 FLOTOR_ENTRY(flotor_entry_your_name) = {
-    .magic = FLOTOR_MAGIC_BYTES,
-    .size = sizeof(FlotorEntry),
-    .abi_major = FLOTOR_ABI_MAJOR,
-    .abi_minor = FLOTOR_ABI_MINOR,
-    .kind = FlotorPluginKind_Device,
-    .sizes = FLOTOR_CONTRACT_SIZES,
+    FLOTOR_ENTRY_HEAD(FlotorPluginKind_Device),
     .get_interface = get_interface,
 };

@@ -14,7 +14,7 @@
 
 /* Read without running the plugin: `flotor plugins` and scenes find it by this. */
 FLOTOR_METADATA("kind = \"model\"\nid = \"" ID "\"\nname = \"" NAME "\"\ndoc = \"" DOC "\"\n"
-                "version = \"0.1.0\"\nabi = \"MAJOR.MINOR\"\nentry = \"flotor_entry_your_name\"\n");
+                "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_your_name\"\n");
 
 /* Deeper than this the floor pushes no harder, m: no pose may give a force without end. */
 static const double DEEPEST_M = 0.1;
@@ -94,11 +94,6 @@ static const void *get_interface(FlotorStr id) {
 }
 
 FLOTOR_ENTRY(flotor_entry_your_name) = {
-    .magic = FLOTOR_MAGIC_BYTES,
-    .size = sizeof(FlotorEntry),
-    .abi_major = FLOTOR_ABI_MAJOR,
-    .abi_minor = FLOTOR_ABI_MINOR,
-    .kind = FlotorPluginKind_Model,
-    .sizes = FLOTOR_CONTRACT_SIZES,
+    FLOTOR_ENTRY_HEAD(FlotorPluginKind_Model),
     .get_interface = get_interface,
 };

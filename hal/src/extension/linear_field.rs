@@ -4,6 +4,12 @@
 //! says what the wrench is at one pose, the anchor, and how it changes around it; the loop evaluates that at every tick,
 //! at the pose the handle has then.
 
+use crate::abi::instance::fill;
+use crate::abi::interface::{Interface, table};
+use crate::abi::layout::layout;
+#[cfg(feature = "loader")]
+use crate::abi::{CallStatus, loader::Model};
+use crate::abi::{Instance, ModelPlug};
 use crate::{DVec3, ForceModel, Input, Pose, Wrench, rotation_vector};
 
 /// Wrench around a pose, in the model frame: `W(d) = W0 - K d`. 416 bytes.
@@ -95,11 +101,75 @@ fn shortened(displacement: DVec3, longest: f64) -> (DVec3, bool) {
 }
 
 /// A force model that can say how its wrench changes around a pose.
-pub trait FieldModel: ForceModel {
+pub trait LinearFieldModel: ForceModel {
     /// The field at an input, the time since the call before (`input.dt_ns`) having passed. A run uses either this or
     /// [`ForceModel::step`] of an instance, never both. Not real-time, but bounded: a call takes less than the period
     /// the model was prepared for.
     fn linear_field(&mut self, input: &Input) -> LinearField;
+}
+
+/// `flotor.linear-field/1`: see [`LinearFieldModel`].
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct LinearFieldTable {
+    /// Bytes of this table as the plugin knows it.
+    pub size: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
+    /// The field at an input, the time since the call before having passed; a [`crate::abi::CallStatus`] code. Not
+    /// real-time, but bounded.
+    pub linear_field:
+        Option<unsafe extern "C" fn(instance: Instance, input: *const Input, field: *mut LinearField) -> u32>,
+}
+
+layout! {
+    LinearField { anchor, wrench, stiffness, valid_m, valid_rad, time_ns }
+    LinearFieldTable { size, reserved, linear_field }
+}
+table!(LinearFieldTable: "flotor.linear-field/1");
+
+unsafe extern "C" fn linear_field<M: LinearFieldModel>(
+    instance: Instance,
+    input: *const Input,
+    field: *mut LinearField,
+) -> u32 {
+    // SAFETY: the contract of every table call.
+    unsafe { fill::<ModelPlug<M>, _>(instance, field, |model| Ok(model.linear_field(&*input))) }
+}
+
+/// For [`crate::export_model!`].
+#[doc(hidden)]
+#[must_use]
+#[allow(clippy::cast_possible_truncation)] // the size of a table
+pub const fn offer<M: LinearFieldModel>() -> Interface<M> {
+    Interface::of(
+        const {
+            &LinearFieldTable {
+                size: size_of::<LinearFieldTable>() as u32,
+                reserved: 0,
+                linear_field: Some(linear_field::<M>),
+            }
+        },
+    )
+}
+
+#[cfg(feature = "loader")]
+impl Model {
+    /// Whether the model can say how its wrench changes around a pose.
+    #[must_use]
+    pub fn has_linear_field(&self) -> bool {
+        self.extensions.linear_field.is_some_and(|table| table.linear_field.is_some())
+    }
+
+    /// The field at an input. Not real-time. `field` is only meaningful for [`CallStatus::Ok`].
+    pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> CallStatus {
+        let Some(ask) = self.extensions.linear_field.and_then(|table| table.linear_field) else {
+            return CallStatus::Unsupported;
+        };
+        // SAFETY: a live instance used by this thread only (`&mut`), pointers valid for the call.
+        CallStatus::from_code(unsafe { ask(self.instance, input, field) })
+    }
 }
 
 #[cfg(test)]

@@ -4,6 +4,14 @@
 //! divides its **total** vertical command by them, gravity compensation included, because the uneven field acts
 //! on the sum (Varadharajan 2007, section 3.4, corrected only the part of the spring).
 
+use crate::abi::instance::{fill, refusable};
+use crate::abi::interface::{Interface, table};
+use crate::abi::layout::layout;
+#[cfg(feature = "loader")]
+use crate::abi::loader::{OpenedDevice, refusal_from};
+use crate::abi::{DevicePlug, Instance, Message, not_opened};
+use crate::{Device, Refusal};
+
 /// Number of coefficients a calibration has room for: a polynomial of degree seven.
 pub const CALIBRATION_COEFFICIENTS: usize = 8;
 
@@ -129,6 +137,113 @@ impl VerticalCalibration {
     #[must_use]
     pub fn command_n(&self, total_n: f64, z_m: f64) -> f64 {
         total_n / self.share(z_m)
+    }
+}
+
+/// A device whose vertical force can be corrected.
+pub trait CalibrationDevice: Device {
+    /// Serial number of the piece of hardware; empty if it has none. Not real-time.
+    fn serial(&self) -> String;
+
+    /// Corrects the total vertical command, gravity compensation included, from the next activation on. The
+    /// numbers are already checked. Not real-time.
+    ///
+    /// # Errors
+    /// A [`Refusal`] if there is nothing to correct.
+    fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal>;
+}
+
+/// `flotor.calibration/1`: see [`CalibrationDevice`]. Both calls belong to the opened phase.
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct CalibrationTable {
+    /// Bytes of this table as the plugin knows it.
+    pub size: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
+    /// Serial number of the piece of hardware, empty if it has none; a [`crate::abi::CallStatus`] code. Not real-time.
+    pub serial: Option<unsafe extern "C" fn(instance: Instance, serial: *mut Message) -> u32>,
+    /// Corrects the total vertical command from the next activation on; 0 or a [`crate::RefusalKind`] with the
+    /// reason in the message. Not real-time.
+    pub calibrate_vertical: Option<
+        unsafe extern "C" fn(
+            instance: Instance,
+            calibration: *const VerticalCalibration,
+            message: *mut Message,
+        ) -> u32,
+    >,
+}
+
+layout! {
+    VerticalCalibration { range_m, coefficients }
+    CalibrationTable { size, reserved, serial, calibrate_vertical }
+}
+table!(CalibrationTable: "flotor.calibration/1");
+
+unsafe extern "C" fn serial<D: CalibrationDevice>(instance: Instance, serial: *mut Message) -> u32 {
+    // SAFETY: the contract of every table call.
+    unsafe {
+        fill::<DevicePlug<D>, _>(instance, serial, |phase| {
+            let mut text = Message::default();
+            text.set(&phase.opened()?.serial());
+            Ok(text)
+        })
+    }
+}
+
+unsafe extern "C" fn calibrate_vertical<D: CalibrationDevice>(
+    instance: Instance,
+    calibration: *const VerticalCalibration,
+    message: *mut Message,
+) -> u32 {
+    // SAFETY: the contract of every table call.
+    unsafe {
+        refusable::<DevicePlug<D>>(instance, message, |phase| {
+            (*calibration).check().map_err(Refusal::parameter)?;
+            phase.opened().map_err(|_| not_opened())?.calibrate_vertical(&*calibration)
+        })
+    }
+}
+
+/// For [`crate::export_device!`].
+#[doc(hidden)]
+#[must_use]
+#[allow(clippy::cast_possible_truncation)] // the size of a table
+pub const fn offer<D: CalibrationDevice>() -> Interface<D> {
+    Interface::of(
+        const {
+            &CalibrationTable {
+                size: size_of::<CalibrationTable>() as u32,
+                reserved: 0,
+                serial: Some(serial::<D>),
+                calibrate_vertical: Some(calibrate_vertical::<D>),
+            }
+        },
+    )
+}
+
+#[cfg(feature = "loader")]
+impl OpenedDevice {
+    /// Serial number of the piece of hardware; empty if it has none or does not say.
+    #[must_use]
+    pub fn serial(&mut self) -> String {
+        let ask = self.extensions().calibration.and_then(|table| table.serial);
+        self.asked(ask, Message::default()).map_or(String::new(), |serial| serial.as_str().to_owned())
+    }
+
+    /// Corrects the total vertical command from the next activation on.
+    ///
+    /// # Errors
+    /// A [`Refusal`] if the device takes no calibration.
+    pub fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
+        let calibrate = self.extensions().calibration.and_then(|table| table.calibrate_vertical);
+        let Some(calibrate) = calibrate else {
+            return Err(Refusal::unsupported("this device takes no calibration of the vertical force"));
+        };
+        let mut message = Message::default();
+        // SAFETY: a live instance, used by this thread only (`&mut`), pointers valid for the call.
+        refusal_from(unsafe { calibrate(self.instance(), calibration, &raw mut message) }, &message)
     }
 }
 

@@ -1,0 +1,69 @@
+//! What a plugin offers: function tables behind ids. Only this crate makes them, each for the type whose instances it
+//! calls, so that no safe code can hand a host a table that lies.
+
+use super::Str;
+use std::ffi::c_void;
+use std::marker::PhantomData;
+
+/// A function table of the contract.
+///
+/// # Safety
+/// The type is `repr(C)`, starts with a `u32`, which is its size in bytes, and takes any bits: the rest is numbers,
+/// pointers, texts and functions that may be null. It is what plugins of this contract have behind `ID`.
+pub(crate) unsafe trait Table: Sized + 'static {
+    /// Id of the interface or extension.
+    const ID: &'static str;
+}
+
+/// Says that a struct is the table behind an id, and that it starts with its size.
+macro_rules! table {
+    ($table:ident: $id:literal) => {
+        const _: () = assert!(std::mem::offset_of!($table, size) == 0);
+
+        // SAFETY: a `repr(C)` struct that starts with its size (see above), and for the rest numbers, pointers, texts
+        // and functions that may be null.
+        unsafe impl $crate::abi::interface::Table for $table {
+            const ID: &'static str = $id;
+        }
+        // SAFETY: an immutable static table; its pointers lead to immutable statics and code.
+        unsafe impl Sync for $table {}
+        // SAFETY: as for `Sync`.
+        unsafe impl Send for $table {}
+    };
+}
+pub(crate) use table;
+
+/// One table of a plugin whose type is `P`. Made by the `offer` of an extension, and by nothing else:
+///
+/// ```compile_fail,E0624
+/// use flotor_hal::abi::{Interface, MAGIC};
+/// let forged: Interface<()> = Interface::of(&MAGIC);
+/// ```
+pub struct Interface<P> {
+    id: &'static str,
+    table: *const c_void,
+    plugin: PhantomData<fn(P)>,
+}
+
+impl<P> Interface<P> {
+    /// A table whose functions take instances of `P`.
+    pub(crate) const fn of<T: Table>(table: &'static T) -> Self {
+        Self { id: T::ID, table: std::ptr::from_ref(table).cast(), plugin: PhantomData }
+    }
+}
+
+/// The extensions of a plugin type. The export macros make it of their words.
+pub trait Extensions<P: 'static>: 'static {
+    /// A table each.
+    const LIST: &'static [Interface<P>];
+}
+
+impl<P: 'static> Extensions<P> for () {
+    const LIST: &'static [Interface<P>] = &[];
+}
+
+/// The table behind an id, null if it is not offered.
+pub(super) fn find<P: 'static, E: Extensions<P>>(main: &Interface<P>, id: Str) -> *const c_void {
+    let mut offered = std::iter::once(main).chain(E::LIST);
+    offered.find(|interface| interface.id == id.as_str()).map_or(std::ptr::null(), |found| found.table)
+}

@@ -1,0 +1,199 @@
+//! `flotor.force/1`: the function table of a force model, and how a [`ForceModel`] becomes one.
+
+use super::entry::{CallStatus, Entry, Instance, PluginKind};
+use super::instance::{self, Plugged, call, fill, refusable};
+use super::interface::{Extensions, Interface, find, table};
+use super::layout::layout;
+use super::{Message, Str};
+use crate::{ForceModel, Input, LoopConfig, ModelInfo, Output, Parameter, ParameterValue, Refusal, Settings};
+use std::ffi::c_void;
+use std::marker::PhantomData;
+
+/// `flotor.force/1`. Statuses are [`super::CallStatus`] codes; `create` and `prepare` return 0 or a
+/// [`crate::RefusalKind`] and say why in the message.
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct ForceTable {
+    /// Bytes of this table as the plugin knows it.
+    pub size: u32,
+    /// Number of parameters.
+    pub parameter_count: u32,
+    /// The schema, constant.
+    pub parameters: *const Parameter,
+    /// What the model says about itself.
+    pub info: ModelInfo,
+    /// Makes an instance from explicitly set values. Not real-time.
+    pub create: Option<
+        unsafe extern "C" fn(
+            values: *const ParameterValue,
+            count: u32,
+            message: *mut Message,
+            out: *mut Instance,
+        ) -> u32,
+    >,
+    /// Frees an instance. Not real-time.
+    pub destroy: Option<unsafe extern "C" fn(instance: Instance)>,
+    /// Last chance to allocate. Not real-time. May be null.
+    pub prepare: Option<
+        unsafe extern "C" fn(instance: Instance, config: *const LoopConfig, message: *mut Message) -> u32,
+    >,
+    /// The wrench for a pose. Real-time: no allocation, lock, system call or unwinding.
+    pub step:
+        Option<unsafe extern "C" fn(instance: Instance, input: *const Input, output: *mut Output) -> u32>,
+    /// `count` poses in order. Real-time per pose. May be null: the host then calls `step`.
+    pub step_batch: Option<
+        unsafe extern "C" fn(
+            instance: Instance,
+            count: u64,
+            inputs: *const Input,
+            outputs: *mut Output,
+        ) -> u32,
+    >,
+    /// Changes a live parameter at a tick boundary. Real-time. May be null.
+    pub set_parameter: Option<unsafe extern "C" fn(instance: Instance, index: u32, value: f64) -> u32>,
+    /// The value in force. Real-time. May be null.
+    pub parameter: Option<unsafe extern "C" fn(instance: Instance, index: u32) -> f64>,
+    /// Forgets history. Real-time. May be null.
+    pub reset: Option<unsafe extern "C" fn(instance: Instance) -> u32>,
+    /// Why the last call failed. Not real-time. May be null.
+    pub last_message: Option<unsafe extern "C" fn(instance: Instance, message: *mut Message)>,
+}
+
+layout! {
+    ForceTable {
+        size, parameter_count, parameters, info, create, destroy, prepare, step, step_batch, set_parameter, parameter,
+        reset, last_message,
+    }
+}
+table!(ForceTable: "flotor.force/1");
+
+/// A model as the tables see it.
+pub(crate) struct ModelPlug<M>(PhantomData<M>);
+
+impl<M: ForceModel> Plugged for ModelPlug<M> {
+    type State = M;
+    type Shared = ();
+    const PARAMETERS: &'static [Parameter] = M::PARAMETERS;
+
+    fn make(settings: &Settings<'_>) -> Result<(M, ()), Refusal> {
+        Ok((M::create(settings)?, ()))
+    }
+}
+
+unsafe extern "C" fn prepare<M: ForceModel>(
+    instance: Instance,
+    config: *const LoopConfig,
+    message: *mut Message,
+) -> u32 {
+    // SAFETY: the contract of every table call: a live instance, used by one thread, and pointers to initialised
+    // values that are the callee's for the call.
+    unsafe { refusable::<ModelPlug<M>>(instance, message, |model| model.prepare(&*config)) }
+}
+
+unsafe extern "C" fn step<M: ForceModel>(
+    instance: Instance,
+    input: *const Input,
+    output: *mut Output,
+) -> u32 {
+    // SAFETY: as in `prepare`.
+    unsafe { fill::<ModelPlug<M>, _>(instance, output, |model| Ok(model.step(&*input))) }
+}
+
+unsafe extern "C" fn step_batch<M: ForceModel>(
+    instance: Instance,
+    count: u64,
+    inputs: *const Input,
+    outputs: *mut Output,
+) -> u32 {
+    if count == 0 {
+        return CallStatus::Ok as u32;
+    }
+    let Ok(count) = usize::try_from(count) else { return CallStatus::Unsupported as u32 };
+    // SAFETY: as in `prepare`; `inputs` and `outputs` point at `count` structs each, which do not overlap.
+    let (inputs, outputs) = unsafe {
+        (std::slice::from_raw_parts(inputs, count), std::slice::from_raw_parts_mut(outputs, count))
+    };
+    // SAFETY: as in `prepare`.
+    unsafe {
+        call::<ModelPlug<M>>(instance, |model| {
+            model.step_batch(inputs, outputs);
+            Ok(())
+        })
+    }
+}
+
+unsafe extern "C" fn set_parameter<M: ForceModel>(instance: Instance, index: u32, value: f64) -> u32 {
+    let set = |model: &mut M| model.set_parameter(index as usize, value).map_err(|_| CallStatus::OutOfRange);
+    // SAFETY: as in `prepare`.
+    unsafe { instance::set_parameter::<ModelPlug<M>>(instance, index, value, set) }
+}
+
+unsafe extern "C" fn parameter<M: ForceModel>(instance: Instance, index: u32) -> f64 {
+    // SAFETY: as in `prepare`.
+    unsafe { instance::parameter::<ModelPlug<M>>(instance, |model| model.parameter(index as usize)) }
+}
+
+unsafe extern "C" fn reset<M: ForceModel>(instance: Instance) -> u32 {
+    // SAFETY: as in `prepare`.
+    unsafe {
+        call::<ModelPlug<M>>(instance, |model| {
+            model.reset();
+            Ok(())
+        })
+    }
+}
+
+#[allow(clippy::cast_possible_truncation)] // table sizes and parameter counts are small
+const fn table<M: ForceModel>() -> Interface<M> {
+    Interface::of(
+        const {
+            &ForceTable {
+                size: size_of::<ForceTable>() as u32,
+                parameter_count: M::PARAMETERS.len() as u32,
+                parameters: M::PARAMETERS.as_ptr(),
+                info: M::INFO,
+                create: Some(instance::create::<ModelPlug<M>>),
+                destroy: Some(instance::destroy::<ModelPlug<M>>),
+                prepare: Some(prepare::<M>),
+                step: Some(step::<M>),
+                step_batch: Some(step_batch::<M>),
+                set_parameter: Some(set_parameter::<M>),
+                parameter: Some(parameter::<M>),
+                reset: Some(reset::<M>),
+                last_message: Some(instance::last_message::<ModelPlug<M>>),
+            }
+        },
+    )
+}
+
+unsafe extern "C" fn get_interface<M: ForceModel, E: Extensions<M>>(id: Str) -> *const c_void {
+    find::<M, E>(&const { table::<M>() }, id)
+}
+
+/// The entry of a model plugin without extensions. In Rust this and [`super::device_entry`] are the only ways to one, so that each
+/// entry that a safe program can have keeps the contract:
+///
+/// ```compile_fail,E0451
+/// use flotor_hal::abi::{Entry, MAGIC};
+/// let forged = Entry { magic: MAGIC, kind: 1, ..unreachable!() };
+/// ```
+#[must_use]
+pub const fn model_entry<M: ForceModel>() -> Entry {
+    model_entry_with::<M, ()>()
+}
+
+/// The entry of a model plugin with extensions; [`crate::export_model!`] makes a static of it.
+#[must_use]
+pub const fn model_entry_with<M: ForceModel, E: Extensions<M>>() -> Entry {
+    Entry::of(PluginKind::Model, get_interface::<M, E>)
+}
+
+/// Makes a [`crate::ForceModel`] a plugin: `export_model!(Spring);`. The extensions that the type implements are listed
+/// behind it by their names in [`crate::extension`]: `export_model!(Spring, centerline, variant, details);`. One per crate.
+#[macro_export]
+macro_rules! export_model {
+    ($model:ty $(, $extension:ident)* $(,)?) => {
+        $crate::export_plugin!($model, ForceModel, Model, model_entry_with $(, $extension)*);
+    };
+}

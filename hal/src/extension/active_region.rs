@@ -1,0 +1,175 @@
+//! Extension `flotor.active-region/1`: where a force model can act, by which a host may leave it asleep elsewhere.
+
+use crate::abi::instance::fill;
+use crate::abi::interface::{Interface, table};
+use crate::abi::layout::layout;
+#[cfg(feature = "loader")]
+use crate::abi::loader::Model;
+use crate::abi::{Instance, ModelPlug};
+use crate::{DVec3, ForceModel};
+
+/// What kind of region it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RegionShape {
+    /// The model may act at any position: it is never asleep.
+    Everywhere,
+    /// A ball.
+    Sphere,
+    /// A box with sides along the axes of the model frame.
+    Box,
+}
+
+/// The positions of the handle, in the model frame, at which a model may act. 56 bytes.
+///
+/// Outside the region wrench and stored energy are **zero at every orientation and velocity**, and the model has
+/// **no history**: the first step inside is as after [`ForceModel::reset`]. The region may be larger than
+/// necessary, never smaller; the host checks nothing and skips the step.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct ActiveRegion {
+    shape: u32,
+    reserved: u32,
+    center_m: [f64; 3],
+    half_sides_m: [f64; 3],
+}
+
+impl ActiveRegion {
+    /// No position is excluded.
+    pub const EVERYWHERE: Self =
+        Self { shape: 0, reserved: 0, center_m: [0.0; 3], half_sides_m: [f64::INFINITY; 3] };
+
+    /// A ball about `center_m`.
+    #[must_use]
+    pub const fn sphere(center_m: [f64; 3], radius_m: f64) -> Self {
+        Self { shape: 1, reserved: 0, center_m, half_sides_m: [radius_m; 3] }
+    }
+
+    /// A box about `center_m`, half its sides given, along the axes of the model frame.
+    #[must_use]
+    pub const fn cuboid(center_m: [f64; 3], half_sides_m: [f64; 3]) -> Self {
+        Self { shape: 2, reserved: 0, center_m, half_sides_m }
+    }
+
+    /// What kind of region it is. Anything unknown, and a region with a number that is none, is everywhere: the safe
+    /// reading.
+    #[must_use]
+    pub fn shape(&self) -> RegionShape {
+        let numbers = self.center_m.iter().chain(&self.half_sides_m);
+        if !numbers.into_iter().all(|number| number.is_finite()) {
+            return RegionShape::Everywhere;
+        }
+        match self.shape {
+            1 => RegionShape::Sphere,
+            2 => RegionShape::Box,
+            _ => RegionShape::Everywhere,
+        }
+    }
+
+    /// Its centre, m.
+    #[must_use]
+    pub fn center(&self) -> DVec3 {
+        DVec3::from_array(self.center_m)
+    }
+
+    /// Half the sides of the box about it along the axes, m (for a ball, its radius three times).
+    #[must_use]
+    pub fn half_sides(&self) -> DVec3 {
+        DVec3::from_array(self.half_sides_m)
+    }
+
+    /// True if the model may act with the handle at `position_m`. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn contains(&self, position_m: DVec3) -> bool {
+        let from_center = position_m - self.center();
+        match self.shape() {
+            RegionShape::Everywhere => true,
+            RegionShape::Sphere => from_center.length() <= self.half_sides().x,
+            RegionShape::Box => from_center.abs().cmple(self.half_sides()).all(),
+        }
+    }
+}
+
+/// A force model that acts in a bounded region only: a scene may hold thousands of them.
+pub trait ActiveRegionModel: ForceModel {
+    /// Where it may act, with the parameters now in force. Real-time: bounded, no allocation (asked again after
+    /// each live parameter).
+    fn active_region(&self) -> ActiveRegion;
+}
+
+/// `flotor.active-region/1`: see [`ActiveRegionModel`]. Real-time.
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct ActiveRegionTable {
+    /// Bytes of this table as the plugin knows it.
+    pub size: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
+    /// Where the instance can act, with the parameters now in force; a [`crate::abi::CallStatus`] code.
+    pub region: Option<unsafe extern "C" fn(instance: Instance, out: *mut ActiveRegion) -> u32>,
+}
+
+layout! {
+    ActiveRegion { shape, reserved, center_m, half_sides_m }
+    ActiveRegionTable { size, reserved, region }
+}
+table!(ActiveRegionTable: "flotor.active-region/1");
+
+unsafe extern "C" fn region<M: ActiveRegionModel>(instance: Instance, out: *mut ActiveRegion) -> u32 {
+    // SAFETY: the contract of every table call.
+    unsafe { fill::<ModelPlug<M>, _>(instance, out, |model| Ok(model.active_region())) }
+}
+
+/// For [`crate::export_model!`].
+#[doc(hidden)]
+#[must_use]
+#[allow(clippy::cast_possible_truncation)] // the size of a table
+pub const fn offer<M: ActiveRegionModel>() -> Interface<M> {
+    Interface::of(
+        const {
+            &ActiveRegionTable {
+                size: size_of::<ActiveRegionTable>() as u32,
+                reserved: 0,
+                region: Some(region::<M>),
+            }
+        },
+    )
+}
+
+#[cfg(feature = "loader")]
+impl Model {
+    /// Where the instance can act, with the parameters now in force: everywhere, unless it says otherwise. Real-time:
+    /// bounded, no allocation.
+    #[must_use]
+    pub fn active_region(&mut self) -> ActiveRegion {
+        let ask = self.extensions.active_region.and_then(|table| table.region);
+        self.asked(ask, ActiveRegion::EVERYWHERE).unwrap_or(ActiveRegion::EVERYWHERE)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_region_contains_its_surface_and_nothing_beyond() {
+        let ball = ActiveRegion::sphere([1.0, 0.0, 0.0], 0.5);
+        assert!(ball.contains(DVec3::new(1.5, 0.0, 0.0)) && !ball.contains(DVec3::new(1.4, 0.4, 0.0)));
+        let cuboid = ActiveRegion::cuboid([0.0; 3], [1.0, 2.0, 3.0]);
+        assert!(cuboid.contains(DVec3::new(-1.0, 2.0, -3.0)) && !cuboid.contains(DVec3::new(0.0, 2.1, 0.0)));
+        assert!(ActiveRegion::EVERYWHERE.contains(DVec3::splat(1.0e300)));
+    }
+
+    #[test]
+    fn a_region_that_makes_no_sense_excludes_nothing() {
+        for wrong in
+            [ActiveRegion::sphere([f64::NAN, 0.0, 0.0], 1.0), ActiveRegion::sphere([0.0; 3], f64::NAN)]
+        {
+            assert_eq!(wrong.shape(), RegionShape::Everywhere);
+            assert!(wrong.contains(DVec3::splat(9.0)));
+        }
+        let unknown = ActiveRegion { shape: 7, ..ActiveRegion::sphere([0.0; 3], 1.0) };
+        assert_eq!(unknown.shape(), RegionShape::Everywhere);
+    }
+}

@@ -1,0 +1,164 @@
+//! Extension `flotor.centerline/1`: the shape of a slender deformable body, for people to look at.
+//!
+//! An observer makes its own instance of the model with the same parameters and asks it at its own rate;
+//! the servo never calls this. A curve with a frame along it draws a rod, a rope or (with turns) a coil spring.
+
+use crate::abi::instance::{call, fill};
+use crate::abi::interface::{Interface, table};
+use crate::abi::layout::layout;
+#[cfg(feature = "loader")]
+use crate::abi::loader::Model;
+use crate::abi::{CallStatus, Instance, ModelPlug};
+use crate::{ForceModel, Input, Pose};
+
+/// How to draw the body around its centreline: a tube, or a wire wound about it. 40 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct CenterlineInfo {
+    /// Radius of the drawn tube or wire, m.
+    pub tube_radius_m: f64,
+    /// Radius of the helix the wire follows about the centreline, m; 0 draws a plain tube.
+    pub helix_radius_m: f64,
+    /// Turns of the helix over the whole length; 0 for a plain tube.
+    pub helix_turns: f64,
+    /// Radius of the end plates, m; 0 for none.
+    pub plate_radius_m: f64,
+    /// How many points describe the centreline well.
+    pub suggested_points: u32,
+    pub(crate) reserved: u32,
+}
+
+impl CenterlineInfo {
+    /// A wire of radius `wire_radius_m` wound `turns` times at `helix_radius_m` between plates.
+    #[must_use]
+    pub const fn coil(wire_radius_m: f64, helix_radius_m: f64, turns: f64, plate_radius_m: f64) -> Self {
+        Self {
+            tube_radius_m: wire_radius_m,
+            helix_radius_m,
+            helix_turns: turns,
+            plate_radius_m,
+            suggested_points: 65,
+            reserved: 0,
+        }
+    }
+}
+
+/// A force model with a shape. Not real-time.
+pub trait CenterlineModel: ForceModel {
+    /// How to draw the body with the parameters now in force.
+    fn centerline_info(&self) -> CenterlineInfo;
+
+    /// Fills `points` from the fixed end to the handle, evenly in arc length of the undeformed body: position
+    /// (m, model frame) and section frame (z along the section normal). Returns how many are valid.
+    fn centerline(&mut self, input: &Input, points: &mut [Pose]) -> usize;
+}
+
+/// `flotor.centerline/1`: see [`CenterlineModel`]. Not real-time.
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct CenterlineTable {
+    /// Bytes of this table as the plugin knows it.
+    pub size: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
+    /// How to draw the body.
+    pub info: Option<unsafe extern "C" fn(instance: Instance, out: *mut CenterlineInfo) -> u32>,
+    /// Fills up to `capacity` points; how many are valid goes to `count`.
+    pub centerline: Option<
+        unsafe extern "C" fn(
+            instance: Instance,
+            input: *const Input,
+            points: *mut Pose,
+            capacity: u32,
+            count: *mut u32,
+        ) -> u32,
+    >,
+}
+
+layout! {
+    CenterlineInfo { tube_radius_m, helix_radius_m, helix_turns, plate_radius_m, suggested_points, reserved }
+    CenterlineTable { size, reserved, info, centerline }
+}
+table!(CenterlineTable: "flotor.centerline/1");
+
+unsafe extern "C" fn info<M: CenterlineModel>(instance: Instance, out: *mut CenterlineInfo) -> u32 {
+    // SAFETY: the contract of every table call.
+    unsafe { fill::<ModelPlug<M>, _>(instance, out, |model| Ok(model.centerline_info())) }
+}
+
+unsafe extern "C" fn centerline<M: CenterlineModel>(
+    instance: Instance,
+    input: *const Input,
+    points: *mut Pose,
+    capacity: u32,
+    count: *mut u32,
+) -> u32 {
+    if capacity == 0 {
+        return CallStatus::OutOfRange as u32;
+    }
+    // SAFETY: the contract of every table call; `points` has room for `capacity` poses.
+    unsafe {
+        call::<ModelPlug<M>>(instance, |model| {
+            let points = std::slice::from_raw_parts_mut(points, capacity as usize);
+            let valid = model.centerline(&*input, points);
+            count.write(u32::try_from(valid).unwrap_or(capacity).min(capacity));
+            Ok(())
+        })
+    }
+}
+
+/// For [`crate::export_model!`].
+#[doc(hidden)]
+#[must_use]
+#[allow(clippy::cast_possible_truncation)] // the size of a table
+pub const fn offer<M: CenterlineModel>() -> Interface<M> {
+    Interface::of(
+        const {
+            &CenterlineTable {
+                size: size_of::<CenterlineTable>() as u32,
+                reserved: 0,
+                info: Some(info::<M>),
+                centerline: Some(centerline::<M>),
+            }
+        },
+    )
+}
+
+/// Access to the centreline of a model. Not real-time.
+#[cfg(feature = "loader")]
+pub struct Centerline<'a> {
+    model: &'a mut Model,
+    table: &'static CenterlineTable,
+}
+
+#[cfg(feature = "loader")]
+impl Model {
+    /// The model's centreline, if it has one. Not real-time: for observers with an instance of their own.
+    #[must_use]
+    pub fn centerline(&mut self) -> Option<Centerline<'_>> {
+        let table = self.extensions.centerline?;
+        Some(Centerline { model: self, table })
+    }
+}
+
+#[cfg(feature = "loader")]
+impl Centerline<'_> {
+    /// How to draw the body; `None` if the model failed.
+    #[must_use]
+    pub fn info(&mut self) -> Option<CenterlineInfo> {
+        self.model.asked(self.table.info, CenterlineInfo::default())
+    }
+
+    /// The centreline at an input, in at most `capacity` points; `None` if the model failed.
+    #[must_use]
+    pub fn points(&mut self, input: &Input, capacity: usize) -> Option<Vec<Pose>> {
+        let (ask, room) = (self.table.centerline?, u32::try_from(capacity).ok()?);
+        let (mut points, mut count) = (vec![Pose::HOME; capacity], 0);
+        // SAFETY: a live instance used by this thread only, room for `capacity` poses, pointers valid for the call.
+        let code = unsafe { ask(self.model.instance, input, points.as_mut_ptr(), room, &raw mut count) };
+        points.truncate(count as usize);
+        (code == CallStatus::Ok as u32).then_some(points)
+    }
+}

@@ -1,0 +1,159 @@
+//! Extension `flotor.details/1`: numbers about the last answer, for people and for tests.
+//!
+//! A model that iterates, switches branches or rolls on its seat knows more than a wrench says. It names the
+//! numbers once, and whoever wants them asks after a step: `flotor eval --details` makes columns of them. The
+//! servo never asks.
+
+use crate::abi::instance::call;
+use crate::abi::interface::{Interface, table};
+use crate::abi::layout::layout;
+#[cfg(feature = "loader")]
+use crate::abi::loader::Model;
+use crate::abi::{CallStatus, Choices, Instance, ModelPlug, Str};
+use crate::{ForceModel, choices};
+
+/// One number about an answer. Built with [`Detail::number`], [`Detail::word`] or [`Detail::flag`].
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct Detail {
+    id: Str,
+    unit: Str,
+    doc: Str,
+    words: Choices,
+}
+
+impl Detail {
+    /// A number, in SI. `unit` is for people ("rad", "1" for none).
+    #[must_use]
+    pub const fn number(id: &'static str, unit: &'static str, doc: &'static str) -> Self {
+        Self { id: Str::new(id), unit: Str::new(unit), doc: Str::new(doc), words: Choices::EMPTY }
+    }
+
+    /// One of a fixed list of words; the number is its index.
+    #[must_use]
+    pub const fn word(id: &'static str, words: Choices, doc: &'static str) -> Self {
+        Self { id: Str::new(id), unit: Str::EMPTY, doc: Str::new(doc), words }
+    }
+
+    /// Yes or no: `1` or `0`.
+    #[must_use]
+    pub const fn flag(id: &'static str, doc: &'static str) -> Self {
+        Self::word(id, choices!["0", "1"], doc)
+    }
+
+    /// Name of the column.
+    #[must_use]
+    pub const fn id(&self) -> &str {
+        self.id.as_str()
+    }
+
+    /// Unit for people; empty for a word.
+    #[must_use]
+    pub const fn unit(&self) -> &str {
+        self.unit.as_str()
+    }
+
+    /// One sentence for people.
+    #[must_use]
+    pub const fn doc(&self) -> &str {
+        self.doc.as_str()
+    }
+
+    /// The words, in index order; empty for a number.
+    #[must_use]
+    pub const fn words(&self) -> &[Str] {
+        self.words.as_slice()
+    }
+}
+
+/// A force model that has numbers about its answers.
+pub trait DetailsModel: ForceModel {
+    /// What there is to know, in order.
+    const DETAILS: &'static [Detail];
+
+    /// Writes the numbers of the last [`ForceModel::step`], one for each of [`Self::DETAILS`]; NaN where there is
+    /// none. Real-time: bounded, no allocation.
+    fn details(&self, values: &mut [f64]);
+}
+
+/// `flotor.details/1`: see [`DetailsModel`].
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct DetailsTable {
+    /// Bytes of this table as the plugin knows it.
+    pub size: u32,
+    /// Number of details.
+    pub detail_count: u32,
+    /// What there is to know, constant.
+    pub details: *const Detail,
+    /// Writes the numbers of the last step into `capacity` places, `detail_count` at most; NaN where there is none.
+    /// Real-time: no allocation, lock, system call or unwinding.
+    pub values: Option<unsafe extern "C" fn(instance: Instance, values: *mut f64, capacity: u32) -> u32>,
+}
+
+layout! {
+    Detail { id, unit, doc, words }
+    DetailsTable { size, detail_count, details, values }
+}
+table!(DetailsTable: "flotor.details/1");
+
+unsafe extern "C" fn values<M: DetailsModel>(instance: Instance, values: *mut f64, capacity: u32) -> u32 {
+    if (capacity as usize) < M::DETAILS.len() {
+        return CallStatus::OutOfRange as u32;
+    }
+    if M::DETAILS.is_empty() {
+        return CallStatus::Ok as u32;
+    }
+    // SAFETY: the contract of every table call; `values` has room for `capacity` numbers, of which there are enough.
+    unsafe {
+        call::<ModelPlug<M>>(instance, |model| {
+            model.details(std::slice::from_raw_parts_mut(values, M::DETAILS.len()));
+            Ok(())
+        })
+    }
+}
+
+/// For [`crate::export_model!`].
+#[doc(hidden)]
+#[must_use]
+#[allow(clippy::cast_possible_truncation)] // the size of a table, a few details
+pub const fn offer<M: DetailsModel>() -> Interface<M> {
+    Interface::of(
+        const {
+            &DetailsTable {
+                size: size_of::<DetailsTable>() as u32,
+                detail_count: M::DETAILS.len() as u32,
+                details: M::DETAILS.as_ptr(),
+                values: Some(values::<M>),
+            }
+        },
+    )
+}
+
+#[cfg(feature = "loader")]
+impl Model {
+    /// Which numbers there are about an answer; empty for a model without details.
+    #[must_use]
+    pub fn details(&self) -> &'static [Detail] {
+        match self.extensions.details {
+            Some(table) if !table.details.is_null() && table.detail_count > 0 => {
+                // SAFETY: a table's list is a static array of `detail_count` details of the checked layout.
+                unsafe { std::slice::from_raw_parts(table.details, table.detail_count as usize) }
+            }
+            _ => &[],
+        }
+    }
+
+    /// Writes the numbers of the last step, one for each of [`Self::details`]; NaN where there is none.
+    /// Real-time: bounded by the model, no allocation.
+    pub fn read_details(&mut self, values: &mut [f64]) -> CallStatus {
+        let Some(read) = self.extensions.details.and_then(|table| table.values) else {
+            return CallStatus::Unsupported;
+        };
+        let capacity = u32::try_from(values.len()).unwrap_or(u32::MAX);
+        // SAFETY: a live instance used by this thread only (`&mut`), room for `capacity` numbers.
+        CallStatus::from_code(unsafe { read(self.instance, values.as_mut_ptr(), capacity) })
+    }
+}

@@ -1,0 +1,101 @@
+//! Extension `flotor.energy-ledger/1`: the account of the mechanical energy of a device with a known plant.
+
+use crate::abi::instance::fill;
+use crate::abi::interface::{Interface, table};
+use crate::abi::layout::layout;
+#[cfg(feature = "loader")]
+use crate::abi::loader;
+use crate::abi::{DevicePlug, Instance};
+use crate::{ActiveDevice, Device};
+
+/// Account of the mechanical energy of a device with a known plant (a simulation), J since activation. 56 bytes.
+///
+/// Every term is integrated on its own, none is the difference of others:
+/// `stored_j - initial_j = actuators_j + feedforward_j + hand_j - dissipated_j` is a check, not a definition.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct EnergyLedger {
+    /// Kinetic and potential energy now.
+    pub stored_j: f64,
+    /// Kinetic and potential energy at activation.
+    pub initial_j: f64,
+    /// Work done by the actuators for the commanded wrench.
+    pub actuators_j: f64,
+    /// Work done by the actuators for gravity compensation.
+    pub feedforward_j: f64,
+    /// Work done by the hand.
+    pub hand_j: f64,
+    /// Energy turned into heat by damping.
+    pub dissipated_j: f64,
+    /// Largest mechanical energy (kinetic plus potential above its lowest point) so far: the scale of an error.
+    pub peak_j: f64,
+}
+
+impl EnergyLedger {
+    /// What the account fails to explain, J.
+    #[must_use]
+    pub fn residual_j(&self) -> f64 {
+        let explained = self.actuators_j + self.feedforward_j + self.hand_j - self.dissipated_j;
+        self.stored_j - self.initial_j - explained
+    }
+}
+
+/// An active device with a known plant.
+pub trait EnergyLedgerDevice: ActiveDevice {
+    /// The account since activation. Real-time: bounded, no allocation.
+    fn energy_ledger(&self) -> EnergyLedger;
+}
+
+/// `flotor.energy-ledger/1`: see [`EnergyLedgerDevice`].
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct EnergyLedgerTable {
+    /// Bytes of this table as the plugin knows it.
+    pub size: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
+    /// The account since activation; a [`crate::abi::CallStatus`] code. Real-time.
+    pub ledger: Option<unsafe extern "C" fn(instance: Instance, out: *mut EnergyLedger) -> u32>,
+}
+
+layout! {
+    EnergyLedger { stored_j, initial_j, actuators_j, feedforward_j, hand_j, dissipated_j, peak_j }
+    EnergyLedgerTable { size, reserved, ledger }
+}
+table!(EnergyLedgerTable: "flotor.energy-ledger/1");
+
+unsafe extern "C" fn ledger<D: Device<Active: EnergyLedgerDevice>>(
+    instance: Instance,
+    out: *mut EnergyLedger,
+) -> u32 {
+    // SAFETY: the contract of every table call.
+    unsafe { fill::<DevicePlug<D>, _>(instance, out, |phase| Ok(phase.active()?.energy_ledger())) }
+}
+
+/// For [`crate::export_device!`].
+#[doc(hidden)]
+#[must_use]
+#[allow(clippy::cast_possible_truncation)] // the size of a table
+pub const fn offer<D: Device<Active: EnergyLedgerDevice>>() -> Interface<D> {
+    Interface::of(
+        const {
+            &EnergyLedgerTable {
+                size: size_of::<EnergyLedgerTable>() as u32,
+                reserved: 0,
+                ledger: Some(ledger::<D>),
+            }
+        },
+    )
+}
+
+#[cfg(feature = "loader")]
+impl loader::ActiveDevice {
+    /// Energy account of the plant, where there is one. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn energy_ledger(&mut self) -> Option<EnergyLedger> {
+        let ask = self.extensions()?.energy_ledger?.ledger;
+        self.asked(ask, EnergyLedger::default())
+    }
+}

@@ -1,0 +1,58 @@
+//! Extensions: what a plugin may offer beside its main interface. Each is one file, named as its trait, its table, its id and
+//! its word in [`crate::export_model!`] or [`crate::export_device!`]; one line here makes a host look for it.
+#![allow(unsafe_code)]
+
+pub mod active_region;
+pub mod calibration;
+pub mod centerline;
+pub mod details;
+pub mod energy_ledger;
+pub mod linear_field;
+pub mod pacing;
+pub mod variant;
+pub mod workspace_bounds;
+
+macro_rules! extensions {
+    ($($tables:ident { $($name:ident: $table:ident),+ $(,)? })+) => {
+        /// Layouts of the structs of all extensions.
+        pub(crate) const LAYOUTS: &[&[crate::abi::FieldLayout]] = &[$($($name::LAYOUT),+),+];
+
+        /// What abi_stable says of them.
+        #[cfg(feature = "layout-proof")]
+        pub(crate) const PROOFS: &[&[(&str, &abi_stable::type_layout::TypeLayout)]] = &[$($($name::PROOF),+),+];
+
+        $(
+            /// The extensions a plugin offers, as a host sees them.
+            #[cfg(feature = "loader")]
+            #[derive(Clone, Copy)]
+            pub(crate) struct $tables {
+                $(pub(crate) $name: Option<&'static $name::$table>),+
+            }
+
+            #[cfg(feature = "loader")]
+            impl $tables {
+                pub(crate) fn of(
+                    offers: &crate::abi::loader::Offers<'_>,
+                ) -> Result<Self, crate::abi::loader::LoadError> {
+                    Ok(Self { $($name: offers.table()?),+ })
+                }
+            }
+        )+
+    };
+}
+
+extensions! {
+    ModelExtensions {
+        active_region: ActiveRegionTable,
+        centerline: CenterlineTable,
+        details: DetailsTable,
+        linear_field: LinearFieldTable,
+        variant: VariantTable,
+        workspace_bounds: WorkspaceBoundsTable,
+    }
+    DeviceExtensions {
+        calibration: CalibrationTable,
+        energy_ledger: EnergyLedgerTable,
+        pacing: PacingTable,
+    }
+}

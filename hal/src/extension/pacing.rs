@@ -1,0 +1,120 @@
+//! Extension `flotor.pacing/1`: a device that can set the pace: the loop waits for its next sample, not for a clock.
+
+use crate::abi::instance::fill;
+use crate::abi::interface::{Interface, table};
+use crate::abi::layout::layout;
+#[cfg(feature = "loader")]
+use crate::abi::loader;
+use crate::abi::{CallStatus, DevicePlug, Instance};
+use crate::{ActiveDevice, Device};
+
+/// What came of waiting for a sample.
+#[must_use]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SampleWait {
+    /// The device does not set the pace.
+    NotPaced,
+    /// No sample came in time.
+    TimedOut,
+    /// A sample is there to be read.
+    Arrived {
+        /// Samples taken since the last wait that ended so: 1 on time, more if some came and went unseen.
+        samples: u64,
+    },
+}
+
+impl SampleWait {
+    /// Number of samples that crosses the boundary; 0 for a wait in vain.
+    const fn samples(self) -> u64 {
+        match self {
+            Self::NotPaced | Self::TimedOut => 0,
+            Self::Arrived { samples } => samples,
+        }
+    }
+}
+
+/// An active device that can set the pace of the loop.
+pub trait PacingDevice: ActiveDevice {
+    /// Blocks until there is a sample that no earlier wait has told of, or until `timeout_ns` have passed. Asked before
+    /// each `read` of a run that the device paces. Real-time but for the waiting: no allocation.
+    fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait;
+}
+
+/// `flotor.pacing/1`: see [`PacingDevice`].
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct PacingTable {
+    /// Bytes of this table as the plugin knows it.
+    pub size: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
+    /// Blocks until the device has a sample that no earlier wait has told of, or until `timeout_ns` have passed;
+    /// writes the number of samples taken since the last wait that found any, 0 after a wait in vain. Returns a
+    /// [`crate::abi::CallStatus`] code. Real-time but for the waiting: no allocation.
+    pub wait_for_sample:
+        Option<unsafe extern "C" fn(instance: Instance, timeout_ns: u64, samples: *mut u64) -> u32>,
+}
+
+layout! {
+    PacingTable { size, reserved, wait_for_sample }
+}
+table!(PacingTable: "flotor.pacing/1");
+
+unsafe extern "C" fn wait_for_sample<D: Device<Active: PacingDevice>>(
+    instance: Instance,
+    timeout_ns: u64,
+    samples: *mut u64,
+) -> u32 {
+    // SAFETY: the contract of every table call.
+    unsafe {
+        fill::<DevicePlug<D>, _>(instance, samples, |phase| {
+            match phase.active()?.wait_for_sample(timeout_ns) {
+                SampleWait::NotPaced => Err(CallStatus::Unsupported),
+                waited => Ok(waited.samples()),
+            }
+        })
+    }
+}
+
+/// For [`crate::export_device!`].
+#[doc(hidden)]
+#[must_use]
+#[allow(clippy::cast_possible_truncation)] // the size of a table
+pub const fn offer<D: Device<Active: PacingDevice>>() -> Interface<D> {
+    Interface::of(
+        const {
+            &PacingTable {
+                size: size_of::<PacingTable>() as u32,
+                reserved: 0,
+                wait_for_sample: Some(wait_for_sample::<D>),
+            }
+        },
+    )
+}
+
+#[cfg(feature = "loader")]
+impl loader::OpenedDevice {
+    /// Whether the device can set the pace of the loop.
+    #[must_use]
+    pub fn can_pace(&self) -> bool {
+        self.extensions().pacing.is_some_and(|table| table.wait_for_sample.is_some())
+    }
+}
+
+#[cfg(feature = "loader")]
+impl loader::ActiveDevice {
+    /// Waits for the device's next sample, for `timeout_ns` at most. Real-time but for the waiting: no allocation.
+    pub fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
+        let pacing = self.extensions().and_then(|extensions| extensions.pacing);
+        let Some(wait) = pacing.and_then(|table| table.wait_for_sample) else { return SampleWait::NotPaced };
+        let mut samples = 0;
+        // SAFETY: a live, active instance used by this thread only (`&mut`), an out pointer valid for the call.
+        let code = unsafe { wait(self.instance(), timeout_ns, &raw mut samples) };
+        match CallStatus::from_code(code) {
+            CallStatus::Ok if samples > 0 => SampleWait::Arrived { samples },
+            CallStatus::Unsupported => SampleWait::NotPaced,
+            _ => SampleWait::TimedOut,
+        }
+    }
+}

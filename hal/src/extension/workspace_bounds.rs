@@ -1,0 +1,130 @@
+//! Extension `flotor.workspace-bounds/1`: how far a force model means the handle to go.
+//!
+//! A spring ends where its coils touch, a table of measured forces where it was measured. Beyond, the model still answers,
+//! but what it says is not what its subject would do. A host puts a wall there, if its own is farther out.
+
+use crate::abi::instance::fill;
+use crate::abi::interface::{Interface, table};
+use crate::abi::layout::layout;
+#[cfg(feature = "loader")]
+use crate::abi::loader::Model;
+use crate::abi::{Instance, ModelPlug};
+use crate::{DVec3, ForceModel};
+
+/// The positions of the handle, in the model frame, that a model is made for: a box along its axes. 48 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct WorkspaceBounds {
+    lower_m: [f64; 3],
+    upper_m: [f64; 3],
+}
+
+impl WorkspaceBounds {
+    /// No end on any axis.
+    pub const UNBOUNDED: Self = Self { lower_m: [f64::NEG_INFINITY; 3], upper_m: [f64::INFINITY; 3] };
+
+    /// From `lower_m` to `upper_m`; infinite where there is no end.
+    #[must_use]
+    pub const fn between(lower_m: [f64; 3], upper_m: [f64; 3]) -> Self {
+        Self { lower_m, upper_m }
+    }
+
+    /// True if there is an end anywhere. A box with home outside, or with a limit that is no number, bounds nothing: a
+    /// wall there would throw the handle out of where a run begins.
+    #[must_use]
+    pub fn is_bounded(&self) -> bool {
+        let (lower, upper) = (DVec3::from_array(self.lower_m), DVec3::from_array(self.upper_m));
+        let holds_home = lower.cmple(DVec3::ZERO).all() && upper.cmpge(DVec3::ZERO).all(); // false for NaN
+        holds_home && *self != Self::UNBOUNDED
+    }
+
+    /// The way from its nearest point to a position, m; zero inside. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn beyond(&self, position_m: DVec3) -> DVec3 {
+        position_m - position_m.clamp(DVec3::from_array(self.lower_m), DVec3::from_array(self.upper_m))
+    }
+}
+
+/// A force model with an end.
+pub trait WorkspaceBoundsModel: ForceModel {
+    /// Where it ends, with the parameters now in force. Real-time: bounded, no allocation (asked again after each live
+    /// parameter).
+    fn workspace_bounds(&self) -> WorkspaceBounds;
+}
+
+/// `flotor.workspace-bounds/1`: see [`WorkspaceBoundsModel`]. Real-time.
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct WorkspaceBoundsTable {
+    /// Bytes of this table as the plugin knows it.
+    pub size: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
+    /// Where the instance ends, with the parameters now in force; a [`crate::abi::CallStatus`] code.
+    pub bounds: Option<unsafe extern "C" fn(instance: Instance, out: *mut WorkspaceBounds) -> u32>,
+}
+
+layout! {
+    WorkspaceBounds { lower_m, upper_m }
+    WorkspaceBoundsTable { size, reserved, bounds }
+}
+table!(WorkspaceBoundsTable: "flotor.workspace-bounds/1");
+
+unsafe extern "C" fn bounds<M: WorkspaceBoundsModel>(instance: Instance, out: *mut WorkspaceBounds) -> u32 {
+    // SAFETY: the contract of every table call.
+    unsafe { fill::<ModelPlug<M>, _>(instance, out, |model| Ok(model.workspace_bounds())) }
+}
+
+/// For [`crate::export_model!`].
+#[doc(hidden)]
+#[must_use]
+#[allow(clippy::cast_possible_truncation)] // the size of a table
+pub const fn offer<M: WorkspaceBoundsModel>() -> Interface<M> {
+    Interface::of(
+        const {
+            &WorkspaceBoundsTable {
+                size: size_of::<WorkspaceBoundsTable>() as u32,
+                reserved: 0,
+                bounds: Some(bounds::<M>),
+            }
+        },
+    )
+}
+
+#[cfg(feature = "loader")]
+impl Model {
+    /// Where the instance ends, with the parameters now in force: nowhere, unless it says otherwise. Real-time: bounded,
+    /// no allocation.
+    #[must_use]
+    pub fn workspace_bounds(&mut self) -> WorkspaceBounds {
+        let ask = self.extensions.workspace_bounds.and_then(|table| table.bounds);
+        self.asked(ask, WorkspaceBounds::UNBOUNDED).unwrap_or(WorkspaceBounds::UNBOUNDED)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const INFINITY: f64 = f64::INFINITY;
+
+    #[test]
+    fn beyond_is_the_shortest_way_back() {
+        let bounds = WorkspaceBounds::between([-INFINITY, -1.0, -0.5], [INFINITY, 1.0, INFINITY]);
+        assert!(bounds.is_bounded());
+        assert_eq!(bounds.beyond(DVec3::new(9.0, 1.0, -0.5)), DVec3::ZERO);
+        assert_eq!(bounds.beyond(DVec3::new(9.0, 3.0, -1.0)), DVec3::new(0.0, 2.0, -0.5));
+    }
+
+    #[test]
+    fn what_makes_no_sense_bounds_nothing() {
+        let above_home = WorkspaceBounds::between([-1.0, -1.0, 0.1], [1.0; 3]);
+        let nowhere = WorkspaceBounds::between([f64::NAN; 3], [1.0; 3]);
+        for bounds in [WorkspaceBounds::UNBOUNDED, above_home, nowhere] {
+            assert!(!bounds.is_bounded(), "{bounds:?}");
+        }
+    }
+}
