@@ -40,7 +40,7 @@ impl<L: Law> ForceModel for Lawful<L> {
 /// A fraction of a short run: every kind of pose, some of each.
 fn stress<L: Law>() -> StressReport {
     let plugin = Plugin::in_process(Box::leak(Box::new(model_entry::<Lawful<L>>()))).unwrap();
-    let part = if L::MEMORY == Memory::Stateless { 1_000 } else { 100_000 };
+    let part = 10 * super::part(Size::Short, L::MEMORY);
     let options = StressOptions::default();
     measure_all(&Setup { plugin: &plugin, settings: &[], options, part, progress: &() }).unwrap()
 }
