@@ -228,9 +228,7 @@ fn the_loader_refuses_every_wrong_file_in_one_line() {
 fn a_proof_by_another_abi_stable_is_no_proof_and_no_refusal() {
     let scratch = Scratch::default();
     let header = |minor: u32| {
-        let mut bytes = b"abi stable library for Rust".to_vec();
-        bytes.resize(32, 0);
-        [bytes.as_slice(), &0_u32.to_ne_bytes(), &minor.to_ne_bytes()].concat()
+        [&b"abi stable library for Rust     "[..], &0_u32.to_ne_bytes(), &minor.to_ne_bytes()].concat()
     };
     let file = scratch.file("other_proof.so", patched(plugin_bytes(MODEL), &header(11), &header(12)));
     let (ours, other) = (load_file(&plugin_file(MODEL)).unwrap(), load_file(&file).unwrap());

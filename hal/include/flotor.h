@@ -222,7 +222,7 @@ typedef uint32_t FlotorFault;
 // One row of the layout table: a field, or a struct as a whole.
 typedef struct FlotorFieldLayout {
     // `Struct.field`, or `Struct` for the whole of it; filled up with zeros.
-    uint8_t name[FlotorNAME_BYTES];
+    uint8_t name[48];
     // Where the field begins in its struct, bytes; 0 for a struct.
     uint32_t offset;
     // Its size, bytes.
@@ -263,14 +263,6 @@ typedef struct FlotorLayoutProof {
 } FlotorLayoutProof;
 
 // The exported static `flotor_entry_<crate>`: plain data, readable before any plugin code runs.
-//
-// Its fields are private: in Rust only [`super::model_entry`] and [`super::device_entry`] make one, so that each that a safe
-// program can have keeps the contract.
-//
-// ```compile_fail,E0451
-// use flotor_hal::abi::{Entry, MAGIC};
-// let forged = Entry { magic: MAGIC, kind: 1, ..unreachable!() };
-// ```
 typedef struct FlotorEntry {
     // [`MAGIC`].
     uint8_t magic[8];

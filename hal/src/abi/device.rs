@@ -2,7 +2,7 @@
 
 use super::entry::{CallStatus, Entry, Instance, PluginKind};
 use super::instance::{self, Plugged, call, fill, from_any_thread, refusable};
-use super::interface::{Extensions, Interface, find, table};
+use super::interface::{Extensions, find, table};
 use super::layout::layout;
 use super::{Message, Str};
 use crate::{
@@ -67,8 +67,6 @@ layout! {
         safe_stop, set_parameter, parameter, last_message,
     }
 }
-table!(DeviceTable: "flotor.device/1");
-
 /// A device as the tables see it.
 pub(crate) struct DevicePlug<D>(PhantomData<D>);
 
@@ -202,33 +200,25 @@ unsafe extern "C" fn parameter<D: Device>(instance: Instance, index: u32) -> f64
     unsafe { instance::parameter::<DevicePlug<D>>(instance, ask) }
 }
 
-#[allow(clippy::cast_possible_truncation)] // table sizes and parameter counts are small
-const fn table<D: Device>() -> Interface<D> {
-    Interface::of(
-        const {
-            &DeviceTable {
-                size: size_of::<DeviceTable>() as u32,
-                parameter_count: D::PARAMETERS.len() as u32,
-                parameters: D::PARAMETERS.as_ptr(),
-                info: D::INFO,
-                open: Some(instance::create::<DevicePlug<D>>),
-                close: Some(instance::destroy::<DevicePlug<D>>),
-                capabilities: Some(capabilities::<D>),
-                activate: Some(activate::<D>),
-                deactivate: Some(deactivate::<D>),
-                read: Some(read::<D>),
-                write: Some(write::<D>),
-                safe_stop: Some(safe_stop::<D>),
-                set_parameter: Some(set_parameter::<D>),
-                parameter: Some(parameter::<D>),
-                last_message: Some(instance::last_message::<DevicePlug<D>>),
-            }
-        },
-    )
-}
+table!(DeviceTable: "flotor.device/1", D: [Device] {
+    parameter_count: D::PARAMETERS.len() as u32,
+    parameters: D::PARAMETERS.as_ptr(),
+    info: D::INFO,
+    open: Some(instance::create::<DevicePlug<D>>),
+    close: Some(instance::destroy::<DevicePlug<D>>),
+    capabilities: Some(capabilities::<D>),
+    activate: Some(activate::<D>),
+    deactivate: Some(deactivate::<D>),
+    read: Some(read::<D>),
+    write: Some(write::<D>),
+    safe_stop: Some(safe_stop::<D>),
+    set_parameter: Some(set_parameter::<D>),
+    parameter: Some(parameter::<D>),
+    last_message: Some(instance::last_message::<DevicePlug<D>>),
+});
 
 unsafe extern "C" fn get_interface<D: Device, E: Extensions<D>>(id: Str) -> *const c_void {
-    find::<D, E>(&const { table::<D>() }, id)
+    find::<D, E>(&offer::<D>(), id)
 }
 
 /// The entry of a device plugin without extensions.

@@ -15,9 +15,18 @@ pub(crate) unsafe trait Table: Sized + 'static {
     const ID: &'static str;
 }
 
-/// Says that a struct is the table behind an id, and that it starts with its size.
+/// Says that a struct is the table behind an id, and makes the one of a plugin type that has what it takes: `offer`, for the
+/// export macros.
 macro_rules! table {
-    ($table:ident: $id:literal) => {
+    ($table:ident: $id:literal, $plugin:ident: [$($bound:tt)+] { $($fields:tt)+ }) => {
+        #[doc(hidden)]
+        #[must_use]
+        #[allow(unreachable_pub, clippy::cast_possible_truncation)] // main interfaces stay here; sizes are small
+        pub const fn offer<$plugin: $($bound)+>() -> $crate::abi::Interface<$plugin> {
+            let table = const { &$table { size: size_of::<$table>() as u32, $($fields)+ } };
+            $crate::abi::Interface::of(table)
+        }
+
         const _: () = assert!(std::mem::offset_of!($table, size) == 0);
 
         // SAFETY: a `repr(C)` struct that starts with its size (see above), and for the rest numbers, pointers, texts

@@ -15,7 +15,7 @@ const NAME_BYTES: usize = 48;
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct FieldLayout {
     /// `Struct.field`, or `Struct` for the whole of it; filled up with zeros.
-    pub(crate) name: [u8; NAME_BYTES],
+    pub(crate) name: [u8; 48],
     /// Where the field begins in its struct, bytes; 0 for a struct.
     pub offset: u32,
     /// Its size, bytes.
@@ -77,17 +77,17 @@ macro_rules! layout {
 }
 pub(crate) use layout;
 
-/// What every plugin must know; data first, so that a report names the struct and not a table that uses it.
-const CORE: &[&[FieldLayout]] = &[
-    super::text::LAYOUT,
-    frame::LAYOUT,
-    parameter::LAYOUT,
-    model::LAYOUT,
-    device::LAYOUT,
-    super::entry::LAYOUT,
-    super::model::LAYOUT,
-    super::device::LAYOUT,
-];
+macro_rules! core {
+    ($($($part:ident)::+),+ $(,)?) => {
+        /// What every plugin must know; data first, so that a report names the struct and not a table that uses it.
+        const CORE: &[&[FieldLayout]] = &[$($($part)::+::LAYOUT),+];
+
+        /// What abi_stable says of it.
+        #[cfg(feature = "layout-proof")]
+        const CORE_PROOF: &[&[(&str, &abi_stable::type_layout::TypeLayout)]] = &[$($($part)::+::PROOF),+];
+    };
+}
+core!(super::text, frame, parameter, model, device, super::entry, super::model, super::device);
 
 /// Number of rows every plugin must have.
 #[cfg(feature = "loader")]
@@ -126,25 +126,15 @@ pub static LAYOUTS: [FieldLayout; COUNT] = {
 /// The second proof.
 #[cfg(feature = "layout-proof")]
 pub(crate) mod proof {
-    use crate::abi::{LayoutProof, Str, device, entry, model, text};
-    use crate::{device as device_data, extension, frame, model as model_data, parameter};
+    use crate::abi::{LayoutProof, Str};
+    use crate::extension;
     use abi_stable::library::AbiHeader;
     use abi_stable::type_layout::TypeLayout;
     use std::ffi::c_void;
 
     /// Every type of the contract, by name.
     pub(crate) fn types() -> impl Iterator<Item = &'static (&'static str, &'static TypeLayout)> {
-        let core: [&[_]; 8] = [
-            text::PROOF,
-            frame::PROOF,
-            parameter::PROOF,
-            model_data::PROOF,
-            device_data::PROOF,
-            entry::PROOF,
-            model::PROOF,
-            device::PROOF,
-        ];
-        core.into_iter().chain(extension::PROOFS.iter().copied()).flatten()
+        super::CORE_PROOF.iter().chain(extension::PROOFS).copied().flatten()
     }
 
     unsafe extern "C" fn layout_of(name: Str) -> *const c_void {

@@ -2,7 +2,7 @@
 
 use super::entry::{CallStatus, Entry, Instance, PluginKind};
 use super::instance::{self, Plugged, call, fill, refusable};
-use super::interface::{Extensions, Interface, find, table};
+use super::interface::{Extensions, find, table};
 use super::layout::layout;
 use super::{Message, Str};
 use crate::{ForceModel, Input, LoopConfig, ModelInfo, Output, Parameter, ParameterValue, Refusal, Settings};
@@ -66,8 +66,6 @@ layout! {
         reset, last_message,
     }
 }
-table!(ForceTable: "flotor.force/1");
-
 /// A model as the tables see it.
 pub(crate) struct ModelPlug<M>(PhantomData<M>);
 
@@ -144,31 +142,23 @@ unsafe extern "C" fn reset<M: ForceModel>(instance: Instance) -> u32 {
     }
 }
 
-#[allow(clippy::cast_possible_truncation)] // table sizes and parameter counts are small
-const fn table<M: ForceModel>() -> Interface<M> {
-    Interface::of(
-        const {
-            &ForceTable {
-                size: size_of::<ForceTable>() as u32,
-                parameter_count: M::PARAMETERS.len() as u32,
-                parameters: M::PARAMETERS.as_ptr(),
-                info: M::INFO,
-                create: Some(instance::create::<ModelPlug<M>>),
-                destroy: Some(instance::destroy::<ModelPlug<M>>),
-                prepare: Some(prepare::<M>),
-                step: Some(step::<M>),
-                step_batch: Some(step_batch::<M>),
-                set_parameter: Some(set_parameter::<M>),
-                parameter: Some(parameter::<M>),
-                reset: Some(reset::<M>),
-                last_message: Some(instance::last_message::<ModelPlug<M>>),
-            }
-        },
-    )
-}
+table!(ForceTable: "flotor.force/1", M: [ForceModel] {
+    parameter_count: M::PARAMETERS.len() as u32,
+    parameters: M::PARAMETERS.as_ptr(),
+    info: M::INFO,
+    create: Some(instance::create::<ModelPlug<M>>),
+    destroy: Some(instance::destroy::<ModelPlug<M>>),
+    prepare: Some(prepare::<M>),
+    step: Some(step::<M>),
+    step_batch: Some(step_batch::<M>),
+    set_parameter: Some(set_parameter::<M>),
+    parameter: Some(parameter::<M>),
+    reset: Some(reset::<M>),
+    last_message: Some(instance::last_message::<ModelPlug<M>>),
+});
 
 unsafe extern "C" fn get_interface<M: ForceModel, E: Extensions<M>>(id: Str) -> *const c_void {
-    find::<M, E>(&const { table::<M>() }, id)
+    find::<M, E>(&offer::<M>(), id)
 }
 
 /// The entry of a model plugin without extensions. In Rust this and [`super::device_entry`] are the only ways to one, so that each

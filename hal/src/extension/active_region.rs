@@ -1,7 +1,7 @@
 //! Extension `flotor.active-region/1`: where a force model can act, by which a host may leave it asleep elsewhere.
 
 use crate::abi::instance::fill;
-use crate::abi::interface::{Interface, table};
+use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader::Model;
@@ -114,28 +114,15 @@ layout! {
     ActiveRegion { shape, reserved, center_m, half_sides_m }
     ActiveRegionTable { size, reserved, region }
 }
-table!(ActiveRegionTable: "flotor.active-region/1");
-
 unsafe extern "C" fn region<M: ActiveRegionModel>(instance: Instance, out: *mut ActiveRegion) -> u32 {
     // SAFETY: the contract of every table call.
     unsafe { fill::<ModelPlug<M>, _>(instance, out, |model| Ok(model.active_region())) }
 }
 
-/// For [`crate::export_model!`].
-#[doc(hidden)]
-#[must_use]
-#[allow(clippy::cast_possible_truncation)] // the size of a table
-pub const fn offer<M: ActiveRegionModel>() -> Interface<M> {
-    Interface::of(
-        const {
-            &ActiveRegionTable {
-                size: size_of::<ActiveRegionTable>() as u32,
-                reserved: 0,
-                region: Some(region::<M>),
-            }
-        },
-    )
-}
+table!(ActiveRegionTable: "flotor.active-region/1", M: [ActiveRegionModel] {
+    reserved: 0,
+    region: Some(region::<M>),
+});
 
 #[cfg(feature = "loader")]
 impl Model {

@@ -5,7 +5,7 @@
 //! on the sum (Varadharajan 2007, section 3.4, corrected only the part of the spring).
 
 use crate::abi::instance::{fill, refusable};
-use crate::abi::interface::{Interface, table};
+use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader::{OpenedDevice, refusal_from};
@@ -179,8 +179,6 @@ layout! {
     VerticalCalibration { range_m, coefficients }
     CalibrationTable { size, reserved, serial, calibrate_vertical }
 }
-table!(CalibrationTable: "flotor.calibration/1");
-
 unsafe extern "C" fn serial<D: CalibrationDevice>(instance: Instance, serial: *mut Message) -> u32 {
     // SAFETY: the contract of every table call.
     unsafe {
@@ -206,22 +204,11 @@ unsafe extern "C" fn calibrate_vertical<D: CalibrationDevice>(
     }
 }
 
-/// For [`crate::export_device!`].
-#[doc(hidden)]
-#[must_use]
-#[allow(clippy::cast_possible_truncation)] // the size of a table
-pub const fn offer<D: CalibrationDevice>() -> Interface<D> {
-    Interface::of(
-        const {
-            &CalibrationTable {
-                size: size_of::<CalibrationTable>() as u32,
-                reserved: 0,
-                serial: Some(serial::<D>),
-                calibrate_vertical: Some(calibrate_vertical::<D>),
-            }
-        },
-    )
-}
+table!(CalibrationTable: "flotor.calibration/1", D: [CalibrationDevice] {
+    reserved: 0,
+    serial: Some(serial::<D>),
+    calibrate_vertical: Some(calibrate_vertical::<D>),
+});
 
 #[cfg(feature = "loader")]
 impl OpenedDevice {

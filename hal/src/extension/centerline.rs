@@ -4,7 +4,7 @@
 //! the servo never calls this. A curve with a frame along it draws a rod, a rope or (with turns) a coil spring.
 
 use crate::abi::instance::{call, fill};
-use crate::abi::interface::{Interface, table};
+use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader::Model;
@@ -81,8 +81,6 @@ layout! {
     CenterlineInfo { tube_radius_m, helix_radius_m, helix_turns, plate_radius_m, suggested_points, reserved }
     CenterlineTable { size, reserved, info, centerline }
 }
-table!(CenterlineTable: "flotor.centerline/1");
-
 unsafe extern "C" fn info<M: CenterlineModel>(instance: Instance, out: *mut CenterlineInfo) -> u32 {
     // SAFETY: the contract of every table call.
     unsafe { fill::<ModelPlug<M>, _>(instance, out, |model| Ok(model.centerline_info())) }
@@ -109,22 +107,11 @@ unsafe extern "C" fn centerline<M: CenterlineModel>(
     }
 }
 
-/// For [`crate::export_model!`].
-#[doc(hidden)]
-#[must_use]
-#[allow(clippy::cast_possible_truncation)] // the size of a table
-pub const fn offer<M: CenterlineModel>() -> Interface<M> {
-    Interface::of(
-        const {
-            &CenterlineTable {
-                size: size_of::<CenterlineTable>() as u32,
-                reserved: 0,
-                info: Some(info::<M>),
-                centerline: Some(centerline::<M>),
-            }
-        },
-    )
-}
+table!(CenterlineTable: "flotor.centerline/1", M: [CenterlineModel] {
+    reserved: 0,
+    info: Some(info::<M>),
+    centerline: Some(centerline::<M>),
+});
 
 /// Access to the centreline of a model. Not real-time.
 #[cfg(feature = "loader")]

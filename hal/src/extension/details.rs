@@ -5,7 +5,7 @@
 //! servo never asks.
 
 use crate::abi::instance::call;
-use crate::abi::interface::{Interface, table};
+use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader::Model;
@@ -97,8 +97,6 @@ layout! {
     Detail { id, unit, doc, words }
     DetailsTable { size, detail_count, details, values }
 }
-table!(DetailsTable: "flotor.details/1");
-
 unsafe extern "C" fn values<M: DetailsModel>(instance: Instance, values: *mut f64, capacity: u32) -> u32 {
     if (capacity as usize) < M::DETAILS.len() {
         return CallStatus::OutOfRange as u32;
@@ -115,22 +113,11 @@ unsafe extern "C" fn values<M: DetailsModel>(instance: Instance, values: *mut f6
     }
 }
 
-/// For [`crate::export_model!`].
-#[doc(hidden)]
-#[must_use]
-#[allow(clippy::cast_possible_truncation)] // the size of a table, a few details
-pub const fn offer<M: DetailsModel>() -> Interface<M> {
-    Interface::of(
-        const {
-            &DetailsTable {
-                size: size_of::<DetailsTable>() as u32,
-                detail_count: M::DETAILS.len() as u32,
-                details: M::DETAILS.as_ptr(),
-                values: Some(values::<M>),
-            }
-        },
-    )
-}
+table!(DetailsTable: "flotor.details/1", M: [DetailsModel] {
+    detail_count: M::DETAILS.len() as u32,
+    details: M::DETAILS.as_ptr(),
+    values: Some(values::<M>),
+});
 
 #[cfg(feature = "loader")]
 impl Model {

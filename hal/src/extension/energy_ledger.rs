@@ -1,7 +1,7 @@
 //! Extension `flotor.energy-ledger/1`: the account of the mechanical energy of a device with a known plant.
 
 use crate::abi::instance::fill;
-use crate::abi::interface::{Interface, table};
+use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader;
@@ -64,8 +64,6 @@ layout! {
     EnergyLedger { stored_j, initial_j, actuators_j, feedforward_j, hand_j, dissipated_j, peak_j }
     EnergyLedgerTable { size, reserved, ledger }
 }
-table!(EnergyLedgerTable: "flotor.energy-ledger/1");
-
 unsafe extern "C" fn ledger<D: Device<Active: EnergyLedgerDevice>>(
     instance: Instance,
     out: *mut EnergyLedger,
@@ -74,21 +72,10 @@ unsafe extern "C" fn ledger<D: Device<Active: EnergyLedgerDevice>>(
     unsafe { fill::<DevicePlug<D>, _>(instance, out, |phase| Ok(phase.active()?.energy_ledger())) }
 }
 
-/// For [`crate::export_device!`].
-#[doc(hidden)]
-#[must_use]
-#[allow(clippy::cast_possible_truncation)] // the size of a table
-pub const fn offer<D: Device<Active: EnergyLedgerDevice>>() -> Interface<D> {
-    Interface::of(
-        const {
-            &EnergyLedgerTable {
-                size: size_of::<EnergyLedgerTable>() as u32,
-                reserved: 0,
-                ledger: Some(ledger::<D>),
-            }
-        },
-    )
-}
+table!(EnergyLedgerTable: "flotor.energy-ledger/1", D: [Device<Active: EnergyLedgerDevice>] {
+    reserved: 0,
+    ledger: Some(ledger::<D>),
+});
 
 #[cfg(feature = "loader")]
 impl loader::ActiveDevice {

@@ -5,7 +5,7 @@
 //! at the pose the handle has then.
 
 use crate::abi::instance::fill;
-use crate::abi::interface::{Interface, table};
+use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::{CallStatus, loader::Model};
@@ -127,8 +127,6 @@ layout! {
     LinearField { anchor, wrench, stiffness, valid_m, valid_rad, time_ns }
     LinearFieldTable { size, reserved, linear_field }
 }
-table!(LinearFieldTable: "flotor.linear-field/1");
-
 unsafe extern "C" fn linear_field<M: LinearFieldModel>(
     instance: Instance,
     input: *const Input,
@@ -138,21 +136,10 @@ unsafe extern "C" fn linear_field<M: LinearFieldModel>(
     unsafe { fill::<ModelPlug<M>, _>(instance, field, |model| Ok(model.linear_field(&*input))) }
 }
 
-/// For [`crate::export_model!`].
-#[doc(hidden)]
-#[must_use]
-#[allow(clippy::cast_possible_truncation)] // the size of a table
-pub const fn offer<M: LinearFieldModel>() -> Interface<M> {
-    Interface::of(
-        const {
-            &LinearFieldTable {
-                size: size_of::<LinearFieldTable>() as u32,
-                reserved: 0,
-                linear_field: Some(linear_field::<M>),
-            }
-        },
-    )
-}
+table!(LinearFieldTable: "flotor.linear-field/1", M: [LinearFieldModel] {
+    reserved: 0,
+    linear_field: Some(linear_field::<M>),
+});
 
 #[cfg(feature = "loader")]
 impl Model {

@@ -1,7 +1,7 @@
 //! Extension `flotor.pacing/1`: a device that can set the pace: the loop waits for its next sample, not for a clock.
 
 use crate::abi::instance::fill;
-use crate::abi::interface::{Interface, table};
+use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader;
@@ -59,8 +59,6 @@ pub struct PacingTable {
 layout! {
     PacingTable { size, reserved, wait_for_sample }
 }
-table!(PacingTable: "flotor.pacing/1");
-
 unsafe extern "C" fn wait_for_sample<D: Device<Active: PacingDevice>>(
     instance: Instance,
     timeout_ns: u64,
@@ -77,21 +75,10 @@ unsafe extern "C" fn wait_for_sample<D: Device<Active: PacingDevice>>(
     }
 }
 
-/// For [`crate::export_device!`].
-#[doc(hidden)]
-#[must_use]
-#[allow(clippy::cast_possible_truncation)] // the size of a table
-pub const fn offer<D: Device<Active: PacingDevice>>() -> Interface<D> {
-    Interface::of(
-        const {
-            &PacingTable {
-                size: size_of::<PacingTable>() as u32,
-                reserved: 0,
-                wait_for_sample: Some(wait_for_sample::<D>),
-            }
-        },
-    )
-}
+table!(PacingTable: "flotor.pacing/1", D: [Device<Active: PacingDevice>] {
+    reserved: 0,
+    wait_for_sample: Some(wait_for_sample::<D>),
+});
 
 #[cfg(feature = "loader")]
 impl loader::OpenedDevice {

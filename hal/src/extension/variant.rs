@@ -5,7 +5,7 @@
 //! extension speaks for one instance, once it is.
 
 use crate::abi::instance::fill;
-use crate::abi::interface::{Interface, table};
+use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader::Model;
@@ -64,22 +64,15 @@ layout! {
     VariantInfo { serves, memory }
     VariantTable { size, reserved, info }
 }
-table!(VariantTable: "flotor.variant/1");
-
 unsafe extern "C" fn info<M: VariantModel>(instance: Instance, out: *mut VariantInfo) -> u32 {
     // SAFETY: the contract of every table call.
     unsafe { fill::<ModelPlug<M>, _>(instance, out, |model| Ok(model.variant_info())) }
 }
 
-/// For [`crate::export_model!`].
-#[doc(hidden)]
-#[must_use]
-#[allow(clippy::cast_possible_truncation)] // the size of a table
-pub const fn offer<M: VariantModel>() -> Interface<M> {
-    Interface::of(
-        const { &VariantTable { size: size_of::<VariantTable>() as u32, reserved: 0, info: Some(info::<M>) } },
-    )
-}
+table!(VariantTable: "flotor.variant/1", M: [VariantModel] {
+    reserved: 0,
+    info: Some(info::<M>),
+});
 
 #[cfg(feature = "loader")]
 impl Model {

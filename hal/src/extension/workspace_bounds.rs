@@ -4,7 +4,7 @@
 //! but what it says is not what its subject would do. A host puts a wall there, if its own is farther out.
 
 use crate::abi::instance::fill;
-use crate::abi::interface::{Interface, table};
+use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader::Model;
@@ -71,28 +71,15 @@ layout! {
     WorkspaceBounds { lower_m, upper_m }
     WorkspaceBoundsTable { size, reserved, bounds }
 }
-table!(WorkspaceBoundsTable: "flotor.workspace-bounds/1");
-
 unsafe extern "C" fn bounds<M: WorkspaceBoundsModel>(instance: Instance, out: *mut WorkspaceBounds) -> u32 {
     // SAFETY: the contract of every table call.
     unsafe { fill::<ModelPlug<M>, _>(instance, out, |model| Ok(model.workspace_bounds())) }
 }
 
-/// For [`crate::export_model!`].
-#[doc(hidden)]
-#[must_use]
-#[allow(clippy::cast_possible_truncation)] // the size of a table
-pub const fn offer<M: WorkspaceBoundsModel>() -> Interface<M> {
-    Interface::of(
-        const {
-            &WorkspaceBoundsTable {
-                size: size_of::<WorkspaceBoundsTable>() as u32,
-                reserved: 0,
-                bounds: Some(bounds::<M>),
-            }
-        },
-    )
-}
+table!(WorkspaceBoundsTable: "flotor.workspace-bounds/1", M: [WorkspaceBoundsModel] {
+    reserved: 0,
+    bounds: Some(bounds::<M>),
+});
 
 #[cfg(feature = "loader")]
 impl Model {

@@ -61,6 +61,19 @@ def test_a_batch_is_stepped_where_it_lies():
         model.step_batch(np.zeros(3), outputs[:3])
 
 
+def test_an_array_that_is_not_aligned_is_refused():
+    model = flotor.Model("spring")
+    inputs = model.inputs(poses())
+    memory = bytearray(inputs.nbytes + 1)
+    odd = np.frombuffer(memory, flotor.INPUT, offset=1)
+    odd[:] = inputs
+    with pytest.raises(flotor.FlotorError, match="multiple of 8 bytes"):
+        model.step_batch(odd, np.empty(len(odd), flotor.OUTPUT))
+    odd = np.frombuffer(bytearray(len(inputs) * 64 + 1), flotor.OUTPUT, offset=1)
+    with pytest.raises(flotor.FlotorError, match="multiple of 8 bytes"):
+        model.step_batch(inputs, odd)
+
+
 def test_records_have_the_contract_s_size():
     assert flotor.INPUT.itemsize == 136
     assert flotor.OUTPUT.itemsize == 64
