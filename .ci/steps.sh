@@ -57,6 +57,8 @@ every_change() {
     # The README's `cargo test`, and the viewer, whose GPU stack that leaves out. One command: of two, the second builds half of
     # what both use again, with other features.
     step test cargo test --workspace --no-fail-fast
+    # Counts of instructions of the optimised program against their budgets.
+    step budgets cargo test --release -p flotor-tests --test instructions
     step lint cargo clippy --workspace --all-targets -- -D warnings
     step docs env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
     # Workspaces of their own: that they still compile against the host.

@@ -1,0 +1,148 @@
+//! What a tick, a law and a step cost, in instructions: the same on every machine of a kind, busy or not.
+//!
+//! Callgrind (valgrind) counts while `counted_workload` runs, and only within a function. Counts are of optimised programs;
+//! `tests/data/instruction_budgets.toml` has the budgets. To print what is counted now:
+//!
+//! ```text
+//! cargo test --release -p flotor-tests --test instructions -- --nocapture
+//! ```
+
+use flotor_tests::scratch::Scratch;
+use flotor_tests::tools::{self, Tool};
+use std::path::Path;
+use std::process::Command;
+
+/// The function of `counted_workload` that is called for each part.
+const PART: &str = "*::one_counted_part";
+
+/// Instructions within each call of a function while a workload runs, in order; nothing where there is no valgrind, which
+/// has been told then.
+fn counts(workload: &str, function: &str) -> Option<Vec<f64>> {
+    if !tools::required(Tool::Valgrind) {
+        return None;
+    }
+    let scratch = Scratch::default();
+    let file = scratch.path().join("count");
+    let counted = Command::new("valgrind")
+        .args(["--tool=callgrind", "--collect-atstart=no"])
+        .args([format!("--toggle-collect={function}"), format!("--dump-after={function}")])
+        .arg(format!("--callgrind-out-file={}", file.display()))
+        .args([env!("CARGO_BIN_EXE_counted_workload"), workload])
+        .output()
+        .expect("valgrind is installed");
+    let told = String::from_utf8_lossy(&counted.stderr);
+    assert!(counted.status.success(), "{workload} does not run under valgrind: {told}");
+    // Each call leaves a file of counts behind, from count.1 on.
+    let total = |call: usize| {
+        let text = std::fs::read_to_string(file.with_extension(call.to_string())).ok()?;
+        text.lines().find_map(|line| line.strip_prefix("totals: "))?.trim().parse().ok()
+    };
+    Some((1..).map_while(total).collect())
+}
+
+/// Counts of a workload whose parts are these.
+fn parts<const N: usize>(workload: &str) -> Option<[f64; N]> {
+    let counts = counts(workload, PART)?;
+    Some(counts.try_into().unwrap_or_else(|counts: Vec<f64>| panic!("{workload}: {N} parts, not {counts:?}")))
+}
+
+/// Holds a count to its budget, with the margin of the file.
+fn keep_budget(name: &str, counted: f64) {
+    println!("{name} = {counted:.2}");
+    if cfg!(not(target_arch = "x86_64")) {
+        return tools::skipped("budgets are of x86-64");
+    }
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/instruction_budgets.toml");
+    let text = std::fs::read_to_string(file).expect("the budgets are there");
+    let budgets: toml::Table = text.parse().expect("the budgets are TOML");
+    let number = |value: &toml::Value| value.as_float().or(value.as_integer().map(|whole| whole as f64));
+    let of = |key: &str| budgets.get(key).and_then(number).unwrap_or_else(|| panic!("no budget `{key}`"));
+    let most = of(name) * (1.0 + of("margin"));
+    assert!(counted <= most, "{name}: {counted:.2} counted, at most {most:.2}");
+}
+
+#[test]
+#[cfg_attr(debug_assertions, ignore = "of the optimised program: .ci/run counts with --release")]
+fn a_whole_tick_keeps_its_budget() {
+    for (name, workload) in [("tick_scripted", "tick-scripted"), ("tick_simulated", "tick-simulated")] {
+        let Some([_, ticks]) = parts(workload) else { return };
+        keep_budget(name, ticks / 3072.0);
+    }
+}
+
+/// Most a tick may do to take a model in, hand one back or change a parameter, the model's own part of that included: at one
+/// instruction a clock of 2 GHz, the microsecond that is allowed.
+const MOST_FOR_CHANGES: f64 = 2000.0;
+
+#[test]
+#[cfg_attr(debug_assertions, ignore = "of the optimised program: .ci/run counts with --release")]
+fn a_tick_that_replaces_a_model_does_next_to_nothing_for_it() {
+    // Nine replacements and nine changes of a parameter, and what is handed back.
+    let Some(counts) = counts("scene-replacing", "*::Servo::apply_changes") else { return };
+    let worst = counts.iter().copied().fold(0.0, f64::max);
+    println!("{} ticks with something to change or to hand back: {worst} instructions at most", counts.len());
+    assert!(counts.len() >= 20, "each replacement and each change is one: {}", counts.len());
+    assert!(worst <= MOST_FOR_CHANGES, "{worst}");
+}
+
+#[test]
+#[cfg_attr(debug_assertions, ignore = "of the optimised program: .ci/run counts with --release")]
+fn ten_thousand_inactive_objects_cost_a_tick_next_to_nothing() {
+    let per_tick = |workload: &str| parts(workload).map(|[_, short, long]: [f64; 3]| (long - short) / 3072.0);
+    let (Some(alone), Some(among)) = (per_tick("scene-alone"), per_tick("scene-among-inactive")) else {
+        return;
+    };
+    println!("a tick with one active object: {alone:.0} instructions");
+    println!("among 10 000 inactive ones:    {among:.0} instructions, {:.4} times", among / alone);
+    assert!(among <= 1.1 * alone, "{among:.0} against {alone:.0}");
+}
+
+#[test]
+#[cfg_attr(debug_assertions, ignore = "of the optimised program: .ci/run counts with --release")]
+fn laws_cost_their_share_of_the_printed_one() {
+    let Some(counts) = parts::<12>("laws") else { return };
+    let [printed, closed, energy, handing_over, closed_batch, energy_batch] =
+        std::array::from_fn(|law| counts[2 * law + 1] / 1024.0);
+    let laws = [
+        ("law_printed", printed),
+        ("law_closed_form", closed),
+        ("law_energy", energy),
+        ("law_closed_form_batch", closed_batch),
+        ("law_energy_batch", energy_batch),
+    ];
+    laws.into_iter().for_each(|(name, counted)| keep_budget(name, counted));
+    // To look at the length first and find nothing to hand over, with the answer handed on.
+    keep_budget("handing_over_where_there_is_nothing_to", handing_over - energy);
+    assert!(closed <= 0.6 * printed, "closed-form: {:.2} of the printed law", closed / printed);
+    assert!(energy <= 1.5 * printed, "energy: {:.2} of the printed law", energy / printed);
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        // Four lanes an instruction, less what a single step gains by working on two components at once and what it takes
+        // to turn poses over. In time it is more or less of that: the spring's `examples/throughput.rs` measures it.
+        assert!(closed_batch <= closed / 2.5, "closed-form, batch: {:.2} times", closed / closed_batch);
+        assert!(energy_batch <= energy / 2.0, "energy, batch: {:.2} times", energy / energy_batch);
+    }
+}
+
+#[test]
+#[cfg_attr(debug_assertions, ignore = "of the optimised program: .ci/run counts with --release")]
+fn no_tick_of_the_rod_costs_ten_times_the_mean() {
+    let Some(counts) = parts::<400>("rod") else { return };
+    let mean = counts.iter().sum::<f64>() / 400.0;
+    let worst = counts.iter().copied().fold(0.0, f64::max);
+    keep_budget("rod_mean", mean);
+    keep_budget("rod_worst", worst);
+    assert!(worst <= 10.0 * mean, "{worst:.0} against {mean:.0}");
+}
+
+#[test]
+#[cfg_attr(debug_assertions, ignore = "of the optimised program: .ci/run counts with --release")]
+fn a_tick_of_the_flotor_costs_no_more_than_so_many_steps_of_a_rigid_body() {
+    let per_tick = |workload: &str| parts(workload).map(|[_, ticks]: [f64; 2]| ticks / 2000.0);
+    let Some(step) = per_tick("rigid-body") else { return };
+    for (name, workload) in [("flotor_plain", "flotor-plain"), ("flotor_full", "flotor-full")] {
+        let Some(tick) = per_tick(workload) else { return };
+        println!("{workload}: {tick:.0} instructions a tick, a step of a rigid body {step:.0}");
+        keep_budget(name, tick / step);
+    }
+}
