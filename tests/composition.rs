@@ -125,7 +125,6 @@ fn a_cross_fade_mixes_two_laws_by_weights_that_move_steadily() {
     let mut stiff = Oracle::new(&flotor_spring::FLOTOR_ENTRY, &[], [0.0; 3]);
     let mut soft = Oracle::new(&flotor_spring::FLOTOR_ENTRY, &[("gamma_n", "5")], [0.0; 3]);
     for record in watch(&scene).records {
-        #[allow(clippy::cast_precision_loss)] // three seconds
         let part = ((record.time_ns as f64 * 1.0e-9 - 1.0) / 0.5).clamp(0.0, 1.0);
         let expected = stiff.at(&record) * (1.0 - part) + soft.at(&record) * part;
         let off_n = (record.model.force() - expected.force()).length();

@@ -22,7 +22,6 @@ fn last_tick_s(file: &Path) -> (f64, Ending) {
     let mut recording = Recording::open(file).expect("it can be read");
     let last = recording.by_ref().map(|record| record.expect("whole up to its last chunk")).last();
     let ending = recording.ending();
-    #[allow(clippy::cast_precision_loss)] // seconds of a test
     let last_s = last.expect("there are ticks").time_ns as f64 * 1.0e-9;
     (last_s, ending)
 }

@@ -1,7 +1,7 @@
 //! Perception experiments through the program and through the library: what is felt, what survives a kill, what is
 //! refused, and that a person at a keyboard goes the same way as a simulated observer.
 
-#![allow(clippy::unwrap_used, clippy::cast_precision_loss)] // tests may panic; counts
+#![allow(clippy::unwrap_used)] // tests may panic; counts
 
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeSubject};

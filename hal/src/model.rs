@@ -85,7 +85,6 @@ impl Input {
     /// Step length, s. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
-    #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
     pub fn dt_s(&self) -> f64 {
         self.dt_ns as f64 * 1.0e-9
     }

@@ -46,7 +46,6 @@ impl RunPicture {
             figure = figure.panel(energy);
         }
         if self.records.iter().any(|record| record.lateness_ns > 0) {
-            #[allow(clippy::cast_precision_loss)] // for people
             let lateness = self.single(0, "Lateness", "µs", |record| record.lateness_ns as f64 * 1.0e-3);
             figure = panels(timing).into_iter().fold(figure.panel(lateness), Figure::panel);
         }
@@ -94,7 +93,6 @@ impl Observer for RunPicture {
     }
 }
 
-#[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
 fn seconds(record: &TickRecord) -> f64 {
     record.time_ns as f64 * 1.0e-9
 }

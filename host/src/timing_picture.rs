@@ -29,7 +29,6 @@ pub(crate) fn octaves(bins: &[(u64, u64)]) -> Vec<Bin> {
     const STEP: f64 = 1.189_207_115_002_721; // 2^(1/4)
     let mut heights = Vec::new();
     for (ns, count) in bins {
-        #[allow(clippy::cast_precision_loss)] // for a picture
         let us = *ns as f64 * 1.0e-3;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most some two hundred bins
         let index = (4.0 * math::log2((us / FIRST_US).max(1.0))).floor() as usize;
@@ -37,7 +36,6 @@ pub(crate) fn octaves(bins: &[(u64, u64)]) -> Vec<Bin> {
             heights.resize(index + 1, 0.0);
         }
         if let Some(height) = heights.get_mut(index) {
-            #[allow(clippy::cast_precision_loss)] // for a picture
             let count = *count as f64;
             *height += count;
         }

@@ -34,7 +34,6 @@ fn run(scene: &Scene, ticks: &mut Ticks) {
 
 fn median(ticks: &mut Ticks) -> f64 {
     ticks.0.sort_unstable();
-    #[allow(clippy::cast_precision_loss)] // some microseconds
     let median = ticks.0[ticks.0.len() / 2] as f64;
     median
 }

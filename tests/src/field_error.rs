@@ -54,7 +54,7 @@ const LONGEST_DELAY: usize = 40;
 /// # Panics
 /// If the plugins are not built.
 #[must_use]
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)] // a few thousand ticks
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand ticks
 pub fn field_error(rate_hz: f64, swing: Swing, slew_n_per_s: f64, duration_s: f64) -> FieldError {
     let Swing { frequency_hz, amplitude_mm } = swing;
     let run = watch(&format!(
@@ -104,7 +104,6 @@ pub fn field_error(rate_hz: f64, swing: Swing, slew_n_per_s: f64, duration_s: f6
 }
 
 /// The place of a minimum between samples, by the parabola through the squares of three.
-#[allow(clippy::cast_precision_loss)] // a few tens
 fn between(rms_of: &[f64], best: usize) -> f64 {
     let square = |index: usize| rms_of.get(index).map(|rms| rms * rms);
     let neighbours = best.checked_sub(1).and_then(square).zip(square(best)).zip(square(best + 1));

@@ -24,7 +24,6 @@ impl fmt::Display for Cost {
         let percent = 100.0 * processor.as_secs_f64() / elapsed.as_secs_f64().max(f64::MIN_POSITIVE);
         write!(f, "{pictures} pictures in {:.1} s, {percent:.2} % of a core", elapsed.as_secs_f64())?;
         if *pictures > 0 {
-            #[allow(clippy::cast_precision_loss)] // pictures of a few minutes
             let each_ms = processor.as_secs_f64() * 1.0e3 / *pictures as f64;
             write!(f, " ({each_ms:.2} ms a picture)")?;
         }

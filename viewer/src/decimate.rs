@@ -25,7 +25,6 @@ pub fn min_max(points: impl Iterator<Item = Point> + Clone, span_s: [f64; 2], bu
 
 /// Width of a bucket, s: a power of two, so that zooming by less does not move any edge.
 #[must_use]
-#[allow(clippy::cast_precision_loss)] // a few thousand buckets
 pub fn bucket_width_s(span_s: f64, buckets: usize) -> f64 {
     let wanted_s = (span_s / buckets.max(1) as f64).max(f64::MIN_POSITIVE);
     wanted_s.log2().ceil().exp2()

@@ -98,7 +98,6 @@ pub fn svg(history: &History, plots: &PlotStack, look: Look) -> String {
     let palette = Palette::of(look);
     let span_s = plots.span_s(history);
     let (width, each) = (f64::from(WIDTH), f64::from(HEIGHT_OF_ONE));
-    #[allow(clippy::cast_precision_loss)] // a handful of plots
     let height = each * plots.shown.len() as f64 + BOTTOM;
     let hex = |color: egui::Color32| format!("#{:02x}{:02x}{:02x}", color.r(), color.g(), color.b());
     let mut svg = format!(
@@ -201,7 +200,6 @@ impl Frame {
 fn png(history: &History, plots: &PlotStack, look: Look) -> egui::ColorImage {
     let palette = Palette::of(look);
     let span_s = plots.span_s(history);
-    #[allow(clippy::cast_precision_loss)] // a handful of plots
     let height = HEIGHT_OF_ONE * plots.shown.len() as f32;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
     let size = [WIDTH * SCALE, (height + 20.0) * SCALE].map(|length| length as usize);

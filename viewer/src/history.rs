@@ -61,7 +61,7 @@ impl Sample {
 }
 
 impl From<&TickRecord> for Sample {
-    #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)] // for pictures
+    #[allow(clippy::cast_possible_truncation)] // for pictures
     fn from(record: &TickRecord) -> Self {
         let six = |a: [f64; 3], b: [f64; 3]| [a[0], a[1], a[2], b[0], b[1], b[2]].map(|value| value as f32);
         Self {
@@ -249,7 +249,6 @@ impl History {
 }
 
 /// Seconds of nanoseconds.
-#[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
 pub(crate) fn seconds(time_ns: u64) -> f64 {
     time_ns as f64 * 1.0e-9
 }

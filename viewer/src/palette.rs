@@ -132,7 +132,7 @@ const VIRIDIS: [[f64; 3]; 9] = [
 
 /// Colour of a part of the scale of strain, 0 to 1; what lies outside has the colour of the end.
 #[must_use]
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)] // nine colours
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // nine colours
 pub fn strain_color(part: f64) -> Color {
     let last = VIRIDIS.len() - 1;
     let place = part.clamp(0.0, 1.0) * last as f64;

@@ -118,7 +118,6 @@ fn view_of(
     let camera = options.camera.unwrap_or_else(|| Camera::experimenter(SceneBuilder::height_mm(shapes)));
     let scale = ArrowScale::fitting(history.samples());
     let mut builder = SceneBuilder::default();
-    #[allow(clippy::cast_precision_loss)] // pixels
     let height_px = size_px[1] as f64;
     let (mesh, facts) = builder.build(shapes, sample, palette, &camera, height_px, scale, Visible::default());
     let drawn = Rasterizer::default().draw(mesh, &camera, palette.backdrop, size_px, SAMPLES);
@@ -149,11 +148,9 @@ pub fn draw_without_window(
     let mut rasterizer = FlatRasterizer::default();
     let mut primitives = Vec::new();
     for pass in 0..PASSES {
-        #[allow(clippy::cast_precision_loss)] // pixels
         let size = vec2(size_px[0] as f32, size_px[1] as f32) / scale;
         let mut input = RawInput {
             screen_rect: Some(Rect::from_min_size(pos2(0.0, 0.0), size)),
-            #[allow(clippy::cast_precision_loss)] // a few passes
             time: Some(pass as f64),
             ..RawInput::default()
         };

@@ -59,7 +59,6 @@ pub fn open(start: Start, wish: WindowWish) -> Result<Option<Cost>, WindowError>
     let mut remembered = file.as_deref().map(Remembered::load).unwrap_or_default();
     remembered.look = wish.look.unwrap_or(remembered.look);
     remembered.zoom = wish.scale.unwrap_or(remembered.zoom);
-    #[allow(clippy::cast_precision_loss)] // pixels
     let size = wish.size.map_or(remembered.size_pt, |size| size.map(|length| length as f32));
     let viewport = ViewportBuilder::default()
         .with_title("Flotor")

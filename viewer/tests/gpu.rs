@@ -33,9 +33,7 @@ fn adapter() -> Option<RenderState> {
 fn difference(a: &[u8], b: &[u8]) -> (f64, f64) {
     assert_eq!(a.len(), b.len(), "one size");
     let differences = || a.iter().zip(b).map(|(a, b)| f64::from(a.abs_diff(*b)));
-    #[allow(clippy::cast_precision_loss)] // pixels
     let part = |sum: f64| sum / a.len() as f64;
-    #[allow(clippy::cast_precision_loss)] // pixels
     let far = differences().filter(|difference| *difference > 40.0).count() as f64;
     (part(differences().sum()), part(far))
 }

@@ -294,7 +294,6 @@ impl DrivenDevice {
         let before_m = self.state.pose.position();
         let velocity = match self.sampled_ns {
             Some(before_ns) if time_ns > before_ns => {
-                #[allow(clippy::cast_precision_loss)] // at most seconds
                 let dt_s = (time_ns - before_ns) as f64 * 1.0e-9;
                 // A first-order low pass, exact for a difference that is held over the interval.
                 let share = 1.0 - math::exp(-TAU * self.opened.cutoff_hz * dt_s);

@@ -123,7 +123,6 @@ impl Holder {
             if status.mode != Mode::Levitating {
                 return Err(Aborted::Faulted(status.condition.faults()));
             }
-            #[allow(clippy::cast_precision_loss)] // a few thousand
             let progress = f64::from(tick) / ticks as f64;
             let command = self.command(&target(progress), &status);
             seen(progress, &command);

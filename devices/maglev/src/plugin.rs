@@ -118,7 +118,6 @@ impl Device for MaglevDevice {
                     newest: first,
                     weight_n,
                     walls: None,
-                    #[allow(clippy::cast_precision_loss)] // at most 10 ms
                     period_s: config.period_ns as f64 * 1.0e-9,
                     period_us: config.period_ns / 1000,
                     awaited: None,

@@ -136,7 +136,6 @@ impl<S: Reports> ActiveDevice for OpenPuck<S> {
             0 => Wish::Follow(self.deflection),
             _ => Wish::Home,
         };
-        #[allow(clippy::cast_precision_loss)] // at most seconds
         let dt_s = (tick.dt_ns as f64 * 1.0e-9).min(LONGEST_TIME_S);
         let twist = self.motion.advance(&wish, &self.opened.values.gains(), dt_s);
         *state = DeviceState {

@@ -85,7 +85,6 @@ pub fn fit(readings: &[Reading]) -> Result<Fit, CalibrationError> {
 
     let shares: Vec<f64> = solution.x.iter().take(degree + 1).copied().collect();
     let calibration = VerticalCalibration::new(scale.range_m(), &scale.powers_of_height(&shares))?;
-    #[allow(clippy::cast_precision_loss)] // some hundred readings
     let freedom = readings.len().saturating_sub(solution.x.len()).max(1) as f64;
     let residual_n = (solution.residual_squares / freedom).sqrt();
     let weight_n = solution.x.last().copied().unwrap_or(f64::NAN);
@@ -159,7 +158,6 @@ fn legendre(u: f64, degree: usize) -> Vec<f64> {
     let mut values = vec![1.0, u];
     for k in 1..degree.max(1) {
         let [before, now] = [k - 1, k].map(|index| values.get(index).copied().unwrap_or(0.0));
-        #[allow(clippy::cast_precision_loss)] // a handful
         let k = k as f64;
         values.push(((2.0 * k + 1.0) * u * now - k * before) / (k + 1.0));
     }
@@ -198,7 +196,6 @@ fn cross_validate(readings: &[Reading], stops: &[u64], scale: &Scale, degree: us
         squares.push(mean(errors.map(|error| error * error)));
     }
     let square = mean(squares.iter().copied());
-    #[allow(clippy::cast_precision_loss)] // some ten heights
     let count = squares.len() as f64;
     let spread = (mean(squares.iter().map(|value| math::powi(value - square, 2))) / (count - 1.0)).sqrt();
     let error_n = square.sqrt();

@@ -78,7 +78,6 @@ fn residuals(readings: &[Reading], fit: &Fit) -> Panel {
 }
 
 /// Each group with how far to the side it is drawn, mm, all of them about the height.
-#[allow(clippy::cast_precision_loss)] // a few forces
 fn side_by_side<T>(groups: Vec<T>) -> impl Iterator<Item = (f64, T)> {
     let middle = 0.5 * groups.len().saturating_sub(1) as f64;
     groups.into_iter().enumerate().map(move |(index, group)| ((index as f64 - middle) * APART_MM, group))

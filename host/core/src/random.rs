@@ -28,7 +28,6 @@ impl Random {
     }
 
     /// Uniform in 0..1.
-    #[allow(clippy::cast_precision_loss)] // 53 bits fit
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / 9_007_199_254_740_992.0
     }

@@ -74,7 +74,6 @@ fn run() -> RunDescription {
 
 /// A tick with a number of its own in every field; `dt_ns` after the one before.
 fn tick(index: u64, dt_ns: u64) -> TickRecord {
-    #[allow(clippy::cast_precision_loss)] // small
     let mut words: [u64; RECORD_WORDS] = std::array::from_fn(|i| (index as f64 + i as f64 / 64.0).to_bits());
     [words[0], words[1], words[2]] = [index, index * dt_ns, dt_ns];
     let [.., flags, lateness_ns, compute_ns] = &mut words;

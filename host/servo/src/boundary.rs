@@ -69,7 +69,6 @@ const STABILITY_MARGIN: f64 = 0.5;
 
 /// How stiff a wall of this damping may be in a loop of this period. One without a damper is what its scene says: only the
 /// device's own damping can hold it. Not real-time.
-#[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
 pub(super) fn stable_stiffness(damping: f64, period_ns: u64) -> f64 {
     let half_a_period_s = 0.5 * period_ns as f64 * 1.0e-9;
     if damping > 0.0 { STABILITY_MARGIN * damping / half_a_period_s } else { f64::INFINITY }

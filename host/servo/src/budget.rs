@@ -50,7 +50,6 @@ impl TimeBudget {
 
     /// Whether the model is to be asked at a time of the run. Real-time: bounded, no allocation.
     #[inline]
-    #[allow(clippy::cast_precision_loss)] // of a fade, 2^53 ns are 104 days
     pub(super) fn allowed(&self, now_ns: u64) -> Allowed {
         let Some((_, since_ns)) = self.out_at else { return Allowed::Asked };
         let elapsed_ns = now_ns.saturating_sub(since_ns);

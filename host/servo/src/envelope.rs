@@ -34,7 +34,6 @@ pub struct Envelope {
 impl Envelope {
     /// Combines what the scene allows with what the device declares; the tighter wins. Not real-time.
     #[must_use]
-    #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
     pub fn new(limits: &Limits, boundary: &Boundary, device: &Capabilities, period_ns: u64) -> Self {
         // A limit without end is the largest number: what is within a limit is finite.
         let tighter = |scene: [f64; 3], device: [f64; 3]| {
@@ -162,7 +161,6 @@ impl Envelope {
 
     /// Moves force and torque from those of the last tick no farther than the slew limit allows. A tick after missed ones
     /// may change them no more than one on time: the hand felt nothing in between.
-    #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
     #[inline]
     fn limit_slew(&self, wrench: Wrench, tick: &Tick, events: &mut Events) -> Wrench {
         let dt_ns = if tick.dt_ns == 0 { self.period_ns } else { tick.dt_ns.min(self.period_ns) };

@@ -200,7 +200,6 @@ fn elapsed(since_ns: u64, now_ns: u64) -> u64 {
 }
 
 /// From 0 to 1 over `length_ns`, with zero slope at both ends.
-#[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
 fn fade(elapsed_ns: u64, length_ns: u64) -> f64 {
     if elapsed_ns >= length_ns {
         return 1.0;

@@ -277,7 +277,6 @@ impl RunSummary {
         let _ = Stage::Read; // the array above is in the order of `Stage`
         let events = Events::NAMES.iter().copied().zip(tally.event_ticks());
         let ledgers = || outcome.devices.iter().filter_map(|device| device.ledger);
-        #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
         let elapsed_s = outcome.elapsed_ns as f64 * 1.0e-9;
         Self {
             title: facts.title.to_owned(),
@@ -431,7 +430,6 @@ fn coupling_summary(
 ) -> CouplingSummary {
     let each = |number: fn(&Account) -> f64| outcome.accounts.each_ref().map(number);
     let carried = carried.iter().find(|(name, _)| *name == coupling.name).map(|(_, carried)| *carried);
-    #[allow(clippy::cast_precision_loss)] // for people
     let link = |hearing: Hearing| LinkSummary {
         heard_ticks: hearing.ticks,
         silences: hearing.silences,
@@ -449,7 +447,6 @@ fn coupling_summary(
 
 /// What has happened to a model; "ok" if nothing.
 fn health_words(health: &ModelHealth, words: &str) -> String {
-    #[allow(clippy::cast_precision_loss)] // for people
     let us = |ns: u64| ns as f64 * 1.0e-3;
     if let Some(tick) = health.panicked_at {
         return format!("panicked at tick {tick}, no force since: {words}");
@@ -506,7 +503,6 @@ fn percentiles(p: &Percentiles) -> String {
     format!("p50 {p50}   p99 {p99}   p99.9 {p999}   max {max}")
 }
 
-#[allow(clippy::cast_precision_loss)] // for people
 fn duration(ns: u64) -> String {
     match ns {
         0..1_000 => format!("{ns} ns"),

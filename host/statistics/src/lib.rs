@@ -78,7 +78,6 @@ fn check(what: &'static str, values: &[f64], needed: usize) -> Result<(), Statis
 }
 
 /// A count as a number; counts here are far below 2^53.
-#[allow(clippy::cast_precision_loss)]
 fn count(n: usize) -> f64 {
     n as f64
 }

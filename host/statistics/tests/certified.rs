@@ -2,7 +2,6 @@
 //! computed with five hundred digits.
 
 #![allow(clippy::unwrap_used, clippy::cast_possible_truncation, clippy::cast_sign_loss)] // tests may panic
-#![allow(clippy::cast_precision_loss)] // counts
 
 use flotor_statistics::anova::{BetweenFactor, Design, SumOfSquares, analyse};
 use flotor_statistics::regression::line;

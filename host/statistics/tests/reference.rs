@@ -3,7 +3,6 @@
 //! `tests/data/reference.R` made the numbers and says where the data come from.
 
 #![allow(clippy::unwrap_used, clippy::cast_possible_truncation, clippy::cast_sign_loss)] // tests may panic
-#![allow(clippy::cast_precision_loss)] // counts
 
 use flotor_statistics::anova::{BetweenFactor, Design, Effect, SumOfSquares, WithinFactor, analyse};
 use flotor_statistics::distribution::{

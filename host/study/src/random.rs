@@ -43,9 +43,7 @@ impl Stream {
     /// Evenly distributed over 0 (included) to 1 (excluded).
     pub(crate) fn uniform(&mut self) -> f64 {
         /// 2^-53: the 53 highest bits fill the mantissa.
-        #[allow(clippy::cast_precision_loss)] // a power of two
         const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
-        #[allow(clippy::cast_precision_loss)] // 53 bits
         let bits = (self.generator.next_u64() >> 11) as f64;
         bits * STEP
     }
@@ -65,7 +63,7 @@ impl Stream {
 
     /// Evenly one of `0..n`; 0 for `n` = 0.
     pub(crate) fn below(&mut self, n: usize) -> usize {
-        #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         // n is the length of a list of trials
         let index = (self.uniform() * n as f64) as usize;
         index.min(n.saturating_sub(1))

@@ -2,7 +2,6 @@
 //! err as it is known to?
 
 #![allow(clippy::unwrap_used, clippy::cast_possible_truncation, clippy::cast_sign_loss)] // tests may panic
-#![allow(clippy::cast_precision_loss)] // counts
 
 use flotor_study::analysis::{AnalysisOptions, JndAnalysis, SubjectRecord, analyse_jnd, analyse_magnitude};
 use flotor_study::bias::{BiasRow, Method, observer_of, rows};

@@ -109,7 +109,6 @@ impl Values {
             Self::Words(words) => Cell::Word(words.get(listed).cloned().unwrap_or_default()),
             // The last value exactly, whatever the rounding of the way there.
             Self::Range { to, steps, .. } if index + 1 == u64::from(*steps) => Cell::number(*to),
-            #[allow(clippy::cast_precision_loss)] // far fewer than 2^53 steps
             Self::Range { steps, .. } => Cell::number(self.at(index as f64 / f64::from(steps - 1))),
         }
     }

@@ -67,7 +67,6 @@ fn means(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
         .chunk_by(|a, b| a.0 == b.0)
         .filter_map(|same| {
             let answered: Vec<f64> = same.iter().map(|(_, y)| *y).filter(|y| y.is_finite()).collect();
-            #[allow(clippy::cast_precision_loss)] // counts of rows
             let mean = answered.iter().sum::<f64>() / answered.len() as f64;
             same.first().map(|(x, _)| (*x, mean))
         })

@@ -214,7 +214,6 @@ impl Sweep {
         };
         let rows = points.into_iter().zip(answers);
         rows.map(|(Point { values, seed }, answer)| {
-            #[allow(clippy::cast_precision_loss)] // seeds above 2^53 are for nobody
             let seed = Cell::number(seed as f64);
             values.into_iter().chain([seed]).chain(answer).collect()
         })
@@ -227,7 +226,6 @@ impl Sweep {
         });
         let none = || Cell::Number(None);
         match answer {
-            #[allow(clippy::cast_precision_loss)] // 2^53 ticks are 285 000 years
             Ok(summary) => vec![
                 Cell::number(summary.ticks as f64),
                 Cell::number(summary.peak_force_n),

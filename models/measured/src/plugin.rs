@@ -124,7 +124,6 @@ impl CenterlineModel for Measured {
     }
 
     /// From the fixed end straight up, leaning to where the handle is; loose at its free length where that is higher.
-    #[allow(clippy::cast_precision_loss)] // a count of points
     fn centerline(&mut self, input: &Input, points: &mut [Pose]) -> usize {
         let foot_m = -DVec3::Z * self.free_length_m;
         let handle_m = input.pose.position();

@@ -44,7 +44,6 @@ impl Mesh {
     /// A square sheet at height 0 with its middle at the origin: each mass is linked to its four neighbours, which is
     /// the five-point Laplacian of a membrane under the tension `stiffness (spacing - rest)` over a spacing.
     #[must_use]
-    #[allow(clippy::cast_precision_loss)] // a few hundred masses along a side
     pub fn sheet(sheet: &Sheet) -> Self {
         let n = sheet.nodes_per_side;
         let spacing_m = sheet.side_m / (n - 1) as f64;
@@ -79,7 +78,6 @@ impl Mesh {
     /// A chain of `links` equal springs along x between two held ends `span_m` apart, at height 0. `length_m` is its
     /// length without force, `axial_n` the force that would double it, `mass_kg` its mass, half a link's at each end.
     #[must_use]
-    #[allow(clippy::cast_precision_loss)] // a few hundred links
     pub fn chain(links: usize, span_m: f64, length_m: f64, axial_n: f64, mass_kg: f64) -> Self {
         let rest_m = length_m / links as f64;
         let mut mesh = Self::default();
@@ -100,7 +98,6 @@ impl Mesh {
     ///
     /// # Errors
     /// One sentence with the number of the line.
-    #[allow(clippy::cast_precision_loss)] // a few ten thousand masses
     pub fn from_obj(text: &str, mass_kg: f64, stiffness_n_per_m: f64, stretch: f64) -> Result<Self, String> {
         let mut mesh = Self::default();
         let mut edges: Vec<[usize; 2]> = Vec::new();

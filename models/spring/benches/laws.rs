@@ -34,7 +34,6 @@ fn poses() -> Vec<Pose> {
     ];
     (0..POSES)
         .map(|index| {
-            #[allow(clippy::cast_precision_loss)] // a thousand
             let [x, y, z, rx, ry, rz] = STEPS.map(|step| 2.0 * (step * index as f64).fract() - 1.0);
             // A quarter of the free length aside, from 40 % compressed to 20 % stretched, 7 degrees.
             let position_m = DVec3::new(0.25 * x, 0.25 * y, 0.3 * z - 0.1) * 0.025;

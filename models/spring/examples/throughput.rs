@@ -38,7 +38,6 @@ fn inputs(free_length_m: f64) -> Vec<Input> {
         0.501_980_271_028_8,
     ];
     let input = |index: usize| {
-        #[allow(clippy::cast_precision_loss)] // a thousand
         let [x, y, z, rx, ry, rz] = STEPS.map(|step| 2.0 * (step * index as f64).fract() - 1.0);
         let position_m = DVec3::new(0.25 * x, 0.25 * y, 0.3 * z - 0.1) * free_length_m;
         let pose = Pose::from_rotation_vector(position_m, DVec3::new(rx, ry, rz) * 0.122);
@@ -70,7 +69,6 @@ fn median(mut numbers: Vec<f64>) -> f64 {
 fn timed(mut slice: impl FnMut()) -> f64 {
     let begin = Instant::now();
     slice();
-    #[allow(clippy::cast_precision_loss)] // a second has 1e9 nanoseconds
     let elapsed_ns = begin.elapsed().as_nanos() as f64;
     elapsed_ns / POSES as f64
 }

@@ -20,7 +20,6 @@ const SQUARE_SERIES: [f64; 6] = series(2.0, true);
 const TWIST_SERIES: [f64; 8] = series(1.0, false);
 
 /// Either series, by the quotient of neighbours.
-#[allow(clippy::cast_precision_loss)] // integers below twenty
 const fn series<const TERMS: usize>(first: f64, is_square: bool) -> [f64; TERMS] {
     let mut coefficients = [first; TERMS];
     let mut i = 1;

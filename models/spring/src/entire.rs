@@ -28,7 +28,6 @@ const G1_SERIES: [f64; TERMS] = power_series(1);
 const G2_SERIES: [f64; TERMS] = power_series(2);
 
 /// Coefficients of `Gn`: `(-1/2)^k (2n+1)!! / (k! (2n+2k+1)!!)`, by the quotient of neighbours.
-#[allow(clippy::cast_precision_loss)] // integers below a hundred
 const fn power_series(n: usize) -> [f64; TERMS] {
     let mut coefficients = [1.0; TERMS];
     let mut k = 1;

@@ -407,7 +407,6 @@ fn refuse_derived(settings: &Settings<'_>, mode: Mode) -> Result<(), Refusal> {
     )))
 }
 
-#[allow(clippy::cast_precision_loss)] // an index of a few choices
 fn position<T: PartialEq>(choices: &[T], value: &T) -> f64 {
     choices.iter().position(|choice| choice == value).map_or(f64::NAN, |index| index as f64)
 }

@@ -321,7 +321,6 @@ fn draw_hand_over(held: &mut Held<HandOver>, spring: &Spring, pose: &Pose, secti
 fn draw_law(spring: &Spring, pose: &Pose, sections: &mut [Section]) -> bool {
     let Some(line) = Centerline::new(spring, pose) else { return false };
     let last = sections.len().saturating_sub(1).max(1);
-    #[allow(clippy::cast_precision_loss)] // some tens of points
     for (index, section) in sections.iter_mut().enumerate() {
         *section = line.section(index as f64 / last as f64);
     }

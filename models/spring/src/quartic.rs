@@ -222,7 +222,6 @@ fn longest_with_shape(rigidities: &Rigidities) -> f64 {
 }
 
 /// Interpolates at the Chebyshev nodes and converts to powers, on -1..1.
-#[allow(clippy::cast_precision_loss)] // integers below twenty
 fn fit(function: impl Fn(f64) -> DVec4) -> [DVec4; TERMS] {
     let terms = TERMS as f64;
     let mut chebyshev = [DVec4::ZERO; TERMS];

@@ -24,7 +24,6 @@ pub fn force_arrow(mesh: &mut Mesh, from_m: DVec3, vector_m: DVec3, shaft_radius
 }
 
 /// An arc with a head about an axis, in the sense a torque turns; `angle_rad` is how far around it goes.
-#[allow(clippy::cast_precision_loss)] // a few dozen rings
 pub fn torque_arrow(
     mesh: &mut Mesh,
     center_m: DVec3,

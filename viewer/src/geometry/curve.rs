@@ -52,7 +52,7 @@ impl Curve {
 
     /// The section at the fraction `s` of the length at rest, 0 at the fixed end, 1 at the handle.
     #[must_use]
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)] // a few pieces
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few pieces
     pub fn section(&self, s: f64) -> Section {
         let pieces = self.values.len() - 1;
         let place = s.clamp(0.0, 1.0) * pieces as f64;

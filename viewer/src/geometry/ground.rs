@@ -64,7 +64,6 @@ impl Ground {
         x * x * (3.0 - 2.0 * x)
     }
 
-    #[allow(clippy::cast_precision_loss)] // a few dozen rings
     fn surface(&self, mesh: &mut Mesh) {
         let mut last: Option<Vec<u32>> = None;
         for k in 0..=RINGS {
@@ -86,7 +85,7 @@ impl Ground {
         }
     }
 
-    #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)] // a few dozen lines
+    #[allow(clippy::cast_possible_truncation)] // a few dozen lines
     fn lines(&self, mesh: &mut Mesh) {
         const PIECES: usize = 24;
         let count = (self.radius_m / self.spacing_m) as i32;

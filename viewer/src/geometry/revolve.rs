@@ -36,7 +36,6 @@ impl Frame {
 
 /// Turns a profile of points `(radius, height)`, m, about the z axis of a frame. The profile runs upwards on the
 /// outside; every edge of it is a sharp one.
-#[allow(clippy::cast_precision_loss)] // a few dozen sides
 pub fn revolve(mesh: &mut Mesh, frame: &Frame, profile: &[(f64, f64)], sides: usize, color: Color) {
     for pair in profile.windows(2) {
         let [(r0, z0), (r1, z1)] = [pair[0], pair[1]];

@@ -48,7 +48,6 @@ impl LocalStrain {
 impl Strain {
     /// Of a body against itself at rest; both need the same number of sections.
     #[must_use]
-    #[allow(clippy::cast_precision_loss)] // a few sections
     pub fn between(rest: &Curve, now: &Curve) -> Self {
         let count = rest.sections().min(now.sections());
         let place = |i: usize| i as f64 / (count - 1) as f64;
@@ -77,7 +76,7 @@ impl Strain {
 
     /// At the fraction `s` of the length, for a fibre at `(x, y)` of the section, m.
     #[must_use]
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)] // a few pieces
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few pieces
     pub fn at(&self, s: f64, fibre_m: DVec2) -> LocalStrain {
         // Values belong to the middles of the pieces; linear between them.
         let place = (s * self.pieces.len() as f64 - 0.5).clamp(0.0, (self.pieces.len() - 1) as f64);

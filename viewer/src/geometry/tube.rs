@@ -23,7 +23,7 @@ fn fibre(body: &Body, s: f64) -> DVec2 {
 }
 
 /// Adds the wire with its flat ends; `color` says how a place of it looks.
-#[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)] // thousands of corners
+#[allow(clippy::cast_possible_truncation)] // thousands of corners
 pub fn append_tube(
     mesh: &mut Mesh,
     body: &Body,

@@ -80,7 +80,7 @@ impl FlatRasterizer {
 }
 
 /// Fills the pixels whose middles are inside; of two triangles with a common edge, one gets its pixels.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)] // pixels
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
 fn fill(image: &mut ColorImage, clip: Rect, corners: [Vertex; 3], texel: impl Fn(Pos2) -> [f32; 4]) {
     let edge = |a: Pos2, b: Pos2, p: Pos2| {
         let [[ax, ay], [bx, by], [px, py]] = [a, b, p].map(|at| [f64::from(at.x), f64::from(at.y)]);
@@ -139,7 +139,6 @@ fn fill(image: &mut ColorImage, clip: Rect, corners: [Vertex; 3], texel: impl Fn
 }
 
 /// True if the middle of a pixel lies in a range.
-#[allow(clippy::cast_precision_loss)] // pixels
 fn clip_contains(low: f32, high: f32, pixel: usize) -> bool {
     let middle = pixel as f32 + 0.5;
     middle >= low && middle < high

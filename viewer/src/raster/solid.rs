@@ -68,7 +68,6 @@ impl Rasterizer {
         self.resolve([width / samples, height / samples], samples)
     }
 
-    #[allow(clippy::cast_precision_loss)] // pixels
     fn begin(&mut self, backdrop: Backdrop, [width, height]: [usize; 2]) {
         self.depth.clear();
         self.depth.resize(width * height, f32::INFINITY);
@@ -80,7 +79,7 @@ impl Rasterizer {
         }
     }
 
-    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)] // pixels
+    #[allow(clippy::cast_possible_truncation)] // pixels
     fn project(&mut self, mesh: &Mesh, camera: &Camera, [width, height]: [usize; 2]) {
         let (w, h) = (width as f64, height as f64);
         let projection = camera.projection(w / h);
@@ -90,7 +89,7 @@ impl Rasterizer {
     }
 
     /// Fills the samples whose middles are inside; counter-clockwise corners face the eye.
-    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
     fn triangle(&mut self, [a, b, c]: [Corner; 3], [width, height]: [usize; 2]) {
         // Twice the area; y runs down, so a triangle that faces the eye has a negative one. False for NaN.
         let area = (b.at - a.at).perp_dot(c.at - a.at);

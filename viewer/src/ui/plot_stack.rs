@@ -125,7 +125,6 @@ impl PlotStack {
         }
         let span_s = self.span_s(history);
         let count = self.shown.len();
-        #[allow(clippy::cast_precision_loss)] // a handful
         let height = (ui.available_height() - 29.0 * count as f32 - 22.0) / count.max(1) as f32;
         let cursor_s = self.hover_s.unwrap_or(now_s);
         self.hover_s = None;

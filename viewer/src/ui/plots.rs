@@ -134,7 +134,6 @@ fn marks((low, high): (f64, f64)) -> Vec<GridMark> {
     let step_size =
         [1.0, 2.0, 5.0, 10.0].map(|k| k * power).into_iter().find(|step| *step >= wanted).unwrap_or(wanted);
     let (first, last) = ((low / step_size).ceil() as i64, (high / step_size).floor() as i64);
-    #[allow(clippy::cast_precision_loss)] // a handful
     (first..=last).map(|k| GridMark { value: k as f64 * step_size, step_size }).collect()
 }
 

@@ -139,7 +139,6 @@ impl View3d {
             Some((drawn, texture, facts)) if drawn == wanted => (texture, facts),
             _ => {
                 let palette = Palette::of(look);
-                #[allow(clippy::cast_precision_loss)] // pixels
                 let height_px = size[1] as f64;
                 let (mesh, facts) =
                     self.builder.build(shapes, sample, &palette, &camera, height_px, scale, visible);

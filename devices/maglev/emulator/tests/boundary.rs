@@ -1,7 +1,7 @@
 //! Pushes out of the range against the host's walls and the controller behind them, sampled and late as they are: a
 //! handle at rest sits where the spring of the wall says, gets no deeper on the way than the printed bound, and where
 //! that bound is beyond the range the controller lands before the sensors lose it.
-#![allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)] // f32 is what the wire has
+#![allow(clippy::cast_possible_truncation)] // f32 is what the wire has
 
 use flotor_hal::{Axes, Capabilities, DQuat, DVec3, DeviceState, Pose, Twist, Wrench};
 use flotor_maglev::boundary::Walls;

@@ -48,7 +48,6 @@ impl Plant for Falling {
         *self.pushed_n.lock().unwrap() = wrench.force().z;
         let steps = 8.0;
         for _ in 0..8 {
-            #[allow(clippy::cast_precision_loss)] // a cycle
             let h = dt_us as f64 * 1.0e-6 / steps;
             let mass_kg = self.weight_n / 9.806_65;
             self.v_m_per_s += h * (wrench.force().z - self.weight_n) / mass_kg;

@@ -3,7 +3,6 @@
 //!
 //! Plugging in needs root and the module `vhci_hcd`, so these tests are ignored unless asked for. `.ci/vm` runs them in
 //! a small virtual machine whose clock counts instructions: there, times are the program's and not the machine's.
-#![allow(clippy::cast_precision_loss)] // microseconds of a few seconds
 #![allow(clippy::unwrap_used)] // helpers of tests
 
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Plugin, Setting};

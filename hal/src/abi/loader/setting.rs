@@ -75,7 +75,6 @@ impl Setting {
                     value: value.to_owned(),
                     choices: names.iter().map(|name| name.as_str().to_owned()).collect(),
                 })?;
-                #[allow(clippy::cast_precision_loss)] // a handful of choices
                 Ok(Self { parameter, index, number: choice as f64, text: String::new() })
             }
             ParameterKind::Real => {

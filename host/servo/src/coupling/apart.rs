@@ -172,7 +172,6 @@ impl EndApart {
     /// Which part of the pull is felt so long after the end took hold.
     #[inline]
     fn part_at(&self, held_ns: u64) -> f64 {
-        #[allow(clippy::cast_precision_loss)] // minutes in ns are far below 2^53
         let [held, fade] = [held_ns, self.patience.fade_ns].map(|ns| ns as f64);
         if held_ns >= self.patience.fade_ns { 1.0 } else { held / fade }
     }

@@ -12,7 +12,6 @@ fn random(state: &mut u64) -> f64 {
     let mut word = *state;
     word = (word ^ (word >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     word = (word ^ (word >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    #[allow(clippy::cast_precision_loss)] // a random number
     let part = (word ^ (word >> 31)) as f64 / u64::MAX as f64;
     2.0 * part - 1.0
 }

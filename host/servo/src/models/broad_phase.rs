@@ -150,7 +150,6 @@ impl Grid {
         let hull = boxed.iter().copied().reduce(Bounds::with);
         let hull = hull.unwrap_or(Bounds { low_m: DVec3::ZERO, high_m: DVec3::ZERO });
         let extent_m = (hull.high_m - hull.low_m).to_array();
-        #[allow(clippy::cast_precision_loss)] // a number of objects
         let most = MOST_CELLS_OF_AN_AXIS.min(math::cbrt(boxed.len() as f64).ceil() * 2.0);
         let counts = [0, 1, 2].map(|axis| {
             let mut sides_m: Vec<f64> =
@@ -163,7 +162,6 @@ impl Grid {
             count
         });
         let per_m = [0, 1, 2].map(|axis| {
-            #[allow(clippy::cast_precision_loss)] // at most 128
             let per_m = counts[axis] as f64 / extent_m[axis];
             if per_m.is_finite() { per_m } else { 0.0 }
         });
@@ -208,7 +206,6 @@ mod tests {
         let mut word = *state;
         word = (word ^ (word >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         word = (word ^ (word >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        #[allow(clippy::cast_precision_loss)] // a random number
         let part = (word ^ (word >> 31)) as f64 / u64::MAX as f64;
         2.0 * part - 1.0
     }

@@ -30,7 +30,6 @@ impl Fade {
 
     /// The weight at a time. Real-time: bounded, no allocation.
     #[inline]
-    #[allow(clippy::cast_precision_loss)] // 2^53 ns are 104 days
     pub(super) fn at(&self, now_ns: u64) -> f64 {
         if self.from == self.target {
             return self.target; // it never moved

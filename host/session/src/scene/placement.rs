@@ -32,14 +32,12 @@ fn points_of(mut grid: Section<'_>) -> Result<Vec<[f64; 3]>, SceneError> {
     let count_value = grid.require("count")?;
     let too_many = count_value.problem(format!("a grid has at most {MOST_PLACES} points"));
     let not_whole = count_value.problem("`count` is three whole numbers from 1 on".to_owned());
-    #[allow(clippy::cast_precision_loss)] // a million
     let counts = count_value.three(1.0..=MOST_PLACES as f64)?;
     let spacing_mm = grid.require("spacing_mm")?.three(0.0..=FARTHEST_MM)?;
     grid.finish()?;
     if counts.iter().any(|count| count.fract() != 0.0) {
         return Err(not_whole);
     }
-    #[allow(clippy::cast_precision_loss)] // a million
     if counts.iter().product::<f64>() > MOST_PLACES as f64 {
         return Err(too_many);
     }

@@ -214,7 +214,6 @@ impl Session {
             Guarded { device: opened.device, sensed: opened.capabilities.sensed, envelope }
         });
         let devices: Vec<_> = devices.collect();
-        #[allow(clippy::cast_precision_loss)] // a period is far below 2^53 ns
         let period_s = period_ns as f64 * 1.0e-9;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a minute
         let [ramp_ns, watchdog_ns] =

@@ -104,7 +104,6 @@ pub fn analyse_jnd(
 
     let unfinished =
         |subject: &SubjectRecord| subject.tracks.iter().filter(|t| t.threshold.is_none()).count();
-    #[allow(clippy::cast_precision_loss)] // a few hundred
     let pairs = subjects.iter().map(|subject| subject.counted().count() as f64).collect::<Vec<_>>();
     Ok(JndAnalysis {
         task: "jnd",

@@ -78,7 +78,6 @@ pub fn analyse_magnitude(
             ratings.push(RatingCell { modality, stimulus, rating: mean_interval(&values, 0.95)? });
         }
     }
-    #[allow(clippy::cast_precision_loss)] // a few dozen
     let counted: Vec<f64> = subjects.iter().map(|subject| subject.counted().count() as f64).collect();
     let repeats =
         |subject: &SubjectRecord| subject.trials.iter().filter(|event| event.trial.repeat > 0).count();

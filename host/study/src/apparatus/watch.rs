@@ -57,7 +57,6 @@ impl Observer for Watch {
 }
 
 /// What a tick says of handle and force along the vertical.
-#[allow(clippy::cast_precision_loss)] // a tick is milliseconds
 #[must_use]
 pub fn sample(record: &TickRecord) -> Sample {
     Sample {

@@ -59,7 +59,6 @@ impl MagnitudeProtocol {
         positive("stimuli", &self.values)?;
         at_least_one("replications", self.replications)?;
         if self.values.len() < 3 {
-            #[allow(clippy::cast_precision_loss)] // fewer than 3
             let value = self.values.len() as f64;
             return Err(ProtocolError::Value { what: "stimuli", value, legal: "a trend needs 3 or more" });
         }

@@ -101,7 +101,6 @@ impl Legendre {
 }
 
 /// Node `i` in ascending order of the rule with `count` nodes on -1..1, and its weight.
-#[allow(clippy::cast_precision_loss)] // some tens of nodes
 pub(crate) fn gauss_legendre(count: usize, i: usize) -> (f64, f64) {
     let legendre = |t| {
         let mut polynomial = Legendre::at(t);

@@ -61,7 +61,6 @@ impl<const K: usize> Curve<K> {
     }
 
     /// Sections evenly in arc length, the first in the lower plate, the last in the upper. Not real-time.
-    #[allow(clippy::cast_precision_loss)] // some hundreds of panels
     pub(crate) fn draw(&self, free_length_m: f64, sections: &mut [Section]) {
         let gaps = sections.len().saturating_sub(1).max(1);
         let panels = LEAST_PANELS.div_ceil(gaps);

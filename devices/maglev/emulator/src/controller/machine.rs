@@ -225,7 +225,6 @@ impl Controller {
     pub fn drive(&mut self, now_us: u64, dt_us: u64) -> Wrench {
         self.watch(now_us);
         let sample = self.sample;
-        #[allow(clippy::cast_precision_loss)] // a cycle
         let dt_s = dt_us as f64 * 1.0e-6;
         let mut reports = self.condition.faults();
         let wanted = match self.mode {

@@ -56,7 +56,6 @@ impl CrossFade {
     }
 
     /// How far the new field has come in, 0 to 1.
-    #[allow(clippy::cast_precision_loss)] // at most a second
     fn share(&self, now_ns: u64) -> f64 {
         let passed_ns = now_ns.saturating_sub(self.since_ns);
         if passed_ns >= self.fade_ns { 1.0 } else { passed_ns as f64 / self.fade_ns as f64 }
@@ -94,7 +93,6 @@ mod tests {
         let mut fade = CrossFade::new(5 * MS);
         // Fields of every kind, some before the last has come in, the handle moving all along.
         for (count, at_ms) in [0, 5, 7, 12, 13, 14, 30].into_iter().enumerate() {
-            #[allow(clippy::cast_precision_loss)] // a handful
             let (count, pose) = (count as f64, up(0.001 * at_ms as f64));
             let before = fade.at(&pose, at_ms * MS).0;
             fade.take(field(3.0 - 2.0 * count, 100.0 * count), &pose, at_ms * MS);
