@@ -93,42 +93,42 @@ pub trait Real:
 impl Real for f64 {
     type Mask = bool;
 
-    #[inline(always)]
+    #[inline]
     fn like(self, value: f64) -> Self {
         value
     }
 
-    #[inline(always)]
+    #[inline]
     fn sqrt(self) -> Self {
         self.sqrt()
     }
 
-    #[inline(always)]
+    #[inline]
     fn abs(self) -> Self {
         self.abs()
     }
 
-    #[inline(always)]
+    #[inline]
     fn below(self, bound: f64) -> bool {
         self < bound
     }
 
-    #[inline(always)]
+    #[inline]
     fn above(self, bound: f64) -> bool {
         self > bound
     }
 
-    #[inline(always)]
+    #[inline]
     fn select(mask: bool, yes: Self, no: Self) -> Self {
         if mask { yes } else { no }
     }
 
-    #[inline(always)]
+    #[inline]
     fn any(mask: bool) -> bool {
         mask
     }
 
-    #[inline(always)]
+    #[inline]
     fn map(self, function: impl Fn(f64) -> f64) -> Self {
         function(self)
     }
