@@ -25,7 +25,7 @@ pub struct MechanicalEnergy {
 impl MechanicalEnergy {
     /// Kinetic plus potential energy, J. Real-time: bounded, no allocation.
     #[must_use]
-    #[inline(always)]
+    #[inline]
     pub fn total_j(&self) -> f64 {
         self.kinetic_j + self.potential_j
     }
@@ -53,7 +53,7 @@ impl Work {
 
     /// True if every term is finite. Real-time: bounded, no allocation.
     #[must_use]
-    #[inline(always)]
+    #[inline]
     pub fn is_finite(&self) -> bool {
         [self.coils_j, self.feed_forward_j, self.hand_j, self.dissipated_j]
             .iter()
@@ -62,7 +62,7 @@ impl Work {
 }
 
 impl AddAssign for Work {
-    #[inline(always)]
+    #[inline]
     fn add_assign(&mut self, more: Self) {
         self.coils_j += more.coils_j;
         self.feed_forward_j += more.feed_forward_j;
@@ -88,7 +88,7 @@ impl Ledger {
     }
 
     /// Books the work of a stretch of time and the energy at its end. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub fn book(&mut self, work: Work, now: MechanicalEnergy) {
         self.work += work;
         self.now = now;

@@ -261,7 +261,7 @@ impl Plant {
 
     /// Pose and velocity now. Real-time: bounded, no allocation.
     #[must_use]
-    #[inline(always)]
+    #[inline]
     pub fn state(&self) -> State {
         self.motion.state()
     }
@@ -273,7 +273,7 @@ impl Plant {
 
     /// Mechanical energy of the flotor now. Real-time: bounded, no allocation.
     #[must_use]
-    #[inline(always)]
+    #[inline]
     pub fn energy(&self) -> MechanicalEnergy {
         self.free.body().energy(&self.motion)
     }
@@ -286,7 +286,7 @@ impl Plant {
     ///
     /// Real-time: bounded, no allocation. A piece other than the nominal one and its predecessor costs a new
     /// set of response functions.
-    #[inline(always)]
+    #[inline]
     pub fn advance(&mut self, piece_ns: u64, coils: &Wrench, hand: Option<&Intention>) -> Outcome {
         if piece_ns == 0 {
             return Outcome::Moved(Work::default());
@@ -312,7 +312,7 @@ impl Plant {
 }
 
 /// Goes on with a motion that is sound, else stops. Real-time: bounded, no allocation.
-#[inline(always)] // else a motion in registers goes to memory to be handed over
+#[inline]
 fn go_on(motion: &mut Motion, next: Option<(Motion, Work)>) -> Outcome {
     let Some((next, work)) = next else {
         *motion = motion.at_rest();

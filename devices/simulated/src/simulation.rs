@@ -129,7 +129,7 @@ impl Simulation {
 
     /// [`Self::advance`] with a finite wrench that stays where it is: a copy would have to be in memory before
     /// the motion starts.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn advance_under(&mut self, dt_ns: u64, coils: &Wrench) -> Incidents {
         debug_assert!(coils.is_finite());
         let mut incidents = Incidents { cut_short: dt_ns > MAX_ADVANCE_NS, ..Incidents::default() };
@@ -188,7 +188,7 @@ impl Simulation {
 
     /// Length of the piece that starts now, ns, and what the hand means meanwhile; nothing while it is off the
     /// handle. It lasts to the tick's end, the next grid point, or the moment the hand lets go.
-    #[inline(always)]
+    #[inline]
     fn next_piece(&mut self, tick_end_ns: u64) -> (u64, Option<Intention>) {
         let trajectory = &self.setup.hand.trajectory;
         if self.time_ns >= self.stroke.end_ns {
@@ -238,7 +238,7 @@ impl Stroke {
     }
 
     /// What an unsteady hand aims at at a time.
-    #[inline(always)]
+    #[inline]
     fn aim(time_ns: u64, trajectory: &Trajectory, wavering: &Wavering) -> Option<Aim> {
         let aim = trajectory.aim(time_ns)?;
         Some(wavered(&aim, wavering, seconds(time_ns)))
@@ -247,7 +247,7 @@ impl Stroke {
     /// The aim at a time during the stroke, drawn straight to its end: position on the chord with
     /// its slope as velocity; orientation and force, which the plant takes as constant, halfway. Where the hand
     /// lets go before the end it stays.
-    #[inline(always)]
+    #[inline]
     fn drawn(&self, time_ns: u64) -> Option<Intention> {
         let start = self.start?;
         let end = self.end.unwrap_or(start);
@@ -268,13 +268,13 @@ impl Stroke {
 }
 
 /// An aim as an unsteady hand has it.
-#[inline(always)]
+#[inline]
 fn wavered(aim: &Aim, wavering: &Wavering, time_s: f64) -> Aim {
     let pose = Pose { position_m: aim.pose.position_m + wavering.offset_m(time_s), ..aim.pose };
     Aim { pose, force_n: wavering.force_n(aim.force_n, time_s), ..*aim }
 }
 
-#[inline(always)]
+#[inline]
 fn seconds(time_ns: u64) -> f64 {
     time_ns as f64 * 1.0e-9
 }

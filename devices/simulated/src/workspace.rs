@@ -40,7 +40,7 @@ impl SensorRange {
     ///
     /// Real-time: bounded, no allocation.
     #[must_use]
-    #[inline(always)]
+    #[inline]
     pub fn of(position_m: DVec3, orientation: DQuat) -> Self {
         // |w| is the cosine of half the angle: comparing cosines needs no arc cosine. NaN fails both
         // comparisons.

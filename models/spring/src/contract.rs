@@ -7,13 +7,13 @@ use crate::response::{Demand, Law, Response};
 use crate::validity::Validity;
 
 /// The pose of a step.
-#[inline(always)]
+#[inline]
 pub(crate) fn pose(input: &Input) -> Pose {
     Pose { position_m: input.pose.position(), orientation: input.pose.orientation() }
 }
 
 /// The demand of a step.
-#[inline(always)]
+#[inline]
 pub(crate) fn demand(input: &Input) -> Demand {
     if input.demand.contains(flotor_hal::Demand::ENERGY) {
         Demand::WrenchAndEnergy
@@ -32,7 +32,7 @@ pub fn step<L: Law>(law: &L, input: &Input) -> Output {
 }
 
 /// The answer of a step.
-#[inline(always)]
+#[inline]
 pub(crate) fn output(response: &Response) -> Output {
     let status = match response.validity {
         Validity::Ok => StepStatus::Ok,

@@ -55,12 +55,12 @@ pub struct Aim {
 impl Aim {
     /// A place and no force. Real-time: bounded, no allocation.
     #[must_use]
-    #[inline(always)]
+    #[inline]
     pub const fn at(pose: Pose) -> Self {
         Self { pose, force_n: DVec3::ZERO, yielding: BVec3::FALSE }
     }
 
-    #[inline(always)]
+    #[inline]
     fn below_home(depth_m: f64) -> Self {
         Self::at(Pose { position_m: DVec3::new(0.0, 0.0, -depth_m), orientation: DQuat::IDENTITY })
     }
@@ -151,7 +151,7 @@ impl Trajectory {
     ///
     /// Real-time: bounded, no allocation.
     #[must_use]
-    #[inline(always)]
+    #[inline]
     pub fn aim(&self, time_ns: u64) -> Option<Aim> {
         let time_s = seconds(time_ns);
         match self {
@@ -179,7 +179,7 @@ impl Trajectory {
     }
 
     /// When the hand lets go, if that is planned, ns. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn release_ns(&self) -> Option<u64> {
         match self {
             Self::Release { at_ns, .. } => Some(*at_ns),
@@ -217,13 +217,13 @@ impl Trajectory {
 /// `10 u^3 - 15 u^4 + 6 u^5` with `u = elapsed / duration` (Flash and Hogan 1985); 0 before and 1 after.
 /// Real-time: bounded, no allocation.
 #[must_use]
-#[inline(always)]
+#[inline]
 pub fn minimum_jerk(elapsed_s: f64, duration_s: f64) -> f64 {
     let u = (elapsed_s / duration_s).clamp(0.0, 1.0);
     u * u * u * (10.0 + u * (-15.0 + 6.0 * u))
 }
 
-#[inline(always)]
+#[inline]
 fn seconds(time_ns: u64) -> f64 {
     time_ns as f64 * 1.0e-9
 }

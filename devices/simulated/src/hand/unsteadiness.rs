@@ -64,7 +64,7 @@ impl Wavering {
 
     /// How far the intended place is off at a time since the start of the run, m. Real-time: bounded, no
     /// allocation.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn offset_m(&self, time_s: f64) -> DVec3 {
         if self.size.tremor_m == 0.0 {
             return DVec3::ZERO;
@@ -73,7 +73,7 @@ impl Wavering {
     }
 
     /// An intended force (N) as it comes out. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn force_n(&self, intended_n: DVec3, time_s: f64) -> DVec3 {
         if self.size.force_share == 0.0 || intended_n == DVec3::ZERO {
             return intended_n;

@@ -106,7 +106,7 @@ impl Body {
     }
 
     /// Kinetic energy of the flotor and its potential energy above home. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn energy(&self, motion: &Motion) -> MechanicalEnergy {
         let (centre_m, spin) = (self.flotor.centre_of_mass_m, motion.spin_rad_per_s);
         let mut velocity = motion.velocity_m_per_s;

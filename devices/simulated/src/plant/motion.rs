@@ -39,7 +39,7 @@ impl Motion {
     }
 
     /// What the outside sees. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn state(&self) -> State {
         State {
             position_m: self.position_m,
@@ -50,7 +50,7 @@ impl Motion {
     }
 
     /// A vector of the flotor frame in the device frame. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn turned(&self, vector: DVec3) -> DVec3 {
         // Upright, as most hands hold the flotor, the product would be the vector itself but for the sign of a zero.
         if self.orientation == DQuat::IDENTITY { vector } else { self.orientation * vector }
@@ -62,19 +62,19 @@ impl Motion {
     }
 
     /// False for NaN as well. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn is_physical(&self) -> bool {
         self.moves_physically() && within(self.spin_rad_per_s) && self.orientation.is_finite()
     }
 
     /// [`Self::is_physical`] of a motion that does not turn. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn moves_physically(&self) -> bool {
         within(self.position_m) && within(self.velocity_m_per_s)
     }
 
     /// The same motion with what is negligible set to zero. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn settled(&self) -> Self {
         let q = self.orientation;
         Self {
@@ -85,7 +85,7 @@ impl Motion {
     }
 
     /// [`Self::settled`] of a motion that does not turn. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn moving_settled(&self) -> Self {
         Self {
             position_m: self.position_m.map(settle),
@@ -96,12 +96,12 @@ impl Motion {
 }
 
 /// False for NaN as well.
-#[inline(always)]
+#[inline]
 fn within(vector: DVec3) -> bool {
     vector.length_squared() <= PHYSICAL_LIMIT * PHYSICAL_LIMIT
 }
 
-#[inline(always)]
+#[inline]
 fn settle(number: f64) -> f64 {
     if number.abs() < NEGLIGIBLE { 0.0 } else { number }
 }
@@ -157,7 +157,7 @@ impl Contact {
     };
 
     /// Of a hand with an intention. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn with(intention: &Intention) -> Self {
         Self {
             intended_m: intention.position_m,
@@ -169,7 +169,7 @@ impl Contact {
     }
 
     /// The same hand `time_s` later. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn later(&self, time_s: f64) -> Self {
         Self { intended_m: self.intended_m + self.pace_m_per_s * time_s, ..*self }
     }

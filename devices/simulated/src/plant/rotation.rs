@@ -5,7 +5,7 @@ use flotor_hal::glam::{DMat3, DQuat, DVec3};
 /// Angular acceleration in the body frame, rad/s², from Euler's equations `I w' = T - w x I w`.
 ///
 /// Real-time: bounded, no allocation.
-#[inline(always)]
+#[inline]
 pub(super) fn angular_acceleration(
     inertia_kg_m2: &DMat3,
     inverse_inertia: &DMat3,
@@ -18,7 +18,7 @@ pub(super) fn angular_acceleration(
 /// Rate of the orientation (body to device frame) at an angular velocity in the body frame: `q' = q w / 2`.
 ///
 /// Real-time: bounded, no allocation.
-#[inline(always)]
+#[inline]
 pub(super) fn quaternion_rate(orientation: DQuat, spin_rad_per_s: DVec3) -> DQuat {
     // The product with a pure quaternion, without its zeros.
     let half = spin_rad_per_s * 0.5;
@@ -33,7 +33,7 @@ pub(super) fn quaternion_rate(orientation: DQuat, spin_rad_per_s: DVec3) -> DQua
 /// It differs from the rotation vector by less than a thousandth over ±7 degrees, needs no arc function, is
 /// smooth up to half a turn, and a torque proportional to it has a potential (`4 k (1 - cos(angle / 2))`).
 /// Real-time: bounded, no allocation.
-#[inline(always)]
+#[inline]
 pub(super) fn misalignment_rad(orientation: DQuat, target: DQuat) -> DVec3 {
     // Vector part of `orientation* target`; q and -q are one rotation: take the shorter way.
     let (from, to) = (orientation.xyz(), target.xyz());

@@ -86,7 +86,7 @@ impl Scheme {
     /// Moves on by `piece_ns` in one straight step, if that will do; gives the new motion and the work done.
     ///
     /// Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn step(
         &mut self,
         from: &Motion,
@@ -105,7 +105,7 @@ impl Scheme {
     /// the work done.
     ///
     /// Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn advance(
         &mut self,
         from: &Motion,
@@ -133,7 +133,7 @@ impl Scheme {
     }
 
     /// The body and the table for a piece of `piece_ns`, computed unless it is at hand.
-    #[inline(always)]
+    #[inline]
     fn prepared(&mut self, piece_ns: u64) -> (&Body, &Table) {
         if piece_ns == self.nominal.piece_ns {
             return (&self.body, &self.nominal);
@@ -189,7 +189,7 @@ impl Grid {
     }
 
     /// Takes all steps of the grid, or gives up where `step` does. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     fn march(
         &self,
         from: &Motion,

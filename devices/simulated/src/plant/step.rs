@@ -66,7 +66,7 @@ struct Power {
 
 impl<'a> Step<'a> {
     /// Prepares a step. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn new(
         body: &'a Body,
         grid: &'a Grid,
@@ -89,7 +89,7 @@ impl<'a> Step<'a> {
     /// however long the step.
     ///
     /// Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn straight(&self) -> Option<(Motion, Work)> {
         let drive = self.drive(self.start.velocity_m_per_s);
         if !self.is_balanced(&drive) {
@@ -107,7 +107,7 @@ impl<'a> Step<'a> {
 
     /// True if the flotor does not turn and nothing turns it during the step: neither coils nor hand by a
     /// torque, nor any force by passing beside the centre of mass.
-    #[inline(always)]
+    #[inline]
     fn is_balanced(&self, drive: &Drive) -> bool {
         let (body, start) = (self.body, self.start);
         let twisted = body.hand.rotational_stiffness_nm_per_rad != 0.0
@@ -141,7 +141,7 @@ impl<'a> Step<'a> {
     }
 
     /// The unknowns at the start, moved on along each slope by a share of the step.
-    #[inline(always)]
+    #[inline]
     fn moved_on(&self, slopes: &[Unknowns; STAGES], shares: &[f64]) -> Unknowns {
         let mut at = Unknowns {
             orientation: self.start.orientation,
@@ -157,7 +157,7 @@ impl<'a> Step<'a> {
     }
 
     /// What drives the oscillator from a velocity of the centre of mass, m/s.
-    #[inline(always)]
+    #[inline]
     fn drive(&self, velocity: DVec3) -> Drive {
         let body = self.body;
         Drive {
@@ -170,13 +170,13 @@ impl<'a> Step<'a> {
     /// Force at the origin while nothing has moved and nothing moves, device frame, N. The lift, which acts at
     /// the flotor's centre of mass, is in it as the force at the origin that turns the body just as much (law
     /// of the lever).
-    #[inline(always)]
+    #[inline]
     fn still_force(&self) -> DVec3 {
         self.pull - self.body.lift_n * self.body.lift_lever
     }
 
     /// Derivatives at a stage, and the power that rotation adds there.
-    #[inline(always)]
+    #[inline]
     fn slope(&self, drive: &Drive, start: &Swing, node: &Node, at: &Unknowns) -> (Unknowns, Power) {
         let body = self.body;
         let Node { time_s, later, earlier } = node;
@@ -221,7 +221,7 @@ impl<'a> Step<'a> {
     }
 
     /// From the unknowns at the end back to the motion of the origin, with the works.
-    #[inline(always)]
+    #[inline]
     fn finish(&self, drive: &Drive, start: &Swing, end: &Unknowns, power: &Power) -> (Motion, Work) {
         let body = self.body;
         let orientation = end.orientation.normalize();
@@ -241,7 +241,7 @@ impl<'a> Step<'a> {
     }
 
     /// Work of a step in which the origin was displaced by `moved` (m), and the centre of mass with it.
-    #[inline(always)]
+    #[inline]
     fn work(&self, drive: &Drive, end: &Motion, moved: DVec3) -> Work {
         let body = self.body;
         let velocity2 = self.grid.gramian.squared_velocity(drive);
@@ -254,7 +254,7 @@ impl<'a> Step<'a> {
     }
 
     /// The same if the centre of mass was displaced by `swung` (m) more, and turning added the `mean` power.
-    #[inline(always)]
+    #[inline]
     fn work_of_turning(&self, straight: Work, moved: DVec3, swung: DVec3, mean: &Power) -> Work {
         let (body, h) = (self.body, self.grid.step_s);
         // The flotor's centre of mass swings farther than the common one, in proportion.
@@ -268,7 +268,7 @@ impl<'a> Step<'a> {
     }
 
     /// Work of the hand's force, spring, damper and mass on a translation, J.
-    #[inline(always)]
+    #[inline]
     fn hand_work_j(&self, drive: &Drive, end: &Motion, moved: DVec3, velocity2: DVec3) -> f64 {
         let (hand, h) = (&self.body.hand, self.grid.step_s);
         let displacement_integral = self.grid.end().later.displacement_integral(drive);
@@ -288,7 +288,7 @@ impl<'a> Step<'a> {
 }
 
 /// The axes along which any of the vectors reaches, as bits.
-#[inline(always)]
+#[inline]
 fn axes<const N: usize>(vectors: [DVec3; N]) -> u32 {
     let [mut x, mut y, mut z] = [0; 3];
     for vector in vectors {

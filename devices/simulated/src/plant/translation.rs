@@ -122,21 +122,21 @@ impl Oscillator {
 
 impl Response {
     /// Distance moved since the start, m. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn displacement(&self, drive: &Drive) -> DVec3 {
         let Self([_, p1, p2, p3, _]) = self;
         drive.velocity * *p1 + drive.acceleration * *p2 + drive.jerk * *p3
     }
 
     /// Velocity, m/s. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn velocity(&self, drive: &Drive) -> DVec3 {
         let Self([p0, p1, p2, ..]) = self;
         drive.velocity * *p0 + drive.acceleration * *p1 + drive.jerk * *p2
     }
 
     /// Integral of the displacement since the start, m s. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn displacement_integral(&self, drive: &Drive) -> DVec3 {
         let Self([_, _, p2, p3, p4]) = self;
         drive.velocity * *p2 + drive.acceleration * *p3 + drive.jerk * *p4
@@ -144,7 +144,7 @@ impl Response {
 
     /// Displacement (m) and velocity (m/s) left of those at the start, without a drive. Real-time: bounded, no
     /// allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn carry(
         &self,
         oscillator: &Oscillator,
@@ -161,7 +161,7 @@ impl Response {
 
     /// Displacement (m) and velocity (m/s) left of a velocity change made at the start. Real-time: bounded,
     /// no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn after_kick(&self, velocity: DVec3) -> (DVec3, DVec3) {
         let Self([p0, p1, ..]) = self;
         (velocity * *p1, velocity * *p0)
@@ -170,7 +170,7 @@ impl Response {
 
 impl Gramian {
     /// Integral of velocity squared over the step, per axis, m²/s. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(super) fn squared_velocity(&self, drive: &Drive) -> DVec3 {
         let Drive { velocity: v, acceleration: a, jerk: j } = *drive;
         v * (v * self.vv + 2.0 * (a * self.va + j * self.vj))

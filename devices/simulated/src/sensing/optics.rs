@@ -191,7 +191,7 @@ impl Optics {
     }
 
     /// Where one lens puts its spot: across and up, m.
-    #[inline(always)]
+    #[inline]
     fn image(&self, eye: &Eye, position_m: DVec3, attitude: &DMat3) -> (f64, f64) {
         let at = position_m + *attitude * eye.diode;
         let scale = self.scale(eye, at);
@@ -222,7 +222,7 @@ impl Optics {
     }
 
     /// The rows of one eye: across and up.
-    #[inline(always)]
+    #[inline]
     fn rows(&self, eye: &Eye, position_m: DVec3, attitude: &DMat3) -> (Row, Row) {
         let arm = *attitude * eye.diode;
         let at = position_m + arm;

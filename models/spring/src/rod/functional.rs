@@ -128,7 +128,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
     }
 
     /// Energy, load and slope. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn value(&self, shape: &Shape<N>, plate: &Plate) -> Value<N, Q> {
         let sections = self.sections(shape, plate);
         let integrals = sections.integrate(&self.basis.weight);
@@ -169,7 +169,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
         }
     }
 
-    #[inline(always)]
+    #[inline]
     fn sections(&self, shape: &Shape<N>, plate: &Plate) -> Sections<Q> {
         let (mut lean, mut rate) = ([[0.0; Q]; 2], [[0.0; Q]; 2]);
         let (x, y) = shape.split_at(K);
@@ -185,7 +185,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
     }
 
     /// Second derivatives at a shape. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn curvature(&self, value: &Value<N, Q>) -> Curvature<N> {
         let mut local = value.sections.curvatures(&value.load, &self.basis.weight);
         if let Some(contact) = &value.contact {
@@ -242,7 +242,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
     }
 
     /// Row of the local part of the matrix: component `c` of a field against all bubbles of both components.
-    #[inline(always)]
+    #[inline]
     fn row(&self, local: &Curvatures<Q>, c: usize, field: &Along<Q>, rate: &Along<Q>) -> [f64; N] {
         let mut parts = [[0.0; K]; 2];
         for (e, part) in parts.iter_mut().enumerate() {
@@ -260,7 +260,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
     }
 
     /// Sums over the stations of a field times each bubble and another times its slope.
-    #[inline(always)]
+    #[inline]
     fn projected(&self, by_lean: &Along<Q>, by_rate: &Along<Q>) -> [f64; K] {
         let mut sums = [0.0; K];
         for i in 0..Q {
@@ -272,7 +272,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
 }
 
 /// `sum += factor * vector`
-#[inline(always)]
+#[inline]
 fn add_products<const M: usize>(sum: &mut [f64; M], vector: &[f64; M], factor: f64) {
     for i in 0..M {
         sum[i] += factor * vector[i];
@@ -280,7 +280,7 @@ fn add_products<const M: usize>(sum: &mut [f64; M], vector: &[f64; M], factor: f
 }
 
 /// Both components one after the other.
-#[inline(always)]
+#[inline]
 pub(super) fn joined<const K: usize, const N: usize>(x: &[f64; K], y: &[f64; K]) -> Shape<N> {
     let mut shape = [0.0; N];
     for (entry, value) in shape.iter_mut().zip(x.iter().chain(y)) {

@@ -101,7 +101,7 @@ pub(crate) fn product<const N: usize, const R: usize>(matrix: &[[f64; N]; R], ve
 }
 
 /// Sum of the products of entries, summed in two lanes.
-#[inline(always)]
+#[inline]
 pub(crate) fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     let mut lanes = [0.0; 2];
     let (pairs_a, rest_a) = a.as_chunks::<2>();

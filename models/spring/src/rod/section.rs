@@ -64,7 +64,7 @@ pub(crate) struct Load {
 }
 
 impl<const Q: usize> Sections<Q> {
-    #[inline(always)]
+    #[inline]
     pub(crate) fn new(lean: [Along<Q>; 2], lean_rate: [Along<Q>; 2]) -> Self {
         let ([x, y], [dx, dy]) = (&lean, &lean_rate);
         let (mut scale, mut normal, mut area_rate) = ([0.0; Q], [[0.0; Q]; 3], [0.0; Q]);
@@ -80,7 +80,7 @@ impl<const Q: usize> Sections<Q> {
         Self { lean, lean_rate, scale, normal, area_rate }
     }
 
-    #[inline(always)]
+    #[inline]
     pub(crate) fn integrate(&self, weight: &Along<Q>) -> Integrals {
         let (w, [dx, dy], [nx, ny, nz]) = (&self.scale, &self.lean_rate, &self.normal);
         let [mut bending, mut winding, mut drop] = [[0.0; Q]; 3];
@@ -106,7 +106,7 @@ impl<const Q: usize> Sections<Q> {
     }
 
     /// First derivatives of `l` by `p` and by `p'`, each times the weight.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn slopes(&self, load: &Load, weight: &Along<Q>) -> [[Along<Q>; 2]; 2] {
         let ([x, y], [dx, dy]) = (&self.lean, &self.lean_rate);
         let mut by_lean = [[0.0; Q]; 2];
@@ -126,7 +126,7 @@ impl<const Q: usize> Sections<Q> {
     }
 
     /// Second derivative of `n.d` by `p`.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn level_curvature(
         &self,
         load: &Load,
@@ -143,7 +143,7 @@ impl<const Q: usize> Sections<Q> {
     }
 
     /// Derivative of component `axis` of `d` by `p_c`.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn normal_slope(&self, axis: usize, c: usize, i: usize) -> f64 {
         let (w, p) = (self.scale[i], [self.lean[0][i], self.lean[1][i]]);
         let scale_slope = -w * w * p[c];
@@ -154,7 +154,7 @@ impl<const Q: usize> Sections<Q> {
     }
 
     /// `n.d`, its slope by `p`, and `1 + delta n.d`.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn potential(&self, load: &Load, i: usize) -> Potential {
         let (x, y, w, n) = (self.lean[0][i], self.lean[1][i], self.scale[i], load.force);
         let level = n.x * x + n.y * y + n.z;
@@ -167,7 +167,7 @@ impl<const Q: usize> Sections<Q> {
     }
 
     /// Second derivatives of `l` and of the integrals that determine the load, each times the weight.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn curvatures(&self, load: &Load, weight: &Along<Q>) -> Curvatures<Q> {
         let mut all = Curvatures {
             by_lean_twice: [[[0.0; Q]; 2]; 2],
