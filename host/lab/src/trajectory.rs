@@ -68,7 +68,7 @@ impl Series {
         let terms = self.terms.iter();
         terms.fold((self.mean, DVec3::ZERO), |(sum, slope), Term { rate, sine, cosine }| {
             let angles = *rate * (self.scale * parameter);
-            let (sines, cosines) = (angles.map(f64::sin), angles.map(f64::cos));
+            let (sines, cosines) = (angles.map(math::sin), angles.map(math::cos));
             let slope = slope + (*sine * cosines - *cosine * sines) * (*rate * self.scale);
             (sum + *cosine * cosines + *sine * sines, slope)
         })

@@ -149,7 +149,6 @@ fn clip_contains(low: f32, high: f32, pixel: usize) -> bool {
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,
     clippy::cast_sign_loss,
-    clippy::cast_precision_loss
 )]
 fn sample(texture: &ColorImage, uv: Pos2, smooth: bool) -> [f32; 4] {
     let [width, height] = texture.size;
