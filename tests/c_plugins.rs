@@ -4,7 +4,6 @@
 
 use flotor_core::trace::Events;
 use flotor_hal::Wrench;
-use flotor_hal::abi::loader::Plugin;
 use flotor_servo::RunEnd;
 use flotor_session::registry::load_file;
 use flotor_tests::library::compile_c_file;

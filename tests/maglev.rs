@@ -2,7 +2,7 @@
 //! with the simulated flotor, and what happens when one side dies, hangs, or talks nonsense.
 
 use flotor_core::trace::Events;
-use flotor_hal::abi::loader::{Plugin, Setting};
+use flotor_hal::abi::loader::Setting;
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
 use flotor_session::registry::load_file;
 use flotor_tests::library::{build_folder, plugin_file};

@@ -5,7 +5,6 @@
 //! the spring turns it. Everything here is compared with a closed form.
 
 use flotor_core::trace::{Events, TickRecord};
-use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{DVec3, EnergyLedger, Input, Output, Pose};
 use flotor_servo::RunEnd;
 use flotor_session::Observer;

@@ -2,7 +2,6 @@
 //!
 //! After a change of one of them: `FLOTOR_WRITE_REFERENCE=1 cargo test -p flotor-tests --test reference`.
 
-use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{Mutability, Parameter, ParameterKind};
 use flotor_session::registry::load_file;
 use flotor_session::scene::{SectionReference, reference};

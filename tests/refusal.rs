@@ -7,7 +7,7 @@
 //! is compared whole, so that no backtrace and no panic message of a plugin slips through.
 
 use flotor_core::trace::Events;
-use flotor_hal::abi::loader::{LoadError, Plugin, Setting, read_metadata};
+use flotor_hal::abi::loader::{LoadError, Setting, read_metadata};
 use flotor_hal::abi::{ABI_MAJOR, ABI_MINOR, CallStatus, MAGIC};
 use flotor_hal::{Input, Output, Pose, Wrench};
 use flotor_servo::ModelHealth;
@@ -168,7 +168,7 @@ const WRONG_FILES: &[WrongFile] = &[
             let (input, after) = input.split_once("} FlotorInput;").expect("it ends");
             let input =
                 input.replace("time_ns;", "TICK;").replace("tick;", "time_ns;").replace("TICK;", "tick;");
-            scratch.file(
+            let _ = scratch.file(
                 "flotor.h",
                 format!("{before}typedef struct FlotorInput {{{input}}} FlotorInput;{after}"),
             );

@@ -2,7 +2,7 @@
 //! refused, and the same bits however it is run.
 
 use flotor_core::trace::{Events, TickRecord};
-use flotor_hal::abi::loader::{LoadError, OpenedDevice, Plugin, Setting};
+use flotor_hal::abi::loader::{LoadError, OpenedDevice, Setting};
 use flotor_hal::{Conditions, Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
 use flotor_servo::RunEnd;
 use flotor_session::registry::load_file;

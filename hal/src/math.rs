@@ -1,7 +1,7 @@
 //! Elementary functions with the same bits on every machine. Real-time: bounded, no allocation.
 //!
 //! Those of `f64` come from the system's C library, which rounds the last bit as its version and the processor please. These
-//! are the crate `libm`, plain sums and products in source order, and so are those of [`glam`](crate::glam) here. Angles are in
+//! are the crate `libm`, plain sums and products in source order, and so are those of [`crate::glam`] here. Angles are in
 //! radians. What IEEE 754 rounds exactly (`sqrt`, `abs`, `floor`, `%`) is the same everywhere as it is. A product and a sum are
 //! two roundings everywhere: `f64::mul_add` is a slow call where the processor has no instruction for it.
 

@@ -6,7 +6,7 @@
 use criterion::{Criterion, criterion_group};
 use fixture_yardstick_model::{Yardstick, wrench};
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{Model, Plugin};
+use flotor_hal::abi::loader::Model;
 use flotor_hal::{Input, Output, Pose};
 use flotor_session::registry::load_file;
 use flotor_tests::library::plugin_file;

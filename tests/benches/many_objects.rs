@@ -34,8 +34,7 @@ fn run(scene: &Scene, ticks: &mut Ticks) {
 
 fn median(ticks: &mut Ticks) -> f64 {
     ticks.0.sort_unstable();
-    let median = ticks.0[ticks.0.len() / 2] as f64;
-    median
+    ticks.0[ticks.0.len() / 2] as f64
 }
 
 fn main() {

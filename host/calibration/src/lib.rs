@@ -13,7 +13,7 @@
 //! | how good it is | not said | residual, 95 % band, and the error measured again afterwards |
 //!
 //! Data flows one way: [`rig`] (device and force [`sensor`]) -> [`procedure`] (readings) -> [`fit`] (polynomial) ->
-//! [`mod@file`] (what is kept) -> the device; [`verify`] asks the device again, [`picture`] draws it. [`thesis`] is
+//! [`flotor_session::calibration_file`] (what is kept) -> the device; [`verify`] asks the device again, [`picture`] draws it. [`thesis`] is
 //! the report's polynomial, as a baseline.
 //!
 //! Not real-time, but for the thread that holds the handle in the rig.

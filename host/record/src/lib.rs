@@ -1,8 +1,6 @@
 //! Recordings: everything a run leaves behind, in one file that other people's tools open.
 //!
-//! A crate of its own because two programs need it: the host writes it, the viewer reads it. With it come the
-//! record of a tick ([`trace`]) and the way from the device's frame to a model's ([`mapping`]), without which
-//! nobody can read a recording.
+//! A crate of its own because two programs need it: the host writes it, the viewer reads it.
 //!
 //! A recording is an [MCAP](https://mcap.dev/spec) file of protobuf messages. It carries its own schemas, so
 //! Foxglove and Rerun draw it, Python's `mcap-protobuf-support` decodes it, and none of them needs this program:
@@ -32,7 +30,7 @@
 //! FLOTOR_WRITE_SCHEMA=1 cargo test -p flotor-tests --test recording_schema committed
 //! ```
 //!
-//! Not real-time, but for [`trace`], [`mapping`] and the words of [`news`]: records reach the rest through the trace ring.
+//! Not real-time: records reach the recorder through the queue of the trace.
 
 mod container;
 mod coupling;

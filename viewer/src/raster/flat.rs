@@ -145,11 +145,7 @@ fn clip_contains(low: f32, high: f32, pixel: usize) -> bool {
 }
 
 /// Colour of a texture at a place, premultiplied, 0 to 255.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::cast_sign_loss,
-)]
+#[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)]
 fn sample(texture: &ColorImage, uv: Pos2, smooth: bool) -> [f32; 4] {
     let [width, height] = texture.size;
     let texel = |x: isize, y: isize| {

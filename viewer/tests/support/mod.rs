@@ -13,7 +13,6 @@ pub(crate) mod tools;
 use flotor_core::Clock;
 use flotor_core::mapping::{Blend, MappingConfig};
 use flotor_core::trace::{Events, RECORD_WORDS, TickRecord};
-use flotor_hal::abi::loader::Plugin;
 use flotor_live::{
     Answer, Ask, ChangeMessage, Directory, End, Frames, Greeting, Kind, Listener, Outcome, PROTOCOL,
     PanelPlugin, Request, SetValue, Subject, WrenchLimits, frame, ticks_to_payload,

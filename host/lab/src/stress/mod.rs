@@ -14,7 +14,7 @@
 //! | M8 `determinism` | same poses, same bits? | |
 //!
 //! Each measure is made on instances of its own through the plugin contract, with nothing known about the
-//! model but what the contract says. Data flows one way: `poses` and [`trajectory`](super::trajectory) say where, [`subject`](super::subject) asks,
+//! model but what the contract says. Data flows one way: `poses` and `trajectory` say where, `subject` asks,
 //! `sweep` shares the work between the processors, each measure's module judges, `report` and `picture`
 //! show.
 //!

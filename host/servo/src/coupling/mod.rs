@@ -15,7 +15,7 @@
 //! Energies are those of the shared frame.
 //!
 //! [`Coupling`] is both ends in one loop with a delay of whole ticks. [`EndApart`] is one end whose partner is on another host:
-//! the same end, the same news, which other threads carry ([`crate::live::carry`]).
+//! the same end, the same news, which other threads carry over the [`Line`].
 //!
 //! Sources: account and transfer of energy, M. Franken, S. Stramigioli, S. Misra, C. Secchi, A. Macchelli, "Bilateral
 //! telemanipulation with time delays: a two-layer approach combining passivity and transparency", IEEE Trans. Robotics

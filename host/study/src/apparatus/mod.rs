@@ -1,6 +1,6 @@
-//! Perception experiments on a scene: what `flotor-study` asks for is presented by the servo loop.
+//! Perception experiments on a scene: what a protocol asks for is presented by the servo loop.
 //!
-//! - [`apparatus`]: a scene and what is varied in it, checked before the first trial.
+//! - [`setup`]: a scene and what is varied in it, checked before the first trial.
 //! - [`rig`]: presents to simulated observers in virtual time; [`live`]: to people, in real time.
 //! - [`attend`]: a person's sitting through a front end.
 //! - [`noise`]: white noise on headphones, where there is a player.
