@@ -10,7 +10,7 @@
 //!
 //! Source: C. Ericson, "Real-Time Collision Detection", 2005, section 7.1 (uniform grids, cells as one array).
 
-use flotor_hal::DVec3;
+use flotor_hal::{DVec3, math};
 
 /// Cells an object's box may lie in before it is looked at in every tick instead.
 const MOST_CELLS_OF_AN_OBJECT: usize = 64;
@@ -245,7 +245,7 @@ impl Grid {
             sides[sides.len() / 2]
         };
         #[allow(clippy::cast_precision_loss)] // a number of objects
-        let most = MOST_CELLS_OF_AN_AXIS.min((boxed.len() as f64).cbrt().ceil() * 2.0);
+        let most = MOST_CELLS_OF_AN_AXIS.min(math::cbrt(boxed.len() as f64).ceil() * 2.0);
         let mut cells = [1; 3];
         let mut per_m = DVec3::ZERO;
         for (axis, extent) in (high - low).to_array().into_iter().enumerate() {
