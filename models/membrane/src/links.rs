@@ -64,7 +64,7 @@ impl Links {
     }
 
     /// Adds the forces of all springs that touch a region awake. Real-time: bounded, no allocation.
-    #[inline(always)] // into the function compiled for wide instructions
+    #[inline]
     pub(crate) fn add_forces(&mut self, positions_m: &Vectors, forces_n: &mut Vectors, regions: &Regions) {
         for run in &self.runs {
             let (first, second) = (run.first, run.first + run.distance);
@@ -92,7 +92,7 @@ impl Links {
 
 impl Vectors {
     /// Forces on the masses `first` of springs to the masses `second`, into the first entries of `self`.
-    #[inline(always)]
+    #[inline]
     fn pull(
         &mut self,
         positions_m: &Vectors,
@@ -120,7 +120,7 @@ impl Vectors {
     }
 
     /// Adds the first entries of `other`, times `sign`, to a range.
-    #[inline(always)]
+    #[inline]
     fn add(&mut self, range: Range<usize>, other: &Vectors, sign: f64) {
         let count = range.len();
         let sums = self.slices_mut(range);

@@ -14,7 +14,6 @@ use crate::links::Links;
 use crate::mesh::Mesh;
 use crate::regions::Regions;
 use flotor_hal::DVec3;
-use pulp::Arch;
 use std::ops::Range;
 
 /// Three coordinates of many things, one array each.
@@ -62,17 +61,17 @@ impl Vectors {
         DVec3::new(self.x[index], self.y[index], self.z[index])
     }
 
-    #[inline(always)]
+    #[inline]
     pub(crate) fn slices(&self, range: Range<usize>) -> [&[f64]; 3] {
         [&self.x[range.clone()], &self.y[range.clone()], &self.z[range]]
     }
 
-    #[inline(always)]
+    #[inline]
     pub(crate) fn slices_mut(&mut self, range: Range<usize>) -> [&mut [f64]; 3] {
         [&mut self.x[range.clone()], &mut self.y[range.clone()], &mut self.z[range]]
     }
 
-    #[inline(always)]
+    #[inline]
     pub(crate) fn clear(&mut self, range: Range<usize>) {
         self.slices_mut(range).into_iter().for_each(|component| component.fill(0.0));
     }
@@ -146,7 +145,6 @@ pub struct Network {
     links: Links,
     surroundings: Surroundings,
     longest_step_s: f64,
-    instructions: Arch,
 }
 
 /// Share of the stability limit that is used: contact and stretching move the limit a little.
@@ -181,7 +179,6 @@ impl Network {
             links,
             surroundings,
             longest_step_s: SHARE_OF_LIMIT * 2.0 / highest_per_s,
-            instructions: Arch::new(),
         }
     }
 
@@ -222,26 +219,6 @@ impl Network {
     /// One step of `step_s`, at most [`Self::longest_step_s`]; the force on the ball, N. Real-time: bounded, no
     /// allocation.
     pub fn step(&mut self, step_s: f64, ball: Option<&Ball>) -> DVec3 {
-        // Everything below is compiled for the widest instructions this machine has; the results are the same bits.
-        self.instructions.dispatch(|| self.advance(step_s, ball))
-    }
-
-    /// Steps until all masses sleep, at most so often; true if they do. Not real-time.
-    pub fn come_to_rest(&mut self, most_steps: usize) -> bool {
-        (0..most_steps).any(|_| {
-            self.step(self.longest_step_s, None);
-            self.awake_nodes() == 0
-        })
-    }
-
-    /// Changes what acts on every mass, but for the contact stiffness, which the longest step depends on. Real-time:
-    /// bounded, no allocation.
-    pub fn set_damping_per_s(&mut self, damping_per_s: f64) {
-        self.surroundings.damping_per_s = damping_per_s;
-    }
-
-    #[inline(always)]
-    fn advance(&mut self, step_s: f64, ball: Option<&Ball>) -> DVec3 {
         let Self { state: State { positions_m, velocities_m_per_s, regions }, forces_n, .. } = self;
         if let Some(ball) = ball {
             regions.wake_near(ball);
@@ -270,10 +247,24 @@ impl Network {
         regions.settle(positions_m, velocities_m_per_s);
         on_ball_n
     }
+
+    /// Steps until all masses sleep, at most so often; true if they do. Not real-time.
+    pub fn come_to_rest(&mut self, most_steps: usize) -> bool {
+        (0..most_steps).any(|_| {
+            self.step(self.longest_step_s, None);
+            self.awake_nodes() == 0
+        })
+    }
+
+    /// Changes what acts on every mass, but for the contact stiffness, which the longest step depends on. Real-time:
+    /// bounded, no allocation.
+    pub fn set_damping_per_s(&mut self, damping_per_s: f64) {
+        self.surroundings.damping_per_s = damping_per_s;
+    }
 }
 
 /// One coordinate of a block, one step.
-#[inline(always)]
+#[inline]
 fn move_masses(
     x: &mut [f64],
     v: &mut [f64],
@@ -303,7 +294,7 @@ fn move_masses(
 }
 
 /// Pushes the masses of a block out of the ball; the force on the ball, N.
-#[inline(always)]
+#[inline]
 fn push(
     ball: &Ball,
     contact_n_per_m: f64,

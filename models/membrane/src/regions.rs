@@ -74,13 +74,13 @@ impl Regions {
     }
 
     /// Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn is_awake(&self, block: usize) -> bool {
         self.blocks.get(block).is_some_and(|block| block.awake)
     }
 
     /// Masses of the blocks that are awake. Real-time: bounded, no allocation.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn awake(&self) -> impl Iterator<Item = Range<usize>> + '_ {
         let awake = self.blocks.iter().enumerate().filter(|(_, block)| block.awake);
         awake.map(|(block, _)| block * BLOCK..(block * BLOCK + BLOCK).min(self.nodes))

@@ -133,16 +133,17 @@ impl Law for EnergyForm {
         // Differences from e instead of k and t themselves: the projection removes e, and nothing is left to
         // cancel near rest.
         let zero = length_m.like(0.0);
-        let by_direction = directions.chord_from_lower * by_lower
-            + directions.chord_from_upper * by_upper
-            + Vector::new(-t.y, t.x, zero) * coupling_nm;
+        let bent = directions.chord_from_lower * by_lower + directions.chord_from_upper * by_upper;
+        let by_direction = Vector::new(bent.x - t.y * coupling_nm, bent.y + t.x * coupling_nm, bent.z);
         let tangential = by_direction - e * by_direction.dot(e);
         let force_n = e * -by_length - tangential * inverse_length;
 
         let torque_nm = if demand >= Demand::Wrench {
-            let by_upper_normal = Vector::new(e.y, -e.x, zero) * coupling_nm
-                - e * by_upper
-                - Vector::new(zero, zero, by_plates);
+            let by_upper_normal = Vector::new(
+                e.y * coupling_nm - e.x * by_upper,
+                -(e.x * coupling_nm + e.y * by_upper),
+                -(e.z * by_upper + by_plates),
+            );
             // A small rotation changes the twist by its component along (t + k) / (1 + k.t).
             let twist_axis = Vector::new(t.x, t.y, directions.overturn);
             let twist_nm = torsion_nm * twist.slope * directions.inverse_overturn;

@@ -38,6 +38,10 @@ pub(crate) fn level_above<R: Real>(quantity: R, knee: f64, reach: f64) -> Levell
 /// The mirror image of [`level_above`]: never below `knee - reach`.
 #[inline(always)]
 pub(crate) fn level_below<R: Real>(quantity: R, knee: f64, reach: f64) -> Levelled<R> {
+    let bent = quantity.below(knee);
+    if !R::any(bent) {
+        return Levelled { value: quantity, slope: quantity.like(1.0), bent };
+    }
     let mirrored = level_above(-quantity, -knee, reach);
     Levelled { value: -mirrored.value, ..mirrored }
 }

@@ -91,8 +91,10 @@ pub(crate) struct QuarticEnergy<R = f64> {
 /// The four coefficients at one length.
 #[derive(Clone, Copy)]
 pub(crate) struct QuarticForm<R> {
-    /// `(c0, c1, c2, c3)`, each with its derivative by the length.
-    coefficients: [[R; 2]; 4],
+    /// `(c0, c1, c2, c3)`
+    coefficients: [R; 4],
+    /// Their derivatives by the length.
+    by_length: [R; 4],
 }
 
 /// The four coefficients of one spring as functions of the length.
@@ -154,7 +156,8 @@ impl Quartic {
         z_by_length: R,
         squares: [R; 3],
     ) -> QuarticEnergy<R> {
-        let [[c0, c0_slope], [c1, c1_slope], [c2, c2_slope], [c3, c3_slope]] = form.coefficients;
+        let ([c0, c1, c2, c3], [c0_slope, c1_slope, c2_slope, c3_slope]) =
+            (form.coefficients, form.by_length);
         let pole = (z.like(POLE) - z).inverse() * POLE;
         let magnification = pole + 1.0;
         let by_argument = pole * pole * (1.0 / POLE);
@@ -196,12 +199,13 @@ impl Quartic {
         let slope = slope * below.slope * self.mapping_per_m;
         let mapped = (value - self.middle_m) * self.mapping_per_m;
         let [p0, p1, p2, p3] = &self.powers;
-        let mut coefficients =
-            [polynomial(mapped, p0), polynomial(mapped, p1), polynomial(mapped, p2), polynomial(mapped, p3)];
-        for [_, by_length] in &mut coefficients {
-            *by_length = *by_length * slope;
+        // One after the other: side by side they take more registers than there are, and 13 ns of a tick more.
+        let ([c0, c0_slope], [c1, c1_slope]) = (polynomial(mapped, p0), polynomial(mapped, p1));
+        let ([c2, c2_slope], [c3, c3_slope]) = (polynomial(mapped, p2), polynomial(mapped, p3));
+        QuarticForm {
+            coefficients: [c0, c1, c2, c3],
+            by_length: [c0_slope * slope, c1_slope * slope, c2_slope * slope, c3_slope * slope],
         }
-        QuarticForm { coefficients }
     }
 }
 

@@ -103,7 +103,7 @@ fn fit_follows_the_coefficients() {
         for step in 0..=100 {
             let length_m = shortest + (longest - shortest) * f64::from(step) / 100.0;
             let exact = coefficients(rigidities, free_length_m, length_m / free_length_m);
-            let found = quartic.form_at(length_m).coefficients.map(|[value, _]| value);
+            let found = quartic.form_at(length_m).coefficients;
             let found = DVec4::from_array(found) * rigidities.gamma_n;
             let error = (found - exact).abs().max_element() / exact.abs().max_element();
             assert!(error < tolerance, "{preset:?} at {length_m}: {error:e}");
