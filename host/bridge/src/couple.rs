@@ -11,8 +11,8 @@
 
 use crate::keys::Name;
 use crate::link::LinkError;
-use flotor_live::{CALL_PERIOD, Directory, DirectoryError, FoundCoupling, NewsSocket};
 use flotor_core::peer::{DISPATCH_BYTES, Dispatch};
+use flotor_live::{CALL_PERIOD, Directory, DirectoryError, FoundCoupling, NewsSocket};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -4,9 +4,10 @@ use crate::keys::Name;
 use crate::link::LinkError;
 use crate::status::Status;
 use crate::wish::{Letter, Wish};
-use flotor_live::{Answer, End, Greeting};
+use flotor_core::Change;
 use flotor_core::trace::TickRecord;
-use flotor_record::{Change, RunDescription, tick_from_messages};
+use flotor_live::{Answer, End, Greeting};
+use flotor_record::{RunDescription, tick_from_messages};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -244,7 +245,9 @@ impl Ear {
                 return;
             }
             Some("tick") => self.tick(&payload, number),
-            Some("change") => flotor_record::change_from_bytes(&payload, number.unwrap_or(0)).ok().map(Told::Change),
+            Some("change") => {
+                flotor_record::change_from_bytes(&payload, number.unwrap_or(0)).ok().map(Told::Change)
+            }
             Some("end") => self.end(&payload, number),
             _ => return,
         };

@@ -2,12 +2,14 @@
 
 use crate::error::refuse;
 use crate::rows::{InputRow, OutputRow};
-use flotor_lab::evaluate::{Answer, Details, Evaluation, Handle, Travel};
-use flotor_session::registry::Registry;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::abi::{CallStatus, PluginKind};
 use flotor_hal::{DVec3, ParameterKind};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1};
+use flotor_lab::evaluate::{Answer, Details, Evaluation, Handle, Travel};
+use flotor_session::registry::Registry;
+use numpy::{
+    IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1,
+};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard};
@@ -105,7 +107,9 @@ impl Model {
     ) -> PyResult<()> {
         // NumPy takes any address for a record, and only says so in a flag: a slice does not.
         if !(inputs.data().is_aligned() && outputs.data().is_aligned()) {
-            return Err(refuse("inputs or outputs do not lie on a multiple of 8 bytes; pass a copy of the array"));
+            return Err(refuse(
+                "inputs or outputs do not lie on a multiple of 8 bytes; pass a copy of the array",
+            ));
         }
         let inputs = InputRow::peel(inputs.as_slice()?);
         let outputs = OutputRow::peel_mut(outputs.as_slice_mut()?);

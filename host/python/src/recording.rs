@@ -1,8 +1,8 @@
 //! A recording as columns.
 
 use crate::error::refuse;
-use flotor_record::{Ending, Recording};
 use flotor_core::trace::TickRecord;
+use flotor_record::{Ending, Recording};
 use numpy::IntoPyArray;
 use numpy::ndarray::Array2;
 use pyo3::prelude::*;

@@ -2,13 +2,13 @@
 
 use crate::design::{Cell, Design, Point};
 use crate::plan::{POSE_COLUMNS, Plan, PlanError, Question};
+use flotor_hal::DVec3;
+use flotor_hal::abi::PluginKind;
+use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_lab::evaluate::{Answer, Details, Evaluation, Handle, Travel};
 use flotor_session::headless;
 use flotor_session::registry::Registry;
 use flotor_session::scene::{PluginKeyValue, Scene};
-use flotor_hal::DVec3;
-use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{Plugin, Setting};
 use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::Xxh3;
 

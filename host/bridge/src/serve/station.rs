@@ -4,9 +4,10 @@ use super::WaitNow;
 use crate::keys::Name;
 use crate::link::LinkError;
 use crate::status::Status;
-use flotor_live::{ChangeMessage, End};
+use flotor_core::Change;
 use flotor_core::trace::TickRecord;
-use flotor_record::{Change, TickMessages};
+use flotor_live::{ChangeMessage, End};
+use flotor_record::TickMessages;
 use serde::Serialize;
 use std::sync::Mutex;
 use zenoh::Session;
@@ -59,7 +60,10 @@ impl Station {
     /// Publishes a change, with its time.
     pub(super) fn change(&self, change: &ChangeMessage) -> Result<(), LinkError> {
         let change = Change::from(change);
-        self.change.put(flotor_record::change_to_bytes(change)).attachment(change.time_ns.to_le_bytes()).wait_now()
+        self.change
+            .put(flotor_record::change_to_bytes(&change))
+            .attachment(change.time_ns.to_le_bytes())
+            .wait_now()
     }
 
     /// Publishes that the run is over, with the number of its last tick.
