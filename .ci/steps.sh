@@ -33,9 +33,12 @@ summary() {
 
 # What the tests use beyond Rust and a C compiler, by Debian's names: valgrind counts instructions, Xvfb and xdotool hold
 # and push a real window, drawn by Mesa; QEMU emulates other processors, and with busybox and cpio a small virtual machine.
-debian_packages="valgrind xvfb xdotool libegl1 libgl1-mesa-dri libxkbcommon-x11-0 qemu-user qemu-system-x86 busybox-static cpio"
+debian_packages="g++ valgrind xvfb xdotool libegl1 libgl1-mesa-dri libxkbcommon-x11-0 qemu-user qemu-system-x86 busybox-static cpio"
 
-# Installs what is missing where that is possible; elsewhere the tests that need it say that they were skipped.
+# What the tests use has to be here: where a tool is missing they fail instead of being skipped.
+export FLOTOR_REQUIRE=${FLOTOR_REQUIRE-cc,cxx,valgrind,display,qemu}
+
+# Installs what is missing where that is possible.
 machine() {
     local missing
     # shellcheck disable=SC2086 # a list of packages
@@ -63,6 +66,7 @@ every_change() {
     step docs env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
     # Workspaces of their own: that they still compile against the host.
     step beside cargo check --manifest-path host/python/Cargo.toml --target-dir target
+    step size .ci/lines
     # Plugins against the USB, HID and serial drivers of a kernel; skips, and says why, without QEMU.
     step usb .ci/vm
     # Every interleaving of the lock-free cells. A target folder of its own: the flag changes every crate.
