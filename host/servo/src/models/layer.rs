@@ -274,6 +274,7 @@ impl Object {
 
     /// Asks the model: its answer in its own frame, if there is one that can be used. What is wrong with one that cannot is
     /// booked in the health.
+    #[inline(always)]
     fn answer(
         &mut self,
         input: &Input,
