@@ -92,8 +92,9 @@ impl Envelope {
         // Before passivity: what cannot be sent anyway may be too large to be squared.
         let bounded = self.limit_wrench(walled, events);
         let passive = self.limit_energy(bounded, state, events);
-        self.last = self.limit_slew(passive, tick, events);
-        self.last
+        let sent = self.limit_slew(passive, tick, events);
+        self.last = sent;
+        sent
     }
 
     /// Energy the hand has put into the device's port so far less what has come out, J; negative: the loop has created

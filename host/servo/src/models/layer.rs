@@ -162,7 +162,7 @@ impl Layer {
     /// what it asked for last fades.
     ///
     /// Real-time: bounded by the objects that are near, no allocation.
-    #[inline]
+    #[inline(always)]
     pub(super) fn step(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
         match self.budget.allowed(tick.time_ns) {
             Allowed::Asked => {
