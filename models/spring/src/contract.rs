@@ -8,13 +8,13 @@ use crate::response::{Demand, Law, Response};
 use crate::validity::Validity;
 
 /// The pose of a step.
-#[inline(always)]
+#[inline]
 pub(crate) fn pose(input: &Input) -> Pose {
     Pose { position_m: input.pose.position(), orientation: input.pose.orientation() }
 }
 
 /// The demand of a step.
-#[inline(always)]
+#[inline]
 pub(crate) fn demand(input: &Input) -> Demand {
     if input.demand.contains(flotor_hal::Demand::ENERGY) {
         Demand::WrenchAndEnergy
@@ -45,14 +45,14 @@ struct Step<'a, L> {
 impl<L: Law> NullaryFnOnce for Step<'_, L> {
     type Output = Output;
 
-    #[inline(always)]
+    #[inline(always)] // into the instructions that `vectorize` chooses: 16 ns of a tick with what it calls
     fn call(self) -> Output {
         output(&self.law.respond_at(&pose(self.input), demand(self.input)))
     }
 }
 
 /// The answer of a step.
-#[inline(always)]
+#[inline(always)] // as `Step::call`
 pub(crate) fn output(response: &Response) -> Output {
     let status = match response.validity {
         Validity::Ok => StepStatus::Ok,

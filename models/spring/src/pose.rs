@@ -67,7 +67,7 @@ impl Pose {
     }
 
     /// The numbers of the pose, for formulas that serve one pose and many.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn coordinates(&self) -> Coordinates<f64> {
         let DVec3 { x, y, z } = self.position_m;
         Coordinates { position_m: Vector { x, y, z }, orientation: self.orientation.to_array() }
