@@ -1,7 +1,7 @@
 //! `flotor.force/1`: the function table of a force model, and how a [`ForceModel`] becomes one.
 
 use super::entry::{CallStatus, Entry, Instance, PluginKind};
-use super::instance::{self, Plugged, call, fill, refusable};
+use super::instance::{self, Plugged, call, refusable};
 use super::interface::{Extensions, find, table};
 use super::layout::layout;
 use super::{Message, Str};
@@ -95,7 +95,12 @@ unsafe extern "C" fn step<M: ForceModel>(
     output: *mut Output,
 ) -> u32 {
     // SAFETY: as in `prepare`.
-    unsafe { fill::<ModelPlug<M>, _>(instance, output, |model| Ok(model.step(&*input))) }
+    unsafe {
+        call::<ModelPlug<M>>(instance, |model| {
+            output.write(model.step(&*input));
+            Ok(())
+        })
+    }
 }
 
 unsafe extern "C" fn step_batch<M: ForceModel>(

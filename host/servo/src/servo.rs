@@ -225,8 +225,11 @@ impl Servo {
         if tick.dt_ns > self.config.held_up_ns {
             self.change_state(RunEvent::SamplesLost, tick);
         }
-        self.change_state(RunEvent::Time, tick);
-        self.change_state(sample, tick);
+        // An active run with a sample goes on as it is.
+        if (self.run, sample) != (RunState::Active, RunEvent::SamplesBack) {
+            self.change_state(RunEvent::Time, tick);
+            self.change_state(sample, tick);
+        }
         if stop.is_stop_asked() {
             self.change_state(RunEvent::StopAsked, tick);
         }

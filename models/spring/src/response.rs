@@ -56,7 +56,7 @@ pub trait Law {
     fn answer<R: Real>(&self, at: &Coordinates<R>, demand: Demand) -> Answer<R>;
 
     /// The response at one pose. Real-time: bounded, no allocation.
-    #[inline]
+    #[inline(always)] // into the instructions of a step, see `contract`
     fn respond_at(&self, pose: &Pose, demand: Demand) -> Response {
         let Answer { force_n, torque_nm, energy_j, answered, trusted } =
             self.answer(&pose.coordinates(), demand);
