@@ -155,7 +155,7 @@ fn screenshot(arguments: &Arguments, history: &History, wish: WindowWish, out: &
     for reason in missing {
         eprintln!("note: {reason}");
     }
-    let options = PictureOptions { size_px, scale, look, at_s: arguments.at, ..PictureOptions::default() };
+    let options = PictureOptions { size_px, scale, look, at_s: arguments.at };
     let image = picture(history, &mut shapes, &options).map_err(|error| Failure::Usage(error.to_string()))?;
     write_png(out, &image).map_err(|error: PictureError| Failure::File(error.to_string()))
 }

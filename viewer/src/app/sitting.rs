@@ -3,7 +3,7 @@
 use super::{Source, Viewer};
 use crate::experiment::{Prompt, screens};
 use crate::palette::Palette;
-use crate::scene::{SceneBuilder, Visible};
+use crate::scene::SceneBuilder;
 use crate::ui::view3d::Subject;
 use egui::{CentralPanel, Frame, Key, Panel as Edge, Rect, Ui, ViewportCommand};
 use flotor_live::Ask;
@@ -62,7 +62,7 @@ impl Viewer {
                 if prompt.shows_scene() {
                     // Nothing of what is drawn may tell how stiff it is: no arrows, no colours of the moment's
                     // largest force, and a wire that stays what it is.
-                    self.view.visible = Visible { arrows: false, ..Visible::default() };
+                    self.view.shows_arrows = false;
                     let subject = Subject {
                         shapes: &mut self.shapes,
                         version: self.shape_version,
