@@ -4,7 +4,6 @@ use super::{Source, Viewer};
 use crate::experiment::{Prompt, screens};
 use crate::palette::Palette;
 use crate::scene::SceneBuilder;
-use crate::ui::view3d::Subject;
 use egui::{CentralPanel, Frame, Key, Panel as Edge, Rect, Ui, ViewportCommand};
 use flotor_live::Ask;
 use flotor_study::screen::Screen;
@@ -63,13 +62,7 @@ impl Viewer {
                     // Nothing of what is drawn may tell how stiff it is: no arrows, no colours of the moment's
                     // largest force, and a wire that stays what it is.
                     self.view.shows_arrows = false;
-                    let subject = Subject {
-                        shapes: &mut self.shapes,
-                        version: self.shape_version,
-                        sample: &sample,
-                        scale: self.tally.scale(),
-                    };
-                    self.facts = self.view.show(ui, area, self.look, subject);
+                    self.scene(ui, area, &sample);
                     self.view.keys(ui, SceneBuilder::height_mm(&self.shapes));
                 }
                 screens::show(ui, area, prompt, palette);
