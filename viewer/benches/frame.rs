@@ -16,7 +16,7 @@ use flotor_viewer::canvas::Canvas;
 use flotor_viewer::history::{History, Keep, unknown_run};
 use flotor_viewer::palette::{Look, Palette};
 use flotor_viewer::quantity::Quantity;
-use flotor_viewer::scene::{ArrowScale, SceneBuilder, Visible};
+use flotor_viewer::scene::{ArrowScale, SceneBuilder};
 use flotor_viewer::shape::shapes_of;
 use flotor_viewer::trace::Trace;
 use std::hint::black_box;
@@ -121,8 +121,7 @@ fn frame(criterion: &mut Criterion<ProcessorTime>) {
         bench.iter(|| {
             moment_s = (moment_s + 0.016) % 10.0;
             let sample = history.at(moment_s).expect("ten seconds");
-            let (mesh, facts) =
-                builder.build(&mut shapes, sample, &palette, &camera, HEIGHT_PX, scale, Visible::default());
+            let (mesh, facts) = builder.build(&mut shapes, sample, &palette, &camera, HEIGHT_PX, scale, true);
             black_box((mesh.indices.len(), facts))
         });
     });
@@ -160,8 +159,7 @@ fn whole_picture(criterion: &mut Criterion<ProcessorTime>) {
     let (palette, scale) = (Palette::of(Look::Dark), ArrowScale::fitting(run.samples()));
     let sample = run.at(0.2).expect("ten seconds");
     let mut builder = SceneBuilder::default();
-    let (mesh, _) =
-        builder.build(&mut shapes, sample, &palette, &camera, SCENE_PX[1] as f64, scale, Visible::default());
+    let (mesh, _) = builder.build(&mut shapes, sample, &palette, &camera, SCENE_PX[1] as f64, scale, true);
     let mut canvas = Canvas::new(None);
     criterion.bench_function("3D scene drawn on the processor", |bench| {
         bench.iter(|| black_box(canvas.draw(&context, mesh, &camera, palette.backdrop, SCENE_PX)));

@@ -1,7 +1,9 @@
 //! Where the picture is seen from: an orbit around a point, z up.
 
 use flotor_hal::DVec3;
-use flotor_hal::glam::{DMat4, DVec4};
+use flotor_hal::glam::DMat4;
+use flotor_hal::glam::dcamera::rh::proj::directx::perspective;
+use flotor_hal::glam::dcamera::rh::view::look_at_mat4;
 
 /// An eye on a sphere around a point it looks at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,18 +63,8 @@ impl Camera {
     #[must_use]
     pub fn projection(&self, aspect: f64) -> DMat4 {
         let (near_mm, far_mm) = (0.05 * self.distance_mm, 20.0 * self.distance_mm);
-        lens(aspect.max(1.0e-3), near_mm, far_mm) * self.eye_frame()
-    }
-
-    /// From mm to the eye's frame: x right, y up, z towards the viewer.
-    fn eye_frame(&self) -> DMat4 {
-        let eye = self.eye_mm();
-        let back = (eye - self.target_mm).normalize_or(DVec3::Z);
-        let right = DVec3::Z.cross(back).normalize_or(DVec3::X);
-        let up = back.cross(right);
-        let turn =
-            DMat4::from_cols(right.extend(0.0), up.extend(0.0), back.extend(0.0), DVec4::W).transpose();
-        turn * DMat4::from_translation(-eye)
+        perspective(FIELD_OF_VIEW_RAD, aspect.max(1.0e-3), near_mm, far_mm)
+            * look_at_mat4(self.eye_mm(), self.target_mm, DVec3::Z)
     }
 
     /// Pixels a millimetre at the point looked at covers in a picture so many pixels high.
@@ -80,30 +72,20 @@ impl Camera {
     pub fn pixels_per_mm(&self, height_px: f64) -> f64 {
         0.5 * height_px / (self.distance_mm * (0.5 * FIELD_OF_VIEW_RAD).tan())
     }
-
-    /// Where a point (mm) appears, as parts of width and height from the upper left; `None` behind the eye.
-    #[must_use]
-    pub fn on_screen(&self, point_mm: DVec3, aspect: f64) -> Option<[f64; 2]> {
-        let DVec4 { x, y, w, .. } = self.projection(aspect) * point_mm.extend(1.0);
-        (w > 0.0).then(|| [0.5 + 0.5 * x / w, 0.5 - 0.5 * y / w])
-    }
-}
-
-/// Perspective with depth 0 at the near plane and 1 at the far one.
-fn lens(aspect: f64, near_mm: f64, far_mm: f64) -> DMat4 {
-    let focal = 1.0 / (0.5 * FIELD_OF_VIEW_RAD).tan();
-    let depth = far_mm / (near_mm - far_mm);
-    DMat4::from_cols(
-        DVec4::new(focal / aspect, 0.0, 0.0, 0.0),
-        DVec4::new(0.0, focal, 0.0, 0.0),
-        DVec4::new(0.0, 0.0, depth, -1.0),
-        DVec4::new(0.0, 0.0, near_mm * depth, 0.0),
-    )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use flotor_hal::glam::DVec4;
+
+    impl Camera {
+        /// Where a point (mm) appears, as parts of width and height from the upper left; `None` behind the eye.
+        fn on_screen(&self, point_mm: DVec3, aspect: f64) -> Option<[f64; 2]> {
+            let DVec4 { x, y, w, .. } = self.projection(aspect) * point_mm.extend(1.0);
+            (w > 0.0).then(|| [0.5 + 0.5 * x / w, 0.5 - 0.5 * y / w])
+        }
+    }
 
     #[test]
     fn the_point_looked_at_is_in_the_middle_and_up_is_up() {

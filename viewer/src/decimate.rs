@@ -8,21 +8,6 @@ use std::collections::VecDeque;
 /// A point of a trace: time, s, and value.
 pub type Point = [f64; 2];
 
-/// Points of a trace of which not more than two fall into a bucket.
-///
-/// `buckets` is how many may fit between the two times, about one a pixel. A trace with fewer points than that
-/// comes back as it is. Values that are not finite are left out.
-#[must_use]
-pub fn min_max(points: impl Iterator<Item = Point> + Clone, span_s: [f64; 2], buckets: usize) -> Vec<Point> {
-    let finite = points.filter(|[time, value]| time.is_finite() && value.is_finite());
-    if finite.clone().take(2 * buckets + 1).count() <= 2 * buckets {
-        return finite.collect();
-    }
-    let mut kept = Buckets::of_width(bucket_width_s(span_s[1] - span_s[0], buckets));
-    finite.for_each(|point| kept.push(point));
-    kept.points().collect()
-}
-
 /// Width of a bucket, s: a power of two, so that zooming by less does not move any edge.
 #[must_use]
 pub fn bucket_width_s(span_s: f64, buckets: usize) -> f64 {
@@ -101,10 +86,16 @@ mod tests {
         (0..count).map(|i| [i as f64 * 1.0e-3, ((i * 7919) % 1009) as f64]).collect()
     }
 
+    fn kept(points: &[Point], span_s: f64, buckets: usize) -> Vec<Point> {
+        let mut kept = Buckets::of_width(bucket_width_s(span_s, buckets));
+        points.iter().for_each(|point| kept.push(*point));
+        kept.points().collect()
+    }
+
     #[test]
     fn extremes_survive_and_points_do_not() {
         let points = noise(10_000);
-        let kept = min_max(points.iter().copied(), [0.0, 10.0], 500);
+        let kept = kept(&points, 10.0, 500);
         assert!(kept.len() <= 1100 && kept.len() >= 500, "{}", kept.len());
         let extremes = |points: &[Point]| {
             points.iter().fold([f64::MAX, f64::MIN], |[low, high], [_, v]| [low.min(*v), high.max(*v)])
@@ -116,7 +107,7 @@ mod tests {
     #[test]
     fn a_scrolling_trace_keeps_its_points() {
         let points = noise(10_000);
-        let window = |from: usize| min_max(points[from..from + 5000].iter().copied(), [0.0, 5.0], 500);
+        let window = |from: usize| kept(&points[from..from + 5000], 5.0, 500);
         let (before, after) = (window(1000), window(1003));
         // All but the buckets at the two edges.
         let inside = |point: &&Point| point[0] > 1.1 && point[0] < 5.9;
@@ -128,7 +119,7 @@ mod tests {
     #[test]
     fn few_points_and_holes_are_left_alone() {
         let points = [[0.0, 1.0], [1.0, f64::NAN], [2.0, 3.0]];
-        assert_eq!(min_max(points.into_iter(), [0.0, 2.0], 100), [[0.0, 1.0], [2.0, 3.0]]);
-        assert!(min_max(std::iter::empty(), [0.0, 0.0], 0).is_empty());
+        assert_eq!(kept(&points, 2.0, 100), [[0.0, 1.0], [2.0, 3.0]]);
+        assert!(kept(&[], 0.0, 0).is_empty());
     }
 }

@@ -32,7 +32,7 @@ pub enum FeedState {
 #[derive(Debug, Default)]
 pub struct News {
     /// Ticks in order.
-    pub records: Vec<TickRecord>,
+    pub records: VecDeque<TickRecord>,
     /// Parameters that changed.
     pub changes: Vec<ChangeMessage>,
     /// Requests that were answered.
@@ -41,9 +41,7 @@ pub struct News {
 
 #[derive(Debug)]
 struct Waiting {
-    records: VecDeque<TickRecord>,
-    changes: Vec<ChangeMessage>,
-    answers: Vec<Answer>,
+    news: News,
     dropped_by_host: u64,
     dropped_here: u64,
     last_tick: Instant,
@@ -67,9 +65,7 @@ impl Feed {
     /// [`LiveError::Connection`]: the host is gone, or there is no thread.
     pub fn start(mut client: Client, wake: impl Fn() + Send + 'static) -> Result<Self, LiveError> {
         let waiting = Arc::new(Mutex::new(Waiting {
-            records: VecDeque::new(),
-            changes: Vec::new(),
-            answers: Vec::new(),
+            news: News::default(),
             dropped_by_host: 0,
             dropped_here: 0,
             last_tick: Instant::now(),
@@ -110,12 +106,7 @@ impl Feed {
     /// Takes what has come.
     #[must_use]
     pub fn news(&self) -> News {
-        let mut waiting = lock(&self.waiting);
-        News {
-            records: waiting.records.drain(..).collect(),
-            changes: std::mem::take(&mut waiting.changes),
-            answers: std::mem::take(&mut waiting.answers),
-        }
+        std::mem::take(&mut lock(&self.waiting).news)
     }
 
     /// How the connection stands.
@@ -156,19 +147,20 @@ impl Drop for Feed {
 impl Waiting {
     /// True while there may be more.
     fn take_in(&mut self, next: Result<Option<Event>, LiveError>) -> bool {
+        let News { records: ticks, changes, answers } = &mut self.news;
         match next {
             Ok(None) => {}
             Ok(Some(Event::Ticks { records, dropped })) => {
                 self.dropped_by_host = dropped;
                 self.last_tick = Instant::now();
-                self.records.extend(records);
-                while self.records.len() > MOST_WAITING {
-                    self.records.pop_front();
+                ticks.extend(records);
+                while ticks.len() > MOST_WAITING {
+                    ticks.pop_front();
                     self.dropped_here += 1;
                 }
             }
-            Ok(Some(Event::Change(change))) if self.changes.len() < MOST_NEWS => self.changes.push(change),
-            Ok(Some(Event::Answer(answer))) if self.answers.len() < MOST_NEWS => self.answers.push(answer),
+            Ok(Some(Event::Change(change))) if changes.len() < MOST_NEWS => changes.push(change),
+            Ok(Some(Event::Answer(answer))) if answers.len() < MOST_NEWS => answers.push(answer),
             Ok(Some(Event::Change(_) | Event::Answer(_))) => {}
             Ok(Some(Event::End(End { words }))) => self.state = FeedState::Ended(words),
             Err(error) => self.state = FeedState::Lost(error.to_string()),

@@ -7,9 +7,10 @@ use flotor_viewer::app::{Start, Viewer, Wanted};
 use flotor_viewer::experiment::wire::at_standard_streams;
 use flotor_viewer::history::History;
 use flotor_viewer::palette::Look;
-use flotor_viewer::picture::{PictureError, PictureOptions, draw_without_window, picture, write_png};
+use flotor_viewer::picture::{PictureOptions, draw_without_window, picture, write_png};
 use flotor_viewer::shape::shapes_of;
 use flotor_viewer::window::{WindowError, WindowWish, open};
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -59,34 +60,30 @@ enum LookOption {
     Light,
 }
 
-/// Why there is nothing to see, with an exit code.
-enum Failure {
-    /// The recording or an option is wrong.
-    Usage(String),
-    /// A file could not be written.
-    File(String),
-    /// There was a window, and then there was none.
-    Window(String),
+/// Why there is nothing to see, with an exit code: 2 where the recording or an option is wrong, else 1.
+struct Failure(String, u8);
+
+impl Failure {
+    fn usage(error: impl Display) -> Self {
+        Self(error.to_string(), 2)
+    }
+
+    fn file(error: impl Display) -> Self {
+        Self(error.to_string(), 1)
+    }
 }
 
 impl From<WindowError> for Failure {
     fn from(error: WindowError) -> Self {
-        let text = error.to_string();
-        match error {
-            WindowError::Lost(_) | WindowError::Broken(_) => Self::Window(text),
-            _ => Self::Usage(text),
-        }
+        let was_there = matches!(error, WindowError::Lost(_) | WindowError::Broken(_));
+        Self(error.to_string(), if was_there { 1 } else { 2 })
     }
 }
 
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            let (text, code) = match failure {
-                Failure::Usage(text) => (text, 2),
-                Failure::File(text) | Failure::Window(text) => (text, 1),
-            };
+        Err(Failure(text, code)) => {
             eprintln!("error: {text}");
             ExitCode::from(code)
         }
@@ -103,7 +100,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         scale: arguments.scale,
         measure: arguments.measure,
     };
-    let read = |path: &PathBuf| History::read(path).map_err(|error| Failure::Usage(error.to_string()));
+    let read = |path: &PathBuf| History::read(path).map_err(Failure::usage);
     let history = arguments.recording.as_ref().map(read).transpose()?;
     match (history, &arguments.screenshot) {
         (Some(history), Some(out)) if arguments.window => whole_window(arguments, history, wish, out),
@@ -126,7 +123,7 @@ fn live(arguments: &Arguments) -> Result<Start, Failure> {
     if !arguments.sitting {
         return Ok(Start::Live(wanted));
     }
-    let prompt = at_standard_streams().map_err(|error| Failure::File(error.to_string()))?;
+    let prompt = at_standard_streams().map_err(Failure::file)?;
     Ok(Start::Sitting(wanted, Box::new(prompt)))
 }
 
@@ -141,7 +138,7 @@ fn whole_window(
     let start = Start::Recording(Box::new(history), arguments.at, arguments.plugins.clone());
     let mut viewer = Viewer::new(&egui::Context::default(), None, start, look);
     let image = draw_without_window(size, scale, look, |ui| viewer.show(ui));
-    write_png(out, &image).map_err(|error| Failure::File(error.to_string()))
+    write_png(out, &image).map_err(Failure::file)
 }
 
 /// Look, size and scale of a picture: the same for everybody.
@@ -155,9 +152,9 @@ fn screenshot(arguments: &Arguments, history: &History, wish: WindowWish, out: &
     for reason in missing {
         eprintln!("note: {reason}");
     }
-    let options = PictureOptions { size_px, scale, look, at_s: arguments.at, ..PictureOptions::default() };
-    let image = picture(history, &mut shapes, &options).map_err(|error| Failure::Usage(error.to_string()))?;
-    write_png(out, &image).map_err(|error: PictureError| Failure::File(error.to_string()))
+    let options = PictureOptions { size_px, scale, look, at_s: arguments.at };
+    let image = picture(history, &mut shapes, &options).map_err(Failure::usage)?;
+    write_png(out, &image).map_err(Failure::file)
 }
 
 /// `1280x800`

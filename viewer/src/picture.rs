@@ -6,7 +6,7 @@ use crate::palette::{Look, Palette};
 use crate::quantity::{Quantity, Units};
 use crate::raster::flat::FlatRasterizer;
 use crate::raster::solid::Rasterizer;
-use crate::scene::{ArrowScale, SceneBuilder, Visible};
+use crate::scene::{ArrowScale, SceneBuilder};
 use crate::shape::Shape;
 use crate::trace::Trace;
 use crate::ui::plots::{PlotView, plot};
@@ -25,23 +25,6 @@ pub struct PictureOptions {
     pub look: Look,
     /// The moment, s; without one, that of the largest force.
     pub at_s: Option<f64>,
-    /// Units of numbers.
-    pub units: Units,
-    /// From where; without one, the experimenter's view.
-    pub camera: Option<Camera>,
-}
-
-impl Default for PictureOptions {
-    fn default() -> Self {
-        Self {
-            size_px: [1280, 800],
-            scale: 1.0,
-            look: Look::Dark,
-            at_s: None,
-            units: Units::Handy,
-            camera: None,
-        }
-    }
 }
 
 /// Why there is no picture.
@@ -96,7 +79,7 @@ pub fn picture(
             let view = PlotView {
                 span_s: history.span_s(),
                 cursor_s: sample.time_s(),
-                units: options.units,
+                units: Units::default(),
                 height: if time_axis { height + 14.0 } else { height - 14.0 },
                 time_axis,
             };
@@ -115,11 +98,11 @@ fn view_of(
     palette: &Palette,
 ) {
     let size_px = [view.width(), view.height()].map(|points| pixels(points * options.scale));
-    let camera = options.camera.unwrap_or_else(|| Camera::experimenter(SceneBuilder::height_mm(shapes)));
+    let camera = Camera::experimenter(SceneBuilder::height_mm(shapes));
     let scale = ArrowScale::fitting(history.samples());
     let mut builder = SceneBuilder::default();
     let height_px = size_px[1] as f64;
-    let (mesh, facts) = builder.build(shapes, sample, palette, &camera, height_px, scale, Visible::default());
+    let (mesh, facts) = builder.build(shapes, sample, palette, &camera, height_px, scale, true);
     let drawn = Rasterizer::default().draw(mesh, &camera, palette.backdrop, size_px, SAMPLES);
     let image = ColorImage::from_rgb(drawn.size, &drawn.rgb);
     let texture = ui.ctx().load_texture("view", image, TextureOptions::NEAREST);
@@ -129,7 +112,7 @@ fn view_of(
     // The handle must outlive the frame, or the texture is gone before it is drawn.
     ui.data_mut(|data| data.insert_temp(egui::Id::unique("view texture"), texture));
     readout::title(&painter, view, history.run(), palette);
-    readout::numbers(&painter, view, sample, options.units, palette);
+    readout::numbers(&painter, view, sample, Units::default(), palette);
     readout::paint_warnings(&painter, view, &readout::warnings(sample, &facts), palette);
     legend::paint(&painter, view, &facts, palette);
 }

@@ -87,16 +87,6 @@ impl Player {
             }
         };
     }
-
-    /// The next speed up or down.
-    pub fn faster(&mut self, by: isize) {
-        let nearest = |speed: f64| {
-            let distance = |index: &usize| (SPEEDS[*index] / speed).ln().abs();
-            (0..SPEEDS.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
-        };
-        let index = nearest(self.speed).saturating_add_signed(by).min(SPEEDS.len() - 1);
-        self.speed = SPEEDS[index];
-    }
 }
 
 #[cfg(test)]
@@ -143,12 +133,8 @@ mod tests {
     }
 
     #[test]
-    fn speeds_are_steps() {
-        let mut player = Player::at(0.0);
-        player.faster(9);
-        assert_eq!(player.speed, 2.0);
-        player.faster(-2);
-        assert_eq!(player.speed, 0.5);
+    fn a_run_without_length_stands_still() {
+        let mut player = Player { motion: Motion::Play, ..Player::at(0.0) };
         player.advance(1.0, [0.0, 0.0]);
         assert_eq!(player.now_s, 0.0, "nothing to play");
     }

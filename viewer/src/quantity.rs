@@ -15,8 +15,8 @@ pub enum Units {
     Si,
 }
 
-/// A measured quantity with one component or three.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// A measured quantity with one component or three. They are in the order of menus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Quantity {
     /// Force sent to the device.

@@ -11,23 +11,6 @@ use crate::palette::{Palette, strain_color};
 use crate::shape::{Posed, Shape};
 use flotor_hal::{DVec3, Pose, Wrench};
 
-/// What of the scene is drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Visible {
-    /// The bodies and their plates.
-    pub bodies: bool,
-    /// Force and torque.
-    pub arrows: bool,
-    /// The ground.
-    pub ground: bool,
-}
-
-impl Default for Visible {
-    fn default() -> Self {
-        Self { bodies: true, arrows: true, ground: true }
-    }
-}
-
 /// Lengths of arrows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArrowScale {
@@ -114,7 +97,7 @@ impl SceneBuilder {
         camera: &Camera,
         height_px: f64,
         scale: ArrowScale,
-        visible: Visible,
+        shows_arrows: bool,
     ) -> (&Mesh, SceneFacts) {
         let mut facts = SceneFacts::default();
         let height_m = Self::height_mm(shapes) / MM_PER_M;
@@ -124,50 +107,34 @@ impl SceneBuilder {
 
         let plate_radius_m =
             drawn().map(|(shape, _)| plate_radius_m(shape.body())).fold(0.25 * height_m, f64::max);
-        let ground = visible.ground.then(|| ground(palette, height_m, plate_radius_m));
+        let (handle, wrench) = in_scene_frame(shapes.first(), sample);
+        let ground = ground(palette, height_m, plate_radius_m);
         self.begin(ground);
-        if let Some(ground) = ground {
-            let handle =
-                shapes.first().map_or(sample.pose, |shape| shape.mapping().pose_to_model(&sample.pose));
-            let shadows = shadows(&ground, palette, plate_radius_m, handle.position());
-            ground.shade(&mut self.mesh.vertices, &shadows);
+        let shadows = shadows(&ground, palette, plate_radius_m, handle.position());
+        ground.shade(&mut self.mesh.vertices, &shadows);
+        let pixels_per_mm = camera.pixels_per_mm(height_px);
+        for (shape, posed) in drawn() {
+            let part =
+                body_of(&mut self.mesh, shape.body(), posed, palette, pixels_per_mm, &mut facts.touching);
+            facts.peak_part = facts.peak_part.max(part);
         }
-        if visible.bodies {
-            let pixels_per_mm = camera.pixels_per_mm(height_px);
-            for (shape, posed) in drawn() {
-                let body = shape.body();
-                facts.peak_part = facts.peak_part.max(body_of(
-                    &mut self.mesh,
-                    body,
-                    posed,
-                    palette,
-                    pixels_per_mm,
-                    &mut facts.touching,
-                ));
-            }
-            if shapes.is_empty() {
-                self.bare_handle(&sample.pose, palette, 0.25 * height_m);
-            }
+        if shapes.is_empty() {
+            self.bare_handle(&sample.pose, palette, 0.25 * height_m);
         }
-        if visible.arrows {
-            let hand = shapes
-                .first()
-                .map_or((sample.pose, Wrench::new(sample.force_n(), sample.torque_nm())), |shape| {
-                    in_model_frame(shape, sample)
-                });
-            self.arrows(hand, palette, scale, height_m, plate_radius_m);
+        if shows_arrows {
+            self.arrows((handle, wrench), palette, scale, height_m, plate_radius_m);
         }
         self.corners_made += (self.mesh.vertices.len() - self.bare[0]) as u64;
         (&self.mesh, facts)
     }
 
     /// Leaves nothing in the mesh but the ground.
-    fn begin(&mut self, ground: Option<Ground>) {
-        if self.ground != ground {
+    fn begin(&mut self, ground: Ground) {
+        if self.ground != Some(ground) {
             self.mesh.clear();
-            ground.iter().for_each(|ground| ground.append(&mut self.mesh));
+            ground.append(&mut self.mesh);
             self.bare = [self.mesh.vertices.len(), self.mesh.indices.len()];
-            self.ground = ground;
+            self.ground = Some(ground);
         }
         self.mesh.vertices.truncate(self.bare[0]);
         self.mesh.indices.truncate(self.bare[1]);
@@ -228,12 +195,15 @@ fn shadows(ground: &Ground, palette: &Palette, plate_radius_m: f64, handle_m: DV
     [shadow(DVec3::ZERO, 1.3, 0.8), shadow(of_plate, 1.1, 0.7), shadow(0.5 * of_plate, 1.3, 0.4)]
 }
 
-/// Handle and wrench in the frame of the first model, in which the scene is drawn.
-fn in_model_frame(shape: &Shape, sample: &Sample) -> (Pose, Wrench) {
-    let handle = shape.mapping().pose_to_model(&sample.pose);
+/// Handle and wrench in the frame in which the scene is drawn: that of the first model, else the device's.
+fn in_scene_frame(first: Option<&Shape>, sample: &Sample) -> (Pose, Wrench) {
+    let (force_n, torque_nm) = (sample.force_n(), sample.torque_nm());
+    let Some(mapping) = first.map(Shape::mapping) else {
+        return (sample.pose, Wrench::new(force_n, torque_nm));
+    };
     // Only the direction turns: an arrow shows what the hand feels, not what the model says.
-    let turn = shape.mapping().rotation();
-    (handle, Wrench::new(turn * sample.force_n(), turn * sample.torque_nm()))
+    let turn = mapping.rotation();
+    (mapping.pose_to_model(&sample.pose), Wrench::new(turn * force_n, turn * torque_nm))
 }
 
 fn plate_radius_m(body: &Body) -> f64 {
@@ -289,19 +259,19 @@ mod tests {
         Sample::from(&record)
     }
 
-    fn build(builder: &mut SceneBuilder, sample: &Sample, visible: Visible) -> Mesh {
+    fn build(builder: &mut SceneBuilder, sample: &Sample, shows_arrows: bool) -> Mesh {
         let (palette, camera) = (Palette::of(Look::Dark), Camera::experimenter(SceneBuilder::height_mm(&[])));
         let scale = ArrowScale::fitting([sample].into_iter());
-        builder.build(&mut [], sample, &palette, &camera, 400.0, scale, visible).0.clone()
+        builder.build(&mut [], sample, &palette, &camera, 400.0, scale, shows_arrows).0.clone()
     }
 
     #[test]
     fn the_largest_force_on_a_handle_at_rest_is_in_sight() {
         let camera = Camera::experimenter(SceneBuilder::height_mm(&[]));
-        let only = Visible { ground: false, ..Visible::default() };
         for force_n in [DVec3::Z, DVec3::X, -DVec3::Z, DVec3::new(1.0, 1.0, 1.0)] {
-            let mesh = build(&mut SceneBuilder::default(), &sample(30.0 * force_n), only);
-            for vertex in &mesh.vertices {
+            let mut builder = SceneBuilder::default();
+            let mesh = build(&mut builder, &sample(30.0 * force_n), true);
+            for vertex in &mesh.vertices[builder.bare[0]..] {
                 let place = DVec3::from_array(vertex.position_mm.map(f64::from)).extend(1.0);
                 let clip = camera.projection(2.0) * place;
                 let [x, y] = [clip.x / clip.w, clip.y / clip.w];
@@ -314,10 +284,9 @@ mod tests {
     #[test]
     fn the_ground_is_kept_and_what_stands_on_it_is_not() {
         let mut used = SceneBuilder::default();
-        for (force_n, ground) in [(DVec3::X, true), (DVec3::Z, true), (DVec3::Z, false), (-DVec3::Z, true)] {
-            let visible = Visible { ground, ..Visible::default() };
-            let again = build(&mut used, &sample(force_n), visible);
-            let new = build(&mut SceneBuilder::default(), &sample(force_n), visible);
+        for (force_n, arrows) in [(DVec3::X, true), (DVec3::Z, true), (DVec3::Z, false), (-DVec3::Z, true)] {
+            let again = build(&mut used, &sample(force_n), arrows);
+            let new = build(&mut SceneBuilder::default(), &sample(force_n), arrows);
             assert_eq!((again.vertices, again.indices), (new.vertices, new.indices));
         }
     }

@@ -80,7 +80,6 @@ impl Trace {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::decimate::min_max;
     use crate::history::{Keep, unknown_run};
     use flotor_core::trace::{RECORD_WORDS, TickRecord};
     use flotor_sync::Words;
@@ -102,8 +101,9 @@ mod tests {
     fn afresh(history: &History, span_s: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
         let component = |k: usize| {
             let samples = history.between(span_s[0], span_s[1]);
-            let points: Vec<_> = samples.map(|s| [s.time_s(), 2.0 * Quantity::Force.value(s, k)]).collect();
-            min_max(points.iter().copied(), span_s, BUCKETS)
+            let mut kept = Buckets::of_width(bucket_width_s(span_s[1] - span_s[0], BUCKETS));
+            samples.for_each(|s| kept.push([s.time_s(), 2.0 * Quantity::Force.value(s, k)]));
+            kept.points().collect()
         };
         (0..3).map(component).collect()
     }

@@ -14,9 +14,10 @@ use flotor_viewer::gpu::GpuScene;
 use flotor_viewer::history::{History, Keep, Sample};
 use flotor_viewer::palette::{Look, Palette};
 use flotor_viewer::picture::{draw_without_window, write_png};
-use flotor_viewer::raster::solid::Rasterizer;
-use flotor_viewer::scene::{ArrowScale, SceneBuilder, Visible};
+use flotor_viewer::raster::solid::{Image, Rasterizer};
+use flotor_viewer::scene::{ArrowScale, SceneBuilder};
 use flotor_viewer::shape::shapes_of;
+use std::time::Duration;
 use support::tools::{Tool, lacks};
 use support::{plugin_file, spring_run, tick};
 
@@ -27,6 +28,34 @@ fn adapter() -> Option<RenderState> {
         lacks(Tool::Adapter, "there is no adapter");
     }
     state.ok()
+}
+
+/// The pixels of a texture, three bytes each, row by row from the top.
+fn read(state: &RenderState, texture: &wgpu::Texture) -> Image {
+    let (device, size) = (&state.device, texture.size());
+    // Rows of a copy begin at multiples of 256 bytes.
+    let row_bytes = (4 * size.width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: u64::from(row_bytes) * u64::from(size.height),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let layout =
+        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row_bytes), rows_per_image: None };
+    let copy = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
+    encoder.copy_texture_to_buffer(texture.as_image_copy(), copy, size);
+    let submission_index = Some(state.queue.submit([encoder.finish()]));
+    buffer.slice(..).map_async(wgpu::MapMode::Read, |result| result.expect("the buffer can be read"));
+    // A software adapter on a loaded machine needs seconds.
+    let timeout = Some(Duration::from_secs(20));
+    device.poll(wgpu::PollType::Wait { submission_index, timeout }).expect("the picture arrives");
+    let mapped = buffer.slice(..).get_mapped_range().expect("the buffer is mapped");
+    let rows = mapped.chunks_exact(row_bytes as usize);
+    let pixels = rows.flat_map(|row| row.chunks_exact(4).take(size.width as usize));
+    let rgb = pixels.flat_map(|pixel| pixel.iter().take(3).copied()).collect();
+    Image { size: [size.width as usize, size.height as usize], rgb }
 }
 
 /// Two pictures of one size, 8 bits a channel: mean difference, levels, and the part of all values that differ by more than 40.
@@ -62,10 +91,8 @@ fn an_adapter_and_the_processor_draw_the_same_scene() {
         let palette = Palette::of(look);
         let (camera, size) = (Camera::experimenter(SceneBuilder::height_mm(&shapes)), [641, 400]);
         let (mut builder, scale) = (SceneBuilder::default(), ArrowScale::fitting([&sample].into_iter()));
-        let (mesh, _) =
-            builder.build(&mut shapes, &sample, &palette, &camera, 400.0, scale, Visible::default());
-        let _ = gpu.draw(mesh, &camera, palette.backdrop, size);
-        let drawn = gpu.read().expect("a picture comes back");
+        let (mesh, _) = builder.build(&mut shapes, &sample, &palette, &camera, 400.0, scale, true);
+        let drawn = read(&state, gpu.draw(mesh, &camera, palette.backdrop, size).texture());
         let expected = Rasterizer::default().draw(mesh, &camera, palette.backdrop, size, 4);
         assert_eq!(drawn.size, expected.size);
         let (mean, far) = difference(&drawn.rgb, &expected.rgb);

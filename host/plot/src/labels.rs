@@ -181,15 +181,15 @@ pub(super) fn baseline(middle: f64, font_px: f64) -> f64 {
 
 /// Width of the gutter that the names of horizontal marks take right of the frame.
 pub(super) fn side_gutter_px(marks: &[Mark], y: &Domain) -> f64 {
-    visible_parts(marks, Direction::Y, y)
+    visible_marks(marks, Direction::Y, y)
         .map(|(label, _)| text::width_px(&side_text(label), font_px::LABEL) + SIDE_LABEL_GAP_PX)
         .fold(0.0, f64::max)
 }
 
 /// Names of horizontal marks, top to bottom, none over another.
 pub(super) fn side_labels(marks: &[Mark], projection: &Projection) -> Vec<MarkLabel> {
-    let mut labels: Vec<MarkLabel> = visible_parts(marks, Direction::Y, &projection.y)
-        .map(|(label, (from, to))| (side_text(label), projection.y_px(0.5 * (from + to))))
+    let mut labels: Vec<MarkLabel> = visible_marks(marks, Direction::Y, &projection.y)
+        .map(|(label, at)| (side_text(label), projection.y_px(at)))
         .map(|(text, anchor)| MarkLabel { text, anchor, middle: anchor, half_px: 0.0, row: 0 })
         .collect();
     labels.sort_by(|one, other| one.anchor.total_cmp(&other.anchor));
@@ -200,11 +200,11 @@ pub(super) fn side_labels(marks: &[Mark], projection: &Projection) -> Vec<MarkLa
 /// Names of vertical marks: flags that fly to the right of their mark, or to the left where the picture ends.
 /// Rows fill from the right, so that no pole crosses a name: what stands in a lower row begins further right.
 pub(super) fn top_labels(marks: &[Mark], x: &Domain, left: f64, right: f64) -> Vec<MarkLabel> {
-    let mut labels: Vec<MarkLabel> = visible_parts(marks, Direction::X, x)
-        .map(|(label, (from, _))| {
+    let mut labels: Vec<MarkLabel> = visible_marks(marks, Direction::X, x)
+        .map(|(label, at)| {
             let text = text::shorten(label, right - left, font_px::LABEL);
             let width_px = text::width_px(&text, font_px::LABEL);
-            let anchor = left + (right - left) * x.fraction(from);
+            let anchor = left + (right - left) * x.fraction(at);
             let start = anchor + FLAG_GAP_PX;
             let fits = start + width_px <= right + FLAG_OVERHANG_PX;
             let start = if fits { start } else { anchor - FLAG_GAP_PX - width_px };
@@ -228,16 +228,16 @@ fn side_text(label: &str) -> String {
     text::shorten(label, SIDE_LABEL_LIMIT_PX, font_px::LABEL)
 }
 
-/// Labels of the marks on one axis that are seen, with the part of the domain they cover.
-fn visible_parts<'a>(
+/// Labels of the marks on one axis that are seen, with their coordinates.
+fn visible_marks<'a>(
     marks: &'a [Mark],
     direction: Direction,
     domain: &Domain,
-) -> impl Iterator<Item = (&'a str, (f64, f64))> {
+) -> impl Iterator<Item = (&'a str, f64)> {
     marks
         .iter()
         .filter(move |mark| mark.direction == direction && !mark.label.is_empty())
-        .filter_map(|mark| mark.visible(domain).map(|part| (mark.label.as_str(), part)))
+        .filter_map(|mark| mark.visible(domain).map(|at| (mark.label.as_str(), at)))
 }
 
 /// Moves sorted labels apart to their pitch: down from `top` first, then up from `bottom`.

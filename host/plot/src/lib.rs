@@ -1,7 +1,7 @@
 //! Charts as self-contained SVG text: every picture the command line makes comes from here.
 //!
 //! A [`Figure`] has a title and [`Panel`]s; a panel has axes, [`Series`] of samples and [`Mark`]s (reference
-//! lines and shaded bands). [`Figure::to_svg`] lays them out and writes one SVG document that needs no other
+//! lines). [`Figure::to_svg`] lays them out and writes one SVG document that needs no other
 //! file, reads on light and dark pages, scales with the page and says in words what it shows.
 //!
 //! Three promises shape the code:
@@ -49,9 +49,8 @@ pub use axis::Axis;
 pub use mark::Mark;
 pub use series::{Bin, Series};
 
-/// Width of a figure unless [`Figure::width_px`] says otherwise: fits the text column of the book and a
-/// laptop screen at full size.
-const DEFAULT_WIDTH_PX: f64 = 960.0;
+/// Width of a figure: fits the text column of the book and a laptop screen at full size.
+const WIDTH_PX: f64 = 960.0;
 
 /// Height of a panel's plotting area unless [`Figure::panel_height_px`] says otherwise: five stacked panels
 /// fit one screen.
@@ -67,7 +66,6 @@ pub struct Figure {
     subtitle: String,
     shared_x: Axis,
     columns: usize,
-    width_px: f64,
     panel_height_px: f64,
     panels: Vec<Panel>,
 }
@@ -80,7 +78,6 @@ impl Figure {
             subtitle: String::new(),
             shared_x,
             columns: 1,
-            width_px: DEFAULT_WIDTH_PX,
             panel_height_px: DEFAULT_PANEL_HEIGHT_PX,
             panels: Vec::new(),
         }
@@ -100,17 +97,12 @@ impl Figure {
         self
     }
 
-    /// Width of the whole picture, held within 320 px to 4000 px.
-    #[must_use]
-    pub fn width_px(mut self, width_px: f64) -> Self {
-        self.width_px = within_or(width_px, 320.0, 4000.0, DEFAULT_WIDTH_PX);
-        self
-    }
-
-    /// Height of each plotting area, without headings and tick labels, held within 40 px to 2000 px.
+    /// Height of each plotting area, without headings and tick labels, held within 40 px to 2000 px; NaN changes nothing.
     #[must_use]
     pub fn panel_height_px(mut self, panel_height_px: f64) -> Self {
-        self.panel_height_px = within_or(panel_height_px, 40.0, 2000.0, DEFAULT_PANEL_HEIGHT_PX);
+        if !panel_height_px.is_nan() {
+            self.panel_height_px = panel_height_px.clamp(40.0, 2000.0);
+        }
         self
     }
 
@@ -165,15 +157,10 @@ impl Panel {
         self
     }
 
-    /// Adds a reference line or band.
+    /// Adds a reference line.
     #[must_use]
     pub fn mark(mut self, mark: Mark) -> Self {
         self.marks.push(mark);
         self
     }
-}
-
-/// `value` held within `low..=high`, or `fallback` when it is NaN.
-fn within_or(value: f64, low: f64, high: f64, fallback: f64) -> f64 {
-    if value.is_nan() { fallback } else { value.clamp(low, high) }
 }

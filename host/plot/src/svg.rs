@@ -1,9 +1,8 @@
 //! The document: an arranged figure written as SVG.
 //!
-//! Within a panel, from back to front: bands, grid, reference lines, data (clipped to the frame), axis. The
+//! Within a panel, from back to front: grid, reference lines, data (clipped to the frame), axis. The
 //! document has no ids and its style is confined to `.plot`, so that several pictures fit in one page.
 
-use super::Figure;
 use super::axis::{Domain, Scale};
 use super::labels::{
     HEADING_ROW_PX, LEGEND_ROW_PX, Legend, LegendEntry, MARK_ROW_PX, SIDE_LABEL_GAP_PX, baseline,
@@ -13,10 +12,11 @@ use super::layout::{
     TITLE_LINE_PX,
 };
 use super::mark::Direction;
-use super::path::{Drawing, Path, Projection, Rect, draw};
+use super::path::{Drawing, Path, Projection, draw};
 use super::series::Shape;
 use super::text::{self, escape, px};
 use super::theme::{Slot, font_px, style_sheet};
+use super::{Figure, WIDTH_PX};
 
 /// Lines may pass the frame by half their width before they are cut, markers by half their size.
 const LINE_SLACK_PX: f64 = 0.8;
@@ -31,7 +31,7 @@ const MINOR_GRID_DECADE_PX: f64 = 60.0;
 /// Writes the figure.
 pub(super) fn document(figure: &Figure, layout: &Layout<'_>) -> String {
     let mut writer = Writer::default();
-    let (width, height) = (px(figure.width_px), px(layout.height));
+    let (width, height) = (px(WIDTH_PX), px(layout.height));
     writer.raw(&format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"plot\" role=\"img\" width=\"{width}\" \
          height=\"{height}\" viewBox=\"0 0 {width} {height}\">\n"
@@ -136,7 +136,6 @@ impl Writer {
         let drawings: Vec<Option<Drawing>> =
             series.map(|(index, series)| draw(series, series.look(index), &cell.projection)).collect();
         self.raw("<g>\n");
-        self.bands(cell);
         self.grid(cell);
         self.reference_lines(cell);
         self.data(cell, &drawings);
@@ -149,31 +148,15 @@ impl Writer {
         self.raw("</g>\n");
     }
 
-    fn bands(&mut self, cell: &Cell<'_>) {
-        for (direction, from, to) in visible_marks(cell).filter(|(_, from, to)| from != to) {
-            let frame = &cell.projection.frame;
-            let band = match direction {
-                Direction::X => Rect { left: from, width: to - from, ..*frame },
-                Direction::Y => Rect { top: to, height: from - to, ..*frame },
-            };
-            self.raw(&format!(
-                "<rect class=\"band\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>\n",
-                px(band.left),
-                px(band.top),
-                px(band.width),
-                px(band.height)
-            ));
-        }
-    }
-
     fn reference_lines(&mut self, cell: &Cell<'_>) {
+        let projection @ Projection { x, y, frame } = &cell.projection;
         let mut path = Path::default();
-        for (direction, at, _) in visible_marks(cell).filter(|(_, from, to)| from == to) {
-            let frame = &cell.projection.frame;
-            match direction {
-                Direction::X => path.polyline(frame.upright(at)),
-                Direction::Y => path.polyline(frame.level(at)),
-            }
+        for mark in &cell.panel.marks {
+            let line = match mark.direction {
+                Direction::X => mark.visible(x).map(|at| frame.upright(projection.x_px(at))),
+                Direction::Y => mark.visible(y).map(|at| frame.level(projection.y_px(at))),
+            };
+            line.into_iter().for_each(|line| path.polyline(line));
         }
         self.path("reference", &path);
     }
@@ -342,19 +325,4 @@ impl Writer {
 /// Whether a log axis gets thin lines between its labelled ones: they show that it is one.
 fn has_minor_grid(domain: &Domain, length_px: f64) -> bool {
     domain.scale == Scale::Log && length_px >= MINOR_GRID_DECADE_PX * domain.span()
-}
-
-/// Marks that are seen, with their ends in pixels along their axis.
-fn visible_marks(cell: &Cell<'_>) -> impl Iterator<Item = (Direction, f64, f64)> {
-    let projection = cell.projection;
-    cell.panel.marks.iter().filter_map(move |mark| match mark.direction {
-        Direction::X => {
-            let (from, to) = mark.visible(&projection.x)?;
-            Some((Direction::X, projection.x_px(from), projection.x_px(to)))
-        }
-        Direction::Y => {
-            let (from, to) = mark.visible(&projection.y)?;
-            Some((Direction::Y, projection.y_px(from), projection.y_px(to)))
-        }
-    })
 }

@@ -1,7 +1,5 @@
 //! Text for pictures: escaping, numbers, and the room a text takes without asking a font.
 
-use std::fmt::Write as _;
-
 /// Escapes what XML reserves and replaces what XML 1.0 forbids (control characters, section 2.2), so that
 /// any string is safe as content and as attribute value.
 pub(super) fn escape(text: &str) -> String {
@@ -136,20 +134,11 @@ pub(super) fn wrap(text: &str, limit_px: f64, font_px: f64) -> Vec<String> {
 /// Appends a coordinate rounded to a tenth of a pixel, in the fewest characters: `12.5`, `-.3`, `7`.
 pub(super) fn push_tenths(out: &mut String, tenths: f64) {
     // Whole tenths divided by ten print with at most one decimal, exactly rounded.
-    let start = out.len();
-    if write!(out, "{}", tenths / 10.0).is_err() {
-        return;
-    }
-    if let Some(written) = out.get(start..) {
-        let short = match written.strip_prefix("-0.") {
-            Some(rest) => format!("-.{rest}"),
-            None => match written.strip_prefix("0.") {
-                Some(rest) => format!(".{rest}"),
-                None => return,
-            },
-        };
-        out.truncate(start);
-        out.push_str(&short);
+    let written = (tenths / 10.0).to_string();
+    match (written.strip_prefix("0."), written.strip_prefix("-0.")) {
+        (Some(rest), _) => out.extend([".", rest]),
+        (_, Some(rest)) => out.extend(["-.", rest]),
+        _ => out.push_str(&written),
     }
 }
 

@@ -113,7 +113,6 @@ pub(super) fn style_sheet() -> String {
          .plot .hair{{fill:none;stroke-width:1}}\n\
          .plot .minor{{stroke-opacity:.5}}\n\
          .plot .reference{{fill:none;stroke-width:1;stroke-dasharray:5 3}}\n\
-         .plot .band{{fill-opacity:.13}}\n\
          .plot .line{{fill:none;stroke:currentColor;stroke-width:1.6;stroke-linejoin:round}}\n\
          .plot .busy{{stroke-width:1}}\n\
          .plot .round{{stroke-linecap:round}}\n\
@@ -148,8 +147,7 @@ impl Page {
              .plot .muted{{fill:{muted}}}\n\
              .plot .grid{{stroke:{grid}}}\n\
              .plot .axis{{stroke:{axis}}}\n\
-             .plot .reference{{stroke:{muted}}}\n\
-             .plot .band{{fill:{muted}}}\n"
+             .plot .reference{{stroke:{muted}}}\n"
         );
         for (index, colors) in PALETTE.into_iter().enumerate() {
             rules.push_str(&format!(".plot .c{index}{{color:{}}}\n", series_color(colors)));

@@ -2,6 +2,7 @@
 
 use super::{Audience, Source, Viewer};
 use crate::export::export;
+use crate::history::Sample;
 use crate::palette::Palette;
 use crate::ui::plot_stack::PlotWish;
 use crate::ui::top_bar::{TopBar, TopBarWish};
@@ -72,13 +73,7 @@ impl Viewer {
             area.min,
             vec2(area.width(), (area.height() * view_part(area.height())).round()),
         );
-        let subject = Subject {
-            shapes: &mut self.shapes,
-            version: self.shape_version,
-            sample: &sample,
-            scale: self.tally.scale(),
-        };
-        self.facts = self.view.show(ui, view, self.look, subject);
+        self.scene(ui, view, &sample);
         readout::numbers(ui.painter(), view, &sample, self.plots.units, palette);
         legend::paint(ui.painter(), view, &self.facts, palette);
         warnings::warnings(ui, view, &self.warnings(&sample), palette);
@@ -99,6 +94,12 @@ impl Viewer {
                 }
             }
         }
+    }
+
+    /// The 3D view at a moment.
+    pub(super) fn scene(&mut self, ui: &mut Ui, area: Rect, sample: &Sample) {
+        let (shapes, version, scale) = (&mut self.shapes, self.shape_version, self.tally.scale());
+        self.facts = self.view.show(ui, area, self.look, Subject { shapes, version, sample, scale });
     }
 
     /// There is nothing to show: what to do.

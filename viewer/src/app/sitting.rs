@@ -3,8 +3,7 @@
 use super::{Source, Viewer};
 use crate::experiment::{Prompt, screens};
 use crate::palette::Palette;
-use crate::scene::{SceneBuilder, Visible};
-use crate::ui::view3d::Subject;
+use crate::scene::SceneBuilder;
 use egui::{CentralPanel, Frame, Key, Panel as Edge, Rect, Ui, ViewportCommand};
 use flotor_live::Ask;
 use flotor_study::screen::Screen;
@@ -62,14 +61,8 @@ impl Viewer {
                 if prompt.shows_scene() {
                     // Nothing of what is drawn may tell how stiff it is: no arrows, no colours of the moment's
                     // largest force, and a wire that stays what it is.
-                    self.view.visible = Visible { arrows: false, ..Visible::default() };
-                    let subject = Subject {
-                        shapes: &mut self.shapes,
-                        version: self.shape_version,
-                        sample: &sample,
-                        scale: self.tally.scale(),
-                    };
-                    self.facts = self.view.show(ui, area, self.look, subject);
+                    self.view.shows_arrows = false;
+                    self.scene(ui, area, &sample);
                     self.view.keys(ui, SceneBuilder::height_mm(&self.shapes));
                 }
                 screens::show(ui, area, prompt, palette);

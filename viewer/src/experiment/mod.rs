@@ -30,15 +30,6 @@ pub enum StudyKey {
     Back,
 }
 
-/// Whose turn it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Turn {
-    /// The person's: keys mean something.
-    Person,
-    /// The experiment's: it was told what the person did, and prepares the next screen.
-    Experiment,
-}
-
 /// Digits of a rating at most.
 const MOST_DIGITS: usize = 8;
 /// How long a warning stays in sight after the last one.
@@ -50,7 +41,8 @@ pub struct Prompt {
     told: Receiver<Told>,
     said: Sender<Said>,
     screen: Option<Screen>,
-    turn: Turn,
+    /// Keys mean something; else the experiment was told what the person did, and prepares the next screen.
+    is_persons_turn: bool,
     typed: String,
     warned: Option<Instant>,
     refused: Option<String>,
@@ -80,7 +72,7 @@ impl Prompt {
             told,
             said,
             screen: None,
-            turn: Turn::Experiment,
+            is_persons_turn: false,
             typed: String::new(),
             warned: None,
             refused: None,
@@ -108,7 +100,7 @@ impl Prompt {
             match self.told.try_recv() {
                 Ok(Told::Screen(screen)) => {
                     self.screen = Some(screen);
-                    self.turn = Turn::Person;
+                    self.is_persons_turn = true;
                     self.typed.clear();
                     self.refused = None;
                 }
@@ -118,7 +110,7 @@ impl Prompt {
                 }
                 Ok(Told::Refused { refused }) => {
                     self.refused = Some(refused);
-                    self.turn = Turn::Person;
+                    self.is_persons_turn = true;
                 }
                 Err(TryRecvError::Empty) => return warn,
                 Err(TryRecvError::Disconnected) => {
@@ -144,7 +136,7 @@ impl Prompt {
     /// Whether keys mean something now.
     #[must_use]
     pub fn is_persons_turn(&self) -> bool {
-        self.turn == Turn::Person
+        self.is_persons_turn
     }
 
     /// The digits typed so far.
@@ -179,7 +171,7 @@ impl Prompt {
 
     /// Follows a key; a key that means nothing now is ignored.
     pub fn key(&mut self, key: StudyKey) {
-        let Some(screen) = self.screen.as_ref().filter(|_| self.turn == Turn::Person) else { return };
+        let Some(screen) = self.screen.as_ref().filter(|_| self.is_persons_turn) else { return };
         let answer = |response| Some(Input::Answer { response });
         let question = match screen {
             Screen::Ask { question, .. } => Some(*question),
@@ -202,7 +194,7 @@ impl Prompt {
             _ => None,
         };
         if let Some(input) = input {
-            self.turn = Turn::Experiment;
+            self.is_persons_turn = false;
             self.refused = None;
             self.say(Said::Input(input));
         }

@@ -181,21 +181,10 @@ fn ask(trial: &TrialView, question: Question) -> Words {
 /// The keys pressed in this picture that mean something here.
 #[must_use]
 pub fn keys(ui: &Ui) -> Vec<StudyKey> {
-    const DIGITS: [Key; 10] = [
-        Key::Num0,
-        Key::Num1,
-        Key::Num2,
-        Key::Num3,
-        Key::Num4,
-        Key::Num5,
-        Key::Num6,
-        Key::Num7,
-        Key::Num8,
-        Key::Num9,
-    ];
     ui.input(|input| {
-        let digits = DIGITS.iter().zip(0_u8..).filter(|(key, _)| input.key_pressed(**key));
-        let mut keys: Vec<StudyKey> = digits.map(|(_, digit)| StudyKey::Digit(digit)).collect();
+        let pressed =
+            |digit: &u8| Key::from_name(&digit.to_string()).is_some_and(|key| input.key_pressed(key));
+        let mut keys: Vec<StudyKey> = (0..=9).filter(pressed).map(StudyKey::Digit).collect();
         let others = [
             (Key::Period, StudyKey::Point),
             (Key::Comma, StudyKey::Point),

@@ -8,7 +8,7 @@ mod target;
 
 use crate::camera::Camera;
 use crate::geometry::Mesh;
-use crate::raster::solid::{Backdrop, Image};
+use crate::raster::solid::Backdrop;
 use bytemuck::{Pod, Zeroable};
 use pipeline::{Pipelines, pipelines};
 use target::Target;
@@ -80,7 +80,7 @@ impl GpuScene {
     ) -> &TextureView {
         let size = size.map(|length| u32::try_from(length.max(1)).unwrap_or(u32::MAX));
         let size = size.map(|length| length.min(self.device.limits().max_texture_dimension_2d));
-        let fits = self.target.as_ref().is_some_and(|target| target.size() == size);
+        let fits = self.target.as_ref().is_some_and(|target| target.size == size);
         if !fits {
             self.target = None; // the old one first: both at once may be more than there is
         }
@@ -102,13 +102,7 @@ impl GpuScene {
             pass.draw_indexed(0..count, 0, 0..1);
         }
         self.queue.submit([encoder.finish()]);
-        target.view()
-    }
-
-    /// The picture drawn last, read back; `None` before the first, or if the device is lost.
-    #[must_use]
-    pub fn read(&self) -> Option<Image> {
-        self.target.as_ref()?.read(&self.device, &self.queue)
+        &target.view
     }
 }
 

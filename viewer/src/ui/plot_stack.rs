@@ -8,6 +8,7 @@ use crate::trace::Trace;
 use crate::ui::plots::{PlotView, plot};
 use crate::ui::style::SMALL_PT;
 use egui::{Color32, ComboBox, RichText, Role, Ui, WidgetInfo};
+use std::collections::BTreeMap;
 
 /// Lengths of time that can be shown, s.
 pub const WINDOWS_S: [f64; 5] = [2.0, 5.0, 10.0, 30.0, 60.0];
@@ -57,7 +58,7 @@ pub struct PlotStack {
     /// Units of all numbers.
     pub units: Units,
     /// What has been made of the history, for each quantity shown so far.
-    traces: Vec<Trace>,
+    traces: BTreeMap<Quantity, Trace>,
     /// End of a window that is shorter than the run, s; the newest while none has been shown.
     end_s: f64,
     /// Where the pointer was in the last picture, s.
@@ -72,7 +73,7 @@ impl PlotStack {
             shown: FIRST_TRACES.to_vec(),
             window,
             units: Units::Handy,
-            traces: Vec::new(),
+            traces: BTreeMap::new(),
             end_s: f64::INFINITY,
             hover_s: None,
         }
@@ -87,7 +88,7 @@ impl PlotStack {
     /// Samples looked at so far: once for each quantity, not once for each picture.
     #[must_use]
     pub fn visited(&self) -> u64 {
-        self.traces.iter().map(Trace::visited).sum()
+        self.traces.values().map(Trace::visited).sum()
     }
 
     /// First and last time shown, s.
@@ -132,7 +133,8 @@ impl PlotStack {
             let time_axis = index + 1 == count;
             let height = if time_axis { height + 14.0 } else { height }.max(24.0);
             let view = PlotView { span_s, cursor_s, units: self.units, height, time_axis };
-            let answer = plot(ui, history, trace_of(&mut self.traces, quantity), view, palette);
+            let trace = self.traces.entry(quantity).or_insert_with(|| Trace::of(quantity));
+            let answer = plot(ui, history, trace, view, palette);
             self.hover_s = self.hover_s.or(answer.hover_s);
             wishes.extend(answer.seek_s.map(PlotWish::Seek));
         }
@@ -212,8 +214,7 @@ impl PlotStack {
             }
             None => {
                 self.shown.push(quantity);
-                let order = |quantity: &Quantity| Quantity::ALL.iter().position(|known| known == quantity);
-                self.shown.sort_by_key(order);
+                self.shown.sort();
             }
         }
     }
@@ -225,14 +226,4 @@ impl PlotStack {
             Units::Si => Units::Handy,
         };
     }
-}
-
-/// The trace of a quantity, begun if there is none.
-fn trace_of(traces: &mut Vec<Trace>, quantity: Quantity) -> &mut Trace {
-    let known = traces.iter().position(|trace| trace.quantity() == quantity);
-    let index = known.unwrap_or_else(|| {
-        traces.push(Trace::of(quantity));
-        traces.len() - 1
-    });
-    &mut traces[index]
 }

@@ -2,6 +2,7 @@
 
 use crate::history::Sample;
 use crate::palette::Palette;
+use crate::quantity::{Quantity, Units};
 use crate::tally::Tally;
 use crate::ui::style::SMALL_PT;
 use egui::{
@@ -13,33 +14,22 @@ use flotor_live::WrenchLimits;
 /// Shows how much of each limit is used, and a line for everything that has happened.
 pub fn standing(ui: &mut Ui, sample: &Sample, limits: &WrenchLimits, tally: &Tally, palette: &Palette) {
     CollapsingHeader::new(RichText::new("Limits and faults").strong()).default_open(true).show(ui, |ui| {
-        let force = sample.force_n().to_array();
-        let torque = sample.torque_nm().to_array();
-        for (name, value, limit) in
-            [("Fx", 0), ("Fy", 1), ("Fz", 2)].map(|(n, k)| (n, force[k], limits.force_n[k]))
-        {
-            bar(ui, name, value, limit, (1.0, "N"), palette);
-        }
-        for (name, value, limit) in
-            [("Mx", 0), ("My", 1), ("Mz", 2)].map(|(n, k)| (n, torque[k], limits.torque_nm[k]))
-        {
-            bar(ui, name, value, limit, (1.0e3, "mN·m"), palette);
-        }
-        ui.add_space(4.0);
-        let mut none = true;
-        for (bit, name) in Events::NAMES.iter().enumerate() {
-            let count = tally.counts().get(bit).copied().unwrap_or(0);
-            if count > 0 {
-                none = false;
-                line(ui, &name.replace('_', " "), &format!("{count} ticks"), palette);
+        for (quantity, limits) in [(Quantity::Force, limits.force_n), (Quantity::Torque, limits.torque_nm)] {
+            for (component, name) in quantity.components().iter().enumerate() {
+                let value = quantity.value(sample, component);
+                bar(ui, name, value, limits[component], quantity.unit(Units::Handy), palette);
             }
         }
-        if tally.dropped > 0 {
-            none = false;
-            line(ui, "not shown", &format!("{} ticks", tally.dropped), palette);
-        }
-        if none {
+        ui.add_space(4.0);
+        let events =
+            Events::NAMES.iter().map(|name| name.replace('_', " ")).zip(tally.counts().iter().copied());
+        let counts = events.chain([("not shown".to_owned(), tally.dropped)]);
+        let happened: Vec<_> = counts.filter(|(_, count)| *count > 0).collect();
+        if happened.is_empty() {
             ui.label(RichText::new("Nothing has happened").color(palette.faint));
+        }
+        for (name, count) in happened {
+            line(ui, &name, &format!("{count} ticks"), palette);
         }
     });
 }
@@ -57,7 +47,7 @@ fn bar(
     name: &str,
     value: f64,
     limit: Option<f64>,
-    (per_si, unit): (f64, &str),
+    (unit, per_si): (&str, f64),
     palette: &Palette,
 ) {
     let text = match limit {

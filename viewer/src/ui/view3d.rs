@@ -4,7 +4,7 @@ use crate::camera::Camera;
 use crate::canvas::Canvas;
 use crate::history::Sample;
 use crate::palette::{Look, Palette};
-use crate::scene::{ArrowScale, SceneBuilder, SceneFacts, Visible};
+use crate::scene::{ArrowScale, SceneBuilder, SceneFacts};
 use crate::shape::Shape;
 use egui::{Color32, Key, PointerButton, Rect, Role, Sense, TextureId, Ui, Vec2, WidgetInfo, pos2};
 use flotor_hal::Pose;
@@ -35,8 +35,8 @@ pub struct Subject<'a> {
 pub struct View3d {
     /// From where.
     pub camera: Camera,
-    /// What of the scene is drawn.
-    pub visible: Visible,
+    /// Whether force and torque are drawn.
+    pub shows_arrows: bool,
     canvas: Canvas,
     builder: SceneBuilder,
     drawn: Option<(Look3d, TextureId, SceneFacts)>,
@@ -49,7 +49,7 @@ struct Look3d {
     wrench: [f32; 6],
     version: u64,
     camera: Camera,
-    visible: Visible,
+    shows_arrows: bool,
     size: [usize; 2],
     look: Look,
     scale: ArrowScale,
@@ -61,7 +61,7 @@ impl View3d {
     pub fn new(canvas: Canvas, height_mm: f64) -> Self {
         Self {
             camera: Camera::experimenter(height_mm),
-            visible: Visible::default(),
+            shows_arrows: true,
             canvas,
             builder: SceneBuilder::default(),
             drawn: None,
@@ -123,14 +123,14 @@ impl View3d {
 
     fn picture(&mut self, ui: &Ui, size: Vec2, look: Look, subject: Subject<'_>) -> (TextureId, SceneFacts) {
         let Subject { shapes, version, sample, scale } = subject;
-        let (camera, visible) = (self.camera, self.visible);
+        let (camera, shows_arrows) = (self.camera, self.shows_arrows);
         let size = pixels(size * ui.ctx().pixels_per_point());
         let wanted = Look3d {
             pose: sample.pose,
             wrench: sample.commanded,
             version,
             camera,
-            visible,
+            shows_arrows,
             size,
             look,
             scale,
@@ -141,7 +141,7 @@ impl View3d {
                 let palette = Palette::of(look);
                 let height_px = size[1] as f64;
                 let (mesh, facts) =
-                    self.builder.build(shapes, sample, &palette, &camera, height_px, scale, visible);
+                    self.builder.build(shapes, sample, &palette, &camera, height_px, scale, shows_arrows);
                 let texture = self.canvas.draw(ui.ctx(), mesh, &camera, palette.backdrop, size);
                 self.drawn = Some((wanted, texture, facts));
                 (texture, facts)
