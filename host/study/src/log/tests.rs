@@ -54,7 +54,8 @@ fn sit(path: &Path) {
     let subject = subject(&begin);
     let mut log = LogWriter::create(path).unwrap();
     log.write(&Event::Begin(Box::new(begin))).unwrap();
-    let ending = conduct(&mut sitting, &mut log, &mut Nothing, &subject, &|| (), &AtomicBool::default()).unwrap();
+    let ending =
+        conduct(&mut sitting, &mut log, &mut Nothing, &subject, &|| (), &AtomicBool::default()).unwrap();
     assert_eq!(ending, Ending::Complete);
 }
 
