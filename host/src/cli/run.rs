@@ -12,7 +12,7 @@ use flotor_record::{Note, RecordError, Recorder, Severity, TraceDigest};
 use flotor_servo::RunEnd;
 use flotor_servo::coupling::Line;
 use flotor_servo::{Clock, Core};
-use flotor_session::live::{Announcement, Carried, Carrier, Handles, carry, publish};
+use flotor_session::live::{Carried, Carrier, carry, publish};
 use flotor_session::registry::Registry;
 use flotor_session::report::{RunFacts, RunSummary, Tally};
 use flotor_session::run_description::describe;
@@ -73,10 +73,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let carriers = carriers(&mut session, clock)?;
     let plugins = session.plugins().to_vec();
     let description = describe(&scene, &options, &plugins);
-    let announcement =
-        Announcement { title: &scene.title, run: &description, plugins: &plugins, limits: session.limits() };
-    let handles = Handles { controls: session.controls(), stop: stop.clone() };
-    let publication = publish(&Directory::of_this_user(), announcement, handles);
+    let publication = publish(&Directory::of_this_user(), &scene, &description, &session, &stop);
     let publication =
         publication.map_err(|error| eprintln!("{} nobody can watch: {error}", style::warning("note:"))).ok();
 

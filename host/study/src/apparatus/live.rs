@@ -14,7 +14,7 @@ use flotor_core::trace::TickRecord;
 use flotor_live::{Ask, Directory, Serve};
 use flotor_record::Recorder;
 use flotor_servo::{Clock, StopSwitch};
-use flotor_session::live::{Announcement, Watched, announce};
+use flotor_session::live::{Watched, announce};
 use flotor_session::{ControlError, Controls, Observer, Outcome, RunError, RunOptions, Session};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -87,16 +87,9 @@ impl<'a> LiveRig<'a> {
         let controls = session.controls();
         apparatus.show(&controls, false)?;
         let (shared, stop) = (Shared::default(), stop.clone());
-        let publication = {
-            let announcement = Announcement {
-                title: &apparatus.scene().title,
-                run: &apparatus.describe(apparatus.scene(), Clock::Real, 0),
-                plugins: session.plugins(),
-                limits: session.limits(),
-            };
-            let host = Arc::new(OnlyStop(stop.clone()));
-            announce(&Directory::of_this_user(), announcement, host)
-        };
+        let run = apparatus.describe(apparatus.scene(), Clock::Real, 0);
+        let host = Arc::new(OnlyStop(stop.clone()));
+        let publication = announce(&Directory::of_this_user(), apparatus.scene(), &run, &session, host);
         let unseen = publication.as_ref().err().map(ToString::to_string);
         let mut observers = Watched { observer: shared.clone(), publication: publication.ok() };
         let switch = stop.clone();
