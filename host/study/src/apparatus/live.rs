@@ -15,7 +15,9 @@ use flotor_live::{Ask, Directory, Serve};
 use flotor_record::Recorder;
 use flotor_servo::{Clock, StopSwitch};
 use flotor_session::live::{Watched, announce};
-use flotor_session::{ControlError, Controls, Observer, Outcome, RunError, RunOptions, Session};
+use flotor_session::{
+    ControlError, Controls, Observer, Outcome, RunError, RunOptions, RunRecording, Session,
+};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -133,9 +135,9 @@ impl<'a> LiveRig<'a> {
         if let Some(what) = watch.refused.take() {
             return Err(StimulusRefused(what).into());
         }
-        if let (Some(files), None) = (&self.files, &watch.recorder) {
+        if let (Some(files), false) = (&self.files, watch.recording.is_on()) {
             let run = self.apparatus.describe(self.apparatus.scene(), Clock::Real, 0);
-            watch.recorder = Some(Recorder::create(&files.of(trial), &run)?);
+            watch.recording = RunRecording::new(Some(Recorder::create(&files.of(trial), &run)?));
         }
         Ok(())
     }
@@ -161,7 +163,7 @@ impl<'a> LiveRig<'a> {
     /// # Errors
     /// The recording.
     pub fn close_recording(&mut self) -> Result<(), OutsideError> {
-        Ok(self.shared.lock().finish_recording()?)
+        Ok(self.shared.lock().recording.finish(&[])?)
     }
 
     /// Whether the handle is out of its range right now.
