@@ -2,7 +2,7 @@
 
 use super::options::{ClockOption, PluginKeyValue, core, duration_s, rate_hz};
 use super::stopping::{Keys, stop_on_signals};
-use super::{CommandError, first_error, remark, report_line, style, write_json};
+use super::{CommandError, first_error, remark, style, tell};
 use crate::run_picture::RunPicture;
 use clap::Args;
 use flotor_core::Change;
@@ -126,10 +126,13 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
             .map_err(|cause| CommandError::file(path, "cannot write the plot", cause)),
         _ => Ok(()),
     };
-    let told = tell(&arguments, &summary, &outcome.real_time.advice());
-    let written = arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &summary));
+    let text = || format!("{}\n{}", style::title(&summary.title), summary.to_text());
+    let told = tell(arguments.json.as_deref(), &summary, text);
+    for line in outcome.real_time.advice() {
+        remark(format_args!("{} {line}", style::warning("note:")));
+    }
     // What became of the run is what scripts ask first; a file that is missing comes after.
-    first_error([verdict(&outcome, &plugins, &summary), recorded, drawn, told, written])
+    first_error([verdict(&outcome, &plugins, &summary), recorded, drawn, told])
 }
 
 /// What whoever opens the recording later has to know of the run: why it ended, who did not behave, what is missing.
@@ -232,20 +235,6 @@ fn broken_models(summary: &RunSummary) -> Result<(), CommandError> {
             format!("{}: `{}` {}; `flotor validate` tells more", plugin.file, plugin.name, plugin.health);
         Err(CommandError::PluginRefused(problem))
     })
-}
-
-/// The report for people, unless standard output is for the one for machines; advice on standard error.
-fn tell(arguments: &RunArguments, summary: &RunSummary, advice: &[String]) -> Result<(), CommandError> {
-    let json_on_stdout = arguments.json.as_ref().is_some_and(|path| path.as_os_str() == "-");
-    let told = if json_on_stdout {
-        Ok(())
-    } else {
-        report_line(format_args!("{}\n{}", style::title(&summary.title), summary.to_text()))
-    };
-    for line in advice {
-        remark(format_args!("{} {line}", style::warning("note:")));
-    }
-    told
 }
 
 /// Everybody who looks at every tick of a run.
