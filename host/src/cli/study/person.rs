@@ -100,7 +100,7 @@ impl Front {
 
     fn as_dyn(&mut self) -> &mut dyn FrontEnd {
         match self {
-            Self::Window(window) => window,
+            Self::Window(window) => &mut window.lines,
             Self::Terminal(terminal) => terminal,
             Self::Json(lines) => lines,
         }
