@@ -9,7 +9,6 @@ use flotor_live::{
 use flotor_record::{Recording, TraceDigest};
 use flotor_servo::RunEnd;
 use flotor_servo::{Clock, EmergencySource, StopSwitch};
-use flotor_session::live::{Announcement, Handles};
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
 use flotor_session::{Observer, Outcome, RunOptions, Session};
@@ -53,11 +52,9 @@ impl Observer for Published<'_> {
 
 fn publish(session: &Session, directory: &Directory, stop: &StopSwitch) -> Publication {
     let scene = Scene::parse(Path::new("scene.toml"), SCENE).expect("the scene is right");
+    let scene = Scene { title: "Test".to_owned(), ..scene };
     let run = describe(&scene, &RunOptions { clock: Clock::Virtual, seed: 1 }, session.plugins());
-    let announcement =
-        Announcement { title: "Test", run: &run, plugins: session.plugins(), limits: session.limits() };
-    let handles = Handles { controls: session.controls(), stop: stop.clone() };
-    let opened = flotor_session::live::publish(directory, announcement, handles);
+    let opened = flotor_session::live::publish(directory, &scene, &run, session, stop);
     opened.expect("a scratch folder takes a socket")
 }
 

@@ -19,6 +19,7 @@
 //! program = "flotor 0.1.0"
 //! ```
 
+use crate::scene::Location;
 use flotor_hal::VerticalCalibration;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -108,54 +109,20 @@ pub enum Source {
     Imported,
 }
 
-/// Why a file is no calibration. Prints file, cause and remedy in one line.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum CalibrationFileError {
-    /// It cannot be read.
-    #[error("{file}: cannot read the calibration: {cause}")]
-    Unreadable {
-        /// The file.
-        file: String,
-        /// What the system said.
-        cause: std::io::Error,
-    },
-    /// It is not TOML, or not this TOML.
-    #[error("{file}:{line}: {problem}")]
-    Syntax {
-        /// The file.
-        file: String,
-        /// Line, from 1.
-        line: usize,
-        /// What is wrong.
-        problem: String,
-    },
-    /// It has another format.
-    #[error("{file}: format {found}, this program reads {FORMAT}; calibrate again")]
-    Format {
-        /// The file.
-        file: String,
-        /// What it says.
-        found: u32,
-    },
-    /// Its curve is none.
-    #[error("{file}: [vertical] {problem}")]
-    Curve {
-        /// The file.
-        file: String,
-        /// What is wrong.
-        problem: String,
-    },
-    /// It is for another device.
-    #[error("{file}: for {theirs}, the device is {ours}; calibrate this one")]
-    OtherDevice {
-        /// The file.
-        file: String,
-        /// What the file is for.
-        theirs: String,
-        /// What is there.
-        ours: String,
-    },
+/// Why a calibration file cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{location}: {problem}")]
+pub struct CalibrationFileError {
+    /// The file, and the line if it is about one.
+    pub location: Location,
+    /// What is wrong and what would be right.
+    pub problem: String,
+}
+
+impl CalibrationFileError {
+    fn new(file: &str, line: usize, problem: impl Into<String>) -> Self {
+        Self { location: Location { file: file.into(), line }, problem: problem.into() }
+    }
 }
 
 const MM: f64 = 1.0e-3;
@@ -198,10 +165,10 @@ impl CalibrationFile {
     /// [`CalibrationFileError`].
     pub fn load(path: &Path) -> Result<(Self, VerticalCalibration), CalibrationFileError> {
         let file = path.display().to_string();
-        match std::fs::read_to_string(path) {
-            Ok(text) => Self::parse(&file, &text),
-            Err(cause) => Err(CalibrationFileError::Unreadable { file, cause }),
-        }
+        let text = std::fs::read_to_string(path).map_err(|cause| {
+            CalibrationFileError::new(&file, 0, format!("cannot read the calibration: {cause}"))
+        })?;
+        Self::parse(&file, &text)
     }
 
     /// Reads and checks a text; `file` is what complaints call it.
@@ -209,21 +176,18 @@ impl CalibrationFile {
     /// # Errors
     /// [`CalibrationFileError`].
     pub fn parse(file: &str, text: &str) -> Result<(Self, VerticalCalibration), CalibrationFileError> {
-        let read: Self = toml::from_str(text).map_err(|error| CalibrationFileError::Syntax {
-            file: file.to_owned(),
-            line: error
-                .span()
-                .map_or(1, |span| text.get(..span.start).unwrap_or(text).matches('\n').count() + 1),
-            problem: error.message().lines().next().unwrap_or_default().to_owned(),
+        let read: Self = toml::from_str(text).map_err(|error| {
+            let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+            let problem = error.message().lines().next().unwrap_or_default();
+            CalibrationFileError::new(file, before.matches('\n').count() + 1, problem)
         })?;
+        let whole = |problem: String| CalibrationFileError::new(file, 0, problem);
         if read.format != FORMAT {
-            return Err(CalibrationFileError::Format { file: file.to_owned(), found: read.format });
+            let found = read.format;
+            return Err(whole(format!("format {found}, this program reads {FORMAT}; calibrate again")));
         }
-        let calibration = read.vertical.calibration().map_err(|invalid| CalibrationFileError::Curve {
-            file: file.to_owned(),
-            problem: invalid.to_string(),
-        })?;
-        Ok((read, calibration))
+        let calibration = read.vertical.calibration();
+        Ok((read, calibration.map_err(|invalid| whole(format!("[vertical] {invalid}")))?))
     }
 
     /// The file as text, the same for the same content.
@@ -239,17 +203,15 @@ impl CalibrationFile {
     /// Refuses a file for another device.
     ///
     /// # Errors
-    /// [`CalibrationFileError::OtherDevice`].
+    /// [`CalibrationFileError`].
     pub fn check_device(&self, file: &str, plugin: &str, serial: &str) -> Result<(), CalibrationFileError> {
         let CalibratedDevice { plugin: wanted, serial: wanted_serial } = &self.device;
         if wanted == plugin && (wanted_serial.is_empty() || wanted_serial == serial) {
             return Ok(());
         }
-        Err(CalibrationFileError::OtherDevice {
-            file: file.to_owned(),
-            theirs: format!("`{wanted}` {wanted_serial}"),
-            ours: format!("`{plugin}` {serial}"),
-        })
+        let problem =
+            format!("for `{wanted}` {wanted_serial}, the device is `{plugin}` {serial}; calibrate this one");
+        Err(CalibrationFileError::new(file, 0, problem))
     }
 }
 

@@ -4,7 +4,7 @@ use crate::registry::Registry;
 use crate::report::{RunFacts, RunSummary, Tally};
 use crate::run_description::describe;
 use crate::scene::Scene;
-use crate::{Observer, RunError, RunOptions, Session};
+use crate::{Observer, RunError, RunOptions, RunRecording, Session};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_record::{RecordError, Recorder, TraceDigest};
@@ -38,16 +38,11 @@ pub fn run(
     let plugins = session.plugins().to_vec();
     let recorder =
         recording.map(|path| Recorder::create(path, &describe(scene, &options, &plugins))).transpose()?;
-    let mut watchers =
-        Watchers { tally: Tally::default(), digest: TraceDigest::new(), recorder, failure: None };
+    let recording = RunRecording::new(recorder);
+    let mut watchers = Watchers { tally: Tally::default(), digest: TraceDigest::new(), recording };
     let outcome = session.run(&mut watchers, &StopSwitch::default())?;
-    let Watchers { tally, digest, recorder, failure } = watchers;
-    if let Some(failure) = failure {
-        return Err(failure.into());
-    }
-    if let Some(recorder) = recorder {
-        recorder.finish()?;
-    }
+    let Watchers { tally, digest, mut recording } = watchers;
+    recording.finish(&[])?;
     let facts = RunFacts {
         title: &scene.title,
         clock: "virtual",
@@ -64,29 +59,17 @@ pub fn run(
 struct Watchers {
     tally: Tally,
     digest: TraceDigest,
-    recorder: Option<Recorder>,
-    failure: Option<RecordError>,
-}
-
-impl Watchers {
-    /// Writes into the recording, if there is one and it has not failed.
-    fn write(&mut self, write: impl FnOnce(&mut Recorder) -> Result<(), RecordError>) {
-        if self.failure.is_none()
-            && let Some(recorder) = &mut self.recorder
-        {
-            self.failure = write(recorder).err();
-        }
-    }
+    recording: RunRecording,
 }
 
 impl Observer for Watchers {
     fn change(&mut self, change: &Change) {
-        self.write(|recorder| recorder.change(change));
+        self.recording.change(change);
     }
 
     fn observe(&mut self, record: &TickRecord) {
         self.tally.observe(record);
         self.digest.update(record);
-        self.write(|recorder| recorder.record(record));
+        self.recording.observe(record);
     }
 }

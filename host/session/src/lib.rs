@@ -18,9 +18,11 @@ pub mod live;
 pub mod registry;
 pub mod report;
 pub mod run_description;
+mod run_recording;
 pub mod scene;
 mod session;
 
+pub use run_recording::RunRecording;
 pub use session::{
     ControlError, Controls, DeviceOutcome, Misbehaved, NewValue, Observer, Outcome, PluginReport, RunError,
     RunOptions, Session, Steps, prepare_model,

@@ -343,37 +343,34 @@ impl RunSummary {
     #[must_use]
     pub fn to_text(&self) -> String {
         let mut lines = Vec::new();
-        let clock = format!("{:.3} s at {} Hz, {} clock", self.elapsed_s, self.rate_hz, self.clock);
-        lines.push(format!("  {:<11}{clock}, {:.2} s wall", "ran", self.wall_s));
-        let counts = format!("{}   late {}   missed {}", self.ticks, self.late_ticks, self.missed_ticks);
-        lines.push(format!("  {:<11}{counts}", "ticks"));
+        let mut row = |name: &str, text: String| lines.push(format!("  {name:<11}{text}"));
+        let Self { elapsed_s, rate_hz, clock, wall_s, .. } = self;
+        row("ran", format!("{elapsed_s:.3} s at {rate_hz} Hz, {clock} clock, {wall_s:.2} s wall"));
+        row("ticks", format!("{}   late {}   missed {}", self.ticks, self.late_ticks, self.missed_ticks));
         if self.clock == "real" {
-            lines.push(format!("  {:<11}{}", "lateness", percentiles(&self.lateness_ns)));
+            row("lateness", percentiles(&self.lateness_ns));
         }
-        lines.push(format!("  {:<11}{}", "compute", percentiles(&self.compute_ns)));
+        row("compute", percentiles(&self.compute_ns));
         let StageSummary { read, models, envelope, write } = &self.stages_ns;
-        let (read, models, envelope, write) =
-            (duration(read.p50), duration(models.p50), duration(envelope.p50), duration(write.p50));
-        let medians = format!("read {read}   models {models}   envelope {envelope}   write {write}");
-        lines.push(format!("  {:<11}{medians}", "of which"));
-        let peaks = format!("{:.3} N   {:.4} N·m", self.peak_force_n, self.peak_torque_nm);
-        lines.push(format!("  {:<11}{peaks}", "peak"));
+        let [read, models, envelope, write] =
+            [read, models, envelope, write].map(|stage| duration(stage.p50));
+        row("of which", format!("read {read}   models {models}   envelope {envelope}   write {write}"));
+        row("peak", format!("{:.3} N   {:.4} N·m", self.peak_force_n, self.peak_torque_nm));
         if let (Some(residual), Some(peak_j)) =
             (self.energy.device_residual_relative, self.energy.device_peak_j)
         {
-            let account = format!("peak {:.3} mJ, balanced to {:.1e} of it", peak_j * 1.0e3, residual.abs());
-            lines.push(format!("  {:<11}{account}", "energy"));
+            row("energy", format!("peak {:.3} mJ, balanced to {:.1e} of it", peak_j * 1.0e3, residual.abs()));
         }
         let [lowest_mj, end_mj] =
             [self.energy.port_lowest_j, self.energy.port_end_j].map(|joule| joule * 1.0e3);
-        lines.push(format!("  {:<11}{end_mj:+.3} mJ at the end, {lowest_mj:+.3} mJ at the lowest", "port"));
+        row("port", format!("{end_mj:+.3} mJ at the end, {lowest_mj:+.3} mJ at the lowest"));
         if self.devices.len() > 1 {
             for DeviceSummary { name, peak_force_n, peak_torque_nm, port_lowest_j, port_end_j } in
                 &self.devices
             {
                 let [lowest_mj, end_mj] = [port_lowest_j, port_end_j].map(|joule| joule * 1.0e3);
                 let peaks = format!("peak {peak_force_n:.3} N   {peak_torque_nm:.4} N·m");
-                lines.push(format!("  {name:<11}{peaks}   port {end_mj:+.3} mJ, lowest {lowest_mj:+.3} mJ"));
+                row(name, format!("{peaks}   port {end_mj:+.3} mJ, lowest {lowest_mj:+.3} mJ"));
             }
         }
         for CouplingSummary { name, lowest_j, given_up_j, link, .. } in &self.couplings {
@@ -381,29 +378,26 @@ impl RunSummary {
             let heat_mj = given_up_j.iter().sum::<f64>() * 1.0e3;
             let accounts =
                 format!("accounts never below {first:+.3} and {second:+.3} mJ, {heat_mj:.3} mJ to heat");
-            lines.push(format!("  {:<11}{name}: {accounts}", "coupling"));
-            lines.extend(link.iter().map(|link| format!("  {:<11}{name}: {}", "link", link.to_text())));
+            row("coupling", format!("{name}: {accounts}"));
+            link.iter().for_each(|link| row("link", format!("{name}: {}", link.to_text())));
         }
         if !self.events.is_empty() {
             let events: Vec<String> =
                 self.events.iter().map(|(name, count)| format!("{name} {count}")).collect();
-            lines.push(format!("  {:<11}{}", "events", events.join("   ")));
+            row("events", events.join("   "));
         }
         if self.dropped_records > 0 {
-            let dropped = format!(
-                "{} records that an observer was too slow for; the loop did not wait",
-                self.dropped_records
+            let dropped = self.dropped_records;
+            row(
+                "dropped",
+                format!("{dropped} records that an observer was too slow for; the loop did not wait"),
             );
-            lines.push(format!("  {:<11}{dropped}", "dropped"));
         }
         for plugin in &self.plugins {
             let health = if plugin.health == "ok" { String::new() } else { format!("  {}", plugin.health) };
-            lines.push(format!(
-                "  {:<11}{} {} ({}){health}",
-                plugin.kind, plugin.id, plugin.version, plugin.file
-            ));
+            row(plugin.kind, format!("{} {} ({}){health}", plugin.id, plugin.version, plugin.file));
         }
-        lines.push(format!("  {:<11}{}", "digest", self.trace_digest));
+        row("digest", self.trace_digest.clone());
         lines.join("\n")
     }
 }

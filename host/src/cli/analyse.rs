@@ -1,7 +1,8 @@
 //! `flotor analyse`: a study's data in, thresholds, effects and tests out.
 
-use super::{CommandError, style, write_json};
+use super::{CommandError, style, tell, write_text};
 use clap::{Args, ValueEnum};
+use flotor_lab::report::to_csv;
 use flotor_statistics::anova::SumOfSquares;
 use flotor_study::analysis::{Analysis, AnalysisOptions, BlindedAnalysis, Estimator, SubjectRecord};
 use flotor_study::apparatus::report::html;
@@ -37,13 +38,13 @@ pub(crate) struct AnalyseArguments {
     blind: bool,
     /// How thresholds are found
     #[arg(long, value_enum, default_value_t)]
-    estimator: EstimatorOption,
+    estimator: Estimator,
     /// Sums of squares of the analysis of variance
     #[arg(long = "type", value_enum, default_value_t)]
     sums: SumsOption,
     /// How ratings of subjects with different scales are made comparable
     #[arg(long, value_enum, default_value_t)]
-    ratings: RatingsOption,
+    ratings: RatingScale,
 }
 
 /// `--type`
@@ -56,28 +57,6 @@ enum SumsOption {
     #[default]
     #[value(name = "III")]
     Three,
-}
-
-/// `--estimator`
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-enum EstimatorOption {
-    /// As the procedure says: the mean of the last differences, or the belief of QUEST+
-    #[default]
-    Procedure,
-    /// The most likely observer, from all trials at a base
-    Map,
-}
-
-/// `--ratings`
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-enum RatingsOption {
-    /// Divided by the subject's mean
-    #[default]
-    Mean,
-    /// Divided by the subject's geometric mean
-    GeometricMean,
-    /// As they are
-    Raw,
 }
 
 pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
@@ -101,15 +80,8 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
             SumsOption::Two => SumOfSquares::Two,
             SumsOption::Three => SumOfSquares::Three,
         },
-        rating_scale: match arguments.ratings {
-            RatingsOption::Mean => RatingScale::DividedByMean,
-            RatingsOption::GeometricMean => RatingScale::DividedByGeometricMean,
-            RatingsOption::Raw => RatingScale::Raw,
-        },
-        estimator: match arguments.estimator {
-            EstimatorOption::Procedure => Estimator::Procedure,
-            EstimatorOption::Map => Estimator::Map,
-        },
+        rating_scale: arguments.ratings,
+        estimator: arguments.estimator,
     };
     let protocol = &first.begin.protocol;
     let analysis = Analysis::of(protocol, &subjects, &options)
@@ -118,37 +90,18 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
         let codes = Codes::new(protocol, first.begin.seed);
         return tell_blinded(arguments, &BlindedAnalysis::of(&analysis, &codes));
     }
-    if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
-        say!("{}", style::title(&format!("{} of {}", protocol.task(), protocol.stimulus())));
-        say!("{}", analysis.to_text());
-    }
-    if let Some(path) = &arguments.html {
-        std::fs::write(path, html(&first.begin, &subjects, &analysis))
-            .map_err(|cause| CommandError::file(path, "cannot write the page", cause))?;
-    }
-    if let Some(path) = &arguments.csv {
-        write_csv(path, analysis.responses()).map_err(|error| {
-            CommandError::file(path, "cannot write the table", std::io::Error::other(error))
-        })?;
-    }
-    arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &analysis))
+    let text = || {
+        let title = format!("{} of {}", protocol.task(), protocol.stimulus());
+        format!("{}\n{}", style::title(&title), analysis.to_text())
+    };
+    tell(arguments.json.as_deref(), &analysis, text)?;
+    write_text(arguments.html.as_deref(), || html(&first.begin, &subjects, &analysis))?;
+    write_text(arguments.csv.as_deref(), || to_csv([], analysis.responses()))
 }
 
 /// Results under codes.
 fn tell_blinded(arguments: &AnalyseArguments, analysis: &BlindedAnalysis) -> Result<(), CommandError> {
-    if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
-        say!("{}\n{}", style::title(analysis.task), analysis.to_text());
-    }
-    if let Some(path) = &arguments.csv {
-        write_csv(path, &analysis.responses).map_err(|error| {
-            CommandError::file(path, "cannot write the table", std::io::Error::other(error))
-        })?;
-    }
-    arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, analysis))
-}
-
-fn write_csv(path: &std::path::Path, rows: &[impl serde::Serialize]) -> Result<(), csv::Error> {
-    let mut writer = csv::Writer::from_path(path)?;
-    rows.iter().try_for_each(|row| writer.serialize(row))?;
-    Ok(writer.flush()?)
+    let text = || format!("{}\n{}", style::title(analysis.task), analysis.to_text());
+    tell(arguments.json.as_deref(), analysis, text)?;
+    write_text(arguments.csv.as_deref(), || to_csv([], &analysis.responses))
 }

@@ -344,10 +344,11 @@ fn tell<T: serde::Serialize>(
     value: &T,
     text: impl FnOnce() -> String,
 ) -> Result<(), CommandError> {
-    if json.is_none_or(|path| path.as_os_str() != "-") {
-        say!("{}", text());
-    }
-    json.map_or(Ok(()), |path| write_json(path, value))
+    let told = match json {
+        Some(path) if path.as_os_str() == "-" => Ok(()),
+        _ => report_line(format_args!("{}", text())),
+    };
+    first_error([told, json.map_or(Ok(()), |path| write_json(path, value))])
 }
 
 /// Writes a picture or a table where it is asked for, `-` being standard output.

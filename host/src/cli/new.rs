@@ -19,8 +19,8 @@ pub(crate) struct NewArguments {
     /// Its id: lower-case letters, digits and hyphens
     name: String,
     /// What it is to be written in
-    #[arg(long, value_enum, default_value_t = Written::Rust)]
-    language: Written,
+    #[arg(long, value_enum, default_value = "rust")]
+    language: Language,
     /// Folder of the contract's sources (default: those this program was built from)
     #[arg(long, value_name = "PATH")]
     hal: Option<PathBuf>,
@@ -34,25 +34,15 @@ enum Kind {
     Device,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum Written {
-    Rust,
-    C,
-}
-
 pub(crate) fn run(arguments: &NewArguments) -> Result<(), CommandError> {
     let kind = match arguments.kind {
         Kind::Model => PluginKind::Model,
         Kind::Device => PluginKind::Device,
     };
-    let language = match arguments.language {
-        Written::Rust => Language::Rust,
-        Written::C => Language::C,
-    };
     let name = PluginName::new(&arguments.name).map_err(ScaffoldError::from)?;
     refuse_an_id_in_use(&name)?;
     let contract = ContractFolder::found_by(arguments.hal.as_deref())?;
-    let made = scaffold(Path::new("."), &name, kind, language, &contract)?;
+    let made = scaffold(Path::new("."), &name, kind, arguments.language, &contract)?;
     tell(&name, &made);
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! `flotor replay`: the models of a recording once more, as they were or changed.
 
 use super::options::{KeyValue, PluginKeyValue};
-use super::{CommandError, run, style, write_json, write_text};
+use super::{CommandError, run, style, tell, write_text};
 use clap::Args;
 use flotor_hal::{DVec3, Wrench};
 use flotor_lab::replay::{Compared, Coverage, Difference, Replay, WhyApart};
@@ -93,7 +93,7 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
         recorded_s,
         wall_s: started.elapsed().as_secs_f64(),
     };
-    tell(arguments, &report)?;
+    tell(arguments.json.as_deref(), &report, || to_text(arguments, &report))?;
     write_text(arguments.plot.as_deref(), || picture(&samples))?;
     if let Some((_, words)) = health.iter().find(|(health, _)| health.panicked_at.is_some()) {
         return Err(CommandError::PluginRefused(format!(
@@ -141,26 +141,23 @@ impl Report {
     }
 }
 
-fn tell(arguments: &ReplayArguments, report: &Report) -> Result<(), CommandError> {
-    if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
-        let verdict = report.verdict();
-        say!("{}", style::title(&format!("{}: {verdict}", arguments.recording.display())));
-        let d = &report.difference;
-        say!("  {:<11}{} ({:.3} s) in {:.3} s", "ticks", d.ticks, report.recorded_s, report.wall_s);
-        if let (Some(first), Some(last)) = (d.first_tick, d.last_tick) {
-            let same = report.same_around(first, last);
-            let differ = d.differing_ticks;
-            say!("  {:<11}{differ} ticks, the first is {first}, the last {last}{same}", "differ");
-            say!("  {:<11}max {:.3e} N, rms {:.3e} N", "force", d.max_force_n, d.rms_force_n);
-            say!("  {:<11}max {:.3e} N·m, rms {:.3e} N·m", "torque", d.max_torque_nm, d.rms_torque_nm);
-        }
-        // If nothing was changed, the error says why.
-        if let (Some(why), true) = (&report.why_apart, arguments.changes_anything()) {
-            say!("  {:<11}the wrench differs not only for what was changed: {why}", "note");
-        }
-        report.gaps().iter().for_each(|gap| say!("  {:<11}{gap}", "note"));
+fn to_text(arguments: &ReplayArguments, report: &Report) -> String {
+    let mut lines = vec![style::title(&format!("{}: {}", arguments.recording.display(), report.verdict()))];
+    let mut row = |name: &str, text: String| lines.push(format!("  {name:<11}{text}"));
+    let d = &report.difference;
+    row("ticks", format!("{} ({:.3} s) in {:.3} s", d.ticks, report.recorded_s, report.wall_s));
+    if let (Some(first), Some(last)) = (d.first_tick, d.last_tick) {
+        let (differ, same) = (d.differing_ticks, report.same_around(first, last));
+        row("differ", format!("{differ} ticks, the first is {first}, the last {last}{same}"));
+        row("force", format!("max {:.3e} N, rms {:.3e} N", d.max_force_n, d.rms_force_n));
+        row("torque", format!("max {:.3e} N·m, rms {:.3e} N·m", d.max_torque_nm, d.rms_torque_nm));
     }
-    arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, report))
+    // If nothing was changed, the error says why.
+    if let (Some(why), true) = (&report.why_apart, arguments.changes_anything()) {
+        row("note", format!("the wrench differs not only for what was changed: {why}"));
+    }
+    report.gaps().into_iter().for_each(|gap| row("note", gap));
+    lines.join("\n")
 }
 
 /// A tick of the recording and what the models say now.

@@ -2,22 +2,22 @@
 
 use super::options::{ClockOption, PluginKeyValue, core, duration_s, rate_hz};
 use super::stopping::{Keys, stop_on_signals};
-use super::{CommandError, first_error, remark, report_line, style, write_json};
+use super::{CommandError, first_error, remark, style, tell};
 use crate::run_picture::RunPicture;
 use clap::Args;
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
-use flotor_live::{Directory, Publication};
-use flotor_record::{Note, RecordError, Recorder, Severity, TraceDigest};
+use flotor_live::Directory;
+use flotor_record::{Note, Recorder, Severity, TraceDigest};
 use flotor_servo::RunEnd;
 use flotor_servo::coupling::Line;
 use flotor_servo::{Clock, Core};
-use flotor_session::live::{Announcement, Carried, Carrier, Handles, carry, publish};
+use flotor_session::live::{Carried, Carrier, Watched, carry, publish};
 use flotor_session::registry::Registry;
 use flotor_session::report::{RunFacts, RunSummary, Tally};
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
-use flotor_session::{Observer, Outcome, PluginReport, RunError, RunOptions, Session};
+use flotor_session::{Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::path::PathBuf;
 
@@ -73,35 +73,34 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let carriers = carriers(&mut session, clock)?;
     let plugins = session.plugins().to_vec();
     let description = describe(&scene, &options, &plugins);
-    let announcement =
-        Announcement { title: &scene.title, run: &description, plugins: &plugins, limits: session.limits() };
-    let handles = Handles { controls: session.controls(), stop: stop.clone() };
-    let publication = publish(&Directory::of_this_user(), announcement, handles);
+    let publication = publish(&Directory::of_this_user(), &scene, &description, &session, &stop);
     let publication =
         publication.map_err(|error| eprintln!("{} nobody can watch: {error}", style::warning("note:"))).ok();
 
     let clock_word = if clock == Clock::Real { "real" } else { "virtual" };
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
     let length_ms = (scene.duration_s * 1.0e3) as u64;
-    let mut watchers = Watchers {
+    let watchers = Watchers {
         tally: Tally::default(),
         digest: TraceDigest::new(),
-        recorder: arguments.record.as_deref().map(|path| Recorder::create(path, &description)).transpose()?,
-        failure: None,
+        recording: RunRecording::new(
+            arguments.record.as_deref().map(|path| Recorder::create(path, &description)).transpose()?,
+        ),
         plot: arguments.plot.as_ref().map(|_| {
             RunPicture::new(&scene.title, scene.devices.iter().map(|device| device.name.clone()).collect())
         }),
-        publication,
         progress: progress_bar(length_ms, "{percent:>3} %  {msg}"),
     };
     let keys = (clock == Clock::Real).then(|| Keys::listen(&stop)).flatten();
-    let outcome = session.run(&mut watchers, &stop);
+    let mut watched = Watched { observer: watchers, publication };
+    let outcome = session.run(&mut watched, &stop);
     drop(keys);
-    watchers.progress.finish_and_clear();
-    let Watchers { tally, digest, recorder, failure, plot, publication, .. } = watchers;
+    let Watched { observer: Watchers { tally, digest, mut recording, plot, progress }, publication } =
+        watched;
+    progress.finish_and_clear();
     let outcome = match outcome {
         Ok(outcome) => outcome,
-        Err(error) => return first_error([Err(error.into()), close(recorder, failure, &[])]),
+        Err(error) => return first_error([Err(error.into()), recording.finish(&[]).map_err(Into::into)]),
     };
 
     let carried: Vec<(String, Carried)> =
@@ -121,30 +120,19 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     };
     let summary = RunSummary::new(facts, &outcome, &tally);
     // Before anything else that may go wrong: it cannot be made again.
-    let recorded = close(recorder, failure, &notes(&outcome, &summary));
+    let recorded = recording.finish(&notes(&outcome, &summary)).map_err(Into::into);
     let drawn = match (&arguments.plot, plot) {
         (Some(path), Some(plot)) => std::fs::write(path, plot.to_svg(&summary.one_line(), &outcome.timing))
             .map_err(|cause| CommandError::file(path, "cannot write the plot", cause)),
         _ => Ok(()),
     };
-    let told = tell(&arguments, &summary, &outcome.real_time.advice());
-    let written = arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &summary));
-    // What became of the run is what scripts ask first; a file that is missing comes after.
-    first_error([verdict(&outcome, &plugins, &summary), recorded, drawn, told, written])
-}
-
-/// Ends the recording, if there is one, with these notes; `failure` is why it has ended before.
-fn close(
-    recorder: Option<Recorder>,
-    failure: Option<RecordError>,
-    notes: &[Note],
-) -> Result<(), CommandError> {
-    if let Some(failure) = failure {
-        return Err(failure.into());
+    let text = || format!("{}\n{}", style::title(&summary.title), summary.to_text());
+    let told = tell(arguments.json.as_deref(), &summary, text);
+    for line in outcome.real_time.advice() {
+        remark(format_args!("{} {line}", style::warning("note:")));
     }
-    let Some(mut recorder) = recorder else { return Ok(()) };
-    notes.iter().try_for_each(|note| recorder.note(note))?;
-    Ok(recorder.finish()?)
+    // What became of the run is what scripts ask first; a file that is missing comes after.
+    first_error([verdict(&outcome, &plugins, &summary), recorded, drawn, told])
 }
 
 /// What whoever opens the recording later has to know of the run: why it ended, who did not behave, what is missing.
@@ -249,63 +237,29 @@ fn broken_models(summary: &RunSummary) -> Result<(), CommandError> {
     })
 }
 
-/// The report for people, unless standard output is for the one for machines; advice on standard error.
-fn tell(arguments: &RunArguments, summary: &RunSummary, advice: &[String]) -> Result<(), CommandError> {
-    let json_on_stdout = arguments.json.as_ref().is_some_and(|path| path.as_os_str() == "-");
-    let told = if json_on_stdout {
-        Ok(())
-    } else {
-        report_line(format_args!("{}\n{}", style::title(&summary.title), summary.to_text()))
-    };
-    for line in advice {
-        remark(format_args!("{} {line}", style::warning("note:")));
-    }
-    told
-}
-
 /// Everybody who looks at every tick of a run.
 struct Watchers {
     tally: Tally,
     digest: TraceDigest,
-    recorder: Option<Recorder>,
-    failure: Option<RecordError>,
+    recording: RunRecording,
     plot: Option<RunPicture>,
-    publication: Option<Publication>,
     progress: ProgressBar,
 }
 
 /// How many ticks pass between two updates of the progress line, at 1 kHz thirty a second.
 const PROGRESS_TICKS: u64 = 33;
 
-impl Watchers {
-    /// Writes into the recording, if there is one. A failing disk ends the recording, not the run; the command says
-    /// so at the end.
-    fn write(&mut self, write: impl FnOnce(&mut Recorder) -> Result<(), RecordError>) {
-        if self.failure.is_none()
-            && let Some(recorder) = &mut self.recorder
-        {
-            self.failure = write(recorder).err();
-        }
-    }
-}
-
 impl Observer for Watchers {
     fn change(&mut self, change: &Change) {
-        self.write(|recorder| recorder.change(change));
-        if let Some(publication) = &self.publication {
-            publication.change(change);
-        }
+        self.recording.change(change);
     }
 
     fn observe(&mut self, record: &TickRecord) {
         self.tally.observe(record);
         self.digest.update(record);
-        self.write(|recorder| recorder.record(record));
+        self.recording.observe(record);
         if let Some(plot) = &mut self.plot {
             plot.observe(record);
-        }
-        if let Some(publication) = &self.publication {
-            publication.observe(record);
         }
         if record.tick.is_multiple_of(PROGRESS_TICKS) && record.device == 0 {
             self.progress.set_position(record.time_ns / 1_000_000);

@@ -11,8 +11,7 @@ use super::options::{PluginKeyValue, duration_s};
 use super::stopping::stop_on_signals;
 use super::{CommandError, remark, run, style};
 use choices::{
-    AveragingChoice, BoundaryChoice, FirstChoice, ForceWay, KinematicsOption, NoiseOption, OrderChoice,
-    PresentationOption, ProcedureChoice, SideChoice, StepChoice, range,
+    BoundaryChoice, FirstChoice, ForceWay, NoiseOption, PresentationOption, ProcedureChoice, range,
 };
 use clap::{Args, Subcommand, ValueEnum};
 use flotor_servo::RunEnd;
@@ -24,9 +23,10 @@ use flotor_study::cohort::{Cohort, CohortError, Earlier};
 use flotor_study::conduct::{ConductError, Nothing, OutsideError, Presenter};
 use flotor_study::dataset::{Dataset, DatasetError};
 use flotor_study::observer::Population;
-use flotor_study::procedure::{Procedure, QuestPlusRule, WeightedUpDownRule};
+use flotor_study::procedure::{Averaging, Procedure, QuestPlusRule, StepAtReversal, WeightedUpDownRule};
 use flotor_study::protocol::{
-    AtBoundary, JndDemo, JndProtocol, MagnitudeProtocol, Protocol, Stimulus, SubjectNumber,
+    ComparisonSide, JndDemo, JndProtocol, MagnitudeProtocol, PresentationOrder, Protocol, Stimulus,
+    SubjectNumber,
 };
 use serde_json::json;
 use std::num::NonZeroUsize;
@@ -112,7 +112,7 @@ struct Common {
     feel: f64,
     /// What is kept of the movement (default: full for people, summary for simulated observers)
     #[arg(long, value_enum)]
-    kinematics: Option<KinematicsOption>,
+    kinematics: Option<Kinematics>,
     /// Offer a rest after so many trials, 0: never (human)
     #[arg(long, default_value_t = 40, value_name = "N")]
     rest_every: u32,
@@ -185,10 +185,10 @@ struct JndArguments {
     average_from: u32,
     /// Whether the trials of the first and last of these reversals count
     #[arg(long, value_enum, default_value_t)]
-    averaging: AveragingChoice,
+    averaging: Averaging,
     /// Which step is applied at a reversal that halves it
     #[arg(long, value_enum, default_value_t)]
-    step_at_reversal: StepChoice,
+    step_at_reversal: StepAtReversal,
     /// Smallest difference, as a share of the base
     #[arg(long, default_value_t = 0.0, value_name = "SHARE")]
     floor: f64,
@@ -197,10 +197,10 @@ struct JndArguments {
     ceiling: f64,
     /// On which side of the base the comparison lies
     #[arg(long, value_enum, default_value_t)]
-    side: SideChoice,
+    side: ComparisonSide,
     /// Which of a pair comes first
     #[arg(long, value_enum, default_value_t)]
-    order: OrderChoice,
+    order: PresentationOrder,
     /// No practice pairs
     #[arg(long)]
     no_demo: bool,
@@ -292,14 +292,6 @@ impl Common {
         set(&mut scene, way.map(ForceWay::load).unwrap_or_default())?;
         Ok(scene)
     }
-
-    fn kinematics(&self) -> Option<Kinematics> {
-        self.kinematics.map(Kinematics::from)
-    }
-
-    fn at_boundary(&self) -> AtBoundary {
-        self.boundary.into()
-    }
 }
 
 impl JndArguments {
@@ -311,8 +303,8 @@ impl JndArguments {
             halve_at: self.halve_at.clone(),
             stop_after: self.stop_after,
             average_from: self.average_from,
-            averaging: self.averaging.into(),
-            step_at_reversal: self.step_at_reversal.into(),
+            averaging: self.averaging,
+            step_at_reversal: self.step_at_reversal,
             floor: self.floor,
             ceiling: self.ceiling,
             ..WeightedUpDownRule::default()
@@ -331,9 +323,9 @@ impl JndArguments {
             replications: self.replications,
             first_modality: self.common.first.into(),
             procedure,
-            side: self.side.into(),
-            order: self.order.into(),
-            at_boundary: self.common.at_boundary(),
+            side: self.side,
+            order: self.order,
+            at_boundary: self.common.boundary.into(),
             demo: JndDemo { shown: !self.no_demo, ..JndDemo::default() },
         })
     }
@@ -348,7 +340,7 @@ impl MagnitudeArguments {
             replications: self.replications,
             first_modality: self.common.first.into(),
             demo: self.demo,
-            at_boundary: self.common.at_boundary(),
+            at_boundary: self.common.boundary.into(),
         })
     }
 }
@@ -393,7 +385,7 @@ fn simulate(common: &Common, protocol: Protocol, apparatus: Option<&Apparatus>) 
     let stop = stop_on_signals().stop_flag();
     let jobs = common.jobs.or_else(|| std::thread::available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN);
     let dataset = Dataset::at(&common.out);
-    let kinematics = common.kinematics().unwrap_or(Kinematics::Summary);
+    let kinematics = common.kinematics.unwrap_or(Kinematics::Summary);
     let task = cohort.protocol.task();
     let presenter = |subject: SubjectNumber| -> Result<Box<dyn Presenter + '_>, OutsideError> {
         let Some(apparatus) = apparatus else { return Ok(Box::new(Nothing)) };

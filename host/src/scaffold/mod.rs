@@ -16,11 +16,11 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// What a plugin is written in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Language {
-    /// A cargo crate.
+    /// A cargo crate
     Rust,
-    /// One C file.
+    /// One C file
     C,
 }
 

@@ -198,28 +198,8 @@ impl Cohort {
             let in_trial = |cause| failed(ConductError::Trial { trial: trial.number, cause });
             presenter.present(trial).map_err(in_trial)?;
         }
-        let mut respondent = Stoppable { subject: self.subject(subject), stop };
-        conduct(&mut sitting, &mut log, presenter.as_mut(), &mut respondent, &mut |_| watch())
-            .map(|_| ())
-            .map_err(failed)
-    }
-}
-
-/// A simulated subject who can be asked to stop.
-struct Stoppable<'a> {
-    subject: SimulatedSubject,
-    stop: &'a AtomicBool,
-}
-
-impl crate::conduct::Respondent for Stoppable<'_> {
-    fn respond(
-        &mut self,
-        trial: &crate::trial::Trial,
-        exploration: &crate::trial::Exploration,
-    ) -> Result<crate::conduct::Reply, OutsideError> {
-        if self.stop.load(Ordering::Relaxed) {
-            return Ok(crate::conduct::Reply::Stop);
-        }
-        crate::conduct::Respondent::respond(&mut self.subject, trial, exploration)
+        let simulated = self.subject(subject);
+        conduct(&mut sitting, &mut log, presenter.as_mut(), &simulated, watch, stop).map_err(failed)?;
+        Ok(())
     }
 }

@@ -2,7 +2,7 @@
 //! and statistics, and no device.
 //!
 //! ```text
-//!                      +----------------- Respondent (a person, a simulated observer)
+//!                      +----------------- a person, a simulated observer
 //!                      v                        ^
 //! Protocol -> Sitting::next -> Trial -> Presenter -> Exploration
 //!                ^                                      |
@@ -18,7 +18,7 @@
 //! - [`kinematics`]: how a stimulus was explored, from samples of handle and force.
 //! - [`screen`]: a person's way through a sitting, for any front end; [`blinding`]: codes in place of conditions.
 //! - [`curve`]: a measured curve of a real spring, and the spring fitted to it.
-//! - [`conduct`]: a sitting with presenter, respondent and log put together.
+//! - [`conduct`]: a sitting with presenter, simulated subject and log put together.
 //! - [`cohort`]: many simulated subjects at once.
 //! - [`analysis`]: from logs to thresholds, tests and effects.
 //!

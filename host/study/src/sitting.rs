@@ -123,12 +123,6 @@ impl Sitting {
         self.presented
     }
 
-    /// Trials to come if nothing adapts and nothing is repeated; a track counts as one.
-    #[must_use]
-    pub fn items_left(&self) -> usize {
-        self.items.len()
-    }
-
     /// Whether everything was presented.
     #[must_use]
     pub fn is_over(&self) -> bool {

@@ -5,14 +5,27 @@
 
 use flotor_study::analysis::{AnalysisOptions, JndAnalysis, SubjectRecord, analyse_jnd, analyse_magnitude};
 use flotor_study::bias::{BiasRow, Method, observer_of, rows};
-use flotor_study::conduct::rehearse;
+use flotor_study::log::TrialEvent;
 use flotor_study::observer::{Population, Sensitivity, SimulatedSubject};
 use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Protocol, SubjectNumber};
 use flotor_study::sitting::Sitting;
+use flotor_study::trial::Exploration;
 
 /// Studies of one experiment; `FLOTOR_TEST_SIZE=full` takes more of them, with the same bounds.
 fn studies() -> u64 {
     if std::env::var("FLOTOR_TEST_SIZE").as_deref() == Ok("full") { 400 } else { 40 }
+}
+
+/// A sitting without apparatus and without a log.
+fn rehearse(mut sitting: Sitting, subject: &SimulatedSubject) -> (Sitting, Vec<TrialEvent>) {
+    let mut events = Vec::new();
+    while let Some(trial) = sitting.next() {
+        let response = subject.respond(&trial);
+        let exploration = Exploration::default();
+        let Ok(verdict) = sitting.answer(response, &exploration) else { break };
+        events.push(TrialEvent { trial, response, verdict, exploration });
+    }
+    (sitting, events)
 }
 
 fn subjects(protocol: &Protocol, population: &Population, seed: u64) -> Vec<SubjectRecord> {

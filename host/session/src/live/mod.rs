@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  servo -> ring -> observers -> flotor_live::Publication -> socket -> watchers
-//!  servo <- Controls, StopSwitch, at a tick boundary <- Handles <- socket <- watchers
+//!  servo <- Controls, StopSwitch, at a tick boundary <- Host <- socket <- watchers
 //! ```
 //!
 //! What is said over the socket, and both its ends, are the crate `flotor_live`; here is what this host says of itself, and how it
@@ -17,38 +17,14 @@ pub use carrier::{Carried, Carrier, carry};
 
 use crate::registry::Registry;
 use crate::scene::Scene;
-use crate::{ControlError, Controls, NewValue, Observer, PluginReport};
+use crate::{ControlError, Controls, NewValue, Observer, PluginReport, Session};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
-use flotor_live::{
-    Ask, Directory, Greeting, PROTOCOL, PanelPlugin, Publication, PublishError, Serve, WrenchLimits,
-};
+use flotor_live::{Ask, Directory, Greeting, PROTOCOL, PanelPlugin, Publication, PublishError, Serve};
 use flotor_record::RunDescription;
 use flotor_servo::StopSwitch;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
-
-/// What is said of a run before its first tick.
-#[derive(Clone, Copy, Debug)]
-pub struct Announcement<'a> {
-    /// Title of the scene.
-    pub title: &'a str,
-    /// How the run was set up.
-    pub run: &'a RunDescription,
-    /// Device first, then the models in the order of the scene.
-    pub plugins: &'a [PluginReport],
-    /// The most that may reach the hand.
-    pub limits: WrenchLimits,
-}
-
-/// What reaches a running loop from other threads.
-#[derive(Clone)]
-pub struct Handles {
-    /// Changes parameters and weights, replaces models.
-    pub controls: Controls,
-    /// Ends the run.
-    pub stop: StopSwitch,
-}
 
 /// Lets a prepared run be found, watched and changed.
 ///
@@ -56,20 +32,14 @@ pub struct Handles {
 /// [`PublishError`]; the run goes on without.
 pub fn publish(
     directory: &Directory,
-    announcement: Announcement<'_>,
-    handles: Handles,
+    scene: &Scene,
+    run: &RunDescription,
+    session: &Session,
+    stop: &StopSwitch,
 ) -> Result<Publication, PublishError> {
-    let folders = plugin_folders(&handles.controls, announcement.run);
-    announce(directory, announcement, Arc::new(Host { handles, folders, registry: Mutex::new(None) }))
-}
-
-/// The folders in which a run's scene has plugins looked for, as they were when it began.
-fn plugin_folders(controls: &Controls, run: &RunDescription) -> Vec<PathBuf> {
-    let file = controls.scene_file().unwrap_or(Path::new(""));
-    let base = file.parent().unwrap_or(Path::new(""));
-    // It has been read before.
-    let folders = Scene::parse(file, &run.scene_toml).map(|scene| scene.plugin_folders).unwrap_or_default();
-    folders.into_iter().map(|folder| base.join(folder)).collect()
+    let folders = scene.plugin_folders.clone();
+    let host = Host { controls: session.controls(), stop: stop.clone(), folders, registry: Mutex::new(None) };
+    announce(directory, scene, run, session, Arc::new(host))
 }
 
 /// Lets a prepared run be found and watched; what else may be asked of it is up to `host`.
@@ -78,17 +48,18 @@ fn plugin_folders(controls: &Controls, run: &RunDescription) -> Vec<PathBuf> {
 /// [`PublishError`]; the run goes on without.
 pub fn announce(
     directory: &Directory,
-    announcement: Announcement<'_>,
+    scene: &Scene,
+    run: &RunDescription,
+    session: &Session,
     host: Arc<dyn Serve>,
 ) -> Result<Publication, PublishError> {
-    let Announcement { title, run, plugins, limits } = announcement;
     let greeting = Greeting {
         protocol: PROTOCOL,
         flotor_version: env!("CARGO_PKG_VERSION").to_owned(),
         process: std::process::id(),
-        title: title.to_owned(),
-        plugins: plugins.iter().map(panel).collect(),
-        limits,
+        title: scene.title.clone(),
+        plugins: session.plugins().iter().map(panel).collect(),
+        limits: session.limits(),
     };
     Publication::open(directory, greeting, run, host)
 }
@@ -133,7 +104,8 @@ impl<O: Observer> Observer for Watched<O> {
 
 /// What does as a watcher asks.
 struct Host {
-    handles: Handles,
+    controls: Controls,
+    stop: StopSwitch,
     /// Where the scene has plugins looked for.
     folders: Vec<PathBuf>,
     /// Searched when the first model is replaced; kept, so that a file that has not changed is not mapped once more.
@@ -153,7 +125,7 @@ impl Host {
         let make = || {
             let mut registry = self.registry.lock().unwrap_or_else(PoisonError::into_inner);
             let registry = registry.get_or_insert_with(|| Registry::search(&self.folders));
-            self.handles.controls.swap(registry, model, plugin, &settings)
+            self.controls.swap(registry, model, plugin, &settings)
         };
         std::thread::scope(|scope| {
             let thread = std::thread::Builder::new().name("flotor-swap".to_owned());
@@ -177,7 +149,7 @@ fn swap_words(model: &str, error: &ControlError) -> String {
 
 impl Serve for Host {
     fn serve(&self, ask: Ask) -> Result<(), String> {
-        let Handles { controls, stop } = &self.handles;
+        let Self { controls, stop, .. } = self;
         match ask {
             Ask::Watch { .. } | Ask::LookAway => {} // the publication's own
             Ask::Set { values } => {

@@ -171,24 +171,7 @@ impl Registry {
     /// # Errors
     /// [`LookupError`]: unknown, with the nearest known id, or refused, with the reason.
     pub fn load(&self, id: &str, kind: PluginKind) -> Result<Plugin, LookupError> {
-        if id.contains(std::path::MAIN_SEPARATOR) {
-            return Ok(self.open(Path::new(id))?);
-        }
-        let is_meant =
-            |plugin: &&Plugin| (plugin.metadata().id.as_str(), plugin.metadata().kind) == (id, kind);
-        if let Some(linked) = self.linked.iter().find(is_meant) {
-            return Ok(linked.clone());
-        }
-        if let Some(metadata) = self.found.iter().find(|known| known.id == id) {
-            if metadata.kind != kind {
-                let Metadata { path, id, kind: found, .. } = metadata.clone();
-                return Err(
-                    LoadError::OtherKind { path, id, found: found.word(), wanted: kind.word() }.into()
-                );
-            }
-            return Ok(self.open(&metadata.path)?);
-        }
-        Err(self.unknown(id, Some(kind)))
+        self.find(id, Some(kind))
     }
 
     /// Loads the plugin an id (or a path to a file) means, whatever it is a plugin for. Not real-time; runs the plugin's
@@ -197,13 +180,24 @@ impl Registry {
     /// # Errors
     /// [`LookupError`]: unknown, with the nearest known id, or refused, with the reason.
     pub fn load_any(&self, id: &str) -> Result<Plugin, LookupError> {
-        if let Some(linked) = self.linked.iter().find(|plugin| plugin.metadata().id == id) {
+        self.find(id, None)
+    }
+
+    fn find(&self, id: &str, kind: Option<PluginKind>) -> Result<Plugin, LookupError> {
+        if id.contains(std::path::MAIN_SEPARATOR) {
+            return Ok(self.open(Path::new(id))?);
+        }
+        let fits = |plugin: &Metadata| plugin.id == id && kind.is_none_or(|kind| plugin.kind == kind);
+        if let Some(linked) = self.linked.iter().find(|plugin| fits(plugin.metadata())) {
             return Ok(linked.clone());
         }
-        match self.found.iter().find(|known| known.id == id) {
-            Some(known) => self.load(id, known.kind),
-            None if id.contains(std::path::MAIN_SEPARATOR) => Ok(self.open(Path::new(id))?),
-            None => Err(self.unknown(id, None)),
+        let found = self.found.iter().find(|known| known.id == id).ok_or_else(|| self.unknown(id, kind))?;
+        match kind {
+            Some(kind) if found.kind != kind => {
+                let Metadata { path, id, kind: found, .. } = found.clone();
+                Err(LoadError::OtherKind { path, id, found: found.word(), wanted: kind.word() }.into())
+            }
+            _ => Ok(self.open(&found.path)?),
         }
     }
 

@@ -53,10 +53,9 @@ impl Alternative {
     /// `plugin` and `parameters` of a table.
     fn take(section: &mut Section<'_>) -> Result<Self, SceneError> {
         let plugin = section.take("plugin").map(Value::text).transpose()?;
-        let texts = section.section("parameters")?.map_or_else(|| Ok(Vec::new()), Section::into_texts)?;
         let parameters =
-            texts.into_iter().map(|(key, value, location)| ParameterText { key, value, location });
-        Ok(Self { plugin, parameters: parameters.collect() })
+            section.section("parameters")?.map_or_else(|| Ok(Vec::new()), Section::into_texts)?;
+        Ok(Self { plugin, parameters })
     }
 }
 

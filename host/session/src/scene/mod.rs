@@ -325,8 +325,6 @@ fn plugin_use(section: &mut Section<'_>) -> Result<PluginUse, SceneError> {
     let plugin = section.require("plugin")?;
     let location = plugin.location.clone();
     let parameters = section.section("parameters")?.map_or_else(|| Ok(Vec::new()), Section::into_texts)?;
-    let parameters =
-        parameters.into_iter().map(|(key, value, location)| ParameterText { key, value, location }).collect();
     Ok(PluginUse { plugin: plugin.text()?, location, parameters })
 }
 

@@ -3,6 +3,7 @@
 //! serde would know the line of an unknown key but not the nearest right one; here each key is taken by name
 //! and what is left over at the end is unknown.
 
+use super::ParameterText;
 use std::borrow::Cow;
 use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};
@@ -223,7 +224,7 @@ impl<'t> Section<'t> {
     }
 
     /// All keys with their values as text: for parameters, whose keys only the plugin knows.
-    pub(super) fn into_texts(self) -> Result<Vec<(String, String, Location)>, SceneError> {
+    pub(super) fn into_texts(self) -> Result<Vec<ParameterText>, SceneError> {
         let source = self.source;
         let mut entries: Vec<_> = self.table.into_iter().collect();
         entries.sort_by_key(|(key, _)| key.span().start); // as written: the order plugins see
@@ -243,7 +244,7 @@ impl<'t> Section<'t> {
                     return Err(SceneError { location, problem });
                 }
             };
-            Ok((key.into_inner().into_owned(), text, location))
+            Ok(ParameterText { key: key.into_inner().into_owned(), value: text, location })
         };
         entries.into_iter().map(text).collect()
     }

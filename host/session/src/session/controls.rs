@@ -14,7 +14,6 @@ use flotor_servo::{
     ReportReceiver, WEIGHT, Workshop,
 };
 use std::collections::VecDeque;
-use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Why the loop was not told.
@@ -305,11 +304,6 @@ impl Controls {
             }
         }
         (first, later)
-    }
-
-    /// The file that names the models, for what it says relative to itself.
-    pub fn scene_file(&self) -> Option<&Path> {
-        self.shared.models.first().map(|model| model.plugin.location.file.as_path())
     }
 }
 

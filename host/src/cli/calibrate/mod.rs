@@ -6,7 +6,7 @@ mod verify;
 mod vertical;
 
 use super::run::progress_bar;
-use super::{CommandError, eval, options, style, write_json};
+use super::{CommandError, eval, options, style, tell, write_text};
 use clap::{Args, Subcommand};
 use flotor_calibration::CalibrationError;
 use flotor_session::calibration_file::{CalibrationFile, Provenance, Source, today};
@@ -44,9 +44,7 @@ fn provenance(source: Source, note: Option<String>) -> Provenance {
 
 fn write_calibration(path: &Path, file: &CalibrationFile) -> Result<(), CommandError> {
     let text = file.to_text().map_err(|error| CommandError::Failed(error.to_string()))?;
-    std::fs::write(path, text)
-        .map_err(|cause| CommandError::file(path, "cannot write the calibration", cause))?;
-    Ok(())
+    write_text(Some(path), || text)
 }
 
 fn refused(error: CalibrationError) -> CommandError {

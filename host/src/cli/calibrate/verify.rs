@@ -1,14 +1,14 @@
 //! `flotor calibrate verify`: the error of the vertical force without and with a file.
 
 use super::rig::RigArguments;
-use super::{CommandError, progress_bar, refused, style, write_json};
+use super::{CommandError, progress_bar, refused, style, tell};
 use clap::Args;
 use flotor_calibration::procedure::{Plan, measure};
 use flotor_calibration::verify::{ErrorCurve, PROBE_N};
 use flotor_hal::VerticalCalibration;
 use flotor_session::calibration_file::{CalibrationFile, CalibrationFileError};
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Measure the error without and with a calibration file.
 #[derive(Args)]
@@ -38,14 +38,10 @@ pub(super) fn run(arguments: &VerifyArguments) -> Result<(), CommandError> {
     } else {
         device(arguments, &file, &calibration)?
     };
-    if arguments.json.as_deref() != Some(Path::new("-")) {
-        say!("{}", style::title("error of the vertical force over all heights, peak to peak"));
-        say!("  without {before:>8.3} %\n  with    {after:>8.3} %");
-    }
-    if let Some(path) = &arguments.json {
-        write_json(path, &VerifyReport { error_before_percent: before, error_after_percent: after })?;
-    }
-    Ok(())
+    let report = VerifyReport { error_before_percent: before, error_after_percent: after };
+    let title = style::title("error of the vertical force over all heights, peak to peak");
+    let text = || format!("{title}\n  without {before:>8.3} %\n  with    {after:>8.3} %");
+    tell(arguments.json.as_deref(), &report, text)
 }
 
 fn usage(error: CalibrationFileError) -> CommandError {

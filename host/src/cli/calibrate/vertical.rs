@@ -1,7 +1,9 @@
 //! `flotor calibrate vertical`: readings, fit, error before and after.
 
 use super::rig::RigArguments;
-use super::{CommandError, force_n, progress_bar, provenance, refused, style, write_calibration, write_json};
+use super::{
+    CommandError, force_n, progress_bar, provenance, refused, style, tell, write_calibration, write_text,
+};
 use clap::Args;
 use flotor_calibration::fit::{Candidate, Fit, fit};
 use flotor_calibration::procedure::{Plan, Reading, measure};
@@ -12,7 +14,7 @@ use flotor_session::calibration_file::{
     CalibratedDevice, CalibrationFile, FORMAT, Provenance, Quality, Source, VerticalCurve,
 };
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Measure how much of the vertical force arrives at each height, and fit it.
 #[derive(Args)]
@@ -100,7 +102,7 @@ pub(super) fn run(arguments: &VerticalArguments) -> Result<(), CommandError> {
     let plan = plan(arguments)?;
     let measured =
         if arguments.rig.simulated { simulated(arguments, &plan)? } else { device(arguments, &plan)? };
-    tell(arguments, &measured)
+    report_on(arguments, &measured)
 }
 
 fn plan(arguments: &VerticalArguments) -> Result<Plan, CommandError> {
@@ -181,7 +183,7 @@ fn report(plan: &Plan) -> Result<VerticalCalibration, CommandError> {
     thesis::calibration(least_n).map_err(|invalid| refused(invalid.into()))
 }
 
-fn tell(arguments: &VerticalArguments, measured: &Measured) -> Result<(), CommandError> {
+fn report_on(arguments: &VerticalArguments, measured: &Measured) -> Result<(), CommandError> {
     let Measured { serial, readings, fit, report, curves } = measured;
     let rows: Vec<ErrorRow> = curves
         .iter()
@@ -192,35 +194,27 @@ fn tell(arguments: &VerticalArguments, measured: &Measured) -> Result<(), Comman
     let device = arguments.rig.plugin();
     let seed = arguments.rig.simulated.then_some(arguments.rig.seed);
 
-    if arguments.json.as_deref() != Some(Path::new("-")) {
-        say!("{}", to_text(fit, &rows, readings.len()));
-    }
     let curve = VerticalCurve::of(&fit.calibration);
-    if let Some(path) = &arguments.json {
-        let report = VerticalReport {
-            device,
-            serial,
-            error_before_percent: before,
-            error_after_percent: after,
-            rows: &rows,
-            degree: fit.degree,
-            range_mm: curve.range_mm,
-            coefficients_per_mm: &curve.coefficients_per_mm,
-            residual_n: fit.residual_n,
-            band_95_percent: fit.band_95_percent,
-            weight_n: fit.weight_n[0],
-            weight_95_n: fit.weight_n[1],
-            candidates: &fit.candidates,
-            readings: readings.len(),
-            seed,
-        };
-        write_json(path, &report)?;
-    }
-    if let Some(path) = &arguments.plot {
-        let curves: Vec<_> = curves.iter().map(|(name, curve)| (*name, curve)).collect();
-        std::fs::write(path, picture::to_svg(readings, fit, report, &curves))
-            .map_err(|cause| CommandError::file(path, "cannot write the plot", cause))?;
-    }
+    let for_machines = VerticalReport {
+        device,
+        serial,
+        error_before_percent: before,
+        error_after_percent: after,
+        rows: &rows,
+        degree: fit.degree,
+        range_mm: curve.range_mm,
+        coefficients_per_mm: &curve.coefficients_per_mm,
+        residual_n: fit.residual_n,
+        band_95_percent: fit.band_95_percent,
+        weight_n: fit.weight_n[0],
+        weight_95_n: fit.weight_n[1],
+        candidates: &fit.candidates,
+        readings: readings.len(),
+        seed,
+    };
+    tell(arguments.json.as_deref(), &for_machines, || to_text(fit, &rows, readings.len()))?;
+    let curves: Vec<_> = curves.iter().map(|(name, curve)| (*name, curve)).collect();
+    write_text(arguments.plot.as_deref(), || picture::to_svg(readings, fit, report, &curves))?;
     if let Some(path) = &arguments.out {
         let file = CalibrationFile {
             format: FORMAT,

@@ -1,6 +1,6 @@
 //! `flotor study bias`: what each way to a threshold is worth.
 
-use crate::cli::{CommandError, run, style, write_json};
+use crate::cli::{CommandError, run, style, tell};
 use clap::Args;
 use flotor_study::bias::{BiasRow, observer_of, rows};
 use std::path::PathBuf;
@@ -54,14 +54,8 @@ pub(super) fn run(arguments: &BiasArguments) -> Result<(), CommandError> {
     progress.finish_and_clear();
     found.sort_by_key(|(index, _)| *index);
     let rows: Vec<BiasRow> = found.into_iter().flat_map(|(_, rows)| rows).collect();
-    if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
-        say!(
-            "{}",
-            style::title(&format!("{} tracks per estimate, {} estimates", arguments.tracks, arguments.runs))
-        );
-        say!("{}", to_text(&rows));
-    }
-    arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &rows))
+    let title = format!("{} tracks per estimate, {} estimates", arguments.tracks, arguments.runs);
+    tell(arguments.json.as_deref(), &rows, || format!("{}\n{}", style::title(&title), to_text(&rows)))
 }
 
 fn to_text(rows: &[BiasRow]) -> String {

@@ -1,9 +1,7 @@
 //! Choices of a protocol as words of the command line.
 
 use clap::ValueEnum;
-use flotor_study::apparatus::Kinematics;
-use flotor_study::procedure::{Averaging, StepAtReversal};
-use flotor_study::protocol::{AtBoundary, ComparisonSide, FirstModality, PresentationOrder};
+use flotor_study::protocol::{AtBoundary, FirstModality};
 use flotor_study::trial::Modality;
 
 /// `--first`
@@ -47,91 +45,6 @@ impl From<BoundaryChoice> for AtBoundary {
     }
 }
 
-/// `--averaging`
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-pub(super) enum AveragingChoice {
-    /// Both count
-    #[default]
-    BothEnds,
-    /// The trial of the first does not
-    AfterFirst,
-    /// The trial of the last does not
-    BeforeLast,
-}
-
-impl From<AveragingChoice> for Averaging {
-    fn from(choice: AveragingChoice) -> Self {
-        match choice {
-            AveragingChoice::BothEnds => Self::BothEnds,
-            AveragingChoice::AfterFirst => Self::AfterFirst,
-            AveragingChoice::BeforeLast => Self::BeforeLast,
-        }
-    }
-}
-
-/// `--step-at-reversal`
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-pub(super) enum StepChoice {
-    /// The halved one, at once
-    #[default]
-    New,
-    /// The old one
-    Old,
-}
-
-impl From<StepChoice> for StepAtReversal {
-    fn from(choice: StepChoice) -> Self {
-        match choice {
-            StepChoice::New => Self::New,
-            StepChoice::Old => Self::Old,
-        }
-    }
-}
-
-/// `--side`
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-pub(super) enum SideChoice {
-    /// Above the base
-    #[default]
-    Above,
-    /// Below the base
-    Below,
-    /// Drawn for each trial
-    Random,
-}
-
-impl From<SideChoice> for ComparisonSide {
-    fn from(choice: SideChoice) -> Self {
-        match choice {
-            SideChoice::Above => Self::Above,
-            SideChoice::Below => Self::Below,
-            SideChoice::Random => Self::Random,
-        }
-    }
-}
-
-/// `--order`
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-pub(super) enum OrderChoice {
-    /// Drawn for each trial
-    #[default]
-    Random,
-    /// The base
-    BaseFirst,
-    /// The comparison
-    ComparisonFirst,
-}
-
-impl From<OrderChoice> for PresentationOrder {
-    fn from(choice: OrderChoice) -> Self {
-        match choice {
-            OrderChoice::Random => Self::Random,
-            OrderChoice::BaseFirst => Self::BaseFirst,
-            OrderChoice::ComparisonFirst => Self::ComparisonFirst,
-        }
-    }
-}
-
 /// `--procedure`
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub(super) enum ProcedureChoice {
@@ -140,27 +53,6 @@ pub(super) enum ProcedureChoice {
     WeightedUpDown,
     /// Trials where they tell most, a fixed number of them
     Questplus,
-}
-
-/// `--kinematics`
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(super) enum KinematicsOption {
-    /// Every tick of every trial (MCAP), and the measures
-    Full,
-    /// Measures of each stimulus
-    Summary,
-    /// Nothing
-    None,
-}
-
-impl From<KinematicsOption> for Kinematics {
-    fn from(option: KinematicsOption) -> Self {
-        match option {
-            KinematicsOption::Full => Self::Full,
-            KinematicsOption::Summary => Self::Summary,
-            KinematicsOption::None => Self::None,
-        }
-    }
 }
 
 /// `--apparatus`

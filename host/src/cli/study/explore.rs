@@ -11,7 +11,7 @@ use flotor_core::{Change, ChangeOutcome};
 use flotor_hal::{Parameter, ParameterKind};
 use flotor_live::Directory;
 use flotor_servo::{Clock, StopSwitch};
-use flotor_session::live::{Announcement, Handles, Watched, publish};
+use flotor_session::live::{Watched, publish};
 use flotor_session::registry::Registry;
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
@@ -63,14 +63,8 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
             CommandError::Usage(format!("{}: the scene has no model to explore", scene.title))
         })?;
     let felt = Felt::default();
-    let announcement = Announcement {
-        title: &scene.title,
-        run: &describe(&scene, &options, session.plugins()),
-        plugins: session.plugins(),
-        limits: session.limits(),
-    };
-    let handles = Handles { controls: session.controls(), stop: stop.clone() };
-    let publication = publish(&Directory::of_this_user(), announcement, handles);
+    let description = describe(&scene, &options, session.plugins());
+    let publication = publish(&Directory::of_this_user(), &scene, &description, &session, &stop);
     let hint = if publication.is_ok() { "; `flotor view` shows it and has it on sliders" } else { "" };
     let mut desk =
         Desk { controls: session.controls(), registry, model, settings: Vec::new(), felt: felt.clone() };

@@ -35,7 +35,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         (dataset.source_folder(subject).join("motion"), format!("{subject}_task-{}", protocol.task()));
     let stop = stop_on_signals();
     let noise = noise(common)?;
-    let kinematics = common.kinematics().unwrap_or(Kinematics::Full);
+    let kinematics = common.kinematics.unwrap_or(Kinematics::Full);
     let mut rig = LiveRig::start(apparatus, kinematics, &stop)
         .map_err(|error| super::outside(error.as_ref(), &error))?;
     let mut front = Front::open(common.screen, &rig)?;
@@ -100,7 +100,7 @@ impl Front {
 
     fn as_dyn(&mut self) -> &mut dyn FrontEnd {
         match self {
-            Self::Window(window) => window,
+            Self::Window(window) => &mut window.lines,
             Self::Terminal(terminal) => terminal,
             Self::Json(lines) => lines,
         }

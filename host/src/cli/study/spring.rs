@@ -1,7 +1,7 @@
 //! `flotor study spring`: a measured curve of a real spring, fitted, drawn, and made a scene to be judged: the fitted spring,
 //! or the curve itself.
 
-use crate::cli::{CommandError, style, write_json};
+use crate::cli::{CommandError, style, tell, write_text};
 use clap::Args;
 use flotor_plot::{Axis, Figure, Panel, Series};
 use flotor_study::curve::{CurveError, FITTED, MeasuredCurve, ServedCurve, SpringFit};
@@ -53,15 +53,11 @@ pub(super) fn run(arguments: &SpringArguments) -> Result<(), CommandError> {
         Some(path) => Some((path, scene(&fit, arguments.coil_diameter_mm).map_err(refused)?)),
         None => None,
     };
-    if arguments.json.as_ref().is_none_or(|path| path.as_os_str() != "-") {
-        say!("{}", style::title(&path.display().to_string()));
-        say!("{}", to_text(&fit, &served));
-    }
-    if let Some(path) = &arguments.plot {
-        write(path, &picture(&curve, &fit, &served))?;
-    }
+    let title = style::title(&path.display().to_string());
+    tell(arguments.json.as_deref(), &fit, || format!("{title}\n{}", to_text(&fit, &served)))?;
+    write_text(arguments.plot.as_deref(), || picture(&curve, &fit, &served))?;
     if let Some((path, text)) = fitted {
-        write(path, &text)?;
+        write_text(Some(path), || text)?;
     }
     if let Some(path) = &arguments.curve_scene {
         let table = path.with_extension("csv");
@@ -73,18 +69,14 @@ pub(super) fn run(arguments: &SpringArguments) -> Result<(), CommandError> {
             );
             return Err(CommandError::Usage(why));
         }
-        write(&table, &served.to_table())?;
-        write(path, &curve_scene(&table, &fit, &served, arguments.coil_diameter_mm))?;
+        write_text(Some(&table), || served.to_table())?;
+        write_text(Some(path), || curve_scene(&table, &fit, &served, arguments.coil_diameter_mm))?;
     }
-    arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &fit))
+    Ok(())
 }
 
 fn same_file(one: &Path, other: &Path) -> bool {
     matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
-}
-
-fn write(path: &Path, text: &str) -> Result<(), CommandError> {
-    std::fs::write(path, text).map_err(|cause| CommandError::file(path, "cannot write the file", cause))
 }
 
 fn to_text(fit: &SpringFit, served: &ServedCurve) -> String {

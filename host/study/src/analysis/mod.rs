@@ -55,13 +55,13 @@ impl SubjectRecord {
 }
 
 /// How thresholds are found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
-    /// As the procedure says: mean of the last differences, or the belief of QUEST+.
+    /// As the procedure says: the mean of the last differences, or the belief of QUEST+
     #[default]
     Procedure,
-    /// The most likely observer, from all trials of a subject at a base in a modality.
+    /// The most likely observer, from all trials at a base
     Map,
 }
 

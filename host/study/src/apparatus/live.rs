@@ -14,8 +14,10 @@ use flotor_core::trace::TickRecord;
 use flotor_live::{Ask, Directory, Serve};
 use flotor_record::Recorder;
 use flotor_servo::{Clock, StopSwitch};
-use flotor_session::live::{Announcement, Watched, announce};
-use flotor_session::{ControlError, Controls, Observer, Outcome, RunError, RunOptions, Session};
+use flotor_session::live::{Watched, announce};
+use flotor_session::{
+    ControlError, Controls, Observer, Outcome, RunError, RunOptions, RunRecording, Session,
+};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -87,16 +89,9 @@ impl<'a> LiveRig<'a> {
         let controls = session.controls();
         apparatus.show(&controls, false)?;
         let (shared, stop) = (Shared::default(), stop.clone());
-        let publication = {
-            let announcement = Announcement {
-                title: &apparatus.scene().title,
-                run: &apparatus.describe(apparatus.scene(), Clock::Real, 0),
-                plugins: session.plugins(),
-                limits: session.limits(),
-            };
-            let host = Arc::new(OnlyStop(stop.clone()));
-            announce(&Directory::of_this_user(), announcement, host)
-        };
+        let run = apparatus.describe(apparatus.scene(), Clock::Real, 0);
+        let host = Arc::new(OnlyStop(stop.clone()));
+        let publication = announce(&Directory::of_this_user(), apparatus.scene(), &run, &session, host);
         let unseen = publication.as_ref().err().map(ToString::to_string);
         let mut observers = Watched { observer: shared.clone(), publication: publication.ok() };
         let switch = stop.clone();
@@ -140,9 +135,9 @@ impl<'a> LiveRig<'a> {
         if let Some(what) = watch.refused.take() {
             return Err(StimulusRefused(what).into());
         }
-        if let (Some(files), None) = (&self.files, &watch.recorder) {
+        if let (Some(files), false) = (&self.files, watch.recording.is_on()) {
             let run = self.apparatus.describe(self.apparatus.scene(), Clock::Real, 0);
-            watch.recorder = Some(Recorder::create(&files.of(trial), &run)?);
+            watch.recording = RunRecording::new(Some(Recorder::create(&files.of(trial), &run)?));
         }
         Ok(())
     }
@@ -168,7 +163,7 @@ impl<'a> LiveRig<'a> {
     /// # Errors
     /// The recording.
     pub fn close_recording(&mut self) -> Result<(), OutsideError> {
-        Ok(self.shared.lock().finish_recording()?)
+        Ok(self.shared.lock().recording.finish(&[])?)
     }
 
     /// Whether the handle is out of its range right now.

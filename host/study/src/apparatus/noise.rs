@@ -1,6 +1,7 @@
 //! White noise on headphones, against the sound of the device (CMU-RI-TR-07-21, section 4). Flotor has no sound of its
 //! own: it writes samples to a player of the system, where there is one.
 
+use flotor_core::Random;
 use std::io::Write;
 use std::process::{Child, Command, Stdio};
 use std::thread::JoinHandle;
@@ -39,8 +40,8 @@ impl WhiteNoise {
             let mut player = player.ok()?;
             let mut pipe = player.stdin.take()?;
             let feeder = std::thread::Builder::new().name("flotor-noise".to_owned()).spawn(move || {
-                let mut noise = Noise::default();
-                while pipe.write_all(&noise.tenth_of_a_second()).is_ok() {}
+                let mut random = Random::new(0, 0);
+                while pipe.write_all(&tenth_of_a_second(&mut random)).is_ok() {}
             });
             let mut started = Self { player, feeder: feeder.ok(), name };
             // A player without a sound card ends at once.
@@ -70,30 +71,15 @@ impl Drop for WhiteNoise {
     }
 }
 
-/// Evenly distributed samples without memory (Marsaglia 2003, xorshift): all frequencies alike.
-struct Noise {
-    state: u64,
+/// A sample of noise, -`LOUDEST` to `LOUDEST`.
+fn sample(random: &mut Random) -> i16 {
+    #[allow(clippy::cast_possible_truncation)] // at most LOUDEST
+    let sample = (random.symmetric() * f64::from(LOUDEST)) as i16;
+    sample
 }
 
-impl Default for Noise {
-    fn default() -> Self {
-        Self { state: 0x9e37_79b9_7f4a_7c15 }
-    }
-}
-
-impl Noise {
-    fn next(&mut self) -> i16 {
-        self.state ^= self.state << 13;
-        self.state ^= self.state >> 7;
-        self.state ^= self.state << 17;
-        #[allow(clippy::cast_possible_truncation)] // below 2 * LOUDEST + 1
-        let sample = ((self.state >> 33) % (2 * LOUDEST as u64 + 1)) as i16;
-        sample - LOUDEST
-    }
-
-    fn tenth_of_a_second(&mut self) -> Vec<u8> {
-        (0..RATE_HZ / 10).flat_map(|_| self.next().to_le_bytes()).collect()
-    }
+fn tenth_of_a_second(random: &mut Random) -> Vec<u8> {
+    (0..RATE_HZ / 10).flat_map(|_| sample(random).to_le_bytes()).collect()
 }
 
 #[cfg(test)]
@@ -103,8 +89,9 @@ mod tests {
     /// White: neighbours at any small distance know nothing of each other, to four standard errors.
     #[test]
     fn noise_is_white_and_not_too_loud() {
-        let mut noise = Noise::default();
-        let samples: Vec<f64> = (0..100_000).map(|_| f64::from(noise.next()) / f64::from(LOUDEST)).collect();
+        let mut random = Random::new(0, 0);
+        let samples: Vec<f64> =
+            (0..100_000).map(|_| f64::from(sample(&mut random)) / f64::from(LOUDEST)).collect();
         assert!(samples.iter().all(|sample| sample.abs() <= 1.0));
         for lag in [1, 2, 3, 10, 100] {
             let products: f64 = samples.iter().zip(&samples[lag..]).map(|(a, b)| a * b).sum();

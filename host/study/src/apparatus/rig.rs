@@ -17,7 +17,7 @@ use flotor_record::Recorder;
 use flotor_servo::Clock;
 use flotor_servo::RunEnd;
 use flotor_session::scene::Scene;
-use flotor_session::{ControlError, Observer, RunError, Steps};
+use flotor_session::{ControlError, Observer, RunError, RunRecording, Steps};
 use std::path::PathBuf;
 
 /// The run ended before the experiment did.
@@ -122,7 +122,7 @@ impl<'a> Rig<'a> {
     ) -> Result<Exploration, OutsideError> {
         if let (Kinematics::Full, Some(files)) = (self.kinematics, &self.files) {
             let run = self.apparatus.describe(&self.scene, Clock::Virtual, self.seed);
-            self.watch.recorder = Some(Recorder::create(&files.of(trial), &run)?);
+            self.watch.recording = RunRecording::new(Some(Recorder::create(&files.of(trial), &run)?));
         }
         let mut exploration = Exploration::default();
         for value in trial.presented.values() {
@@ -137,7 +137,7 @@ impl<'a> Rig<'a> {
             }
         }
         exploration.missed_ticks = std::mem::take(&mut self.watch.missed_ticks);
-        self.watch.finish_recording()?;
+        self.watch.recording.finish(&[])?;
         Ok(exploration)
     }
 

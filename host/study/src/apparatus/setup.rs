@@ -14,13 +14,13 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// What is kept of how people moved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Kinematics {
-    /// Every tick of every trial in a recording of its own (MCAP), and the measures.
+    /// Every tick of every trial (MCAP), and the measures
     Full,
-    /// Measures of each stimulus, in the log.
+    /// Measures of each stimulus
     Summary,
-    /// Nothing.
+    /// Nothing
     None,
 }
 

@@ -6,6 +6,7 @@ use crate::observer::{Population, SimulatedSubject};
 use crate::protocol::JndProtocol;
 use crate::sitting::Sitting;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 /// A folder that goes away with the test.
 struct Folder(PathBuf);
@@ -50,10 +51,11 @@ fn subject(begin: &Begin) -> SimulatedSubject {
 fn sit(path: &Path) {
     let begin = begin();
     let mut sitting = Sitting::new(&begin.protocol, begin.seed, begin.subject);
-    let mut subject = subject(&begin);
+    let subject = subject(&begin);
     let mut log = LogWriter::create(path).unwrap();
     log.write(&Event::Begin(Box::new(begin))).unwrap();
-    let ending = conduct(&mut sitting, &mut log, &mut Nothing, &mut subject, &mut |_| ()).unwrap();
+    let ending =
+        conduct(&mut sitting, &mut log, &mut Nothing, &subject, &|| (), &AtomicBool::default()).unwrap();
     assert_eq!(ending, Ending::Complete);
 }
 
@@ -157,12 +159,12 @@ fn cut_anywhere_it_goes_on_as_if_nothing_had_happened() {
         let log = SittingLog::read(&path).unwrap();
         let complete_lines = whole[..cut].iter().filter(|byte| **byte == b'\n').count();
         assert_eq!(log.trials.len(), (complete_lines - 1).min(uninterrupted.len()));
-        let mut subject = subject(&log.begin);
+        let subject = subject(&log.begin);
         if log.complete {
             continue;
         }
         let (mut sitting, mut writer) = log.resume("0.0.1").unwrap();
-        conduct(&mut sitting, &mut writer, &mut Nothing, &mut subject, &mut |_| ()).unwrap();
+        conduct(&mut sitting, &mut writer, &mut Nothing, &subject, &|| (), &AtomicBool::default()).unwrap();
         drop(writer);
         let resumed = SittingLog::read(&path).unwrap();
         assert!(resumed.complete && resumed.resumed == 1);

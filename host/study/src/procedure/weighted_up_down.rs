@@ -14,26 +14,26 @@ use serde::{Deserialize, Serialize};
 const ALTERNATIVES: f64 = 2.0;
 
 /// Which step size moves the difference at a reversal that halves it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum StepAtReversal {
-    /// The halved one, at once.
+    /// The halved one, at once
     #[default]
     New,
-    /// The old one; the halved one from the next trial on.
+    /// The old one; the halved one from the next trial on
     Old,
 }
 
-/// Which differences the threshold is the mean of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Which differences the threshold is the mean of: whether the trials of the first and the last reversal that count do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Averaging {
-    /// From the trial of the first reversal that counts to that of the last, both included.
+    /// Both count
     #[default]
     BothEnds,
-    /// Without the trial of the first one.
+    /// The trial of the first does not
     AfterFirst,
-    /// Without the trial of the last one.
+    /// The trial of the last does not
     BeforeLast,
 }
 

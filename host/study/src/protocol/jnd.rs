@@ -5,28 +5,28 @@ use crate::procedure::Procedure;
 use serde::{Deserialize, Serialize};
 
 /// On which side of the base the comparison lies.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum ComparisonSide {
-    /// Always above.
+    /// Above the base
     #[default]
     Above,
-    /// Always below.
+    /// Below the base
     Below,
-    /// Drawn for each trial.
+    /// Drawn for each trial
     Random,
 }
 
 /// Which of a pair is presented first.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum PresentationOrder {
-    /// Drawn for each trial.
+    /// Drawn for each trial
     #[default]
     Random,
-    /// Always the base.
+    /// The base
     BaseFirst,
-    /// Always the comparison.
+    /// The comparison
     ComparisonFirst,
 }
 

@@ -4,15 +4,17 @@ use super::{AtBoundary, FirstModality, ProtocolError, Stimulus, at_least_one, ex
 use serde::{Deserialize, Serialize};
 
 /// How ratings of subjects with different ranges are made comparable.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum RatingScale {
-    /// Each subject's ratings divided by their mean.
+    /// Divided by the subject's mean
     #[default]
+    #[value(name = "mean")]
     DividedByMean,
-    /// Each subject's ratings divided by their geometric mean (modulus equalisation); needs positive ratings.
+    /// Divided by the subject's geometric mean (modulus equalisation); needs positive ratings
+    #[value(name = "geometric-mean")]
     DividedByGeometricMean,
-    /// As they are.
+    /// As they are
     Raw,
 }
 

@@ -4,9 +4,6 @@ use super::{JsonLines, lines_of};
 use crate::cli::CommandError;
 use crate::cli::view::VIEWER;
 use flotor_servo::StopSwitch;
-use flotor_study::apparatus::attend::FrontEnd;
-use flotor_study::conduct::OutsideError;
-use flotor_study::screen::{Input, Screen};
 use rustix::process::{Pid, Signal, kill_process};
 use std::io::BufReader;
 use std::process::{Child, ChildStdin, Stdio};
@@ -17,7 +14,8 @@ const LOOK_PERIOD: Duration = Duration::from_millis(50);
 
 /// A window in front of a person. Dropped, it closes.
 pub(in crate::cli::study) struct Window {
-    lines: JsonLines<ChildStdin>,
+    /// What is said to it and heard of it.
+    pub(in crate::cli::study) lines: JsonLines<ChildStdin>,
     viewer: Viewer,
 }
 
@@ -49,24 +47,6 @@ impl Window {
         while self.viewer.0.try_wait().is_ok_and(|status| status.is_none()) && !stop.is_stop_asked() {
             std::thread::sleep(LOOK_PERIOD);
         }
-    }
-}
-
-impl FrontEnd for Window {
-    fn show(&mut self, screen: &Screen) -> Result<(), OutsideError> {
-        self.lines.show(screen)
-    }
-
-    fn poll(&mut self, screen: &Screen) -> Result<Option<Input>, OutsideError> {
-        self.lines.poll(screen)
-    }
-
-    fn warn_out_of_range(&mut self) -> Result<(), OutsideError> {
-        self.lines.warn_out_of_range()
-    }
-
-    fn refuse(&mut self, why: &str) -> Result<(), OutsideError> {
-        self.lines.refuse(why)
     }
 }
 

@@ -1,0 +1,56 @@
+//! A recording beside a run: where it fails, the run goes on.
+
+use crate::Observer;
+use flotor_core::Change;
+use flotor_core::trace::TickRecord;
+use flotor_record::{Note, RecordError, Recorder};
+
+/// Records a run, if it is to be recorded at all. A failing disk ends the recording, not the run. Not real-time.
+#[derive(Default)]
+pub struct RunRecording {
+    recorder: Option<Recorder>,
+    failure: Option<RecordError>,
+}
+
+impl RunRecording {
+    /// Into this file; without one nothing is recorded.
+    #[must_use]
+    pub fn new(recorder: Option<Recorder>) -> Self {
+        Self { recorder, failure: None }
+    }
+
+    /// Whether it has begun and is not finished.
+    #[must_use]
+    pub fn is_on(&self) -> bool {
+        self.recorder.is_some()
+    }
+
+    /// Ends it, with these notes.
+    ///
+    /// # Errors
+    /// What ended it before, or ends it now.
+    pub fn finish(&mut self, notes: &[Note]) -> Result<(), RecordError> {
+        let Some(mut recorder) = self.recorder.take() else { return Ok(()) };
+        self.failure.take().map_or(Ok(()), Err)?;
+        notes.iter().try_for_each(|note| recorder.note(note))?;
+        recorder.finish()
+    }
+
+    fn write(&mut self, write: impl FnOnce(&mut Recorder) -> Result<(), RecordError>) {
+        if self.failure.is_none()
+            && let Some(recorder) = &mut self.recorder
+        {
+            self.failure = write(recorder).err();
+        }
+    }
+}
+
+impl Observer for RunRecording {
+    fn change(&mut self, change: &Change) {
+        self.write(|recorder| recorder.change(change));
+    }
+
+    fn observe(&mut self, record: &TickRecord) {
+        self.write(|recorder| recorder.record(record));
+    }
+}
