@@ -155,7 +155,7 @@ impl Servo {
     }
 
     /// What was to change before this tick does so now.
-    #[inline(never)] // its instructions are counted: tests/tick_cost.rs
+    #[inline(never)] // its instructions are counted: tests/instructions.rs
     fn apply_changes(&mut self, tick: &Tick, events: &mut Events) {
         let Self { stations, forces, parameters, exchange, .. } = self;
         let devices = stations.len();
