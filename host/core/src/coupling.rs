@@ -1,4 +1,4 @@
-//! How two devices were held together: what it takes to compute a coupling's wrenches again.
+//! Configuration of a virtual coupling between two devices.
 
 use crate::mapping::MappingConfig;
 
