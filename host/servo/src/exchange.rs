@@ -40,6 +40,16 @@ pub fn exchange(models: usize, mut schedule: Vec<(u64, Replacement)>) -> (Exchan
 }
 
 impl Exchange {
+    /// Whether a replacement is to be put in at this tick. Real-time: bounded, no allocation.
+    pub fn is_due(&self, tick: &Tick) -> bool {
+        self.is_scheduled(tick) || !self.arriving.is_empty()
+    }
+
+    /// Whether the time of the next scheduled replacement has come.
+    fn is_scheduled(&self, tick: &Tick) -> bool {
+        self.schedule.get(self.next).is_some_and(|(time_ns, _)| *time_ns <= tick.time_ns)
+    }
+
     /// Hands back what has faded out and puts in what is due; `report` hears of model and generation.
     ///
     /// Real-time: bounded by the models and what is scheduled, no allocation.
@@ -65,12 +75,11 @@ impl Exchange {
     /// The next replacement whose time has come.
     #[inline]
     fn due(&mut self, tick: &Tick) -> Option<Replacement> {
-        if let Some((time_ns, replacement)) = self.schedule.get_mut(self.next)
-            && *time_ns <= tick.time_ns
-        {
-            self.next += 1;
-            return replacement.take();
+        if !self.is_scheduled(tick) {
+            return self.arriving.pop().ok();
         }
-        self.arriving.pop().ok()
+        let (_, replacement) = self.schedule.get_mut(self.next)?;
+        self.next += 1;
+        replacement.take()
     }
 }

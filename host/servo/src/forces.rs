@@ -251,6 +251,11 @@ impl Forces {
         self.stacks.iter_mut().find_map(|stack| stack.take_faded(tick))
     }
 
+    /// Whether a layer is fading out. Real-time: bounded by the models, no allocation.
+    pub(crate) fn is_fading(&self) -> bool {
+        self.stacks.iter().any(ModelStack::is_fading)
+    }
+
     /// What is known of every layer that is in place or fading out. Not real-time.
     pub fn reports(&mut self) -> Vec<LayerReport> {
         self.stacks.iter_mut().flat_map(ModelStack::reports).collect()

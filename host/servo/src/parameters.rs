@@ -99,6 +99,12 @@ impl ParameterQueue {
         self.sent.slots()
     }
 
+    /// Whether anything is to be applied at this tick. Real-time: bounded, no allocation.
+    pub fn is_due(&self, tick: &Tick) -> bool {
+        let is_scheduled = self.schedule.get(self.next).is_some_and(|due| due.time_ns <= tick.time_ns);
+        is_scheduled || !self.sent.is_empty()
+    }
+
     /// Reports that a plugin was replaced. Real-time: bounded, no allocation.
     pub fn report_replaced(&mut self, tick: &Tick, plugin: u16, generation: u16) {
         let change = ParameterChange { plugin, generation, parameter: PLUGIN, value: f64::from(generation) };

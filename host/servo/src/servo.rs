@@ -118,7 +118,9 @@ impl Servo {
         let mut watch = StageWatch::start(tick.index, started);
         let mut events = if *missed > 0 { Events::MISSED } else { Events::NONE };
 
-        self.apply_changes(tick, &mut events);
+        if self.parameters.is_due(tick) || self.exchange.is_due(tick) || self.forces.is_fading() {
+            self.apply_changes(tick, &mut events);
+        }
         let (sample, buttons) = self.read(tick);
         self.follow(sample, buttons, tick, stop, &mut events);
         watch.lap(&self.stopwatch, &mut self.timing, Stage::Read);
@@ -155,7 +157,7 @@ impl Servo {
     }
 
     /// What was to change before this tick does so now.
-    #[inline(never)] // its instructions are counted: tests/instructions.rs
+    #[inline(never)] // seldom called; its instructions are counted: tests/tests/instructions.rs
     fn apply_changes(&mut self, tick: &Tick, events: &mut Events) {
         let Self { stations, forces, parameters, exchange, .. } = self;
         let devices = stations.len();

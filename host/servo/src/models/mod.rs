@@ -159,6 +159,11 @@ impl ModelStack {
         self.slots.iter_mut().find_map(take)
     }
 
+    /// Whether a layer is fading out. Real-time: bounded by the models, no allocation.
+    pub(crate) fn is_fading(&self) -> bool {
+        self.slots.iter().any(Slot::is_fading)
+    }
+
     /// A layer may act elsewhere now.
     fn rebound(&mut self, model: usize) {
         let bounds = self.slots.get(model).and_then(Slot::bounds);

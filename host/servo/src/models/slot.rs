@@ -74,6 +74,11 @@ impl Slot {
         is_felt.then(|| gap.times(absence))
     }
 
+    /// Whether a layer is fading out. Real-time: bounded, no allocation.
+    pub(super) fn is_fading(&self) -> bool {
+        self.leaving.is_some()
+    }
+
     /// The layer that has faded out, if there is one. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn take_faded(&mut self, tick: &Tick) -> Option<Box<Layer>> {
