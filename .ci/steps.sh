@@ -59,7 +59,7 @@ every_change() {
     step format cargo fmt --all --check
     # The README's `cargo test`, and the viewer, whose GPU stack that leaves out. One command: of two, the second builds half of
     # what both use again, with other features.
-    step test cargo test --workspace --no-fail-fast
+    step test cargo test --workspace --features flotor-tests/formats --no-fail-fast
     # Counts of instructions of the optimised program against their budgets.
     step budgets cargo test --release -p flotor-tests --test instructions
     step lint cargo clippy --workspace --all-targets -- -D warnings
@@ -118,7 +118,7 @@ bits() {
             return 0
         fi
         echo "on ${runner:-the processor at hand}:"
-        FLOTOR_RUNNER=$runner cargo test --release -p flotor-tests --test golden -- --nocapture
+        FLOTOR_RUNNER=$runner cargo test --release -p flotor-tests golden -- --nocapture
     done
 }
 

@@ -1,6 +1,6 @@
 //! What a call through the plugin boundary costs, the whole SDK path, next to a plain function pointer.
 //!
-//! `cargo bench -p flotor-tests --bench boundary`. Prints the ratio of the two, measured in turns in one run, and
+//! `cargo bench -p flotor-tests --features measurements --bench boundary`. Prints the ratio of the two, measured in turns in one run, and
 //! fails above 1.3: absolute times are the machine's, the ratio is ours.
 
 use criterion::{Criterion, criterion_group};

@@ -1,7 +1,7 @@
 //! What a tick of the simulated flotor costs in time, by preset and velocity estimator.
 //!
 //! ```text
-//! cargo bench -p flotor-tests --bench simulated_tick
+//! cargo bench -p flotor-tests --features measurements --bench simulated_tick
 //! ```
 
 use criterion::{Criterion, criterion_group, criterion_main};

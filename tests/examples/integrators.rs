@@ -5,7 +5,7 @@
 //! this machine, errors are not.
 //!
 //! ```text
-//! cargo run --release -p flotor-tests --example integrators -- integrators.svg > integrators.csv
+//! cargo run --release -p flotor-tests --features measurements --example integrators -- integrators.svg > integrators.csv
 //! ```
 
 use flotor_hal::glam::{DQuat, DVec3};

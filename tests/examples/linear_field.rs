@@ -4,7 +4,7 @@
 //! runs on the virtual clock, so that nothing here depends on the machine.
 //!
 //! ```text
-//! cargo run --release -p flotor-tests --example linear_field -- field.svg > field.csv
+//! cargo run --release -p flotor-tests --features measurements --example linear_field -- field.svg > field.csv
 //! ```
 
 use flotor_plot::{Axis, Figure, Panel, Series};

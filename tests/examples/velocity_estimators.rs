@@ -6,7 +6,7 @@
 //! that acceleration, seen by perfect sensors. Nothing here depends on the machine.
 //!
 //! ```text
-//! cargo run --release -p flotor-tests --example velocity_estimators -- velocity.svg > velocity.csv
+//! cargo run --release -p flotor-tests --features measurements --example velocity_estimators -- velocity.svg > velocity.csv
 //! ```
 
 use flotor_hal::glam::DVec3;

@@ -72,7 +72,7 @@ pub fn shapes_of(run: &RunDescription, plugin_files: &[PathBuf]) -> (Vec<Shape>,
 ///
 /// # Errors
 /// [`LoadError`], with file, cause and remedy.
-#[allow(unsafe_code)] // listed in tests/architecture.rs
+#[allow(unsafe_code)] // listed in tests/tests/system/architecture.rs
 pub fn load_file(file: &Path) -> Result<Plugin, LoadError> {
     // SAFETY: whoever watches a run vouches for its plugins, which are those the host runs or that lie in folders of the
     // viewer's command line.

@@ -1,6 +1,6 @@
 //! The contract's step structs as NumPy records: a NumPy array of them *is* the slice a model steps through.
 
-#![allow(unsafe_code)] // listed in tests/architecture.rs
+#![allow(unsafe_code)] // listed in tests/tests/system/architecture.rs
 
 use flotor_hal::{Input, Output};
 use numpy::{Element, PyArrayDescr, PyArrayDescrMethods};

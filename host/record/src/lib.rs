@@ -27,7 +27,7 @@
 //! build needs a protobuf compiler. After a change of `host/proto`, one command compiles them again:
 //!
 //! ```text
-//! FLOTOR_WRITE_SCHEMA=1 cargo test -p flotor-tests --test recording_schema committed
+//! FLOTOR_WRITE_SCHEMA=1 cargo test -p flotor-tests --features formats recording_schema::
 //! ```
 //!
 //! Not real-time: records reach the recorder through the queue of the trace.

@@ -1,9 +1,7 @@
 //! A batch is the single steps, faster: same bits, same statuses, whatever the poses, the length, the demands and
 //! the instruction set.
 
-#[allow(dead_code)] // each test needs its part of the helpers
-mod sample;
-
+use crate::sample::{Sampler, Workspace};
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::{Demand, Input, Output};
 use flotor_spring::batch::Batch;
@@ -14,7 +12,6 @@ use flotor_spring::precision::Precision;
 use flotor_spring::preset::Preset;
 use flotor_spring::response::{self, Law};
 use pulp::Arch;
-use sample::{Sampler, Workspace};
 
 /// From the device's workspace to plates upside down.
 const WORKSPACES: [Workspace; 3] = [

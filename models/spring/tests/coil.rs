@@ -1,8 +1,6 @@
 //! Coils that touch: under the plates and along a bulge, as part of one energy.
 
-#[allow(dead_code)] // each test needs its part of the helpers
-mod sample;
-
+use crate::sample::{Loop, Sampler, Workspace};
 use flotor_hal::glam::DVec3;
 use flotor_spring::contact::AxialContact;
 use flotor_spring::energy::EnergyForm;
@@ -13,7 +11,6 @@ use flotor_spring::response::{Demand, Response};
 use flotor_spring::rod::{Accuracy, Coils, Rod};
 use flotor_spring::validity::Validity;
 use flotor_spring::wire::Wire;
-use sample::{Loop, Sampler, Workspace};
 
 fn at(free_length_m: f64, shear: f64, compression: f64, tilt_rad: f64) -> Pose {
     let position_m = DVec3::new(shear, 0.0, -compression) * free_length_m;

@@ -1,11 +1,9 @@
 //! The energy form is one energy: its wrench is the gradient, closed paths cost nothing, and nothing depends on
 //! how the axes are laid. The printed law serves as the counter-example.
 
-#[allow(dead_code)] // each test needs its part of the helpers
-mod sample;
-
 use std::f64::consts::TAU;
 
+use crate::sample::{Loop, Sampler, Workspace};
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_spring::closed_form::{ClosedForm, Form};
 use flotor_spring::energy::EnergyForm;
@@ -14,7 +12,6 @@ use flotor_spring::preset::Preset;
 use flotor_spring::response::{Demand, Response};
 use flotor_spring::rigidity::{Geometry, Material, Spring, Stiffness};
 use flotor_spring::validity::Validity;
-use sample::{Loop, Sampler, Workspace};
 
 /// What the device reaches: 7 degrees, a quarter of the free length.
 const DEVICE: Workspace = Workspace { shear: 0.25, height: 0.5, tilt_rad: 0.12, yaw_rad: 0.12 };

@@ -1,8 +1,6 @@
 //! One energy from two laws: what is felt is its gradient everywhere, and nothing jumps where they meet.
 
-#[allow(dead_code)] // each test needs its part of the helpers
-mod sample;
-
+use crate::sample::Sampler;
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_spring::energy::EnergyForm;
 use flotor_spring::hand_over::HandOver;
@@ -13,7 +11,6 @@ use flotor_spring::response::{Demand, Response};
 use flotor_spring::rigidity::Spring;
 use flotor_spring::rod::{Accuracy, Coils, Rod};
 use flotor_spring::validity::Validity;
-use sample::Sampler;
 
 /// Spring 3 from rest to past its buckling, sheared and tilted a little.
 fn at(compression: f64) -> Pose {

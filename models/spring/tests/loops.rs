@@ -1,8 +1,5 @@
 //! Closed paths cost nothing: whatever law with an energy answers, on whatever seat, the hand gets back what it gave.
 
-#[allow(dead_code)] // each test needs its part of the helpers
-mod sample;
-
 use std::f64::consts::TAU;
 
 use flotor_hal::glam::DVec3;

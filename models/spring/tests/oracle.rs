@@ -1,8 +1,7 @@
 //! The spring against reference tables computed elsewhere: parameters, the thesis's closed form in 50-digit
 //! arithmetic, and the exact spatial rod. The tables are in `tests/data/cases`.
 
-mod table;
-
+use crate::table::{Row, preset, rows};
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_spring::closed_form::{ClosedForm, Form};
 use flotor_spring::energy::EnergyForm;
@@ -11,7 +10,6 @@ use flotor_spring::precision::Precision;
 use flotor_spring::response::Demand;
 use flotor_spring::rigidity::{Spring, Stiffness};
 use flotor_spring::validity::Validity;
-use table::{Row, preset, rows};
 
 /// Pose of a row of the thesis table: the device's millimetres and left-handed angles.
 fn thesis_pose(row: &Row, spring: &Spring) -> Pose {

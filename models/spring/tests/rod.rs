@@ -1,9 +1,8 @@
 //! The exact rod against reference tables computed elsewhere, reached the way a hand reaches a pose; and what
 //! no table can show: convergence, energy, symmetry, totality. All rows and long walks with `FLOTOR_TEST_SIZE=full`.
 
-mod sample;
-mod table;
-
+use crate::sample::{Loop, Sampler, Workspace, of};
+use crate::table::{Row, preset, rows};
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_spring::pose::Pose;
 use flotor_spring::preset::Preset;
@@ -11,8 +10,6 @@ use flotor_spring::response::{Demand, Response};
 use flotor_spring::rigidity::Spring;
 use flotor_spring::rod::{Accuracy, Branch, Rod, Work};
 use flotor_spring::validity::Validity;
-use sample::{Loop, Sampler, Workspace, of};
-use table::{Row, preset, rows};
 
 /// Steps of a hand on its way, and ticks it is held at its goal.
 const STEP_M: f64 = 0.05e-3;
@@ -162,7 +159,7 @@ fn servo_rod_follows_a_smooth_hand() {
     }
 }
 
-/// Instructions of a tick from what it did, in thousands. Counted on x86-64 with AVX2 (`tests/instructions.rs` counts ticks one by
+/// Instructions of a tick from what it did, in thousands. Counted on x86-64 with AVX2 (`tests/tests/instructions.rs` counts ticks one by
 /// one): one evaluation takes 7.6, one that computes a matrix and factors it 50 more.
 fn thousand_instructions(work: Work) -> f64 {
     7.6 * f64::from(work.evaluations) + 38.0 * f64::from(work.matrices) + 12.0 * f64::from(work.factorings)

@@ -1,10 +1,8 @@
 //! The spring on its seat against reference tables, and the properties of a free base.
 
+use crate::sample::{Sampler, Workspace};
+use crate::table::{preset, rows};
 #[allow(dead_code)] // each test needs its part of the helpers
-mod sample;
-#[allow(dead_code)]
-mod table;
-
 use flotor_hal::glam::{DQuat, DVec2, DVec3};
 use flotor_spring::energy::EnergyForm;
 use flotor_spring::held::HeldSpring;
@@ -15,8 +13,6 @@ use flotor_spring::rigidity::Spring;
 use flotor_spring::rod::{Accuracy, Coils, Rod};
 use flotor_spring::seat::{Friction, Seat};
 use flotor_spring::validity::Validity;
-use sample::{Sampler, Workspace};
-use table::{preset, rows};
 
 /// Walks from rest in steps of at most 0.05 mm and 0.002 rad, then holds until converged.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few hundred steps

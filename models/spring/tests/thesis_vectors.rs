@@ -4,9 +4,7 @@
 //! platform on both sides. (Against another library a last-place difference in double would have to decide a
 //! rounding to single to be seen at all, about once in 1e8 operations.)
 
-#[allow(dead_code)] // each test needs its part of the helpers
-mod table;
-
+use crate::table::{Row, read};
 use flotor_hal::glam::DVec3;
 use flotor_spring::pose::Pose;
 use flotor_spring::precision::Precision;
@@ -15,7 +13,6 @@ use flotor_spring::response::Demand;
 use flotor_spring::rigidity::{Spring, Stiffness};
 use flotor_spring::thesis::Thesis;
 use flotor_spring::validity::Validity;
-use table::{Row, read};
 
 /// The constant that rules in a mode of `change`, as the generator has it.
 fn stiffness(spring: usize, change: &str) -> Stiffness {

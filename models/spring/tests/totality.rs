@@ -4,11 +4,9 @@
 //! and spring, a hundred thousand cold poses and ten million warm ticks of the rod. The named sets of poses where formulas
 //! break (home, axes, planes, denormals, what is no number) are asked by `flotor stress`, and here in small.
 
-#[allow(dead_code)] // each test needs its part of the helpers
-mod sample;
-
 use std::f64::consts::{PI, TAU};
 
+use crate::sample::{Sampler, Workspace};
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_spring::closed_form::{ClosedForm, Form};
 use flotor_spring::energy::EnergyForm;
@@ -19,14 +17,13 @@ use flotor_spring::preset::Preset;
 use flotor_spring::response::{Demand, Response};
 use flotor_spring::rod::{Accuracy, Coils, Rod};
 use flotor_spring::validity::Validity;
-use sample::{Sampler, Workspace};
 
 const DEVICE: Workspace = Workspace { shear: 0.25, height: 0.5, tilt_rad: 0.12, yaw_rad: 0.12 };
 const WILD: Workspace = Workspace { shear: 1.5, height: 1.5, tilt_rad: 2.0, yaw_rad: 3.0 };
 
 /// A number of poses: all, or each day a hundredth.
 fn of(all: u32) -> u32 {
-    sample::of(all, all / 100)
+    crate::sample::of(all, all / 100)
 }
 
 fn is_sound(answer: &Response, pose: &Pose) {

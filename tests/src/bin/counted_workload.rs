@@ -1,4 +1,4 @@
-//! What `tests/instructions.rs` counts: runs one workload, by name. What is counted happens within [`one_counted_part`],
+//! What `tests/tests/instructions.rs` counts: runs one workload, by name. What is counted happens within [`one_counted_part`],
 //! so that what is made before it, which takes time that depends on the machine, is left out.
 
 #[allow(dead_code)] // the spring's tests use the rest

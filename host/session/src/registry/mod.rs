@@ -1,6 +1,6 @@
 //! Where plugins are, and which one an id means. Files are read, not run, until a scene needs one.
 
-#![allow(unsafe_code)] // `load_file`; listed in tests/architecture.rs
+#![allow(unsafe_code)] // `load_file`; listed in tests/tests/system/architecture.rs
 
 mod stamp;
 

@@ -3,7 +3,7 @@
 //! Everything in it is an atomic, so that neither side can bring the other to read what it must not: whatever the
 //! other process writes, every bit pattern is a value. Its length is sealed: a worker holds the file as its
 //! standard input, and what it could cut off would be a bus error in the host.
-#![allow(unsafe_code)] // a mapping cannot be made without; tests/architecture.rs lists it
+#![allow(unsafe_code)] // a mapping cannot be made without; tests/tests/system/architecture.rs lists it
 
 use rustix::fs::{MemfdFlags, SealFlags, fcntl_add_seals, fcntl_get_seals, ftruncate, memfd_create};
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};

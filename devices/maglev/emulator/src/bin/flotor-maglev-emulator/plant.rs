@@ -37,7 +37,7 @@ pub(crate) fn load(file: Option<&Path>) -> Result<Plugin, Box<dyn Error>> {
 }
 
 /// Loads a plugin file; runs its code.
-#[allow(unsafe_code)] // listed in tests/architecture.rs
+#[allow(unsafe_code)] // listed in tests/tests/system/architecture.rs
 fn load_file(file: &Path) -> Result<Plugin, Box<dyn Error>> {
     // SAFETY: whoever runs the emulator vouches for the plugin it names, or that lies beside it.
     Ok(unsafe { Plugin::load(file) }?)

@@ -2,7 +2,7 @@
 //!
 //! The allocator of this test counts per thread. A plugin in a library of its own has an allocator of its own, so
 //! the plugins are counted linked into this test; the host is counted with the libraries it really loads.
-#![allow(unsafe_code)] // an allocator cannot be written without; tests/architecture.rs lists it
+#![allow(unsafe_code)] // an allocator cannot be written without; tests/tests/system/architecture.rs lists it
 
 use flotor_core::trace::TickRecord;
 use flotor_hal::abi::CallStatus;
@@ -90,7 +90,7 @@ fn the_host_allocates_nothing_in_ten_thousand_ticks() {
 
 #[test]
 fn the_host_allocates_nothing_with_two_devices_and_a_coupling() {
-    let text = include_str!("../host/scenes/teleoperation.toml");
+    let text = include_str!("../../host/scenes/teleoperation.toml");
     let scene = Scene::parse(std::path::Path::new("teleoperation.toml"), text).expect("the scene is right");
     let options = RunOptions { clock: Clock::Virtual, seed: 1 };
     let session = Session::prepare(&scene, &Registry::search(&[]), &options).expect("the scene starts");

@@ -1,6 +1,6 @@
 //! The C header is what the Rust sources say, and C and C++ compilers take it without a word.
 //!
-//! After a change of the contract: `FLOTOR_WRITE_HEADER=1 cargo test -p flotor-tests --test header`.
+//! After a change of the contract: `FLOTOR_WRITE_HEADER=1 cargo test -p flotor-tests --features formats header`.
 
 use flotor_hal::abi::{CONTRACT, FieldLayout, LAYOUTS};
 use flotor_tests::tools::{Tool, required};
@@ -101,7 +101,7 @@ fn the_committed_header_is_what_the_sources_say() {
     let committed = std::fs::read_to_string(&path).unwrap_or_default();
     assert!(
         committed == generated,
-        "hal/include/flotor.h is out of date: FLOTOR_WRITE_HEADER=1 cargo test -p flotor-tests --test header"
+        "hal/include/flotor.h is out of date: FLOTOR_WRITE_HEADER=1 cargo test -p flotor-tests --features formats header"
     );
 }
 

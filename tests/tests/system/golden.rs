@@ -1,7 +1,7 @@
 //! One set of bits (ADR 0012): what runs, replays and tables come to, against the digests in `data/golden.txt`.
 //!
 //! They are the same on every machine with IEEE doubles, debug or optimised. After a change that means to change numbers:
-//! `FLOTOR_WRITE_GOLDEN=1 cargo test -p flotor-tests --test golden`. `FLOTOR_RUNNER` is a command that runs `flotor`, as an
+//! `FLOTOR_WRITE_GOLDEN=1 cargo test -p flotor-tests golden`. `FLOTOR_RUNNER` is a command that runs `flotor`, as an
 //! emulator of another processor does: `FLOTOR_RUNNER="qemu-x86_64 -cpu qemu64"`.
 
 use flotor_tests::program::{Flotor, exit_code};

@@ -37,7 +37,7 @@ fn the_committed_descriptor_set_is_the_compiled_proto_folder() {
     let committed = std::fs::read(&path).unwrap();
     assert!(
         committed == compiled,
-        "host/proto/flotor.binpb is out of date; {WRITE_SCHEMA}=1 cargo test -p flotor-tests --test recording_schema committed"
+        "host/proto/flotor.binpb is out of date; {WRITE_SCHEMA}=1 cargo test -p flotor-tests --features formats recording_schema::"
     );
 }
 

@@ -1,6 +1,6 @@
 //! The reference chapters of the book are what the program, the scene reader and the plugins say of themselves.
 //!
-//! After a change of one of them: `FLOTOR_WRITE_REFERENCE=1 cargo test -p flotor-tests --test reference`.
+//! After a change of one of them: `FLOTOR_WRITE_REFERENCE=1 cargo test -p flotor-tests reference`.
 
 use flotor_hal::{Mutability, Parameter, ParameterKind};
 use flotor_session::registry::load_file;
@@ -9,8 +9,7 @@ use flotor_tests::library::plugin_file;
 use flotor_tests::{crate_name_of, plugin_folders, workspace_root};
 use std::fmt::Write;
 
-const NOTE: &str =
-    "<!-- Made by `FLOTOR_WRITE_REFERENCE=1 cargo test -p flotor-tests --test reference`. -->\n\n";
+const NOTE: &str = "<!-- Made by `FLOTOR_WRITE_REFERENCE=1 cargo test -p flotor-tests reference`. -->\n\n";
 
 /// Compares a chapter with what it must be; writes it first if asked to.
 fn committed(chapter: &str, text: &str) {
@@ -23,7 +22,7 @@ fn committed(chapter: &str, text: &str) {
     let committed = std::fs::read_to_string(&path).unwrap_or_default();
     assert!(
         committed == text,
-        "docs/src/reference/{chapter} is out of date: FLOTOR_WRITE_REFERENCE=1 cargo test -p flotor-tests --test reference"
+        "docs/src/reference/{chapter} is out of date: FLOTOR_WRITE_REFERENCE=1 cargo test -p flotor-tests reference"
     );
 }
 

@@ -1,0 +1,5 @@
+//! The emulated controller: as a program, as a plant, and at the edge of its range.
+
+mod boundary;
+mod emulator;
+mod flight;

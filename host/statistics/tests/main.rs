@@ -1,0 +1,4 @@
+//! Every result against published tables.
+
+mod certified;
+mod reference;

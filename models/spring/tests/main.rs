@@ -1,0 +1,15 @@
+//! The laws of the spring as a library: tables of higher precision, conservation, invariance, totality.
+
+mod batch;
+mod coil;
+mod conservation;
+mod hand_over;
+mod invariance;
+mod loops;
+mod oracle;
+mod rod;
+mod sample;
+mod seat;
+mod table;
+mod thesis_vectors;
+mod totality;

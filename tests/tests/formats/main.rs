@@ -1,0 +1,5 @@
+//! What other languages read is what the sources say. With the tools that make it, which take long to build:
+//! `cargo test -p flotor-tests --features formats`.
+
+mod header;
+mod recording_schema;
