@@ -21,9 +21,7 @@ use std::borrow::Cow;
 
 pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
     registry.load(&plugin.plugin, kind).map_err(|error| match error {
-        LookupError::Unknown { .. } => {
-            SceneError { location: plugin.location.clone(), problem: error.to_string() }.into()
-        }
+        LookupError::Unknown { .. } => plugin.location.problem(error.to_string()).into(),
         refused => refused.into(),
     })
 }
@@ -49,10 +47,7 @@ fn calibrate(
     calibration: &CalibrationUse,
 ) -> Result<(), RunError> {
     let path = calibration.path();
-    let wrong = |problem: CalibrationFileError| SceneError {
-        location: calibration.location.clone(),
-        problem: problem.to_string(),
-    };
+    let wrong = |problem: CalibrationFileError| calibration.location.problem(problem.to_string());
     let (file, curve) = CalibrationFile::load(&path).map_err(wrong)?;
     let id = &plugin.metadata().id;
     file.check_device(&path.display().to_string(), id, &device.serial()).map_err(wrong)?;
@@ -152,7 +147,7 @@ pub fn prepare_model(
 
 /// What a scene says of a model that cannot be.
 fn complain(model: &ModelUse, problem: &str) -> SceneError {
-    SceneError { location: model.plugin.location.clone(), problem: format!("[{}] {problem}", model.name) }
+    model.plugin.location.problem(format!("[{}] {problem}", model.name))
 }
 
 /// How long a run on the virtual clock waits for a model in a process of its own before it counts as hung, ns.
@@ -179,10 +174,8 @@ pub(super) fn settings(
     let schema = plugin.parameters();
     let check = |parameter: &ParameterText| {
         let value = from_the_scene(schema, parameter);
-        Setting::parse(schema, &parameter.key, &value).map_err(|error| SceneError {
-            location: parameter.location.clone(),
-            problem: format!("[{name}] {error}"),
-        })
+        Setting::parse(schema, &parameter.key, &value)
+            .map_err(|error| parameter.location.problem(format!("[{name}] {error}")))
     };
     parameters.iter().map(check).collect()
 }
@@ -330,10 +323,7 @@ pub(super) fn schedule(
     for (draw, change) in (0..).zip(in_time) {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
         let time_ns = (change.at_s * 1.0e9).round() as u64;
-        let complain = |key: &str, error: ControlError| SceneError {
-            location: change.location.clone(),
-            problem: format!("`{key}`: {error}"),
-        };
+        let complain = |key: &str, error: ControlError| change.location.problem(format!("`{key}`: {error}"));
         let checked = match &change.what {
             ChangeWhat::Set { plugin, parameter: ParameterText { key, value, .. } } => {
                 let new = NewValue { plugin, parameter: key, value };
