@@ -70,13 +70,7 @@ pub(super) fn open_device(
     let settings = settings(&plugin, name, &used.parameters)?;
     let mut device = plugin.open_device(&settings)?;
     let capabilities = device.capabilities().map_err(|refusal| refused(plugin.metadata(), refusal))?;
-    let report = PluginReport {
-        name: name.clone(),
-        metadata: plugin.metadata().clone(),
-        schema: plugin.parameters(),
-        settings: as_written(used),
-        parameters: in_force(&plugin, &settings, |index| device.parameter(index)),
-    };
+    let report = report(&plugin, name, used, &settings, |index| device.parameter(index));
     if let Some(calibration) = calibration {
         calibrate(&plugin, &mut device, calibration)?;
     }
@@ -135,13 +129,7 @@ pub fn prepare_model(
         // Nobody waits for it any longer than that, or at all.
         (Isolation::Process, _) | (_, Some(_)) => TimeBudget::default(),
     };
-    let report = PluginReport {
-        name: model.name.clone(),
-        metadata: plugin.metadata().clone(),
-        schema: plugin.parameters(),
-        settings: as_written(&model.plugin),
-        parameters: in_force(&plugin, &settings, &mut value),
-    };
+    let report = report(&plugin, &model.name, &model.plugin, &settings, &mut value);
     Ok((Layer::new(instances, &model.blend, budget, config), report))
 }
 
@@ -194,6 +182,24 @@ fn from_the_scene<'t>(schema: &[Parameter], text: &'t ParameterText) -> Cow<'t, 
             Cow::Owned(folder.join(value).to_string_lossy().into_owned())
         }
         _ => Cow::Borrowed(value),
+    }
+}
+
+/// What a run knows of a plugin that was made with these settings; `value` reads a parameter of it.
+fn report(
+    plugin: &Plugin,
+    name: &str,
+    used: &PluginUse,
+    settings: &[Setting],
+    value: impl FnMut(usize) -> f64,
+) -> PluginReport {
+    let written = used.parameters.iter().map(|parameter| (parameter.key.clone(), parameter.value.clone()));
+    PluginReport {
+        name: name.to_owned(),
+        metadata: plugin.metadata().clone(),
+        schema: plugin.parameters(),
+        settings: written.collect(),
+        parameters: in_force(plugin, settings, value),
     }
 }
 
@@ -294,11 +300,6 @@ fn unfelt(wanted_n: &[f64; 3], device: &Capabilities) -> Option<String> {
             unfelt.join(" and ")
         )
     })
-}
-
-/// What a scene sets for a plugin, as written.
-pub(super) fn as_written(plugin: &PluginUse) -> Vec<(String, String)> {
-    plugin.parameters.iter().map(|parameter| (parameter.key.clone(), parameter.value.clone())).collect()
 }
 
 /// What a scene has scheduled, checked and made.
