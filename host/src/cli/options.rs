@@ -57,6 +57,18 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_number_may_have_its_unit_and_stays_in_its_range() {
+        let force = |text| number(text, "N", "force", 1.0..=50.0);
+        assert_eq!((force("10"), force(" 2.5 N ")), (Ok(10.0), Ok(2.5)));
+        assert_eq!(force("ten N"), Err("`ten N` is no force".to_owned()));
+        for outside in ["0.5", "51N", "inf", "nan"] {
+            assert_eq!(force(outside), Err("legal is 1 to 50 N".to_owned()), "{outside}");
+        }
+        assert_eq!(rate_hz("1000 Hz"), Ok(1000.0));
+        assert_eq!(rate_hz("99"), Err("legal is 100 to 10000 Hz".to_owned()));
+    }
+
+    #[test]
     fn durations_have_units() {
         assert_eq!(duration_s("10"), Ok(10.0));
         assert_eq!(duration_s("10s"), Ok(10.0));
