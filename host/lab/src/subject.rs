@@ -30,6 +30,11 @@ pub(super) fn prepared(plugin: &Plugin, settings: &[Setting], seed: u64) -> Resu
     Ok(model)
 }
 
+/// The input of a tick of a 1 kHz loop whose handle is at rest.
+pub(super) fn input_of(tick: u64, pose: Pose) -> Input {
+    Input { tick, time_ns: tick * PERIOD_NS, dt_ns: PERIOD_NS, ..Input::at_rest(pose) }
+}
+
 /// One call.
 pub(super) fn call(model: &mut Model, input: &Input) -> Result<Output, CallStatus> {
     let mut output = Output::default();

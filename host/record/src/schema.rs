@@ -69,40 +69,151 @@ impl Topic {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Missing(pub(crate) &'static str);
 
-#[derive(Clone, Copy, PartialEq, Message)]
-pub(crate) struct Vector3 {
-    #[prost(double, optional, tag = "1")]
-    x: Option<f64>,
-    #[prost(double, optional, tag = "2")]
-    y: Option<f64>,
-    #[prost(double, optional, tag = "3")]
-    z: Option<f64>,
+/// A message for each name, as `prost` makes them: a field's type here, its number and its kind on the wire.
+macro_rules! messages {
+    ($($message:ident $(: $also:ident)? { $($field:ident: $value:ty = $number:tt [$($kind:tt)+],)+ })+) => {
+        $(#[derive(Clone, $($also,)? PartialEq, Message)]
+        pub(crate) struct $message {
+            $(#[prost($($kind)+, tag = $number)]
+            pub(crate) $field: $value,)+
+        })+
+    };
 }
 
-#[derive(Clone, Copy, PartialEq, Message)]
-pub(crate) struct Quaternion {
-    #[prost(double, optional, tag = "1")]
-    x: Option<f64>,
-    #[prost(double, optional, tag = "2")]
-    y: Option<f64>,
-    #[prost(double, optional, tag = "3")]
-    z: Option<f64>,
-    #[prost(double, optional, tag = "4")]
-    w: Option<f64>,
-}
+messages! {
+    Vector3: Copy {
+        x: Option<f64> = 1 [double, optional],
+        y: Option<f64> = 2 [double, optional],
+        z: Option<f64> = 3 [double, optional],
+    }
 
-#[derive(Clone, PartialEq, Message)]
-pub(crate) struct FrameTransform {
-    #[prost(message, optional, tag = "1")]
-    timestamp: Option<Timestamp>,
-    #[prost(string, tag = "2")]
-    parent_frame_id: String,
-    #[prost(string, tag = "3")]
-    child_frame_id: String,
-    #[prost(message, optional, tag = "4")]
-    translation: Option<Vector3>,
-    #[prost(message, optional, tag = "5")]
-    rotation: Option<Quaternion>,
+    Quaternion: Copy {
+        x: Option<f64> = 1 [double, optional],
+        y: Option<f64> = 2 [double, optional],
+        z: Option<f64> = 3 [double, optional],
+        w: Option<f64> = 4 [double, optional],
+    }
+
+    FrameTransform {
+        timestamp: Option<Timestamp> = 1 [message, optional],
+        parent_frame_id: String = 2 [string],
+        child_frame_id: String = 3 [string],
+        translation: Option<Vector3> = 4 [message, optional],
+        rotation: Option<Quaternion> = 5 [message, optional],
+    }
+
+    Log {
+        timestamp: Option<Timestamp> = 1 [message, optional],
+        level: i32 = 2 [enumeration = "Level"],
+        message: String = 3 [string],
+        name: String = 4 [string],
+        file: String = 5 [string],
+        line: u32 = 6 [fixed32],
+    }
+
+    Twist: Copy {
+        linear_m_per_s: Option<Vector3> = 1 [message, optional],
+        angular_rad_per_s: Option<Vector3> = 2 [message, optional],
+    }
+
+    Wrench: Copy {
+        force_n: Option<Vector3> = 1 [message, optional],
+        torque_nm: Option<Vector3> = 2 [message, optional],
+    }
+
+    Tick: Copy {
+        tick: u64 = 1 [uint64],
+        time_ns: u64 = 2 [uint64],
+        dt_ns: u64 = 3 [uint64],
+        twist: Option<Twist> = 4 [message, optional],
+        model: Option<Wrench> = 5 [message, optional],
+        commanded: Option<Wrench> = 6 [message, optional],
+        delivered: Option<Wrench> = 7 [message, optional],
+        energy_j: Option<f64> = 8 [double, optional],
+        events: u32 = 9 [uint32],
+        buttons: u32 = 10 [uint32],
+        lateness_ns: u64 = 11 [uint64],
+        compute_ns: u64 = 12 [uint64],
+        port_energy_j: Option<f64> = 13 [double, optional],
+        device: u32 = 14 [uint32],
+    }
+
+    Change {
+        tick: u64 = 1 [uint64],
+        plugin: String = 2 [string],
+        key: String = 3 [string],
+        value: String = 4 [string],
+        number: Option<f64> = 5 [double, optional],
+        outcome: i32 = 6 [enumeration = "Outcome"],
+        subject: i32 = 7 [enumeration = "Subject"],
+        settings: Vec<Setting> = 8 [message, repeated],
+    }
+
+    Run {
+        format: u32 = 1 [uint32],
+        flotor_version: String = 2 [string],
+        rate_hz: Option<f64> = 3 [double, optional],
+        duration_s: Option<f64> = 4 [double, optional],
+        seed: u64 = 5 [uint64],
+        clock: i32 = 6 [enumeration = "Clock"],
+        scene_toml: String = 7 [string],
+        plugins: Vec<Plugin> = 8 [message, repeated],
+        couplings: Vec<Coupling> = 9 [message, repeated],
+    }
+
+    Coupling {
+        name: String = 1 [string],
+        stiffness_n_per_m: Option<f64> = 2 [double, optional],
+        damping_ns_per_m: Option<f64> = 3 [double, optional],
+        stiffness_nm_per_rad: Option<f64> = 4 [double, optional],
+        damping_nms_per_rad: Option<f64> = 5 [double, optional],
+        delay_ticks: u32 = 6 [uint32],
+        reserve_j: Option<f64> = 7 [double, optional],
+        passivity: i32 = 8 [enumeration = "Passivity"],
+        ends: Vec<CouplingEnd> = 9 [message, repeated],
+    }
+
+    CouplingEnd: Copy {
+        device: u32 = 1 [uint32],
+        mapping: Option<Mapping> = 2 [message, optional],
+    }
+
+    Plugin {
+        name: String = 1 [string],
+        id: String = 2 [string],
+        version: String = 3 [string],
+        file: String = 4 [string],
+        settings: Vec<Setting> = 5 [message, repeated],
+        parameters: Vec<Setting> = 6 [message, repeated],
+        mapping: Option<Mapping> = 7 [message, optional],
+        places: Vec<Vector3> = 8 [message, repeated],
+        blend: Option<Blend> = 9 [message, optional],
+        device: u32 = 10 [uint32],
+        field: Option<FieldTiming> = 11 [message, optional],
+    }
+
+    FieldTiming: Copy {
+        rate_hz: Option<f64> = 1 [double, optional],
+        latency_s: Option<f64> = 2 [double, optional],
+    }
+
+    Blend: Copy {
+        weight: Option<f64> = 1 [double, optional],
+        priority: u32 = 2 [uint32],
+        fade_s: Option<f64> = 3 [double, optional],
+    }
+
+    Setting: Eq {
+        key: String = 1 [string],
+        value: String = 2 [string],
+    }
+
+    Mapping: Copy {
+        rotation: Option<Quaternion> = 1 [message, optional],
+        motion_scale: Option<f64> = 2 [double, optional],
+        force_scale: Option<f64> = 3 [double, optional],
+        torque_scale: Option<f64> = 4 [double, optional],
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
@@ -116,70 +227,6 @@ enum Level {
     Fatal = 5,
 }
 
-#[derive(Clone, PartialEq, Message)]
-pub(crate) struct Log {
-    #[prost(message, optional, tag = "1")]
-    timestamp: Option<Timestamp>,
-    #[prost(enumeration = "Level", tag = "2")]
-    level: i32,
-    #[prost(string, tag = "3")]
-    message: String,
-    #[prost(string, tag = "4")]
-    name: String,
-    #[prost(string, tag = "5")]
-    file: String,
-    #[prost(fixed32, tag = "6")]
-    line: u32,
-}
-
-#[derive(Clone, Copy, PartialEq, Message)]
-struct Twist {
-    #[prost(message, optional, tag = "1")]
-    linear_m_per_s: Option<Vector3>,
-    #[prost(message, optional, tag = "2")]
-    angular_rad_per_s: Option<Vector3>,
-}
-
-#[derive(Clone, Copy, PartialEq, Message)]
-struct Wrench {
-    #[prost(message, optional, tag = "1")]
-    force_n: Option<Vector3>,
-    #[prost(message, optional, tag = "2")]
-    torque_nm: Option<Vector3>,
-}
-
-#[derive(Clone, Copy, PartialEq, Message)]
-pub(crate) struct Tick {
-    #[prost(uint64, tag = "1")]
-    tick: u64,
-    #[prost(uint64, tag = "2")]
-    time_ns: u64,
-    #[prost(uint64, tag = "3")]
-    dt_ns: u64,
-    #[prost(message, optional, tag = "4")]
-    twist: Option<Twist>,
-    #[prost(message, optional, tag = "5")]
-    model: Option<Wrench>,
-    #[prost(message, optional, tag = "6")]
-    commanded: Option<Wrench>,
-    #[prost(message, optional, tag = "7")]
-    delivered: Option<Wrench>,
-    #[prost(double, optional, tag = "8")]
-    energy_j: Option<f64>,
-    #[prost(uint32, tag = "9")]
-    events: u32,
-    #[prost(uint32, tag = "10")]
-    buttons: u32,
-    #[prost(uint64, tag = "11")]
-    lateness_ns: u64,
-    #[prost(uint64, tag = "12")]
-    compute_ns: u64,
-    #[prost(double, optional, tag = "13")]
-    port_energy_j: Option<f64>,
-    #[prost(uint32, tag = "14")]
-    device: u32,
-}
-
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
 #[repr(i32)]
 enum Outcome {
@@ -189,84 +236,12 @@ enum Outcome {
     Broke = 3,
 }
 
-#[derive(Clone, PartialEq, Message)]
-pub(crate) struct Change {
-    #[prost(uint64, tag = "1")]
-    tick: u64,
-    #[prost(string, tag = "2")]
-    plugin: String,
-    #[prost(string, tag = "3")]
-    key: String,
-    #[prost(string, tag = "4")]
-    value: String,
-    #[prost(double, optional, tag = "5")]
-    number: Option<f64>,
-    #[prost(enumeration = "Outcome", tag = "6")]
-    outcome: i32,
-    #[prost(enumeration = "Subject", tag = "7")]
-    subject: i32,
-    #[prost(message, repeated, tag = "8")]
-    settings: Vec<Setting>,
-}
-
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
 #[repr(i32)]
 enum Subject {
     Parameter = 0,
     Weight = 1,
     Plugin = 2,
-}
-
-#[derive(Clone, PartialEq, Message)]
-pub(crate) struct Run {
-    #[prost(uint32, tag = "1")]
-    pub(crate) format: u32,
-    #[prost(string, tag = "2")]
-    pub(crate) flotor_version: String,
-    #[prost(double, optional, tag = "3")]
-    pub(crate) rate_hz: Option<f64>,
-    #[prost(double, optional, tag = "4")]
-    pub(crate) duration_s: Option<f64>,
-    #[prost(uint64, tag = "5")]
-    pub(crate) seed: u64,
-    #[prost(enumeration = "Clock", tag = "6")]
-    pub(crate) clock: i32,
-    #[prost(string, tag = "7")]
-    pub(crate) scene_toml: String,
-    #[prost(message, repeated, tag = "8")]
-    pub(crate) plugins: Vec<Plugin>,
-    #[prost(message, repeated, tag = "9")]
-    pub(crate) couplings: Vec<Coupling>,
-}
-
-#[derive(Clone, PartialEq, Message)]
-pub(crate) struct Coupling {
-    #[prost(string, tag = "1")]
-    pub(crate) name: String,
-    #[prost(double, optional, tag = "2")]
-    pub(crate) stiffness_n_per_m: Option<f64>,
-    #[prost(double, optional, tag = "3")]
-    pub(crate) damping_ns_per_m: Option<f64>,
-    #[prost(double, optional, tag = "4")]
-    pub(crate) stiffness_nm_per_rad: Option<f64>,
-    #[prost(double, optional, tag = "5")]
-    pub(crate) damping_nms_per_rad: Option<f64>,
-    #[prost(uint32, tag = "6")]
-    pub(crate) delay_ticks: u32,
-    #[prost(double, optional, tag = "7")]
-    pub(crate) reserve_j: Option<f64>,
-    #[prost(enumeration = "Passivity", tag = "8")]
-    pub(crate) passivity: i32,
-    #[prost(message, repeated, tag = "9")]
-    pub(crate) ends: Vec<CouplingEnd>,
-}
-
-#[derive(Clone, Copy, PartialEq, Message)]
-pub(crate) struct CouplingEnd {
-    #[prost(uint32, tag = "1")]
-    pub(crate) device: u32,
-    #[prost(message, optional, tag = "2")]
-    pub(crate) mapping: Option<Mapping>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
@@ -283,70 +258,6 @@ pub(crate) enum Clock {
     Unspecified = 0,
     Real = 1,
     Virtual = 2,
-}
-
-#[derive(Clone, PartialEq, Message)]
-pub(crate) struct Plugin {
-    #[prost(string, tag = "1")]
-    pub(crate) name: String,
-    #[prost(string, tag = "2")]
-    pub(crate) id: String,
-    #[prost(string, tag = "3")]
-    pub(crate) version: String,
-    #[prost(string, tag = "4")]
-    pub(crate) file: String,
-    #[prost(message, repeated, tag = "5")]
-    pub(crate) settings: Vec<Setting>,
-    #[prost(message, repeated, tag = "6")]
-    pub(crate) parameters: Vec<Setting>,
-    #[prost(message, optional, tag = "7")]
-    pub(crate) mapping: Option<Mapping>,
-    #[prost(message, repeated, tag = "8")]
-    pub(crate) places: Vec<Vector3>,
-    #[prost(message, optional, tag = "9")]
-    pub(crate) blend: Option<Blend>,
-    #[prost(uint32, tag = "10")]
-    pub(crate) device: u32,
-    #[prost(message, optional, tag = "11")]
-    pub(crate) field: Option<FieldTiming>,
-}
-
-#[derive(Clone, Copy, PartialEq, Message)]
-pub(crate) struct FieldTiming {
-    #[prost(double, optional, tag = "1")]
-    pub(crate) rate_hz: Option<f64>,
-    #[prost(double, optional, tag = "2")]
-    pub(crate) latency_s: Option<f64>,
-}
-
-#[derive(Clone, Copy, PartialEq, Message)]
-pub(crate) struct Blend {
-    #[prost(double, optional, tag = "1")]
-    pub(crate) weight: Option<f64>,
-    #[prost(uint32, tag = "2")]
-    pub(crate) priority: u32,
-    #[prost(double, optional, tag = "3")]
-    pub(crate) fade_s: Option<f64>,
-}
-
-#[derive(Clone, PartialEq, Eq, Message)]
-pub(crate) struct Setting {
-    #[prost(string, tag = "1")]
-    pub(crate) key: String,
-    #[prost(string, tag = "2")]
-    pub(crate) value: String,
-}
-
-#[derive(Clone, Copy, PartialEq, Message)]
-pub(crate) struct Mapping {
-    #[prost(message, optional, tag = "1")]
-    pub(crate) rotation: Option<Quaternion>,
-    #[prost(double, optional, tag = "2")]
-    pub(crate) motion_scale: Option<f64>,
-    #[prost(double, optional, tag = "3")]
-    pub(crate) force_scale: Option<f64>,
-    #[prost(double, optional, tag = "4")]
-    pub(crate) torque_scale: Option<f64>,
 }
 
 impl Mapping {

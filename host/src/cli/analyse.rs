@@ -1,13 +1,13 @@
 //! `flotor analyse`: a study's data in, thresholds, effects and tests out.
 
-use super::{CommandError, style, tell, write_text};
+use super::{CommandError, note, style, tell, write_text};
 use clap::{Args, ValueEnum};
 use flotor_lab::report::to_csv;
 use flotor_statistics::anova::SumOfSquares;
 use flotor_study::analysis::{Analysis, AnalysisOptions, BlindedAnalysis, Estimator, SubjectRecord};
 use flotor_study::apparatus::report::html;
 use flotor_study::blinding::Codes;
-use flotor_study::dataset::{Dataset, DatasetError};
+use flotor_study::dataset::Dataset;
 use flotor_study::protocol::RatingScale;
 use std::path::PathBuf;
 
@@ -60,17 +60,9 @@ enum SumsOption {
 }
 
 pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
-    let logs = Dataset::at(&arguments.data).logs().map_err(|error| match error {
-        DatasetError::File { .. } => CommandError::Failed(error.to_string()),
-        other => CommandError::Usage(other.to_string()),
-    })?;
+    let logs = Dataset::at(&arguments.data).logs()?;
     for log in logs.iter().filter(|log| !log.complete) {
-        let subject = log.begin.subject;
-        eprintln!(
-            "{} {subject} broke off after {} trials: left out",
-            style::warning("note:"),
-            log.trials.len()
-        );
+        note(format_args!("{} broke off after {} trials: left out", log.begin.subject, log.trials.len()));
     }
     let Some(first) = logs.first() else { return Ok(()) };
     let complete = logs.iter().filter(|log| log.complete).map(SubjectRecord::of_log);

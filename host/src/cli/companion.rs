@@ -4,10 +4,11 @@
 //! without a hash in their name, so two workspaces in one folder overwrite each other's, and then neither builds.
 
 use super::CommandError;
+use rustix::process::{Pid, Signal, kill_process};
 use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command};
 
 /// Where a program comes from.
 pub(super) enum Built {
@@ -57,6 +58,20 @@ impl Companion<'_> {
     pub(super) fn become_with(&self, arguments: &[OsString]) -> Result<(), CommandError> {
         let cause = self.command()?.args(arguments).exec();
         Err(CommandError::file(self.program.as_ref(), "cannot be started", cause))
+    }
+}
+
+/// A companion at work. Dropped, it is asked to end in order, so that its socket goes with it, and waited for.
+pub(super) struct Running(pub(super) Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // The number of a process that has ended and been waited for may be another's by now.
+        if self.0.try_wait().ok().flatten().is_none() {
+            let process = i32::try_from(self.0.id()).ok().and_then(Pid::from_raw);
+            let _ = process.map(|process| kill_process(process, Signal::TERM));
+        }
+        let _ = self.0.wait();
     }
 }
 

@@ -1,7 +1,7 @@
 //! `flotor eval`: poses in, wrenches out, as CSV.
 
 use super::options::KeyValue;
-use super::{CommandError, style, write_text};
+use super::{CommandError, note, write_text};
 use clap::Args;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Plugin, Setting};
@@ -9,7 +9,7 @@ use flotor_hal::{DVec3, Detail};
 use flotor_lab::evaluate::{Answer, Details, EvaluateError, Evaluation, Handle, Travel};
 use flotor_lab::report::to_csv;
 use flotor_session::registry::Registry;
-use flotor_session::scene::nearest;
+use flotor_session::scene::did_you_mean;
 use std::path::{Path, PathBuf};
 
 /// Evaluate a force model at poses from a CSV file.
@@ -119,7 +119,7 @@ fn read_text(path: &Path) -> std::io::Result<String> {
         return std::fs::read_to_string(path);
     }
     if std::io::IsTerminal::is_terminal(&std::io::stdin()) {
-        eprintln!("{} reading poses from the terminal; end with Ctrl-D", style::warning("note:"));
+        note("reading poses from the terminal; end with Ctrl-D");
     }
     std::io::read_to_string(std::io::stdin().lock())
 }
@@ -138,8 +138,7 @@ fn columns(path: &Path, header: &csv::StringRecord) -> Result<[usize; 6], Comman
     let problem = |text: String| CommandError::Usage(format!("{}:1: {text}", path.display()));
     let known = || POSE_COLUMNS.iter().copied().chain([ID_COLUMN]);
     if let Some(unknown) = header.iter().find(|name| !known().any(|column| column == *name)) {
-        let hint =
-            nearest(unknown, known()).map_or(String::new(), |column| format!("; did you mean `{column}`?"));
+        let hint = did_you_mean(unknown, known());
         let expected = format!("[{ID_COLUMN},]{}", POSE_COLUMNS.join(","));
         return Err(problem(format!("unknown column `{unknown}`{hint} (the header is {expected})")));
     }

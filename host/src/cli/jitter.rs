@@ -2,7 +2,7 @@
 
 use super::options::{core, duration_s, rate_hz};
 use super::stopping::stop_on_signals;
-use super::{CommandError, run, style, tell, write_text};
+use super::{CommandError, note, run, style, tell, write_text};
 use crate::timing_picture::octaves;
 use clap::Args;
 use flotor_lab::jitter::{JitterReport, LoopTiming, MissedMore, measure};
@@ -51,9 +51,7 @@ pub(crate) fn run(arguments: &JitterArguments) -> Result<(), CommandError> {
     let report = measure(session, slices, &stop, |done| progress.set_position(done))?;
     progress.finish_and_clear();
 
-    for line in report.real_time.advice() {
-        eprintln!("{} {line}", style::warning("note:"));
-    }
+    report.real_time.advice().into_iter().for_each(note);
     tell(arguments.json.as_deref(), &report, || to_text(&report))?;
     write_text(arguments.plot.as_deref(), || picture(&report))
 }

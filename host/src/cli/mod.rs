@@ -42,6 +42,7 @@ use flotor_hal::abi::loader::LoadError;
 use flotor_servo::{EmergencySource, Place, Stuck};
 use flotor_session::RunError;
 use flotor_session::registry::LookupError;
+use flotor_study::dataset::DatasetError;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -191,6 +192,15 @@ impl From<LoadError> for CommandError {
     }
 }
 
+impl From<DatasetError> for CommandError {
+    fn from(error: DatasetError) -> Self {
+        match error {
+            DatasetError::File { .. } => Self::Failed(error.to_string()),
+            other => Self::Usage(other.to_string()),
+        }
+    }
+}
+
 impl From<flotor_lab::replay::ReplayError> for CommandError {
     fn from(error: flotor_lab::replay::ReplayError) -> Self {
         match error {
@@ -317,6 +327,11 @@ fn report_line(line: std::fmt::Arguments<'_>) -> Result<(), CommandError> {
 /// Prints a line on standard error. `eprintln!` panics where nobody reads it, and the exit code is lost then.
 fn remark(line: std::fmt::Arguments<'_>) {
     let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// Prints something worth knowing that ends nothing, on standard error.
+fn note(text: impl std::fmt::Display) {
+    remark(format_args!("{} {text}", style::warning("note:")));
 }
 
 /// The first error there is: it decides the exit code and is told last. What else went wrong is told here.

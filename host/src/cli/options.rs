@@ -3,6 +3,7 @@
 use clap::ValueEnum;
 use flotor_servo::Core;
 pub(crate) use flotor_session::scene::{KeyValue, PluginKeyValue};
+use std::ops::RangeInclusive;
 
 /// `--clock`
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -34,9 +35,15 @@ pub(crate) fn duration_s(text: &str) -> Result<f64, String> {
 
 /// A loop rate in Hz.
 pub(crate) fn rate_hz(text: &str) -> Result<f64, String> {
-    let rate: f64 =
-        text.trim().trim_end_matches("Hz").trim().parse().map_err(|_| format!("`{text}` is no rate"))?;
-    if (100.0..=10_000.0).contains(&rate) { Ok(rate) } else { Err("legal is 100 to 10000 Hz".to_owned()) }
+    number(text, "Hz", "rate", 100.0..=10_000.0)
+}
+
+/// A number in a unit, which may be left out; complaints call it `what`.
+pub(crate) fn number(text: &str, unit: &str, what: &str, legal: RangeInclusive<f64>) -> Result<f64, String> {
+    let number = text.trim().trim_end_matches(unit).trim().parse();
+    let number = number.map_err(|_| format!("`{text}` is no {what}"))?;
+    let (least, most) = (legal.start(), legal.end());
+    if legal.contains(&number) { Ok(number) } else { Err(format!("legal is {least} to {most} {unit}")) }
 }
 
 /// A core of the machine.
@@ -48,6 +55,18 @@ pub(crate) fn core(text: &str) -> Result<Core, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_number_may_have_its_unit_and_stays_in_its_range() {
+        let force = |text| number(text, "N", "force", 1.0..=50.0);
+        assert_eq!((force("10"), force(" 2.5 N ")), (Ok(10.0), Ok(2.5)));
+        assert_eq!(force("ten N"), Err("`ten N` is no force".to_owned()));
+        for outside in ["0.5", "51N", "inf", "nan"] {
+            assert_eq!(force(outside), Err("legal is 1 to 50 N".to_owned()), "{outside}");
+        }
+        assert_eq!(rate_hz("1000 Hz"), Ok(1000.0));
+        assert_eq!(rate_hz("99"), Err("legal is 100 to 10000 Hz".to_owned()));
+    }
 
     #[test]
     fn durations_have_units() {

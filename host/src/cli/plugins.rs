@@ -3,9 +3,9 @@
 use super::{CommandError, style, write_json};
 use clap::Args;
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::Plugin;
+use flotor_hal::abi::loader::{Metadata, Plugin};
 use flotor_hal::{Mutability, Parameter, ParameterKind};
-use flotor_session::registry::{PATH_VARIABLE, Registry};
+use flotor_session::registry::{PATH_VARIABLE, Registry, SkippedFolder};
 use serde::Serialize;
 use std::path::Path;
 
@@ -66,19 +66,15 @@ fn list(registry: &Registry, json: bool) -> Result<(), CommandError> {
             say!("  {:<12} {:<8} {}", "", "", plugin.file);
         }
     }
-    for shadowed in registry.shadowed() {
-        let note = style::warning("note:");
-        say!(
-            "{note} {} has the id `{}` too and is hidden by the one above",
-            shadowed.path.display(),
-            shadowed.id
-        );
+    let note = style::warning("note:");
+    for Metadata { path, id, .. } in registry.shadowed() {
+        say!("{note} {} has the id `{id}` too and is hidden by the one above", path.display());
     }
     for broken in registry.broken() {
-        say!("{} {broken}", style::warning("note:"));
+        say!("{note} {broken}");
     }
-    for skipped in registry.skipped() {
-        say!("{} {}: not searched: {}", style::warning("note:"), skipped.folder.display(), skipped.reason);
+    for SkippedFolder { folder, reason } in registry.skipped() {
+        say!("{note} {}: not searched: {reason}", folder.display());
     }
     if listed.is_empty() {
         let folders: Vec<String> =

@@ -95,13 +95,8 @@ fn keep(mut client: Client, out: &Path, stop: &StopSwitch) -> Result<Kept, Comma
             Ok(Some(Event::Ticks { records, dropped })) => {
                 if let (true, Some(first)) = (dropped > kept.dropped, records.first()) {
                     let text = format!("{} ticks were dropped", dropped - kept.dropped);
-                    let source = "flotor record".to_owned();
-                    recorder.note(&Note {
-                        time_ns: first.time_ns,
-                        severity: Severity::Warning,
-                        source,
-                        text,
-                    })?;
+                    let (time_ns, source) = (first.time_ns, "flotor record".to_owned());
+                    recorder.note(&Note { time_ns, severity: Severity::Warning, source, text })?;
                     kept.dropped = dropped;
                 }
                 for record in &records {

@@ -2,7 +2,7 @@
 
 use super::options::{ClockOption, PluginKeyValue, core, duration_s, rate_hz};
 use super::stopping::{Keys, stop_on_signals};
-use super::{CommandError, first_error, remark, style, tell};
+use super::{CommandError, first_error, note, style, tell};
 use crate::run_picture::RunPicture;
 use clap::Args;
 use flotor_core::Change;
@@ -74,8 +74,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let plugins = session.plugins().to_vec();
     let description = describe(&scene, &options, &plugins);
     let publication = publish(&Directory::of_this_user(), &scene, &description, &session, &stop);
-    let publication =
-        publication.map_err(|error| eprintln!("{} nobody can watch: {error}", style::warning("note:"))).ok();
+    let publication = publication.map_err(|error| note(format_args!("nobody can watch: {error}"))).ok();
 
     let clock_word = if clock == Clock::Real { "real" } else { "virtual" };
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
@@ -128,9 +127,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     };
     let text = || format!("{}\n{}", style::title(&summary.title), summary.to_text());
     let told = tell(arguments.json.as_deref(), &summary, text);
-    for line in outcome.real_time.advice() {
-        remark(format_args!("{} {line}", style::warning("note:")));
-    }
+    outcome.real_time.advice().into_iter().for_each(note);
     // What became of the run is what scripts ask first; a file that is missing comes after.
     first_error([verdict(&outcome, &plugins, &summary), recorded, drawn, told])
 }

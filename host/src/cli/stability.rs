@@ -1,6 +1,6 @@
 //! `flotor stability`: the stiffest spring that stays stable on the simulated device, next to theory.
 
-use super::options::rate_hz;
+use super::options::{number, rate_hz};
 use super::{CommandError, run, style, tell, write_json, write_text};
 use clap::Args;
 use flotor_hal::abi::PluginKind;
@@ -206,15 +206,9 @@ fn stiffness_panel(first: &Case, plant: Plant, within: &[(&Case, &Row)]) -> Pane
 }
 
 fn damping(text: &str) -> Result<f64, String> {
-    number_within(text, 100_000.0, "N s/m")
+    number(text, "N s/m", "number", 0.0..=100_000.0)
 }
 
 fn quantum_um(text: &str) -> Result<f64, String> {
-    number_within(text, 100.0, "µm")
-}
-
-/// A number from zero on.
-fn number_within(text: &str, most: f64, unit: &str) -> Result<f64, String> {
-    let number: f64 = text.trim().parse().map_err(|_| format!("`{text}` is no number"))?;
-    (0.0..=most).contains(&number).then_some(number).ok_or_else(|| format!("legal is 0 to {most} {unit}"))
+    number(text, "µm", "number", 0.0..=100.0)
 }

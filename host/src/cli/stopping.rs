@@ -3,7 +3,7 @@
 //! Whoever finds that an orderly end takes too long asks again: the second signal is an emergency stop, the
 //! third ends the process.
 
-use super::style;
+use super::note;
 use flotor_servo::StopSwitch;
 use rustix::process::getpgrp;
 use rustix::termios::{LocalModes, OptionalActions, Termios, isatty, tcgetattr, tcgetpgrp, tcsetattr};
@@ -34,7 +34,7 @@ const ONE_WISH: Duration = Duration::from_millis(100);
 pub(super) fn stop_on_signals() -> StopSwitch {
     let stop = StopSwitch::default();
     if let Err(error) = register(&stop) {
-        eprintln!("{} signals will not end the run in order: {error}", style::warning("note:"));
+        note(format_args!("signals will not end the run in order: {error}"));
     }
     stop
 }

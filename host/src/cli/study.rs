@@ -9,7 +9,7 @@ mod spring;
 
 use super::options::{PluginKeyValue, duration_s};
 use super::stopping::stop_on_signals;
-use super::{CommandError, remark, run, style};
+use super::{CommandError, run, style};
 use choices::{
     BoundaryChoice, FirstChoice, ForceWay, NoiseOption, PresentationOption, ProcedureChoice, range,
 };
@@ -21,7 +21,7 @@ use flotor_study::apparatus::rig::{Rig, RunEnded, TrialFiles};
 use flotor_study::apparatus::{Apparatus, ApparatusError, Kinematics};
 use flotor_study::cohort::{Cohort, CohortError, Earlier};
 use flotor_study::conduct::{ConductError, Nothing, OutsideError, Presenter};
-use flotor_study::dataset::{Dataset, DatasetError};
+use flotor_study::dataset::Dataset;
 use flotor_study::observer::Population;
 use flotor_study::procedure::{Averaging, Procedure, QuestPlusRule, StepAtReversal, WeightedUpDownRule};
 use flotor_study::protocol::{
@@ -411,7 +411,7 @@ fn unfit(error: ApparatusError) -> CommandError {
 }
 
 fn note(arguments: &NoteArguments) -> Result<(), CommandError> {
-    let logs = Dataset::at(&arguments.data).logs().map_err(|error| refused(error.into()))?;
+    let logs = Dataset::at(&arguments.data).logs()?;
     let log = logs.into_iter().find(|log| log.begin.subject.get() == arguments.subject);
     let log = log.ok_or_else(|| {
         let (data, subject) = (arguments.data.display(), arguments.subject);
@@ -421,7 +421,7 @@ fn note(arguments: &NoteArguments) -> Result<(), CommandError> {
 }
 
 fn tell(dataset: &Dataset) -> Result<(), CommandError> {
-    let logs = dataset.logs().map_err(|error| refused(error.into()))?;
+    let logs = dataset.logs()?;
     let complete = logs.iter().filter(|log| log.complete).count();
     let presentations: usize = logs.iter().map(|log| log.trials.len()).sum();
     let root = dataset.root().display();
@@ -437,8 +437,7 @@ fn tell(dataset: &Dataset) -> Result<(), CommandError> {
 
 fn refused(error: CohortError) -> CommandError {
     match error {
-        CohortError::Dataset(error @ DatasetError::File { .. }) => CommandError::Failed(error.to_string()),
-        CohortError::Dataset(error) => CommandError::Usage(error.to_string()),
+        CohortError::Dataset(error) => error.into(),
         CohortError::Sitting {
             cause: ConductError::Outside(ref cause) | ConductError::Trial { ref cause, .. },
             ..
@@ -459,6 +458,6 @@ fn outside(
         Some(RunEnded(RunEnd::Watchdog(stuck))) => CommandError::Watchdog(*stuck),
         _ => return CommandError::Failed(told.to_string()),
     };
-    remark(format_args!("{} {told}", style::warning("note:")));
+    super::note(told);
     error
 }

@@ -2,14 +2,13 @@
 
 use super::CommandError;
 use super::bridge::{BRIDGE, Way, is_elsewhere};
-use super::companion::{Built, Companion};
+use super::companion::{Built, Companion, Running};
 use clap::Args;
 use flotor_record::Recording;
 use flotor_session::registry::Registry;
-use rustix::process::{Pid, Signal, kill_process};
 use std::ffi::OsString;
 use std::path::PathBuf;
-use std::process::{Child, Stdio};
+use std::process::Stdio;
 
 /// The viewer, built by name because of its graphics stack.
 pub(super) const VIEWER: Companion<'_> = Companion {
@@ -104,7 +103,7 @@ fn view_elsewhere(for_bridge: &[OsString], mut for_viewer: Vec<OsString>) -> Res
     let (mut viewer, mut bridge) = (VIEWER.command()?, BRIDGE.command()?);
     let cannot = |program: &str, cause| CommandError::file(program.as_ref(), "cannot be started", cause);
     let bridge = bridge.args(for_bridge).stdin(Stdio::null()).spawn();
-    let bridge = Attached(bridge.map_err(|cause| cannot(BRIDGE.program, cause))?);
+    let bridge = Running(bridge.map_err(|cause| cannot(BRIDGE.program, cause))?);
     for_viewer.extend(["--run".into(), bridge.0.id().to_string().into()]);
     let shown = viewer.args(&for_viewer).status().map_err(|cause| cannot(VIEWER.program, cause))?;
     drop(bridge);
@@ -113,19 +112,6 @@ fn view_elsewhere(for_bridge: &[OsString], mut for_viewer: Vec<OsString>) -> Res
     }
     // It has said why.
     std::process::exit(shown.code().unwrap_or(1));
-}
-
-/// A bridge that shows a run here, until this is dropped.
-struct Attached(Child);
-
-impl Drop for Attached {
-    fn drop(&mut self) {
-        // In order, so that its socket goes with it.
-        if let Some(process) = Pid::from_raw(i32::try_from(self.0.id()).unwrap_or_default()) {
-            let _ = kill_process(process, Signal::TERM);
-        }
-        let _ = self.0.wait();
-    }
 }
 
 /// Files of the plugins of a recording, as far as they are found; the viewer says what it misses.

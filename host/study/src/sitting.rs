@@ -239,13 +239,8 @@ fn check_kind(trial: &Trial, response: Response) -> Result<(), AnswerError> {
     match (trial.phase, trial.presented, response) {
         (Phase::Practice, _, Response::Seen)
         | (_, Presented::Pair(_), Response::First | Response::Second | Response::DontKnow) => Ok(()),
-        (_, Presented::One { .. }, Response::Rating(rating)) => {
-            if rating.is_finite() {
-                Ok(())
-            } else {
-                Err(AnswerError::NotFinite)
-            }
-        }
+        (_, Presented::One { .. }, Response::Rating(rating)) if rating.is_finite() => Ok(()),
+        (_, Presented::One { .. }, Response::Rating(_)) => Err(AnswerError::NotFinite),
         _ => Err(AnswerError::Kind(response)),
     }
 }

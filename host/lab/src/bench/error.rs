@@ -1,7 +1,6 @@
 //! How far answers lie from the reference's.
 
-use crate::PERIOD_NS;
-use crate::subject::call;
+use crate::subject::{call, input_of};
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Input, Pose, StepStatus, Wrench};
 use serde::Serialize;
@@ -61,13 +60,8 @@ pub(super) fn walk(model: &mut Model, path: &[Pose]) -> Vec<Option<Wrench>> {
 
 /// The answer at a pose, if it is one.
 pub(super) fn answer(model: &mut Model, pose: Pose, tick: u64) -> Option<Wrench> {
-    let input = Input {
-        time_ns: tick * PERIOD_NS,
-        dt_ns: PERIOD_NS,
-        tick,
-        demand: Demand::WRENCH.limited_to(model.serves()),
-        ..Input::at_rest(pose)
-    };
+    let demand = Demand::WRENCH.limited_to(model.serves());
+    let input = Input { demand, ..input_of(tick, pose) };
     let output = call(model, &input).ok()?;
     let sound =
         matches!(output.status(), Some(StepStatus::Ok | StepStatus::Clamped | StepStatus::NotConverged));

@@ -4,8 +4,8 @@
 //! so on to the end of it, round after round. What disturbs one slice disturbs its neighbours too, and quotients of
 //! neighbouring slices are those of a quiet machine.
 
-use crate::PERIOD_NS;
 use crate::stopwatch::{net_ns, overhead_ns, quantile};
+use crate::subject::input_of;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Input, Memory, Output, Pose};
 use serde::Serialize;
@@ -118,14 +118,7 @@ impl Clocked {
 
 /// Inputs of consecutive ticks.
 pub(super) fn inputs(path: &[Pose], demand: Demand) -> Vec<Input> {
-    let input = |(tick, pose): (u64, &Pose)| Input {
-        time_ns: tick * PERIOD_NS,
-        dt_ns: PERIOD_NS,
-        tick,
-        demand,
-        ..Input::at_rest(*pose)
-    };
-    (0..).zip(path).map(input).collect()
+    (0..).zip(path).map(|(tick, pose)| Input { demand, ..input_of(tick, *pose) }).collect()
 }
 
 fn walk(model: &mut Model, inputs: &[Input], outputs: &mut [Output]) {

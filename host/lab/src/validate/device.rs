@@ -13,8 +13,7 @@ const TICK: Duration = Duration::from_millis(1);
 /// How far the length of a quaternion may be from one: rounding in single precision, ten times.
 const QUATERNION_TOLERANCE: f64 = 1.0e-6;
 
-pub(super) fn capabilities(device: OpenedDevice) -> Result<(), String> {
-    let mut device = device;
+pub(super) fn capabilities(mut device: OpenedDevice) -> Result<(), String> {
     // What the host enforces, it has checked when this comes back.
     let told = device.capabilities().map_err(|refusal| refusal.to_string())?;
     let [slowest_hz, fastest_hz] = told.rate_hz;
@@ -32,11 +31,10 @@ pub(super) fn capabilities(device: OpenedDevice) -> Result<(), String> {
     Ok(())
 }
 
-pub(super) fn lifecycle(device: OpenedDevice) -> Result<(), String> {
+pub(super) fn lifecycle(mut device: OpenedDevice) -> Result<(), String> {
     const TICKS: u64 = 100;
-    let mut opened = device;
     for _ in 0..2 {
-        let mut running = Running::start(opened)?;
+        let mut running = Running::start(device)?;
         let started = Instant::now();
         let mut has_sampled = false;
         while running.ticks < TICKS || !has_sampled {
@@ -48,13 +46,12 @@ pub(super) fn lifecycle(device: OpenedDevice) -> Result<(), String> {
                 std::thread::sleep(TICK);
             }
         }
-        opened = running.device.deactivate().ok_or("deactivate failed")?;
+        device = running.device.deactivate().ok_or("deactivate failed")?;
     }
     Ok(())
 }
 
-pub(super) fn safe_stop(device: OpenedDevice) -> Result<(), String> {
-    let mut device = device;
+pub(super) fn safe_stop(mut device: OpenedDevice) -> Result<(), String> {
     let push = push(&device.capabilities().map_err(|refusal| refusal.to_string())?);
     let stopper = device.stopper();
     let mut running = Running::start(device)?;
@@ -95,8 +92,7 @@ impl From<Trouble> for String {
 }
 
 impl Running {
-    fn start(device: OpenedDevice) -> Result<Self, String> {
-        let mut device = device;
+    fn start(mut device: OpenedDevice) -> Result<Self, String> {
         // A sensor without a pose may leave it as it likes.
         let has_pose = !device.capabilities().is_ok_and(|told| told.sensed == Axes::NONE);
         let device = device.activate(&CONFIG).map_err(|(_, refusal)| refusal.to_string())?;

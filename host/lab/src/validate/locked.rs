@@ -81,8 +81,7 @@ pub(super) fn system_calls(model: Model) -> Result<(), Seen> {
 }
 
 /// What the thread does: never ends once it is locked in.
-fn walk_locked_in(model: Model, ready: &Sender<Result<i32, String>>, stage: &AtomicU8) {
-    let mut model = model;
+fn walk_locked_in(mut model: Model, ready: &Sender<Result<i32, String>>, stage: &AtomicU8) {
     let inputs: Vec<Input> = walk((FIRST_STEPS + STEPS) as u64).collect();
     let (first, others) = inputs.split_at(FIRST_STEPS);
     let began = first.iter().try_for_each(|input| finite(&mut model, input).map(|_| ()));

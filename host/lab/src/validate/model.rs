@@ -2,6 +2,7 @@
 
 use super::checks::Subject;
 use super::path::{CONFIG, FAST, directions, finite, grid, step, walk, walk_at};
+use crate::subject::input_of;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{
@@ -173,9 +174,7 @@ pub(super) fn activity(model: &mut Model) -> Result<(), String> {
             for pose in [Pose::new(region.center(), DQuat::IDENTITY), Pose::new(position_m, turned)] {
                 let tick = ticks.next().unwrap_or(0);
                 let twist = Twist::new(velocity_m_per_s, DVec3::ZERO);
-                let (time_ns, dt_ns) = (tick * CONFIG.period_ns, CONFIG.period_ns);
-                let input = Input { tick, time_ns, dt_ns, twist, ..Input::at_rest(pose) };
-                let output = finite(model, &input)?;
+                let output = finite(model, &Input { twist, ..input_of(tick, pose) })?;
                 let acts = output.wrench != Wrench::ZERO || output.energy_j.abs() > 0.0;
                 if acts && !region.contains(pose.position()) {
                     return Err(format!(

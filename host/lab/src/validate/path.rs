@@ -1,6 +1,6 @@
 //! Poses a model is asked at: at rest on a grid, and on the way along a smooth path.
 
-use crate::subject::call;
+use crate::subject::{call, input_of};
 use crate::trajectory::{Series, Trajectory};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
@@ -52,7 +52,7 @@ pub(super) fn walk_at(speed: f64, steps: u64) -> impl Iterator<Item = Input> {
         let (pose, shift_m, turn_rad) = path.at(tick as f64 * 1.0e-3 * speed);
         let dt_ns = if tick == 0 { 0 } else { CONFIG.period_ns };
         let twist = Twist::new(shift_m * speed, turn_rad * speed);
-        Input { tick, time_ns: tick * CONFIG.period_ns, dt_ns, twist, ..Input::at_rest(pose) }
+        Input { dt_ns, twist, ..input_of(tick, pose) }
     })
 }
 

@@ -68,23 +68,23 @@ pub(super) fn read(sections: Vec<Section<'_>>) -> Result<Vec<ChangeUse>, SceneEr
     for mut section in sections {
         let at_s = section.require("at_s")?.number(0.0..=LATEST_S)?;
         let whole = section.location();
+        let wrong = |problem: &str| Err(whole.problem(problem));
         let (set, weight, swap) = (section.take("set"), section.take("weight"), section.take("swap"));
         let alone = Alternative::take(&mut section)?;
         let either = section.sections("either")?;
         section.finish()?;
         if set.is_none() && weight.is_none() && swap.is_none() {
-            let problem = "`change.set`, `change.weight` or `change.swap` is missing: what is to change?";
-            return Err(SceneError { location: whole, problem: problem.to_owned() });
+            return wrong("`change.set`, `change.weight` or `change.swap` is missing: what is to change?");
         }
         if swap.is_none() && (alone != Alternative::default() || !either.is_empty()) {
-            let problem =
-                "`change.plugin`, `change.parameters` and `change.either` belong to a `change.swap`";
-            return Err(SceneError { location: whole, problem: problem.to_owned() });
+            return wrong(
+                "`change.plugin`, `change.parameters` and `change.either` belong to a `change.swap`",
+            );
         }
         if alone != Alternative::default() && !either.is_empty() {
-            let problem =
-                "`change.either` has a `plugin` and `parameters` for each alternative: not beside it";
-            return Err(SceneError { location: whole, problem: problem.to_owned() });
+            return wrong(
+                "`change.either` has a `plugin` and `parameters` for each alternative: not beside it",
+            );
         }
         if let Some(swap) = swap {
             let location = swap.location.clone();
@@ -97,36 +97,25 @@ pub(super) fn read(sections: Vec<Section<'_>>) -> Result<Vec<ChangeUse>, SceneEr
             let by = if several.is_empty() { vec![alone] } else { several };
             changes.push(ChangeUse { at_s, what: ChangeWhat::Swap { model: swap.text()?, by }, location });
         }
-        if let Some(set) = set {
-            let location = set.location.clone();
-            for text in set.one_or_more_texts()? {
-                changes.push(ChangeUse {
-                    at_s,
-                    what: parameter(&text, &location)?,
-                    location: location.clone(),
-                });
-            }
-        }
-        if let Some(weight) = weight {
-            let location = weight.location.clone();
-            for text in weight.one_or_more_texts()? {
-                changes.push(ChangeUse {
-                    at_s,
-                    what: weight_of(&text, &location)?,
-                    location: location.clone(),
-                });
+        let read: [(_, Read); 2] = [(set, parameter), (weight, weight_of)];
+        for (value, what) in read {
+            let Some(value) = value else { continue };
+            let location = value.location.clone();
+            for text in value.one_or_more_texts()? {
+                changes.push(ChangeUse { at_s, what: what(&text, &location)?, location: location.clone() });
             }
         }
     }
     Ok(changes)
 }
 
+/// What a text of a change means, and where it was written.
+type Read = fn(&str, &Location) -> Result<ChangeWhat, SceneError>;
+
 /// `PLUGIN.KEY=VALUE`
 fn parameter(text: &str, location: &Location) -> Result<ChangeWhat, SceneError> {
-    let setting = text.parse::<PluginKeyValue>().map_err(|problem| SceneError {
-        location: location.clone(),
-        problem: format!("`change.set`: {problem}"),
-    })?;
+    let setting = text.parse::<PluginKeyValue>();
+    let setting = setting.map_err(|problem| location.problem(format!("`change.set`: {problem}")))?;
     let (plugin, key, value) = setting.into_parts();
     Ok(ChangeWhat::Set { plugin, parameter: ParameterText { key, value, location: location.clone() } })
 }
@@ -137,10 +126,9 @@ fn weight_of(text: &str, location: &Location) -> Result<ChangeWhat, SceneError> 
         let weight = weight.trim().parse::<f64>().ok().filter(|weight| (0.0..=1.0).contains(weight))?;
         Some(ChangeWhat::Weight { model: model.trim().to_owned(), weight })
     });
-    parts.ok_or_else(|| SceneError {
-        location: location.clone(),
-        problem: format!(
+    parts.ok_or_else(|| {
+        location.problem(format!(
             "`change.weight`: `{text}` is not MODEL=WEIGHT with a weight from 0 to 1, like spring=0.5"
-        ),
+        ))
     })
 }

@@ -23,7 +23,7 @@ fn coupling(
     limits: &Limits,
 ) -> Result<CouplingDescription, SceneError> {
     let here = section.location();
-    let wrong = |problem: &str| SceneError { location: here.clone(), problem: problem.to_owned() };
+    let wrong = |problem: &str| here.problem(problem);
     let default = CouplingConfig::default();
     let name = section.take("name").map(devices::name).transpose()?;
     let partner = section.take("partner");

@@ -1,6 +1,6 @@
 //! The devices of a scene, and which of them a model is on.
 
-use super::reader::{Location, SceneError, Section, Value, nearest};
+use super::reader::{Location, SceneError, Section, Value, did_you_mean};
 use super::{CalibrationUse, ModelUse, PluginUse, plugin_use};
 use flotor_core::MOST_DEVICES;
 
@@ -36,12 +36,10 @@ pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<DeviceUse>, SceneError>
             None => return Err(section.missing("name")),
         };
         if devices.iter().any(|device| device.name == name) {
-            let problem = format!("two devices are called `{name}`; give one another `name`");
-            return Err(SceneError { location: here, problem });
+            return Err(here.problem(format!("two devices are called `{name}`; give one another `name`")));
         }
         if devices.len() >= MOST_DEVICES.into() {
-            let problem = format!("a scene has at most {MOST_DEVICES} devices");
-            return Err(SceneError { location: here, problem });
+            return Err(here.problem(format!("a scene has at most {MOST_DEVICES} devices")));
         }
         let plugin = plugin_use(&mut section)?;
         let calibration = section.take("calibration").map(|value| {
@@ -69,13 +67,9 @@ pub(super) fn number(devices: &[DeviceUse], value: Value<'_>) -> Result<u16, Sce
 
 fn find(devices: &[DeviceUse], name: &str, location: &Location) -> Result<u16, SceneError> {
     (0..).zip(devices).find(|(_, device)| device.name == name).map(|(number, _)| number).ok_or_else(|| {
-        let names = || devices.iter().map(|device| device.name.as_str());
-        let hint = nearest(name, names()).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-        let problem = format!(
-            "there is no device `{name}`{hint} (there are {})",
-            names().collect::<Vec<_>>().join(", ")
-        );
-        SceneError { location: location.clone(), problem }
+        let names: Vec<&str> = devices.iter().map(|device| device.name.as_str()).collect();
+        let hint = did_you_mean(name, names.iter().copied());
+        location.problem(format!("there is no device `{name}`{hint} (there are {})", names.join(", ")))
     })
 }
 
@@ -89,15 +83,15 @@ pub(super) fn of_model(
         let problem = "the scene has several devices: say which the model is on, `device = \"NAME\"` or a list of names";
         return match devices {
             [_] => Ok(vec![0]),
-            _ => Err(SceneError { location: location.clone(), problem: problem.to_owned() }),
+            _ => Err(location.problem(problem)),
         };
     };
     let location = value.location.clone();
     let names = value.one_or_more_texts()?;
     if names.is_empty() {
-        let problem =
-            "`model.device` names no device; name one at least, or leave it out where there is only one";
-        return Err(SceneError { location, problem: problem.to_owned() });
+        return Err(location.problem(
+            "`model.device` names no device; name one at least, or leave it out where there is only one",
+        ));
     }
     names.iter().map(|name| find(devices, name, &location)).collect()
 }
@@ -131,7 +125,7 @@ pub(super) fn tell_apart(models: &[ModelUse], devices: &[DeviceUse]) -> Result<(
             continue;
         };
         let problem = format!("{other} called `{}`; give one another `name`", model.name);
-        return Err(SceneError { location: model.plugin.location.clone(), problem });
+        return Err(model.plugin.location.problem(problem));
     }
     Ok(())
 }

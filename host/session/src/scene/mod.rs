@@ -18,8 +18,8 @@ pub use reader::{Location, SceneError};
 pub use reference::{KeyReference, SectionReference, reference};
 pub use setting::{KeyValue, PluginKeyValue};
 
-pub use reader::nearest;
 use reader::{Section, Source, Value};
+pub use reader::{did_you_mean, nearest};
 use std::path::{Path, PathBuf};
 
 /// The scene `flotor` runs when none is named: spring 1 on the simulated flotor, held by a hand.
@@ -180,9 +180,8 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] with file, line, key and remedy.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
-        let text = std::fs::read_to_string(path).map_err(|error| SceneError {
-            location: Location { file: path.into(), line: 0 },
-            problem: format!("cannot read the scene: {error}"),
+        let text = std::fs::read_to_string(path).map_err(|error| {
+            Location { file: path.into(), line: 0 }.problem(format!("cannot read the scene: {error}"))
         })?;
         let mut scene = Self::parse(path, &text)?;
         let base = path.parent().unwrap_or(Path::new(""));
@@ -296,9 +295,9 @@ fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse
 fn field(mut section: Section<'_>, isolation: Isolation) -> Result<FieldTiming, SceneError> {
     let rate = section.require("rate_hz")?;
     if isolation == Isolation::Process {
-        return Err(rate.problem(
-            "a model in a process of its own is asked in the loop; remove one of the two".to_owned(),
-        ));
+        return Err(
+            rate.problem("a model in a process of its own is asked in the loop; remove one of the two")
+        );
     }
     let rate_hz = rate.number(1.0..=10_000.0)?;
     let period_s = 1.0 / rate_hz;
@@ -383,7 +382,7 @@ fn legal_watchdog_s(watchdog_s: f64, rate_hz: f64, place: Location) -> Result<f6
         "`limits.watchdog_ms` = {watchdog_ms}: legal at {rate_hz} Hz is {least_ms} to {LONGEST_WATCHDOG_MS}, \
          three periods of the loop at least"
     );
-    Err(SceneError { location: place, problem })
+    Err(place.problem(problem))
 }
 
 fn limits(mut section: Section<'_>, rate_hz: f64) -> Result<Limits, SceneError> {

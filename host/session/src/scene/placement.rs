@@ -17,7 +17,7 @@ pub(super) fn read(mapping: &mut Section<'_>) -> Result<Vec<[f64; 3]>, SceneErro
         (Some(list), None) => list.points(-FARTHEST_MM..=FARTHEST_MM, 1..=MOST_PLACES)?,
         (None, Some(grid)) => points_of(grid)?,
         (Some(list), Some(_)) => {
-            return Err(list.problem("a model has `positions_mm` or a `grid`, not both".to_owned()));
+            return Err(list.problem("a model has `positions_mm` or a `grid`, not both"));
         }
     };
     let from_centre = |place_mm: [f64; 3]| {
@@ -31,7 +31,7 @@ pub(super) fn read(mapping: &mut Section<'_>) -> Result<Vec<[f64; 3]>, SceneErro
 fn points_of(mut grid: Section<'_>) -> Result<Vec<[f64; 3]>, SceneError> {
     let count_value = grid.require("count")?;
     let too_many = count_value.problem(format!("a grid has at most {MOST_PLACES} points"));
-    let not_whole = count_value.problem("`count` is three whole numbers from 1 on".to_owned());
+    let not_whole = count_value.problem("`count` is three whole numbers from 1 on");
     let counts = count_value.three(1.0..=MOST_PLACES as f64)?;
     let spacing_mm = grid.require("spacing_mm")?.three(0.0..=FARTHEST_MM)?;
     grid.finish()?;

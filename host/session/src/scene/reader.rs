@@ -26,6 +26,11 @@ impl Location {
     pub fn is_in_a_file(&self) -> bool {
         self.line > 0
     }
+
+    /// That what was said here is wrong. Not real-time.
+    pub(crate) fn problem(&self, problem: impl Into<String>) -> SceneError {
+        SceneError { location: self.clone(), problem: problem.into() }
+    }
 }
 
 impl std::fmt::Display for Location {
@@ -99,9 +104,9 @@ impl<'t> Source<'t> {
     }
 
     pub(super) fn parse(&'t self) -> Result<Section<'t>, SceneError> {
-        let root = DeTable::parse(self.text).map_err(|error| SceneError {
-            location: self.location(&error.span().unwrap_or(0..0)),
-            problem: format!("not valid TOML: {}", error.message().lines().next().unwrap_or_default()),
+        let root = DeTable::parse(self.text).map_err(|error| {
+            let problem = error.message().lines().next().unwrap_or_default();
+            self.location(&error.span().unwrap_or(0..0)).problem(format!("not valid TOML: {problem}"))
         })?;
         Ok(Section {
             source: self,
@@ -162,8 +167,7 @@ impl<'t> Section<'t> {
         if let Some(written) = self.table.keys().find(|written| Some(&**written.get_ref()) == alike) {
             return self.unknown(written, &format!("; did you mean `{key}`?"));
         }
-        let location = self.location();
-        SceneError { location, problem: format!("`{}` is missing", self.path(key)) }
+        self.location().problem(format!("`{}` is missing", self.path(key)))
     }
 
     /// Takes a number, if it is there, and checks that it lies in `range`.
@@ -216,10 +220,10 @@ impl<'t> Section<'t> {
             table @ DeValue::Table(_) => {
                 Ok(vec![Section::from_value(source, name, Spanned::new(span, table))?])
             }
-            other => Err(SceneError {
-                location: source.location(&span),
-                problem: format!("`{name}` is a table like [[{name}]], not {}", other.type_str()),
-            }),
+            other => {
+                let problem = format!("`{name}` is a table like [[{name}]], not {}", other.type_str());
+                Err(source.location(&span).problem(problem))
+            }
         }
     }
 
@@ -236,12 +240,9 @@ impl<'t> Section<'t> {
                 DeValue::Float(number) => number.as_str().replace('_', ""),
                 DeValue::Boolean(flag) => if flag { "on" } else { "off" }.to_owned(),
                 other => {
-                    let problem = format!(
-                        "`{}` is a number, a word or true/false, not {}",
-                        key.get_ref(),
-                        other.type_str()
-                    );
-                    return Err(SceneError { location, problem });
+                    let (key, found) = (key.get_ref(), other.type_str());
+                    let problem = format!("`{key}` is a number, a word or true/false, not {found}");
+                    return Err(location.problem(problem));
                 }
             };
             Ok(ParameterText { key: key.into_inner().into_owned(), value: text, location })
@@ -259,17 +260,13 @@ impl<'t> Section<'t> {
         if let Some(above) = self.source.above.borrow().iter().find(|above| **above == &**key.get_ref()) {
             return Err(self.unknown(key, &format!("; `{above}` belongs above all tables")));
         }
-        let nearest = nearest(key.get_ref(), self.known.iter().map(|known| known.key));
-        let hint = nearest.map_or(String::new(), |known| format!("; did you mean `{known}`?"));
-        Err(self.unknown(key, &hint))
+        Err(self.unknown(key, &did_you_mean(key.get_ref(), self.known.iter().map(|known| known.key))))
     }
 
     /// That nobody takes a key, and what may help.
     fn unknown(&self, key: &Spanned<Cow<'t, str>>, hint: &str) -> SceneError {
-        SceneError {
-            location: self.source.location(&key.span()),
-            problem: format!("unknown key `{}`{hint}", self.path(key.get_ref())),
-        }
+        let location = self.source.location(&key.span());
+        location.problem(format!("unknown key `{}`{hint}", self.path(key.get_ref())))
     }
 
     fn from_value(
@@ -280,10 +277,10 @@ impl<'t> Section<'t> {
         let span = value.span();
         match value.into_inner() {
             DeValue::Table(table) => Ok(Section { source, name, span, table, known: Vec::new() }),
-            other => Err(SceneError {
-                location: source.location(&span),
-                problem: format!("`{name}` is a table like [{name}], not {}", other.type_str()),
-            }),
+            other => {
+                let problem = format!("`{name}` is a table like [{name}], not {}", other.type_str());
+                Err(source.location(&span).problem(problem))
+            }
         }
     }
 
@@ -293,8 +290,8 @@ impl<'t> Section<'t> {
 }
 
 impl Value<'_> {
-    pub(super) fn problem(&self, problem: String) -> SceneError {
-        SceneError { location: self.location.clone(), problem }
+    pub(super) fn problem(&self, problem: impl Into<String>) -> SceneError {
+        self.location.problem(problem)
     }
 
     pub(super) fn text(self) -> Result<String, SceneError> {
@@ -413,6 +410,11 @@ fn parse_number(value: &DeValue<'_>) -> Option<f64> {
         DeValue::Float(number) => number.as_str().replace('_', "").parse().ok(),
         _ => None,
     }
+}
+
+/// A hint at the known word most like `word`, to stand behind a complaint; empty if none is like it. Not real-time.
+pub fn did_you_mean<'k>(word: &str, known: impl Iterator<Item = &'k str>) -> String {
+    nearest(word, known).map_or_else(String::new, |near| format!("; did you mean `{near}`?"))
 }
 
 /// The known word most like `word`, if any is like it at all.

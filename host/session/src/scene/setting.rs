@@ -1,6 +1,6 @@
 //! Settings on top of a scene, as people write them: `spring.variant=energy`.
 
-use super::{DeviceUse, Location, ModelUse, ParameterText, Scene, is_named, nearest, without_device};
+use super::{DeviceUse, Location, ModelUse, ParameterText, Scene, did_you_mean, is_named, without_device};
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -118,16 +118,9 @@ impl PluginKeyValue {
     fn unknown(&self, models: &[ModelUse], others: &[&str]) -> String {
         let names: Vec<&str> =
             models.iter().map(|model| model.name.as_str()).chain(others.iter().copied()).collect();
-        let hint =
-            nearest(&self.plugin, names.iter().copied()).map(|name| format!("; did you mean `{name}`?"));
-        format!(
-            "--set {}.{}: there is no plugin `{}`{} (there are {})",
-            self.plugin,
-            self.setting.key,
-            self.plugin,
-            hint.unwrap_or_default(),
-            names.join(", ")
-        )
+        let (plugin, key) = (&self.plugin, &self.setting.key);
+        let hint = did_you_mean(plugin, names.iter().copied());
+        format!("--set {plugin}.{key}: there is no plugin `{plugin}`{hint} (there are {})", names.join(", "))
     }
 
     fn parameter(&self) -> ParameterText {

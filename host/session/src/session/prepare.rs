@@ -21,9 +21,7 @@ use std::borrow::Cow;
 
 pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
     registry.load(&plugin.plugin, kind).map_err(|error| match error {
-        LookupError::Unknown { .. } => {
-            SceneError { location: plugin.location.clone(), problem: error.to_string() }.into()
-        }
+        LookupError::Unknown { .. } => plugin.location.problem(error.to_string()).into(),
         refused => refused.into(),
     })
 }
@@ -49,10 +47,7 @@ fn calibrate(
     calibration: &CalibrationUse,
 ) -> Result<(), RunError> {
     let path = calibration.path();
-    let wrong = |problem: CalibrationFileError| SceneError {
-        location: calibration.location.clone(),
-        problem: problem.to_string(),
-    };
+    let wrong = |problem: CalibrationFileError| calibration.location.problem(problem.to_string());
     let (file, curve) = CalibrationFile::load(&path).map_err(wrong)?;
     let id = &plugin.metadata().id;
     file.check_device(&path.display().to_string(), id, &device.serial()).map_err(wrong)?;
@@ -75,13 +70,7 @@ pub(super) fn open_device(
     let settings = settings(&plugin, name, &used.parameters)?;
     let mut device = plugin.open_device(&settings)?;
     let capabilities = device.capabilities().map_err(|refusal| refused(plugin.metadata(), refusal))?;
-    let report = PluginReport {
-        name: name.clone(),
-        metadata: plugin.metadata().clone(),
-        schema: plugin.parameters(),
-        settings: as_written(used),
-        parameters: in_force(&plugin, &settings, |index| device.parameter(index)),
-    };
+    let report = report(&plugin, name, used, &settings, |index| device.parameter(index));
     if let Some(calibration) = calibration {
         calibrate(&plugin, &mut device, calibration)?;
     }
@@ -140,19 +129,13 @@ pub fn prepare_model(
         // Nobody waits for it any longer than that, or at all.
         (Isolation::Process, _) | (_, Some(_)) => TimeBudget::default(),
     };
-    let report = PluginReport {
-        name: model.name.clone(),
-        metadata: plugin.metadata().clone(),
-        schema: plugin.parameters(),
-        settings: as_written(&model.plugin),
-        parameters: in_force(&plugin, &settings, &mut value),
-    };
+    let report = report(&plugin, &model.name, &model.plugin, &settings, &mut value);
     Ok((Layer::new(instances, &model.blend, budget, config), report))
 }
 
 /// What a scene says of a model that cannot be.
 fn complain(model: &ModelUse, problem: &str) -> SceneError {
-    SceneError { location: model.plugin.location.clone(), problem: format!("[{}] {problem}", model.name) }
+    model.plugin.location.problem(format!("[{}] {problem}", model.name))
 }
 
 /// How long a run on the virtual clock waits for a model in a process of its own before it counts as hung, ns.
@@ -179,10 +162,8 @@ pub(super) fn settings(
     let schema = plugin.parameters();
     let check = |parameter: &ParameterText| {
         let value = from_the_scene(schema, parameter);
-        Setting::parse(schema, &parameter.key, &value).map_err(|error| SceneError {
-            location: parameter.location.clone(),
-            problem: format!("[{name}] {error}"),
-        })
+        Setting::parse(schema, &parameter.key, &value)
+            .map_err(|error| parameter.location.problem(format!("[{name}] {error}")))
     };
     parameters.iter().map(check).collect()
 }
@@ -201,6 +182,24 @@ fn from_the_scene<'t>(schema: &[Parameter], text: &'t ParameterText) -> Cow<'t, 
             Cow::Owned(folder.join(value).to_string_lossy().into_owned())
         }
         _ => Cow::Borrowed(value),
+    }
+}
+
+/// What a run knows of a plugin that was made with these settings; `value` reads a parameter of it.
+fn report(
+    plugin: &Plugin,
+    name: &str,
+    used: &PluginUse,
+    settings: &[Setting],
+    value: impl FnMut(usize) -> f64,
+) -> PluginReport {
+    let written = used.parameters.iter().map(|parameter| (parameter.key.clone(), parameter.value.clone()));
+    PluginReport {
+        name: name.to_owned(),
+        metadata: plugin.metadata().clone(),
+        schema: plugin.parameters(),
+        settings: written.collect(),
+        parameters: in_force(plugin, settings, value),
     }
 }
 
@@ -303,11 +302,6 @@ fn unfelt(wanted_n: &[f64; 3], device: &Capabilities) -> Option<String> {
     })
 }
 
-/// What a scene sets for a plugin, as written.
-pub(super) fn as_written(plugin: &PluginUse) -> Vec<(String, String)> {
-    plugin.parameters.iter().map(|parameter| (parameter.key.clone(), parameter.value.clone())).collect()
-}
-
 /// What a scene has scheduled, checked and made.
 pub(super) struct Scheduled {
     pub(super) changes: Vec<ScheduledChange>,
@@ -330,10 +324,7 @@ pub(super) fn schedule(
     for (draw, change) in (0..).zip(in_time) {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
         let time_ns = (change.at_s * 1.0e9).round() as u64;
-        let complain = |key: &str, error: ControlError| SceneError {
-            location: change.location.clone(),
-            problem: format!("`{key}`: {error}"),
-        };
+        let complain = |key: &str, error: ControlError| change.location.problem(format!("`{key}`: {error}"));
         let checked = match &change.what {
             ChangeWhat::Set { plugin, parameter: ParameterText { key, value, .. } } => {
                 let new = NewValue { plugin, parameter: key, value };

@@ -62,6 +62,5 @@ fn refused(error: CalibrationError) -> CommandError {
 }
 
 fn force_n(text: &str) -> Result<f64, String> {
-    let force_n: f64 = text.trim().parse().map_err(|_| format!("`{text}` is no force"))?;
-    if (1.0..=50.0).contains(&force_n) { Ok(force_n) } else { Err("legal is 1 to 50 N".to_owned()) }
+    options::number(text, "N", "force", 1.0..=50.0)
 }

@@ -1,6 +1,6 @@
 //! Which rig is calibrated: the simulated one, or a device with a force sensor on a serial port.
 
-use super::options::{KeyValue, duration_s};
+use super::options::{KeyValue, duration_s, number};
 use super::{CommandError, eval, progress_bar, refused};
 use crate::cli::stopping::stop_on_signals;
 use clap::Args;
@@ -102,7 +102,5 @@ fn guide(progress: &ProgressBar, stop: &StopSwitch) -> Guide {
 }
 
 fn tolerance_mm(text: &str) -> Result<f64, String> {
-    let tolerance_mm: f64 = text.trim().parse().map_err(|_| format!("`{text}` is no length"))?;
-    let legal = (0.005..=1.0).contains(&tolerance_mm);
-    if legal { Ok(tolerance_mm) } else { Err("legal is 0.005 to 1 mm".to_owned()) }
+    number(text, "mm", "length", 0.005..=1.0)
 }

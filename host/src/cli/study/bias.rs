@@ -3,8 +3,8 @@
 use crate::cli::{CommandError, run, style, tell};
 use clap::Args;
 use flotor_study::bias::{BiasRow, observer_of, rows};
+use rayon::prelude::*;
 use std::path::PathBuf;
-use std::sync::Mutex;
 
 /// Observers: true threshold as a share of the base, and criterion. First the two of the default population, then one
 /// threshold over the range of criteria.
@@ -36,24 +36,14 @@ pub(super) struct BiasArguments {
 
 pub(super) fn run(arguments: &BiasArguments) -> Result<(), CommandError> {
     let progress = run::progress_bar(OBSERVERS.len() as u64, "{percent:>3} %  observer {pos} of {len}");
-    let next = Mutex::new(OBSERVERS.iter().enumerate());
-    let work = || {
-        let mut found: Vec<(usize, Vec<BiasRow>)> = Vec::new();
-        while let Some((index, (threshold, criterion))) = next.lock().ok().and_then(|mut next| next.next()) {
-            let observer = observer_of(*threshold, *criterion);
-            found.push((index, rows(&observer, arguments.tracks, arguments.runs, arguments.seed)));
-            progress.inc(1);
-        }
-        found
+    let of_one = |(threshold, criterion)| {
+        let observer = observer_of(threshold, criterion);
+        let rows = rows(&observer, arguments.tracks, arguments.runs, arguments.seed);
+        progress.inc(1);
+        rows
     };
-    let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    let mut found: Vec<(usize, Vec<BiasRow>)> = std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-        threads.into_iter().filter_map(|thread| thread.join().ok()).flatten().collect()
-    });
+    let rows: Vec<BiasRow> = OBSERVERS.into_par_iter().flat_map_iter(of_one).collect();
     progress.finish_and_clear();
-    found.sort_by_key(|(index, _)| *index);
-    let rows: Vec<BiasRow> = found.into_iter().flat_map(|(_, rows)| rows).collect();
     let title = format!("{} tracks per estimate, {} estimates", arguments.tracks, arguments.runs);
     tell(arguments.json.as_deref(), &rows, || format!("{}\n{}", style::title(&title), to_text(&rows)))
 }

@@ -6,8 +6,7 @@ use crate::cli::options::PluginKeyValue;
 use crate::cli::stopping::stop_on_signals;
 use crate::cli::{CommandError, style};
 use clap::Args;
-use flotor_core::trace::TickRecord;
-use flotor_core::{Change, ChangeOutcome};
+use flotor_core::Change;
 use flotor_hal::{Parameter, ParameterKind};
 use flotor_live::Directory;
 use flotor_servo::{Clock, StopSwitch};
@@ -15,13 +14,12 @@ use flotor_session::live::{Watched, publish};
 use flotor_session::registry::Registry;
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
-use flotor_session::{ControlError, Controls, NewValue, Observer, RunError, RunOptions, Session};
-use flotor_study::apparatus::live::measured;
+use flotor_session::{ControlError, Controls, NewValue, RunError, RunOptions, Session};
+use flotor_study::apparatus::watch::Shared;
 use flotor_study::kinematics::{KinematicsMeter, StimulusKinematics};
 use std::io::{BufReader, stdin};
 use std::path::PathBuf;
 use std::sync::mpsc::RecvTimeoutError;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// Young's and shear modulus of spring wire, MPa: music wire as in the report, the others from Shigley's Mechanical
@@ -62,13 +60,14 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
         scene.models.first().map(|model| model.name.clone()).ok_or_else(|| {
             CommandError::Usage(format!("{}: the scene has no model to explore", scene.title))
         })?;
-    let felt = Felt::default();
+    let watch = Shared::default();
+    watch.lock().meter = Some(KinematicsMeter::default());
     let description = describe(&scene, &options, session.plugins());
     let publication = publish(&Directory::of_this_user(), &scene, &description, &session, &stop);
     let hint = if publication.is_ok() { "; `flotor view` shows it and has it on sliders" } else { "" };
     let mut desk =
-        Desk { controls: session.controls(), registry, model, settings: Vec::new(), felt: felt.clone() };
-    let (switch, mut observers) = (stop.clone(), Watched { observer: felt, publication: publication.ok() });
+        Desk { controls: session.controls(), registry, model, settings: Vec::new(), watch: watch.clone() };
+    let (switch, mut observers) = (stop.clone(), Watched { observer: watch, publication: publication.ok() });
     let run = std::thread::spawn(move || {
         let outcome = session.run(&mut observers, &switch);
         observers.end("the exploration has ended");
@@ -125,13 +124,13 @@ struct Desk {
     model: String,
     /// Everything changed so far: a model that is built anew gets it too.
     settings: Vec<(String, String)>,
-    felt: Felt,
+    watch: Shared,
 }
 
 impl Desk {
     fn take(&mut self, line: &str) -> String {
         match line.split_whitespace().collect::<Vec<_>>().as_slice() {
-            [] => self.felt.take(),
+            [] => self.felt(),
             ["?"] => self.list(),
             ["material", name] => match MATERIALS.iter().find(|(known, _)| known == name) {
                 Some((_, [young, shear])) => {
@@ -164,15 +163,14 @@ impl Desk {
         self.settings.extend(changes.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())));
         // Until it has faded in and a hand has gone up and down once.
         std::thread::sleep(Duration::from_millis(200));
-        if let Some(refused) = self.felt.refused() {
-            changes.iter().for_each(|_| {
-                self.settings.pop();
-            });
-            return format!("  the model refused {refused}: it does not fit its other values");
+        let refused = self.watch.lock().refused.take();
+        if let Some(Change { parameter, value, .. }) = refused {
+            self.settings.truncate(self.settings.len() - changes.len());
+            return format!("  the model refused {parameter} = {value}: it does not fit its other values");
         }
-        self.felt.start_again();
+        self.watch.lock().meter = Some(KinematicsMeter::default());
         std::thread::sleep(Duration::from_millis(700));
-        self.felt.take()
+        self.felt()
     }
 
     /// What is not live is read when a model is made: a new one, with everything that was changed before.
@@ -197,45 +195,15 @@ impl Desk {
         };
         schema.iter().map(line).collect::<Vec<_>>().join("\n")
     }
-}
 
-/// What the hand feels, between two lines.
-#[derive(Clone, Default)]
-struct Felt(Arc<Mutex<(KinematicsMeter, Option<String>)>>);
-
-impl Felt {
-    fn lock(&self) -> MutexGuard<'_, (KinematicsMeter, Option<String>)> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn start_again(&self) {
-        self.lock().0 = KinematicsMeter::default();
-    }
-
-    fn refused(&self) -> Option<String> {
-        self.lock().1.take()
-    }
-
-    /// In words, and from the start again.
-    fn take(&self) -> String {
-        let felt = std::mem::take(&mut self.lock().0).finish();
+    /// What the hand has felt since this was asked last, in words.
+    fn felt(&self) -> String {
+        let felt = self.watch.lock().meter.replace(KinematicsMeter::default());
         let words = |felt: StimulusKinematics| {
             let stiffness = felt.felt_stiffness_n_per_m;
             let stiffness = stiffness.map_or("no".to_owned(), |k| format!("{:.3} N/mm", k * 1.0e-3));
             format!("  felt at the hand: {stiffness} stiffness, up to {:.2} N", felt.peak_force_n)
         };
-        felt.map_or("  nothing felt yet".to_owned(), words)
-    }
-}
-
-impl Observer for Felt {
-    fn observe(&mut self, record: &TickRecord) {
-        self.lock().0.take(&measured(record));
-    }
-
-    fn change(&mut self, change: &Change) {
-        if change.outcome != ChangeOutcome::Applied {
-            self.lock().1 = Some(format!("{} = {}", change.parameter, change.value));
-        }
+        felt.and_then(|meter| meter.finish()).map_or("  nothing felt yet".to_owned(), words)
     }
 }

@@ -3,7 +3,7 @@
 use super::front::{JsonLines, ScreenOption, Terminal, Window, lines_of};
 use super::{Common, NoiseOption, tell};
 use crate::cli::stopping::stop_on_signals;
-use crate::cli::{CommandError, style};
+use crate::cli::{CommandError, note};
 use flotor_study::apparatus::attend::{FrontEnd, attend};
 use flotor_study::apparatus::live::LiveRig;
 use flotor_study::apparatus::noise::WhiteNoise;
@@ -40,10 +40,9 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         .map_err(|error| super::outside(error.as_ref(), &error))?;
     let mut front = Front::open(common.screen, &rig)?;
 
-    let refuse = |error: DatasetError| super::refused(error.into());
     let (sitting, mut log) = match before {
-        None => dataset.begin(begin).map_err(refuse)?,
-        Some(log) => log.resume(&begin.version).map_err(|error| refuse(error.into()))?,
+        None => dataset.begin(begin)?,
+        Some(log) => log.resume(&begin.version).map_err(DatasetError::from)?,
     };
     if kinematics == Kinematics::Full {
         let files = TrialFiles::make(files.0, files.1);
@@ -57,7 +56,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     let mut attended = Attended::new(sitting, protocol, common.seed, common.rest_every);
     let ending = attend(&mut attended, &mut log, &mut rig, front.as_dyn(), &mut |_| ());
     let ending = ending.map_err(|error| super::outside(error.as_ref(), &error))?;
-    dataset.write_tables().map_err(refuse)?;
+    dataset.write_tables()?;
     if let (Ending::Complete, Front::Window(window)) = (ending, front) {
         window.wait_closed(&stop); // the last screen says thank you
     }
@@ -130,8 +129,8 @@ fn before(
 ) -> Result<Option<Box<SittingLog>>, CommandError> {
     let (subject, root) = (begin.subject, dataset.root().to_path_buf());
     let progress = dataset.progress(subject, begin.protocol.task());
-    let refuse = |error: DatasetError| Err(super::refused(error.into()));
-    match progress.map_err(|error| super::refused(error.into()))? {
+    let refuse = |error: DatasetError| Err(error.into());
+    match progress? {
         Progress::New => Ok(None),
         Progress::Complete(_) => refuse(DatasetError::Duplicate { subject, root }),
         Progress::Partial(log) if !common.resume => {
@@ -157,7 +156,7 @@ fn noise(common: &Common) -> Result<Option<WhiteNoise>, CommandError> {
                 .to_owned(),
         )),
         (None, _) => {
-            eprintln!("{} no sound here: play white noise on headphones by other means", style::warning("note:"));
+            note("no sound here: play white noise on headphones by other means");
             Ok(noise)
         }
         _ => Ok(noise),

@@ -2,7 +2,8 @@
 
 use super::kinematics::{KinematicMeasure, measures};
 use super::{
-    AnalysisError, AnalysisOptions, Estimator, ResponseRow, SubjectRecord, order_factor, response_rows,
+    AnalysisError, AnalysisOptions, CONFIDENCE, Estimator, ResponseRow, SubjectRecord, mean_responses,
+    order_factor, response_rows, within_factors,
 };
 use crate::estimate::{Observation, Prior, most_likely};
 use crate::protocol::JndProtocol;
@@ -13,9 +14,6 @@ use flotor_statistics::describe::{MeanInterval, mean, mean_interval};
 use flotor_statistics::t_test::{TTest, paired};
 use flotor_statistics::trend;
 use serde::Serialize;
-
-/// Confidence of every interval.
-const CONFIDENCE: f64 = 0.95;
 
 /// A number for each modality.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -95,12 +93,10 @@ pub fn analyse_jnd(
     let of = |modality| fractions.iter().map(|subject| subject.mean(modality)).collect::<Vec<_>>();
     let weber_detail = WeberFractions::try_each(|modality| mean_interval(&of(modality), CONFIDENCE))?;
 
-    let mut within = vec![WithinFactor { name: "modality".to_owned(), levels: 2 }];
-    if protocol.bases.len() > 1 {
-        within.push(WithinFactor { name: "base".to_owned(), levels: protocol.bases.len() });
-    }
     let responses: Vec<Vec<f64>> = fractions.iter().map(|subject| subject.thresholds(protocol)).collect();
+    let within = within_factors("base", &protocol.bases);
     let design = Design::new(order_factor(subjects), within, &responses)?;
+    let thresholds = mean_responses(&protocol.bases, &responses)?.into_iter();
 
     let unfinished =
         |subject: &SubjectRecord| subject.tracks.iter().filter(|t| t.threshold.is_none()).count();
@@ -115,7 +111,9 @@ pub fn analyse_jnd(
         anova: analyse(&design, options.sums_of_squares),
         constancy: WeberFractions::try_each(|modality| constancy(protocol, &fractions, modality, options))?,
         linear_r2: linear_r2(protocol, &fractions)?,
-        thresholds: cells(protocol, &fractions)?,
+        thresholds: thresholds
+            .map(|(modality, base, threshold)| ThresholdCell { modality, base, threshold })
+            .collect(),
         pairs_per_subject: mean(&pairs),
         unfinished_tracks: subjects.iter().map(unfinished).sum(),
         kinematics: measures(&protocol.bases, subjects, options)?,
@@ -219,16 +217,4 @@ fn linear_r2(protocol: &JndProtocol, fractions: &[Fractions]) -> Result<f64, Ana
     };
     let rows: Vec<Vec<f64>> = fractions.iter().map(row).collect();
     Ok(trend::linear(&protocol.bases, &rows)?.r_squared)
-}
-
-fn cells(protocol: &JndProtocol, fractions: &[Fractions]) -> Result<Vec<ThresholdCell>, AnalysisError> {
-    let mut cells = Vec::new();
-    for modality in Modality::ALL {
-        for (index, base) in protocol.bases.iter().copied().enumerate() {
-            let share = |subject: &Fractions| subject.modality(modality).get(index).copied();
-            let values: Vec<f64> = fractions.iter().filter_map(share).map(|share| share * base).collect();
-            cells.push(ThresholdCell { modality, base, threshold: mean_interval(&values, CONFIDENCE)? });
-        }
-    }
-    Ok(cells)
 }

@@ -1,10 +1,10 @@
 //! How people moved: mean speed, acceleration and force along the vertical, over stimulus and modality.
 
-use super::{AnalysisError, AnalysisOptions, SubjectRecord};
+use super::{AnalysisError, AnalysisOptions, SubjectRecord, conditions, within_factors};
 use crate::kinematics::StimulusKinematics;
 use crate::log::TrialEvent;
-use crate::trial::{Modality, Presented};
-use flotor_statistics::anova::{Design, Effect, WithinFactor, analyse};
+use crate::trial::Presented;
+use flotor_statistics::anova::{Design, Effect, analyse};
 use flotor_statistics::describe::mean;
 use serde::Serialize;
 
@@ -40,11 +40,8 @@ pub(super) fn measures(
         let rows: Option<Vec<Vec<f64>>> =
             subjects.iter().map(|subject| cells(levels, subject, value)).collect();
         let Some(rows) = rows else { return Ok(Vec::new()) };
-        let mut within = vec![WithinFactor { name: "modality".to_owned(), levels: Modality::ALL.len() }];
-        if levels.len() > 1 {
-            within.push(WithinFactor { name: "stimulus".to_owned(), levels: levels.len() });
-        }
-        let anova = analyse(&Design::new(Vec::new(), within, &rows)?, options.sums_of_squares);
+        let design = Design::new(Vec::new(), within_factors("stimulus", levels), &rows)?;
+        let anova = analyse(&design, options.sums_of_squares);
         let at = |level: usize| {
             let both = rows.iter().flat_map(|row| row.iter().skip(level).step_by(levels.len()));
             mean(&both.copied().collect::<Vec<_>>())
@@ -60,18 +57,11 @@ fn cells(levels: &[f64], record: &SubjectRecord, value: fn(&StimulusKinematics) 
         Presented::One { value } => value,
         Presented::Pair(pair) => pair.base,
     };
-    let mut cells = Vec::new();
-    for modality in Modality::ALL {
-        for level in levels {
-            let here = record
-                .counted()
-                .filter(|event| event.trial.modality == modality && level_of(event) == *level);
-            let values: Vec<f64> = here.flat_map(|event| &event.exploration.kinematics).map(value).collect();
-            if values.is_empty() {
-                return None;
-            }
-            cells.push(mean(&values));
-        }
-    }
-    Some(cells)
+    let cell = |(modality, level)| {
+        let is_here = |event: &&TrialEvent| event.trial.modality == modality && level_of(event) == level;
+        let felt = record.counted().filter(is_here).flat_map(|event| &event.exploration.kinematics);
+        let values: Vec<f64> = felt.map(value).collect();
+        (!values.is_empty()).then(|| mean(&values))
+    };
+    conditions(levels).map(cell).collect()
 }

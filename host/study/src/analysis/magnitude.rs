@@ -1,11 +1,14 @@
 //! Ratings: made comparable, their trend over the stimuli, effects of stimulus, modality and order.
 
 use super::kinematics::{KinematicMeasure, measures};
-use super::{AnalysisError, AnalysisOptions, ResponseRow, SubjectRecord, order_factor, response_rows};
+use super::{
+    AnalysisError, AnalysisOptions, ResponseRow, SubjectRecord, conditions, mean_responses, order_factor,
+    response_rows, within_factors,
+};
 use crate::protocol::{MagnitudeProtocol, RatingScale};
 use crate::trial::{Modality, Presented, Response};
-use flotor_statistics::anova::{Design, Effect, WithinFactor, analyse};
-use flotor_statistics::describe::{MeanInterval, mean, mean_interval};
+use flotor_statistics::anova::{Design, Effect, analyse};
+use flotor_statistics::describe::{MeanInterval, mean};
 use flotor_statistics::trend::{self, LinearTrend};
 use serde::Serialize;
 
@@ -60,24 +63,13 @@ pub fn analyse_magnitude(
     let rows = subjects.iter().map(|subject| scaled(protocol, subject, options.rating_scale));
     let rows = rows.collect::<Result<Vec<_>, _>>()?;
     let stimuli = &protocol.values;
-    let within = vec![
-        WithinFactor { name: "modality".to_owned(), levels: 2 },
-        WithinFactor { name: "stimulus".to_owned(), levels: stimuli.len() },
-    ];
-    let design = Design::new(order_factor(subjects), within, &rows)?;
+    let design = Design::new(order_factor(subjects), within_factors("stimulus", stimuli), &rows)?;
     let both = |row: &Vec<f64>| {
         let (vh, h) = row.split_at(stimuli.len());
         vh.iter().zip(h).map(|(vh, h)| 0.5 * (vh + h)).collect::<Vec<_>>()
     };
     let trend = trend::linear(stimuli, &rows.iter().map(both).collect::<Vec<_>>())?;
-    let mut ratings = Vec::new();
-    for (block, modality) in Modality::ALL.into_iter().enumerate() {
-        for (index, stimulus) in stimuli.iter().copied().enumerate() {
-            let cell = block * stimuli.len() + index;
-            let values: Vec<f64> = rows.iter().filter_map(|row| row.get(cell).copied()).collect();
-            ratings.push(RatingCell { modality, stimulus, rating: mean_interval(&values, 0.95)? });
-        }
-    }
+    let ratings = mean_responses(stimuli, &rows)?.into_iter();
     let counted: Vec<f64> = subjects.iter().map(|subject| subject.counted().count() as f64).collect();
     let repeats =
         |subject: &SubjectRecord| subject.trials.iter().filter(|event| event.trial.repeat > 0).count();
@@ -88,7 +80,9 @@ pub fn analyse_magnitude(
         linear_r2: trend.r_squared,
         trend,
         anova: analyse(&design, options.sums_of_squares),
-        ratings,
+        ratings: ratings
+            .map(|(modality, stimulus, rating)| RatingCell { modality, stimulus, rating })
+            .collect(),
         trials_per_subject: mean(&counted),
         repeated: subjects.iter().map(repeats).sum(),
         kinematics: measures(stimuli, subjects, options)?,
@@ -126,16 +120,11 @@ fn scaled(
             libm::exp(mean(&all.iter().map(|rating| libm::log(*rating)).collect::<Vec<_>>()))
         }
     };
-    let mut cells = Vec::new();
-    for modality in Modality::ALL {
-        for stimulus in &protocol.values {
-            let same = ratings.iter().filter(|(m, value, _)| *m == modality && value == stimulus);
-            let values: Vec<f64> = same.map(|(_, _, rating)| rating / unit).collect();
-            if values.is_empty() {
-                return refuse("a stimulus was never rated");
-            }
-            cells.push(mean(&values));
-        }
-    }
-    Ok(cells)
+    let cell = |(modality, stimulus)| {
+        let same = ratings.iter().filter(|(m, value, _)| *m == modality && *value == stimulus);
+        let values: Vec<f64> = same.map(|(_, _, rating)| rating / unit).collect();
+        (!values.is_empty()).then(|| mean(&values))
+    };
+    let cells: Option<Vec<f64>> = conditions(&protocol.values).map(cell).collect();
+    cells.map_or_else(|| refuse("a stimulus was never rated"), Ok)
 }

@@ -17,8 +17,12 @@ use crate::protocol::{Protocol, SubjectNumber};
 use crate::sitting::{TrackResult, Verdict};
 use crate::trial::{Modality, Phase};
 use flotor_statistics::StatisticsError;
-use flotor_statistics::anova::{BetweenFactor, Effect, SumOfSquares};
+use flotor_statistics::anova::{BetweenFactor, Effect, SumOfSquares, WithinFactor};
+use flotor_statistics::describe::{MeanInterval, mean_interval};
 use serde::Serialize;
+
+/// Confidence of every interval.
+const CONFIDENCE: f64 = 0.95;
 
 /// One subject's data.
 #[derive(Clone, Debug)]
@@ -188,10 +192,8 @@ pub struct ResponseRow {
 
 /// Rows of `responses[subject][modality by level]`.
 fn response_rows(subjects: &[SubjectRecord], levels: &[f64], responses: &[Vec<f64>]) -> Vec<ResponseRow> {
-    let conditions =
-        || Modality::ALL.into_iter().flat_map(|modality| levels.iter().map(move |level| (modality, *level)));
     let of = |(record, row): (&SubjectRecord, &Vec<f64>)| {
-        let row = conditions().zip(row).map(|((modality, stimulus), response)| ResponseRow {
+        let row = conditions(levels).zip(row).map(|((modality, stimulus), response)| ResponseRow {
             subject: record.subject.to_string(),
             first_modality: record.first_modality,
             modality,
@@ -201,6 +203,30 @@ fn response_rows(subjects: &[SubjectRecord], levels: &[f64], responses: &[Vec<f6
         row.collect::<Vec<_>>()
     };
     subjects.iter().zip(responses).flat_map(of).collect()
+}
+
+/// The factors within a subject: modality, and the level of the stimulus where there are several.
+fn within_factors(name: &str, levels: &[f64]) -> Vec<WithinFactor> {
+    let factor = |name: &str, levels| WithinFactor { name: name.to_owned(), levels };
+    let by_level = (levels.len() > 1).then(|| factor(name, levels.len()));
+    [factor("modality", Modality::ALL.len())].into_iter().chain(by_level).collect()
+}
+
+/// Modality by level, in the order of the cells of a subject's row.
+fn conditions(levels: &[f64]) -> impl Iterator<Item = (Modality, f64)> {
+    Modality::ALL.into_iter().flat_map(|modality| levels.iter().map(move |level| (modality, *level)))
+}
+
+/// Mean over subjects under each condition, of `responses[subject][modality by level]`.
+fn mean_responses(
+    levels: &[f64],
+    responses: &[Vec<f64>],
+) -> Result<Vec<(Modality, f64, MeanInterval)>, StatisticsError> {
+    let cell = |(index, (modality, level)): (usize, (Modality, f64))| {
+        let values: Vec<f64> = responses.iter().filter_map(|row| row.get(index).copied()).collect();
+        Ok((modality, level, mean_interval(&values, CONFIDENCE)?))
+    };
+    conditions(levels).enumerate().map(cell).collect()
 }
 
 /// The factor "which modality came first", unless all subjects started with the same, or so few are in a group that

@@ -1,24 +1,19 @@
 //! Presents stimuli to a person: the servo loop in real time, on threads of its own. Windows may watch it, and stop it; what
 //! is felt is the experiment's to change.
 
-use super::watch::Watch;
-pub use super::watch::sample as measured;
+use super::watch::Shared;
 use super::{Apparatus, Kinematics};
 use crate::apparatus::rig::{RunEnded, StimulusRefused, TrialFiles};
 use crate::conduct::OutsideError;
 use crate::kinematics::KinematicsMeter;
 use crate::screen::Felt;
 use crate::trial::Trial;
-use flotor_core::Change;
-use flotor_core::trace::TickRecord;
 use flotor_live::{Ask, Directory, Serve};
 use flotor_record::Recorder;
 use flotor_servo::{Clock, StopSwitch};
 use flotor_session::live::{Watched, announce};
-use flotor_session::{
-    ControlError, Controls, Observer, Outcome, RunError, RunOptions, RunRecording, Session,
-};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use flotor_session::{ControlError, Controls, Outcome, RunError, RunOptions, RunRecording, Session};
+use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -35,26 +30,6 @@ pub struct LiveRig<'a> {
     shared: Shared,
     unseen: Option<String>,
     run: Option<JoinHandle<Result<Outcome, RunError>>>,
-}
-
-/// What the observers' thread and the experiment share; never the servo's.
-#[derive(Clone, Default)]
-struct Shared(Arc<Mutex<Watch>>);
-
-impl Shared {
-    fn lock(&self) -> MutexGuard<'_, Watch> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Observer for Shared {
-    fn observe(&mut self, record: &TickRecord) {
-        self.lock().observe(record);
-    }
-
-    fn change(&mut self, change: &Change) {
-        self.lock().change(change);
-    }
 }
 
 /// Who watches a study may end it, and nothing else.
@@ -132,8 +107,8 @@ impl<'a> LiveRig<'a> {
         self.wait_for_fade();
         self.wait_until_seen();
         let mut watch = self.shared.lock();
-        if let Some(what) = watch.refused.take() {
-            return Err(StimulusRefused(what).into());
+        if let Some(change) = watch.refused.take() {
+            return Err(StimulusRefused(change).into());
         }
         if let (Some(files), false) = (&self.files, watch.recording.is_on()) {
             let run = self.apparatus.describe(self.apparatus.scene(), Clock::Real, 0);

@@ -2,6 +2,7 @@
 //!
 //! - [`setup`]: a scene and what is varied in it, checked before the first trial.
 //! - [`rig`]: presents to simulated observers in virtual time; [`live`]: to people, in real time.
+//! - [`watch`]: what is taken down of a presentation.
 //! - [`attend`]: a person's sitting through a front end.
 //! - [`noise`]: white noise on headphones, where there is a player.
 //! - [`report`]: the page of the results.
@@ -15,6 +16,6 @@ pub mod noise;
 pub mod report;
 pub mod rig;
 pub mod setup;
-mod watch;
+pub mod watch;
 
 pub use setup::{Apparatus, ApparatusError, Kinematics};

@@ -13,6 +13,8 @@ use crate::conduct::{OutsideError, Presenter};
 use crate::kinematics::KinematicsMeter;
 use crate::protocol::SubjectNumber;
 use crate::trial::{Exploration, Trial};
+use flotor_core::Change;
+use flotor_core::trace::TickRecord;
 use flotor_record::Recorder;
 use flotor_servo::Clock;
 use flotor_servo::RunEnd;
@@ -38,9 +40,9 @@ fn end_words(end: &RunEnd) -> String {
 }
 
 /// The model did not take a stimulus although the check said it would.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the model refused {0}")]
-pub struct StimulusRefused(pub String);
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("the model refused {}.{} = {}", .0.plugin, .0.parameter, .0.value)]
+pub struct StimulusRefused(pub Change);
 
 /// Where recordings of trials go: a file for each.
 #[derive(Clone, Debug)]
@@ -154,7 +156,7 @@ impl<'a> Rig<'a> {
         busy?;
         apparatus.show(self.steps.controls(), true)?;
         self.advance(self.fade_ticks, also)?;
-        Ok(self.watch.refused.take().map_or(Ok(()), |what| Err(StimulusRefused(what)))?)
+        self.watch.refused.take().map_or(Ok(()), |change| Err(StimulusRefused(change).into()))
     }
 
     fn advance(&mut self, ticks: u64, also: &mut dyn Observer) -> Result<(), RunEnded> {
@@ -172,12 +174,12 @@ impl Presenter for Rig<'_> {
 struct Both<'a>(&'a mut Watch, &'a mut dyn Observer);
 
 impl Observer for Both<'_> {
-    fn observe(&mut self, record: &flotor_core::trace::TickRecord) {
+    fn observe(&mut self, record: &TickRecord) {
         self.0.observe(record);
         self.1.observe(record);
     }
 
-    fn change(&mut self, change: &flotor_core::Change) {
+    fn change(&mut self, change: &Change) {
         self.0.change(change);
         self.1.change(change);
     }
@@ -186,5 +188,5 @@ impl Observer for Both<'_> {
 struct Nobody;
 
 impl Observer for Nobody {
-    fn observe(&mut self, _: &flotor_core::trace::TickRecord) {}
+    fn observe(&mut self, _: &TickRecord) {}
 }

@@ -4,20 +4,21 @@ use crate::kinematics::{KinematicsMeter, Sample};
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeOutcome};
 use flotor_session::{Observer, RunRecording};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Looks at every tick of a study.
 #[derive(Default)]
-pub(super) struct Watch {
+pub struct Watch {
     /// Runs while a stimulus is being felt.
-    pub(super) meter: Option<KinematicsMeter>,
+    pub meter: Option<KinematicsMeter>,
     /// Of the trial under way.
-    pub(super) recording: RunRecording,
+    pub recording: RunRecording,
     /// Ticks missed since somebody asked.
-    pub(super) missed_ticks: u64,
+    pub missed_ticks: u64,
     /// Whether the handle was out of its range in the last tick.
-    pub(super) out_of_range: bool,
-    /// A change of the stimulus that the model did not take: its name and value.
-    pub(super) refused: Option<String>,
+    pub out_of_range: bool,
+    /// A change of the stimulus that the model did not take.
+    pub refused: Option<Change>,
 }
 
 impl Observer for Watch {
@@ -32,15 +33,35 @@ impl Observer for Watch {
 
     fn change(&mut self, change: &Change) {
         if change.outcome != ChangeOutcome::Applied {
-            self.refused = Some(format!("{}.{} = {}", change.plugin, change.parameter, change.value));
+            self.refused = Some(change.clone());
         }
         self.recording.change(change);
     }
 }
 
+/// The same for the observers' thread and whoever else wants to know; never for the servo's.
+#[derive(Clone, Default)]
+pub struct Shared(Arc<Mutex<Watch>>);
+
+impl Shared {
+    /// What was taken down so far. Not real-time: waits for the observers.
+    pub fn lock(&self) -> MutexGuard<'_, Watch> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Observer for Shared {
+    fn observe(&mut self, record: &TickRecord) {
+        self.lock().observe(record);
+    }
+
+    fn change(&mut self, change: &Change) {
+        self.lock().change(change);
+    }
+}
+
 /// What a tick says of handle and force along the vertical.
-#[must_use]
-pub fn sample(record: &TickRecord) -> Sample {
+fn sample(record: &TickRecord) -> Sample {
     Sample {
         dt_s: record.dt_ns as f64 * 1.0e-9,
         z_m: record.pose.position().z,

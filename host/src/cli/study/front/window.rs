@@ -2,11 +2,11 @@
 
 use super::{JsonLines, lines_of};
 use crate::cli::CommandError;
+use crate::cli::companion::Running;
 use crate::cli::view::VIEWER;
 use flotor_servo::StopSwitch;
-use rustix::process::{Pid, Signal, kill_process};
 use std::io::BufReader;
-use std::process::{Child, ChildStdin, Stdio};
+use std::process::{ChildStdin, Stdio};
 use std::time::Duration;
 
 /// How often it is looked whether the window is still there.
@@ -16,7 +16,7 @@ const LOOK_PERIOD: Duration = Duration::from_millis(50);
 pub(in crate::cli::study) struct Window {
     /// What is said to it and heard of it.
     pub(in crate::cli::study) lines: JsonLines<ChildStdin>,
-    viewer: Viewer,
+    viewer: Running,
 }
 
 impl Window {
@@ -29,7 +29,7 @@ impl Window {
         command.arg("--sitting").arg("--run").arg(std::process::id().to_string());
         command.stdin(Stdio::piped()).stdout(Stdio::piped());
         let failed = |cause| CommandError::file(VIEWER.program.as_ref(), "cannot be started", cause);
-        let mut viewer = Viewer(command.spawn().map_err(failed)?);
+        let mut viewer = Running(command.spawn().map_err(failed)?);
         let (Some(input), Some(output)) = (viewer.0.stdin.take(), viewer.0.stdout.take()) else {
             return Err(CommandError::Failed("the viewer has no pipes".to_owned()));
         };
@@ -47,18 +47,5 @@ impl Window {
         while self.viewer.0.try_wait().is_ok_and(|status| status.is_none()) && !stop.is_stop_asked() {
             std::thread::sleep(LOOK_PERIOD);
         }
-    }
-}
-
-/// The process; asked to end in order when nobody needs it.
-struct Viewer(Child);
-
-impl Drop for Viewer {
-    fn drop(&mut self) {
-        if self.0.try_wait().ok().flatten().is_none() {
-            let id = i32::try_from(self.0.id()).ok().and_then(Pid::from_raw);
-            let _ = id.map(|id| kill_process(id, Signal::TERM));
-        }
-        let _ = self.0.wait();
     }
 }
