@@ -61,12 +61,11 @@ fn description(figure: &Figure, layout: &Layout<'_>) -> String {
     let mut description = figure.subtitle.clone();
     for cell in &layout.cells {
         let panel = cell.draft.panel;
-        let name = |label: &str, unit: String| format!("{label} {unit}").trim().to_owned();
         let sentence = format!(
             " {}{} against {}:",
             if panel.title.is_empty() { String::new() } else { format!("{}: ", panel.title) },
-            name(&panel.y.label, panel.y.unit_label(0)),
-            name(&cell.draft.x_axis.label, cell.draft.x_axis.unit_label(0)),
+            panel.y.name(0),
+            cell.draft.x_axis.name(0),
         );
         description.push_str(&sentence);
         let clauses: Vec<String> = panel
@@ -250,13 +249,9 @@ impl Writer {
             let y = frame.bottom() + FRAME_TO_X_LABEL_PX;
             self.text("muted middle", frame.x_at(tick.position), y, &tick.label);
         }
-        let name = format!(
-            "{} {}",
-            cell.draft.x_axis.label,
-            cell.draft.x_axis.unit_label(cell.head.x_ticks.exponent)
-        );
-        if !name.trim().is_empty() {
-            self.text("label middle", frame.x_at(0.5), frame.bottom() + FRAME_TO_X_NAME_PX, name.trim());
+        let name = cell.draft.x_axis.name(cell.head.x_ticks.exponent);
+        if !name.is_empty() {
+            self.text("label middle", frame.x_at(0.5), frame.bottom() + FRAME_TO_X_NAME_PX, &name);
         }
     }
 
