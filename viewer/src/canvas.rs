@@ -23,6 +23,8 @@ pub enum Canvas {
     Cpu {
         /// What draws.
         rasterizer: Rasterizer,
+        /// Samples a pixel and direction.
+        samples: usize,
         /// The texture.
         texture: Option<TextureHandle>,
     },
@@ -32,14 +34,22 @@ impl Canvas {
     /// On the device of the interface, if it has one.
     #[must_use]
     pub fn new(state: Option<&RenderState>) -> Self {
+        /// This is for interfaces that nobody waits for.
+        const SAMPLES: usize = 2;
         match state {
             Some(state) => Self::Gpu {
                 scene: Box::new(GpuScene::new(&state.device, &state.queue)),
                 state: state.clone(),
                 shown: None,
             },
-            None => Self::Cpu { rasterizer: Rasterizer::default(), texture: None },
+            None => Self::on_processor(SAMPLES),
         }
+    }
+
+    /// On the processor, with so many samples a pixel and direction.
+    #[must_use]
+    pub fn on_processor(samples: usize) -> Self {
+        Self::Cpu { rasterizer: Rasterizer::default(), samples, texture: None }
     }
 
     /// Draws a mesh.
@@ -52,8 +62,6 @@ impl Canvas {
         size: [usize; 2],
     ) -> TextureId {
         const FILTER: wgpu::FilterMode = wgpu::FilterMode::Nearest;
-        /// Samples a pixel and direction on the processor: this is for interfaces that nobody waits for.
-        const SAMPLES: usize = 2;
         match self {
             Self::Gpu { scene, state, shown } => {
                 let view = scene.draw(mesh, camera, backdrop, size);
@@ -69,8 +77,8 @@ impl Canvas {
                 *shown = Some((id, size));
                 id
             }
-            Self::Cpu { rasterizer, texture } => {
-                let drawn = rasterizer.draw(mesh, camera, backdrop, size, SAMPLES);
+            Self::Cpu { rasterizer, samples, texture } => {
+                let drawn = rasterizer.draw(mesh, camera, backdrop, size, *samples);
                 let image = ColorImage::from_rgb(drawn.size, &drawn.rgb);
                 let load = || context.load_texture("scene", image.clone(), TextureOptions::NEAREST);
                 let texture = texture.get_or_insert_with(load);

@@ -7,6 +7,8 @@ use crate::quantity::Quantity;
 use crate::trace::Trace;
 use crate::ui::plot_stack::{ExportFormat, PlotStack};
 use crate::ui::plots::{PlotView, plot};
+use crate::ui::view3d::pixels;
+use egui::vec2;
 use flotor_plot::{Axis, Figure, Panel, Series};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -110,11 +112,9 @@ pub fn svg(history: &History, plots: &PlotStack) -> String {
 fn png(history: &History, plots: &PlotStack, look: Look) -> egui::ColorImage {
     let palette = Palette::of(look);
     let span_s = plots.span_s(history);
-    let height = HEIGHT_OF_ONE * plots.shown.len() as f32;
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
-    let size = [WIDTH * SCALE, (height + 20.0) * SCALE].map(|length| length as usize);
-    draw_without_window(size, SCALE, look, |ui| {
-        let inside = ui.max_rect().shrink2(egui::vec2(12.0, 4.0));
+    let size = vec2(WIDTH, HEIGHT_OF_ONE * plots.shown.len() as f32 + 20.0);
+    draw_without_window(pixels(size * SCALE), SCALE, look, |ui| {
+        let inside = ui.max_rect().shrink2(vec2(12.0, 4.0));
         let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(inside));
         for (index, quantity) in plots.shown.iter().enumerate() {
             let time_axis = index + 1 == plots.shown.len();

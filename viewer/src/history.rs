@@ -3,11 +3,11 @@
 use flotor_core::Clock;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, Pose, rotation_vector};
-use flotor_record::{Ending, Note, ReadError, Recording, RunDescription};
+use flotor_record::{Note, ReadError, Recording, RunDescription};
 use std::collections::VecDeque;
 use std::path::Path;
 
-/// What the viewer keeps of a tick. Half the size of the record: pictures need no more than `f32` of most of it.
+/// What the viewer keeps of a tick. Less than half the size of the record: pictures need no more than `f32` of most of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Scheduled time since the loop started, ns.
@@ -18,8 +18,6 @@ pub struct Sample {
     pub pose: Pose,
     /// Velocity of the handle, m/s and rad/s.
     pub twist: [f32; 6],
-    /// What the models asked for, N and N·m.
-    pub model: [f32; 6],
     /// What was sent to the device, N and N·m.
     pub commanded: [f32; 6],
     /// Energy stored in the models, J.
@@ -69,7 +67,6 @@ impl From<&TickRecord> for Sample {
             tick: record.tick,
             pose: record.pose,
             twist: six(record.twist.linear_m_per_s, record.twist.angular_rad_per_s),
-            model: six(record.model.force_n, record.model.torque_nm),
             commanded: six(record.commanded.force_n, record.commanded.torque_nm),
             energy_j: record.energy_j as f32,
             lateness_s: record.lateness_ns as f32 * 1.0e-9,
@@ -111,7 +108,6 @@ pub struct History {
     forgotten: u64,
     keep: Keep,
     notes: Vec<Note>,
-    ending: Option<Ending>,
 }
 
 impl History {
@@ -120,7 +116,7 @@ impl History {
     pub fn new(run: RunDescription, keep: Keep) -> Self {
         let capacity = if let Keep::Newest(count) = keep { count } else { 0 };
         let samples = VecDeque::with_capacity(capacity);
-        Self { run, samples, forgotten: 0, keep, notes: Vec::new(), ending: None }
+        Self { run, samples, forgotten: 0, keep, notes: Vec::new() }
     }
 
     /// All of a recording. Damage after the first tick costs only what follows it and becomes a note.
@@ -130,7 +126,6 @@ impl History {
     pub fn read(path: &Path) -> Result<Self, ReadError> {
         let mut recording = Recording::open(path)?;
         let mut history = Self::new(recording.run().clone(), Keep::All);
-        history.ending = Some(recording.ending());
         let mut damage = None;
         for tick in recording.by_ref() {
             match tick {
@@ -162,11 +157,6 @@ impl History {
         self.samples.push_back(Sample::from(record));
     }
 
-    /// Adds something that happened, in words.
-    pub fn note(&mut self, note: Note) {
-        self.notes.push(note);
-    }
-
     /// How the run was set up.
     #[must_use]
     pub fn run(&self) -> &RunDescription {
@@ -177,12 +167,6 @@ impl History {
     #[must_use]
     pub fn notes(&self) -> &[Note] {
         &self.notes
-    }
-
-    /// How the recording ends; `None` for a running host.
-    #[must_use]
-    pub fn ending(&self) -> Option<Ending> {
-        self.ending
     }
 
     /// How many samples there are.

@@ -1,17 +1,17 @@
 //! A picture of a moment of a run, without a window, a display or a GPU.
 
-use crate::camera::Camera;
-use crate::history::{History, Sample};
+use crate::canvas::Canvas;
+use crate::history::History;
 use crate::palette::{Look, Palette};
 use crate::quantity::{Quantity, Units};
 use crate::raster::flat::FlatRasterizer;
-use crate::raster::solid::Rasterizer;
 use crate::scene::{ArrowScale, SceneBuilder};
 use crate::shape::Shape;
 use crate::trace::Trace;
 use crate::ui::plots::{PlotView, plot};
+use crate::ui::view3d::{Subject, View3d};
 use crate::ui::{legend, readout, style};
-use egui::{Color32, ColorImage, Context, RawInput, Rect, TextureOptions, Ui, pos2, vec2};
+use egui::{ColorImage, Context, RawInput, Rect, Ui, pos2, vec2};
 use std::path::{Path, PathBuf};
 
 /// How a picture is to be made.
@@ -67,10 +67,17 @@ pub fn picture(
         None => history.strongest(),
     };
     let sample = *sample.ok_or(PictureError::Empty)?;
+    let (scale, height_mm) = (ArrowScale::fitting(history.samples()), SceneBuilder::height_mm(shapes));
+    let mut view3d = View3d::new(Canvas::on_processor(SAMPLES), height_mm);
     Ok(draw_without_window(options.size_px, options.scale, options.look, |ui| {
         let area = ui.max_rect();
         let view = Rect::from_min_size(area.min, vec2(area.width(), (area.height() * VIEW_PART).round()));
-        view_of(ui, view, history, shapes, &sample, options, &palette);
+        let subject = Subject { shapes, version: 0, sample: &sample, scale };
+        let facts = view3d.show(ui, view, options.look, subject);
+        readout::title(ui.painter(), view, history.run(), &palette);
+        readout::numbers(ui.painter(), view, &sample, Units::default(), &palette);
+        readout::paint_warnings(ui.painter(), view, &readout::warnings(&sample, &facts), &palette);
+        legend::paint(ui.painter(), view, &facts, &palette);
         let below = Rect::from_min_max(view.left_bottom() + vec2(14.0, 8.0), area.max - vec2(20.0, 4.0));
         let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(below));
         let height = (below.height() - 2.0 * 26.0 - 12.0) / 2.0;
@@ -86,35 +93,6 @@ pub fn picture(
             plot(&mut ui, history, &mut Trace::of(quantity), view, &palette);
         }
     }))
-}
-
-fn view_of(
-    ui: &mut Ui,
-    view: Rect,
-    history: &History,
-    shapes: &mut [Shape],
-    sample: &Sample,
-    options: &PictureOptions,
-    palette: &Palette,
-) {
-    let size_px = [view.width(), view.height()].map(|points| pixels(points * options.scale));
-    let camera = Camera::experimenter(SceneBuilder::height_mm(shapes));
-    let scale = ArrowScale::fitting(history.samples());
-    let mut builder = SceneBuilder::default();
-    let height_px = size_px[1] as f64;
-    let (mesh, facts) = builder.build(shapes, sample, palette, &camera, height_px, scale, true);
-    let drawn = Rasterizer::default().draw(mesh, &camera, palette.backdrop, size_px, SAMPLES);
-    let image = ColorImage::from_rgb(drawn.size, &drawn.rgb);
-    let texture = ui.ctx().load_texture("view", image, TextureOptions::NEAREST);
-    let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-    let painter = ui.painter().clone();
-    painter.image(texture.id(), view, whole, Color32::WHITE);
-    // The handle must outlive the frame, or the texture is gone before it is drawn.
-    ui.data_mut(|data| data.insert_temp(egui::Id::unique("view texture"), texture));
-    readout::title(&painter, view, history.run(), palette);
-    readout::numbers(&painter, view, sample, Units::default(), palette);
-    readout::paint_warnings(&painter, view, &readout::warnings(sample, &facts), palette);
-    legend::paint(&painter, view, &facts, palette);
 }
 
 /// Runs an interface for the few passes it takes to settle, and draws it on the CPU.
@@ -163,9 +141,4 @@ pub fn write_png(path: &Path, image: &ColorImage) -> Result<(), PictureError> {
         encoder.write_header()?.write_image_data(&bytes)
     };
     write().map_err(|cause| PictureError::Write { path: path.into(), cause: cause.into() })
-}
-
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
-fn pixels(length: f32) -> usize {
-    length.round().max(1.0) as usize
 }

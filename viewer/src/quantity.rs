@@ -53,53 +53,39 @@ impl Quantity {
     /// What people call it.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Force => "Force",
-            Self::Torque => "Torque",
-            Self::Position => "Position",
-            Self::Rotation => "Rotation",
-            Self::Velocity => "Velocity",
-            Self::AngularVelocity => "Angular velocity",
-            Self::Energy => "Energy",
-            Self::Lateness => "Lateness",
-        }
+        self.entry().0
     }
 
     /// Names of its components.
     #[must_use]
     pub const fn components(self) -> &'static [&'static str] {
-        match self {
-            Self::Force => &["Fx", "Fy", "Fz"],
-            Self::Torque => &["Mx", "My", "Mz"],
-            Self::Position => &["x", "y", "z"],
-            Self::Rotation => &["rx", "ry", "rz"],
-            Self::Velocity => &["vx", "vy", "vz"],
-            Self::AngularVelocity => &["wx", "wy", "wz"],
-            Self::Energy => &["stored"],
-            Self::Lateness => &["start", "compute"],
-        }
+        self.entry().1
     }
 
     /// Unit, and how many of it one SI unit is.
     #[must_use]
     pub const fn unit(self, units: Units) -> (&'static str, f64) {
+        let (_, _, si, handy) = self.entry();
+        match units {
+            Units::Si => (si, 1.0),
+            Units::Handy => handy,
+        }
+    }
+
+    /// Name, names of components, SI unit, and the unit people read with how many of it one SI unit is.
+    const fn entry(self) -> (&'static str, &'static [&'static str], &'static str, (&'static str, f64)) {
         const DEGREES_PER_RAD: f64 = 180.0 / std::f64::consts::PI;
-        match (self, units) {
-            (Self::Force, _) => ("N", 1.0),
-            (Self::Torque, Units::Si) => ("N·m", 1.0),
-            (Self::Torque, Units::Handy) => ("mN·m", 1.0e3),
-            (Self::Position, Units::Si) => ("m", 1.0),
-            (Self::Position, Units::Handy) => ("mm", 1.0e3),
-            (Self::Rotation, Units::Si) => ("rad", 1.0),
-            (Self::Rotation, Units::Handy) => ("°", DEGREES_PER_RAD),
-            (Self::Velocity, Units::Si) => ("m/s", 1.0),
-            (Self::Velocity, Units::Handy) => ("mm/s", 1.0e3),
-            (Self::AngularVelocity, Units::Si) => ("rad/s", 1.0),
-            (Self::AngularVelocity, Units::Handy) => ("°/s", DEGREES_PER_RAD),
-            (Self::Energy, Units::Si) => ("J", 1.0),
-            (Self::Energy, Units::Handy) => ("mJ", 1.0e3),
-            (Self::Lateness, Units::Si) => ("s", 1.0),
-            (Self::Lateness, Units::Handy) => ("µs", 1.0e6),
+        match self {
+            Self::Force => ("Force", &["Fx", "Fy", "Fz"], "N", ("N", 1.0)),
+            Self::Torque => ("Torque", &["Mx", "My", "Mz"], "N·m", ("mN·m", 1.0e3)),
+            Self::Position => ("Position", &["x", "y", "z"], "m", ("mm", 1.0e3)),
+            Self::Rotation => ("Rotation", &["rx", "ry", "rz"], "rad", ("°", DEGREES_PER_RAD)),
+            Self::Velocity => ("Velocity", &["vx", "vy", "vz"], "m/s", ("mm/s", 1.0e3)),
+            Self::AngularVelocity => {
+                ("Angular velocity", &["wx", "wy", "wz"], "rad/s", ("°/s", DEGREES_PER_RAD))
+            }
+            Self::Energy => ("Energy", &["stored"], "J", ("mJ", 1.0e3)),
+            Self::Lateness => ("Lateness", &["start", "compute"], "s", ("µs", 1.0e6)),
         }
     }
 

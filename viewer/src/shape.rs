@@ -7,7 +7,7 @@
 use crate::geometry::{Body, Curve, Strain};
 use flotor_core::mapping::Mapping;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
+use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting, read_metadata};
 use flotor_hal::{Input, Pose};
 use flotor_record::{PluginDescription, Role, RunDescription};
 use std::path::{Path, PathBuf};
@@ -68,6 +68,12 @@ pub fn shapes_of(run: &RunDescription, plugin_files: &[PathBuf]) -> (Vec<Shape>,
     (shapes, errors)
 }
 
+/// The one of some plugin files that has an id; runs no code.
+#[must_use]
+pub fn file_of<'a>(plugin_files: &'a [PathBuf], id: &str) -> Option<&'a PathBuf> {
+    plugin_files.iter().find(|file| read_metadata(file).is_ok_and(|metadata| metadata.id == id))
+}
+
 /// Loads a plugin file; runs its code.
 ///
 /// # Errors
@@ -87,11 +93,8 @@ impl Shape {
         plugin_files: &[PathBuf],
     ) -> Result<Option<Self>, ShapeError> {
         let PluginDescription { name, id, .. } = description;
-        let is_it = |file: &&PathBuf| {
-            flotor_hal::abi::loader::read_metadata(file).is_ok_and(|metadata| metadata.id == *id)
-        };
         let no_plugin = || ShapeError::NoPlugin { name: name.clone(), id: id.clone() };
-        let plugin = load_file(plugin_files.iter().find(is_it).ok_or_else(no_plugin)?)?;
+        let plugin = load_file(file_of(plugin_files, id).ok_or_else(no_plugin)?)?;
         let parse = |(key, value): &(String, String)| {
             Setting::parse(plugin.parameters(), key, value)
                 .map_err(|error| ShapeError::Setting { name: name.clone(), problem: error.to_string() })

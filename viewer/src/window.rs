@@ -37,16 +37,44 @@ pub enum WindowError {
 }
 
 /// What a command line says about a window; what it does not say is as it was the last time.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, clap::Args)]
 pub struct WindowWish {
-    /// Light or dark.
+    /// Light or dark (default: dark; a window: as the last time)
+    #[arg(long, value_enum)]
     pub look: Option<Look>,
-    /// Width and height, points.
+    /// Width and height of picture or window (default: 1280x800; a window: as the last time)
+    #[arg(long, value_parser = size, value_name = "WxH")]
     pub size: Option<[usize; 2]>,
-    /// Size of text and lines.
+    /// Size of text and lines, 1 to 3 (default: 1; a window: as the last time)
+    #[arg(long, value_parser = scale, value_name = "FACTOR")]
     pub scale: Option<f32>,
-    /// Watch what the window costs for so long, and close it then.
+    /// Say what the window costs over so many seconds, 1 to 3600, once it has opened, which may take up to half a minute more, and
+    /// close it then
+    #[arg(long, value_parser = seconds, value_name = "SECONDS", conflicts_with_all = ["screenshot", "sitting"])]
     pub measure: Option<Duration>,
+}
+
+/// `1280x800`
+fn size(text: &str) -> Result<[usize; 2], String> {
+    let wrong = || format!("`{text}` is no size; write 1280x800, each side 64 to 8192 pixels");
+    let (width, height) = text.split_once('x').ok_or_else(wrong)?;
+    let length =
+        |text: &str| text.parse().ok().filter(|length| (64..=8192).contains(length)).ok_or_else(wrong);
+    Ok([length(width)?, length(height)?])
+}
+
+/// `10`
+fn seconds(text: &str) -> Result<Duration, String> {
+    let wrong = || format!("`{text}` is no time to watch a window; legal is 1 to 3600 seconds");
+    let seconds: f64 =
+        text.parse().ok().filter(|seconds| (1.0..=3600.0).contains(seconds)).ok_or_else(wrong)?;
+    Ok(Duration::from_secs_f64(seconds))
+}
+
+/// `1.5`
+fn scale(text: &str) -> Result<f32, String> {
+    let wrong = || format!("`{text}` is no size of text; legal is 1 to 3");
+    text.parse().ok().filter(|scale| (1.0..=3.0).contains(scale)).ok_or_else(wrong)
 }
 
 /// Opens a window and stays until it is closed; gives what it cost, if that was asked for.

@@ -70,6 +70,11 @@ impl Axis {
         }
     }
 
+    /// Label and unit, as far as there are any: `Force (10⁻⁶ N)`.
+    pub(super) fn name(&self, exponent: i32) -> String {
+        format!("{} {}", self.label, self.unit_label(exponent)).trim().to_owned()
+    }
+
     /// The range the axis covers for data within `extent`.
     pub(super) fn domain(&self, extent: Extent, fit: Fit) -> Domain {
         let fixed = self.fixed.and_then(|(low, high)| {

@@ -52,12 +52,11 @@ pub(super) struct Heading {
 impl Heading {
     /// The heading of `panel`, whose y tick labels leave out `exponent`, cut to `limit_px`.
     pub(super) fn new(panel: &Panel, exponent: i32, limit_px: f64) -> Self {
-        let unit = panel.y.unit_label(exponent);
         let (strong, light) = match panel.title.is_empty() {
-            true => (panel.y.label.clone(), unit),
-            false => (panel.title.clone(), format!("{} {unit}", panel.y.label).trim().to_owned()),
+            true => (&panel.y.label, panel.y.unit_label(exponent)),
+            false => (&panel.title, panel.y.name(exponent)),
         };
-        let strong = text::shorten(&strong, limit_px, font_px::HEADING);
+        let strong = text::shorten(strong, limit_px, font_px::HEADING);
         let room_px = (limit_px - text::width_px(&strong, font_px::HEADING)).max(0.0);
         Self { light: text::shorten(&light, room_px, font_px::HEADING), strong }
     }

@@ -6,8 +6,7 @@
 
 use super::axis::{Axis, Domain, Extent, Fit};
 use super::labels::{
-    HEADING_ROW_PX, Heading, LEGEND_ROW_PX, Legend, MARK_ROW_PX, MarkLabel, side_gutter_px, side_labels,
-    top_labels,
+    HEADING_ROW_PX, Heading, LEGEND_ROW_PX, Legend, MARK_ROW_PX, MarkLabel, side_gutter_px, top_labels,
 };
 use super::mark::Direction;
 use super::path::{Projection, Rect};
@@ -48,23 +47,13 @@ pub(super) struct Layout<'a> {
 /// One arranged panel.
 #[derive(Debug)]
 pub(super) struct Cell<'a> {
-    pub(super) panel: &'a Panel,
-    pub(super) x_axis: &'a Axis,
+    pub(super) draft: Draft<'a>,
+    pub(super) head: Head<'a>,
     pub(super) projection: Projection,
-    pub(super) x_ticks: Ticks,
-    pub(super) y_ticks: Ticks,
-    /// Whether the x tick labels and the x axis' name stand under this panel.
-    pub(super) has_x_labels: bool,
-    /// Whether any sample is seen.
-    pub(super) has_data: bool,
-    pub(super) heading: Heading,
     /// Left end of the heading, and of a legend in rows of its own.
     pub(super) left: f64,
     /// Top of the heading row.
     pub(super) top: f64,
-    pub(super) legend: Legend<'a>,
-    pub(super) side_labels: Vec<MarkLabel>,
-    pub(super) top_labels: Vec<MarkLabel>,
 }
 
 /// Arranges the whole figure.
@@ -75,24 +64,28 @@ pub(super) fn arrange(figure: &Figure) -> Layout<'_> {
     let subtitle = text::wrap(&figure.subtitle, inner_px, font_px::SUBTITLE);
     let mut y = MARGIN_PX + TITLE_LINE_PX * title.len() as f64 + SUBTITLE_LINE_PX * subtitle.len() as f64;
 
-    let drafts = drafts(figure);
+    let mut drafts = drafts(figure);
     let columns = columns(figure, &drafts);
     let mut cells = Vec::with_capacity(drafts.len());
-    for row in drafts.chunks(columns.len().max(1)) {
+    while !drafts.is_empty() {
+        let row = drafts.drain(..columns.len().min(drafts.len())).collect();
         y = place_row(row, &columns, figure.panel_height_px, y + ROW_GAP_PX, &mut cells);
     }
     Layout { height: y + MARGIN_PX, title, subtitle, cells }
 }
 
 /// A panel with its ranges, before it has a place.
-struct Draft<'a> {
-    panel: &'a Panel,
-    x_axis: &'a Axis,
+#[derive(Debug)]
+pub(super) struct Draft<'a> {
+    pub(super) panel: &'a Panel,
+    pub(super) x_axis: &'a Axis,
     x: Domain,
     y: Domain,
-    y_ticks: Ticks,
-    has_x_labels: bool,
-    has_data: bool,
+    pub(super) y_ticks: Ticks,
+    /// Whether the x tick labels and the x axis' name stand under this panel.
+    pub(super) has_x_labels: bool,
+    /// Whether any sample is seen.
+    pub(super) has_data: bool,
 }
 
 fn drafts(figure: &Figure) -> Vec<Draft<'_>> {
@@ -187,12 +180,13 @@ fn columns(figure: &Figure, drafts: &[Draft<'_>]) -> Vec<Column> {
         .collect()
 }
 
-/// A panel with its x ticks and the labels above it, before its height in the figure is known.
-struct Head<'a> {
-    x_ticks: Ticks,
-    heading: Heading,
-    legend: Legend<'a>,
-    top_labels: Vec<MarkLabel>,
+/// What stands above a panel, and its x ticks: all that depends on its column and not on its row.
+#[derive(Debug)]
+pub(super) struct Head<'a> {
+    pub(super) x_ticks: Ticks,
+    pub(super) heading: Heading,
+    pub(super) legend: Legend<'a>,
+    pub(super) top_labels: Vec<MarkLabel>,
     height_px: f64,
 }
 
@@ -220,38 +214,24 @@ impl<'a> Head<'a> {
 /// Places one row of panels below `top`, headings on one line and frames on another; returns the bottom of
 /// the row.
 fn place_row<'a>(
-    row: &[Draft<'a>],
+    row: Vec<Draft<'a>>,
     columns: &[Column],
     height_px: f64,
     top: f64,
     cells: &mut Vec<Cell<'a>>,
 ) -> f64 {
+    // Where one panel of a row carries x labels there is room for all to.
+    let has_x_labels = row.iter().any(|draft| draft.has_x_labels);
+    let foot_px = if has_x_labels { row.iter().map(Draft::foot_px).fold(0.0, f64::max) } else { 0.0 };
     let heads: Vec<Head<'a>> =
         row.iter().zip(columns).map(|(draft, column)| Head::new(draft, column)).collect();
     let frame_top = top + heads.iter().map(|head| head.height_px).fold(0.0, f64::max);
-    // Where one panel of a row carries x labels there is room for all to.
-    let has_x_labels = row.iter().any(|draft| draft.has_x_labels);
-    for ((draft, column), head) in row.iter().zip(columns).zip(heads) {
-        let frame =
-            Rect { left: column.frame_left, top: frame_top, width: column.frame_width, height: height_px };
+    for ((draft, head), &Column { left, frame_left, frame_width }) in row.into_iter().zip(heads).zip(columns)
+    {
+        let frame = Rect { left: frame_left, top: frame_top, width: frame_width, height: height_px };
         let projection = Projection { x: draft.x, y: draft.y, frame };
-        cells.push(Cell {
-            panel: draft.panel,
-            x_axis: draft.x_axis,
-            projection,
-            x_ticks: head.x_ticks,
-            y_ticks: draft.y_ticks.clone(),
-            has_x_labels,
-            has_data: draft.has_data,
-            heading: head.heading,
-            left: column.left,
-            top,
-            legend: head.legend,
-            side_labels: side_labels(&draft.panel.marks, &projection),
-            top_labels: head.top_labels,
-        });
+        cells.push(Cell { draft: Draft { has_x_labels, ..draft }, head, projection, left, top });
     }
-    let foot_px = if has_x_labels { row.iter().map(Draft::foot_px).fold(0.0, f64::max) } else { 0.0 };
     frame_top + height_px + foot_px
 }
 

@@ -5,7 +5,7 @@
 
 use super::axis::{Domain, Scale};
 use super::labels::{
-    HEADING_ROW_PX, LEGEND_ROW_PX, Legend, LegendEntry, MARK_ROW_PX, SIDE_LABEL_GAP_PX, baseline,
+    HEADING_ROW_PX, LEGEND_ROW_PX, Legend, LegendEntry, MARK_ROW_PX, SIDE_LABEL_GAP_PX, baseline, side_labels,
 };
 use super::layout::{
     Cell, FRAME_TO_X_LABEL_PX, FRAME_TO_X_NAME_PX, FRAME_TO_Y_LABEL_PX, Layout, MARGIN_PX, SUBTITLE_LINE_PX,
@@ -60,13 +60,12 @@ pub(super) fn document(figure: &Figure, layout: &Layout<'_>) -> String {
 fn description(figure: &Figure, layout: &Layout<'_>) -> String {
     let mut description = figure.subtitle.clone();
     for cell in &layout.cells {
-        let panel = cell.panel;
-        let name = |label: &str, unit: String| format!("{label} {unit}").trim().to_owned();
+        let panel = cell.draft.panel;
         let sentence = format!(
             " {}{} against {}:",
             if panel.title.is_empty() { String::new() } else { format!("{}: ", panel.title) },
-            name(&panel.y.label, panel.y.unit_label(0)),
-            name(&cell.x_axis.label, cell.x_axis.unit_label(0)),
+            panel.y.name(0),
+            cell.draft.x_axis.name(0),
         );
         description.push_str(&sentence);
         let clauses: Vec<String> = panel
@@ -132,14 +131,14 @@ impl Writer {
     }
 
     fn cell(&mut self, cell: &Cell<'_>) {
-        let series = cell.panel.series.iter().enumerate();
+        let series = cell.draft.panel.series.iter().enumerate();
         let drawings: Vec<Option<Drawing>> =
             series.map(|(index, series)| draw(series, series.look(index), &cell.projection)).collect();
         self.raw("<g>\n");
         self.grid(cell);
         self.reference_lines(cell);
         self.data(cell, &drawings);
-        if cell.has_x_labels {
+        if cell.draft.has_x_labels {
             self.x_axis(cell);
         }
         self.y_labels(cell);
@@ -151,7 +150,7 @@ impl Writer {
     fn reference_lines(&mut self, cell: &Cell<'_>) {
         let projection @ Projection { x, y, frame } = &cell.projection;
         let mut path = Path::default();
-        for mark in &cell.panel.marks {
+        for mark in &cell.draft.panel.marks {
             let line = match mark.direction {
                 Direction::X => mark.visible(x).map(|at| frame.upright(projection.x_px(at))),
                 Direction::Y => mark.visible(y).map(|at| frame.level(projection.y_px(at))),
@@ -165,19 +164,27 @@ impl Writer {
         let Projection { x, y, frame } = &cell.projection;
         let (mut minor, mut major, mut zero_line) = (Path::default(), Path::default(), Path::default());
         if has_minor_grid(x, frame.width) {
-            cell.x_ticks.minor.iter().for_each(|&at| minor.polyline(frame.upright(frame.x_at(at))));
+            cell.head.x_ticks.minor.iter().for_each(|&at| minor.polyline(frame.upright(frame.x_at(at))));
         }
         if has_minor_grid(y, frame.height) {
-            cell.y_ticks.minor.iter().for_each(|&at| minor.polyline(frame.level(frame.y_at(at))));
+            cell.draft.y_ticks.minor.iter().for_each(|&at| minor.polyline(frame.level(frame.y_at(at))));
         }
-        cell.x_ticks.major.iter().for_each(|tick| major.polyline(frame.upright(frame.x_at(tick.position))));
-        cell.y_ticks.major.iter().for_each(|tick| major.polyline(frame.level(frame.y_at(tick.position))));
-        if !cell.has_x_labels {
+        cell.head
+            .x_ticks
+            .major
+            .iter()
+            .for_each(|tick| major.polyline(frame.upright(frame.x_at(tick.position))));
+        cell.draft
+            .y_ticks
+            .major
+            .iter()
+            .for_each(|tick| major.polyline(frame.level(frame.y_at(tick.position))));
+        if !cell.draft.has_x_labels {
             major.polyline(frame.level(frame.bottom()));
         }
         let zero = y.scale.forward(0.0).map(|zero| y.fraction(zero)).filter(|zero| (0.0..1.0).contains(zero));
         if let Some(zero) = zero
-            && !cell.y_ticks.major.is_empty()
+            && !cell.draft.y_ticks.major.is_empty()
         {
             zero_line.polyline(frame.level(frame.y_at(zero)));
         }
@@ -188,12 +195,13 @@ impl Writer {
 
     fn data(&mut self, cell: &Cell<'_>, drawings: &[Option<Drawing>]) {
         let frame = &cell.projection.frame;
-        if !cell.has_data {
+        if !cell.draft.has_data {
             let y = baseline(frame.y_at(0.5), font_px::LABEL);
             self.text("label muted middle", frame.x_at(0.5), y, "no data");
             return;
         }
-        let has_markers = cell.panel.series.iter().any(|series| matches!(series.shape, Shape::Points(_)));
+        let has_markers =
+            cell.draft.panel.series.iter().any(|series| matches!(series.shape, Shape::Points(_)));
         let slack = if has_markers { MARKER_SLACK_PX } else { LINE_SLACK_PX };
         // A nested document clips without an id, unlike <clipPath>.
         let (x, y) = (px(frame.left - slack), px(frame.top - slack));
@@ -202,7 +210,7 @@ impl Writer {
             "<svg x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" \
              viewBox=\"{x} {y} {width} {height}\" overflow=\"hidden\">\n"
         ));
-        for (index, (series, drawing)) in cell.panel.series.iter().zip(drawings).enumerate() {
+        for (index, (series, drawing)) in cell.draft.panel.series.iter().zip(drawings).enumerate() {
             if let Some(drawing) = drawing {
                 self.drawing(drawing, series.look(index));
             }
@@ -230,26 +238,26 @@ impl Writer {
         let frame = &cell.projection.frame;
         let mut axis = Path::default();
         axis.polyline(frame.level(frame.bottom()));
-        let major = cell.x_ticks.major.iter().map(|tick| (tick.position, MAJOR_TICK_PX));
-        let minor = cell.x_ticks.minor.iter().map(|&position| (position, MINOR_TICK_PX));
+        let major = cell.head.x_ticks.major.iter().map(|tick| (tick.position, MAJOR_TICK_PX));
+        let minor = cell.head.x_ticks.minor.iter().map(|&position| (position, MINOR_TICK_PX));
         for (position, length) in major.chain(minor) {
             let x = frame.x_at(position);
             axis.polyline([(x, frame.bottom()), (x, frame.bottom() + length)]);
         }
         self.path("hair axis", &axis);
-        for tick in &cell.x_ticks.major {
+        for tick in &cell.head.x_ticks.major {
             let y = frame.bottom() + FRAME_TO_X_LABEL_PX;
             self.text("muted middle", frame.x_at(tick.position), y, &tick.label);
         }
-        let name = format!("{} {}", cell.x_axis.label, cell.x_axis.unit_label(cell.x_ticks.exponent));
-        if !name.trim().is_empty() {
-            self.text("label middle", frame.x_at(0.5), frame.bottom() + FRAME_TO_X_NAME_PX, name.trim());
+        let name = cell.draft.x_axis.name(cell.head.x_ticks.exponent);
+        if !name.is_empty() {
+            self.text("label middle", frame.x_at(0.5), frame.bottom() + FRAME_TO_X_NAME_PX, &name);
         }
     }
 
     fn y_labels(&mut self, cell: &Cell<'_>) {
         let frame = &cell.projection.frame;
-        for tick in &cell.y_ticks.major {
+        for tick in &cell.draft.y_ticks.major {
             let y = baseline(frame.y_at(tick.position), font_px::TICK);
             self.text("muted end", frame.left - FRAME_TO_Y_LABEL_PX, y, &tick.label);
         }
@@ -258,17 +266,17 @@ impl Writer {
     /// Heading and legend.
     fn head(&mut self, cell: &Cell<'_>, drawings: &[Option<Drawing>]) {
         let y = baseline(cell.top + 0.5 * HEADING_ROW_PX, font_px::HEADING);
-        let light = match cell.heading.light.is_empty() {
+        let light = match cell.head.heading.light.is_empty() {
             true => String::new(),
-            false => format!(" <tspan class=\"unit muted\">{}</tspan>", escape(&cell.heading.light)),
+            false => format!(" <tspan class=\"unit muted\">{}</tspan>", escape(&cell.head.heading.light)),
         };
         self.raw(&format!(
             "<text class=\"heading\" x=\"{}\" y=\"{}\">{}{light}</text>\n",
             px(cell.left),
             px(y),
-            escape(&cell.heading.strong)
+            escape(&cell.head.heading.strong)
         ));
-        let Legend { entries, own_rows } = &cell.legend;
+        let Legend { entries, own_rows } = &cell.head.legend;
         let first_row = match own_rows {
             0 => cell.top + 0.5 * HEADING_ROW_PX,
             _ => cell.top + HEADING_ROW_PX + 0.5 * LEGEND_ROW_PX,
@@ -308,12 +316,12 @@ impl Writer {
     fn mark_labels(&mut self, cell: &Cell<'_>) {
         let frame = &cell.projection.frame;
         let mut leaders = Path::default();
-        for label in &cell.side_labels {
+        for label in side_labels(&cell.draft.panel.marks, &cell.projection) {
             let x = frame.right() + SIDE_LABEL_GAP_PX;
             leaders.polyline([(frame.right(), label.anchor), (x - 4.0, label.middle)]);
             self.text("label muted", x, baseline(label.middle, font_px::LABEL), &label.text);
         }
-        for label in &cell.top_labels {
+        for label in &cell.head.top_labels {
             let row_bottom = frame.top - MARK_ROW_PX * label.row as f64;
             leaders.polyline([(label.anchor, frame.top), (label.anchor, row_bottom - MARK_ROW_PX + 2.0)]);
             self.text("label muted", label.start(), row_bottom - 0.3 * MARK_ROW_PX, &label.text);

@@ -62,22 +62,10 @@ impl Slot {
     }
 }
 
-/// A plus sign with arms of the given reach and half width.
+/// A plus sign with arms of the given reach and half width: the upper arm and the corner after it, turned by quarters.
 fn plus_outline(reach: f64, half: f64) -> [(f64, f64); 12] {
-    [
-        (-half, -reach),
-        (half, -reach),
-        (half, -half),
-        (reach, -half),
-        (reach, half),
-        (half, half),
-        (half, reach),
-        (-half, reach),
-        (-half, half),
-        (-reach, half),
-        (-reach, -half),
-        (-half, -half),
-    ]
+    let arm = [(-half, -reach), (half, -reach), (half, -half)];
+    std::array::from_fn(|corner| (0..corner / 3).fold(arm[corner % 3], |(x, y), _| (-y, x)))
 }
 
 /// The plus sign turned by an eighth.

@@ -2,7 +2,7 @@
 
 use crate::feed::{Feed, FeedState};
 use crate::panel::{Panel, Use};
-use crate::shape::{Shape, load_file, shapes_of};
+use crate::shape::{Shape, file_of, load_file, shapes_of};
 use egui::Context;
 use flotor_live::{Client, Directory, LiveError, PanelPlugin};
 use flotor_record::RunDescription;
@@ -118,10 +118,8 @@ impl Parts {
     pub(super) fn of_recording(run: &RunDescription, files: &[PathBuf]) -> Self {
         let (shapes, missing) = shapes_of(run, files);
         let schema = |id: &str| {
-            let file = files.iter().find(|file| {
-                flotor_hal::abi::loader::read_metadata(file).is_ok_and(|metadata| metadata.id == id)
-            });
-            file.and_then(|file| load_file(file).ok()).map_or(&[][..], |plugin| plugin.parameters())
+            let plugin = file_of(files, id).and_then(|file| load_file(file).ok());
+            plugin.map_or(&[][..], |plugin| plugin.parameters())
         };
         let panels = run.plugins.iter().map(|plugin| {
             let file = PathBuf::from(&plugin.file);

@@ -43,24 +43,17 @@ pub fn torque_arrow(
         return;
     }
     let out = |angle: f64| frame.x * angle.cos() + frame.y * angle.sin();
-    let mut last: Option<Vec<u32>> = None;
-    for k in 0..=RINGS {
+    mesh.sheet(RINGS + 1, |mesh, k| {
         let radial = out(arc_rad * k as f64 / RINGS as f64);
-        let ring: Vec<u32> = (0..SIDES)
-            .map(|i| {
-                let around = DVec2::from_angle(TAU * i as f64 / SIDES as f64);
-                let normal = radial * around.x + axis * around.y;
-                mesh.vertex(center_m + radial * radius_m + normal * shaft_m, normal, color)
-            })
-            .collect();
-        if let Some(last) = &last {
-            for i in 0..SIDES {
-                let j = (i + 1) % SIDES;
-                mesh.quad(last[i], ring[i], ring[j], last[j]);
-            }
-        }
-        last = Some(ring);
-    }
+        let corner = |i: usize| {
+            let around = DVec2::from_angle(TAU * i as f64 / SIDES as f64);
+            let normal = radial * around.x + axis * around.y;
+            mesh.vertex(center_m + radial * radius_m + normal * shaft_m, normal, color)
+        };
+        let mut ring: Vec<u32> = (0..SIDES).map(corner).collect();
+        ring.push(ring[0]);
+        ring
+    });
     let tip = out(arc_rad);
     let head = Frame::along(center_m + tip * radius_m, axis.cross(tip));
     let profile = [(0.0, 0.0), (HEAD_RADIUS * shaft_m, 0.0), (0.0, HEAD_LENGTH * shaft_m)];

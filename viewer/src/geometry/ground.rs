@@ -65,24 +65,16 @@ impl Ground {
     }
 
     fn surface(&self, mesh: &mut Mesh) {
-        let mut last: Option<Vec<u32>> = None;
-        for k in 0..=RINGS {
+        mesh.sheet(RINGS + 1, |mesh, k| {
             // Denser in the middle, where the shadows are.
             let radius_m = self.radius_m * (k as f64 / RINGS as f64).powf(1.6);
-            let ring: Vec<u32> = (0..=SECTORS)
-                .map(|i| {
-                    let at = DVec2::from_angle(TAU * i as f64 / SECTORS as f64) * radius_m;
-                    let color = with_opacity(self.surface, self.fade(at));
-                    mesh.vertex(at.extend(self.height_m), DVec3::ZERO, color)
-                })
-                .collect();
-            if let Some(last) = &last {
-                for i in 0..SECTORS {
-                    mesh.quad(last[i], ring[i], ring[i + 1], last[i + 1]);
-                }
-            }
-            last = Some(ring);
-        }
+            let corner = |i: usize| {
+                let at = DVec2::from_angle(TAU * i as f64 / SECTORS as f64) * radius_m;
+                let color = with_opacity(self.surface, self.fade(at));
+                mesh.vertex(at.extend(self.height_m), DVec3::ZERO, color)
+            };
+            (0..=SECTORS).map(corner).collect::<Vec<u32>>()
+        });
     }
 
     #[allow(clippy::cast_possible_truncation)] // a few dozen lines
@@ -95,21 +87,15 @@ impl Ground {
             for line in -count..=count {
                 let offset_m = f64::from(line) * self.spacing_m;
                 let reach_m = (self.radius_m.powi(2) - offset_m.powi(2)).max(0.0).sqrt();
-                let mut last: Option<(u32, u32)> = None;
-                for piece in 0..=PIECES {
+                mesh.sheet(PIECES + 1, |mesh, piece| {
                     let along_m = reach_m * (2.0 * piece as f64 / PIECES as f64 - 1.0);
                     let at = |side: f64| {
                         let (u, v) = (along_m, offset_m + side * half_m);
                         if across_x { DVec2::new(u, v) } else { DVec2::new(-v, u) }
                     };
                     let color = with_opacity(self.line, self.fade(at(0.0)));
-                    let [a, b] =
-                        [-1.0, 1.0].map(|side| mesh.vertex(at(side).extend(height_m), DVec3::ZERO, color));
-                    if let Some((a0, b0)) = last {
-                        mesh.quad(a0, a, b, b0);
-                    }
-                    last = Some((a, b));
-                }
+                    [-1.0, 1.0].map(|side| mesh.vertex(at(side).extend(height_m), DVec3::ZERO, color))
+                });
             }
         }
     }

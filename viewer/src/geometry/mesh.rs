@@ -54,4 +54,17 @@ impl Mesh {
     pub fn quad(&mut self, a: u32, b: u32, c: u32, d: u32) {
         self.indices.extend_from_slice(&[a, b, c, a, c, d]);
     }
+
+    /// Adds a surface of so many rows of corners: `row` adds one, and quads join it to the one before.
+    pub fn sheet<Row: AsRef<[u32]>>(&mut self, rows: usize, row: impl Fn(&mut Self, usize) -> Row) {
+        let mut last: Option<Row> = None;
+        for number in 0..rows {
+            let row = row(self, number);
+            let before = last.iter().flat_map(|last| last.as_ref().windows(2));
+            for (near, far) in before.zip(row.as_ref().windows(2)) {
+                self.quad(near[0], far[0], far[1], near[1]);
+            }
+            last = Some(row);
+        }
+    }
 }

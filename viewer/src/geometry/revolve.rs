@@ -40,18 +40,13 @@ pub fn revolve(mesh: &mut Mesh, frame: &Frame, profile: &[(f64, f64)], sides: us
     for pair in profile.windows(2) {
         let [(r0, z0), (r1, z1)] = [pair[0], pair[1]];
         let slope = DVec2::new(z1 - z0, r0 - r1).normalize_or_zero();
-        let mut last: Option<(u32, u32)> = None;
-        for i in 0..=sides {
+        mesh.sheet(sides + 1, |mesh, i| {
             let around = DVec2::from_angle(TAU * i as f64 / sides as f64);
             let out = frame.x * around.x + frame.y * around.y;
             let normal = out * slope.x + frame.z * slope.y;
-            let a = mesh.vertex(frame.origin_m + out * r0 + frame.z * z0, normal, color);
-            let b = mesh.vertex(frame.origin_m + out * r1 + frame.z * z1, normal, color);
-            if let Some((a0, b0)) = last {
-                mesh.quad(a0, a, b, b0);
-            }
-            last = Some((a, b));
-        }
+            [(r0, z0), (r1, z1)]
+                .map(|(r, z)| mesh.vertex(frame.origin_m + out * r + frame.z * z, normal, color))
+        });
     }
 }
 

@@ -53,10 +53,7 @@ pub fn plot(
         .min_thickness(52.0)
         .label_spacing(egui::Rangef::new(11.0, 30.0))
         .formatter(|mark, _| short(mark.value));
-    let mut x_axis = AxisHints::new_x().formatter(|mark, _| format!("{} s", short(mark.value)));
-    if !time_axis {
-        x_axis = x_axis.min_thickness(0.0).formatter(|_, _| String::new());
-    }
+    let x_axis = AxisHints::new_x().formatter(|mark, _| format!("{} s", short(mark.value)));
     let shown = Plot::new(("plot", quantity.name()))
         .height(height)
         .show_axes([time_axis, true])

@@ -52,14 +52,10 @@ pub fn numbers(painter: &Painter, area: Rect, sample: &Sample, units: Units, pal
     let right = area.right() - MARGIN;
     let mut y = area.top() + MARGIN - 2.0;
     let line = BODY_PT + 6.0;
+    let (large, mono) = (FontId::monospace(BODY_PT + 3.0), FontId::monospace(BODY_PT - 1.0));
+    let (small, name) = (FontId::proportional(SMALL_PT), FontId::proportional(SMALL_PT + 0.5));
     let time = format!("{:.3} s", sample.time_s());
-    painter.text(
-        Pos2::new(right, y),
-        Align2::RIGHT_TOP,
-        time,
-        FontId::monospace(BODY_PT + 3.0),
-        palette.text,
-    );
+    painter.text(Pos2::new(right, y), Align2::RIGHT_TOP, time, large, palette.text);
     y += line + 6.0;
     if area.width() < ROOM_FOR_NUMBERS_PT {
         return;
@@ -67,16 +63,8 @@ pub fn numbers(painter: &Painter, area: Rect, sample: &Sample, units: Units, pal
     let shown = [Quantity::Force, Quantity::Torque, Quantity::Position, Quantity::Rotation, Quantity::Energy];
     for quantity in shown {
         let (unit, per_si) = quantity.unit(units);
-        let mono = FontId::monospace(BODY_PT - 1.0);
-        let mut x = right;
-        painter.text(
-            Pos2::new(x - 34.0, y),
-            Align2::LEFT_TOP,
-            unit,
-            FontId::proportional(SMALL_PT),
-            palette.faint,
-        );
-        x -= 42.0;
+        painter.text(Pos2::new(right - 34.0, y), Align2::LEFT_TOP, unit, small.clone(), palette.faint);
+        let mut x = right - 42.0;
         for component in (0..quantity.components().len()).rev() {
             let value = fixed(quantity.value(sample, component) * per_si);
             let color =
@@ -85,8 +73,7 @@ pub fn numbers(painter: &Painter, area: Rect, sample: &Sample, units: Units, pal
             x -= 60.0;
         }
         x = right - 42.0 - 3.0 * 60.0;
-        let font = FontId::proportional(SMALL_PT + 0.5);
-        painter.text(Pos2::new(x - 4.0, y), Align2::RIGHT_TOP, quantity.name(), font, palette.faint);
+        painter.text(Pos2::new(x - 4.0, y), Align2::RIGHT_TOP, quantity.name(), name.clone(), palette.faint);
         y += line;
     }
 }

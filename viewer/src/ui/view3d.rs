@@ -150,7 +150,9 @@ impl View3d {
     }
 }
 
+/// The whole pixels of a size, one at least.
+#[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
-fn pixels(size: Vec2) -> [usize; 2] {
+pub fn pixels(size: Vec2) -> [usize; 2] {
     [size.x, size.y].map(|length| length.round().max(1.0) as usize)
 }
