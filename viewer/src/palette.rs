@@ -6,6 +6,7 @@
 
 use crate::geometry::Color;
 use crate::raster::solid::Backdrop;
+use clap::builder::Resettable;
 use egui::Color32;
 use serde::{Deserialize, Serialize};
 
@@ -15,8 +16,10 @@ use serde::{Deserialize, Serialize};
 pub enum Look {
     /// Dark background.
     #[default]
+    #[value(help = Resettable::Reset)] // a word says it, and help stays a line for each option
     Dark,
     /// Light background.
+    #[value(help = Resettable::Reset)]
     Light,
 }
 
