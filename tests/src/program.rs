@@ -170,16 +170,27 @@ impl Ran {
     }
 }
 
-/// The program beside the tests. Built by the same `cargo test`, because the host has an integration test.
+/// What `flotor` starts for its commands. Built, as itself, by the same `cargo test`, because each has an integration test.
+const SEPARATE: [&str; 3] = ["flotor-lab", "flotor-study", "flotor-calibration"];
+
+/// The program beside the tests.
 fn program() -> PathBuf {
-    let file = build_folder().join(format!("flotor{}", std::env::consts::EXE_SUFFIX));
+    for name in SEPARATE {
+        current(name);
+    }
+    current("flotor")
+}
+
+/// A program beside the tests, which must be as new as its sources.
+fn current(name: &str) -> PathBuf {
+    let file = build_folder().join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
     let build = if cfg!(debug_assertions) { "cargo build" } else { "cargo build --release" };
     let Ok(built) = std::fs::metadata(&file).and_then(|attributes| attributes.modified()) else {
-        panic!("{} is missing: run `{build} -p flotor`, or all tests with `cargo test`", file.display());
+        panic!("{} is missing: run `{build}`, or all tests with `cargo test`", file.display());
     };
-    if let Some(source) = sources().into_iter().find(|source| changed_since(source, built)) {
+    if let Some(source) = sources(name).into_iter().find(|source| changed_since(source, built)) {
         panic!(
-            "{} is older than {}: run `{build} -p flotor`, or all tests with `cargo test`",
+            "{} is older than {}: run `{build}`, or all tests with `cargo test`",
             file.display(),
             source.display()
         );
@@ -187,10 +198,10 @@ fn program() -> PathBuf {
     file
 }
 
-/// What the program was made of, as cargo noted it beside the program: `cargo test -p flotor-tests` does not build it
+/// What a program was made of, as cargo noted it beside the program: `cargo test -p flotor-tests` does not build it
 /// again, so a test could meet the program of yesterday.
-fn sources() -> Vec<PathBuf> {
-    let notes = std::fs::read_to_string(build_folder().join("flotor.d")).unwrap_or_default();
+fn sources(name: &str) -> Vec<PathBuf> {
+    let notes = std::fs::read_to_string(build_folder().join(format!("{name}.d"))).unwrap_or_default();
     let files = notes.lines().next().and_then(|line| line.split_once(": ")).map_or("", |(_, files)| files);
     // A space within a name is written `\ `.
     let files = files.replace("\\ ", "\0");

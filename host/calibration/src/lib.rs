@@ -18,6 +18,7 @@
 //!
 //! Not real-time, but for the thread that holds the handle in the rig.
 
+pub mod cli;
 pub mod fit;
 mod least_squares;
 pub mod picture;

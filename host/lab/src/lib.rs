@@ -7,17 +7,16 @@
 //! - [`stability`]: how stiff a spring the servo can render.
 //! - [`jitter`]: how well the servo keeps time.
 //! - [`replay`]: the models of a recording once more.
-//! - [`report`]: results as tables.
 //! - [`sampling`]: points that cover a space evenly.
 //!
 //! Nothing here runs a hand; not real-time throughout.
 
 pub mod bench;
+pub mod cli;
 pub mod evaluate;
 pub mod jitter;
 mod plant;
 pub mod replay;
-pub mod report;
 pub mod sampling;
 pub mod stability;
 mod stopwatch;

@@ -36,6 +36,32 @@ pub struct Bin {
 }
 
 impl Bin {
+    /// Bars of a quarter octave from `first` up, of values and how often each occurs; values below `first` are in the first.
+    #[must_use]
+    pub fn quarter_octaves(first: f64, counts: impl IntoIterator<Item = (f64, u64)>) -> Vec<Self> {
+        const STEP: f64 = 1.189_207_115_002_721; // 2^(1/4)
+        let mut heights = Vec::new();
+        for (value, count) in counts {
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            // some two hundred bars for nanoseconds to hours
+            let index = (4.0 * libm::log2((value / first).max(1.0))).floor() as usize;
+            if heights.len() <= index {
+                heights.resize(index + 1, 0.0);
+            }
+            if let Some(height) = heights.get_mut(index) {
+                let count = count as f64;
+                *height += count;
+            }
+        }
+        let mut from = first;
+        let bin = |height| {
+            let bin = Self { from, to: from * STEP, height };
+            from *= STEP;
+            bin
+        };
+        heights.into_iter().map(bin).collect()
+    }
+
     /// Left and right edge in the coordinates of `scale`, or nothing when the bin cannot be drawn.
     pub(super) fn edges(&self, scale: Scale) -> Option<(f64, f64)> {
         let right = scale.forward(self.to)?;
@@ -141,5 +167,20 @@ impl Series {
             Shape::Line(samples) | Shape::Steps(samples) | Shape::Points(samples) => samples.len(),
             Shape::Histogram(bins) => bins.len(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_value_is_in_the_bar_of_its_quarter_octave() {
+        let bins = Bin::quarter_octaves(0.01, [(0.001, 5), (0.009, 2), (1.0, 7), (1000.0, 1)]);
+        let count = |at: f64| bins.iter().find(|bin| bin.from <= at && at < bin.to).map(|bin| bin.height);
+        assert_eq!(count(0.01), Some(7.0), "what is below the first");
+        assert_eq!(count(1.0), Some(7.0));
+        assert_eq!(count(1000.0), Some(1.0));
+        assert_eq!(bins.iter().map(|bin| bin.height).sum::<f64>(), 15.0);
     }
 }

@@ -1,12 +1,12 @@
 //! `flotor bridge`: starts the bridge, which is a program of its own, because it brings Zenoh.
 
-use super::CommandError;
-use super::companion::{Built, Companion};
 use clap::Args;
+use flotor_command::CommandError;
+use flotor_command::separate::{Built, SeparateProgram};
 use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;
 
-pub(super) const BRIDGE: Companion<'static> = Companion {
+pub(super) const BRIDGE: SeparateProgram<'static> = SeparateProgram {
     program: "flotor-bridge",
     built: Built::Apart("bridge"),
     build: "cargo build --release --manifest-path host/bridge/Cargo.toml --target-dir target/bridge",

@@ -1,7 +1,8 @@
 //! `flotor doctor`: what this machine lets a real-time loop hope for, and how to allow more.
 
-use super::{CommandError, style, write_json};
 use clap::Args;
+use flotor_command::say;
+use flotor_command::{CommandError, style, write_json};
 use flotor_servo::{Privilege, RealTimeReport, probe_real_time};
 use flotor_session::registry::Registry;
 use serde::Serialize;

@@ -1,8 +1,9 @@
 //! `flotor emulate`: a device without the device, in a process of its own.
 
-use super::CommandError;
-use super::companion::{Built, Companion};
 use clap::{Args, Command};
+use flotor_command::CommandError;
+use flotor_command::say;
+use flotor_command::separate::{Built, SeparateProgram};
 use std::ffi::OsString;
 
 /// Emulate the controller of a device, so that its plugin can be used without hardware.
@@ -39,5 +40,5 @@ pub(crate) fn run(arguments: &EmulateArguments) -> Result<(), CommandError> {
     }
     let program = format!("flotor-{device}-emulator");
     let build = format!("cargo build --release -p {program}");
-    Companion { program: &program, built: Built::WithThis, build: &build }.become_with(arguments)
+    SeparateProgram { program: &program, built: Built::WithThis, build: &build }.become_with(arguments)
 }

@@ -1,8 +1,9 @@
 //! `flotor new`: the start of a plugin of one's own.
 
-use super::{CommandError, style};
 use crate::scaffold::{ContractFolder, Language, PluginName, Scaffold, ScaffoldError, scaffold};
 use clap::{Args, ValueEnum};
+use flotor_command::say;
+use flotor_command::{CommandError, style};
 use flotor_hal::abi::PluginKind;
 use flotor_session::registry::Registry;
 use std::path::{Path, PathBuf};
@@ -43,7 +44,7 @@ pub(crate) fn run(arguments: &NewArguments) -> Result<(), CommandError> {
     refuse_an_id_in_use(&name)?;
     let contract = ContractFolder::found_by(arguments.hal.as_deref())?;
     let made = scaffold(Path::new("."), &name, kind, arguments.language, &contract)?;
-    tell(&name, &made);
+    report(&name, &made);
     Ok(())
 }
 
@@ -58,7 +59,7 @@ fn refuse_an_id_in_use(name: &PluginName) -> Result<(), CommandError> {
     )))
 }
 
-fn tell(name: &PluginName, made: &Scaffold) {
+fn report(name: &PluginName, made: &Scaffold) {
     say!("{} in {}:", style::title(&name.title()), made.folder.display());
     let first = made.files.first().copied().unwrap_or_default();
     say!("  {first:<16} the plugin: change this");

@@ -1,7 +1,8 @@
 //! `flotor plugins`: what is there, read from the files without running any of them.
 
-use super::{CommandError, style, write_json};
 use clap::Args;
+use flotor_command::say;
+use flotor_command::{CommandError, style, write_json};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Metadata, Plugin};
 use flotor_hal::{Mutability, Parameter, ParameterKind};

@@ -1,9 +1,9 @@
 //! `flotor record`: a recording of a run that somebody else started, here or elsewhere.
 
 use super::bridge::{BRIDGE, Way, is_elsewhere};
-use super::stopping::stop_on_signals;
-use super::{CommandError, first_error, report_line, style};
 use clap::Args;
+use flotor_command::stopping::stop_on_signals;
+use flotor_command::{CommandError, first_error, report_line, style};
 use flotor_core::Change;
 use flotor_live::{Ask, Client, Directory, Event, LiveError};
 use flotor_record::{Note, Recorder, Severity};

@@ -1,10 +1,10 @@
 //! `flotor run`: a scene in the servo loop, watched by whoever is asked for.
 
-use super::options::{ClockOption, PluginKeyValue, core, duration_s, rate_hz};
-use super::stopping::{Keys, stop_on_signals};
-use super::{CommandError, first_error, note, style, tell};
 use crate::run_picture::RunPicture;
 use clap::Args;
+use flotor_command::options::{ClockOption, PluginKeyValue, core, duration_s, rate_hz};
+use flotor_command::stopping::{Keys, stop_on_signals};
+use flotor_command::{CommandError, first_error, note, print_result, progress_bar, style};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_live::Directory;
@@ -18,7 +18,7 @@ use flotor_session::report::{RunFacts, RunSummary, Tally};
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
 use flotor_session::{Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::ProgressBar;
 use std::path::PathBuf;
 
 /// Run a scene in the servo loop.
@@ -126,7 +126,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         _ => Ok(()),
     };
     let text = || format!("{}\n{}", style::title(&summary.title), summary.to_text());
-    let told = tell(arguments.json.as_deref(), &summary, text);
+    let told = print_result(arguments.json.as_deref(), &summary, text);
     outcome.real_time.advice().into_iter().for_each(note);
     // What became of the run is what scripts ask first; a file that is missing comes after.
     first_error([verdict(&outcome, &plugins, &summary), recorded, drawn, told])
@@ -214,7 +214,7 @@ fn end_words(outcome: &Outcome, rate_hz: f64) -> String {
         RunEnd::DeviceFault(fault) => {
             format!(
                 "device fault: {}{}",
-                super::before_advice(outcome.faulted().map_or("", |(_, words)| words)),
+                flotor_command::before_advice(outcome.faulted().map_or("", |(_, words)| words)),
                 fault.advice()
             )
         }
@@ -286,11 +286,4 @@ fn live_line(record: &TickRecord) -> String {
         })
         .collect();
     format!("-10 mm {bar} +10   z {z_mm:+6.2} mm   Fz {force_n:+6.2} N")
-}
-
-/// A progress line on a terminal, nothing in a pipe.
-pub(super) fn progress_bar(length: u64, template: &str) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
-    bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar
 }

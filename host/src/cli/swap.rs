@@ -1,8 +1,9 @@
 //! `flotor swap`: another plugin in place of a model of a run that somebody started, here on this machine.
 
-use super::CommandError;
-use super::options::KeyValue;
 use clap::Args;
+use flotor_command::CommandError;
+use flotor_command::options::KeyValue;
+use flotor_command::say;
 use flotor_live::{Answer, Ask, ChangeMessage, Client, Directory, Event, LiveError, Subject};
 use flotor_session::scene::is_named;
 use std::path::MAIN_SEPARATOR;

@@ -1,11 +1,11 @@
 //! `flotor sweep`: starts the sweeper, which is a program of its own, because it writes Parquet.
 
-use super::CommandError;
-use super::companion::{Built, Companion};
 use clap::Args;
+use flotor_command::CommandError;
+use flotor_command::separate::{Built, SeparateProgram};
 use std::ffi::OsString;
 
-const SWEEPER: Companion<'static> = Companion {
+const SWEEPER: SeparateProgram<'static> = SeparateProgram {
     program: "flotor-sweep",
     built: Built::Apart("sweep"),
     build: "cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target/sweep",

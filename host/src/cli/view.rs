@@ -1,21 +1,14 @@
 //! `flotor view`: starts the viewer, which is a program of its own, and tells it where the plugins are.
 
-use super::CommandError;
 use super::bridge::{BRIDGE, Way, is_elsewhere};
-use super::companion::{Built, Companion, Running};
 use clap::Args;
+use flotor_command::CommandError;
+use flotor_command::separate::{Running, SeparateProgram};
 use flotor_record::Recording;
 use flotor_session::registry::Registry;
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::Stdio;
-
-/// The viewer, built by name because of its graphics stack.
-pub(super) const VIEWER: Companion<'_> = Companion {
-    program: "flotor-viewer",
-    built: Built::WithThis,
-    build: "cargo build --release -p flotor-viewer",
-};
 
 /// Show what the hand feels: the spring in 3D, and traces.
 #[derive(Args)]
@@ -93,19 +86,20 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
     for_viewer.extend(arguments.window.then(|| "--window".into()));
     for_viewer.extend(file.map(|file| file.into()));
     match elsewhere {
-        None => VIEWER.become_with(&for_viewer),
+        None => SeparateProgram::VIEWER.become_with(&for_viewer),
         Some(name) => view_elsewhere(&arguments.way.arguments("attach", name.as_os_str()), for_viewer),
     }
 }
 
 /// The bridge shows the run here, and the viewer watches that one; the bridge's words of loss and reconnection go to the terminal.
 fn view_elsewhere(for_bridge: &[OsString], mut for_viewer: Vec<OsString>) -> Result<(), CommandError> {
-    let (mut viewer, mut bridge) = (VIEWER.command()?, BRIDGE.command()?);
+    let (mut viewer, mut bridge) = (SeparateProgram::VIEWER.command()?, BRIDGE.command()?);
     let cannot = |program: &str, cause| CommandError::file(program.as_ref(), "cannot be started", cause);
     let bridge = bridge.args(for_bridge).stdin(Stdio::null()).spawn();
     let bridge = Running(bridge.map_err(|cause| cannot(BRIDGE.program, cause))?);
     for_viewer.extend(["--run".into(), bridge.0.id().to_string().into()]);
-    let shown = viewer.args(&for_viewer).status().map_err(|cause| cannot(VIEWER.program, cause))?;
+    let shown =
+        viewer.args(&for_viewer).status().map_err(|cause| cannot(SeparateProgram::VIEWER.program, cause))?;
     drop(bridge);
     if shown.success() {
         return Ok(());

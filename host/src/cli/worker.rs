@@ -1,7 +1,7 @@
 //! `flotor worker`: the process that holds one force model, started by `flotor run`.
 
-use super::{CommandError, stopping};
 use clap::Args;
+use flotor_command::{CommandError, stopping};
 use flotor_servo::engine::process;
 use flotor_session::registry::load_file;
 use std::path::PathBuf;

@@ -29,6 +29,8 @@ pub mod analysis;
 pub mod apparatus;
 pub mod bias;
 pub mod blinding;
+#[cfg(feature = "program")]
+pub mod cli;
 pub mod cohort;
 pub mod conduct;
 pub mod curve;

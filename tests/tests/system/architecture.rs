@@ -8,7 +8,7 @@ use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
 use flotor_tests::{files_under, workspace_root};
 use proc_macro2::{TokenStream, TokenTree};
 use std::path::Path;
-use std::process::Command;
+use std::process;
 
 // ---------------------------------------------------------------- dependencies point one way
 
@@ -33,6 +33,8 @@ enum Role {
     Statistics,
     /// Draws, and knows nothing of what.
     Plot,
+    /// What the programs share: options, output, errors.
+    Command,
     Lab,
     Calibration,
     Study,
@@ -44,8 +46,8 @@ enum Role {
 }
 
 use Role::{
-    Calibration, Contract, Core, Emulator, Fixture, Host, Lab, Live, Plot, Plugin, Record, Servo, Session,
-    Statistics, Study, Sync, Tests, Viewer,
+    Calibration, Command, Contract, Core, Emulator, Fixture, Host, Lab, Live, Plot, Plugin, Record, Servo,
+    Session, Statistics, Study, Sync, Tests, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
@@ -59,29 +61,12 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("host/session", Session, &[Contract, Sync, Core, Servo, Record, Live]),
     ("host/statistics", Statistics, &[]),
     ("host/plot", Plot, &[]),
-    ("host/lab", Lab, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot]),
-    ("host/calibration", Calibration, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot]),
-    ("host/study", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Statistics]),
+    ("host/command", Command, &[Contract, Sync, Core, Servo, Record, Live, Session]),
+    ("host/lab", Lab, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command]),
+    ("host/calibration", Calibration, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command]),
+    ("host/study", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Statistics, Command]),
     // The plugins only as paths, so that one `cargo run` builds them; no line of the host names them.
-    (
-        "host",
-        Host,
-        &[
-            Contract,
-            Sync,
-            Core,
-            Servo,
-            Record,
-            Live,
-            Session,
-            Plot,
-            Statistics,
-            Lab,
-            Calibration,
-            Study,
-            Plugin,
-        ],
-    ),
+    ("host", Host, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command, Plugin]),
     ("viewer", Viewer, &[Contract, Sync, Core, Record, Live, Plot, Study]),
     (
         "tests",
@@ -95,6 +80,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
             Live,
             Session,
             Plot,
+            Command,
             Statistics,
             Lab,
             Calibration,
@@ -231,7 +217,7 @@ fn carried_by_mistake(plugin: &str, made_of: &str) -> Vec<String> {
 /// What cargo builds this crate of when nothing else is built: a line a crate, its name and its features. `cargo metadata`
 /// merges the features of the whole workspace.
 fn made_of(name: &str) -> String {
-    let mut cargo = Command::new(env!("CARGO"));
+    let mut cargo = process::Command::new(env!("CARGO"));
     cargo.args("tree --offline --edges normal --prefix none -p".split(' '));
     cargo.args([name, "--format", "{lib} {f}"]).current_dir(workspace_root());
     let output = cargo.output().expect("cargo starts");

@@ -1,7 +1,7 @@
 //! The measurements as a table, as CSV, as a picture.
 
 use super::{Apart, DEMANDS, Distance, Losses, Speed, Times};
-use crate::report::{table, to_csv};
+use flotor_command::tables::{table, to_csv};
 use flotor_plot::{Axis, Figure, Mark, Panel, Series};
 use serde::Serialize;
 

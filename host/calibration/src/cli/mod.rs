@@ -1,0 +1,93 @@
+//! `flotor calibrate`: how much of the vertical force arrives, and the correction. The program `flotor-calibration`, which
+//! `flotor` starts.
+
+mod import;
+mod rig;
+mod verify;
+mod vertical;
+
+use crate::CalibrationError;
+use clap::{Args, CommandFactory, Parser, Subcommand};
+use flotor_command::{CommandError, exit_code_of, options, write_text};
+use flotor_session::calibration_file::{CalibrationFile, Provenance, Source, today};
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Calibrate devices; `flotor calibrate` starts this program.
+#[derive(Parser)]
+#[command(name = "flotor", bin_name = "flotor", version, about, max_term_width = 110)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Calibrate(CalibrateArguments),
+}
+
+/// The command with its arguments. Not real-time.
+#[must_use]
+pub fn command() -> clap::Command {
+    Arguments::command()
+}
+
+/// Runs the command of this process.
+#[must_use]
+pub fn main() -> ExitCode {
+    let Command::Calibrate(arguments) = Arguments::parse().command;
+    exit_code_of(run(&arguments))
+}
+
+/// Calibrate a device: measure, check, or take over somebody else's numbers.
+#[derive(Args)]
+struct CalibrateArguments {
+    #[command(subcommand)]
+    command: CalibrateCommand,
+}
+
+#[derive(Subcommand)]
+enum CalibrateCommand {
+    /// Measure how much of the vertical force arrives at each height, and fit it
+    Vertical(vertical::VerticalArguments),
+    /// Measure the error without and with a calibration file
+    Verify(verify::VerifyArguments),
+    /// Make a calibration file of the report's polynomial, or of any other
+    Import(import::ImportArguments),
+}
+
+fn run(arguments: &CalibrateArguments) -> Result<(), CommandError> {
+    match &arguments.command {
+        CalibrateCommand::Vertical(arguments) => vertical::run(arguments),
+        CalibrateCommand::Verify(arguments) => verify::run(arguments),
+        CalibrateCommand::Import(arguments) => import::run(arguments),
+    }
+}
+
+fn provenance(source: Source, note: Option<String>) -> Provenance {
+    let program = format!("flotor {}", env!("CARGO_PKG_VERSION"));
+    Provenance { source, program, date: Some(today()), seed: None, note }
+}
+
+fn write_calibration(path: &Path, file: &CalibrationFile) -> Result<(), CommandError> {
+    let text = file.to_text().map_err(|error| CommandError::Failed(error.to_string()))?;
+    write_text(Some(path), || text)
+}
+
+fn refused(error: CalibrationError) -> CommandError {
+    match error {
+        CalibrationError::Plugin(error) => error.into(),
+        CalibrationError::Fault(fault) => CommandError::DeviceFault(fault),
+        CalibrationError::Setting(_) | CalibrationError::Refused(_) => {
+            CommandError::PluginRefused(error.to_string())
+        }
+        CalibrationError::TooFew { .. } | CalibrationError::TooStrong { .. } => {
+            CommandError::Usage(error.to_string())
+        }
+        other => CommandError::Failed(other.to_string()),
+    }
+}
+
+fn force_n(text: &str) -> Result<f64, String> {
+    options::number(text, "N", "force", 1.0..=50.0)
+}

@@ -1,0 +1,107 @@
+//! Which rig is calibrated: the simulated one, or a device with a force sensor on a serial port.
+
+use super::refused;
+use crate::rig::{DeviceRig, SimulatedRig, Waiting};
+use crate::sensor::{ForceSensor, SERIAL_SENSOR};
+use clap::Args;
+use flotor_command::options::{KeyValue, duration_s, number, settings};
+use flotor_command::stopping::stop_on_signals;
+use flotor_command::{CommandError, progress_bar};
+use flotor_hal::abi::PluginKind;
+use flotor_servo::StopSwitch;
+use flotor_session::registry::Registry;
+use indicatif::ProgressBar;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// The device that is calibrated in a simulated rig.
+pub(super) const SIMULATED: &str = "simulated";
+
+/// How often the line below the bar is drawn.
+const REDRAWN: Duration = Duration::from_millis(100);
+
+/// What is calibrated.
+#[derive(Args)]
+pub(super) struct RigArguments {
+    /// The simulated flotor in a simulated rig
+    #[arg(long, required_unless_present = "device", conflicts_with = "device")]
+    pub(super) simulated: bool,
+    /// The device of this plugin (id or file), under a force sensor
+    #[arg(long, value_name = "ID", requires = "sensor")]
+    device: Option<String>,
+    /// Set a parameter of the device (repeatable)
+    #[arg(long = "set", value_name = "KEY=VALUE", requires = "device")]
+    sets: Vec<KeyValue>,
+    /// Serial port of the force sensor
+    #[arg(long, value_name = "PORT", requires = "device")]
+    sensor: Option<String>,
+    /// Plugin that reads it (id or file): a device with a parameter `port`
+    #[arg(long, value_name = "ID", default_value = SERIAL_SENSOR, requires = "device")]
+    sensor_plugin: String,
+    /// How far from its height a stop may be, in mm
+    #[arg(long, value_name = "MM", default_value_t = 0.4, requires = "device", value_parser = tolerance_mm)]
+    tolerance_mm: f64,
+    /// How long to wait for the sensor to be moved to the next height
+    #[arg(long, value_name = "TIME", default_value = "10min", requires = "device", value_parser = duration_s)]
+    patience: f64,
+    /// Seed of the simulated sensor's noise
+    #[arg(long, default_value_t = 1, value_name = "N", conflicts_with = "device")]
+    pub(super) seed: u64,
+    /// Folder to search for plugins (repeatable)
+    #[arg(long = "plugin-path", value_name = "FOLDER")]
+    folders: Vec<PathBuf>,
+}
+
+/// Says where the sensor has to go, until somebody breaks it off.
+pub(super) type Guide = Box<dyn FnMut(Option<Waiting>) -> ControlFlow<()>>;
+
+impl RigArguments {
+    /// Id of the plugin.
+    pub(super) fn plugin(&self) -> &str {
+        self.device.as_deref().unwrap_or(SIMULATED)
+    }
+
+    pub(super) fn simulated_rig(&self) -> Result<SimulatedRig, CommandError> {
+        let registry = Registry::search(&self.folders);
+        Ok(SimulatedRig::new(registry.load(SIMULATED, PluginKind::Device)?, self.seed))
+    }
+
+    /// The device and its sensor, and a bar over so many stops that says where the sensor has to go.
+    pub(super) fn device_rig(&self, stops: u64) -> Result<(DeviceRig<Guide>, ProgressBar), CommandError> {
+        let registry = Registry::search(&self.folders);
+        let plugin = registry.load(self.plugin(), PluginKind::Device)?;
+        let sensor_plugin = registry.load(&self.sensor_plugin, PluginKind::Device)?;
+        let settings = settings(&plugin, &self.sets)?;
+        let port = self.sensor.as_deref().unwrap_or_default();
+        let sensor = ForceSensor::open(&sensor_plugin, port).map_err(refused)?;
+        let (close_m, patience) = (self.tolerance_mm * 1.0e-3, Duration::from_secs_f64(self.patience));
+        let progress = progress_bar(stops, "{pos}/{len}  {wide_bar}\n{msg}");
+        progress.enable_steady_tick(REDRAWN);
+        let stop = stop_on_signals();
+        let guide = guide(&progress, &stop);
+        let rig = DeviceRig::open(&plugin, &settings, sensor, close_m, patience, stop, guide);
+        Ok((rig.map_err(refused)?, progress))
+    }
+}
+
+fn guide(progress: &ProgressBar, stop: &StopSwitch) -> Guide {
+    let (progress, stop) = (progress.clone(), stop.clone());
+    Box::new(move |waiting| {
+        match waiting {
+            Some(Waiting { target_m, height_m, command_n }) => {
+                let (target_mm, height_mm) = (target_m * 1.0e3, height_m * 1.0e3);
+                let at = if height_mm.is_finite() { format!("{height_mm:.2} mm") } else { "...".to_owned() };
+                progress.set_message(format!(
+                    "pushing with {command_n} N, handle at {at}; sensor to {target_mm:.1} mm"
+                ));
+            }
+            None => progress.set_message("reading"),
+        }
+        if stop.is_stop_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })
+}
+
+fn tolerance_mm(text: &str) -> Result<f64, String> {
+    number(text, "mm", "length", 0.005..=1.0)
+}

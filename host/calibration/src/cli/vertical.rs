@@ -1,0 +1,261 @@
+//! `flotor calibrate vertical`: readings, fit, error before and after.
+
+use super::rig::RigArguments;
+use super::{force_n, provenance, refused, write_calibration};
+use crate::fit::{Candidate, Fit, fit};
+use crate::procedure::{Plan, Reading, measure};
+use crate::verify::{ErrorCurve, PROBE_N};
+use crate::{picture, thesis};
+use clap::Args;
+use flotor_command::{CommandError, print_result, progress_bar, style, write_text};
+use flotor_hal::VerticalCalibration;
+use flotor_session::calibration_file::{
+    CalibratedDevice, CalibrationFile, FORMAT, Provenance, Quality, Source, VerticalCurve,
+};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Measure how much of the vertical force arrives at each height, and fit it.
+#[derive(Args)]
+#[command(
+    after_help = "The handle is locked in all axes but the vertical and pushes against a force sensor that \
+    is lowered step by step.\nThe sensor answers `R` with `F 1.234`, a force in N. A device asks for its stops one after the other and \
+    reads\nwhile the handle rests at one.\n\nExamples:\n  \
+    flotor calibrate vertical --simulated\n  \
+    flotor calibrate vertical --simulated --out calibration.toml --plot calibration.svg\n  \
+    flotor calibrate vertical --simulated --force 8,10,12,14 --steps 28 --step-mm 0.5 --json -\n  \
+    flotor calibrate vertical --device maglev --set transport=usb --sensor /dev/ttyUSB0 --out mine.toml"
+)]
+pub(super) struct VerticalArguments {
+    #[command(flatten)]
+    rig: RigArguments,
+    /// Commanded vertical forces in N, at least two
+    #[arg(long, value_name = "N", value_delimiter = ',', default_value = "10,12", value_parser = force_n)]
+    force: Vec<f64>,
+    /// How often each force is measured over all heights
+    #[arg(long, default_value_t = 2, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100))]
+    runs: u32,
+    /// Steps down from the top
+    #[arg(long, default_value_t = 14, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=200))]
+    steps: u32,
+    /// Length of a step in mm
+    #[arg(long, default_value_t = 1.0, value_name = "MM")]
+    step_mm: f64,
+    /// Readings of the force sensor at each height
+    #[arg(long, default_value_t = 10, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    readings: u32,
+    /// Write the calibration file
+    #[arg(long, value_name = "FILE.toml")]
+    out: Option<PathBuf>,
+    /// Draw readings, fit, residuals and the error before and after
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Write the result as JSON (- for standard output)
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// What machines read of `vertical`.
+#[derive(Serialize)]
+struct VerticalReport<'a> {
+    device: &'a str,
+    serial: &'a str,
+    error_before_percent: f64,
+    error_after_percent: f64,
+    rows: &'a [ErrorRow],
+    degree: usize,
+    range_mm: [f64; 2],
+    coefficients_per_mm: &'a [f64],
+    residual_n: f64,
+    band_95_percent: f64,
+    weight_n: f64,
+    weight_95_n: f64,
+    candidates: &'a [Candidate],
+    readings: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seed: Option<u64>,
+}
+
+/// One correction, and the error it leaves.
+#[derive(Clone, Debug, Serialize)]
+struct ErrorRow {
+    correction: &'static str,
+    error_percent: f64,
+}
+
+/// What came of a procedure.
+struct Measured {
+    serial: String,
+    readings: Vec<Reading>,
+    fit: Fit,
+    /// The report's polynomial.
+    report: VerticalCalibration,
+    /// The error that is left, by name of the correction: first none, last this fit.
+    curves: Vec<(&'static str, ErrorCurve)>,
+}
+
+const UNCORRECTED: &str = "none";
+const FITTED: &str = "this fit, total command";
+
+pub(super) fn run(arguments: &VerticalArguments) -> Result<(), CommandError> {
+    let plan = plan(arguments)?;
+    let measured =
+        if arguments.rig.simulated { simulated(arguments, &plan)? } else { device(arguments, &plan)? };
+    report_on(arguments, &measured)
+}
+
+fn plan(arguments: &VerticalArguments) -> Result<Plan, CommandError> {
+    let VerticalArguments { force, runs, steps, step_mm, readings, .. } = arguments;
+    let half_mm = f64::from(*steps) * step_mm * 0.5;
+    if !(*step_mm > 0.0 && half_mm <= 11.0) {
+        return Err(CommandError::Usage(format!(
+            "--steps {steps} of {step_mm} mm: the handle reaches 11 mm to either side"
+        )));
+    }
+    Ok(Plan {
+        forces_n: force.clone(),
+        runs: *runs,
+        top_m: half_mm * 1.0e-3,
+        step_m: step_mm * 1.0e-3,
+        steps: *steps,
+        readings: *readings,
+    })
+}
+
+/// Number of corrections that are compared in the simulated rig.
+const CORRECTIONS: u64 = 4;
+
+/// A way to correct the force: by the device, by the command, or not at all.
+struct Correction<'a> {
+    name: &'static str,
+    calibration: Option<VerticalCalibration>,
+    command_n: &'a dyn Fn(f64) -> f64,
+}
+
+/// In the simulated rig the error is known without the noise of the sensor, and a sweep costs little: the report's two
+/// ways are compared as well.
+fn simulated(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, CommandError> {
+    let mut rig = arguments.rig.simulated_rig()?;
+    let serial = rig.serial().map_err(refused)?;
+    let length = plan.stops() + CORRECTIONS * ErrorCurve::HEIGHTS;
+    let progress = progress_bar(length, "{percent:>3} %  {wide_bar}");
+    let readings = measure(&mut rig, plan, || progress.inc(1)).map_err(refused)?;
+    let (fit, report) = (fit(&readings).map_err(refused)?, report(plan)?);
+    let uncorrected = |_: f64| PROBE_N;
+    let as_report = |height_m: f64| thesis::command_n(PROBE_N, height_m);
+    let corrections = [
+        Correction { name: UNCORRECTED, calibration: None, command_n: &uncorrected },
+        Correction { name: "report, spring force only", calibration: None, command_n: &as_report },
+        Correction { name: "report, total command", calibration: Some(report), command_n: &uncorrected },
+        Correction { name: FITTED, calibration: Some(fit.calibration), command_n: &uncorrected },
+    ];
+    let mut curves = Vec::new();
+    for Correction { name, calibration, command_n } in corrections {
+        rig.calibrate(calibration);
+        curves.push((name, ErrorCurve::measure(&mut rig, command_n, || progress.inc(1)).map_err(refused)?));
+    }
+    progress.finish_and_clear();
+    Ok(Measured { serial, readings, fit, report, curves })
+}
+
+/// With a device the error is what the force sensor reads: without correction in the readings of the fit, with it in one
+/// more run over all heights.
+fn device(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, CommandError> {
+    let check = Plan { forces_n: plan.forces_n.iter().copied().take(1).collect(), runs: 1, ..plan.clone() };
+    let (mut rig, progress) = arguments.rig.device_rig(plan.stops() + check.stops())?;
+    let serial = rig.serial().to_owned();
+    let readings = measure(&mut rig, plan, || progress.inc(1)).map_err(refused)?;
+    let (fit, report) = (fit(&readings).map_err(refused)?, report(plan)?);
+    rig.calibrate(&fit.calibration).map_err(refused)?;
+    let after = measure(&mut rig, &check, || progress.inc(1)).map_err(refused)?;
+    progress.finish_and_clear();
+    let [weight_n, _] = fit.weight_n;
+    let curves = vec![
+        (UNCORRECTED, ErrorCurve::of_readings(&readings, weight_n)),
+        (FITTED, ErrorCurve::of_readings(&after, weight_n)),
+    ];
+    Ok(Measured { serial, readings, fit, report, curves })
+}
+
+fn report(plan: &Plan) -> Result<VerticalCalibration, CommandError> {
+    let least_n = plan.forces_n.iter().copied().fold(f64::INFINITY, f64::min);
+    thesis::calibration(least_n).map_err(|invalid| refused(invalid.into()))
+}
+
+fn report_on(arguments: &VerticalArguments, measured: &Measured) -> Result<(), CommandError> {
+    let Measured { serial, readings, fit, report, curves } = measured;
+    let rows: Vec<ErrorRow> = curves
+        .iter()
+        .map(|(correction, curve)| ErrorRow { correction, error_percent: curve.error_percent() })
+        .collect();
+    let error = |row: Option<&ErrorRow>| row.map_or(f64::NAN, |row| row.error_percent);
+    let (before, after) = (error(rows.first()), error(rows.last()));
+    let device = arguments.rig.plugin();
+    let seed = arguments.rig.simulated.then_some(arguments.rig.seed);
+
+    let curve = VerticalCurve::of(&fit.calibration);
+    let for_machines = VerticalReport {
+        device,
+        serial,
+        error_before_percent: before,
+        error_after_percent: after,
+        rows: &rows,
+        degree: fit.degree,
+        range_mm: curve.range_mm,
+        coefficients_per_mm: &curve.coefficients_per_mm,
+        residual_n: fit.residual_n,
+        band_95_percent: fit.band_95_percent,
+        weight_n: fit.weight_n[0],
+        weight_95_n: fit.weight_n[1],
+        candidates: &fit.candidates,
+        readings: readings.len(),
+        seed,
+    };
+    print_result(arguments.json.as_deref(), &for_machines, || to_text(fit, &rows, readings.len()))?;
+    let curves: Vec<_> = curves.iter().map(|(name, curve)| (*name, curve)).collect();
+    write_text(arguments.plot.as_deref(), || picture::to_svg(readings, fit, report, &curves))?;
+    if let Some(path) = &arguments.out {
+        let file = CalibrationFile {
+            format: FORMAT,
+            device: CalibratedDevice { plugin: device.to_owned(), serial: serial.clone() },
+            vertical: curve,
+            quality: Quality {
+                readings: u32::try_from(readings.len()).ok(),
+                residual_n: Some(fit.residual_n),
+                band_95_percent: Some(fit.band_95_percent),
+                error_before_percent: Some(before),
+                error_after_percent: Some(after),
+                weight_n: Some(fit.weight_n[0]),
+            },
+            provenance: Provenance {
+                seed: seed.and_then(|seed| i64::try_from(seed).ok()),
+                ..provenance(Source::Measured, None)
+            },
+        };
+        write_calibration(path, &file)?;
+    }
+    Ok(())
+}
+
+fn to_text(fit: &Fit, rows: &[ErrorRow], readings: usize) -> String {
+    let mut lines = vec![style::title("degree   error of prediction (each height from the others)")];
+    for candidate in &fit.candidates {
+        let mark = if candidate.degree == fit.degree { "  <- taken" } else { "" };
+        let Candidate { degree, error_n, standard_error_n } = candidate;
+        lines.push(format!(
+            "  {degree:>4}   {:>8.2} ± {:.2} mN{mark}",
+            error_n * 1.0e3,
+            standard_error_n * 1.0e3
+        ));
+    }
+    lines.push(format!(
+        "{readings} readings, residual {:.1} mN, 95 % band of the shape ±{:.3} %, weight {:.3} ± {:.3} N\n",
+        fit.residual_n * 1.0e3,
+        fit.band_95_percent,
+        fit.weight_n[0],
+        fit.weight_n[1]
+    ));
+    lines.push(style::title("correction                     error over all heights, peak to peak"));
+    lines.extend(rows.iter().map(|row| format!("  {:<28} {:>8.3} %", row.correction, row.error_percent)));
+    lines.join("\n")
+}

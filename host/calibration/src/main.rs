@@ -1,0 +1,5 @@
+//! The program `flotor-calibration`; everything is in the library.
+
+fn main() -> std::process::ExitCode {
+    flotor_calibration::cli::main()
+}

@@ -1,0 +1,28 @@
+//! What Flotor's programs share on the command line.
+//!
+//! - [`CommandError`]: why a command failed, with the exit code that is a contract.
+//! - [`options`]: options several commands have, and how they are read.
+//! - [`say!`], [`print_result`], [`write_json`], [`write_text`]: results for people and for machines.
+//! - [`tables`]: results as tables.
+//! - [`stopping`]: signals and keys that end a run.
+//! - [`separate`]: programs beside this one that carry out a command.
+//! - [`reference()`]: every command with its arguments, for the book.
+//!
+//! Not real-time throughout.
+
+mod error;
+pub mod options;
+mod output;
+mod progress;
+mod reference;
+pub mod separate;
+pub mod stopping;
+pub mod style;
+pub mod tables;
+
+pub use error::{CommandError, before_advice};
+pub use output::{
+    exit_code_of, first_error, note, print_line, print_result, remark, report_line, write_json, write_text,
+};
+pub use progress::progress_bar;
+pub use reference::reference;

@@ -1,0 +1,108 @@
+//! What commands print, for people and for machines.
+
+use crate::{CommandError, style};
+use std::io::Write;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Prints a line; a reader that has gone away (`flotor plugins | head`) ends the program without a word.
+#[macro_export]
+macro_rules! say {
+    ($($text:tt)*) => { $crate::print_line(format_args!($($text)*)) };
+}
+
+/// The exit code of a command; its error is printed. Not real-time.
+pub fn exit_code_of(result: Result<(), CommandError>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            remark(format_args!("{} {error}", style::error("error:")));
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// What `say!` does.
+pub fn print_line(line: std::fmt::Arguments<'_>) {
+    if let Err(error) = writeln!(std::io::stdout(), "{line}") {
+        let gone = error.kind() == std::io::ErrorKind::BrokenPipe;
+        std::process::exit(if gone { 0 } else { 1 });
+    }
+}
+
+/// Prints a line where the command has more to do, or an exit code of its own: a reader that has gone away ends
+/// nothing.
+///
+/// # Errors
+/// If standard output cannot be written; a reader that has gone away is none.
+pub fn report_line(line: std::fmt::Arguments<'_>) -> Result<(), CommandError> {
+    match writeln!(std::io::stdout(), "{line}") {
+        Err(cause) if cause.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(CommandError::file(Path::new("standard output"), "cannot write the result", cause))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Prints a line on standard error. `eprintln!` panics where nobody reads it, and the exit code is lost then.
+pub fn remark(line: std::fmt::Arguments<'_>) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// Prints something worth knowing that ends nothing, on standard error.
+pub fn note(text: impl std::fmt::Display) {
+    remark(format_args!("{} {text}", style::warning("note:")));
+}
+
+/// The first error there is: it decides the exit code and is told last. What else went wrong is told here.
+///
+/// # Errors
+/// The first of the results that is one.
+pub fn first_error(results: impl IntoIterator<Item = Result<(), CommandError>>) -> Result<(), CommandError> {
+    let mut errors = results.into_iter().filter_map(Result::err);
+    let first = errors.next();
+    errors.for_each(|error| remark(format_args!("{} {error}", style::error("error:"))));
+    first.map_or(Ok(()), Err)
+}
+
+/// Writes a result for machines, `-` being standard output.
+///
+/// # Errors
+/// If the file or standard output cannot be written.
+pub fn write_json<T: serde::Serialize>(path: &Path, value: &T) -> Result<(), CommandError> {
+    let json =
+        serde_json::to_string_pretty(value).map_err(|error| CommandError::Failed(error.to_string()))?;
+    if path.as_os_str() == "-" {
+        return report_line(format_args!("{json}"));
+    }
+    std::fs::write(path, json + "\n")
+        .map_err(|cause| CommandError::file(path, "cannot write the JSON", cause))
+}
+
+/// Tells a result: as text to people, unless standard output is asked for the JSON for machines.
+///
+/// # Errors
+/// If the file or standard output cannot be written.
+pub fn print_result<T: serde::Serialize>(
+    json: Option<&Path>,
+    value: &T,
+    text: impl FnOnce() -> String,
+) -> Result<(), CommandError> {
+    let told = match json {
+        Some(path) if path.as_os_str() == "-" => Ok(()),
+        _ => report_line(format_args!("{}", text())),
+    };
+    first_error([told, json.map_or(Ok(()), |path| write_json(path, value))])
+}
+
+/// Writes a picture or a table where it is asked for, `-` being standard output.
+///
+/// # Errors
+/// If the file or standard output cannot be written.
+pub fn write_text(path: Option<&Path>, text: impl FnOnce() -> String) -> Result<(), CommandError> {
+    let Some(path) = path else { return Ok(()) };
+    if path.as_os_str() == "-" {
+        return report_line(format_args!("{}", text().trim_end()));
+    }
+    std::fs::write(path, text()).map_err(|cause| CommandError::file(path, "cannot write the result", cause))
+}

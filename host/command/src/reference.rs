@@ -1,0 +1,87 @@
+//! Every command with its arguments and options, as the parser knows them: for the book.
+
+use clap::{Arg, Command};
+use std::fmt::Write;
+
+/// Every command that the help of a program lists, as a chapter in Markdown. A command that one of the `separate` programs
+/// carries out is described as that program does. Not real-time.
+#[must_use]
+pub fn reference(mut program: Command, separate: &mut [Command]) -> String {
+    program.build();
+    separate.iter_mut().for_each(Command::build);
+    let mut text = String::new();
+    for command in offered(&program) {
+        let elsewhere = separate.iter().find_map(|other| other.find_subcommand(command.get_name()));
+        let described = elsewhere.unwrap_or(command).clone().about(command.get_about().cloned().unwrap_or_default());
+        chapter(&described, "flotor", 2, &mut text);
+    }
+    text
+}
+
+fn offered(command: &Command) -> impl Iterator<Item = &Command> {
+    command.get_subcommands().filter(|command| !command.is_hide_set() && command.get_name() != "help")
+}
+
+/// One command and, below it, its own.
+fn chapter(command: &Command, above: &str, depth: usize, text: &mut String) {
+    let name = format!("{above} {}", command.get_name());
+    let about = command.get_long_about().or(command.get_about()).map(ToString::to_string).unwrap_or_default();
+    // Writing to a string cannot fail.
+    let _ = write!(text, "{} `{name}`\n\n{}.\n\n", "#".repeat(depth), about.trim_end_matches('.'));
+    let arguments: Vec<&Arg> = command
+        .get_arguments()
+        .filter(|argument| !argument.is_hide_set() && !is_everywhere(argument))
+        .collect();
+    if !arguments.is_empty() {
+        text.push_str("| Argument | Default | |\n|---|---|---|\n");
+        for argument in arguments {
+            let _ = writeln!(text, "| `{}` | {} | {} |", usage(argument), default(argument), help(argument));
+        }
+        text.push('\n');
+    }
+    if let Some(examples) = command.get_after_help() {
+        let _ = write!(text, "```text\n{}\n```\n\n", examples.to_string().trim_end());
+    }
+    offered(command).for_each(|command| chapter(command, &name, depth + 1, text));
+}
+
+/// What every command has.
+fn is_everywhere(argument: &Arg) -> bool {
+    ["help", "version"].contains(&argument.get_id().as_str())
+}
+
+fn usage(argument: &Arg) -> String {
+    let names: Vec<&str> =
+        argument.get_value_names().unwrap_or_default().iter().map(clap::builder::Str::as_str).collect();
+    let values = names.join(" ");
+    match argument.get_long() {
+        None => cell(&values),
+        Some(long) if argument.get_action().takes_values() => cell(&format!("--{long} {values}")),
+        Some(long) => format!("--{long}"),
+    }
+}
+
+fn default(argument: &Arg) -> String {
+    if !argument.get_action().takes_values() {
+        return String::new();
+    }
+    let values = argument.get_default_values().iter().map(|value| format!("`{}`", value.to_string_lossy()));
+    values.collect::<Vec<_>>().join(" ")
+}
+
+fn help(argument: &Arg) -> String {
+    let help = argument.get_help().map(ToString::to_string).unwrap_or_default();
+    let words: Vec<String> = match argument.get_action().takes_values() {
+        true => {
+            argument.get_possible_values().iter().map(|value| format!("`{}`", value.get_name())).collect()
+        }
+        false => Vec::new(),
+    };
+    let help = cell(&help);
+    if words.is_empty() { help } else { format!("{help}: {}", words.join(", ")) }
+}
+
+/// Text that can stand in a cell of a table.
+fn cell(text: &str) -> String {
+    text.replace('|', "\\|").split_whitespace().collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,112 @@
+//! Programs of their own that lie beside this one: what is too heavy to be built with the core.
+//!
+//! Those that are workspaces of their own are built into a folder of their own below the core's `target`: plugins are libraries
+//! without a hash in their name, so two workspaces in one folder overwrite each other's, and then neither builds.
+
+use crate::CommandError;
+use rustix::process::{Pid, Signal, kill_process};
+use std::ffi::OsString;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command};
+
+/// Where a program comes from.
+pub enum Built {
+    /// The same workspace.
+    WithThis,
+    /// One of its own, into this folder below `target`.
+    Apart(&'static str),
+}
+
+/// A program beside this one.
+pub struct SeparateProgram<'a> {
+    /// Its file, without the suffix of executables.
+    pub program: &'a str,
+    /// Where cargo puts it.
+    pub built: Built,
+    /// The command that builds it.
+    pub build: &'a str,
+}
+
+impl SeparateProgram<'_> {
+    /// The viewer, built by name because of its graphics stack.
+    pub const VIEWER: SeparateProgram<'static> = SeparateProgram {
+        program: "flotor-viewer",
+        built: Built::WithThis,
+        build: "cargo build --release -p flotor-viewer",
+    };
+
+    /// A command that starts it.
+    ///
+    /// # Errors
+    /// [`CommandError::Usage`] with the command that builds it, if it is not there.
+    pub fn command(&self) -> Result<Command, CommandError> {
+        let own = std::env::current_exe().map_err(|cause| CommandError::Failed(cause.to_string()))?;
+        let (beside, apart) = self.places(&own);
+        if let Some(file) = [&beside].into_iter().chain(&apart).find(|file| file.is_file()) {
+            return Ok(Command::new(file));
+        }
+        let file = apart.unwrap_or(beside);
+        Err(CommandError::Usage(format!("there is no `{}`; `{}` builds it", file.display(), self.build)))
+    }
+
+    /// Where it is looked for: beside this program, and where cargo puts it if this one lies where cargo has put it.
+    fn places(&self, own: &Path) -> (PathBuf, Option<PathBuf>) {
+        let name = format!("{}{}", self.program, std::env::consts::EXE_SUFFIX);
+        let target = own.parent().and_then(Path::parent);
+        let apart = match (&self.built, target) {
+            (Built::Apart(folder), Some(target)) => Some(target.join(folder).join("release").join(&name)),
+            _ => None,
+        };
+        (own.with_file_name(name), apart)
+    }
+
+    /// Becomes the program with a command and what follows it.
+    ///
+    /// # Errors
+    /// If it is not there or cannot be started.
+    pub fn carry_out(&self, command: &str, arguments: &[OsString]) -> Result<(), CommandError> {
+        self.become_with(&[&[command.into()], arguments].concat())
+    }
+
+    /// Becomes the separate program: its words and its exit code are those of this command.
+    ///
+    /// # Errors
+    /// If it is not there or cannot be started.
+    pub fn become_with(&self, arguments: &[OsString]) -> Result<(), CommandError> {
+        let cause = self.command()?.args(arguments).exec();
+        Err(CommandError::file(self.program.as_ref(), "cannot be started", cause))
+    }
+}
+
+/// A separate program at work. Dropped, it is asked to end in order, so that its socket goes with it, and waited for.
+pub struct Running(pub Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // The number of a process that has ended and been waited for may be another's by now.
+        if self.0.try_wait().ok().flatten().is_none() {
+            let process = i32::try_from(self.0.id()).ok().and_then(Pid::from_raw);
+            let _ = process.map(|process| kill_process(process, Signal::TERM));
+        }
+        let _ = self.0.wait();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_built_apart_is_found_from_either_profile() {
+        let sweeper = SeparateProgram { program: "flotor-sweep", built: Built::Apart("sweep"), build: "" };
+        let name = format!("flotor-sweep{}", std::env::consts::EXE_SUFFIX);
+        for profile in ["debug", "release"] {
+            let (beside, apart) = sweeper.places(&Path::new("/f/target").join(profile).join("flotor"));
+            assert_eq!(beside, Path::new("/f/target").join(profile).join(&name));
+            assert_eq!(apart, Some(Path::new("/f/target/sweep/release").join(&name)));
+        }
+        let viewer = SeparateProgram { program: "flotor-viewer", built: Built::WithThis, build: "" };
+        assert_eq!(viewer.places(Path::new("/f/target/release/flotor")).1, None);
+    }
+}

@@ -1,0 +1,194 @@
+//! How a person ends a run: Ctrl-C in order; the space bar or `kill -USR1` at once.
+//!
+//! Whoever finds that an orderly end takes too long asks again: the second signal is an emergency stop, the
+//! third ends the process.
+
+use super::note;
+use flotor_servo::StopSwitch;
+use rustix::process::getpgrp;
+use rustix::termios::{LocalModes, OptionalActions, Termios, isatty, tcgetattr, tcgetpgrp, tcsetattr};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGUSR1, SIGXFSZ};
+use signal_hook::{flag, low_level};
+use std::io::{self, Read, stdin};
+use std::os::unix::net::UnixStream;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Exit code after a third signal, when nothing else has ended the process: 128 + SIGINT, as shells have it.
+const INTERRUPTED: i32 = 130;
+
+/// What ends a run in order: the keys of a terminal (Ctrl-C, `Ctrl-\`, Ctrl-Z), its closing, and who manages
+/// processes.
+///
+/// By itself a terminal would end the process with the device unstopped, or, at Ctrl-Z, suspend the loop and its
+/// watchdog together, with the last force held.
+const ENDING: [i32; 5] = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP];
+
+/// Signals this close together are one wish: `timeout` signals its child and then the group the child is in, a
+/// terminal that closes tells the shell, which tells its jobs. A person takes longer.
+const ONE_WISH: Duration = Duration::from_millis(100);
+
+/// A switch that the first signal of [`ENDING`] uses in order and the second at once (the third ends the
+/// process), and `SIGUSR1` at once.
+pub fn stop_on_signals() -> StopSwitch {
+    let stop = StopSwitch::default();
+    if let Err(error) = register(&stop) {
+        note(format_args!("signals will not end the run in order: {error}"));
+    }
+    stop
+}
+
+fn register(stop: &StopSwitch) -> io::Result<()> {
+    let (asked, asking) = UnixStream::pair()?;
+    let insisted = stop.clone();
+    let thread = std::thread::Builder::new().name("flotor-signals".to_owned());
+    thread.spawn(move || attend(asked, &insisted))?;
+    // Started with `nohup`, a run is to outlive its terminal.
+    let heard = ENDING.into_iter().filter(|signal| *signal != SIGHUP || !is_ignored(SIGHUP));
+    for signal in heard {
+        // In the handler: an orderly end waits for no thread.
+        flag::register(signal, stop.stop_flag())?;
+        low_level::pipe::register(signal, asking.try_clone()?)?;
+    }
+    flag::register(SIGUSR1, stop.emergency_flag())?;
+    // Else a file that may not grow any further would end the process, not the recording.
+    flag::register(SIGXFSZ, Arc::<AtomicBool>::default())?;
+    Ok(())
+}
+
+/// Whether this process was started with a signal ignored.
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    (ignored >> (signal - 1)) & 1 == 1 // the lowest bit is signal 1
+}
+
+/// Reads a byte for every signal that asks for an end. Ends with the process: the handlers keep the other end
+/// open.
+fn attend(mut asked: UnixStream, stop: &StopSwitch) {
+    let mut insistence = Insistence::default();
+    let mut signal = [0];
+    while asked.read_exact(&mut signal).is_ok() {
+        match insistence.answer(Instant::now()) {
+            Answer::InOrder => {} // the handler has seen to it
+            Answer::AtOnce => stop.emergency_flag().store(true, Ordering::Relaxed),
+            // Without what a process does at its end: that may be what hangs.
+            Answer::Leave => low_level::exit(INTERRUPTED),
+        }
+    }
+}
+
+/// What is done about a signal that asks for an end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Answer {
+    InOrder,
+    AtOnce,
+    Leave,
+}
+
+/// How often an end was asked for, as the last answer and when it was given.
+#[derive(Default)]
+struct Insistence {
+    last: Option<(Instant, Answer)>,
+}
+
+impl Insistence {
+    fn answer(&mut self, now: Instant) -> Answer {
+        let answer = match self.last {
+            Some((since, answer)) if now.duration_since(since) < ONE_WISH => return answer,
+            None => Answer::InOrder,
+            Some((_, Answer::InOrder)) => Answer::AtOnce,
+            Some((_, Answer::AtOnce | Answer::Leave)) => Answer::Leave,
+        };
+        self.last = Some((now, answer));
+        answer
+    }
+}
+
+/// Keys without a line end, while it lives.
+pub struct Keys {
+    before: Termios,
+}
+
+impl Keys {
+    /// Listens to the terminal: space is the emergency stop, `q` an orderly end. `None` where there is no terminal
+    /// to listen to: in a pipe, in the background.
+    pub fn listen(stop: &StopSwitch) -> Option<Self> {
+        let terminal = stdin();
+        // Changing the terminal from the background would suspend the process.
+        if !isatty(&terminal) || tcgetpgrp(&terminal).ok()? != getpgrp() {
+            return None;
+        }
+        let before = tcgetattr(&terminal).ok()?;
+        let mut keys = before.clone();
+        keys.local_modes.remove(LocalModes::ICANON | LocalModes::ECHO);
+        tcsetattr(&terminal, OptionalActions::Now, &keys).ok()?;
+        let stop = stop.clone();
+        // Ends with the process: nothing can call it back from a read.
+        let thread = std::thread::Builder::new().name("flotor-keys".to_owned());
+        let listening = thread.spawn(move || {
+            for key in stdin().lock().bytes().map_while(Result::ok) {
+                match Wish::of(key) {
+                    Some(Wish::Emergency) => stop.emergency_by_key(),
+                    Some(Wish::Stop) => stop.stop(),
+                    None => {}
+                }
+            }
+        });
+        let keys = Self { before }; // dropped, and the terminal put right, if there is no thread
+        listening.ok().map(|_| keys)
+    }
+}
+
+impl Drop for Keys {
+    fn drop(&mut self) {
+        let _ = tcsetattr(stdin(), OptionalActions::Now, &self.before);
+    }
+}
+
+/// What a key asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Wish {
+    Emergency,
+    Stop,
+}
+
+impl Wish {
+    /// The largest key is the emergency stop.
+    fn of(key: u8) -> Option<Self> {
+        match key {
+            b' ' => Some(Self::Emergency),
+            b'q' => Some(Self::Stop),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whoever_asks_again_is_answered_more_urgently() {
+        let (mut insistence, start) = (Insistence::default(), Instant::now());
+        let mut after_ms = |ms| insistence.answer(start + Duration::from_millis(ms));
+        assert_eq!([0, 1, 99].map(&mut after_ms), [Answer::InOrder; 3], "one wish, however many signals");
+        assert_eq!([100, 199].map(&mut after_ms), [Answer::AtOnce; 2]);
+        assert_eq!([200, 300, 301].map(&mut after_ms), [Answer::Leave; 3]);
+    }
+
+    #[test]
+    fn ignored_signals_are_known() {
+        assert!(!is_ignored(signal_hook::consts::SIGKILL), "nobody can");
+        assert!(is_ignored(signal_hook::consts::SIGPIPE), "Rust starts every program so");
+    }
+
+    #[test]
+    fn the_space_bar_is_the_emergency_stop() {
+        assert_eq!(Wish::of(b' '), Some(Wish::Emergency));
+        assert_eq!(Wish::of(b'q'), Some(Wish::Stop));
+        assert_eq!(Wish::of(b'x'), None);
+    }
+}

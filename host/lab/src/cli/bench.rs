@@ -1,0 +1,195 @@
+//! `flotor bench`: work against precision of a force model's settings, and the cost of the loop around it.
+
+use super::ProgressLine;
+use crate::Size;
+use crate::bench::{BenchDevice, Case, Hand, Plan, TellApart, TickCost, WholeTick, measure};
+use clap::Args;
+use flotor_command::options::KeyValue;
+use flotor_command::tables::table;
+use flotor_command::{CommandError, print_result, style, write_text};
+use flotor_hal::abi::PluginKind;
+use flotor_hal::abi::loader::{Plugin, Setting};
+use flotor_session::registry::Registry;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Measure what an evaluation costs and how wrong it is, for many settings of a force model.
+#[derive(Args)]
+#[command(
+    after_help = "Without --case, the spring's variants and settings are compared with its exact rod; another model's\n\
+    defaults alone. With --tick, the whole tick around the model is timed instead: device, mapping, envelope, trace.\n\
+    Times are wall clock: compare within one run.\n\n\
+    Examples:\n  \
+    flotor bench --csv bench.csv --plot bench.svg\n  \
+    flotor bench --case variant=energy --case variant=rod,accuracy=servo --size full\n  \
+    flotor bench --model ./libmy_model.so --case steps=8 --case steps=64 --reference steps=1024\n  \
+    flotor bench --set preset=slender --case variant=energy --depth-mm 20 --apart rod_share\n  \
+    flotor bench --tick"
+)]
+pub(crate) struct BenchArguments {
+    /// Id of the model, or path to its plugin file
+    #[arg(long, value_name = "ID", default_value = "spring")]
+    model: String,
+    /// A case: its settings (repeatable)
+    #[arg(long = "case", value_name = "KEY=VALUE,...")]
+    cases: Vec<String>,
+    /// Settings every case starts from (repeatable)
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<KeyValue>,
+    /// The case errors are measured against
+    #[arg(long, value_name = "KEY=VALUE,...")]
+    reference: Option<String>,
+    /// The case whose times those of the others are compared with [default: the first]
+    #[arg(long, value_name = "KEY=VALUE,...")]
+    yardstick: Option<String>,
+    /// How far below home the middle of the motion lies
+    #[arg(long, value_name = "MM", default_value_t = 4.0, allow_negative_numbers = true)]
+    depth_mm: f64,
+    /// Time calls apart for which this detail of the answer is above zero
+    #[arg(long, value_name = "DETAIL")]
+    apart: Option<String>,
+    /// Time the whole tick around the model, on a scripted device and on the simulated flotor
+    #[arg(long, conflicts_with_all = ["cases", "sets", "reference", "yardstick", "apart", "csv", "plot"])]
+    tick: bool,
+    /// How much to time
+    #[arg(long, value_enum, default_value = "short")]
+    size: Size,
+    /// Write every measurement as CSV
+    #[arg(long, value_name = "FILE.csv")]
+    csv: Option<PathBuf>,
+    /// Draw error over time
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Write the measurements as JSON (- for standard output)
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// Cases of the spring that ships with Flotor: every variant and setting of it.
+const SPRING_CASES: [&str; 9] = [
+    "variant=thesis",
+    "variant=thesis,precision=f32",
+    "variant=closed-form",
+    "variant=closed-form,precision=f32",
+    "variant=current-length",
+    "variant=energy,hand_over=off",
+    "variant=energy",
+    "variant=rod,accuracy=servo",
+    "variant=rod,accuracy=tight",
+];
+/// What they are measured against.
+const SPRING_REFERENCE: &str = "variant=rod,accuracy=tight";
+/// Which of its answers come from two laws, and where: about the depth of the cases, and about half the free length (mm),
+/// where springs that can buckle have.
+const SPRING_APART: &str = "rod_share";
+const SPRING_WALKS: [(&str, f64); 8] = [
+    ("preset=thesis-1", 4.0),
+    ("preset=thesis-1", 12.5),
+    ("preset=thesis-2", 4.0),
+    ("preset=thesis-2", 18.7),
+    ("preset=thesis-3", 4.0),
+    ("preset=thesis-3", 13.5),
+    ("preset=slender", 4.0),
+    ("preset=slender", 30.0),
+];
+
+pub(crate) fn run(arguments: &BenchArguments) -> Result<(), CommandError> {
+    if arguments.tick { time_ticks(arguments) } else { compare_cases(arguments) }
+}
+
+/// A whole tick of the loop on one device.
+#[derive(Serialize)]
+struct TickRow {
+    device: BenchDevice,
+    #[serde(flatten)]
+    cost: TickCost,
+}
+
+/// `--tick`
+fn time_ticks(arguments: &BenchArguments) -> Result<(), CommandError> {
+    let batches = match arguments.size {
+        Size::Short => 2_000,
+        Size::Full => 50_000,
+    };
+    let row = |device: BenchDevice| {
+        let cost = WholeTick::prepare(device, &arguments.model)?.time(batches);
+        Ok(TickRow { device, cost })
+    };
+    let rows = BenchDevice::ALL.into_iter().map(row).collect::<Result<Vec<_>, CommandError>>()?;
+    let text = || {
+        let title = format!("a tick with `{}`, trace on, virtual clock: ns", arguments.model);
+        let cells =
+            rows.iter().map(|TickRow { device, cost: TickCost { median_ns, p99_ns, fastest_ns } }| {
+                let [median, p99, fastest] = [median_ns, p99_ns, fastest_ns].map(|ns| format!("{ns:.0}"));
+                [device.name().to_owned(), median, p99, fastest]
+            });
+        [vec![style::title(&title)], table(["", "median", "p99", "fastest"], cells)].concat().join("\n")
+    };
+    print_result(arguments.json.as_deref(), &rows, text)
+}
+
+fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
+    let plugin = Registry::search(&[]).load(&arguments.model, PluginKind::Model)?;
+    let is_spring = plugin.metadata().id == "spring" && arguments.cases.is_empty();
+    let cases: Vec<&str> = match (arguments.cases.is_empty(), is_spring) {
+        (false, _) => arguments.cases.iter().map(String::as_str).collect(),
+        (true, true) => SPRING_CASES.to_vec(),
+        (true, false) => vec![""],
+    };
+    let reference = arguments.reference.as_deref().or(is_spring.then_some(SPRING_REFERENCE));
+    let case = |text: &str| case(&plugin, &arguments.sets, text);
+    let hand = Hand { depth_m: arguments.depth_mm / 1e3 };
+    let cases = cases.into_iter().map(case).collect::<Result<Vec<_>, _>>()?;
+    let yardstick = match &arguments.yardstick {
+        Some(text) => {
+            let name = case(text)?.name;
+            cases.iter().position(|case| case.name == name).ok_or_else(|| {
+                CommandError::Usage(format!("yardstick `{text}` is none of the cases; add --case {text}"))
+            })?
+        }
+        None => 0,
+    };
+    let spring_walks = || {
+        let walks = SPRING_WALKS.iter().map(|(text, mm)| Ok((case(text)?, Hand { depth_m: mm / 1e3 })));
+        walks.collect::<Result<_, CommandError>>()
+    };
+    let apart = match (&arguments.apart, is_spring) {
+        (Some(detail), _) => Some((detail.clone(), cases.iter().map(|case| (case.clone(), hand)).collect())),
+        (None, true) => Some((SPRING_APART.to_owned(), spring_walks()?)),
+        (None, false) => None,
+    };
+    let apart = apart.map(|(detail, walks)| TellApart { detail, walks });
+    let reference = reference.map(case).transpose()?;
+    let line = ProgressLine::new();
+    let plan = Plan { cases, yardstick, reference, hand, apart, size: arguments.size };
+    let report = measure(&plugin, &plan, &line)?;
+    line.0.finish_and_clear();
+
+    let title = || style::title(&format!("{} {}", report.model, report.version));
+    print_result(arguments.json.as_deref(), &report, || format!("{}\n{}", title(), report.to_text()))?;
+    write_text(arguments.csv.as_deref(), || report.to_csv())?;
+    write_text(arguments.plot.as_deref(), || report.to_svg())
+}
+
+/// A case from `KEY=VALUE,KEY=VALUE` on top of what every case starts from.
+fn case(plugin: &Plugin, sets: &[KeyValue], text: &str) -> Result<Case, CommandError> {
+    let usage = |problem: String| CommandError::Usage(format!("case `{text}`: {problem}"));
+    let own = text.split(',').filter(|part| !part.trim().is_empty()).map(str::parse::<KeyValue>);
+    let own = own.collect::<Result<Vec<_>, _>>().map_err(usage)?;
+    let settings = sets.iter().chain(&own).map(|set| {
+        let parameter = set.parameter();
+        Setting::parse(plugin.parameters(), &parameter.key, &parameter.value)
+            .map_err(|error| usage(error.to_string()))
+    });
+    // A value says what it is of, but for a switch.
+    let word = |set: &KeyValue| {
+        let parameter = set.parameter();
+        match parameter.value.as_str() {
+            "on" | "off" => format!("{} {}", parameter.key, parameter.value),
+            _ => parameter.value,
+        }
+    };
+    let values: Vec<String> = own.iter().map(word).collect();
+    let name = if values.is_empty() { "defaults".to_owned() } else { values.join(" ") };
+    Ok(Case { name, settings: settings.collect::<Result<_, _>>()? })
+}

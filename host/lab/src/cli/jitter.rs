@@ -1,0 +1,99 @@
+//! `flotor jitter`: lateness of the servo next to that of a bare loop.
+
+use crate::jitter::{JitterReport, LoopTiming, MissedMore, measure};
+use clap::Args;
+use flotor_command::options::{core, duration_s, rate_hz};
+use flotor_command::stopping::stop_on_signals;
+use flotor_command::tables::table;
+use flotor_command::{CommandError, note, print_result, progress_bar, style, write_text};
+use flotor_plot::{Axis, Bin, Figure, Panel, Series};
+use flotor_servo::{Clock, Core};
+use flotor_session::registry::Registry;
+use flotor_session::scene::Scene;
+use flotor_session::{RunError, RunOptions, Session};
+use std::path::PathBuf;
+
+/// Measure how well the servo keeps time here.
+#[derive(Args)]
+#[command(
+    after_help = "Servo and bare loop take turns of a second each: same spin window, priority and core, same neighbours.\n\n\
+    Example:\n  flotor jitter --duration 20s --plot jitter.svg"
+)]
+pub(crate) struct JitterArguments {
+    /// How long to measure in all
+    #[arg(long, value_parser = duration_s, value_name = "TIME", default_value = "20s")]
+    duration: f64,
+    /// Loop rate in Hz, 100 to 10000
+    #[arg(long, value_parser = rate_hz, value_name = "HZ", default_value = "1000")]
+    rate: f64,
+    /// Run both loops on this core
+    #[arg(long, value_parser = core, value_name = "N")]
+    core: Option<Core>,
+    /// Write the result as JSON (- for standard output)
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Draw both histograms
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+}
+
+pub(crate) fn run(arguments: &JitterArguments) -> Result<(), CommandError> {
+    let mut scene = Scene::demo().map_err(RunError::Scene)?;
+    scene.rate_hz = arguments.rate;
+    let options = RunOptions { clock: Clock::Real, seed: 0 };
+    let session = Session::prepare(&scene, &Registry::search(&scene.plugin_folders), &options)?;
+    let session = session.on_core(arguments.core);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
+    let slices = ((arguments.duration / 2.0).ceil() as u64).max(1);
+    let progress = progress_bar(slices, "{percent:>3} %  pair {pos} of {len}");
+    let stop = stop_on_signals();
+    let report = measure(session, slices, &stop, |done| progress.set_position(done))?;
+    progress.finish_and_clear();
+
+    report.real_time.advice().into_iter().for_each(note);
+    print_result(arguments.json.as_deref(), &report, || to_text(&report))?;
+    write_text(arguments.plot.as_deref(), || picture(&report))
+}
+
+fn to_text(report: &JitterReport) -> String {
+    let us = |ns: u64| format!("{:.2}", ns as f64 * 1.0e-3);
+    let row = |name: &str, timing: &LoopTiming| {
+        let LoopTiming { lateness_ns: l, ticks, late_ticks, missed_ticks } = timing;
+        let [p50, p99, p999, max] = [l.p50, l.p99, l.p999, l.max].map(us);
+        let [ticks, late, missed] = [ticks, late_ticks, missed_ticks].map(u64::to_string);
+        [name.to_owned(), p50, p99, p999, max, ticks, late, missed]
+    };
+    let title = format!(
+        "lateness in µs at {} Hz, {} s each in turns, the last {} µs spun",
+        report.rate_hz,
+        report.slices,
+        us(report.spin_window_ns)
+    );
+    let head = ["", "p50", "p99", "p99.9", "max", "ticks", "late", "missed"];
+    let mut lines = vec![style::title(&title)];
+    lines.extend(table(head, [row("servo", &report.servo), row("bare", &report.bare)]));
+    if let MissedMore { ticks, standard_error: Some(error) } = report.missed_more {
+        lines.push(format!(
+            "  missed, servo - bare: {ticks:+} ± {error:.0} (standard error, from how much the pairs differ)"
+        ));
+    }
+    lines.join("\n")
+}
+
+/// Bars of a quarter octave, µs, of bins of ns; what is shorter than 10 ns takes no time.
+fn of_time(bins: &[(u64, u64)]) -> Vec<Bin> {
+    Bin::quarter_octaves(0.01, bins.iter().map(|(ns, count)| (*ns as f64 * 1.0e-3, *count)))
+}
+
+fn picture(report: &JitterReport) -> String {
+    let mut panel = Panel::new(Axis::log("Ticks", "1"));
+    for (name, bins) in ["servo", "bare loop"].iter().zip(&report.bins) {
+        panel = panel.series(Series::histogram(*name, of_time(bins)));
+    }
+    let subtitle = format!("{} Hz, {} s each in turns of a second", report.rate_hz, report.slices);
+    Figure::new("Lateness of the servo and of a bare loop", Axis::log("Lateness", "µs"))
+        .subtitle(subtitle)
+        .panel_height_px(260.0)
+        .panel(panel)
+        .to_svg()
+}

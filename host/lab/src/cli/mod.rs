@@ -1,0 +1,85 @@
+//! The commands that measure plugins, loops and recordings: the program `flotor-lab`, which `flotor` starts.
+
+mod bench;
+mod eval;
+mod jitter;
+mod replay;
+mod stability;
+mod stress;
+mod validate;
+
+use crate::Progress;
+use crate::replay::ReplayError;
+use clap::{CommandFactory, Parser, Subcommand};
+use flotor_command::{CommandError, exit_code_of, progress_bar};
+use std::process::ExitCode;
+
+/// Measure plugins, loops and recordings; `flotor COMMAND` starts this program.
+#[derive(Parser)]
+#[command(name = "flotor", bin_name = "flotor", version, about, max_term_width = 110)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Replay(replay::ReplayArguments),
+    Eval(eval::EvalArguments),
+    Validate(validate::ValidateArguments),
+    Jitter(jitter::JitterArguments),
+    Stability(stability::StabilityArguments),
+    Bench(bench::BenchArguments),
+    Stress(stress::StressArguments),
+}
+
+/// The commands with their arguments. Not real-time.
+#[must_use]
+pub fn command() -> clap::Command {
+    Arguments::command()
+}
+
+/// Runs the command of this process.
+#[must_use]
+pub fn main() -> ExitCode {
+    exit_code_of(match Arguments::parse().command {
+        Command::Replay(arguments) => replay::run(&arguments),
+        Command::Eval(arguments) => eval::run(&arguments),
+        Command::Validate(arguments) => validate::run(&arguments),
+        Command::Jitter(arguments) => jitter::run(&arguments),
+        Command::Stability(arguments) => stability::run(&arguments),
+        Command::Bench(arguments) => bench::run(&arguments),
+        Command::Stress(arguments) => stress::run(&arguments),
+    })
+}
+
+impl From<ReplayError> for CommandError {
+    fn from(error: ReplayError) -> Self {
+        match error {
+            ReplayError::Read(error) => Self::Read(error),
+            ReplayError::Run(error) => Self::Run(error),
+            other => Self::Usage(other.to_string()),
+        }
+    }
+}
+
+/// A line on a terminal that says how a measurement comes along; nothing in a pipe.
+struct ProgressLine(indicatif::ProgressBar);
+
+impl ProgressLine {
+    fn new() -> Self {
+        Self(progress_bar(0, "{msg:<44} {wide_bar} {percent:>3} %  {elapsed}"))
+    }
+}
+
+impl Progress for ProgressLine {
+    fn begin(&self, name: &str, steps: u64) {
+        self.0.set_length(steps);
+        self.0.set_position(0);
+        self.0.set_message(name.to_owned());
+    }
+
+    fn advance(&self, steps: u64) {
+        self.0.inc(steps);
+    }
+}

@@ -1,0 +1,191 @@
+//! `flotor replay`: the models of a recording once more, as they were or changed.
+
+use crate::replay::{Compared, Coverage, Difference, Replay, WhyApart};
+use clap::Args;
+use flotor_command::options::{KeyValue, PluginKeyValue};
+use flotor_command::{CommandError, print_result, progress_bar, style, write_text};
+use flotor_hal::{DVec3, Wrench};
+use flotor_plot::{Axis, Figure, Panel, Series};
+use flotor_record::Ending;
+use flotor_session::registry::Registry;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Ask the models of a recording again.
+#[derive(Args)]
+#[command(
+    after_help = "With nothing changed the wrench must come out bit for bit: exit code 1 if it does not. With --set or --model\n\
+    the difference is what was asked for.\n\n\
+    Examples:\n  flotor replay run.mcap\n  flotor replay run.mcap --set spring.variant=closed-form --plot difference.svg\n  \
+    flotor replay run.mcap --model spring=./libmy_spring.so --json -\n  \
+    flotor replay run.mcap --plugin-path target/release"
+)]
+pub(crate) struct ReplayArguments {
+    /// The recording
+    recording: PathBuf,
+    /// Set a parameter of a model of the recording (repeatable)
+    #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
+    sets: Vec<PluginKeyValue>,
+    /// Ask another model in place of one of the recording (repeatable): its name, and the id or file of a plugin
+    #[arg(long = "model", value_name = "NAME=PLUGIN")]
+    models: Vec<KeyValue>,
+    /// Folder to search for plugins (repeatable): for those the run's scene named by their files
+    #[arg(long = "plugin-path", value_name = "FOLDER")]
+    folders: Vec<PathBuf>,
+    /// Write the difference as JSON (- for standard output)
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Draw recorded and replayed force
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+}
+
+impl ReplayArguments {
+    /// True if another wrench is what was asked for.
+    fn changes_anything(&self) -> bool {
+        !(self.sets.is_empty() && self.models.is_empty())
+    }
+}
+
+#[derive(Serialize)]
+struct Report {
+    bit_exact: bool,
+    /// Of the whole run, as far as anybody can tell.
+    complete: bool,
+    #[serde(skip)]
+    ending: Ending,
+    #[serde(flatten)]
+    coverage: Coverage,
+    #[serde(flatten)]
+    difference: Difference,
+    why_apart: Option<WhyApart>,
+    recorded_s: f64,
+    wall_s: f64,
+}
+
+pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
+    let registry = Registry::search(&arguments.folders);
+    let replay = Replay::open(&arguments.recording, &registry, &arguments.models, &arguments.sets)?;
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
+    let progress = progress_bar((replay.run().duration_s * 1.0e3) as u64, "{percent:>3} %  replaying");
+    let started = Instant::now();
+    let mut samples = Vec::new();
+    let mut end_ns = 0;
+    let Compared { difference, coverage, why, ending, health } = replay.compare(|record, wrench| {
+        end_ns = record.time_ns;
+        progress.set_position(record.time_ns / 1_000_000);
+        if arguments.plot.is_some() {
+            samples.push(Sample { time_ns: record.time_ns, recorded: record.model, replayed: *wrench });
+        }
+    })?;
+    progress.finish_and_clear();
+
+    let recorded_s = end_ns as f64 * 1.0e-9;
+    let bit_exact = difference.is_bit_exact();
+    let report = Report {
+        bit_exact,
+        complete: ending == Ending::Finished && coverage.is_whole(),
+        ending,
+        coverage,
+        difference,
+        why_apart: why,
+        recorded_s,
+        wall_s: started.elapsed().as_secs_f64(),
+    };
+    print_result(arguments.json.as_deref(), &report, || to_text(arguments, &report))?;
+    write_text(arguments.plot.as_deref(), || picture(&samples))?;
+    if let Some((_, words)) = health.iter().find(|(health, _)| health.panicked_at.is_some()) {
+        return Err(CommandError::PluginRefused(format!(
+            "a model of the recording stopped answering: {words}"
+        )));
+    }
+    if !bit_exact && !arguments.changes_anything() {
+        let why = report.why_apart.unwrap_or(WhyApart::OtherBuild);
+        return Err(CommandError::Failed(format!("nothing was changed, yet the wrench differs: {why}")));
+    }
+    Ok(())
+}
+
+impl Report {
+    /// What came out, in a few words that claim no more than was compared.
+    fn verdict(&self) -> String {
+        match (self.difference.ticks, self.bit_exact, self.coverage.missing_ticks) {
+            (0, ..) => "there is no tick to compare".to_owned(),
+            (_, false, _) => "the wrench differs".to_owned(),
+            (_, true, 0) => "bit for bit the recorded wrench".to_owned(),
+            (_, true, missing) => format!("bit for bit the recorded wrench, but {missing} ticks are missing"),
+        }
+    }
+
+    /// Where the wrench is the same although it differs from one tick to another.
+    fn same_around(&self, first: u64, last: u64) -> String {
+        let Coverage { begins_at_tick, ends_at_tick, .. } = self.coverage;
+        let before = begins_at_tick.filter(|begin| *begin < first).map(|_| format!("before {first}"));
+        let after = ends_at_tick.filter(|end| *end > last).map(|_| format!("after {last}"));
+        let parts: Vec<String> = before.into_iter().chain(after).collect();
+        if parts.is_empty() { String::new() } else { format!("; bit for bit {}", parts.join(" and ")) }
+    }
+
+    /// What of the run is not in the recording.
+    fn gaps(&self) -> Vec<String> {
+        let Coverage { begins_at_tick, missing_ticks, first_missing_tick, .. } = self.coverage;
+        let late = begins_at_tick.filter(|first| *first > 0);
+        let late = late.map(|first| format!("the recording begins at tick {first}: the run was on by then"));
+        let missing = first_missing_tick.map(|first| {
+            format!("{missing_ticks} ticks are missing, from {first} on: their records were lost")
+        });
+        let cut = (self.ending == Ending::CutOff)
+            .then(|| "the recording breaks off: its process was killed or its disk full".to_owned());
+        [late, missing, cut].into_iter().flatten().collect()
+    }
+}
+
+fn to_text(arguments: &ReplayArguments, report: &Report) -> String {
+    let mut lines = vec![style::title(&format!("{}: {}", arguments.recording.display(), report.verdict()))];
+    let mut row = |name: &str, text: String| lines.push(format!("  {name:<11}{text}"));
+    let d = &report.difference;
+    row("ticks", format!("{} ({:.3} s) in {:.3} s", d.ticks, report.recorded_s, report.wall_s));
+    if let (Some(first), Some(last)) = (d.first_tick, d.last_tick) {
+        let (differ, same) = (d.differing_ticks, report.same_around(first, last));
+        row("differ", format!("{differ} ticks, the first is {first}, the last {last}{same}"));
+        row("force", format!("max {:.3e} N, rms {:.3e} N", d.max_force_n, d.rms_force_n));
+        row("torque", format!("max {:.3e} N·m, rms {:.3e} N·m", d.max_torque_nm, d.rms_torque_nm));
+    }
+    // If nothing was changed, the error says why.
+    if let (Some(why), true) = (&report.why_apart, arguments.changes_anything()) {
+        row("note", format!("the wrench differs not only for what was changed: {why}"));
+    }
+    report.gaps().into_iter().for_each(|gap| row("note", gap));
+    lines.join("\n")
+}
+
+/// A tick of the recording and what the models say now.
+struct Sample {
+    time_ns: u64,
+    recorded: Wrench,
+    replayed: Wrench,
+}
+
+/// The force that was and that would be, and how they differ along every axis.
+fn picture(samples: &[Sample]) -> String {
+    let line = |value: &dyn Fn(&Sample) -> f64| -> Vec<(f64, f64)> {
+        samples.iter().map(|sample| (sample.time_ns as f64 * 1.0e-9, value(sample))).collect()
+    };
+    let axes = |label: &str, unit: &str, scale: f64, difference: fn(&Sample) -> DVec3| {
+        let panel = Panel::new(Axis::linear(label, unit));
+        ["x", "y", "z"].into_iter().enumerate().fold(panel, |panel, (axis, name)| {
+            panel.series(Series::line(name, line(&|sample| difference(sample)[axis] * scale)).slot(axis))
+        })
+    };
+    Figure::new("Recorded and replayed", Axis::linear("Time", "s"))
+        .panel(
+            Panel::new(Axis::linear("Force, z", "N"))
+                .series(Series::line("recorded", line(&|sample| sample.recorded.force().z)))
+                .series(Series::line("replayed", line(&|sample| sample.replayed.force().z))),
+        )
+        .panel(axes("Difference of force", "N", 1.0, |s| s.replayed.force() - s.recorded.force()))
+        .panel(axes("Difference of torque", "mN·m", 1.0e3, |s| s.replayed.torque() - s.recorded.torque()))
+        .panel_height_px(180.0)
+        .to_svg()
+}

@@ -1,0 +1,214 @@
+//! `flotor stability`: the stiffest spring that stays stable on the simulated device, next to theory.
+
+use crate::stability::theory::{Plant, Rendering, exact_limit_n_per_m, gil_limit_n_per_m};
+use crate::stability::{Case, Grip, LoopError, Row, default_cases, measure};
+use clap::Args;
+use flotor_command::options::{number, rate_hz};
+use flotor_command::tables::{table, to_csv};
+use flotor_command::{CommandError, print_result, progress_bar, style, write_json, write_text};
+use flotor_hal::abi::PluginKind;
+use flotor_hal::abi::loader::Plugin;
+use flotor_plot::{Axis, Figure, Panel, Series};
+use flotor_session::registry::Registry;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Find the stiffest virtual spring that stays stable.
+#[derive(Args)]
+#[command(
+    after_help = "Each case is bisected on the simulated flotor's own dynamics, in virtual time, until the \
+    vibration of a released\nhandle neither grows nor fades. Lists multiply: without any, a default grid is measured.\n\n\
+    Examples:\n  \
+    flotor stability --plot stability.svg --csv stability.csv\n  \
+    flotor stability --rate 1000,4000 --delay 0,1 --virtual-damping 0,15\n  \
+    flotor stability --virtual-damping 15 --quantum-um 10 --hand relaxed"
+)]
+pub(crate) struct StabilityArguments {
+    /// Servo rates in Hz, 100 to 10000
+    #[arg(long, value_parser = rate_hz, value_name = "HZ", value_delimiter = ',')]
+    rate: Vec<f64>,
+    /// Whole periods between a sample and the force that answers it, 0 to 100
+    #[arg(long, value_parser = clap::value_parser!(u32).range(0..=100), value_name = "TICKS", value_delimiter = ',')]
+    delay: Vec<u32>,
+    /// Drag of the device in N s/m
+    #[arg(long, value_parser = damping, value_name = "B", value_delimiter = ',')]
+    damping: Vec<f64>,
+    /// Virtual damping (backward difference) in N s/m
+    #[arg(long, value_parser = damping, value_name = "B", value_delimiter = ',')]
+    virtual_damping: Vec<f64>,
+    /// Step of the position sensor in µm, 0 to 100
+    #[arg(long, value_parser = quantum_um, value_name = "UM", default_value = "0")]
+    quantum_um: f64,
+    /// How the handle is held
+    #[arg(long, value_enum, default_value_t)]
+    hand: Grip,
+    /// Write the rows as JSON (- for standard output)
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write the rows as CSV (- for standard output)
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Draw stiffness against virtual damping: theory as lines, simulation as points
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+}
+
+/// The device whose dynamics are simulated.
+const DEVICE: &str = "simulated";
+
+/// What machines read.
+#[derive(Serialize)]
+struct Report<'a> {
+    device: &'a str,
+    version: &'a str,
+    rows: &'a [Row],
+    worst_deviation: f64,
+}
+
+pub(crate) fn run(arguments: &StabilityArguments) -> Result<(), CommandError> {
+    let cases = cases(arguments);
+    let plugin = Registry::search(&[]).load(DEVICE, PluginKind::Device)?;
+    let progress = progress_bar(cases.len() as u64, "{percent:>3} %  case {pos} of {len}");
+    let rows = measure(&plugin, &cases, || progress.inc(1)).map_err(refused)?;
+    progress.finish_and_clear();
+
+    let worst_deviation = rows.iter().map(|row| row.deviation().abs()).fold(0.0, f64::max);
+    let version = &plugin.metadata().version;
+    let report = Report { device: DEVICE, version, rows: &rows, worst_deviation };
+    // A table for machines on standard output is all that is there.
+    let csv = arguments.csv.as_deref();
+    if csv.is_none_or(|path| path.as_os_str() != "-") {
+        print_result(arguments.json.as_deref(), &report, || to_text(&rows, worst_deviation))?;
+    } else if let Some(path) = &arguments.json {
+        write_json(path, &report)?;
+    }
+    write_text(csv, || to_csv([], &rows))?;
+    if arguments.plot.is_none() {
+        return Ok(());
+    }
+    let picture = picture(&plugin, &cases, &rows)?;
+    write_text(arguments.plot.as_deref(), || picture)
+}
+
+/// The product of all lists given, or the default grid.
+fn cases(arguments: &StabilityArguments) -> Vec<Case> {
+    let StabilityArguments { rate, delay, damping, virtual_damping, quantum_um, hand: grip, .. } = arguments;
+    let quantum_m = quantum_um * 1.0e-6;
+    if rate.is_empty() && delay.is_empty() && damping.is_empty() && virtual_damping.is_empty() {
+        return default_cases().into_iter().map(|case| Case { quantum_m, grip: *grip, ..case }).collect();
+    }
+    let mut cases = Vec::new();
+    for rate_hz in given_or(rate, 1000.0) {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 100 Hz to 10 kHz
+        let period_ns = (1.0e9 / rate_hz).round() as u64;
+        for delay_ticks in given_or(delay, 0) {
+            for plant_damping_ns_per_m in given_or(damping, 0.5) {
+                cases.extend(given_or(virtual_damping, 0.0).map(|virtual_damping_ns_per_m| Case {
+                    period_ns,
+                    delay_ticks,
+                    plant_damping_ns_per_m,
+                    virtual_damping_ns_per_m,
+                    quantum_m,
+                    grip: *grip,
+                }));
+            }
+        }
+    }
+    cases
+}
+
+fn given_or<T: Copy>(list: &[T], default: T) -> impl Iterator<Item = T> {
+    list.iter().copied().chain(list.is_empty().then_some(default))
+}
+
+fn refused(error: LoopError) -> CommandError {
+    match error {
+        LoopError::Plugin(error) => error.into(),
+        LoopError::Fault(fault) => CommandError::DeviceFault(fault),
+        other => CommandError::PluginRefused(other.to_string()),
+    }
+}
+
+fn to_text(rows: &[Row], worst_deviation: f64) -> String {
+    let title = style::title("largest stable stiffness in N/m");
+    let head = ["T in ms", "delay", "b", "B", "simulated", "exact", "differ", "Gil", "passive"];
+    let line = |row: &Row| {
+        let [simulated, exact, gil, passive] =
+            [row.k_max_n_per_m, row.exact_n_per_m, row.gil_n_per_m, row.passive_n_per_m]
+                .map(|limit| format!("{limit:.1}"));
+        let [period_ms, b, virtual_b] =
+            [row.period_s * 1.0e3, row.plant_damping_ns_per_m, row.virtual_damping_ns_per_m]
+                .map(|number| number.to_string());
+        let differ = format!("{:.3}%", row.deviation() * 100.0);
+        [period_ms, row.delay_ticks.to_string(), b, virtual_b, simulated, exact, differ, gil, passive]
+    };
+    let foot =
+        format!("worst difference between simulated and exact limit: {:.3} %", worst_deviation * 100.0);
+    [vec![title], table(head, rows.iter().map(line)), vec![foot]].concat().join("\n")
+}
+
+/// A panel for each combination of period and drag, a line and points for each delay in it.
+fn picture(plugin: &Plugin, cases: &[Case], rows: &[Row]) -> Result<String, CommandError> {
+    let mut figure = Figure::new("Largest stable stiffness", Axis::linear("Virtual damping", "N s/m"))
+        .subtitle("points: simulated flotor; lines: exact limit of the sampled loop, and Gil's rule")
+        .panel_height_px(320.0);
+    let pairs: Vec<(&Case, &Row)> = cases.iter().zip(rows).collect();
+    for (index, first) in cases.iter().enumerate() {
+        let is_alike = |case: &Case| {
+            case.period_ns == first.period_ns && case.plant_damping_ns_per_m == first.plant_damping_ns_per_m
+        };
+        let within: Vec<_> = pairs.iter().copied().filter(|(case, _)| is_alike(case)).collect();
+        let is_new = !cases.iter().take(index).any(is_alike);
+        // A curve needs points; single cases are in the table.
+        if is_new && (within.len() >= 3 || cases.len() == within.len()) {
+            figure = figure.panel(stiffness_panel(first, first.plant(plugin).map_err(refused)?, &within));
+        }
+    }
+    Ok(figure.to_svg())
+}
+
+fn stiffness_panel(first: &Case, plant: Plant, within: &[(&Case, &Row)]) -> Panel {
+    const CURVE_POINTS: u32 = 120;
+    let period_s = first.period_ns as f64 * 1.0e-9;
+    let title = format!("T = {} ms, b = {} N s/m", period_s * 1.0e3, first.plant_damping_ns_per_m);
+    let most = within.iter().map(|(case, _)| case.virtual_damping_ns_per_m).fold(0.0, f64::max);
+
+    let mut panel = Panel::new(Axis::log("Stiffness", "N/m")).title(title);
+    let mut delays: Vec<u32> = within.iter().map(|(case, _)| case.delay_ticks).collect();
+    delays.sort_unstable();
+    delays.dedup();
+    for (slot, delay_ticks) in delays.iter().copied().enumerate() {
+        let theory = |limit: fn(&Plant, &Rendering) -> f64| {
+            let rendering =
+                move |virtual_damping_ns_per_m| Rendering { period_s, delay_ticks, virtual_damping_ns_per_m };
+            (0..=CURVE_POINTS).map(move |index| {
+                // Closer where the curves are steep, at little damping.
+                let share = f64::from(index) / f64::from(CURVE_POINTS);
+                let damping = most * share * share;
+                (damping, limit(&plant, &rendering(damping)))
+            })
+        };
+        let measured = within
+            .iter()
+            .filter(|(case, _)| case.delay_ticks == delay_ticks)
+            .map(|(case, row)| (case.virtual_damping_ns_per_m, row.k_max_n_per_m));
+        panel = panel
+            .series(
+                Series::line(format!("exact, {delay_ticks} ticks"), theory(exact_limit_n_per_m)).slot(slot),
+            )
+            .series(Series::points("", measured).slot(slot))
+            .series(
+                Series::line(format!("Gil, {delay_ticks} ticks"), theory(gil_limit_n_per_m))
+                    .slot(slot + delays.len()),
+            );
+    }
+    panel
+}
+
+fn damping(text: &str) -> Result<f64, String> {
+    number(text, "N s/m", "number", 0.0..=100_000.0)
+}
+
+fn quantum_um(text: &str) -> Result<f64, String> {
+    number(text, "µm", "number", 0.0..=100.0)
+}

@@ -1,0 +1,93 @@
+//! `flotor validate`: a plugin file against the rules of the contract.
+
+use crate::validate::{Check, Figures, Finding, Verdict, check, validate};
+use clap::Args;
+use flotor_command::options::{KeyValue, duration_s};
+use flotor_command::say;
+use flotor_command::{CommandError, style, write_json};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+/// Check a plugin file.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  flotor validate target/release/libmy_model.so\n  \
+    flotor validate target/release/libmy_device.so --set port=/dev/ttyACM0\n\n\
+    Runs the plugin's code, each rule in a process of its own: validate only files you would load.")]
+pub(crate) struct ValidateArguments {
+    /// The plugin's shared library
+    plugin: PathBuf,
+    /// Set a parameter of the instances that are checked, as where the device is (repeatable)
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<KeyValue>,
+    /// For machines
+    #[arg(long)]
+    json: bool,
+    /// Longest time for one rule: 10s, 500ms
+    #[arg(long, value_parser = duration_s, value_name = "TIME", default_value = "10s")]
+    timeout: f64,
+    /// Check one rule in this process, and print the verdict as JSON
+    #[arg(long, hide = true, value_parser = rule)]
+    rule: Option<Check>,
+    /// Write the verdict into the file that is standard input instead
+    #[arg(long, hide = true, requires = "rule")]
+    deliver: bool,
+}
+
+fn rule(id: &str) -> Result<Check, String> {
+    Check::from_id(id).ok_or_else(|| format!("no rule `{id}`"))
+}
+
+pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
+    if let Some(rule) = arguments.rule {
+        let verdict = Verdict::of(check(&arguments.plugin, &arguments.sets, rule));
+        if arguments.deliver {
+            return verdict.deliver().map_err(|error| CommandError::Failed(error.to_string()));
+        }
+        // On a line of its own, whatever the plugin has printed before.
+        say!(
+            "\n{}",
+            serde_json::to_string(&verdict).map_err(|error| CommandError::Failed(error.to_string()))?
+        );
+        return Ok(());
+    }
+    let program = std::env::current_exe()
+        .map_err(|cause| CommandError::file(Path::new("flotor"), "cannot find this program", cause))?;
+    let one_rule = |rule: Check| {
+        let mut command = Command::new(&program);
+        command.arg("validate").args(["--rule", rule.id(), "--deliver"]).arg(&arguments.plugin);
+        for (key, value) in arguments.sets.iter().map(KeyValue::pair) {
+            command.arg("--set").arg(format!("{key}={value}"));
+        }
+        command
+    };
+    let findings = validate(&arguments.plugin, Duration::from_secs_f64(arguments.timeout), one_rule);
+    let violated = findings.iter().filter(|finding| finding.violation.is_some()).count();
+    if arguments.json {
+        write_json(Path::new("-"), &findings)?;
+    } else {
+        say!("{}", style::title(&arguments.plugin.display().to_string()));
+        findings.iter().for_each(print);
+        if let Some(first) = findings.iter().find_map(|finding| finding.unchecked.as_ref()) {
+            let unchecked = findings.iter().filter(|finding| finding.unchecked.is_some()).count();
+            say!("{unchecked} of {} rules could not be checked: {first}", findings.len());
+        }
+    }
+    if violated == 0 {
+        return Ok(());
+    }
+    let problem = format!("{}: {violated} of {} rules violated", arguments.plugin.display(), findings.len());
+    Err(CommandError::PluginRefused(problem))
+}
+
+fn print(finding: &Finding) {
+    let Finding { rule, text, .. } = finding;
+    match &finding.violation {
+        None if finding.unchecked.is_some() => say!("  ?       {rule:<20} {text}"),
+        None => say!("  ok      {rule:<20} {text}"),
+        Some(seen) => say!("  FAILED  {rule:<20} {text}\n          {seen}"),
+    }
+    if let Some(Figures { stiffness_n_per_m, damping_ns_per_m }) = finding.figures {
+        say!("          near home up to {stiffness_n_per_m:.6} N/m and {damping_ns_per_m:.6} N s/m");
+    }
+}

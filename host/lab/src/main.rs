@@ -1,0 +1,5 @@
+//! The program `flotor-lab`; everything is in the library.
+
+fn main() -> std::process::ExitCode {
+    flotor_lab::cli::main()
+}

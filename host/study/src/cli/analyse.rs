@@ -1,0 +1,99 @@
+//! `flotor analyse`: a study's data in, thresholds, effects and tests out.
+
+use crate::analysis::{Analysis, AnalysisOptions, BlindedAnalysis, Estimator, SubjectRecord};
+use crate::apparatus::report::html;
+use crate::blinding::Codes;
+use crate::dataset::Dataset;
+use crate::protocol::RatingScale;
+use clap::{Args, ValueEnum};
+use flotor_command::tables::to_csv;
+use flotor_command::{CommandError, note, print_result, style, write_text};
+use flotor_statistics::anova::SumOfSquares;
+use std::path::PathBuf;
+
+/// Analyse a study
+#[derive(Args)]
+#[command(
+    after_help = "Every event log is verified first: a changed line is refused with its number. Sittings that \
+    never came to an end are\nleft out, and said so.\n\n\
+    Examples:\n  \
+    flotor analyse data\n  \
+    flotor analyse data --json result.json --type II"
+)]
+pub(crate) struct AnalyseArguments {
+    /// Folder given to `study --out`
+    #[arg(value_name = "DIR")]
+    data: PathBuf,
+    /// Write the result as JSON (- for standard output)
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write a page with figures and all numbers
+    #[arg(long, value_name = "FILE.html")]
+    html: Option<PathBuf>,
+    /// Write every subject's response under every condition, for R or Python
+    #[arg(long, value_name = "FILE.csv")]
+    csv: Option<PathBuf>,
+    /// Codes in place of modalities and stimuli, nothing of the report beside them
+    #[arg(long, conflicts_with = "html")]
+    blind: bool,
+    /// How thresholds are found
+    #[arg(long, value_enum, default_value_t)]
+    estimator: Estimator,
+    /// Sums of squares of the analysis of variance
+    #[arg(long = "type", value_enum, default_value_t)]
+    sums: SumsOption,
+    /// How ratings of subjects with different scales are made comparable
+    #[arg(long, value_enum, default_value_t)]
+    ratings: RatingScale,
+}
+
+/// `--type`
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum SumsOption {
+    /// Each effect beyond those that do not contain it
+    #[value(name = "II")]
+    Two,
+    /// Each effect beyond all others
+    #[default]
+    #[value(name = "III")]
+    Three,
+}
+
+pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
+    let logs = Dataset::at(&arguments.data).logs()?;
+    for log in logs.iter().filter(|log| !log.complete) {
+        note(format_args!("{} broke off after {} trials: left out", log.begin.subject, log.trials.len()));
+    }
+    let Some(first) = logs.first() else { return Ok(()) };
+    let complete = logs.iter().filter(|log| log.complete).map(SubjectRecord::of_log);
+    let subjects: Vec<SubjectRecord> = complete.collect();
+    let options = AnalysisOptions {
+        sums_of_squares: match arguments.sums {
+            SumsOption::Two => SumOfSquares::Two,
+            SumsOption::Three => SumOfSquares::Three,
+        },
+        rating_scale: arguments.ratings,
+        estimator: arguments.estimator,
+    };
+    let protocol = &first.begin.protocol;
+    let analysis = Analysis::of(protocol, &subjects, &options)
+        .map_err(|error| CommandError::Usage(format!("{}: {error}", arguments.data.display())))?;
+    if arguments.blind {
+        let codes = Codes::new(protocol, first.begin.seed);
+        return tell_blinded(arguments, &BlindedAnalysis::of(&analysis, &codes));
+    }
+    let text = || {
+        let title = format!("{} of {}", protocol.task(), protocol.stimulus());
+        format!("{}\n{}", style::title(&title), analysis.to_text())
+    };
+    print_result(arguments.json.as_deref(), &analysis, text)?;
+    write_text(arguments.html.as_deref(), || html(&first.begin, &subjects, &analysis))?;
+    write_text(arguments.csv.as_deref(), || to_csv([], analysis.responses()))
+}
+
+/// Results under codes.
+fn tell_blinded(arguments: &AnalyseArguments, analysis: &BlindedAnalysis) -> Result<(), CommandError> {
+    let text = || format!("{}\n{}", style::title(analysis.task), analysis.to_text());
+    print_result(arguments.json.as_deref(), analysis, text)?;
+    write_text(arguments.csv.as_deref(), || to_csv([], &analysis.responses))
+}

@@ -1,0 +1,47 @@
+//! The commands of experiments: the program `flotor-study`, which `flotor` starts.
+
+mod analyse;
+mod study;
+
+use crate::dataset::DatasetError;
+use clap::{CommandFactory, Parser, Subcommand};
+use flotor_command::{CommandError, exit_code_of};
+use std::process::ExitCode;
+
+/// Carry out and analyse perception experiments; `flotor COMMAND` starts this program.
+#[derive(Parser)]
+#[command(name = "flotor", bin_name = "flotor", version, about, max_term_width = 110)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Study(study::StudyArguments),
+    Analyse(analyse::AnalyseArguments),
+}
+
+/// The commands with their arguments. Not real-time.
+#[must_use]
+pub fn command() -> clap::Command {
+    Arguments::command()
+}
+
+/// Runs the command of this process.
+#[must_use]
+pub fn main() -> ExitCode {
+    exit_code_of(match Arguments::parse().command {
+        Command::Study(arguments) => study::run(&arguments),
+        Command::Analyse(arguments) => analyse::run(&arguments),
+    })
+}
+
+impl From<DatasetError> for CommandError {
+    fn from(error: DatasetError) -> Self {
+        match error {
+            DatasetError::File { .. } => Self::Failed(error.to_string()),
+            other => Self::Usage(other.to_string()),
+        }
+    }
+}

@@ -1,0 +1,464 @@
+//! `flotor study`: perception experiments.
+
+mod bias;
+mod choices;
+mod explore;
+mod front;
+mod person;
+mod spring;
+
+use crate::apparatus::rig::{Rig, RunEnded, TrialFiles};
+use crate::apparatus::{Apparatus, ApparatusError, Kinematics};
+use crate::cohort::{Cohort, CohortError, Earlier};
+use crate::conduct::{ConductError, Nothing, OutsideError, Presenter};
+use crate::dataset::Dataset;
+use crate::observer::Population;
+use crate::procedure::{Averaging, Procedure, QuestPlusRule, StepAtReversal, WeightedUpDownRule};
+use crate::protocol::{
+    ComparisonSide, JndDemo, JndProtocol, MagnitudeProtocol, PresentationOrder, Protocol, Stimulus,
+    SubjectNumber,
+};
+use choices::{
+    BoundaryChoice, FirstChoice, ForceWay, NoiseOption, PresentationOption, ProcedureChoice, range,
+};
+use clap::{Args, Subcommand, ValueEnum};
+use flotor_command::options::{PluginKeyValue, duration_s};
+use flotor_command::say;
+use flotor_command::stopping::stop_on_signals;
+use flotor_command::{CommandError, progress_bar, style};
+use flotor_servo::RunEnd;
+use flotor_session::RunError;
+use flotor_session::scene::Scene;
+use serde_json::json;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+/// Perception experiments
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    flotor study jnd --out data                              16 simulated subjects, thresholds of stiffness\n  \
+    flotor analyse data                                      Weber fractions, tests, effects\n  \
+    flotor study magnitude --subjects 8 --seed 3 --out ratings\n  \
+    flotor study jnd --bases 20,40 --target 0.8 --side random --out other\n  \
+    flotor study jnd --out data --resume                     go on where it broke off\n  \
+    flotor study jnd --observer human --subject 3 --scene mlhd.toml --out people    a person, in front of the viewer\n  \
+    flotor study jnd --observer human --subject 3 --out people --resume\n  \
+    flotor study magnitude --stimulus spring.wire_diameter_mm --set spring.mode=physical --range 0.4-0.8 --out d\n  \
+    flotor study bias --runs 1000                            what is each estimator worth?")]
+pub(crate) struct StudyArguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Just noticeable difference: pairs, by an adaptive procedure
+    Jnd(JndArguments),
+    /// Magnitude estimation: one at a time, any number
+    Magnitude(MagnitudeArguments),
+    /// Just noticeable difference of a force, felt or exerted
+    Force(ForceArguments),
+    /// Feel a spring while its dimensions and material change: no trials, no questions
+    Explore(explore::ExploreArguments),
+    /// Fit a spring to a measured curve of a real one, to be judged beside others
+    Spring(spring::SpringArguments),
+    /// Add a note of the experimenter to a subject's log
+    Note(NoteArguments),
+    /// How far each way to a threshold is off, with observers whose threshold is known
+    Bias(bias::BiasArguments),
+}
+
+/// `--observer`
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum ObserverOption {
+    /// Signal detection with known thresholds, a simulated hand, virtual time
+    #[default]
+    Simulated,
+    /// A person at the device, in front of the viewer or of this terminal, in real time
+    Human,
+}
+
+/// What every experiment has.
+#[derive(Args)]
+struct Common {
+    /// Who answers
+    #[arg(long, value_enum, default_value_t)]
+    observer: ObserverOption,
+    /// How many subjects, numbered from 1
+    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=i64::from(SubjectNumber::MOST)), value_name = "N")]
+    subjects: u16,
+    /// Simulated subjects at a time (default: one a core)
+    #[arg(long, value_name = "N")]
+    jobs: Option<NonZeroUsize>,
+    /// Seed of orders, presentations and simulated answers
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    seed: u64,
+    /// Folder for the data
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Number of the person (human; default: the first that is free)
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=i64::from(SubjectNumber::MOST)), value_name = "N")]
+    subject: Option<u16>,
+    /// Scene that is felt (TOML); without it, a spring on the simulated flotor
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+    /// Set a parameter of a plugin of the scene (repeatable)
+    #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
+    sets: Vec<PluginKeyValue>,
+    /// What presents the stimuli to simulated observers
+    #[arg(long, value_enum, default_value_t)]
+    apparatus: PresentationOption,
+    /// How long a simulated observer feels each stimulus
+    #[arg(long, default_value = "1s", value_parser = duration_s, value_name = "TIME")]
+    feel: f64,
+    /// What is kept of the movement (default: full for people, summary for simulated observers)
+    #[arg(long, value_enum)]
+    kinematics: Option<Kinematics>,
+    /// Offer a rest after so many trials, 0: never (human)
+    #[arg(long, default_value_t = 40, value_name = "N")]
+    rest_every: u32,
+    /// Where the person sees and answers (human)
+    #[arg(long, value_enum, default_value_t)]
+    screen: front::ScreenOption,
+    /// White noise on headphones (human)
+    #[arg(long, value_enum, default_value_t)]
+    noise: NoiseOption,
+    /// Go on with subjects who broke off, leave complete ones alone
+    #[arg(long)]
+    resume: bool,
+    /// What is varied: MODEL.PARAMETER (default: spring.gamma_n, of a force load.force_n)
+    #[arg(long, value_name = "MODEL.KEY")]
+    stimulus: Option<String>,
+    /// Which modality comes first
+    #[arg(long, value_enum, default_value_t, value_name = "MODALITY")]
+    first: FirstChoice,
+    /// What happens when the handle leaves its range
+    #[arg(long, value_enum, default_value_t)]
+    boundary: BoundaryChoice,
+}
+
+#[derive(Args)]
+struct NoteArguments {
+    /// Folder of the study
+    #[arg(value_name = "DIR")]
+    data: PathBuf,
+    /// Number of the subject
+    #[arg(value_name = "SUBJECT", value_parser = clap::value_parser!(u16).range(1..=i64::from(SubjectNumber::MOST)))]
+    subject: u16,
+    /// What is to be known; no names
+    #[arg(value_name = "TEXT")]
+    text: String,
+}
+
+#[derive(Args)]
+struct JndArguments {
+    #[command(flatten)]
+    common: Common,
+    /// Bases, in the stimulus's unit (default: 17,26,35; of a force 3,6,9)
+    #[arg(long, value_delimiter = ',', value_name = "LIST")]
+    bases: Option<Vec<f64>>,
+    /// Replications, in alternating modality
+    #[arg(long, default_value_t = 4, value_name = "N")]
+    replications: u32,
+    /// Which difference comes next
+    #[arg(long, value_enum, default_value_t)]
+    procedure: ProcedureChoice,
+    /// QUEST+: trials of a track
+    #[arg(long, default_value_t = 18, value_name = "N")]
+    trials: u32,
+    /// First difference, as a share of the base
+    #[arg(long, default_value_t = 0.40, value_name = "SHARE")]
+    initial: f64,
+    /// First step down, as a share of the base
+    #[arg(long, default_value_t = 0.10, value_name = "SHARE")]
+    step: f64,
+    /// Share of correct answers aimed at
+    #[arg(long, default_value_t = 0.75, value_name = "SHARE")]
+    target: f64,
+    /// Reversals that halve the step
+    #[arg(long, value_delimiter = ',', default_values_t = [2, 4], value_name = "LIST")]
+    halve_at: Vec<u32>,
+    /// Reversal that ends a track
+    #[arg(long, default_value_t = 8, value_name = "N")]
+    stop_after: u32,
+    /// Reversal from which differences count for the threshold
+    #[arg(long, default_value_t = 4, value_name = "N")]
+    average_from: u32,
+    /// Whether the trials of the first and last of these reversals count
+    #[arg(long, value_enum, default_value_t)]
+    averaging: Averaging,
+    /// Which step is applied at a reversal that halves it
+    #[arg(long, value_enum, default_value_t)]
+    step_at_reversal: StepAtReversal,
+    /// Smallest difference, as a share of the base
+    #[arg(long, default_value_t = 0.0, value_name = "SHARE")]
+    floor: f64,
+    /// Largest difference, as a share of the base
+    #[arg(long, default_value_t = 0.95, value_name = "SHARE")]
+    ceiling: f64,
+    /// On which side of the base the comparison lies
+    #[arg(long, value_enum, default_value_t)]
+    side: ComparisonSide,
+    /// Which of a pair comes first
+    #[arg(long, value_enum, default_value_t)]
+    order: PresentationOrder,
+    /// No practice pairs
+    #[arg(long)]
+    no_demo: bool,
+}
+
+#[derive(Args)]
+struct MagnitudeArguments {
+    #[command(flatten)]
+    common: Common,
+    /// Smallest and largest stimulus, in its unit
+    #[arg(long, default_value = "12-48", value_parser = range, value_name = "LEAST-MOST")]
+    range: (f64, f64),
+    /// Stimuli, at equal distances
+    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(3..=1000), value_name = "N")]
+    stimuli: u32,
+    /// Replications in each modality
+    #[arg(long, default_value_t = 3, value_name = "N")]
+    replications: u32,
+    /// Stimuli shown before each modality
+    #[arg(long, default_value_t = 5, value_name = "N")]
+    demo: u32,
+}
+
+#[derive(Args)]
+#[command(
+    after_help = "Felt: a weight that pulls down all the time. Exerted: a resistance that is felt only while the hand \
+    pushes.\n\n\
+    Examples:\n  \
+    flotor study force --way felt --out felt\n  \
+    flotor study force --way exerted --out exerted\n  \
+    flotor study force --observer human --way exerted --out people"
+)]
+struct ForceArguments {
+    /// Whether the force is felt or exerted
+    #[arg(long, value_enum, default_value_t)]
+    way: ForceWay,
+    #[command(flatten)]
+    jnd: JndArguments,
+}
+
+/// What a difference experiment is about unless told otherwise.
+struct Subject {
+    stimulus: &'static str,
+    bases: [f64; 3],
+}
+
+/// Springs, as in the report.
+const STIFFNESS: Subject = Subject { stimulus: "spring.gamma_n", bases: [17.0, 26.0, 35.0] };
+/// Forces in the same proportions and in the range those springs are felt with.
+const FORCE: Subject = Subject { stimulus: "load.force_n", bases: [3.0, 6.0, 9.0] };
+
+pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
+    match &arguments.task {
+        Task::Note(arguments) => note(arguments),
+        Task::Bias(arguments) => bias::run(arguments),
+        Task::Explore(arguments) => explore::run(arguments),
+        Task::Spring(arguments) => spring::run(arguments),
+        Task::Jnd(arguments) => {
+            carry_out(&arguments.common, Protocol::Jnd(arguments.protocol(&STIFFNESS)?), None)
+        }
+        Task::Force(arguments) => {
+            let protocol = Protocol::Jnd(arguments.jnd.protocol(&FORCE)?);
+            carry_out(&arguments.jnd.common, protocol, Some(arguments.way))
+        }
+        Task::Magnitude(arguments) => {
+            carry_out(&arguments.common, Protocol::Magnitude(arguments.protocol()?), None)
+        }
+    }
+}
+
+impl Common {
+    fn stimulus(&self, usual: &Subject) -> Result<Stimulus, CommandError> {
+        let text = self.stimulus.as_deref().unwrap_or(usual.stimulus);
+        let (model, parameter) = text.split_once('.').ok_or_else(|| {
+            CommandError::Usage(format!("--stimulus {text}: write MODEL.PARAMETER, like spring.gamma_n"))
+        })?;
+        Ok(Stimulus { model: model.to_owned(), parameter: parameter.to_owned() })
+    }
+
+    /// The scene with everything the command line says on top.
+    fn scene(&self, stimulus: &Stimulus, way: Option<ForceWay>) -> Result<Scene, CommandError> {
+        let (scene, hand) = match &self.scene {
+            Some(path) => (Scene::load(path), None),
+            None => (Scene::study(&stimulus.model), way.map(ForceWay::hand)),
+        };
+        let mut scene = scene.map_err(RunError::Scene)?;
+        set(&mut scene, hand.unwrap_or_default())?;
+        self.sets.iter().try_for_each(|set| set.apply(&mut scene)).map_err(CommandError::Usage)?;
+        set(&mut scene, way.map(ForceWay::load).unwrap_or_default())?;
+        Ok(scene)
+    }
+}
+
+impl JndArguments {
+    fn protocol(&self, usual: &Subject) -> Result<JndProtocol, CommandError> {
+        let rule = WeightedUpDownRule {
+            initial_delta: self.initial,
+            first_step: self.step,
+            target: self.target,
+            halve_at: self.halve_at.clone(),
+            stop_after: self.stop_after,
+            average_from: self.average_from,
+            averaging: self.averaging,
+            step_at_reversal: self.step_at_reversal,
+            floor: self.floor,
+            ceiling: self.ceiling,
+            ..WeightedUpDownRule::default()
+        };
+        let procedure = match self.procedure {
+            ProcedureChoice::WeightedUpDown => Procedure::WeightedUpDown(rule),
+            ProcedureChoice::Questplus => Procedure::QuestPlus(QuestPlusRule {
+                trials: self.trials,
+                target: self.target,
+                ..QuestPlusRule::default()
+            }),
+        };
+        Ok(JndProtocol {
+            stimulus: self.common.stimulus(usual)?,
+            bases: self.bases.clone().unwrap_or_else(|| usual.bases.to_vec()),
+            replications: self.replications,
+            first_modality: self.common.first.into(),
+            procedure,
+            side: self.side,
+            order: self.order,
+            at_boundary: self.common.boundary.into(),
+            demo: JndDemo { shown: !self.no_demo, ..JndDemo::default() },
+        })
+    }
+}
+
+impl MagnitudeArguments {
+    fn protocol(&self) -> Result<MagnitudeProtocol, CommandError> {
+        let (least, most) = self.range;
+        Ok(MagnitudeProtocol {
+            stimulus: self.common.stimulus(&STIFFNESS)?,
+            values: MagnitudeProtocol::evenly(least, most, self.stimuli),
+            replications: self.replications,
+            first_modality: self.common.first.into(),
+            demo: self.demo,
+            at_boundary: self.common.boundary.into(),
+        })
+    }
+}
+
+/// Settings of an experiment, written as on the command line.
+fn set(scene: &mut Scene, texts: &[&str]) -> Result<(), CommandError> {
+    let apply = |text: &&str| text.parse::<PluginKeyValue>()?.apply(scene);
+    texts.iter().try_for_each(apply).map_err(CommandError::Usage)
+}
+
+/// Checks everything, then carries the study out; of a force, `way` says how it is felt.
+fn carry_out(common: &Common, protocol: Protocol, way: Option<ForceWay>) -> Result<(), CommandError> {
+    protocol.check().map_err(|error| CommandError::Usage(error.to_string()))?;
+    let scene = common.scene(protocol.stimulus(), way)?;
+    let apparatus = Apparatus::check(scene, &protocol).map_err(unfit)?;
+    match (common.observer, common.apparatus) {
+        (ObserverOption::Human, _) => person::sit(common, &protocol, &apparatus),
+        (ObserverOption::Simulated, PresentationOption::Scene) => {
+            apparatus.check_hand().map_err(unfit)?;
+            simulate(common, protocol, Some(&apparatus))
+        }
+        (ObserverOption::Simulated, PresentationOption::None) => simulate(common, protocol, None),
+    }
+}
+
+/// All simulated subjects, several at a time.
+fn simulate(common: &Common, protocol: Protocol, apparatus: Option<&Apparatus>) -> Result<(), CommandError> {
+    let cohort = Cohort {
+        seed: common.seed,
+        subjects: (1..=common.subjects).filter_map(SubjectNumber::new).collect(),
+        population: Population::default(),
+        apparatus: apparatus.map_or(
+            json!(null),
+            |apparatus| json!({ "feel_s": common.feel, "scene": apparatus.description() }),
+        ),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        earlier: if common.resume { Earlier::Resume } else { Earlier::Refuse },
+        protocol,
+    };
+    let about = u64::from(common.subjects) * cohort.protocol.presentations_about();
+    let progress = progress_bar(about, "{wide_bar} {pos} of about {len} presentations  {elapsed}");
+    let stop = stop_on_signals().stop_flag();
+    let jobs = common.jobs.or_else(|| std::thread::available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN);
+    let dataset = Dataset::at(&common.out);
+    let kinematics = common.kinematics.unwrap_or(Kinematics::Summary);
+    let task = cohort.protocol.task();
+    let presenter = |subject: SubjectNumber| -> Result<Box<dyn Presenter + '_>, OutsideError> {
+        let Some(apparatus) = apparatus else { return Ok(Box::new(Nothing)) };
+        let folder = dataset.source_folder(subject).join("motion");
+        let files = (kinematics == Kinematics::Full)
+            .then(|| TrialFiles::make(folder, format!("{subject}_task-{task}")))
+            .transpose()?;
+        Ok(Box::new(Rig::start(apparatus, (common.seed, subject), kinematics, files, common.feel)?))
+    };
+    let watch = || progress.inc(1);
+    let result = cohort.run(&dataset, jobs, &presenter, &watch, &stop);
+    progress.finish_and_clear();
+    result.map_err(refused)?;
+    tell(&dataset)
+}
+
+/// A scene that does not fit the experiment: configuration, unless a plugin was refused.
+fn unfit(error: ApparatusError) -> CommandError {
+    match error {
+        ApparatusError::Run(error) => error.into(),
+        other => CommandError::Usage(other.to_string()),
+    }
+}
+
+fn note(arguments: &NoteArguments) -> Result<(), CommandError> {
+    let logs = Dataset::at(&arguments.data).logs()?;
+    let log = logs.into_iter().find(|log| log.begin.subject.get() == arguments.subject);
+    let log = log.ok_or_else(|| {
+        let (data, subject) = (arguments.data.display(), arguments.subject);
+        CommandError::Usage(format!("{data}: there is no subject {subject}"))
+    })?;
+    log.annotate(&arguments.text).map_err(|error| CommandError::Failed(error.to_string()))
+}
+
+fn tell(dataset: &Dataset) -> Result<(), CommandError> {
+    let logs = dataset.logs()?;
+    let complete = logs.iter().filter(|log| log.complete).count();
+    let presentations: usize = logs.iter().map(|log| log.trials.len()).sum();
+    let root = dataset.root().display();
+    say!("{}", style::title(&format!("{complete} of {} subjects complete", logs.len())));
+    say!("  {presentations} presentations in {root}");
+    if complete < logs.len() {
+        say!("  go on with --resume");
+    } else {
+        say!("  flotor analyse {root}");
+    }
+    Ok(())
+}
+
+fn refused(error: CohortError) -> CommandError {
+    match error {
+        CohortError::Dataset(error) => error.into(),
+        CohortError::Sitting {
+            cause: ConductError::Outside(ref cause) | ConductError::Trial { ref cause, .. },
+            ..
+        } => outside(cause.as_ref(), &error),
+        sitting => CommandError::Failed(sitting.to_string()),
+    }
+}
+
+/// What an apparatus said, with the exit code of a device that faulted where it did. Errors of a device do not know of
+/// experiments: whose trial it was, and which, stands above them.
+fn outside(
+    cause: &(dyn std::error::Error + Send + Sync + 'static),
+    told: &dyn std::fmt::Display,
+) -> CommandError {
+    let error = match cause.downcast_ref::<RunEnded>() {
+        Some(RunEnded(RunEnd::DeviceFault(fault))) => CommandError::DeviceFault(*fault),
+        Some(RunEnded(RunEnd::EmergencyStop(source))) => CommandError::EmergencyStop(*source),
+        Some(RunEnded(RunEnd::Watchdog(stuck))) => CommandError::Watchdog(*stuck),
+        _ => return CommandError::Failed(told.to_string()),
+    };
+    flotor_command::note(told);
+    error
+}

@@ -1,0 +1,70 @@
+//! `flotor study bias`: what each way to a threshold is worth.
+
+use crate::bias::{BiasRow, observer_of, rows};
+use clap::Args;
+use flotor_command::{CommandError, print_result, progress_bar, style};
+use rayon::prelude::*;
+use std::path::PathBuf;
+
+/// Observers: true threshold as a share of the base, and criterion. First the two of the default population, then one
+/// threshold over the range of criteria.
+const OBSERVERS: [(f64, f64); 7] =
+    [(0.1114, 1.0), (0.1357, 1.0), (0.142, 0.0), (0.142, 0.25), (0.142, 0.5), (0.142, 0.75), (0.142, 1.0)];
+
+#[derive(Args)]
+#[command(
+    after_help = "thesis: mean of the differences from the 4th to the 8th reversal; map: the most likely \
+    observer, from the same trials;\nquestplus: 18 trials placed where they tell most.\n\n\
+    Examples:\n  \
+    flotor study bias --runs 1000\n  \
+    flotor study bias --tracks 1 --json bias.json"
+)]
+pub(super) struct BiasArguments {
+    /// Estimates per observer and method
+    #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(2..=1_000_000), value_name = "N")]
+    runs: u32,
+    /// Tracks that make one estimate
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100), value_name = "N")]
+    tracks: u32,
+    /// Seed of the answers
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    seed: u64,
+    /// Write the rows as JSON (- for standard output)
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+pub(super) fn run(arguments: &BiasArguments) -> Result<(), CommandError> {
+    let progress = progress_bar(OBSERVERS.len() as u64, "{percent:>3} %  observer {pos} of {len}");
+    let of_one = |(threshold, criterion)| {
+        let observer = observer_of(threshold, criterion);
+        let rows = rows(&observer, arguments.tracks, arguments.runs, arguments.seed);
+        progress.inc(1);
+        rows
+    };
+    let rows: Vec<BiasRow> = OBSERVERS.into_par_iter().flat_map_iter(of_one).collect();
+    progress.finish_and_clear();
+    let title = format!("{} tracks per estimate, {} estimates", arguments.tracks, arguments.runs);
+    print_result(arguments.json.as_deref(), &rows, || format!("{}\n{}", style::title(&title), to_text(&rows)))
+}
+
+fn to_text(rows: &[BiasRow]) -> String {
+    let head = format!(
+        "  {:>9}{:>11}  {:<11}{:>8}{:>11}{:>11}{:>9}",
+        "threshold", "criterion", "method", "bias", "deviation", "rms error", "trials"
+    );
+    let percent = |share: f64| format!("{:.1} %", share * 100.0);
+    let line = |row: &BiasRow| {
+        format!(
+            "  {:>9}{:>11}  {:<11}{:>8}{:>11}{:>11}{:>9.1}",
+            percent(row.threshold),
+            row.criterion,
+            row.method.word(),
+            percent(row.bias),
+            percent(row.deviation),
+            percent(row.rms_error),
+            row.trials
+        )
+    };
+    [head].into_iter().chain(rows.iter().map(line)).collect::<Vec<_>>().join("\n")
+}

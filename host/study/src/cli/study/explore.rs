@@ -1,0 +1,210 @@
+//! `flotor study explore`: no trials, no questions. A spring to feel while its dimensions and its material change under
+//! the hand: what the report names as an immediate use of it (CMU-RI-TR-07-21, section 7).
+
+use super::front::lines_of;
+use crate::apparatus::watch::Shared;
+use crate::kinematics::{KinematicsMeter, StimulusKinematics};
+use clap::Args;
+use flotor_command::options::PluginKeyValue;
+use flotor_command::say;
+use flotor_command::stopping::stop_on_signals;
+use flotor_command::{CommandError, style};
+use flotor_core::Change;
+use flotor_hal::{Parameter, ParameterKind};
+use flotor_live::Directory;
+use flotor_servo::{Clock, StopSwitch};
+use flotor_session::live::{Watched, publish};
+use flotor_session::registry::Registry;
+use flotor_session::run_description::describe;
+use flotor_session::scene::Scene;
+use flotor_session::{ControlError, Controls, NewValue, RunError, RunOptions, Session};
+use std::io::{BufReader, stdin};
+use std::path::PathBuf;
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::Duration;
+
+/// Young's and shear modulus of spring wire, MPa: music wire as in the report, the others from Shigley's Mechanical
+/// Engineering Design, table 10-5.
+const MATERIALS: [(&str, [&str; 2]); 4] = [
+    ("music-wire", ["203395", "75842"]),
+    ("stainless", ["193000", "69000"]),
+    ("phosphor-bronze", ["103400", "41400"]),
+    ("inconel", ["213700", "77200"]),
+];
+
+#[derive(Args)]
+#[command(after_help = "While it runs, type\n  \
+    wire_diameter_mm 0.8      a new value; what cannot change in a running model is built anew\n  \
+    material phosphor-bronze  music-wire, stainless, phosphor-bronze, inconel\n  \
+    (Enter)                   what the hand felt since the last line\n  \
+    ?                         everything that can be changed\n  \
+    q                         the end\n\n\
+    Examples:\n  \
+    flotor study explore\n  \
+    flotor study explore --set spring.preset=thesis-3 --set spring.variant=rod")]
+pub(super) struct ExploreArguments {
+    /// Scene that is felt (TOML); without it, a spring of wire on the simulated flotor
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+    /// Set a parameter of a plugin of the scene (repeatable)
+    #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
+    sets: Vec<PluginKeyValue>,
+}
+
+pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
+    let stop = stop_on_signals();
+    let scene = scene(arguments)?;
+    let registry = Registry::search(&scene.plugin_folders);
+    let options = RunOptions { clock: Clock::Real, seed: 0 };
+    let session = Session::prepare(&scene, &registry, &options)?;
+    let model =
+        scene.models.first().map(|model| model.name.clone()).ok_or_else(|| {
+            CommandError::Usage(format!("{}: the scene has no model to explore", scene.title))
+        })?;
+    let watch = Shared::default();
+    watch.lock().meter = Some(KinematicsMeter::default());
+    let description = describe(&scene, &options, session.plugins());
+    let publication = publish(&Directory::of_this_user(), &scene, &description, &session, &stop);
+    let hint = if publication.is_ok() { "; `flotor view` shows it and has it on sliders" } else { "" };
+    let mut desk =
+        Desk { controls: session.controls(), registry, model, settings: Vec::new(), watch: watch.clone() };
+    let (switch, mut observers) = (stop.clone(), Watched { observer: watch, publication: publication.ok() });
+    let run = std::thread::spawn(move || {
+        let outcome = session.run(&mut observers, &switch);
+        observers.end("the exploration has ended");
+        outcome
+    });
+    say!("{}", style::title(&scene.title));
+    say!("  type a parameter and its value; ? lists them, q ends{hint}");
+    let lines = lines_of(BufReader::new(stdin())).map_err(|error| CommandError::Failed(error.to_string()))?;
+    while !(stop.is_stop_asked() || run.is_finished()) {
+        match lines.recv_timeout(Duration::from_millis(50)) {
+            Ok(line) if line.trim() == "q" => break,
+            Ok(line) => say!("{}", desk.take(line.trim())),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+    }
+    end(&stop, run)
+}
+
+fn end(
+    stop: &StopSwitch,
+    run: std::thread::JoinHandle<Result<flotor_session::Outcome, RunError>>,
+) -> Result<(), CommandError> {
+    stop.stop();
+    let outcome = run.join().map_err(|_| RunError::Thread("panicked"))??;
+    match outcome.end {
+        flotor_servo::RunEnd::DeviceFault(fault) => Err(CommandError::DeviceFault(fault)),
+        flotor_servo::RunEnd::EmergencyStop(source) => Err(CommandError::EmergencyStop(source)),
+        _ => Ok(()),
+    }
+}
+
+/// A spring of wire, so that every dimension and the material may change.
+fn scene(arguments: &ExploreArguments) -> Result<Scene, CommandError> {
+    let scene = match &arguments.scene {
+        Some(path) => Scene::load(path),
+        None => Scene::parse(
+            std::path::Path::new("built-in study"),
+            &flotor_session::scene::STUDY
+                .replace("mode = \"gamma\"", "mode = \"physical\"")
+                .replace("A spring to be judged", "A spring to explore"),
+        ),
+    };
+    let mut scene = scene.map_err(RunError::Scene)?;
+    arguments.sets.iter().try_for_each(|set| set.apply(&mut scene)).map_err(CommandError::Usage)?;
+    scene.duration_s = 86_400.0;
+    Ok(scene)
+}
+
+/// Takes lines, changes the model, tells what is felt.
+struct Desk {
+    controls: Controls,
+    registry: Registry,
+    model: String,
+    /// Everything changed so far: a model that is built anew gets it too.
+    settings: Vec<(String, String)>,
+    watch: Shared,
+}
+
+impl Desk {
+    fn take(&mut self, line: &str) -> String {
+        match line.split_whitespace().collect::<Vec<_>>().as_slice() {
+            [] => self.felt(),
+            ["?"] => self.list(),
+            ["material", name] => match MATERIALS.iter().find(|(known, _)| known == name) {
+                Some((_, [young, shear])) => {
+                    self.change(&[("youngs_modulus_mpa", young), ("shear_modulus_mpa", shear)])
+                }
+                None => {
+                    format!(
+                        "  no material `{name}`; there are {}",
+                        MATERIALS.map(|(name, _)| name).join(", ")
+                    )
+                }
+            },
+            [key, value] => self.change(&[(key, value)]),
+            _ => "  write a parameter and its value, like wire_diameter_mm 0.8".to_owned(),
+        }
+    }
+
+    fn change(&mut self, changes: &[(&str, &str)]) -> String {
+        let values: Vec<NewValue<'_>> = changes
+            .iter()
+            .map(|(parameter, value)| NewValue { plugin: &self.model, parameter, value })
+            .collect();
+        let result = match self.controls.set_parameters(&values) {
+            Err(ControlError::Fixed { .. }) => self.swap(changes),
+            other => other,
+        };
+        if let Err(error) = result {
+            return format!("  {error}");
+        }
+        self.settings.extend(changes.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())));
+        // Until it has faded in and a hand has gone up and down once.
+        std::thread::sleep(Duration::from_millis(200));
+        let refused = self.watch.lock().refused.take();
+        if let Some(Change { parameter, value, .. }) = refused {
+            self.settings.truncate(self.settings.len() - changes.len());
+            return format!("  the model refused {parameter} = {value}: it does not fit its other values");
+        }
+        self.watch.lock().meter = Some(KinematicsMeter::default());
+        std::thread::sleep(Duration::from_millis(700));
+        self.felt()
+    }
+
+    /// What is not live is read when a model is made: a new one, with everything that was changed before.
+    fn swap(&self, changes: &[(&str, &str)]) -> Result<(), ControlError> {
+        let before = self.settings.iter().map(|(key, value)| (key.as_str(), value.as_str()));
+        let all: Vec<(&str, &str)> = before.chain(changes.iter().copied()).collect();
+        self.controls.swap(&self.registry, &self.model, None, &all)
+    }
+
+    fn list(&self) -> String {
+        let plugins = self.controls.plugins();
+        let schema =
+            plugins.iter().find(|(name, _)| *name == self.model).map_or(&[][..], |(_, schema)| schema);
+        let line = |parameter: &Parameter| {
+            let legal = match parameter.kind() {
+                ParameterKind::Real => {
+                    format!("{} to {} {}", parameter.min(), parameter.max(), parameter.unit())
+                }
+                _ => parameter.choices().iter().map(|name| name.as_str()).collect::<Vec<_>>().join(" | "),
+            };
+            format!("  {:<22}{:<34}{}", parameter.id(), legal, parameter.doc())
+        };
+        schema.iter().map(line).collect::<Vec<_>>().join("\n")
+    }
+
+    /// What the hand has felt since this was asked last, in words.
+    fn felt(&self) -> String {
+        let felt = self.watch.lock().meter.replace(KinematicsMeter::default());
+        let words = |felt: StimulusKinematics| {
+            let stiffness = felt.felt_stiffness_n_per_m;
+            let stiffness = stiffness.map_or("no".to_owned(), |k| format!("{:.3} N/mm", k * 1.0e-3));
+            format!("  felt at the hand: {stiffness} stiffness, up to {:.2} N", felt.peak_force_n)
+        };
+        felt.and_then(|meter| meter.finish()).map_or("  nothing felt yet".to_owned(), words)
+    }
+}

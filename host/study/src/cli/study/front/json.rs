@@ -1,0 +1,61 @@
+//! Screens and inputs as lines of JSON, for a window that is another program.
+
+use super::MOMENT;
+use crate::apparatus::attend::FrontEnd;
+use crate::conduct::OutsideError;
+use crate::screen::{Input, Said, Screen, Told, Warning};
+use std::io::{ErrorKind, Write};
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+
+/// The two directions of a window.
+pub(in crate::cli::study) struct JsonLines<W> {
+    lines: Receiver<String>,
+    out: W,
+}
+
+impl<W: Write> JsonLines<W> {
+    /// A window that is heard and told things here.
+    pub(in crate::cli::study) fn new(lines: Receiver<String>, out: W) -> Self {
+        Self { lines, out }
+    }
+
+    fn report(&mut self, told: &Told) -> Result<(), OutsideError> {
+        let line = serde_json::to_string(told)?;
+        match writeln!(self.out, "{line}").and_then(|()| self.out.flush()) {
+            // A window that has gone says so by falling silent.
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+            other => Ok(other?),
+        }
+    }
+}
+
+impl<W: Write> FrontEnd for JsonLines<W> {
+    fn show(&mut self, screen: &Screen) -> Result<(), OutsideError> {
+        self.report(&Told::Screen(screen.clone()))
+    }
+
+    fn poll(&mut self, _screen: &Screen) -> Result<Option<Input>, OutsideError> {
+        let line = match self.lines.recv_timeout(MOMENT) {
+            Ok(line) => line,
+            Err(RecvTimeoutError::Timeout) => return Ok(None),
+            // The window is closed.
+            Err(RecvTimeoutError::Disconnected) => return Ok(Some(Input::Stop)),
+        };
+        match serde_json::from_str(&line) {
+            Ok(Said::Input(input)) => Ok(Some(input)),
+            Ok(Said::Window { .. }) => Ok(None),
+            Err(error) => {
+                self.refuse(&error.to_string())?;
+                Ok(None)
+            }
+        }
+    }
+
+    fn warn_out_of_range(&mut self) -> Result<(), OutsideError> {
+        self.report(&Told::Warning { warning: Warning::OutOfRange })
+    }
+
+    fn refuse(&mut self, why: &str) -> Result<(), OutsideError> {
+        self.report(&Told::Refused { refused: why.to_owned() })
+    }
+}

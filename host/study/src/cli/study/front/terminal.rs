@@ -1,0 +1,176 @@
+//! Words on a terminal, answers by keyboard.
+
+use super::{MOMENT, lines_of};
+use crate::apparatus::attend::FrontEnd;
+use crate::conduct::OutsideError;
+use crate::protocol::Quality;
+use crate::screen::{Input, Pause, Question, Screen, TrialView};
+use crate::trial::{Phase, Position, Response};
+use flotor_command::say;
+use flotor_command::style;
+use std::io::BufReader;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+
+/// A person at this terminal.
+pub(in crate::cli::study) struct Terminal {
+    lines: Receiver<String>,
+}
+
+impl Terminal {
+    /// Listens to standard input from now on.
+    pub(in crate::cli::study) fn listen() -> std::io::Result<Self> {
+        Ok(Self { lines: lines_of(BufReader::new(std::io::stdin()))? })
+    }
+}
+
+impl FrontEnd for Terminal {
+    fn show(&mut self, screen: &Screen) -> Result<(), OutsideError> {
+        say!("{}", words(screen));
+        Ok(())
+    }
+
+    fn poll(&mut self, screen: &Screen) -> Result<Option<Input>, OutsideError> {
+        let line = match self.lines.recv_timeout(MOMENT) {
+            Ok(line) => line,
+            Err(RecvTimeoutError::Timeout) => return Ok(None),
+            // Nobody types any more.
+            Err(RecvTimeoutError::Disconnected) => return Ok(Some(Input::Stop)),
+        };
+        match typed(&line, screen) {
+            Ok(input) => Ok(Some(input)),
+            Err(why) => {
+                self.refuse(&why)?;
+                Ok(None)
+            }
+        }
+    }
+
+    fn warn_out_of_range(&mut self) -> Result<(), OutsideError> {
+        // The bell is the beep of the report; it is not the noise that masks it.
+        say!("\x07  {} the handle is out of its range: let it come back", style::warning("!"));
+        Ok(())
+    }
+
+    fn refuse(&mut self, why: &str) -> Result<(), OutsideError> {
+        say!("  {why}");
+        Ok(())
+    }
+}
+
+/// A screen in words.
+fn words(screen: &Screen) -> String {
+    match screen {
+        Screen::Ready { reason, next } => {
+            format!(
+                "\n{}\n{}\n  Enter goes on, n TEXT takes a note, q stops",
+                style::title(pause(*reason, next)),
+                place(next)
+            )
+        }
+        Screen::Feel { trial, position } => {
+            let which = match position {
+                None => "Feel it",
+                Some(Position::First) => "Feel the first",
+                Some(Position::Second) => "Feel the second",
+            };
+            format!("\n{}\n  {which}; Enter when done", place(trial))
+        }
+        Screen::Ask { question, trial } => {
+            let (more, how) = match trial.quality {
+                Quality::Stiffness => ("stiffer", "stiff"),
+                Quality::Force => ("stronger", "strong"),
+            };
+            match question {
+                Question::Nothing => "  That was practice: Enter goes on, a feels it again".to_owned(),
+                Question::WhichIsMore => {
+                    format!("  Which was {more}?  1 first, 2 second, 0 I don't know; a feels them again")
+                }
+                Question::HowMuch => {
+                    format!("  How {how}? Any number of your own, larger for {more}; a feels it again")
+                }
+            }
+        }
+        Screen::Over => format!("\n{}\n  Everything is on disk. Thank you.", style::title("Done")),
+    }
+}
+
+fn place(trial: &TrialView) -> String {
+    let phase = if trial.phase == Phase::Practice { "practice" } else { "counts" };
+    let seen = if trial.object_is_shown { "object shown" } else { "object hidden" };
+    format!("  {} of about {}  {phase}, {seen}, condition {}", trial.number, trial.of_about, trial.condition)
+}
+
+fn pause(reason: Pause, next: &TrialView) -> &'static str {
+    match (reason, next.phase, next.object_is_shown) {
+        (Pause::Welcome, ..) => "Ready",
+        (Pause::PhaseChanges, Phase::Main, _) => "Practice is over: from now on it counts",
+        (Pause::PhaseChanges, Phase::Practice, _) => "A few to practise first; they do not count",
+        (Pause::ModalityChanges, _, true) => "From now on you see what you feel",
+        (Pause::ModalityChanges, _, false) => "From now on you feel only",
+        (Pause::Rest, ..) => "Time to rest your hand",
+        (Pause::OutOfRange, ..) => "The handle left its range, so this one comes again",
+    }
+}
+
+/// What a typed line means.
+fn typed(line: &str, screen: &Screen) -> Result<Input, String> {
+    let line = line.trim();
+    let answer = |response| Ok(Input::Answer { response });
+    match line {
+        "" => return Ok(Input::Continue),
+        "q" => return Ok(Input::Stop),
+        "a" => return Ok(Input::Again),
+        _ => {}
+    }
+    if let Some(text) = line.strip_prefix("n ") {
+        return Ok(Input::Note { text: text.trim().to_owned() });
+    }
+    match screen {
+        Screen::Ask { question: Question::WhichIsMore, .. } => match line {
+            "1" => answer(Response::First),
+            "2" => answer(Response::Second),
+            "0" => answer(Response::DontKnow),
+            _ => Err("type 1, 2 or 0".to_owned()),
+        },
+        Screen::Ask { question: Question::HowMuch, .. } => line.replace(',', ".").parse().map_or_else(
+            |_| Err(format!("`{line}` is no number")),
+            |rating| answer(Response::Rating(rating)),
+        ),
+        _ => Err("nothing is asked just now; Enter goes on".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ask(question: Question) -> Screen {
+        let trial = TrialView {
+            number: 1,
+            of_about: 2,
+            phase: Phase::Main,
+            object_is_shown: true,
+            condition: "A1".to_owned(),
+            repeat: 0,
+            stimuli: 2,
+            quality: Quality::Stiffness,
+        };
+        Screen::Ask { trial, question }
+    }
+
+    #[test]
+    fn keys_mean_answers() {
+        let answer = |response| Ok(Input::Answer { response });
+        let pair = ask(Question::WhichIsMore);
+        assert_eq!(typed("1", &pair), answer(Response::First));
+        assert_eq!(typed(" 0 ", &pair), answer(Response::DontKnow));
+        assert!(typed("3", &pair).is_err());
+        let one = ask(Question::HowMuch);
+        assert_eq!(typed("7,5", &one), answer(Response::Rating(7.5)));
+        assert!(typed("seven", &one).is_err());
+        assert_eq!(typed("n 5 o'clock", &one), Ok(Input::Note { text: "5 o'clock".to_owned() }));
+        for (line, input) in [("", Input::Continue), ("a", Input::Again), ("q", Input::Stop)] {
+            assert_eq!(typed(line, &one), Ok(input));
+        }
+    }
+}

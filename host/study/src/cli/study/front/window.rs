@@ -1,0 +1,51 @@
+//! The viewer's window: a process of its own that watches the run, shows what it is told and says what the person does.
+
+use super::{JsonLines, lines_of};
+use flotor_command::CommandError;
+use flotor_command::separate::{Running, SeparateProgram};
+use flotor_servo::StopSwitch;
+use std::io::BufReader;
+use std::process::{ChildStdin, Stdio};
+use std::time::Duration;
+
+/// How often it is looked whether the window is still there.
+const LOOK_PERIOD: Duration = Duration::from_millis(50);
+
+/// A window in front of a person. Dropped, it closes.
+pub(in crate::cli::study) struct Window {
+    /// What is said to it and heard of it.
+    pub(in crate::cli::study) lines: JsonLines<ChildStdin>,
+    viewer: Running,
+}
+
+impl Window {
+    /// Opens a window on the run of this process, and waits until it is there.
+    ///
+    /// # Errors
+    /// There is no viewer, or it cannot open a window and has said why.
+    pub(in crate::cli::study) fn open() -> Result<Self, CommandError> {
+        let mut command = SeparateProgram::VIEWER.command()?;
+        command.arg("--sitting").arg("--run").arg(std::process::id().to_string());
+        command.stdin(Stdio::piped()).stdout(Stdio::piped());
+        let failed =
+            |cause| CommandError::file(SeparateProgram::VIEWER.program.as_ref(), "cannot be started", cause);
+        let mut viewer = Running(command.spawn().map_err(failed)?);
+        let (Some(input), Some(output)) = (viewer.0.stdin.take(), viewer.0.stdout.take()) else {
+            return Err(CommandError::Failed("the viewer has no pipes".to_owned()));
+        };
+        let heard = lines_of(BufReader::new(output)).map_err(failed)?;
+        // Its first word is that it is open; it says none when it cannot be.
+        if heard.recv().is_err() {
+            let why = "no window for the sitting: the viewer says why above; --screen terminal needs none";
+            return Err(CommandError::Usage(why.to_owned()));
+        }
+        Ok(Self { lines: JsonLines::new(heard, input), viewer })
+    }
+
+    /// Waits until the person closes the window, or somebody stops the study.
+    pub(in crate::cli::study) fn wait_closed(mut self, stop: &StopSwitch) {
+        while self.viewer.0.try_wait().is_ok_and(|status| status.is_none()) && !stop.is_stop_asked() {
+            std::thread::sleep(LOOK_PERIOD);
+        }
+    }
+}

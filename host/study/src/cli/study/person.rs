@@ -1,0 +1,165 @@
+//! `--observer human`: one person, one sitting, in real time.
+
+use super::front::{JsonLines, ScreenOption, Terminal, Window, lines_of};
+use super::{Common, NoiseOption};
+use crate::apparatus::attend::{FrontEnd, attend};
+use crate::apparatus::live::LiveRig;
+use crate::apparatus::noise::WhiteNoise;
+use crate::apparatus::rig::TrialFiles;
+use crate::apparatus::{Apparatus, Kinematics};
+use crate::conduct::Ending;
+use crate::dataset::{Dataset, DatasetError, Progress};
+use crate::log::{Begin, Event, FORMAT, SittingLog};
+use crate::protocol::{Protocol, SubjectNumber};
+use crate::screen::Attended;
+use flotor_command::say;
+use flotor_command::stopping::stop_on_signals;
+use flotor_command::{CommandError, note};
+use serde_json::json;
+use std::io::{BufReader, Stdout, stdin, stdout};
+
+/// Presents a study to a person: everything is checked, the loop runs and the window is open before the log begins.
+pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -> Result<(), CommandError> {
+    let dataset = Dataset::at(&common.out);
+    let subject = subject(common, &dataset, protocol)?;
+    let begin = Begin {
+        format: FORMAT,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        subject,
+        seed: common.seed,
+        protocol: protocol.clone(),
+        observer: json!("human"),
+        apparatus: apparatus.description(),
+    };
+    let before = before(common, &dataset, &begin)?;
+    let files =
+        (dataset.source_folder(subject).join("motion"), format!("{subject}_task-{}", protocol.task()));
+    let stop = stop_on_signals();
+    let noise = noise(common)?;
+    let kinematics = common.kinematics.unwrap_or(Kinematics::Full);
+    let mut rig = LiveRig::start(apparatus, kinematics, &stop)
+        .map_err(|error| super::outside(error.as_ref(), &error))?;
+    let mut front = Front::open(common.screen, &rig)?;
+
+    let (sitting, mut log) = match before {
+        None => dataset.begin(begin)?,
+        Some(log) => log.resume(&begin.version).map_err(DatasetError::from)?,
+    };
+    if kinematics == Kinematics::Full {
+        let files = TrialFiles::make(files.0, files.1);
+        rig.record_into(
+            files.map_err(|cause| CommandError::file(&common.out, "cannot make the folder", cause))?,
+        );
+    }
+    let text = format!("white noise: {}", noise.as_ref().map_or("none", WhiteNoise::player));
+    log.write(&Event::Note { text }).map_err(failed)?;
+
+    let mut attended = Attended::new(sitting, protocol, common.seed, common.rest_every);
+    let ending = attend(&mut attended, &mut log, &mut rig, front.as_dyn(), &mut |_| ());
+    let ending = ending.map_err(|error| super::outside(error.as_ref(), &error))?;
+    dataset.write_tables()?;
+    if let (Ending::Complete, Front::Window(window)) = (ending, front) {
+        window.wait_closed(&stop); // the last screen says thank you
+    }
+    drop((rig, noise));
+    match (ending, common.screen) {
+        (_, ScreenOption::Json) => Ok(()),
+        (Ending::Complete, _) => super::tell(&dataset),
+        (Ending::Stopped, _) => {
+            let presented = attended.presented();
+            say!(
+                "  {subject} stopped after {presented} presentations; go on with --subject {} --resume",
+                subject.get()
+            );
+            Ok(())
+        }
+    }
+}
+
+/// Where the person sees and answers.
+enum Front {
+    Window(Window),
+    Terminal(Terminal),
+    Json(JsonLines<Stdout>),
+}
+
+impl Front {
+    fn open(screen: ScreenOption, rig: &LiveRig<'_>) -> Result<Self, CommandError> {
+        match screen {
+            ScreenOption::Viewer => match rig.unseen() {
+                None => Ok(Self::Window(Window::open()?)),
+                Some(why) => Err(CommandError::Failed(format!("no window can watch the run: {why}"))),
+            },
+            ScreenOption::Terminal => Terminal::listen().map(Self::Terminal).map_err(failed),
+            ScreenOption::Json => {
+                let lines = lines_of(BufReader::new(stdin())).map_err(failed)?;
+                Ok(Self::Json(JsonLines::new(lines, stdout())))
+            }
+        }
+    }
+
+    fn as_dyn(&mut self) -> &mut dyn FrontEnd {
+        match self {
+            Self::Window(window) => &mut window.lines,
+            Self::Terminal(terminal) => terminal,
+            Self::Json(lines) => lines,
+        }
+    }
+}
+
+fn failed(error: impl std::fmt::Display) -> CommandError {
+    CommandError::Failed(error.to_string())
+}
+
+/// Who was named, or the first number that is free.
+fn subject(common: &Common, dataset: &Dataset, protocol: &Protocol) -> Result<SubjectNumber, CommandError> {
+    let is_new = |number: &SubjectNumber| !dataset.log_path(*number, protocol.task()).exists();
+    let named = common.subject.and_then(SubjectNumber::new);
+    let free = || (1..=SubjectNumber::MOST).filter_map(SubjectNumber::new).find(is_new);
+    named.or_else(free).ok_or_else(|| {
+        let root = dataset.root().display();
+        CommandError::Usage(format!("{root}: all subject numbers are taken; use another folder"))
+    })
+}
+
+/// The sitting that broke off and is to go on; none where there was none yet.
+fn before(
+    common: &Common,
+    dataset: &Dataset,
+    begin: &Begin,
+) -> Result<Option<Box<SittingLog>>, CommandError> {
+    let (subject, root) = (begin.subject, dataset.root().to_path_buf());
+    let progress = dataset.progress(subject, begin.protocol.task());
+    let refuse = |error: DatasetError| Err(error.into());
+    match progress? {
+        Progress::New => Ok(None),
+        Progress::Complete(_) => refuse(DatasetError::Duplicate { subject, root }),
+        Progress::Partial(log) if !common.resume => {
+            refuse(DatasetError::Unfinished { subject, trials: log.trials.len(), root })
+        }
+        Progress::Partial(log) => match begin.differs(&log.begin) {
+            Some(what) => refuse(DatasetError::Changed { path: log.path().to_path_buf(), what }),
+            None => Ok(Some(log)),
+        },
+    }
+}
+
+/// Noise if it was asked for; said plainly where there is none.
+fn noise(common: &Common) -> Result<Option<WhiteNoise>, CommandError> {
+    if common.noise == NoiseOption::Off {
+        return Ok(None);
+    }
+    let noise = WhiteNoise::start();
+    match (&noise, common.noise) {
+        (None, NoiseOption::On) => Err(CommandError::Usage(
+            "--noise on: no sound here (tried pw-cat, paplay, aplay); play white noise on headphones by other means \
+             and say --noise off"
+                .to_owned(),
+        )),
+        (None, _) => {
+            note("no sound here: play white noise on headphones by other means");
+            Ok(noise)
+        }
+        _ => Ok(noise),
+    }
+}

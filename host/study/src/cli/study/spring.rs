@@ -1,0 +1,217 @@
+//! `flotor study spring`: a measured curve of a real spring, fitted, drawn, and made a scene to be judged: the fitted spring,
+//! or the curve itself.
+
+use crate::curve::{CurveError, FITTED, MeasuredCurve, ServedCurve, SpringFit};
+use clap::Args;
+use flotor_command::{CommandError, print_result, style, write_text};
+use flotor_plot::{Axis, Figure, Panel, Series};
+use std::path::{Path, PathBuf};
+
+#[derive(Args)]
+#[command(after_help = "The table has the header `length_mm,force_n` or `compression_mm,force_n`.\n\n\
+    Examples:\n  \
+    flotor study spring measured.csv --plot measured.svg\n  \
+    flotor study spring measured.csv --scene real.toml\n  \
+    flotor study jnd --scene real.toml --bases 17 --out real      the real spring's gamma as the base\n  \
+    flotor study spring measured.csv --curve-scene as-measured.toml\n  \
+    flotor study jnd --scene as-measured.toml --stimulus measured.stiffness_scale --bases 1 --out curve")]
+pub(super) struct SpringArguments {
+    /// Measured force over length or compression (CSV)
+    #[arg(value_name = "FILE.csv")]
+    curve: PathBuf,
+    /// Length without load (default: the longest in the table; --scene needs it where the table has compressions)
+    #[arg(long, value_name = "MM")]
+    free_length_mm: Option<f64>,
+    /// Diameter of the coil between wire centres, for the scene (default: spring 1 of the thesis)
+    #[arg(long, value_name = "MM")]
+    coil_diameter_mm: Option<f64>,
+    /// Draw the measurement and the fitted spring
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Write a scene with the fitted spring, for `study jnd --scene` and `run`
+    #[arg(long, value_name = "FILE.toml")]
+    scene: Option<PathBuf>,
+    /// Write a scene that serves the measured curve itself, and beside it the table it reads
+    #[arg(long, value_name = "FILE.toml")]
+    curve_scene: Option<PathBuf>,
+    /// Write the fit as JSON (- for standard output)
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+pub(super) fn run(arguments: &SpringArguments) -> Result<(), CommandError> {
+    let path = &arguments.curve;
+    let text = std::fs::read_to_string(path).map_err(|cause| {
+        CommandError::Usage(format!("{}: cannot read the table: {cause}", path.display()))
+    })?;
+    let refused = |error| CommandError::Usage(format!("{}: {error}", path.display()));
+    let curve =
+        MeasuredCurve::parse(&text, arguments.free_length_mm.map(|mm| mm * 1.0e-3)).map_err(refused)?;
+    let fit = curve.fit().map_err(refused)?;
+    let served = curve.served().map_err(refused)?;
+    let fitted = match &arguments.scene {
+        Some(path) => Some((path, scene(&fit, arguments.coil_diameter_mm).map_err(refused)?)),
+        None => None,
+    };
+    let title = style::title(&path.display().to_string());
+    print_result(arguments.json.as_deref(), &fit, || format!("{title}\n{}", to_text(&fit, &served)))?;
+    write_text(arguments.plot.as_deref(), || picture(&curve, &fit, &served))?;
+    if let Some((path, text)) = fitted {
+        write_text(Some(path), || text)?;
+    }
+    if let Some(path) = &arguments.curve_scene {
+        let table = path.with_extension("csv");
+        if same_file(&table, &arguments.curve) {
+            let table = table.display();
+            let why = format!(
+                "--curve-scene {}: `{table}` is the measurement itself; choose another name",
+                path.display()
+            );
+            return Err(CommandError::Usage(why));
+        }
+        write_text(Some(&table), || served.to_table())?;
+        write_text(Some(path), || curve_scene(&table, &fit, &served, arguments.coil_diameter_mm))?;
+    }
+    Ok(())
+}
+
+fn same_file(one: &Path, other: &Path) -> bool {
+    matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
+}
+
+fn to_text(fit: &SpringFit, served: &ServedCurve) -> String {
+    let [low, high] = fit.stiffness_interval_n_per_m.map(|end| end * 1.0e-3);
+    let known = |value: Option<f64>, text: &dyn Fn(f64) -> String| {
+        value.map_or_else(|| "not known (--free-length-mm)".to_owned(), text)
+    };
+    [
+        format!("stiffness    {:.4} N/mm  (95 %: {low:.4} to {high:.4})", fit.stiffness_n_per_m * 1.0e-3),
+        format!("play         {:.3} mm", fit.offset_m * 1.0e3),
+        format!(
+            "free length  {}",
+            known(fit.free_length_m, &|length_m: f64| format!("{:.3} mm", length_m * 1.0e3))
+        ),
+        format!("gamma        {}", known(fit.gamma_n, &|gamma_n: f64| format!("{gamma_n:.3} N"))),
+        format!(
+            "R²           {:.6} over {} points between 30 and 70 % of the deflection",
+            fit.r_squared, fit.points
+        ),
+        format!("nonlinearity {:.1} % of the largest force, ends included", fit.nonlinearity * 100.0),
+        format!("as measured  {} knots, {:.3} N rms from the points", served.knots.len(), served.rms_n),
+    ]
+    .map(|line| format!("  {line}"))
+    .join("\n")
+}
+
+/// The measurement with both springs over it: the fitted one, and the curve as it is served.
+fn picture(curve: &MeasuredCurve, fit: &SpringFit, served: &ServedCurve) -> String {
+    let points = || curve.points.iter().map(|(x_m, force_n)| (x_m * 1.0e3, *force_n));
+    let deepest_mm = points().map(|(x_mm, _)| x_mm).fold(0.0, f64::max);
+    let line = |share: f64| {
+        let x_mm = share * deepest_mm;
+        (x_mm, fit.stiffness_n_per_m * (x_mm * 1.0e-3 - fit.offset_m))
+    };
+    let panel = Panel::new(Axis::linear("Force", "N"))
+        .series(Series::points("measured", points()).slot(0))
+        .series(Series::line("fitted spring", [0.0, 1.0].map(line)).slot(1))
+        .series(Series::line("fitted here", FITTED.map(line)).slot(2))
+        .series(
+            Series::line("served as measured", served.knots.iter().map(|(x_m, n)| (x_m * 1.0e3, *n))).slot(3),
+        );
+    Figure::new("A real spring", Axis::linear("Compression", "mm"))
+        .subtitle(format!(
+            "{:.4} N/mm{}, R² {:.5}",
+            fit.stiffness_n_per_m * 1.0e-3,
+            fit.gamma_n.map_or_else(String::new, |gamma_n| format!(", gamma {gamma_n:.3} N")),
+            fit.r_squared
+        ))
+        .panel_height_px(320.0)
+        .panel(panel)
+        .to_svg()
+}
+
+/// The fitted spring by the law of the built-in scene of experiments.
+fn scene(fit: &SpringFit, coil_diameter_mm: Option<f64>) -> Result<String, CurveError> {
+    let (free_length_m, gamma_n) = fit.free_length_m.zip(fit.gamma_n).ok_or(CurveError::NoFreeLength)?;
+    let parameters = format!(
+        "preset = \"thesis-1\"\nvariant = \"energy\"\nmode = \"gamma\"\n# Fitted to a measured curve.\n\
+         gamma_n = {gamma_n:.6}\nfree_length_mm = {:.6}\n{}",
+        free_length_m * 1.0e3,
+        coil(coil_diameter_mm)
+    );
+    let head = "# A spring fitted to a real one; an experiment sets its stiffness gamma / L0 between trials.\n\
+                title = \"A real spring, fitted\"\n";
+    Ok(life_size(head, "spring", &parameters))
+}
+
+/// How long a spring of unknown length is drawn, as a share of how far it was compressed: it was not solid then.
+const DRAWN: f64 = 1.5;
+
+/// The curve itself.
+fn curve_scene(table: &Path, fit: &SpringFit, served: &ServedCurve, coil_diameter_mm: Option<f64>) -> String {
+    let table = table.file_name().unwrap_or_default().to_string_lossy();
+    let deepest_m = served.knots.last().map_or(0.0, |(x_m, _)| *x_m);
+    let (note, length_m) = match fit.free_length_m {
+        Some(length_m) => ("", length_m),
+        None => ("# Not known, and for the drawing alone.\n", (DRAWN * deepest_m).max(1.0e-3)),
+    };
+    let parameters = format!(
+        "curve = {table:?}\n{note}free_length_mm = {:.6}\n{}",
+        length_m * 1.0e3,
+        coil(coil_diameter_mm)
+    );
+    let head = "# A real spring as it was measured; `stiffness_scale` makes it stiffer or softer as a whole.\n\
+                title = \"A real spring, as measured\"\n";
+    life_size(head, "measured", &parameters)
+}
+
+fn coil(diameter_mm: Option<f64>) -> String {
+    diameter_mm.map_or_else(String::new, |mm| format!("coil_diameter_mm = {mm}\n"))
+}
+
+/// A scene with a model millimetre for millimetre and newton for newton: scaled, it would not be the real spring any more.
+fn life_size(head: &str, plugin: &str, parameters: &str) -> String {
+    format!(
+        "{head}rate_hz = 1000\n\n[device]\nplugin = \"simulated\"\n\n[[model]]\nplugin = \"{plugin}\"\n\n\
+         [model.parameters]\n{parameters}\n[model.mapping]\nmotion_scale = 1.0\nforce_scale = 1.0\n"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_session::scene::Scene;
+
+    fn fit(free_length_m: Option<f64>) -> SpringFit {
+        SpringFit {
+            stiffness_n_per_m: 680.0,
+            stiffness_interval_n_per_m: [679.0, 681.0],
+            offset_m: 0.0,
+            free_length_m,
+            gamma_n: free_length_m.map(|length_m| 680.0 * length_m),
+            r_squared: 1.0,
+            points: 41,
+            nonlinearity: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_fitted_spring_makes_a_scene_of_its_own_size() {
+        let text = scene(&fit(Some(0.025)), Some(6.0)).unwrap();
+        let scene = Scene::parse(Path::new("real.toml"), &text).unwrap();
+        let parameters = &scene.models[0].plugin.parameters;
+        let value =
+            |key: &str| parameters.iter().find(|p| p.key == key).unwrap().value.parse::<f64>().unwrap();
+        assert_eq!([value("gamma_n"), value("free_length_mm"), value("coil_diameter_mm")], [17.0, 25.0, 6.0]);
+        assert_eq!((scene.models[0].mapping.motion_scale, scene.models[0].mapping.force_scale), (1.0, 1.0));
+    }
+
+    #[test]
+    fn a_length_that_is_not_known_is_needed_for_the_fit_and_not_for_the_curve() {
+        assert_eq!(scene(&fit(None), None), Err(CurveError::NoFreeLength));
+        let served = ServedCurve { knots: vec![(0.0, 0.0), (0.02, 9.0)], rms_n: 0.0 };
+        let text = curve_scene(Path::new("real.csv"), &fit(None), &served, None);
+        assert!(text.contains("free_length_mm = 30.000000\n"), "{text}");
+        Scene::parse(Path::new("real.toml"), &text).unwrap();
+    }
+}
