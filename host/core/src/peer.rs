@@ -53,16 +53,16 @@ const UNIT_TOLERANCE: f64 = 1.0e-6;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoDispatch {
     /// Too long or too short.
-    #[error("{length} bytes, and a dispatch has {DISPATCH_BYTES}")]
+    #[error("peer message of {length} bytes, expected {DISPATCH_BYTES}")]
     Length {
         /// How many.
         length: usize,
     },
     /// Not marked as one.
-    #[error("no dispatch of this version; use both hosts from one build")]
+    #[error("unsupported message version; run the same release on both hosts")]
     Mark,
     /// A number is not finite, the orientation has no unit length, or the energy passed on is negative.
-    #[error("numbers that no handle and no account can have")]
+    #[error("invalid peer state: a pose, twist or energy is not possible")]
     Numbers,
 }
 

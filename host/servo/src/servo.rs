@@ -215,7 +215,7 @@ impl Servo {
         }
     }
 
-    /// Takes the run where the samples, the clock and everybody who may stop it lead.
+    /// Advances the state machine of the run from sample validity, timing and requests to stop.
     fn follow(
         &mut self,
         sample: RunEvent,

@@ -259,11 +259,11 @@ impl LinkSummary {
         let Self { heard_ticks, silences, longest_wait_ms, carried } = self;
         let Carried { lost, overtaken, refused, .. } = carried;
         let silent = match silences {
-            0 => format!("never silent for longer than {longest_wait_ms:.0} ms"),
-            silences => format!("let go {silences} times, when nothing was heard"),
+            0 => format!("longest wait for a message {longest_wait_ms:.0} ms"),
+            silences => format!("force removed {silences} times for want of messages"),
         };
         format!(
-            "heard in {heard_ticks} ticks, {silent}; {lost} lost, {overtaken} overtaken, {refused} refused"
+            "messages in {heard_ticks} ticks, {silent}; {lost} lost, {overtaken} overtaken, {refused} refused"
         )
     }
 }
@@ -377,7 +377,7 @@ impl RunSummary {
             let [first, second] = lowest_j.map(|joule| joule * 1.0e3);
             let heat_mj = given_up_j.iter().sum::<f64>() * 1.0e3;
             let accounts =
-                format!("accounts never below {first:+.3} and {second:+.3} mJ, {heat_mj:.3} mJ to heat");
+                format!("tanks never below {first:+.3} and {second:+.3} mJ, {heat_mj:.3} mJ dissipated");
             row("coupling", format!("{name}: {accounts}"));
             link.iter().for_each(|link| row("link", format!("{name}: {}", link.to_text())));
         }
@@ -388,10 +388,7 @@ impl RunSummary {
         }
         if self.dropped_records > 0 {
             let dropped = self.dropped_records;
-            row(
-                "dropped",
-                format!("{dropped} records that an observer was too slow for; the loop did not wait"),
-            );
+            row("dropped", format!("{dropped} records dropped for a slow observer; the loop did not wait"));
         }
         for plugin in &self.plugins {
             let health = if plugin.health == "ok" { String::new() } else { format!("  {}", plugin.health) };
@@ -446,7 +443,7 @@ fn health_words(health: &ModelHealth, words: &str) -> String {
         return format!("panicked at tick {tick}, no force since: {words}");
     }
     if let Some(tick) = health.lost_at {
-        return format!("was lost at tick {tick}, no force since: {words}");
+        return format!("process lost at tick {tick}, no force since: {words}");
     }
     if let Some(Overrun { tick, longest_ns, limit_ns }) = health.overrun {
         let (longest_us, limit_us) = (us(longest_ns), us(limit_ns));
@@ -455,7 +452,7 @@ fn health_words(health: &ModelHealth, words: &str) -> String {
         );
     }
     if let Some(tick) = health.first_late {
-        return format!("gave no answer in time in {} ticks, the first at tick {tick}", health.late_ticks);
+        return format!("late in {} ticks, the first at tick {tick}", health.late_ticks);
     }
     health.first_rejected.map_or_else(
         || "ok".to_owned(),

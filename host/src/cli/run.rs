@@ -74,7 +74,8 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let plugins = session.plugins().to_vec();
     let description = describe(&scene, &options, &plugins);
     let publication = publish(&Directory::of_this_user(), &scene, &description, &session, &stop);
-    let publication = publication.map_err(|error| note(format_args!("nobody can watch: {error}"))).ok();
+    let publication =
+        publication.map_err(|error| note(format_args!("telemetry server not started: {error}"))).ok();
 
     let clock_word = if clock == Clock::Real { "real" } else { "virtual" };
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year

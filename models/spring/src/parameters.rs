@@ -337,7 +337,7 @@ fn accuracy(settings: &Settings<'_>, variant: Variant) -> Result<Accuracy, Refus
     match (settings.choice_or_default("accuracy"), variant) {
         (1, Variant::Rod) => Ok(Accuracy::Tight),
         (1, Variant::Thesis | Variant::ClosedForm | Variant::CurrentLength | Variant::Energy) => {
-            Err(Refusal::parameter("`accuracy` tight is for variant `rod`; the other laws are formulas"))
+            Err(Refusal::parameter("`accuracy` tight is for variant `rod`; the other laws have closed forms"))
         }
         _ => Ok(Accuracy::Servo),
     }
@@ -354,7 +354,7 @@ fn seat(settings: &Settings<'_>, variant: Variant) -> Result<SeatChoice, Refusal
     }
 }
 
-/// Whether the law `energy` hands over to the rod, as it does unless told otherwise. No other law does.
+/// Whether the law `energy` blends into the rod, which is its default. No other law does.
 fn hand_over(settings: &Settings<'_>, variant: Variant) -> Result<Switch, Refusal> {
     let wanted = settings.choice_or_default("hand_over") == 1;
     match variant {
@@ -362,7 +362,7 @@ fn hand_over(settings: &Settings<'_>, variant: Variant) -> Result<Switch, Refusa
         Variant::Thesis | Variant::ClosedForm | Variant::CurrentLength | Variant::Rod
             if wanted && settings.number("hand_over").is_some() =>
         {
-            Err(Refusal::parameter("`hand_over` on is for variant `energy`, which hands over to the rod"))
+            Err(Refusal::parameter("`hand_over` on is for variant `energy`, which blends into the rod"))
         }
         _ => Ok(Switch::Off),
     }

@@ -284,7 +284,7 @@ fn what_is_wrong_with_devices_and_couplings_is_said() {
     let two = "[[device]]\nname = \"left\"\nplugin = \"simulated\"\n[[device]]\nname = \"right\"\nplugin = \"simulated\"\n";
     for (wrong, expected) in [
         ("[[device]]\nplugin = \"a\"\n[[device]]\nplugin = \"b\"\n".to_owned(), "`device.name` is missing"),
-        (two.replace("right", "left"), "two devices are called `left`; give one another `name`"),
+        (two.replace("right", "left"), "two devices are called `left`; give each a different `name`"),
         (format!("{two}[[model]]\nplugin = \"spring\"\n"), "the scene has several devices: say which"),
         (
             format!("{two}[[model]]\nplugin = \"spring\"\ndevice = \"rigth\"\n"),
@@ -293,7 +293,7 @@ fn what_is_wrong_with_devices_and_couplings_is_said() {
         (
             "[device]\nplugin = \"a\"\n[[model]]\nplugin = \"wall\"\n[[model]]\nplugin = \"wall\"\n"
                 .to_owned(),
-            "two models are called `wall`; give one another `name`",
+            "two models are called `wall`; give each a different `name`",
         ),
         (
             format!("{two}[[model]]\nplugin = \"spring\"\ndevice = \"left\"\nname = \"a@b\"\n"),
