@@ -112,7 +112,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         1.0,
         0.15,
-        "Damping beyond it; report: everywhere",
+        "Damping beyond it; thesis: everywhere",
     )
     .live(),
     Parameter::real(

@@ -18,7 +18,7 @@ use std::time::Duration;
 
 /// How long a controller may take to describe itself, to arm and take off, and to switch off.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// How long a lockstep tick waits: an emulator that is held up is not a fault.
+/// How long a lockstep tick waits: a delayed emulator is not a fault.
 const LOCKSTEP_PATIENCE: Duration = Duration::from_secs(10);
 /// Periods a command is valid for: one more than it takes to replace it. A host that has missed two deadlines has
 /// no say until it is back, long before the watchdog ends its session.

@@ -138,7 +138,7 @@ fn rest(client: &mut Client) -> (Vec<TickRecord>, u64, Vec<Event>) {
 }
 
 #[test]
-fn who_watches_sees_every_tick_or_knows_how_many_not() {
+fn a_client_sees_every_tick_or_knows_how_many_not() {
     let (digest, ticks, _, watcher) = run_watched(
         Clock::Virtual,
         |directory| {
@@ -189,7 +189,7 @@ fn a_frozen_a_killed_and_a_talkative_watcher_change_no_bit() {
             }
         },
     );
-    assert_eq!(flooding.0, unwatched_digest(), "flooding: rubbish, and requests that are refused");
+    assert_eq!(flooding.0, unwatched_digest(), "flooding: malformed data, and requests that are refused");
 }
 
 #[test]
@@ -202,7 +202,7 @@ fn a_watcher_changes_parameters_and_is_told() {
             let bad = answer(&mut client, set("spring", "gamma", "20"));
             assert!(
                 bad.refused.is_some_and(|reason| reason.contains("gamma_n")),
-                "with the nearest right key"
+                "with the closest valid key"
             );
             let fixed = answer(&mut client, set("spring", "variant", "rod"));
             assert!(fixed.refused.is_some_and(|reason| reason.contains("while the loop runs")));

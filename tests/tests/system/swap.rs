@@ -114,7 +114,7 @@ fn a_recording_with_replacements_replays_bit_for_bit() {
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     let ran = Flotor::with(["replay", &recording, "--json", "-"]).run();
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
-    let report: Value = serde_json::from_str(&ran.stdout).expect("the report is JSON");
+    let report: Value = serde_json::from_str(&ran.stdout).expect("the summary is JSON");
     assert_eq!(report["bit_exact"], Value::from(true), "{report}");
 }
 

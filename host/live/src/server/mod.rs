@@ -119,7 +119,7 @@ impl Publication {
         self.shared.greeting().keep(&message);
         let Ok(payload) = serde_json::to_vec(&message) else { return };
         let bytes = frame(Kind::Change, &payload);
-        self.shared.watchers().iter().for_each(|watcher| watcher.outbox.news(bytes.clone()));
+        self.shared.watchers().iter().for_each(|watcher| watcher.outbox.push(bytes.clone()));
     }
 
     /// Notifies all clients of the end of the run and its outcome; no client can connect afterwards.
@@ -182,8 +182,8 @@ fn welcome(stream: UnixStream, shared: &Arc<Shared>) {
     }
     let outbox = Arc::new(Outbox::default());
     let Ok(greeting) = serde_json::to_vec(&*shared.greeting()) else { return };
-    outbox.news(frame(Kind::Greeting, &greeting));
-    outbox.news(frame(Kind::Run, &shared.run));
+    outbox.push(frame(Kind::Greeting, &greeting));
+    outbox.push(frame(Kind::Run, &shared.run));
     // With the list locked, so that no change is told between greeting and list.
     watchers.extend(Watcher::start(stream, outbox, shared));
 }

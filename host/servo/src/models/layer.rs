@@ -286,8 +286,8 @@ impl Object {
             return None;
         }
         // Where it was not stepped it has no history: it starts anew.
-        let was_asleep = self.stepped_at.is_some_and(|last| last + 1 != input.tick);
-        if was_asleep && memory == Memory::PathDependent && self.model.reset() != CallStatus::Ok {
+        let was_inactive = self.stepped_at.is_some_and(|last| last + 1 != input.tick);
+        if was_inactive && memory == Memory::PathDependent && self.model.reset() != CallStatus::Ok {
             return self.fail(input.tick, health);
         }
         self.stepped_at = Some(input.tick);

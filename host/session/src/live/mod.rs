@@ -11,9 +11,9 @@
 //! A model that somebody wants in place of another is loaded and made here, on a thread of its own, and goes to the loop when
 //! it is ready.
 
-mod carrier;
+mod peer_link;
 
-pub use carrier::{Carried, Carrier, carry};
+pub use peer_link::{LinkCounts, PeerLink, start_peer_link};
 
 use crate::registry::Registry;
 use crate::scene::Scene;

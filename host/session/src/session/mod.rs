@@ -154,7 +154,7 @@ impl Outcome {
 pub struct DeviceOutcome {
     /// The first fault it reported.
     pub fault: Option<Fault>,
-    /// Its own energy account, where it keeps one.
+    /// Its own energy balance, where it keeps one.
     pub ledger: Option<EnergyLedger>,
     /// Its last words; empty if it had no reason to say any.
     pub words: String,
@@ -228,7 +228,7 @@ impl Session {
         });
         let forces = Forces::new(devices.len(), models, couplings.collect());
         let emergency_buttons = scene.limits.emergency_buttons;
-        let run = RunConfig { period_ns, ramp_ns, held_up_ns: watchdog_ns, emergency_buttons };
+        let run = RunConfig { period_ns, ramp_ns, longest_gap_ns: watchdog_ns, emergency_buttons };
         Ok(Self {
             standby: Standby::new(devices, forces, parameters, exchange, config, run),
             controls,
@@ -284,7 +284,7 @@ impl Session {
         WrenchLimits { force_n, torque_nm }
     }
 
-    /// The couplings whose other end is on another host, by name, each with the line on which its news is to be carried.
+    /// The couplings whose other end is on another host, by name, each with the line for its peer state.
     /// Given once; an end whose line nobody takes is never heard of, and asks for nothing.
     #[must_use]
     pub fn take_lines(&mut self) -> Vec<(String, Line)> {
