@@ -1,4 +1,4 @@
-//! The reports of a puck, as bytes. No input or output here.
+//! HID reports of a puck, as bytes. No input or output here.
 //!
 //! | First byte | Then | Meaning |
 //! |---|---|---|

@@ -44,9 +44,9 @@ use flotor_hal::math;
 use crate::beam_column::Column;
 use crate::bending::{KNEE, REACH};
 use crate::entire::EntireFunctions;
-use crate::level::{Levelled, level_above, level_below};
 use crate::real::{Real, polynomial};
 use crate::rigidity::{Rigidities, Spring};
+use crate::saturation::{Saturated, saturate_above, saturate_below};
 use crate::shape::Shape;
 
 /// Length of the fit: relative error below 2e-4 of the coefficients of short springs, 1e-2 of the slender one.
@@ -109,7 +109,7 @@ pub(crate) struct Quartic {
     mapping_per_m: f64,
 }
 
-/// A length at which the fit ends, and where the levelling before it begins.
+/// A length at which the fit ends, and where the saturation before it begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Limit {
     knee_m: f64,
@@ -146,8 +146,8 @@ impl Quartic {
         Self { gamma_n, ..self }
     }
 
-    /// The term of the form at a length, its argument `z` (levelled, with `dz/dL`) and the squared angles. Real-time: bounded,
-    /// no allocation.
+    /// The term of the form at a length, its argument `z` (saturated, with `dz/dL`) and the squared angles. Real-time:
+    /// bounded, no allocation.
     #[inline(always)]
     pub(crate) fn at<R: Real>(
         &self,
@@ -194,8 +194,8 @@ impl Quartic {
     #[inline(always)]
     pub(crate) fn form_at<R: Real>(&self, length_m: R) -> QuarticForm<R> {
         let Self { shortest, longest, .. } = *self;
-        let below = level_below(length_m, shortest.knee_m, shortest.reach_m);
-        let Levelled { value, slope, .. } = level_above(below.value, longest.knee_m, longest.reach_m);
+        let below = saturate_below(length_m, shortest.knee_m, shortest.reach_m);
+        let Saturated { value, slope, .. } = saturate_above(below.value, longest.knee_m, longest.reach_m);
         let slope = slope * below.slope * self.mapping_per_m;
         let mapped = (value - self.middle_m) * self.mapping_per_m;
         let [p0, p1, p2, p3] = &self.powers;

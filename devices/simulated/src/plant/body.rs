@@ -29,7 +29,7 @@ pub(super) struct Body {
     /// Compensation less weight, device frame, N: exactly zero when they are set equal.
     pub(super) lift_n: DVec3,
     /// How far the flotor's centre of mass lies beyond the common one, in units of the distance from the
-    /// origin to that: mass of the hand over mass of the flotor (law of the lever).
+    /// origin to that: mass of the hand divided by that of the flotor (law of the lever).
     pub(super) lift_lever: f64,
     /// Damping of drag and hand together, per axis, N s/m.
     pub(super) damping_ns_per_m: DVec3,

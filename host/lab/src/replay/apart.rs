@@ -63,7 +63,7 @@ impl Coverage {
 pub enum WhyApart {
     /// A model had a thread of its own, and nobody knows any more which field the loop had when.
     #[error(
-        "`{model}` was computed beside the loop on the real clock, and when its fields came is not in the recording"
+        "`{model}` was computed asynchronously on the real clock, and when its fields came is not in the recording"
     )]
     FieldOnRealClock {
         /// Its name.
