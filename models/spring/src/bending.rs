@@ -65,6 +65,7 @@ impl Bending {
         let rigidities = spring.rigidities();
         let free_length_m = spring.geometry().free_length_m;
         Self {
+            // Stiffnesses at rest, 2 alpha / L0 and 6 alpha / L0, and the constants of their formulas.
             bow_nm_per_rad: 2.0 * rigidities.alpha_n_m2 / free_length_m,
             sway_nm_per_rad: 6.0 * rigidities.alpha_n_m2 / free_length_m,
             slenderness_per_m2: rigidities.beta_n / (12.0 * rigidities.alpha_n_m2),

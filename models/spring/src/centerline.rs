@@ -100,6 +100,7 @@ impl Centerline {
     pub fn section(&self, s: f64) -> Section {
         #[allow(clippy::manual_clamp)] // clamp would let NaN through
         let s = s.max(0.0).min(1.0);
+        // Lean and offset of equations 17 and 18 of the thesis, weighted by the sway and the bow of the ends.
         let [sway, bow] = self.shape.lean(s - 0.5).map(|lean| lean.value);
         let lean = self.sway_rad * sway + self.bow_rad * bow;
         let [sway, bow] = self.shape.offset(s - 0.5);

@@ -373,6 +373,7 @@ impl<R: Real> Real for Pair<R> {
 /// apart: short dependency chains. Real-time: bounded, no allocation, no branch.
 #[inline(always)]
 pub(crate) fn polynomial<R: Real, const TERMS: usize>(x: R, powers: &[f64; TERMS]) -> [R; 2] {
+    // Horner in x² for even and odd powers at once, value and derivative.
     let square = x * x;
     let (mut even_slope, mut odd_slope) = (x.like(powers[TERMS - 2]), x.like(powers[TERMS - 1]));
     let (mut even, mut odd) =

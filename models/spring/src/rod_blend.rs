@@ -282,6 +282,7 @@ impl RodBlend {
         let (Some(rod_j), Some(energy_j)) = (rod.energy_j, energy.energy_j) else {
             return self.energy.respond(pose, demand);
         };
+        // F = (1 - s) F_energy + s F_rod - (W_rod - W_energy) ds/dr of the module documentation.
         let torque_nm = energy.torque_nm.lerp(rod.torque_nm, share.value);
         Response {
             force_n: energy.force_n.lerp(rod.force_n, share.value)

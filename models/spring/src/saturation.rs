@@ -24,6 +24,7 @@ pub(crate) fn saturate_above<R: Real>(quantity: R, knee: f64, reach: f64) -> Sat
     if !R::any(saturated) {
         return Saturated { value: quantity, slope: unit, saturated };
     }
+    // d / sqrt(1 + (d / reach)²), and its derivative (1 + (d / reach)²)^(-3/2).
     let excess = quantity - knee;
     let reached = excess * (1.0 / reach);
     let square = (reached * reached + 1.0).inverse();

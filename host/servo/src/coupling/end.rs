@@ -124,6 +124,7 @@ impl End {
         let away = partner.pose.position() - pose.position();
         let turned: DVec3 = rotation_vector(partner.pose.orientation() * pose.orientation().conjugate());
         let config = &self.config;
+        // Spring and damper towards the partner, in the shared frame: F = k dx + b dv, T = k dphi + b dw.
         let force = away * config.stiffness_n_per_m
             + (partner.twist.linear() - twist.linear()) * config.damping_ns_per_m;
         let torque = turned * config.stiffness_nm_per_rad
