@@ -94,7 +94,7 @@ every_change() {
     # That a workspace of its own still compiles against the host; `full` tests them.
     step beside cargo check --manifest-path host/python/Cargo.toml --target-dir target
     # Counts of instructions of the optimised program against their budgets.
-    step budgets cargo test --release -p flotor-tests --test instructions
+    step budgets cargo test --release -p flotor-tests --features budgets instructions
     # Plugins against the USB, HID and serial drivers of a kernel.
     step usb .ci/vm
     # Every interleaving of the lock-free cell. A target folder of its own: the flag changes every crate. The crate forbids

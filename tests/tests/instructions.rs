@@ -4,7 +4,7 @@
 //! `tests/data/instruction_budgets.toml` has the budgets. To print what is counted now:
 //!
 //! ```text
-//! cargo test --release -p flotor-tests --test instructions -- --nocapture
+//! cargo test --release -p flotor-tests --features budgets instructions -- --nocapture
 //! ```
 
 use flotor_tests::scratch::Scratch;
@@ -62,7 +62,6 @@ fn keep_budget(name: &str, counted: f64) {
 }
 
 #[test]
-#[cfg_attr(debug_assertions, ignore = "of the optimised program: .ci/run counts with --release")]
 fn a_whole_tick_keeps_its_budget() {
     for (name, workload) in [("tick_scripted", "tick-scripted"), ("tick_simulated", "tick-simulated")] {
         let Some([_, ticks]) = parts(workload) else { return };
@@ -75,7 +74,6 @@ fn a_whole_tick_keeps_its_budget() {
 const MOST_FOR_CHANGES: f64 = 2000.0;
 
 #[test]
-#[cfg_attr(debug_assertions, ignore = "of the optimised program: .ci/run counts with --release")]
 fn a_tick_that_replaces_a_model_does_next_to_nothing_for_it() {
     // Nine replacements and nine changes of a parameter, and what is handed back.
     let Some(counts) = counts("scene-replacing", "*::Servo::apply_changes") else { return };
@@ -86,7 +84,6 @@ fn a_tick_that_replaces_a_model_does_next_to_nothing_for_it() {
 }
 
 #[test]
-#[cfg_attr(debug_assertions, ignore = "of the optimised program: .ci/run counts with --release")]
 fn ten_thousand_inactive_objects_cost_a_tick_next_to_nothing() {
     let per_tick = |workload: &str| parts(workload).map(|[_, short, long]: [f64; 3]| (long - short) / 3072.0);
     let (Some(alone), Some(among)) = (per_tick("scene-alone"), per_tick("scene-among-inactive")) else {
@@ -98,7 +95,6 @@ fn ten_thousand_inactive_objects_cost_a_tick_next_to_nothing() {
 }
 
 #[test]
-#[cfg_attr(debug_assertions, ignore = "of the optimised program: .ci/run counts with --release")]
 fn laws_cost_their_share_of_the_printed_one() {
     let Some(counts) = parts::<12>("laws") else { return };
     let [printed, closed, energy, handing_over, closed_batch, energy_batch] =
@@ -125,7 +121,6 @@ fn laws_cost_their_share_of_the_printed_one() {
 }
 
 #[test]
-#[cfg_attr(debug_assertions, ignore = "of the optimised program: .ci/run counts with --release")]
 fn no_tick_of_the_rod_costs_ten_times_the_mean() {
     let Some(counts) = parts::<400>("rod") else { return };
     let mean = counts.iter().sum::<f64>() / 400.0;
@@ -136,7 +131,6 @@ fn no_tick_of_the_rod_costs_ten_times_the_mean() {
 }
 
 #[test]
-#[cfg_attr(debug_assertions, ignore = "of the optimised program: .ci/run counts with --release")]
 fn a_tick_of_the_flotor_costs_no_more_than_so_many_steps_of_a_rigid_body() {
     let per_tick = |workload: &str| parts(workload).map(|[_, ticks]: [f64; 2]| ticks / 2000.0);
     let Some(step) = per_tick("rigid-body") else { return };

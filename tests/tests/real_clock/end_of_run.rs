@@ -111,6 +111,7 @@ impl Observer for Dawdler {
 
 #[test]
 fn a_device_is_energised_and_stopped_by_the_loops_own_thread_whatever_an_observer_is_at() {
+    let _turn = crate::alone();
     let scene = "rate_hz = 1000\nduration_s = 60\n[device]\nplugin = \"button\"\n\
                  [limits]\nemergency_button = 0\nwatchdog_ms = 60000\n";
     let scene = Scene::parse(Path::new("scene.toml"), scene).expect("the scene is right");
@@ -133,6 +134,7 @@ const HELD: &str = "rate_hz = 1000\nduration_s = 1.2\n[device]\nplugin = \"simul
 
 #[test]
 fn a_run_whose_time_is_over_fades_out_and_does_not_drop() {
+    let _turn = crate::alone();
     let run = watch_on(Clock::Real, HELD);
     assert_eq!(run.outcome.end, RunEnd::Finished);
     let force_n = |record: &TickRecord| record.commanded.force().length();
@@ -152,6 +154,7 @@ fn a_run_whose_time_is_over_fades_out_and_does_not_drop() {
 /// holds it.
 #[test]
 fn the_boundary_holds_and_creates_no_energy_at_any_rate() {
+    let _turn = crate::alone();
     for rate_hz in [100, 200, 300, 1000, 10_000] {
         let scene = format!(
             "rate_hz = {rate_hz}\nduration_s = 3\n[device]\nplugin = \"simulated\"\n[device.parameters]\n\

@@ -6,6 +6,7 @@ use serde_json::Value;
 
 #[test]
 fn every_period_of_both_loops_is_a_tick_or_missed() {
+    let _turn = crate::alone();
     let scratch = Scratch::default();
     let picture = scratch.path().join("jitter.svg").display().to_string();
     let arguments = ["jitter", "--rate", "500", "--duration", "4s", "--json", "-", "--plot", &picture];
