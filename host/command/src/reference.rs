@@ -12,7 +12,8 @@ pub fn reference(mut program: Command, separate: &mut [Command]) -> String {
     let mut text = String::new();
     for command in offered(&program) {
         let elsewhere = separate.iter().find_map(|other| other.find_subcommand(command.get_name()));
-        let described = elsewhere.unwrap_or(command).clone().about(command.get_about().cloned().unwrap_or_default());
+        let described =
+            elsewhere.unwrap_or(command).clone().about(command.get_about().cloned().unwrap_or_default());
         chapter(&described, "flotor", 2, &mut text);
     }
     text
