@@ -5,71 +5,100 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 report=()
+left_out=()
+logs=target/ci
+mkdir -p "$logs"
 
-# step NAME COMMAND...: says what runs, runs it, says how long it took.
+# step NAME COMMAND...: says what runs, runs it, says how long it took. What it printed is kept in target/ci/NAME.log.
 step() {
-    local name=$1 started=$SECONDS code
+    local name=$1 started=$SECONDS code log=$logs/$1.log
     shift
     printf '\n[%s] %s\n' "$name" "$*"
     # Not as a condition: within one, `set -e` is ignored, and a function of many commands is what its last one says.
     set +e
-    (set -e; "$@")
-    code=$?
+    (set -e; "$@") 2>&1 | tee "$log"
+    code=${PIPESTATUS[0]}
     set -e
+    # Tests that are ignored, with the reason the test gives, and tools that say they skip something.
+    while IFS= read -r line; do left_out+=("$name: $line"); done < <(
+        sed -n -e 's/^test \(.* \.\.\. ignored.*\)/\1/p' -e 's/^\(skipped: .*\)/\1/pI' "$log" | sort -u)
     if [ "$code" = 0 ]; then
-        report+=("$(printf '%-8s ok %6d s' "$name" $((SECONDS - started)))")
+        report+=("$(printf '%-10s ok %6d s' "$name" $((SECONDS - started)))")
     else
-        report+=("$(printf '%-8s FAILED after %d s (exit code %d): %s' "$name" $((SECONDS - started)) "$code" "$*")")
+        report+=("$(printf '%-10s FAILED after %d s (exit code %d): %s' "$name" $((SECONDS - started)) "$code" "$*")")
         summary
         exit "$code"
     fi
 }
 
-# Prints what ran so far, a line a step.
+# Prints what ran so far, a line a step, and what was left out of it.
 summary() {
     printf '\n'
     printf '%s\n' "${report[@]}"
+    printf 'in all %11d s\n' "$SECONDS"
+    printf '\nleft out:\n'
+    if [ ${#left_out[@]} = 0 ]; then echo '  nothing'; else printf '  %s\n' "${left_out[@]}"; fi
 }
 
-# What the tests use beyond Rust and a C compiler, by Debian's names: valgrind counts instructions, Xvfb and xdotool hold
-# and push a real window, drawn by Mesa; QEMU emulates other processors, and with busybox and cpio a small virtual machine.
-debian_packages="g++ valgrind xvfb xdotool libegl1 libgl1-mesa-dri libxkbcommon-x11-0 qemu-user qemu-system-x86 busybox-static cpio"
+# What the tests use beyond Rust, each program with Debian's package: valgrind counts instructions, Xvfb and xdotool hold and push a
+# real window, drawn by Mesa; QEMU emulates other processors, and with busybox and cpio a small virtual machine.
+tools="cc:gcc c++:g++ valgrind:valgrind Xvfb:xvfb xdotool:xdotool qemu-x86_64:qemu-user qemu-system-x86_64:qemu-system-x86
+    busybox:busybox-static cpio:cpio"
+libraries="libegl1 libgl1-mesa-dri libxkbcommon-x11-0"
 
 # What the tests use has to be here: where a tool is missing they fail instead of being skipped.
 export FLOTOR_REQUIRE=${FLOTOR_REQUIRE-cc,cxx,valgrind,display,qemu}
 
-# Installs what is missing where that is possible.
+# What is not here, by package.
+missing_packages() {
+    local tool
+    for tool in $tools; do command -v "${tool%%:*}" >/dev/null || echo "${tool##*:}"; done
+    # shellcheck disable=SC2086 # a list of packages
+    { dpkg-query -Wf '${db:Status-Status} ${Package}\n' $libraries 2>/dev/null || true; } | sed -n 's/^installed //p' |
+        grep -vxFf - <(printf '%s\n' $libraries) || true
+}
+
+# Installs what is missing; names and fails on what is still missing then.
 machine() {
     local missing
-    # shellcheck disable=SC2086 # a list of packages
-    missing=$(dpkg-query -Wf '${db:Status-Status} ${Package}\n' $debian_packages 2>/dev/null | sed -n 's/^installed //p' |
-        grep -vxFf - <(printf '%s\n' $debian_packages) || true)
-    [ -n "$missing" ] || return 0
-    if ! command -v apt-get >/dev/null || [ "$(id -u)" != 0 ]; then
-        echo "not installed, and only root on Debian can change that here:" $missing
-        return 0
+    missing=$(missing_packages)
+    if [ -n "$missing" ] && command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
+        # shellcheck disable=SC2086
+        apt-get -qq update && DEBIAN_FRONTEND=noninteractive apt-get -qq install -y --no-install-recommends $missing >/dev/null || true
     fi
-    # shellcheck disable=SC2086
-    apt-get -qq update && DEBIAN_FRONTEND=noninteractive apt-get -qq install -y --no-install-recommends $missing >/dev/null
+    missing=$(missing_packages)
+    [ -z "$missing" ] && return 0
+    echo "missing, by Debian's packages:" $missing
+    return 1
+}
+
+# Workspaces of their own beside the core.
+satellites="host/python host/bridge host/sweep devices/maglev/fuzz"
+
+format() {
+    local satellite
+    cargo fmt --all --check
+    for satellite in $satellites; do cargo fmt --manifest-path "$satellite/Cargo.toml" --check; done
 }
 
 # The checks of every change, cheapest first.
 every_change() {
     step machine machine
-    step format cargo fmt --all --check
-    # The README's `cargo test`, and the viewer, whose GPU stack that leaves out. One command: of two, the second builds half of
-    # what both use again, with other features.
+    step format format
+    step size .ci/lines
+    # The README's `cargo test`; the viewer, whose GPU stack that leaves out; and what needs tools that take long to build. One
+    # command: of two, the second builds half of what both use again, with other features.
     step test cargo test --workspace --features flotor-tests/formats --no-fail-fast
+    step lint cargo clippy --workspace --all-targets --all-features -- -D warnings
+    step docs env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
+    # That a workspace of its own still compiles against the host; `full` tests them.
+    step beside cargo check --manifest-path host/python/Cargo.toml --target-dir target
     # Counts of instructions of the optimised program against their budgets.
     step budgets cargo test --release -p flotor-tests --test instructions
-    step lint cargo clippy --workspace --all-targets -- -D warnings
-    step docs env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
-    # Workspaces of their own: that they still compile against the host.
-    step beside cargo check --manifest-path host/python/Cargo.toml --target-dir target
-    step size .ci/lines
-    # Plugins against the USB, HID and serial drivers of a kernel; skips, and says why, without QEMU.
+    # Plugins against the USB, HID and serial drivers of a kernel.
     step usb .ci/vm
-    # Every interleaving of the lock-free cells. A target folder of its own: the flag changes every crate.
+    # Every interleaving of the lock-free cell. A target folder of its own: the flag changes every crate. The crate forbids
+    # `unsafe`, so that data races are left to the compiler.
     step loom env RUSTFLAGS="--cfg loom" cargo test -p flotor-sync --release --test loom --target-dir target/loom
 }
 
@@ -78,24 +107,18 @@ target() {
     rustc -vV | sed -n 's/^host: //p'
 }
 
-# Data races by ThreadSanitizer: threads on the lock-free cells. The standard library is built along, for its locks and
-# threads to be seen too; that takes its sources. Loom finds what depends on memory orders, this what is not atomic at all.
-race() {
-    rustup component add rust-src
-    RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=thread" cargo test -Zbuild-std --target "$(target)" --target-dir target/tsan \
-        -p flotor-sync --lib
-}
-
 # Whatever a tick does that may block, by RealtimeSanitizer: memory, files, locks, also inside plugins. It ends the process
-# with the place. The plugins are ordinary ones: the sanitizer is in the program, which has to be the only one with it. The
-# model that starts a thread in a step has to be caught: else nothing was watched.
+# with the place. The plugins are ordinary ones: the sanitizer is in the program, which has to be the only one with it; so is
+# the standard library, whose sources need not be here. The model that starts a thread in a step has to be caught: else nothing
+# was watched.
 blocking() {
     local flotor
     local -x FLOTOR_PLUGIN_PATH=target/debug/deps
     flotor=target/rtsan/$(target)/debug/flotor
-    cargo build -p flotor -p fixture-faulty-model
-    RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=realtime --cfg rtsan" cargo build --target "$(target)" --target-dir target/rtsan \
-        -p flotor --bin flotor
+    cargo build
+    cargo build -p fixture-faulty-model
+    RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=realtime -Cunsafe-allow-abi-mismatch=sanitizer --cfg rtsan" \
+        cargo build --target "$(target)" --target-dir target/rtsan -p flotor --bin flotor
     "$flotor" run --clock virtual --duration 5s --seed 1
     "$flotor" run --clock real --duration 2s --seed 1
     "$flotor" run --clock virtual --duration 5s --set device.preset=full
@@ -113,22 +136,36 @@ blocking() {
 bits() {
     local runner
     for runner in "" "qemu-x86_64 -cpu Haswell" "qemu-x86_64 -cpu qemu64"; do
-        if ! command -v "${runner%% *}" >/dev/null && [ -n "$runner" ]; then
-            echo "skipped: there is no ${runner%% *} to emulate processors with"
-            return 0
-        fi
         echo "on ${runner:-the processor at hand}:"
-        FLOTOR_RUNNER=$runner cargo test --release -p flotor-tests golden -- --nocapture
+        FLOTOR_RUNNER=$runner cargo test --release -p flotor-tests --test system golden -- --nocapture
     done
+}
+
+# Coverage-guided fuzzing of the maglev's frame decoder for a minute. The instrumentation is LLVM's, as `cargo fuzz` asks for it;
+# without its address sanitizer no nightly compiler is needed, and the decoder has no `unsafe`.
+fuzz() {
+    local coverage="--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4
+        -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table
+        -Cllvm-args=-sanitizer-coverage-trace-compares"
+    RUSTFLAGS="$(echo $coverage)" cargo run --release --manifest-path devices/maglev/fuzz/Cargo.toml --target "$(target)" \
+        --target-dir target/fuzz --bin decode -- -max_total_time=60 -print_final_stats=1
 }
 
 # The Python wheel as a user installs it, and its tests against the command: models, runs, sweeps on threads and Dask.
 wheel() {
+    cargo clippy --manifest-path host/python/Cargo.toml --target-dir target --all-targets -- -D warnings
     python3 -m venv target/venv
     target/venv/bin/pip install --quiet 'host/python[test]'
     cargo build --release
     cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target/sweep
     FLOTOR=target/release/flotor FLOTOR_SWEEP=target/sweep/release/flotor-sweep target/venv/bin/python -m pytest -q host/python
+}
+
+# The sweeper: a table of every kind.
+sweep() {
+    cargo build --release
+    FLOTOR=$PWD/target/release/flotor cargo test --release --manifest-path host/sweep/Cargo.toml --target-dir target/sweep
+    cargo clippy --release --all-targets --manifest-path host/sweep/Cargo.toml --target-dir target/sweep -- -D warnings
 }
 
 # The bridge: messages to the bit, who may do what, what is refused, over loopback; two hosts with a hand each over a bad way.

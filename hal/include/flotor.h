@@ -167,7 +167,7 @@ typedef uint32_t FlotorStepStatus;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// Whether the answer depends on the way to the pose.
+// Whether the force is path-dependent: the model has an internal state.
 enum FlotorMemory
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
@@ -346,7 +346,7 @@ typedef void *FlotorInstance;
 typedef struct FlotorLoopConfig {
     // Nominal time between ticks, ns.
     uint64_t period_ns;
-    // Seed of everything random in this run.
+    // Seed of all random numbers of this run.
     uint64_t seed;
 } FlotorLoopConfig;
 
@@ -694,7 +694,7 @@ typedef struct FlotorWorkspaceBoundsTable {
     uint32_t (*bounds)(FlotorInstance instance, struct FlotorWorkspaceBounds *out);
 } FlotorWorkspaceBoundsTable;
 
-// Account of the mechanical energy of a device with a known plant (a simulation), J since activation. 56 bytes.
+// Balance of the mechanical energy of a device with a known plant (a simulation), J since activation. 56 bytes.
 //
 // Every term is integrated on its own, none is the difference of others:
 // `stored_j - initial_j = actuators_j + feedforward_j + hand_j - dissipated_j` is a check, not a definition.
@@ -721,7 +721,7 @@ typedef struct FlotorEnergyLedgerTable {
     uint32_t size;
     // Reserved, 0.
     uint32_t reserved;
-    // The account since activation; a [`crate::abi::CallStatus`] code. Real-time.
+    // The energy balance since activation; a [`crate::abi::CallStatus`] code. Real-time.
     uint32_t (*ledger)(FlotorInstance instance, struct FlotorEnergyLedger *out);
 } FlotorEnergyLedgerTable;
 

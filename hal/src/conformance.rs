@@ -12,7 +12,7 @@ pub enum Rule {
     Loads,
     /// Every parameter has id, doc and a default inside its range, and no id occurs twice.
     Schema,
-    /// An instance can be made from nothing but defaults.
+    /// An instance can be created from defaults alone.
     Defaults,
     /// At home and near it a model answers with finite numbers.
     FiniteNearHome,
@@ -24,11 +24,11 @@ pub enum Rule {
     ResetRepeats,
     /// A step takes less than half a period at 1 kHz.
     TimeBudget,
-    /// Two instances, stepped in turns and on two threads, answer as one alone does.
+    /// Two instances give the same answers alternately, on two threads and alone.
     Independent,
     /// A step starts no thread.
     NoThreads,
-    /// Where a model without memory serves energy, its force is the energy's gradient: units and frame agree.
+    /// The force of a model without a history is minus the gradient of its energy: units and frame agree.
     EnergyGradient,
     /// A device's declared limits, ranges and rates are numbers a host can enforce.
     Capabilities,
@@ -85,18 +85,18 @@ impl Rule {
     pub const fn text(self) -> &'static str {
         match self {
             Rule::Metadata => "the metadata section names kind, id, version, contract and entry",
-            Rule::Loads => "the library links and means the same structs as the host",
+            Rule::Loads => "the library links, and its structs equal the host's",
             Rule::Schema => "every parameter has an id of its own, a doc and a default inside its range",
-            Rule::Defaults => "an instance can be made from nothing but defaults",
+            Rule::Defaults => "an instance can be created from defaults alone",
             Rule::FiniteNearHome => "at home and near it the wrench is finite",
             Rule::SurvivesNotFinite => "NaN and infinity in the pose give a status, not NaN, and no panic",
             Rule::SurvivesFarPoses => "poses far outside any workspace give finite numbers and no panic",
             Rule::ResetRepeats => "after reset the same poses give the same bits",
             Rule::TimeBudget => "99 of 100 steps take less than half a period at 1 kHz",
-            Rule::Independent => "two instances, in turns and on two threads, answer as one alone does",
+            Rule::Independent => "two instances give the same answers alternately, on two threads and alone",
             Rule::NoThreads => "a step starts no thread",
             Rule::EnergyGradient => {
-                "where a model without memory serves energy, its force is minus the gradient of it"
+                "the force of a model without a history is minus the gradient of its energy"
             }
             Rule::Capabilities => "declared limits, ranges and rates are numbers a host can enforce",
             Rule::Lifecycle => "activate, read, write, deactivate and activate again all work",

@@ -162,7 +162,7 @@ impl Conditions {
     pub const NONE: Conditions = Conditions { bits: 0 };
     /// The actuators are at their limit: since the previous tick they gave less than was commanded.
     pub const SATURATED: Conditions = Conditions { bits: 1 << 0 };
-    /// The device was asked for more force than it should be used with: warn the person who holds it.
+    /// The force requested of the device is more than it should be used with: warn the person who holds it.
     pub const EXCESS_FORCE: Conditions = Conditions { bits: 1 << 1 };
 
     /// Both. Real-time: bounded, no allocation.
@@ -195,7 +195,7 @@ impl DeviceState {
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        self.pose.doubt() | self.twist.doubt() == 0
+        self.pose.non_finite_bits() | self.twist.non_finite_bits() == 0
     }
 }
 

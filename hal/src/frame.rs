@@ -54,13 +54,13 @@ impl Pose {
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        self.doubt() == 0
+        self.non_finite_bits() == 0
     }
 
     /// 0 if every number is finite.
     #[inline]
-    pub(crate) fn doubt(&self) -> u64 {
-        doubt(&self.position_m) | doubt(&self.orientation_xyzw)
+    pub(crate) fn non_finite_bits(&self) -> u64 {
+        non_finite_bits(&self.position_m) | non_finite_bits(&self.orientation_xyzw)
     }
 }
 
@@ -104,13 +104,13 @@ impl Twist {
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        self.doubt() == 0
+        self.non_finite_bits() == 0
     }
 
     /// 0 if every number is finite.
     #[inline]
-    pub(crate) fn doubt(&self) -> u64 {
-        doubt(&self.linear_m_per_s) | doubt(&self.angular_rad_per_s)
+    pub(crate) fn non_finite_bits(&self) -> u64 {
+        non_finite_bits(&self.linear_m_per_s) | non_finite_bits(&self.angular_rad_per_s)
     }
 }
 
@@ -163,7 +163,7 @@ impl Wrench {
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        doubt(&self.force_n) | doubt(&self.torque_nm) == 0
+        non_finite_bits(&self.force_n) | non_finite_bits(&self.torque_nm) == 0
     }
 }
 
@@ -226,8 +226,8 @@ pub fn orientation_from_rotation_vector(rotation_rad: DVec3) -> DQuat {
 /// instructions, not a branch for each.
 #[inline]
 #[allow(clippy::eq_op)] // that is the point of it
-fn doubt<const N: usize>(values: &[f64; N]) -> u64 {
-    values.iter().fold(0, |doubt, value| doubt | (value - value).to_bits())
+fn non_finite_bits<const N: usize>(values: &[f64; N]) -> u64 {
+    values.iter().fold(0, |bits, value| bits | (value - value).to_bits())
 }
 
 #[cfg(test)]

@@ -171,7 +171,7 @@ impl From<Wrench> for Output {
     }
 }
 
-/// Whether the answer depends on the way to the pose.
+/// Whether the force is path-dependent: the model has an internal state.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Memory {
@@ -267,7 +267,7 @@ impl ModelInfo {
 pub struct LoopConfig {
     /// Nominal time between ticks, ns.
     pub period_ns: u64,
-    /// Seed of everything random in this run.
+    /// Seed of all random numbers of this run.
     pub seed: u64,
 }
 

@@ -11,7 +11,7 @@ use flotor_session::{Observer, RunOptions, Session};
 use std::path::Path;
 
 const ALONE: &str = "duration_s = 5\n[device]\nplugin = \"simulated\"\n[[model]]\nplugin = \"spring\"\n";
-const ASLEEP: &str = "[[model]]\nplugin = \"wall\"\n[model.parameters]\nshape = \"sphere\"\nsize_mm = 1\n\
+const INACTIVE: &str = "[[model]]\nplugin = \"wall\"\n[model.parameters]\nshape = \"sphere\"\nsize_mm = 1\n\
     [model.mapping]\nposition_mm = [0, 0, 100]\ngrid = { count = [20, 25, 20], spacing_mm = 3 }\n";
 /// Runs of each scene.
 const TURNS: usize = 15;
@@ -38,7 +38,7 @@ fn median(ticks: &mut Ticks) -> f64 {
 }
 
 fn main() {
-    let [alone, among] = [ALONE.to_owned(), format!("{ALONE}{ASLEEP}")]
+    let [alone, among] = [ALONE.to_owned(), format!("{ALONE}{INACTIVE}")]
         .map(|text| Scene::parse(Path::new("scene.toml"), &text).expect("the scene is right"));
     let (mut ticks_alone, mut ticks_among) = (Ticks::default(), Ticks::default());
     for _ in 0..TURNS {

@@ -1,4 +1,4 @@
-// A force model in C++: a jelly that gives way in every direction, and says where it can act.
+// A force model in C++: a jelly that gives way in every direction, and declares its active region.
 #include "flotor.h"
 #include <cmath>
 #include <cstring>

@@ -69,7 +69,7 @@ fn main() -> std::io::Result<()> {
     }
     let figure =
         Figure::new("Integrators of a tumbling flotor", Axis::log("Time for a simulated millisecond", "ns"))
-            .subtitle("steps of 1, 1/2, 1/4 and 1/8 ms; the plant keeps its energy accounts meanwhile")
+            .subtitle("steps of 1, 1/2, 1/4 and 1/8 ms; the plant keeps its energy balance meanwhile")
             .panel_height_px(320.0)
             .panel(panel);
     match std::env::args().nth(1) {

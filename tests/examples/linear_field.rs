@@ -1,4 +1,5 @@
-//! What computing the membrane beside the loop costs: error and delay of its linear field by its rate, table and picture.
+//! What computing the membrane asynchronously costs: error and delay of its local linear model by its rate, table and
+//! picture.
 //!
 //! The hand swings into the sheet and out again; the membrane itself is led along the same poses at each tick. All of it
 //! runs on the virtual clock, so that nothing here depends on the machine.
@@ -47,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
         }
     }
-    let figure = Figure::new("A membrane beside the loop", Axis::linear("Time", "s"))
+    let figure = Figure::new("A membrane computed asynchronously", Axis::linear("Time", "s"))
         .subtitle("the hand at 3 Hz and ±1.5 mm in and out of the sheet; loop at 1 kHz")
         .panel(forces)
         .panel(errors);

@@ -1,5 +1,5 @@
-//! What it costs to compute the membrane beside the loop: its linear field against the membrane itself, at the poses of
-//! one run.
+//! What it costs to compute the membrane asynchronously: its local linear model against the membrane itself, at the
+//! poses of one run.
 
 use crate::watched::watch;
 use flotor_core::trace::{Events, TickRecord};
@@ -81,7 +81,7 @@ pub fn field_error(rate_hz: f64, swing: Swing, slew_n_per_s: f64, duration_s: f6
         let (sum, count) = difference(delay).fold((0.0, 0.0), |(sum, count), e| (sum + e * e, count + 1.0));
         (sum / count).sqrt()
     };
-    // What was asked for at a look is to be had a period later, and held for another.
+    // What was requested at a look is to be had a period later, and held for another.
     let held_back = (begun..direct_n.len()).map(|tick| direct_n[tick] - direct_n[(tick / held - 1) * held]);
     let (held_sum, held_count) =
         held_back.fold((0.0, 0.0), |(sum, count), off| (sum + off.length_squared(), count + 1.0));

@@ -119,7 +119,7 @@ impl Flotor {
     pub fn start(mut self) -> Running {
         self.command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut process = Owned::start(&mut self.command);
-        let (mut pipe, input) = (process.stdin.take().expect("a pipe was asked for"), self.input);
+        let (mut pipe, input) = (process.stdin.take().expect("a pipe was requested"), self.input);
         // On a thread of its own: neither side waits for the other to empty a full pipe.
         let writer = std::thread::spawn(move || pipe.write_all(input.as_bytes()));
         Running { process, writer }

@@ -111,7 +111,7 @@ fn laws_cost_their_share_of_the_printed_one() {
         ("law_energy_batch", energy_batch),
     ];
     laws.into_iter().for_each(|(name, counted)| keep_budget(name, counted));
-    // To look at the length first and find nothing to hand over, with the answer handed on.
+    // To look at the length first and find nothing to blend, with the answer handed on.
     keep_budget("handing_over_where_there_is_nothing_to", handing_over - energy);
     assert!(closed <= 0.6 * printed, "closed-form: {:.2} of the printed law", closed / printed);
     assert!(energy <= 1.5 * printed, "energy: {:.2} of the printed law", energy / printed);

@@ -1,4 +1,4 @@
-//! A force sensor on a serial port: a device that is felt by nobody and says which force rests on it.
+//! A force sensor on a serial port: a device that measures a vertical force and exerts none.
 //!
 //! ```text
 //! host: R  ->  sensor: F 1.234   (N, upwards positive)

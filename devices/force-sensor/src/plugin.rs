@@ -38,7 +38,8 @@ pub struct AskedSensor {
 impl ForceSensor {
     /// Waits for the first reading: what is wrong with a sensor is to be said before it is needed.
     fn prove(&mut self, port: &str) -> Result<(), String> {
-        let gone = |LineLost| format!("the force sensor at {port} is gone; plug it in and measure again");
+        let gone =
+            |LineLost| format!("the force sensor at {port} is disconnected; plug it in and measure again");
         loop {
             self.line.ask().map_err(gone)?;
             match self.line.hear().map_err(gone)? {
@@ -66,16 +67,16 @@ impl Device for ForceSensor {
     const INFO: DeviceInfo = DeviceInfo::new(
         "force-sensor",
         "Force sensor",
-        "A force sensor on a serial port: says which force rests on it, and drives nothing",
+        "A force sensor on a serial port: measures a vertical force, exerts none",
     );
     const PARAMETERS: &'static [Parameter] = SCHEMA;
     type Active = AskedSensor;
     type Stop = NothingToStop;
 
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
-        let port = settings.text("port").ok_or_else(|| {
-            Refusal::resource("where is the force sensor? Say it with `port`, as /dev/ttyACM0")
-        })?;
+        let port = settings
+            .text("port")
+            .ok_or_else(|| Refusal::resource("no `port` for the force sensor; set it, as in /dev/ttyACM0"))?;
         let timeout = Duration::from_secs_f64(settings.number_or_default("timeout_ms") * 1.0e-3);
         let mut sensor = Self { line: SensorLine::open(port).map_err(Refusal::resource)?, timeout };
         sensor.prove(port).map_err(Refusal::resource)?;

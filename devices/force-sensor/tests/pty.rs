@@ -43,7 +43,7 @@ fn emulated(mut answers: Box<Answers>) -> Emulated {
 }
 
 impl Emulated {
-    /// By a host that waits for long: a machine may hold up every answer.
+    /// By a host that waits for long: a machine may delay every answer.
     fn open(&self) -> Result<OpenedDevice, String> {
         self.open_waiting_ms(8000.0)
     }

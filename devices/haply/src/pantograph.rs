@@ -64,8 +64,8 @@ impl Pantograph {
         None
     }
 
-    /// Angles of the arms with the handle at a place, elbows outwards, rad; `None` out of reach. Not real-time: for
-    /// emulators.
+    /// Angles of the arms with the handle at a place, elbows outwards, rad; `None` outside the workspace. Not
+    /// real-time: for emulators.
     #[must_use]
     pub fn angles_rad(&self, handle_m: DVec2) -> Option<[f64; 2]> {
         let angle = |from_motor: DVec2, side: f64| {

@@ -88,7 +88,7 @@ fn put(bytes: &mut [u8], head: &[u8], numbers: impl Iterator<Item = f32>) {
     bytes.iter_mut().zip(head.iter().copied().chain(tail)).for_each(|(place, byte)| *place = byte);
 }
 
-/// What a board was asked for: the other side of [`setup`] and [`torques`].
+/// What was requested of a board: the other side of [`setup`] and [`torques`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
     /// Forget everything.

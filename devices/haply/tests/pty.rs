@@ -89,7 +89,7 @@ impl Rig {
         self.until_board(|board| (board.force_n().map(DVec2::length) == Some(0.0)).then_some(()));
     }
 
-    /// By a host that waits for long: a machine may hold up every answer.
+    /// By a host that waits for long: a machine may delay every answer.
     fn open(&self) -> OpenedDevice {
         self.open_waiting_ms("8000")
     }

@@ -13,7 +13,7 @@ fn main() {
     let push_n = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(40.0_f64);
     let margin_mm = (facts::RANGE_M - RADIUS_M) * 1.0e3;
     println!("push {push_n} N from rest at the wall, {margin_mm:.1} mm to the edge, 1 kHz, 15 N s/m");
-    println!("{:>9} {:>12} {:>10} {:>10}   what then", "delay", "stiffness", "at rest", "at most");
+    println!("{:>9} {:>12} {:>10} {:>10}   result", "delay", "stiffness", "at rest", "at most");
     for delay_ms in [0.0, 0.5, 1.0, 2.0] {
         let delay_s = delay_ms * 1.0e-3;
         let wall = Walls::maker(RADIUS_M).stabilised(PERIOD_S, delay_s).sphere;

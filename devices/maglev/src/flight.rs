@@ -1,4 +1,4 @@
-//! Taking off and landing: before the scene has a say the handle is caught where it is, brought home, and weighed; after
+//! Taking off and landing: before the scene becomes active the handle is caught, brought home, and weighed; after
 //! it, it is let down.
 //!
 //! A spring and a damper about a target hold the handle (the gains of the device's client program, made stable for
@@ -31,7 +31,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// Periods a command is valid for.
 const VALID_PERIODS: u32 = 3;
 
-/// Why it did not come home.
+/// Why homing failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Aborted {
     /// The link broke.

@@ -33,7 +33,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         1.0,
         1000.0,
         8.0,
-        "Silence after which the controller stops listening to this host and holds by itself",
+        "Watchdog of the controller: time without a command after which it ends the session and holds",
     ),
     Parameter::real("timeout_ms", "ms", 2.0, 10_000.0, 15.0, "Silence of the controller that is a fault"),
     Parameter::real(
@@ -50,20 +50,20 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         10_000.0,
         0.0,
-        "Time in which the handle is brought home and held before the scene has a say; 0: the scene has it at once",
+        "Time to bring the handle home before the scene becomes active; 0: the scene is active at once",
     ),
     Parameter::choice(
         "gravity",
         GRAVITY,
         0,
-        "Weight of what moves: off: carried by the controller or the scene; defy: found at take-off, and carried",
+        "Gravity compensation: off (the controller or the scene does it), defy (measured at take-off, then applied)",
     ),
     Parameter::real("landing_ms", "ms", 0.0, 10_000.0, 0.0, "Time in which the handle is let down at the end"),
     Parameter::choice(
         "walls",
         WALLS,
         0,
-        "Walls of the device, inside those of the scene: off, maker's, report's",
+        "Walls of the device, inside those of the scene: off, the maker's, or those of the thesis",
     ),
     Parameter::real("wall_radius_mm", "mm", 1.0, 12.0, 11.0, "Where the spherical wall begins").live(),
     Parameter::real("wall_x_mm", "mm", 0.5, 12.0, 12.0, "Where the walls on x begin").live(),
@@ -103,7 +103,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         100.0,
         17.0,
-        "Gamma of the spring, with the report's walls: the stiffness beyond the angle limit is 2.5 gamma, at least 30",
+        "Gamma of the spring, with the thesis's walls: the stiffness beyond the angle limit is 2.5 gamma, at least 30",
     )
     .live(),
     Parameter::real(
@@ -112,7 +112,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         1.0,
         0.15,
-        "Damping beyond it; report: everywhere",
+        "Damping beyond it; thesis: everywhere",
     )
     .live(),
     Parameter::real(

@@ -18,7 +18,7 @@ use std::time::Duration;
 
 /// How long a controller may take to describe itself, to arm and take off, and to switch off.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// How long a lockstep tick waits: an emulator that is held up is not a fault.
+/// How long a lockstep tick waits: a delayed emulator is not a fault.
 const LOCKSTEP_PATIENCE: Duration = Duration::from_secs(10);
 /// Periods a command is valid for: one more than it takes to replace it. A host that has missed two deadlines has
 /// no say until it is back, long before the watchdog ends its session.
@@ -173,7 +173,7 @@ impl MaglevDevice {
         let (status, found_n) =
             holder.take_off(&mut self.link, status, self.options.take_off).map_err(|why| {
                 let _ = self.link.disarm(PATIENCE);
-                Refusal::resource(format!("the handle did not come home: {why}; is it free to move?"))
+                Refusal::resource(format!("homing failed: {why}; check that the handle is free to move"))
             })?;
         Ok((status, if self.options.defy_gravity { found_n } else { 0.0 }))
     }
@@ -202,8 +202,10 @@ fn refused(options: &Options, unanswered: Unanswered) -> Refusal {
         Kind::Serial | Kind::Usb | Kind::Hid => "",
     };
     Refusal::resource(match unanswered {
-        Unanswered::Lost => format!("the controller at {address} hung up: does another program use it?"),
-        Unanswered::Silent => format!("nothing at {address} answers as a controller of this device{hint}"),
+        Unanswered::Lost => {
+            format!("the controller at {address} closed the connection; does another program use it?")
+        }
+        Unanswered::Silent => format!("no controller of this device answers at {address}{hint}"),
     })
 }
 

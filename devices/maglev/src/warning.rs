@@ -1,11 +1,11 @@
-//! The warning of excess force: the report's beep (Varadharajan 2007, appendix A), once for each time and not for each
+//! The warning of excess force: the thesis's beep (Varadharajan 2007, appendix A), once for each time and not for each
 //! tick.
 //!
 //! Real-time: bounded, no allocation.
 
 use flotor_hal::DVec3;
 
-/// Force along each axis from which on the report's program beeps, N.
+/// Force along each axis from which on the thesis's program beeps, N.
 const LIMIT_N: DVec3 = DVec3::new(10.0, 10.0, 50.0);
 /// Share of the limit below which the warning ends: a force that trembles about the limit is one warning.
 const RELEASE: f64 = 0.9;

@@ -1,4 +1,4 @@
-//! Energy accounts of the flotor: where every joule came from and where it went.
+//! Energy balance of the flotor: where every joule came from and where it went.
 //!
 //! Over any stretch of time
 //!
@@ -71,7 +71,7 @@ impl AddAssign for Work {
     }
 }
 
-/// Running accounts since the start of a run.
+/// Running energy balance since the start of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ledger {
     start: MechanicalEnergy,
@@ -81,7 +81,7 @@ pub struct Ledger {
 }
 
 impl Ledger {
-    /// Opens the accounts on a flotor with the given energy. Real-time: bounded, no allocation.
+    /// Opens the energy balance of a flotor with the given energy. Real-time: bounded, no allocation.
     #[must_use]
     pub fn open(start: MechanicalEnergy) -> Self {
         Self { start, now: start, work: Work::default(), peak_j: start.total_j().abs() }
@@ -95,7 +95,7 @@ impl Ledger {
         self.peak_j = self.peak_j.max(now.total_j().abs());
     }
 
-    /// Mechanical energy when the accounts were opened. Real-time: bounded, no allocation.
+    /// Mechanical energy when the balance was opened. Real-time: bounded, no allocation.
     #[must_use]
     pub fn start(&self) -> MechanicalEnergy {
         self.start

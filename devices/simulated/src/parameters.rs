@@ -18,7 +18,7 @@ const MM: f64 = 1.0e-3;
 const UM: f64 = 1.0e-6;
 const PERCENT: f64 = 1.0e-2;
 
-/// How the sentence of a parameter begins that has a say in preset `full` only.
+/// Beginning of the documentation of a parameter that only preset `full` reads.
 const OF_FULL: &str = "Full:";
 
 /// Refuses a value that would change nothing: one of the machine that preset `plain` leaves out.
@@ -107,7 +107,7 @@ fn impedance(settings: &Settings<'_>, trajectory: &Trajectory) -> Impedance {
 fn trajectory(settings: &Settings<'_>) -> Result<Trajectory, Refusal> {
     match (settings.text("hand_script"), settings.text("hand_recording")) {
         (Some(_), Some(_)) => {
-            Err(Refusal::parameter("one hand cannot follow both hand_script and hand_recording: set one"))
+            Err(Refusal::parameter("set either `hand_script` or `hand_recording`, not both"))
         }
         (Some(script), None) => Script::load(script).map(Trajectory::Scripted).map_err(Refusal::parameter),
         (None, Some(file)) => {

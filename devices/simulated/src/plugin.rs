@@ -40,7 +40,7 @@ pub struct RunningFlotor {
     samples: SampleClock,
     /// Acts from the last write to the next.
     held: Wrench,
-    /// It is less than was asked for.
+    /// It is less than was requested.
     is_limited: bool,
     /// Height of the latest sample, m: where the vertical force is corrected for.
     height_m: f64,

@@ -1,9 +1,9 @@
-//! Flotor, hand and energy accounts on one clock: what a device needs to stand in for the machine.
+//! Flotor, hand and energy balance on one clock: what a device needs to stand in for the machine.
 //!
 //! The clock counts integer nanoseconds, so a run can be cut at any of them and goes on bit for bit the same
 //! way. The hand's intention is a smooth curve sampled once a millisecond and drawn straight in between, on a
 //! grid that belongs to the clock and not to the servo: ticks of any length, regular or not, meet the same
-//! hand. Each tick is cut at the grid and at the moment the hand lets go; within a piece the plant is exact
+//! hand. Each tick is cut at the grid and at the moment the hand releases the handle; within a piece the plant is exact
 //! (see `plant`).
 
 use crate::hand::{Aim, Hand, Intention, Pose, Trajectory, Wavering};
@@ -13,7 +13,7 @@ use crate::validation::InvalidParameter;
 use crate::workspace::SensorRange;
 
 /// Longest time one call of [`Simulation::advance`] simulates, ns: ten ticks of the slowest servo (100 Hz).
-/// It bounds what a tick may cost after the host was held up.
+/// It bounds what a tick may cost after a delay of the host.
 pub const MAX_ADVANCE_NS: u64 = 100_000_000;
 
 /// Distance of the samples of the hand's intention, ns.
@@ -50,8 +50,8 @@ impl Setup {
 pub struct Incidents {
     /// The wrench held a NaN or an infinity; the coils gave nothing instead.
     pub wrench_rejected: bool,
-    /// The motion left every physical range; the flotor was stopped where it was and the accounts were opened
-    /// anew.
+    /// The motion left every physical range; the flotor was stopped where it was and a new energy balance
+    /// began.
     pub stopped: bool,
     /// The tick was longer than [`MAX_ADVANCE_NS`]; only that much was simulated.
     pub cut_short: bool,
@@ -94,7 +94,7 @@ impl Simulation {
         })
     }
 
-    /// Back to the start: time 0, first state, fresh accounts. Real-time: bounded, no allocation.
+    /// Back to the start: time 0, first state, new energy balance. Real-time: bounded, no allocation.
     pub fn reset(&mut self) {
         self.plant.place(&self.setup.start);
         self.ledger = Ledger::open(self.plant.energy());
@@ -173,7 +173,7 @@ impl Simulation {
         self.setup.hand.trajectory.aim(self.time_ns)
     }
 
-    /// Energy accounts since the start. Real-time: bounded, no allocation.
+    /// Energy balance since the start. Real-time: bounded, no allocation.
     #[must_use]
     pub fn ledger(&self) -> &Ledger {
         &self.ledger
@@ -186,8 +186,8 @@ impl Simulation {
         &self.setup
     }
 
-    /// Length of the piece that starts now, ns, and what the hand means meanwhile; nothing while it is off the
-    /// handle. It lasts to the tick's end, the next grid point, or the moment the hand lets go.
+    /// Length of the piece that starts now, ns, and the intention of the hand meanwhile; nothing while it is off the
+    /// handle. It lasts to the tick's end, the next grid point, or the moment the hand releases the handle.
     #[inline]
     fn next_piece(&mut self, tick_end_ns: u64) -> (u64, Option<Intention>) {
         let trajectory = &self.setup.hand.trajectory;
@@ -246,7 +246,7 @@ impl Stroke {
 
     /// The aim at a time during the stroke, drawn straight to its end: position on the chord with
     /// its slope as velocity; orientation and force, which the plant takes as constant, halfway. Where the hand
-    /// lets go before the end it stays.
+    /// releases the handle before the end it stays.
     #[inline]
     fn drawn(&self, time_ns: u64) -> Option<Intention> {
         let start = self.start?;

@@ -1,6 +1,6 @@
 //! 3Dconnexion's SpaceMouse and its relatives: six axes in, no force out.
 //!
-//! The puck springs back to where it was; how far it is pushed says how fast the pose moves. A tick takes the reports
+//! The puck springs back to where it was; how far it is pushed says how fast the pose moves. A tick takes all reports
 //! that have come, remembers the newest deflection and moves the pose on:
 //!
 //! ```text

@@ -52,7 +52,7 @@ fn share([x, y, z]: [i16; 3]) -> DVec3 {
 
 /// What the puck asks for in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Wish {
+pub enum MotionRequest {
     /// Move as it is pushed.
     Follow(Deflection),
     /// Go home, at full speed.
@@ -74,14 +74,14 @@ impl Default for Motion {
 
 impl Motion {
     /// Moves on for a time; the velocity is that of the motion made, limits included. Real-time: bounded, no allocation.
-    pub fn advance(&mut self, wish: &Wish, gains: &Gains, dt_s: f64) -> Twist {
+    pub fn advance(&mut self, request: &MotionRequest, gains: &Gains, dt_s: f64) -> Twist {
         if dt_s <= 0.0 {
             return Twist::ZERO;
         }
         let before = *self;
         let rotation_rad = rotation_vector(self.orientation);
-        match wish {
-            Wish::Follow(deflection) => {
+        match request {
+            MotionRequest::Follow(deflection) => {
                 let velocity = gains.past_dead_zone(deflection.translation) * gains.speed_m_per_s;
                 let spin = gains.past_dead_zone(deflection.rotation) * gains.spin_rad_per_s;
                 self.position_m = (self.position_m + velocity * dt_s).clamp_length_max(gains.range_m);
@@ -89,7 +89,7 @@ impl Motion {
                 let limited_rad = rotation_vector(turned).clamp_length_max(gains.range_rad);
                 self.orientation = orientation_from_rotation_vector(limited_rad);
             }
-            Wish::Home => {
+            MotionRequest::Home => {
                 self.position_m = towards_zero(self.position_m, gains.speed_m_per_s * dt_s);
                 let left_rad = towards_zero(rotation_rad, gains.spin_rad_per_s * dt_s);
                 self.orientation = orientation_from_rotation_vector(left_rad);
@@ -127,10 +127,10 @@ mod tests {
     const GAINS: Gains =
         Gains { speed_m_per_s: 0.02, spin_rad_per_s: 0.5, dead_zone: 0.1, range_m: 0.01, range_rad: 0.1 };
 
-    fn pushed(translation: [i16; 3], rotation: [i16; 3]) -> Wish {
+    fn pushed(translation: [i16; 3], rotation: [i16; 3]) -> MotionRequest {
         let mut deflection = Deflection::default();
         deflection.update(&Report::Motion { translation, rotation });
-        Wish::Follow(deflection)
+        MotionRequest::Follow(deflection)
     }
 
     #[test]
@@ -161,10 +161,10 @@ mod tests {
         let mut motion = Motion::default();
         motion.advance(&pushed([350, -350, 0], [0, 0, 350]), &GAINS, 0.2);
         let far_m = motion.pose().position().length();
-        let twist = motion.advance(&Wish::Home, &GAINS, 0.001);
+        let twist = motion.advance(&MotionRequest::Home, &GAINS, 0.001);
         assert!((twist.linear().length() - 0.02).abs() < 1.0e-12 && far_m > 0.004);
         for _ in 0..1000 {
-            motion.advance(&Wish::Home, &GAINS, 0.001);
+            motion.advance(&MotionRequest::Home, &GAINS, 0.001);
         }
         assert_eq!(motion, Motion::default());
     }

@@ -1,6 +1,6 @@
 //! The puck as a plugin: pose in, no force out.
 
-use crate::motion::{Deflection, Gains, Motion, Wish};
+use crate::motion::{Deflection, Gains, Motion, MotionRequest};
 use crate::report::Report;
 use crate::source::{Gone, HidPuck, REPORT_BYTES, Reports};
 use flotor_hal::{
@@ -132,12 +132,12 @@ impl<S: Reports> ActiveDevice for OpenPuck<S> {
         if self.take_reports() == Err(Gone) {
             return Cycle::Fault(Fault::Disconnected);
         }
-        let wish = match self.buttons & self.opened.values.home_bit() {
-            0 => Wish::Follow(self.deflection),
-            _ => Wish::Home,
+        let request = match self.buttons & self.opened.values.home_bit() {
+            0 => MotionRequest::Follow(self.deflection),
+            _ => MotionRequest::Home,
         };
         let dt_s = (tick.dt_ns as f64 * 1.0e-9).min(LONGEST_TIME_S);
-        let twist = self.motion.advance(&wish, &self.opened.values.gains(), dt_s);
+        let twist = self.motion.advance(&request, &self.opened.values.gains(), dt_s);
         *state = DeviceState {
             pose: self.motion.pose(),
             twist,

@@ -10,7 +10,7 @@ use std::io::Write;
 use std::time::{Duration, Instant};
 
 /// A multi-axis controller: translation in report 1, rotation in report 2, two buttons in report 3 (HID 1.11, items of
-/// the report descriptor).
+/// a report descriptor).
 const DESCRIPTOR: &[u8] = &[
     0x05, 0x01, 0x09, 0x08, 0xa1, 0x01, // generic desktop, multi-axis controller, application
     0x16, 0xa2, 0xfe, 0x26, 0x5e, 0x01, 0x75, 0x10, 0x95, 0x03, // -350 to 350, 16 bits, three of them
@@ -63,7 +63,7 @@ impl EmulatedPuck {
     fn unplug(&mut self) {
         let mut event = vec![0; EVENT_BYTES];
         event[..4].copy_from_slice(&UHID_DESTROY.to_le_bytes());
-        self.0.write_all(&event).expect("the kernel lets go");
+        self.0.write_all(&event).expect("the kernel takes it");
     }
 }
 

@@ -32,7 +32,7 @@ struct Work<S> {
 }
 
 impl<S> Work<S> {
-    /// Runs `body`; `None` if the plugin panics or did so before. A panic ends the instance and keeps its words.
+    /// Runs `body`; `None` if the plugin panics or did so before. A panic ends the instance; its message is kept.
     #[inline]
     fn call<T>(&mut self, body: impl FnOnce(&mut S) -> T) -> Option<T> {
         let state = self.state.as_mut()?;

@@ -1,4 +1,4 @@
-//! What happens to a panic inside a plugin: caught at the boundary, its words kept, the terminal left alone.
+//! What happens to a panic inside a plugin: caught at the boundary, its message kept, the terminal left alone.
 
 use super::entry::{HOST_QUIET_PANICS, Host};
 use std::any::Any;

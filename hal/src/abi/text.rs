@@ -14,7 +14,7 @@ pub struct Str {
 }
 
 // SAFETY: a `Str` is a shared borrow of immutable bytes; its makers are `new` (a `&'static str`), `borrowed`
-// (whose caller vouches for the lifetime) and a plugin's own read-only data, which is never unmapped.
+// (whose caller guarantees the lifetime) and a plugin's own read-only data, which is never unmapped.
 unsafe impl Sync for Str {}
 // SAFETY: as for `Sync`: it owns nothing.
 unsafe impl Send for Str {}

@@ -1,4 +1,4 @@
-//! Extension `flotor.active-region/1`: where a force model can act, by which a host may leave it asleep elsewhere.
+//! Extension `flotor.active-region/1`: where a force model can act; elsewhere a host may leave it inactive.
 
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
@@ -11,7 +11,7 @@ use crate::{DVec3, ForceModel};
 /// What kind of region it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RegionShape {
-    /// The model may act at any position: it is never asleep.
+    /// The model may act at any position: it is never inactive.
     Everywhere,
     /// A ball.
     Sphere,

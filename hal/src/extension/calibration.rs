@@ -50,7 +50,7 @@ pub enum InvalidCalibration {
 impl std::fmt::Display for InvalidCalibration {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Range([from, to]) => write!(f, "a range from {from} m to {to} m is none"),
+            Self::Range([from, to]) => write!(f, "invalid range {from} m to {to} m"),
             Self::Count(count) => {
                 write!(f, "{count} coefficients; legal is 1 to {CALIBRATION_COEFFICIENTS}")
             }

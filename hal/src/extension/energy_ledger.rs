@@ -1,4 +1,4 @@
-//! Extension `flotor.energy-ledger/1`: the account of the mechanical energy of a device with a known plant.
+//! Extension `flotor.energy-ledger/1`: the balance of the mechanical energy of a device with a known plant.
 
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
@@ -8,7 +8,7 @@ use crate::abi::loader;
 use crate::abi::{DevicePlug, Instance};
 use crate::{ActiveDevice, Device};
 
-/// Account of the mechanical energy of a device with a known plant (a simulation), J since activation. 56 bytes.
+/// Balance of the mechanical energy of a device with a known plant (a simulation), J since activation. 56 bytes.
 ///
 /// Every term is integrated on its own, none is the difference of others:
 /// `stored_j - initial_j = actuators_j + feedforward_j + hand_j - dissipated_j` is a check, not a definition.
@@ -33,7 +33,7 @@ pub struct EnergyLedger {
 }
 
 impl EnergyLedger {
-    /// What the account fails to explain, J.
+    /// What the balance fails to explain, J.
     #[must_use]
     pub fn residual_j(&self) -> f64 {
         let explained = self.actuators_j + self.feedforward_j + self.hand_j - self.dissipated_j;
@@ -43,7 +43,7 @@ impl EnergyLedger {
 
 /// An active device with a known plant.
 pub trait EnergyLedgerDevice: ActiveDevice {
-    /// The account since activation. Real-time: bounded, no allocation.
+    /// The energy balance since activation. Real-time: bounded, no allocation.
     fn energy_ledger(&self) -> EnergyLedger;
 }
 
@@ -56,7 +56,7 @@ pub struct EnergyLedgerTable {
     pub size: u32,
     /// Reserved, 0.
     pub reserved: u32,
-    /// The account since activation; a [`crate::abi::CallStatus`] code. Real-time.
+    /// The energy balance since activation; a [`crate::abi::CallStatus`] code. Real-time.
     pub ledger: Option<unsafe extern "C" fn(instance: Instance, out: *mut EnergyLedger) -> u32>,
 }
 
@@ -79,7 +79,7 @@ table!(EnergyLedgerTable: "flotor.energy-ledger/1", D: [Device<Active: EnergyLed
 
 #[cfg(feature = "loader")]
 impl loader::ActiveDevice {
-    /// Energy account of the plant, where there is one. Real-time: bounded, no allocation.
+    /// Energy balance of the plant, where there is one. Real-time: bounded, no allocation.
     #[must_use]
     pub fn energy_ledger(&mut self) -> Option<EnergyLedger> {
         let ask = self.extensions()?.energy_ledger?.ledger;

@@ -1,6 +1,6 @@
 //! Extension `flotor.linear-field/1`: a model too slow for the loop, as a local linear field the loop evaluates instead.
 //!
-//! A model that needs milliseconds (a mesh, a network, a solver) runs beside the loop at a rate of its own. Each time it
+//! A model that needs milliseconds (a mesh, a network, a solver) runs asynchronously, at a rate of its own. Each time it
 //! says what the wrench is at one pose, the anchor, and how it changes around it; the loop evaluates that at every tick,
 //! at the pose the handle has then.
 

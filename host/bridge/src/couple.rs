@@ -12,7 +12,7 @@
 use crate::keys::Name;
 use crate::link::LinkError;
 use flotor_core::peer::{DISPATCH_BYTES, Dispatch};
-use flotor_live::{CALL_PERIOD, Directory, DirectoryError, FoundCoupling, NewsSocket};
+use flotor_live::{CALL_PERIOD, Directory, DirectoryError, FoundCoupling, PeerSocket};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -229,7 +229,7 @@ impl Coupler {
             .priority(Priority::RealTime)
             .wait()
             .map_err(LinkError::from)?;
-        let socket = NewsSocket::join(directory, found)?;
+        let socket = PeerSocket::join(directory, found)?;
         let stop = Arc::new(AtomicBool::new(false));
         let (of_thread, until) = (Arc::clone(&counts), Arc::clone(&stop));
         let thread = std::thread::Builder::new().name("flotor-couple".to_owned());
@@ -249,7 +249,7 @@ impl Drop for Coupler {
 
 /// Both ways, until told to stop or until the host is gone.
 fn carry(
-    mut socket: NewsSocket,
+    mut socket: PeerSocket,
     from_network: &Receiver<Dispatch>,
     tells: &Publisher<'_>,
     counts: &Counts,

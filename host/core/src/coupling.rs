@@ -23,7 +23,7 @@ pub struct CouplingConfig {
     pub stiffness_nm_per_rad: f64,
     /// Damping of relative rotation, N·m·s/rad.
     pub damping_nms_per_rad: f64,
-    /// How long news of one end takes to the other, ticks; of ends in one run.
+    /// How long the peer state of one end takes to the other, ticks; of ends in one run.
     pub delay_ticks: u32,
     /// Energy an end may keep beyond what its spring stores, J.
     pub reserve_j: f64,
@@ -66,7 +66,7 @@ pub enum CouplingEnds {
     /// Both in this run.
     Here([CouplingEnd; 2]),
     /// One here, the other on another host, which knows the coupling by the same name.
-    Apart(CouplingEnd),
+    Remote(CouplingEnd),
 }
 
 impl CouplingEnds {
@@ -75,7 +75,7 @@ impl CouplingEnds {
     pub fn here(&self) -> &[CouplingEnd] {
         match self {
             CouplingEnds::Here(ends) => ends,
-            CouplingEnds::Apart(end) => std::slice::from_ref(end),
+            CouplingEnds::Remote(end) => std::slice::from_ref(end),
         }
     }
 }

@@ -45,7 +45,7 @@ impl Default for Blend {
     }
 }
 
-/// When a model that is computed beside the loop gives a new linear field.
+/// When a model that is computed asynchronously gives a new linear field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldTiming {
     /// How often, Hz.

@@ -5,7 +5,7 @@ use flotor_sync::Words;
 
 /// What one end tells the other in every tick, in the shared frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct News {
+pub struct PeerState {
     /// Where the handle is, m and unit quaternion.
     pub pose: Pose,
     /// How it moves, m/s and rad/s.
@@ -14,10 +14,10 @@ pub struct News {
     pub told_j: f64,
 }
 
-/// An end's energy account, for whoever is to see it.
+/// The energy tank of an end in numbers, for reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Account {
-    /// What is there to be taken out, J; negative: overdrawn.
+pub struct TankState {
+    /// What is there to be taken out, J; negative: more has come out than had gone in.
     pub level_j: f64,
     /// The lowest it ever was, J.
     pub lowest_j: f64,
@@ -27,22 +27,22 @@ pub struct Account {
     pub given_up_j: f64,
 }
 
-/// News with what it takes to be carried to another host.
+/// The peer state with what its transport to another host needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dispatch {
     /// Which run tells: when it began, ns since 1970. A later run counts its energy from nothing.
     pub run: u64,
     /// The tick that tells: of two dispatches of a run the higher is the newer.
     pub tick: u64,
-    /// The news.
-    pub news: News,
-    /// The account of the end that tells.
-    pub account: Account,
+    /// The peer state.
+    pub state: PeerState,
+    /// The energy tank of the sending end.
+    pub tank: TankState,
 }
 
 /// 64-bit words of a [`Dispatch`].
 pub const DISPATCH_WORDS: usize = 20;
-/// Bytes of a [`Dispatch`] on its way: a word that says what it is, then its words, all little endian.
+/// Bytes of a [`Dispatch`] on its way: a mark with the version, then [`DISPATCH_WORDS`], all little endian.
 pub const DISPATCH_BYTES: usize = 8 * (1 + DISPATCH_WORDS);
 /// The word that says what it is; the digit is the version.
 const MARK: u64 = u64::from_le_bytes(*b"flotnew1");
@@ -51,18 +51,18 @@ const UNIT_TOLERANCE: f64 = 1.0e-6;
 
 /// Bytes that are no dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum NoDispatch {
+pub enum InvalidDispatch {
     /// Too long or too short.
-    #[error("{length} bytes, and a dispatch has {DISPATCH_BYTES}")]
+    #[error("peer message of {length} bytes, expected {DISPATCH_BYTES}")]
     Length {
         /// How many.
         length: usize,
     },
     /// Not marked as one.
-    #[error("no dispatch of this version; use both hosts from one build")]
+    #[error("unsupported message version; run the same release on both hosts")]
     Mark,
     /// A number is not finite, the orientation has no unit length, or the energy passed on is negative.
-    #[error("numbers that no handle and no account can have")]
+    #[error("invalid peer state: a pose, twist or energy is not possible")]
     Numbers,
 }
 
@@ -81,19 +81,19 @@ impl Dispatch {
     /// Checks what has travelled. Not real-time.
     ///
     /// # Errors
-    /// [`NoDispatch`].
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, NoDispatch> {
+    /// [`InvalidDispatch`].
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, InvalidDispatch> {
         if bytes.len() != DISPATCH_BYTES {
-            return Err(NoDispatch::Length { length: bytes.len() });
+            return Err(InvalidDispatch::Length { length: bytes.len() });
         }
         let mut words =
             bytes.chunks_exact(8).map(|word| u64::from_le_bytes(word.try_into().unwrap_or_default()));
         if words.next() != Some(MARK) {
-            return Err(NoDispatch::Mark);
+            return Err(InvalidDispatch::Mark);
         }
         let words: [u64; DISPATCH_WORDS] = std::array::from_fn(|_| words.next().unwrap_or_default());
         let dispatch = Self::from_words(&words);
-        if dispatch.is_possible() { Ok(dispatch) } else { Err(NoDispatch::Numbers) }
+        if dispatch.is_possible() { Ok(dispatch) } else { Err(InvalidDispatch::Numbers) }
     }
 
     /// True if it comes after `other`: of a later run, or later in the same.
@@ -103,8 +103,8 @@ impl Dispatch {
     }
 
     fn is_possible(&self) -> bool {
-        let Self { news: News { pose, twist, told_j }, account, .. } = self;
-        let Account { level_j, lowest_j, gone_in_j, given_up_j } = account;
+        let Self { state: PeerState { pose, twist, told_j }, tank, .. } = self;
+        let TankState { level_j, lowest_j, gone_in_j, given_up_j } = tank;
         let length = pose.orientation().length();
         pose.is_finite()
             && (length - 1.0).abs() < UNIT_TOLERANCE
@@ -117,10 +117,10 @@ impl Dispatch {
 impl Words<DISPATCH_WORDS> for Dispatch {
     #[inline]
     fn to_words(&self) -> [u64; DISPATCH_WORDS] {
-        let Self { run, tick, news: News { pose, twist, told_j }, account } = self;
+        let Self { run, tick, state: PeerState { pose, twist, told_j }, tank } = self;
         let Pose { position_m: [x, y, z], orientation_xyzw: [qx, qy, qz, qw] } = *pose;
         let Twist { linear_m_per_s: [vx, vy, vz], angular_rad_per_s: [wx, wy, wz] } = *twist;
-        let Account { level_j, lowest_j, gone_in_j, given_up_j } = *account;
+        let TankState { level_j, lowest_j, gone_in_j, given_up_j } = *tank;
         let [x, y, z, qx, qy, qz, qw] = [x, y, z, qx, qy, qz, qw].map(f64::to_bits);
         let [vx, vy, vz, wx, wy, wz] = [vx, vy, vz, wx, wy, wz].map(f64::to_bits);
         let [told, level, lowest, gone_in, given_up] =
@@ -160,8 +160,8 @@ impl Words<DISPATCH_WORDS> for Dispatch {
         ] = numbers.map(f64::from_bits);
         let pose = Pose { position_m: [x, y, z], orientation_xyzw: [qx, qy, qz, qw] };
         let twist = Twist { linear_m_per_s: [vx, vy, vz], angular_rad_per_s: [wx, wy, wz] };
-        let account = Account { level_j, lowest_j, gone_in_j, given_up_j };
-        Self { run, tick, news: News { pose, twist, told_j }, account }
+        let tank = TankState { level_j, lowest_j, gone_in_j, given_up_j };
+        Self { run, tick, state: PeerState { pose, twist, told_j }, tank }
     }
 }
 
@@ -172,8 +172,8 @@ mod tests {
     fn dispatch() -> Dispatch {
         let pose = Pose { position_m: [1.0e-3, -2.0e-3, 3.0e-3], orientation_xyzw: [0.6, 0.0, 0.0, 0.8] };
         let twist = Twist { linear_m_per_s: [0.1, 0.2, 0.3], angular_rad_per_s: [1.0, 2.0, 3.0] };
-        let account = Account { level_j: 4.0e-3, lowest_j: -1.0e-3, gone_in_j: -0.5, given_up_j: 0.25 };
-        Dispatch { run: 7, tick: 9, news: News { pose, twist, told_j: 0.125 }, account }
+        let tank = TankState { level_j: 4.0e-3, lowest_j: -1.0e-3, gone_in_j: -0.5, given_up_j: 0.25 };
+        Dispatch { run: 7, tick: 9, state: PeerState { pose, twist, told_j: 0.125 }, tank }
     }
 
     #[test]
@@ -188,25 +188,29 @@ mod tests {
     fn what_is_none_is_not_taken_for_one() {
         let bytes = dispatch().to_bytes();
         for length in [0, 1, DISPATCH_BYTES - 1] {
-            assert_eq!(Dispatch::from_bytes(&bytes[..length]), Err(NoDispatch::Length { length }));
+            assert_eq!(Dispatch::from_bytes(&bytes[..length]), Err(InvalidDispatch::Length { length }));
         }
         let long = [bytes.as_slice(), &[0]].concat();
-        assert_eq!(Dispatch::from_bytes(&long), Err(NoDispatch::Length { length: DISPATCH_BYTES + 1 }));
+        assert_eq!(Dispatch::from_bytes(&long), Err(InvalidDispatch::Length { length: DISPATCH_BYTES + 1 }));
         let mut other = bytes;
         other[7] += 1;
-        assert_eq!(Dispatch::from_bytes(&other), Err(NoDispatch::Mark));
+        assert_eq!(Dispatch::from_bytes(&other), Err(InvalidDispatch::Mark));
         for word in 2..DISPATCH_WORDS {
             for number in [f64::NAN, f64::INFINITY] {
                 let mut wrong = bytes;
                 wrong[8 * (1 + word)..8 * (2 + word)].copy_from_slice(&number.to_le_bytes());
-                assert_eq!(Dispatch::from_bytes(&wrong), Err(NoDispatch::Numbers), "{number} in word {word}");
+                assert_eq!(
+                    Dispatch::from_bytes(&wrong),
+                    Err(InvalidDispatch::Numbers),
+                    "{number} in word {word}"
+                );
             }
         }
-        let longer = Pose { orientation_xyzw: [0.6, 0.0, 0.0, 0.9], ..dispatch().news.pose };
-        let owing = News { told_j: -1.0e-9, ..dispatch().news };
-        for news in [News { pose: longer, ..dispatch().news }, owing] {
-            let wrong = Dispatch { news, ..dispatch() };
-            assert_eq!(Dispatch::from_bytes(&wrong.to_bytes()), Err(NoDispatch::Numbers));
+        let longer = Pose { orientation_xyzw: [0.6, 0.0, 0.0, 0.9], ..dispatch().state.pose };
+        let owing = PeerState { told_j: -1.0e-9, ..dispatch().state };
+        for state in [PeerState { pose: longer, ..dispatch().state }, owing] {
+            let wrong = Dispatch { state, ..dispatch() };
+            assert_eq!(Dispatch::from_bytes(&wrong.to_bytes()), Err(InvalidDispatch::Numbers));
         }
     }
 

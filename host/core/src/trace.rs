@@ -1,4 +1,4 @@
-//! What one tick leaves behind, for everybody who watches: recorder, plot, digest, viewer.
+//! What one tick leaves behind, for all observers: recorder, plot, digest, viewer.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
@@ -48,11 +48,11 @@ impl Events {
     pub const VELOCITY_LIMITED: Events = Events { bits: 1 << 15 };
     /// A parameter of a plugin was changed before this tick, or was to be.
     pub const PARAMETER_CHANGED: Events = Events { bits: 1 << 16 };
-    /// Energy would have come out that had not gone in, and was kept back.
+    /// Energy would have come out that had not gone in; the passivity controller removed it.
     pub const PASSIVITY_DAMPED: Events = Events { bits: 1 << 17 };
     /// A model took longer than its budget.
     pub const MODEL_OVERRUN: Events = Events { bits: 1 << 18 };
-    /// The device was asked for more force than it should be used with.
+    /// The force requested of the device is more than it should be used with.
     pub const EXCESS_FORCE: Events = Events { bits: 1 << 19 };
     /// Nothing is heard of a coupling's other end, on another host: the coupling does not pull.
     pub const PARTNER_SILENT: Events = Events { bits: 1 << 20 };

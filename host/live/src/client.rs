@@ -22,7 +22,7 @@ const ASK_WAIT: Duration = Duration::from_secs(1);
 #[non_exhaustive]
 pub enum LiveError {
     /// Nothing runs.
-    #[error("no run to watch: start one with `flotor run` (looked in {})", path.display())]
+    #[error("no running session: start one with `flotor run` (searched in {})", path.display())]
     NoRun {
         /// Where it was looked for.
         path: PathBuf,
@@ -37,7 +37,7 @@ pub enum LiveError {
         host: u32,
     },
     /// What the host says makes no sense.
-    #[error("the host said something that cannot be read: {0}; use both from one build")]
+    #[error("malformed message from the host: {0}; use both from one build")]
     Garbled(String),
 }
 

@@ -46,7 +46,7 @@ pub enum DirectoryError {
         cause: io::Error,
     },
     /// Others may enter the folder: they could change a run.
-    #[error("{}: others may enter it, and could change a run; `chmod 700` it, and it must be yours", path.display())]
+    #[error("{}: unsafe permissions: other users may enter it and change a run; `chmod 700` it, and own it", path.display())]
     NotPrivate {
         /// The folder.
         path: PathBuf,

@@ -60,11 +60,9 @@ impl Kind {
     }
 }
 
-/// A frame longer than any of ours: the other side speaks something else.
+/// A frame longer than any of ours: the other side uses another protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "a frame of {length} bytes; at most {MOST_PAYLOAD} are sent, so the other side speaks something else"
-)]
+#[error("a frame of {length} bytes exceeds {MOST_PAYLOAD}: protocol mismatch; use both sides from one build")]
 pub struct LongFrame {
     /// What it says of its length.
     pub length: usize,
@@ -184,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn rubbish_is_noticed_and_short_payloads_are_harmless() {
+    fn malformed_data_is_noticed_and_short_payloads_are_harmless() {
         let mut frames = Frames::default();
         frames.push(b"GET / HTTP/1.1\r\n");
         assert!(frames.take().is_err());

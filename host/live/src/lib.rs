@@ -38,14 +38,14 @@
 //! torque (6), commanded (6), delivered (6), stored energy, energy of the port as IEEE doubles; events (low half) and buttons
 //! (high half); lateness and compute time (ns). SI units, device frame, little endian.
 //!
-//! **Nobody who watches can hold up the loop.** A host sends nothing but the first two frames until it is asked to, and
-//! does nothing per tick while nobody watches. Between loop and socket lies a queue of fixed length for each client; what finds
-//! no room is dropped and counted. Requests are answered at most a thousand times a second for each client.
+//! **No client can delay the loop.** A host sends nothing but the first two frames until it is asked to, and
+//! does nothing per tick without a client. Between loop and socket lies a queue of fixed length for each client; what
+//! finds no room is dropped and counted. Requests are answered at most a thousand times a second for each client.
 //!
 //! # Couplings
 //!
-//! A run with a coupling whose other end is on another host has a second socket, for datagrams: [`NewsSocket`] gives and takes what
-//! the ends tell each other ([`flotor_core::peer`]).
+//! A run with a coupling whose other end is on another host has a second socket, for datagrams: [`PeerSocket`] gives
+//! and takes what the ends tell each other ([`flotor_core::peer`]).
 //!
 //! Not real-time.
 
@@ -53,7 +53,7 @@ mod client;
 mod directory;
 mod frame;
 mod message;
-mod news;
+mod peer_socket;
 mod server;
 
 pub use client::{Asker, Client, Event, LiveError};
@@ -63,7 +63,7 @@ pub use message::{
     Answer, Ask, ChangeMessage, End, Greeting, Outcome, PanelParameter, PanelPlugin, ParameterShape, Request,
     SetValue, Subject, WrenchLimits,
 };
-pub use news::{CALL_PERIOD, FoundCoupling, NewsSocket};
+pub use peer_socket::{CALL_PERIOD, FoundCoupling, PeerSocket};
 pub use server::{Publication, PublishError, Serve};
 
 /// Version of what is said over the socket.

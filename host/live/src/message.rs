@@ -183,8 +183,8 @@ pub enum Ask {
         /// The new weight.
         weight: f64,
     },
-    /// Another plugin in place of a model, or the same one read and made anew, faded in while the old one fades out. It is
-    /// made before the answer comes.
+    /// Hot swap of a model by another plugin, or by the same one rebuilt, faded in while the old one fades out. It is
+    /// created before the answer comes.
     Swap {
         /// Its name in the scene.
         model: String,

@@ -55,7 +55,7 @@ impl TryFrom<CouplingMessage> for CouplingDescription {
         };
         let ends = match message.ends.as_slice() {
             [first, second] => CouplingEnds::Here([end(first)?, end(second)?]),
-            [here] => CouplingEnds::Apart(end(here)?),
+            [here] => CouplingEnds::Remote(end(here)?),
             _ => return Err(Missing("coupling.ends")),
         };
         Ok(Self { ends, config, name: message.name })

@@ -42,7 +42,7 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// It breaks off before anything of use.
-    #[error("`{}` was cut off before it says what was run, nothing in it can be used; record again", path.display())]
+    #[error("`{}` is truncated before the run description and cannot be used; record again", path.display())]
     CutOffAtStart {
         /// The file.
         path: PathBuf,

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 /// Bytes that describe no run.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no description of a run: {0}")]
+#[error("not a run description: {0}")]
 pub struct NoRun(String);
 
 /// How a run was set up.
@@ -21,7 +21,7 @@ pub struct RunDescription {
     pub rate_hz: f64,
     /// How long it was to run, s.
     pub duration_s: f64,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// Real or virtual time.
     pub clock: Clock,
@@ -52,7 +52,7 @@ pub struct PluginDescription {
     pub places_m: Vec<[f64; 3]>,
     /// Of a model: how it was mixed with the others.
     pub blend: Blend,
-    /// Of a model that was computed beside the loop: when.
+    /// Of a model that was computed asynchronously: when.
     pub field: Option<FieldTiming>,
     /// What scene and command line set, as written, in order: to repeat the run, set these.
     pub settings: Vec<(String, String)>,
@@ -83,7 +83,10 @@ impl RunDescription {
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, NoRun> {
         let run = Run::decode(bytes).map_err(|cause| NoRun(cause.to_string()))?;
         if run.format > FORMAT {
-            return Err(NoRun(format!("it is of format {}, this program knows {FORMAT}", run.format)));
+            return Err(NoRun(format!(
+                "format {} is not supported; this version reads up to {FORMAT}",
+                run.format
+            )));
         }
         Self::from_message(run).map_err(|Missing(field)| NoRun(format!("it has no `{field}`")))
     }

@@ -30,8 +30,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (parameters, _sender, _reports) = ParameterQueue::new(Vec::new(), 1);
     let (exchange, _workshop) = exchange(1, Vec::new());
     let forces = Forces::new(1, vec![(0, layer)], Vec::new());
-    let run =
-        RunConfig { period_ns: config.period_ns, ramp_ns: 0, held_up_ns: 100_000_000, emergency_buttons: 0 };
+    let run = RunConfig {
+        period_ns: config.period_ns,
+        ramp_ns: 0,
+        longest_gap_ns: 100_000_000,
+        emergency_buttons: 0,
+    };
     let standby = Standby::new(vec![device], forces, parameters, exchange, config, run);
 
     let stoppers = standby.stoppers();

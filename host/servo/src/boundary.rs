@@ -115,6 +115,7 @@ impl Ellipsoid {
             return None;
         }
         let distance = at.length();
+        // Depth beyond the ellipsoid along the ray; the force is k depth + b v, v outwards only.
         let outward = at / distance;
         let depth = distance - distance / beyond;
         let push = (self.stiffness * depth + self.damping * velocity.dot(outward).max(0.0)).max(0.0);

@@ -97,7 +97,7 @@ pub enum PaceLost {
 }
 
 /// How far the samples of a device that sets the pace may run ahead of the machine's clock, ns: what it may have kept for the
-/// loop before the start, or while that was held up.
+/// loop before the start, or while that was delayed.
 const AHEAD_NS: u64 = 250_000_000;
 /// And by which part of the time since the start: one in so many, 2 %. Two oscillators differ by far less.
 const AHEAD_SHARE: u64 = 50;
@@ -202,8 +202,8 @@ impl Schedule {
         Ok(Woken { late_ns, missed: periods - 1 })
     }
 
-    /// Waits for the end of the last tick's period; time since the start, ns. As for a tick, whole periods in which the loop was
-    /// held up count as passed over: the run was over before them.
+    /// Waits for the end of the last tick's period; time since the start, ns. As for a tick, whole periods by which the
+    /// loop was delayed count as passed over: the run was over before them.
     pub fn finish(mut self) -> u64 {
         match self.pace {
             Pace::Virtual => self.next_time_ns(),
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn a_loop_that_was_held_up_skips_what_is_past_and_counts_it() {
+    fn a_delayed_loop_skips_what_is_past_and_counts_it() {
         let period_ns = 1_000_000;
         let mut schedule = Schedule::start_real(period_ns, SpinWindow { spin_ns: 50_000 });
         let first = wait(&mut schedule);
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn a_loop_that_was_held_up_at_its_end_ran_no_longer_for_it() {
+    fn a_loop_that_was_delayed_at_its_end_ran_no_longer_for_it() {
         let period_ns = 1_000_000;
         let started_ns = monotonic_ns() - 20 * period_ns;
         let mut schedule = Schedule::start(Pace::Clock(SpinWindow { spin_ns: 0 }), period_ns, started_ns);

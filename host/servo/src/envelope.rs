@@ -21,7 +21,7 @@ pub struct Envelope {
     /// The most that may be sent.
     max_force_n: DVec3,
     max_torque_nm: DVec3,
-    /// The fastest at which all that drives the handle on passes.
+    /// Velocity above which force components along it are scaled down.
     max_twist: Twist,
     /// Fastest change of force (N/s) and torque (N·m/s).
     slew_per_s: [f64; 2],
@@ -104,7 +104,8 @@ impl Envelope {
         self.passivity.energy_j()
     }
 
-    /// Above the velocity limit fades out what drives the handle on, gone at twice the limit; what brakes it passes.
+    /// Scales force components along the velocity down above the velocity limit, linearly to zero at twice the limit;
+    /// components against it pass.
     #[inline]
     fn limit_velocity(&self, wrench: Wrench, state: &DeviceState, events: &mut Events) -> Wrench {
         let (velocity, spin) = (state.twist.linear(), state.twist.angular());

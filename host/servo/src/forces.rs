@@ -5,7 +5,8 @@
 use super::Heartbeat;
 use super::models::{Layer, LayerReport, ModelHealth, ModelStack, Replacement};
 use crate::coupling::{
-    Account, Coupling, CouplingDescription, CouplingEnds, EndApart, Grip, Hearing, Line, Patience, Pull, Tank,
+    Coupling, CouplingDescription, CouplingEnds, Grip, Hearing, Line, Patience, Pull, RemoteEnd, Tank,
+    TankState,
 };
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
@@ -60,8 +61,8 @@ impl Port {
 /// What becomes of a coupling in a run: for reports.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CouplingOutcome {
-    /// The accounts of both ends; that of an end on another host as it was told last.
-    pub accounts: [Account; 2],
+    /// The energy tanks of both ends; that of an end on another host as received last.
+    pub tanks: [TankState; 2],
     /// How an end on another host was heard.
     pub hearing: Option<Hearing>,
 }
@@ -78,9 +79,9 @@ pub enum Coupled {
         pulls: [Pull; 2],
     },
     /// The other end is on another host.
-    Apart {
+    Remote {
         /// The end here.
-        end: Box<EndApart>,
+        end: Box<RemoteEnd>,
         /// Number of its device.
         device: usize,
         /// What it asks for.
@@ -89,7 +90,7 @@ pub enum Coupled {
 }
 
 impl Coupled {
-    /// With the line on which news is to be carried to another host, if one end is there. Not real-time.
+    /// With the line for the peer state, if one end is on another host. Not real-time.
     pub fn new(description: &CouplingDescription, period_s: f64, patience: Patience) -> (Self, Option<Line>) {
         let CouplingDescription { config, ends, .. } = description;
         match ends {
@@ -98,10 +99,10 @@ impl Coupled {
                 let coupling = Box::new(Coupling::new(config, ends, period_s));
                 (Self::Here { coupling, devices, pulls: [Pull::default(); 2] }, None)
             }
-            CouplingEnds::Apart(here) => {
-                let (end, line) = EndApart::new(config, here, period_s, patience);
+            CouplingEnds::Remote(here) => {
+                let (end, line) = RemoteEnd::new(config, here, period_s, patience);
                 let device = usize::from(here.device);
-                (Self::Apart { end: Box::new(end), device, pull: Pull::default() }, Some(line))
+                (Self::Remote { end: Box::new(end), device, pull: Pull::default() }, Some(line))
             }
         }
     }
@@ -117,7 +118,7 @@ impl Coupled {
                 };
                 *pulls = coupling.step([&first, &second].map(|(state, held)| Grip { state, held: *held }));
             }
-            Self::Apart { end, device, pull } => {
+            Self::Remote { end, device, pull } => {
                 let Some((state, held)) = ports.get(*device).map(grip) else { return };
                 *pull = end.step(tick, Grip { state: &state, held });
             }
@@ -134,7 +135,7 @@ impl Coupled {
                     port.add(pull);
                 }
             }
-            Self::Apart { end, device, pull } => {
+            Self::Remote { end, device, pull } => {
                 let Some(port) = ports.get_mut(*device) else { return };
                 port.add(pull);
                 if end.is_alone() {
@@ -148,11 +149,11 @@ impl Coupled {
     fn outcome(&self) -> CouplingOutcome {
         match self {
             Self::Here { coupling, .. } => {
-                CouplingOutcome { accounts: coupling.tanks().map(Tank::account), hearing: None }
+                CouplingOutcome { tanks: coupling.tanks().map(Tank::state), hearing: None }
             }
-            Self::Apart { end, .. } => {
+            Self::Remote { end, .. } => {
                 let hearing = end.hearing();
-                CouplingOutcome { accounts: [end.account(), hearing.partner], hearing: Some(hearing) }
+                CouplingOutcome { tanks: [end.tank(), hearing.partner], hearing: Some(hearing) }
             }
         }
     }

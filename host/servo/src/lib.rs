@@ -1,10 +1,10 @@
 //! The real-time core: one tick after the other, at a rate that is kept, inside limits that no plugin can bypass.
 //!
 //! - [`Servo`]: the tick; [`Clock`] decides when it happens, [`Envelope`] what may reach a hand.
-//! - [`coupling`]: two devices held together by a virtual spring, over any delay; [`port_energy`]: what crosses a port.
-//! - [`engine`]: where a model executes: in the loop, beside it at a rate of its own, or in a process of its own.
+//! - [`coupling`]: virtual coupling of two devices, over any delay; [`port_energy`]: what crosses a port.
+//! - [`engine`]: where a model executes: in the loop, asynchronously at a rate of its own, or in a process of its own.
 //!
-//! Knows neither scenes nor files: whoever prepares a run hands over opened devices and prepared models.
+//! Knows neither scenes nor files: the caller provides opened devices and prepared models.
 #![cfg_attr(rtsan, feature(sanitize))] // the step `blocking` of .ci/full
 
 mod boundary;

@@ -88,7 +88,7 @@ impl ParameterQueue {
     ) -> (Self, ChangeSender, ReportReceiver) {
         schedule.sort_by_key(|scheduled| scheduled.time_ns); // stable: equal times keep the scene's order
         let (sender, sent) = queue(WAITING_CHANGES);
-        // Room for the whole schedule and for twice what may wait, so that what is scheduled is never held up.
+        // Room for the whole schedule and for twice what may wait, so that what is scheduled is never delayed.
         let (reports, receiver) = queue(schedule.len() + replacements + 2 * WAITING_CHANGES);
         (Self { schedule: schedule.into(), next: 0, sent, reports }, sender, receiver)
     }
@@ -139,7 +139,7 @@ impl ParameterQueue {
             take(reports, due.change);
             *next += 1;
         }
-        // Somebody must take the reports out for what was sent to go in; else it waits.
+        // The queue of reports must have room for what was sent; else that waits.
         if waiting > 0 && reports.slots() >= schedule.len() - *next + sent.buffer().capacity() {
             (0..waiting).map_while(|_| sent.pop().ok()).for_each(|change| take(reports, change));
         }

@@ -1,6 +1,7 @@
-//! The envelope's stage for energy: the account of a device's port, and the controller on top that a scene may ask for.
+//! The envelope's stage for energy: the energy balance of a device's port, and the passivity controller that a scene
+//! may add.
 //!
-//! What crosses a port and how it is kept back: [`crate::port_energy`].
+//! What crosses a port and how the controller removes it: [`crate::port_energy`].
 
 use crate::port_energy::{Controller, Expected, PortObserver};
 use flotor_core::coupling::PassivityMode;

@@ -26,7 +26,7 @@ pub struct RunConfig {
     /// Time over which force fades in and out, ns.
     pub ramp_ns: u64,
     /// Time without a tick after which force has to fade in again: the hand is not where it was, ns.
-    pub held_up_ns: u64,
+    pub longest_gap_ns: u64,
     /// Buttons of the device that are emergency stops, one bit each.
     pub emergency_buttons: u32,
 }
@@ -139,7 +139,7 @@ impl Servo {
         watch.lap(&self.stopwatch, &mut self.timing, Stage::Write);
 
         let compute_ns = self.stopwatch.between_ns(started, self.stopwatch.now());
-        self.account(*lateness_ns, compute_ns, *missed);
+        self.record_timing(*lateness_ns, compute_ns, *missed);
         (events, compute_ns)
     }
 
@@ -215,7 +215,7 @@ impl Servo {
         }
     }
 
-    /// Takes the run where the samples, the clock and everybody who may stop it lead.
+    /// Advances the state machine of the run from sample validity, timing and requests to stop.
     fn follow(
         &mut self,
         sample: RunEvent,
@@ -224,7 +224,7 @@ impl Servo {
         stop: &StopSwitch,
         events: &mut Events,
     ) {
-        if tick.dt_ns > self.config.held_up_ns {
+        if tick.dt_ns > self.config.longest_gap_ns {
             self.change_state(RunEvent::SamplesLost, tick);
         }
         // An active run with a sample goes on as it is.
@@ -250,7 +250,7 @@ impl Servo {
         self.run = self.run.after(event, tick.time_ns, self.config.ramp_ns);
     }
 
-    fn account(&mut self, lateness_ns: Option<u64>, compute_ns: u64, missed: u64) {
+    fn record_timing(&mut self, lateness_ns: Option<u64>, compute_ns: u64, missed: u64) {
         self.timing.compute.record(compute_ns);
         self.timing.ticks += 1;
         self.timing.missed += missed;

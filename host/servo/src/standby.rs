@@ -14,8 +14,8 @@ pub struct Guarded {
     pub envelope: Envelope,
 }
 
-/// What becomes a [`Servo`] right before its first tick: a device that is energised and not spoken to lets go, some after
-/// a few milliseconds.
+/// What becomes a [`Servo`] right before its first tick: an energised device without commands removes its force, some
+/// after a few milliseconds.
 pub struct Standby {
     devices: Vec<Guarded>,
     forces: Forces,

@@ -10,7 +10,7 @@ use flotor_hal::{Axes, Conditions, Cycle, Fault, Tick};
 /// Time without a new sample after which there is no force: what is older than this is not where the hand is. In 10 ms a
 /// 10 Hz movement of 5 mm goes 3 mm.
 const STALE_LIMIT_NS: u64 = 10_000_000;
-/// Samples in a row that may be lost at any rate: one is no news.
+/// Samples in a row that may be lost at any rate: one is normal.
 const STALE_TICKS_BORNE: u64 = 2;
 
 /// A device, and what nothing gets past on its way there.

@@ -67,7 +67,7 @@ impl Look {
     }
 
     /// Within so many ns the clock's time at the count is unknown.
-    fn doubt_ns(self) -> u64 {
+    fn uncertainty_ns(self) -> u64 {
         self.after_ns - self.before_ns + Self::STEP_NS
     }
 }
@@ -86,7 +86,7 @@ impl CountLength {
     const ENOUGH: f64 = 100e-6;
     /// Where it ends in any case, with the best there was, ns: as long as `quanta` takes at most.
     const LONGEST_NS: u64 = 200_000_000;
-    /// Of so many looks at its beginning the one that leaves least in doubt counts.
+    /// Of so many looks at its beginning the one with the least uncertainty counts.
     const FIRST_LOOKS: usize = 32;
 
     /// Not real-time.
@@ -94,28 +94,28 @@ impl CountLength {
         let mut first = look();
         for _ in 1..Self::FIRST_LOOKS {
             let next = look();
-            first = if next.doubt_ns() < first.doubt_ns() { next } else { first };
+            first = if next.uncertainty_ns() < first.uncertainty_ns() { next } else { first };
         }
         // Of no length, should no count be seen to go up.
-        let (mut least_doubt, mut best) = (f64::INFINITY, Self { parts: 0 });
+        let (mut least_uncertainty, mut best) = (f64::INFINITY, Self { parts: 0 });
         loop {
             let last = look();
             // From the middle of the one look to the middle of the other, twice.
             let twice_ns = (last.before_ns - first.before_ns) + (last.after_ns - first.after_ns);
-            let doubt = (first.doubt_ns() + last.doubt_ns()) as f64 / twice_ns as f64;
+            let uncertainty = (first.uncertainty_ns() + last.uncertainty_ns()) as f64 / twice_ns as f64;
             // Counters of two cores may differ, and the process may have moved from the one to the other. Only a difference of
             // more than what has passed shows.
-            if doubt < least_doubt && last.count > first.count {
-                (least_doubt, best) = (doubt, Self::of(twice_ns, 2 * (last.count - first.count)));
+            if uncertainty < least_uncertainty && last.count > first.count {
+                (least_uncertainty, best) = (uncertainty, Self::of(twice_ns, 2 * (last.count - first.count)));
             }
-            if least_doubt <= Self::ENOUGH || twice_ns / 2 >= Self::LONGEST_NS {
+            if least_uncertainty <= Self::ENOUGH || twice_ns / 2 >= Self::LONGEST_NS {
                 return best;
             }
         }
     }
 
     /// So many counts in so many ns.
-    #[allow(clippy::cast_possible_truncation)] // some 2³², or the counter is slower than a clock on the wall
+    #[allow(clippy::cast_possible_truncation)] // some 2³², or the counter is slower than a wall clock
     fn of(ns: u64, counts: u64) -> Self {
         Self { parts: ((u128::from(ns) << Self::PARTS_PER_NS_LOG2) / u128::from(counts)) as u64 }
     }
@@ -215,9 +215,9 @@ mod tests {
     fn where_no_look_is_worth_much_the_measurement_ends_with_the_best() {
         let first = 3 * CountLength::FIRST_LOOKS;
         let aside_ns = |reading| if reading % 3 == if reading < first { 1 } else { 2 } { 100_000 } else { 0 };
-        let doubt_ns = Processor::new(&aside_ns).look().doubt_ns();
+        let uncertainty_ns = Processor::new(&aside_ns).look().uncertainty_ns();
         let error = Processor::new(&aside_ns).error();
-        assert!(error <= doubt_ns as f64 / CountLength::LONGEST_NS as f64, "{error}");
+        assert!(error <= uncertainty_ns as f64 / CountLength::LONGEST_NS as f64, "{error}");
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! What a run says about itself: numbers for machines, a page for people.
 
-use crate::live::Carried;
+use crate::live::LinkCounts;
 use crate::{Misbehaved, Observer, Outcome, PluginReport};
 use flotor_core::coupling::CouplingDescription;
-use flotor_core::peer::Account;
+use flotor_core::peer::TankState;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, EnergyLedger};
 use flotor_servo::RunEnd;
@@ -124,7 +124,7 @@ pub struct RunSummary {
     pub peak_force_n: f64,
     /// Largest torque sent, N·m.
     pub peak_torque_nm: f64,
-    /// Energy accounts, all devices together.
+    /// Energy tanks, all devices together.
     pub energy: EnergySummary,
     /// Each device.
     pub devices: Vec<DeviceSummary>,
@@ -170,12 +170,12 @@ pub struct DeviceSummary {
     pub port_end_j: f64,
 }
 
-/// One coupling of a run: the energy accounts of its ends, in the frame they share.
+/// One coupling of a run: the energy tanks of its ends, in the frame they share.
 #[derive(Clone, Debug, Serialize)]
 pub struct CouplingSummary {
     /// Name in the scene.
     pub name: String,
-    /// The lowest the account of each end ever was, J: below zero, energy has come out that nobody had put in.
+    /// The lowest the tank of each end ever was, J: below zero, the coupling has generated energy.
     pub lowest_j: [f64; 2],
     /// What the hand at each end has put in altogether less what came out, J.
     pub gone_in_j: [f64; 2],
@@ -186,25 +186,25 @@ pub struct CouplingSummary {
     pub link: Option<LinkSummary>,
 }
 
-/// How news crossed the way between two hosts.
+/// How messages crossed the way between two hosts.
 #[derive(Clone, Debug, Serialize)]
 pub struct LinkSummary {
-    /// Ticks in which there was news.
+    /// Ticks in which a message arrived.
     pub heard_ticks: u64,
-    /// How often there was none for as long as the watchdog waits: the coupling let go.
+    /// How often there was none for as long as the watchdog waits: the coupling removed its force.
     pub silences: u64,
-    /// The longest the coupling went by old news, ms; always less than the watchdog waits.
+    /// The longest wait for a message, ms; always less than the watchdog waits.
     pub longest_wait_ms: f64,
-    /// What was carried.
-    pub carried: Carried,
+    /// Counts of messages.
+    pub carried: LinkCounts,
 }
 
-/// Energy accounts of a run.
+/// Energy balance of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct EnergySummary {
-    /// What the device's own account fails to explain, over its peak energy; absent without an account.
+    /// What the device's own energy balance fails to explain, over its peak energy; absent without one.
     pub device_residual_relative: Option<f64>,
-    /// Largest mechanical energy of the device, J; absent without an account.
+    /// Largest mechanical energy of the device, J; absent without a balance.
     pub device_peak_j: Option<f64>,
     /// Largest energy the sampled loop has put out beyond what the models had stored, J: a hold leaks.
     pub loop_generated_j: f64,
@@ -247,8 +247,8 @@ pub struct RunFacts<'a> {
     pub plugins: &'a [PluginReport],
     /// What holds devices together.
     pub couplings: &'a [CouplingDescription],
-    /// What was carried between hosts, by name of the coupling.
-    pub carried: &'a [(String, Carried)],
+    /// Counts of messages between hosts, by name of the coupling.
+    pub carried: &'a [(String, LinkCounts)],
     /// Digest of the trace.
     pub trace_digest: String,
 }
@@ -257,13 +257,13 @@ impl LinkSummary {
     /// For people.
     fn to_text(&self) -> String {
         let Self { heard_ticks, silences, longest_wait_ms, carried } = self;
-        let Carried { lost, overtaken, refused, .. } = carried;
+        let LinkCounts { lost, overtaken, refused, .. } = carried;
         let silent = match silences {
-            0 => format!("never silent for longer than {longest_wait_ms:.0} ms"),
-            silences => format!("let go {silences} times, when nothing was heard"),
+            0 => format!("longest wait for a message {longest_wait_ms:.0} ms"),
+            silences => format!("force removed {silences} times for want of messages"),
         };
         format!(
-            "heard in {heard_ticks} ticks, {silent}; {lost} lost, {overtaken} overtaken, {refused} refused"
+            "messages in {heard_ticks} ticks, {silent}; {lost} lost, {overtaken} overtaken, {refused} refused"
         )
     }
 }
@@ -376,9 +376,9 @@ impl RunSummary {
         for CouplingSummary { name, lowest_j, given_up_j, link, .. } in &self.couplings {
             let [first, second] = lowest_j.map(|joule| joule * 1.0e3);
             let heat_mj = given_up_j.iter().sum::<f64>() * 1.0e3;
-            let accounts =
-                format!("accounts never below {first:+.3} and {second:+.3} mJ, {heat_mj:.3} mJ to heat");
-            row("coupling", format!("{name}: {accounts}"));
+            let tanks =
+                format!("tanks never below {first:+.3} and {second:+.3} mJ, {heat_mj:.3} mJ dissipated");
+            row("coupling", format!("{name}: {tanks}"));
             link.iter().for_each(|link| row("link", format!("{name}: {}", link.to_text())));
         }
         if !self.events.is_empty() {
@@ -388,10 +388,7 @@ impl RunSummary {
         }
         if self.dropped_records > 0 {
             let dropped = self.dropped_records;
-            row(
-                "dropped",
-                format!("{dropped} records that an observer was too slow for; the loop did not wait"),
-            );
+            row("dropped", format!("{dropped} records dropped for a slow observer; the loop did not wait"));
         }
         for plugin in &self.plugins {
             let health = if plugin.health == "ok" { String::new() } else { format!("  {}", plugin.health) };
@@ -402,7 +399,7 @@ impl RunSummary {
     }
 }
 
-/// What a device's own account fails to explain, over its peak energy.
+/// What a device's own energy balance fails to explain, over its peak energy.
 fn relative_residual(ledger: EnergyLedger) -> f64 {
     if ledger.peak_j > 0.0 { ledger.residual_j() / ledger.peak_j } else { ledger.residual_j() }
 }
@@ -420,9 +417,9 @@ fn device_summary((plugin, tally): (&PluginReport, &DeviceTally)) -> DeviceSumma
 fn coupling_summary(
     coupling: &CouplingDescription,
     outcome: &CouplingOutcome,
-    carried: &[(String, Carried)],
+    carried: &[(String, LinkCounts)],
 ) -> CouplingSummary {
-    let each = |number: fn(&Account) -> f64| outcome.accounts.each_ref().map(number);
+    let each = |number: fn(&TankState) -> f64| outcome.tanks.each_ref().map(number);
     let carried = carried.iter().find(|(name, _)| *name == coupling.name).map(|(_, carried)| *carried);
     let link = |hearing: Hearing| LinkSummary {
         heard_ticks: hearing.ticks,
@@ -432,9 +429,9 @@ fn coupling_summary(
     };
     CouplingSummary {
         name: coupling.name.clone(),
-        lowest_j: each(|account| account.lowest_j),
-        gone_in_j: each(|account| account.gone_in_j),
-        given_up_j: each(|account| account.given_up_j),
+        lowest_j: each(|tank| tank.lowest_j),
+        gone_in_j: each(|tank| tank.gone_in_j),
+        given_up_j: each(|tank| tank.given_up_j),
         link: outcome.hearing.map(link),
     }
 }
@@ -446,7 +443,7 @@ fn health_words(health: &ModelHealth, words: &str) -> String {
         return format!("panicked at tick {tick}, no force since: {words}");
     }
     if let Some(tick) = health.lost_at {
-        return format!("was lost at tick {tick}, no force since: {words}");
+        return format!("process lost at tick {tick}, no force since: {words}");
     }
     if let Some(Overrun { tick, longest_ns, limit_ns }) = health.overrun {
         let (longest_us, limit_us) = (us(longest_ns), us(limit_ns));
@@ -455,7 +452,7 @@ fn health_words(health: &ModelHealth, words: &str) -> String {
         );
     }
     if let Some(tick) = health.first_late {
-        return format!("gave no answer in time in {} ticks, the first at tick {tick}", health.late_ticks);
+        return format!("late in {} ticks, the first at tick {tick}", health.late_ticks);
     }
     health.first_rejected.map_or_else(
         || "ok".to_owned(),

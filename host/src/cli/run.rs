@@ -12,7 +12,7 @@ use flotor_record::{Note, Recorder, Severity, TraceDigest};
 use flotor_servo::RunEnd;
 use flotor_servo::coupling::Line;
 use flotor_servo::{Clock, Core};
-use flotor_session::live::{Carried, Carrier, Watched, carry, publish};
+use flotor_session::live::{LinkCounts, PeerLink, Watched, publish, start_peer_link};
 use flotor_session::registry::Registry;
 use flotor_session::report::{RunFacts, RunSummary, Tally};
 use flotor_session::run_description::describe;
@@ -70,11 +70,12 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let options = RunOptions { clock, seed: arguments.seed };
     let registry = Registry::search(&scene.plugin_folders);
     let mut session = Session::prepare(&scene, &registry, &options)?.on_core(arguments.core);
-    let carriers = carriers(&mut session, clock)?;
+    let links = peer_links(&mut session, clock)?;
     let plugins = session.plugins().to_vec();
     let description = describe(&scene, &options, &plugins);
     let publication = publish(&Directory::of_this_user(), &scene, &description, &session, &stop);
-    let publication = publication.map_err(|error| note(format_args!("nobody can watch: {error}"))).ok();
+    let publication =
+        publication.map_err(|error| note(format_args!("telemetry server not started: {error}"))).ok();
 
     let clock_word = if clock == Clock::Real { "real" } else { "virtual" };
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
@@ -102,8 +103,8 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         Err(error) => return first_error([Err(error.into()), recording.finish(&[]).map_err(Into::into)]),
     };
 
-    let carried: Vec<(String, Carried)> =
-        carriers.into_iter().map(|(name, carrier)| (name, carrier.finish())).collect();
+    let carried: Vec<(String, LinkCounts)> =
+        links.into_iter().map(|(name, link)| (name, link.finish())).collect();
     if let Some(publication) = publication {
         publication.end(&end_words(&outcome, scene.rate_hz));
     }
@@ -191,7 +192,7 @@ fn scene(arguments: &RunArguments) -> Result<Scene, CommandError> {
 }
 
 /// Starts a peer link for each coupling with a remote end.
-fn carriers(session: &mut Session, clock: Clock) -> Result<Vec<(String, Carrier)>, CommandError> {
+fn peer_links(session: &mut Session, clock: Clock) -> Result<Vec<(String, PeerLink)>, CommandError> {
     let lines = session.take_lines();
     if let (Some((name, _)), Clock::Virtual) = (lines.first(), clock) {
         return Err(CommandError::Usage(format!(
@@ -199,11 +200,13 @@ fn carriers(session: &mut Session, clock: Clock) -> Result<Vec<(String, Carrier)
         )));
     }
     let directory = Directory::of_this_user();
-    let carrier = |(name, line): (String, Line)| match carry(&directory, &name, line) {
-        Ok(carrier) => Ok((name, carrier)),
-        Err(error) => Err(CommandError::Failed(format!("the coupling `{name}` reaches nobody: {error}"))),
+    let link = |(name, line): (String, Line)| match start_peer_link(&directory, &name, line) {
+        Ok(link) => Ok((name, link)),
+        Err(error) => {
+            Err(CommandError::Failed(format!("coupling `{name}`: cannot start the peer link: {error}")))
+        }
     };
-    lines.into_iter().map(carrier).collect()
+    lines.into_iter().map(link).collect()
 }
 
 /// How a run ended, for its clients.

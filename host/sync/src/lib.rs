@@ -1,6 +1,6 @@
 //! The newest value of something, from one thread to others, without either waiting.
 //!
-//! The servo runs a thousand times a second or more and may not be held up: not by a mutex another thread
+//! The servo runs a thousand times a second or more and may not be delayed: not by a mutex another thread
 //! holds, not by the allocator, not by the kernel. [`latest`] makes a latest-value cell: a reader that is slow misses
 //! values, never the newest. Where every record counts (ticks for the recorder, commands for the servo) the host uses a
 //! bounded queue of the crate `rtrb`.

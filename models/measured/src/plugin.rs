@@ -7,7 +7,7 @@ use flotor_hal::{
     Parameter, Pose, Refusal, Settings, StepStatus, Wrench, choices,
 };
 
-/// Without a table: spring 1 of the report, 0.68 N/mm, straight over 12 mm.
+/// Without a table: spring 1 of the thesis, 0.68 N/mm, straight over 12 mm.
 const SPRING_1: &str = "compression_mm,force_n\n0,0\n6,4.08\n12,8.16\n";
 
 /// Farther from home than this there is no handle, m: the answer is that at the edge, and says so.

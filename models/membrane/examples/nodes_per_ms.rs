@@ -1,5 +1,5 @@
 //! How many masses one core updates in a millisecond: a 45 by 45 sheet (2 025 masses, each linked to its four neighbours)
-//! with a ball pressed into it, explicit steps, all awake.
+//! with a ball pressed into it, explicit steps, all active.
 //!
 //! `cargo run --release -p flotor-membrane --example nodes_per_ms` prints the best and the median of twenty runs: a busy
 //! machine can only make it slower.
@@ -22,7 +22,7 @@ fn nodes_per_ms(network: &mut Network) -> f64 {
     let step_s = network.longest_step_s();
     let started = Instant::now();
     for _ in 0..STEPS {
-        network.wake(); // it must not rest while it is measured
+        network.activate(); // it must not rest while it is measured
         black_box(network.step(step_s, Some(&BALL)));
     }
     NODES * f64::from(STEPS) / (started.elapsed().as_secs_f64() * 1.0e3)

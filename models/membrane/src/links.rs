@@ -63,16 +63,16 @@ impl Links {
         })
     }
 
-    /// Adds the forces of all springs that touch a region awake. Real-time: bounded, no allocation.
+    /// Adds the forces of all springs that touch a region active. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn add_forces(&mut self, positions_m: &Vectors, forces_n: &mut Vectors, regions: &Regions) {
         for run in &self.runs {
             let (first, second) = (run.first, run.first + run.distance);
             let count = run.springs.len();
             let last = second + count - 1;
-            if !(regions.is_awake(first / BLOCK)
-                || regions.is_awake(second / BLOCK)
-                || regions.is_awake(last / BLOCK))
+            if !(regions.is_active(first / BLOCK)
+                || regions.is_active(second / BLOCK)
+                || regions.is_active(last / BLOCK))
             {
                 continue;
             }
@@ -158,7 +158,7 @@ mod tests {
         let mut positions = Vectors::zero(3);
         (positions.x[1], positions.x[2]) = (1.5, 1.5);
         let mut forces = Vectors::zero(3);
-        links.add_forces(&positions, &mut forces, &Regions::all_awake(3));
+        links.add_forces(&positions, &mut forces, &Regions::all_active(3));
         assert_eq!(forces.x, [5.0, -5.0, 0.0]);
         assert!(forces.y.iter().chain(&forces.z).all(|force| *force == 0.0));
     }

@@ -205,15 +205,15 @@ impl Network {
         self.state.clone_from(state);
     }
 
-    /// How many masses are awake. Real-time: bounded, no allocation.
+    /// How many masses are active. Real-time: bounded, no allocation.
     #[must_use]
-    pub fn awake_nodes(&self) -> usize {
-        self.state.regions.awake().map(|range| range.len()).sum()
+    pub fn active_nodes(&self) -> usize {
+        self.state.regions.active().map(|range| range.len()).sum()
     }
 
-    /// Wakes everything, as nothing was asleep in the beginning. Real-time: bounded, no allocation.
-    pub fn wake(&mut self) {
-        self.state.regions.wake_all();
+    /// Activates everything, as nothing was inactive in the beginning. Real-time: bounded, no allocation.
+    pub fn activate(&mut self) {
+        self.state.regions.activate_all();
     }
 
     /// One step of `step_s`, at most [`Self::longest_step_s`]; the force on the ball, N. Real-time: bounded, no
@@ -221,20 +221,20 @@ impl Network {
     pub fn step(&mut self, step_s: f64, ball: Option<&Ball>) -> DVec3 {
         let Self { state: State { positions_m, velocities_m_per_s, regions }, forces_n, .. } = self;
         if let Some(ball) = ball {
-            regions.wake_near(ball);
+            regions.activate_near(ball);
         }
-        for range in regions.awake() {
+        for range in regions.active() {
             forces_n.clear(range);
         }
         self.links.add_forces(positions_m, forces_n, regions);
         let mut on_ball_n = DVec3::ZERO;
         if let Some(ball) = ball {
-            for range in regions.awake() {
+            for range in regions.active() {
                 on_ball_n += push(ball, self.surroundings.contact_n_per_m, positions_m, forces_n, range);
             }
         }
         let damped = 1.0 / (1.0 + step_s * self.surroundings.damping_per_s);
-        for range in regions.awake() {
+        for range in regions.active() {
             let inverse = &self.inverse_masses_per_kg[range.clone()];
             let weight = &self.weights_m_per_s2[range.clone()];
             let [vx, vy, vz] = velocities_m_per_s.slices_mut(range.clone());
@@ -248,11 +248,11 @@ impl Network {
         on_ball_n
     }
 
-    /// Steps until all masses sleep, at most so often; true if they do. Not real-time.
+    /// Steps until all masses are inactive, at most so often; true if they do. Not real-time.
     pub fn come_to_rest(&mut self, most_steps: usize) -> bool {
         (0..most_steps).any(|_| {
             self.step(self.longest_step_s, None);
-            self.awake_nodes() == 0
+            self.active_nodes() == 0
         })
     }
 

@@ -144,7 +144,7 @@ impl ForceModel for Membrane {
         // Under gravity it sags before anybody touches it.
         if number("gravity_m_per_s2") > 0.0 {
             network.come_to_rest(MOST_SETTLING_STEPS);
-            network.wake();
+            network.activate();
         }
         let mut parameters = [0.0; SCHEMA.len()];
         for (value, parameter) in parameters.iter_mut().zip(Self::PARAMETERS) {

@@ -1,8 +1,8 @@
 //! Blocks of masses that rest: left out of the work until something moves beside them.
 //!
-//! A block is 64 masses in a row of numbers. It falls asleep when all of them have been slow for a while, and wakes when
-//! the ball comes near or a mass of a block it is linked to is no longer slow. While it sleeps its masses stand still:
-//! what is left out is a motion slower than [`QUIET_M_PER_S`].
+//! A block is 64 masses in a row of numbers. It becomes inactive when all of them have been slow for a while, and
+//! activates when the ball comes near or a mass of a block it is linked to is no longer slow. While it is inactive its
+//! masses stand still: what is left out is a motion slower than [`QUIET_M_PER_S`].
 
 use crate::network::{Ball, Vectors};
 use flotor_hal::DVec3;
@@ -13,14 +13,14 @@ use std::sync::Arc;
 pub(crate) const BLOCK: usize = 64;
 /// Slower than this is at rest, m/s: a micrometre in a second is far below what a hand or an eye can tell.
 const QUIET_M_PER_S: f64 = 1.0e-6;
-/// Faster than this wakes the neighbours, m/s: twice, so that a block on the edge does not flicker.
-const WAKING_M_PER_S: f64 = 2.0 * QUIET_M_PER_S;
+/// Faster than this activates the neighbours, m/s: twice, so that a block on the edge does not flicker.
+const ACTIVATING_M_PER_S: f64 = 2.0 * QUIET_M_PER_S;
 /// Steps between two looks at a block.
 const STEPS_BETWEEN_LOOKS: u64 = 8;
-/// Quiet looks before a block falls asleep: turning points of a swing are shorter.
+/// Quiet looks before a block becomes inactive: turning points of a swing are shorter.
 const QUIET_LOOKS: u8 = 16;
 
-/// Which blocks are awake.
+/// Which blocks are active.
 #[derive(Debug)]
 pub(crate) struct Regions {
     nodes: usize,
@@ -32,9 +32,9 @@ pub(crate) struct Regions {
 
 #[derive(Clone, Copy, Debug)]
 struct Block {
-    awake: bool,
+    active: bool,
     quiet_looks: u8,
-    /// Box around its masses when it fell asleep, m.
+    /// Box around its masses when it became inactive, m.
     lowest_m: DVec3,
     highest_m: DVec3,
 }
@@ -54,13 +54,13 @@ impl Clone for Regions {
 }
 
 impl Regions {
-    /// Everything awake, nothing linked: nothing ever sleeps or wakes by another. For tests.
+    /// Everything active, nothing linked: nothing is ever deactivated, or activated by another. For tests.
     #[cfg(test)]
-    pub(crate) fn all_awake(nodes: usize) -> Self {
+    pub(crate) fn all_active(nodes: usize) -> Self {
         Self::new(nodes, std::iter::empty())
     }
 
-    /// Everything awake. Not real-time.
+    /// Everything active. Not real-time.
     pub(crate) fn new(nodes: usize, joined: impl Iterator<Item = [usize; 2]>) -> Self {
         let count = nodes.div_ceil(BLOCK);
         let mut neighbours = vec![std::collections::BTreeSet::new(); count];
@@ -68,41 +68,41 @@ impl Regions {
             neighbours[a].insert(b);
             neighbours[b].insert(a);
         }
-        let awake = Block { awake: true, quiet_looks: 0, lowest_m: DVec3::ZERO, highest_m: DVec3::ZERO };
+        let active = Block { active: true, quiet_looks: 0, lowest_m: DVec3::ZERO, highest_m: DVec3::ZERO };
         let neighbours = neighbours.into_iter().map(|set| set.into_iter().collect()).collect();
-        Self { nodes, blocks: vec![awake; count], neighbours, steps: 0 }
+        Self { nodes, blocks: vec![active; count], neighbours, steps: 0 }
     }
 
     /// Real-time: bounded, no allocation.
     #[inline]
-    pub(crate) fn is_awake(&self, block: usize) -> bool {
-        self.blocks.get(block).is_some_and(|block| block.awake)
+    pub(crate) fn is_active(&self, block: usize) -> bool {
+        self.blocks.get(block).is_some_and(|block| block.active)
     }
 
-    /// Masses of the blocks that are awake. Real-time: bounded, no allocation.
+    /// Masses of the blocks that are active. Real-time: bounded, no allocation.
     #[inline]
-    pub(crate) fn awake(&self) -> impl Iterator<Item = Range<usize>> + '_ {
-        let awake = self.blocks.iter().enumerate().filter(|(_, block)| block.awake);
-        awake.map(|(block, _)| block * BLOCK..(block * BLOCK + BLOCK).min(self.nodes))
+    pub(crate) fn active(&self) -> impl Iterator<Item = Range<usize>> + '_ {
+        let active = self.blocks.iter().enumerate().filter(|(_, block)| block.active);
+        active.map(|(block, _)| block * BLOCK..(block * BLOCK + BLOCK).min(self.nodes))
     }
 
     /// Wakes all. Real-time: bounded, no allocation.
-    pub(crate) fn wake_all(&mut self) {
-        self.blocks.iter_mut().for_each(Block::wake);
+    pub(crate) fn activate_all(&mut self) {
+        self.blocks.iter_mut().for_each(Block::activate);
     }
 
     /// Wakes what the ball may touch. Real-time: bounded, no allocation.
     #[inline]
-    pub(crate) fn wake_near(&mut self, ball: &Ball) {
-        for block in self.blocks.iter_mut().filter(|block| !block.awake) {
+    pub(crate) fn activate_near(&mut self, ball: &Ball) {
+        for block in self.blocks.iter_mut().filter(|block| !block.active) {
             let nearest_m = ball.centre_m.clamp(block.lowest_m, block.highest_m);
             if nearest_m.distance_squared(ball.centre_m) < ball.radius_m * ball.radius_m {
-                block.wake();
+                block.activate();
             }
         }
     }
 
-    /// After a step: lets slow blocks sleep, and wakes the neighbours of those that are not. Real-time: bounded, no
+    /// After a step: deactivates slow blocks, and activates the neighbours of those that are not. Real-time: bounded, no
     /// allocation.
     #[inline]
     pub(crate) fn settle(&mut self, positions_m: &Vectors, velocities_m_per_s: &mut Vectors) {
@@ -111,14 +111,14 @@ impl Regions {
         let neighbours = Arc::clone(&self.neighbours);
         for (index, linked) in neighbours.iter().enumerate() {
             let range = index * BLOCK..(index * BLOCK + BLOCK).min(self.nodes);
-            // A block all of whose neighbours are awake matters to nobody between two looks.
-            let frontier = || linked.iter().any(|neighbour| !self.is_awake(*neighbour));
-            if !self.is_awake(index) || !(look || frontier()) {
+            // A block all of whose neighbours are active matters to nobody between two looks.
+            let frontier = || linked.iter().any(|neighbour| !self.is_active(*neighbour));
+            if !self.is_active(index) || !(look || frontier()) {
                 continue;
             }
             let fastest = velocities_m_per_s.longest_square(range.clone());
-            if fastest > WAKING_M_PER_S * WAKING_M_PER_S {
-                linked.iter().for_each(|neighbour| self.blocks[*neighbour].wake());
+            if fastest > ACTIVATING_M_PER_S * ACTIVATING_M_PER_S {
+                linked.iter().for_each(|neighbour| self.blocks[*neighbour].activate());
             }
             let block = &mut self.blocks[index];
             if fastest > QUIET_M_PER_S * QUIET_M_PER_S {
@@ -126,7 +126,7 @@ impl Regions {
             } else if look {
                 block.quiet_looks += 1;
                 if block.quiet_looks >= QUIET_LOOKS {
-                    block.sleep(positions_m, range.clone());
+                    block.deactivate(positions_m, range.clone());
                     velocities_m_per_s.clear(range);
                 }
             }
@@ -135,11 +135,11 @@ impl Regions {
 }
 
 impl Block {
-    fn wake(&mut self) {
-        (self.awake, self.quiet_looks) = (true, 0);
+    fn activate(&mut self) {
+        (self.active, self.quiet_looks) = (true, 0);
     }
 
-    fn sleep(&mut self, positions_m: &Vectors, range: Range<usize>) {
+    fn deactivate(&mut self, positions_m: &Vectors, range: Range<usize>) {
         let [x, y, z] = positions_m.slices(range);
         let ends = |numbers: &[f64]| {
             let fold = |pick: fn(f64, f64) -> f64, start| numbers.iter().copied().fold(start, pick);
@@ -147,6 +147,6 @@ impl Block {
         };
         let (x, y, z) = (ends(x), ends(y), ends(z));
         (self.lowest_m, self.highest_m) = (DVec3::new(x.0, y.0, z.0), DVec3::new(x.1, y.1, z.1));
-        self.awake = false;
+        self.active = false;
     }
 }

@@ -1,4 +1,4 @@
-//! Networks in motion: frequency, momentum, sleep, and the field a faster loop is given.
+//! Networks in motion: frequency, momentum, inactive blocks, and the field a faster loop is given.
 
 use flotor_hal::DVec3;
 use flotor_membrane::mesh::{Link, Mesh, Sheet};
@@ -91,32 +91,32 @@ fn what_the_ball_feels_is_what_the_masses_get() {
 }
 
 #[test]
-fn a_sheet_at_rest_sleeps_a_touch_wakes_it_and_sleep_changes_nothing_that_is_felt() {
-    let press = |awake: bool| {
+fn a_sheet_at_rest_is_inactive_a_touch_activates_it_and_inactivity_changes_nothing_that_is_felt() {
+    let press = |active: bool| {
         let mut network = Network::new(&Mesh::sheet(&SHEET), TOUCHED);
         let step_s = network.longest_step_s();
         let away = Ball { centre_m: DVec3::Z * 0.1, radius_m: RADIUS_M };
         for _ in 0..5000 {
             network.step(step_s, Some(&away));
         }
-        let asleep = network.awake_nodes() == 0;
+        let inactive = network.active_nodes() == 0;
         let mut forces_n = Vec::new();
         for step in 0..4000_u32 {
-            if awake {
-                network.wake();
+            if active {
+                network.activate();
             }
             let depth_m = 0.002 * (f64::from(step) / 4000.0 * TAU).sin().max(0.0);
             let ball = Ball { centre_m: DVec3::Z * (RADIUS_M - depth_m), radius_m: RADIUS_M };
             forces_n.push(network.step(step_s, Some(&ball)));
         }
-        (asleep, forces_n)
+        (inactive, forces_n)
     };
-    let ((asleep, slept), (_, woken)) = (press(false), press(true));
-    assert!(asleep, "nothing touched it for seconds");
+    let ((inactive, slept), (_, woken)) = (press(false), press(true));
+    assert!(inactive, "nothing touched it for seconds");
     let largest_n = woken.iter().map(|force| force.length()).fold(0.0, f64::max);
     let difference_n = slept.iter().zip(&woken).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
     assert!(largest_n > 0.1);
-    // Left out: motion below 1e-6 m/s for the time until a neighbour wakes, some 10 nm at 1 kN/m of contact springs.
+    // Left out: motion below 1e-6 m/s for the time until a neighbour activates, some 10 nm at 1 kN/m of contact springs.
     assert!(difference_n < 1.0e-4 * largest_n, "{difference_n} of {largest_n} N");
 }
 

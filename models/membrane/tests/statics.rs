@@ -106,5 +106,5 @@ fn a_sheet_without_gravity_is_at_rest_as_it_is() {
         // Opposite springs pull alike but for rounding of lengths of 4 cm.
         assert!((network.positions_m().get(index) - *start).length() < 1.0e-14);
     }
-    assert_eq!(network.awake_nodes(), 0);
+    assert_eq!(network.active_nodes(), 0);
 }

@@ -6,8 +6,8 @@
 //!
 //! One by one is the fastest way to a wrench that this crate has for a single pose: the very step of the plugin, with the
 //! law in the instructions of the machine, called from the loop without a boundary between. Contenders take turns, a
-//! slice of a fraction of a millisecond each, and what is told is the median of the quotients of neighbouring slices: a
-//! busy machine slows both.
+//! slice of a fraction of a millisecond each, and the reported number is the median of the quotients of neighbouring
+//! slices: a busy machine slows both.
 
 use std::hint::black_box;
 use std::time::Instant;

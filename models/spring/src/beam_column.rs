@@ -37,6 +37,7 @@ impl<R: Real> StabilityFunctions<R> {
     pub fn at(z: R) -> Self {
         let f = EntireFunctions::at(z);
         let inverse = f.g0.inverse();
+        // bow C0 / G0 and sway G1 / G0, and the slope of sway by z from dG0/dz = -G1 / 6 and dG1/dz = -G2 / 10.
         let (bow, sway) = (f.c0 * inverse, f.g1 * inverse);
         let sway_slope = sway * sway * (1.0 / 6.0) - f.g2 * inverse * 0.1;
         let regular = Self { bow, sway, writhe: writhe(bow, sway), sway_slope };
@@ -128,6 +129,7 @@ impl Column {
     #[inline(always)]
     #[must_use]
     pub fn ends<R: Real>(&self, axial_force_n: R, length_m: R, reference_m: R) -> EndStiffness<R> {
+        // `l P`, `Lam`, `z` of the formulas above, and the two parts of the denominator of `(a + b) / L`.
         let load_nm = axial_force_n * reference_m;
         let sheared_m = length_m + load_nm * self.shear_per_n;
         let argument = load_nm * self.load_per_n_m2 * sheared_m;

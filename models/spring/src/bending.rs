@@ -17,12 +17,12 @@
 
 use crate::angle::SquaredAngle;
 use crate::beam_column::StabilityFunctions;
-use crate::level::{Levelled, level_above};
 use crate::quartic::{Quartic, QuarticEnergy};
 use crate::real::Real;
 use crate::rigidity::Spring;
+use crate::saturation::{Saturated, saturate_above};
 
-/// Argument `z` from which on it is bent off its course to the pole at 9.87, where the column buckles. Here
+/// Argument `z` from which on it saturates below the pole at 9.87, where the column buckles. Here
 /// `G0 = 0.062` and the bow stiffness is -16 times that of the unloaded rod.
 pub const KNEE: f64 = 8.75;
 
@@ -31,8 +31,8 @@ pub const REACH: f64 = 0.5;
 
 /// The argument kept short of the pole.
 #[inline(always)]
-pub(crate) fn levelled_argument<R: Real>(z: R) -> Levelled<R> {
-    level_above(z, KNEE, REACH)
+pub(crate) fn saturated_argument<R: Real>(z: R) -> Saturated<R> {
+    saturate_above(z, KNEE, REACH)
 }
 
 /// Bending of one spring, its constants prepared.
@@ -65,6 +65,7 @@ impl Bending {
         let rigidities = spring.rigidities();
         let free_length_m = spring.geometry().free_length_m;
         Self {
+            // Stiffnesses at rest, 2 alpha / L0 and 6 alpha / L0, and the constants of their formulas.
             bow_nm_per_rad: 2.0 * rigidities.alpha_n_m2 / free_length_m,
             sway_nm_per_rad: 6.0 * rigidities.alpha_n_m2 / free_length_m,
             slenderness_per_m2: rigidities.beta_n / (12.0 * rigidities.alpha_n_m2),
@@ -94,7 +95,7 @@ impl Bending {
         let form = self.quartic.form_at(length_m);
         let sheared_length_m = self.sheared_length_m(length_m, shortening_m);
         let sheared_slope = length_m.like(1.0 - self.shear_compliance);
-        let argument = levelled_argument(shortening_m * sheared_length_m * self.load_per_m2);
+        let argument = saturated_argument(shortening_m * sheared_length_m * self.load_per_m2);
         let z_by_length =
             argument.slope * (shortening_m * sheared_slope - sheared_length_m) * self.load_per_m2;
         let stability = StabilityFunctions::at(argument.value);
@@ -125,7 +126,7 @@ impl Bending {
             by_length: sway_slope * ends + (by_length - carry_slope * plates),
             writhe,
             writhe_slope,
-            levelled: argument.bent,
+            saturated: argument.saturated,
         }
     }
 }
@@ -143,5 +144,5 @@ pub(crate) struct BendingEnergy<R: Real> {
     /// Its derivative by the length of the chord.
     pub(crate) writhe_slope: R,
     /// Where the argument was kept short of the pole.
-    pub(crate) levelled: R::Mask,
+    pub(crate) saturated: R::Mask,
 }

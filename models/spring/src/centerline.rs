@@ -10,7 +10,7 @@
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::math;
 
-use crate::bending::levelled_argument;
+use crate::bending::saturated_argument;
 use crate::entire::EntireFunctions;
 use crate::pose::{Pose, quaternion};
 use crate::rigidity::{Geometry, Spring};
@@ -81,7 +81,7 @@ impl Centerline {
         let rest = (quaternion(direction.cross(upper_lean)) * upright_to_chord).conjugate() * orientation;
         // Short of the pole, and of tension so strong that all bending is at the ends.
         let argument = Shape::argument(spring.rigidities(), free_length_m, chord.length_m)?;
-        let argument = levelled_argument(argument).value.max(EntireFunctions::MIN_ARGUMENT);
+        let argument = saturated_argument(argument).value.max(EntireFunctions::MIN_ARGUMENT);
         Some(Self {
             lower_plate_m: DVec3::new(0.0, 0.0, -free_length_m),
             chord_m: chord.vector_m,
@@ -100,6 +100,7 @@ impl Centerline {
     pub fn section(&self, s: f64) -> Section {
         #[allow(clippy::manual_clamp)] // clamp would let NaN through
         let s = s.max(0.0).min(1.0);
+        // Lean and offset of equations 17 and 18 of the thesis, weighted by the sway and the bow of the ends.
         let [sway, bow] = self.shape.lean(s - 0.5).map(|lean| lean.value);
         let lean = self.sway_rad * sway + self.bow_rad * bow;
         let [sway, bow] = self.shape.offset(s - 0.5);

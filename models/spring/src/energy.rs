@@ -115,7 +115,7 @@ impl Law for EnergyForm {
         let Directions { versines, twist_versine, twist_sine, .. } = directions;
         let (angles, twist) = measures(versines, twist_versine, twist_sine);
         let bending = self.bending.at(length_m, shortening_m, &angles);
-        let BendingEnergy { by_squares, writhe, writhe_slope, levelled, .. } = bending;
+        let BendingEnergy { by_squares, writhe, writhe_slope, saturated, .. } = bending;
 
         let Directions { chord: e, upper: t, .. } = directions;
         // Derivatives by the versines of lower normal to chord, upper normal to chord, lower to upper normal.
@@ -157,7 +157,7 @@ impl Law for EnergyForm {
         } else {
             zero
         };
-        Answer { force_n, torque_nm, energy_j, answered, trusted: directions.trusted(levelled) }
+        Answer { force_n, torque_nm, energy_j, answered, trusted: directions.trusted(saturated) }
     }
 }
 
@@ -209,12 +209,12 @@ impl<R: Real> Directions<R> {
         }
     }
 
-    /// Where no angle is beyond what its measure is trusted for, and the argument was not levelled.
+    /// Where no angle is beyond what its measure is trusted for, and the argument was not saturated.
     #[inline(always)]
-    fn trusted(&self, levelled: R::Mask) -> R::Mask {
+    fn trusted(&self, saturated: R::Mask) -> R::Mask {
         let [lower, upper, plates] = self.versines;
-        // A levelled lane counts as an angle out of range: no complement of a mask is needed.
-        let beyond = R::select(levelled, lower.like(2.0), self.twist_versine);
+        // A saturated lane counts as an angle out of range: no complement of a mask is needed.
+        let beyond = R::select(saturated, lower.like(2.0), self.twist_versine);
         lower.below(TRUSTED_VERSINE)
             & upper.below(TRUSTED_VERSINE)
             & plates.below(TRUSTED_VERSINE)

@@ -99,6 +99,7 @@ impl<R: Real> EntireFunctions<R> {
     #[inline(always)]
     fn doubled(self, twice_z: R) -> Self {
         let Self { c0, g0, g1, g2 } = self;
+        // Doubling of the angle: C0(4 z) = 1 - 2 z G0², G0(4 z) = G0 C0; G1 and G2 by the recurrences of the module.
         let square = g0 * g0;
         Self {
             c0: square.like(1.0) - square * twice_z,

@@ -12,7 +12,7 @@
 //!   fourth order in the angles by [`shape`] and [`quartic`]; [`angle`] gives angles without `acos`, and [`level`]
 //!   keeps the law smooth close to buckling.
 //! - [`rod`]: the exact rod, past buckling too, with a memory of where it was.
-//! - [`hand_over`]: from the law `energy` to the rod where it is better, as one energy.
+//! - [`rod_blend`]: from the law `energy` to the rod where it is better, as one energy.
 //! - [`held`]: a law with what a real coil adds to it: [`contact`] of its coils, and the twist and the off-axis ends of
 //!   its [`wire`].
 //! - [`seat`]: a lower plate that may roll up on its rim and lift off.
@@ -31,9 +31,7 @@ pub mod contact;
 pub mod contract;
 pub mod energy;
 pub mod entire;
-pub mod hand_over;
 pub mod held;
-pub mod level;
 mod parameters;
 mod plugin;
 pub mod pose;
@@ -45,6 +43,8 @@ pub mod real;
 pub mod response;
 pub mod rigidity;
 pub mod rod;
+pub mod rod_blend;
+pub mod saturation;
 pub mod seat;
 pub mod shape;
 pub mod thesis;

@@ -162,7 +162,7 @@ pub(crate) struct Choice {
     pub(crate) accuracy: Accuracy,
     pub(crate) seat: SeatChoice,
     pub(crate) friction: Friction,
-    pub(crate) hand_over: Switch,
+    pub(crate) rod_blend: Switch,
     pub(crate) coil_contact: Switch,
     pub(crate) wire: Switch,
     pub(crate) preset: Preset,
@@ -178,7 +178,7 @@ impl Choice {
         let precision = precision(settings, variant)?;
         let accuracy = accuracy(settings, variant)?;
         let seat = seat(settings, variant)?;
-        let hand_over = hand_over(settings, variant)?;
+        let rod_blend = rod_blend(settings, variant)?;
         let coil_contact = coil("coil_contact", settings, variant)?;
         let wire = coil("wire", settings, variant)?;
         let (geometry, material, stiffness) = preset.parameters();
@@ -215,7 +215,7 @@ impl Choice {
             accuracy,
             seat,
             friction,
-            hand_over,
+            rod_blend,
             coil_contact,
             wire,
             preset,
@@ -235,7 +235,7 @@ impl Choice {
             accuracy: Accuracy::Servo,
             seat: SeatChoice::Fixed,
             friction: Friction::STICKING,
-            hand_over: if variant == Variant::Energy { Switch::On } else { Switch::Off },
+            rod_blend: if variant == Variant::Energy { Switch::On } else { Switch::Off },
             coil_contact: Switch::Off,
             wire: Switch::Off,
             preset,
@@ -303,7 +303,7 @@ impl Choice {
             "accuracy" => position(&[Accuracy::Servo, Accuracy::Tight], &self.accuracy),
             "seat" => position(&[SeatChoice::Fixed, SeatChoice::Free], &self.seat),
             "seat_friction" => self.friction.coefficient,
-            "hand_over" => position(&[Switch::Off, Switch::On], &self.hand_over),
+            "hand_over" => position(&[Switch::Off, Switch::On], &self.rod_blend),
             "coil_contact" => position(&[Switch::Off, Switch::On], &self.coil_contact),
             "wire" => position(&[Switch::Off, Switch::On], &self.wire),
             "mode" => position(&Mode::ALL, &Mode::of(self.stiffness)),
@@ -337,7 +337,7 @@ fn accuracy(settings: &Settings<'_>, variant: Variant) -> Result<Accuracy, Refus
     match (settings.choice_or_default("accuracy"), variant) {
         (1, Variant::Rod) => Ok(Accuracy::Tight),
         (1, Variant::Thesis | Variant::ClosedForm | Variant::CurrentLength | Variant::Energy) => {
-            Err(Refusal::parameter("`accuracy` tight is for variant `rod`; the other laws are formulas"))
+            Err(Refusal::parameter("`accuracy` tight is for variant `rod`; the other laws have closed forms"))
         }
         _ => Ok(Accuracy::Servo),
     }
@@ -354,15 +354,15 @@ fn seat(settings: &Settings<'_>, variant: Variant) -> Result<SeatChoice, Refusal
     }
 }
 
-/// Whether the law `energy` hands over to the rod, as it does unless told otherwise. No other law does.
-fn hand_over(settings: &Settings<'_>, variant: Variant) -> Result<Switch, Refusal> {
+/// Whether the law `energy` blends into the rod, which is its default. No other law does.
+fn rod_blend(settings: &Settings<'_>, variant: Variant) -> Result<Switch, Refusal> {
     let wanted = settings.choice_or_default("hand_over") == 1;
     match variant {
         Variant::Energy if wanted => Ok(Switch::On),
         Variant::Thesis | Variant::ClosedForm | Variant::CurrentLength | Variant::Rod
             if wanted && settings.number("hand_over").is_some() =>
         {
-            Err(Refusal::parameter("`hand_over` on is for variant `energy`, which hands over to the rod"))
+            Err(Refusal::parameter("`hand_over` on is for variant `energy`, which blends into the rod"))
         }
         _ => Ok(Switch::Off),
     }

@@ -115,6 +115,7 @@ impl<R: Real> Coordinates<R> {
         let Vector { x, y, z } = self.position_m;
         let [qx, qy, qz, qw] = self.orientation;
         let height_m = z + free_length_m;
+        // Square of the chord, and the error of the squared norm of the quaternion.
         let aside = x * x + y * y;
         let length_squared = aside + height_m * height_m;
         let norm_error = (qx * qx + qy * qy) + (qz * qz + qw * qw) - 1.0;

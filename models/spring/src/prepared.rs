@@ -8,13 +8,13 @@ use crate::closed_form::{ClosedForm, Form};
 use crate::contact::AxialContact;
 use crate::contract;
 use crate::energy::EnergyForm;
-use crate::hand_over::HandOver;
 use crate::held::{Held, HeldSpring};
 use crate::parameters::{Choice, SeatChoice, Switch, Variant};
 use crate::pose::Pose;
 use crate::response::{Demand, Response};
 use crate::rigidity::Spring;
 use crate::rod::{Accuracy, Branch, Coils, Rod};
+use crate::rod_blend::RodBlend;
 use crate::seat::Seat;
 use crate::thesis::Thesis;
 use crate::validity::Validity;
@@ -31,9 +31,9 @@ pub(crate) enum Prepared {
     ClosedForm(ClosedForm),
     Energy(Held<EnergyForm>),
     Rod(Held<Rod>),
-    HandOver(Held<HandOver>),
+    RodBlend(Held<RodBlend>),
     FreeEnergy(Held<EnergyForm>, Seat),
-    FreeHandOver(Held<HandOver>, Seat),
+    FreeRodBlend(Held<RodBlend>, Seat),
     FreeRod(Held<Rod>, Seat),
 }
 
@@ -43,25 +43,25 @@ pub(crate) struct Insight {
     pub(crate) is_stable: Option<bool>,
     /// Roll of the base about the y axis (rad); `None` for a spring that hangs in the air.
     pub(crate) seat_roll_rad: Option<f64>,
-    /// Share of the exact rod in a law that hands over to it, 0 to 1.
+    /// Share of the exact rod in a law that blends into it, 0 to 1.
     pub(crate) rod_share: Option<f64>,
 }
 
 impl Prepared {
     /// Not real-time: the rod allocates.
     pub(crate) fn new(choice: &Choice) -> Self {
-        let Choice { spring, stiffness, precision, variant, seat, friction, hand_over, .. } = choice;
+        let Choice { spring, stiffness, precision, variant, seat, friction, rod_blend, .. } = choice;
         match (variant, seat) {
             (Variant::Thesis, _) => Self::Thesis(Thesis::new(spring, *stiffness, *precision)),
             (Variant::ClosedForm, _) => {
                 Self::ClosedForm(ClosedForm::new(spring, Form::Printed).with_precision(*precision))
             }
             (Variant::CurrentLength, _) => Self::ClosedForm(ClosedForm::new(spring, Form::CurrentLength)),
-            (Variant::Energy, SeatChoice::Fixed) if *hand_over == Switch::On => {
-                Self::HandOver(handing_over(choice))
+            (Variant::Energy, SeatChoice::Fixed) if *rod_blend == Switch::On => {
+                Self::RodBlend(held_blend(choice))
             }
-            (Variant::Energy, SeatChoice::Free) if *hand_over == Switch::On => {
-                Self::FreeHandOver(handing_over(choice), Seat::new(spring, *friction))
+            (Variant::Energy, SeatChoice::Free) if *rod_blend == Switch::On => {
+                Self::FreeRodBlend(held_blend(choice), Seat::new(spring, *friction))
             }
             (Variant::Energy, SeatChoice::Fixed) => Self::Energy(energy(choice)),
             (Variant::Energy, SeatChoice::Free) => {
@@ -79,14 +79,14 @@ impl Prepared {
         match self {
             Self::Thesis(_) | Self::ClosedForm(_) => *self = Self::new(to),
             Self::Energy(held) => retune_energy(held, from, to),
-            Self::HandOver(held) => retune_hand_over(held, to),
+            Self::RodBlend(held) => retune_blend(held, to),
             Self::Rod(held) => retune_rod(held, to),
             Self::FreeEnergy(held, seat) => {
                 retune_energy(held, from, to);
                 seat.set_spring(&to.spring, to.friction);
             }
-            Self::FreeHandOver(held, seat) => {
-                retune_hand_over(held, to);
+            Self::FreeRodBlend(held, seat) => {
+                retune_blend(held, to);
                 seat.set_spring(&to.spring, to.friction);
             }
             Self::FreeRod(held, seat) => {
@@ -100,10 +100,10 @@ impl Prepared {
     pub(crate) fn reset(&mut self) {
         match self {
             Self::Thesis(_) | Self::ClosedForm(_) | Self::Energy(_) => {}
-            Self::HandOver(held) => held.law.reset(),
+            Self::RodBlend(held) => held.law.reset(),
             Self::Rod(held) => held.law.reset(),
             Self::FreeEnergy(_, seat) => seat.reset(),
-            Self::FreeHandOver(held, seat) => {
+            Self::FreeRodBlend(held, seat) => {
                 held.law.reset();
                 seat.reset();
             }
@@ -120,7 +120,7 @@ impl Prepared {
         match self {
             Self::ClosedForm(law) => contract::step(law, input),
             Self::Energy(held) if held.is_plain() => contract::step(&held.law, input),
-            Self::HandOver(held) if held.is_plain() && held.law.is_energy_alone(&contract::pose(input)) => {
+            Self::RodBlend(held) if held.is_plain() && held.law.is_energy_alone(&contract::pose(input)) => {
                 held.law.leave();
                 contract::step(&held.law.energy().law, input)
             }
@@ -134,10 +134,10 @@ impl Prepared {
             Self::Thesis(law) => law.respond(pose, demand),
             Self::ClosedForm(law) => law.respond(pose, demand),
             Self::Energy(held) => held.respond(pose, demand),
-            Self::HandOver(held) => held.respond(pose, demand),
+            Self::RodBlend(held) => held.respond(pose, demand),
             Self::Rod(held) => held.respond(pose, demand),
             Self::FreeEnergy(held, seat) => seat.step(held, pose, demand),
-            Self::FreeHandOver(held, seat) => seat.step(held, pose, demand),
+            Self::FreeRodBlend(held, seat) => seat.step(held, pose, demand),
             Self::FreeRod(held, seat) => seat.step(held, pose, demand),
         }
     }
@@ -153,9 +153,9 @@ impl Prepared {
         match self {
             Self::ClosedForm(law) => batch.respond(law, inputs, outputs),
             Self::Energy(held) if held.is_plain() => batch.respond(&held.law, inputs, outputs),
-            Self::HandOver(held) if held.is_plain() && held.law.energy().is_plain() => {
+            Self::RodBlend(held) if held.is_plain() && held.law.energy().is_plain() => {
                 batch.respond(&held.law.energy().law, inputs, outputs);
-                hand_over_some(&mut held.law, inputs, outputs);
+                blend_some(&mut held.law, inputs, outputs);
             }
             _ => return false,
         }
@@ -167,11 +167,11 @@ impl Prepared {
         match self {
             Self::Thesis(_) | Self::ClosedForm(_) => VariantInfo::new(Served::WRENCH, Memory::Stateless),
             Self::Energy(_) => VariantInfo::new(Served::ALL, Memory::Stateless),
-            Self::HandOver(held) if !held.law.remembers() => VariantInfo::new(Served::ALL, Memory::Stateless),
+            Self::RodBlend(held) if !held.law.remembers() => VariantInfo::new(Served::ALL, Memory::Stateless),
             Self::Rod(_)
-            | Self::HandOver(_)
+            | Self::RodBlend(_)
             | Self::FreeEnergy(..)
-            | Self::FreeHandOver(..)
+            | Self::FreeRodBlend(..)
             | Self::FreeRod(..) => VariantInfo::new(Served::ALL, Memory::PathDependent),
         }
     }
@@ -180,17 +180,17 @@ impl Prepared {
     pub(crate) fn insight(&self) -> Insight {
         let (state, seat) = match self {
             Self::Thesis(_) | Self::ClosedForm(_) | Self::Energy(_) => (None, None),
-            Self::HandOver(held) => (held.law.rod_state(), None),
+            Self::RodBlend(held) => (held.law.rod_state(), None),
             Self::Rod(held) => (Some(held.law.state()), None),
             Self::FreeEnergy(_, seat) => (None, Some(seat)),
-            Self::FreeHandOver(held, seat) => (held.law.rod_state(), Some(seat)),
+            Self::FreeRodBlend(held, seat) => (held.law.rod_state(), Some(seat)),
             Self::FreeRod(held, seat) => (Some(held.law.state()), Some(seat)),
         };
         Insight {
             branch: state.map(|state| state.branch),
             is_stable: state.map(|state| state.is_stable()),
             rod_share: match self {
-                Self::HandOver(held) | Self::FreeHandOver(held, _) => Some(held.law.share()),
+                Self::RodBlend(held) | Self::FreeRodBlend(held, _) => Some(held.law.share()),
                 _ => None,
             },
             seat_roll_rad: match seat {
@@ -206,17 +206,16 @@ impl Prepared {
     pub(crate) fn draw(&mut self, spring: &Spring, pose: &Pose, sections: &mut [Section]) -> bool {
         match self {
             Self::Thesis(_) | Self::ClosedForm(_) | Self::Energy(_) => draw_law(spring, pose, sections),
-            Self::HandOver(held) => draw_hand_over(held, spring, pose, sections),
+            Self::RodBlend(held) => draw_blend(held, spring, pose, sections),
             Self::Rod(held) => draw_rod(&mut held.law, pose, sections),
             Self::FreeEnergy(held, seat) => {
                 let arrived = arrive(|| seat.step(held, pose, Demand::Wrench));
                 arrived && seat.draw(pose, sections, |pose, sections| draw_law(spring, pose, sections))
             }
-            Self::FreeHandOver(held, seat) => {
+            Self::FreeRodBlend(held, seat) => {
                 let arrived = arrive(|| seat.step(held, pose, Demand::Wrench));
                 arrived
-                    && seat
-                        .draw(pose, sections, |pose, sections| draw_hand_over(held, spring, pose, sections))
+                    && seat.draw(pose, sections, |pose, sections| draw_blend(held, spring, pose, sections))
             }
             Self::FreeRod(held, seat) => {
                 let arrived = arrive(|| seat.step(held, pose, Demand::Wrench));
@@ -250,8 +249,8 @@ fn rod_to_tip(choice: &Choice) -> Held<Rod> {
     }
 }
 
-fn handing_over(choice: &Choice) -> Held<HandOver> {
-    Held { law: HandOver::new(&choice.spring, coils(choice)), contact: None, wire: wire(choice) }
+fn held_blend(choice: &Choice) -> Held<RodBlend> {
+    Held { law: RodBlend::new(&choice.spring, coils(choice)), contact: None, wire: wire(choice) }
 }
 
 fn coils(choice: &Choice) -> Coils {
@@ -262,10 +261,10 @@ fn coils(choice: &Choice) -> Coils {
 }
 
 /// Asks again, in order, where the rod has a share.
-fn hand_over_some(law: &mut HandOver, inputs: &[Input], outputs: &mut [Output]) {
+fn blend_some(law: &mut RodBlend, inputs: &[Input], outputs: &mut [Output]) {
     for (input, output) in inputs.iter().zip(outputs) {
         let pose = contract::pose(input);
-        if law.hands_over(&pose) {
+        if law.blends(&pose) {
             *output = contract::output(&law.respond(&pose, contract::demand(input)));
         } else {
             law.leave();
@@ -273,7 +272,7 @@ fn hand_over_some(law: &mut HandOver, inputs: &[Input], outputs: &mut [Output]) 
     }
 }
 
-fn retune_hand_over(held: &mut Held<HandOver>, to: &Choice) {
+fn retune_blend(held: &mut Held<RodBlend>, to: &Choice) {
     held.law.set_spring(&to.spring);
     held.wire = held.wire.map(|_| Wire::new(&to.spring));
 }
@@ -310,7 +309,7 @@ fn draw_rod(rod: &mut Rod, pose: &Pose, sections: &mut [Section]) -> bool {
 }
 
 /// The shape of the law that has the say, of `energy` as long as it has one.
-fn draw_hand_over(held: &mut Held<HandOver>, spring: &Spring, pose: &Pose, sections: &mut [Section]) -> bool {
+fn draw_blend(held: &mut Held<RodBlend>, spring: &Spring, pose: &Pose, sections: &mut [Section]) -> bool {
     arrive(|| held.law.respond(pose, Demand::Force))
         && match held.law.rod_alone() {
             Some(rod) => draw_rod(rod, pose, sections),

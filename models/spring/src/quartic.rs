@@ -44,9 +44,9 @@ use flotor_hal::math;
 use crate::beam_column::Column;
 use crate::bending::{KNEE, REACH};
 use crate::entire::EntireFunctions;
-use crate::level::{Levelled, level_above, level_below};
 use crate::real::{Real, polynomial};
 use crate::rigidity::{Rigidities, Spring};
+use crate::saturation::{Saturated, saturate_above, saturate_below};
 use crate::shape::Shape;
 
 /// Length of the fit: relative error below 2e-4 of the coefficients of short springs, 1e-2 of the slender one.
@@ -109,7 +109,7 @@ pub(crate) struct Quartic {
     mapping_per_m: f64,
 }
 
-/// A length at which the fit ends, and where the levelling before it begins.
+/// A length at which the fit ends, and where the saturation before it begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Limit {
     knee_m: f64,
@@ -128,6 +128,7 @@ impl Quartic {
         let longest = at_argument(EntireFunctions::MIN_ARGUMENT).unwrap_or(LONGEST);
         let longest = longest.min(LONGEST).min(longest_with_shape(rigidities));
         let margin = MARGIN.min(0.5 * (longest - 1.0));
+        // Lengths from `shortest` to `longest` are mapped to -1 to 1, where the polynomials are fitted.
         let (middle, half_width) = (0.5 * (longest + shortest), 0.5 * (longest - shortest));
         let powers = fit(|mapped| coefficients(rigidities, free_length_m, middle + half_width * mapped));
         Self {
@@ -146,8 +147,8 @@ impl Quartic {
         Self { gamma_n, ..self }
     }
 
-    /// The term of the form at a length, its argument `z` (levelled, with `dz/dL`) and the squared angles. Real-time: bounded,
-    /// no allocation.
+    /// The term of the form at a length, its argument `z` (saturated, with `dz/dL`) and the squared angles. Real-time:
+    /// bounded, no allocation.
     #[inline(always)]
     pub(crate) fn at<R: Real>(
         &self,
@@ -158,10 +159,12 @@ impl Quartic {
     ) -> QuarticEnergy<R> {
         let ([c0, c1, c2, c3], [c0_slope, c1_slope, c2_slope, c3_slope]) =
             (form.coefficients, form.by_length);
+        // The magnification 1 + z_p / (z_p - z) with its pole z_p, and the derivative by z.
         let pole = (z.like(POLE) - z).inverse() * POLE;
         let magnification = pole + 1.0;
         let by_argument = pole * pole * (1.0 / POLE);
 
+        // S² and the magnified D² and S.D, from the squared angles of the ends and between the plates.
         let [lower, upper, plates] = squares;
         let (across, along) = (plates * 0.25, (upper - lower) * 0.25);
         let sway = (lower + upper) * 0.5 - across;
@@ -194,8 +197,8 @@ impl Quartic {
     #[inline(always)]
     pub(crate) fn form_at<R: Real>(&self, length_m: R) -> QuarticForm<R> {
         let Self { shortest, longest, .. } = *self;
-        let below = level_below(length_m, shortest.knee_m, shortest.reach_m);
-        let Levelled { value, slope, .. } = level_above(below.value, longest.knee_m, longest.reach_m);
+        let below = saturate_below(length_m, shortest.knee_m, shortest.reach_m);
+        let Saturated { value, slope, .. } = saturate_above(below.value, longest.knee_m, longest.reach_m);
         let slope = slope * below.slope * self.mapping_per_m;
         let mapped = (value - self.middle_m) * self.mapping_per_m;
         let [p0, p1, p2, p3] = &self.powers;
@@ -293,6 +296,7 @@ impl Means {
     }
 
     fn add(&mut self, shape: &Shape, u: f64, weight: f64) {
+        // One node of the quadrature of the means over the rod.
         let [sway, bow] = shape.lean(u);
         let (s, b) = (sway.value, bow.value);
         let sweep = s * bow.slope - b * sway.slope;
@@ -322,12 +326,14 @@ fn coefficients(rigidities: &Rigidities, free_length_m: f64, relative: f64) -> D
     let c = 1.0 - gamma / beta;
     let sigma = 1.0 - c * p;
 
+    // The factors of `W4` in the module documentation, in its order.
     let squared_mean = gamma * (sigma - 0.5) * (sigma - 0.5);
     let mean_square = gamma * p * (1.0 / 12.0 - (1.0 - sigma) / 3.0);
     let cubic = -2.0 * beta * sigma * (2.0 / 3.0 * sigma - 0.5);
     let shortening = 2.0 * beta * sigma * c * (sigma - 0.5);
     let tilting = -beta * (beta / gamma - 1.0) * sigma * sigma;
 
+    // With theta = S sway + D bow: the coefficients of S⁴, S² D², (S.D)² and D⁴.
     let mean2 = m.sway * m.sway;
     let sway = squared_mean * m.sway2 * m.sway2
         + mean_square * m.sway4

@@ -4,7 +4,7 @@
 //! poses in the lanes of one vector register. Every operation rounds as IEEE 754 says, in the order written, and no product is
 //! fused with a sum, so a lane of a batch holds *the same bits* as the scalar law, on every machine.
 //!
-//! A comparison gives a mask, a truth value per lane. What is rare (strong tension, levelling, a plate below the
+//! A comparison gives a mask, a truth value per lane. What is rare (strong tension, saturation, a plate below the
 //! other) stands behind `if R::any(mask)`: for one pose an ordinary branch, for several a branch taken when one of
 //! them needs it, with [`Real::select`] keeping the others as they were.
 //!
@@ -373,6 +373,7 @@ impl<R: Real> Real for Pair<R> {
 /// apart: short dependency chains. Real-time: bounded, no allocation, no branch.
 #[inline(always)]
 pub(crate) fn polynomial<R: Real, const TERMS: usize>(x: R, powers: &[f64; TERMS]) -> [R; 2] {
+    // Horner in x² for even and odd powers at once, value and derivative.
     let square = x * x;
     let (mut even_slope, mut odd_slope) = (x.like(powers[TERMS - 2]), x.like(powers[TERMS - 1]));
     let (mut even, mut odd) =

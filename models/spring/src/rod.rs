@@ -161,7 +161,7 @@ impl Rod {
     }
 
     /// The rod at rest with the servo's polynomials and each equilibrium to rounding, so that nothing of the past is left
-    /// in an answer: for laws that do something with its energy, mix it ([`crate::hand_over`]) or minimise it
+    /// in an answer: for laws that do something with its energy, mix it ([`crate::rod_blend`]) or minimise it
     /// ([`crate::seat`]). Not real-time: allocates.
     #[must_use]
     pub fn to_rounding(spring: &Spring, coils: Coils) -> Self {

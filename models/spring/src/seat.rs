@@ -349,6 +349,7 @@ fn tipped_minimum(curvature: DMat2, pull: DVec2, tip: f64) -> DVec2 {
     let mut length = 0.0;
     let mut direction = pull / pull.length();
     for _ in 0..SECULAR_STEPS {
+        // One Newton step on 1 - 1 / |(t H + c)⁻¹ b| = 0 for the length `t`.
         let matrix = curvature * length + DMat2::from_diagonal(DVec2::splat(tip));
         let inverse = matrix.inverse();
         let scaled = inverse * pull;

@@ -52,11 +52,13 @@ impl Shape {
     /// the bending rigidity that belongs to it, and meet their end conditions all the same.
     pub(crate) fn new(rigidities: &Rigidities, free_length_m: f64, length_m: f64, z: f64) -> Option<Self> {
         let true_z = Self::argument(rigidities, free_length_m, length_m)?;
+        // Rigidities per current length, and s = 1 + P / beta.
         let scale = length_m / free_length_m;
         let beta = rigidities.beta_n * scale;
         let alpha = rigidities.alpha_n_m2 * scale * if z == true_z { 1.0 } else { true_z / z };
         let softening = 1.0 + rigidities.gamma_n * (1.0 - scale) / beta;
 
+        // The sway stiffness a + b, then Q, B and A from the end conditions theta = S and y = 0.
         let EntireFunctions { g0, g1, .. } = EntireFunctions::at(z);
         let sway = 0.5 * softening * length_m * g0
             / (g0 / beta + softening * length_m * length_m * g1 / (12.0 * alpha));
@@ -68,6 +70,7 @@ impl Shape {
 
     /// Lean of the section at `u`, from -1/2 to 1/2: of the sway (`S`) and of the bow (`D`).
     pub(crate) fn lean(&self, u: f64) -> [Lean; 2] {
+        // `theta` of the module documentation and its derivative by `u`.
         let square = u * u;
         let inner = EntireFunctions::at(self.z * square);
         let outer = EntireFunctions::at(4.0 * self.z * square);
@@ -80,6 +83,7 @@ impl Shape {
 
     /// Offset from the chord at `u`, in chord lengths per radian: of the sway and of the bow.
     pub(crate) fn offset(&self, u: f64) -> [f64; 2] {
+        // `y / L` of the module documentation.
         let at = |position: f64| EntireFunctions::at(self.z * position * position);
         let (above, below) = (0.5 - u, 0.5 + u);
         let curved = self.cosine * at(2.0 * u).g0 + self.parabola * u * u * at(u).h() / 3.0;

@@ -217,6 +217,7 @@ impl<T: CFloat> Printed<T> {
             }
         };
         let pi = T::store(PRINTED_PI).wide();
+        // Buckling: P (1 + P / beta) = 4 pi² alpha / L0², equation 19 at q L0 = 2 pi (equation 20), and its length.
         let root = (beta.wide() * beta.wide()
             + 16.0 * (pi * pi) * alpha.wide() * beta.wide() / (free_length.wide() * free_length.wide()))
         .sqrt();
@@ -259,6 +260,7 @@ impl<T: CFloat> Printed<T> {
         let Self { free_length: l0, alpha, beta, gamma, .. } = *self;
         let [one, two] = [1.0, 2.0].map(T::store);
         let p = gamma * (l0 - l) / l0;
+        // q of equation 19 in tension, H' of equation 71, M' of equation 72; near the free length H of equation 76.
         let q = T::store((-(p / alpha) * (one + p / beta)).wide().sqrt());
         let tanh = math::tanh((q * l / two).wide());
         let (hx, hz) = if l.wide() < l0.wide() + WINDOW_MM {
@@ -287,6 +289,7 @@ impl<T: CFloat> Printed<T> {
         let Self { free_length: l0, alpha, beta, gamma, .. } = *self;
         let [one, two] = [1.0, 2.0].map(T::store);
         let p = gamma * (l0 - l) / l0;
+        // q of equation 19, H of equation 48, M of equation 49; near the free length H of equation 76.
         let q = T::store(((p / alpha) * (one + p / beta)).wide().sqrt());
         let tan = math::tan((q * l / two).wide());
         let (hx, hz) = if l.wide() > l0.wide() - WINDOW_MM {

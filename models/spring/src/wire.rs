@@ -113,6 +113,7 @@ struct Section {
 impl Section {
     fn new(geometry: &Geometry, material: &Material) -> Self {
         let d = geometry.wire_diameter_m;
+        // Round wire: area pi d² / 4, second moment pi d⁴ / 64; the helix climbs L0 / (2 pi n) per radian.
         let (area_m2, second_moment_m4) = (0.25 * PI * d * d, PI * math::powi(d, 4) / 64.0);
         let coil_radius_m = 0.5 * geometry.coil_diameter_m;
         let climb_m_per_rad = geometry.free_length_m / (TAU * geometry.active_coils);
@@ -164,6 +165,7 @@ impl Compliance {
             let radius = section.coil_radius_m;
             let tangent =
                 DVec3::new(-radius * sine, radius * cosine, section.climb_m_per_rad) / section.arc_m_per_rad;
+            // A section yields along and across its tangent: shear and tension, bending and torsion.
             let along = DMat3::from_cols(tangent * tangent.x, tangent * tangent.y, tangent * tangent.z);
             let across = DMat3::IDENTITY - along;
             let yields = Self {
@@ -182,6 +184,7 @@ impl Compliance {
     /// The same, loaded at a point that is an arm away: its force has a moment here.
     fn seen_from(&self, arm_m: DVec3) -> Self {
         let DVec3 { x, y, z } = arm_m;
+        // With the cross product matrix X of the arm: ff + fm X + (fm X)ᵀ + Xᵀ mm X, and fm + Xᵀ mm.
         let cross = DMat3::from_cols(DVec3::new(0.0, z, -y), DVec3::new(-z, 0.0, x), DVec3::new(y, -x, 0.0));
         let mixed = self.fm * cross;
         Self {
@@ -221,6 +224,7 @@ fn stiffness(compliance: &Compliance) -> Stiffness6 {
 /// Of the straight rod: a beam that shears (Timoshenko), compressed and twisted beside.
 fn rod_stiffness(rigidities: &Rigidities, length_m: f64) -> Stiffness6 {
     let Rigidities { alpha_n_m2: alpha, beta_n: beta, gamma_n: gamma, tau_n_m2: tau } = *rigidities;
+    // Timoshenko beam: lateral 12 u / L², coupling 6 u / L, bending (4 + softness) u, u = alpha / (L (1 + softness)).
     let softness = 12.0 * alpha / (beta * length_m * length_m);
     let unit = alpha / (length_m * (1.0 + softness));
     let lateral = 12.0 * unit / (length_m * length_m);

@@ -109,7 +109,7 @@ fn closed_paths_cost_nothing() {
 }
 
 #[test]
-fn printed_law_makes_energy_on_closed_paths() {
+fn printed_law_generates_energy_on_closed_paths() {
     let spring = Preset::Thesis1.spring();
     let law = ClosedForm::new(&spring, Form::Printed);
     let mut sampler = Sampler::new(2);

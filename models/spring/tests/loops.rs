@@ -5,13 +5,13 @@ use std::f64::consts::TAU;
 use flotor_hal::glam::DVec3;
 use flotor_spring::contact::AxialContact;
 use flotor_spring::energy::EnergyForm;
-use flotor_spring::hand_over::HandOver;
 use flotor_spring::held::{Held, HeldSpring};
 use flotor_spring::pose::Pose;
 use flotor_spring::preset::Preset;
 use flotor_spring::response::{Demand, Response};
 use flotor_spring::rigidity::Spring;
 use flotor_spring::rod::{Accuracy, Coils, Rod};
+use flotor_spring::rod_blend::RodBlend;
 use flotor_spring::seat::{Friction, Seat};
 use flotor_spring::validity::Validity;
 use flotor_spring::wire::Wire;
@@ -104,11 +104,11 @@ fn no_law_on_a_held_seat_makes_or_takes_energy() {
             let mut rod = Rod::new(&spring, Accuracy::Servo);
             costs_nothing("rod", &spring, way, |pose| rod.step(pose, Demand::Wrench));
             for coils in [Coils::Pass, Coils::Touch] {
-                let mut law = HandOver::new(&spring, coils);
+                let mut law = RodBlend::new(&spring, coils);
                 costs_nothing("hand-over", &spring, way, |pose| law.respond(pose, Demand::Wrench));
             }
             let (contact, wire) = (Some(AxialContact::new(&spring)), Some(Wire::new(&spring)));
-            let mut coil = Held { law: HandOver::new(&spring, Coils::Pass), contact, wire };
+            let mut coil = Held { law: RodBlend::new(&spring, Coils::Pass), contact, wire };
             costs_nothing("contact and wire", &spring, way, |pose| coil.respond(pose, Demand::Wrench));
         }
     }
@@ -124,13 +124,13 @@ fn a_base_that_rolls_and_sits_down_makes_no_energy() {
     let (mut base, mut law) = (seat(), EnergyForm::new(&spring));
     costs_nothing("energy", &spring, way, |pose| base.step(&mut law, pose, Demand::Wrench));
     assert!(base.tilt_rad().length() > 0.01, "the path tips the base");
-    let (mut base, mut law) = (seat(), HandOver::new(&spring, Coils::Pass));
+    let (mut base, mut law) = (seat(), RodBlend::new(&spring, Coils::Pass));
     costs_nothing("hand-over", &spring, way, |pose| base.step(&mut law, pose, Demand::Wrench));
     let (mut base, mut law) = (seat(), Rod::to_rounding(&spring, Coils::Pass));
     costs_nothing("rod", &spring, way, |pose| base.step(&mut law, pose, Demand::Wrench));
-    // Spring 3 is handed over on the way; its base sits down and tips in turns.
+    // Spring 3 is blended on the way; its base sits down and tips in turns.
     let spring = Preset::Thesis3.spring();
-    let (mut base, mut law) = (Seat::new(&spring, Friction::STICKING), HandOver::new(&spring, Coils::Pass));
+    let (mut base, mut law) = (Seat::new(&spring, Friction::STICKING), RodBlend::new(&spring, Coils::Pass));
     costs_nothing("hand-over, seated", &spring, (&DEEP, 2000), |pose| {
         base.step(&mut law, pose, Demand::Wrench)
     });

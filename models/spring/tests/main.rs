@@ -3,11 +3,11 @@
 mod batch;
 mod coil;
 mod conservation;
-mod hand_over;
 mod invariance;
 mod loops;
 mod oracle;
 mod rod;
+mod rod_blend;
 mod sample;
 mod seat;
 mod table;

@@ -10,12 +10,12 @@ use crate::sample::{Sampler, Workspace};
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_spring::closed_form::{ClosedForm, Form};
 use flotor_spring::energy::EnergyForm;
-use flotor_spring::hand_over::HandOver;
 use flotor_spring::held::HeldSpring;
 use flotor_spring::pose::Pose;
 use flotor_spring::preset::Preset;
 use flotor_spring::response::{Demand, Response};
 use flotor_spring::rod::{Accuracy, Coils, Rod};
+use flotor_spring::rod_blend::RodBlend;
 use flotor_spring::validity::Validity;
 
 const DEVICE: Workspace = Workspace { shear: 0.25, height: 0.5, tilt_rad: 0.12, yaw_rad: 0.12 };
@@ -73,14 +73,14 @@ fn a_cold_rod_answers_every_pose() {
     for preset in Preset::ALL {
         let spring = preset.spring();
         let mut rod = Rod::new(&spring, Accuracy::Servo);
-        let mut handing_over = HandOver::new(&spring, Coils::Touch);
+        let mut blending = RodBlend::new(&spring, Coils::Touch);
         let mut sampler = Sampler::new(7);
         for workspace in [WILD, DEVICE] {
             for _ in 0..of(12_500) {
                 let pose = workspace.pose(&mut sampler, spring.geometry().free_length_m);
                 rod.reset();
                 (0..4).for_each(|_| is_sound(&rod.step(&pose, Demand::WrenchAndEnergy), &pose));
-                is_sound(&handing_over.respond(&pose, Demand::WrenchAndEnergy), &pose);
+                is_sound(&blending.respond(&pose, Demand::WrenchAndEnergy), &pose);
             }
         }
     }

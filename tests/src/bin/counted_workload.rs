@@ -17,13 +17,13 @@ use flotor_simulated::simulation::{Setup, Simulation};
 use flotor_spring::batch::Batch;
 use flotor_spring::closed_form::{ClosedForm, Form};
 use flotor_spring::energy::EnergyForm;
-use flotor_spring::hand_over::HandOver;
 use flotor_spring::held::HeldSpring;
 use flotor_spring::pose::Pose;
 use flotor_spring::precision::Precision;
 use flotor_spring::preset::Preset;
 use flotor_spring::response::Demand;
 use flotor_spring::rod::{Accuracy, Coils, Rod};
+use flotor_spring::rod_blend::RodBlend;
 use flotor_spring::thesis::Thesis;
 use flotor_tests::watched::prepared;
 use sample::{Sampler, Workspace};
@@ -117,7 +117,8 @@ fn replacements(ticks: u32) -> String {
 /// The workspace of the thesis: a quarter of the free length, seven degrees.
 const WORKSPACE: Workspace = Workspace { shear: 0.25, height: 0.3, tilt_rad: 0.12, yaw_rad: 0.12 };
 
-/// Two parts of each law: printed, closed-form, energy, energy that may hand over, and the batches of closed-form and energy.
+/// Two parts of each law: printed, closed-form, energy, energy that may blend, and the batches of closed-form and
+/// energy.
 fn laws() {
     let spring = Preset::Thesis1.spring();
     let (_, _, stiffness) = Preset::Thesis1.parameters();
@@ -127,11 +128,11 @@ fn laws() {
     let printed = Thesis::new(&spring, stiffness, Precision::Double);
     let closed = ClosedForm::new(&spring, Form::Printed);
     let energy = EnergyForm::new(&spring);
-    let mut handing_over = HandOver::new(&spring, Coils::Pass);
+    let mut blending = RodBlend::new(&spring, Coils::Pass);
     law(&poses, |pose| printed.respond(pose, Demand::Wrench));
     law(&poses, |pose| closed.respond(pose, Demand::Wrench));
     law(&poses, |pose| energy.respond(pose, Demand::Wrench));
-    law(&poses, |pose| handing_over.respond(pose, Demand::Wrench));
+    law(&poses, |pose| blending.respond(pose, Demand::Wrench));
 
     let input = |pose: &Pose| Input {
         demand: Demanded::WRENCH,

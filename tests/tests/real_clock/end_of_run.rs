@@ -132,7 +132,7 @@ const HELD: &str = "rate_hz = 1000\nduration_s = 1.2\n[device]\nplugin = \"simul
                     [limits]\nramp_s = 0.5\nwatchdog_ms = 60000\n";
 
 #[test]
-fn a_run_whose_time_is_over_lets_go_and_does_not_drop() {
+fn a_run_whose_time_is_over_fades_out_and_does_not_drop() {
     let run = watch_on(Clock::Real, HELD);
     assert_eq!(run.outcome.end, RunEnd::Finished);
     let force_n = |record: &TickRecord| record.commanded.force().length();

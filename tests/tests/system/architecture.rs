@@ -305,7 +305,7 @@ const UNSAFE: &[(&str, &str)] = &[
     ("hal/src/extension/", "the function tables of the extensions"),
     (
         "host/session/src/registry/mod.rs",
-        "the one place of the host that loads a plugin file, for which the user vouches",
+        "the one place of the host that loads a plugin file, which the user guarantees",
     ),
     ("viewer/src/shape.rs", "the one place of the viewer that loads a plugin file"),
     (

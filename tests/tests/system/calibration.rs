@@ -11,7 +11,7 @@ use std::path::Path;
 fn run(arguments: &[&str]) -> Value {
     let ran = Flotor::with(arguments.iter().copied().chain(["--json", "-"])).run();
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
-    serde_json::from_str(&ran.stdout).expect("the report is JSON")
+    serde_json::from_str(&ran.stdout).expect("the summary is JSON")
 }
 
 fn number(report: &Value, key: &str) -> f64 {
@@ -101,7 +101,7 @@ fn a_scene_names_the_file_and_the_device_corrects_the_total_force() {
 }
 
 #[test]
-fn the_reports_polynomial_can_be_imported_and_leaves_what_it_leaves() {
+fn the_polynomial_of_the_thesis_can_be_imported_and_leaves_what_it_leaves() {
     let scratch = Scratch::default();
     let file = scratch.path().join("thesis.toml");
     let ran = Flotor::with(["calibrate", "import", "--out", text(&file)]).run();

@@ -207,7 +207,7 @@ set = ["first.gamma_n=0.1", "second.beta_n=50", "second.gamma_n=12"]
         let arguments = ["replay", &recording, "--json", "-"].into_iter().chain(more.iter().copied());
         let ran = Flotor::with(arguments).run();
         assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
-        serde_json::from_str(&ran.stdout).expect("the report is JSON")
+        serde_json::from_str(&ran.stdout).expect("the summary is JSON")
     };
     assert_eq!(replay(&[])["bit_exact"], Value::from(true));
     let held = replay(&["--set", "first.gamma_n=16.97"]);

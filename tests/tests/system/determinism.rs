@@ -52,11 +52,11 @@ fn a_recording_replays_bit_for_bit_and_a_changed_one_does_not() {
     let _ = summary(&["--duration", "2s", "--record", &recording]);
     let same = Flotor::with(["replay", &recording, "--json", "-"]).run();
     assert_eq!(same.code, Some(exit_code::OK), "{same:?}");
-    let report: Value = serde_json::from_str(&same.stdout).expect("the report is JSON");
+    let report: Value = serde_json::from_str(&same.stdout).expect("the summary is JSON");
     assert_eq!((&report["bit_exact"], &report["ticks"]), (&Value::from(true), &Value::from(2000)));
     let changed = Flotor::with(["replay", &recording, "--set", "spring.gamma_n=18", "--json", "-"]).run();
     assert_eq!(changed.code, Some(exit_code::OK), "{changed:?}");
-    let report: Value = serde_json::from_str(&changed.stdout).expect("the report is JSON");
+    let report: Value = serde_json::from_str(&changed.stdout).expect("the summary is JSON");
     // The axial force scales with gamma: 18 / 16.97 - 1 of a peak of some newtons.
     assert!(report["max_force_n"].as_f64().is_some_and(|force_n| force_n > 0.1), "{report}");
 
@@ -64,7 +64,7 @@ fn a_recording_replays_bit_for_bit_and_a_changed_one_does_not() {
     let arguments = ["replay", &recording, "--model", "spring=wall", "--json", "-", "--plot", &plot];
     let other = Flotor::with(arguments).run();
     assert_eq!(other.code, Some(exit_code::OK), "{other:?}");
-    let report: Value = serde_json::from_str(&other.stdout).expect("the report is JSON");
+    let report: Value = serde_json::from_str(&other.stdout).expect("the summary is JSON");
     assert!(report["differing_ticks"].as_u64().is_some_and(|ticks| ticks > 1000), "{report}");
     let picture = std::fs::read_to_string(plot).expect("the picture is there");
     assert!(picture.starts_with("<svg") && picture.contains("Difference of torque"));

@@ -166,3 +166,133 @@ fn the_book_prints_every_refusal_of_the_loader() {
     let printed: Vec<String> = printed.iter().map(|row| row[0].trim_matches('`').to_owned()).collect();
     assert_eq!(printed, refusals);
 }
+
+// ---------------------------------------------------------------- glossary
+
+/// Files with words: their extensions.
+const TEXT: [&str; 10] = ["rs", "toml", "md", "py", "h", "c", "cpp", "proto", "sh", "wgsl"];
+/// Documents that keep the words of their time.
+const HISTORY: [&str; 2] = ["CHANGELOG.md", "docs/src/adr"];
+/// Where left terms still stand, and the documents that quote their output. The list only shrinks.
+const NOT_YET_MENDED: [&str; 12] = [
+    "host/src",
+    "host/command",
+    "host/lab",
+    "host/study",
+    "host/calibration",
+    "viewer",
+    "host/bridge",
+    "host/python",
+    "host/sweep",
+    "docs/src/reference/commands.md",
+    "docs/src/stress.md",
+    "docs/src/write-a-model.md",
+];
+/// Between the words of a name in CamelCase.
+const HUMP: char = '\u{1}';
+
+/// Lower case and in one line, without the signs of comments; `_` is a space.
+fn flattened(text: &str) -> String {
+    let mut flat = String::with_capacity(text.len() + text.len() / 16);
+    for line in text.lines() {
+        let words = line.trim_start().trim_start_matches(['/', '!', '#', '*']).trim().trim_end_matches('\\');
+        let mut last = ' ';
+        for next in words.chars().map(|character| if character == '_' { ' ' } else { character }).chain([' '])
+        {
+            if next.is_uppercase() && (last.is_lowercase() || last.is_ascii_digit()) {
+                flat.push(HUMP);
+            }
+            if next != ' ' || !flat.ends_with(' ') {
+                flat.extend(next.to_lowercase());
+            }
+            last = next;
+        }
+    }
+    flat
+}
+
+/// Where a term stands in a flattened text, with what surrounds it. A term next to `/` or `-` is part of a path, a key or
+/// the name of a file.
+fn first_use<'a>(flat: &'a str, term: &str) -> Option<&'a str> {
+    let term = flattened(term);
+    let (term, camel) = (term.trim(), term.trim().replace(' ', &HUMP.to_string()));
+    let is_part = |c: char| c.is_alphanumeric() || c == '/' || c == '-';
+    let is_whole = |start: usize, length: usize| {
+        let after = &flat[start + length..];
+        let ends = ["", "s", "es"].iter().filter_map(|plural| after.strip_prefix(plural));
+        !flat[..start].ends_with(is_part) && ends.into_iter().any(|rest| !rest.starts_with(is_part))
+    };
+    let found = [term, &camel].into_iter().flat_map(|form| flat.match_indices(form));
+    let (start, found) = found.into_iter().find(|(start, found)| is_whole(*start, found.len()))?;
+    let from = flat.floor_char_boundary(start.saturating_sub(40));
+    Some(&flat[from..flat.ceil_char_boundary(start + found.len() + 40)])
+}
+
+/// The terms of the left column of the glossary, and those of the middle one.
+fn glossary() -> Vec<[String; 2]> {
+    let rows = table_under(&read("CONTRIBUTING.md"), "## Glossary");
+    rows.iter().map(|row| [row[0].trim_matches('`').to_owned(), row[1].clone()]).collect()
+}
+
+#[test]
+fn the_glossary_replaces_each_term_once_and_by_none_of_its_own() {
+    let rows = glossary();
+    assert!(rows.len() >= 60, "{} rows", rows.len());
+    for (number, [left, _]) in rows.iter().enumerate() {
+        assert!(!rows[..number].iter().any(|[before, _]| before == left), "`{left}` has two rows");
+        for [_, term] in &rows {
+            assert_eq!(
+                first_use(&flattened(term), left),
+                None,
+                "`{term}` replaces a term and contains `{left}`"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_term_is_found_in_every_form_in_which_it_can_be_written() {
+    for [term, _] in glossary() {
+        let name = flattened(&term).trim().replace([' ', HUMP], "_");
+        let is_camel = flattened(&term).contains(HUMP);
+        let split = term.replace(' ', "\n    /// ");
+        for text in [format!("/// A {term}."), format!("let {term}s = 1;"), format!("// {split}")] {
+            assert!(first_use(&flattened(&text), &term).is_some(), "`{term}` in {text:?}");
+        }
+        let planted = flattened(&format!("fn of_{name}_here()"));
+        assert_eq!(first_use(&planted, &term).is_some(), !is_camel, "`{term}` in {planted}");
+        for text in [format!("x{term}x"), format!("key/{term}/name"), format!("{term}-file.md")] {
+            assert_eq!(first_use(&flattened(&text), &term), None, "`{term}` in {text:?}");
+        }
+    }
+    for (text, term) in
+        [("struct FreeHandOver;", "HandOver"), ("SlowModel::start()", "slow model"), ("wishes", "wish")]
+    {
+        assert!(first_use(&flattened(text), term).is_some(), "`{term}` in {text}");
+    }
+}
+
+#[test]
+fn no_text_uses_a_term_that_the_glossary_replaces() {
+    let terms = glossary();
+    let is_left_out =
+        |file: &Path| HISTORY.iter().chain(&NOT_YET_MENDED).any(|folder| file.starts_with(folder));
+    let files =
+        TEXT.iter().flat_map(|extension| files_under("", extension).expect("the workspace can be read"));
+    let uses: Vec<String> = files
+        .filter(|file| !is_left_out(file))
+        .flat_map(|file| {
+            let text = read(&file);
+            // The table itself is the one place that has to name them.
+            let is_table = file.ends_with("CONTRIBUTING.md");
+            let text = text.lines().filter(|line| !is_table || !line.starts_with("| `"));
+            let flat = flattened(&text.flat_map(|line| [line, "\n"]).collect::<String>());
+            let found = terms.iter().filter_map(|[term, right]| {
+                let place = first_use(&flat, term)?;
+                Some(format!("{}: `{term}` ({right}) in \"{place}\"", file.display()))
+            });
+            found.collect::<Vec<_>>()
+        })
+        .collect();
+    assert!(uses.is_empty(), "the glossary of CONTRIBUTING.md replaces these:\n{}", uses.join("\n"));
+}

@@ -64,7 +64,7 @@ fn a_slow_sensor_costs_the_handle_nothing() {
 
 #[test]
 fn a_sensor_that_falls_silent_is_a_fault() {
-    // A machine may hold up the three answers; the run ends with the silence, long before its time.
+    // A machine may delay the three answers; the run ends with the silence, long before its time.
     let run = run_beside_a_sensor(3, 20.0, 1000);
     assert_eq!(run.outcome.end, RunEnd::DeviceFault(Fault::Timeout));
 }

@@ -56,7 +56,7 @@ impl Board {
     fn scene(&self, limits: &str) -> Scene {
         let file = workspace_root().join("host/scenes/haply.toml");
         let text = std::fs::read_to_string(&file).expect("the scene is there");
-        // A machine that is held up for long is no fault of the board.
+        // A machine that is delayed for long is no fault of the board.
         let port = format!("{}\"\ntimeout_ms = \"9000", self.path).replace("\"9000", "9000");
         let text = text.replace("/dev/ttyACM0\"", &port).replace("force_n = [3, 3, 0]", limits);
         Scene::parse(&file, &text.replace("duration_s = 20", "duration_s = 1")).expect("the scene is right")

@@ -138,7 +138,7 @@ fn rest(client: &mut Client) -> (Vec<TickRecord>, u64, Vec<Event>) {
 }
 
 #[test]
-fn who_watches_sees_every_tick_or_knows_how_many_not() {
+fn a_client_sees_every_tick_or_knows_how_many_not() {
     let (digest, ticks, _, watcher) = run_watched(
         Clock::Virtual,
         |directory| {
@@ -189,7 +189,7 @@ fn a_frozen_a_killed_and_a_talkative_watcher_change_no_bit() {
             }
         },
     );
-    assert_eq!(flooding.0, unwatched_digest(), "flooding: rubbish, and requests that are refused");
+    assert_eq!(flooding.0, unwatched_digest(), "flooding: malformed data, and requests that are refused");
 }
 
 #[test]
@@ -202,7 +202,7 @@ fn a_watcher_changes_parameters_and_is_told() {
             let bad = answer(&mut client, set("spring", "gamma", "20"));
             assert!(
                 bad.refused.is_some_and(|reason| reason.contains("gamma_n")),
-                "with the nearest right key"
+                "with the closest valid key"
             );
             let fixed = answer(&mut client, set("spring", "variant", "rod"));
             assert!(fixed.refused.is_some_and(|reason| reason.contains("while the loop runs")));
@@ -305,7 +305,7 @@ fn a_model_of_a_run_of_the_program_is_replaced_from_another_terminal() {
     let refused = swap(&["spring", "--plugin", &no_plugin]);
     assert_eq!(refused.code, Some(exit_code::OTHER), "{refused:?}");
     let error = refused.error();
-    assert!(error.starts_with("[spring] it stays as it is: ") && error.contains("libmine.so"), "{error}");
+    assert!(error.starts_with("[spring] model unchanged: ") && error.contains("libmine.so"), "{error}");
 
     let swapped = swap(&["spring", "--plugin", "wall", "--set", "friction=0.2"]);
     assert_eq!(swapped.code, Some(exit_code::OK), "{swapped:?}");
@@ -356,7 +356,7 @@ fn a_folder_that_cannot_be_used_costs_a_note_and_not_the_run() {
         .env("XDG_RUNTIME_DIR", &runtime)
         .run();
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
-    assert!(ran.stderr.contains("nobody can watch"), "{ran:?}");
+    assert!(ran.stderr.contains("telemetry server not started"), "{ran:?}");
 }
 
 /// Memory does not grow while somebody who never reads is flooded with ticks.

@@ -49,7 +49,7 @@ impl Emulator {
         let mut command = Command::new(program("flotor-maglev-emulator"));
         command.args(["--transport", transport, "--listen", at]).args(arguments);
         let mut child = Owned::start(command.stdout(Stdio::piped()));
-        let output = child.stdout.take().expect("a pipe was asked for");
+        let output = child.stdout.take().expect("a pipe was requested");
         let mut lines = BufReader::new(output).lines();
         let first = lines
             .by_ref()
@@ -73,7 +73,7 @@ impl Emulator {
         panic!("the emulator never said {words:?}, but {seen:#?}");
     }
 
-    /// A scene on this controller. Timings are loose: a test machine may be held up for long, and none of these
+    /// A scene on this controller. Timings are loose: a test machine may be delayed for long, and none of these
     /// tests is about how long.
     fn scene(&self, device: &str) -> String {
         let transport = if self.transport == "pty" { "serial" } else { self.transport };
@@ -130,7 +130,7 @@ fn one_scene_gives_one_trajectory_on_both_devices() {
 
 // ---------------------------------------------------------------- calibration
 
-/// `flotor calibrate`, with patience for a test machine that is held up.
+/// `flotor calibrate`, with patience for a delayed test machine.
 fn calibrate(emulator: &Emulator, sensor: &Path, arguments: &[&str]) -> Ran {
     start_calibrating(emulator, sensor, arguments).wait()
 }
@@ -148,7 +148,7 @@ fn a_device_is_calibrated_with_a_force_sensor_on_a_serial_port() {
     let scratch = Scratch::default();
     let (sensor, file) = (scratch.path().join("force"), scratch.path().join("mine.toml"));
     let rig = ["--calibration-rig", sensor.to_str().unwrap(), "--rig-step-mm", "2", "--rig-stop-s", "0.8"];
-    // In lockstep: the controller waits for a host that is held up, and so does the stand.
+    // In lockstep: the controller waits for a delayed host, and so does the stand.
     let mut emulator =
         Emulator::listening("tcp", "127.0.0.1:0", &[&["--pace", "lockstep"], &rig[..]].concat());
     let plan = [
@@ -168,7 +168,7 @@ fn a_device_is_calibrated_with_a_force_sensor_on_a_serial_port() {
     ];
     let ran = calibrate(&emulator, &sensor, &[&plan[..], &["--out", file.to_str().unwrap()]].concat());
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
-    let report: serde_json::Value = serde_json::from_str(&ran.stdout).expect("the report is JSON");
+    let report: serde_json::Value = serde_json::from_str(&ran.stdout).expect("the summary is JSON");
     let number = |key: &str| report[key].as_f64().unwrap_or_else(|| panic!("{key} in {report}"));
     // The field's error is 10.87 % over exactly 14 mm; the stand gives way by at most 0.3 mm, at the steep end of 1.1 %
     // a millimetre.

@@ -2,6 +2,7 @@
 //! runs by its name: `cargo test -p flotor-tests golden`.
 
 mod architecture;
+mod asynchronous_models;
 mod c_plugins;
 mod calibration;
 mod changes;
@@ -28,7 +29,6 @@ mod safety;
 mod scaffold;
 mod scene;
 mod simulated;
-mod slow_models;
 mod study;
 mod swap;
 mod teleoperation;

@@ -77,7 +77,7 @@ fn heights_m(records: &[TickRecord]) -> Vec<f64> {
 }
 
 fn ledger(watched: &Watched) -> EnergyLedger {
-    watched.outcome.devices[0].ledger.expect("the simulated flotor keeps accounts")
+    watched.outcome.devices[0].ledger.expect("the simulated flotor keeps an energy balance")
 }
 
 // ---------------------------------------------------------------- frequency
@@ -139,14 +139,14 @@ fn every_tick_is_the_exact_sampled_oscillator() {
 fn the_energy_of_the_flotor_is_accounted_for() {
     let ledger = ledger(&Release::from_height(-2.0).run());
     let spring_j = 0.5 * HAND_STIFFNESS_N_PER_M * 2.0e-3 * 2.0e-3;
-    // The bound of the requirement, taken of the energy of the spring: the account's own peak holds the weight, too.
+    // The bound of the requirement, taken of the energy of the spring: the balance's own peak holds the weight, too.
     assert!(ledger.peak_j > spring_j);
     assert!(ledger.residual_j().abs() <= 1.0e-9 * spring_j, "{ledger:?}");
     assert!(ledger.dissipated_j > 0.99 * spring_j, "after 4 s drag has taken it all: {ledger:?}");
 }
 
 /// A spring whose force is held while the handle moves on by `d` does the work of the force at the start:
-/// `k d^2 / 2` more than the spring had stored. The host's own account of the loop must find exactly that.
+/// `k d^2 / 2` more than the spring had stored. The host's own energy balance of the loop must find exactly that.
 #[test]
 fn the_hold_puts_out_exactly_the_energy_a_held_spring_must() {
     let watched = Release::from_height(-2.0).run();

@@ -13,7 +13,7 @@ const SOLID_M: f64 = 11.8 * 0.63e-3;
 /// Stiffness of hand and wall, N/m.
 const HAND_N_PER_M: f64 = 2000.0;
 const WALL_N_PER_M: f64 = 10_000.0;
-/// Where the hand means to go, m below home.
+/// Intended position of the hand, m below home.
 const MEANT_M: f64 = 8.0e-3;
 
 /// A hand that presses down and stays there, for `duration_s`; settings of the spring, further tables of the scene.

@@ -409,7 +409,7 @@ fn a_model_that_panics_in_a_step_is_out_and_the_run_goes_on_without_it() {
 }
 
 #[test]
-fn a_model_that_panicked_is_told_in_one_line_with_its_words() {
+fn a_model_that_panicked_is_reported_in_one_line_with_its_message() {
     let file = plugin_file(MODEL);
     let ran = run_scene_with(&model_scene(&file), &["model.fault=panics-in-step", "model.at_tick=7"]);
     assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
@@ -633,7 +633,7 @@ fn told_of(text: &str) -> String {
 }
 
 #[test]
-fn a_table_of_a_wrong_name_and_a_key_below_the_wrong_table_are_what_is_told() {
+fn a_table_of_a_wrong_name_and_a_key_below_the_wrong_table_are_reported() {
     let rest = "plugin = \"simulated\"\n[[model]]\nplugin = \"spring\"\n";
     let told = told_of(&format!("[devic]\n{rest}"));
     assert!(told.ends_with("unknown key `devic`; did you mean `device`?"), "{told}");

@@ -27,11 +27,11 @@ fn replay(recording: &Path, more: &[&str]) -> Flotor {
     Flotor::with(["replay", &recording].iter().chain(more))
 }
 
-/// The report of a replay that ends with this code.
+/// The summary of a replay that ends with this code.
 fn report(recording: &Path, more: &[&str], code: i32) -> Value {
     let ran = replay(recording, &[&["--json", "-"][..], more].concat()).run();
     assert_eq!(ran.code, Some(code), "{ran:?}");
-    serde_json::from_str(&ran.stdout).expect("the report is JSON")
+    serde_json::from_str(&ran.stdout).expect("the summary is JSON")
 }
 
 fn text(report: &Value, key: &str) -> String {
@@ -227,7 +227,7 @@ fn fields_of_a_run_in_real_time_cannot_be_repeated() {
     let (told, words) = why(&recording);
     assert_eq!(text(&told, "cause"), "field_on_real_clock");
     assert_eq!(text(&told, "model"), "membrane");
-    assert!(words.contains("`membrane` was computed beside the loop on the real clock"), "{words}");
+    assert!(words.contains("`membrane` was computed asynchronously on the real clock"), "{words}");
 }
 
 #[test]

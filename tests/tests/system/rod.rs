@@ -78,27 +78,27 @@ fn a_free_base_rolls_as_the_reference_does() {
 
 /// Where `G0` is below 0.3 the rod has a share (it says so: it has a branch), and what is felt is nearer to the table.
 #[test]
-fn energy_that_hands_over_is_nearer_to_the_rod() {
-    let of = |hand_over: &str| {
+fn energy_that_blends_is_nearer_to_the_rod() {
+    let of = |on: &str| {
         let mut rows = table("b_exact_rod_prebuckling.csv");
         rows.retain(|row| row["spring"] == "3" && row["category"] != "large_rotation");
-        compared(rows, rod_pose, &["variant=energy", &format!("hand_over={hand_over}")])
+        compared(rows, rod_pose, &["variant=energy", &format!("hand_over={on}")])
     };
     let error_n = |(row, answer): &(Row, Answer)| {
         let (force_n, torque_nm) = rod_wrench(row);
         answer.distance(force_n, torque_nm).0
     };
-    let (mut with, mut without, mut handed_over) = (0.0, 0.0, 0);
+    let (mut with, mut without, mut blended) = (0.0, 0.0, 0);
     for (on, off) in of("on").iter().zip(&of("off")) {
         if on.1.details["branch"].is_empty() {
             assert_eq!((on.1.wrench, on.1.energy_j), (off.1.wrench, off.1.energy_j), "{}", on.0["id"]);
         } else {
-            handed_over += 1;
+            blended += 1;
             with += error_n(on).powi(2);
             without += error_n(off).powi(2);
         }
     }
-    assert!(handed_over > 5, "{handed_over} rows hand over");
+    assert!(blended > 5, "{blended} rows blended");
     assert!(with.sqrt() < 0.3 * without.sqrt(), "{with} of {without}");
 }
 

@@ -228,8 +228,8 @@ fn whatever_a_terminal_sends_ends_a_run_in_order_and_nothing_suspends_it() {
     }
 }
 
-/// Longer than signals may lie apart that are taken for one wish.
-const ANOTHER_WISH: Duration = Duration::from_millis(500);
+/// Longer than signals may lie apart that are taken for one request.
+const ANOTHER_REQUEST: Duration = Duration::from_millis(500);
 
 #[test]
 fn a_second_signal_is_an_emergency_stop() {
@@ -237,7 +237,7 @@ fn a_second_signal_is_an_emergency_stop() {
     let slowly = format!("{PATIENT}\nramp_s = 20");
     let ran = run_in_real_time(&scratch, &scene("", "", &slowly), |running| {
         running.signal(Signal::INT);
-        std::thread::sleep(ANOTHER_WISH);
+        std::thread::sleep(ANOTHER_REQUEST);
         running.signal(Signal::TERM);
     });
     assert_eq!((ran.code, end(&ran).as_str()), (Some(exit_code::DEVICE_FAULT), "emergency_stop"), "{ran:?}");
@@ -264,7 +264,7 @@ fn a_third_signal_ends_a_process_whatever_holds_it_up() {
         std::thread::sleep(Duration::from_millis(10));
     }
     for _ in 0..3 {
-        std::thread::sleep(ANOTHER_WISH);
+        std::thread::sleep(ANOTHER_REQUEST);
         running.signal(Signal::INT);
     }
     assert_eq!(running.wait().code, Some(130));
@@ -291,7 +291,7 @@ fn a_run_that_is_to_outlive_its_terminal_does() {
 }
 
 #[test]
-fn an_emergency_stop_has_its_exit_code_also_where_the_report_cannot_be_written() {
+fn an_emergency_stop_has_its_exit_code_also_where_the_summary_cannot_be_written() {
     let scratch = Scratch::default();
     let json = scratch.path().join("missing").join("run.json");
     let flotor = in_real_time(&scratch, &scene("", "", PATIENT), json.as_ref());
@@ -309,7 +309,7 @@ fn an_emergency_stop_has_its_exit_code_also_where_the_report_cannot_be_written()
 }
 
 #[test]
-fn an_emergency_stop_has_its_exit_code_also_where_nobody_reads_the_report() {
+fn an_emergency_stop_has_its_exit_code_also_where_nobody_reads_the_summary() {
     let scratch = Scratch::default();
     let stops = scene("fault = \"emergency-stop\"\nat_tick = 50", "", "");
     for json in ["-", "/dev/null"] {
@@ -329,10 +329,11 @@ fn a_model_that_hangs_costs_the_run_and_is_named_and_the_device_is_stopped() {
     let hangs = scene("", "fault = \"hangs\"\nat_tick = 400", "[limits]\nwatchdog_ms = 500");
     let ran = run_in_real_time(&scratch, &hangs, |_| ());
     assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:?}");
-    let told = "error: `block` did not come back from `step` in tick 400; the watchdog stopped the device after 500 ms";
+    let told =
+        "error: `block` did not return from `step` in tick 400; the watchdog stopped the device after 500 ms";
     // A tick that was missed earlier moves the number of the tick.
     assert!(
-        last_line(&ran).starts_with("error: `block` did not come back from `step` in tick 4"),
+        last_line(&ran).starts_with("error: `block` did not return from `step` in tick 4"),
         "{told}: {ran:?}"
     );
     assert!(scratch.path().join("stopped").exists(), "the device was told to stop");
@@ -344,7 +345,7 @@ fn a_device_that_hangs_is_a_device_fault() {
     let hangs = scene("fault = \"hangs-in-read\"\nat_tick = 400", "", "[limits]\nwatchdog_ms = 500");
     let ran = run_in_real_time(&scratch, &hangs, |_| ());
     assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:?}");
-    assert!(last_line(&ran).starts_with("error: `device` did not come back from `read`"), "{ran:?}");
+    assert!(last_line(&ran).starts_with("error: `device` did not return from `read`"), "{ran:?}");
 }
 
 #[test]

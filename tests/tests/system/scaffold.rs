@@ -56,7 +56,7 @@ fn peak_force_n(folder: &Path, name: &str, language: &str) -> f64 {
         Flotor::with(["run", "scene.toml", "--clock", "virtual", "--duration", "2s", "--json", "run.json"]);
     let ran = ran.inside(folder).run();
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(exit_code::OK), ""), "{ran:?}");
-    let json = std::fs::read_to_string(folder.join("run.json")).expect("the summary was asked for");
+    let json = std::fs::read_to_string(folder.join("run.json")).expect("the summary was requested");
     let json: serde_json::Value = serde_json::from_str(&json).expect("a summary is JSON");
     json["peak_force_n"].as_f64().expect("the summary has the peak force")
 }
@@ -66,7 +66,8 @@ fn a_new_model_builds_validates_and_pushes() {
     for language in ["rust", "c"] {
         let (scratch, name) = (Scratch::default(), format!("jelly-in-{language}"));
         let folder = made(&scratch, "model", &name, language);
-        // The hand means to go 4 mm down against 800 N/m and is itself soft: more than nothing, less than 3.2 N.
+        // The intended position of the hand is 4 mm down, against 800 N/m, and the hand is soft: more than nothing,
+        // less than 3.2 N.
         let peak = peak_force_n(&folder, &name, language);
         assert!(peak > 0.5 && peak < 3.2, "{language}: {peak} N");
         let poses = scratch

@@ -1,4 +1,4 @@
-//! What is wrong with a scene is said in one line: file, line, key, and the nearest right one.
+//! An error of a scene is reported in one line: file, line, key, and the closest valid one.
 
 use flotor_session::scene::Scene;
 use flotor_tests::program::{Flotor, exit_code};
@@ -51,7 +51,7 @@ fn the_built_in_demo_is_right() {
 }
 
 #[test]
-fn an_unknown_key_is_named_with_its_line_and_the_nearest_right_one() {
+fn an_unknown_key_is_named_with_its_line_and_the_closest_valid_one() {
     for (piece, wrong, expected) in [
         ("rate_hz", "rate_hs", "scene.toml:2: unknown key `rate_hs`; did you mean `rate_hz`?"),
         (

@@ -42,7 +42,7 @@ fn summary(ran: &Ran) -> Value {
 // ---------------------------------------------------------------- hands that follow files
 
 #[test]
-fn a_script_lies_beside_its_scene_and_is_named_in_the_report() {
+fn a_script_lies_beside_its_scene_and_is_named_in_the_summary() {
     let scratch = Scratch::default();
     let script = "[[step]]\nmove = { to_mm = [0, 0, -3], duration_s = 0.2 }\n";
     let _ = scratch.file("mine.toml", script);
@@ -63,7 +63,7 @@ fn every_built_in_script_runs_on_both_presets() {
             let parameters = format!("hand_script = \"{script}\"\npreset = \"{preset}\"");
             let Watched { records, outcome, .. } = watch(&scene(2.5, &parameters));
             assert_eq!(outcome.end, RunEnd::Finished, "{script} {preset}");
-            let ledger = outcome.devices[0].ledger.expect("the flotor has accounts");
+            let ledger = outcome.devices[0].ledger.expect("the flotor has an energy balance");
             let imbalance = ledger.residual_j().abs() / ledger.peak_j;
             assert!(imbalance <= 1.0e-9, "{script} {preset}: {imbalance:e}");
             let moved = records.iter().any(|record| record.pose.position().length() > 0.1e-3);
@@ -257,7 +257,7 @@ fn saturated_coils_are_counted_in_the_summary() {
 }
 
 #[test]
-fn the_plain_flotor_tells_when_it_was_asked_for_more_than_its_limits() {
+fn the_plain_flotor_tells_when_more_than_its_limits_is_commanded() {
     let mut flotor = activated(&[], 1);
     let (mut state, tick) =
         (DeviceState::HOME, |index| Tick { index, time_ns: index * PERIOD_NS, dt_ns: PERIOD_NS });

@@ -114,7 +114,7 @@ fn a_recording_with_replacements_replays_bit_for_bit() {
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     let ran = Flotor::with(["replay", &recording, "--json", "-"]).run();
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
-    let report: Value = serde_json::from_str(&ran.stdout).expect("the report is JSON");
+    let report: Value = serde_json::from_str(&ran.stdout).expect("the summary is JSON");
     assert_eq!(report["bit_exact"], Value::from(true), "{report}");
 }
 
@@ -309,7 +309,7 @@ fn a_plugin_that_is_refused_changes_nothing() {
     let controls = session.controls();
     let path = scratch.file("libmine.so", b"not a plugin").display().to_string();
     let refused = controls.swap(&registry, "spring", Some(&path), &[]).expect_err("it is no plugin");
-    assert!(refused.to_string().starts_with("[spring] it stays as it is: "), "{refused}");
+    assert!(refused.to_string().starts_with("[spring] model unchanged: "), "{refused}");
     assert!(refused.to_string().contains("libmine.so"), "{refused}");
     let unknown = controls.swap(&registry, "sprng", None, &[]).expect_err("no such model");
     assert!(unknown.to_string().contains("did you mean `spring`?"), "{unknown}");

@@ -106,7 +106,7 @@ fn a_fault_of_one_device_ends_the_run_for_both() {
 struct Pair {
     left: String,
     right: String,
-    lowest_account_j: f64,
+    lowest_tank_j: f64,
     lowest_ports_j: f64,
     fastest_late_m_per_s: f64,
     fastest_m_per_s: f64,
@@ -127,7 +127,7 @@ fn pair(registry: &Registry, left: &str, right: &str, duration_s: f64) -> Pair {
     let thrown = RunEnd::DeviceFault(Fault::SensorOutOfRange);
     let throws = throws_a_free_handle(left) || throws_a_free_handle(right);
     assert!(run.outcome.end == RunEnd::Finished || throws && run.outcome.end == thrown, "{left} and {right}");
-    let accounts = run.outcome.couplings.iter().flat_map(|coupling| coupling.accounts);
+    let tanks = run.outcome.couplings.iter().flat_map(|coupling| coupling.tanks);
     let fastest = |records: &[TickRecord]| {
         records.iter().map(|record| record.twist.linear().length()).fold(0.0, f64::max)
     };
@@ -135,7 +135,7 @@ fn pair(registry: &Registry, left: &str, right: &str, duration_s: f64) -> Pair {
     Pair {
         left: left.to_owned(),
         right: right.to_owned(),
-        lowest_account_j: accounts.map(|account| account.lowest_j).fold(0.0, f64::min),
+        lowest_tank_j: tanks.map(|tank| tank.lowest_j).fold(0.0, f64::min),
         lowest_ports_j: lowest_sum_of_ports_j(&run),
         fastest_late_m_per_s: fastest(&run.records[tail..]),
         fastest_m_per_s: fastest(&run.records),
@@ -163,13 +163,13 @@ fn a_pair_is_stable_in_every_pair_of_hands_and_gives_nothing_that_was_not_put_in
     let pairs: Vec<Pair> =
         pairs.par_iter().map(|(left, right)| pair(&registry, left, right, duration_s)).collect();
     let worst = |number: fn(&Pair) -> f64| pairs.iter().map(number).fold(f64::NEG_INFINITY, f64::max);
-    for pair in pairs.iter().filter(|pair| pair.lowest_account_j < 0.0) {
-        println!("{} against {}: {:.3e} J", pair.left, pair.right, pair.lowest_account_j);
+    for pair in pairs.iter().filter(|pair| pair.lowest_tank_j < 0.0) {
+        println!("{} against {}: {:.3e} J", pair.left, pair.right, pair.lowest_tank_j);
     }
     println!(
-        "{} pairs of hands: lowest account {:.3e} J, lowest sum of ports {:.3e} J, fastest {:.3} m/s, farthest {:.2} mm",
+        "{} pairs of hands: lowest tank {:.3e} J, lowest sum of ports {:.3e} J, fastest {:.3} m/s, farthest {:.2} mm",
         pairs.len(),
-        -worst(|pair| -pair.lowest_account_j),
+        -worst(|pair| -pair.lowest_tank_j),
         -worst(|pair| -pair.lowest_ports_j),
         worst(|pair| pair.fastest_m_per_s),
         worst(|pair| pair.farthest_m) * 1.0e3,
@@ -177,7 +177,7 @@ fn a_pair_is_stable_in_every_pair_of_hands_and_gives_nothing_that_was_not_put_in
     for pair in &pairs {
         // A hand swings with up to 0.1 m/s or so; what drives itself gets to the boundary and past it.
         assert!(pair.fastest_m_per_s < 0.5, "{pair:?}");
-        assert!(pair.lowest_account_j >= 0.0, "an account was overdrawn: {pair:?}");
+        assert!(pair.lowest_tank_j >= 0.0, "a tank was below zero: {pair:?}");
         // Sums of some thousand terms of up to 10 mJ.
         assert!(pair.lowest_ports_j >= -1.0e-12, "more came out than went in: {pair:?}");
     }
@@ -214,7 +214,7 @@ fn what_one_hand_does_the_other_feels() {
 }
 
 #[test]
-fn without_the_controller_a_long_way_makes_energy_and_with_it_none() {
+fn without_the_controller_a_long_way_generates_energy_and_with_it_none() {
     let scene = |passivity: &str| {
         format!(
             "duration_s = 4\n{}{}[[coupling]]\ndelay_ticks = 60\npassivity = \"{passivity}\"\n\
@@ -252,7 +252,7 @@ fn a_recording_of_a_pair_replays_bit_for_bit_and_keeps_both_handles() {
     assert!(records.chunks(2).all(|tick| tick[0].tick == tick[1].tick && tick[1].device == 1));
     let ran = Flotor::with(["replay".as_ref(), recording.as_os_str(), "--json".as_ref(), "-".as_ref()]).run();
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
-    let report: Value = serde_json::from_str(&ran.stdout).expect("the report is JSON");
+    let report: Value = serde_json::from_str(&ran.stdout).expect("the summary is JSON");
     assert_eq!(
         (&report["bit_exact"], &report["ticks"]),
         (&Value::from(true), &Value::from(6000)),
@@ -284,7 +284,7 @@ fn what_is_wrong_with_devices_and_couplings_is_said() {
     let two = "[[device]]\nname = \"left\"\nplugin = \"simulated\"\n[[device]]\nname = \"right\"\nplugin = \"simulated\"\n";
     for (wrong, expected) in [
         ("[[device]]\nplugin = \"a\"\n[[device]]\nplugin = \"b\"\n".to_owned(), "`device.name` is missing"),
-        (two.replace("right", "left"), "two devices are called `left`; give one another `name`"),
+        (two.replace("right", "left"), "two devices are called `left`; give each a different `name`"),
         (format!("{two}[[model]]\nplugin = \"spring\"\n"), "the scene has several devices: say which"),
         (
             format!("{two}[[model]]\nplugin = \"spring\"\ndevice = \"rigth\"\n"),
@@ -293,7 +293,7 @@ fn what_is_wrong_with_devices_and_couplings_is_said() {
         (
             "[device]\nplugin = \"a\"\n[[model]]\nplugin = \"wall\"\n[[model]]\nplugin = \"wall\"\n"
                 .to_owned(),
-            "two models are called `wall`; give one another `name`",
+            "two models are called `wall`; give each a different `name`",
         ),
         (
             format!("{two}[[model]]\nplugin = \"spring\"\ndevice = \"left\"\nname = \"a@b\"\n"),

@@ -1,7 +1,7 @@
 //! Two runs, each with one end of a coupling, and a way between them that delays, loses and breaks: all on the virtual clock.
 //!
-//! The same sessions, envelopes and ends as on two machines; what differs is who carries the news. The bridge's own tests carry
-//! it over Zenoh.
+//! The same sessions, envelopes and ends as on two machines; what differs is the transport of the peer state. The
+//! bridge's own tests run over Zenoh.
 
 use flotor_core::peer::Dispatch;
 use flotor_core::trace::{Events, TickRecord};
@@ -21,9 +21,9 @@ const HANDS: [&str; 5] = ["oscillate", "press", "release", "hold", "open"];
 const SCRIPTS: [&str; 7] = flotor_simulated::hand::Script::NAMES;
 const GRIPS: [&str; 2] = ["firm", "relaxed"];
 
-/// Ticks without news after which an end lets go: the watchdog of the scenes here, at 1 kHz.
+/// Ticks without a message after which an end removes its force: the watchdog of the scenes here, at 1 kHz.
 const WATCHDOG_TICKS: u64 = 100;
-/// Ticks over which it takes hold again: their ramp.
+/// Ticks over which it fades in again: their ramp.
 const RAMP_TICKS: usize = 200;
 
 fn scene(hand: &str, duration_s: f64, more: &str) -> String {
@@ -78,7 +78,7 @@ impl Host {
         is_new.then_some(Dispatch { run: self.run, ..dispatch })
     }
 
-    /// As a carrier does: only what is newer.
+    /// As a peer link does: only what is newer.
     fn hear(&mut self, dispatch: Dispatch) {
         if self.newest.is_none_or(|newest| dispatch.is_newer_than(&newest)) {
             self.newest = Some(dispatch);
@@ -113,7 +113,7 @@ impl Random {
     }
 }
 
-/// A way between two hosts: 20 ms give or take 5, and one datagram in a hundred lost. News may overtake news.
+/// A way between two hosts: 20 ms give or take 5, and one datagram in a hundred lost. Messages may overtake one another.
 struct Way {
     random: Random,
     /// When, at which host, what.
@@ -201,7 +201,7 @@ fn throws_a_free_handle(hand: &str) -> bool {
 }
 
 #[test]
-fn every_pair_of_hands_is_stable_over_20_ms_with_jitter_and_loss_and_no_account_is_overdrawn() {
+fn every_pair_of_hands_is_stable_over_20_ms_with_jitter_and_loss_and_no_tank_falls_below_zero() {
     let registry = Registry::search(&[]);
     let hands = hands();
     let full = TestSize::of_this_run() == TestSize::Full;
@@ -228,36 +228,36 @@ fn every_pair_of_hands_is_stable_over_20_ms_with_jitter_and_loss_and_no_account_
                 let ports = pair.hosts.iter().filter_map(|host| host.records.0.last());
                 lowest_ports_j = lowest_ports_j.min(ports.map(|record| record.port_energy_j).sum());
             }
-            let mut lowest_account_j = 0.0_f64;
+            let mut lowest_tank_j = 0.0_f64;
             let mut fastest_m_per_s = 0.0_f64;
             for host in &mut pair.hosts {
-                let CouplingOutcome { accounts, hearing } = host.coupling();
+                let CouplingOutcome { tanks, hearing } = host.coupling();
                 let hearing = hearing.expect("its other end is elsewhere");
-                lowest_account_j = lowest_account_j.min(accounts[0].lowest_j);
+                lowest_tank_j = lowest_tank_j.min(tanks[0].lowest_j);
                 let throws = throws_a_free_handle(left) || throws_a_free_handle(right);
                 let thrown = host.end == Some(RunEnd::DeviceFault(Fault::SensorOutOfRange));
                 assert!(host.end.is_none() || throws && thrown, "{left} and {right}: {:?}", host.end);
-                // A thrown handle ends one run; then the other one lets go, once.
+                // A thrown handle ends one run; then the other one removes its force, once.
                 assert!(hearing.silences <= u64::from(throws), "{left} and {right}: {hearing:?}");
                 assert!(hearing.ticks > 100, "{left} and {right}: {hearing:?}");
                 let speeds = host.records.0.iter().map(|record| record.twist.linear().length());
                 fastest_m_per_s = speeds.fold(fastest_m_per_s, f64::max);
             }
-            assert!(lowest_account_j >= 0.0, "{left} and {right}: {lowest_account_j} J");
+            assert!(lowest_tank_j >= 0.0, "{left} and {right}: {lowest_tank_j} J");
             // Sums of some thousand terms of up to 10 mJ.
             assert!(lowest_ports_j >= -1.0e-12, "{left} and {right}: {lowest_ports_j} J");
             // A hand swings with up to 0.1 m/s or so; what drives itself gets to the boundary and past it.
             assert!(fastest_m_per_s < 0.5, "{left} and {right}: {fastest_m_per_s} m/s");
-            (lowest_account_j, lowest_ports_j, fastest_m_per_s)
+            (lowest_tank_j, lowest_ports_j, fastest_m_per_s)
         })
         .collect();
     let worst =
         |number: fn(&(f64, f64, f64)) -> f64| lowest_and_fastest.iter().map(number).fold(0.0, f64::max);
     println!(
-        "{} pairs of hands over 20 ± 5 ms with 1 % loss: lowest account {:.3e} J, lowest sum of ports {:.3e} J, fastest \
+        "{} pairs of hands at 20 ± 5 ms with 1 % loss: lowest tank {:.3e} J, lowest sum of ports {:.3e} J, fastest \
          {:.3} m/s",
         lowest_and_fastest.len(),
-        -worst(|(account, ..)| -account),
+        -worst(|(tank, ..)| -tank),
         -worst(|(_, ports, _)| -ports),
         worst(|(.., fastest)| *fastest)
     );
@@ -273,8 +273,8 @@ fn what_one_hand_does_the_other_feels_across_the_way() {
     let [left, right] = pair.hosts.each_ref().map(|host| *host.records.0.last().expect("ticks"));
     let down_m = [left, right].map(|record| -record.pose.position().z);
     assert!(down_m[0] > 2.0e-3 && down_m[1] > 1.0e-3, "the left draws the right along: {down_m:?}");
-    // Each shows the other's account as it was some 20 ms ago.
-    let [of_left, of_right] = pair.hosts.each_mut().map(|host| host.coupling().accounts);
+    // Each shows the other's tank as it was some 20 ms ago.
+    let [of_left, of_right] = pair.hosts.each_mut().map(|host| host.coupling().tanks);
     for (own, told) in [(of_left[0], of_right[1]), (of_right[0], of_left[1])] {
         assert!((own.gone_in_j - told.gone_in_j).abs() < 1.0e-6, "{own:?} and {told:?}");
     }
@@ -305,8 +305,8 @@ fn a_cut_cable_leaves_both_devices_without_force_within_the_watchdog_and_two_mil
         let last_felt = last_felt.expect("a pull");
         let after_cut = last_felt as u64 + 1 - cut_at;
         assert!(after_cut <= WATCHDOG_TICKS + 2, "force for {after_cut} ms after the cut");
-        // News that was a little late before the cut is no reason to let go.
-        assert!(after_cut + 10 > WATCHDOG_TICKS, "it lets go {after_cut} ms after the cut");
+        // A message that was a little late before the cut does not remove the force.
+        assert!(after_cut + 10 > WATCHDOG_TICKS, "it removes its force {after_cut} ms after the cut");
         // The controller may have taken the last of the force before. Where the silence is noticed it is shown, and stays.
         let is_silent = |record: &TickRecord| record.events.intersects(Events::PARTNER_SILENT);
         let after = records.get(usize::try_from(cut_at).unwrap()..).expect("it went on after the cut");
@@ -321,7 +321,7 @@ fn a_cut_cable_leaves_both_devices_without_force_within_the_watchdog_and_two_mil
 }
 
 #[test]
-fn a_mended_cable_is_taken_hold_of_slowly_and_no_account_is_overdrawn() {
+fn a_mended_cable_is_taken_hold_of_slowly_and_no_tank_falls_below_zero() {
     let mut pair = struggle(&Registry::search(&[]));
     pair.cut();
     pair.run(1000);
@@ -333,11 +333,15 @@ fn a_mended_cable_is_taken_hold_of_slowly_and_no_account_is_overdrawn() {
             host.records.0[range].iter().map(|record| record.commanded.force().length()).fold(0.0, f64::max)
         };
         let first = (mended_at..).find(|tick| force_n(*tick..tick + 1) > 0.0).expect("it pulls again");
-        assert!((15..=27).contains(&(first - mended_at)), "as soon as news arrives: {}", first - mended_at);
+        assert!(
+            (15..=27).contains(&(first - mended_at)),
+            "as soon as a message arrives: {}",
+            first - mended_at
+        );
         let (at_first_n, later_n) =
             (force_n(first..first + RAMP_TICKS / 10), force_n(first + 1000..first + 2900));
         assert!(later_n > 0.5 && at_first_n < 0.15 * later_n, "{at_first_n} N at first, {later_n} N later");
-        assert!(host.coupling().accounts[0].lowest_j >= 0.0);
+        assert!(host.coupling().tanks[0].lowest_j >= 0.0);
     }
 }
 
@@ -353,9 +357,9 @@ fn a_host_that_starts_anew_brings_no_energy_of_its_last_run() {
     for _ in 0..3000 {
         pair.run(1);
         let coupling = pair.hosts[1].coupling();
-        assert!(coupling.accounts[0].lowest_j >= 0.0);
+        assert!(coupling.tanks[0].lowest_j >= 0.0);
     }
-    let heard_j = pair.hosts.each_mut().map(|host| host.coupling().accounts[0]);
+    let heard_j = pair.hosts.each_mut().map(|host| host.coupling().tanks[0]);
     // What is at the new end has come in there, or was passed on since: less than the reserve and what its spring stores.
     assert!(heard_j[1].level_j < 0.02, "{heard_j:?}");
     assert!(pair.hosts[1].records.0.last().is_some_and(|record| record.commanded.force() != DVec3::ZERO));

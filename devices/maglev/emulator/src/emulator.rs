@@ -54,7 +54,7 @@ pub enum Event {
 
 /// Time of one cycle in real time, µs.
 const CYCLE_US: u64 = 1000;
-/// Packets looked at in one cycle: a burst is a host that was held up, and its old commands are not obeyed anyway.
+/// Packets looked at in one cycle: a burst is from a delayed host, and its old commands are not obeyed anyway.
 const PACKETS_PER_CYCLE: usize = 16;
 /// How long a lockstep cycle sleeps while there is no command.
 const LOCKSTEP_NAP: Duration = Duration::from_micros(20);
@@ -116,7 +116,7 @@ impl<P: Plant> Emulator<P> {
                         return;
                     }
                 }
-                // Held up: what was missed is made up in simulated time, so that the watchdog sees the silence.
+                // Delayed: what was missed is made up in simulated time, so that the watchdog sees the silence.
                 None => {
                     let missed_us = u64::try_from(deadline.elapsed().as_micros()).unwrap_or(u64::MAX);
                     for _ in 0..(missed_us / CYCLE_US).min(1000) {

@@ -130,9 +130,9 @@ fn the_handle_comes_home_and_its_weight_is_found() {
 
 #[test]
 fn a_flight_that_goes_wrong_says_so() {
-    // Heavier than the coils: it is on its way out, and the controller lands.
+    // Heavier than the coils: it is leaving the range, and the controller lands.
     flight(400.0, 500.0, |device, _| {
         let refusal = device.err().expect("it cannot come home").to_string();
-        assert!(refusal.contains("did not come home: the controller faulted"), "{refusal}");
+        assert!(refusal.contains("homing failed: the controller faulted"), "{refusal}");
     });
 }

@@ -1,8 +1,8 @@
-//! Walls at the edge of what the sensors see, and limits of rotation: the report's, made stable and passive.
+//! Walls at the edge of what the sensors see, and limits of rotation: those of the thesis, made stable and passive.
 //!
-//! The report keeps the flotor in range by a sphere of springs and dampers and limits its tilt to 2.86° (0.05 rad;
+//! The thesis keeps the flotor in range by a sphere of springs and dampers and limits its tilt to 2.86° (0.05 rad;
 //! Varadharajan 2007, section 3.2 and appendix A). Here, too, with three differences:
-//! - Damping acts once. The program of the report damps rotation always, and again beyond the limit.
+//! - Damping acts once. The program of the thesis damps rotation always, and again beyond the limit.
 //! - Damping in a wall resists going out only: it does not pull a handle that comes back by itself.
 //! - Every stiffness is scaled down to half of what is stable for its damping, period and delay (Gil et al. 2009,
 //!   `K < (b + B) / (T / 2 + delay)`), and the stiffness in force is what is reported.
@@ -87,7 +87,7 @@ pub struct Walls {
     pub tilt: Wall,
     /// Limit of rotation about z.
     pub yaw: Wall,
-    /// Spring of yaw about home, N·m/rad: the report's stand-in for the torque its spring has none for.
+    /// Spring of yaw about home, N·m/rad: the thesis's stand-in for the torque its spring has none for.
     pub yaw_spring_nm_per_rad: f64,
     /// Damping of rotation everywhere, N·m·s/rad; takes the place of the walls' own where that is larger.
     pub rotation_damping_nms_per_rad: f64,
@@ -96,13 +96,13 @@ pub struct Walls {
 /// Stiffness and damping of the makers' boundary mode: N/m, N·s/m, N·m/rad, N·m·s/rad (client program of the
 /// University of Utah).
 const MAKER: [f64; 4] = [15_000.0, 15.0, 50.0, 0.15];
-/// Least proportional constant of the report's angle limit, N·m/rad, and its multiple of gamma in N.
+/// Least proportional constant of the thesis's angle limit, N·m/rad, and its multiple of gamma in N.
 const THESIS_LEAST_NM_PER_RAD: f64 = 30.0;
 const THESIS_PER_GAMMA: f64 = 2.5;
-/// Angle limit of the report, rad: 2.86 degrees.
+/// Angle limit of the thesis, rad: 2.86 degrees.
 pub const THESIS_ANGLE_LIMIT_RAD: f64 = 0.05;
 
-/// Stiffness of the report's angle limit for a spring of `gamma_n`, N·m/rad.
+/// Stiffness of the thesis's angle limit for a spring of `gamma_n`, N·m/rad.
 #[must_use]
 pub fn thesis_nm_per_rad(gamma_n: f64) -> f64 {
     (THESIS_PER_GAMMA * gamma_n).max(THESIS_LEAST_NM_PER_RAD)
@@ -125,8 +125,8 @@ impl Walls {
         }
     }
 
-    /// The report's walls for a spring of `gamma_n`: the sphere ends where its coils touch (or at `radius_m`, if that
-    /// is nearer), the angular constant grows with gamma. What the report does not print (translational gains,
+    /// The thesis's walls for a spring of `gamma_n`: the sphere ends where its coils touch (or at `radius_m`, if that
+    /// is nearer), the angular constant grows with gamma. What the thesis does not print (translational gains,
     /// damping) is the makers'.
     #[must_use]
     pub fn thesis(radius_m: f64, gamma_n: f64) -> Self {

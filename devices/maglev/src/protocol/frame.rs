@@ -116,7 +116,7 @@ impl Condition {
     pub const OVER_TEMPERATURE: Self = Self(1 << 4);
     /// The flotor moved too fast.
     pub const OVER_SPEED: Self = Self(1 << 5);
-    /// The flotor was on its way out of the sensors' range; the controller lands.
+    /// The flotor was leaving the sensors' range; the controller lands.
     pub const EDGE: Self = Self(1 << 6);
     /// The command was larger, or changed faster, than the coils may; it was limited. No fault.
     pub const LIMITED: Self = Self(1 << 8);

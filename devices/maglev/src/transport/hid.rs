@@ -34,7 +34,7 @@ pub fn open(address: &str) -> Result<HidLink, OpenError> {
 impl Transport for HidLink {
     fn send(&mut self, frame: &[u8; FRAME_BYTES]) -> Result<(), LinkLost> {
         let mut report = [0; FRAME_BYTES + 1];
-        // The first byte is the number of the report: 0, there is only one.
+        // The first byte is the HID report number: 0, there is only one.
         if let Some(room) = report.get_mut(1..) {
             room.copy_from_slice(frame);
         }

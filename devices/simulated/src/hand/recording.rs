@@ -62,7 +62,7 @@ impl Recording {
         let wrong = |problem: String| RecordingError { file: path.display().to_string(), problem };
         let size = std::fs::metadata(path).map_err(|error| wrong(format!("cannot be read: {error}")))?;
         if !size.is_file() || size.len() > MAX_BYTES {
-            return Err(wrong(format!("is no recording: that is a file of at most {MAX_BYTES} bytes")));
+            return Err(wrong(format!("is not a recording: it is larger than {MAX_BYTES} bytes")));
         }
         let bytes = std::fs::read(path).map_err(|error| wrong(format!("cannot be read: {error}")))?;
         let is_recording = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"));
@@ -106,7 +106,8 @@ impl Sample {
         }
         pose.check().map_err(|error| error.to_string())?;
         let inside = position_m.abs().max_element() <= FARTHEST_M;
-        let far = || format!("({position_m}) m is farther out than {FARTHEST_M} m; are these millimetres?");
+        let far =
+            || format!("({position_m}) m is outside the workspace of {FARTHEST_M} m; are these millimetres?");
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked above
         inside.then_some(Self { time_ns: (time_s * 1.0e9).round() as u64, pose }).ok_or_else(far)
     }

@@ -122,7 +122,7 @@ impl Script {
         self.legs.last().map_or(0, |leg| leg.start_ns + leg.duration_ns)
     }
 
-    /// When the hand lets go, if it does, ns. Real-time: bounded, no allocation.
+    /// When the hand releases the handle, if it does, ns. Real-time: bounded, no allocation.
     pub(super) fn release_ns(&self) -> Option<u64> {
         self.release_ns
     }

@@ -1,4 +1,4 @@
-//! What the hand means to do: its intended motion as a function of time, and when it holds the handle at all.
+//! The intended motion of the hand as a function of time, and when it holds the handle at all.
 //!
 //! Voluntary movements start and stop smoothly; [`minimum_jerk`] (Flash and Hogan 1985, J. Neurosci. 5:1688)
 //! is the usual curve, and every motion here is built from it and from sines.
@@ -178,7 +178,7 @@ impl Trajectory {
         }
     }
 
-    /// When the hand lets go, if that is planned, ns. Real-time: bounded, no allocation.
+    /// When the hand releases the handle, if that is planned, ns. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn release_ns(&self) -> Option<u64> {
         match self {

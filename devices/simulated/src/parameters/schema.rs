@@ -46,12 +46,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0,
         "How much of the machine is simulated: plain is rigid body, gravity, drag and hand; full adds coils and sensors",
     ),
-    Parameter::choice(
-        "flotor",
-        FLOTORS,
-        0,
-        "Whose flotor: mass and centre of mass of the thesis or of the Utah device",
-    ),
+    Parameter::choice("flotor", FLOTORS, 0, "Mass and centre of mass: of the thesis, or of the Utah device"),
     Parameter::real("mass_kg", "kg", 0.01, 10.0, DEMO.mass_kg, "Mass of the flotor"),
     Parameter::real(
         "inertia_x_kg_m2",
@@ -105,16 +100,16 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         DEMO.drag.rotational_nms_per_rad,
         "Eddy-current drag on rotation",
     ),
-    Parameter::choice("hand", HANDS, 0, "What the hand does"),
+    Parameter::choice("hand", HANDS, 0, "Intended motion of the hand"),
     Parameter::file(
         "hand_script",
         SCRIPTS,
-        "What the hand does, movement by movement: a TOML file or a built-in script; comes before hand",
+        "Intended motion of the hand, step by step: a TOML file or a built-in script; overrides `hand`",
     ),
     Parameter::file(
         "hand_recording",
         choices![],
-        "What the hand means to do: the path of a handle in a recording (.mcap) or a table (.csv)",
+        "Intended motion of the hand: the path of a handle in a recording (.mcap) or a table (.csv)",
     ),
     Parameter::real(
         "hand_tremor_um",
@@ -233,9 +228,9 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         1000.0,
         40.0,
-        "Full: how much a coil heats up in the end",
+        "Full: steady temperature rise of a coil",
     ),
-    Parameter::real("coil_lag_s", "s", 0.1, 3600.0, 120.0, "Full: how slowly it does"),
+    Parameter::real("coil_lag_s", "s", 0.1, 3600.0, 120.0, "Full: time constant of the heating"),
     Parameter::real("led_radius_mm", "mm", 1.0, 120.0, 60.0, "Full: radius of the circle of LEDs"),
     Parameter::real(
         "led_2_deg",
@@ -296,8 +291,8 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         2.0,
         "Full: acceleration the Kalman estimate expects",
     ),
-    Parameter::choice("fault", FAULTS, 0, "Full: what breaks"),
-    Parameter::real("fault_time_s", "s", 0.0, 3600.0, 1.0, "Full: when it breaks"),
+    Parameter::choice("fault", FAULTS, 0, "Full: kind of fault"),
+    Parameter::real("fault_time_s", "s", 0.0, 3600.0, 1.0, "Full: time of the fault"),
     Parameter::real("fault_duration_s", "s", 0.0, 3600.0, 0.01, "Full: for how long"),
     Parameter::real(
         "fault_rate_per_s",

@@ -29,7 +29,7 @@ pub(super) struct Body {
     /// Compensation less weight, device frame, N: exactly zero when they are set equal.
     pub(super) lift_n: DVec3,
     /// How far the flotor's centre of mass lies beyond the common one, in units of the distance from the
-    /// origin to that: mass of the hand over mass of the flotor (law of the lever).
+    /// origin to that: mass of the hand divided by that of the flotor (law of the lever).
     pub(super) lift_lever: f64,
     /// Damping of drag and hand together, per axis, N s/m.
     pub(super) damping_ns_per_m: DVec3,
@@ -96,6 +96,7 @@ impl Body {
     /// of mass, over the least moment of inertia.
     fn rotation_rate(&self) -> f64 {
         let arm_m = self.centre_of_mass_m.length();
+        // Largest rates of a damped oscillator: sqrt(K / I) and B / I.
         let stiffness_nm = self.hand.rotational_stiffness_nm_per_rad
             + self.hand.stiffness_n_per_m.max_element() * arm_m * arm_m
             + self.lift_n.length() * self.lift_lever * arm_m;
@@ -115,6 +116,7 @@ impl Body {
             velocity += motion.turned(spin.cross(centre_m));
             turning_j = 0.5 * spin.dot(self.flotor.inertia_kg_m2 * spin);
         }
+        // Of the centre of mass: m v² / 2 + w.I w / 2, and m g h above home.
         let height_m = motion.position_m.z + (motion.turned(centre_m) - centre_m).z;
         MechanicalEnergy {
             kinetic_j: 0.5 * self.flotor.mass_kg * velocity.length_squared() + turning_j,

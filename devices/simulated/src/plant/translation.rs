@@ -79,6 +79,7 @@ impl Oscillator {
     /// Real-time: bounded, no allocation.
     pub(super) fn response(&self, time_s: f64) -> Response {
         let (beta, kappa) = (self.damping_per_s, self.stiffness_per_s2);
+        // p3 and p4 by the Taylor series of the module documentation.
         let damping = beta * -time_s;
         let stiffness = kappa * -(time_s * time_s);
         let (mut previous, mut term) = (DVec3::ZERO, DVec3::ONE);
@@ -89,6 +90,7 @@ impl Oscillator {
             sum4 += term * of_p4;
             (previous, term) = (term, damping * term + stiffness * previous);
         }
+        // The lower ones by p[n] = t^n / n! - beta p[n+1] - kappa p[n+2].
         let square = time_s * time_s;
         let p4 = sum4 * (square * square);
         let p3 = sum3 * (square * time_s);
@@ -173,6 +175,7 @@ impl Gramian {
     #[inline]
     pub(super) fn squared_velocity(&self, drive: &Drive) -> DVec3 {
         let Drive { velocity: v, acceleration: a, jerk: j } = *drive;
+        // Quadratic form in velocity, acceleration and jerk with the Gramian of the response functions.
         v * (v * self.vv + 2.0 * (a * self.va + j * self.vj))
             + a * (a * self.aa + 2.0 * (j * self.aj))
             + j * j * self.jj

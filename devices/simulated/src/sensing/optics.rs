@@ -133,6 +133,7 @@ impl Optics {
     #[must_use]
     pub fn bent(&self, spots: &Spots, edge: f64) -> Spots {
         let half_m = self.geometry.cell_half_width_m;
+        // Radial distortion of third order: r (1 + edge (r / half width)²).
         let square = spots.across_m * spots.across_m + spots.up_m * spots.up_m;
         let factor = 1.0 + square * (edge / (half_m * half_m));
         Spots { across_m: spots.across_m * factor, up_m: spots.up_m * factor }

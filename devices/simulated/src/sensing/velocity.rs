@@ -122,6 +122,7 @@ impl Estimator {
     /// Predicts, compares, corrects. `tracking_index` is the motion an acceleration makes in a tick over the
     /// noise of the sensor; the gains are the steady state of the Kalman filter for it.
     fn track(&mut self, last: &Pose, pose: &Pose, dt_s: f64, tracking_index: f64) {
+        // Gains of the alpha-beta filter from the tracking index (Kalata 1984).
         let damping = 0.25 * (4.0 + tracking_index - (tracking_index * (8.0 + tracking_index)).sqrt());
         let alpha = 1.0 - damping * damping;
         let beta = 2.0 * (2.0 - alpha) - 4.0 * damping;

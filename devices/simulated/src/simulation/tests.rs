@@ -166,7 +166,7 @@ fn energy_balances_to_rounding_when_nothing_turns() {
         let ledger = simulation.ledger();
         // The works are sums of 3000 terms as large as the peak at most.
         assert!(ledger.relative_imbalance() <= 3000.0 * f64::EPSILON, "{:e}", ledger.relative_imbalance());
-        assert!(ledger.work().dissipated_j > 0.01 * ledger.peak_j(), "there was something to account for");
+        assert!(ledger.work().dissipated_j > 0.01 * ledger.peak_j(), "there was energy to balance");
     }
 }
 

@@ -75,7 +75,9 @@ impl OpenedDevice {
     ) -> Result<Self, Refusal> {
         // SAFETY: `settings` outlives the call, and the plugin keeps no copy past it (contract).
         let values = unsafe { to_raw(settings, parameters) }?;
-        let Some(open) = table.open else { return Err(Refusal::broken("its table has lost a function")) };
+        let Some(open) = table.open else {
+            return Err(Refusal::broken("a required entry of its function table is null"));
+        };
         let mut message = Message::default();
         let mut instance = std::ptr::null_mut();
         let count = u32::try_from(values.len()).unwrap_or(u32::MAX);
@@ -129,7 +131,7 @@ impl OpenedDevice {
     pub fn activate(self, config: &LoopConfig) -> Result<ActiveDevice, (Self, Refusal)> {
         let table = self.handle.table;
         let (Some(activate), Some(read), Some(write)) = (table.activate, table.read, table.write) else {
-            return Err((self, Refusal::broken("its table has lost a function")));
+            return Err((self, Refusal::broken("a required entry of its function table is null")));
         };
         let mut message = Message::default();
         // SAFETY: a live instance, used by this thread only (`self` is owned), pointers valid for the call.

@@ -141,7 +141,7 @@ pub enum LoadError {
     },
 }
 
-/// What to do about a refusal whose reason does not say it: a plugin that broke did not choose its words.
+/// What to do about a refusal whose reason does not say it: a plugin that broke gives no remedy.
 const fn advice(kind: RefusalKind) -> &'static str {
     match kind {
         RefusalKind::Broken => "; report this to the author of the plugin",

@@ -38,7 +38,7 @@ impl Plugin {
     ///
     /// ```compile_fail,E0133
     /// # use flotor_hal::abi::loader::Plugin;
-    /// let plugin = Plugin::load("libjelly.so".as_ref()); // needs `unsafe`: nothing vouches for the file
+    /// let plugin = Plugin::load("libjelly.so".as_ref()); // needs `unsafe`: nothing guarantees the file
     /// ```
     ///
     /// # Errors

@@ -39,7 +39,7 @@ impl Model {
         let values = unsafe { to_raw(settings, parameters) }?;
         let table = tables.force;
         let (Some(create), Some(step)) = (table.create, table.step) else {
-            return Err(Refusal::broken("its table has lost a function"));
+            return Err(Refusal::broken("a required entry of its function table is null"));
         };
         let mut message = Message::default();
         let mut instance = std::ptr::null_mut();

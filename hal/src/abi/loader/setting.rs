@@ -19,7 +19,7 @@ pub enum SettingError {
     /// No parameter has this id.
     #[error("no parameter `{id}`{}", nearest.as_ref().map_or(String::new(), |n| format!("; did you mean `{n}`?")))]
     Unknown {
-        /// What was asked for.
+        /// The id in the request.
         id: String,
         /// The most similar id there is.
         nearest: Option<String>,
@@ -60,7 +60,7 @@ impl Setting {
     /// Reads a value for the parameter `id` of a schema.
     ///
     /// # Errors
-    /// [`SettingError`] with the nearest right id, the range, or the choices.
+    /// [`SettingError`] with the closest valid id, the range, or the choices.
     pub fn parse(schema: &'static [Parameter], id: &str, value: &str) -> Result<Self, SettingError> {
         let (index, parameter) = find(schema, id)?;
         match parameter.kind() {
@@ -91,7 +91,7 @@ impl Setting {
     /// Takes a number for the parameter `id` of a schema (for a choice, its index).
     ///
     /// # Errors
-    /// [`SettingError`] with the nearest right id or the range.
+    /// [`SettingError`] with the closest valid id or the range.
     pub fn number(schema: &'static [Parameter], id: &str, number: f64) -> Result<Self, SettingError> {
         let (index, parameter) = find(schema, id)?;
         parameter.check(number).map_err(|range| SettingError::OutOfRange {

@@ -62,7 +62,7 @@ impl Coverage {
 pub enum DivergenceCause {
     /// A model ran asynchronously, and the recording lacks the times of its results.
     #[error(
-        "`{model}` was computed beside the loop on the real clock, and when its fields came is not in the recording"
+        "`{model}` ran asynchronously in real time, and the recording lacks the arrival times of its results"
     )]
     FieldOnRealClock {
         /// Its name.

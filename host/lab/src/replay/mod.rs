@@ -56,7 +56,7 @@ pub enum ReplayError {
 const NOBODY_TO_WAIT_FOR: Patience = Patience { silence_ns: 0, fade_ns: 0 };
 
 fn is_remote(coupling: &CouplingDescription) -> bool {
-    matches!(coupling.ends, CouplingEnds::Apart(_))
+    matches!(coupling.ends, CouplingEnds::Remote(_))
 }
 
 /// How the replayed wrench differs from the recorded one.

@@ -40,7 +40,7 @@ pub enum PublishError {
     #[error(transparent)]
     Directory(#[from] DirectoryError),
     /// No thread, or no second handle to the socket.
-    #[error("no thread for those who watch: {0}")]
+    #[error("cannot start the telemetry threads: {0}")]
     Thread(#[from] io::Error),
 }
 
@@ -119,10 +119,10 @@ impl Publication {
         self.shared.greeting().keep(&message);
         let Ok(payload) = serde_json::to_vec(&message) else { return };
         let bytes = frame(Kind::Change, &payload);
-        self.shared.watchers().iter().for_each(|watcher| watcher.outbox.news(bytes.clone()));
+        self.shared.watchers().iter().for_each(|watcher| watcher.outbox.push(bytes.clone()));
     }
 
-    /// Tells everybody that the run is over, and how; then nobody can watch it any more.
+    /// Notifies all clients of the end of the run and its outcome; no client can connect afterwards.
     pub fn end(self, words: &str) {
         let Ok(payload) = serde_json::to_vec(&End { words: words.to_owned() }) else { return };
         let bytes = frame(Kind::End, &payload);
@@ -182,13 +182,13 @@ fn welcome(stream: UnixStream, shared: &Arc<Shared>) {
     }
     let outbox = Arc::new(Outbox::default());
     let Ok(greeting) = serde_json::to_vec(&*shared.greeting()) else { return };
-    outbox.news(frame(Kind::Greeting, &greeting));
-    outbox.news(frame(Kind::Run, &shared.run));
+    outbox.push(frame(Kind::Greeting, &greeting));
+    outbox.push(frame(Kind::Run, &shared.run));
     // With the list locked, so that no change is told between greeting and list.
     watchers.extend(Watcher::start(stream, outbox, shared));
 }
 
-/// Lets go of those who have gone.
+/// Drops disconnected clients.
 fn sweep(shared: &Shared) {
     let gone: Vec<Watcher> = {
         let mut watchers = shared.watchers();

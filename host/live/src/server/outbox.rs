@@ -8,7 +8,7 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 /// Ticks that wait at most: four seconds at 1 kHz.
 const MOST_TICKS: usize = 4096;
 /// Everything else that waits at most. A watcher who asks this often and reads nothing gets no answer.
-const MOST_NEWS: usize = 256;
+const MOST_FRAMES: usize = 256;
 
 #[derive(Default)]
 pub(super) struct Outbox {
@@ -21,7 +21,7 @@ pub(super) struct Outbox {
 enum Waiting {
     Tick(TickRecord),
     /// A frame of any other kind.
-    News(Vec<u8>),
+    Frame(Vec<u8>),
 }
 
 #[derive(Default)]
@@ -29,7 +29,7 @@ struct State {
     /// In the order in which it came: a change goes out before the tick that saw it first, and after the one before.
     waiting: VecDeque<Waiting>,
     ticks: usize,
-    news: usize,
+    frames: usize,
     dropped: u64,
     /// What goes out after everything else.
     last: Option<Vec<u8>>,
@@ -78,11 +78,11 @@ impl Outbox {
     }
 
     /// A frame that is no tick, if there is room.
-    pub(super) fn news(&self, frame: Vec<u8>) {
+    pub(super) fn push(&self, frame: Vec<u8>) {
         let mut state = self.lock();
-        if state.news < MOST_NEWS && !state.is_closed {
-            state.waiting.push_back(Waiting::News(frame));
-            state.news += 1;
+        if state.frames < MOST_FRAMES && !state.is_closed {
+            state.waiting.push_back(Waiting::Frame(frame));
+            state.frames += 1;
         }
         drop(state);
         self.changed.notify_one();
@@ -120,13 +120,13 @@ impl Outbox {
         }
         let mut batch = Batch::new(state.dropped);
         let all: Vec<Waiting> = state.waiting.drain(..).collect();
-        (state.ticks, state.news) = (0, 0);
+        (state.ticks, state.frames) = (0, 0);
         // Whoever brings the next tick does not wait for this one to be written down.
         drop(state);
         for waiting in all {
             match waiting {
                 Waiting::Tick(record) => batch.tick(record),
-                Waiting::News(frame) => batch.news(&frame),
+                Waiting::Frame(frame) => batch.frame(&frame),
             }
         }
         Some(batch.finish())
@@ -155,7 +155,7 @@ impl Batch {
         }
     }
 
-    fn news(&mut self, frame: &[u8]) {
+    fn frame(&mut self, frame: &[u8]) {
         self.close_frame();
         self.bytes.extend(frame);
     }
@@ -211,7 +211,7 @@ mod tests {
         outbox.last(vec![7]);
         assert_eq!((outbox.take(), outbox.take()), (Some(vec![7]), None));
         for _ in 0..1000 {
-            outbox.news(vec![0; 10]);
+            outbox.push(vec![0; 10]);
         }
         assert_eq!(outbox.take(), None, "a closed one takes nothing in");
     }
@@ -234,7 +234,7 @@ mod tests {
         outbox.want_ticks(1);
         outbox.tick(&record(0, Events::NONE));
         outbox.tick(&record(1, Events::NONE));
-        outbox.news(frame(Kind::Change, b"{}"));
+        outbox.push(frame(Kind::Change, b"{}"));
         outbox.tick(&record(2, Events::NONE));
         let mut frames = Frames::default();
         frames.push(&outbox.take().expect("something waits"));

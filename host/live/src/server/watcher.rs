@@ -110,7 +110,7 @@ fn read(mut stream: UnixStream, outbox: &Outbox, shared: &Shared) {
                 Ok(Some((Kind::Request, payload))) => {
                     let answer = answer(payload, outbox, shared);
                     if let Ok(payload) = serde_json::to_vec(&answer) {
-                        outbox.news(frame(Kind::Answer, &payload));
+                        outbox.push(frame(Kind::Answer, &payload));
                     }
                     std::thread::sleep(REQUEST_PERIOD);
                 }

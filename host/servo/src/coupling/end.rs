@@ -3,12 +3,12 @@
 use super::{CouplingConfig, PassivityMode, Pull, Tank};
 use crate::port_energy::{Controller, Expected, PortObserver};
 use flotor_core::mapping::{Mapping, MappingConfig};
-use flotor_core::peer::News;
+use flotor_core::peer::PeerState;
 use flotor_hal::{DVec3, DeviceState, Pose, Twist, Wrench, rotation_vector};
 
 /// Energy that is never counted on, J: what a surprise of 20 µm costs at 1 N. With it in hand, a hand that starts faster
-/// than expected does not overdraw the account.
-const KEPT_BACK_J: f64 = 2.0e-5;
+/// than expected does not take the tank below zero.
+const SURPRISE_J: f64 = 2.0e-5;
 
 /// One end.
 pub struct End {
@@ -19,7 +19,7 @@ pub struct End {
     calm: Calm,
     tank: Tank,
     bounce: Bounce,
-    partner: Option<News>,
+    partner: Option<PeerState>,
 }
 
 impl End {
@@ -61,37 +61,37 @@ impl End {
     /// What the partner is to know, with a part of the energy that is here. Once a tick. Real-time: bounded, no
     /// allocation.
     #[inline]
-    pub fn tell(&mut self, state: &DeviceState) -> News {
+    pub fn tell(&mut self, state: &DeviceState) -> PeerState {
         let told_j = self.tank.pass_on(self.bounce_j());
-        self.news(state, told_j)
+        self.peer_state(state, told_j)
     }
 
     /// The same without energy: to a partner that may not be there nothing is passed on. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn call(&self, state: &DeviceState) -> News {
-        self.news(state, self.tank.told_j())
+    pub(super) fn call(&self, state: &DeviceState) -> PeerState {
+        self.peer_state(state, self.tank.told_j())
     }
 
     #[inline]
-    fn news(&self, state: &DeviceState, told_j: f64) -> News {
-        News {
+    fn peer_state(&self, state: &DeviceState, told_j: f64) -> PeerState {
+        PeerState {
             pose: self.mapping.pose_to_model(&state.pose),
             twist: self.mapping.twist_to_model(&state.twist),
             told_j,
         }
     }
 
-    /// Takes news in, the newest there is; that of ticks before may be missing. Real-time: bounded, no allocation.
+    /// Takes the newest peer state in; those of ticks before may be missing. Real-time: bounded, no allocation.
     #[inline]
-    pub fn hear(&mut self, news: &News) {
-        self.tank.hear(news.told_j);
-        self.partner = Some(*news);
+    pub fn hear(&mut self, peer: &PeerState) {
+        self.tank.hear(peer.told_j);
+        self.partner = Some(*peer);
     }
 
-    /// Another partner tells from these news on, or the first. Real-time: bounded, no allocation.
+    /// Another partner sends from this peer state on, or the first. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn meet(&mut self, news: &News) {
-        self.tank.meet(news.told_j);
+    pub(super) fn meet(&mut self, peer: &PeerState) {
+        self.tank.meet(peer.told_j);
     }
 
     /// What this end asks for. Real-time: bounded, no allocation.
@@ -124,6 +124,7 @@ impl End {
         let away = partner.pose.position() - pose.position();
         let turned: DVec3 = rotation_vector(partner.pose.orientation() * pose.orientation().conjugate());
         let config = &self.config;
+        // Spring and damper towards the partner, in the shared frame: F = k dx + b dv, T = k dphi + b dw.
         let force = away * config.stiffness_n_per_m
             + (partner.twist.linear() - twist.linear()) * config.damping_ns_per_m;
         let torque = turned * config.stiffness_nm_per_rad
@@ -137,7 +138,7 @@ impl End {
         let less = match config.passivity {
             PassivityMode::Observe => None,
             PassivityMode::Control => {
-                let available_j = (self.tank.level_j() - KEPT_BACK_J) * scale;
+                let available_j = (self.tank.level_j() - SURPRISE_J) * scale;
                 let change = wrench - self.bounce.asked;
                 let expected = self.calm.expected_with(&change);
                 self.controller.keep_within(available_j, &wrench, &state.twist, expected)
@@ -152,7 +153,7 @@ impl End {
         self.bounce.stored_j / self.mapping.energy_scale()
     }
 
-    /// The energy account.
+    /// The energy tank.
     #[must_use]
     pub fn tank(&self) -> &Tank {
         &self.tank
@@ -174,7 +175,7 @@ impl Bounce {
     /// Less than this is the rounding of sums, N; a tenth of it in N·m.
     const NOTHING_N: f64 = 1.0e-9;
 
-    /// What is held beyond what was asked for takes energy in and gives it back. Where nothing is, nothing stands in it.
+    /// What is held beyond what was requested takes energy in and gives it back. Where nothing is, nothing stands in it.
     #[inline]
     fn follow(&mut self, pose: &Pose, held: &Wrench) {
         let beyond = *held - self.asked;
@@ -187,7 +188,7 @@ impl Bounce {
 
 /// How steadily a handle has moved of late: what is to be expected of its next sample.
 ///
-/// A hand that rests or draws slowly can only feel a coupling whose account is still empty if a small surprise is
+/// A hand that rests or draws slowly can only feel a coupling whose tank is still empty if a small surprise is
 /// expected of it; one that shakes is expected to go on.
 struct Calm {
     period_s: f64,

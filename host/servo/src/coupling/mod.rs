@@ -1,41 +1,41 @@
-//! Two devices held together by a virtual spring and damper: bilateral teleoperation.
+//! Virtual coupling of two devices by a spring and a damper: bilateral teleoperation.
 //!
-//! Each device has an [`End`]. An end hears from its partner where that is, how it moves and how much energy it has
-//! passed on ([`News`], some ticks old), and pulls its own handle there. It keeps an energy account ([`Tank`]): what its
-//! hand puts in, less what comes out, plus what the partner has passed on. As long as no account is overdrawn, nothing
-//! comes out of the pair that nobody has put in, *whatever the delay*, constant or not, and even if news gets lost: the
-//! energy passed on is told as a running total.
+//! Each device has an [`End`]. An end receives the state of its partner: pose, velocity and the energy it has
+//! passed on ([`PeerState`], some ticks old), and pulls its own handle there. It keeps an energy tank ([`Tank`]): what
+//! its hand puts in, less what comes out, plus what the partner has passed on. As long as no tank is below zero, the
+//! pair generates no energy, *whatever the delay*, constant or not, and even if messages get lost: the energy passed on
+//! is sent as a running total.
 //!
 //! ```text
-//!  hand  <-- wrench --  End   -- News: pose, twist, energy passed on -->  End  -- wrench -->  hand
-//!        -- motion -->  Tank  <-- News ---------------------------------  Tank <-- motion --
+//!  hand  <-- wrench --  End   -- PeerState: pose, twist, energy passed on -->  End  -- wrench -->  hand
+//!        -- motion -->  Tank  <-- PeerState ---------------------------------  Tank <-- motion --
 //! ```
 //!
 //! Where frames and scales differ, both ends speak of one shared frame; the way there is a mapping like a model's.
 //! Energies are those of the shared frame.
 //!
-//! [`Coupling`] is both ends in one loop with a delay of whole ticks. [`EndApart`] is one end whose partner is on another host:
-//! the same end, the same news, which other threads carry over the [`Line`].
+//! [`Coupling`] is both ends in one loop with a delay of whole ticks. [`RemoteEnd`] is one end whose partner is on
+//! another host: the same end, the same peer state, which other threads transport over the [`Line`].
 //!
-//! Sources: account and transfer of energy, M. Franken, S. Stramigioli, S. Misra, C. Secchi, A. Macchelli, "Bilateral
-//! telemanipulation with time delays: a two-layer approach combining passivity and transparency", IEEE Trans. Robotics
-//! 27(4), 2011, sections III and IV; controller at an end, see [`crate::port_energy`].
+//! Sources: energy tank and transfer of energy, M. Franken, S. Stramigioli, S. Misra, C. Secchi, A. Macchelli,
+//! "Bilateral telemanipulation with time delays: a two-layer approach combining passivity and transparency", IEEE
+//! Trans. Robotics 27(4), 2011, sections III and IV; controller at an end, see [`crate::port_energy`].
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
-mod apart;
 mod delay;
 mod end;
+mod remote;
 mod tank;
 #[cfg(test)]
 mod tests;
 
-pub use apart::{EndApart, Hearing, Line, Patience};
 pub use end::End;
 pub use flotor_core::coupling::{
     CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MOST_DELAY_TICKS, PassivityMode,
 };
-pub use flotor_core::peer::{Account, Dispatch, News};
+pub use flotor_core::peer::{Dispatch, PeerState, TankState};
+pub use remote::{Hearing, Line, Patience, RemoteEnd};
 pub use tank::Tank;
 
 use delay::DelayLine;
@@ -64,12 +64,12 @@ pub struct Pull {
 /// Two ends in one loop.
 pub struct Coupling {
     ends: [End; 2],
-    /// News on its way to the end of the same number.
+    /// Peer states on their way to the end of the same number.
     ways: [DelayLine; 2],
 }
 
 impl Coupling {
-    /// A coupling at rest, with empty accounts; `period_s` is the time between ticks. Not real-time.
+    /// A coupling at rest, with empty tanks; `period_s` is the time between ticks. Not real-time.
     #[must_use]
     pub fn new(config: &CouplingConfig, ends: &[CouplingEnd; 2], period_s: f64) -> Self {
         Self {
@@ -85,16 +85,16 @@ impl Coupling {
         let [at_first, at_second] = grips;
         first.observe(at_first.state, &at_first.held);
         second.observe(at_second.state, &at_second.held);
-        if let Some(news) = to_second.pass(first.tell(at_first.state)) {
-            second.hear(&news);
+        if let Some(peer) = to_second.pass(first.tell(at_first.state)) {
+            second.hear(&peer);
         }
-        if let Some(news) = to_first.pass(second.tell(at_second.state)) {
-            first.hear(&news);
+        if let Some(peer) = to_first.pass(second.tell(at_second.state)) {
+            first.hear(&peer);
         }
         [first.pull(at_first.state), second.pull(at_second.state)]
     }
 
-    /// The energy accounts of both ends.
+    /// The energy tanks of both ends.
     #[must_use]
     pub fn tanks(&self) -> [&Tank; 2] {
         let [first, second] = &self.ends;

@@ -1,9 +1,10 @@
-//! The energy account of one end of a coupling.
+//! The energy tank of one end of a coupling.
 
-use flotor_core::peer::Account;
+use flotor_core::peer::TankState;
 
-/// Part of an account that is passed on in a tick. Ends that share halves are level after a few ticks, so that an end
-/// that is to push has what the other one's hand has put in; what is on its way is out of reach for as long as it travels.
+/// Part of the level that is passed on in a tick. Ends that share halves are level after a few ticks, so that an end
+/// that is to push has what the other one's hand has put in; what is on its way serves neither for as long as it
+/// travels.
 const PASSED_ON: f64 = 0.1;
 
 /// What a hand has put in and what has come out, J; what the partner has passed on, and what was passed on to it.
@@ -39,7 +40,7 @@ impl Tank {
         self.told_j
     }
 
-    /// Takes in what the partner has passed on since it was heard of last; `told_j` is all it ever has. News that was
+    /// Takes in what the partner has passed on since it was heard of last; `told_j` is all it ever has. What was
     /// overtaken brings nothing. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn hear(&mut self, told_j: f64) {
@@ -64,12 +65,12 @@ impl Tank {
         self.told_j
     }
 
-    /// The account in numbers, for whoever is to see it. Real-time: bounded, no allocation.
+    /// The tank in numbers, for reports. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
-    pub fn account(&self) -> Account {
+    pub fn state(&self) -> TankState {
         let Self { level_j, lowest_j, gone_in_j, given_up_j, .. } = *self;
-        Account { level_j, lowest_j, gone_in_j, given_up_j }
+        TankState { level_j, lowest_j, gone_in_j, given_up_j }
     }
 
     /// Gives up what is more than `most_j`: energy that has turned to heat in a damper is not to drive anything later.
@@ -82,7 +83,7 @@ impl Tank {
         self.level_j -= excess_j;
     }
 
-    /// What is there to be taken out, J; negative: the account is overdrawn.
+    /// What is there to be taken out, J; negative: more has come out than had gone in.
     #[must_use]
     pub fn level_j(&self) -> f64 {
         self.level_j
@@ -107,7 +108,7 @@ impl Tank {
         self.given_up_j
     }
 
-    /// By how much the account is off: what it has seen come and go, less what is there, J.
+    /// Imbalance: what has come and gone, less what is there, J.
     #[must_use]
     pub fn imbalance_j(&self) -> f64 {
         self.gone_in_j + self.heard_before_j + self.heard_j - self.told_j - self.given_up_j - self.level_j

@@ -1,4 +1,4 @@
-//! The coupling against what it promises: energy, delay, lost and overtaken news, scales and frames.
+//! The coupling against what it promises: energy, delay, lost and overtaken messages, scales and frames.
 
 use super::*;
 use flotor_core::mapping::MappingConfig;
@@ -67,7 +67,8 @@ fn shaken(config: CouplingConfig) -> (f64, f64) {
         let gone_in_j: f64 = coupling.tanks().iter().map(|tank| tank.gone_in_j()).sum();
         lowest_j = lowest_j.min(gone_in_j);
         let [first, second] = &mut sliders;
-        // A hand that means to go up and down at 2 Hz and holds with 400 N/m and 4 N s/m; it lets go after three seconds.
+        // A hand that intends to go up and down at 2 Hz and holds with 400 N/m and 4 N s/m; it releases after three
+        // seconds.
         let aim_m = 0.004 * (2.0 * std::f64::consts::TAU * f64::from(tick) * PERIOD_S).sin();
         let grip = if tick < 3000 { 1.0 } else { 0.0 };
         let hand_n = grip * (400.0 * (aim_m - first.z_m) - 4.0 * first.velocity_m_per_s);
@@ -82,12 +83,12 @@ fn shaken(config: CouplingConfig) -> (f64, f64) {
 fn what_one_hand_does_moves_the_other_handle() {
     let (lowest_j, fastest_m_per_s) = shaken(CouplingConfig::default());
     assert_eq!(lowest_j, 0.0);
-    // The hand means 50 mm/s.
+    // The intended motion of the hand has 50 mm/s.
     assert!((0.02..0.2).contains(&fastest_m_per_s), "{fastest_m_per_s} m/s");
 }
 
 #[test]
-fn a_long_delay_makes_energy_and_the_controller_keeps_it_back() {
+fn a_long_delay_generates_energy_and_the_controller_removes_it() {
     for delay_ticks in [30, 100, 300] {
         let with = |passivity| shaken(CouplingConfig { delay_ticks, passivity, ..CouplingConfig::default() });
         let (free, kept) = (with(PassivityMode::Observe), with(PassivityMode::Control));
@@ -97,7 +98,7 @@ fn a_long_delay_makes_energy_and_the_controller_keeps_it_back() {
 }
 
 #[test]
-fn accounts_balance_and_what_is_on_its_way_is_nobodys() {
+fn tanks_balance_and_energy_on_its_way_is_in_neither() {
     let config = CouplingConfig { delay_ticks: 7, ..CouplingConfig::default() };
     let mut coupling = Coupling::new(&config, &ends(), PERIOD_S);
     let mut sliders = [Slider::AT_REST, Slider::AT_REST];
@@ -119,31 +120,32 @@ fn accounts_balance_and_what_is_on_its_way_is_nobodys() {
     }
 }
 
-/// Two ends on two machines: news is late by a time that changes, overtakes other news, and a third of it is lost.
+/// Two ends on two machines: messages are late by a time that changes, overtake one another, and a third of them is
+/// lost.
 #[test]
-fn nothing_comes_out_that_nobody_put_in_whatever_becomes_of_the_news() {
+fn the_pair_generates_no_energy_whatever_becomes_of_the_messages() {
     for seed in 0..20 {
         let mut state = seed;
         let config = CouplingConfig::default();
         let mut ends = [(); 2].map(|()| End::new(&config, &MappingConfig::default(), PERIOD_S));
         let mut sliders = [Slider::AT_REST, Slider::AT_REST];
-        // News on its way to an end, and when it arrives.
-        let mut ways: [Vec<(i32, News)>; 2] = [Vec::new(), Vec::new()];
+        // Peer states on their way to an end, and when they arrive.
+        let mut ways: [Vec<(i32, PeerState)>; 2] = [Vec::new(), Vec::new()];
         let mut hand_n = [0.0; 2];
         let mut moved_m = 0.0_f64;
         for tick in 0..3000 {
             let states = sliders.each_ref().map(Slider::state);
             for from in [0, 1] {
                 ends[from].observe(&states[from], &sliders[from].held());
-                let news = ends[from].tell(&states[from]);
+                let peer = ends[from].tell(&states[from]);
                 #[allow(clippy::cast_possible_truncation)] // up to 80 ticks
                 let late = (40.0 + 40.0 * random(&mut state)) as i32;
                 if random(&mut state) > -1.0 / 3.0 {
-                    ways[1 - from].push((tick + late, news));
+                    ways[1 - from].push((tick + late, peer));
                 }
             }
             for (end, way) in ends.iter_mut().zip(&mut ways) {
-                way.iter().filter(|(arrives, _)| *arrives == tick).for_each(|(_, news)| end.hear(news));
+                way.iter().filter(|(arrives, _)| *arrives == tick).for_each(|(_, peer)| end.hear(peer));
                 way.retain(|(arrives, _)| *arrives > tick);
             }
             let gone_in_j: f64 = ends.iter().map(|end| end.tank().gone_in_j()).sum();

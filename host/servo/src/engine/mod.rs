@@ -1,9 +1,9 @@
-//! Where a model runs: in the loop, beside it, or in a worker of its own.
+//! Where a model runs: in the loop, asynchronously, or in a worker of its own.
 
-pub mod beside;
+pub mod asynchronous;
 pub mod process;
 
-use beside::SlowModel;
+use asynchronous::AsynchronousModel;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{ActiveRegion, Demand, Input, Memory, Output, WorkspaceBounds};
@@ -14,9 +14,9 @@ pub enum Engine {
     /// In the loop: fastest, and what breaks the model may break the process.
     Here(Model),
     /// In a process of its own.
-    Apart(Worker),
-    /// Beside the loop, which evaluates its linear field.
-    Beside(Box<SlowModel>),
+    Process(Worker),
+    /// Asynchronously; the loop evaluates its local linear model.
+    Asynchronous(Box<AsynchronousModel>),
 }
 
 /// What came of a step.
@@ -42,7 +42,7 @@ impl Engine {
         };
         match self {
             Self::Here(model) => answered(model.step(input, output)),
-            Self::Apart(worker) => match worker.step(input) {
+            Self::Process(worker) => match worker.step(input) {
                 Reply::Answered((status, answer)) => {
                     *output = answer;
                     answered(status)
@@ -50,7 +50,7 @@ impl Engine {
                 Reply::Late => Stepped::Late,
                 Reply::Gone => Stepped::Gone,
             },
-            Self::Beside(model) => model.step(input, output),
+            Self::Asynchronous(model) => model.step(input, output),
         }
     }
 
@@ -63,12 +63,12 @@ impl Engine {
     pub fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
         match self {
             Self::Here(model) => model.set_parameter(index, value),
-            Self::Apart(worker) => match worker.set_parameter(index, value) {
+            Self::Process(worker) => match worker.set_parameter(index, value) {
                 Reply::Answered(status) => status,
                 // Not now: the next step tells whether it is late or gone.
                 Reply::Late | Reply::Gone => CallStatus::Unsupported,
             },
-            Self::Beside(model) => model.set_parameter(index, value),
+            Self::Asynchronous(model) => model.set_parameter(index, value),
         }
     }
 
@@ -76,8 +76,8 @@ impl Engine {
     pub fn parameter(&mut self, index: usize) -> f64 {
         match self {
             Self::Here(model) => model.parameter(index),
-            Self::Apart(worker) => worker.parameter(index),
-            Self::Beside(model) => model.parameter(index),
+            Self::Process(worker) => worker.parameter(index),
+            Self::Asynchronous(model) => model.parameter(index),
         }
     }
 
@@ -85,8 +85,8 @@ impl Engine {
     pub fn serves(&self) -> Demand {
         match self {
             Self::Here(model) => model.serves(),
-            Self::Apart(worker) => worker.serves(),
-            Self::Beside(model) => model.serves(),
+            Self::Process(worker) => worker.serves(),
+            Self::Asynchronous(model) => model.serves(),
         }
     }
 
@@ -94,28 +94,30 @@ impl Engine {
     pub fn reset(&mut self) -> CallStatus {
         match self {
             Self::Here(model) => model.reset(),
-            Self::Apart(worker) => match worker.reset() {
+            Self::Process(worker) => match worker.reset() {
                 Reply::Answered(status) => status,
                 // The next step tells whether it is late or gone.
                 Reply::Late | Reply::Gone => CallStatus::Ok,
             },
-            Self::Beside(model) => model.reset(),
+            Self::Asynchronous(model) => model.reset(),
         }
     }
 
-    /// Where the model can act; one beside the loop or in a process of its own is always asked. Real-time: bounded, no allocation.
+    /// Where the model can act; an asynchronous one, or one in a process of its own, is always stepped. Real-time:
+    /// bounded, no allocation.
     pub fn active_region(&mut self) -> ActiveRegion {
         match self {
             Self::Here(model) => model.active_region(),
-            Self::Apart(_) | Self::Beside(_) => ActiveRegion::EVERYWHERE,
+            Self::Process(_) | Self::Asynchronous(_) => ActiveRegion::EVERYWHERE,
         }
     }
 
-    /// Where the model ends; one beside the loop or in a process of its own has no end. Real-time: bounded, no allocation.
+    /// Where the model ends; an asynchronous one, or one in a process of its own, has no end. Real-time: bounded, no
+    /// allocation.
     pub fn workspace_bounds(&mut self) -> WorkspaceBounds {
         match self {
             Self::Here(model) => model.workspace_bounds(),
-            Self::Apart(_) | Self::Beside(_) => WorkspaceBounds::UNBOUNDED,
+            Self::Process(_) | Self::Asynchronous(_) => WorkspaceBounds::UNBOUNDED,
         }
     }
 
@@ -123,8 +125,8 @@ impl Engine {
     pub fn memory(&self) -> Memory {
         match self {
             Self::Here(model) => model.memory(),
-            Self::Apart(worker) => worker.memory(),
-            Self::Beside(model) => model.memory(),
+            Self::Process(worker) => worker.memory(),
+            Self::Asynchronous(model) => model.memory(),
         }
     }
 
@@ -132,8 +134,8 @@ impl Engine {
     pub fn last_message(&mut self) -> String {
         match self {
             Self::Here(model) => model.last_message(),
-            Self::Apart(worker) => worker.last_message(),
-            Self::Beside(model) => model.last_message(),
+            Self::Process(worker) => worker.last_message(),
+            Self::Asynchronous(model) => model.last_message(),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Which models can act where the handle is: a uniform grid over the regions they have declared.
 //!
-//! A model declares where it can act ([`flotor_hal::ActiveRegion`]); elsewhere its wrench is zero and it is not
+//! A model declares its active region ([`flotor_hal::ActiveRegion`]); elsewhere its wrench is zero and it is not
 //! stepped. The grid is built before the loop starts, over the box around all regions, with cells about twice the size
 //! of a usual region, so that a region lies in a few cells and a cell holds a few regions. A tick looks up one cell
 //! and compares the handle with the boxes of the objects in it; what lies elsewhere costs nothing.

@@ -11,7 +11,7 @@ use flotor_hal::{
     DVec3, Demand, DeviceState, Input, LoopConfig, Memory, Output, RegionShape, StepStatus, Tick, Wrench,
 };
 
-/// How a plugin in place of a model has behaved so far, in all its places.
+/// How a plugin swapped in for a model has behaved so far, in all its places.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ModelHealth {
     /// The tick at which it first panicked; from then on the instance that did is out.
@@ -98,7 +98,7 @@ pub struct Layer {
     /// What it asked for last: it fades if the model took too long too often.
     last: Share,
     blend: Blend,
-    /// It stays with the layer: whoever takes its place is not to blame for it.
+    /// It stays with the layer: the replacement is not the cause.
     health: ModelHealth,
     /// How often its model had been replaced when it was put in.
     pub(super) generation: u16,
@@ -286,8 +286,8 @@ impl Object {
             return None;
         }
         // Where it was not stepped it has no history: it starts anew.
-        let was_asleep = self.stepped_at.is_some_and(|last| last + 1 != input.tick);
-        if was_asleep && memory == Memory::PathDependent && self.model.reset() != CallStatus::Ok {
+        let was_inactive = self.stepped_at.is_some_and(|last| last + 1 != input.tick);
+        if was_inactive && memory == Memory::PathDependent && self.model.reset() != CallStatus::Ok {
             return self.fail(input.tick, health);
         }
         self.stepped_at = Some(input.tick);

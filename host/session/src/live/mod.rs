@@ -11,9 +11,9 @@
 //! A model that somebody wants in place of another is loaded and made here, on a thread of its own, and goes to the loop when
 //! it is ready.
 
-mod carrier;
+mod peer_link;
 
-pub use carrier::{Carried, Carrier, carry};
+pub use peer_link::{LinkCounts, PeerLink, start_peer_link};
 
 use crate::registry::Registry;
 use crate::scene::Scene;
@@ -69,16 +69,16 @@ fn panel(report: &PluginReport) -> PanelPlugin {
     PanelPlugin::new(name, &metadata.id, metadata.path.clone(), schema, parameters)
 }
 
-/// An observer, and beside it whoever watches.
+/// An observer, and the clients of the telemetry server.
 pub struct Watched<O> {
     /// The one that is always there.
     pub observer: O,
-    /// The others, unless nobody can watch.
+    /// The others, if the telemetry server has started.
     pub publication: Option<Publication>,
 }
 
 impl<O> Watched<O> {
-    /// Tells those who watch that the run is over.
+    /// Notifies the clients of the end of the run.
     pub fn end(self, words: &str) {
         if let Some(publication) = self.publication {
             publication.end(words);
@@ -130,8 +130,8 @@ impl Host {
         std::thread::scope(|scope| {
             let thread = std::thread::Builder::new().name("flotor-swap".to_owned());
             let making = thread.spawn_scoped(scope, make);
-            let making =
-                making.map_err(|error| refused(format!("there is no thread to make it: {error}")))?;
+            let making = making
+                .map_err(|error| refused(format!("cannot start a thread to create the model: {error}")))?;
             making.join().unwrap_or_else(|_| Err(refused("making it panicked".to_owned())))
         })
     }
@@ -141,7 +141,7 @@ impl Host {
 fn swap_words(model: &str, error: &ControlError) -> String {
     match error {
         ControlError::Busy => {
-            format!("[{model}] what came in last is still fading; try again after a moment")
+            format!("[{model}] the last swap is still fading in; try again in a moment")
         }
         other => other.to_string(),
     }

@@ -218,7 +218,7 @@ impl Registry {
         // Taken before the bytes are read: whoever writes meanwhile is noticed the next time.
         let Ok(stamp) = FileStamp::of(path) else { return load_file(path) }; // it says what is wrong
         let mut loaded = self.loaded.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = loaded.iter().find(|known| known.path == path && known.stamp.vouches_for(&stamp))
+        if let Some(known) = loaded.iter().find(|known| known.path == path && known.stamp.is_same_as(&stamp))
         {
             return Ok(known.plugin.clone());
         }
@@ -238,8 +238,8 @@ impl Registry {
 /// # Errors
 /// [`LoadError`], with file, cause and remedy.
 pub fn load_file(path: &Path) -> Result<Plugin, LoadError> {
-    // SAFETY: whoever runs this program vouches for the plugins that the scene, the command line and the searched folders
-    // name, as for the program itself; folders that anybody may write into are not searched.
+    // SAFETY: the user who runs this program guarantees the plugins that the scene, the command line and the searched
+    // folders name, as for the program itself; folders that anybody may write into are not searched.
     unsafe { Plugin::load(path) }
 }
 

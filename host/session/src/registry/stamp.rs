@@ -37,7 +37,7 @@ impl FileStamp {
     }
 
     /// Whether the contents read when this stamp was taken are those of a file with that one: a no means to look.
-    pub(super) fn vouches_for(&self, other: &Self) -> bool {
+    pub(super) fn is_same_as(&self, other: &Self) -> bool {
         let what = |stamp: &Self| (stamp.device, stamp.inode, stamp.length_bytes, stamp.changed);
         self.settled && what(self) == what(other)
     }
@@ -68,13 +68,13 @@ mod tests {
         let file = folder.path().join("file");
         std::fs::write(&file, b"one").expect("a file");
         let fresh = FileStamp::of(&file).expect("it is there");
-        assert!(!fresh.vouches_for(&fresh), "a write within the clock's tick would have the same time");
+        assert!(!fresh.is_same_as(&fresh), "a write within the clock's tick would have the same time");
         let settled = FileStamp { settled: true, ..fresh };
-        assert!(settled.vouches_for(&FileStamp::of(&file).expect("it is there")));
+        assert!(settled.is_same_as(&FileStamp::of(&file).expect("it is there")));
         let other = FileStamp { changed: (settled.changed.0, settled.changed.1 + 1), ..settled.clone() };
-        assert!(!settled.vouches_for(&other));
+        assert!(!settled.is_same_as(&other));
         let other = FileStamp { length_bytes: 4, ..settled.clone() };
-        assert!(!settled.vouches_for(&other));
+        assert!(!settled.is_same_as(&other));
     }
 
     #[test]

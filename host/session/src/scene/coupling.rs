@@ -1,4 +1,4 @@
-//! `[[coupling]]`: what holds two devices together.
+//! `[[coupling]]`: the virtual coupling of two devices.
 
 use super::devices::{self, DeviceUse};
 use super::reader::{SceneError, Section};
@@ -51,10 +51,10 @@ fn coupling(
     let ends = ends.into_iter().map(|section| end(section, devices)).collect::<Result<Vec<_>, _>>()?;
     let ends = match (partner, ends.as_slice()) {
         (Partner::Here, [first, second]) if first.device == second.device => {
-            return Err(wrong("a coupling holds two devices together, not one with itself"));
+            return Err(wrong("a coupling needs two different devices"));
         }
         (Partner::Here, [first, second]) => CouplingEnds::Here([*first, *second]),
-        (Partner::Elsewhere, [here]) => CouplingEnds::Apart(*here),
+        (Partner::Elsewhere, [here]) => CouplingEnds::Remote(*here),
         (Partner::Here, _) => {
             return Err(wrong(
                 "a coupling has two ends: `[[coupling.end]]` twice, each with its `device`; if one is on another host, \
@@ -77,8 +77,8 @@ fn coupling(
     let name = match (name, ends) {
         (Some(name), CouplingEnds::Here(_)) => name,
         (None, CouplingEnds::Here([first, second])) => format!("{}-{}", named(first), named(second)),
-        (Some(name), CouplingEnds::Apart(_)) if is_key(&name) => name,
-        (_, CouplingEnds::Apart(_)) => {
+        (Some(name), CouplingEnds::Remote(_)) if is_key(&name) => name,
+        (_, CouplingEnds::Remote(_)) => {
             return Err(wrong(
                 "both hosts know the coupling by its `name`: lower-case letters, digits and hyphens, at most 40",
             ));

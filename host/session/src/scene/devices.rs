@@ -36,7 +36,9 @@ pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<DeviceUse>, SceneError>
             None => return Err(section.missing("name")),
         };
         if devices.iter().any(|device| device.name == name) {
-            return Err(here.problem(format!("two devices are called `{name}`; give one another `name`")));
+            return Err(
+                here.problem(format!("two devices are called `{name}`; give each a different `name`"))
+            );
         }
         if devices.len() >= MOST_DEVICES.into() {
             return Err(here.problem(format!("a scene has at most {MOST_DEVICES} devices")));
@@ -113,7 +115,7 @@ pub fn without_device(name: &str) -> &str {
     name.split_once(ON).map_or(name, |(model, _)| model)
 }
 
-/// Complains about two models, or a model and a device, of one name: `--set` and changes would reach only one.
+/// Reports an error for two models, or a model and a device, of one name: `--set` and changes would reach only one.
 pub(super) fn tell_apart(models: &[ModelUse], devices: &[DeviceUse]) -> Result<(), SceneError> {
     for (index, model) in models.iter().enumerate() {
         let before = models.get(..index).unwrap_or_default();
@@ -124,7 +126,7 @@ pub(super) fn tell_apart(models: &[ModelUse], devices: &[DeviceUse]) -> Result<(
         } else {
             continue;
         };
-        let problem = format!("{other} called `{}`; give one another `name`", model.name);
+        let problem = format!("{other} called `{}`; give each a different `name`", model.name);
         return Err(model.plugin.location.problem(problem));
     }
     Ok(())

@@ -116,7 +116,7 @@ pub struct ModelUse {
     pub blend: Blend,
     /// Where it runs.
     pub isolation: Isolation,
-    /// When it is computed, if beside the loop; the loop evaluates its linear field.
+    /// When it is computed, if asynchronously; the loop evaluates its local linear model.
     pub field: Option<FieldTiming>,
     /// Longest time a step may take, s; `None`: half a period in real time, anything on the virtual clock.
     pub budget_s: Option<f64>,
@@ -291,7 +291,7 @@ fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse
     Ok(on.into_iter().map(on_device).collect())
 }
 
-/// When a model beside the loop is computed.
+/// When an asynchronous model is computed.
 fn field(mut section: Section<'_>, isolation: Isolation) -> Result<FieldTiming, SceneError> {
     let rate = section.require("rate_hz")?;
     if isolation == Isolation::Process {

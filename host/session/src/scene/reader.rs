@@ -1,6 +1,6 @@
 //! Reads TOML tables key by key, so that every complaint has a file, a line, a key and a way out.
 //!
-//! serde would know the line of an unknown key but not the nearest right one; here each key is taken by name
+//! serde would know the line of an unknown key but not the closest valid one; here each key is taken by name
 //! and what is left over at the end is unknown.
 
 use super::ParameterText;
@@ -250,7 +250,7 @@ impl<'t> Section<'t> {
         entries.into_iter().map(text).collect()
     }
 
-    /// Complains about the first key nobody took.
+    /// Reports an error for the first unknown key.
     pub(super) fn finish(self) -> Result<(), SceneError> {
         let Some(key) = self.table.keys().min_by_key(|key| key.span().start) else {
             self.source.seen.borrow_mut().push((self.name, self.known));

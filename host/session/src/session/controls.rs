@@ -27,7 +27,7 @@ pub enum ControlError {
         names.join(", ")
     )]
     UnknownPlugin {
-        /// What was asked for.
+        /// The name in the request.
         name: String,
         /// The most similar name there is.
         nearest: Option<String>,
@@ -54,10 +54,10 @@ pub enum ControlError {
         live: Vec<String>,
     },
     /// Only models are mixed and replaced.
-    #[error("the device has no weight and cannot be replaced; models have and can")]
+    #[error("only models have a weight and can be swapped; this is a device")]
     NoWeight,
     /// A model cannot be replaced.
-    #[error("[{model}] it stays as it is: {problem}")]
+    #[error("[{model}] model unchanged: {problem}")]
     Refused {
         /// The model.
         model: String,
@@ -65,7 +65,7 @@ pub enum ControlError {
         problem: String,
     },
     /// More changes wait than the loop takes in, or the model replaced last is still fading.
-    #[error("the loop has not taken in the changes before this one yet; try again after a moment")]
+    #[error("previous changes are still pending; try again in a moment")]
     Busy,
     /// The loop has ended.
     #[error("the run is over")]
@@ -226,7 +226,7 @@ impl Controls {
         changes.push_entire_slice(checked).map_err(|_| ControlError::Busy)
     }
 
-    /// Puts another plugin, or the same one built anew, in place of a model: it is loaded and created here, and fades
+    /// Hot swap of a model by another plugin, or by the same one rebuilt: the new one is loaded and created here, and fades
     /// in from the next tick on while the old one fades out. Not real-time: takes as long as creating the model.
     ///
     /// Without `plugin` it is the one the scene names, with the scene's settings; another one starts from its own
@@ -404,7 +404,7 @@ impl Parts {
         self.list.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Another plugin in place of a model: changes are checked against it from now on. Its generation.
+    /// The hot swap of a model: changes are checked against it from now on. Its generation.
     pub(super) fn put_in(&self, model: usize, report: PluginReport) -> u16 {
         let mut list = self.lock();
         let devices = devices(&list);
@@ -419,7 +419,7 @@ impl Parts {
         }
     }
 
-    /// The plugin that had this number among those in place of a model.
+    /// The plugin that had this number among those swapped in.
     fn plugin(&self, model: usize, generation: u16) -> Option<PluginReport> {
         let list = self.lock();
         list.get(devices(&list) + model).map(|versions| versions.get(generation).clone())
@@ -537,7 +537,7 @@ fn devices(plugins: &[Versions]) -> usize {
 pub(super) struct ChangeLog {
     parts: Parts,
     reports: ReportReceiver,
-    /// Taken out of the queue, and of a later tick than was asked for.
+    /// Taken out of the queue, and of a later tick than requested.
     waiting: Option<ChangeReport>,
 }
 

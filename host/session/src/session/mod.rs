@@ -33,7 +33,7 @@ use std::time::{Duration, Instant};
 pub struct RunOptions {
     /// Real or virtual time.
     pub clock: Clock,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
@@ -59,11 +59,11 @@ pub enum RunError {
         mismatches: Vec<String>,
     },
     /// The servo's thread could not be started or died.
-    #[error("the servo thread {0}; nothing was moved")]
+    #[error("the servo thread {0}; no device was moved")]
     Thread(&'static str),
-    /// Somebody did not come back to the loop; the watchdog has stopped the device.
+    /// A call of the loop did not return; the watchdog has stopped the device.
     #[error(
-        "`{who}` did not come back from {} in tick {}; the watchdog stopped the device after {} ms",
+        "`{who}` did not return from {} in tick {}; the watchdog stopped the device after {} ms",
         stuck.place.call(), stuck.tick, limit_ns / 1_000_000
     )]
     Hung {
@@ -154,7 +154,7 @@ impl Outcome {
 pub struct DeviceOutcome {
     /// The first fault it reported.
     pub fault: Option<Fault>,
-    /// Its own energy account, where it keeps one.
+    /// Its own energy balance, where it keeps one.
     pub ledger: Option<EnergyLedger>,
     /// Its last words; empty if it had no reason to say any.
     pub words: String,
@@ -228,7 +228,7 @@ impl Session {
         });
         let forces = Forces::new(devices.len(), models, couplings.collect());
         let emergency_buttons = scene.limits.emergency_buttons;
-        let run = RunConfig { period_ns, ramp_ns, held_up_ns: watchdog_ns, emergency_buttons };
+        let run = RunConfig { period_ns, ramp_ns, longest_gap_ns: watchdog_ns, emergency_buttons };
         Ok(Self {
             standby: Standby::new(devices, forces, parameters, exchange, config, run),
             controls,
@@ -284,7 +284,7 @@ impl Session {
         WrenchLimits { force_n, torque_nm }
     }
 
-    /// The couplings whose other end is on another host, by name, each with the line on which its news is to be carried.
+    /// The couplings whose other end is on another host, by name, each with the line for its peer state.
     /// Given once; an end whose line nobody takes is never heard of, and asks for nothing.
     #[must_use]
     pub fn take_lines(&mut self) -> Vec<(String, Line)> {
@@ -401,7 +401,7 @@ impl Session {
             let watchdog = start_watchdog(loop_heart, stoppers.clone(), loop_stop.clone(), watchdog_ns);
             let mut runner = Loop::new(servo, schedule, duration_ns).releasing();
             // Without a watchdog nothing is moved.
-            // A full queue drops records and counts them: observers never hold up the loop.
+            // A full queue drops records and counts them: observers never delay the loop.
             let mut dropped_records = 0;
             while watchdog.is_ok() && runner.end().is_none() {
                 runner.advance(&loop_stop, |record| {

@@ -14,7 +14,7 @@ use flotor_core::mapping::Mapping;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting};
 use flotor_hal::{Axes, Capabilities, LoopConfig, Parameter, ParameterKind, Refusal};
-use flotor_servo::engine::beside::SlowModel;
+use flotor_servo::engine::asynchronous::AsynchronousModel;
 use flotor_servo::engine::process::{Worker, WorkerOrder};
 use flotor_servo::{Clock, Engine, Layer, Replacement, ScheduledChange, Servo, Standby, TimeBudget};
 use std::borrow::Cow;
@@ -105,8 +105,9 @@ pub fn prepare_model(
                         "it has no linear field, so it can only run in the loop; remove `[model.field]`";
                     return Err(complain(model, problem).into());
                 }
-                let slow = SlowModel::start(instance, plugin.parameters().len(), timing, config, clock);
-                Engine::Beside(Box::new(slow.map_err(|refusal| refused(plugin.metadata(), refusal))?))
+                let slow =
+                    AsynchronousModel::start(instance, plugin.parameters().len(), timing, config, clock);
+                Engine::Asynchronous(Box::new(slow.map_err(|refusal| refused(plugin.metadata(), refusal))?))
             }
             (Isolation::Process, _) => {
                 let keys = model.plugin.parameters.iter().map(|parameter| parameter.key.clone());
@@ -117,7 +118,7 @@ pub fn prepare_model(
                     config: *config,
                     patience_ns: budget_ns.unwrap_or(PATIENCE_NS),
                 };
-                Engine::Apart(Worker::start(&order).map_err(|refusal| refused(plugin.metadata(), refusal))?)
+                Engine::Process(Worker::start(&order).map_err(|refusal| refused(plugin.metadata(), refusal))?)
             }
         };
         Ok((engine, mapping.at(*place_m)))
@@ -141,8 +142,8 @@ fn complain(model: &ModelUse, problem: &str) -> SceneError {
 /// How long a run on the virtual clock waits for a model in a process of its own before it counts as hung, ns.
 const PATIENCE_NS: u64 = 2_000_000_000;
 
-/// Longest time a step of a model may take, ns. On the virtual clock only if the scene says so: what a clock on the
-/// wall says would make two runs differ.
+/// Longest time a step of a model may take, ns. On the virtual clock only if the scene says so: the wall
+/// clock would make two runs differ.
 fn budget_ns(model: &ModelUse, clock: Clock, period_ns: u64) -> Option<u64> {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked: at most a second
     let told_ns = model.budget_s.map(|seconds| (seconds * 1.0e9).round() as u64);

@@ -59,7 +59,7 @@ pub struct Effect {
     pub sphericity: Option<Sphericity>,
 }
 
-/// How unequally the contrasts of an effect vary, and p-values that take it into account.
+/// How unequally the contrasts of an effect vary, and p-values that include it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sphericity {
     /// Greenhouse and Geisser's epsilon: 1 where all contrasts vary equally and independently.

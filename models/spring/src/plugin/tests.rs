@@ -72,10 +72,10 @@ fn a_batch_is_single_steps_for_every_variant() {
     }
 }
 
-/// Spring 3 is handed over past 24 %: in a batch some poses go side by side, some one by one, and what is followed from
+/// Spring 3 is blended past 24 %: in a batch some poses go side by side, some one by one, and what is followed from
 /// pose to pose is the same.
 #[test]
-fn a_batch_hands_over_as_single_steps_do() {
+fn a_batch_blends_as_single_steps_do() {
     let preset = Preset::Thesis3;
     let (_, _, stiffness) = preset.parameters();
     let choice =
@@ -91,14 +91,14 @@ fn a_batch_hands_over_as_single_steps_do() {
         .collect();
     let mut outputs = vec![Output::default(); inputs.len()];
     together.step_batch(&inputs, &mut outputs);
-    let mut handed_over = 0;
+    let mut blended = 0;
     for (input, output) in inputs.iter().zip(&outputs) {
         let single = apart.step(input);
-        handed_over += u32::from(number(&apart, "rod_share") > 0.0);
+        blended += u32::from(number(&apart, "rod_share") > 0.0);
         assert_eq!((output.wrench, output.status()), (single.wrench, single.status()), "{input:?}");
         assert_eq!(output.energy_j.to_bits(), single.energy_j.to_bits(), "{input:?}");
     }
-    assert!((50..150).contains(&handed_over), "{handed_over}");
+    assert!((50..150).contains(&blended), "{blended}");
 }
 
 fn number(model: &SpringModel, id: &str) -> f64 {
@@ -113,7 +113,7 @@ fn only_the_rod_a_free_seat_and_what_buckles_remember() {
         let spring = preset.spring();
         let info = Prepared::new(&Choice { spring, ..Choice::default_with(Variant::Energy) }).info();
         assert_eq!(info.memory() == Memory::PathDependent, buckles, "{preset:?}");
-        let alone = Choice { hand_over: Switch::Off, spring, ..Choice::default_with(Variant::Energy) };
+        let alone = Choice { rod_blend: Switch::Off, spring, ..Choice::default_with(Variant::Energy) };
         assert_eq!(Prepared::new(&alone).info().memory(), Memory::Stateless, "{preset:?}");
     }
     for variant in Variant::ALL {

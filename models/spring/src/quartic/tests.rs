@@ -2,7 +2,7 @@ use flotor_hal::glam::{DMat3, DVec2, DVec3, DVec4};
 
 use super::{Quartic, coefficients, relative_length};
 use crate::angle::measures;
-use crate::bending::{Bending, levelled_argument};
+use crate::bending::{Bending, saturated_argument};
 use crate::preset::Preset;
 use crate::rigidity::Spring;
 use crate::shape::Shape;
@@ -118,13 +118,13 @@ fn derivatives_agree_with_differences() {
         let spring = preset.spring();
         let (rigidities, free_length_m) = (spring.rigidities(), spring.geometry().free_length_m);
         let quartic = Quartic::new(&spring);
-        // Inside the fit, in both levelled ends and far outside.
+        // Inside the fit, in both saturated ends and far outside.
         for relative in [0.1, 0.22, 0.5, 0.8, 0.97, 1.0, 1.4, 1.78, 3.0] {
             let length_m = relative * free_length_m;
             for squares in [[0.01, 0.02, 0.04], [0.3, 0.1, 0.5], [1.5, 2.0, 0.7]] {
                 let at = |step_m: f64, offsets: [f64; 3]| {
                     let z = |length| {
-                        levelled_argument(Shape::argument(rigidities, free_length_m, length).unwrap()).value
+                        saturated_argument(Shape::argument(rigidities, free_length_m, length).unwrap()).value
                     };
                     let length = length_m + step_m;
                     let tiny = 1e-3 * h * free_length_m;

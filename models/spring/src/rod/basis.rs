@@ -90,12 +90,14 @@ impl Legendre {
 
     fn advance(&mut self) {
         let Self { argument, degree, value, previous } = *self;
+        // Recurrence of the Legendre polynomials: (n + 1) P(n+1) = (2 n + 1) x P(n) - n P(n-1).
         let next = ((2.0 * degree + 1.0) * argument * value - degree * previous) / (degree + 1.0);
         *self = Self { argument, degree: degree + 1.0, value: next, previous: value };
     }
 
     /// Derivative, for arguments inside -1..1.
     fn derivative(&self) -> f64 {
+        // (x² - 1) P'(n) = n (x P(n) - P(n-1)).
         self.degree * (self.argument * self.value - self.previous) / (self.argument * self.argument - 1.0)
     }
 }

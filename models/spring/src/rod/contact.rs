@@ -97,6 +97,7 @@ pub(crate) fn solve<const Q: usize>(
     let Contact { compliance: c, stiffness, .. } = *contact;
     let mut solution = Solution { force: free, compliance, energy: 0.0, touches: false };
     for _ in 0..MOST_STEPS {
+        // Sums over the sections that touch: (K/gamma) <e> d, its derivative by the force, and (K/2) <e>².
         let (mut pressed, mut released, mut energy) = (DVec3::ZERO, DMat3::ZERO, 0.0);
         let mut touches = false;
         for (i, weight) in weight.iter().enumerate() {
@@ -133,6 +134,7 @@ impl<const Q: usize> Sections<Q> {
         let square =
             self.lean_rate[0][i] * self.lean_rate[0][i] + self.lean_rate[1][i] * self.lean_rate[1][i];
         let scale = self.scale[i];
+        // `kappa` rounded at zero, then `e` of the module documentation.
         let bend = (scale * scale * square + ROUNDING * ROUNDING).sqrt() - ROUNDING;
         contact.solid + contact.coil_radius * bend - 1.0 - contact.compliance * force.dot(self.normal_at(i))
     }
@@ -143,6 +145,7 @@ impl<const Q: usize> Sections<Q> {
         let rate = [self.lean_rate[0][i], self.lean_rate[1][i]];
         let (w, square) = (self.scale[i], rate[0] * rate[0] + rate[1] * rate[1]);
         let (w2, w3) = (w * w, w * w * w);
+        // Derivatives of the rounded `kappa` by the lean `p` and its rate.
         let root = (w2 * square + ROUNDING * ROUNDING).sqrt();
         let r = contact.coil_radius;
         // Of the square of kappa, w² p'².
@@ -208,6 +211,7 @@ impl<const Q: usize> Sections<Q> {
             if excess.value <= 0.0 {
                 continue;
             }
+            // Second derivatives of (K/2) <e>²: K times the product of the slopes, and K e times the curvatures.
             let share = weight * stiffness;
             let pressure = share * excess.value;
             let (x, by) = (&excess.bend, [excess.by_lean, excess.by_rate]);

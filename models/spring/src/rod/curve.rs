@@ -73,6 +73,7 @@ impl<const K: usize> Curve<K> {
                 center_m: center * free_length_m,
                 orientation: shortest * DQuat::from_rotation_z(turn_rad),
             };
+            // Center and turn by Gauss-Legendre quadrature of the tangent and the rate of turn.
             for panel in 0..panels {
                 let start = (index * panels + panel) as f64 * width;
                 for node in 0..NODES {
@@ -91,6 +92,7 @@ impl<const K: usize> Curve<K> {
         let along = |field: &[f64; K], c: usize| -> f64 {
             field.iter().zip(&self.lean[c]).map(|(value, coefficient)| value * coefficient).sum()
         };
+        // `p` is linear in `s` plus the bubbles of the basis.
         let lean = self.end * s + DVec2::new(along(&bubble, 0), along(&bubble, 1));
         let rate = self.end + DVec2::new(along(&slope, 0), along(&slope, 1));
         let section = Sections::<1>::new([[lean.x], [lean.y]], [[rate.x], [rate.y]]);

@@ -293,6 +293,7 @@ pub(super) fn joined<const K: usize, const N: usize>(x: &[f64; K], y: &[f64; K])
 #[inline]
 fn solve_symmetric(matrix: &DMat3, right: DVec3) -> DVec3 {
     let (a, b, c) = (matrix.x_axis, matrix.y_axis, matrix.z_axis);
+    // The rows of the inverse are the cross products of the columns over the determinant.
     let (bc, ca, ab) = (b.cross(c), c.cross(a), a.cross(b));
     DVec3::new(bc.dot(right), ca.dot(right), ab.dot(right)) / a.dot(bc)
 }

@@ -69,6 +69,7 @@ impl<const Q: usize> Sections<Q> {
         let ([x, y], [dx, dy]) = (&lean, &lean_rate);
         let (mut scale, mut normal, mut area_rate) = ([0.0; Q], [[0.0; Q]; 3], [0.0; Q]);
         for i in 0..Q {
+            // Stereographic projection: w = 2 / (1 + p²), normal (w p, 1 - w p²), and the rate of the area p sweeps.
             let square = x[i] * x[i] + y[i] * y[i];
             let w = 2.0 / (1.0 + square);
             scale[i] = w;
@@ -136,6 +137,7 @@ impl<const Q: usize> Sections<Q> {
         i: usize,
     ) -> f64 {
         let (p, force) = ([self.lean[0][i], self.lean[1][i]], [load.force.x, load.force.y]);
+        // Second derivatives of n.d = w (n.(p, 1)) - n_z by p_c and p_e, with dw/dp = -w² p.
         let w2 = self.scale[i] * self.scale[i];
         let same = if c == e { 1.0 } else { 0.0 };
         let scale_curvature = 2.0 * w2 * self.scale[i] * p[c] * p[e] - same * w2;

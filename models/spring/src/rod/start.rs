@@ -6,7 +6,7 @@
 use flotor_hal::glam::{DVec2, DVec3};
 
 use super::basis::Basis;
-use crate::bending::levelled_argument;
+use crate::bending::saturated_argument;
 use crate::pose::Pose;
 use crate::rigidity::Spring;
 use crate::shape::Shape;
@@ -29,7 +29,7 @@ pub(crate) fn linear<const K: usize, const Q: usize>(
     let chord = pose.chord(free_length_m).ok()?;
     let direction = chord.vector_m / chord.length_m;
     let argument = Shape::argument(rigidities, free_length_m, chord.length_m)?;
-    let shape = Shape::new(rigidities, free_length_m, chord.length_m, levelled_argument(argument).value)?;
+    let shape = Shape::new(rigidities, free_length_m, chord.length_m, saturated_argument(argument).value)?;
     let lean_of = |normal: DVec3| normal - direction * normal.dot(direction);
     let (lower, upper) = (lean_of(DVec3::Z), lean_of(pose.orientation * DVec3::Z));
     let (sway, bow) = (0.5 * (upper + lower), 0.5 * (upper - lower));

@@ -21,7 +21,7 @@ pub struct LimitConfig {
     pub wall_ns_per_m: f64,
     /// Distance from the origin, m, beyond which it does not wait for the sensors to lose the flotor: it lands.
     pub edge_m: f64,
-    /// How far ahead it looks for that, s: a flotor that would be beyond then is on its way out.
+    /// How far ahead it looks for that, s: a flotor that would be beyond then is leaving the range.
     pub edge_ahead_s: f64,
     /// Share of the full load that is borne for ever; the mean of the squared load is held against its square.
     pub continuous_load: f64,

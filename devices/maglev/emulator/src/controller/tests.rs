@@ -245,7 +245,7 @@ fn the_controllers_own_wall_keeps_the_flotor_in_range() {
 }
 
 #[test]
-fn a_flotor_on_its_way_out_is_landed_before_the_sensors_lose_it() {
+fn a_flotor_that_leaves_the_range_is_landed_before_the_sensors_lose_it() {
     let mut bench = Bench::levitating();
     bench.settled_n(5.0);
     // 11.9 mm, and beyond 11.95 mm within two milliseconds.

@@ -86,7 +86,7 @@ fn descriptors_are_as_long_as_they_say() {
         assert_eq!(at, configuration.len());
         let (_, serial) = host.control([0x80, 6, 3, 3, 9, 4, 255, 0]);
         assert_eq!(serial, [8, 3, b'T', 0, b'-', 0, b'1', 0]);
-        // No more than was asked for; nothing of what is not there.
+        // No more than was requested; nothing of what is not there.
         assert_eq!(host.control([0x80, 6, 0, 1, 0, 0, 8, 0]).1.len(), 8);
         assert_eq!(host.control([0x80, 6, 9, 3, 9, 4, 255, 0]).0, -32);
     }

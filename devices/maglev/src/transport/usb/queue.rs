@@ -1,6 +1,6 @@
 //! Transfers in flight: several reads that wait for the device, and one write.
 //!
-//! A read that has ended is handed over and submitted again from its own end, so that the device always finds one
+//! A read that has ended is delivered and submitted again from its own end, so that the device always finds one
 //! waiting; a packet costs one wake-up, and no tick waits for the bus. `rusb` wraps only transfers that block, so this
 //! module talks to libusb itself, and is the one place of this crate that does.
 //!
@@ -31,7 +31,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, sync
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Reads that wait on the bus: one is being handed over while the next is filled, and two for a late thread.
+/// Reads that wait on the bus: one is being delivered while the next is filled, and two for a late thread.
 const WAITING_READS: usize = 4;
 /// Packets between libusb's thread and the tick: a few periods.
 const KEPT_PACKETS: usize = 16;
@@ -54,7 +54,7 @@ struct Shared {
 
 /// Reads and a write on a claimed interface.
 pub(super) struct Queue {
-    // Before the handle, in the order of dropping: freeing a transfer lets go of the device, in a live context.
+    // Before the handle, in the order of dropping: freeing a transfer frees the device, in a live context.
     reads: Vec<Transfer>,
     write: Transfer,
     handle: Arc<DeviceHandle<Context>>,

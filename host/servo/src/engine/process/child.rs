@@ -29,7 +29,7 @@ pub struct WorkerArguments {
     pub sets: Vec<String>,
 }
 
-/// How a plugin's file is loaded: by whoever vouches for it.
+/// How a plugin's file is loaded: by the caller that guarantees it.
 pub type LoadFile = fn(&Path) -> Result<Plugin, LoadError>;
 
 /// Loads the model, says so, and steps it as long as the host asks. Ends with the host.

@@ -3,7 +3,7 @@
 //! The host starts its own program once more, as `flotor worker`, which loads the plugin and makes the model. The
 //! two share one page of memory. A step is a request there; the worker sleeps until one comes, the loop sleeps until
 //! it is answered, but no longer than the model's time. A late answer costs one tick with the last force and none
-//! after that, until the worker has caught up; a worker that is gone is out for good.
+//! after that, until the worker has caught up; a worker that has ended stays disabled.
 //!
 //! The library is loaded into the host as well, for its schema, but no model of it is made there.
 

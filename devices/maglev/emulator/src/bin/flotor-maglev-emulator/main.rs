@@ -56,7 +56,7 @@ struct Arguments {
     /// Calibration rig: time at each step, in s
     #[arg(long, default_value_t = 1.0, value_name = "S", requires = "calibration_rig", value_parser = stop_s)]
     rig_stop_s: f64,
-    /// Seed of everything random
+    /// Seed of all random numbers
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
     /// Serial number it tells

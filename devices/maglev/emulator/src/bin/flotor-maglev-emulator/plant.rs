@@ -39,7 +39,7 @@ pub(crate) fn load(file: Option<&Path>) -> Result<Plugin, Box<dyn Error>> {
 /// Loads a plugin file; runs its code.
 #[allow(unsafe_code)] // listed in tests/tests/system/architecture.rs
 fn load_file(file: &Path) -> Result<Plugin, Box<dyn Error>> {
-    // SAFETY: whoever runs the emulator vouches for the plugin it names, or that lies beside it.
+    // SAFETY: the user who runs the emulator guarantees the plugin it names, or that lies beside it.
     Ok(unsafe { Plugin::load(file) }?)
 }
 

@@ -15,7 +15,7 @@ const MASS_KG: f64 = 0.874_917;
 /// The stand: stiff and damped, N/m and N·s/m.
 const STIFFNESS_N_PER_M: f64 = 20_000.0;
 const DAMPING_NS_PER_M: f64 = 250.0;
-/// Highest and lowest place of the stand, mm: what the report measured.
+/// Highest and lowest place of the stand, mm: what the thesis measured.
 const TOP_MM: f64 = 7.0;
 /// Time of one step down, s: a twentieth of a millimetre's worth of hurry.
 const MOVE_S: f64 = 0.15;

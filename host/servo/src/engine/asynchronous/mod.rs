@@ -1,4 +1,4 @@
-//! A force model slower than the loop: computed beside it at a rate of its own, evaluated in it as a linear field.
+//! A force model slower than the loop: computed asynchronously, evaluated in the loop as a local linear model.
 //!
 //! ```text
 //!            pose, velocity                     linear field
@@ -25,8 +25,8 @@ use thread::ModelThread;
 /// was elsewhere.
 const OLDEST_PERIODS: u64 = 10;
 
-/// A model beside the loop.
-pub struct SlowModel {
+/// A model that is computed asynchronously.
+pub struct AsynchronousModel {
     computing: Computing,
     fields: CrossFade,
     /// Time of the look the newest field answers, ns; `None` before the first.
@@ -58,7 +58,7 @@ pub enum Arrival {
     Broken,
 }
 
-impl SlowModel {
+impl AsynchronousModel {
     /// Prepares the model for its own rate and starts it. Not real-time.
     ///
     /// # Errors

@@ -1,13 +1,13 @@
-//! Carries the news of a coupling between the loop and whoever connects it with the other host.
+//! Transports the peer state of a coupling between the loop and the bridge to the other host.
 //!
 //! ```text
-//!  servo <-> latest-value cells (coupling::Line) <-> this thread <-> flotor_live::NewsSocket <-> bridge <-> network
+//!  servo <-> latest-value cells (coupling::Line) <-> this thread <-> flotor_live::PeerSocket <-> bridge <-> network
 //! ```
 //!
 //! A thread for each coupling; the loop never waits for it. Not real-time.
 
 use flotor_core::peer::Dispatch;
-use flotor_live::{Directory, NewsSocket, PublishError};
+use flotor_live::{Directory, PeerSocket, PublishError};
 use flotor_servo::coupling::Line;
 use serde::Serialize;
 use std::sync::Arc;
@@ -21,58 +21,58 @@ const LOOK_PERIOD: Duration = Duration::from_micros(500);
 /// Datagrams taken in at a look.
 const MOST_AT_ONCE: usize = 256;
 
-/// What was carried to a loop.
+/// Messages on their way to a loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Carried {
-    /// News that arrived, and was newer than what was there.
+pub struct LinkCounts {
+    /// Messages that arrived, and were newer than the last.
     pub arrived: u64,
-    /// Ticks of the partner that were passed over: their news was lost, or came after newer news.
+    /// Ticks of the partner that were passed over: their messages were lost, or came after newer ones.
     pub lost: u64,
-    /// News that came after newer news, or twice.
+    /// Messages that came after newer ones, or twice.
     pub overtaken: u64,
-    /// What came and was no news.
+    /// Malformed messages.
     pub refused: u64,
 }
 
-/// A thread that carries; it ends when dropped.
-pub struct Carrier {
+/// The thread of a peer link; it ends when dropped.
+pub struct PeerLink {
     stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<Carried>>,
+    thread: Option<JoinHandle<LinkCounts>>,
 }
 
-/// Begins to carry news of a coupling.
+/// Starts the peer link of a coupling.
 ///
 /// # Errors
 /// [`PublishError`]; the run goes on, and its end of the coupling asks for nothing.
-pub fn carry(directory: &Directory, coupling: &str, line: Line) -> Result<Carrier, PublishError> {
-    let socket = NewsSocket::listen(directory, coupling)?;
+pub fn start_peer_link(directory: &Directory, coupling: &str, line: Line) -> Result<PeerLink, PublishError> {
+    let socket = PeerSocket::listen(directory, coupling)?;
     let stop = Arc::new(AtomicBool::new(false));
     let until = Arc::clone(&stop);
-    let thread = std::thread::Builder::new().name("flotor-news".to_owned());
+    let thread = std::thread::Builder::new().name("flotor-peer".to_owned());
     let thread = thread.spawn(move || run(socket, line, &until)).map_err(PublishError::Thread)?;
-    Ok(Carrier { stop, thread: Some(thread) })
+    Ok(PeerLink { stop, thread: Some(thread) })
 }
 
-impl Carrier {
-    /// Ends it; what was carried.
+impl PeerLink {
+    /// Ends it; what it has counted.
     #[must_use]
-    pub fn finish(mut self) -> Carried {
+    pub fn finish(mut self) -> LinkCounts {
         self.join()
     }
 
-    fn join(&mut self) -> Carried {
+    fn join(&mut self) -> LinkCounts {
         self.stop.store(true, Ordering::Relaxed);
         self.thread.take().and_then(|thread| thread.join().ok()).unwrap_or_default()
     }
 }
 
-impl Drop for Carrier {
+impl Drop for PeerLink {
     fn drop(&mut self) {
         self.join();
     }
 }
 
-fn run(mut socket: NewsSocket, line: Line, stop: &AtomicBool) -> Carried {
+fn run(mut socket: PeerSocket, line: Line, stop: &AtomicBool) -> LinkCounts {
     let Line { told, mut heard } = line;
     let began = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
     #[allow(clippy::cast_possible_truncation)] // in the year 2554
@@ -86,40 +86,40 @@ fn run(mut socket: NewsSocket, line: Line, stop: &AtomicBool) -> Carried {
             sent = version;
             socket.tell(&Dispatch { run, ..dispatch });
         }
-        // Of what comes together only the last is news; a flood ends here, and goes on after the next look.
+        // Of what comes together only the last counts; a flood ends here, and goes on after the next look.
         let mut newest = None;
         for _ in 0..MOST_AT_ONCE {
             match socket.hear() {
                 Ok(None) => break,
                 Ok(Some(dispatch)) => newest = sieve.take(dispatch).or(newest),
-                Err(_) => sieve.carried.refused += 1,
+                Err(_) => sieve.counts.refused += 1,
             }
         }
         newest.iter().for_each(|newest| heard.publish(newest));
         std::thread::sleep(LOOK_PERIOD);
     }
-    sieve.carried
+    sieve.counts
 }
 
-/// Lets newer news through and counts the rest.
+/// Lets newer messages through and counts the rest.
 #[derive(Default)]
 struct Sieve {
     newest: Option<Dispatch>,
-    carried: Carried,
+    counts: LinkCounts,
 }
 
 impl Sieve {
     fn take(&mut self, dispatch: Dispatch) -> Option<Dispatch> {
-        let Self { newest, carried } = self;
+        let Self { newest, counts } = self;
         match newest {
             Some(newest) if !dispatch.is_newer_than(newest) => {
-                carried.overtaken += 1;
+                counts.overtaken += 1;
                 return None;
             }
-            Some(newest) if dispatch.run == newest.run => carried.lost += dispatch.tick - newest.tick - 1,
+            Some(newest) if dispatch.run == newest.run => counts.lost += dispatch.tick - newest.tick - 1,
             _ => {}
         }
-        carried.arrived += 1;
+        counts.arrived += 1;
         *newest = Some(dispatch);
         Some(dispatch)
     }
@@ -128,19 +128,19 @@ impl Sieve {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flotor_core::peer::{Account, News};
+    use flotor_core::peer::{PeerState, TankState};
     use flotor_hal::{Pose, Twist};
 
     #[test]
-    fn only_newer_news_passes_and_the_rest_is_counted() {
+    fn only_newer_messages_pass_and_the_rest_is_counted() {
         let dispatch = |run, tick| {
-            let news = News { pose: Pose::HOME, twist: Twist::ZERO, told_j: 0.0 };
-            Dispatch { run, tick, news, account: Account::default() }
+            let state = PeerState { pose: Pose::HOME, twist: Twist::ZERO, told_j: 0.0 };
+            Dispatch { run, tick, state, tank: TankState::default() }
         };
         let mut sieve = Sieve::default();
         let came = [(7, 5), (7, 6), (7, 9), (7, 8), (7, 9), (8, 0), (7, 10), (8, 1)];
         let passed: Vec<bool> = came.map(|(run, tick)| sieve.take(dispatch(run, tick)).is_some()).into();
         assert_eq!(passed, [true, true, true, false, false, true, false, true]);
-        assert_eq!(sieve.carried, Carried { arrived: 5, lost: 2, overtaken: 3, refused: 0 });
+        assert_eq!(sieve.counts, LinkCounts { arrived: 5, lost: 2, overtaken: 3, refused: 0 });
     }
 }

@@ -137,10 +137,11 @@ impl ModelThread {
             looked_ns: None,
         };
         let thread = std::thread::Builder::new().name("flotor-field".to_owned());
-        // Never joined: a model that hangs must not hold up whoever is rid of it.
+        // Never joined: a model that hangs must not delay its owner.
         let started = thread.spawn(move || computer.run(Duration::from_nanos(period_ns)));
-        started
-            .map_err(|error| Refusal::resource(format!("no thread for a model beside the loop: {error}")))?;
+        started.map_err(|error| {
+            Refusal::resource(format!("cannot start a thread for an asynchronous model: {error}"))
+        })?;
         Ok(Self { looks, fields, orders, flags, taken: 0, forgotten_ns: 0, now_ns: 0 })
     }
 

@@ -1,23 +1,23 @@
 //! One end of a coupling whose other end is on another host.
 
 use super::{CouplingConfig, CouplingEnd, End, Grip, Pull};
-use flotor_core::peer::{Account, DISPATCH_WORDS, Dispatch, News};
+use flotor_core::peer::{DISPATCH_WORDS, Dispatch, PeerState, TankState};
 use flotor_hal::Tick;
 use flotor_sync::{Observer, Publisher, latest};
 
 /// How long an end goes by what it heard last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
-    /// Time without news after which the end lets go, ns.
+    /// Time without a message after which the end removes its force, ns.
     pub silence_ns: u64,
-    /// Time over which it takes hold, again or for the first time, ns.
+    /// Time over which its force fades in, again or for the first time, ns.
     pub fade_ns: u64,
 }
 
-/// Where news leaves the loop and enters it; for whoever carries it. Neither side ever waits for the other: only the newest
-/// counts.
+/// Where the peer state leaves the loop and enters it, for a peer link. Neither side ever waits for the other: only the
+/// newest counts.
 pub struct Line {
-    /// What this end told last. Its `run` is 0: the carrier knows when the run began.
+    /// What this end sent last. Its `run` is 0: the peer link knows when the run began.
     pub told: Observer<Dispatch, DISPATCH_WORDS>,
     /// What this end is to hear, newest last.
     pub heard: Publisher<Dispatch, DISPATCH_WORDS>,
@@ -26,26 +26,26 @@ pub struct Line {
 /// How an end has heard its partner.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Hearing {
-    /// Ticks in which there was news.
+    /// Ticks in which a message arrived.
     pub ticks: u64,
     /// How often the partner fell silent for longer than is waited.
     pub silences: u64,
-    /// The longest the end went by old news, ns.
+    /// The longest wait for a message, ns.
     pub longest_wait_ns: u64,
-    /// The partner's account, as it was last told.
-    pub partner: Account,
+    /// The partner's energy tank, as received last.
+    pub partner: TankState,
 }
 
 /// An end, and the line to its partner.
 ///
-/// Until it hears of the partner, and when it has not for too long, it asks for nothing: of a partner that may be anywhere
-/// nobody knows which way to pull. When there is news (again) it takes hold over some time, not at once.
-pub struct EndApart {
+/// Until the first message of the partner, and after too long a silence, its force is zero: the position of the partner
+/// is unknown. When messages arrive (again) the force fades in.
+pub struct RemoteEnd {
     end: End,
     patience: Patience,
     told: Publisher<Dispatch, DISPATCH_WORDS>,
     heard: Observer<Dispatch, DISPATCH_WORDS>,
-    /// Version of the news taken in last.
+    /// Version of the message taken in last.
     version: u64,
     /// The partner's run.
     run: Option<u64>,
@@ -62,16 +62,16 @@ enum Hold {
     On { since_ns: u64, heard_ns: u64 },
 }
 
-/// News of nobody: what the cells hold before there is any. It is never taken in.
+/// What the cells hold before the first message. It is never taken in.
 const NOBODY: Dispatch = Dispatch {
     run: 0,
     tick: 0,
-    news: News { pose: flotor_hal::Pose::HOME, twist: flotor_hal::Twist::ZERO, told_j: 0.0 },
-    account: Account { level_j: 0.0, lowest_j: 0.0, gone_in_j: 0.0, given_up_j: 0.0 },
+    state: PeerState { pose: flotor_hal::Pose::HOME, twist: flotor_hal::Twist::ZERO, told_j: 0.0 },
+    tank: TankState { level_j: 0.0, lowest_j: 0.0, gone_in_j: 0.0, given_up_j: 0.0 },
 };
 
-impl EndApart {
-    /// An end at rest, and the line on which its news is to be carried. `period_s` is the time between ticks. Not real-time.
+impl RemoteEnd {
+    /// An end at rest, and the line for its peer state. `period_s` is the time between ticks. Not real-time.
     #[must_use]
     pub fn new(
         config: &CouplingConfig,
@@ -99,11 +99,11 @@ impl EndApart {
     pub fn step(&mut self, tick: &Tick, grip: Grip<'_>) -> Pull {
         self.end.observe(grip.state, &grip.held);
         self.listen(tick.time_ns);
-        let news = match self.hold {
+        let state = match self.hold {
             Hold::Released => self.end.call(grip.state),
             Hold::On { .. } => self.end.tell(grip.state),
         };
-        self.told.publish(&Dispatch { run: 0, tick: tick.index, news, account: self.end.tank().account() });
+        self.told.publish(&Dispatch { run: 0, tick: tick.index, state, tank: self.end.tank().state() });
         match self.hold {
             Hold::Released => self.end.let_go(),
             Hold::On { since_ns, .. } => {
@@ -120,10 +120,10 @@ impl EndApart {
         self.hold == Hold::Released
     }
 
-    /// This end's energy account. Real-time: bounded, no allocation.
+    /// This end's energy tank. Real-time: bounded, no allocation.
     #[must_use]
-    pub fn account(&self) -> Account {
-        self.end.tank().account()
+    pub fn tank(&self) -> TankState {
+        self.end.tank().state()
     }
 
     /// How the partner was heard. Real-time: bounded, no allocation.
@@ -156,12 +156,12 @@ impl EndApart {
     fn hear(&mut self, dispatch: &Dispatch, now_ns: u64) {
         if self.run.replace(dispatch.run) != Some(dispatch.run) {
             // Another run may be anywhere: it is taken hold of as slowly as the first.
-            self.end.meet(&dispatch.news);
+            self.end.meet(&dispatch.state);
             self.hold = Hold::Released;
         }
-        self.end.hear(&dispatch.news);
+        self.end.hear(&dispatch.state);
         self.hearing.ticks += 1;
-        self.hearing.partner = dispatch.account;
+        self.hearing.partner = dispatch.tank;
         let since_ns = match self.hold {
             Hold::Released => now_ns,
             Hold::On { since_ns, .. } => since_ns,

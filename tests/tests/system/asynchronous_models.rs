@@ -1,5 +1,6 @@
-//! A model beside the loop: the membrane at 200 Hz, its linear field evaluated at 1 kHz. No step above the slew limit, an
-//! error smaller than that of a force that is held, equal bits on the virtual clock, and what a thread of its own does when it breaks.
+//! An asynchronous model: the membrane at 200 Hz, its local linear model evaluated at 1 kHz. No step above the slew
+//! limit, an error smaller than that of a force that is held, equal bits on the virtual clock, and what a thread of its
+//! own does when it breaks.
 
 use flotor_core::trace::Events;
 use flotor_servo::Clock;
@@ -66,7 +67,7 @@ fn equal_runs_give_equal_bits_and_a_recording_replays() {
     assert_eq!(run(&["--record", &recording]), run(&[]));
     let ran = Flotor::with(["replay", &recording, "--json", "-"]).run();
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
-    let report: Value = serde_json::from_str(&ran.stdout).expect("the report is JSON");
+    let report: Value = serde_json::from_str(&ran.stdout).expect("the summary is JSON");
     assert_eq!(report["bit_exact"], Value::from(true), "{report}");
 }
 

@@ -10,7 +10,7 @@
 //! with a share `s` that goes from 0 to 1 with two continuous derivatives, in `G0` and so in the length of the chord, and
 //! back to 0 where the chord lies down: a rod whose plates stand beside one another, or past one another, has several
 //! shapes, and none that a coil could take. So the spring stays conservative, its force continuous, and its stiffness too;
-//! and past buckling it is the rod, where `energy` levels off. Elsewhere nothing but the length is computed in addition.
+//! and past buckling it is the rod, where `energy` saturates. Elsewhere nothing but the length is computed in addition.
 //!
 //! **A function of the pose, as far as a spring is one.** Short of buckling there is one equilibrium, and it is found
 //! anew at each pose, from the shape of the linear column. Past it there are several: a bulge may point anywhere, and
@@ -33,12 +33,12 @@ use crate::rigidity::Spring;
 use crate::rod::{Coils, Rod, State};
 use crate::validity::Validity;
 
-/// `G0` at which the rod has a first say, and at which it has the only one.
+/// `G0` below which the rod has a share, and below which it is alone.
 const FIRST: f64 = 0.30;
 const LAST: f64 = 0.20;
 
-/// Cosine of the chord's inclination from which on the rod loses its say, 60 degrees (where the measures of angles of
-/// `energy` cease to be the angles), and at which it has none, 75.5 degrees.
+/// Cosine of the chord's inclination from which on the share of the rod falls, 60 degrees (where the measures of angles
+/// of `energy` cease to be the angles), and at which it is zero, 75.5 degrees.
 const UPRIGHT: f64 = 0.5;
 const LYING: f64 = 0.25;
 
@@ -51,7 +51,7 @@ const BUCKLING_ARGUMENT: f64 = PI * PI;
 
 /// Both laws of one spring.
 #[derive(Clone, Debug, PartialEq)]
-pub struct HandOver {
+pub struct RodBlend {
     energy: Held<EnergyForm>,
     rod: Rod,
     region: Region,
@@ -175,7 +175,7 @@ impl Region {
     }
 }
 
-impl HandOver {
+impl RodBlend {
     /// Prepares both. Not real-time: the rod allocates.
     #[must_use]
     pub fn new(spring: &Spring, coils: Coils) -> Self {
@@ -235,14 +235,14 @@ impl HandOver {
 
     /// Whether the rod has a share at a pose.
     #[inline]
-    pub(crate) fn hands_over(&self, pose: &Pose) -> bool {
+    pub(crate) fn blends(&self, pose: &Pose) -> bool {
         self.region.holds(pose)
     }
 
     /// Whether at a pose the law `energy` answers alone and as it is.
     #[inline]
     pub(crate) fn is_energy_alone(&self, pose: &Pose) -> bool {
-        self.energy.is_plain() && !self.hands_over(pose)
+        self.energy.is_plain() && !self.blends(pose)
     }
 
     /// The hand is where the rod has no share: nothing is left to follow.
@@ -282,6 +282,7 @@ impl HandOver {
         let (Some(rod_j), Some(energy_j)) = (rod.energy_j, energy.energy_j) else {
             return self.energy.respond(pose, demand);
         };
+        // F = (1 - s) F_energy + s F_rod - (W_rod - W_energy) ds/dr of the module documentation.
         let torque_nm = energy.torque_nm.lerp(rod.torque_nm, share.value);
         Response {
             force_n: energy.force_n.lerp(rod.force_n, share.value)
@@ -302,10 +303,10 @@ fn contact(spring: &Spring, coils: Coils) -> Option<AxialContact> {
     }
 }
 
-impl HeldSpring for HandOver {
+impl HeldSpring for RodBlend {
     #[inline]
     fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
-        if self.hands_over(pose) {
+        if self.blends(pose) {
             return self.blend(pose, demand);
         }
         self.leave();

@@ -3,13 +3,13 @@
 use crate::sample::Sampler;
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_spring::energy::EnergyForm;
-use flotor_spring::hand_over::HandOver;
 use flotor_spring::held::HeldSpring;
 use flotor_spring::pose::Pose;
 use flotor_spring::preset::Preset;
 use flotor_spring::response::{Demand, Response};
 use flotor_spring::rigidity::Spring;
 use flotor_spring::rod::{Accuracy, Coils, Rod};
+use flotor_spring::rod_blend::RodBlend;
 use flotor_spring::validity::Validity;
 
 /// Spring 3 from rest to past its buckling, sheared and tilted a little.
@@ -32,7 +32,7 @@ fn settled<S: HeldSpring>(law: &mut S, pose: &Pose) -> Response {
 #[test]
 fn the_share_goes_from_one_law_to_the_other() {
     let spring = Preset::Thesis3.spring();
-    let (mut law, energy) = (HandOver::new(&spring, Coils::Pass), EnergyForm::new(&spring));
+    let (mut law, energy) = (RodBlend::new(&spring, Coils::Pass), EnergyForm::new(&spring));
     let mut rod = Rod::new(&spring, Accuracy::Servo);
     let (mut last_share, mut shared) = (0.0, 0);
     for step in 0..=1200 {
@@ -63,7 +63,7 @@ fn wrench_is_the_gradient_of_the_one_energy() {
     let spring = Preset::Thesis3.spring();
     let h = 1e-6;
     for wanted in [0.2, 0.5, 0.8] {
-        let mut law = HandOver::new(&spring, Coils::Pass);
+        let mut law = RodBlend::new(&spring, Coils::Pass);
         let mut compression = 0.0;
         while law.share() < wanted {
             compression += 1e-3;
@@ -98,7 +98,7 @@ fn wrench_is_the_gradient_where_the_chord_lies_down() {
         let (sine, cosine) = degrees.to_radians().sin_cos();
         let rise = DVec3::new(0.8 * sine, -0.6 * sine, cosine) * (0.4 * free_length_m);
         let pose = Pose::from_rotation_vector(rise - DVec3::Z * free_length_m, DVec3::new(0.03, 0.02, 0.05));
-        let mut law = HandOver::new(&spring, Coils::Pass);
+        let mut law = RodBlend::new(&spring, Coils::Pass);
         let here = settled(&mut law, &pose);
         shares.push(law.share());
         for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
@@ -120,7 +120,7 @@ fn wrench_is_the_gradient_where_the_chord_lies_down() {
 #[test]
 fn nothing_jumps_where_the_laws_meet() {
     let spring = Preset::Thesis3.spring();
-    let mut law = HandOver::new(&spring, Coils::Pass);
+    let mut law = RodBlend::new(&spring, Coils::Pass);
     let forces: Vec<DVec3> = (0..=4000)
         .map(|step| law.respond(&at(0.2 + 0.18 * f64::from(step) / 4000.0), Demand::Force).force_n)
         .collect();
@@ -132,7 +132,7 @@ fn nothing_jumps_where_the_laws_meet() {
     }
 }
 
-/// Poses of which many are handed over.
+/// Poses of which many are blended.
 fn scattered(spring: &Spring, compressions: [f64; 2], count: usize) -> Vec<Pose> {
     let mut sampler = Sampler::new(17);
     let free_length_m = spring.geometry().free_length_m;
@@ -151,26 +151,26 @@ fn scattered(spring: &Spring, compressions: [f64; 2], count: usize) -> Vec<Pose>
 /// pose, one that can as long as it has not.
 #[test]
 fn short_of_buckling_the_answer_depends_on_the_pose_alone() {
-    // Spring 1 hands over past 60 % and never buckles; spring 3 hands over past 24 % and buckles past 54 %.
+    // Spring 1 blends past 60 % and never buckles; spring 3 blends past 24 % and buckles past 54 %.
     for (preset, compressions) in [(Preset::Thesis1, [0.5, 0.9]), (Preset::Thesis3, [0.15, 0.45])] {
         let spring = preset.spring();
-        let mut wandering = HandOver::new(&spring, Coils::Pass);
-        let mut handed_over = 0;
+        let mut wandering = RodBlend::new(&spring, Coils::Pass);
+        let mut blended = 0;
         for pose in scattered(&spring, compressions, 500) {
             let found = wandering.respond(&pose, Demand::WrenchAndEnergy);
             assert_eq!(found.validity, Validity::Ok, "{preset:?} {pose:?}");
-            handed_over += u32::from(wandering.share() > 0.0);
-            let first = HandOver::new(&spring, Coils::Pass).respond(&pose, Demand::WrenchAndEnergy);
+            blended += u32::from(wandering.share() > 0.0);
+            let first = RodBlend::new(&spring, Coils::Pass).respond(&pose, Demand::WrenchAndEnergy);
             assert_eq!(found, first, "{preset:?} {pose:?}");
             assert_eq!(wandering.respond(&pose, Demand::WrenchAndEnergy), first, "{preset:?} {pose:?}");
         }
-        assert!(handed_over > 200, "{preset:?}: {handed_over} of 500");
+        assert!(blended > 200, "{preset:?}: {blended} of 500");
     }
 }
 
 #[test]
 fn only_a_spring_that_can_buckle_remembers() {
-    let remembers = Preset::ALL.map(|preset| HandOver::new(&preset.spring(), Coils::Pass).remembers());
+    let remembers = Preset::ALL.map(|preset| RodBlend::new(&preset.spring(), Coils::Pass).remembers());
     // Haringx: never below 5.326 diameters.
     assert_eq!(remembers, [false, false, true, true]);
 }
@@ -188,7 +188,7 @@ fn past_buckling_the_bulge_does_not_jump() {
     let free_length_m = spring.geometry().free_length_m;
     let down = DVec3::NEG_Z * (0.57 * free_length_m);
     let tilted = |part: f64, tilt_rad: f64| Pose::from_rotation_vector(down * part, DVec3::X * tilt_rad);
-    let mut law = HandOver::new(&spring, Coils::Pass);
+    let mut law = RodBlend::new(&spring, Coils::Pass);
     for step in 0..400 {
         let _ = law.respond(&tilted(f64::from(step) / 400.0, 1e-3), Demand::Force);
     }

@@ -1,16 +1,16 @@
-//! Where news of a coupling leaves a host and enters it: a datagram socket beside that of the run.
+//! Where the peer state of a coupling leaves a host and enters it: a datagram socket beside that of the run.
 //!
 //! ```text
-//!  host: NewsSocket::listen  <- news, or an empty call: "tell me" -  NewsSocket::join :bridge
-//!                            -  news                              ->
+//!  host: PeerSocket::listen  <- peer state, or an empty call -  PeerSocket::join :bridge
+//!                            -  peer state                      ->
 //! ```
 //!
-//! Datagrams because only the newest news counts: one that finds no room is dropped, and nothing waits behind it. Whoever
+//! Datagrams because only the newest counts: one that finds no room is dropped, and nothing waits behind it. Whoever
 //! joined tells so again every [`CALL_PERIOD`]; a host forgets who has not for a while. Not real-time.
 
 use crate::Directory;
 use crate::directory::{DirectoryError, lives, private};
-use flotor_core::peer::{Dispatch, NoDispatch};
+use flotor_core::peer::{Dispatch, InvalidDispatch};
 use std::io::{self, ErrorKind};
 use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 /// Ending of the name of a host's socket.
-const HOST: &str = "news";
+const HOST: &str = "peer";
 /// Ending of the name of one that joined.
 const JOINED: &str = "joined";
 /// Who joined calls this often.
@@ -27,7 +27,7 @@ pub const CALL_PERIOD: Duration = Duration::from_millis(100);
 const FORGET_AFTER: Duration = Duration::from_secs(1);
 /// Who may join a host's coupling at a time.
 const MOST_JOINED: usize = 8;
-/// Longer than any news: what fills this is no news.
+/// Longer than any message: what fills this is malformed.
 const BUFFER_BYTES: usize = 1024;
 
 /// A coupling of a running host whose other end is on another host.
@@ -42,7 +42,7 @@ pub struct FoundCoupling {
 
 /// One end of the local way; its file is gone when dropped.
 #[derive(Debug)]
-pub struct NewsSocket {
+pub struct PeerSocket {
     socket: UnixDatagram,
     path: PathBuf,
     peers: Vec<Peer>,
@@ -79,7 +79,7 @@ impl Directory {
     }
 }
 
-impl NewsSocket {
+impl PeerSocket {
     /// The host's end for a coupling.
     ///
     /// # Errors
@@ -90,7 +90,7 @@ impl NewsSocket {
         Self::bind(path).map_err(|(path, cause)| DirectoryError::Unusable { path, cause })
     }
 
-    /// The end of somebody who carries news to a host and from it.
+    /// The end of a program that transports the peer state to a host and from it.
     ///
     /// # Errors
     /// [`DirectoryError`]: the folder is not usable, or not ours alone.
@@ -123,12 +123,12 @@ impl NewsSocket {
         &self.path
     }
 
-    /// Sends news to everybody at the other end. Who is gone is forgotten; who has no room misses it.
+    /// Sends the peer state to all at the other end. A closed socket is forgotten; a full one misses it.
     pub fn tell(&mut self, dispatch: &Dispatch) {
         self.send(&dispatch.to_bytes());
     }
 
-    /// Says that news is wanted, without any. False if the host is gone.
+    /// Subscribes, without a peer state. False if the host is gone.
     pub fn call(&mut self) -> bool {
         self.send(&[]);
         !self.peers.is_empty()
@@ -144,12 +144,12 @@ impl NewsSocket {
         });
     }
 
-    /// The next news that has come, or what came that was none; nothing when all has been heard. Does not wait. Whoever calls
-    /// a host is told from then on.
+    /// The next message, or what was malformed; nothing when all has been read. Does not wait. A caller of a host
+    /// receives from then on.
     ///
     /// # Errors
-    /// [`NoDispatch`].
-    pub fn hear(&mut self) -> Result<Option<Dispatch>, NoDispatch> {
+    /// [`InvalidDispatch`].
+    pub fn hear(&mut self) -> Result<Option<Dispatch>, InvalidDispatch> {
         let mut buffer = [0; BUFFER_BYTES];
         loop {
             let Ok((length, from)) = self.socket.recv_from(&mut buffer) else { return Ok(None) };
@@ -176,7 +176,7 @@ impl NewsSocket {
     }
 }
 
-impl Drop for NewsSocket {
+impl Drop for PeerSocket {
     fn drop(&mut self) {
         let _ = std::fs::remove_file(&self.path);
     }
@@ -190,26 +190,26 @@ fn is_passing(kind: ErrorKind) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flotor_core::peer::{Account, News};
+    use flotor_core::peer::{PeerState, TankState};
 
     fn dispatch(tick: u64) -> Dispatch {
-        let news = News { pose: flotor_hal::Pose::HOME, twist: flotor_hal::Twist::ZERO, told_j: 0.0 };
-        Dispatch { run: 1, tick, news, account: Account::default() }
+        let state = PeerState { pose: flotor_hal::Pose::HOME, twist: flotor_hal::Twist::ZERO, told_j: 0.0 };
+        Dispatch { run: 1, tick, state, tank: TankState::default() }
     }
 
     #[test]
     fn who_joined_is_told_and_heard_and_who_left_is_forgotten() {
         let scratch = tempfile::tempdir().unwrap();
         let directory = Directory::at(scratch.path().join("runs"));
-        let mut host = NewsSocket::listen(&directory, "pair").unwrap();
+        let mut host = PeerSocket::listen(&directory, "pair").unwrap();
         let found = directory.couplings();
         assert_eq!(found.iter().map(|found| found.name.as_str()).collect::<Vec<_>>(), ["pair"]);
-        let mut bridges = [(); 2].map(|()| NewsSocket::join(&directory, &found[0]).unwrap());
+        let mut bridges = [(); 2].map(|()| PeerSocket::join(&directory, &found[0]).unwrap());
         host.tell(&dispatch(1));
         assert_eq!(bridges[0].hear(), Ok(None), "nobody has called yet");
         assert!(bridges[0].call());
         bridges[1].tell(&dispatch(7));
-        assert_eq!(host.hear(), Ok(Some(dispatch(7))), "a call is no news");
+        assert_eq!(host.hear(), Ok(Some(dispatch(7))), "a call is no message");
         assert_eq!(host.hear(), Ok(None));
         host.tell(&dispatch(2));
         for bridge in &mut bridges {
@@ -225,11 +225,11 @@ mod tests {
     }
 
     #[test]
-    fn who_takes_nothing_holds_up_nobody() {
+    fn who_takes_nothing_delays_nobody() {
         let scratch = tempfile::tempdir().unwrap();
         let directory = Directory::at(scratch.path().join("runs"));
-        let mut host = NewsSocket::listen(&directory, "pair").unwrap();
-        let mut stalled = NewsSocket::join(&directory, &directory.couplings()[0]).unwrap();
+        let mut host = PeerSocket::listen(&directory, "pair").unwrap();
+        let mut stalled = PeerSocket::join(&directory, &directory.couplings()[0]).unwrap();
         assert!(stalled.call());
         assert_eq!(host.hear(), Ok(None));
         (0..2000).for_each(|tick| host.tell(&dispatch(tick)));
@@ -238,14 +238,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_news_is_said_to_be_none() {
+    fn a_malformed_message_is_reported() {
         let scratch = tempfile::tempdir().unwrap();
         let directory = Directory::at(scratch.path().join("runs"));
-        let mut host = NewsSocket::listen(&directory, "pair").unwrap();
+        let mut host = PeerSocket::listen(&directory, "pair").unwrap();
         let stranger = UnixDatagram::unbound().unwrap();
         for length in [1, 167, 169, 5000] {
             stranger.send_to(&vec![7; length], host.path()).unwrap();
-            assert!(matches!(host.hear(), Err(NoDispatch::Length { .. })), "{length} bytes");
+            assert!(matches!(host.hear(), Err(InvalidDispatch::Length { .. })), "{length} bytes");
         }
     }
 }
