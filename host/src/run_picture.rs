@@ -1,4 +1,4 @@
-//! A run as a picture: where the handle was, what it felt, what was stored and, in real time, how time was kept.
+//! A run as a picture: pose, force and torque, stored energy and, in real time, the timing.
 
 use crate::timing_picture::panels;
 use flotor_core::trace::{Events, TickRecord};

@@ -1,4 +1,4 @@
-//! How time was kept, as histograms: lateness and the stages of a tick.
+//! Timing as histograms: lateness and the stages of a tick.
 
 use flotor_plot::{Axis, Bin, Panel, Series};
 use flotor_servo::{Durations, Timing};

@@ -1,8 +1,8 @@
 //! Calibration of the vertical force: how much of a commanded force arrives, over the height of the handle.
 //!
 //! The coils of a levitation device sit in an uneven field, so the same current pushes differently at every
-//! height. The report this framework follows measured 10.87 % over 14 mm (Varadharajan 2007, section 3.4) and
-//! corrected for it; this module does the same, and better where the report left something open:
+//! height. The thesis (Varadharajan 2007, section 3.4) measured 10.87 % over 14 mm and
+//! corrected for it; this module does the same, and better where the thesis leaves something open:
 //!
 //! | | report | here |
 //! |---|---|---|
@@ -14,7 +14,7 @@
 //!
 //! Data flows one way: [`rig`] (device and force [`sensor`]) -> [`procedure`] (readings) -> [`fit`] (polynomial) ->
 //! [`flotor_session::calibration_file`] (what is kept) -> the device; [`verify`] asks the device again, [`picture`] draws it. [`thesis`] is
-//! the report's polynomial, as a baseline.
+//! the thesis's polynomial, as a baseline.
 //!
 //! Not real-time, but for the thread that holds the handle in the rig.
 
@@ -41,12 +41,13 @@ pub enum CalibrationError {
     /// The plugin was refused or refuses.
     #[error(transparent)]
     Plugin(#[from] LoadError),
-    /// The plugin does not understand what the rig asks of a simulated flotor.
-    #[error("the plugin is no simulated flotor: {0}")]
+    /// The plugin lacks the parameters of the simulated flotor.
+    #[error("the plugin is not the simulated flotor: {0}")]
     Setting(#[from] SettingError),
-    /// Nothing held the handle.
+    /// The handle lost contact with the sensor.
     #[error(
-        "at {height_mm:.1} mm the handle flew off and was braked; is the force sensor above it, and held firmly?"
+        "the handle lost contact with the force sensor at {height_mm:.1} mm and was braked; check that the sensor is above it and \
+         held firmly"
     )]
     RanAway {
         /// Where, mm.
@@ -54,7 +55,8 @@ pub enum CalibrationError {
     },
     /// The sensor was not brought where it should be.
     #[error(
-        "the handle rests at {height_mm:.2} mm and not at {target_mm:.2} mm; move the sensor, or wait longer (--patience)"
+        "the handle rests at {height_mm:.2} mm instead of {target_mm:.2} mm; move the sensor, or raise the time limit \
+         (--patience)"
     )]
     NotReached {
         /// Where it should rest, mm.
@@ -63,7 +65,7 @@ pub enum CalibrationError {
         height_mm: f64,
     },
     /// The plan asks for more than the device gives: what is cut off would be fitted as a loss.
-    #[error("the plan pushes with {command_n} N, the device gives {most_n} N at most; plan smaller forces")]
+    #[error("the plan needs {command_n} N, the device exerts at most {most_n} N; plan smaller forces")]
     TooStrong {
         /// What the plan asks for, N.
         command_n: f64,
@@ -71,19 +73,19 @@ pub enum CalibrationError {
         most_n: f64,
     },
     /// Somebody stopped it.
-    #[error("stopped before it was done: the handle was let down, nothing was written")]
+    #[error("calibration aborted; handle lowered, no file written")]
     BrokenOff,
     /// There is no thread to hold the handle.
-    #[error("cannot hold the handle beside measuring: {0}")]
+    #[error("cannot start the holding controller thread: {0}")]
     NoThread(std::io::Error),
     /// The device refuses to run or to be calibrated.
-    #[error("the device refuses: {0}")]
+    #[error("device refused: {0}")]
     Refused(Refusal),
     /// The device faulted.
-    #[error("the device faulted: {}", .0.advice())]
+    #[error("device fault: {}", .0.advice())]
     Fault(Fault),
     /// The handle did not come to rest.
-    #[error("at {height_mm:.1} mm the handle still moves by {moved_um:.0} µm; is the sensor's stand firm?")]
+    #[error("at {height_mm:.1} mm the handle still moves by {moved_um:.0} µm; check the sensor's stand")]
     Restless {
         /// Where, mm.
         height_mm: f64,
@@ -91,7 +93,7 @@ pub enum CalibrationError {
         moved_um: f64,
     },
     /// The force sensor does not say how large the force is.
-    #[error("the force sensor faulted: {}", .0.advice())]
+    #[error("fault of the force sensor: {}", .0.advice())]
     Sensor(Fault),
     /// The readings do not determine a curve.
     #[error("{readings} readings at {heights} heights and {forces} forces are too few: {needed}")]
@@ -106,6 +108,6 @@ pub enum CalibrationError {
         needed: &'static str,
     },
     /// The fitted curve is no calibration.
-    #[error("the fit is no calibration: {0}")]
+    #[error("invalid calibration: {0}")]
     Implausible(#[from] InvalidCalibration),
 }

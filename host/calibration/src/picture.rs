@@ -9,7 +9,7 @@ use flotor_plot::{Axis, Figure, Panel, Series};
 const MM_PER_M: f64 = 1.0e3;
 /// Readings of different forces at one height stand side by side, this far apart, mm.
 const APART_MM: f64 = 0.16;
-/// Looks of the fit and of the report's polynomial, the same in every panel.
+/// Looks of the fit and of the thesis's polynomial, the same in every panel.
 const FIT: usize = 2;
 const REPORT: usize = 3;
 
@@ -26,7 +26,7 @@ pub fn to_svg(
         fit.degree, fit.residual_n, fit.band_95_percent, fit.weight_n[0], fit.weight_n[1]
     );
     let mut errors = Panel::new(Axis::linear("Delivered over commanded", "%"));
-    // In the order of the corrections: without, the report's two ways, the fit.
+    // In the order of the corrections: none, the two of the thesis, the fit.
     for ((name, curve), slot) in curves.iter().zip([0, 1, REPORT, FIT]) {
         let samples = curve.ratios.iter().map(|(height_m, ratio)| (height_m * MM_PER_M, ratio * 100.0));
         let label = format!("{name}: {:.2} %", curve.error_percent());

@@ -21,7 +21,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The report's procedure (Varadharajan 2007, section 3.4): 10 N and 12 N, two runs each, 14 steps of 1 mm;
+    /// The thesis's procedure (Varadharajan 2007, section 3.4): 10 N and 12 N, two runs each, 14 steps of 1 mm;
     /// here with ten readings at each height, a second of a slow force sensor.
     #[must_use]
     pub fn thesis() -> Self {

@@ -96,7 +96,7 @@ fn one_force_cannot_tell_the_weight_from_the_field() {
 }
 
 #[test]
-fn the_reports_polynomial_is_the_printed_one() {
+fn the_polynomial_of_the_thesis_is_the_printed_one() {
     // Section 3.4 at z = 2 mm: p = -0.01804 - 0.05166 + 0.19157 = 0.12187 N, on a feed-forward of 10 N.
     let calibration = thesis::calibration(10.0).unwrap();
     assert!((calibration.share(2.0e-3) - 1.012_187).abs() < 1.0e-12);

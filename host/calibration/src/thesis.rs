@@ -1,4 +1,4 @@
-//! The report's own correction, as a baseline (Varadharajan 2007, section 3.4 and appendix A).
+//! The thesis's own correction, as a baseline (Varadharajan 2007, section 3.4 and appendix A).
 //!
 //! It fits the excess of the sensor's reading over its mean by `p(z)` in N, z in mm, and multiplies the force of
 //! the spring by `F / (F + p(z))`, where `F` is the feed-forward. Written as a share, `s(z) = 1 + p(z) / F`.
@@ -8,13 +8,13 @@ use flotor_hal::{InvalidCalibration, VerticalCalibration};
 /// Coefficients of 1, z and z², z in mm, as printed in section 3.4, N.
 pub const POLYNOMIAL_N_PER_MM: [f64; 3] = [0.191_57, -0.025_83, -0.004_51];
 
-/// Feed-forward of the report's program, N (section 3.2 and appendix A).
+/// Feed-forward of the thesis's program, N (section 3.2 and appendix A).
 pub const FEED_FORWARD_N: f64 = 7.7;
 
-/// Half the stretch the report measured, m.
+/// Half the stretch the thesis measured, m.
 pub const HALF_STRETCH_M: f64 = 7.0e-3;
 
-/// The report's polynomial as a calibration of the total command at a feed-forward of `feed_forward_n`.
+/// The thesis's polynomial as a calibration of the total command at a feed-forward of `feed_forward_n`.
 ///
 /// # Errors
 /// [`InvalidCalibration`] if the feed-forward is so small that the curve is none.
@@ -26,7 +26,7 @@ pub fn calibration(feed_forward_n: f64) -> Result<VerticalCalibration, InvalidCa
     )
 }
 
-/// The command of the report's program, N: feed-forward as it is, spring corrected.
+/// The command of the thesis's program, N: feed-forward as it is, spring corrected.
 #[must_use]
 pub fn command_n(total_n: f64, height_m: f64) -> f64 {
     let z_mm = height_m * 1.0e3;

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CommandError {
-    /// The command line or a configuration says something that cannot be.
+    /// The command line or a configuration is invalid.
     #[error("{0}")]
     Usage(String),
     /// A run could not start.
@@ -30,27 +30,27 @@ pub enum CommandError {
         path: PathBuf,
         /// What is wrong, and what to do.
         fault: Fault,
-        /// What the device itself said; may be empty.
+        /// Message of the device; may be empty.
         words: String,
     },
-    /// Somebody pressed the emergency stop.
-    #[error("emergency stop ({}); the device is stopped and gives no force until the next run", .0.word())]
+    /// The emergency stop was pressed.
+    #[error("emergency stop ({}); the device is stopped and exerts no force until the next run", .0.word())]
     EmergencyStop(EmergencySource),
     /// A tick took so long that the watchdog stopped the device.
     #[error(
-        "tick {} took longer than the watchdog allows, and it stopped the device; look at the machine with \
-         `flotor doctor`, or allow more with `[limits] watchdog_ms`", .0.tick
+        "tick {} exceeded the time limit, and the watchdog stopped the device; check the machine with \
+         `flotor doctor`, or raise `[limits] watchdog_ms`", .0.tick
     )]
     Watchdog(Stuck),
-    /// The device sets the pace, and it is a faster one.
+    /// The device sets the pace, and its rate is above the scene's.
     #[error(
-        "the device sends {samples_per_s} samples a second and sets the pace, the scene counts {rate_hz} ticks: every limit per \
-         second would be too high; set `rate_hz = {samples_per_s}`, or `pacing = \"host\"`"
+        "the device paces the loop with {samples_per_s} samples a second, above the scene's `rate_hz = {rate_hz}`: all limits \
+         per second would be too high; set `rate_hz = {samples_per_s}`, or `pacing = \"host\"`"
     )]
     TooFast {
-        /// What the device sends.
+        /// Sample rate of the device.
         samples_per_s: u32,
-        /// What the scene says.
+        /// Loop rate of the scene.
         rate_hz: f64,
     },
     /// A plugin was refused.
@@ -63,7 +63,7 @@ pub enum CommandError {
         path: PathBuf,
         /// What was attempted.
         action: &'static str,
-        /// What the system said.
+        /// Error of the system.
         cause: std::io::Error,
     },
     /// A recording could not be written or read.
@@ -72,7 +72,7 @@ pub enum CommandError {
     /// A recording could not be replayed.
     #[error(transparent)]
     Read(#[from] flotor_record::ReadError),
-    /// Something found wrong that the output has already told.
+    /// A failure with its message.
     #[error("{0}")]
     Failed(String),
 }
@@ -125,13 +125,13 @@ impl CommandError {
     }
 }
 
-/// What a device said, in front of the advice for its fault.
+/// Message of a device, before the advice for its fault.
 #[must_use]
 pub fn before_advice(words: &str) -> String {
     if words.is_empty() { String::new() } else { format!("{words}; ") }
 }
 
-/// A plugin that says its parameters do not fit is a configuration error; everything else is a refused plugin.
+/// Parameters that a plugin refuses are a configuration error; everything else is a refused plugin.
 fn refusal_code(error: &LoadError) -> u8 {
     match error {
         LoadError::Refused { refusal, .. } if refusal.kind == flotor_hal::RefusalKind::Parameter => 2,

@@ -1,4 +1,4 @@
-//! Options several commands share, and how they are read.
+//! Options that several commands share, and their parsers.
 
 use crate::CommandError;
 use clap::ValueEnum;
@@ -13,7 +13,7 @@ pub enum ClockOption {
     /// The machine's clock
     #[default]
     Real,
-    /// As fast as it goes, bit-exact
+    /// As fast as possible, bit-exact
     Virtual,
 }
 
@@ -30,12 +30,16 @@ pub fn duration_s(text: &str) -> Result<f64, String> {
         "ms" => 1.0e-3,
         "min" | "m" => 60.0,
         "h" => 3600.0,
-        other => return Err(format!("`{other}` is no unit of time; legal is ms, s, min, h")),
+        other => return Err(format!("unknown unit of time `{other}`; use ms, s, min or h")),
     };
     let number: f64 =
-        number.trim().parse().map_err(|_| format!("`{text}` is no duration; write 10s or 500ms"))?;
+        number.trim().parse().map_err(|_| format!("invalid duration `{text}`; write 10s or 500ms"))?;
     let seconds = number * scale;
-    if (0.0..=31_536_000.0).contains(&seconds) { Ok(seconds) } else { Err("legal is 0 to a year".to_owned()) }
+    if (0.0..=31_536_000.0).contains(&seconds) {
+        Ok(seconds)
+    } else {
+        Err("the range is 0 to 1 year".to_owned())
+    }
 }
 
 /// A loop rate in Hz.
@@ -46,15 +50,15 @@ pub fn rate_hz(text: &str) -> Result<f64, String> {
     number(text, "Hz", "rate", 100.0..=10_000.0)
 }
 
-/// A number in a unit, which may be left out; complaints call it `what`.
+/// A number in a unit, which may be left out; errors call it `what`.
 ///
 /// # Errors
 /// If the text is no number in this unit, or not a legal one.
 pub fn number(text: &str, unit: &str, what: &str, legal: RangeInclusive<f64>) -> Result<f64, String> {
     let number = text.trim().trim_end_matches(unit).trim().parse();
-    let number = number.map_err(|_| format!("`{text}` is no {what}"))?;
+    let number = number.map_err(|_| format!("invalid {what} `{text}`"))?;
     let (least, most) = (legal.start(), legal.end());
-    if legal.contains(&number) { Ok(number) } else { Err(format!("legal is {least} to {most} {unit}")) }
+    if legal.contains(&number) { Ok(number) } else { Err(format!("the range is {least} to {most} {unit}")) }
 }
 
 /// A core of the machine.
@@ -62,8 +66,8 @@ pub fn number(text: &str, unit: &str, what: &str, legal: RangeInclusive<f64>) ->
 /// # Errors
 /// If the text is no number, or the system has no such core.
 pub fn core(text: &str) -> Result<Core, String> {
-    let number = text.trim().parse().map_err(|_| format!("`{text}` is no number of a core"))?;
-    Core::new(number).ok_or_else(|| format!("the system has no name for a core {number}"))
+    let number = text.trim().parse().map_err(|_| format!("invalid core number `{text}`"))?;
+    Core::new(number).ok_or_else(|| format!("no core {number} on this machine"))
 }
 
 /// Checks `--set KEY=VALUE` against the schema of a plugin.
@@ -87,12 +91,12 @@ mod tests {
     fn a_number_may_have_its_unit_and_stays_in_its_range() {
         let force = |text| number(text, "N", "force", 1.0..=50.0);
         assert_eq!((force("10"), force(" 2.5 N ")), (Ok(10.0), Ok(2.5)));
-        assert_eq!(force("ten N"), Err("`ten N` is no force".to_owned()));
+        assert_eq!(force("ten N"), Err("invalid force `ten N`".to_owned()));
         for outside in ["0.5", "51N", "inf", "nan"] {
-            assert_eq!(force(outside), Err("legal is 1 to 50 N".to_owned()), "{outside}");
+            assert_eq!(force(outside), Err("the range is 1 to 50 N".to_owned()), "{outside}");
         }
         assert_eq!(rate_hz("1000 Hz"), Ok(1000.0));
-        assert_eq!(rate_hz("99"), Err("legal is 100 to 10000 Hz".to_owned()));
+        assert_eq!(rate_hz("99"), Err("the range is 100 to 10000 Hz".to_owned()));
     }
 
     #[test]

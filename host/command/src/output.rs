@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Prints a line; a reader that has gone away (`flotor plugins | head`) ends the program without a word.
+/// Prints a line; a closed pipe (`flotor plugins | head`) ends the program without a message.
 #[macro_export]
 macro_rules! say {
     ($($text:tt)*) => { $crate::print_line(format_args!($($text)*)) };
@@ -16,7 +16,7 @@ pub fn exit_code_of(result: Result<(), CommandError>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            remark(format_args!("{} {error}", style::error("error:")));
+            print_error_line(format_args!("{} {error}", style::error("error:")));
             ExitCode::from(error.exit_code())
         }
     }
@@ -30,11 +30,11 @@ pub fn print_line(line: std::fmt::Arguments<'_>) {
     }
 }
 
-/// Prints a line where the command has more to do, or an exit code of its own: a reader that has gone away ends
+/// Prints a line where the command has more to do, or an exit code of its own: a closed pipe ends
 /// nothing.
 ///
 /// # Errors
-/// If standard output cannot be written; a reader that has gone away is none.
+/// If standard output cannot be written; a closed pipe is no error.
 pub fn report_line(line: std::fmt::Arguments<'_>) -> Result<(), CommandError> {
     match writeln!(std::io::stdout(), "{line}") {
         Err(cause) if cause.kind() != std::io::ErrorKind::BrokenPipe => {
@@ -45,23 +45,23 @@ pub fn report_line(line: std::fmt::Arguments<'_>) -> Result<(), CommandError> {
 }
 
 /// Prints a line on standard error. `eprintln!` panics where nobody reads it, and the exit code is lost then.
-pub fn remark(line: std::fmt::Arguments<'_>) {
+pub fn print_error_line(line: std::fmt::Arguments<'_>) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// Prints something worth knowing that ends nothing, on standard error.
+/// Prints a note on standard error; it changes no exit code.
 pub fn note(text: impl std::fmt::Display) {
-    remark(format_args!("{} {text}", style::warning("note:")));
+    print_error_line(format_args!("{} {text}", style::warning("note:")));
 }
 
-/// The first error there is: it decides the exit code and is told last. What else went wrong is told here.
+/// The first error: it decides the exit code, and the caller prints it last. This function prints the others.
 ///
 /// # Errors
 /// The first of the results that is one.
 pub fn first_error(results: impl IntoIterator<Item = Result<(), CommandError>>) -> Result<(), CommandError> {
     let mut errors = results.into_iter().filter_map(Result::err);
     let first = errors.next();
-    errors.for_each(|error| remark(format_args!("{} {error}", style::error("error:"))));
+    errors.for_each(|error| print_error_line(format_args!("{} {error}", style::error("error:"))));
     first.map_or(Ok(()), Err)
 }
 
@@ -79,7 +79,7 @@ pub fn write_json<T: serde::Serialize>(path: &Path, value: &T) -> Result<(), Com
         .map_err(|cause| CommandError::file(path, "cannot write the JSON", cause))
 }
 
-/// Tells a result: as text to people, unless standard output is asked for the JSON for machines.
+/// Prints a result as text, unless JSON is requested on standard output.
 ///
 /// # Errors
 /// If the file or standard output cannot be written.
@@ -88,14 +88,14 @@ pub fn print_result<T: serde::Serialize>(
     value: &T,
     text: impl FnOnce() -> String,
 ) -> Result<(), CommandError> {
-    let told = match json {
+    let printed = match json {
         Some(path) if path.as_os_str() == "-" => Ok(()),
         _ => report_line(format_args!("{}", text())),
     };
-    first_error([told, json.map_or(Ok(()), |path| write_json(path, value))])
+    first_error([printed, json.map_or(Ok(()), |path| write_json(path, value))])
 }
 
-/// Writes a picture or a table where it is asked for, `-` being standard output.
+/// Writes a picture or a table to the given file, `-` being standard output.
 ///
 /// # Errors
 /// If the file or standard output cannot be written.

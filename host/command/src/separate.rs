@@ -1,7 +1,7 @@
-//! Programs of their own that lie beside this one: what is too heavy to be built with the core.
+//! Separate programs in the folder of this one: parts that are too heavy to build with the core.
 //!
-//! Those that are workspaces of their own are built into a folder of their own below the core's `target`: plugins are libraries
-//! without a hash in their name, so two workspaces in one folder overwrite each other's, and then neither builds.
+//! A program with its own workspace is built into its own folder below the core's `target`: plugins are libraries without a hash
+//! in their name, so two workspaces in one folder would overwrite each other's.
 
 use crate::CommandError;
 use rustix::process::{Pid, Signal, kill_process};
@@ -14,11 +14,11 @@ use std::process::{Child, Command};
 pub enum Built {
     /// The same workspace.
     WithThis,
-    /// One of its own, into this folder below `target`.
-    Apart(&'static str),
+    /// Its own workspace, built into this folder below `target`.
+    OwnWorkspace(&'static str),
 }
 
-/// A program beside this one.
+/// A program in the folder of this one.
 pub struct SeparateProgram<'a> {
     /// Its file, without the suffix of executables.
     pub program: &'a str,
@@ -42,26 +42,32 @@ impl SeparateProgram<'_> {
     /// [`CommandError::Usage`] with the command that builds it, if it is not there.
     pub fn command(&self) -> Result<Command, CommandError> {
         let own = std::env::current_exe().map_err(|cause| CommandError::Failed(cause.to_string()))?;
-        let (beside, apart) = self.places(&own);
-        if let Some(file) = [&beside].into_iter().chain(&apart).find(|file| file.is_file()) {
+        let (beside, own_build) = self.places(&own);
+        if let Some(file) = [&beside].into_iter().chain(&own_build).find(|file| file.is_file()) {
             return Ok(Command::new(file));
         }
-        let file = apart.unwrap_or(beside);
-        Err(CommandError::Usage(format!("there is no `{}`; `{}` builds it", file.display(), self.build)))
+        let file = own_build.unwrap_or(beside);
+        Err(CommandError::Usage(format!(
+            "`{}` does not exist; build it with `{}`",
+            file.display(),
+            self.build
+        )))
     }
 
     /// Where it is looked for: beside this program, and where cargo puts it if this one lies where cargo has put it.
     fn places(&self, own: &Path) -> (PathBuf, Option<PathBuf>) {
         let name = format!("{}{}", self.program, std::env::consts::EXE_SUFFIX);
         let target = own.parent().and_then(Path::parent);
-        let apart = match (&self.built, target) {
-            (Built::Apart(folder), Some(target)) => Some(target.join(folder).join("release").join(&name)),
+        let own_build = match (&self.built, target) {
+            (Built::OwnWorkspace(folder), Some(target)) => {
+                Some(target.join(folder).join("release").join(&name))
+            }
             _ => None,
         };
-        (own.with_file_name(name), apart)
+        (own.with_file_name(name), own_build)
     }
 
-    /// Becomes the program with a command and what follows it.
+    /// Replaces this process by the program, with a command and its arguments.
     ///
     /// # Errors
     /// If it is not there or cannot be started.
@@ -69,7 +75,7 @@ impl SeparateProgram<'_> {
         self.become_with(&[&[command.into()], arguments].concat())
     }
 
-    /// Becomes the separate program: its words and its exit code are those of this command.
+    /// Replaces this process by the separate program, which gives output and exit code.
     ///
     /// # Errors
     /// If it is not there or cannot be started.
@@ -79,7 +85,7 @@ impl SeparateProgram<'_> {
     }
 }
 
-/// A separate program at work. Dropped, it is asked to end in order, so that its socket goes with it, and waited for.
+/// A running separate program. Drop sends SIGTERM, so that it removes its socket, and waits for its end.
 pub struct Running(pub Child);
 
 impl Drop for Running {
@@ -98,13 +104,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_built_apart_is_found_from_either_profile() {
-        let sweeper = SeparateProgram { program: "flotor-sweep", built: Built::Apart("sweep"), build: "" };
+    fn a_program_with_its_own_workspace_is_found_from_both_profiles() {
+        let sweeper =
+            SeparateProgram { program: "flotor-sweep", built: Built::OwnWorkspace("sweep"), build: "" };
         let name = format!("flotor-sweep{}", std::env::consts::EXE_SUFFIX);
         for profile in ["debug", "release"] {
-            let (beside, apart) = sweeper.places(&Path::new("/f/target").join(profile).join("flotor"));
+            let (beside, own_build) = sweeper.places(&Path::new("/f/target").join(profile).join("flotor"));
             assert_eq!(beside, Path::new("/f/target").join(profile).join(&name));
-            assert_eq!(apart, Some(Path::new("/f/target/sweep/release").join(&name)));
+            assert_eq!(own_build, Some(Path::new("/f/target/sweep/release").join(&name)));
         }
         let viewer = SeparateProgram { program: "flotor-viewer", built: Built::WithThis, build: "" };
         assert_eq!(viewer.places(Path::new("/f/target/release/flotor")).1, None);

@@ -1,6 +1,6 @@
 //! How a person ends a run: Ctrl-C in order; the space bar or `kill -USR1` at once.
 //!
-//! Whoever finds that an orderly end takes too long asks again: the second signal is an emergency stop, the
+//! If an orderly end takes too long, the user repeats the signal: the second one is an emergency stop, the
 //! third ends the process.
 
 use super::note;
@@ -18,23 +18,22 @@ use std::time::{Duration, Instant};
 /// Exit code after a third signal, when nothing else has ended the process: 128 + SIGINT, as shells have it.
 const INTERRUPTED: i32 = 130;
 
-/// What ends a run in order: the keys of a terminal (Ctrl-C, `Ctrl-\`, Ctrl-Z), its closing, and who manages
-/// processes.
+/// Signals that stop a run: the keys of a terminal (Ctrl-C, `Ctrl-\`, Ctrl-Z), its closing, and process managers.
 ///
 /// By itself a terminal would end the process with the device unstopped, or, at Ctrl-Z, suspend the loop and its
 /// watchdog together, with the last force held.
 const ENDING: [i32; 5] = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP];
 
-/// Signals this close together are one wish: `timeout` signals its child and then the group the child is in, a
+/// Signals this close together are one request: `timeout` signals its child and then the group the child is in, a
 /// terminal that closes tells the shell, which tells its jobs. A person takes longer.
-const ONE_WISH: Duration = Duration::from_millis(100);
+const ONE_REQUEST: Duration = Duration::from_millis(100);
 
 /// A switch that the first signal of [`ENDING`] uses in order and the second at once (the third ends the
 /// process), and `SIGUSR1` at once.
 pub fn stop_on_signals() -> StopSwitch {
     let stop = StopSwitch::default();
     if let Err(error) = register(&stop) {
-        note(format_args!("signals will not end the run in order: {error}"));
+        note(format_args!("cannot install signal handlers, so signals kill the run: {error}"));
     }
     stop
 }
@@ -52,7 +51,7 @@ fn register(stop: &StopSwitch) -> io::Result<()> {
         low_level::pipe::register(signal, asking.try_clone()?)?;
     }
     flag::register(SIGUSR1, stop.emergency_flag())?;
-    // Else a file that may not grow any further would end the process, not the recording.
+    // Otherwise a file at its size limit would end the process, not the recording.
     flag::register(SIGXFSZ, Arc::<AtomicBool>::default())?;
     Ok(())
 }
@@ -65,7 +64,7 @@ fn is_ignored(signal: i32) -> bool {
     (ignored >> (signal - 1)) & 1 == 1 // the lowest bit is signal 1
 }
 
-/// Reads a byte for every signal that asks for an end. Ends with the process: the handlers keep the other end
+/// Reads a byte for each signal that requests an end. Ends with the process: the handlers keep the other end
 /// open.
 fn attend(mut asked: UnixStream, stop: &StopSwitch) {
     let mut insistence = Insistence::default();
@@ -80,7 +79,7 @@ fn attend(mut asked: UnixStream, stop: &StopSwitch) {
     }
 }
 
-/// What is done about a signal that asks for an end.
+/// Answer to a signal that requests an end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Answer {
     InOrder,
@@ -88,7 +87,7 @@ enum Answer {
     Leave,
 }
 
-/// How often an end was asked for, as the last answer and when it was given.
+/// How often an end was requested: the last answer and its time.
 #[derive(Default)]
 struct Insistence {
     last: Option<(Instant, Answer)>,
@@ -97,7 +96,7 @@ struct Insistence {
 impl Insistence {
     fn answer(&mut self, now: Instant) -> Answer {
         let answer = match self.last {
-            Some((since, answer)) if now.duration_since(since) < ONE_WISH => return answer,
+            Some((since, answer)) if now.duration_since(since) < ONE_REQUEST => return answer,
             None => Answer::InOrder,
             Some((_, Answer::InOrder)) => Answer::AtOnce,
             Some((_, Answer::AtOnce | Answer::Leave)) => Answer::Leave,
@@ -130,9 +129,9 @@ impl Keys {
         let thread = std::thread::Builder::new().name("flotor-keys".to_owned());
         let listening = thread.spawn(move || {
             for key in stdin().lock().bytes().map_while(Result::ok) {
-                match Wish::of(key) {
-                    Some(Wish::Emergency) => stop.emergency_by_key(),
-                    Some(Wish::Stop) => stop.stop(),
+                match KeyRequest::of(key) {
+                    Some(KeyRequest::Emergency) => stop.emergency_by_key(),
+                    Some(KeyRequest::Stop) => stop.stop(),
                     None => {}
                 }
             }
@@ -148,14 +147,14 @@ impl Drop for Keys {
     }
 }
 
-/// What a key asks for.
+/// Request of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Wish {
+enum KeyRequest {
     Emergency,
     Stop,
 }
 
-impl Wish {
+impl KeyRequest {
     /// The largest key is the emergency stop.
     fn of(key: u8) -> Option<Self> {
         match key {
@@ -171,24 +170,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whoever_asks_again_is_answered_more_urgently() {
+    fn a_repeated_request_is_more_urgent() {
         let (mut insistence, start) = (Insistence::default(), Instant::now());
         let mut after_ms = |ms| insistence.answer(start + Duration::from_millis(ms));
-        assert_eq!([0, 1, 99].map(&mut after_ms), [Answer::InOrder; 3], "one wish, however many signals");
+        assert_eq!([0, 1, 99].map(&mut after_ms), [Answer::InOrder; 3], "one request, however many signals");
         assert_eq!([100, 199].map(&mut after_ms), [Answer::AtOnce; 2]);
         assert_eq!([200, 300, 301].map(&mut after_ms), [Answer::Leave; 3]);
     }
 
     #[test]
     fn ignored_signals_are_known() {
-        assert!(!is_ignored(signal_hook::consts::SIGKILL), "nobody can");
+        assert!(!is_ignored(signal_hook::consts::SIGKILL), "no process can ignore it");
         assert!(is_ignored(signal_hook::consts::SIGPIPE), "Rust starts every program so");
     }
 
     #[test]
     fn the_space_bar_is_the_emergency_stop() {
-        assert_eq!(Wish::of(b' '), Some(Wish::Emergency));
-        assert_eq!(Wish::of(b'q'), Some(Wish::Stop));
-        assert_eq!(Wish::of(b'x'), None);
+        assert_eq!(KeyRequest::of(b' '), Some(KeyRequest::Emergency));
+        assert_eq!(KeyRequest::of(b'q'), Some(KeyRequest::Stop));
+        assert_eq!(KeyRequest::of(b'x'), None);
     }
 }

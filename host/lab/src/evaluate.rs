@@ -34,7 +34,7 @@ impl Handle {
     }
 }
 
-/// What a model answers at a pose. All numbers are finite.
+/// Answer of a model at a pose. All numbers are finite.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
     /// Force and torque on the hand, N and N·m; zero where there is no answer.
@@ -43,7 +43,7 @@ pub struct Answer {
     pub energy_j: Option<f64>,
     /// What the model says about the answer.
     pub status: StepStatus,
-    /// What else it knows, in the order of its [`flotor_hal::Detail`]s; empty where nobody asked.
+    /// Its details, in the order of its [`flotor_hal::Detail`]s; empty if not requested.
     pub details: Vec<Option<f64>>,
 }
 
@@ -56,7 +56,7 @@ pub enum Travel {
     Successive,
 }
 
-/// Whether a model is asked for what it knows beside the wrench.
+/// Whether a model also returns its details.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Details {
     /// Wrench, energy and status only.
@@ -68,13 +68,13 @@ pub enum Details {
 /// Why there are no answers.
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluateError {
-    /// The model could not be made.
+    /// The model could not be created.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// It panicked; nothing more can be asked of it.
-    #[error("the model stopped answering: {words}")]
+    /// It panicked and cannot be called any more.
+    #[error("the model failed: {words}")]
     Broke {
-        /// What it said.
+        /// Its message.
         words: String,
     },
 }

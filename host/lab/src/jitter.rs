@@ -1,4 +1,4 @@
-//! How well this machine lets the servo keep time, next to the best a bare loop can do.
+//! Timing of the servo on this machine, next to that of a bare loop.
 //!
 //! Lateness on a shared machine is mostly the machine's. So the servo is compared with a loop that only sleeps
 //! and spins: same spin window, same priority, same core, in alternating slices of a second, so that both meet
@@ -116,7 +116,7 @@ pub fn measure(
     })
 }
 
-/// The yardstick, written out on its own: it shares no line with the servo's schedule but the system call.
+/// The bare loop, written separately: it shares only the system call with the servo's schedule.
 fn bare_slice(timing: &mut Timing, period_ns: u64, window: SpinWindow) {
     let start_ns = monotonic_ns() + period_ns;
     let mut slot = 0;
@@ -190,7 +190,7 @@ mod tests {
     fn a_difference_is_worth_as_much_as_the_pairs_agree() {
         assert_eq!(of_pairs(&[]), MissedMore { ticks: 0.0, standard_error: None });
         assert_eq!(of_pairs(&[(5, 2)]), MissedMore { ticks: 3.0, standard_error: None });
-        // Always one more: nothing is in doubt, whatever both have in common.
+        // Always one more: no uncertainty, whatever both have in common.
         let steady = of_pairs(&[(1, 0), (21, 20), (8, 7), (4, 3)]);
         assert_eq!(steady, MissedMore { ticks: 4.0, standard_error: Some(0.0) });
         // Differences 3, -1, -1, 3: a mean of 1, a variance of 16/3 each.

@@ -1,17 +1,18 @@
 //! Measurements of plugins, loops and recordings.
 //!
 //! - [`evaluate`]: a force model at given poses.
-//! - [`stress`]: how far a force model can be trusted with a hand.
+//! - [`stress`]: numerical stability of a force model.
 //! - [`mod@validate`]: a plugin against the rules of the contract.
-//! - [`mod@bench`]: what an evaluation costs, and how wrong it is.
-//! - [`stability`]: how stiff a spring the servo can render.
-//! - [`jitter`]: how well the servo keeps time.
-//! - [`replay`]: the models of a recording once more.
+//! - [`mod@bench`]: cost and error of an evaluation.
+//! - [`stability`]: the largest stable stiffness of the servo.
+//! - [`jitter`]: timing of the servo.
+//! - [`replay`]: the models of a recording re-evaluated.
 //! - [`sampling`]: points that cover a space evenly.
 //!
 //! Nothing here runs a hand; not real-time throughout.
 
 pub mod bench;
+mod call_timer;
 pub mod cli;
 pub mod evaluate;
 pub mod jitter;
@@ -19,7 +20,6 @@ mod plant;
 pub mod replay;
 pub mod sampling;
 pub mod stability;
-mod stopwatch;
 pub mod stress;
 mod subject;
 mod tally;
@@ -53,7 +53,7 @@ impl Size {
     }
 }
 
-/// Told how a measurement comes along, from any thread. `()` does not listen.
+/// Receives the progress of a measurement, from any thread. `()` ignores it.
 pub trait Progress: Sync {
     /// So many steps of something begin.
     fn begin(&self, name: &str, steps: u64);

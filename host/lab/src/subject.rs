@@ -81,7 +81,7 @@ pub(super) struct Trouble {
 /// The ways not to answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum TroubleKind {
-    /// It panicked, with these words.
+    /// It panicked, with this message.
     Panicked(String),
     /// NaN or infinity came back.
     NotFinite,

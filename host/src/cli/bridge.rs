@@ -1,4 +1,4 @@
-//! `flotor bridge`: starts the bridge, which is a program of its own, because it brings Zenoh.
+//! `flotor bridge`: starts the bridge, a separate program because it needs Zenoh.
 
 use clap::Args;
 use flotor_command::CommandError;
@@ -8,26 +8,26 @@ use std::path::PathBuf;
 
 pub(super) const BRIDGE: SeparateProgram<'static> = SeparateProgram {
     program: "flotor-bridge",
-    built: Built::Apart("bridge"),
+    built: Built::OwnWorkspace("bridge"),
     build: "cargo build --release --manifest-path host/bridge/Cargo.toml --target-dir target/bridge",
 };
 
-/// How runs elsewhere are written.
+/// Prefix of the names of remote sessions.
 const REMOTE: &str = "zenoh/";
 
-/// The way to a run elsewhere.
+/// How to reach a remote session.
 #[derive(Args)]
 pub(super) struct Way {
     /// With zenoh/NAME: Zenoh configuration with keys, see `flotor bridge keys`
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// With zenoh/NAME: whom to reach, such as tls/lab.example.org:7447 (repeatable)
+    /// With zenoh/NAME: endpoint to connect to, such as tls/lab.example.org:7447 (repeatable)
     #[arg(long, value_name = "ENDPOINT")]
     connect: Vec<String>,
 }
 
 impl Way {
-    /// What the bridge is told to do something with a run elsewhere.
+    /// Arguments of the bridge for a command on a remote session.
     pub(super) fn arguments(&self, command: &str, name: &OsStr) -> Vec<OsString> {
         let mut arguments = vec![command.into(), name.to_owned()];
         arguments.extend(self.config.iter().flat_map(|file| ["--config".into(), file.into()]));
@@ -36,16 +36,16 @@ impl Way {
     }
 }
 
-/// Whether a text names a run elsewhere.
-pub(super) fn is_elsewhere(text: &OsStr) -> bool {
+/// Whether a text names a remote session.
+pub(super) fn is_remote(text: &OsStr) -> bool {
     text.to_str().is_some_and(|text| text.starts_with(REMOTE))
 }
 
-/// Put a running host on a network, or bring one from there to this machine.
+/// Publish a running host on a network, or show a remote one here.
 #[derive(Args)]
 #[command(disable_help_flag = true)]
 pub(crate) struct BridgeArguments {
-    /// What to do, and options; `flotor bridge --help` lists them
+    /// Command and options; `flotor bridge --help` lists them
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "COMMAND")]
     arguments: Vec<OsString>,
 }

@@ -1,4 +1,4 @@
-//! `flotor doctor`: what this machine lets a real-time loop hope for, and how to allow more.
+//! `flotor doctor`: the real-time configuration of this machine, and how to improve it.
 
 use clap::Args;
 use flotor_command::say;
@@ -9,11 +9,13 @@ use serde::Serialize;
 use std::fs::read_to_string;
 use std::path::Path;
 
-/// Look at this machine.
+/// Check this machine's real-time configuration and suggest fixes.
 #[derive(Args)]
-#[command(after_help = "Example:\n  flotor doctor\n\nChanges nothing; every finding says how to improve it.")]
+#[command(
+    after_help = "Example:\n  flotor doctor\n\nThe command changes nothing; each finding names its remedy."
+)]
 pub(crate) struct DoctorArguments {
-    /// For machines
+    /// Print JSON
     #[arg(long)]
     json: bool,
 }
@@ -27,7 +29,7 @@ enum Grade {
     Bad,
 }
 
-/// One thing looked at.
+/// One finding.
 #[derive(Debug, Serialize)]
 struct Diagnosis {
     what: &'static str,
@@ -69,7 +71,7 @@ pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
         }
     }
     let bad = diagnoses.iter().filter(|diagnosis| diagnosis.grade == Grade::Bad).count();
-    let verdict = if bad == 0 { "ready".to_owned() } else { format!("{bad} things to mend first") };
+    let verdict = if bad == 0 { "ready".to_owned() } else { format!("not ready: {bad} findings are bad") };
     say!("{}", style::title(&verdict));
     Ok(())
 }
@@ -80,7 +82,7 @@ fn cores() -> Diagnosis {
         1 => Diagnosis::note(
             "cores",
             "1",
-            "the loop shares its core with everything else; give the machine two",
+            "the loop shares its core with all other programs; use a machine with two cores or more",
         ),
         _ => Diagnosis::good("cores", cores.to_string()),
     }
@@ -92,7 +94,7 @@ fn isolated_cores() -> Diagnosis {
         "" => Diagnosis::note(
             "isolated cores",
             "none",
-            "where other work competes, boot with `isolcpus=N nohz_full=N` and start with `flotor run --core N`",
+            "on a machine with other load, boot with `isolcpus=N nohz_full=N` and start with `flotor run --core N`",
         ),
         cores => Diagnosis::good("isolated cores", cores),
     }
@@ -111,9 +113,9 @@ fn throttling() -> Diagnosis {
         (Some(runtime), Some(period)) => Diagnosis::note(
             "RT throttling",
             format!("at {:.0} % of a core", runtime / period * 100.0),
-            "fast rates are cut off there: `sysctl kernel.sched_rt_runtime_us=950000`",
+            "the kernel suspends faster loops at this limit: `sysctl kernel.sched_rt_runtime_us=950000`",
         ),
-        _ => Diagnosis::good("RT throttling", "not known here"),
+        _ => Diagnosis::good("RT throttling", "unknown"),
     }
 }
 
@@ -124,7 +126,7 @@ fn kernel() -> Diagnosis {
         return Diagnosis::good("kernel", format!("{version}, PREEMPT_RT"));
     }
     let remedy =
-        "fine for trying things out; for bounded lateness install a PREEMPT_RT kernel (linux-image-rt)";
+        "sufficient for a first test; for bounded lateness install a PREEMPT_RT kernel (linux-image-rt)";
     Diagnosis::note("kernel", format!("{version}, not PREEMPT_RT"), remedy)
 }
 
@@ -144,7 +146,7 @@ fn privileges(report: &RealTimeReport) -> [Diagnosis; 2] {
     let diagnose = |what, privilege: &Privilege, remedy: &'static str| match privilege {
         Privilege::Granted => Diagnosis::good(what, "granted"),
         Privilege::Refused(reason) => Diagnosis::bad(what, reason.clone(), remedy),
-        Privilege::NotAsked => Diagnosis::note(what, "not asked for", remedy),
+        Privilege::NotAsked => Diagnosis::note(what, "not requested", remedy),
     };
     let fifo = "`@realtime - rtprio 99` in /etc/security/limits.conf, then log in again";
     let lock = "`@realtime - memlock unlimited` in /etc/security/limits.conf, then log in again";
@@ -160,8 +162,8 @@ fn plugins() -> Diagnosis {
         (false, 0) => Diagnosis::good("plugins", ids.join(", ")),
         (false, _) => Diagnosis::note(
             "plugins",
-            format!("{}; {broken} files cannot be read", ids.join(", ")),
-            "`flotor plugins` says why",
+            format!("{}; {broken} files are unreadable", ids.join(", ")),
+            "`flotor plugins` gives the reasons",
         ),
     }
 }

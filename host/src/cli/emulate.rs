@@ -1,4 +1,4 @@
-//! `flotor emulate`: a device without the device, in a process of its own.
+//! `flotor emulate`: the emulator of a device, a separate program.
 
 use clap::{Args, Command};
 use flotor_command::CommandError;
@@ -6,16 +6,16 @@ use flotor_command::say;
 use flotor_command::separate::{Built, SeparateProgram};
 use std::ffi::OsString;
 
-/// Emulate the controller of a device, so that its plugin can be used without hardware.
+/// Emulate the controller of a device, to use its plugin without hardware.
 #[derive(Args)]
 #[command(
-    after_help = "`flotor emulate NAME` becomes the program `flotor-NAME-emulator` beside this one, with all \
+    after_help = "`flotor emulate NAME` executes the program `flotor-NAME-emulator` of the same folder, with all \
     further arguments.\n\nExamples:\n  \
     flotor emulate maglev\n  \
     flotor emulate maglev --transport pty --link /tmp/flotor-tty\n  \
     flotor emulate maglev --pace lockstep --set preset=full\n  \
     flotor emulate maglev --help                 options of that emulator",
-    // Behind NAME it is the emulator's.
+    // After NAME the flag belongs to the emulator.
     disable_help_flag = true
 )]
 pub(crate) struct EmulateArguments {
@@ -36,7 +36,9 @@ pub(crate) fn run(arguments: &EmulateArguments) -> Result<(), CommandError> {
     }
     let is_id = !device.is_empty() && device.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
     if !is_id {
-        return Err(CommandError::Usage(format!("`{device}` is no id of a device")));
+        return Err(CommandError::Usage(format!(
+            "invalid device id `{device}`: use letters, digits, hyphens and underscores"
+        )));
     }
     let program = format!("flotor-{device}-emulator");
     let build = format!("cargo build --release -p {program}");

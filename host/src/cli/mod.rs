@@ -57,43 +57,43 @@ struct Separate {
 enum Command {
     /// Run a scene in the servo loop (without SCENE: the built-in demo)
     Run(run::RunArguments),
-    /// Ask the models of a recording again: bit for bit, or with other parameters
+    /// Re-evaluate the models on a recorded trajectory: bit-exact, or with changed parameters
     Replay(Separate),
     /// Show a running host or a recording: the spring in 3D, and traces
     View(view::ViewArguments),
     /// Evaluate a force model at poses from a CSV file
     Eval(Separate),
-    /// List the plugins that are found, without running any of them
+    /// List the installed plugins, without running any of them
     Plugins(plugins::PluginsArguments),
-    /// Check a plugin file: does it load, answer, and survive bad input
+    /// Check a plugin file against the rules of the contract
     Validate(Separate),
-    /// Start a plugin of your own: a folder that builds, validates and runs
+    /// Create a plugin: a folder that builds, validates and runs
     New(new::NewArguments),
-    /// Measure how well the servo keeps time here, next to a bare loop
+    /// Measure the timing of the servo on this machine, next to a bare loop
     Jitter(Separate),
-    /// Find the stiffest virtual spring that stays stable, next to theory
+    /// Find the largest stable stiffness of a virtual spring, next to theory
     Stability(Separate),
-    /// Measure what an evaluation costs and how wrong it is, for many settings of a force model
+    /// Measure cost and error of an evaluation, for many settings of a force model
     Bench(Separate),
     /// Score the numerical stability of a force model
     Stress(Separate),
-    /// Record a run that is on, from now to its end
+    /// Attach to a running session and record it until it ends
     Record(record::RecordArguments),
-    /// Replace a model of a run that is on, without a jump in the force
+    /// Hot-swap a model of a running session, without a jump in the force
     Swap(swap::SwapArguments),
-    /// Put a running host on a network, or bring one from there to this machine
+    /// Publish a running host on a network, or show a remote one here
     Bridge(bridge::BridgeArguments),
     /// Sweep a model or a scene over parameters, poses and seeds into a Parquet table
     Sweep(sweep::SweepArguments),
-    /// Carry out a perception experiment
+    /// Run a perception experiment
     Study(Separate),
     /// Analyse the data of a perception experiment
     Analyse(Separate),
-    /// Measure how much of the vertical force arrives, and correct it
+    /// Measure the ratio of delivered to commanded vertical force, and correct it
     Calibrate(Separate),
-    /// Emulate the controller of a device, so that its plugin can be used without hardware
+    /// Emulate the controller of a device, to use its plugin without hardware
     Emulate(emulate::EmulateArguments),
-    /// Look at this machine: what a real-time loop may hope for, and how to improve it
+    /// Check this machine's real-time configuration and suggest fixes
     Doctor(doctor::DoctorArguments),
     /// A process that holds one force model, started by `run` for `isolation = "process"`
     #[command(hide = true)]

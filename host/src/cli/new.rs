@@ -1,4 +1,4 @@
-//! `flotor new`: the start of a plugin of one's own.
+//! `flotor new`: creates the folder of a plugin.
 
 use crate::scaffold::{ContractFolder, Language, PluginName, Scaffold, ScaffoldError, scaffold};
 use clap::{Args, ValueEnum};
@@ -8,21 +8,21 @@ use flotor_hal::abi::PluginKind;
 use flotor_session::registry::Registry;
 use std::path::{Path, PathBuf};
 
-/// Start a plugin.
+/// Create a plugin: a folder that builds, validates and runs.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  flotor new model jelly\n  flotor new device crank\n  \
-    flotor new model jelly --language c\n\nMakes the folder ./NAME with a plugin that builds, passes \
-    `flotor validate` and runs in the scene beside it.\nNothing is ever overwritten.")]
+    flotor new model jelly --language c\n\nCreates the folder ./NAME with a plugin that builds, passes \
+    `flotor validate` and runs in the scene of the same folder.\nIt overwrites no file.")]
 pub(crate) struct NewArguments {
-    /// What it is to be
+    /// Kind of plugin
     #[arg(value_enum)]
     kind: Kind,
-    /// Its id: lower-case letters, digits and hyphens
+    /// Id of the plugin: lower-case letters, digits and hyphens
     name: String,
-    /// What it is to be written in
+    /// Programming language
     #[arg(long, value_enum, default_value = "rust")]
     language: Language,
-    /// Folder of the contract's sources (default: those this program was built from)
+    /// Folder of the contract's sources (default: the sources of this program)
     #[arg(long, value_name = "PATH")]
     hal: Option<PathBuf>,
 }
@@ -53,7 +53,7 @@ fn refuse_an_id_in_use(name: &PluginName) -> Result<(), CommandError> {
     let registry = Registry::search(&[]);
     let Some(known) = registry.found().iter().find(|known| known.id == name.id()) else { return Ok(()) };
     Err(CommandError::Usage(format!(
-        "`{0}` is the id of {1} already; `my-{0}` would do",
+        "`{0}` is already the id of {1}; choose another, such as `my-{0}`",
         name.id(),
         known.path.display()
     )))

@@ -1,4 +1,4 @@
-//! `flotor plugins`: what is there, read from the files without running any of them.
+//! `flotor plugins`: the installed plugins, read from their files without running any of them.
 
 use clap::Args;
 use flotor_command::say;
@@ -10,16 +10,16 @@ use flotor_session::registry::{PATH_VARIABLE, Registry, SkippedFolder};
 use serde::Serialize;
 use std::path::Path;
 
-/// List the plugins that are found.
+/// List the installed plugins, without running any of them.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  flotor plugins\n  flotor plugins spring        its parameters, with units and ranges\n  \
     flotor plugins --json | python3 -m json.tool"
 )]
 pub(crate) struct PluginsArguments {
-    /// Id of a plugin: show its parameters (this loads it)
+    /// Id of a plugin: show its parameters (this loads the plugin)
     id: Option<String>,
-    /// For machines
+    /// Print JSON
     #[arg(long)]
     json: bool,
 }
@@ -69,7 +69,7 @@ fn list(registry: &Registry, json: bool) -> Result<(), CommandError> {
     }
     let note = style::warning("note:");
     for Metadata { path, id, .. } in registry.shadowed() {
-        say!("{note} {} has the id `{id}` too and is hidden by the one above", path.display());
+        say!("{note} {}: not used, because a plugin listed above has the same id `{id}`", path.display());
     }
     for broken in registry.broken() {
         say!("{note} {broken}");
@@ -80,7 +80,7 @@ fn list(registry: &Registry, json: bool) -> Result<(), CommandError> {
     if listed.is_empty() {
         let folders: Vec<String> =
             registry.folders().iter().map(|folder| folder.display().to_string()).collect();
-        say!("no plugins found in {}; {PATH_VARIABLE} adds folders", folders.join(", "));
+        say!("no plugins found in {}; add folders with {PATH_VARIABLE}", folders.join(", "));
     }
     Ok(())
 }

@@ -1,6 +1,6 @@
-//! `flotor record`: a recording of a run that somebody else started, here or elsewhere.
+//! `flotor record`: a recording of a running session, local or remote.
 
-use super::bridge::{BRIDGE, Way, is_elsewhere};
+use super::bridge::{BRIDGE, Way, is_remote};
 use clap::Args;
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, first_error, report_line, style};
@@ -11,19 +11,19 @@ use flotor_servo::StopSwitch;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// How long to wait for news before looking whether to stop.
+/// How long to wait for an event before checking the stop switch.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
 
-/// Record a run that is on, from now to its end.
+/// Attach to a running session and record it until it ends.
 #[derive(Args)]
 #[command(
-    after_help = "Nobody has to start a run with --record: this joins while it runs, and leaves at Ctrl-C.\n\n\
+    after_help = "The session need not have been started with --record: this command attaches to it, and detaches at Ctrl-C.\n\n\
     Examples:\n  \
-    flotor record --out run.mcap                 the run that was started last on this machine\n  \
-    flotor record zenoh/lab --out run.mcap       a run elsewhere, see `flotor bridge --help`"
+    flotor record --out run.mcap                 the newest session of this machine\n  \
+    flotor record zenoh/lab --out run.mcap       a remote session, see `flotor bridge --help`"
 )]
 pub(crate) struct RecordArguments {
-    /// A run elsewhere: zenoh/NAME (default: the newest run of this machine)
+    /// Remote session: zenoh/NAME (default: the newest session of this machine)
     #[arg(value_name = "zenoh/NAME")]
     source: Option<String>,
     /// The recording
@@ -37,13 +37,13 @@ pub(crate) fn run(arguments: &RecordArguments) -> Result<(), CommandError> {
     let RecordArguments { source, out, way } = arguments;
     match source.as_deref() {
         None => record_local(out),
-        Some(remote) if is_elsewhere(remote.as_ref()) => {
+        Some(remote) if is_remote(remote.as_ref()) => {
             let mut arguments = way.arguments("record", remote.as_ref());
             arguments.insert(2, out.into());
             BRIDGE.become_with(&arguments)
         }
         Some(other) => Err(CommandError::Usage(format!(
-            "`{other}` is no run elsewhere: write zenoh/NAME; `flotor bridge list` shows who is there"
+            "`{other}` is not a remote session: write zenoh/NAME; `flotor bridge list` lists the names"
         ))),
     }
 }
@@ -56,39 +56,40 @@ fn record_local(out: &Path) -> Result<(), CommandError> {
     let Kept { ticks, dropped, end } = keep(client, out, &stop)?;
     let lost = match dropped {
         0 => String::new(),
-        dropped => format!(", {} {dropped} ticks the host could not hand over", style::warning("without")),
+        dropped => format!(", {} {dropped} ticks dropped by the host", style::warning("without")),
     };
-    let (RecordingEnd::Told(words) | RecordingEnd::Cut(words)) = &end;
-    let told = report_line(format_args!("{}: {ticks} ticks{lost}; {words}", out.display()));
+    let (RecordingEnd::Complete(words) | RecordingEnd::Cut(words)) = &end;
+    let printed = report_line(format_args!("{}: {ticks} ticks{lost}; {words}", out.display()));
     let whole = match end {
-        RecordingEnd::Told(_) => Ok(()),
+        RecordingEnd::Complete(_) => Ok(()),
         RecordingEnd::Cut(_) => Err(CommandError::Failed(
-            "the recording ends before the run has told its end; what had come is in the file".to_owned(),
+            "connection lost before the end of the run; the file contains the ticks received until then"
+                .to_owned(),
         )),
     };
-    first_error([whole, told])
+    first_error([whole, printed])
 }
 
-/// What came of a recording.
+/// Result of a recording.
 struct Kept {
     ticks: u64,
     dropped: u64,
     end: RecordingEnd,
 }
 
-/// How a recording of somebody else's run ends, in words.
+/// How the recording of a session ends, with the text to print.
 enum RecordingEnd {
-    /// The run is over, or whoever recorded has stopped.
-    Told(String),
-    /// The host went without a word.
+    /// The run is over, or the user stopped the recording.
+    Complete(String),
+    /// The connection was lost without an end message.
     Cut(String),
 }
 
 fn keep(mut client: Client, out: &Path, stop: &StopSwitch) -> Result<Kept, CommandError> {
     let mut recorder = Recorder::create(out, client.run())?;
-    let gone = |error: LiveError| CommandError::Failed(error.to_string());
-    client.asker().ask(Ask::Watch { every: 1 }).map_err(gone)?;
-    let mut kept = Kept { ticks: 0, dropped: 0, end: RecordingEnd::Told("stopped recording".to_owned()) };
+    let lost = |error: LiveError| CommandError::Failed(error.to_string());
+    client.asker().ask(Ask::Watch { every: 1 }).map_err(lost)?;
+    let mut kept = Kept { ticks: 0, dropped: 0, end: RecordingEnd::Complete("stopped recording".to_owned()) };
     while !stop.is_stop_asked() {
         match client.next(LOOK_PERIOD) {
             Ok(None | Some(Event::Answer(_))) => {}
@@ -106,10 +107,10 @@ fn keep(mut client: Client, out: &Path, stop: &StopSwitch) -> Result<Kept, Comma
             }
             Ok(Some(Event::Change(change))) => recorder.change(&Change::from(&change))?,
             Ok(Some(Event::End(end))) => {
-                kept.end = RecordingEnd::Told(end.words);
+                kept.end = RecordingEnd::Complete(end.words);
                 break;
             }
-            // What was recorded is good; that the host died belongs to it.
+            // The recorded ticks are valid; the note says that the host failed.
             Err(error) => {
                 kept.end = RecordingEnd::Cut(error.to_string());
                 break;

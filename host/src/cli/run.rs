@@ -1,4 +1,4 @@
-//! `flotor run`: a scene in the servo loop, watched by whoever is asked for.
+//! `flotor run`: a scene in the servo loop, with its observers.
 
 use crate::run_picture::RunPicture;
 use clap::Args;
@@ -30,25 +30,25 @@ use std::path::PathBuf;
 pub(crate) struct RunArguments {
     /// Scene file (TOML); without it, the built-in demo
     scene: Option<PathBuf>,
-    /// How long to run: 10s, 500ms, 2min (default: what the scene says)
+    /// Duration of the run: 10s, 500ms, 2min (default: that of the scene)
     #[arg(long, value_parser = duration_s, value_name = "TIME")]
     duration: Option<f64>,
-    /// Loop rate in Hz, 100 to 10000 (default: what the scene says)
+    /// Loop rate in Hz, 100 to 10000 (default: that of the scene)
     #[arg(long, value_parser = rate_hz, value_name = "HZ")]
     rate: Option<f64>,
-    /// Keep real time, or run as fast as it goes, bit-exact
+    /// Real time, or as fast as possible and bit-exact
     #[arg(long, value_enum, default_value_t)]
     clock: ClockOption,
-    /// Seed of everything random
+    /// Seed of all random numbers
     #[arg(long, default_value_t = 0, value_name = "N")]
     seed: u64,
-    /// Keep the loop on this core of the machine (real clock)
+    /// Pin the loop to this core of the machine (real clock)
     #[arg(long, value_parser = core, value_name = "N")]
     core: Option<Core>,
     /// Record every tick to an MCAP file (opens in Foxglove, Rerun, Python)
     #[arg(long, value_name = "FILE.mcap")]
     record: Option<PathBuf>,
-    /// Draw the run as a picture
+    /// Plot the run
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     /// Write the summary as JSON (- for standard output)
@@ -60,7 +60,7 @@ pub(crate) struct RunArguments {
 }
 
 pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
-    // First of all: a signal that comes while things load ends the run, too.
+    // First of all: a signal during loading ends the run, too.
     let stop = stop_on_signals();
     let scene = scene(&arguments)?;
     let clock = match arguments.clock {
@@ -70,7 +70,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let options = RunOptions { clock, seed: arguments.seed };
     let registry = Registry::search(&scene.plugin_folders);
     let mut session = Session::prepare(&scene, &registry, &options)?.on_core(arguments.core);
-    let carriers = carriers(&mut session, clock)?;
+    let links = peer_links(&mut session, clock)?;
     let plugins = session.plugins().to_vec();
     let description = describe(&scene, &options, &plugins);
     let publication = publish(&Directory::of_this_user(), &scene, &description, &session, &stop);
@@ -104,7 +104,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     };
 
     let carried: Vec<(String, LinkCounts)> =
-        carriers.into_iter().map(|(name, carrier)| (name, carrier.finish())).collect();
+        links.into_iter().map(|(name, link)| (name, link.finish())).collect();
     if let Some(publication) = publication {
         publication.end(&end_words(&outcome, scene.rate_hz));
     }
@@ -119,7 +119,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         trace_digest: digest.finish(),
     };
     let summary = RunSummary::new(facts, &outcome, &tally);
-    // Before anything else that may go wrong: it cannot be made again.
+    // Before anything else that can fail: the recording cannot be repeated.
     let recorded = recording.finish(&notes(&outcome, &summary)).map_err(Into::into);
     let drawn = match (&arguments.plot, plot) {
         (Some(path), Some(plot)) => std::fs::write(path, plot.to_svg(&summary.one_line(), &outcome.timing))
@@ -127,13 +127,13 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         _ => Ok(()),
     };
     let text = || format!("{}\n{}", style::title(&summary.title), summary.to_text());
-    let told = print_result(arguments.json.as_deref(), &summary, text);
+    let printed = print_result(arguments.json.as_deref(), &summary, text);
     outcome.real_time.advice().into_iter().for_each(note);
-    // What became of the run is what scripts ask first; a file that is missing comes after.
-    first_error([verdict(&outcome, &plugins, &summary), recorded, drawn, told])
+    // Scripts need the outcome of the run first, a missing file second.
+    first_error([verdict(&outcome, &plugins, &summary), recorded, drawn, printed])
 }
 
-/// What whoever opens the recording later has to know of the run: why it ended, who did not behave, what is missing.
+/// Notes for readers of the recording: why the run ended, which plugins failed, which ticks are missing.
 fn notes(outcome: &Outcome, summary: &RunSummary) -> Vec<Note> {
     let note = |severity, source: &str, text: String| Note {
         time_ns: outcome.elapsed_ns,
@@ -191,27 +191,29 @@ fn scene(arguments: &RunArguments) -> Result<Scene, CommandError> {
     Ok(scene)
 }
 
-/// Begins to carry the news of couplings whose other end is on another host.
-fn carriers(session: &mut Session, clock: Clock) -> Result<Vec<(String, PeerLink)>, CommandError> {
+/// Starts a peer link for each coupling with a remote end.
+fn peer_links(session: &mut Session, clock: Clock) -> Result<Vec<(String, PeerLink)>, CommandError> {
     let lines = session.take_lines();
     if let (Some((name, _)), Clock::Virtual) = (lines.first(), clock) {
         return Err(CommandError::Usage(format!(
-            "the other end of the coupling `{name}` is on another host, which keeps real time: leave `--clock virtual` out"
+            "the remote end of the coupling `{name}` runs in real time: leave `--clock virtual` out"
         )));
     }
     let directory = Directory::of_this_user();
-    let carrier = |(name, line): (String, Line)| match start_peer_link(&directory, &name, line) {
-        Ok(carrier) => Ok((name, carrier)),
-        Err(error) => Err(CommandError::Failed(format!("the coupling `{name}` reaches nobody: {error}"))),
+    let link = |(name, line): (String, Line)| match start_peer_link(&directory, &name, line) {
+        Ok(link) => Ok((name, link)),
+        Err(error) => {
+            Err(CommandError::Failed(format!("coupling `{name}`: cannot start the peer link: {error}")))
+        }
     };
-    lines.into_iter().map(carrier).collect()
+    lines.into_iter().map(link).collect()
 }
 
-/// How a run ended, for those who watched it.
+/// How a run ended, for its clients.
 fn end_words(outcome: &Outcome, rate_hz: f64) -> String {
     match outcome.end {
-        RunEnd::Finished => "the run is finished".to_owned(),
-        RunEnd::Stopped => "the run was stopped in order".to_owned(),
+        RunEnd::Finished => "the run finished".to_owned(),
+        RunEnd::Stopped => "the run was stopped".to_owned(),
         RunEnd::DeviceFault(fault) => {
             format!(
                 "device fault: {}{}",
@@ -225,17 +227,19 @@ fn end_words(outcome: &Outcome, rate_hz: f64) -> String {
     }
 }
 
-/// A model that broke is a refused plugin, told once more where scripts look: in the exit code.
+/// A model that failed is a refused plugin, reported in the exit code as well, for scripts.
 fn broken_models(summary: &RunSummary) -> Result<(), CommandError> {
     let broken = summary.plugins.iter().find(|plugin| plugin.health != "ok");
     broken.map_or(Ok(()), |plugin| {
-        let problem =
-            format!("{}: `{}` {}; `flotor validate` tells more", plugin.file, plugin.name, plugin.health);
+        let problem = format!(
+            "{}: `{}` {}; run `flotor validate` for details",
+            plugin.file, plugin.name, plugin.health
+        );
         Err(CommandError::PluginRefused(problem))
     })
 }
 
-/// Everybody who looks at every tick of a run.
+/// The observers of every tick of a run.
 struct Watchers {
     tally: Tally,
     digest: TraceDigest,

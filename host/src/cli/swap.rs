@@ -1,4 +1,4 @@
-//! `flotor swap`: another plugin in place of a model of a run that somebody started, here on this machine.
+//! `flotor swap`: hot swap of a model in a running session of this machine.
 
 use clap::Args;
 use flotor_command::CommandError;
@@ -9,33 +9,33 @@ use flotor_session::scene::is_named;
 use std::path::MAIN_SEPARATOR;
 use std::time::{Duration, Instant};
 
-/// How long a host may take to make a model.
-const MAKING: Duration = Duration::from_secs(60);
-/// How long a loop may take to take it in, and its observers to say so.
-const TAKING_IN: Duration = Duration::from_secs(5);
+/// Time limit for the host to create the model.
+const CREATION_LIMIT: Duration = Duration::from_secs(60);
+/// Time limit for the loop to swap it in and to report that.
+const SWAP_LIMIT: Duration = Duration::from_secs(5);
 
-/// Replace a model of a run that is on, without a jump in the force.
+/// Hot-swap a model of a running session, without a jump in the force.
 #[derive(Args)]
 #[command(
-    after_help = "The new model is made beside the loop and fades in while the old one fades out (`fade_s` of the model).\n\
-    Without --plugin it is the plugin of the scene, its file read again, with the scene's settings; another plugin\n\
-    starts from its own defaults. Parameters that were changed while the run was on are not kept.\n\n\
+    after_help = "The host creates the new model outside the loop and blends it in over `fade_s` of the model.\n\
+    Without --plugin, it reads the plugin file of the scene again and keeps the scene's settings; another plugin\n\
+    starts from its own defaults. Changes of parameters during the session are lost.\n\n\
     Examples:\n  \
-    flotor swap spring                                      the same plugin, built anew a moment ago\n  \
-    flotor swap spring --set gamma_n=20 --set variant=rod   the same one with other settings\n  \
+    flotor swap spring                                      the same plugin, just rebuilt\n  \
+    flotor swap spring --set gamma_n=20 --set variant=rod   the same plugin with other settings\n  \
     flotor swap spring --plugin wall --set stiffness_n_per_m=800\n  \
     flotor swap spring --plugin ./target/release/libmine.so --run 4711"
 )]
 pub(crate) struct SwapArguments {
     /// Name of the model in the scene
     model: String,
-    /// What comes in its place: the id of a plugin or the path of its file (default: the same plugin)
+    /// The new plugin: its id or the path of its file (default: the same plugin)
     #[arg(long, value_name = "ID|FILE")]
     plugin: Option<String>,
     /// Set a parameter of the new model (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<KeyValue>,
-    /// The run of this process (default: the newest run)
+    /// The session of this process (default: the newest session)
     #[arg(long, value_name = "PID")]
     run: Option<u32>,
 }
@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &SwapArguments) -> Result<(), CommandError> {
         Some(ChangeMessage { plugin, parameter, value, tick, .. }) => {
             say!("`{plugin}` is `{parameter}` {value} from tick {tick} on");
         }
-        None => say!("`{model}` is replaced as soon as the loop goes on"),
+        None => say!("`{model}` will be swapped when the loop resumes"),
     }
     Ok(())
 }
@@ -76,25 +76,25 @@ fn for_host(plugin: &str) -> Result<String, CommandError> {
     whole
         .into_os_string()
         .into_string()
-        .map_err(|path| CommandError::Usage(format!("`{}` cannot be told: it is no text", path.display())))
+        .map_err(|path| CommandError::Usage(format!("`{}`: the path is not valid UTF-8", path.display())))
 }
 
-/// Asks for it and waits for what becomes of it: the change in the loop, unless nothing is heard of that in time.
+/// Requests the swap and waits for its result: the change in the loop, or nothing if the loop does not report it in time.
 fn swapped(client: &mut Client, ask: Ask, model: &str) -> Result<Option<ChangeMessage>, CommandError> {
-    let gone = |error: LiveError| CommandError::Failed(error.to_string());
-    let asked = client.asker().ask(ask).map_err(gone)?;
+    let lost = |error: LiveError| CommandError::Failed(error.to_string());
+    let asked = client.asker().ask(ask).map_err(lost)?;
     let (mut change, mut is_answered) = (None, false);
-    let mut until = Instant::now() + MAKING;
+    let mut until = Instant::now() + CREATION_LIMIT;
     while change.is_none() || !is_answered {
         let left = until.saturating_duration_since(Instant::now());
         if left.is_zero() {
             break;
         }
-        match client.next(left).map_err(gone)? {
+        match client.next(left).map_err(lost)? {
             Some(Event::Answer(Answer { number, refused })) if number == asked => {
                 refused.map_or(Ok(()), |reason| Err(CommandError::Failed(reason)))?;
                 is_answered = true;
-                until = Instant::now() + TAKING_IN;
+                until = Instant::now() + SWAP_LIMIT;
             }
             // The loop may be faster than the answer.
             Some(Event::Change(told)) if told.subject == Subject::Plugin && is_named(&told.plugin, model) => {
@@ -108,7 +108,7 @@ fn swapped(client: &mut Client, ask: Ask, model: &str) -> Result<Option<ChangeMe
         return Ok(change);
     }
     Err(CommandError::Failed(format!(
-        "the host has not answered in {} s; the model may still come in",
-        MAKING.as_secs()
+        "no answer from the host in {} s; it may still swap the model",
+        CREATION_LIMIT.as_secs()
     )))
 }

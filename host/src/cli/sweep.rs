@@ -1,4 +1,4 @@
-//! `flotor sweep`: starts the sweeper, which is a program of its own, because it writes Parquet.
+//! `flotor sweep`: starts the sweeper, a separate program because it needs Parquet.
 
 use clap::Args;
 use flotor_command::CommandError;
@@ -7,7 +7,7 @@ use std::ffi::OsString;
 
 const SWEEPER: SeparateProgram<'static> = SeparateProgram {
     program: "flotor-sweep",
-    built: Built::Apart("sweep"),
+    built: Built::OwnWorkspace("sweep"),
     build: "cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target/sweep",
 };
 
@@ -15,7 +15,7 @@ const SWEEPER: SeparateProgram<'static> = SeparateProgram {
 #[derive(Args)]
 #[command(disable_help_flag = true)]
 pub(crate) struct SweepArguments {
-    /// The plan (TOML), and options; `flotor sweep --help` lists them
+    /// Plan (TOML) and options; `flotor sweep --help` lists them
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "PLAN.toml")]
     arguments: Vec<OsString>,
 }

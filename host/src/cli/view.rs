@@ -1,6 +1,6 @@
-//! `flotor view`: starts the viewer, which is a program of its own, and tells it where the plugins are.
+//! `flotor view`: starts the viewer, a separate program, with the paths of the plugins.
 
-use super::bridge::{BRIDGE, Way, is_elsewhere};
+use super::bridge::{BRIDGE, Way, is_remote};
 use clap::Args;
 use flotor_command::CommandError;
 use flotor_command::separate::{Running, SeparateProgram};
@@ -10,32 +10,32 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::Stdio;
 
-/// Show what the hand feels: the spring in 3D, and traces.
+/// Show a running host or a recording: the spring in 3D, and traces.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    flotor view                                   the run that goes on in another terminal\n  \
-    flotor view zenoh/lab                         one on another machine, see `flotor bridge --help`\n  \
+    flotor view                                   the session in another terminal\n  \
+    flotor view zenoh/lab                         a session on another machine, see `flotor bridge --help`\n  \
     flotor run --clock virtual --record run.mcap && flotor view run.mcap\n  \
     flotor view --screenshot run.png run.mcap     a picture, without display or GPU\n  \
     flotor view --screenshot run.png --at 2.5 --look light --size 1920x1200 --scale 1.5 run.mcap\n  \
-    flotor view --measure 10 run.mcap             pictures made and processor time taken in ten seconds")]
+    flotor view --measure 10 run.mcap             pictures drawn and processor time used in ten seconds")]
 pub(crate) struct ViewArguments {
-    /// A recording, or zenoh/NAME for a run elsewhere (without: the running host)
+    /// Recording, or zenoh/NAME for a remote session (default: the running host)
     #[arg(value_name = "FILE.mcap | zenoh/NAME")]
     file: Option<PathBuf>,
-    /// Write a picture of a moment; needs no display and no GPU
+    /// Write a picture of one moment; needs no display and no GPU
     #[arg(long, value_name = "OUT.png", requires = "file")]
     screenshot: Option<PathBuf>,
-    /// The picture is that of the whole window, with panels
+    /// Draw the whole window with its panels
     #[arg(long, requires = "screenshot")]
     window: bool,
-    /// Watch the run of this process (default: the newest run)
+    /// Show the session of this process (default: the newest session)
     #[arg(long, value_name = "PID", conflicts_with = "file")]
     run: Option<u32>,
-    /// The moment to show, s (default: that of the largest force)
+    /// Moment to show, s (default: that of the largest force)
     #[arg(long, value_name = "SECONDS")]
     at: Option<String>,
-    /// Light or dark
+    /// Colours: dark or light
     #[arg(long, value_name = "dark|light")]
     look: Option<String>,
     /// Width and height of picture or window (default: 1280x800)
@@ -44,7 +44,7 @@ pub(crate) struct ViewArguments {
     /// Size of text and lines, 1 to 3 (default: 1)
     #[arg(long, value_name = "FACTOR")]
     scale: Option<String>,
-    /// Say what the window costs over so many seconds, and close it then
+    /// Measure the processor time of the window for this time, then close it
     #[arg(long, value_name = "SECONDS", conflicts_with = "screenshot")]
     measure: Option<String>,
     #[command(flatten)]
@@ -54,16 +54,16 @@ pub(crate) struct ViewArguments {
 pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
     let mut for_viewer: Vec<OsString> = Vec::new();
     let mut add = |name: &str, value: OsString| for_viewer.extend([name.into(), value]);
-    let elsewhere = arguments.file.as_deref().filter(|file| is_elsewhere(file.as_os_str()));
-    let file = if elsewhere.is_some() { None } else { arguments.file.as_ref() };
-    if elsewhere.is_some() && arguments.screenshot.is_some() {
+    let remote = arguments.file.as_deref().filter(|file| is_remote(file.as_os_str()));
+    let file = if remote.is_some() { None } else { arguments.file.as_ref() };
+    if remote.is_some() && arguments.screenshot.is_some() {
         return Err(CommandError::Usage(
             "a picture of a moment needs a recording: `flotor record zenoh/NAME --out FILE.mcap` makes one"
                 .to_owned(),
         ));
     }
     if let Some(file) = file {
-        // Opened here as well: what is wrong with the file is told before anything else is started.
+        // Opened here as well: an error in the file is reported before another program starts.
         let recording = Recording::open(file)?;
         plugin_files(&recording).into_iter().for_each(|plugin| add("--plugin", plugin.into()));
     }
@@ -85,14 +85,14 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
     }
     for_viewer.extend(arguments.window.then(|| "--window".into()));
     for_viewer.extend(file.map(|file| file.into()));
-    match elsewhere {
+    match remote {
         None => SeparateProgram::VIEWER.become_with(&for_viewer),
-        Some(name) => view_elsewhere(&arguments.way.arguments("attach", name.as_os_str()), for_viewer),
+        Some(name) => view_remote(&arguments.way.arguments("attach", name.as_os_str()), for_viewer),
     }
 }
 
-/// The bridge shows the run here, and the viewer watches that one; the bridge's words of loss and reconnection go to the terminal.
-fn view_elsewhere(for_bridge: &[OsString], mut for_viewer: Vec<OsString>) -> Result<(), CommandError> {
+/// The bridge republishes the session here, and the viewer shows that one; the bridge reports loss and reconnection on the terminal.
+fn view_remote(for_bridge: &[OsString], mut for_viewer: Vec<OsString>) -> Result<(), CommandError> {
     let (mut viewer, mut bridge) = (SeparateProgram::VIEWER.command()?, BRIDGE.command()?);
     let cannot = |program: &str, cause| CommandError::file(program.as_ref(), "cannot be started", cause);
     let bridge = bridge.args(for_bridge).stdin(Stdio::null()).spawn();
@@ -104,11 +104,11 @@ fn view_elsewhere(for_bridge: &[OsString], mut for_viewer: Vec<OsString>) -> Res
     if shown.success() {
         return Ok(());
     }
-    // It has said why.
+    // The viewer has printed the reason.
     std::process::exit(shown.code().unwrap_or(1));
 }
 
-/// Files of the plugins of a recording, as far as they are found; the viewer says what it misses.
+/// Files of the plugins of a recording that were found; the viewer reports the missing ones.
 fn plugin_files(recording: &Recording) -> Vec<PathBuf> {
     let registry = Registry::search(&[]);
     let plugins = recording.run().plugins.iter();

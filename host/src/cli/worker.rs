@@ -6,7 +6,7 @@ use flotor_servo::engine::process;
 use flotor_session::registry::load_file;
 use std::path::PathBuf;
 
-/// What a worker is started with. Standard input is the memory it shares with its host.
+/// Arguments of a worker. Its standard input is the memory it shares with its host.
 #[derive(Args, Clone, Debug)]
 pub(super) struct WorkerArguments {
     /// The plugin's shared library
@@ -23,7 +23,7 @@ pub(super) struct WorkerArguments {
 }
 
 pub(super) fn run(arguments: WorkerArguments) -> Result<(), CommandError> {
-    // A terminal signals worker and host alike, and while force fades out the model is still asked. A
+    // A terminal signals both worker and host, and the host still steps the model while the force fades out. A
     // worker ends with its host, so nobody listens to the switch.
     let _ = stopping::stop_on_signals();
     let WorkerArguments { plugin, period_ns, seed, sets } = arguments;

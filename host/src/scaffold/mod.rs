@@ -1,4 +1,4 @@
-//! `flotor new`: a plugin crate of its own that builds, validates and runs as it is.
+//! `flotor new`: a new plugin crate that builds, validates and runs unchanged.
 //!
 //! The templates are whole files that compile once `your-name` (the id), `your_name` (in symbols), `YourName` (the
 //! type), `Your name` (for people) and what differs by language and place are replaced. A crate that is made lies
@@ -15,7 +15,7 @@ use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// What a plugin is written in.
+/// Programming language of a plugin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Language {
     /// A cargo crate
@@ -24,44 +24,42 @@ pub enum Language {
     C,
 }
 
-/// Why no plugin was made.
+/// Why no plugin was created.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScaffoldError {
     /// The name cannot be used.
     #[error(transparent)]
     Name(#[from] NameError),
-    /// The type would be called like something the template uses.
-    #[error(
-        "a plugin `{id}` would have a type `{type_name}`, and the contract has one, too; `my-{id}` would do"
-    )]
+    /// The type would have the name of a type that the template uses.
+    #[error("type `{type_name}` of plugin `{id}` clashes with a type of the contract; use `my-{id}`")]
     Clash {
         /// The name.
         id: String,
-        /// What the type would be called.
+        /// The name of the type.
         type_name: String,
     },
     /// There is something of this name already.
-    #[error("{} exists already, and nothing is ever overwritten; move it or choose another name", .0.display())]
+    #[error("{} exists; move it or choose another name", .0.display())]
     Exists(PathBuf),
     /// The folder belongs to a cargo workspace that takes every folder in it as a member.
     #[error(
-        "{} belongs to Flotor's own workspace, where a plugin is a folder with `flotor-hal.workspace = true` (see \
-         ARCHITECTURE.md, Adding a plugin); for one of its own, go to another folder",
+        "{} belongs to Flotor's own workspace, whose plugins use `flotor-hal.workspace = true` (see \
+         ARCHITECTURE.md, Adding a plugin); change to a folder outside it",
         .0.display()
     )]
     InsideWorkspace(PathBuf),
     /// The contract's sources are not where this program was built.
     #[error(
-        "the sources of the contract (`hal/`) are not found beside this program, nor at {}; say where they are: \
+        "the sources of the contract (`hal/`) are neither above this program nor at {}; set \
          --hal PATH",
         .0.display()
     )]
     NoContract(PathBuf),
     /// A path that cannot be written into a manifest.
-    #[error("{}: a manifest holds text, and this path is not text", .0.display())]
+    #[error("{}: the path is not valid UTF-8, or has quotes, backslashes or `$`; use another folder", .0.display())]
     NotText(PathBuf),
-    /// The system said no.
+    /// The system reports an error.
     #[error("{}: cannot write: {cause}", path.display())]
     Write {
         /// What was to be written.
@@ -71,7 +69,7 @@ pub enum ScaffoldError {
     },
 }
 
-/// A plugin that was made.
+/// A plugin that was created.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Scaffold {
     /// Its folder.
@@ -80,7 +78,7 @@ pub struct Scaffold {
     pub files: Vec<&'static str>,
     /// The command that builds it, in its folder.
     pub build: String,
-    /// The library that comes out, relative to the folder.
+    /// The built library, relative to the folder.
     pub library: String,
 }
 

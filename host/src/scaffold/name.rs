@@ -12,30 +12,30 @@ const CRATES: [&str; 7] = ["alloc", "core", "proc-macro", "std", "test", "build"
 /// Longer names make unreadable lists.
 const LONGEST: usize = 32;
 
-/// A name that is good for a folder, a crate, a type and an id.
+/// A valid name of a folder, a crate, a type and an id.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PluginName(String);
 
-/// Why a name is not good.
+/// Why a name is invalid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NameError {
     /// It has characters that cannot stand in a crate's name, or stands them wrongly.
-    #[error("`{name}` cannot be the name of a plugin: lower-case letters, digits and single hyphens between \
+    #[error("invalid plugin name `{name}`: use lower-case letters, digits and single hyphens between \
         them, a letter first, at most {LONGEST} characters{}",
-        nearest.as_ref().map_or(String::new(), |nearest| format!("; `{nearest}` would do")))]
+        nearest.as_ref().map_or(String::new(), |nearest| format!("; use `{nearest}`")))]
     Form {
         /// The name.
         name: String,
         /// A good name made of the same letters.
         nearest: Option<String>,
     },
-    /// It means something else already.
-    #[error("`{name}` means something else to {owner}; `my-{name}` would do")]
+    /// It is reserved.
+    #[error("`{name}` is reserved by {owner}; use `my-{name}`")]
     Taken {
         /// The name.
         name: String,
-        /// To whom.
+        /// By whom.
         owner: &'static str,
     },
 }
@@ -54,7 +54,7 @@ impl PluginName {
         match name {
             _ if TAKEN.contains(&name) => Err(taken("the compiler")),
             _ if CRATES.contains(&name) => Err(taken("cargo")),
-            _ if name.starts_with("flotor") => Err(taken("Flotor, whose crates begin with it")),
+            _ if name.starts_with("flotor") => Err(taken("Flotor, for its own crates")),
             _ => Ok(Self(name.to_owned())),
         }
     }
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_mean_something_else_are_refused() {
+    fn reserved_names_are_refused() {
         for name in ["fn", "self", "test", "std", "flotor-hal", "flotor"] {
             assert!(matches!(PluginName::new(name), Err(NameError::Taken { .. })), "{name}");
         }

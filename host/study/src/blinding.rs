@@ -1,4 +1,4 @@
-//! Codes in place of conditions, so that nobody who watches or analyses a study knows which is which until they ask.
+//! Codes instead of conditions: whoever runs or analyses a study does not know the conditions until unblinding.
 //!
 //! Which code stands for which condition follows from the seed; [`Codes`] made from the same protocol and seed tell it
 //! again.
@@ -69,6 +69,6 @@ mod tests {
             assert_eq!(codes.level(99.0), 0);
             keys.insert((bases, codes.modality(Modality::Vh)));
         }
-        assert!(keys.len() > 6, "codes must not tell the order: {keys:?}");
+        assert!(keys.len() > 6, "codes must not reveal the order: {keys:?}");
     }
 }

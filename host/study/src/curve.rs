@@ -73,16 +73,16 @@ pub enum CurveError {
         problem: String,
     },
     /// The length without load is not known.
-    #[error("the table gives compressions only; say how long the spring is without load (--free-length-mm)")]
+    #[error("the table has compressions only; give the length without load (--free-length-mm)")]
     NoFreeLength,
     /// Too little in the fitted part.
-    #[error("the middle of the deflection (30 to 70 %) holds too little: {0}")]
+    #[error("the middle of the deflection (30 to 70 %) has too few points: {0}")]
     Statistics(#[from] StatisticsError),
     /// Not a spring.
     #[error("the force falls as the spring is compressed ({0:.1} N/m); are length and compression mixed up?")]
     Falling(f64),
     /// Too few different lengths to serve the curve itself.
-    #[error("a curve to be felt needs points at three lengths at least; there are {0}")]
+    #[error("the curve needs points at three lengths at least; there are {0}")]
     Sparse(usize),
 }
 

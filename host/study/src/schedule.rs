@@ -8,7 +8,7 @@ use crate::trial::Modality;
 ///
 /// The rows of a cyclic Latin square (each base once at each place) in random order, with the bases permuted at random
 /// and the square mirrored at random; after its last row the mirrored square follows. For the three bases of the
-/// report these two squares hold all six orders, so four replications never repeat one.
+/// thesis these two squares hold all six orders, so four replications never repeat one.
 pub(crate) fn base_orders(protocol: &JndProtocol, seed: u64, subject: SubjectNumber) -> Vec<Vec<usize>> {
     let count = protocol.bases.len();
     let mut stream = Stream::new(seed, Purpose::Schedule, subject.get(), 0);

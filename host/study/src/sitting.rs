@@ -33,10 +33,10 @@ pub enum Verdict {
 #[non_exhaustive]
 pub enum AnswerError {
     /// A rating for a pair, or a comparison for one stimulus.
-    #[error("`{}` is no answer to this trial", .0.word())]
+    #[error("`{}` is not a valid answer in this trial", .0.word())]
     Kind(Response),
     /// A rating that is no number.
-    #[error("a rating is a finite number")]
+    #[error("a rating must be a finite number")]
     NotFinite,
     /// There is no trial.
     #[error("the experiment is over")]

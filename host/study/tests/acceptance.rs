@@ -63,7 +63,7 @@ fn mean(values: &[f64]) -> f64 {
 /// and .177 with a standard error of .011, t(15) 1.8 to 5.8, F for the base 43 to 124, 212 pairs with a deviation of
 /// 13.
 #[test]
-fn simulated_studies_reproduce_the_report() {
+fn simulated_studies_reproduce_the_thesis() {
     let analyses: Vec<JndAnalysis> = (0..studies()).map(|seed| jnd(&Population::default(), seed)).collect();
     let of = |value: fn(&JndAnalysis) -> f64| analyses.iter().map(value).collect::<Vec<f64>>();
 
@@ -141,7 +141,7 @@ fn the_staircase_errs_as_it_is_known_to() {
     }
 }
 
-/// The better estimators find the threshold, where the report's rule is a quarter or more too high. Observers of the
+/// The better estimators find the threshold, where the thesis's rule is a quarter or more too high. Observers of the
 /// default population, and some who say "I don't know" less often or never; two tracks make an estimate, as in the experiment.
 #[test]
 fn better_estimators_find_the_threshold() {

@@ -10,11 +10,11 @@ use flotor_session::calibration_file::{
 };
 use std::path::PathBuf;
 
-/// Make a calibration file of the report's polynomial, or of any other.
+/// Write a calibration file from the thesis's polynomial, or from any other.
 #[derive(Args)]
 #[command(
     after_help = "The excess p(z) = c0 + c1 z + c2 z² ... in N (z in mm) was measured at a commanded force F; \
-    what is kept is the\nshare 1 + p / F. Without --excess, the polynomial of CMU-RI-TR-07-21 is taken.\n\n\
+    the file stores the\nratio 1 + p / F. Without --excess, the command uses the polynomial of CMU-RI-TR-07-21.\n\n\
     Examples:\n  \
     flotor calibrate import --out thesis.toml\n  \
     flotor calibrate import --excess 0.19,-0.026,-0.0045 --at 10 --device maglev --serial 7 --out mine.toml"
@@ -23,10 +23,10 @@ pub(super) struct ImportArguments {
     /// Coefficients of 1, z, z² ... in N, N/mm, N/mm² ...
     #[arg(long, value_name = "C0,C1,...", value_delimiter = ',', allow_hyphen_values = true)]
     excess: Vec<f64>,
-    /// Commanded force in N the excess was measured at
+    /// Commanded force of the measured excess, in N
     #[arg(long, default_value = "10", value_name = "N", value_parser = force_n)]
     at: f64,
-    /// Lowest and highest height in mm it was measured at
+    /// Lowest and highest measured height, in mm
     #[arg(
         long,
         value_name = "FROM,TO",
@@ -39,10 +39,10 @@ pub(super) struct ImportArguments {
     /// Id of the device's plugin
     #[arg(long, default_value = "simulated", value_name = "ID")]
     device: String,
-    /// Serial number of the device (default: fits every one)
+    /// Serial number of the device (default: valid for all)
     #[arg(long, default_value = "", value_name = "TEXT")]
     serial: String,
-    /// Where to write the calibration file
+    /// Calibration file to write
     #[arg(long, value_name = "FILE.toml")]
     out: PathBuf,
 }
@@ -57,7 +57,9 @@ pub(super) fn run(arguments: &ImportArguments) -> Result<(), CommandError> {
     }
     let range_mm = [range_mm.first(), range_mm.get(1)].map(|end| end.copied().unwrap_or(f64::NAN));
     let vertical = VerticalCurve { range_mm, coefficients_per_mm: coefficients };
-    vertical.calibration().map_err(|invalid| CommandError::Usage(format!("these numbers: {invalid}")))?;
+    vertical
+        .calibration()
+        .map_err(|invalid| CommandError::Usage(format!("invalid polynomial: {invalid}")))?;
     let note = if from_report {
         format!("CMU-RI-TR-07-21, section 3.4, taken at a commanded force of {at} N")
     } else {

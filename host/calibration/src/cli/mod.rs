@@ -39,7 +39,7 @@ pub fn main() -> ExitCode {
     exit_code_of(run(&arguments))
 }
 
-/// Calibrate a device: measure, check, or take over somebody else's numbers.
+/// Measure the ratio of delivered to commanded vertical force, and correct it.
 #[derive(Args)]
 struct CalibrateArguments {
     #[command(subcommand)]
@@ -48,11 +48,11 @@ struct CalibrateArguments {
 
 #[derive(Subcommand)]
 enum CalibrateCommand {
-    /// Measure how much of the vertical force arrives at each height, and fit it
+    /// Measure the ratio of delivered to commanded vertical force at each height, and fit it
     Vertical(vertical::VerticalArguments),
     /// Measure the error without and with a calibration file
     Verify(verify::VerifyArguments),
-    /// Make a calibration file of the report's polynomial, or of any other
+    /// Write a calibration file from the thesis's polynomial, or from any other
     Import(import::ImportArguments),
 }
 

@@ -1,4 +1,4 @@
-//! Which rig is calibrated: the simulated one, or a device with a force sensor on a serial port.
+//! Selection of the rig: the simulated one, or a device with a force sensor on a serial port.
 
 use super::refused;
 use crate::rig::{DeviceRig, SimulatedRig, Waiting};
@@ -18,16 +18,16 @@ use std::time::Duration;
 /// The device that is calibrated in a simulated rig.
 pub(super) const SIMULATED: &str = "simulated";
 
-/// How often the line below the bar is drawn.
+/// Period of the line below the bar.
 const REDRAWN: Duration = Duration::from_millis(100);
 
-/// What is calibrated.
+/// Selection of the rig.
 #[derive(Args)]
 pub(super) struct RigArguments {
-    /// The simulated flotor in a simulated rig
+    /// Use the simulated flotor in a simulated rig
     #[arg(long, required_unless_present = "device", conflicts_with = "device")]
     pub(super) simulated: bool,
-    /// The device of this plugin (id or file), under a force sensor
+    /// Use the device of this plugin (id or file), with a force sensor
     #[arg(long, value_name = "ID", requires = "sensor")]
     device: Option<String>,
     /// Set a parameter of the device (repeatable)
@@ -36,13 +36,13 @@ pub(super) struct RigArguments {
     /// Serial port of the force sensor
     #[arg(long, value_name = "PORT", requires = "device")]
     sensor: Option<String>,
-    /// Plugin that reads it (id or file): a device with a parameter `port`
+    /// Plugin of the force sensor (id or file): a device with a parameter `port`
     #[arg(long, value_name = "ID", default_value = SERIAL_SENSOR, requires = "device")]
     sensor_plugin: String,
-    /// How far from its height a stop may be, in mm
+    /// Tolerance of the height of each stop, in mm
     #[arg(long, value_name = "MM", default_value_t = 0.4, requires = "device", value_parser = tolerance_mm)]
     tolerance_mm: f64,
-    /// How long to wait for the sensor to be moved to the next height
+    /// Time limit for moving the sensor to the next height
     #[arg(long, value_name = "TIME", default_value = "10min", requires = "device", value_parser = duration_s)]
     patience: f64,
     /// Seed of the simulated sensor's noise
@@ -53,7 +53,7 @@ pub(super) struct RigArguments {
     folders: Vec<PathBuf>,
 }
 
-/// Says where the sensor has to go, until somebody breaks it off.
+/// Shows the next height of the sensor; breaks if the user stops the procedure.
 pub(super) type Guide = Box<dyn FnMut(Option<Waiting>) -> ControlFlow<()>>;
 
 impl RigArguments {
@@ -67,7 +67,7 @@ impl RigArguments {
         Ok(SimulatedRig::new(registry.load(SIMULATED, PluginKind::Device)?, self.seed))
     }
 
-    /// The device and its sensor, and a bar over so many stops that says where the sensor has to go.
+    /// The device and its sensor, and a progress bar over this many stops that shows the next height of the sensor.
     pub(super) fn device_rig(&self, stops: u64) -> Result<(DeviceRig<Guide>, ProgressBar), CommandError> {
         let registry = Registry::search(&self.folders);
         let plugin = registry.load(self.plugin(), PluginKind::Device)?;
@@ -93,7 +93,7 @@ fn guide(progress: &ProgressBar, stop: &StopSwitch) -> Guide {
                 let (target_mm, height_mm) = (target_m * 1.0e3, height_m * 1.0e3);
                 let at = if height_mm.is_finite() { format!("{height_mm:.2} mm") } else { "...".to_owned() };
                 progress.set_message(format!(
-                    "pushing with {command_n} N, handle at {at}; sensor to {target_mm:.1} mm"
+                    "pushing with {command_n} N, handle at {at}; move the sensor to {target_mm:.1} mm"
                 ));
             }
             None => progress.set_message("reading"),

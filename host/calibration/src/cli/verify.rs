@@ -16,7 +16,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:\n  flotor calibrate verify calibration.toml --simulated\n  \
     flotor calibrate verify mine.toml --device maglev --set transport=usb --sensor /dev/ttyUSB0")]
 pub(super) struct VerifyArguments {
-    /// The calibration file
+    /// Calibration file
     file: PathBuf,
     #[command(flatten)]
     rig: RigArguments,
@@ -25,7 +25,7 @@ pub(super) struct VerifyArguments {
     json: Option<PathBuf>,
 }
 
-/// What machines read of `verify`.
+/// The JSON output of `verify`.
 #[derive(Serialize)]
 struct VerifyReport {
     error_before_percent: f64,

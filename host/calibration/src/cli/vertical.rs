@@ -15,12 +15,12 @@ use flotor_session::calibration_file::{
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Measure how much of the vertical force arrives at each height, and fit it.
+/// Measure the ratio of delivered to commanded vertical force at each height, and fit it.
 #[derive(Args)]
 #[command(
     after_help = "The handle is locked in all axes but the vertical and pushes against a force sensor that \
-    is lowered step by step.\nThe sensor answers `R` with `F 1.234`, a force in N. A device asks for its stops one after the other and \
-    reads\nwhile the handle rests at one.\n\nExamples:\n  \
+    is lowered step by step.\nThe sensor answers `R` with `F 1.234`, a force in N. The program requests one height after \
+    the other\nand reads the sensor while the handle rests there.\n\nExamples:\n  \
     flotor calibrate vertical --simulated\n  \
     flotor calibrate vertical --simulated --out calibration.toml --plot calibration.svg\n  \
     flotor calibrate vertical --simulated --force 8,10,12,14 --steps 28 --step-mm 0.5 --json -\n  \
@@ -32,7 +32,7 @@ pub(super) struct VerticalArguments {
     /// Commanded vertical forces in N, at least two
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "10,12", value_parser = force_n)]
     force: Vec<f64>,
-    /// How often each force is measured over all heights
+    /// Number of sweeps over all heights for each force
     #[arg(long, default_value_t = 2, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100))]
     runs: u32,
     /// Steps down from the top
@@ -47,7 +47,7 @@ pub(super) struct VerticalArguments {
     /// Write the calibration file
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
-    /// Draw readings, fit, residuals and the error before and after
+    /// Plot readings, fit, residuals and the error before and after
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     /// Write the result as JSON (- for standard output)
@@ -55,7 +55,7 @@ pub(super) struct VerticalArguments {
     json: Option<PathBuf>,
 }
 
-/// What machines read of `vertical`.
+/// The JSON output of `vertical`.
 #[derive(Serialize)]
 struct VerticalReport<'a> {
     device: &'a str,
@@ -83,12 +83,12 @@ struct ErrorRow {
     error_percent: f64,
 }
 
-/// What came of a procedure.
+/// Result of a procedure.
 struct Measured {
     serial: String,
     readings: Vec<Reading>,
     fit: Fit,
-    /// The report's polynomial.
+    /// The thesis's polynomial.
     report: VerticalCalibration,
     /// The error that is left, by name of the correction: first none, last this fit.
     curves: Vec<(&'static str, ErrorCurve)>,
@@ -132,7 +132,7 @@ struct Correction<'a> {
     command_n: &'a dyn Fn(f64) -> f64,
 }
 
-/// In the simulated rig the error is known without the noise of the sensor, and a sweep costs little: the report's two
+/// In the simulated rig the error is known without the noise of the sensor, and a sweep costs little: the thesis's two
 /// ways are compared as well.
 fn simulated(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, CommandError> {
     let mut rig = arguments.rig.simulated_rig()?;
@@ -145,8 +145,8 @@ fn simulated(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, Com
     let as_report = |height_m: f64| thesis::command_n(PROBE_N, height_m);
     let corrections = [
         Correction { name: UNCORRECTED, calibration: None, command_n: &uncorrected },
-        Correction { name: "report, spring force only", calibration: None, command_n: &as_report },
-        Correction { name: "report, total command", calibration: Some(report), command_n: &uncorrected },
+        Correction { name: "thesis, spring force only", calibration: None, command_n: &as_report },
+        Correction { name: "thesis, total command", calibration: Some(report), command_n: &uncorrected },
         Correction { name: FITTED, calibration: Some(fit.calibration), command_n: &uncorrected },
     ];
     let mut curves = Vec::new();
@@ -240,7 +240,7 @@ fn report_on(arguments: &VerticalArguments, measured: &Measured) -> Result<(), C
 fn to_text(fit: &Fit, rows: &[ErrorRow], readings: usize) -> String {
     let mut lines = vec![style::title("degree   error of prediction (each height from the others)")];
     for candidate in &fit.candidates {
-        let mark = if candidate.degree == fit.degree { "  <- taken" } else { "" };
+        let mark = if candidate.degree == fit.degree { "  <- selected" } else { "" };
         let Candidate { degree, error_n, standard_error_n } = candidate;
         lines.push(format!(
             "  {degree:>4}   {:>8.2} ± {:.2} mN{mark}",

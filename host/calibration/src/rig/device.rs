@@ -129,7 +129,7 @@ fn without_wall() -> Boundary {
 }
 
 fn lost() -> CalibrationError {
-    CalibrationError::Refused(Refusal::resource("it was lost; plug it in and begin again"))
+    CalibrationError::Refused(Refusal::resource("device disconnected; plug it in and start again"))
 }
 
 impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {

@@ -1,6 +1,6 @@
 //! A thread that holds a levitating handle in the rig: every axis but the vertical locked, and along that a force.
 //!
-//! It goes on whatever the procedure does in the meantime: a device that is not spoken to lets go. Nothing in a tick
+//! It goes on whatever the procedure does in the meantime: a device without commands removes its force. Nothing in a tick
 //! allocates or waits for anybody. As in a run, nothing reaches the device but through the envelope, a watchdog stops a
 //! device that does not come back, and the emergency stop is for both.
 
@@ -22,7 +22,7 @@ const RUNAWAY_M_PER_S: f64 = 0.1;
 /// 2007, section 2.2).
 pub(super) const REST_M: f64 = 10.0e-6;
 /// Delivered force of two means after each other that is the same force, N: the noise of the sensor. A single tick without
-/// the force, as a host that was held up makes, is five times that.
+/// the force, as a delayed host causes it, is five times that.
 const STEADY_N: f64 = 0.02;
 /// Damping that stops it, N·s/m (the locked axes').
 const BRAKE_NS_PER_M: f64 = 15.0;

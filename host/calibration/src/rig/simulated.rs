@@ -8,7 +8,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
 
-/// Weight of flotor, plates, screws and bolts in the report's rig, N (Varadharajan 2007, section 3.4).
+/// Weight of flotor, plates, screws and bolts in the thesis's rig, N (Varadharajan 2007, section 3.4).
 pub const RIG_WEIGHT_N: f64 = 8.58;
 /// Noise of the force sensor, N, root mean square.
 pub const SENSOR_NOISE_N: f64 = 0.02;

@@ -6,7 +6,7 @@
 //! machine does. An error is the distance from a reference that walks the same path: another setting of the same model,
 //! computed in this run, not a table.
 //!
-//! - `path`: the motion. `times`: the times. `apart`: times of two kinds of calls. `error`: the distance from the
+//! - `path`: the motion. `times`: the times. `split`: times of two kinds of calls. `error`: the distance from the
 //!   reference.
 //! - `reach_hand`: the whole loop: what of the reference's force reaches a hand, through sampling and delay.
 //! - `report`: table, CSV and picture.
@@ -14,20 +14,20 @@
 //!
 //! Not real-time.
 
-mod apart;
 mod error;
 mod path;
 mod reach_hand;
-mod report;
 pub mod scripted;
+mod split;
+mod tables;
 mod times;
 mod whole_tick;
 
-pub use apart::{Apart, Speed};
 pub use error::Distance;
 pub use path::Hand;
 pub use reach_hand::{Losses, Sampling};
-pub use report::{ApartRow, BenchReport, CaseRow};
+pub use split::{Speed, SplitTimes};
+pub use tables::{BenchReport, CaseRow, SplitRow};
 pub use times::Times;
 pub use whole_tick::{BenchDevice, TickCost, WholeTick};
 
@@ -58,22 +58,22 @@ const fn extent(size: Size) -> (usize, usize) {
 pub struct Plan {
     /// The cases.
     pub cases: Vec<Case>,
-    /// Which of them the times of the others are compared with.
-    pub yardstick: usize,
-    /// The case errors are measured against.
+    /// The baseline of the times.
+    pub baseline: usize,
+    /// Reference case of the errors.
     pub reference: Option<Case>,
     /// The motion.
     pub hand: Hand,
-    /// Calls to tell apart.
-    pub apart: Option<TellApart>,
+    /// Calls to split.
+    pub split: Option<Split>,
     /// How much is timed.
     pub size: Size,
 }
 
-/// Calls to tell apart by a detail of the answer.
+/// Calls to split by a detail of the answer.
 #[derive(Clone, Debug)]
-pub struct TellApart {
-    /// Id of the detail; what counts is whether it is above zero.
+pub struct Split {
+    /// Id of the detail: above zero, or not.
     pub detail: String,
     /// In which cases, each along its motion.
     pub walks: Vec<(Case, Hand)>,
@@ -88,7 +88,7 @@ const DEMANDS: [(&str, Demand); 3] =
 /// # Errors
 /// [`LoadError`] if the plugin refuses a case or the reference.
 pub fn measure(plugin: &Plugin, plan: &Plan, progress: &dyn Progress) -> Result<BenchReport, LoadError> {
-    let Plan { cases, yardstick, reference, hand, apart, size } = plan;
+    let Plan { cases, baseline, reference, hand, split, size } = plan;
     let (ticks, rounds) = extent(*size);
     let path = hand.poses(ticks);
     let mut models = cases.iter().map(|case| create(plugin, case)).collect::<Result<Vec<_>, _>>()?;
@@ -106,20 +106,20 @@ pub fn measure(plugin: &Plugin, plan: &Plan, progress: &dyn Progress) -> Result<
     }
     let [force, wrench, everything] = DEMANDS.map(|(name, demand)| {
         progress.begin(&format!("times: {name}"), rounds as u64);
-        times::in_turns(&mut models, *yardstick, &path, demand, rounds, || progress.advance(1))
+        times::in_turns(&mut models, *baseline, &path, demand, rounds, || progress.advance(1))
     });
     let times = force.into_iter().zip(wrench).zip(everything);
     let rows = cases.iter().zip(distances).zip(times).map(|((case, distance), ((force, wrench), all))| {
         CaseRow { name: case.name.clone(), distance, times: [force, wrench, all] }
     });
     let rows = rows.collect();
-    let mut told_apart = Vec::new();
-    if let Some(TellApart { detail, walks }) = apart {
+    let mut split_rows = Vec::new();
+    if let Some(Split { detail, walks }) = split {
         progress.begin(detail, walks.len() as u64);
         for (case, hand) in walks {
             let mut model = create(plugin, case)?;
-            let apart = apart::apart(&mut model, detail, &hand.poses(ticks), rounds);
-            told_apart.extend(apart.map(|apart| ApartRow {
+            let times = split::split_times(&mut model, detail, &hand.poses(ticks), rounds);
+            split_rows.extend(times.map(|apart| SplitRow {
                 name: case.name.clone(),
                 depth_m: hand.depth_m,
                 detail: detail.clone(),
@@ -132,11 +132,11 @@ pub fn measure(plugin: &Plugin, plan: &Plan, progress: &dyn Progress) -> Result<
         model: plugin.metadata().id.clone(),
         version: plugin.metadata().version.clone(),
         reference: reference.as_ref().map(|case| case.name.clone()),
-        yardstick: cases.get(*yardstick).map(|case| case.name.clone()),
+        yardstick: cases.get(*baseline).map(|case| case.name.clone()),
         ticks: path.len(),
         rows,
         losses,
-        apart: told_apart,
+        apart: split_rows,
     })
 }
 

@@ -4,7 +4,7 @@
 //! so on to the end of it, round after round. What disturbs one slice disturbs its neighbours too, and quotients of
 //! neighbouring slices are those of a quiet machine.
 
-use crate::stopwatch::{net_ns, overhead_ns, quantile};
+use crate::call_timer::{net_ns, overhead_ns, quantile};
 use crate::subject::input_of;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Input, Memory, Output, Pose};
@@ -17,7 +17,7 @@ use std::time::Instant;
 pub struct Times {
     /// A tick of the path, nothing between the calls; of every slice its fastest walk.
     pub mean_ns: f64,
-    /// Mean over that of the yardstick: median of all turns.
+    /// Mean over that of the baseline: median of all turns.
     pub of_yardstick: f64,
     /// A pose in a batch, the same way; `None` for a model whose answers depend on the way to the pose.
     pub batch_ns: Option<f64>,
@@ -52,7 +52,7 @@ struct Clocked {
 /// Times models along a path, all of them in turns. `done` is called after every round.
 pub(super) fn in_turns(
     models: &mut [Model],
-    yardstick: usize,
+    baseline: usize,
     path: &[Pose],
     demand: Demand,
     rounds: usize,
@@ -96,16 +96,16 @@ pub(super) fn in_turns(
         done();
     }
     let slices = path.len().div_ceil(SLICE_TICKS);
-    let yardstick_ns = cases.get(yardstick).map_or_else(Vec::new, |(_, _, clocked)| clocked.walks_ns.clone());
-    cases.into_iter().map(|(_, _, clocked)| clocked.times(slices, &yardstick_ns)).collect()
+    let baseline_ns = cases.get(baseline).map_or_else(Vec::new, |(_, _, clocked)| clocked.walks_ns.clone());
+    cases.into_iter().map(|(_, _, clocked)| clocked.times(slices, &baseline_ns)).collect()
 }
 
 impl Clocked {
-    fn times(mut self, slices: usize, yardstick_ns: &[f64]) -> Times {
+    fn times(mut self, slices: usize, baseline_ns: &[f64]) -> Times {
         let has_batches = !self.batches_ns.is_empty();
         Times {
             mean_ns: mean_of_fastest(&self.walks_ns, slices),
-            of_yardstick: median_quotient(&self.walks_ns, yardstick_ns),
+            of_yardstick: median_quotient(&self.walks_ns, baseline_ns),
             batch_ns: has_batches.then(|| mean_of_fastest(&self.batches_ns, slices)),
             batch_gain: has_batches.then(|| median_quotient(&self.walks_ns, &self.batches_ns)),
             warm_median_ns: quantile(&mut self.warm_ns, 0.5),

@@ -5,7 +5,7 @@
 //! their own. The middle of many batches counts: a neighbour on the machine spoils some of them.
 
 use super::scripted::{SCRIPTED, SCRIPTED_ENTRY};
-use crate::stopwatch::{net_ns, quantile};
+use crate::call_timer::{net_ns, quantile};
 use flotor_core::trace::TickRecord;
 use flotor_hal::SampleWait;
 use flotor_hal::abi::loader::Stopper;

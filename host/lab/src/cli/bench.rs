@@ -2,7 +2,7 @@
 
 use super::ProgressLine;
 use crate::Size;
-use crate::bench::{BenchDevice, Case, Hand, Plan, TellApart, TickCost, WholeTick, measure};
+use crate::bench::{BenchDevice, Case, Hand, Plan, Split, TickCost, WholeTick, measure};
 use clap::Args;
 use flotor_command::options::KeyValue;
 use flotor_command::tables::table;
@@ -13,12 +13,12 @@ use flotor_session::registry::Registry;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Measure what an evaluation costs and how wrong it is, for many settings of a force model.
+/// Measure cost and error of an evaluation, for many settings of a force model.
 #[derive(Args)]
 #[command(
-    after_help = "Without --case, the spring's variants and settings are compared with its exact rod; another model's\n\
-    defaults alone. With --tick, the whole tick around the model is timed instead: device, mapping, envelope, trace.\n\
-    Times are wall clock: compare within one run.\n\n\
+    after_help = "Without --case, the command compares the spring's variants and settings with its exact rod, or measures the defaults\n\
+    of another model. With --tick, it measures the whole tick around the model instead: device, mapping, envelope, trace.\n\
+    Times are wall clock: compare them within one run only.\n\n\
     Examples:\n  \
     flotor bench --csv bench.csv --plot bench.svg\n  \
     flotor bench --case variant=energy --case variant=rod,accuracy=servo --size full\n  \
@@ -30,34 +30,34 @@ pub(crate) struct BenchArguments {
     /// Id of the model, or path to its plugin file
     #[arg(long, value_name = "ID", default_value = "spring")]
     model: String,
-    /// A case: its settings (repeatable)
+    /// Settings of a case (repeatable)
     #[arg(long = "case", value_name = "KEY=VALUE,...")]
     cases: Vec<String>,
-    /// Settings every case starts from (repeatable)
+    /// Settings common to all cases (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<KeyValue>,
-    /// The case errors are measured against
+    /// Reference case of the errors
     #[arg(long, value_name = "KEY=VALUE,...")]
     reference: Option<String>,
-    /// The case whose times those of the others are compared with [default: the first]
+    /// Baseline case of the times [default: the first]
     #[arg(long, value_name = "KEY=VALUE,...")]
     yardstick: Option<String>,
-    /// How far below home the middle of the motion lies
+    /// Depth of the middle of the motion below home
     #[arg(long, value_name = "MM", default_value_t = 4.0, allow_negative_numbers = true)]
     depth_mm: f64,
-    /// Time calls apart for which this detail of the answer is above zero
+    /// Report calls separately in which this detail of the answer is above zero
     #[arg(long, value_name = "DETAIL")]
     apart: Option<String>,
-    /// Time the whole tick around the model, on a scripted device and on the simulated flotor
+    /// Measure the whole tick around the model, on a scripted device and on the simulated flotor
     #[arg(long, conflicts_with_all = ["cases", "sets", "reference", "yardstick", "apart", "csv", "plot"])]
     tick: bool,
-    /// How much to time
+    /// Extent of the measurement
     #[arg(long, value_enum, default_value = "short")]
     size: Size,
     /// Write every measurement as CSV
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
-    /// Draw error over time
+    /// Plot error over time
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     /// Write the measurements as JSON (- for standard output)
@@ -77,11 +77,11 @@ const SPRING_CASES: [&str; 9] = [
     "variant=rod,accuracy=servo",
     "variant=rod,accuracy=tight",
 ];
-/// What they are measured against.
+/// Their reference.
 const SPRING_REFERENCE: &str = "variant=rod,accuracy=tight";
-/// Which of its answers come from two laws, and where: about the depth of the cases, and about half the free length (mm),
-/// where springs that can buckle have.
-const SPRING_APART: &str = "rod_share";
+/// The detail that splits its calls, and the depths (mm): that of the cases, and about half the free length, where springs
+/// that can buckle have both laws.
+const SPRING_SPLIT: &str = "rod_share";
 const SPRING_WALKS: [(&str, f64); 8] = [
     ("preset=thesis-1", 4.0),
     ("preset=thesis-1", 12.5),
@@ -140,11 +140,13 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
     let case = |text: &str| case(&plugin, &arguments.sets, text);
     let hand = Hand { depth_m: arguments.depth_mm / 1e3 };
     let cases = cases.into_iter().map(case).collect::<Result<Vec<_>, _>>()?;
-    let yardstick = match &arguments.yardstick {
+    let baseline = match &arguments.yardstick {
         Some(text) => {
             let name = case(text)?.name;
             cases.iter().position(|case| case.name == name).ok_or_else(|| {
-                CommandError::Usage(format!("yardstick `{text}` is none of the cases; add --case {text}"))
+                CommandError::Usage(format!(
+                    "the baseline `{text}` is not among the cases; add --case {text}"
+                ))
             })?
         }
         None => 0,
@@ -153,15 +155,15 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
         let walks = SPRING_WALKS.iter().map(|(text, mm)| Ok((case(text)?, Hand { depth_m: mm / 1e3 })));
         walks.collect::<Result<_, CommandError>>()
     };
-    let apart = match (&arguments.apart, is_spring) {
+    let split = match (&arguments.apart, is_spring) {
         (Some(detail), _) => Some((detail.clone(), cases.iter().map(|case| (case.clone(), hand)).collect())),
-        (None, true) => Some((SPRING_APART.to_owned(), spring_walks()?)),
+        (None, true) => Some((SPRING_SPLIT.to_owned(), spring_walks()?)),
         (None, false) => None,
     };
-    let apart = apart.map(|(detail, walks)| TellApart { detail, walks });
+    let split = split.map(|(detail, walks)| Split { detail, walks });
     let reference = reference.map(case).transpose()?;
     let line = ProgressLine::new();
-    let plan = Plan { cases, yardstick, reference, hand, apart, size: arguments.size };
+    let plan = Plan { cases, baseline, reference, hand, split, size: arguments.size };
     let report = measure(&plugin, &plan, &line)?;
     line.0.finish_and_clear();
 
@@ -171,7 +173,7 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
     write_text(arguments.plot.as_deref(), || report.to_svg())
 }
 
-/// A case from `KEY=VALUE,KEY=VALUE` on top of what every case starts from.
+/// A case from `KEY=VALUE,KEY=VALUE`, on top of the common settings.
 fn case(plugin: &Plugin, sets: &[KeyValue], text: &str) -> Result<Case, CommandError> {
     let usage = |problem: String| CommandError::Usage(format!("case `{text}`: {problem}"));
     let own = text.split(',').filter(|part| !part.trim().is_empty()).map(str::parse::<KeyValue>);

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 #[command(
     after_help = "Poses: a header [id,]x_m,y_m,z_m,rx_rad,ry_rad,rz_rad and one row a pose, in the model frame (home is\n\
     the origin, z up; rx, ry, rz is a rotation vector). nan and inf are legal. Result: id, force, torque, energy, status;\n\
-    with --details also what the model knows beside them (the spring: branch, stable, seat_roll_rad,\n\
+    with --details also the details of the model (the spring: branch, stable, seat_roll_rad,\n\
     rod_share).\n\n\
     Examples:\n  \
     flotor eval --model spring --poses poses.csv --out wrenches.csv\n  \
@@ -36,10 +36,10 @@ pub(crate) struct EvalArguments {
     /// Wrenches (- for standard output)
     #[arg(long, value_name = "OUT.csv", default_value = "-")]
     out: PathBuf,
-    /// Rows are successive poses of one handle, instead of each being reached from home
+    /// Rows are successive poses of one handle (default: each pose is reached from home)
     #[arg(long)]
     path: bool,
-    /// Append what the model knows beside the wrench, a column each
+    /// Append the details of the model, a column each
     #[arg(long)]
     details: bool,
 }
@@ -92,7 +92,10 @@ fn read_poses(path: &Path) -> Result<(Vec<String>, Vec<Handle>), CommandError> {
             let text = record.get(column).unwrap_or_default();
             *number = text.parse().map_err(|_| {
                 let line = line(record.position());
-                CommandError::Usage(format!("{}:{line}: {name} is a number, not `{text}`", path.display()))
+                CommandError::Usage(format!(
+                    "{}:{line}: {name} must be a number, not `{text}`",
+                    path.display()
+                ))
             })?;
         }
         let id = id_column.and_then(|column| record.get(column)).map(str::to_owned);
@@ -122,7 +125,7 @@ fn line_of(text: &str, at: &csv::Position) -> usize {
     1 + before.matches('\n').count() + skipped.matches('\n').count()
 }
 
-/// Where each pose column is; anything missing or unknown is an error that says what would be right.
+/// Where each pose column is; the error of a missing or unknown one names the right columns.
 fn columns(path: &Path, header: &csv::StringRecord) -> Result<[usize; 6], CommandError> {
     let problem = |text: String| CommandError::Usage(format!("{}:1: {text}", path.display()));
     let known = || POSE_COLUMNS.iter().copied().chain([ID_COLUMN]);
@@ -154,7 +157,7 @@ fn csv_text(ids: &[String], answers: &[Answer], details: &[Detail]) -> String {
     to_csv(head, ids.iter().zip(answers).map(row))
 }
 
-/// A detail as its column says it.
+/// A detail as the text of its column.
 fn written(detail: &Detail, value: Option<f64>) -> String {
     let Some(value) = value else { return String::new() };
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]

@@ -13,14 +13,14 @@ use flotor_session::scene::Scene;
 use flotor_session::{RunError, RunOptions, Session};
 use std::path::PathBuf;
 
-/// Measure how well the servo keeps time here.
+/// Measure the timing of the servo on this machine, next to a bare loop.
 #[derive(Args)]
 #[command(
-    after_help = "Servo and bare loop take turns of a second each: same spin window, priority and core, same neighbours.\n\n\
+    after_help = "Servo and bare loop alternate every second, with the same spin window, priority, core and load.\n\n\
     Example:\n  flotor jitter --duration 20s --plot jitter.svg"
 )]
 pub(crate) struct JitterArguments {
-    /// How long to measure in all
+    /// Duration of the whole measurement
     #[arg(long, value_parser = duration_s, value_name = "TIME", default_value = "20s")]
     duration: f64,
     /// Loop rate in Hz, 100 to 10000
@@ -32,7 +32,7 @@ pub(crate) struct JitterArguments {
     /// Write the result as JSON (- for standard output)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Draw both histograms
+    /// Plot both histograms
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
 }
@@ -64,7 +64,7 @@ fn to_text(report: &JitterReport) -> String {
         [name.to_owned(), p50, p99, p999, max, ticks, late, missed]
     };
     let title = format!(
-        "lateness in µs at {} Hz, {} s each in turns, the last {} µs spun",
+        "lateness in µs at {} Hz, {} s each in turns, spin window {} µs",
         report.rate_hz,
         report.slices,
         us(report.spin_window_ns)
@@ -74,7 +74,7 @@ fn to_text(report: &JitterReport) -> String {
     lines.extend(table(head, [row("servo", &report.servo), row("bare", &report.bare)]));
     if let MissedMore { ticks, standard_error: Some(error) } = report.missed_more {
         lines.push(format!(
-            "  missed, servo - bare: {ticks:+} ± {error:.0} (standard error, from how much the pairs differ)"
+            "  missed, servo - bare: {ticks:+} ± {error:.0} (standard error, from the spread of the pairs)"
         ));
     }
     lines.join("\n")

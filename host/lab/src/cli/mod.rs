@@ -63,7 +63,7 @@ impl From<ReplayError> for CommandError {
     }
 }
 
-/// A line on a terminal that says how a measurement comes along; nothing in a pipe.
+/// Progress of a measurement on a terminal; nothing in a pipe.
 struct ProgressLine(indicatif::ProgressBar);
 
 impl ProgressLine {

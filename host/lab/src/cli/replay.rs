@@ -1,6 +1,6 @@
-//! `flotor replay`: the models of a recording once more, as they were or changed.
+//! `flotor replay`: the models of a recording re-evaluated, unchanged or changed.
 
-use crate::replay::{Compared, Coverage, Difference, Replay, WhyApart};
+use crate::replay::{Compared, Coverage, Difference, DivergenceCause, Replay};
 use clap::Args;
 use flotor_command::options::{KeyValue, PluginKeyValue};
 use flotor_command::{CommandError, print_result, progress_bar, style, write_text};
@@ -12,11 +12,11 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Ask the models of a recording again.
+/// Re-evaluate the models on a recorded trajectory: bit-exact, or with changed parameters.
 #[derive(Args)]
 #[command(
-    after_help = "With nothing changed the wrench must come out bit for bit: exit code 1 if it does not. With --set or --model\n\
-    the difference is what was asked for.\n\n\
+    after_help = "Without a change the wrench must equal the recorded one bit for bit: the exit code is 1 if it does not. With --set\n\
+    or --model a difference is the expected result.\n\n\
     Examples:\n  flotor replay run.mcap\n  flotor replay run.mcap --set spring.variant=closed-form --plot difference.svg\n  \
     flotor replay run.mcap --model spring=./libmy_spring.so --json -\n  \
     flotor replay run.mcap --plugin-path target/release"
@@ -27,22 +27,22 @@ pub(crate) struct ReplayArguments {
     /// Set a parameter of a model of the recording (repeatable)
     #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
     sets: Vec<PluginKeyValue>,
-    /// Ask another model in place of one of the recording (repeatable): its name, and the id or file of a plugin
+    /// Evaluate another model instead of a recorded one (repeatable): NAME in the recording, id or file of a plugin
     #[arg(long = "model", value_name = "NAME=PLUGIN")]
     models: Vec<KeyValue>,
-    /// Folder to search for plugins (repeatable): for those the run's scene named by their files
+    /// Folder to search for plugins (repeatable): for plugins that the scene named by their files
     #[arg(long = "plugin-path", value_name = "FOLDER")]
     folders: Vec<PathBuf>,
     /// Write the difference as JSON (- for standard output)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Draw recorded and replayed force
+    /// Plot recorded and replayed force
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
 }
 
 impl ReplayArguments {
-    /// True if another wrench is what was asked for.
+    /// True if the user requested a change of the wrench.
     fn changes_anything(&self) -> bool {
         !(self.sets.is_empty() && self.models.is_empty())
     }
@@ -51,7 +51,7 @@ impl ReplayArguments {
 #[derive(Serialize)]
 struct Report {
     bit_exact: bool,
-    /// Of the whole run, as far as anybody can tell.
+    /// Whether the recording covers the whole run.
     complete: bool,
     #[serde(skip)]
     ending: Ending,
@@ -59,7 +59,7 @@ struct Report {
     coverage: Coverage,
     #[serde(flatten)]
     difference: Difference,
-    why_apart: Option<WhyApart>,
+    why_apart: Option<DivergenceCause>,
     recorded_s: f64,
     wall_s: f64,
 }
@@ -96,22 +96,20 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
     print_result(arguments.json.as_deref(), &report, || to_text(arguments, &report))?;
     write_text(arguments.plot.as_deref(), || picture(&samples))?;
     if let Some((_, words)) = health.iter().find(|(health, _)| health.panicked_at.is_some()) {
-        return Err(CommandError::PluginRefused(format!(
-            "a model of the recording stopped answering: {words}"
-        )));
+        return Err(CommandError::PluginRefused(format!("a model of the recording failed: {words}")));
     }
     if !bit_exact && !arguments.changes_anything() {
-        let why = report.why_apart.unwrap_or(WhyApart::OtherBuild);
-        return Err(CommandError::Failed(format!("nothing was changed, yet the wrench differs: {why}")));
+        let why = report.why_apart.unwrap_or(DivergenceCause::OtherBuild);
+        return Err(CommandError::Failed(format!("the wrench differs although nothing was changed: {why}")));
     }
     Ok(())
 }
 
 impl Report {
-    /// What came out, in a few words that claim no more than was compared.
+    /// The result in a few words that claim no more than was compared.
     fn verdict(&self) -> String {
         match (self.difference.ticks, self.bit_exact, self.coverage.missing_ticks) {
-            (0, ..) => "there is no tick to compare".to_owned(),
+            (0, ..) => "no tick to compare".to_owned(),
             (_, false, _) => "the wrench differs".to_owned(),
             (_, true, 0) => "bit for bit the recorded wrench".to_owned(),
             (_, true, missing) => format!("bit for bit the recorded wrench, but {missing} ticks are missing"),
@@ -131,12 +129,13 @@ impl Report {
     fn gaps(&self) -> Vec<String> {
         let Coverage { begins_at_tick, missing_ticks, first_missing_tick, .. } = self.coverage;
         let late = begins_at_tick.filter(|first| *first > 0);
-        let late = late.map(|first| format!("the recording begins at tick {first}: the run was on by then"));
+        let late =
+            late.map(|first| format!("the recording begins at tick {first}, after the start of the run"));
         let missing = first_missing_tick.map(|first| {
             format!("{missing_ticks} ticks are missing, from {first} on: their records were lost")
         });
         let cut = (self.ending == Ending::CutOff)
-            .then(|| "the recording breaks off: its process was killed or its disk full".to_owned());
+            .then(|| "the recording is truncated: its process was killed, or its disk was full".to_owned());
         [late, missing, cut].into_iter().flatten().collect()
     }
 }
@@ -152,22 +151,22 @@ fn to_text(arguments: &ReplayArguments, report: &Report) -> String {
         row("force", format!("max {:.3e} N, rms {:.3e} N", d.max_force_n, d.rms_force_n));
         row("torque", format!("max {:.3e} N·m, rms {:.3e} N·m", d.max_torque_nm, d.rms_torque_nm));
     }
-    // If nothing was changed, the error says why.
+    // If nothing was changed, the error gives the cause.
     if let (Some(why), true) = (&report.why_apart, arguments.changes_anything()) {
-        row("note", format!("the wrench differs not only for what was changed: {why}"));
+        row("note", format!("the wrench differs for another reason as well: {why}"));
     }
     report.gaps().into_iter().for_each(|gap| row("note", gap));
     lines.join("\n")
 }
 
-/// A tick of the recording and what the models say now.
+/// A tick of the recording and the wrench of the models now.
 struct Sample {
     time_ns: u64,
     recorded: Wrench,
     replayed: Wrench,
 }
 
-/// The force that was and that would be, and how they differ along every axis.
+/// Recorded and replayed force, and their difference along every axis.
 fn picture(samples: &[Sample]) -> String {
     let line = |value: &dyn Fn(&Sample) -> f64| -> Vec<(f64, f64)> {
         samples.iter().map(|sample| (sample.time_ns as f64 * 1.0e-9, value(sample))).collect()

@@ -13,7 +13,7 @@ use flotor_session::registry::Registry;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Find the stiffest virtual spring that stays stable.
+/// Find the largest stable stiffness of a virtual spring, next to theory.
 #[derive(Args)]
 #[command(
     after_help = "Each case is bisected on the simulated flotor's own dynamics, in virtual time, until the \
@@ -27,7 +27,7 @@ pub(crate) struct StabilityArguments {
     /// Servo rates in Hz, 100 to 10000
     #[arg(long, value_parser = rate_hz, value_name = "HZ", value_delimiter = ',')]
     rate: Vec<f64>,
-    /// Whole periods between a sample and the force that answers it, 0 to 100
+    /// Whole periods from a sample to its force, 0 to 100
     #[arg(long, value_parser = clap::value_parser!(u32).range(0..=100), value_name = "TICKS", value_delimiter = ',')]
     delay: Vec<u32>,
     /// Drag of the device in N s/m
@@ -39,7 +39,7 @@ pub(crate) struct StabilityArguments {
     /// Step of the position sensor in µm, 0 to 100
     #[arg(long, value_parser = quantum_um, value_name = "UM", default_value = "0")]
     quantum_um: f64,
-    /// How the handle is held
+    /// Grip of the hand on the handle
     #[arg(long, value_enum, default_value_t)]
     hand: Grip,
     /// Write the rows as JSON (- for standard output)
@@ -48,7 +48,7 @@ pub(crate) struct StabilityArguments {
     /// Write the rows as CSV (- for standard output)
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Draw stiffness against virtual damping: theory as lines, simulation as points
+    /// Plot stiffness over virtual damping: theory as lines, simulation as points
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
 }
@@ -56,7 +56,7 @@ pub(crate) struct StabilityArguments {
 /// The device whose dynamics are simulated.
 const DEVICE: &str = "simulated";
 
-/// What machines read.
+/// The JSON output.
 #[derive(Serialize)]
 struct Report<'a> {
     device: &'a str,

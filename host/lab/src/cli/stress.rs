@@ -14,7 +14,7 @@ use std::path::PathBuf;
 #[derive(Args)]
 #[command(after_help = "Nine measures: M0 totality, M1 continuity, M2 Lipschitz constant, M3 reciprocity,\n\
     M4 loop energy, M5 sampled energy, M6 closed loop, M7 cost, M8 determinism.\n\
-    `score` is the share that passed.\n\n\
+    `score` is the share of measures that passed.\n\n\
     Examples:\n  \
     flotor stress --model spring\n  \
     flotor stress --model spring --set variant=closed-form --json score.json --plot score.svg\n  \
@@ -26,7 +26,7 @@ pub(crate) struct StressArguments {
     /// Set a parameter of the model (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<KeyValue>,
-    /// How much to ask
+    /// Extent of the measurement
     #[arg(long, value_enum, default_value = "short")]
     size: Size,
     /// Seed of poses and motions
@@ -35,7 +35,7 @@ pub(crate) struct StressArguments {
     /// Write the score as JSON (- for standard output)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Draw the score as a picture
+    /// Plot the score
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
 }

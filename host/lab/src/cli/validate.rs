@@ -9,21 +9,21 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-/// Check a plugin file.
+/// Check a plugin file against the rules of the contract.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  flotor validate target/release/libmy_model.so\n  \
     flotor validate target/release/libmy_device.so --set port=/dev/ttyACM0\n\n\
-    Runs the plugin's code, each rule in a process of its own: validate only files you would load.")]
+    The command runs the plugin's code, each rule in its own process: validate only files that you would load.")]
 pub(crate) struct ValidateArguments {
     /// The plugin's shared library
     plugin: PathBuf,
-    /// Set a parameter of the instances that are checked, as where the device is (repeatable)
+    /// Set a parameter of the checked instances, such as the port of a device (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<KeyValue>,
-    /// For machines
+    /// Print JSON
     #[arg(long)]
     json: bool,
-    /// Longest time for one rule: 10s, 500ms
+    /// Time limit of one rule: 10s, 500ms
     #[arg(long, value_parser = duration_s, value_name = "TIME", default_value = "10s")]
     timeout: f64,
     /// Check one rule in this process, and print the verdict as JSON
@@ -35,7 +35,7 @@ pub(crate) struct ValidateArguments {
 }
 
 fn rule(id: &str) -> Result<Check, String> {
-    Check::from_id(id).ok_or_else(|| format!("no rule `{id}`"))
+    Check::from_id(id).ok_or_else(|| format!("unknown rule `{id}`"))
 }
 
 pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {

@@ -1,4 +1,4 @@
-//! The files that parameters of a recorded run named: the same ones again, or a word about it.
+//! The files that parameters of a recorded run named: found by their content, or an error.
 
 use flotor_record::NamedFile;
 use flotor_session::scene::{Location, ParameterText, SceneError};
@@ -29,7 +29,7 @@ pub(super) fn as_recorded(
             other.hash_text(),
             then.hash_text()
         ),
-        None => format!("`{}` is not there any more ({})", then.path.display(), then.hash_text()),
+        None => format!("`{}` no longer exists ({})", then.path.display(), then.hash_text()),
     };
     let problem = format!(
         "[{model}] `{key}`: {what}; put the file of the run beside the recording as `{written}`, or name another with \

@@ -1,8 +1,8 @@
-//! What is changed for a replay, and therefore does not change with the run.
+//! Changes for a replay, which override those of the run.
 
 use flotor_session::scene::{KeyValue, ModelUse, PluginKeyValue, is_named};
 
-/// What a replay gave the models of a recording: they keep it, whatever changed in the run.
+/// Changes of the models for a replay: they stay, whatever changed in the run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Held {
     /// Names of models and parameters.
@@ -50,7 +50,7 @@ impl Held {
     }
 }
 
-/// Another plugin in place of a model, from its own defaults; the names of the models it now stands for.
+/// Replaces a model by another plugin with its own defaults; returns the names of the models it replaces.
 fn exchange(other: &KeyValue, models: &mut [ModelUse]) -> Result<Vec<String>, String> {
     let (asked, plugin) = other.pair();
     let mut exchanged = Vec::new();

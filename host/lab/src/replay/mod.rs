@@ -1,16 +1,16 @@
-//! A recorded run once more, without its device: the models are asked again at the recorded poses.
+//! Replay of a recorded run without its device: the models are re-evaluated at the recorded poses.
 //!
-//! With nothing changed the wrench must come out bit for bit; with another parameter the difference shows what
-//! the change does to the same hand movement.
+//! Without a change the wrench equals the recorded one bit for bit; with another parameter the difference shows the
+//! effect of the change on the same hand movement.
 
-mod apart;
+mod divergence;
 mod files;
 mod held;
 
-pub use apart::{Coverage, WhyApart};
+pub use divergence::{Coverage, DivergenceCause};
 use held::Held;
 
-use apart::Evidence;
+use divergence::Evidence;
 use files::as_recorded;
 use flotor_core::coupling::{CouplingDescription, CouplingEnds};
 use flotor_core::trace::{Events, TickRecord};
@@ -35,27 +35,27 @@ pub enum ReplayError {
     /// The recording cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// A model cannot be had.
+    /// A model cannot be created.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// What another host told is not in the recording.
+    /// The messages of another host are not in the recording.
     #[error(
-        "the coupling `{coupling}` was held by another host too, and what that one told is not in the recording: \
-         only runs whose couplings have both ends here can be replayed"
+        "the coupling `{coupling}` has its other end on another host, whose messages are not in the recording: \
+         only runs whose couplings have both ends on one host can be replayed"
     )]
     Apart {
         /// Its name.
         coupling: String,
     },
-    /// What is to be changed is not there.
+    /// The requested change does not fit the recording.
     #[error("{0}")]
     Change(String),
 }
 
-/// Of couplings whose ends are both here.
+/// Of couplings with both ends on this host.
 const NOBODY_TO_WAIT_FOR: Patience = Patience { silence_ns: 0, fade_ns: 0 };
 
-fn is_apart(coupling: &CouplingDescription) -> bool {
+fn is_remote(coupling: &CouplingDescription) -> bool {
     matches!(coupling.ends, CouplingEnds::Remote(_))
 }
 
@@ -80,22 +80,22 @@ pub struct Difference {
     pub rms_torque_nm: f64,
 }
 
-/// What came of a replay.
+/// Result of a replay.
 #[derive(Clone, Debug)]
 pub struct Compared {
     /// How the wrench differs.
     pub difference: Difference,
-    /// What of the run the recording holds.
+    /// The part of the run that the recording holds.
     pub coverage: Coverage,
-    /// Why it differs; if something was changed, why not only for that, as far as the recording tells.
-    pub why: Option<WhyApart>,
+    /// Why it differs; if something was changed, a further cause, as far as the recording shows it.
+    pub why: Option<DivergenceCause>,
     /// Whether the recording has the run's end.
     pub ending: Ending,
-    /// How each model has behaved now, and what it said last, in the scene's order.
+    /// Health of each model in this replay and its last message, in the scene's order.
     pub health: Vec<(ModelHealth, String)>,
 }
 
-/// The models of a recording, ready to be asked again.
+/// The models of a recording, ready for re-evaluation.
 pub struct Replay<'r> {
     registry: &'r Registry,
     config: LoopConfig,
@@ -136,7 +136,7 @@ impl<'r> Replay<'r> {
         }
         let devices = recording.run().devices().count();
         let period_s = period_ns as f64 * 1.0e-9;
-        if let Some(coupling) = recording.run().couplings.iter().find(|coupling| is_apart(coupling)) {
+        if let Some(coupling) = recording.run().couplings.iter().find(|coupling| is_remote(coupling)) {
             return Err(ReplayError::Apart { coupling: coupling.name.clone() });
         }
         let couplings = recording.run().couplings.iter();
@@ -157,7 +157,7 @@ impl<'r> Replay<'r> {
         &self.plugins
     }
 
-    /// Asks the models at every recorded pose. `look` gets the recorded tick and the wrench that came out now.
+    /// Evaluates the models at every recorded pose. `look` gets the recorded tick and the replayed wrench.
     ///
     /// # Errors
     /// [`ReplayError`] at a damaged place, or if a plugin that was put in during the run is refused; what was compared
@@ -165,7 +165,7 @@ impl<'r> Replay<'r> {
     pub fn compare(mut self, mut look: impl FnMut(&TickRecord, &Wrench)) -> Result<Compared, ReplayError> {
         let mut difference = Difference::default();
         let mut evidence = Evidence::of(self.recording.run());
-        let heart = Heartbeat::default(); // nobody waits for a replay
+        let heart = Heartbeat::default(); // no watchdog observes a replay
         let mut ports = vec![Port::REST; self.devices];
         let mut records: Vec<TickRecord> = Vec::with_capacity(self.devices);
         while let Some(record) = self.recording.next() {
@@ -203,7 +203,7 @@ impl<'r> Replay<'r> {
             for (port, record) in ports.iter_mut().zip(records.drain(..)) {
                 difference.add(&record, &port.requested);
                 look(&record, &port.requested);
-                // What was really held then.
+                // The pose that was really held then.
                 port.commanded = record.commanded;
             }
         }
@@ -241,7 +241,7 @@ impl<'r> Replay<'r> {
         Ok(())
     }
 
-    /// Puts another plugin in place of a model as in the run; not if the model was replaced for this replay.
+    /// Swaps a model as in the run; not if the user replaced the model for this replay.
     fn replace(&mut self, model: usize, change: &Change, tick: &Tick) -> Result<(), ReplayError> {
         let (Some(used), Some(report)) = (self.uses.get(model), self.plugins.get_mut(model)) else {
             return Ok(());
@@ -252,8 +252,8 @@ impl<'r> Replay<'r> {
         let settings: Vec<(&str, &str)> =
             change.settings.iter().map(|(k, v)| (k.as_str(), v.as_str())).collect();
         let mut other = used.replaced_by(Some(&change.parameter), &settings);
-        // What was set for the plugin before may mean nothing to this one. A plugin that cannot be had has no
-        // schema, and is complained about below.
+        // Settings of the plugin before may not fit this one. A plugin that cannot be loaded has no schema; the
+        // error comes below.
         let plugin = self.registry.load(&other.plugin.plugin, PluginKind::Model);
         let schema = plugin.map_or(&[][..], |plugin| plugin.parameters());
         let is_known = |key: &str| schema.iter().any(|parameter| parameter.id() == key);
@@ -294,7 +294,7 @@ impl Difference {
         self.rms_torque_nm = (self.rms_torque_nm / ticks).sqrt();
     }
 
-    /// True if every bit of every tick came out again.
+    /// True if every bit of every tick is the same.
     #[must_use]
     pub fn is_bit_exact(&self) -> bool {
         self.differing_ticks == 0
@@ -307,7 +307,7 @@ fn bits(wrench: &Wrench) -> [u64; 6] {
     [fx, fy, fz, tx, ty, tz].map(f64::to_bits)
 }
 
-/// Finds the files that settings of the run named. What was set for this replay means what it says.
+/// Finds the files that settings of the run named. Settings of this replay are taken as they are.
 fn use_recorded_files(
     uses: &mut [ModelUse],
     held: &Held,
@@ -348,7 +348,7 @@ fn models_of(path: &Path, run: &RunDescription) -> Vec<ModelUse> {
             mapping,
             places_m: plugin.places_m.clone(),
             blend: plugin.blend,
-            isolation: Isolation::None, // nobody is held by a replay
+            isolation: Isolation::None, // no hand is on the device
             field: plugin.field,
             budget_s: None,
         }),

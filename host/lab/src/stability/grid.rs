@@ -1,6 +1,6 @@
 //! The cases that are measured, side by side on all processors, and what is reported of each.
 
-use super::closed_loop::{Grip, LoopError, LoopSetup};
+use super::simulated_loop::{Grip, LoopError, LoopSetup};
 use super::theory::{Rendering, exact_limit_n_per_m, gil_limit_n_per_m, passive_limit_n_per_m};
 use flotor_hal::abi::loader::Plugin;
 use rayon::prelude::*;

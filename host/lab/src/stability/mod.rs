@@ -1,7 +1,7 @@
 //! The stiffest virtual spring that stays stable on a device: measured on the simulated flotor, next to theory.
 //!
-//! A servo renders a spring by sampling the handle's position `x` once a period `T` and holding the force
-//! until the next sample,
+//! A servo renders a spring by sampling the handle's position `x` once a period `T` and a zero-order hold
+//! of the force until the next sample,
 //!
 //! ```text
 //! u = K x[k] + B (x[k] - x[k-1]) / T
@@ -12,16 +12,16 @@
 //! cannot take that out, the handle starts to buzz by itself. The largest `K` without that is what a device
 //! can render.
 //!
-//! - [`closed_loop`]: the loop itself around a loaded device plugin; what counts as stable.
+//! - [`simulated_loop`]: the loop itself around a loaded device plugin; what counts as stable.
 //! - [`theory`]: the same limit without simulating: exact, by passivity, by Gil's rule.
 //! - [`grid`]: the cases, measured side by side on all processors.
 //!
 //! Not real-time throughout.
 
-pub mod closed_loop;
 pub mod grid;
 mod search;
+pub mod simulated_loop;
 pub mod theory;
 
-pub use closed_loop::{Grip, LoopError};
 pub use grid::{Case, Row, default_cases, measure};
+pub use simulated_loop::{Grip, LoopError};

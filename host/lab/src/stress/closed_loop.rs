@@ -309,17 +309,15 @@ fn judge(rows: &[Row]) -> Measure {
     let answered = count(&|row| row.release.is_some());
     let foretold = count(&Row::must_settle);
     let carried_off = count(&Row::carried_off);
-    let (verdict, remark) = match (surprises, foretold) {
-        (1.., _) => (Verdict::Fail, "diverges although nowhere stiffer than the loop allows".to_owned()),
-        (0, 0) if carried_off > 0 => {
-            (Verdict::Note, "pulled away from everywhere: no place to settle at".to_owned())
-        }
-        (0, 0) => (Verdict::Note, "stiffer than every loop here allows: nothing to judge".to_owned()),
-        _ => (Verdict::Pass, format!("{foretold} releases had to settle, and did")),
+    let (verdict, comment) = match (surprises, foretold) {
+        (1.., _) => (Verdict::Fail, "diverges although nowhere stiffer than the stability limit".to_owned()),
+        (0, 0) if carried_off > 0 => (Verdict::Note, "no release has an equilibrium to settle at".to_owned()),
+        (0, 0) => (Verdict::Note, "stiffer than the stability limit everywhere: nothing to judge".to_owned()),
+        _ => (Verdict::Pass, format!("{foretold} releases had to settle and settled")),
     };
     let pose = rows.iter().find(|row| is_surprise(row)).map(|row| row.start);
     let worst = Worst { value: surprises as f64, pose };
-    let mut measure = Measure { verdict, ..Measure::of(["M6", NAME, ""], &worst, [0.0, 0.0], remark) }
+    let mut measure = Measure { verdict, ..Measure::of(["M6", NAME, ""], &worst, [0.0, 0.0], comment) }
         .count("releases", rows.len() as u64)
         .count("releases without answer", rows.len() as u64 - answered)
         .count("releases carried off", carried_off)

@@ -219,14 +219,14 @@ fn judge(total: &Jumps) -> Measure {
     // The graver of the two is the one that is shown.
     let torque_is_graver = torque.value / FELT_NM > force.value / FELT_N;
     let (worst, unit, felt) = if torque_is_graver { (torque, "N·m", FELT_NM) } else { (force, "N", FELT_N) };
-    let remark = match verdict {
+    let comment = match verdict {
         Verdict::Pass => String::new(),
         _ => format!(
             "plateau over {:.0e} mm ({:.1e} N in the workspace itself); felt from {felt:.0e} {unit} on",
             PIECES_MM[last], total.inside.value
         ),
     };
-    let mut measure = Measure::of(["M1", NAME, unit], &worst, [felt * HARMLESS, felt], remark);
+    let mut measure = Measure::of(["M1", NAME, unit], &worst, [felt * HARMLESS, felt], comment);
     measure.verdict = verdict;
     for Jump { length_mm, force_n, torque_nm } in curve(total) {
         measure = measure.with(format!("force jump over {length_mm:.0e} mm"), force_n, "N").with(

@@ -9,8 +9,8 @@
 use super::measure::Measure;
 use super::poses::mixed;
 use super::{Setup, WIDER};
+use crate::call_timer::{net_ns, overhead_ns};
 use crate::sampling::{Random, Sobol};
-use crate::stopwatch::{net_ns, overhead_ns};
 use crate::subject::Subject;
 use crate::tally::{Decades, Worst};
 use flotor_hal::abi::CallStatus;
@@ -49,7 +49,7 @@ struct Stopwatch {
     overhead_ns: f64,
     calls: Histogram<u64>,
     spread: Decades,
-    /// Longest of the shortest times, and the pose that was asked for or walked to.
+    /// Longest of the shortest times, and the evaluated pose.
     slowest: Worst,
 }
 
@@ -113,8 +113,8 @@ impl Stopwatch {
     }
 
     fn judge(&self) -> Measure {
-        let remark = "best of three at its slowest pose; whether it allocates cannot be seen from outside";
-        Measure::of(["M7", NAME, "ns"], &self.slowest, [TENTH_OF_A_TICK_NS; 2], remark)
+        let comment = "best of three at the slowest pose";
+        Measure::of(["M7", NAME, "ns"], &self.slowest, [TENTH_OF_A_TICK_NS; 2], comment)
             .with("p50", self.calls.value_at_quantile(0.5) as f64, "ns")
             .with("p99.9", self.calls.value_at_quantile(0.999) as f64, "ns")
             .with("p99.999", self.calls.value_at_quantile(0.99999) as f64, "ns")

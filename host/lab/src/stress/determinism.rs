@@ -128,14 +128,14 @@ fn compare(inputs: &[Input], reference: &[Bits], again: [&[Bits]; AGAIN.len()]) 
 fn judge(total: &Tally) -> Measure {
     let mut digest = Xxh3::new();
     total.digests.iter().for_each(|block| digest.update(&block.to_le_bytes()));
-    let mut remark = format!("digest {:016x}", digest.digest());
+    let mut comment = format!("digest {:016x}", digest.digest());
     if let Some((_, way)) = total.first {
-        remark = format!("first by {way}; {remark}");
+        comment = format!("first by {way}; {comment}");
     }
     let value = total.differing.iter().sum::<u64>() as f64;
     let differing = Worst { value, pose: total.first.map(|(pose, _)| pose) };
-    let mut measure =
-        Measure::of(["M8", NAME, ""], &differing, [0.0, 0.0], remark).count("poses compared", total.compared);
+    let mut measure = Measure::of(["M8", NAME, ""], &differing, [0.0, 0.0], comment)
+        .count("poses compared", total.compared);
     for (way, count) in AGAIN.iter().zip(total.differing) {
         measure = measure.count(format!("differing, {way}"), count);
     }

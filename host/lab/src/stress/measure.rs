@@ -82,8 +82,9 @@ pub struct Measure {
     pub verdict: Verdict,
     /// Where the worst was seen.
     pub pose: Option<PoseRecord>,
-    /// What to know beside the number, in words.
-    pub remark: String,
+    /// Comment on the number.
+    #[serde(rename = "remark")]
+    pub comment: String,
     /// Everything else that was measured.
     pub values: Vec<Quantity>,
 }
@@ -94,11 +95,11 @@ impl Measure {
         [id, name, unit]: [&'static str; 3],
         worst: &Worst,
         [bound, limit]: [f64; 2],
-        remark: impl Into<String>,
+        comment: impl Into<String>,
     ) -> Self {
         let (value, verdict) = (worst.value, Verdict::of(worst.value, bound, limit));
-        let (pose, remark) = (worst.pose.map(PoseRecord::from), remark.into());
-        Self { id, name, value, unit, bound: Some(bound), verdict, pose, remark, values: Vec::new() }
+        let (pose, comment) = (worst.pose.map(PoseRecord::from), comment.into());
+        Self { id, name, value, unit, bound: Some(bound), verdict, pose, comment, values: Vec::new() }
     }
 
     /// Adds a further number.
@@ -120,7 +121,7 @@ impl Measure {
         if answered == 0 {
             self.value = f64::NAN;
             self.verdict = Verdict::Note;
-            "the model gave no answer to judge".clone_into(&mut self.remark);
+            "the model gave no answer to judge".clone_into(&mut self.comment);
         }
         self
     }

@@ -29,7 +29,7 @@ mod jacobian;
 mod measure;
 mod picture;
 mod poses;
-mod report;
+mod score;
 mod stiffness;
 mod sweep;
 mod totality;
@@ -41,7 +41,7 @@ pub use super::tally::Decades;
 pub use continuity::Jump;
 pub use measure::{Measure, PoseRecord, Quantity, Verdict};
 pub use poses::Reach;
-pub use report::{Distributions, StressReport};
+pub use score::{Distributions, StressReport};
 
 use super::subject::Subject;
 use super::{Progress, Size};

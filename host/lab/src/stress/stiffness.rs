@@ -7,8 +7,8 @@
 //! the renderable share.
 //!
 //! **M3, reciprocity.** Force and torque that come from one energy have a symmetric derivative (Maxwell's
-//! reciprocity); `|J - J^T| / |J|` measures how far a model is from that. Only what the differences leave no
-//! doubt about counts.
+//! reciprocity); `|J - J^T| / |J|` measures how far a model is from that. Only the part above the
+//! uncertainty of the finite differences counts.
 
 use super::jacobian::Jacobian;
 use super::measure::Measure;
@@ -101,13 +101,13 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Measure, Decades), 
 fn lipschitz(total: &Tally) -> Measure {
     let share = |index: usize| total.renderable[index] as f64 / total.judged().max(1) as f64;
     let [lightly, heavily] = DAMPINGS_NS_PER_M;
-    let remark = format!(
+    let comment = format!(
         "renderable at 1 kHz: {:.4} of the workspace with b = {lightly} N s/m, {:.4} with {heavily}",
         share(0),
         share(1)
     );
     let bounds = DAMPINGS_NS_PER_M.map(stiffest_n_per_m);
-    Measure::of(["M2", "Lipschitz constant", "N/m"], &total.gain, bounds, remark)
+    Measure::of(["M2", "Lipschitz constant", "N/m"], &total.gain, bounds, comment)
         .with("force by shift", total.blocks[0], "N/m")
         .with("force by turn", total.blocks[1] * LEVER_M, "N/rad")
         .with("torque by shift", total.blocks[2] * LEVER_M, "N·m/m")
@@ -121,8 +121,8 @@ fn lipschitz(total: &Tally) -> Measure {
 }
 
 fn reciprocity(total: &Tally) -> Measure {
-    let remark = format!("beyond the {:.0e} that differences leave uncertain", total.uncertain);
-    Measure::of(["M3", "reciprocity", ""], &total.asymmetry, [RECIPROCAL, RECIPROCAL], remark)
+    let comment = format!("beyond the uncertainty of finite differences, {:.0e}", total.uncertain);
+    Measure::of(["M3", "reciprocity", ""], &total.asymmetry, [RECIPROCAL, RECIPROCAL], comment)
         .count("poses", total.judged())
         .with("uncertainty taken off, at most", total.uncertain, "")
         .unless_unanswered(total.judged())

@@ -87,7 +87,7 @@ fn an_honest_spring_passes_everything() {
     let gain = measure(&report, "M2").value;
     assert!((1.0..1.0019).contains(&(gain / STIFFNESS_N_PER_M)), "{gain}");
     assert_eq!(value(&report, "M2", "renderable share, b = 0.5 N s/m"), 1.0);
-    // Holding a linear force for a period gives away k T / 2 per unit of damping (Colgate and Schenkel);
+    // A zero-order hold of a linear force generates k T / 2 per unit of damping (Colgate and Schenkel);
     // turns of a few hundredths of a radian that do not commute change it in the third digit at most.
     let damping = measure(&report, "M5").value;
     assert!((damping / (0.5 * STIFFNESS_N_PER_M * 1.0e-3) - 1.0).abs() < 1.0e-3, "{damping}");
@@ -220,7 +220,7 @@ fn nan_at_home_is_named() {
     assert_eq!(with(&report, Verdict::Fail), ["M0"], "{}", report.to_text());
     let totality = measure(&report, "M0");
     assert_eq!(totality.pose.unwrap().position_m, [0.0; 3]);
-    assert!(totality.remark.contains("home"), "{}", totality.remark);
+    assert!(totality.comment.contains("home"), "{}", totality.comment);
 }
 
 struct PanicsAtHome;
@@ -235,7 +235,7 @@ impl Law for PanicsAtHome {
 fn a_panic_is_named_and_the_score_goes_on() {
     let report = stress::<PanicsAtHome>();
     assert_eq!(with(&report, Verdict::Fail), ["M0"], "{}", report.to_text());
-    assert!(measure(&report, "M0").remark.contains("no law at home"));
+    assert!(measure(&report, "M0").comment.contains("no law at home"));
     assert!(value(&report, "M0", "panics") >= 1.0);
     assert_eq!(measure(&report, "M4").verdict, Verdict::Pass);
 }

@@ -98,20 +98,20 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
 }
 
 fn judge(total: &Tally) -> Measure {
-    let asked = format!("{} poses, {} of them out of the model's domain", total.asked, total.out_of_domain);
-    let remark = total.first.as_ref().map_or(asked, |(trouble, place)| {
+    let asked = format!("{} poses, {} of them outside the model's domain", total.asked, total.out_of_domain);
+    let comment = total.first.as_ref().map_or(asked, |(trouble, place)| {
         let what = match &trouble.kind {
             TroubleKind::Panicked(words) => words.clone(),
-            TroubleKind::NotFinite => "answered a number that is not finite".to_owned(),
-            TroubleKind::UnknownStatus => "answered a status the contract does not know".to_owned(),
+            TroubleKind::NotFinite => "returned a number that is not finite".to_owned(),
+            TroubleKind::UnknownStatus => "returned a status unknown to the contract".to_owned(),
             TroubleKind::Refused(status) => format!("refused the call ({status:?})"),
-            TroubleKind::CallsNonsenseSound => "answered `ok` to a pose that is not finite".to_owned(),
+            TroubleKind::CallsNonsenseSound => "returned `ok` for a pose that is not finite".to_owned(),
         };
         format!("first at {place}: {what}")
     });
     let pose = total.first.as_ref().map(|(trouble, _)| trouble.pose);
     let troubles = Worst { value: total.troubles() as f64, pose };
-    Measure::of(["M0", NAME, ""], &troubles, [0.0, 0.0], remark)
+    Measure::of(["M0", NAME, ""], &troubles, [0.0, 0.0], comment)
         .count("poses", total.asked)
         .count("panics", total.panics)
         .count("not finite", total.not_finite)

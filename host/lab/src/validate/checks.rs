@@ -2,7 +2,7 @@
 
 use super::path::CONFIG;
 use super::rule::Check;
-use super::{Figures, Seen, device, live, locked, model, passive};
+use super::{Figures, Seen, device, live_parameters, locked, model, passive};
 use crate::subject::prepared;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Model, OpenedDevice, Plugin, Setting, read_metadata};
@@ -34,7 +34,7 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
     let is_device = subject.plugin.metadata().kind == PluginKind::Device;
     match wanted {
         Check::FiniteInMotion => of_model(model::finite_in_motion)?,
-        Check::LiveParameters => live::live_parameters(&subject)?,
+        Check::LiveParameters => live_parameters::live_parameters(&subject)?,
         Check::Activity => of_model(model::activity)?,
         Check::Passive => return Ok(passive::passive(&mut subject.prepared_model()?)?),
         Check::SystemCalls => locked::system_calls(subject.prepared_model()?)?,

@@ -1,4 +1,4 @@
-//! Rules of a device: what it says of itself, its life, and its stop.
+//! Rules of a device: its description, its life cycle, and its stop.
 
 use super::path::CONFIG;
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice};
@@ -41,7 +41,7 @@ pub(super) fn lifecycle(mut device: OpenedDevice) -> Result<(), String> {
             has_sampled |= running.turn(&Wrench::ZERO)? == Cycle::Fresh;
             if running.ticks >= TICKS && !has_sampled {
                 if started.elapsed() > PATIENCE {
-                    return Err(format!("it is stale for ever: no sample within {PATIENCE:?}"));
+                    return Err(format!("no fresh sample within {PATIENCE:?}"));
                 }
                 std::thread::sleep(TICK);
             }
@@ -138,8 +138,7 @@ impl Running {
         while !self.delivers() {
             if started.elapsed() > PATIENCE {
                 return Err(format!(
-                    "told to give {} N, it says for {PATIENCE:?} that it delivers nothing: whether it stops cannot be \
-                     seen",
+                    "commanded {} N, it reports no force for {PATIENCE:?}, so its stop cannot be checked",
                     push.force()
                 ));
             }

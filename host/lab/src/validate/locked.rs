@@ -2,7 +2,7 @@
 //!
 //! The kernel can lock a thread in (seccomp, strict mode): whatever it asks of the system but to read and to
 //! write ends that thread. A thread that has been locked in walks a model along a path; one that comes
-//! through has opened no file, started no thread, and waited for nobody.
+//! through has opened no file, started no thread, and waited for no other thread.
 //!
 //! An allocation is such a call as well, if the C library is told to serve each from the system, which
 //! [`C_LIBRARY`] does: of a pair of `malloc` and `free` nothing else is left to see. Reading and writing are
@@ -49,11 +49,11 @@ pub(super) fn system_calls(model: Model) -> Result<(), Seen> {
     let (ready, told) = channel();
     let of_thread = Arc::clone(&stage);
     let _ = std::thread::spawn(move || walk_locked_in(model, &ready, &of_thread));
-    let ended = |_| Seen::Violation("its thread ended before it was locked in".to_owned());
+    let ended = |_| Seen::Violation("its thread ended before the test".to_owned());
     let thread = told.recv().map_err(ended)?.map_err(Seen::Violation)?;
     let folder = PathBuf::from(format!("/proc/self/task/{thread}"));
     if !folder.exists() {
-        return Err(Seen::Missing("there is no /proc, to see a thread end".to_owned()));
+        return Err(Seen::Missing("the system has no /proc, which the test needs".to_owned()));
     }
     let before = transfers(&folder);
     stage.store(LOCKED, Ordering::Release);
@@ -62,11 +62,9 @@ pub(super) fn system_calls(model: Model) -> Result<(), Seen> {
         let is_there = folder.exists();
         match stage.load(Ordering::Acquire) {
             DONE => break,
-            FAILED => return Err(Seen::Violation("it failed in a step of the walk".to_owned())),
+            FAILED => return Err(Seen::Violation("a step of the path failed".to_owned())),
             NOT_ALLOWED => {
-                return Err(Seen::Missing(
-                    "the system does not let a thread be locked in (seccomp)".to_owned(),
-                ));
+                return Err(Seen::Missing("the system does not allow seccomp (strict mode)".to_owned()));
             }
             _ if !is_there => end_here(),
             _ => std::thread::sleep(LOOK),

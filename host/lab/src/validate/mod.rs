@@ -1,14 +1,14 @@
-//! Checks a plugin against the rules of the contract, from outside, the way a host meets it: each rule in a process of
-//! its own, so that a plugin that crashes or hangs costs one rule.
+//! Checks a plugin against the rules of the contract, from outside as a host does: each rule in its own process, so that a
+//! plugin that crashes or hangs costs one rule.
 
 //!
 //! - `rule`: what is checked; `checks`: one of it, in this process.
-//! - `path`: where a model is asked; `model`, `live`, `passive`, `locked`: what is asked of it.
+//! - `path`: where a model is asked; `model`, `live_parameters`, `passive`, `locked`: what is asked of it.
 //! - `device`: what is asked of a device.
 
 mod checks;
 mod device;
-mod live;
+mod live_parameters;
 mod locked;
 mod model;
 mod passive;
@@ -37,16 +37,16 @@ pub struct Finding {
     pub rule: &'static str,
     /// What it demands.
     pub text: &'static str,
-    /// What was seen that violates it.
+    /// The violation.
     pub violation: Option<String>,
-    /// Why it could not be checked here: what the plugin needs is not there.
+    /// Why it could not be checked here: something that the plugin needs is missing.
     pub unchecked: Option<String>,
     /// What was measured on the way.
     pub figures: Option<Figures>,
 }
 
-/// What a model without memory measures near home. No contract limits it, but a person can tell newtons per metre from
-/// newtons per millimetre.
+/// Measurements of a model without memory near home. No contract limits them, but a person can distinguish newtons per
+/// metre from newtons per millimetre.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
     /// Largest stiffness, N/m.
@@ -77,7 +77,7 @@ pub enum Seen {
     Missing(String),
 }
 
-/// What the process that checks one rule says.
+/// Result of the process that checks one rule.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
     /// `None` if the rule holds, else what was seen.
@@ -137,13 +137,13 @@ pub fn validate(path: &Path, patience: Duration, program: impl Fn(Check) -> Comm
             let (name, value) = locked::C_LIBRARY;
             command.env(name, value);
         }
-        let outcome = apart(check, command, patience);
+        let outcome = in_own_process(check, command, patience);
         let is_fatal = matches!(check, Check::Contract(Rule::Loads | Rule::Defaults));
         let stops = is_fatal || matches!(outcome, Ok(None));
         let verdict = match outcome {
             Ok(Some(verdict)) => verdict,
             Ok(None) => Verdict::violated(format!(
-                "it did not come back within {patience:?}; the rules after it were not checked"
+                "it did not return within {patience:?}; the rules after it were not checked"
             )),
             Err(error) => Verdict::violated(format!("cannot be checked: {error}")),
         };
@@ -154,20 +154,19 @@ pub fn validate(path: &Path, patience: Duration, program: impl Fn(Check) -> Comm
     findings
 }
 
-/// What an end before there was a verdict says.
+/// Explains an end without a verdict.
 fn died(check: Check, end: ExitStatus) -> String {
-    let Some(signal) = end.signal() else { return format!("it ended the process ({end})") };
+    let Some(signal) = end.signal() else { return format!("the process ended without a verdict ({end})") };
     if check == Check::SystemCalls && signal == locked::CAUGHT.as_raw() {
-        return "a step allocated, or called the system otherwise".to_owned();
+        return "a step allocated memory or made another system call".to_owned();
     }
     // A thread that is locked in may not read the clock of the processor either.
-    let hint =
-        if check == Check::SystemCalls { "; a step that asks for the time does that here" } else { "" };
-    format!("it ended the process by signal {signal}{hint}")
+    let hint = if check == Check::SystemCalls { "; here a step that reads the time causes this" } else { "" };
+    format!("the process died by signal {signal}{hint}")
 }
 
-/// Runs the check of one rule in a process of its own; `None` if it took too long.
-fn apart(check: Check, mut command: Command, patience: Duration) -> io::Result<Option<Verdict>> {
+/// Runs the check of one rule in its own process; `None` if it took too long.
+fn in_own_process(check: Check, mut command: Command, patience: Duration) -> io::Result<Option<Verdict>> {
     // A file, not a pipe: nobody has to empty it. What a plugin prints is its own business.
     let mut told = File::from(memfd_create("flotor-verdict", MemfdFlags::CLOEXEC)?);
     let mut child = command.stdin(told.try_clone()?).stdout(Stdio::null()).stderr(Stdio::null()).spawn()?;

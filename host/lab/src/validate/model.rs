@@ -57,12 +57,12 @@ pub(super) fn reset_repeats(model: &mut Model) -> Result<(), String> {
     let first = run(model)?;
     match model.reset() {
         CallStatus::Ok => {}
-        other => return Err(format!("reset was answered {other:?}")),
+        other => return Err(format!("reset returned {other:?}")),
     }
     let second = run(model)?;
     let differs = first.iter().zip(&second).position(|(a, b)| a.wrench != b.wrench);
     differs
-        .map_or(Ok(()), |index| Err(format!("pose {index} of the same walk gave another answer after reset")))
+        .map_or(Ok(()), |index| Err(format!("pose {index} of the same path gave another answer after reset")))
 }
 
 pub(super) fn time_budget(model: &mut Model) -> Result<(), String> {
@@ -80,7 +80,11 @@ pub(super) fn time_budget(model: &mut Model) -> Result<(), String> {
     if usual_ns <= limit_ns {
         return Ok(());
     }
-    Err(format!("one step in a hundred takes more than {} µs, of {} µs", usual_ns / 1000, limit_ns / 1000))
+    Err(format!(
+        "the 99th percentile of a step is {} µs, above the limit of {} µs",
+        usual_ns / 1000,
+        limit_ns / 1000
+    ))
 }
 
 /// Wrenches of a walk; two models may be walked in turns.
@@ -100,7 +104,7 @@ pub(super) fn independent(subject: &Subject) -> Result<(), String> {
     let alone = alone.first().cloned().unwrap_or_default();
     let in_turns = walked(&mut [&mut make()?, &mut make()?])?;
     if in_turns.iter().any(|wrenches| *wrenches != alone) {
-        return Err("two instances stepped in turns answer otherwise than one alone".to_owned());
+        return Err("two instances stepped alternately give other answers than one alone".to_owned());
     }
     // Made here, used there: a loop has a thread of its own.
     let elsewhere: Vec<_> = [make()?, make()?]
@@ -109,7 +113,7 @@ pub(super) fn independent(subject: &Subject) -> Result<(), String> {
         .map(|thread| thread.join().map_err(|_| "a thread panicked".to_owned())?)
         .collect::<Result<_, String>>()?;
     if elsewhere.iter().flatten().any(|wrenches| *wrenches != alone) {
-        return Err("two instances stepped on two threads answer otherwise than one alone".to_owned());
+        return Err("two instances stepped on two threads give other answers than one alone".to_owned());
     }
     Ok(())
 }
@@ -119,7 +123,11 @@ pub(super) fn no_threads(model: &mut Model) -> Result<(), String> {
     let before = threads();
     let _ = walked(&mut [model])?;
     let after = threads();
-    if after <= before { Ok(()) } else { Err(format!("{} threads more after 500 steps", after - before)) }
+    if after <= before {
+        Ok(())
+    } else {
+        Err(format!("the process has {} more threads after 500 steps", after - before))
+    }
 }
 
 /// Compares force and energy over steps of a micrometre at poses of a walk. A kink in the law may lie between
@@ -153,13 +161,12 @@ pub(super) fn energy_gradient(model: &mut Model) -> Result<(), String> {
         return Ok(());
     }
     let example = seen.iter().find(differs).map_or(String::new(), |(force_n, gradient_n)| {
-        format!(": {force_n:.4} N where the energy's gradient says {gradient_n:.4} N")
+        format!(": {force_n:.4} N instead of the {gradient_n:.4} N of the energy's gradient")
     });
     Err(format!("force and energy disagree in {different} of {} places{example}", seen.len()))
 }
 
-/// Asks around the region in which the model says it acts: a host does not ask there, and takes zero for
-/// granted.
+/// Steps the model around its active region: a host does not step it there and assumes zero.
 pub(super) fn activity(model: &mut Model) -> Result<(), String> {
     let region = model.active_region();
     if region.shape() == RegionShape::Everywhere {
@@ -178,7 +185,7 @@ pub(super) fn activity(model: &mut Model) -> Result<(), String> {
                 let acts = output.wrench != Wrench::ZERO || output.energy_j.abs() > 0.0;
                 if acts && !region.contains(pose.position()) {
                     return Err(format!(
-                        "at {position_m} m, outside its region, it answered {:?} and {} J",
+                        "at {position_m} m, outside its active region, it returned {:?} and {} J",
                         output.wrench, output.energy_j
                     ));
                 }

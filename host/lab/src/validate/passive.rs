@@ -1,10 +1,10 @@
-//! Whether a law without memory gives out energy, and how steep it is near home.
+//! Whether a law without memory generates energy, and its stiffness near home.
 //!
 //! A law that answers from pose and velocity alone is asked for two things:
 //!
 //! - *On a closed path at rest* the work must be zero: walked the other way round, it has the other sign. The circles
 //!   lie in all fifteen planes of the three directions and three rotations.
-//! - *There and back* through one pose, at the same speed, what depends on the pose cancels. What is left is the work of
+//! - *Forward and back* through one pose, at the same speed, what depends on the pose cancels. What is left is the work of
 //!   the damping, which must take energy away.
 //!
 //! Both are exact but for rounding and for what a law does between two points of the circle, which its change
@@ -60,7 +60,7 @@ fn on_circle(plane: [usize; 2], index: usize) -> Pose {
 /// Work on the hand once round the circle, by the trapezoidal rule: a segment is wrong by no more than the
 /// change of the wrench over it times its length.
 fn circle(model: &mut Model, plane: [usize; 2]) -> Result<(), String> {
-    let (mut given_j, mut doubt_j) = (0.0, 0.0);
+    let (mut given_j, mut uncertain_j) = (0.0, 0.0);
     let mut before = (on_circle(plane, 0), finite(model, &Input::at_rest(on_circle(plane, 0)))?.wrench);
     for index in 1..=POINTS {
         let pose = on_circle(plane, index);
@@ -73,15 +73,15 @@ fn circle(model: &mut Model, plane: [usize; 2]) -> Result<(), String> {
         let largest_j = |wrench: &Wrench| {
             wrench.force().length() * moved_m.length() + wrench.torque().length() * turned_rad.length()
         };
-        doubt_j += largest_j(&change) + ROUNDING * largest_j(&mean);
+        uncertain_j += largest_j(&change) + ROUNDING * largest_j(&mean);
     }
-    if given_j.abs() <= doubt_j {
+    if given_j.abs() <= uncertain_j {
         return Ok(());
     }
     let [first, second] = plane.map(|axis| COORDINATES.get(axis).copied().unwrap_or_default());
     Err(format!(
-        "once round a circle in {first} and {second} ({} mm, {} rad) it gives {:.3e} J; what it gives must be stored \
-         before",
+        "once round a circle in {first} and {second} ({} mm, {} rad) it generates {:.3e} J; a law without memory must \
+         generate none",
         RADIUS_M * 1.0e3,
         RADIUS_RAD,
         given_j.abs()
@@ -107,7 +107,7 @@ fn there_and_back(model: &mut Model) -> Result<f64, String> {
             let largest_nm = ahead.torque().length() + behind.torque().length();
             if given_w > ROUNDING * (largest_n * linear.length() + largest_nm * angular.length()) {
                 return Err(format!(
-                    "there and back at {:.3} m/s through {:?} it gives {given_w:.3e} W: damping must take energy away",
+                    "forward and back at {:.3} m/s through {:?} it generates {given_w:.3e} W; damping must dissipate",
                     linear.length(),
                     there.pose
                 ));

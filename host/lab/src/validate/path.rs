@@ -60,7 +60,7 @@ pub(super) fn walk_at(speed: f64, steps: u64) -> impl Iterator<Item = Input> {
 pub(super) fn step(model: &mut Model, input: &Input) -> Result<Output, String> {
     call(model, input).map_err(|status| match status {
         CallStatus::Panicked => format!("{} it {}", place(input), model.last_message()),
-        other => format!("{} it answered {other:?}", place(input)),
+        other => format!("{} it returned {other:?}", place(input)),
     })
 }
 
@@ -70,7 +70,7 @@ pub(super) fn finite(model: &mut Model, input: &Input) -> Result<Output, String>
     if output.wrench.is_finite() && !output.energy_j.is_infinite() && output.status().is_some() {
         return Ok(output);
     }
-    Err(format!("{} it answered {output:?}", place(input)))
+    Err(format!("{} it returned {output:?}", place(input)))
 }
 
 fn place(input: &Input) -> String {

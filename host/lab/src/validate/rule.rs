@@ -48,13 +48,13 @@ impl Check {
     pub const fn text(self) -> &'static str {
         match self {
             Self::Contract(rule) => rule.text(),
-            Self::FiniteInMotion => "where the handle moves, slowly and fast, the wrench is finite",
-            Self::LiveParameters => {
-                "live parameters can be set, answer in time and report the value in force"
+            Self::FiniteInMotion => "the wrench is finite while the handle moves, slowly and fast",
+            Self::LiveParameters => "live parameters can be set in time and report their value",
+            Self::Activity => "outside the active region, wrench and energy are zero",
+            Self::Passive => {
+                "a model without a history generates no energy on a closed path or forward and back along one"
             }
-            Self::Activity => "outside the region a model declares, wrench and energy are zero",
-            Self::Passive => "a model without memory gives out no energy on a closed path or there and back",
-            Self::SystemCalls => "a step allocates nothing, starts no thread and calls nothing of the system",
+            Self::SystemCalls => "a step allocates no memory, starts no thread and makes no system call",
         }
     }
 

@@ -62,7 +62,7 @@ impl SubjectRecord {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
-    /// As the procedure says: the mean of the last differences, or the belief of QUEST+
+    /// That of the procedure: the mean of the last differences, or the posterior of QUEST+
     #[default]
     Procedure,
     /// The most likely observer, from all trials at a base
@@ -91,7 +91,7 @@ pub enum AnalysisError {
         complete: usize,
     },
     /// A subject without a threshold in some condition.
-    #[error("{subject}: no track at base {base} in modality {modality} came to a threshold")]
+    #[error("{subject}: no track at base {base} in modality {modality} reached a threshold")]
     NoThreshold {
         /// Who.
         subject: SubjectNumber,

@@ -1,6 +1,6 @@
 //! What CMU-RI-TR-07-21 reports (section 4.3), to stand beside one's own results.
 
-/// A statistic of the report, and the effect it is of.
+/// A statistic of the thesis, and its effect.
 pub type Published = (&'static str, &'static str);
 
 /// Effects on thresholds (section 4.3.2).

@@ -9,9 +9,9 @@ use flotor_statistics::describe::MeanInterval;
 pub(super) fn jnd(analysis: &JndAnalysis) -> String {
     let mut page = Page::default();
     let JndAnalysis { subjects, pairs_per_subject, .. } = analysis;
-    page.line(format!("{subjects} subjects, {pairs_per_subject:.1} pairs each (report: about 200)"));
+    page.line(format!("{subjects} subjects, {pairs_per_subject:.1} pairs each (thesis: about 200)"));
     page.gap();
-    page.row("Weber fraction", "here", "report");
+    page.row("Weber fraction", "here", "thesis");
     let fractions =
         [("vision + haptics", &analysis.weber_detail.vh), ("haptics alone", &analysis.weber_detail.h)];
     for ((name, detail), published) in fractions.into_iter().zip(published::WEBER) {
@@ -42,10 +42,7 @@ pub(super) fn jnd(analysis: &JndAnalysis) -> String {
     page.movements(analysis.task, &analysis.kinematics);
     if analysis.unfinished_tracks > 0 {
         page.gap();
-        page.line(format!(
-            "{} tracks never came to a threshold and are left out",
-            analysis.unfinished_tracks
-        ));
+        page.line(format!("{} tracks did not reach a threshold and are omitted", analysis.unfinished_tracks));
     }
     page.end()
 }
@@ -53,7 +50,7 @@ pub(super) fn jnd(analysis: &JndAnalysis) -> String {
 pub(super) fn magnitude(analysis: &MagnitudeAnalysis) -> String {
     let mut page = Page::default();
     let MagnitudeAnalysis { subjects, trials_per_subject, repeated, linear_r2, .. } = analysis;
-    page.line(format!("{subjects} subjects, {trials_per_subject} ratings each (report: 72)"));
+    page.line(format!("{subjects} subjects, {trials_per_subject} ratings each (thesis: 72)"));
     page.line(format!("{repeated} presentations repeated because the handle left its range"));
     page.gap();
     page.row("Linear trend", &format!("R² = {linear_r2:.3}"), &format!("R² = {}", published::LINEAR_R2));
@@ -95,7 +92,7 @@ impl Page {
         self.lines.push(String::new());
     }
 
-    /// What, what it is here, and what it is in the report.
+    /// Name, value here, and value in the thesis.
     fn row(&mut self, name: &str, here: &str, published: &str) {
         self.lines.push(format!("  {name:<30}{here:<46}{published}").trim_end().to_owned());
     }
@@ -106,7 +103,7 @@ impl Page {
 
     fn effects(&mut self, what: &str, table: &[Effect], published: &[(&str, &str)]) {
         self.gap();
-        self.row(&format!("Effects on {what}"), "here", "report");
+        self.row(&format!("Effects on {what}"), "here", "thesis");
         for effect in table {
             let known = published.iter().find(|(name, _)| *name == effect.effect);
             self.row(&effect.effect, &effect_text(effect), known.map_or("", |(_, text)| text));

@@ -1,6 +1,6 @@
 //! A person's sitting: screens shown, stimuli felt, answers logged, each before the next trial begins.
 
-use super::live::LiveRig;
+use super::real_time_rig::RealTimeRig;
 use crate::conduct::{Ending, OutsideError};
 use crate::log::{Event, LogWriter, TrialEvent};
 use crate::screen::{Attended, Input, Screen, Step};
@@ -41,7 +41,7 @@ pub trait FrontEnd {
 pub fn attend(
     attended: &mut Attended,
     log: &mut LogWriter,
-    rig: &mut LiveRig<'_>,
+    rig: &mut RealTimeRig<'_>,
     front: &mut dyn FrontEnd,
     watch: &mut dyn FnMut(&TrialEvent),
 ) -> Result<Ending, OutsideError> {
@@ -84,7 +84,7 @@ pub fn attend(
 
 /// The next input; none if the run is to end. Warns once for each time the handle leaves its range.
 fn wait_for_input(
-    rig: &LiveRig<'_>,
+    rig: &RealTimeRig<'_>,
     front: &mut dyn FrontEnd,
     screen: &Screen,
 ) -> Result<Option<Input>, OutsideError> {

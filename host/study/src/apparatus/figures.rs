@@ -18,7 +18,7 @@ const HEIGHT_PX: f64 = 340.0;
 const MODALITIES: [(Modality, &str); 2] =
     [(Modality::Vh, "vision + haptics"), (Modality::H, "haptics alone")];
 
-/// Figure 18: thresholds as bars over the base, a bar for each modality, with standard errors; what the report's Weber
+/// Figure 18: thresholds as bars over the base, a bar for each modality, with standard errors; what the thesis's Weber
 /// fractions come to at each base.
 pub(super) fn thresholds(analysis: &JndAnalysis, stimulus: &Stimulus) -> String {
     let cells = |modality| analysis.thresholds.iter().filter(move |cell| cell.modality == modality);

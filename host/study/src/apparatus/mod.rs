@@ -1,19 +1,19 @@
-//! Perception experiments on a scene: what a protocol asks for is presented by the servo loop.
+//! Perception experiments on a scene: the servo loop presents the stimuli of a protocol.
 //!
-//! - [`setup`]: a scene and what is varied in it, checked before the first trial.
-//! - [`rig`]: presents to simulated observers in virtual time; [`live`]: to people, in real time.
-//! - [`watch`]: what is taken down of a presentation.
+//! - [`setup`]: a scene and its varied parameter, checked before the first trial.
+//! - [`rig`]: presents to simulated observers in virtual time; [`real_time_rig`]: to people, in real time.
+//! - [`watch`]: the record of a presentation.
 //! - [`attend`]: a person's sitting through a front end.
 //! - [`noise`]: white noise on headphones, where there is a player.
-//! - [`report`]: the page of the results.
+//! - [`page`]: the page of the results.
 //!
 //! Nothing here is real-time: the loop is the servo's.
 
 pub mod attend;
 mod figures;
-pub mod live;
 pub mod noise;
-pub mod report;
+pub mod page;
+pub mod real_time_rig;
 pub mod rig;
 pub mod setup;
 pub mod watch;

@@ -33,12 +33,12 @@ pub enum ApparatusError {
     Run(#[from] RunError),
     /// No model of the scene has this name.
     #[error(
-        "stimulus {stimulus}: the scene has no model `{}`{} (there are {})",
+        "stimulus {stimulus}: the scene has no model `{}`{} (it has {})",
         stimulus.model, nearest.as_ref().map_or(String::new(), |near| format!("; did you mean `{near}`?")),
         models.join(", ")
     )]
     NoModel {
-        /// What was asked for.
+        /// The requested name.
         stimulus: Stimulus,
         /// The most similar name there is.
         nearest: Option<String>,
@@ -47,12 +47,12 @@ pub enum ApparatusError {
     },
     /// The model has no such number.
     #[error(
-        "stimulus {stimulus}: `{}` has no number `{}`{} (there are {})",
+        "stimulus {stimulus}: `{}` has no number `{}`{} (it has {})",
         stimulus.model, stimulus.parameter,
         nearest.as_ref().map_or(String::new(), |near| format!("; did you mean `{near}`?")), numbers.join(", ")
     )]
     NoParameter {
-        /// What was asked for.
+        /// The requested name.
         stimulus: Stimulus,
         /// The most similar id there is.
         nearest: Option<String>,
@@ -74,8 +74,7 @@ pub enum ApparatusError {
     },
     /// A simulated observer needs a hand to feel with.
     #[error(
-        "the device `{device}` has no simulated hand (it lacks `{missing}`), so no simulated observer can feel with \
-         it; use --observer human, a scene with the device `simulated`, or --apparatus none"
+        "the device `{device}` has no simulated hand for simulated observers (it lacks `{missing}`); use --observer human, a scene with the device `simulated`, or --apparatus none"
     )]
     NoHand {
         /// The device.

@@ -1,7 +1,7 @@
-//! `flotor analyse`: a study's data in, thresholds, effects and tests out.
+//! `flotor analyse`: thresholds, effects and tests from the data of a study.
 
 use crate::analysis::{Analysis, AnalysisOptions, BlindedAnalysis, Estimator, SubjectRecord};
-use crate::apparatus::report::html;
+use crate::apparatus::page::html;
 use crate::blinding::Codes;
 use crate::dataset::Dataset;
 use crate::protocol::RatingScale;
@@ -11,11 +11,11 @@ use flotor_command::{CommandError, note, print_result, style, write_text};
 use flotor_statistics::anova::SumOfSquares;
 use std::path::PathBuf;
 
-/// Analyse a study
+/// Analyse the data of a perception experiment
 #[derive(Args)]
 #[command(
-    after_help = "Every event log is verified first: a changed line is refused with its number. Sittings that \
-    never came to an end are\nleft out, and said so.\n\n\
+    after_help = "The command verifies every event log first and refuses a changed line with its number. It omits \
+    incomplete\nsittings, with a note.\n\n\
     Examples:\n  \
     flotor analyse data\n  \
     flotor analyse data --json result.json --type II"
@@ -27,22 +27,22 @@ pub(crate) struct AnalyseArguments {
     /// Write the result as JSON (- for standard output)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write a page with figures and all numbers
+    /// Write an HTML page with figures and all numbers
     #[arg(long, value_name = "FILE.html")]
     html: Option<PathBuf>,
     /// Write every subject's response under every condition, for R or Python
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
-    /// Codes in place of modalities and stimuli, nothing of the report beside them
+    /// Codes instead of modalities and stimuli, without the values of the thesis
     #[arg(long, conflicts_with = "html")]
     blind: bool,
-    /// How thresholds are found
+    /// Threshold estimator
     #[arg(long, value_enum, default_value_t)]
     estimator: Estimator,
     /// Sums of squares of the analysis of variance
     #[arg(long = "type", value_enum, default_value_t)]
     sums: SumsOption,
-    /// How ratings of subjects with different scales are made comparable
+    /// Normalisation of the ratings between subjects
     #[arg(long, value_enum, default_value_t)]
     ratings: RatingScale,
 }
@@ -62,7 +62,7 @@ enum SumsOption {
 pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     let logs = Dataset::at(&arguments.data).logs()?;
     for log in logs.iter().filter(|log| !log.complete) {
-        note(format_args!("{} broke off after {} trials: left out", log.begin.subject, log.trials.len()));
+        note(format_args!("{}: incomplete after {} trials, omitted", log.begin.subject, log.trials.len()));
     }
     let Some(first) = logs.first() else { return Ok(()) };
     let complete = logs.iter().filter(|log| log.complete).map(SubjectRecord::of_log);

@@ -8,7 +8,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use flotor_command::{CommandError, exit_code_of};
 use std::process::ExitCode;
 
-/// Carry out and analyse perception experiments; `flotor COMMAND` starts this program.
+/// Run and analyse perception experiments; `flotor COMMAND` starts this program.
 #[derive(Parser)]
 #[command(name = "flotor", bin_name = "flotor", version, about, max_term_width = 110)]
 struct Arguments {

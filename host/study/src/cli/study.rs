@@ -33,18 +33,18 @@ use serde_json::json;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-/// Perception experiments
+/// Run a perception experiment
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     flotor study jnd --out data                              16 simulated subjects, thresholds of stiffness\n  \
     flotor analyse data                                      Weber fractions, tests, effects\n  \
     flotor study magnitude --subjects 8 --seed 3 --out ratings\n  \
     flotor study jnd --bases 20,40 --target 0.8 --side random --out other\n  \
-    flotor study jnd --out data --resume                     go on where it broke off\n  \
+    flotor study jnd --out data --resume                     resume an interrupted study\n  \
     flotor study jnd --observer human --subject 3 --scene mlhd.toml --out people    a person, in front of the viewer\n  \
     flotor study jnd --observer human --subject 3 --out people --resume\n  \
     flotor study magnitude --stimulus spring.wire_diameter_mm --set spring.mode=physical --range 0.4-0.8 --out d\n  \
-    flotor study bias --runs 1000                            what is each estimator worth?")]
+    flotor study bias --runs 1000                            bias and error of each estimator")]
 pub(crate) struct StudyArguments {
     #[command(subcommand)]
     task: Task,
@@ -52,19 +52,19 @@ pub(crate) struct StudyArguments {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Just noticeable difference: pairs, by an adaptive procedure
+    /// Just noticeable difference: pairs, with an adaptive procedure
     Jnd(JndArguments),
-    /// Magnitude estimation: one at a time, any number
+    /// Magnitude estimation: single stimuli, free numbers
     Magnitude(MagnitudeArguments),
     /// Just noticeable difference of a force, felt or exerted
     Force(ForceArguments),
-    /// Feel a spring while its dimensions and material change: no trials, no questions
+    /// Feel a spring while its dimensions and material change, without trials
     Explore(explore::ExploreArguments),
-    /// Fit a spring to a measured curve of a real one, to be judged beside others
+    /// Fit a spring to the measured curve of a real one
     Spring(spring::SpringArguments),
     /// Add a note of the experimenter to a subject's log
     Note(NoteArguments),
-    /// How far each way to a threshold is off, with observers whose threshold is known
+    /// Bias and error of each threshold estimator, on observers with a known threshold
     Bias(bias::BiasArguments),
 }
 
@@ -78,16 +78,16 @@ enum ObserverOption {
     Human,
 }
 
-/// What every experiment has.
+/// Options of every experiment.
 #[derive(Args)]
 struct Common {
-    /// Who answers
+    /// Observer who answers
     #[arg(long, value_enum, default_value_t)]
     observer: ObserverOption,
-    /// How many subjects, numbered from 1
+    /// Number of subjects; their numbers start at 1
     #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=i64::from(SubjectNumber::MOST)), value_name = "N")]
     subjects: u16,
-    /// Simulated subjects at a time (default: one a core)
+    /// Simulated subjects in parallel (default: one per core)
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
     /// Seed of orders, presentations and simulated answers
@@ -96,43 +96,43 @@ struct Common {
     /// Folder for the data
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Number of the person (human; default: the first that is free)
+    /// Number of the person (human; default: the first free one)
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=i64::from(SubjectNumber::MOST)), value_name = "N")]
     subject: Option<u16>,
-    /// Scene that is felt (TOML); without it, a spring on the simulated flotor
+    /// Scene of the stimuli (TOML); without it, a spring on the simulated flotor
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
     /// Set a parameter of a plugin of the scene (repeatable)
     #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
     sets: Vec<PluginKeyValue>,
-    /// What presents the stimuli to simulated observers
+    /// Apparatus of simulated observers
     #[arg(long, value_enum, default_value_t)]
     apparatus: PresentationOption,
-    /// How long a simulated observer feels each stimulus
+    /// Time for which a simulated observer feels each stimulus
     #[arg(long, default_value = "1s", value_parser = duration_s, value_name = "TIME")]
     feel: f64,
-    /// What is kept of the movement (default: full for people, summary for simulated observers)
+    /// Stored movement (default: full for people, summary for simulated observers)
     #[arg(long, value_enum)]
     kinematics: Option<Kinematics>,
-    /// Offer a rest after so many trials, 0: never (human)
+    /// Trials between two rests, 0: no rests (human)
     #[arg(long, default_value_t = 40, value_name = "N")]
     rest_every: u32,
-    /// Where the person sees and answers (human)
+    /// Screen for questions and answers (human)
     #[arg(long, value_enum, default_value_t)]
     screen: front::ScreenOption,
     /// White noise on headphones (human)
     #[arg(long, value_enum, default_value_t)]
     noise: NoiseOption,
-    /// Go on with subjects who broke off, leave complete ones alone
+    /// Resume incomplete subjects, skip complete ones
     #[arg(long)]
     resume: bool,
-    /// What is varied: MODEL.PARAMETER (default: spring.gamma_n, of a force load.force_n)
+    /// Varied parameter: MODEL.PARAMETER (default: spring.gamma_n, for a force load.force_n)
     #[arg(long, value_name = "MODEL.KEY")]
     stimulus: Option<String>,
-    /// Which modality comes first
+    /// First modality
     #[arg(long, value_enum, default_value_t, value_name = "MODALITY")]
     first: FirstChoice,
-    /// What happens when the handle leaves its range
+    /// Response to a handle that leaves its range
     #[arg(long, value_enum, default_value_t)]
     boundary: BoundaryChoice,
 }
@@ -145,7 +145,7 @@ struct NoteArguments {
     /// Number of the subject
     #[arg(value_name = "SUBJECT", value_parser = clap::value_parser!(u16).range(1..=i64::from(SubjectNumber::MOST)))]
     subject: u16,
-    /// What is to be known; no names
+    /// Text of the note, without names
     #[arg(value_name = "TEXT")]
     text: String,
 }
@@ -154,16 +154,16 @@ struct NoteArguments {
 struct JndArguments {
     #[command(flatten)]
     common: Common,
-    /// Bases, in the stimulus's unit (default: 17,26,35; of a force 3,6,9)
+    /// Bases, in the unit of the stimulus (default: 17,26,35; for a force 3,6,9)
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     bases: Option<Vec<f64>>,
     /// Replications, in alternating modality
     #[arg(long, default_value_t = 4, value_name = "N")]
     replications: u32,
-    /// Which difference comes next
+    /// Adaptive procedure, which selects the next difference
     #[arg(long, value_enum, default_value_t)]
     procedure: ProcedureChoice,
-    /// QUEST+: trials of a track
+    /// QUEST+: trials per track
     #[arg(long, default_value_t = 18, value_name = "N")]
     trials: u32,
     /// First difference, as a share of the base
@@ -172,7 +172,7 @@ struct JndArguments {
     /// First step down, as a share of the base
     #[arg(long, default_value_t = 0.10, value_name = "SHARE")]
     step: f64,
-    /// Share of correct answers aimed at
+    /// Target share of correct answers
     #[arg(long, default_value_t = 0.75, value_name = "SHARE")]
     target: f64,
     /// Reversals that halve the step
@@ -181,13 +181,13 @@ struct JndArguments {
     /// Reversal that ends a track
     #[arg(long, default_value_t = 8, value_name = "N")]
     stop_after: u32,
-    /// Reversal from which differences count for the threshold
+    /// First reversal whose difference counts for the threshold
     #[arg(long, default_value_t = 4, value_name = "N")]
     average_from: u32,
     /// Whether the trials of the first and last of these reversals count
     #[arg(long, value_enum, default_value_t)]
     averaging: Averaging,
-    /// Which step is applied at a reversal that halves it
+    /// Step at a reversal that halves it
     #[arg(long, value_enum, default_value_t)]
     step_at_reversal: StepAtReversal,
     /// Smallest difference, as a share of the base
@@ -242,13 +242,13 @@ struct ForceArguments {
     jnd: JndArguments,
 }
 
-/// What a difference experiment is about unless told otherwise.
+/// Default stimulus and bases of a difference experiment.
 struct Subject {
     stimulus: &'static str,
     bases: [f64; 3],
 }
 
-/// Springs, as in the report.
+/// Springs, as in the thesis.
 const STIFFNESS: Subject = Subject { stimulus: "spring.gamma_n", bases: [17.0, 26.0, 35.0] };
 /// Forces in the same proportions and in the range those springs are felt with.
 const FORCE: Subject = Subject { stimulus: "load.force_n", bases: [3.0, 6.0, 9.0] };
@@ -416,7 +416,7 @@ fn note(arguments: &NoteArguments) -> Result<(), CommandError> {
     let log = logs.into_iter().find(|log| log.begin.subject.get() == arguments.subject);
     let log = log.ok_or_else(|| {
         let (data, subject) = (arguments.data.display(), arguments.subject);
-        CommandError::Usage(format!("{data}: there is no subject {subject}"))
+        CommandError::Usage(format!("{data}: no subject {subject}"))
     })?;
     log.annotate(&arguments.text).map_err(|error| CommandError::Failed(error.to_string()))
 }
@@ -429,7 +429,7 @@ fn tell(dataset: &Dataset) -> Result<(), CommandError> {
     say!("{}", style::title(&format!("{complete} of {} subjects complete", logs.len())));
     say!("  {presentations} presentations in {root}");
     if complete < logs.len() {
-        say!("  go on with --resume");
+        say!("  continue with --resume");
     } else {
         say!("  flotor analyse {root}");
     }
@@ -447,18 +447,18 @@ fn refused(error: CohortError) -> CommandError {
     }
 }
 
-/// What an apparatus said, with the exit code of a device that faulted where it did. Errors of a device do not know of
-/// experiments: whose trial it was, and which, stands above them.
+/// An error of an apparatus, with the exit code of a device fault where it was one. The note above it names subject and
+/// trial, which an error of the device lacks.
 fn outside(
     cause: &(dyn std::error::Error + Send + Sync + 'static),
-    told: &dyn std::fmt::Display,
+    message: &dyn std::fmt::Display,
 ) -> CommandError {
     let error = match cause.downcast_ref::<RunEnded>() {
         Some(RunEnded(RunEnd::DeviceFault(fault))) => CommandError::DeviceFault(*fault),
         Some(RunEnded(RunEnd::EmergencyStop(source))) => CommandError::EmergencyStop(*source),
         Some(RunEnded(RunEnd::Watchdog(stuck))) => CommandError::Watchdog(*stuck),
-        _ => return CommandError::Failed(told.to_string()),
+        _ => return CommandError::Failed(message.to_string()),
     };
-    flotor_command::note(told);
+    flotor_command::note(message);
     error
 }

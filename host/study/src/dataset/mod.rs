@@ -52,7 +52,7 @@ pub enum DatasetError {
         cause: std::io::Error,
     },
     /// There is no study.
-    #[error("{}: holds no study (no logs under sourcedata/); name the folder given to `study --out`", .0.display())]
+    #[error("{}: no study (no logs under sourcedata/); give the folder of `study --out`", .0.display())]
     NoStudy(PathBuf),
     /// Sittings that do not belong together.
     #[error("{}: differs from {} in {what}; a study has one protocol: use another folder", path.display(), other.display())]
@@ -65,7 +65,7 @@ pub enum DatasetError {
         what: &'static str,
     },
     /// A sitting that was begun otherwise than it is to go on.
-    #[error("{}: was begun with another {what}; continue it as it was begun, or use another folder", path.display())]
+    #[error("{}: has another {what}; resume it with the same one, or use another folder", path.display())]
     Changed {
         /// Its log.
         path: PathBuf,
@@ -81,7 +81,7 @@ pub enum DatasetError {
         root: PathBuf,
     },
     /// A subject who has begun.
-    #[error("{subject} broke off after {trials} trials in {}; add --resume to continue", root.display())]
+    #[error("{subject} is incomplete after {trials} trials in {}; add --resume to continue", root.display())]
     Unfinished {
         /// Who.
         subject: SubjectNumber,

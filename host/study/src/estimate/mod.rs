@@ -2,13 +2,13 @@
 //!
 //! An observer is described by two numbers (`sigma`, `criterion`; see [`TernaryObserver`]), held against the answers by
 //! their likelihood and a weak prior. [`most_likely`] finds the best pair for any trials, however they were placed;
-//! [`Belief`] holds the probability of many pairs, from which the next trial can be chosen as well.
+//! [`Posterior`] holds the probability of many pairs, from which the next trial can be chosen as well.
 
-mod belief;
 mod most_likely;
+mod posterior;
 
-pub use belief::{Belief, BeliefGrid};
 pub use most_likely::most_likely;
+pub use posterior::{Posterior, PosteriorGrid};
 
 use crate::observer::TernaryObserver;
 use crate::trial::Judgement;

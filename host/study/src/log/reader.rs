@@ -35,19 +35,19 @@ pub enum LogProblem {
         cause: std::io::Error,
     },
     /// No log at all.
-    #[error("holds no complete line; nothing was recorded, the file can be removed")]
+    #[error("has no complete line, so nothing was recorded; remove the file")]
     Empty,
     /// A line that is not made like one.
     #[error("is not a line of an event log: {0}")]
     Text(String),
     /// The chain does not continue.
     #[error(
-        "the chain is broken: this line, or one before it, was changed, removed or exchanged since it was written; \
-         use an untouched copy"
+        "the hash chain is broken: this line or an earlier one was changed, removed or exchanged; use an unchanged \
+         copy"
     )]
     Chain,
     /// A revision this program does not know.
-    #[error("has format {found}, this program reads {FORMAT}; use the version that wrote it")]
+    #[error("format {found} is not supported, this version reads {FORMAT}; use the version that wrote it")]
     Format {
         /// The format found.
         found: u32,
@@ -57,8 +57,8 @@ pub enum LogProblem {
     Order(&'static str),
     /// The experiment would have presented something else.
     #[error(
-        "trial {number} is not what this protocol, seed and answers lead to; the program that wrote it differs \
-         from this one"
+        "trial {number} does not follow from protocol, seed and answers; another version of the program wrote \
+         it"
     )]
     Diverges {
         /// Trial, from 1.

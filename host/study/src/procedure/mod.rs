@@ -48,7 +48,7 @@ impl Procedure {
         }
     }
 
-    /// Trials a track takes, about: an adaptive one ends when it has turned often enough (18 with the report's settings
+    /// Trials a track takes, about: an adaptive one ends when it has turned often enough (18 with the thesis's settings
     /// and observers like its subjects).
     #[must_use]
     pub fn trials_about(&self) -> u32 {

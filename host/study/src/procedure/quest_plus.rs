@@ -1,7 +1,7 @@
 //! Trials placed where their answer tells most, in the manner of QUEST+ (Watson 2017), with three answers.
 
 use super::InvalidRule;
-use crate::estimate::{Belief, BeliefGrid, Estimate, Observation, Prior};
+use crate::estimate::{Estimate, Observation, Posterior, PosteriorGrid, Prior};
 use crate::trial::Judgement;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -53,8 +53,8 @@ impl QuestPlusRule {
 #[derive(Clone, Debug)]
 pub struct QuestPlus {
     rule: QuestPlusRule,
-    grid: Arc<BeliefGrid>,
-    belief: Belief,
+    grid: Arc<PosteriorGrid>,
+    posterior: Posterior,
     delta: f64,
     trials: u32,
 }
@@ -64,10 +64,10 @@ impl QuestPlus {
     #[must_use]
     pub fn new(rule: &QuestPlusRule) -> Self {
         let [least, most] = rule.deltas;
-        let grid = Arc::new(BeliefGrid::new(&rule.prior, rule.target, least, most));
-        let belief = Belief::new(&grid);
-        let delta = belief.best_delta(&grid);
-        Self { rule: rule.clone(), grid, belief, delta, trials: 0 }
+        let grid = Arc::new(PosteriorGrid::new(&rule.prior, rule.target, least, most));
+        let posterior = Posterior::new(&grid);
+        let delta = posterior.best_delta(&grid);
+        Self { rule: rule.clone(), grid, posterior, delta, trials: 0 }
     }
 
     /// The difference to present next.
@@ -82,8 +82,8 @@ impl QuestPlus {
             return;
         }
         self.trials += 1;
-        self.belief.answer(&self.grid, &Observation { delta: self.delta, judgement });
-        self.delta = self.belief.best_delta(&self.grid);
+        self.posterior.answer(&self.grid, &Observation { delta: self.delta, judgement });
+        self.delta = self.posterior.best_delta(&self.grid);
     }
 
     /// Whether it is over.
@@ -95,6 +95,6 @@ impl QuestPlus {
     /// What the answers say so far.
     #[must_use]
     pub fn estimate(&self) -> Estimate {
-        self.belief.estimate(&self.grid)
+        self.posterior.estimate(&self.grid)
     }
 }

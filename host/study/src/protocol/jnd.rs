@@ -43,7 +43,7 @@ pub struct JndDemo {
 }
 
 impl Default for JndDemo {
-    /// The report names the kinds, not the numbers: one Weber fraction above what it found, and a fifth of it.
+    /// The thesis names the kinds, not the numbers: one Weber fraction above its result, and a fifth of it.
     fn default() -> Self {
         Self { shown: true, close: 0.20, nearly_equal: 0.03 }
     }

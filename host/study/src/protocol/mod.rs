@@ -172,7 +172,7 @@ pub enum Protocol {
 #[non_exhaustive]
 pub enum ProtocolError {
     /// A list that may not be.
-    #[error("{list} is empty; name at least one value")]
+    #[error("{list} is empty; give at least one value")]
     Empty {
         /// Which.
         list: &'static str,
@@ -192,7 +192,7 @@ pub enum ProtocolError {
     Rule(#[from] InvalidRule),
     /// Stimuli outside the range the model declares.
     #[error(
-        "{stimulus} would be set to {value}, its range is {least} to {most}; change the values or the difference"
+        "stimulus {stimulus} = {value} is outside its range {least} to {most}; change the values or the difference"
     )]
     Range {
         /// What is varied.

@@ -136,8 +136,8 @@ impl Attended {
             }
             (Stage::Ask, Input::Answer { response }) => self.answer(&trial, response, time_s),
             (Stage::Ask, Input::Continue) => Err(InputError::NotNow("an answer is expected")),
-            (_, Input::Answer { .. }) => Err(InputError::NotNow("nothing is asked yet")),
-            (_, Input::Again) => Err(InputError::NotNow("it can be felt again once it is over")),
+            (_, Input::Answer { .. }) => Err(InputError::NotNow("no question is open yet")),
+            (_, Input::Again) => Err(InputError::NotNow("it can be repeated after its end")),
         }
     }
 

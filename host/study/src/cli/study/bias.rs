@@ -1,4 +1,4 @@
-//! `flotor study bias`: what each way to a threshold is worth.
+//! `flotor study bias`: bias and error of each threshold estimator.
 
 use crate::bias::{BiasRow, observer_of, rows};
 use clap::Args;
@@ -14,7 +14,7 @@ const OBSERVERS: [(f64, f64); 7] =
 #[derive(Args)]
 #[command(
     after_help = "thesis: mean of the differences from the 4th to the 8th reversal; map: the most likely \
-    observer, from the same trials;\nquestplus: 18 trials placed where they tell most.\n\n\
+    observer, from the same trials;\nquestplus: 18 trials placed for the most information.\n\n\
     Examples:\n  \
     flotor study bias --runs 1000\n  \
     flotor study bias --tracks 1 --json bias.json"
@@ -23,7 +23,7 @@ pub(super) struct BiasArguments {
     /// Estimates per observer and method
     #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(2..=1_000_000), value_name = "N")]
     runs: u32,
-    /// Tracks that make one estimate
+    /// Tracks per estimate
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100), value_name = "N")]
     tracks: u32,
     /// Seed of the answers

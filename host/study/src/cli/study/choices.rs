@@ -1,4 +1,4 @@
-//! Choices of a protocol as words of the command line.
+//! Choices of a protocol on the command line.
 
 use crate::protocol::{AtBoundary, FirstModality};
 use crate::trial::Modality;
@@ -29,10 +29,10 @@ impl From<FirstChoice> for FirstModality {
 /// `--boundary`
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub(super) enum BoundaryChoice {
-    /// The trial comes again, at most three times
+    /// Repeat the trial, at most three times
     #[default]
     Repeat,
-    /// The answer counts, the hit is noted
+    /// Keep the answer, log the event
     Keep,
 }
 
@@ -48,10 +48,10 @@ impl From<BoundaryChoice> for AtBoundary {
 /// `--procedure`
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub(super) enum ProcedureChoice {
-    /// Kaernbach's rule, as in the report
+    /// Kaernbach's rule, as in the thesis
     #[default]
     WeightedUpDown,
-    /// Trials where they tell most, a fixed number of them
+    /// A fixed number of trials, placed for the most information
     Questplus,
 }
 
@@ -61,19 +61,19 @@ pub(super) enum PresentationOption {
     /// A scene, felt by a simulated hand
     #[default]
     Scene,
-    /// Nothing: answers follow from the numbers alone, for studies of the method
+    /// None: answers follow from the numbers alone, for studies of the method
     None,
 }
 
 /// `--noise`
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(super) enum NoiseOption {
-    /// If this machine can
+    /// On, if this machine can play it
     #[default]
     Auto,
-    /// It must
+    /// On, or an error
     On,
-    /// None
+    /// Off
     Off,
 }
 
@@ -96,12 +96,12 @@ impl ForceWay {
         }
     }
 
-    /// How the simulated hand of the built-in scene goes about it, where not as with a spring.
+    /// Settings of the simulated hand of the built-in scene, where they differ from those for a spring.
     pub(super) fn hand(self) -> &'static [&'static str] {
         match self {
-            // Nothing but the hand holds a weight up: the softest of hands (1.5 N/mm) gives way by 12 mm to the heaviest
-            // that the default bases can lead to (17.5 N), which is all the way there is below home. So it means to be above
-            // home, and lifts the weight a little.
+            // Only the hand supports a weight: the softest hand (1.5 N/mm) yields by 12 mm to the heaviest weight of the
+            // default bases (17.5 N), which is the whole range below home. So its intended position is above home, and it
+            // lifts the weight a little.
             Self::Felt => &["device.hand_centre_mm=4", "device.hand_amplitude_mm=3"],
             Self::Exerted => &[],
         }
@@ -110,7 +110,7 @@ impl ForceWay {
 
 /// `LEAST-MOST`, of which the first is smaller.
 pub(super) fn range(text: &str) -> Result<(f64, f64), String> {
-    let number = |text: &str| text.trim().parse::<f64>().map_err(|_| format!("`{text}` is no number"));
+    let number = |text: &str| text.trim().parse::<f64>().map_err(|_| format!("invalid number `{text}`"));
     let (least, most) = text.split_once('-').ok_or("write LEAST-MOST, like 12-48")?;
     let (least, most) = (number(least)?, number(most)?);
     if least < most {

@@ -1,5 +1,5 @@
-//! `flotor study explore`: no trials, no questions. A spring to feel while its dimensions and its material change under
-//! the hand: what the report names as an immediate use of it (CMU-RI-TR-07-21, section 7).
+//! `flotor study explore`: a spring to feel while its dimensions and its material change, without trials: the immediate
+//! use that the thesis names (CMU-RI-TR-07-21, section 7).
 
 use super::front::lines_of;
 use crate::apparatus::watch::Shared;
@@ -23,7 +23,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
 
-/// Young's and shear modulus of spring wire, MPa: music wire as in the report, the others from Shigley's Mechanical
+/// Young's and shear modulus of spring wire, MPa: music wire as in the thesis, the others from Shigley's Mechanical
 /// Engineering Design, table 10-5.
 const MATERIALS: [(&str, [&str; 2]); 4] = [
     ("music-wire", ["203395", "75842"]),
@@ -33,17 +33,17 @@ const MATERIALS: [(&str, [&str; 2]); 4] = [
 ];
 
 #[derive(Args)]
-#[command(after_help = "While it runs, type\n  \
-    wire_diameter_mm 0.8      a new value; what cannot change in a running model is built anew\n  \
+#[command(after_help = "While it runs, type:\n  \
+    wire_diameter_mm 0.8      a new value; a parameter that is not live creates a new model\n  \
     material phosphor-bronze  music-wire, stainless, phosphor-bronze, inconel\n  \
-    (Enter)                   what the hand felt since the last line\n  \
-    ?                         everything that can be changed\n  \
-    q                         the end\n\n\
+    (Enter)                   stiffness and force at the hand since the last line\n  \
+    ?                         all parameters\n  \
+    q                         end of the session\n\n\
     Examples:\n  \
     flotor study explore\n  \
     flotor study explore --set spring.preset=thesis-3 --set spring.variant=rod")]
 pub(super) struct ExploreArguments {
-    /// Scene that is felt (TOML); without it, a spring of wire on the simulated flotor
+    /// Scene to explore (TOML); without it, a spring of wire on the simulated flotor
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
     /// Set a parameter of a plugin of the scene (repeatable)
@@ -65,13 +65,13 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     watch.lock().meter = Some(KinematicsMeter::default());
     let description = describe(&scene, &options, session.plugins());
     let publication = publish(&Directory::of_this_user(), &scene, &description, &session, &stop);
-    let hint = if publication.is_ok() { "; `flotor view` shows it and has it on sliders" } else { "" };
-    let mut desk =
-        Desk { controls: session.controls(), registry, model, settings: Vec::new(), watch: watch.clone() };
+    let hint = if publication.is_ok() { "; `flotor view` shows it and has sliders" } else { "" };
+    let mut prompt =
+        Prompt { controls: session.controls(), registry, model, settings: Vec::new(), watch: watch.clone() };
     let (switch, mut observers) = (stop.clone(), Watched { observer: watch, publication: publication.ok() });
     let run = std::thread::spawn(move || {
         let outcome = session.run(&mut observers, &switch);
-        observers.end("the exploration has ended");
+        observers.end("the exploration ended");
         outcome
     });
     say!("{}", style::title(&scene.title));
@@ -80,7 +80,7 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     while !(stop.is_stop_asked() || run.is_finished()) {
         match lines.recv_timeout(Duration::from_millis(50)) {
             Ok(line) if line.trim() == "q" => break,
-            Ok(line) => say!("{}", desk.take(line.trim())),
+            Ok(line) => say!("{}", prompt.take(line.trim())),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => break,
         }
@@ -118,17 +118,17 @@ fn scene(arguments: &ExploreArguments) -> Result<Scene, CommandError> {
     Ok(scene)
 }
 
-/// Takes lines, changes the model, tells what is felt.
-struct Desk {
+/// Executes typed lines: changes the model and reports what the hand felt.
+struct Prompt {
     controls: Controls,
     registry: Registry,
     model: String,
-    /// Everything changed so far: a model that is built anew gets it too.
+    /// All changes so far: a new model gets them too.
     settings: Vec<(String, String)>,
     watch: Shared,
 }
 
-impl Desk {
+impl Prompt {
     fn take(&mut self, line: &str) -> String {
         match line.split_whitespace().collect::<Vec<_>>().as_slice() {
             [] => self.felt(),
@@ -138,14 +138,11 @@ impl Desk {
                     self.change(&[("youngs_modulus_mpa", young), ("shear_modulus_mpa", shear)])
                 }
                 None => {
-                    format!(
-                        "  no material `{name}`; there are {}",
-                        MATERIALS.map(|(name, _)| name).join(", ")
-                    )
+                    format!("  unknown material `{name}`; use {}", MATERIALS.map(|(name, _)| name).join(", "))
                 }
             },
             [key, value] => self.change(&[(key, value)]),
-            _ => "  write a parameter and its value, like wire_diameter_mm 0.8".to_owned(),
+            _ => "  type a parameter and its value, such as wire_diameter_mm 0.8".to_owned(),
         }
     }
 
@@ -167,14 +164,14 @@ impl Desk {
         let refused = self.watch.lock().refused.take();
         if let Some(Change { parameter, value, .. }) = refused {
             self.settings.truncate(self.settings.len() - changes.len());
-            return format!("  the model refused {parameter} = {value}: it does not fit its other values");
+            return format!("  the model refused {parameter} = {value}: it contradicts its other values");
         }
         self.watch.lock().meter = Some(KinematicsMeter::default());
         std::thread::sleep(Duration::from_millis(700));
         self.felt()
     }
 
-    /// What is not live is read when a model is made: a new one, with everything that was changed before.
+    /// A model reads fixed parameters at its creation: swaps in a new one, with all earlier changes.
     fn swap(&self, changes: &[(&str, &str)]) -> Result<(), ControlError> {
         let before = self.settings.iter().map(|(key, value)| (key.as_str(), value.as_str()));
         let all: Vec<(&str, &str)> = before.chain(changes.iter().copied()).collect();
@@ -197,7 +194,7 @@ impl Desk {
         schema.iter().map(line).collect::<Vec<_>>().join("\n")
     }
 
-    /// What the hand has felt since this was asked last, in words.
+    /// Stiffness and force at the hand since the last request, as text.
     fn felt(&self) -> String {
         let felt = self.watch.lock().meter.replace(KinematicsMeter::default());
         let words = |felt: StimulusKinematics| {

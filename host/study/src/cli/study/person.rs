@@ -3,8 +3,8 @@
 use super::front::{JsonLines, ScreenOption, Terminal, Window, lines_of};
 use super::{Common, NoiseOption};
 use crate::apparatus::attend::{FrontEnd, attend};
-use crate::apparatus::live::LiveRig;
 use crate::apparatus::noise::WhiteNoise;
+use crate::apparatus::real_time_rig::RealTimeRig;
 use crate::apparatus::rig::TrialFiles;
 use crate::apparatus::{Apparatus, Kinematics};
 use crate::conduct::Ending;
@@ -31,17 +31,17 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         observer: json!("human"),
         apparatus: apparatus.description(),
     };
-    let before = before(common, &dataset, &begin)?;
+    let earlier = earlier(common, &dataset, &begin)?;
     let files =
         (dataset.source_folder(subject).join("motion"), format!("{subject}_task-{}", protocol.task()));
     let stop = stop_on_signals();
     let noise = noise(common)?;
     let kinematics = common.kinematics.unwrap_or(Kinematics::Full);
-    let mut rig = LiveRig::start(apparatus, kinematics, &stop)
+    let mut rig = RealTimeRig::start(apparatus, kinematics, &stop)
         .map_err(|error| super::outside(error.as_ref(), &error))?;
     let mut front = Front::open(common.screen, &rig)?;
 
-    let (sitting, mut log) = match before {
+    let (sitting, mut log) = match earlier {
         None => dataset.begin(begin)?,
         Some(log) => log.resume(&begin.version).map_err(DatasetError::from)?,
     };
@@ -59,7 +59,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     let ending = ending.map_err(|error| super::outside(error.as_ref(), &error))?;
     dataset.write_tables()?;
     if let (Ending::Complete, Front::Window(window)) = (ending, front) {
-        window.wait_closed(&stop); // the last screen says thank you
+        window.wait_closed(&stop); // the last screen thanks the person
     }
     drop((rig, noise));
     match (ending, common.screen) {
@@ -68,7 +68,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         (Ending::Stopped, _) => {
             let presented = attended.presented();
             say!(
-                "  {subject} stopped after {presented} presentations; go on with --subject {} --resume",
+                "  {subject} stopped after {presented} presentations; continue with --subject {} --resume",
                 subject.get()
             );
             Ok(())
@@ -76,7 +76,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     }
 }
 
-/// Where the person sees and answers.
+/// Screen for questions and answers.
 enum Front {
     Window(Window),
     Terminal(Terminal),
@@ -84,11 +84,11 @@ enum Front {
 }
 
 impl Front {
-    fn open(screen: ScreenOption, rig: &LiveRig<'_>) -> Result<Self, CommandError> {
+    fn open(screen: ScreenOption, rig: &RealTimeRig<'_>) -> Result<Self, CommandError> {
         match screen {
             ScreenOption::Viewer => match rig.unseen() {
                 None => Ok(Self::Window(Window::open()?)),
-                Some(why) => Err(CommandError::Failed(format!("no window can watch the run: {why}"))),
+                Some(why) => Err(CommandError::Failed(format!("the viewer cannot show the session: {why}"))),
             },
             ScreenOption::Terminal => Terminal::listen().map(Self::Terminal).map_err(failed),
             ScreenOption::Json => {
@@ -111,7 +111,7 @@ fn failed(error: impl std::fmt::Display) -> CommandError {
     CommandError::Failed(error.to_string())
 }
 
-/// Who was named, or the first number that is free.
+/// The requested number, or the first free one.
 fn subject(common: &Common, dataset: &Dataset, protocol: &Protocol) -> Result<SubjectNumber, CommandError> {
     let is_new = |number: &SubjectNumber| !dataset.log_path(*number, protocol.task()).exists();
     let named = common.subject.and_then(SubjectNumber::new);
@@ -122,8 +122,8 @@ fn subject(common: &Common, dataset: &Dataset, protocol: &Protocol) -> Result<Su
     })
 }
 
-/// The sitting that broke off and is to go on; none where there was none yet.
-fn before(
+/// The incomplete sitting to resume, if any.
+fn earlier(
     common: &Common,
     dataset: &Dataset,
     begin: &Begin,
@@ -144,7 +144,7 @@ fn before(
     }
 }
 
-/// Noise if it was asked for; said plainly where there is none.
+/// Noise if requested; a note or an error if this machine cannot play it.
 fn noise(common: &Common) -> Result<Option<WhiteNoise>, CommandError> {
     if common.noise == NoiseOption::Off {
         return Ok(None);
@@ -152,12 +152,12 @@ fn noise(common: &Common) -> Result<Option<WhiteNoise>, CommandError> {
     let noise = WhiteNoise::start();
     match (&noise, common.noise) {
         (None, NoiseOption::On) => Err(CommandError::Usage(
-            "--noise on: no sound here (tried pw-cat, paplay, aplay); play white noise on headphones by other means \
-             and say --noise off"
+            "--noise on: no sound player works here (tried pw-cat, paplay, aplay); play white noise on headphones by other \
+             means and use --noise off"
                 .to_owned(),
         )),
         (None, _) => {
-            note("no sound here: play white noise on headphones by other means");
+            note("no sound player works here: play white noise on headphones by other means");
             Ok(noise)
         }
         _ => Ok(noise),

@@ -1,5 +1,5 @@
-//! `flotor study spring`: a measured curve of a real spring, fitted, drawn, and made a scene to be judged: the fitted spring,
-//! or the curve itself.
+//! `flotor study spring`: a spring fitted to the measured curve of a real one, its plot, and scenes of the fitted spring or of
+//! the curve itself.
 
 use crate::curve::{CurveError, FITTED, MeasuredCurve, ServedCurve, SpringFit};
 use clap::Args;
@@ -19,19 +19,19 @@ pub(super) struct SpringArguments {
     /// Measured force over length or compression (CSV)
     #[arg(value_name = "FILE.csv")]
     curve: PathBuf,
-    /// Length without load (default: the longest in the table; --scene needs it where the table has compressions)
+    /// Length without load (default: the longest in the table; required for --scene if the table has compressions)
     #[arg(long, value_name = "MM")]
     free_length_mm: Option<f64>,
     /// Diameter of the coil between wire centres, for the scene (default: spring 1 of the thesis)
     #[arg(long, value_name = "MM")]
     coil_diameter_mm: Option<f64>,
-    /// Draw the measurement and the fitted spring
+    /// Plot the measurement and the fitted spring
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     /// Write a scene with the fitted spring, for `study jnd --scene` and `run`
     #[arg(long, value_name = "FILE.toml")]
     scene: Option<PathBuf>,
-    /// Write a scene that serves the measured curve itself, and beside it the table it reads
+    /// Write a scene with the measured curve itself, and the table that it reads
     #[arg(long, value_name = "FILE.toml")]
     curve_scene: Option<PathBuf>,
     /// Write the fit as JSON (- for standard output)
@@ -82,7 +82,7 @@ fn same_file(one: &Path, other: &Path) -> bool {
 fn to_text(fit: &SpringFit, served: &ServedCurve) -> String {
     let [low, high] = fit.stiffness_interval_n_per_m.map(|end| end * 1.0e-3);
     let known = |value: Option<f64>, text: &dyn Fn(f64) -> String| {
-        value.map_or_else(|| "not known (--free-length-mm)".to_owned(), text)
+        value.map_or_else(|| "unknown (--free-length-mm)".to_owned(), text)
     };
     [
         format!("stiffness    {:.4} N/mm  (95 %: {low:.4} to {high:.4})", fit.stiffness_n_per_m * 1.0e-3),

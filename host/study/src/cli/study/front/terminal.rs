@@ -1,4 +1,4 @@
-//! Words on a terminal, answers by keyboard.
+//! Text on a terminal, answers by keyboard.
 
 use super::{MOMENT, lines_of};
 use crate::apparatus::attend::FrontEnd;
@@ -33,7 +33,7 @@ impl FrontEnd for Terminal {
         let line = match self.lines.recv_timeout(MOMENT) {
             Ok(line) => line,
             Err(RecvTimeoutError::Timeout) => return Ok(None),
-            // Nobody types any more.
+            // Standard input is closed.
             Err(RecvTimeoutError::Disconnected) => return Ok(Some(Input::Stop)),
         };
         match typed(&line, screen) {
@@ -46,8 +46,8 @@ impl FrontEnd for Terminal {
     }
 
     fn warn_out_of_range(&mut self) -> Result<(), OutsideError> {
-        // The bell is the beep of the report; it is not the noise that masks it.
-        say!("\x07  {} the handle is out of its range: let it come back", style::warning("!"));
+        // The bell is the beep of the thesis; the masking noise is another signal.
+        say!("\x07  {} the handle is out of its range: move it back", style::warning("!"));
         Ok(())
     }
 
@@ -57,12 +57,12 @@ impl FrontEnd for Terminal {
     }
 }
 
-/// A screen in words.
+/// A screen as text.
 fn words(screen: &Screen) -> String {
     match screen {
         Screen::Ready { reason, next } => {
             format!(
-                "\n{}\n{}\n  Enter goes on, n TEXT takes a note, q stops",
+                "\n{}\n{}\n  Enter continues, n TEXT adds a note, q stops",
                 style::title(pause(*reason, next)),
                 place(next)
             )
@@ -81,12 +81,12 @@ fn words(screen: &Screen) -> String {
                 Quality::Force => ("stronger", "strong"),
             };
             match question {
-                Question::Nothing => "  That was practice: Enter goes on, a feels it again".to_owned(),
+                Question::Nothing => "  That was practice: Enter continues, a repeats it".to_owned(),
                 Question::WhichIsMore => {
-                    format!("  Which was {more}?  1 first, 2 second, 0 I don't know; a feels them again")
+                    format!("  Which was {more}?  1 first, 2 second, 0 I don't know; a repeats them")
                 }
                 Question::HowMuch => {
-                    format!("  How {how}? Any number of your own, larger for {more}; a feels it again")
+                    format!("  How {how}? Any number of your own, larger for {more}; a repeats it")
                 }
             }
         }
@@ -103,16 +103,16 @@ fn place(trial: &TrialView) -> String {
 fn pause(reason: Pause, next: &TrialView) -> &'static str {
     match (reason, next.phase, next.object_is_shown) {
         (Pause::Welcome, ..) => "Ready",
-        (Pause::PhaseChanges, Phase::Main, _) => "Practice is over: from now on it counts",
-        (Pause::PhaseChanges, Phase::Practice, _) => "A few to practise first; they do not count",
+        (Pause::PhaseChanges, Phase::Main, _) => "Practice is over: the next answers count",
+        (Pause::PhaseChanges, Phase::Practice, _) => "Practice: these answers do not count",
         (Pause::ModalityChanges, _, true) => "From now on you see what you feel",
         (Pause::ModalityChanges, _, false) => "From now on you feel only",
         (Pause::Rest, ..) => "Time to rest your hand",
-        (Pause::OutOfRange, ..) => "The handle left its range, so this one comes again",
+        (Pause::OutOfRange, ..) => "The handle left its range: this trial is repeated",
     }
 }
 
-/// What a typed line means.
+/// Meaning of a typed line.
 fn typed(line: &str, screen: &Screen) -> Result<Input, String> {
     let line = line.trim();
     let answer = |response| Ok(Input::Answer { response });
@@ -133,10 +133,10 @@ fn typed(line: &str, screen: &Screen) -> Result<Input, String> {
             _ => Err("type 1, 2 or 0".to_owned()),
         },
         Screen::Ask { question: Question::HowMuch, .. } => line.replace(',', ".").parse().map_or_else(
-            |_| Err(format!("`{line}` is no number")),
+            |_| Err(format!("invalid number `{line}`")),
             |rating| answer(Response::Rating(rating)),
         ),
-        _ => Err("nothing is asked just now; Enter goes on".to_owned()),
+        _ => Err("no question is open; Enter continues".to_owned()),
     }
 }
 

@@ -31,12 +31,12 @@ impl Window {
             |cause| CommandError::file(SeparateProgram::VIEWER.program.as_ref(), "cannot be started", cause);
         let mut viewer = Running(command.spawn().map_err(failed)?);
         let (Some(input), Some(output)) = (viewer.0.stdin.take(), viewer.0.stdout.take()) else {
-            return Err(CommandError::Failed("the viewer has no pipes".to_owned()));
+            return Err(CommandError::Failed("cannot open the pipes of the viewer".to_owned()));
         };
         let heard = lines_of(BufReader::new(output)).map_err(failed)?;
         // Its first word is that it is open; it says none when it cannot be.
         if heard.recv().is_err() {
-            let why = "no window for the sitting: the viewer says why above; --screen terminal needs none";
+            let why = "the viewer opened no window (its message is above); --screen terminal needs none";
             return Err(CommandError::Usage(why.to_owned()));
         }
         Ok(Self { lines: JsonLines::new(heard, input), viewer })

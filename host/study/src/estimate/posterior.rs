@@ -19,7 +19,7 @@ const DELTAS: u32 = 40;
 
 /// What does not change from trial to trial.
 #[derive(Clone, Debug)]
-pub struct BeliefGrid {
+pub struct PosteriorGrid {
     observers: Vec<Member>,
     deltas: Vec<f64>,
 }
@@ -34,7 +34,7 @@ struct Member {
     answers: Vec<([f64; 3], f64)>,
 }
 
-impl BeliefGrid {
+impl PosteriorGrid {
     /// Observers of a prior, and differences between two bounds.
     #[must_use]
     pub fn new(prior: &Prior, target: f64, least_delta: f64, most_delta: f64) -> Self {
@@ -70,21 +70,21 @@ fn entropy(shares: &[f64]) -> f64 {
 
 /// How probable each observer of a grid is.
 #[derive(Clone, Debug)]
-pub struct Belief {
+pub struct Posterior {
     weights: Vec<f64>,
 }
 
-impl Belief {
+impl Posterior {
     /// Before the first answer.
     #[must_use]
-    pub fn new(grid: &BeliefGrid) -> Self {
-        let mut belief = Self { weights: grid.observers.iter().map(|member| member.prior).collect() };
-        belief.normalise();
-        belief
+    pub fn new(grid: &PosteriorGrid) -> Self {
+        let mut posterior = Self { weights: grid.observers.iter().map(|member| member.prior).collect() };
+        posterior.normalise();
+        posterior
     }
 
     /// Takes an answer in, at any difference.
-    pub fn answer(&mut self, grid: &BeliefGrid, observation: &Observation) {
+    pub fn answer(&mut self, grid: &PosteriorGrid, observation: &Observation) {
         for (weight, member) in self.weights.iter_mut().zip(&grid.observers) {
             *weight *= probability(&member.observer, observation);
         }
@@ -98,7 +98,7 @@ impl Belief {
 
     /// The difference whose answer tells most.
     #[must_use]
-    pub fn best_delta(&self, grid: &BeliefGrid) -> f64 {
+    pub fn best_delta(&self, grid: &PosteriorGrid) -> f64 {
         let mut best = (f64::NEG_INFINITY, 0.0);
         for (index, delta) in grid.deltas.iter().copied().enumerate() {
             let mut expected = [0.0; 3];
@@ -119,7 +119,7 @@ impl Belief {
 
     /// The middle of what is held probable: the mean criterion, geometric means of sigma and threshold.
     #[must_use]
-    pub fn estimate(&self, grid: &BeliefGrid) -> Estimate {
+    pub fn estimate(&self, grid: &PosteriorGrid) -> Estimate {
         let mean = |value: fn(&Member) -> f64| {
             let weighted = self.weights.iter().zip(&grid.observers);
             libm::exp(weighted.map(|(weight, member)| weight * libm::log(value(member))).sum::<f64>())
@@ -141,18 +141,18 @@ impl Belief {
 mod tests {
     use super::*;
 
-    /// Answers of one kind only move the belief the way they must, and the next difference with it.
+    /// Answers of one kind only move the posterior the way they must, and the next difference with it.
     #[test]
-    fn belief_follows_the_answers() {
-        let grid = BeliefGrid::new(&Prior::default(), 0.75, 0.01, 0.95);
-        let start = Belief::new(&grid);
+    fn posterior_follows_the_answers() {
+        let grid = PosteriorGrid::new(&Prior::default(), 0.75, 0.01, 0.95);
+        let start = Posterior::new(&grid);
         let after = |judgement| {
-            let mut belief = start.clone();
+            let mut posterior = start.clone();
             for _ in 0..6 {
-                let delta = belief.best_delta(&grid);
-                belief.answer(&grid, &Observation { delta, judgement });
+                let delta = posterior.best_delta(&grid);
+                posterior.answer(&grid, &Observation { delta, judgement });
             }
-            (belief.estimate(&grid).threshold, belief.best_delta(&grid))
+            (posterior.estimate(&grid).threshold, posterior.best_delta(&grid))
         };
         let middle = (start.estimate(&grid).threshold, start.best_delta(&grid));
         let (keen, dull) = (after(Judgement::Correct), after(Judgement::Wrong));

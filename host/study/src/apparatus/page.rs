@@ -49,7 +49,7 @@ fn jnd_page(
     let [vh, h] = [&analysis.weber_detail.vh, &analysis.weber_detail.h];
     let how = match analysis.estimator {
         Estimator::Procedure => "the mean of each track's last differences, or its posterior for QUEST+",
-        Estimator::Map => "the most likely observer in the light of all of a subject's answers at a base",
+        Estimator::Map => "the most likely observer given all answers of a subject at a base",
     };
     page.paragraph(&format!(
         "{} subjects compared {:.1} pairs each. The Weber fraction was {} with vision and haptics and {} with haptics \
@@ -68,7 +68,7 @@ fn jnd_page(
          markers are its mean Weber fraction, 14.2 and 17.2 %, times the base.",
     );
     page.heading("Weber fractions");
-    page.table(&["", "this study", "95 % interval", "report"], |rows| {
+    page.table(&["", "this study", "95 % interval", "thesis"], |rows| {
         for ((name, detail), published) in
             [("Vision and haptics", vh), ("Haptics alone", h)].into_iter().zip(published::WEBER)
         {
@@ -114,7 +114,7 @@ fn jnd_page(
     movements(page, analysis.task, &analysis.kinematics, levels, stimulus);
     if analysis.unfinished_tracks > 0 {
         let count = analysis.unfinished_tracks;
-        page.paragraph(&format!("{count} tracks never came to a threshold and are left out."));
+        page.paragraph(&format!("{count} tracks did not reach a threshold and are omitted."));
     }
 }
 
@@ -122,7 +122,7 @@ fn magnitude_page(page: &mut Page, analysis: &MagnitudeAnalysis, stimulus: &Stim
     let trend = &analysis.trend;
     page.paragraph(&format!(
         "{} subjects gave {} ratings each; {} presentations were repeated because the handle left its range. The mean \
-         rating rises linearly with the stimulus: R² = {:.3} (report: {}), F({}, {}) = {:.2}, {}.",
+         rating rises linearly with the stimulus: R² = {:.3} (thesis: {}), F({}, {}) = {:.2}, {}.",
         analysis.subjects,
         analysis.trials_per_subject,
         analysis.repeated,
@@ -150,8 +150,8 @@ fn movements(
     stimulus: &Stimulus,
 ) {
     let Some(figure) = figures::movements(measures, levels, stimulus) else { return };
-    page.heading("How the stimuli were explored");
-    page.figure(&figure, "Mean speed, acceleration and force along the vertical (report: section 4.3).");
+    page.heading("Exploration of the stimuli");
+    page.figure(&figure, "Mean speed, acceleration and force along the vertical (thesis: section 4.3).");
     for measure in measures {
         page.paragraph(&format!("Effects on {}:", measure.measure));
         page.effects(&measure.anova, published::movement(task, measure.measure));
@@ -226,7 +226,7 @@ impl Page {
     }
 
     fn effects(&mut self, effects: &[Effect], report: &[published::Published]) {
-        self.table(&["Effect", "F", "p", "ε (GG)", "p (GG)", "η² partial", "report"], |rows| {
+        self.table(&["Effect", "F", "p", "ε (GG)", "p (GG)", "η² partial", "thesis"], |rows| {
             for effect in effects {
                 let beside = report.iter().find(|(name, _)| *name == effect.effect);
                 let corrected = |value: fn(&flotor_statistics::anova::Sphericity) -> String| {

@@ -1,5 +1,5 @@
-//! Presents stimuli to a person: the servo loop in real time, on threads of its own. Windows may watch it, and stop it; what
-//! is felt is the experiment's to change.
+//! Presents stimuli to a person: the servo loop in real time, on threads of its own. Clients may show it and stop it; only the
+//! experiment changes the stimuli.
 
 use super::watch::Shared;
 use super::{Apparatus, Kinematics};
@@ -17,11 +17,11 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Longer than the loop takes to take in a change and its observers to say so.
+/// Longer than the time in which the loop applies a change and its observers report it.
 const SETTLE: Duration = Duration::from_millis(20);
 
 /// The apparatus of one person, in real time. Dropped, it ends the run in order.
-pub struct LiveRig<'a> {
+pub struct RealTimeRig<'a> {
     apparatus: &'a Apparatus,
     kinematics: Kinematics,
     files: Option<TrialFiles>,
@@ -32,7 +32,7 @@ pub struct LiveRig<'a> {
     run: Option<JoinHandle<Result<Outcome, RunError>>>,
 }
 
-/// Who watches a study may end it, and nothing else.
+/// A client of a study may end it, and nothing else.
 struct OnlyStop(StopSwitch);
 
 impl Serve for OnlyStop {
@@ -49,7 +49,7 @@ impl Serve for OnlyStop {
     }
 }
 
-impl<'a> LiveRig<'a> {
+impl<'a> RealTimeRig<'a> {
     /// Starts the loop; no object is felt yet.
     ///
     /// # Errors
@@ -197,7 +197,7 @@ impl<'a> LiveRig<'a> {
     }
 }
 
-impl Drop for LiveRig<'_> {
+impl Drop for RealTimeRig<'_> {
     fn drop(&mut self) {
         self.stop.stop();
         if let Some(run) = self.run.take() {

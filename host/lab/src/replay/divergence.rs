@@ -1,5 +1,4 @@
-//! What of a run a recording holds, and why a replay of it may come out differently although nothing was
-//! changed.
+//! The part of a run that a recording holds, and why a replay may differ although nothing was changed.
 
 use flotor_core::Clock;
 use flotor_core::trace::{Events, TickRecord};
@@ -10,7 +9,7 @@ use serde::Serialize;
 /// The ticks of a run that can be compared. One that lost the record of a device cannot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Coverage {
-    /// The first of them: above 0 if the recording began while the run was on. `None` if there is no tick.
+    /// The first of them: above 0 if the recording began after the start of the run. `None` if there is no tick.
     pub begins_at_tick: Option<u64>,
     /// The last of them.
     pub ends_at_tick: Option<u64>,
@@ -21,7 +20,7 @@ pub struct Coverage {
 }
 
 impl Coverage {
-    /// Adds a tick that is there whole; how many are missing just before it.
+    /// Adds a complete tick; returns how many are missing just before it.
     fn add(&mut self, tick: u64) -> u64 {
         let missing = self.ends_at_tick.map_or(0, |last| tick.saturating_sub(last).saturating_sub(1));
         self.miss(missing);
@@ -49,47 +48,46 @@ impl Coverage {
         self.missing_ticks == 0 && !self.is_joined_late()
     }
 
-    /// True if the recording began while the run was on.
+    /// True if the recording began after the start of the run.
     #[must_use]
     pub fn is_joined_late(&self) -> bool {
         self.begins_at_tick.is_some_and(|first| first > 0)
     }
 }
 
-/// Why a wrench does not come out again.
+/// Why a replayed wrench differs from the recorded one.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, thiserror::Error)]
 #[serde(tag = "cause", rename_all = "snake_case")]
 #[non_exhaustive]
-pub enum WhyApart {
-    /// A model had a thread of its own, and nobody knows any more which field the loop had when.
+pub enum DivergenceCause {
+    /// A model ran asynchronously, and the recording lacks the times of its results.
     #[error(
-        "`{model}` was computed asynchronously on the real clock, and when its fields came is not in the recording"
+        "`{model}` ran asynchronously in real time, and the recording lacks the arrival times of its results"
     )]
     FieldOnRealClock {
         /// Its name.
         model: String,
     },
-    /// A model was not asked any more, or could not answer, because of the time it took or the process it was
-    /// in.
+    /// A model was disabled in the run, because of its time budget or its process.
     #[error(
-        "in tick {tick} of the run a model was out, because it had taken too long or its process failed, and here it is \
-         not"
+        "in tick {tick} of the run a model was disabled (time budget or process failure), and in the replay it is not"
     )]
     ModelOut {
         /// The first tick of the run in which that made a difference.
         tick: u64,
     },
-    /// A model was late, and its answer before stood in for the one that was due.
+    /// A model was late, and the loop used its answer before.
     #[error(
-        "in tick {tick} of the run the answer of a model came too late and the one before was used, and here none is late"
+        "in tick {tick} of the run the answer of a model was late and the loop used the one before; in the replay no answer is \
+         late"
     )]
     ModelLate {
         /// The first tick of the run in which that made a difference.
         tick: u64,
     },
-    /// Ticks are missing, and up to them the wrench came out bit for bit.
+    /// Ticks are missing, and up to them the wrench is the same bit for bit.
     #[error(
-        "{ticks} ticks are missing after tick {after_tick}, and with them what models and couplings remember"
+        "{ticks} ticks are missing after tick {after_tick}, so the states of models and couplings are unknown"
     )]
     Gap {
         /// The last tick before them.
@@ -97,21 +95,21 @@ pub enum WhyApart {
         /// How many.
         ticks: u64,
     },
-    /// The recording began while the run was on.
+    /// The recording began after the start of the run.
     #[error(
-        "the recording begins at tick {first_tick} of the run: what had changed by then, and what models and couplings \
-         remembered, is not in it"
+        "the recording begins at tick {first_tick} of the run: it lacks the changes before it and the states of models and \
+         couplings"
     )]
     JoinedLate {
         /// Its first tick.
         first_tick: u64,
     },
-    /// Nothing in the recording tells.
-    #[error("another build of the plugin, or another machine")]
+    /// The recording shows no cause.
+    #[error("probably another build of the plugin, or another machine")]
     OtherBuild,
 }
 
-/// What is gathered on the way, to tell the cause.
+/// Evidence collected during the replay, to find the cause.
 #[derive(Default)]
 pub(super) struct Evidence {
     pub(super) coverage: Coverage,
@@ -119,10 +117,10 @@ pub(super) struct Evidence {
     field: Option<String>,
     /// The last gap: the tick before it, and its ticks.
     gap: Option<(u64, u64)>,
-    /// The first tick in which a model was out in the run alone.
+    /// The first tick in which a model was disabled in the run only.
     out_at: Option<u64>,
     /// Of the first tick that differs.
-    cause: Option<WhyApart>,
+    cause: Option<DivergenceCause>,
 }
 
 impl Evidence {
@@ -144,43 +142,45 @@ impl Evidence {
         }
     }
 
-    /// The tick looked at last differs. What it says of itself tells more than what lies before it: up to it
-    /// all was the same.
+    /// The last observed tick differs. Its own events take precedence over earlier ones: up to it everything was the
+    /// same.
     pub(super) fn differs(&mut self, tick: u64, records: &[TickRecord], ports: &[Port]) {
         if self.cause.is_some() {
             return;
         }
         let first_tick = self.coverage.begins_at_tick.filter(|_| self.coverage.is_joined_late());
         let cause = if let Some(model) = &self.field {
-            WhyApart::FieldOnRealClock { model: model.clone() }
+            DivergenceCause::FieldOnRealClock { model: model.clone() }
         } else if happened_then(Events::MODEL_FAULT, records, ports) {
-            WhyApart::ModelOut { tick }
+            DivergenceCause::ModelOut { tick }
         } else if happened_then(Events::MODEL_OVERRUN, records, ports) {
-            WhyApart::ModelLate { tick }
+            DivergenceCause::ModelLate { tick }
         } else if let Some((after_tick, ticks)) = self.gap {
-            WhyApart::Gap { after_tick, ticks }
+            DivergenceCause::Gap { after_tick, ticks }
         } else if let Some(first_tick) = first_tick {
-            WhyApart::JoinedLate { first_tick }
+            DivergenceCause::JoinedLate { first_tick }
         } else {
-            WhyApart::OtherBuild
+            DivergenceCause::OtherBuild
         };
         self.cause = Some(cause);
     }
 
     /// Why the wrench differs although nothing was changed, if it does.
-    pub(super) fn cause(&self) -> Option<WhyApart> {
+    pub(super) fn cause(&self) -> Option<DivergenceCause> {
         self.cause.clone()
     }
 
-    /// Why it differs not only for what was changed, as far as the run itself tells.
-    pub(super) fn other_cause(&self) -> Option<WhyApart> {
-        let field = self.field.as_ref().map(|model| WhyApart::FieldOnRealClock { model: model.clone() });
-        field.or_else(|| self.out_at.map(|tick| WhyApart::ModelOut { tick })).filter(|_| self.cause.is_some())
+    /// A cause other than the change, as far as the recording shows it.
+    pub(super) fn other_cause(&self) -> Option<DivergenceCause> {
+        let field =
+            self.field.as_ref().map(|model| DivergenceCause::FieldOnRealClock { model: model.clone() });
+        field
+            .or_else(|| self.out_at.map(|tick| DivergenceCause::ModelOut { tick }))
+            .filter(|_| self.cause.is_some())
     }
 }
 
-/// True if something happened in a tick of the run and does not happen now: what a model does for itself
-/// happens again.
+/// True if an event happened in a tick of the run and not in the replay: events of the model itself happen again.
 fn happened_then(event: Events, records: &[TickRecord], ports: &[Port]) -> bool {
     let then_only = |(record, port): (&TickRecord, &Port)| {
         record.events.intersects(event) && !port.events.intersects(event)

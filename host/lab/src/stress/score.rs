@@ -98,9 +98,9 @@ impl StressReport {
 fn rows(measure: &Measure) -> Vec<String> {
     let bound = measure.bound.map_or(String::new(), |bound| format!("<= {}", number(bound, measure.unit)));
     let value = number(measure.value, measure.unit);
-    let Measure { id, name, verdict, remark, pose, .. } = measure;
+    let Measure { id, name, verdict, comment, pose, .. } = measure;
     let mut rows =
-        vec![format!("  {:<5} {id}  {name:<19} {value:>15}  {bound:<18} {remark}", verdict.word())];
+        vec![format!("  {:<5} {id}  {name:<19} {value:>15}  {bound:<18} {comment}", verdict.word())];
     // Where to look is only worth a line when there is something to look at.
     if let (Some(pose), true) = (pose, *verdict != Verdict::Pass) {
         rows.push(format!("            worst at {}", place(pose)));

@@ -1,6 +1,6 @@
 //! The measurements as a table, as CSV, as a picture.
 
-use super::{Apart, DEMANDS, Distance, Losses, Speed, Times};
+use super::{DEMANDS, Distance, Losses, Speed, SplitTimes, Times};
 use flotor_command::tables::{table, to_csv};
 use flotor_plot::{Axis, Figure, Mark, Panel, Series};
 use serde::Serialize;
@@ -12,9 +12,9 @@ pub struct BenchReport {
     pub model: String,
     /// Version of its plugin.
     pub version: String,
-    /// Case that errors are measured against.
+    /// Reference case of the errors.
     pub reference: Option<String>,
-    /// Case whose times those of the others are compared with.
+    /// Baseline case of the times.
     pub yardstick: Option<String>,
     /// Length of the path, ticks of 1 ms.
     pub ticks: usize,
@@ -22,8 +22,8 @@ pub struct BenchReport {
     pub rows: Vec<CaseRow>,
     /// Each case in a whole loop: error of the force at the hand by cause.
     pub losses: Vec<(String, Losses)>,
-    /// Calls of two kinds told apart.
-    pub apart: Vec<ApartRow>,
+    /// Times of calls of two kinds.
+    pub apart: Vec<SplitRow>,
 }
 
 /// A case.
@@ -39,15 +39,15 @@ pub struct CaseRow {
 
 /// Two kinds of calls of a case.
 #[derive(Clone, Debug, Serialize)]
-pub struct ApartRow {
+pub struct SplitRow {
     /// Name of the case.
     pub name: String,
     /// How far below home the middle of its path lies, m.
     pub depth_m: f64,
-    /// The detail that tells them apart.
+    /// The detail that splits them.
     pub detail: String,
     /// The times.
-    pub apart: Apart,
+    pub apart: SplitTimes,
 }
 
 /// Errors of a case in a line of CSV.
@@ -68,7 +68,7 @@ impl BenchReport {
     /// The tables for people.
     #[must_use]
     pub fn to_text(&self) -> String {
-        let tables = [self.times(), self.errors(), self.at_the_hand(), self.told_apart()];
+        let tables = [self.times(), self.errors(), self.at_the_hand(), self.split_calls()];
         tables
             .into_iter()
             .filter(|lines| !lines.is_empty())
@@ -78,9 +78,9 @@ impl BenchReport {
     }
 
     fn times(&self) -> Vec<String> {
-        let yardstick = self.yardstick.as_deref().unwrap_or("itself");
+        let baseline = self.yardstick.as_deref().unwrap_or("itself");
         let title = format!(
-            "  Times of a tick with force and torque, ns; all cases in turns, share is that of {yardstick}, median of turns"
+            "  Times of a tick with force and torque, ns; cases in turns; share: median over all turns, relative to {baseline}"
         );
         let rows = self.rows.iter().map(|CaseRow { name, times: [force, wrench, _], .. }| {
             let [mean, median, p999, cold, force] = [
@@ -123,13 +123,13 @@ impl BenchReport {
         [vec![title.to_owned()], table(head, rows)].concat()
     }
 
-    fn told_apart(&self) -> Vec<String> {
-        let Some(ApartRow { detail, .. }) = self.apart.first() else { return Vec::new() };
+    fn split_calls(&self) -> Vec<String> {
+        let Some(SplitRow { detail, .. }) = self.apart.first() else { return Vec::new() };
         let two = |speed: Option<Speed>| match speed {
             Some(Speed { mean_ns, p99_ns }) => [format!("{mean_ns:.0}"), format!("{p99_ns:.0}")],
             None => ["-".to_owned(), "-".to_owned()],
         };
-        let rows = self.apart.iter().map(|ApartRow { name, depth_m, apart, .. }| {
+        let rows = self.apart.iter().map(|SplitRow { name, depth_m, apart, .. }| {
             let ([mean, p99], [others, others_p99]) = (two(apart.above), two(apart.others));
             let [depth, share] = [depth_m * 1e3, apart.share * 100.0].map(|number| format!("{number:.1}"));
             [name.clone(), depth, share, mean, p99, others, others_p99]
@@ -171,10 +171,10 @@ impl BenchReport {
         let title = format!("Work and precision of {} {}", self.model, self.version);
         let against = match &self.reference {
             Some(reference) => format!("errors against {reference}"),
-            None => "no errors: there is no reference".to_owned(),
+            None => "no errors: no reference".to_owned(),
         };
         let force = Panel::new(Axis::log("Force, rms error", "N"));
-        // What a 1 kHz loop loses with an exact model: precision far below this line never reaches the hand.
+        // Error of a 1 kHz loop with an exact model: precision far below this line does not reach the hand.
         let force = match self.losses.first() {
             Some((_, losses)) => force.mark(Mark::at_y(losses.delay_n, "lost to delay")),
             None => force,

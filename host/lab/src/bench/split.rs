@@ -1,15 +1,15 @@
-//! Calls told apart by a detail of the answer: a model that solves for some poses and evaluates a formula for the
-//! others has two speeds, and a mean of both says nothing about either.
+//! Calls split by a detail of the answer: a model that solves for some poses and evaluates a formula for the others
+//! has two speeds, and a mean of both describes neither.
 
 use super::times::{call_ns, inputs};
-use crate::stopwatch::{overhead_ns, quantile};
+use crate::call_timer::{overhead_ns, quantile};
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Pose};
 use serde::Serialize;
 
 /// Calls for which a detail is above zero, and the others.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Apart {
+pub struct SplitTimes {
     /// Share of the ticks for which it is above zero, 0 to 1.
     pub share: f64,
     /// Those calls; `None` if there are none.
@@ -28,7 +28,12 @@ pub struct Speed {
 }
 
 /// Walks along the path, force and torque demanded; `None` for a model without that detail.
-pub(super) fn apart(model: &mut Model, detail: &str, path: &[Pose], rounds: usize) -> Option<Apart> {
+pub(super) fn split_times(
+    model: &mut Model,
+    detail: &str,
+    path: &[Pose],
+    rounds: usize,
+) -> Option<SplitTimes> {
     let index = model.details().iter().position(|known| known.id() == detail)?;
     let mut details = vec![f64::NAN; model.details().len()];
     let inputs = inputs(path, Demand::WRENCH.limited_to(model.serves()));
@@ -47,7 +52,7 @@ pub(super) fn apart(model: &mut Model, detail: &str, path: &[Pose], rounds: usiz
         Speed::of(&mut times_ns.collect::<Vec<_>>())
     };
     let share = ticks.iter().filter(|(_, is_above)| *is_above).count() as f64 / ticks.len().max(1) as f64;
-    Some(Apart { share, above: of(true), others: of(false) })
+    Some(SplitTimes { share, above: of(true), others: of(false) })
 }
 
 impl Speed {

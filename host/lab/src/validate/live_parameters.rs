@@ -1,4 +1,4 @@
-//! Live parameters: whether a person who moves a slider gets what the slider says.
+//! Live parameters: whether a new value takes effect.
 
 use super::checks::Subject;
 use super::path::{CONFIG, finite, walk};
@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 /// How often a value is set, to tell how long that takes.
 const TIMES: usize = 33;
 
-/// Sets each live parameter to what it is, to the ends of its range and to its default. An instance of its
-/// own for each: what the value of one does to the range of another is the model's business.
+/// Sets each live parameter to its value, to the ends of its range and to its default. Each has its own instance, because
+/// the value of one may change the range of another.
 pub(super) fn live_parameters(subject: &Subject) -> Result<(), String> {
     let is_live = |(_, parameter): &(usize, &Parameter)| parameter.mutability() == Mutability::Live;
     let mut taken = Vec::new();
@@ -27,12 +27,12 @@ pub(super) fn live_parameters(subject: &Subject) -> Result<(), String> {
         }
     }
     if !taken.is_empty() && taken.iter().all(|took| *took == Took::Refused) {
-        return Err("it refuses every live parameter, even the value in force".to_owned());
+        return Err("it refuses every live parameter, even with its present value".to_owned());
     }
     Ok(())
 }
 
-/// What came of a value that was set.
+/// Result of setting a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Took {
     /// It is in force.
@@ -55,23 +55,23 @@ fn set(model: &mut Model, index: usize, parameter: &Parameter, value: f64) -> Re
         CallStatus::Ok => (Took::Taken, value),
         CallStatus::OutOfRange => (Took::Refused, before),
         CallStatus::Unsupported => {
-            return Err(format!("`{id}` is declared live, but there is no `set_parameter` to set it"));
+            return Err(format!("`{id}` is declared live, but the plugin has no `set_parameter`"));
         }
         CallStatus::Panicked => return Err(format!("`{id}` = {value}: it {}", model.last_message())),
-        CallStatus::WrongPhase => return Err(format!("`{id}` = {value} was answered {last:?}")),
+        CallStatus::WrongPhase => return Err(format!("setting `{id}` = {value} returned {last:?}")),
     };
     took.sort_unstable();
     // The one in the middle: what disturbs this process for a moment does not count.
     let usual = took.get(TIMES / 2).copied().unwrap_or_default();
     let limit = Duration::from_nanos(CONFIG.period_ns / 2);
     if usual > limit {
-        return Err(format!("setting `{id}` to {value} takes {usual:?}, of {limit:?}"));
+        return Err(format!("setting `{id}` to {value} takes {usual:?}, above the limit of {limit:?}"));
     }
     // A model need not tell the value in force; if it does, it is the one. A conversion of units may round.
-    let told = model.parameter(index);
-    let is_told = told.is_finite() && expected.is_finite();
-    if is_told && (told - expected).abs() > 1.0e-9 * told.abs().max(expected.abs()) {
-        return Err(format!("`{id}` was set to {value}, answered {last:?}, and is said to be {told}"));
+    let read_back = model.parameter(index);
+    let is_told = read_back.is_finite() && expected.is_finite();
+    if is_told && (read_back - expected).abs() > 1.0e-9 * read_back.abs().max(expected.abs()) {
+        return Err(format!("`{id}` was set to {value} (answer {last:?}), but reads back {read_back}"));
     }
     walk(10).try_for_each(|input| {
         finite(model, &input).map(|_| ()).map_err(|words| format!("with `{id}` = {value}, {words}"))
