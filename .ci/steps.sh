@@ -33,10 +33,10 @@ summary() {
 
 # What the tests use beyond Rust and a C compiler, by Debian's names: valgrind counts instructions, Xvfb and xdotool hold
 # and push a real window, drawn by Mesa; QEMU emulates other processors, and with busybox and cpio a small virtual machine.
-debian_packages="g++ valgrind xvfb xdotool libegl1 libgl1-mesa-dri libxkbcommon-x11-0 qemu-user qemu-system-x86 busybox-static cpio"
+debian_packages="g++ python3 valgrind xvfb xdotool libegl1 libgl1-mesa-dri libxkbcommon-x11-0 qemu-user qemu-system-x86 busybox-static cpio"
 
 # What the tests use has to be here: where a tool is missing they fail instead of being skipped.
-export FLOTOR_REQUIRE=${FLOTOR_REQUIRE-cc,cxx,valgrind,display,qemu}
+export FLOTOR_REQUIRE=${FLOTOR_REQUIRE-cc,cxx,valgrind,display,qemu,python}
 
 # Installs what is missing where that is possible.
 machine() {
@@ -122,13 +122,15 @@ bits() {
     done
 }
 
-# The Python wheel as a user installs it, and its tests against the command: models, runs, sweeps on threads and Dask.
+# The Python wheel as a user installs it, and its tests against the command: models, runs, sweeps on threads and Dask; and the
+# Python of the book, with the package that it names for recordings.
 wheel() {
     python3 -m venv target/venv
-    target/venv/bin/pip install --quiet 'host/python[test]'
+    target/venv/bin/pip install --quiet 'host/python[test]' mcap-protobuf-support
     cargo build --release
     cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target/sweep
     FLOTOR=target/release/flotor FLOTOR_SWEEP=target/sweep/release/flotor-sweep target/venv/bin/python -m pytest -q host/python
+    FLOTOR_TEST_SIZE=full FLOTOR_PYTHON=$PWD/target/venv/bin/python cargo test --release -p flotor-tests --test system book::
 }
 
 # The bridge: messages to the bit, who may do what, what is refused, over loopback; two hosts with a hand each over a bad way.

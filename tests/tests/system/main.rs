@@ -2,6 +2,7 @@
 //! runs by its name: `cargo test -p flotor-tests golden`.
 
 mod architecture;
+mod book;
 mod c_plugins;
 mod calibration;
 mod changes;
