@@ -43,11 +43,11 @@ summary() {
 # What the tests use beyond Rust, each program with Debian's package: valgrind counts instructions, Xvfb and xdotool hold and push a
 # real window, drawn by Mesa; QEMU emulates other processors, and with busybox and cpio a small virtual machine.
 tools="cc:gcc c++:g++ valgrind:valgrind Xvfb:xvfb xdotool:xdotool qemu-x86_64:qemu-user qemu-system-x86_64:qemu-system-x86
-    busybox:busybox-static cpio:cpio"
+    busybox:busybox-static cpio:cpio python3:python3"
 libraries="libegl1 libgl1-mesa-dri libxkbcommon-x11-0"
 
 # What the tests use has to be here: where a tool is missing they fail instead of being skipped.
-export FLOTOR_REQUIRE=${FLOTOR_REQUIRE-cc,cxx,valgrind,display,qemu}
+export FLOTOR_REQUIRE=${FLOTOR_REQUIRE-cc,cxx,valgrind,display,qemu,python}
 
 # What is not here, by package.
 missing_packages() {
@@ -151,14 +151,16 @@ fuzz() {
         --target-dir target/fuzz --bin decode -- -max_total_time=60 -print_final_stats=1
 }
 
-# The Python wheel as a user installs it, and its tests against the command: models, runs, sweeps on threads and Dask.
+# The Python wheel as a user installs it, and its tests against the command: models, runs, sweeps on threads and Dask; and the
+# Python of the book, with the package that it names for recordings.
 wheel() {
     cargo clippy --manifest-path host/python/Cargo.toml --target-dir target --all-targets -- -D warnings
     python3 -m venv target/venv
-    target/venv/bin/pip install --quiet 'host/python[test]'
+    target/venv/bin/pip install --quiet 'host/python[test]' mcap-protobuf-support
     cargo build --release
     cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target/sweep
     FLOTOR=target/release/flotor FLOTOR_SWEEP=target/sweep/release/flotor-sweep target/venv/bin/python -m pytest -q host/python
+    FLOTOR_TEST_SIZE=full FLOTOR_PYTHON=$PWD/target/venv/bin/python cargo test --release -p flotor-tests --test system book::
 }
 
 # The sweeper: a table of every kind.

@@ -23,10 +23,13 @@ pub enum Tool {
     Adapter,
     /// A virtual machine.
     Qemu,
+    /// Python, without any package.
+    Python,
 }
 
 impl Tool {
-    const ALL: [Self; 6] = [Self::Cc, Self::Cxx, Self::Valgrind, Self::Display, Self::Adapter, Self::Qemu];
+    const ALL: [Self; 7] =
+        [Self::Cc, Self::Cxx, Self::Valgrind, Self::Display, Self::Adapter, Self::Qemu, Self::Python];
 
     /// Its word in [`VARIABLE`].
     const fn word(self) -> &'static str {
@@ -37,6 +40,7 @@ impl Tool {
             Self::Display => "display",
             Self::Adapter => "adapter",
             Self::Qemu => "qemu",
+            Self::Python => "python",
         }
     }
 
@@ -48,6 +52,7 @@ impl Tool {
             Self::Display => &["Xvfb", "xdotool"],
             Self::Adapter => &[],
             Self::Qemu => &["qemu-system-x86_64"],
+            Self::Python => &["python3"],
         }
     }
 }

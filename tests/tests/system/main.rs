@@ -3,6 +3,7 @@
 
 mod architecture;
 mod asynchronous_models;
+mod book;
 mod c_plugins;
 mod calibration;
 mod changes;
