@@ -62,7 +62,8 @@ fn of_two_plugins_with_one_id_the_first_wins_and_the_other_is_told() {
     let copy = scratch.file("libspring_copy.so", plugin_bytes("flotor-spring"));
     let ran = Flotor::with(["plugins"]).searching(&[scratch.path()]).run();
     let own = plugin_file("flotor-spring");
-    let hidden = format!("{} has the id `spring` too", own.display());
+    let hidden =
+        format!("{}: not used, because a plugin listed above has the same id `spring`", own.display());
     assert!(ran.stdout.contains(&hidden), "{}", ran.stdout);
     assert!(ran.stdout.contains(&copy.display().to_string()), "{}", ran.stdout);
 }

@@ -279,7 +279,10 @@ fn a_run_of_the_program_is_found_watched_and_stopped() {
     assert!(first.tick.is_multiple_of(10));
     assert_eq!(answer(&mut client, Ask::Stop).refused, None);
     let (_, _, others) = rest(&mut client);
-    assert!(matches!(others.last(), Some(Event::End(end)) if end.words.contains("in order")), "{others:?}");
+    assert!(
+        matches!(others.last(), Some(Event::End(end)) if end.words == "the run was stopped"),
+        "{others:?}"
+    );
     assert_eq!(running.wait().code, Some(exit_code::OK));
     assert_eq!(directory.runs(), [], "it cleans up after itself");
     assert!(matches!(Client::find(&directory), Err(LiveError::NoRun { .. })));
@@ -342,7 +345,7 @@ fn a_recording_of_a_run_that_is_killed_is_whole_so_far_and_ends_as_cut() {
     assert_eq!(running.wait().code, None, "ended by a signal");
     let recorded = recording.wait();
     assert_eq!(recorded.code, Some(exit_code::OTHER), "{recorded:?}");
-    assert!(recorded.stderr.contains("the recording ends before the run has told its end"), "{recorded:?}");
+    assert!(recorded.stderr.contains("connection lost before the end of the run"), "{recorded:?}");
     let ticks = Recording::open(&file).expect("it is finished").count();
     assert!(ticks > 0 && recorded.stdout.contains(&format!("{ticks} ticks")), "{ticks}: {recorded:?}");
 }

@@ -227,7 +227,7 @@ fn fields_of_a_run_in_real_time_cannot_be_repeated() {
     let (told, words) = why(&recording);
     assert_eq!(text(&told, "cause"), "field_on_real_clock");
     assert_eq!(text(&told, "model"), "membrane");
-    assert!(words.contains("`membrane` was computed asynchronously on the real clock"), "{words}");
+    assert!(words.contains("`membrane` ran asynchronously in real time"), "{words}");
 }
 
 #[test]
@@ -244,7 +244,7 @@ fn what_was_changed_is_not_the_only_cause_where_a_model_was_out() {
         "{told}"
     );
     let words = replay(&recording, &set).run().stdout;
-    assert!(words.contains("not only for what was changed: in tick 700"), "{words}");
+    assert!(words.contains("for another reason as well: in tick 700"), "{words}");
 }
 
 // ---------------------------------------------------------------- files
@@ -282,7 +282,7 @@ fn the_file_of_the_run_is_found_or_the_replay_is_refused() {
 
     let gone = replay(&recording, &[]).run();
     assert_eq!(gone.code, Some(exit_code::CONFIGURATION), "{gone:?}");
-    assert!(gone.error().contains("is not there any more"), "{gone:?}");
+    assert!(gone.error().contains("no longer exists"), "{gone:?}");
 
     std::fs::write(&curve, STIFF).expect("scratch can be written");
     let other = replay(&recording, &[]).run();

@@ -116,7 +116,7 @@ fn nothing_is_overwritten() {
     std::fs::write(own.join("notes.txt"), "mine").expect("a scratch folder can be written to");
     let ran = new(scratch.path(), &["model", "jelly"]);
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION));
-    assert!(ran.error().contains("jelly exists already"), "{ran:?}");
+    assert!(ran.error().contains("jelly exists; move it or choose another name"), "{ran:?}");
     let left: Vec<_> = std::fs::read_dir(&own).expect("it is still there").collect();
     assert_eq!(left.len(), 1);
 }
@@ -125,13 +125,13 @@ fn nothing_is_overwritten() {
 fn a_name_that_cannot_be_costs_one_line_with_one_that_can() {
     let scratch = Scratch::default();
     for (name, says) in [
-        ("SoftWall", "`soft-wall` would do"),
-        ("../wall", "`wall` would do"),
-        ("fn", "means something else to the compiler"),
-        ("test", "means something else to cargo"),
-        ("flotor-hal", "Flotor, whose crates begin with it"),
-        ("wrench", "would have a type `Wrench`"),
-        ("spring", "is the id of"),
+        ("SoftWall", "use `soft-wall`"),
+        ("../wall", "use `wall`"),
+        ("fn", "reserved by the compiler"),
+        ("test", "reserved by cargo"),
+        ("flotor-hal", "reserved by Flotor, for its own crates"),
+        ("wrench", "clashes with a type of the contract"),
+        ("spring", "is already the id of"),
     ] {
         let ran = new(scratch.path(), &["model", name]);
         assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{name}: {ran:?}");

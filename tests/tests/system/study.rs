@@ -167,7 +167,7 @@ fn bad_input_is_refused_before_the_first_trial() {
         (&["jnd", "--stimulus", "sprin.gamma_n"], "sprin"),
         (&["jnd", "--stimulus", "gamma"], "MODEL.PARAMETER"),
         (&["jnd", "--scene", other, "--stimulus", "spin.gamma_n"], "has no model `spin`"),
-        (&["jnd", "--bases", "9000"], "its range is"),
+        (&["jnd", "--bases", "9000"], "its range 0.01 to 10000"),
         (&["magnitude", "--range", "48-12"], "empty"),
         (&["magnitude", "--stimulus", "spring.alpha_n_mm2"], "mode"),
         (&["jnd", "--bases", "0"], "above 0"),
@@ -338,7 +338,7 @@ fn an_edited_log_is_refused_with_line_and_reason() {
     let resumed: Vec<&str> = arguments.iter().copied().chain(["--resume"]).collect();
     for ran in [analysed, study(&resumed, &out).run()] {
         assert_eq!(ran.code, Some(exit_code::CONFIGURATION));
-        assert!(ran.error().contains("_log.jsonl:5: the chain is broken"), "{ran:?}");
+        assert!(ran.error().contains("_log.jsonl:5: the hash chain is broken"), "{ran:?}");
     }
 }
 

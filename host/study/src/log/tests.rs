@@ -108,7 +108,7 @@ fn a_line_removed_or_exchanged_is_found() {
     removed.remove(4);
     let error = refused(removed);
     assert!(error.line == 5 && matches!(error.problem, LogProblem::Chain), "{error}");
-    assert!(error.to_string().contains("log.jsonl:5: the chain is broken"), "{error}");
+    assert!(error.to_string().contains("log.jsonl:5: the hash chain is broken"), "{error}");
     let mut exchanged = lines.clone();
     exchanged.swap(3, 4);
     assert_eq!(refused(exchanged).line, 4);
