@@ -1,7 +1,7 @@
 //! Keys and access control: one command makes a network of which every member is known and may do what it may.
 
 use crate::keys::{Name, ROOT};
-use crate::wish::Right;
+use crate::request::Right;
 use rcgen::{
     BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair,
     KeyUsagePurpose,

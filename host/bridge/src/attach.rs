@@ -2,7 +2,7 @@
 
 use crate::link::LinkError;
 use crate::remote::{Errand, Remote, Told};
-use crate::wish::Wish;
+use crate::request::Request;
 use flotor_live::{Ask, Directory, Publication, PublishError, Serve};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -29,7 +29,7 @@ impl Serve for Errand {
         if matches!(ask, Ask::Swap { .. }) {
             return Err("a model is swapped on the host's own machine, where its plugin's file is".to_owned());
         }
-        Wish::of_ask(ask).map_or(Ok(()), |wish| self.run(wish))
+        Request::of_ask(ask).map_or(Ok(()), |request| self.run(request))
     }
 }
 

@@ -12,10 +12,10 @@
 //! | `flotor/NAME/end` | JSON [`flotor_live::End`] | published |
 //! | `flotor/NAME/news/COUPLING` | a [`flotor_core::peer::Dispatch`]: what this end of a coupling tells the other | published, best effort |
 //! | `flotor/NAME/couple/COUPLING` | the same, of the other end | put by who holds it |
-//! | `flotor/NAME/ask/...` | JSON [`crate::wish::Letter`] | a request, answered |
+//! | `flotor/NAME/ask/...` | JSON [`crate::request::NumberedRequest`] | a request, answered |
 //!
 //! The messages are those of a recording. What may be asked for is one key for each right, so that Zenoh's access control
-//! decides who has it: see [`crate::wish::Wish::key`].
+//! decides who has it: see [`crate::request::Request::key`].
 
 use std::fmt;
 

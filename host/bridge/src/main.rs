@@ -9,7 +9,7 @@ use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkError, LinkOptions, open};
 use flotor_bridge::remote::{Remote, bridges};
 use flotor_bridge::serve::{Launcher, Service, serve};
-use flotor_bridge::wish::{Right, Wish};
+use flotor_bridge::request::{Right, Request};
 use flotor_live::{Directory, SetValue};
 use std::error::Error;
 use std::path::PathBuf;
@@ -69,7 +69,7 @@ enum Command {
         /// The bridge
         name: Name,
         #[command(subcommand)]
-        wish: WishArgument,
+        request: RequestArgument,
     },
     /// List the bridges that can be seen
     List,
@@ -104,7 +104,7 @@ enum Allow {
 }
 
 #[derive(Subcommand)]
-enum WishArgument {
+enum RequestArgument {
     /// No force at once; the run is over
     EmergencyStop,
     /// An orderly end: force fades out
@@ -209,13 +209,13 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
                 );
             }
         }
-        Command::Ask { name, wish } => {
+        Command::Ask { name, request } => {
             let remote = Remote::listen(&open(&link, End::Visiting)?, &name)?;
-            // Most wishes are for the run that is on; the bridge knows without us when none is.
+            // Most requests are for the run that is on; the bridge knows without us when none is.
             let status =
                 remote.status()?.ok_or(format!("zenoh/{name} cannot be seen; `flotor bridge list`"))?;
             remote.mean(status.run);
-            remote.errand().run(wish.into())?;
+            remote.errand().run(request.into())?;
         }
         Command::List => {
             let session = open(&link, End::Visiting)?;
@@ -257,15 +257,15 @@ fn service(arguments: ServeArguments) -> Result<Service, Box<dyn Error>> {
     Ok(Service { name: name.unwrap_or_else(Name::of_this_machine), allow, every, launcher })
 }
 
-impl From<WishArgument> for Wish {
-    fn from(argument: WishArgument) -> Self {
+impl From<RequestArgument> for Request {
+    fn from(argument: RequestArgument) -> Self {
         match argument {
-            WishArgument::EmergencyStop => Wish::EmergencyStop,
-            WishArgument::Stop => Wish::Stop,
-            WishArgument::Set { values } => Wish::Set { values },
-            WishArgument::Weight { model, weight } => Wish::Weight { model, weight },
-            WishArgument::Start => Wish::Start,
-            WishArgument::Release => Wish::Release,
+            RequestArgument::EmergencyStop => Request::EmergencyStop,
+            RequestArgument::Stop => Request::Stop,
+            RequestArgument::Set { values } => Request::Set { values },
+            RequestArgument::Weight { model, weight } => Request::Weight { model, weight },
+            RequestArgument::Start => Request::Start,
+            RequestArgument::Release => Request::Release,
         }
     }
 }

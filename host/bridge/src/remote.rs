@@ -3,7 +3,7 @@
 use crate::keys::Name;
 use crate::link::LinkError;
 use crate::status::Status;
-use crate::wish::{Letter, Wish};
+use crate::request::{NumberedRequest, Request};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_live::{Answer, End, Greeting};
@@ -167,10 +167,10 @@ impl Errand {
     ///
     /// # Errors
     /// In words, for people.
-    pub fn run(&self, wish: Wish) -> Result<(), String> {
-        let key = self.name.key(wish.key());
+    pub fn run(&self, request: Request) -> Result<(), String> {
+        let key = self.name.key(request.key());
         let answer =
-            self.send(&key, wish).map_err(|error| error.to_string()).map(|answers| first(&answers))?;
+            self.send(&key, request).map_err(|error| error.to_string()).map(|answers| first(&answers))?;
         let answer = answer.ok_or(
             "nobody answers: the bridge is gone, or does not take this request, or not from this peer; \
              `flotor bridge serve --allow` and the network's access control say who may",
@@ -179,14 +179,14 @@ impl Errand {
         answer.refused.map_or(Ok(()), Err)
     }
 
-    fn send(&self, key: &str, wish: Wish) -> Result<Answers, LinkError> {
+    fn send(&self, key: &str, request: Request) -> Result<Answers, LinkError> {
         let mut number = self.number.lock().unwrap_or_else(PoisonError::into_inner);
         *number += 1;
-        let letter = Letter {
+        let letter = NumberedRequest {
             peer: self.session.zid().to_string(),
             number: *number,
             run: u32::try_from(self.run.load(Ordering::Relaxed)).unwrap_or(0),
-            wish,
+            request,
         };
         Ok(self.session.get(key).timeout(ANSWER_WAIT).payload(letter.to_bytes()).wait()?)
     }

@@ -1,7 +1,7 @@
 //! How a bridge is doing: what is lost or refused is shown.
 
 use crate::couple::Carried;
-use crate::wish::Refusal;
+use crate::request::Refusal;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -7,7 +7,7 @@ use flotor_bridge::access::{AccessError, Members, write_keys};
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkOptions, open};
 use flotor_bridge::remote::Remote;
-use flotor_bridge::wish::{Right, Wish};
+use flotor_bridge::request::{Right, Request};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -45,7 +45,7 @@ fn rights_are_what_the_keys_say() {
     let link = LinkOptions { config: Some(folder.path().join("bridge.json5")), ..LinkOptions::default() };
     let bridge = Bridge::start_with(&host.directory, Right::Own, endpoint.clone(), link);
 
-    let weight = || Wish::Weight { model: "spring".to_owned(), weight: 0.5 };
+    let weight = || Request::Weight { model: "spring".to_owned(), weight: 0.5 };
     for (who, may_operate, may_own) in [("alan", false, false), ("grace", true, false), ("ada", true, true)] {
         let remote = visit(folder.path(), who, &endpoint, &bridge.name);
         let (greeting, _) = remote.wait_for_run(&NEVER).unwrap().expect("every member may see");
@@ -54,8 +54,8 @@ fn rights_are_what_the_keys_say() {
         let before = host.asked.0.lock().unwrap().len();
         assert_eq!(errand.run(weight()).is_ok(), may_operate, "{who}");
         assert_eq!(host.asked.0.lock().unwrap().len() > before, may_operate, "{who}");
-        assert_eq!(errand.run(Wish::EmergencyStop), Ok(()), "{who}: anybody presses it");
-        assert_eq!(errand.run(Wish::Release).is_ok(), may_own, "{who}");
+        assert_eq!(errand.run(Request::EmergencyStop), Ok(()), "{who}: anybody presses it");
+        assert_eq!(errand.run(Request::Release).is_ok(), may_own, "{who}");
     }
 }
 
@@ -77,7 +77,7 @@ fn who_is_no_member_is_not_let_in() {
             Ok(session) => {
                 let remote = Remote::listen(&session, &bridge.name).unwrap();
                 assert_eq!(remote.status().unwrap(), None, "nothing is told");
-                assert!(remote.errand().run(Wish::EmergencyStop).is_err());
+                assert!(remote.errand().run(Request::EmergencyStop).is_err());
             }
         }
     }

@@ -9,7 +9,7 @@ use common::{free_port, is_full_size, program, wait_until};
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkOptions, open};
 use flotor_bridge::remote::{Remote, Told};
-use flotor_bridge::wish::{Letter, MOST_LETTER_BYTES, Refusal, Wish};
+use flotor_bridge::request::{NumberedRequest, MAX_REQUEST_BYTES, Refusal, Request};
 use flotor_live::SetValue;
 use rustix::process::Signal;
 use serde_json::Value;
@@ -182,18 +182,18 @@ fn flood(session: &Session, run: u32, is_over: &AtomicBool) {
     const BURST: usize = 32;
     let key = |what: &str| Name::new(NAME).unwrap().key(what);
     let [plugin, parameter, value] = ["spring", "no_such_parameter", "1"].map(str::to_owned);
-    let wish = Wish::Set { values: vec![SetValue { plugin, parameter, value }] };
-    let letter = |number: u64, wish: &Wish| {
-        Letter { peer: "flood".to_owned(), number, run, wish: wish.clone() }.to_bytes()
+    let request = Request::Set { values: vec![SetValue { plugin, parameter, value }] };
+    let letter = |number: u64, request: &Request| {
+        NumberedRequest { peer: "flood".to_owned(), number, run, request: request.clone() }.to_bytes()
     };
-    let huge = vec![b'x'; 4 * MOST_LETTER_BYTES];
+    let huge = vec![b'x'; 4 * MAX_REQUEST_BYTES];
     for number in 1.. {
         if is_over.load(Ordering::Relaxed) {
             return;
         }
         for _ in 0..BURST {
             // The same number again: a replay.
-            for payload in [letter(number, &wish), b"{".to_vec(), vec![0xff; 300]] {
+            for payload in [letter(number, &request), b"{".to_vec(), vec![0xff; 300]] {
                 let asked = session.get(key("ask/set")).payload(payload).timeout(FORGOTTEN);
                 asked.callback(|_| {}).wait().unwrap();
             }

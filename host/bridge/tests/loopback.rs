@@ -8,7 +8,7 @@ use flotor_bridge::keep::{RecordingEnd, keep};
 use flotor_bridge::link::{End, LinkOptions, open};
 use flotor_bridge::remote::{Remote, Told, bridges};
 use flotor_bridge::status::State;
-use flotor_bridge::wish::{Letter, MOST_LETTER_BYTES, Refusal, Right, Wish};
+use flotor_bridge::request::{NumberedRequest, MAX_REQUEST_BYTES, Refusal, Right, Request};
 use flotor_live::{Ask, Client, Directory, Event, SetValue};
 use flotor_record::Recording;
 use flotor_sync::Words;
@@ -37,9 +37,9 @@ fn listening(bridge: &Bridge, host: &FakeHost) -> Remote {
     remote
 }
 
-fn set(parameter: &str) -> Wish {
+fn set(parameter: &str) -> Request {
     let [plugin, parameter, value] = ["spring", parameter, "20"].map(str::to_owned);
-    Wish::Set { values: vec![SetValue { plugin, parameter, value }] }
+    Request::Set { values: vec![SetValue { plugin, parameter, value }] }
 }
 
 #[test]
@@ -136,11 +136,11 @@ fn requests_reach_the_host_and_its_words_come_back() {
     let errand = remote.errand();
     assert_eq!(errand.run(set("gamma_n")), Ok(()));
     assert_eq!(errand.run(set("gamma")), Err("no parameter `gamma`; did you mean `gamma_n`?".to_owned()));
-    assert_eq!(errand.run(Wish::EmergencyStop), Ok(()));
+    assert_eq!(errand.run(Request::EmergencyStop), Ok(()));
     let asked = host.asked.0.lock().unwrap().clone();
     assert!(matches!(asked.as_slice(), [Ask::Set { .. }, Ask::Set { .. }, Ask::EmergencyStop]), "{asked:?}");
     // Starting is the owner's, and this bridge does not let anybody.
-    let refused = errand.run(Wish::Start).unwrap_err();
+    let refused = errand.run(Request::Start).unwrap_err();
     assert!(refused.contains("nobody answers"), "{refused}");
 }
 
@@ -152,10 +152,10 @@ fn an_emergency_stop_stays_until_its_owner_releases_it() {
     remote.wait_for_run(&NEVER).unwrap();
     let errand = remote.errand();
     let state = || remote.status().unwrap().expect("the bridge is there").state;
-    assert_eq!(errand.run(Wish::EmergencyStop), Ok(()));
+    assert_eq!(errand.run(Request::EmergencyStop), Ok(()));
     assert_eq!(state(), State::EmergencyStopped);
-    assert!(errand.run(Wish::Start).unwrap_err().contains("its owner releases it first"));
-    assert_eq!(errand.run(Wish::Release), Ok(()));
+    assert!(errand.run(Request::Start).unwrap_err().contains("its owner releases it first"));
+    assert_eq!(errand.run(Request::Release), Ok(()));
     assert_eq!(state(), State::Running);
 }
 
@@ -173,21 +173,21 @@ fn malformed_long_stale_and_replayed_requests_are_refused_and_counted() {
         let answer: flotor_live::Answer = serde_json::from_slice(&answer.payload().to_bytes()).unwrap();
         answer.refused
     };
-    let letter = |number, run, wish| {
-        serde_json::to_vec(&Letter { peer: "tester".to_owned(), number, run, wish }).unwrap()
+    let letter = |number, run, request| {
+        serde_json::to_vec(&NumberedRequest { peer: "tester".to_owned(), number, run, request }).unwrap()
     };
-    let good = letter(5, greeting.process, Wish::Stop);
+    let good = letter(5, greeting.process, Request::Stop);
     assert_eq!(ask("ask/stop", good.clone()), None);
     let before = host.asked.0.lock().unwrap().len();
     assert!(ask("ask/stop", good).is_some(), "replayed");
-    assert!(ask("ask/stop", letter(4, greeting.process, Wish::Stop)).is_some(), "older");
-    assert!(ask("ask/stop", letter(6, greeting.process + 1, Wish::Stop)).is_some(), "of another run");
+    assert!(ask("ask/stop", letter(4, greeting.process, Request::Stop)).is_some(), "older");
+    assert!(ask("ask/stop", letter(6, greeting.process + 1, Request::Stop)).is_some(), "of another run");
     assert!(
         ask("ask/emergency-stop", letter(7, greeting.process, set("gamma_n"))).is_some(),
         "through the wrong door"
     );
     assert!(ask("ask/set", b"{".to_vec()).is_some(), "no letter");
-    assert!(ask("ask/set", vec![b'x'; 4 * MOST_LETTER_BYTES]).is_some(), "long");
+    assert!(ask("ask/set", vec![b'x'; 4 * MAX_REQUEST_BYTES]).is_some(), "long");
     assert_eq!(host.asked.0.lock().unwrap().len(), before, "the host heard of none of them");
     let refused = remote.status().unwrap().expect("the bridge is there").refused;
     let expected =
@@ -204,14 +204,14 @@ fn a_flood_of_requests_is_cut_short_and_the_emergency_stop_gets_past() {
     std::thread::scope(|scope| {
         for _ in 0..64 {
             let errand = remote.errand();
-            let wish = Wish::Weight { model: SLOW.to_owned(), weight: 0.5 };
-            scope.spawn(move || errand.run(wish));
+            let request = Request::Weight { model: SLOW.to_owned(), weight: 0.5 };
+            scope.spawn(move || errand.run(request));
         }
         wait_until("requests are refused", || {
             let status = remote.status().unwrap().expect("the bridge is there");
             status.refused.contains_key(&Refusal::Busy)
         });
-        assert_eq!(remote.errand().run(Wish::EmergencyStop), Ok(()));
+        assert_eq!(remote.errand().run(Request::EmergencyStop), Ok(()));
     });
     let asked = host.asked.0.lock().unwrap();
     assert!(asked.contains(&Ask::EmergencyStop) && asked.len() < 64, "{} requests", asked.len());

@@ -12,7 +12,7 @@ use flotor_bridge::couple::couple;
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkOptions, open};
 use flotor_bridge::serve::{Service, serve};
-use flotor_bridge::wish::Right;
+use flotor_bridge::request::Right;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_live::Directory;
 use flotor_record::Recording;

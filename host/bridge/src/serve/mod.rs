@@ -2,13 +2,13 @@
 //!
 //! ```text
 //!  host -> live socket -> relay -> tf, tick, change, end                    (only while somebody subscribes)
-//!  host <- live socket <- desk  <- ask/...   by letters that pass the gate  (only keys the bridge was told to open)
+//!  host <- live socket <- handler  <- ask/...   by letters that pass the gate  (only keys the bridge was told to open)
 //! ```
 //!
 //! The bridge is one of the host's watchers, in a process of its own: whatever happens to it, the host drops what the bridge does
 //! not take, counts it, and goes on.
 
-mod desk;
+mod handler;
 mod launcher;
 mod station;
 
@@ -17,8 +17,8 @@ pub use launcher::Launcher;
 use crate::couple::{CoupleError, Couplers, Side};
 use crate::keys::Name;
 use crate::link::LinkError;
-use crate::wish::Right;
-use desk::Desk;
+use crate::request::Right;
+use handler::RequestHandler;
 use flotor_live::{Ask, Client, Directory, Event, LiveError};
 use station::Station;
 use std::sync::Arc;
@@ -56,14 +56,14 @@ pub fn serve(
     tell: &mut dyn FnMut(&str),
 ) -> Result<(), CoupleError> {
     let Service { name, allow, every, launcher } = service;
-    let desk = Arc::new(Desk::new(name.clone(), launcher));
+    let handler = Arc::new(RequestHandler::new(name.clone(), launcher));
     let station = Station::declare(session, &name)?;
-    let _counter = desk::open(session, &desk, allow)?;
+    let _counter = handler::open(session, &handler, allow)?;
     // Last of all: who sees it can ask.
     let _alive = session.liveliness().declare_token(name.key("alive")).wait_now()?;
     let side = if allow >= Right::Operate { Side::Serving } else { Side::ServingDeaf };
     let couplers = Couplers::new(session, directory, &name, side);
-    let mut relay = Relay { station, desk, couplers, every, stop };
+    let mut relay = Relay { station, handler, couplers, every, stop };
     let mut told = String::new();
     while !stop.load(Ordering::Relaxed) {
         match Client::find(directory) {
@@ -95,7 +95,7 @@ pub fn serve(
 /// What it takes to carry runs.
 struct Relay<'s> {
     station: Station,
-    desk: Arc<Desk>,
+    handler: Arc<RequestHandler>,
     couplers: Couplers,
     every: u32,
     stop: &'s AtomicBool,
@@ -104,7 +104,7 @@ struct Relay<'s> {
 impl Relay<'_> {
     /// Carries one run.
     fn carry(&mut self, mut client: Client, tell: &mut dyn FnMut(&str)) -> Result<(), CoupleError> {
-        self.desk.begin(&client);
+        self.handler.begin(&client);
         let asker = client.asker();
         let mut is_watching = false;
         let mut checked: Option<Instant> = None;
@@ -120,40 +120,40 @@ impl Relay<'_> {
                 }
                 self.report(tell)?;
             }
-            let Self { station, desk, .. } = self;
+            let Self { station, handler, .. } = self;
             match client.next(CHECK_PERIOD) {
                 Ok(None) => {}
                 Ok(Some(Event::Ticks { records, dropped })) => {
                     for record in &records {
-                        station.tick(record, desk.publishing())?;
+                        station.tick(record, handler.publishing())?;
                     }
                     // A full queue keeps what is in it: what it dropped came after these.
-                    desk.dropped(dropped);
+                    handler.dropped(dropped);
                 }
                 Ok(Some(Event::Change(change))) => {
-                    desk.keep(&change);
+                    handler.keep(&change);
                     station.change(&change)?;
                 }
-                Ok(Some(Event::Answer(answer))) => desk.answered(answer),
+                Ok(Some(Event::Answer(answer))) => handler.answered(answer),
                 Ok(Some(Event::End(end))) => {
-                    station.end(&end, desk.due())?;
+                    station.end(&end, handler.due())?;
                     break;
                 }
                 Err(error) => {
-                    station.end(&flotor_live::End { words: error.to_string() }, desk.due())?;
+                    station.end(&flotor_live::End { words: error.to_string() }, handler.due())?;
                     break;
                 }
             }
         }
-        self.desk.end();
+        self.handler.end();
         self.report(tell)
     }
 
     /// Looks after the couplings, and says how the bridge is doing.
     fn report(&mut self, tell: &mut dyn FnMut(&str)) -> Result<(), CoupleError> {
         self.couplers.follow(tell)?;
-        self.desk.carried(self.couplers.carried());
-        Ok(self.desk.report(&self.station)?)
+        self.handler.carried(self.couplers.carried());
+        Ok(self.handler.report(&self.station)?)
     }
 }
 

@@ -11,7 +11,7 @@ use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkOptions, open};
 use flotor_bridge::remote::Remote;
 use flotor_bridge::serve::{Service, serve};
-use flotor_bridge::wish::Right;
+use flotor_bridge::request::Right;
 use flotor_core::Clock;
 use flotor_core::trace::{Events, RECORD_WORDS, TickRecord};
 use flotor_live::{Ask, Directory, Greeting, PROTOCOL, Publication, Serve, WrenchLimits};

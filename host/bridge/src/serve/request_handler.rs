@@ -6,7 +6,7 @@ use crate::couple::Carried;
 use crate::keys::Name;
 use crate::link::LinkError;
 use crate::status::{State, Status};
-use crate::wish::{Gate, MOST_LETTER_BYTES, Refusal, Right, Wish};
+use crate::request::{Gate, MAX_REQUEST_BYTES, Refusal, Right, Request};
 use flotor_live::{Answer, Asker, ChangeMessage, Client, Greeting};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -22,7 +22,7 @@ const MOST_OPEN: usize = 32;
 const STATUS_PERIOD: Duration = Duration::from_secs(1);
 
 /// Everything a bridge knows.
-pub(super) struct Desk {
+pub(super) struct RequestHandler {
     name: Name,
     inside: Mutex<Inside>,
 }
@@ -47,23 +47,23 @@ struct Run {
     open: BTreeMap<u64, (Query, Instant)>,
 }
 
-/// Opens the desk: for reading always, for requests as far as `allow` goes.
+/// Opens the handler: for reading always, for requests as far as `allow` goes.
 pub(super) fn open(
     session: &Session,
-    desk: &Arc<Desk>,
+    handler: &Arc<RequestHandler>,
     allow: Right,
 ) -> Result<Vec<Queryable<()>>, LinkError> {
     let mut counter = Vec::new();
     for (key, read) in [
-        ("status", Desk::status as fn(&Desk) -> Option<Vec<u8>>),
-        ("greeting", Desk::greeting),
-        ("run", Desk::description),
+        ("status", RequestHandler::status as fn(&RequestHandler) -> Option<Vec<u8>>),
+        ("greeting", RequestHandler::greeting),
+        ("run", RequestHandler::description),
     ] {
-        let key = desk.name.key(key);
-        let (desk, name) = (Arc::clone(desk), key.clone());
+        let key = handler.name.key(key);
+        let (handler, name) = (Arc::clone(handler), key.clone());
         let answer = move |query: Query| {
             // Without a run there is nothing to say, which is an answer, too.
-            if let Some(bytes) = read(&desk) {
+            if let Some(bytes) = read(&handler) {
                 let _ = query.reply(&name, bytes).wait_now();
             }
         };
@@ -71,16 +71,16 @@ pub(super) fn open(
     }
     for right in Right::ALL.into_iter().filter(|right| *right <= allow) {
         for key in right.keys() {
-            let key = desk.name.key(key);
-            let (desk, name) = (Arc::clone(desk), key.clone());
-            let receive = move |query: Query| desk.receive(&name, query);
+            let key = handler.name.key(key);
+            let (handler, name) = (Arc::clone(handler), key.clone());
+            let receive = move |query: Query| handler.receive(&name, query);
             counter.push(session.declare_queryable(key).callback(receive).wait_now()?);
         }
     }
     Ok(counter)
 }
 
-impl Desk {
+impl RequestHandler {
     pub(super) fn new(name: Name, launcher: Option<Launcher>) -> Self {
         let inside = Inside {
             gate: Gate::default(),
@@ -211,17 +211,17 @@ impl Desk {
         // A long one is not even copied; one on a pattern of keys is not meant for us.
         let length = query.payload().map_or(0, zenoh::bytes::ZBytes::len);
         let letter =
-            query.payload().filter(|_| length <= MOST_LETTER_BYTES).map(|payload| payload.to_bytes());
+            query.payload().filter(|_| length <= MAX_REQUEST_BYTES).map(|payload| payload.to_bytes());
         let letter = match letter {
             Some(letter) => letter.into_owned(),
-            None => vec![0; length.min(MOST_LETTER_BYTES + 1)],
+            None => vec![0; length.min(MAX_REQUEST_BYTES + 1)],
         };
         let asked = if query.key_expr().as_str() == key { key } else { "" };
         let mut inside = self.lock();
         let run = inside.status.run;
         match inside.gate.admit(asked, &letter, run) {
             Err(refusal) => reply(&query, Some(refusal.to_string())),
-            Ok(wish) => inside.follow(&wish, query),
+            Ok(request) => inside.follow(&request, query),
         }
     }
 }
@@ -236,10 +236,10 @@ impl Inside {
         Status { state, refused: self.gate.refused().clone(), ..self.status.clone() }
     }
 
-    fn follow(&mut self, wish: &Wish, query: Query) {
-        self.is_latched |= *wish == Wish::EmergencyStop;
-        match (wish.ask(), &mut self.run) {
-            (Some(_), Some(run)) if run.open.len() >= MOST_OPEN && *wish != Wish::EmergencyStop => {
+    fn follow(&mut self, request: &Request, query: Query) {
+        self.is_latched |= *request == Request::EmergencyStop;
+        match (request.ask(), &mut self.run) {
+            (Some(_), Some(run)) if run.open.len() >= MOST_OPEN && *request != Request::EmergencyStop => {
                 reply(&query, Some(self.gate.refuse(Refusal::Busy).to_string()));
             }
             (Some(ask), Some(run)) => match run.asker.ask(ask) {
@@ -250,12 +250,12 @@ impl Inside {
                 Err(error) => reply(&query, Some(error.to_string())),
             },
             (Some(_), None) => {
-                let is_done = *wish == Wish::EmergencyStop;
+                let is_done = *request == Request::EmergencyStop;
                 reply(&query, (!is_done).then(|| "no host runs".to_owned()));
             }
             (None, _) => {
-                let done = match wish {
-                    Wish::Release => {
+                let done = match request {
+                    Request::Release => {
                         self.is_latched = false;
                         Ok(())
                     }

@@ -5,14 +5,14 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// A longer letter is refused before it is looked at, bytes.
-pub const MOST_LETTER_BYTES: usize = 64 * 1024;
+pub const MAX_REQUEST_BYTES: usize = 64 * 1024;
 /// Peers whose last number is remembered for each right; a peer beyond them is refused until the bridge starts anew.
 const MOST_PEERS: usize = 4096;
 
 /// Something a peer asks for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "wish", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Wish {
+#[serde(tag = "request", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Request {
     /// The emergency stop. Anybody's.
     EmergencyStop,
     /// New values for live parameters.
@@ -50,7 +50,7 @@ impl Right {
     /// All of them, the least first.
     pub const ALL: [Right; 3] = [Right::Watch, Right::Operate, Right::Own];
 
-    /// The last parts of the keys on which this right's own wishes arrive.
+    /// The last parts of the keys on which this right's own requests arrive.
     #[must_use]
     pub const fn keys(self) -> &'static [&'static str] {
         match self {
@@ -61,14 +61,14 @@ impl Right {
     }
 }
 
-impl Wish {
+impl Request {
     /// What it takes to have it followed.
     #[must_use]
     pub const fn right(&self) -> Right {
         match self {
-            Wish::EmergencyStop => Right::Watch,
-            Wish::Set { .. } | Wish::Weight { .. } | Wish::Stop => Right::Operate,
-            Wish::Start | Wish::Release => Right::Own,
+            Request::EmergencyStop => Right::Watch,
+            Request::Set { .. } | Request::Weight { .. } | Request::Stop => Right::Operate,
+            Request::Start | Request::Release => Right::Own,
         }
     }
 
@@ -76,12 +76,12 @@ impl Wish {
     #[must_use]
     pub const fn key(&self) -> &'static str {
         match self {
-            Wish::EmergencyStop => "ask/emergency-stop",
-            Wish::Set { .. } => "ask/set",
-            Wish::Weight { .. } => "ask/weight",
-            Wish::Stop => "ask/stop",
-            Wish::Start => "ask/start",
-            Wish::Release => "ask/release",
+            Request::EmergencyStop => "ask/emergency-stop",
+            Request::Set { .. } => "ask/set",
+            Request::Weight { .. } => "ask/weight",
+            Request::Stop => "ask/stop",
+            Request::Start => "ask/start",
+            Request::Release => "ask/release",
         }
     }
 
@@ -89,11 +89,11 @@ impl Wish {
     #[must_use]
     pub fn ask(&self) -> Option<Ask> {
         match self {
-            Wish::EmergencyStop => Some(Ask::EmergencyStop),
-            Wish::Set { values } => Some(Ask::Set { values: values.clone() }),
-            Wish::Weight { model, weight } => Some(Ask::Weight { model: model.clone(), weight: *weight }),
-            Wish::Stop => Some(Ask::Stop),
-            Wish::Start | Wish::Release => None,
+            Request::EmergencyStop => Some(Ask::EmergencyStop),
+            Request::Set { values } => Some(Ask::Set { values: values.clone() }),
+            Request::Weight { model, weight } => Some(Ask::Weight { model: model.clone(), weight: *weight }),
+            Request::Stop => Some(Ask::Stop),
+            Request::Start | Request::Release => None,
         }
     }
 
@@ -102,18 +102,18 @@ impl Wish {
     pub fn of_ask(ask: Ask) -> Option<Self> {
         match ask {
             Ask::Watch { .. } | Ask::LookAway | Ask::Swap { .. } => None,
-            Ask::Set { values } => Some(Wish::Set { values }),
-            Ask::Weight { model, weight } => Some(Wish::Weight { model, weight }),
-            Ask::Stop => Some(Wish::Stop),
-            Ask::EmergencyStop => Some(Wish::EmergencyStop),
+            Ask::Set { values } => Some(Request::Set { values }),
+            Ask::Weight { model, weight } => Some(Request::Weight { model, weight }),
+            Ask::Stop => Some(Request::Stop),
+            Ask::EmergencyStop => Some(Request::EmergencyStop),
         }
     }
 }
 
-/// A wish with what makes it good once.
+/// A request with what makes it good once.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Letter {
+pub struct NumberedRequest {
     /// Who asks: anything that no other peer calls itself, new with every start of a program.
     pub peer: String,
     /// Higher than that of the peer's letter before.
@@ -121,10 +121,10 @@ pub struct Letter {
     /// Process of the run that is meant, from its greeting; 0 for the bridge itself.
     pub run: u32,
     /// What is wished.
-    pub wish: Wish,
+    pub request: Request,
 }
 
-impl Letter {
+impl NumberedRequest {
     /// As it is sent.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
@@ -141,7 +141,7 @@ pub enum Refusal {
     #[error("this is no request that belongs on this key")]
     Malformed,
     /// Longer than any request.
-    #[error("longer than {MOST_LETTER_BYTES} bytes, which no request is")]
+    #[error("longer than {MAX_REQUEST_BYTES} bytes, which no request is")]
     TooLong,
     /// Its number is not higher than that of the peer's last.
     #[error("a request with this number, or a higher one, came before: requests are good once")]
@@ -172,7 +172,7 @@ impl Gate {
     ///
     /// # Errors
     /// [`Refusal`], counted.
-    pub fn admit(&mut self, key: &str, payload: &[u8], run: u32) -> Result<Wish, Refusal> {
+    pub fn admit(&mut self, key: &str, payload: &[u8], run: u32) -> Result<Request, Refusal> {
         self.read(key, payload, run).map_err(|refusal| self.refuse(refusal))
     }
 
@@ -188,23 +188,23 @@ impl Gate {
         &self.refused
     }
 
-    fn read(&mut self, key: &str, payload: &[u8], run: u32) -> Result<Wish, Refusal> {
-        if payload.len() > MOST_LETTER_BYTES {
+    fn read(&mut self, key: &str, payload: &[u8], run: u32) -> Result<Request, Refusal> {
+        if payload.len() > MAX_REQUEST_BYTES {
             return Err(Refusal::TooLong);
         }
-        let letter: Letter = serde_json::from_slice(payload).map_err(|_| Refusal::Malformed)?;
-        let belongs = key.strip_suffix(letter.wish.key()).is_some_and(|rest| rest.ends_with('/'));
+        let letter: NumberedRequest = serde_json::from_slice(payload).map_err(|_| Refusal::Malformed)?;
+        let belongs = key.strip_suffix(letter.request.key()).is_some_and(|rest| rest.ends_with('/'));
         if !belongs || letter.peer.is_empty() || letter.peer.len() > 64 {
             return Err(Refusal::Malformed);
         }
         // Whoever presses the emergency stop means whatever runs.
-        let is_meant = match letter.wish.right() {
-            Right::Watch => return Ok(letter.wish),
+        let is_meant = match letter.request.right() {
+            Right::Watch => return Ok(letter.request),
             Right::Operate => run != 0 && letter.run == run,
             Right::Own => true,
         };
-        self.use_up(letter.wish.right(), letter.peer, letter.number)?;
-        if is_meant { Ok(letter.wish) } else { Err(Refusal::Stale) }
+        self.use_up(letter.request.right(), letter.peer, letter.number)?;
+        if is_meant { Ok(letter.request) } else { Err(Refusal::Stale) }
     }
 
     /// A number is good once.
@@ -227,19 +227,19 @@ impl Gate {
 mod tests {
     use super::*;
 
-    fn letter(number: u64, run: u32, wish: Wish) -> Vec<u8> {
-        serde_json::to_vec(&Letter { peer: "somebody".to_owned(), number, run, wish }).unwrap()
+    fn letter(number: u64, run: u32, request: Request) -> Vec<u8> {
+        serde_json::to_vec(&NumberedRequest { peer: "somebody".to_owned(), number, run, request }).unwrap()
     }
 
     #[test]
     fn a_letter_is_good_once_and_for_its_run() {
         let mut gate = Gate::default();
-        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(1, 7, Wish::Stop), 7), Ok(Wish::Stop));
-        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(1, 7, Wish::Stop), 7), Err(Refusal::Replayed));
-        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(2, 7, Wish::Stop), 8), Err(Refusal::Stale));
-        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(3, 0, Wish::Stop), 0), Err(Refusal::Stale));
-        let stop = letter(4, 7, Wish::EmergencyStop);
-        assert_eq!(gate.admit("flotor/a/ask/emergency-stop", &stop, 8), Ok(Wish::EmergencyStop));
+        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(1, 7, Request::Stop), 7), Ok(Request::Stop));
+        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(1, 7, Request::Stop), 7), Err(Refusal::Replayed));
+        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(2, 7, Request::Stop), 8), Err(Refusal::Stale));
+        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(3, 0, Request::Stop), 0), Err(Refusal::Stale));
+        let stop = letter(4, 7, Request::EmergencyStop);
+        assert_eq!(gate.admit("flotor/a/ask/emergency-stop", &stop, 8), Ok(Request::EmergencyStop));
         let refused: Vec<_> = gate.refused().iter().map(|(refusal, count)| (*refusal, *count)).collect();
         assert_eq!(refused, [(Refusal::Replayed, 1), (Refusal::Stale, 2)]);
     }
@@ -247,18 +247,18 @@ mod tests {
     #[test]
     fn a_wish_on_another_ones_key_is_no_wish() {
         let mut gate = Gate::default();
-        for wish in [
-            Wish::EmergencyStop,
-            Wish::Set { values: Vec::new() },
-            Wish::Weight { model: "spring".to_owned(), weight: 0.5 },
-            Wish::Stop,
-            Wish::Start,
-            Wish::Release,
+        for request in [
+            Request::EmergencyStop,
+            Request::Set { values: Vec::new() },
+            Request::Weight { model: "spring".to_owned(), weight: 0.5 },
+            Request::Stop,
+            Request::Start,
+            Request::Release,
         ] {
             for right in Right::ALL {
-                for key in right.keys().iter().filter(|key| **key != wish.key()) {
-                    let refused = gate.admit(&format!("flotor/a/{key}"), &letter(9, 7, wish.clone()), 7);
-                    assert_eq!(refused, Err(Refusal::Malformed), "{wish:?} on {key}");
+                for key in right.keys().iter().filter(|key| **key != request.key()) {
+                    let refused = gate.admit(&format!("flotor/a/{key}"), &letter(9, 7, request.clone()), 7);
+                    assert_eq!(refused, Err(Refusal::Malformed), "{request:?} on {key}");
                 }
             }
         }
@@ -268,13 +268,13 @@ mod tests {
     fn what_is_no_letter_is_refused_and_counted() {
         let mut gate = Gate::default();
         let key = "flotor/a/ask/stop";
-        for nonsense in [b"".as_slice(), b"{}", b"\xff\xfe", b"[[[[", &letter(1, 7, Wish::Stop)[1..]] {
+        for nonsense in [b"".as_slice(), b"{}", b"\xff\xfe", b"[[[[", &letter(1, 7, Request::Stop)[1..]] {
             assert_eq!(gate.admit(key, nonsense, 7), Err(Refusal::Malformed));
         }
-        let mut more = letter(1, 7, Wish::Stop);
+        let mut more = letter(1, 7, Request::Stop);
         more.splice(1..1, br#""extra":1,"#.iter().copied());
         assert_eq!(gate.admit(key, &more, 7), Err(Refusal::Malformed), "an unknown word");
-        let long = vec![b' '; MOST_LETTER_BYTES + 1];
+        let long = vec![b' '; MAX_REQUEST_BYTES + 1];
         assert_eq!(gate.admit(key, &long, 7), Err(Refusal::TooLong));
         assert_eq!(gate.refused().values().sum::<u64>(), 7);
     }
@@ -283,27 +283,27 @@ mod tests {
     fn no_flood_of_peers_fills_the_memory() {
         let mut gate = Gate::default();
         let from = |peer: usize| {
-            let letter = Letter { peer: peer.to_string(), number: 1, run: 7, wish: Wish::Stop };
+            let letter = NumberedRequest { peer: peer.to_string(), number: 1, run: 7, request: Request::Stop };
             serde_json::to_vec(&letter).unwrap()
         };
         let admitted = (0..2 * MOST_PEERS)
             .filter(|peer| gate.admit("flotor/a/ask/stop", &from(*peer), 7).is_ok())
             .count();
         assert_eq!(admitted, MOST_PEERS);
-        let stop = letter(1, 0, Wish::EmergencyStop);
-        assert_eq!(gate.admit("flotor/a/ask/emergency-stop", &stop, 7), Ok(Wish::EmergencyStop));
-        assert_eq!(gate.admit("flotor/a/ask/start", &letter(1, 0, Wish::Start), 7), Ok(Wish::Start));
+        let stop = letter(1, 0, Request::EmergencyStop);
+        assert_eq!(gate.admit("flotor/a/ask/emergency-stop", &stop, 7), Ok(Request::EmergencyStop));
+        assert_eq!(gate.admit("flotor/a/ask/start", &letter(1, 0, Request::Start), 7), Ok(Request::Start));
     }
 
     #[test]
     fn who_calls_itself_like_another_peer_keeps_nothing_from_it_that_it_may_not_do_itself() {
         let mut gate = Gate::default();
         let key = "flotor/a/ask/emergency-stop";
-        let last_of_all = letter(u64::MAX, 0, Wish::EmergencyStop);
-        assert_eq!(gate.admit(key, &last_of_all, 7), Ok(Wish::EmergencyStop));
-        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(1, 7, Wish::Stop), 7), Ok(Wish::Stop));
-        assert_eq!(gate.admit("flotor/a/ask/release", &letter(2, 0, Wish::Release), 7), Ok(Wish::Release));
-        assert_eq!(gate.admit(key, &letter(3, 0, Wish::EmergencyStop), 7), Ok(Wish::EmergencyStop));
+        let last_of_all = letter(u64::MAX, 0, Request::EmergencyStop);
+        assert_eq!(gate.admit(key, &last_of_all, 7), Ok(Request::EmergencyStop));
+        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(1, 7, Request::Stop), 7), Ok(Request::Stop));
+        assert_eq!(gate.admit("flotor/a/ask/release", &letter(2, 0, Request::Release), 7), Ok(Request::Release));
+        assert_eq!(gate.admit(key, &letter(3, 0, Request::EmergencyStop), 7), Ok(Request::EmergencyStop));
         assert_eq!(gate.refused().len(), 0);
     }
 }
