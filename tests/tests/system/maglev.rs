@@ -144,6 +144,7 @@ fn start_calibrating(emulator: &Emulator, sensor: &Path, arguments: &[&str]) -> 
 }
 
 #[test]
+#[ignore = "a stand that moves for 25 s, and wants both cores: .ci/full runs it alone"]
 fn a_device_is_calibrated_with_a_force_sensor_on_a_serial_port() {
     let scratch = Scratch::default();
     let (sensor, file) = (scratch.path().join("force"), scratch.path().join("mine.toml"));
@@ -196,7 +197,7 @@ fn a_calibration_that_cannot_be_says_why_and_lets_the_handle_down() {
     let mut emulator = Emulator::listening("tcp", "127.0.0.1:0", &["--set", "hand=open"]);
     let ran = calibrate(&emulator, &sensor, &["vertical", "--patience", "60s"]);
     assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
-    assert!(ran.error().contains("flew off"), "{}", ran.error());
+    assert!(ran.error().contains("lost contact with the force sensor"), "{}", ran.error());
     emulator.wait_for(&["mode Disarmed"]);
     let missing = scratch.path().join("nowhere");
     let ran = calibrate(&emulator, &missing, &["vertical"]);
