@@ -302,7 +302,7 @@ fn what_is_wrong_with_devices_and_couplings_is_said() {
         (format!("{two}[[coupling]]\nend = [{{ device = \"left\" }}]\n"), "a coupling has two ends"),
         (
             format!("{two}[[coupling]]\nend = [{{ device = \"left\" }}, {{ device = \"left\" }}]\n"),
-            "not one with itself",
+            "a coupling needs two different devices",
         ),
         (format!("{two}{COUPLING}partner = \"elsewhere\"\nname = \"pair\"\n"), "a coupling has one end here"),
         (
