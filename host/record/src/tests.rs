@@ -378,7 +378,7 @@ fn other_files_are_refused_with_name_reason_and_remedy() {
     let text = TestFile::with("text", b"time,force\n0,1\n");
     holds(&refusal(&text.0), &["flotor-record", "not an MCAP file", "--record"]);
     let empty = TestFile::with("empty", b"");
-    holds(&refusal(&empty.0), &["cut off", "record again"]);
+    holds(&refusal(&empty.0), &["truncated", "record again"]);
 
     let foreign = TestFile::new("foreign");
     let mut writer = mcap::Writer::new(File::create(&foreign.0).unwrap()).unwrap();
