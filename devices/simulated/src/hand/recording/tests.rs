@@ -36,7 +36,7 @@ fn complaints_name_the_line_and_the_column() {
         ("time_s,x_m,y_m,z_m\n0,0,0,0\n1,0,up,0\n", "line 3: `y_m` is a number, not `up`"),
         ("time_s,x_m,y_m,z_m\n0,0,0,0\n0,0,0,0\n", "line 3: time 0 ns is not after 0 ns"),
         ("time_s,x_m,y_m,z_m\n0,0,0,nan\n", "line 2: position_m is not a finite number"),
-        ("time_s,x_m,y_m,z_m\n0,0,0,4\n", "line 2: ([0, 0, 4]) m is farther out"),
+        ("time_s,x_m,y_m,z_m\n0,0,0,4\n", "line 2: ([0, 0, 4]) m is outside the workspace of"),
         ("time_s,x_m,y_m,z_m\n0,0,0\n", "CSV error: record 1 (line: 2"),
     ] {
         let problem = table(text).expect_err("refused");
