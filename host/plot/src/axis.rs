@@ -186,7 +186,7 @@ fn rounded_outward(low: f64, high: f64) -> (f64, f64) {
     )
 }
 
-/// Whether two ends are too close to tell apart, in particular equal.
+/// Whether two ends are too close to distinguish, in particular equal.
 fn is_narrow(low: f64, high: f64) -> bool {
     high - low <= NARROWEST_RELATIVE_SPAN * low.abs().max(high.abs()) || high - low < 1.0 / LARGEST_DRAWABLE
 }

@@ -11,7 +11,7 @@ const DIGEST_WORDS: usize = RECORD_WORDS - TIMING_WORDS;
 ///
 /// The hash runs over the 64-bit words of each record, little endian, in the order of [`TickRecord`], so it
 /// depends neither on the machine nor on how records arrive. Every NaN counts as the same and zero has no sign: processors and
-/// compilers choose these as they please. It tells runs apart; it is no protection against malice.
+/// compilers choose these as they please. It distinguishes runs; it is no protection against malice.
 #[derive(Clone, Default)]
 pub struct TraceDigest {
     hash: Xxh3,

@@ -22,7 +22,7 @@ const HASH_PREFIX: &str = "xxh3:";
 pub struct NamedFile {
     /// Where it is, from the root.
     pub path: PathBuf,
-    /// xxh3-64 of what is in it. It tells files apart; it is no protection against malice.
+    /// xxh3-64 of what is in it. It distinguishes files; it is no protection against malice.
     pub hash: u64,
 }
 

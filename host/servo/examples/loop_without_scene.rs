@@ -8,7 +8,7 @@ use flotor_hal::LoopConfig;
 use flotor_hal::abi::loader::Plugin;
 use flotor_servo::{
     Engine, Envelope, Forces, Guarded, Layer, Loop, ParameterQueue, RunConfig, Schedule, Standby, StopSwitch,
-    TimeBudget, exchange,
+    TimeBudget, swap_queues,
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     // Nothing is scheduled, and nobody changes anything while it runs.
     let (parameters, _sender, _reports) = ParameterQueue::new(Vec::new(), 1);
-    let (exchange, _workshop) = exchange(1, Vec::new());
+    let (swaps, _host_swaps) = swap_queues(1, Vec::new());
     let forces = Forces::new(1, vec![(0, layer)], Vec::new());
     let run = RunConfig {
         period_ns: config.period_ns,
@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         longest_gap_ns: 100_000_000,
         emergency_buttons: 0,
     };
-    let standby = Standby::new(vec![device], forces, parameters, exchange, config, run);
+    let standby = Standby::new(vec![device], forces, parameters, swaps, config, run);
 
     let stoppers = standby.stoppers();
     let servo = standby.activate().map_err(|(_, refusal)| refusal)?;

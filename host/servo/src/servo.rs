@@ -7,10 +7,10 @@
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
-use crate::stopwatch::{Moment, Stopwatch};
+use crate::stage_timer::{Moment, StageTimer};
 use crate::timing::STAGE_SAMPLING;
 use crate::{
-    Cause, Due, EmergencySource, Exchange, Forces, Heartbeat, ParameterQueue, Place, Port, RunEvent,
+    Cause, Due, EmergencySource, Forces, Heartbeat, LoopSwaps, ParameterQueue, Place, Port, RunEvent,
     RunState, Stage, Station, StopSwitch, Timing, WEIGHT,
 };
 use flotor_core::trace::{Events, TickRecord};
@@ -38,12 +38,12 @@ pub struct Servo {
     ports: Box<[Port]>,
     forces: Forces,
     parameters: ParameterQueue,
-    exchange: Exchange,
+    swaps: LoopSwaps,
     config: RunConfig,
     heart: Heartbeat,
     run: RunState,
     timing: Timing,
-    stopwatch: Stopwatch,
+    stage_timer: StageTimer,
 }
 
 impl Servo {
@@ -52,7 +52,7 @@ impl Servo {
         stations: Vec<Station>,
         forces: Forces,
         parameters: ParameterQueue,
-        exchange: Exchange,
+        swaps: LoopSwaps,
         config: RunConfig,
         heart: Heartbeat,
     ) -> Self {
@@ -61,12 +61,12 @@ impl Servo {
             stations: stations.into(),
             forces,
             parameters,
-            exchange,
+            swaps,
             config,
             heart,
             run: RunState::START,
             timing: Timing::default(),
-            stopwatch: Stopwatch::new(),
+            stage_timer: StageTimer::new(),
         }
     }
 
@@ -114,31 +114,31 @@ impl Servo {
     /// All of a tick but its records; what happened in the run, and how long it took, ns.
     fn advance(&mut self, due: &Due, stop: &StopSwitch) -> (Events, u64) {
         let Due { tick, lateness_ns, missed, .. } = due;
-        let started = self.stopwatch.now();
+        let started = self.stage_timer.now();
         let mut watch = StageWatch::start(tick.index, started);
         let mut events = if *missed > 0 { Events::MISSED } else { Events::NONE };
 
-        if self.parameters.is_due(tick) || self.exchange.is_due(tick) || self.forces.is_fading() {
+        if self.parameters.is_due(tick) || self.swaps.is_due(tick) || self.forces.is_fading() {
             self.apply_changes(tick, &mut events);
         }
         let (sample, buttons) = self.read(tick);
         self.follow(sample, buttons, tick, stop, &mut events);
-        watch.lap(&self.stopwatch, &mut self.timing, Stage::Read);
+        watch.lap(&self.stage_timer, &mut self.timing, Stage::Read);
 
         self.forces.step(tick, &mut self.ports, &self.heart);
-        watch.lap(&self.stopwatch, &mut self.timing, Stage::Models);
+        watch.lap(&self.stage_timer, &mut self.timing, Stage::Models);
 
         let gate = self.run.gate(tick.time_ns, self.config.ramp_ns);
         for (station, port) in self.stations.iter_mut().zip(&mut self.ports) {
             station.limit(tick, gate, port);
         }
-        watch.lap(&self.stopwatch, &mut self.timing, Stage::Envelope);
+        watch.lap(&self.stage_timer, &mut self.timing, Stage::Envelope);
 
         self.write(tick);
         self.heart.enter(tick.index, Place::Waiting);
-        watch.lap(&self.stopwatch, &mut self.timing, Stage::Write);
+        watch.lap(&self.stage_timer, &mut self.timing, Stage::Write);
 
-        let compute_ns = self.stopwatch.between_ns(started, self.stopwatch.now());
+        let compute_ns = self.stage_timer.between_ns(started, self.stage_timer.now());
         self.record_timing(*lateness_ns, compute_ns, *missed);
         (events, compute_ns)
     }
@@ -159,12 +159,12 @@ impl Servo {
     /// What was to change before this tick does so now.
     #[inline(never)] // seldom called; its instructions are counted: tests/tests/instructions.rs
     fn apply_changes(&mut self, tick: &Tick, events: &mut Events) {
-        let Self { stations, forces, parameters, exchange, .. } = self;
+        let Self { stations, forces, parameters, swaps, .. } = self;
         let devices = stations.len();
         // Looked at before the replacements: whoever sent one of these after a replacement has sent that too.
         let waiting = parameters.waiting();
         let mut replaced = false;
-        exchange.apply_due(tick, forces, |model, generation| {
+        swaps.apply_due(tick, forces, |model, generation| {
             replaced = true;
             let plugin = u16::try_from(model as usize + devices).unwrap_or(u16::MAX); // a run has fewer plugins
             parameters.report_replaced(tick, plugin, generation);
@@ -307,10 +307,10 @@ impl StageWatch {
         Self { last: tick.is_multiple_of(STAGE_SAMPLING).then_some(now) }
     }
 
-    fn lap(&mut self, stopwatch: &Stopwatch, timing: &mut Timing, stage: Stage) {
+    fn lap(&mut self, stage_timer: &StageTimer, timing: &mut Timing, stage: Stage) {
         if let Some(last) = self.last {
-            let now = stopwatch.now();
-            timing.stage(stage, stopwatch.between_ns(last, now));
+            let now = stage_timer.now();
+            timing.stage(stage, stage_timer.between_ns(last, now));
             self.last = Some(now);
         }
     }

@@ -1,6 +1,6 @@
 //! Everything a servo is made of, its devices open and not yet energised.
 
-use crate::{Envelope, Exchange, Forces, Heartbeat, ParameterQueue, RunConfig, Servo, Station};
+use crate::{Envelope, Forces, Heartbeat, LoopSwaps, ParameterQueue, RunConfig, Servo, Station};
 use flotor_hal::abi::loader::{OpenedDevice, Stopper};
 use flotor_hal::{Axes, DVec3, LoopConfig, Refusal};
 
@@ -20,7 +20,7 @@ pub struct Standby {
     devices: Vec<Guarded>,
     forces: Forces,
     parameters: ParameterQueue,
-    exchange: Exchange,
+    swaps: LoopSwaps,
     config: LoopConfig,
     run: RunConfig,
     heart: Heartbeat,
@@ -32,11 +32,11 @@ impl Standby {
         devices: Vec<Guarded>,
         forces: Forces,
         parameters: ParameterQueue,
-        exchange: Exchange,
+        swaps: LoopSwaps,
         config: LoopConfig,
         run: RunConfig,
     ) -> Self {
-        Self { devices, forces, parameters, exchange, config, run, heart: Heartbeat::default() }
+        Self { devices, forces, parameters, swaps, config, run, heart: Heartbeat::default() }
     }
 
     /// What the servo's watchdog will listen to.
@@ -61,7 +61,7 @@ impl Standby {
     /// The number of the device that says no, and why; then none stays energised.
     pub fn activate(self) -> Result<Servo, (usize, Refusal)> {
         let stoppers = self.stoppers();
-        let Self { devices, forces, parameters, exchange, config, run, heart } = self;
+        let Self { devices, forces, parameters, swaps, config, run, heart } = self;
         let station = |(number, guarded): (usize, Guarded)| {
             let Guarded { device, sensed, envelope } = guarded;
             let device = device.activate(&config).map_err(|(_, refusal)| (number, refusal))?;
@@ -70,6 +70,6 @@ impl Standby {
         let stations =
             devices.into_iter().enumerate().map(station).collect::<Result<Vec<_>, (usize, Refusal)>>();
         let stations = stations.inspect_err(|_| stoppers.iter().for_each(Stopper::safe_stop))?;
-        Ok(Servo::new(stations, forces, parameters, exchange, run, heart))
+        Ok(Servo::new(stations, forces, parameters, swaps, run, heart))
     }
 }

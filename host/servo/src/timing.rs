@@ -3,7 +3,7 @@
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
-/// Longest time a histogram tells apart, ns; longer ones count as this.
+/// Longest time a histogram distinguishes, ns; longer ones count as this.
 const LONGEST_NS: u64 = 100_000_000_000;
 
 /// Two significant digits: a bin is at most 1 % wide, and the whole histogram is some 16 kB.
@@ -79,7 +79,7 @@ pub enum Stage {
     Write,
 }
 
-/// Every how many ticks the stages are timed: four looks at the stopwatch cost as much as a stage.
+/// Every how many ticks the stages are timed: four looks at the stage_timer cost as much as a stage.
 pub(super) const STAGE_SAMPLING: u64 = 16;
 
 /// All that is measured of a loop.

@@ -1,9 +1,9 @@
 //! A scene in virtual time from start to end, with nobody watching: for sweeps, studies and other programs.
 
 use crate::registry::Registry;
-use crate::report::{RunFacts, RunSummary, Tally};
 use crate::run_description::describe;
 use crate::scene::Scene;
+use crate::summary::{RunFacts, RunSummary, Tally};
 use crate::{Observer, RunError, RunOptions, RunRecording, Session};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;

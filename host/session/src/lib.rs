@@ -14,13 +14,13 @@
 
 pub mod calibration_file;
 pub mod headless;
-pub mod live;
 pub mod registry;
-pub mod report;
 pub mod run_description;
 mod run_recording;
 pub mod scene;
 mod session;
+pub mod summary;
+pub mod telemetry;
 
 pub use run_recording::RunRecording;
 pub use session::{

@@ -54,7 +54,7 @@ fn publish(session: &Session, directory: &Directory, stop: &StopSwitch) -> Publi
     let scene = Scene::parse(Path::new("scene.toml"), SCENE).expect("the scene is right");
     let scene = Scene { title: "Test".to_owned(), ..scene };
     let run = describe(&scene, &RunOptions { clock: Clock::Virtual, seed: 1 }, session.plugins());
-    let opened = flotor_session::live::publish(directory, &scene, &run, session, stop);
+    let opened = flotor_session::telemetry::publish(directory, &scene, &run, session, stop);
     opened.expect("a scratch folder takes a socket")
 }
 

@@ -9,7 +9,7 @@ use flotor_hal::{DVec3, EnergyLedger, Input, Output, Pose};
 use flotor_servo::RunEnd;
 use flotor_session::Observer;
 use flotor_session::registry::load_file;
-use flotor_session::report::{RunFacts, RunSummary, Tally};
+use flotor_session::summary::{RunFacts, RunSummary, Tally};
 use flotor_tests::library::plugin_file;
 use flotor_tests::watched::{Watched, watch};
 

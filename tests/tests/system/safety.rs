@@ -435,13 +435,13 @@ fn the_model(run: &Watched) -> ModelHealth {
 // ---------------------------------------------------------------- models in a process of their own
 
 /// The scene with its model in a process of its own.
-fn apart(device: &str, model: &str, tables: &str) -> String {
+fn isolated(device: &str, model: &str, tables: &str) -> String {
     scene(device, model, tables).replace("name = \"block\"", "name = \"block\"\nisolation = \"process\"")
 }
 
 #[test]
 fn a_model_in_a_process_of_its_own_answers_bit_for_bit_the_same() {
-    let [here, there] = [scene("", "", ""), apart("", "", "")].map(|scene| watch(&scene).records);
+    let [here, there] = [scene("", "", ""), isolated("", "", "")].map(|scene| watch(&scene).records);
     let answers = |records: &[TickRecord]| records.iter().map(|record| record.commanded).collect::<Vec<_>>();
     assert_eq!(answers(&there), answers(&here));
     assert_eq!(there.len(), 200);
@@ -449,7 +449,7 @@ fn a_model_in_a_process_of_its_own_answers_bit_for_bit_the_same() {
 
 #[test]
 fn a_model_that_ends_its_process_is_out_and_the_loop_goes_on() {
-    let run = watch(&apart("", "fault = \"aborts\"\nat_tick = 50", "[limits]\nramp_s = 0"));
+    let run = watch(&isolated("", "fault = \"aborts\"\nat_tick = 50", "[limits]\nramp_s = 0"));
     assert_eq!((run.outcome.end, run.records.len()), (RunEnd::Finished, 200));
     let [(name, health, words)] = &run.outcome.models[..] else { panic!("one model") };
     let lost = health.lost_at.expect("it is gone");
@@ -465,7 +465,7 @@ fn a_model_that_crashes_its_process_is_out_and_the_loop_goes_on() {
     let library = scratch.path().join("libwall.so");
     compile_c_file(&workspace_root().join("tests/c/wall.c"), &["CRASHES"], &library);
     let honest = plugin_file("fixture-faulty-model").display().to_string();
-    let crashing = apart("", "", "[limits]\nramp_s = 0").replace(&honest, &library.display().to_string());
+    let crashing = isolated("", "", "[limits]\nramp_s = 0").replace(&honest, &library.display().to_string());
     let run = watch(&crashing);
     assert_eq!((run.outcome.end, run.records.len()), (RunEnd::Finished, 200));
     let [(_, _, words)] = &run.outcome.models[..] else { panic!("one model") };
@@ -478,7 +478,7 @@ fn a_model_that_crashes_its_process_is_out_and_the_loop_goes_on() {
 fn a_model_that_hangs_in_a_process_of_its_own_costs_two_ticks_of_force() {
     // In real time: the loop waits half a period for it once, and not at all while it is behind. For a second: a machine
     // that holds the loop up costs it ticks.
-    let hangs = apart("", "fault = \"hangs\"\nat_tick = 50", "[limits]\nramp_s = 0\nwatchdog_ms = 1000");
+    let hangs = isolated("", "fault = \"hangs\"\nat_tick = 50", "[limits]\nramp_s = 0\nwatchdog_ms = 1000");
     let run = watch_in_real_time(&hangs.replace("duration_s = 0.2", "duration_s = 1"));
     assert_eq!(run.outcome.end, RunEnd::Finished);
     assert!(the_model(&run).late_ticks > 50, "{:?}", the_model(&run));
@@ -494,7 +494,7 @@ fn a_model_in_a_process_of_its_own_says_no_like_any_other() {
         ("refuses-to-create", "the table of forces is on another machine"),
         ("panics-in-create", "create gave up"),
     ] {
-        let file = scratch.file("scene.toml", apart("", &format!("fault = \"{fault}\""), ""));
+        let file = scratch.file("scene.toml", isolated("", &format!("fault = \"{fault}\""), ""));
         let ran =
             Flotor::with(["run".as_ref(), file.as_os_str(), "--clock".as_ref(), "virtual".as_ref()]).run();
         assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:?}");
@@ -506,7 +506,7 @@ fn a_model_in_a_process_of_its_own_says_no_like_any_other() {
 #[test]
 fn a_model_in_a_process_of_its_own_is_felt_until_the_run_has_ended_in_order() {
     let patiently = format!("{PATIENT}\nramp_s = 1");
-    let scene = apart("", "", &patiently).replace("name = \"block\"", "name = \"block\"\nbudget_us = 1e6");
+    let scene = isolated("", "", &patiently).replace("name = \"block\"", "name = \"block\"\nbudget_us = 1e6");
     for signal in [Signal::INT, Signal::TSTP] {
         let scratch = Scratch::default();
         let flotor = in_real_time(&scratch, &scene, "-".as_ref()).through_shell("exec setsid \"$@\"");

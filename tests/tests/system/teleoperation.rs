@@ -273,7 +273,7 @@ fn the_example_scene_is_the_coupling_that_is_measured_here() {
     assert_eq!((coupling.config.delay_ticks, coupling.config.passivity), (1, PassivityMode::Control));
     let options = RunOptions { clock: Clock::Virtual, seed: 1 };
     let session = Session::prepare(&scene, &Registry::search(&[]), &options).expect("it starts");
-    let mut nobody = flotor_session::report::Tally::default();
+    let mut nobody = flotor_session::summary::Tally::default();
     assert!(session.run(&mut nobody, &StopSwitch::default()).is_ok());
 }
 

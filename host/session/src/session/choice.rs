@@ -7,7 +7,7 @@
 
 use flotor_core::Random;
 
-/// Which of so many alternatives a seed gets; `draw` tells several choices of one run apart. Not real-time.
+/// Which of so many alternatives a seed gets; `draw` distinguishes several choices of one run. Not real-time.
 pub(super) fn chosen(seed: u64, draw: u64, alternatives: usize) -> usize {
     let count = alternatives.max(1) as u64;
     let (block, place) = (seed / count, seed % count);

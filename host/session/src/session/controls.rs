@@ -10,8 +10,8 @@ use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Setting, SettingError};
 use flotor_hal::{LoopConfig, Mutability, Parameter};
 use flotor_servo::{
-    ChangeReport, ChangeSender, Clock, LayerReport, ModelHealth, PLUGIN, ParameterChange, Replacement,
-    ReportReceiver, WEIGHT, Workshop,
+    ChangeReport, ChangeSender, Clock, HostSwaps, LayerReport, ModelHealth, PLUGIN, ParameterChange,
+    Replacement, ReportReceiver, WEIGHT,
 };
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -106,7 +106,7 @@ struct Shared {
     models: Vec<ModelUse>,
     config: LoopConfig,
     clock: Clock,
-    workshop: Mutex<Supervised>,
+    supervised: Mutex<Supervised>,
 }
 
 impl Shared {
@@ -126,9 +126,9 @@ pub struct Misbehaved {
     pub words: String,
 }
 
-/// The workshop, which models have a replacement on its way or fading in, and who came back with a fault.
+/// The queues of the hot swap, which models have a replacement on its way or fading in, and who came back with a fault.
 struct Supervised {
-    workshop: Workshop,
+    swaps: HostSwaps,
     busy: Vec<bool>,
     /// With the number of the model and which of its plugins it was: of each file the first, so that there is an end to them.
     misbehaved: Vec<(usize, u16, Misbehaved)>,
@@ -137,7 +137,7 @@ struct Supervised {
 impl Supervised {
     /// Drops what the loop has handed back. Not real-time.
     fn sweep(&mut self, parts: &Parts) {
-        while let Ok((model, mut layer)) = self.workshop.retired.pop() {
+        while let Ok((model, mut layer)) = self.swaps.retired.pop() {
             let number = model as usize;
             let report = layer.report(number);
             drop(layer);
@@ -174,11 +174,13 @@ impl Controls {
         changes: ChangeSender,
         models: &[ModelUse],
         (config, clock): (LoopConfig, Clock),
-        workshop: Workshop,
+        swaps: HostSwaps,
     ) -> Self {
-        let supervised = Supervised { workshop, busy: vec![false; models.len()], misbehaved: Vec::new() };
-        let (changes, workshop) = (Mutex::new(changes), Mutex::new(supervised));
-        Self { shared: Arc::new(Shared { parts, changes, models: models.to_vec(), config, clock, workshop }) }
+        let supervised = Supervised { swaps, busy: vec![false; models.len()], misbehaved: Vec::new() };
+        let (changes, supervised) = (Mutex::new(changes), Mutex::new(supervised));
+        Self {
+            shared: Arc::new(Shared { parts, changes, models: models.to_vec(), config, clock, supervised }),
+        }
     }
 
     /// Every plugin of the run with its schema: the device, then the models in the scene's order.
@@ -241,12 +243,12 @@ impl Controls {
         plugin: Option<&str>,
         settings: &[(&str, &str)],
     ) -> Result<(), ControlError> {
-        let Shared { parts, models, config, clock, workshop, .. } = &*self.shared;
+        let Shared { parts, models, config, clock, supervised, .. } = &*self.shared;
         let numbers = parts.models(model)?;
         if self.shared.changes().is_abandoned() {
             return Err(ControlError::Ended);
         }
-        let mut supervised = workshop.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut supervised = supervised.lock().unwrap_or_else(PoisonError::into_inner);
         supervised.sweep(parts);
         if numbers.iter().any(|number| supervised.busy.get(*number).is_none_or(|busy| *busy)) {
             return Err(ControlError::Busy);
@@ -265,7 +267,7 @@ impl Controls {
             let model = u32::try_from(number).unwrap_or(u32::MAX); // a scene has fewer models
             let replacement = Replacement { model, generation, layer: Box::new(layer) };
             // There is room: at most one of each model is on its way.
-            let pushed = supervised.workshop.leaving_for_the_loop.push(replacement);
+            let pushed = supervised.swaps.leaving_for_the_loop.push(replacement);
             if let Some(busy) = supervised.busy.get_mut(number) {
                 *busy = pushed.is_ok();
             }
@@ -276,7 +278,7 @@ impl Controls {
 
     /// Drops models the loop has handed back, unless somebody else is at it. Not real-time.
     pub(super) fn sweep(&self) {
-        if let Ok(mut supervised) = self.shared.workshop.try_lock() {
+        if let Ok(mut supervised) = self.shared.supervised.try_lock() {
             supervised.sweep(&self.shared.parts);
         }
     }
@@ -285,8 +287,8 @@ impl Controls {
     /// health and last words of those it began with, in the scene's order, and of those that came later the ones that did
     /// not behave. Not real-time.
     pub(super) fn settle(&self, left: Vec<LayerReport>) -> (Vec<(ModelHealth, String)>, Vec<Misbehaved>) {
-        let Shared { parts, models, workshop, .. } = &*self.shared;
-        let mut supervised = workshop.lock().unwrap_or_else(PoisonError::into_inner);
+        let Shared { parts, models, supervised, .. } = &*self.shared;
+        let mut supervised = supervised.lock().unwrap_or_else(PoisonError::into_inner);
         supervised.sweep(parts);
         let mut first = vec![(ModelHealth::default(), String::new()); models.len()];
         for report in left {

@@ -23,7 +23,7 @@ use flotor_servo::coupling::{Line, Patience};
 use flotor_servo::{
     Clock, Core, Coupled, CouplingOutcome, Envelope, Forces, Guarded, Loop, ModelHealth, ParameterQueue,
     Place, RealTimeReport, RunConfig, RunEnd, Schedule, Servo, SpinWindow, Standby, StopSwitch, Stuck,
-    Timing, drain, enter_real_time, exchange, queue, start_watchdog,
+    Timing, drain, enter_real_time, queue, start_watchdog, swap_queues,
 };
 use prepare::{Scheduled, activate};
 use std::time::{Duration, Instant};
@@ -206,8 +206,9 @@ impl Session {
             prepare::schedule(scene, &parts, registry, &config, options.clock)?;
         let room = models.len() + replacements.len();
         let (parameters, sender, reports) = ParameterQueue::new(changes, room);
-        let (exchange, workshop) = exchange(models.len(), replacements);
-        let controls = Controls::new(parts.clone(), sender, &scene.models, (config, options.clock), workshop);
+        let (swaps, host_swaps) = swap_queues(models.len(), replacements);
+        let controls =
+            Controls::new(parts.clone(), sender, &scene.models, (config, options.clock), host_swaps);
 
         let devices = opened.into_iter().map(|opened| {
             let envelope = Envelope::new(&scene.limits, &scene.boundary, &opened.capabilities, period_ns);
@@ -230,7 +231,7 @@ impl Session {
         let emergency_buttons = scene.limits.emergency_buttons;
         let run = RunConfig { period_ns, ramp_ns, longest_gap_ns: watchdog_ns, emergency_buttons };
         Ok(Self {
-            standby: Standby::new(devices, forces, parameters, exchange, config, run),
+            standby: Standby::new(devices, forces, parameters, swaps, config, run),
             controls,
             changes: ChangeLog::new(parts, reports),
             clock: options.clock,

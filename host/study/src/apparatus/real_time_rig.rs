@@ -11,7 +11,7 @@ use crate::trial::Trial;
 use flotor_live::{Ask, Directory, Serve};
 use flotor_record::Recorder;
 use flotor_servo::{Clock, StopSwitch};
-use flotor_session::live::{Watched, announce};
+use flotor_session::telemetry::{Watched, announce};
 use flotor_session::{ControlError, Controls, Outcome, RunError, RunOptions, RunRecording, Session};
 use std::sync::Arc;
 use std::thread::JoinHandle;

@@ -80,7 +80,7 @@ fn a_batch_blends_as_single_steps_do() {
     let (_, _, stiffness) = preset.parameters();
     let choice =
         Choice { spring: preset.spring(), stiffness, preset, ..Choice::default_with(Variant::Energy) };
-    let (mut together, mut apart) = (SpringModel::new(choice), SpringModel::new(choice));
+    let (mut batched, mut stepped) = (SpringModel::new(choice), SpringModel::new(choice));
     let inputs: Vec<Input> = (0..200_u32)
         .map(|index| {
             let down = 0.027 * 0.6 * f64::from(index * 37 % 200) / 200.0;
@@ -90,11 +90,11 @@ fn a_batch_blends_as_single_steps_do() {
         })
         .collect();
     let mut outputs = vec![Output::default(); inputs.len()];
-    together.step_batch(&inputs, &mut outputs);
+    batched.step_batch(&inputs, &mut outputs);
     let mut blended = 0;
     for (input, output) in inputs.iter().zip(&outputs) {
-        let single = apart.step(input);
-        blended += u32::from(number(&apart, "rod_share") > 0.0);
+        let single = stepped.step(input);
+        blended += u32::from(number(&stepped, "rod_share") > 0.0);
         assert_eq!((output.wrench, output.status()), (single.wrench, single.status()), "{input:?}");
         assert_eq!(output.energy_j.to_bits(), single.energy_j.to_bits(), "{input:?}");
     }

@@ -1,8 +1,8 @@
 //! The worker's side: the process that holds the model.
 
 use super::Greeting;
-use super::exchange::{self, Order, wait_for_change};
 use super::memory::{MESSAGE_BYTES, SharedMemory};
+use super::shared_words::{self, Order, wait_for_change};
 use crate::enter_worker_priority;
 use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
 use flotor_hal::abi::{CallStatus, PluginKind};
@@ -41,7 +41,7 @@ pub fn serve(arguments: &WorkerArguments, load: LoadFile) -> io::Result<()> {
     let host = rustix::process::getppid();
     let (greeting, model) = match prepare(arguments, load) {
         Ok((model, parameters)) => {
-            let serves = exchange::DEMANDS.map(|demand| model.serves().contains(demand));
+            let serves = shared_words::DEMANDS.map(|demand| model.serves().contains(demand));
             let remembers = model.memory() == Memory::PathDependent;
             (Greeting::Ready { parameters, serves, remembers }, Some(model))
         }

@@ -21,7 +21,7 @@ pub(super) const MESSAGE_BYTES: usize = 508;
 
 /// One request and one answer at a time.
 #[repr(C)]
-pub(super) struct Exchange {
+pub(super) struct SharedPage {
     /// Number of the newest request; the worker sleeps on it.
     pub(super) request: AtomicU32,
     /// Number of the newest request that is answered; the host sleeps on it.
@@ -39,9 +39,9 @@ pub(super) struct Exchange {
     pub(super) message: [AtomicU8; MESSAGE_BYTES],
 }
 
-/// An [`Exchange`] that another process may have mapped too.
+/// An [`SharedPage`] that another process may have mapped too.
 pub(super) struct SharedMemory {
-    exchange: NonNull<Exchange>,
+    page: NonNull<SharedPage>,
 }
 
 // SAFETY: the mapping lives until `drop`, and all that is in it is atomic.
@@ -55,7 +55,7 @@ unsafe impl Sync for SharedMemory {}
 /// What the system says.
 pub(super) fn create_file() -> io::Result<OwnedFd> {
     let file = memfd_create("flotor-worker", MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING)?;
-    ftruncate(&file, size_of::<Exchange>() as u64)?;
+    ftruncate(&file, size_of::<SharedPage>() as u64)?;
     fcntl_add_seals(&file, SealFlags::SHRINK | SealFlags::GROW | SealFlags::SEAL)?;
     Ok(file)
 }
@@ -70,33 +70,33 @@ impl SharedMemory {
         // What is no anonymous file has no seals to ask for.
         let is_sealed = fcntl_get_seals(&file).is_ok_and(|seals| seals.contains(SealFlags::SHRINK));
         let held = rustix::fs::fstat(&file)?.st_size;
-        if !is_sealed || usize::try_from(held).unwrap_or(0) < size_of::<Exchange>() {
+        if !is_sealed || usize::try_from(held).unwrap_or(0) < size_of::<SharedPage>() {
             return Err(io::Error::other("this is not the memory of a worker"));
         }
-        let (length, protection) = (size_of::<Exchange>(), ProtFlags::READ | ProtFlags::WRITE);
+        let (length, protection) = (size_of::<SharedPage>(), ProtFlags::READ | ProtFlags::WRITE);
         // SAFETY: a new mapping at an address of the system's choice aliases nothing of this process. The file is at
         // least as long as the mapping and stays so, being sealed against shrinking: no seal is ever taken off.
         let address = unsafe { mmap(std::ptr::null_mut(), length, protection, MapFlags::SHARED, file, 0) }?;
-        let exchange = NonNull::new(address.cast()).ok_or_else(|| io::Error::other("mapped nowhere"))?;
-        Ok(Self { exchange })
+        let page = NonNull::new(address.cast()).ok_or_else(|| io::Error::other("mapped nowhere"))?;
+        Ok(Self { page })
     }
 }
 
 impl std::ops::Deref for SharedMemory {
-    type Target = Exchange;
+    type Target = SharedPage;
 
     #[inline]
-    fn deref(&self) -> &Exchange {
+    fn deref(&self) -> &SharedPage {
         // SAFETY: mapped, page-aligned and long enough since `map`, until `drop`; only atomics, for which every bit
         // pattern is a value, whoever writes it.
-        unsafe { self.exchange.as_ref() }
+        unsafe { self.page.as_ref() }
     }
 }
 
 impl Drop for SharedMemory {
     fn drop(&mut self) {
         // SAFETY: the address and length of the mapping made in `map`; no reference outlives `self`.
-        let _ = unsafe { munmap(self.exchange.as_ptr().cast(), size_of::<Exchange>()) };
+        let _ = unsafe { munmap(self.page.as_ptr().cast(), size_of::<SharedPage>()) };
     }
 }
 
@@ -112,7 +112,7 @@ mod tests {
         let memory = SharedMemory::map(&file).expect("mapped");
         memory.request.store(7, Ordering::Relaxed);
         assert_eq!(ftruncate(&file, 0), Err(Errno::PERM));
-        assert_eq!(ftruncate(&file, 2 * size_of::<Exchange>() as u64), Err(Errno::PERM));
+        assert_eq!(ftruncate(&file, 2 * size_of::<SharedPage>() as u64), Err(Errno::PERM));
         // Would be a bus error if the file had been cut.
         assert_eq!(memory.request.load(Ordering::Relaxed), 7);
     }
@@ -121,7 +121,7 @@ mod tests {
     fn a_file_that_could_be_cut_is_not_mapped() {
         for flags in [MemfdFlags::CLOEXEC, MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING] {
             let file = memfd_create("unsealed", flags).expect("an anonymous file");
-            ftruncate(&file, size_of::<Exchange>() as u64).expect("a length");
+            ftruncate(&file, size_of::<SharedPage>() as u64).expect("a length");
             assert!(SharedMemory::map(&file).is_err(), "{flags:?}");
         }
     }

@@ -8,9 +8,9 @@
 //! The library is loaded into the host as well, for its schema, but no model of it is made there.
 
 mod child;
-mod exchange;
 mod memory;
 mod parent;
+mod shared_words;
 
 pub use child::{LoadFile, WorkerArguments, serve};
 pub use parent::{Worker, WorkerOrder};

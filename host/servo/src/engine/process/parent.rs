@@ -1,8 +1,8 @@
 //! The host's side: a model that lives in another process.
 
 use super::child::WHOLE;
-use super::exchange::{DEMANDS, NO_DEMAND, Order, wait_for_change};
 use super::memory::{SharedMemory, create_file};
+use super::shared_words::{DEMANDS, NO_DEMAND, Order, wait_for_change};
 use super::{Greeting, Reply};
 use crate::monotonic_ns;
 use flotor_hal::abi::CallStatus;

@@ -1,6 +1,6 @@
 //! What host and worker say to each other, as words in shared memory.
 
-use super::memory::{Exchange, INPUT_WORDS, OUTPUT_WORDS};
+use super::memory::{INPUT_WORDS, OUTPUT_WORDS, SharedPage};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{Demand, Input, Output, Pose, StepStatus, Twist, Wrench};
 use rustix::thread::futex;
@@ -34,7 +34,7 @@ impl Order {
     }
 }
 
-impl Exchange {
+impl SharedPage {
     /// The host's side: asks for something under a new number. Real-time: one system call.
     pub(super) fn ask(&self, number: u32, order: Order) {
         self.order.store(order.code(), Ordering::Relaxed);

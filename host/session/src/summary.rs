@@ -1,6 +1,6 @@
 //! What a run says about itself: numbers for machines, a page for people.
 
-use crate::live::LinkCounts;
+use crate::telemetry::LinkCounts;
 use crate::{Misbehaved, Observer, Outcome, PluginReport};
 use flotor_core::coupling::CouplingDescription;
 use flotor_core::peer::TankState;

@@ -21,12 +21,12 @@ use super::clock::monotonic_ns;
 pub(super) struct Moment(u64);
 
 /// Reads the counter.
-pub(super) struct Stopwatch {
+pub(super) struct StageTimer {
     counter: Clock,
     count: CountLength,
 }
 
-impl Stopwatch {
+impl StageTimer {
     /// Not real-time: the first one of a process measures how fast the counter is. On an idle machine that takes two or three
     /// milliseconds, on one that keeps the process from working 0.4 s at most, and its pauses.
     pub(super) fn new() -> Self {
@@ -82,7 +82,7 @@ struct CountLength {
 impl CountLength {
     const PARTS_PER_NS_LOG2: u32 = 32;
     /// The measurement ends where it can be wrong by so much, relative, against the clock as it runs meanwhile: a hundredth of
-    /// what the histograms tell apart (two digits, `timing.rs`). An idle machine gets there in two milliseconds.
+    /// what the histograms distinguish (two digits, `timing.rs`). An idle machine gets there in two milliseconds.
     const ENOUGH: f64 = 100e-6;
     /// Where it ends in any case, with the best there was, ns: as long as `quanta` takes at most.
     const LONGEST_NS: u64 = 200_000_000;
@@ -238,16 +238,16 @@ mod tests {
     /// Between two looks at the system's clock there is no more time than these say.
     #[test]
     fn the_counter_and_the_clock_agree() {
-        let stopwatch = Stopwatch::new();
+        let stage_timer = StageTimer::new();
         let least_error = (0..100).map(|_| {
-            let (outer, from) = (monotonic_ns(), stopwatch.now());
+            let (outer, from) = (monotonic_ns(), stage_timer.now());
             let inner = monotonic_ns();
             while monotonic_ns() < inner + 1_000_000 {
                 std::hint::spin_loop();
             }
             let inner_ns = monotonic_ns() - inner;
-            let (to, outer_ns) = (stopwatch.now(), monotonic_ns() - outer);
-            let took_ns = stopwatch.between_ns(from, to);
+            let (to, outer_ns) = (stage_timer.now(), monotonic_ns() - outer);
+            let took_ns = stage_timer.between_ns(from, to);
             took_ns.saturating_sub(outer_ns).max(inner_ns.saturating_sub(took_ns))
         });
         // Of a millisecond, in the best of a hundred tries: what the measurement may be wrong by, and the frequency of the clock,
@@ -257,8 +257,8 @@ mod tests {
 
     #[test]
     fn a_moment_before_is_no_time_ago() {
-        let stopwatch = Stopwatch::new();
-        let (before, after) = (stopwatch.now(), stopwatch.now());
-        assert_eq!(stopwatch.between_ns(after, Moment(before.0 - 1)), 0);
+        let stage_timer = StageTimer::new();
+        let (before, after) = (stage_timer.now(), stage_timer.now());
+        assert_eq!(stage_timer.between_ns(after, Moment(before.0 - 1)), 0);
     }
 }

@@ -12,7 +12,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 pub(crate) type Retired = (u32, Box<Layer>);
 
 /// The loop's end.
-pub struct Exchange {
+pub struct LoopSwaps {
     /// What the scene has scheduled, in order of time, ns; each place is emptied when its time comes.
     schedule: Box<[(u64, Option<Replacement>)]>,
     next: usize,
@@ -21,7 +21,7 @@ pub struct Exchange {
 }
 
 /// The other end.
-pub struct Workshop {
+pub struct HostSwaps {
     /// Replacements for the loop.
     pub leaving_for_the_loop: Producer<Replacement>,
     /// Layers the loop needs no longer.
@@ -29,17 +29,17 @@ pub struct Workshop {
 }
 
 /// Both ends, for a number of models. Not real-time.
-pub fn exchange(models: usize, mut schedule: Vec<(u64, Replacement)>) -> (Exchange, Workshop) {
+pub fn swap_queues(models: usize, mut schedule: Vec<(u64, Replacement)>) -> (LoopSwaps, HostSwaps) {
     schedule.sort_by_key(|(time_ns, _)| *time_ns); // stable: equal times keep the scene's order
     // One of each model may be on its way in; on the way out there may be that one, the one before, and the scheduled.
     let (leaving_for_the_loop, arriving) = RingBuffer::new(models.max(1));
     let (retired, taken_back) = RingBuffer::new(2 * models + schedule.len() + 1);
     let schedule = schedule.into_iter().map(|(time_ns, replacement)| (time_ns, Some(replacement))).collect();
-    let exchange = Exchange { schedule, next: 0, arriving, retired };
-    (exchange, Workshop { leaving_for_the_loop, retired: taken_back })
+    let swaps = LoopSwaps { schedule, next: 0, arriving, retired };
+    (swaps, HostSwaps { leaving_for_the_loop, retired: taken_back })
 }
 
-impl Exchange {
+impl LoopSwaps {
     /// Whether a replacement is to be put in at this tick. Real-time: bounded, no allocation.
     pub fn is_due(&self, tick: &Tick) -> bool {
         self.is_scheduled(tick) || !self.arriving.is_empty()
