@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 /// Ticks that wait for a picture at most: a window that is hidden takes none in, and memory stays what it is.
 const MOST_WAITING: usize = 32_768;
 /// Everything else that waits at most.
-const MOST_NEWS: usize = 1024;
+const MOST_ARRIVALS: usize = 1024;
 /// How often the thread looks whether it is still needed.
 const READ_WAIT: Duration = Duration::from_millis(200);
 /// Without a tick for this long, what is shown is old.
@@ -30,7 +30,7 @@ pub enum FeedState {
 
 /// What has come since the last look.
 #[derive(Debug, Default)]
-pub struct News {
+pub struct Arrivals {
     /// Ticks in order.
     pub records: VecDeque<TickRecord>,
     /// Parameters that changed.
@@ -41,7 +41,7 @@ pub struct News {
 
 #[derive(Debug)]
 struct Waiting {
-    news: News,
+    arrivals: Arrivals,
     dropped_by_host: u64,
     dropped_here: u64,
     last_tick: Instant,
@@ -65,7 +65,7 @@ impl Feed {
     /// [`LiveError::Connection`]: the host is gone, or there is no thread.
     pub fn start(mut client: Client, wake: impl Fn() + Send + 'static) -> Result<Self, LiveError> {
         let waiting = Arc::new(Mutex::new(Waiting {
-            news: News::default(),
+            arrivals: Arrivals::default(),
             dropped_by_host: 0,
             dropped_here: 0,
             last_tick: Instant::now(),
@@ -105,8 +105,8 @@ impl Feed {
 
     /// Takes what has come.
     #[must_use]
-    pub fn news(&self) -> News {
-        std::mem::take(&mut lock(&self.waiting).news)
+    pub fn arrivals(&self) -> Arrivals {
+        std::mem::take(&mut lock(&self.waiting).arrivals)
     }
 
     /// How the connection stands.
@@ -147,7 +147,7 @@ impl Drop for Feed {
 impl Waiting {
     /// True while there may be more.
     fn take_in(&mut self, next: Result<Option<Event>, LiveError>) -> bool {
-        let News { records: ticks, changes, answers } = &mut self.news;
+        let Arrivals { records: ticks, changes, answers } = &mut self.arrivals;
         match next {
             Ok(None) => {}
             Ok(Some(Event::Ticks { records, dropped })) => {
@@ -159,8 +159,8 @@ impl Waiting {
                     self.dropped_here += 1;
                 }
             }
-            Ok(Some(Event::Change(change))) if changes.len() < MOST_NEWS => changes.push(change),
-            Ok(Some(Event::Answer(answer))) if answers.len() < MOST_NEWS => answers.push(answer),
+            Ok(Some(Event::Change(change))) if changes.len() < MOST_ARRIVALS => changes.push(change),
+            Ok(Some(Event::Answer(answer))) if answers.len() < MOST_ARRIVALS => answers.push(answer),
             Ok(Some(Event::Change(_) | Event::Answer(_))) => {}
             Ok(Some(Event::End(End { words }))) => self.state = FeedState::Ended(words),
             Err(error) => self.state = FeedState::Lost(error.to_string()),

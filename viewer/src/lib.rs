@@ -1,6 +1,6 @@
 //! The viewer: what the hand feels, for the eye.
 //!
-//! A program of its own, so that no graphics driver can hold up a servo (docs/src/adr/0008-viewer-process.md). It
+//! A program of its own, so that no graphics driver can delay a servo (docs/src/adr/0008-viewer-process.md). It
 //! shows a running host or a recording: the bodies of its models in 3D, what was felt as traces, and panels to change it.
 //!
 //! - [`history`]: what has been seen of a run; [`feed`] reads it from a running host, [`player`] says which moment is shown,

@@ -9,7 +9,7 @@ use flotor_viewer::history::History;
 use flotor_viewer::palette::Look;
 use flotor_viewer::picture::{PictureOptions, draw_without_window, picture, write_png};
 use flotor_viewer::shape::shapes_of;
-use flotor_viewer::window::{WindowError, WindowWish, open};
+use flotor_viewer::window::{WindowError, WindowOptions, open};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -39,7 +39,7 @@ struct Arguments {
     #[arg(long, value_name = "SECONDS")]
     at: Option<f64>,
     #[command(flatten)]
-    wish: WindowWish,
+    request: WindowOptions,
 }
 
 /// Why there is nothing to see, with an exit code: 2 where the recording or an option is wrong, else 1.
@@ -83,7 +83,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
                 Some(history) => Start::Recording(Box::new(history), arguments.at, arguments.plugins.clone()),
                 None => live(arguments)?,
             };
-            let cost = open(start, arguments.wish)?;
+            let cost = open(start, arguments.request)?;
             cost.iter().for_each(|cost| println!("{cost}"));
             Ok(())
         }
@@ -102,7 +102,7 @@ fn live(arguments: &Arguments) -> Result<Start, Failure> {
 
 /// The window as it would open on the recording, drawn on the processor.
 fn whole_window(arguments: &Arguments, history: History, out: &Path) -> Result<(), Failure> {
-    let (look, size, scale) = of_picture(arguments.wish);
+    let (look, size, scale) = of_picture(arguments.request);
     let start = Start::Recording(Box::new(history), arguments.at, arguments.plugins.clone());
     let mut viewer = Viewer::new(&egui::Context::default(), None, start, look);
     let image = draw_without_window(size, scale, look, |ui| viewer.show(ui));
@@ -110,12 +110,12 @@ fn whole_window(arguments: &Arguments, history: History, out: &Path) -> Result<(
 }
 
 /// Look, size and scale of a picture: the same for everybody.
-fn of_picture(wish: WindowWish) -> (Look, [usize; 2], f32) {
-    (wish.look.unwrap_or_default(), wish.size.unwrap_or([1280, 800]), wish.scale.unwrap_or(1.0))
+fn of_picture(request: WindowOptions) -> (Look, [usize; 2], f32) {
+    (request.look.unwrap_or_default(), request.size.unwrap_or([1280, 800]), request.scale.unwrap_or(1.0))
 }
 
 fn screenshot(arguments: &Arguments, history: &History, out: &Path) -> Result<(), Failure> {
-    let (look, size_px, scale) = of_picture(arguments.wish);
+    let (look, size_px, scale) = of_picture(arguments.request);
     let (mut shapes, missing) = shapes_of(history.run(), &arguments.plugins);
     for reason in missing {
         eprintln!("note: {reason}");

@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn what_must_be_told_apart_is_told_apart_by_every_eye() {
+    fn what_must_be_distinguished_is_distinguished_by_every_eye() {
         /// Distance in L*a*b*: 2.3 is just seen side by side (Mahy 1994), ten times that from one glance to the next.
         const APART: f64 = 23.0;
         for look in [Look::Dark, Look::Light] {

@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn two_of_one_name_are_told_apart_by_their_units() {
+    fn two_of_one_name_are_distinguished_by_their_units() {
         let twins = [("damping_ns_per_m", "N s/m"), ("hand", ""), ("damping_nms_per_rad", "N m s/rad")];
         let panel = Panel::new(&plugin(twins.map(|(id, unit)| parameter(id, unit)).into()), Use::Change);
         let names: Vec<&str> = panel.knobs.iter().map(|knob| knob.name.as_str()).collect();

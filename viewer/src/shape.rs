@@ -80,7 +80,7 @@ pub fn file_of<'a>(plugin_files: &'a [PathBuf], id: &str) -> Option<&'a PathBuf>
 /// [`LoadError`], with file, cause and remedy.
 #[allow(unsafe_code)] // listed in tests/tests/system/architecture.rs
 pub fn load_file(file: &Path) -> Result<Plugin, LoadError> {
-    // SAFETY: whoever watches a run vouches for its plugins, which are those the host runs or that lie in folders of the
+    // SAFETY: whoever watches a run guarantees for its plugins, which are those the host runs or that lie in folders of the
     // viewer's command line.
     unsafe { Plugin::load(file) }
 }

@@ -38,7 +38,7 @@ pub enum WindowError {
 
 /// What a command line says about a window; what it does not say is as it was the last time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, clap::Args)]
-pub struct WindowWish {
+pub struct WindowOptions {
     /// Light or dark (default: dark; a window: as the last time)
     #[arg(long, value_enum)]
     pub look: Option<Look>,
@@ -77,17 +77,17 @@ fn scale(text: &str) -> Result<f32, String> {
     text.parse().ok().filter(|scale| (1.0..=3.0).contains(scale)).ok_or_else(wrong)
 }
 
-/// Opens a window and stays until it is closed; gives what it cost, if that was asked for.
+/// Opens a window and stays until it is closed; gives what it cost, if that was requested.
 ///
 /// # Errors
 /// [`WindowError`].
-pub fn open(start: Start, wish: WindowWish) -> Result<Option<Cost>, WindowError> {
+pub fn open(start: Start, request: WindowOptions) -> Result<Option<Cost>, WindowError> {
     // A sitting looks the same for everybody.
     let file = if matches!(start, Start::Sitting(..)) { None } else { Remembered::file() };
     let mut remembered = file.as_deref().map(Remembered::load).unwrap_or_default();
-    remembered.look = wish.look.unwrap_or(remembered.look);
-    remembered.zoom = wish.scale.unwrap_or(remembered.zoom);
-    let size = wish.size.map_or(remembered.size_pt, |size| size.map(|length| length as f32));
+    remembered.look = request.look.unwrap_or(remembered.look);
+    remembered.zoom = request.scale.unwrap_or(remembered.zoom);
+    let size = request.size.map_or(remembered.size_pt, |size| size.map(|length| length as f32));
     let viewport = ViewportBuilder::default()
         .with_title("Flotor")
         .with_app_id("flotor-viewer")
@@ -110,7 +110,7 @@ pub fn open(start: Start, wish: WindowWish) -> Result<Option<Cost>, WindowError>
                     viewer,
                     file,
                     kept: remembered,
-                    measure: wish.measure.map(|duration| (duration, tells)),
+                    measure: request.measure.map(|duration| (duration, tells)),
                 }))
             }),
         )

@@ -39,7 +39,7 @@ fn goes_on(run: &mut Owned) -> bool {
 fn summary(run: &mut Owned) -> Value {
     let (stdout, stderr) = (run.stdout.take(), run.stderr.take());
     let [said, errors] = [stdout.map(std::io::read_to_string), stderr.map(std::io::read_to_string)]
-        .map(|text| text.expect("a pipe was asked for").expect("it is text"));
+        .map(|text| text.expect("a pipe was requested").expect("it is text"));
     assert!(run.wait().expect("it is ours").success(), "{errors}");
     let mut summary: Value = serde_json::from_str(&said).expect("it is JSON");
     let all = summary.as_object_mut().expect("an object");
@@ -139,7 +139,7 @@ fn a_viewer_that_is_frozen_changes_nothing() {
 }
 
 #[test]
-fn a_viewer_and_a_flood_of_requests_and_rubbish_change_nothing() {
+fn a_viewer_and_a_flood_of_requests_and_malformed_data_change_nothing() {
     let Some(mut watched) = Watched::begin() else { return };
     let directory = Directory::at(watched.folder.path().join("flotor"));
     let path = directory.runs().remove(0).path;
@@ -166,7 +166,7 @@ fn flood(client: Client, path: PathBuf) -> [JoinHandle<u32>; 2] {
         let sent = asks.take_while(|ask| asker.ask(ask.clone()).is_ok()).count();
         u32::try_from(sent).expect("of a few seconds")
     };
-    let rubbish = move || {
+    let malformed_data = move || {
         let mut sent = 0;
         // A frame of 4 GiB: the host hangs up, and there is a next connection.
         while let Ok(mut nonsense) = UnixStream::connect(&path) {
@@ -177,5 +177,5 @@ fn flood(client: Client, path: PathBuf) -> [JoinHandle<u32>; 2] {
         }
         sent
     };
-    [std::thread::spawn(requests), std::thread::spawn(rubbish)]
+    [std::thread::spawn(requests), std::thread::spawn(malformed_data)]
 }

@@ -44,7 +44,7 @@ pub enum AccessError {
 
 /// The bridge's own name among the files.
 const BRIDGE: &str = "bridge";
-/// The name of who vouches for all.
+/// The name of who guarantees for all.
 const AUTHORITY: &str = "authority";
 
 /// Writes certificates, keys and one Zenoh configuration for the bridge and each member; the configurations written.
@@ -81,7 +81,7 @@ pub fn write_keys(folder: &Path, members: &Members) -> Result<Vec<PathBuf>, Acce
     Ok(written)
 }
 
-/// Who vouches for all members, and the certificate by which they know it. Its key is thrown away: a new member means new keys
+/// Who guarantees for all members, and the certificate by which they know it. Its key is thrown away: a new member means new keys
 /// for all, and nobody can ever add one secretly.
 fn authority() -> Result<(Issuer<'static, KeyPair>, String), AccessError> {
     let mut parameters = CertificateParams::default();

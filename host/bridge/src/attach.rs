@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// How long to wait for news before looking whether to stop.
+/// How long to wait for messages before looking whether to stop.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
 
 /// Why a remote run does not appear here.

@@ -1,12 +1,12 @@
 //! Bilateral teleoperation: carries what the two ends of a coupling tell each other, between a host here and a bridge elsewhere.
 //!
 //! ```text
-//!  host -> news socket -> couple -> flotor/NAME/couple/COUPLING -> serve -> news socket -> host
+//!  host -> peer socket -> couple -> flotor/NAME/couple/COUPLING -> serve -> peer socket -> host
 //!       <-             <-        <- flotor/NAME/news/COUPLING   <-       <-             <-
 //! ```
 //!
 //! Both directions are best effort, and only the newest counts: what finds no room is dropped, here and in Zenoh. Nothing of it
-//! is trusted: what is no [`Dispatch`] is refused and counted, and what a host hears is bounded by its own energy account and its
+//! is trusted: what is no [`Dispatch`] is refused and counted, and what a host hears is bounded by its own energy tank and its
 //! own envelope.
 
 use crate::keys::Name;
@@ -26,7 +26,7 @@ use zenoh::{Session, Wait};
 
 /// Pause between two looks at both sides: half a period at 1 kHz.
 const LOOK_PERIOD: Duration = Duration::from_micros(500);
-/// News from the network that waits for the host at most: more is old.
+/// Messages from the network that waits for the host at most: more is old.
 const MOST_WAITING: usize = 64;
 /// How often it is looked which couplings there are.
 const FIND_PERIOD: Duration = Duration::from_millis(200);
@@ -62,11 +62,11 @@ impl Side {
 /// What was carried for a coupling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Carried {
-    /// News of the host here, put on the network.
+    /// Messages of the host here, put on the network.
     pub told: u64,
-    /// News from the network, given to the host here.
+    /// Messages from the network, given to the host here.
     pub heard: u64,
-    /// What came from the network and was no news.
+    /// What came from the network and was no message.
     pub refused: u64,
 }
 
@@ -86,7 +86,7 @@ impl Counts {
     }
 }
 
-/// Why news is not carried.
+/// Why messages are not carried.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CoupleError {
@@ -97,7 +97,7 @@ pub enum CoupleError {
     #[error(transparent)]
     Directory(#[from] DirectoryError),
     /// No thread.
-    #[error("no thread to carry news: {0}")]
+    #[error("no thread to carry messages: {0}")]
     Thread(#[from] std::io::Error),
 }
 
@@ -125,7 +125,7 @@ impl Couplers {
         }
     }
 
-    /// Takes up what has come and lets go of what has gone, if it is time to look. `tell` gets a line for people about each.
+    /// Takes up what has come and closes what has gone, if it is time to look. `tell` gets a line for people about each.
     ///
     /// # Errors
     /// [`CoupleError`].
@@ -143,7 +143,10 @@ impl Couplers {
         });
         for found in self.directory.couplings() {
             if !self.here.contains_key(&found.name) {
-                tell(&format!("carrying news of the coupling `{}` (process {})", found.name, found.process));
+                tell(&format!(
+                    "carrying the peer state of the coupling `{}` (process {})",
+                    found.name, found.process
+                ));
                 let coupler = Coupler::start(&self.session, &self.directory, &self.name, self.side, &found)?;
                 self.here.insert(found.name, coupler);
             }
@@ -263,7 +266,7 @@ fn carry(
                 return;
             }
         }
-        // Of what comes together only the last is news. What the host says is its own: nothing is refused there.
+        // Of what comes together only the last is new. What the host says is its own: nothing is refused there.
         let mut newest = None;
         while let Ok(Some(dispatch)) = socket.hear() {
             newest = Some(dispatch);

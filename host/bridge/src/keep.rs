@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// How long to wait for news before looking whether to stop.
+/// How long to wait for messages before looking whether to stop.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
 
 /// Why there is no recording.
@@ -36,7 +36,7 @@ pub struct Kept {
 /// How a recording ends.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RecordingEnd {
-    /// The run is over; its words.
+    /// The run is over; its message.
     Over(String),
     /// Whoever recorded has stopped.
     Stopped,

@@ -4,7 +4,7 @@
 //!  machine A                                              machine B
 //!  flotor run -> live socket -> bridge serve  -> network -> bridge attach -> live socket -> flotor view
 //!                                                        -> bridge record -> FILE.mcap
-//!  flotor run <-> news socket <-> bridge serve <-> network <-> bridge couple <-> news socket <-> flotor run
+//!  flotor run <-> peer socket <-> bridge serve <-> network <-> bridge couple <-> peer socket <-> flotor run
 //! ```
 //!
 //! [`serve`] is the one end: a watcher of the host like any other ([`flotor_live`]), whose words it puts on keys
@@ -21,6 +21,6 @@ pub mod keep;
 pub mod keys;
 pub mod link;
 pub mod remote;
+pub mod request;
 pub mod serve;
 pub mod status;
-pub mod request;

@@ -34,7 +34,7 @@ pub enum LinkError {
         reason: String,
     },
     /// No session.
-    #[error("no way onto the network: {0}; is the endpoint free, and the peer there?")]
+    #[error("cannot open the session: {0}; is the endpoint free, and the peer there?")]
     Open(String),
     /// The network refuses something.
     #[error("the network refuses: {0}")]

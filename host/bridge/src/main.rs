@@ -8,8 +8,8 @@ use flotor_bridge::keep::{RecordingEnd, keep};
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkError, LinkOptions, open};
 use flotor_bridge::remote::{Remote, bridges};
+use flotor_bridge::request::{Request, Right};
 use flotor_bridge::serve::{Launcher, Service, serve};
-use flotor_bridge::request::{Right, Request};
 use flotor_live::{Directory, SetValue};
 use std::error::Error;
 use std::path::PathBuf;
@@ -51,7 +51,7 @@ enum Command {
         /// The bridge
         name: Name,
     },
-    /// Hold a hand here and one there together: carry the news of couplings with `partner = "elsewhere"`
+    /// Hold a hand here and one there together: carry the peer state of couplings with `partner = "elsewhere"`
     Couple {
         /// The bridge
         name: Name,
@@ -211,7 +211,7 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
         }
         Command::Ask { name, request } => {
             let remote = Remote::listen(&open(&link, End::Visiting)?, &name)?;
-            // Most requests are for the run that is on; the bridge knows without us when none is.
+            // Most requests are for the current run; the bridge knows without us when none is.
             let status =
                 remote.status()?.ok_or(format!("zenoh/{name} cannot be seen; `flotor bridge list`"))?;
             remote.mean(status.run);

@@ -2,8 +2,8 @@
 
 use crate::keys::Name;
 use crate::link::LinkError;
-use crate::status::Status;
 use crate::request::{NumberedRequest, Request};
+use crate::status::Status;
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_live::{Answer, End, Greeting};
@@ -118,7 +118,7 @@ impl Remote {
         Ok(None)
     }
 
-    /// What is told next; nothing if nothing is told in this time.
+    /// the next report; nothing if there is none in this time.
     #[must_use]
     pub fn next(&self, timeout: Duration) -> Option<Told> {
         match self.told.recv_timeout(timeout) {

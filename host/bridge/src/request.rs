@@ -110,7 +110,7 @@ impl Request {
     }
 }
 
-/// A request with what makes it good once.
+/// A request with what makes it valid once.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NumberedRequest {
@@ -144,7 +144,7 @@ pub enum Refusal {
     #[error("longer than {MAX_REQUEST_BYTES} bytes, which no request is")]
     TooLong,
     /// Its number is not higher than that of the peer's last.
-    #[error("a request with this number, or a higher one, came before: requests are good once")]
+    #[error("a request with this number, or a higher one, came before: requests are valid once")]
     Replayed,
     /// It is meant for a run that is over, or none is on.
     #[error("no run is on, or not the one that was meant")]
@@ -168,7 +168,7 @@ pub struct Gate {
 }
 
 impl Gate {
-    /// What a letter on a key asks for, while `run` is the run that is on (0: none).
+    /// What a letter on a key asks for, while `run` is the current run (0: none).
     ///
     /// # Errors
     /// [`Refusal`], counted.
@@ -207,7 +207,7 @@ impl Gate {
         if is_meant { Ok(letter.request) } else { Err(Refusal::Stale) }
     }
 
-    /// A number is good once.
+    /// A number is valid once.
     fn use_up(&mut self, right: Right, peer: String, number: u64) -> Result<(), Refusal> {
         let last = self.last.entry(right).or_default();
         let peers = last.len();
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_letter_is_good_once_and_for_its_run() {
+    fn a_letter_is_valid_once_and_for_its_run() {
         let mut gate = Gate::default();
         assert_eq!(gate.admit("flotor/a/ask/stop", &letter(1, 7, Request::Stop), 7), Ok(Request::Stop));
         assert_eq!(gate.admit("flotor/a/ask/stop", &letter(1, 7, Request::Stop), 7), Err(Refusal::Replayed));
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wish_on_another_ones_key_is_no_wish() {
+    fn a_request_on_the_key_of_another_is_refused() {
         let mut gate = Gate::default();
         for request in [
             Request::EmergencyStop,
@@ -283,7 +283,8 @@ mod tests {
     fn no_flood_of_peers_fills_the_memory() {
         let mut gate = Gate::default();
         let from = |peer: usize| {
-            let letter = NumberedRequest { peer: peer.to_string(), number: 1, run: 7, request: Request::Stop };
+            let letter =
+                NumberedRequest { peer: peer.to_string(), number: 1, run: 7, request: Request::Stop };
             serde_json::to_vec(&letter).unwrap()
         };
         let admitted = (0..2 * MOST_PEERS)
@@ -302,7 +303,10 @@ mod tests {
         let last_of_all = letter(u64::MAX, 0, Request::EmergencyStop);
         assert_eq!(gate.admit(key, &last_of_all, 7), Ok(Request::EmergencyStop));
         assert_eq!(gate.admit("flotor/a/ask/stop", &letter(1, 7, Request::Stop), 7), Ok(Request::Stop));
-        assert_eq!(gate.admit("flotor/a/ask/release", &letter(2, 0, Request::Release), 7), Ok(Request::Release));
+        assert_eq!(
+            gate.admit("flotor/a/ask/release", &letter(2, 0, Request::Release), 7),
+            Ok(Request::Release)
+        );
         assert_eq!(gate.admit(key, &letter(3, 0, Request::EmergencyStop), 7), Ok(Request::EmergencyStop));
         assert_eq!(gate.refused().len(), 0);
     }

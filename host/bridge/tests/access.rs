@@ -7,7 +7,7 @@ use flotor_bridge::access::{AccessError, Members, write_keys};
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkOptions, open};
 use flotor_bridge::remote::Remote;
-use flotor_bridge::request::{Right, Request};
+use flotor_bridge::request::{Request, Right};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -60,7 +60,7 @@ fn rights_are_what_the_keys_say() {
 }
 
 #[test]
-fn who_is_no_member_is_not_let_in() {
+fn who_is_no_member_is_refused() {
     let host = FakeHost::start();
     let (folder, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     write_keys(folder.path(), &members()).unwrap();

@@ -9,7 +9,7 @@ use common::{free_port, is_full_size, program, wait_until};
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkOptions, open};
 use flotor_bridge::remote::{Remote, Told};
-use flotor_bridge::request::{NumberedRequest, MAX_REQUEST_BYTES, Refusal, Request};
+use flotor_bridge::request::{MAX_REQUEST_BYTES, NumberedRequest, Refusal, Request};
 use flotor_live::SetValue;
 use rustix::process::Signal;
 use serde_json::Value;

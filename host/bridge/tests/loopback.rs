@@ -7,8 +7,8 @@ use flotor_bridge::attach::attach;
 use flotor_bridge::keep::{RecordingEnd, keep};
 use flotor_bridge::link::{End, LinkOptions, open};
 use flotor_bridge::remote::{Remote, Told, bridges};
+use flotor_bridge::request::{MAX_REQUEST_BYTES, NumberedRequest, Refusal, Request, Right};
 use flotor_bridge::status::State;
-use flotor_bridge::request::{NumberedRequest, MAX_REQUEST_BYTES, Refusal, Right, Request};
 use flotor_live::{Ask, Client, Directory, Event, SetValue};
 use flotor_record::Recording;
 use flotor_sync::Words;
@@ -128,7 +128,7 @@ fn who_comes_late_knows_all_that_is_needed() {
 }
 
 #[test]
-fn requests_reach_the_host_and_its_words_come_back() {
+fn requests_reach_the_host_and_its_message_come_back() {
     let host = FakeHost::start();
     let bridge = Bridge::start(&host.directory, Right::Operate);
     let remote = bridge.visit();

@@ -11,8 +11,8 @@ use common::{free_port, is_full_size, program, wait_until};
 use flotor_bridge::couple::couple;
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkOptions, open};
-use flotor_bridge::serve::{Service, serve};
 use flotor_bridge::request::Right;
+use flotor_bridge::serve::{Service, serve};
 use flotor_core::trace::{Events, TickRecord};
 use flotor_live::Directory;
 use flotor_record::Recording;
@@ -29,7 +29,7 @@ use std::time::Duration;
 /// Every hand preset of the simulated flotor, and how it may be held.
 const HANDS: [&str; 5] = ["oscillate", "press", "release", "hold", "open"];
 const GRIPS: [&str; 2] = ["firm", "relaxed"];
-/// Time without news after which an end lets go, ms: long enough that a loaded machine is not taken for a cut cable.
+/// Time without a message after which an end removes the force, ms: long enough that a loaded machine is not taken for a cut cable.
 const WATCHDOG_MS: f64 = 300.0;
 
 fn scene(hand: &str, grip: &str, watchdog_ms: f64) -> String {
@@ -153,8 +153,8 @@ fn out_while_missing_j(records: &[TickRecord]) -> f64 {
     most_j
 }
 
-/// The accounts of this end and of the other one, as it told, are overdrawn by no more than what came out while ticks were missed.
-fn assert_overdrawn_by_no_more(coupling: &Value, missing_j: [f64; 2]) {
+/// the tanks of this end and of the other one, as it told, are below zero by no more than what came out while ticks were missed.
+fn assert_below_zero_by_no_more(coupling: &Value, missing_j: [f64; 2]) {
     for (end, missing_j) in missing_j.into_iter().enumerate() {
         assert!(number(&coupling["lowest_j"][end]) >= -missing_j - 1.0e-12, "end {end}: {coupling}");
     }
@@ -165,7 +165,7 @@ fn number(value: &Value) -> f64 {
 }
 
 #[test]
-fn a_pair_over_zenoh_and_a_bad_way_is_stable_and_no_account_is_overdrawn() {
+fn a_pair_over_zenoh_and_a_bad_way_is_stable_and_no_tank_is_below_zero() {
     let Some(program) = program() else { return };
     let hands: Vec<(&str, &str)> = HANDS.iter().flat_map(|hand| GRIPS.map(|grip| (*hand, grip))).collect();
     let hands = if is_full_size() { hands } else { vec![("press", "firm"), ("oscillate", "relaxed")] };
@@ -182,7 +182,7 @@ fn a_pair_over_zenoh_and_a_bad_way_is_stable_and_no_account_is_overdrawn() {
             let link = &coupling["link"];
             println!("{hand}, {grip}: {coupling}, out while missing ticks {missing_j:?} J");
             assert_eq!(summary["end"], "finished");
-            assert_overdrawn_by_no_more(coupling, [missing_j[index], missing_j[1 - index]]);
+            assert_below_zero_by_no_more(coupling, [missing_j[index], missing_j[1 - index]]);
             assert!(number(&link["heard_ticks"]) > 100.0, "{link}");
             assert!(number(&link["longest_wait_ms"]) < WATCHDOG_MS, "{link}");
             assert_eq!(link["carried"]["refused"], 0);
@@ -214,7 +214,7 @@ fn a_cut_cable_leaves_both_devices_without_force_within_the_watchdog() {
         let silent = |record: &TickRecord| record.events.intersects(Events::PARTNER_SILENT);
         let first_silent = 1 + records.iter().rposition(|record| !silent(record)).expect("it was heard");
         println!("force until {} ms, {link}", records[last_felt].time_ns / 1_000_000);
-        // No tick goes by news as old as the watchdog, and none after that has force.
+        // No tick goes by a state as old as the watchdog, and none after that has force.
         assert!(number(&link["longest_wait_ms"]) < WATCHDOG_MS, "{link}");
         assert!(number(&link["silences"]) >= 1.0, "{link}");
         assert!(first_silent < records.len(), "the cut is seen");
@@ -222,12 +222,12 @@ fn a_cut_cable_leaves_both_devices_without_force_within_the_watchdog() {
     }
 }
 
-/// Whatever a host does, a force that was sent goes on acting while it is kept from running. The account knows of it afterwards.
+/// Whatever a host does, a force that was sent goes on acting while it is kept from running. The tank knows of it afterwards.
 #[test]
-fn a_host_that_is_held_up_overdraws_by_what_came_out_meanwhile_and_no_more() {
+fn a_host_that_is_delayed_overdraws_by_what_came_out_meanwhile_and_no_more() {
     let Some(program) = program() else { return };
     let network = Network::start();
-    let scenes = GRIPS.map(|grip| scene("oscillate", grip, 60_000.0)); // however long they are held up
+    let scenes = GRIPS.map(|grip| scene("oscillate", grip, 60_000.0)); // however long they are delayed
     network.run(&program, scenes, 4.0, |runs, _| {
         for run in runs.iter().cycle().take(40) {
             std::thread::sleep(Duration::from_millis(37)); // no part of a swing's period
@@ -240,7 +240,7 @@ fn a_host_that_is_held_up_overdraws_by_what_came_out_meanwhile_and_no_more() {
     for (index, host) in network.hosts.iter().enumerate() {
         let summary = host.summary();
         println!("{}, out while missing ticks {missing_j:?} J", summary["couplings"][0]);
-        assert_overdrawn_by_no_more(&summary["couplings"][0], [missing_j[index], missing_j[1 - index]]);
+        assert_below_zero_by_no_more(&summary["couplings"][0], [missing_j[index], missing_j[1 - index]]);
     }
     assert!(missing_j.iter().sum::<f64>() > 1.0e-6, "nothing came out: {missing_j:?}");
 }

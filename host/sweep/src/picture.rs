@@ -6,7 +6,7 @@ use crate::table::number;
 use crate::task::{Column, ColumnKind};
 use flotor_plot::{Axis, Figure, Panel, Series};
 
-/// Lines in a panel: more cannot be told apart.
+/// Lines in a panel: more cannot be distinguished.
 const MOST_LINES: usize = 6;
 
 /// Draws the answers `wanted` (all numeric ones if empty, four at most) of a finished sweep as SVG.

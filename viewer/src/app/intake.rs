@@ -3,7 +3,7 @@
 use super::source::{Parts, connect};
 use super::{Audience, Heading, Source, Viewer, Wanted};
 use crate::camera::Camera;
-use crate::feed::{FeedState, News, STALE_AFTER};
+use crate::feed::{Arrivals, FeedState, STALE_AFTER};
 use crate::history::{History, Keep, Sample};
 use crate::panel::Panel;
 use crate::player::Player;
@@ -43,16 +43,16 @@ impl Viewer {
             }
         }
         if let Source::Live { feed, .. } = &self.source {
-            // Before its news: of a run that was over by then, nothing is missing from them.
+            // Before its arrivals: of a run that was over by then, nothing is missing from them.
             let is_running = feed.state() == FeedState::Running;
-            let news = feed.news();
+            let arrivals = feed.arrivals();
             self.tally.dropped = feed.dropped();
             if is_running {
                 context.request_repaint_after(STALE_AFTER); // to notice that nothing comes
             } else {
                 self.panels.iter_mut().for_each(Panel::freeze);
             }
-            self.digest(news);
+            self.digest(arrivals);
             if !is_running {
                 self.player.stop_following(self.history.span_s());
             }
@@ -76,18 +76,18 @@ impl Viewer {
         self.source = Source::Live { feed: Box::new(feed), wanted: wanted.clone() };
     }
 
-    fn digest(&mut self, news: News) {
-        for record in &news.records {
+    fn digest(&mut self, arrivals: Arrivals) {
+        for record in &arrivals.records {
             self.history.push(record);
             self.tally.add(&Sample::from(record));
             if record.events.intersects(EXCESS) {
                 self.bell.ring();
             }
         }
-        for change in &news.changes {
+        for change in &arrivals.changes {
             self.follow(change);
         }
-        for answer in news.answers {
+        for answer in arrivals.answers {
             if let Some(reason) = answer.refused {
                 self.panels.iter_mut().for_each(Panel::take_back);
                 self.say(reason);

@@ -4,8 +4,8 @@ use super::{Audience, Source, Viewer};
 use crate::export::export;
 use crate::history::Sample;
 use crate::palette::Palette;
-use crate::ui::plot_stack::PlotWish;
-use crate::ui::top_bar::{TopBar, TopBarWish};
+use crate::ui::plot_stack::PlotRequest;
+use crate::ui::top_bar::{TopBar, TopBarRequest};
 use crate::ui::view3d::Subject;
 use crate::ui::{legend, parameters, readout, standing, style, warnings};
 use egui::{Rect, RichText, ScrollArea, Ui, vec2};
@@ -35,9 +35,9 @@ impl Viewer {
             look: self.look,
         };
         match bar.show(ui, palette) {
-            Some(TopBarWish::EmergencyStop) => self.ask(Ask::EmergencyStop),
-            Some(TopBarWish::SwitchLook) => self.switch_look(ui.ctx()),
-            Some(TopBarWish::SwitchPanel) => self.switch_panel(ui.ctx()),
+            Some(TopBarRequest::EmergencyStop) => self.ask(Ask::EmergencyStop),
+            Some(TopBarRequest::SwitchLook) => self.switch_look(ui.ctx()),
+            Some(TopBarRequest::SwitchPanel) => self.switch_panel(ui.ctx()),
             None => {}
         }
     }
@@ -81,11 +81,11 @@ impl Viewer {
         let below = Rect::from_min_max(view.left_bottom() + vec2(12.0, 6.0), area.max - vec2(16.0, 2.0));
         let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(below).id_salt("plots"));
         let motion = self.player.motion;
-        let wishes = self.plots.show(&mut ui, &self.history, self.player.now_s, motion, palette);
-        for wish in wishes {
-            match wish {
-                PlotWish::Seek(now_s) => self.player.seek(now_s, self.history.span_s()),
-                PlotWish::Export(format) => {
+        let requests = self.plots.show(&mut ui, &self.history, self.player.now_s, motion, palette);
+        for request in requests {
+            match request {
+                PlotRequest::Seek(now_s) => self.player.seek(now_s, self.history.span_s()),
+                PlotRequest::Export(format) => {
                     let remark = match export(&self.history, &self.plots, format, self.look) {
                         Ok(path) => format!("Written: {}", path.display()),
                         Err(error) => error.to_string(),

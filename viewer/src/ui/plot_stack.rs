@@ -30,7 +30,7 @@ pub enum Window {
 
 /// What a person asks for beside the traces themselves.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum PlotWish {
+pub enum PlotRequest {
     /// Another moment, s.
     Seek(f64),
     /// A file of what is shown.
@@ -104,7 +104,7 @@ impl PlotStack {
         }
     }
 
-    /// Shows the row of choices and the traces; says what was asked for.
+    /// Shows the row of choices and the traces; says what was requested.
     pub fn show(
         &mut self,
         ui: &mut Ui,
@@ -112,16 +112,16 @@ impl PlotStack {
         now_s: f64,
         motion: Motion,
         palette: &Palette,
-    ) -> Vec<PlotWish> {
+    ) -> Vec<PlotRequest> {
         self.end_s = self.end_of_window(history.span_s(), now_s, motion);
-        let mut wishes = Vec::new();
+        let mut requests = Vec::new();
         if ui.available_width() < ROOM_FOR_ONE_ROW_PT {
             ui.horizontal_wrapped(|ui| self.quantities(ui, palette));
-            ui.horizontal(|ui| self.presentation(ui, &mut wishes));
+            ui.horizontal(|ui| self.presentation(ui, &mut requests));
         } else {
             ui.horizontal(|ui| {
                 self.quantities(ui, palette);
-                self.presentation(ui, &mut wishes);
+                self.presentation(ui, &mut requests);
             });
         }
         let span_s = self.span_s(history);
@@ -136,9 +136,9 @@ impl PlotStack {
             let trace = self.traces.entry(quantity).or_insert_with(|| Trace::of(quantity));
             let answer = plot(ui, history, trace, view, palette);
             self.hover_s = self.hover_s.or(answer.hover_s);
-            wishes.extend(answer.seek_s.map(PlotWish::Seek));
+            requests.extend(answer.seek_s.map(PlotRequest::Seek));
         }
-        wishes
+        requests
     }
 
     /// A trace that is looked at stands still, as long as the moment shown is in it and not at its edge.
@@ -170,7 +170,7 @@ impl PlotStack {
     }
 
     /// How they are shown, from the right.
-    fn presentation(&mut self, ui: &mut Ui, wishes: &mut Vec<PlotWish>) {
+    fn presentation(&mut self, ui: &mut Ui, requests: &mut Vec<PlotRequest>) {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             ui.menu_button(RichText::new("Export").size(SMALL_PT + 0.5), |ui| {
@@ -178,7 +178,7 @@ impl PlotStack {
                     [(ExportFormat::Csv, "CSV"), (ExportFormat::Svg, "SVG"), (ExportFormat::Png, "PNG")]
                 {
                     if ui.button(name).clicked() {
-                        wishes.push(PlotWish::Export(format));
+                        requests.push(PlotRequest::Export(format));
                         ui.close();
                     }
                 }

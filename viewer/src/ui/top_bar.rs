@@ -24,7 +24,7 @@ pub struct TopBar<'a> {
 
 /// What was pressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TopBarWish {
+pub enum TopBarRequest {
     /// The emergency stop.
     EmergencyStop,
     /// The other look.
@@ -35,25 +35,25 @@ pub enum TopBarWish {
 
 impl TopBar<'_> {
     /// Shows the bar.
-    pub fn show(&self, ui: &mut Ui, palette: &Palette) -> Option<TopBarWish> {
-        let mut wish = None;
+    pub fn show(&self, ui: &mut Ui, palette: &Palette) -> Option<TopBarRequest> {
+        let mut request = None;
         ui.horizontal_centered(|ui| {
             ui.label(RichText::new(self.title).size(BODY_PT + 2.5).strong());
             ui.add_space(6.0);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 if self.can_stop && emergency_stop(ui).clicked() {
-                    wish = Some(TopBarWish::EmergencyStop);
+                    request = Some(TopBarRequest::EmergencyStop);
                 }
                 ui.add_space(4.0);
                 if self.has_panel && quiet(ui, "☰", "Parameters (P)").clicked() {
-                    wish = Some(TopBarWish::SwitchPanel);
+                    request = Some(TopBarRequest::SwitchPanel);
                 }
                 let (sign, help) = match self.look {
                     Look::Dark => ("☀", "Light (L)"),
                     Look::Light => ("🌙", "Dark (L)"),
                 };
                 if quiet(ui, sign, help).clicked() {
-                    wish = Some(TopBarWish::SwitchLook);
+                    request = Some(TopBarRequest::SwitchLook);
                 }
                 ui.add_space(6.0);
                 let color = if self.is_well { palette.text } else { palette.warning };
@@ -68,7 +68,7 @@ impl TopBar<'_> {
                 });
             });
         });
-        wish
+        request
     }
 }
 

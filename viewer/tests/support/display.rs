@@ -37,7 +37,7 @@ impl Display {
         command.arg(folder);
         let mut server = Owned::start(command.stdout(Stdio::piped()).stderr(Stdio::null()));
         let mut number = String::new();
-        let output = server.stdout.take().expect("a pipe was asked for");
+        let output = server.stdout.take().expect("a pipe was requested");
         BufReader::new(output).read_line(&mut number).expect("it says its number");
         Self { _server: server, name: format!(":{}", number.trim()), screen: folder.join("Xvfb_screen0") }
     }

@@ -1,4 +1,4 @@
-//! A host that can be watched, without a host: records at a steady rate, and a list of what it was asked for.
+//! A host that can be watched, without a host: records at a steady rate, and a list of what it was requested.
 
 #![allow(dead_code)] // each test program uses its part
 
@@ -10,8 +10,8 @@ pub mod tools;
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkOptions, open};
 use flotor_bridge::remote::Remote;
-use flotor_bridge::serve::{Service, serve};
 use flotor_bridge::request::Right;
+use flotor_bridge::serve::{Service, serve};
 use flotor_core::Clock;
 use flotor_core::trace::{Events, RECORD_WORDS, TickRecord};
 use flotor_live::{Ask, Directory, Greeting, PROTOCOL, Publication, Serve, WrenchLimits};
@@ -61,7 +61,7 @@ pub fn description() -> RunDescription {
 /// A model that takes its time to be weighted.
 pub const SLOW: &str = "slow";
 
-/// What a host was asked for.
+/// What a host was requested.
 #[derive(Default)]
 pub struct Asked(pub Mutex<Vec<Ask>>);
 

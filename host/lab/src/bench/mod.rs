@@ -2,7 +2,7 @@
 //!
 //! Every case goes along one smooth path (1 to 3 Hz in all six coordinates, 1 kHz) and is timed four ways: without
 //! interruption (the mean of a tick), in a batch, call by call (median and p99.9), and cold (after a reset, each call at
-//! another pose). All cases take turns, so that what is told of one against another does not depend on what else the
+//! another pose). All cases take turns, so that what is reported of one against another does not depend on what else the
 //! machine does. An error is the distance from a reference that walks the same path: another setting of the same model,
 //! computed in this run, not a table.
 //!

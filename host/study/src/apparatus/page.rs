@@ -1,5 +1,5 @@
 //! A study on one page: figures 17 or 18 of CMU-RI-TR-07-21 with this study's data, and every number next to the
-//! report's. One HTML file that needs no other.
+//! thesis's. One HTML file that needs no other.
 
 use super::figures;
 use crate::analysis::{

@@ -5,8 +5,8 @@ use super::{Launcher, WaitNow};
 use crate::couple::Carried;
 use crate::keys::Name;
 use crate::link::LinkError;
+use crate::request::{Gate, MAX_REQUEST_BYTES, Refusal, Request, Right};
 use crate::status::{State, Status};
-use crate::request::{Gate, MAX_REQUEST_BYTES, Refusal, Right, Request};
 use flotor_live::{Answer, Asker, ChangeMessage, Client, Greeting};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -38,7 +38,7 @@ struct Inside {
     due: u64,
 }
 
-/// The run that is on.
+/// The current run.
 struct Run {
     greeting: Greeting,
     description: Vec<u8>,
@@ -162,7 +162,7 @@ impl RequestHandler {
         }
     }
 
-    /// Publishes the status if it is news, and gives up on answers that do not come.
+    /// Publishes the status if it has changed, and gives up on answers that do not come.
     pub(super) fn report(&self, station: &Station) -> Result<(), LinkError> {
         let mut inside = self.lock();
         if let Some(run) = &mut inside.run {
@@ -175,7 +175,7 @@ impl RequestHandler {
             });
         }
         let status = inside.now();
-        let is_news = match &inside.reported {
+        let has_changed = match &inside.reported {
             None => true,
             Some((last, since)) => {
                 since.elapsed() >= STATUS_PERIOD
@@ -186,7 +186,7 @@ impl RequestHandler {
                     } != *last
             }
         };
-        if is_news {
+        if has_changed {
             inside.reported = Some((status.clone(), Instant::now()));
             drop(inside);
             station.status(&status)?;
