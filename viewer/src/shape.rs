@@ -54,7 +54,7 @@ pub enum ShapeError {
     },
 }
 
-/// Makes everything of a run that has a shape; the rest is told in words. Not real-time.
+/// Makes everything of a run that has a shape; the rest is reported as text. Not real-time.
 #[must_use]
 pub fn shapes_of(run: &RunDescription, plugin_files: &[PathBuf]) -> (Vec<Shape>, Vec<ShapeError>) {
     let (mut shapes, mut errors) = (Vec::new(), Vec::new());

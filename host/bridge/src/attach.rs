@@ -1,7 +1,7 @@
 //! A remote run as if it ran here: the viewer and everything else that watches runs of this machine sees it.
 
 use crate::link::LinkError;
-use crate::remote::{Message, Remote, RequestSender};
+use crate::remote::{Errand, Remote, Told};
 use crate::request::Request;
 use flotor_live::{Ask, Directory, Publication, PublishError, Serve};
 use std::sync::Arc;
@@ -23,7 +23,7 @@ pub enum AttachError {
     Publish(#[from] PublishError),
 }
 
-impl Serve for RequestSender {
+impl Serve for Errand {
     /// Carries the request to the remote host, and its answer back.
     fn serve(&self, ask: Ask) -> Result<(), String> {
         if matches!(ask, Ask::Swap { .. }) {
@@ -45,7 +45,7 @@ pub fn attach(
 ) -> Result<(), AttachError> {
     while let Some((greeting, run)) = remote.wait_for_run(stop)? {
         let title = greeting.title.clone();
-        let publication = Publication::open(directory, greeting, &run, Arc::new(remote.request_sender()))?;
+        let publication = Publication::open(directory, greeting, &run, Arc::new(remote.errand()))?;
         tell(&format!("`{title}` is at {}; `flotor view` shows it", publication.path().display()));
         let lost_before = remote.lost();
         let words = show(remote, &publication, stop);
@@ -64,10 +64,10 @@ fn show(remote: &Remote, publication: &Publication, stop: &AtomicBool) -> String
     while !stop.load(Ordering::Relaxed) {
         match remote.next(LOOK_PERIOD) {
             None => {}
-            Some(Message::Tick(record)) => publication.observe(&record),
-            Some(Message::Change(change)) => publication.change(&change),
-            Some(Message::End(end)) => return end.words,
-            Some(Message::Lost) => return "the bridge cannot be seen any more".to_owned(),
+            Some(Told::Tick(record)) => publication.observe(&record),
+            Some(Told::Change(change)) => publication.change(&change),
+            Some(Told::End(end)) => return end.words,
+            Some(Told::Gone) => return "the bridge cannot be seen any more".to_owned(),
         }
     }
     "stopped watching".to_owned()

@@ -1,7 +1,7 @@
 //! A recording of a remote run.
 
 use crate::link::LinkError;
-use crate::remote::{Message, Remote};
+use crate::remote::{Remote, Told};
 use flotor_record::{Note, RecordError, Recorder, Severity};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -55,7 +55,7 @@ pub fn keep(remote: &Remote, file: &Path, stop: &AtomicBool) -> Result<Kept, Kee
     while !stop.load(Ordering::Relaxed) {
         match remote.next(LOOK_PERIOD) {
             None => {}
-            Some(Message::Tick(record)) => {
+            Some(Told::Tick(record)) => {
                 let lost = remote.lost();
                 if lost > kept.lost {
                     let text = format!("{} ticks were lost on the way here", lost - kept.lost);
@@ -71,12 +71,12 @@ pub fn keep(remote: &Remote, file: &Path, stop: &AtomicBool) -> Result<Kept, Kee
                 recorder.record(&record)?;
                 kept.ticks += 1;
             }
-            Some(Message::Change(change)) => recorder.change(&change)?,
-            Some(Message::End(end)) => {
+            Some(Told::Change(change)) => recorder.change(&change)?,
+            Some(Told::End(end)) => {
                 kept.end = RecordingEnd::Over(end.words);
                 break;
             }
-            Some(Message::Lost) => {
+            Some(Told::Gone) => {
                 kept.end = RecordingEnd::Cut;
                 break;
             }

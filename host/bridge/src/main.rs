@@ -215,7 +215,7 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
             let status =
                 remote.status()?.ok_or(format!("zenoh/{name} cannot be seen; `flotor bridge list`"))?;
             remote.mean(status.run);
-            remote.request_sender().run(request.into())?;
+            remote.errand().run(request.into())?;
         }
         Command::List => {
             let session = open(&link, End::Visiting)?;

@@ -29,7 +29,7 @@ const LOOK_PERIOD: Duration = Duration::from_millis(300);
 
 /// What a remote run tells.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Message {
+pub enum Told {
     /// A tick.
     Tick(TickRecord),
     /// A parameter changed.
@@ -44,16 +44,16 @@ pub enum Message {
 pub struct Remote {
     session: Session,
     name: Name,
-    told: Receiver<Message>,
+    told: Receiver<Told>,
     queue: Queue,
-    request_sender: RequestSender,
+    errand: Errand,
     _all: Subscriber<()>,
     _alive: Subscriber<()>,
 }
 
 /// Carries requests to a bridge, from any thread; clone it freely.
 #[derive(Clone)]
-pub struct RequestSender {
+pub struct Errand {
     session: Session,
     name: Name,
     /// The last that was used; held until the letter has left, for letters to leave in the order of their numbers.
@@ -79,11 +79,11 @@ impl Remote {
             .declare_subscriber(name.key("alive"))
             .callback(move |sample| {
                 if sample.kind() == SampleKind::Delete {
-                    of_liveliness.put(Message::Lost);
+                    of_liveliness.put(Told::Gone);
                 }
             })
             .wait()?;
-        let request_sender = RequestSender {
+        let errand = Errand {
             session: session.clone(),
             name: name.clone(),
             number: Arc::default(),
@@ -94,7 +94,7 @@ impl Remote {
             name: name.clone(),
             told,
             queue,
-            request_sender,
+            errand,
             _all: all,
             _alive: alive,
         })
@@ -110,7 +110,7 @@ impl Remote {
                 self.get("greeting")?.and_then(|bytes| serde_json::from_slice::<Greeting>(&bytes).ok());
             let run = self.get("run")?.and_then(|bytes| RunDescription::from_bytes(&bytes).ok());
             if let (Some(greeting), Some(run)) = (greeting, run) {
-                self.request_sender.run.store(u64::from(greeting.process), Ordering::Relaxed);
+                self.errand.run.store(u64::from(greeting.process), Ordering::Relaxed);
                 return Ok(Some((greeting, run)));
             }
             std::thread::sleep(LOOK_PERIOD);
@@ -120,20 +120,20 @@ impl Remote {
 
     /// the next report; nothing if there is none in this time.
     #[must_use]
-    pub fn next(&self, timeout: Duration) -> Option<Message> {
+    pub fn next(&self, timeout: Duration) -> Option<Told> {
         match self.told.recv_timeout(timeout) {
             Ok(told) => {
                 self.queue.waiting.fetch_sub(1, Ordering::Relaxed);
                 Some(told)
             }
             Err(RecvTimeoutError::Timeout) => None,
-            Err(RecvTimeoutError::Disconnected) => Some(Message::Lost),
+            Err(RecvTimeoutError::Disconnected) => Some(Told::Gone),
         }
     }
 
     /// Requests are for this run from now on (its process, 0 for none). Not needed after [`Remote::wait_for_run`].
     pub fn mean(&self, run: u32) {
-        self.request_sender.run.store(u64::from(run), Ordering::Relaxed);
+        self.errand.run.store(u64::from(run), Ordering::Relaxed);
     }
 
     /// Ticks that were published and did not get here, as far as is known.
@@ -152,8 +152,8 @@ impl Remote {
 
     /// The way to ask for something.
     #[must_use]
-    pub fn request_sender(&self) -> RequestSender {
-        self.request_sender.clone()
+    pub fn errand(&self) -> Errand {
+        self.errand.clone()
     }
 
     fn get(&self, what: &str) -> Result<Option<Vec<u8>>, LinkError> {
@@ -162,7 +162,7 @@ impl Remote {
     }
 }
 
-impl RequestSender {
+impl Errand {
     /// Asks for something and waits for the answer: the reason if it is refused.
     ///
     /// # Errors
@@ -204,14 +204,14 @@ fn first(answers: &Answers) -> Option<Vec<u8>> {
 /// The way from the network's threads to who listens: of bounded length, and what is lost on it is counted.
 #[derive(Clone)]
 struct Queue {
-    sender: Sender<Message>,
+    sender: Sender<Told>,
     waiting: Arc<AtomicUsize>,
     lost: Arc<AtomicU64>,
 }
 
 impl Queue {
-    fn put(&self, told: Message) {
-        let is_tick = matches!(told, Message::Tick(_));
+    fn put(&self, told: Told) {
+        let is_tick = matches!(told, Told::Tick(_));
         let most = if is_tick { MOST_TICKS } else { MOST_WAITING };
         if self.waiting.load(Ordering::Relaxed) >= most {
             self.lose(u64::from(is_tick));
@@ -246,7 +246,7 @@ impl Ear {
             }
             Some("tick") => self.tick(&payload, number),
             Some("change") => {
-                flotor_record::change_from_bytes(&payload, number.unwrap_or(0)).ok().map(Message::Change)
+                flotor_record::change_from_bytes(&payload, number.unwrap_or(0)).ok().map(Told::Change)
             }
             Some("end") => self.end(&payload, number),
             _ => return,
@@ -257,16 +257,16 @@ impl Ear {
     }
 
     /// The end; what was to come before it and did not is lost.
-    fn end(&mut self, payload: &[u8], last: Option<u64>) -> Option<Message> {
+    fn end(&mut self, payload: &[u8], last: Option<u64>) -> Option<Told> {
         if let (Some(heard), Some(last)) = (self.number, last) {
             self.queue.lose(last.saturating_sub(heard));
             self.number = Some(last.max(heard));
         }
-        serde_json::from_slice(payload).ok().map(Message::End)
+        serde_json::from_slice(payload).ok().map(Told::End)
     }
 
     /// A tick, if its pose came before it; gaps in the numbers are losses.
-    fn tick(&mut self, payload: &[u8], number: Option<u64>) -> Option<Message> {
+    fn tick(&mut self, payload: &[u8], number: Option<u64>) -> Option<Told> {
         if let Some(number) = number {
             let missing = self.number.map_or(0, |last| number.saturating_sub(last + 1));
             self.queue.lose(missing);
@@ -277,7 +277,7 @@ impl Ear {
         if record.is_none() {
             self.queue.lose(1);
         }
-        record.map(Message::Tick)
+        record.map(Told::Tick)
     }
 }
 

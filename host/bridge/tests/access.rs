@@ -50,12 +50,12 @@ fn rights_are_what_the_keys_say() {
         let remote = visit(folder.path(), who, &endpoint, &bridge.name);
         let (greeting, _) = remote.wait_for_run(&NEVER).unwrap().expect("every member may see");
         assert_eq!(greeting.title, "Far away", "{who}");
-        let request_sender = remote.request_sender();
+        let errand = remote.errand();
         let before = host.asked.0.lock().unwrap().len();
-        assert_eq!(request_sender.run(weight()).is_ok(), may_operate, "{who}");
+        assert_eq!(errand.run(weight()).is_ok(), may_operate, "{who}");
         assert_eq!(host.asked.0.lock().unwrap().len() > before, may_operate, "{who}");
-        assert_eq!(request_sender.run(Request::EmergencyStop), Ok(()), "{who}: anybody presses it");
-        assert_eq!(request_sender.run(Request::Release).is_ok(), may_own, "{who}");
+        assert_eq!(errand.run(Request::EmergencyStop), Ok(()), "{who}: anybody presses it");
+        assert_eq!(errand.run(Request::Release).is_ok(), may_own, "{who}");
     }
 }
 
@@ -77,7 +77,7 @@ fn who_is_no_member_is_refused() {
             Ok(session) => {
                 let remote = Remote::listen(&session, &bridge.name).unwrap();
                 assert_eq!(remote.status().unwrap(), None, "nothing is told");
-                assert!(remote.request_sender().run(Request::EmergencyStop).is_err());
+                assert!(remote.errand().run(Request::EmergencyStop).is_err());
             }
         }
     }

@@ -8,7 +8,7 @@ use common::process::Owned;
 use common::{free_port, is_full_size, program, wait_until};
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkOptions, open};
-use flotor_bridge::remote::{Message, Remote};
+use flotor_bridge::remote::{Remote, Told};
 use flotor_bridge::request::{MAX_REQUEST_BYTES, NumberedRequest, Refusal, Request};
 use flotor_live::SetValue;
 use rustix::process::Signal;
@@ -149,7 +149,7 @@ fn run_with_bridge(program: &Path, clock: &str, duration_s: u64, fate: Fate) -> 
         let (heard, is_over) = (&heard, &is_over);
         let listener = scope.spawn(move || {
             while !is_over.load(Ordering::Relaxed) {
-                if let Some(Message::Tick(_)) = remote.next(Duration::from_millis(20)) {
+                if let Some(Told::Tick(_)) = remote.next(Duration::from_millis(20)) {
                     heard.fetch_add(1, Ordering::Relaxed);
                 }
             }

@@ -6,7 +6,7 @@ use common::{Bridge, FakeHost, PATIENCE, SLOW, description, is_full_size, record
 use flotor_bridge::attach::attach;
 use flotor_bridge::keep::{RecordingEnd, keep};
 use flotor_bridge::link::{End, LinkOptions, open};
-use flotor_bridge::remote::{Message, Remote, bridges};
+use flotor_bridge::remote::{Remote, Told, bridges};
 use flotor_bridge::request::{MAX_REQUEST_BYTES, NumberedRequest, Refusal, Request, Right};
 use flotor_bridge::status::State;
 use flotor_live::{Ask, Client, Directory, Event, SetValue};
@@ -32,7 +32,7 @@ fn listening(bridge: &Bridge, host: &FakeHost) -> Remote {
     wait_until("the visitor hears", || {
         host.publication().observe(&record(probe));
         probe += 1;
-        matches!(remote.next(Duration::from_millis(50)), Some(Message::Tick(_)))
+        matches!(remote.next(Duration::from_millis(50)), Some(Told::Tick(_)))
     });
     remote
 }
@@ -53,7 +53,7 @@ fn every_tick_arrives_to_the_bit() {
             let mut heard = Vec::new();
             let until = Instant::now() + Duration::from_millis(total) + PATIENCE;
             while heard.len() < total as usize && Instant::now() < until {
-                if let Some(Message::Tick(tick)) = remote.next(Duration::from_millis(100))
+                if let Some(Told::Tick(tick)) = remote.next(Duration::from_millis(100))
                     && tick.tick < 1 << 40
                 {
                     heard.push(tick);
@@ -91,8 +91,8 @@ fn what_the_host_drops_and_what_a_slow_visitor_misses_are_losses_and_the_end_is_
     wait_until("the end is heard", || {
         while let Some(told) = remote.next(Duration::from_millis(10)) {
             match told {
-                Message::Tick(tick) if tick.tick < 1 << 40 => heard += 1,
-                Message::End(end) => words = Some(end.words),
+                Told::Tick(tick) if tick.tick < 1 << 40 => heard += 1,
+                Told::End(end) => words = Some(end.words),
                 _ => {}
             }
         }
@@ -133,17 +133,14 @@ fn requests_reach_the_host_and_its_message_come_back() {
     let bridge = Bridge::start(&host.directory, Right::Operate);
     let remote = bridge.visit();
     remote.wait_for_run(&NEVER).unwrap();
-    let request_sender = remote.request_sender();
-    assert_eq!(request_sender.run(set("gamma_n")), Ok(()));
-    assert_eq!(
-        request_sender.run(set("gamma")),
-        Err("no parameter `gamma`; did you mean `gamma_n`?".to_owned())
-    );
-    assert_eq!(request_sender.run(Request::EmergencyStop), Ok(()));
+    let errand = remote.errand();
+    assert_eq!(errand.run(set("gamma_n")), Ok(()));
+    assert_eq!(errand.run(set("gamma")), Err("no parameter `gamma`; did you mean `gamma_n`?".to_owned()));
+    assert_eq!(errand.run(Request::EmergencyStop), Ok(()));
     let asked = host.asked.0.lock().unwrap().clone();
     assert!(matches!(asked.as_slice(), [Ask::Set { .. }, Ask::Set { .. }, Ask::EmergencyStop]), "{asked:?}");
     // Starting is the owner's, and this bridge does not let anybody.
-    let refused = request_sender.run(Request::Start).unwrap_err();
+    let refused = errand.run(Request::Start).unwrap_err();
     assert!(refused.contains("nobody answers"), "{refused}");
 }
 
@@ -153,12 +150,12 @@ fn an_emergency_stop_stays_until_its_owner_releases_it() {
     let bridge = Bridge::start(&host.directory, Right::Own);
     let remote = bridge.visit();
     remote.wait_for_run(&NEVER).unwrap();
-    let request_sender = remote.request_sender();
+    let errand = remote.errand();
     let state = || remote.status().unwrap().expect("the bridge is there").state;
-    assert_eq!(request_sender.run(Request::EmergencyStop), Ok(()));
+    assert_eq!(errand.run(Request::EmergencyStop), Ok(()));
     assert_eq!(state(), State::EmergencyStopped);
-    assert!(request_sender.run(Request::Start).unwrap_err().contains("its owner releases it first"));
-    assert_eq!(request_sender.run(Request::Release), Ok(()));
+    assert!(errand.run(Request::Start).unwrap_err().contains("its owner releases it first"));
+    assert_eq!(errand.run(Request::Release), Ok(()));
     assert_eq!(state(), State::Running);
 }
 
@@ -206,15 +203,15 @@ fn a_flood_of_requests_is_cut_short_and_the_emergency_stop_gets_past() {
     remote.wait_for_run(&NEVER).unwrap();
     std::thread::scope(|scope| {
         for _ in 0..64 {
-            let request_sender = remote.request_sender();
+            let errand = remote.errand();
             let request = Request::Weight { model: SLOW.to_owned(), weight: 0.5 };
-            scope.spawn(move || request_sender.run(request));
+            scope.spawn(move || errand.run(request));
         }
         wait_until("requests are refused", || {
             let status = remote.status().unwrap().expect("the bridge is there");
             status.refused.contains_key(&Refusal::Busy)
         });
-        assert_eq!(remote.request_sender().run(Request::EmergencyStop), Ok(()));
+        assert_eq!(remote.errand().run(Request::EmergencyStop), Ok(()));
     });
     let asked = host.asked.0.lock().unwrap();
     assert!(asked.contains(&Ask::EmergencyStop) && asked.len() < 64, "{} requests", asked.len());
