@@ -9,7 +9,7 @@
 //! - [`closed_form`]: the thesis's printed law, regularised, and its current-length correction. [`arctangent`] gives
 //!   it angles from sides, [`precision`] says in which format its numbers are stored.
 //! - [`energy`]: the conservative law in three dimensions, the default. Its bending part is in [`bending`], to
-//!   fourth order in the angles by [`shape`] and [`quartic`]; [`angle`] gives angles without `acos`, and [`level`]
+//!   fourth order in the angles by [`shape`] and [`quartic`]; [`angle`] gives angles without `acos`, and [`saturation`]
 //!   keeps the law smooth close to buckling.
 //! - [`rod`]: the exact rod, past buckling too, with a memory of where it was.
 //! - [`rod_blend`]: from the law `energy` to the rod where it is better, as one energy.
