@@ -28,7 +28,7 @@ const ENDING: [i32; 5] = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP];
 /// terminal that closes tells the shell, which tells its jobs. A person takes longer.
 const ONE_REQUEST: Duration = Duration::from_millis(100);
 
-/// A switch that the first signal of [`ENDING`] uses in order and the second at once (the third ends the
+/// A switch that the first signal of `ENDING` uses in order and the second at once (the third ends the
 /// process), and `SIGUSR1` at once.
 pub fn stop_on_signals() -> StopSwitch {
     let stop = StopSwitch::default();

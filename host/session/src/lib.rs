@@ -8,8 +8,8 @@
 //! - [`registry`]: where plugins are.
 //! - [`Session`]: from a scene to a run.
 //! - [`headless`]: a whole run in virtual time, recorded and reported.
-//! - [`report`]: what a run came to; [`run_description`]: all it takes to repeat it.
-//! - [`live`]: a running session, for other programs to watch and change.
+//! - [`summary`]: what a run came to; [`run_description`]: all it takes to repeat it.
+//! - [`telemetry`]: a running session, for other programs to watch and change.
 //! - [`calibration_file`]: the correction of a device's vertical force, as measured and kept.
 
 pub mod calibration_file;
