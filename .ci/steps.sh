@@ -94,7 +94,7 @@ every_change() {
     # That a workspace of its own still compiles against the host; `full` tests them.
     step beside cargo check --manifest-path host/python/Cargo.toml --target-dir target
     # Counts of instructions of the optimised program against their budgets.
-    step budgets cargo test --release -p flotor-tests --features budgets instructions
+    step budgets cargo test --release -p flotor-tests --features budgets --test instructions
     # Plugins against the USB, HID and serial drivers of a kernel.
     step usb .ci/vm
     # Every interleaving of the lock-free cell. A target folder of its own: the flag changes every crate. The crate forbids
@@ -135,6 +135,7 @@ blocking() {
 # One set of bits: the golden digests, optimised, on the processor at hand and on emulated ones with AVX2 and without AVX.
 bits() {
     local runner
+    cargo build --release
     for runner in "" "qemu-x86_64 -cpu Haswell" "qemu-x86_64 -cpu qemu64"; do
         echo "on ${runner:-the processor at hand}:"
         FLOTOR_RUNNER=$runner cargo test --release -p flotor-tests --test system golden -- --nocapture

@@ -4,7 +4,7 @@
 //! `tests/data/instruction_budgets.toml` has the budgets. To print what is counted now:
 //!
 //! ```text
-//! cargo test --release -p flotor-tests --features budgets instructions -- --nocapture
+//! cargo test --release -p flotor-tests --features budgets --test instructions -- --nocapture
 //! ```
 
 use flotor_tests::scratch::Scratch;
