@@ -1,7 +1,6 @@
 //! `flotor bridge`: starts the bridge, a separate program because it needs Zenoh.
 
 use clap::Args;
-use flotor_command::CommandError;
 use flotor_command::separate::{Built, SeparateProgram};
 use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;
@@ -39,17 +38,4 @@ impl Way {
 /// Whether a text names a remote session.
 pub(super) fn is_remote(text: &OsStr) -> bool {
     text.to_str().is_some_and(|text| text.starts_with(REMOTE))
-}
-
-/// Publish a running host on a network, or show a remote one here.
-#[derive(Args)]
-#[command(disable_help_flag = true)]
-pub(crate) struct BridgeArguments {
-    /// Command and options; `flotor bridge --help` lists them
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "COMMAND")]
-    arguments: Vec<OsString>,
-}
-
-pub(crate) fn run(arguments: &BridgeArguments) -> Result<(), CommandError> {
-    BRIDGE.become_with(&arguments.arguments)
 }

@@ -10,10 +10,10 @@ mod plugins;
 mod record;
 mod run;
 mod swap;
-mod sweep;
 mod view;
 mod worker;
 
+use bridge::BRIDGE;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use flotor_command::exit_code_of;
 use flotor_command::separate::{Built, SeparateProgram};
@@ -43,6 +43,13 @@ const STUDY: SeparateProgram<'static> =
 /// Calibration of devices.
 const CALIBRATION: SeparateProgram<'static> =
     SeparateProgram { program: "flotor-calibration", built: Built::WithThis, build: "cargo build --release" };
+
+/// Sweeps into tables; its own workspace, because it brings Parquet.
+const SWEEP: SeparateProgram<'static> = SeparateProgram {
+    program: "flotor-sweep",
+    built: Built::OwnWorkspace("sweep"),
+    build: "cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target/sweep",
+};
 
 /// What a command takes that a separate program carries out.
 #[derive(Args)]
@@ -82,9 +89,9 @@ enum Command {
     /// Hot-swap a model of a running session, without a jump in the force
     Swap(swap::SwapArguments),
     /// Publish a running host on a network, or show a remote one here
-    Bridge(bridge::BridgeArguments),
+    Bridge(Separate),
     /// Sweep a model or a scene over parameters, poses and seeds into a Parquet table
-    Sweep(sweep::SweepArguments),
+    Sweep(Separate),
     /// Run a perception experiment
     Study(Separate),
     /// Analyse the data of a perception experiment
@@ -114,8 +121,8 @@ pub fn command() -> clap::Command {
 /// Names of the commands that the help lists, in its order. Not real-time.
 #[must_use]
 pub fn command_names() -> Vec<String> {
-    let arguments = Arguments::command();
-    let listed = arguments.get_subcommands().filter(|command| !command.is_hide_set());
+    let command = command();
+    let listed = command.get_subcommands().filter(|command| !command.is_hide_set());
     listed.map(|command| command.get_name().to_owned()).collect()
 }
 
@@ -138,8 +145,8 @@ pub fn main() -> ExitCode {
         Some(Command::Stress(separate)) => LAB.carry_out("stress", &separate.arguments),
         Some(Command::Record(arguments)) => record::run(&arguments),
         Some(Command::Swap(arguments)) => swap::run(&arguments),
-        Some(Command::Bridge(arguments)) => bridge::run(&arguments),
-        Some(Command::Sweep(arguments)) => sweep::run(&arguments),
+        Some(Command::Bridge(separate)) => BRIDGE.become_with(&separate.arguments),
+        Some(Command::Sweep(separate)) => SWEEP.become_with(&separate.arguments),
         Some(Command::Study(separate)) => STUDY.carry_out("study", &separate.arguments),
         Some(Command::Analyse(separate)) => STUDY.carry_out("analyse", &separate.arguments),
         Some(Command::Calibrate(separate)) => CALIBRATION.carry_out("calibrate", &separate.arguments),
