@@ -72,6 +72,32 @@ machine() {
     return 1
 }
 
+# That `machine` fails and names the package where a tool or a library is missing: each is hidden in turn, and so is apt-get.
+missing_named() {
+    local programs=$PWD/target/ci/programs folder entry package said
+    rm -rf "$programs"
+    mkdir -p "$programs"
+    # Of two programs with one name the first is kept, as in PATH.
+    for folder in ${PATH//:/ }; do ln -s "$folder"/* "$programs" 2>/dev/null || true; done
+    rm -f "$programs/apt-get"
+    for entry in $tools $libraries; do
+        package=${entry##*:}
+        if said=$(
+            [ "$entry" = "$package" ] || mv "$programs/${entry%%:*}" "$programs/.hidden"
+            dpkg-query() { command dpkg-query "$@" | sed "/ $package\$/d"; }
+            PATH=$programs
+            hash -r
+            machine
+        ); then
+            echo "without $entry nothing is said to be missing"
+            return 1
+        fi
+        [ -e "$programs/.hidden" ] && mv "$programs/.hidden" "$programs/${entry%%:*}"
+        grep -qw -- "$package" <<<"$said" || { echo "without $entry: $said"; return 1; }
+        echo "without ${entry%%:*}: $said"
+    done
+}
+
 # Workspaces of their own beside the core.
 satellites="host/python host/bridge host/sweep devices/maglev/fuzz"
 
