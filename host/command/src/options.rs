@@ -6,6 +6,7 @@ use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_servo::Core;
 pub use flotor_session::scene::{KeyValue, PluginKeyValue};
 use std::ops::RangeInclusive;
+use std::path::PathBuf;
 
 /// `--clock`
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -56,9 +57,35 @@ pub fn rate_hz(text: &str) -> Result<f64, String> {
 /// If the text is no number in this unit, or not a legal one.
 pub fn number(text: &str, unit: &str, what: &str, legal: RangeInclusive<f64>) -> Result<f64, String> {
     let number = text.trim().trim_end_matches(unit).trim().parse();
-    let number = number.map_err(|_| format!("invalid {what} `{text}`"))?;
+    let number = number.map_err(|_| format!("invalid {what} `{text}`; write a number in {unit}"))?;
     let (least, most) = (legal.start(), legal.end());
     if legal.contains(&number) { Ok(number) } else { Err(format!("the range is {least} to {most} {unit}")) }
+}
+
+/// The file of a picture.
+///
+/// # Errors
+/// If its name ends like that of another kind of picture.
+pub fn svg_file(text: &str) -> Result<PathBuf, String> {
+    let file = PathBuf::from(text);
+    let is_svg = file.extension().is_none_or(|extension| extension.eq_ignore_ascii_case("svg"));
+    if is_svg { Ok(file) } else { Err("the picture is an SVG; name it FILE.svg".to_owned()) }
+}
+
+/// A number of a list.
+///
+/// # Errors
+/// If the text is no number.
+pub fn real(text: &str) -> Result<f64, String> {
+    text.trim().parse().map_err(|_| format!("`{text}` is no number"))
+}
+
+/// A whole number from 0, such as a seed.
+///
+/// # Errors
+/// If the text is none.
+pub fn whole(text: &str) -> Result<u64, String> {
+    text.trim().parse().map_err(|_| "write a whole number from 0".to_owned())
 }
 
 /// A core of the machine.
@@ -91,7 +118,7 @@ mod tests {
     fn a_number_may_have_its_unit_and_stays_in_its_range() {
         let force = |text| number(text, "N", "force", 1.0..=50.0);
         assert_eq!((force("10"), force(" 2.5 N ")), (Ok(10.0), Ok(2.5)));
-        assert_eq!(force("ten N"), Err("invalid force `ten N`".to_owned()));
+        assert_eq!(force("ten N"), Err("invalid force `ten N`; write a number in N".to_owned()));
         for outside in ["0.5", "51N", "inf", "nan"] {
             assert_eq!(force(outside), Err("the range is 1 to 50 N".to_owned()), "{outside}");
         }

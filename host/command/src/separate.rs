@@ -46,11 +46,13 @@ impl SeparateProgram<'_> {
         if let Some(file) = [&beside].into_iter().chain(&own_build).find(|file| file.is_file()) {
             return Ok(Command::new(file));
         }
+        let built_without_release =
+            own_build.is_none() && beside.parent().is_some_and(|at| at.ends_with("debug"));
         let file = own_build.unwrap_or(beside);
         Err(CommandError::Usage(format!(
             "`{}` does not exist; build it with `{}`",
             file.display(),
-            self.build
+            if built_without_release { self.build.replace(" --release", "") } else { self.build.to_owned() }
         )))
     }
 

@@ -36,9 +36,9 @@ const PERIOD_NS: u64 = 1_000_000;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Size {
-    /// Seconds: for a daily check
+    /// Takes seconds: for a daily check
     Short,
-    /// Minutes: what is rare shows as well
+    /// Takes minutes, and finds rare failures too
     Full,
 }
 

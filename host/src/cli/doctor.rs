@@ -12,7 +12,7 @@ use std::path::Path;
 /// Check this machine's real-time configuration and suggest fixes.
 #[derive(Args)]
 #[command(
-    after_help = "Example:\n  flotor doctor\n\nThe command changes nothing; each finding names its remedy."
+    after_help = "Example:\n  flotor doctor\n\nThe command changes nothing; each finding names its remedy. The exit code is 0 whatever it finds."
 )]
 pub(crate) struct DoctorArguments {
     /// Print JSON
@@ -71,7 +71,7 @@ pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
         }
     }
     let bad = diagnoses.iter().filter(|diagnosis| diagnosis.grade == Grade::Bad).count();
-    let verdict = if bad == 0 { "ready".to_owned() } else { format!("not ready: {bad} findings are bad") };
+    let verdict = if bad == 0 { "ready".to_owned() } else { format!("not ready; bad findings: {bad}") };
     say!("{}", style::title(&verdict));
     Ok(())
 }

@@ -20,11 +20,11 @@ use flotor_command::separate::{Built, SeparateProgram};
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-/// Haptics from plugins: force models and devices in a safe servo loop.
+/// Runs force models and haptic devices, which are plugins, in a servo loop inside safety limits.
 #[derive(Parser)]
-#[command(name = "flotor", version, about, propagate_version = true, max_term_width = 110)]
+#[command(name = "flotor", version, propagate_version = true, max_term_width = 110)]
 #[command(after_help = "Examples:\n  \
-    flotor                                            feel spring 1 on the simulated flotor for 10 s\n  \
+    flotor                                            simulate spring 1 of the thesis in a hand for 10 s\n  \
     flotor run --clock virtual --seed 1 --plot run.svg    the same, repeatable, as a picture\n  \
     flotor run scene.toml --set spring.variant=closed-form --record run.mcap\n  \
     flotor eval --model spring --set preset=thesis-2 --poses poses.csv --out -\n\n\

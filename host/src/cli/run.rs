@@ -2,7 +2,7 @@
 
 use crate::run_picture::RunPicture;
 use clap::Args;
-use flotor_command::options::{ClockOption, PluginKeyValue, core, duration_s, rate_hz};
+use flotor_command::options::{ClockOption, PluginKeyValue, core, duration_s, rate_hz, svg_file, whole};
 use flotor_command::stopping::{Keys, stop_on_signals};
 use flotor_command::{CommandError, first_error, note, print_result, progress_bar, style};
 use flotor_core::Change;
@@ -30,7 +30,7 @@ use std::path::PathBuf;
 pub(crate) struct RunArguments {
     /// Scene file (TOML); without it, the built-in demo
     scene: Option<PathBuf>,
-    /// Duration of the run: 10s, 500ms, 2min (default: that of the scene)
+    /// Duration of the run: 10s, 500ms, 2min; a number alone is in seconds (default: that of the scene)
     #[arg(long, value_parser = duration_s, value_name = "TIME")]
     duration: Option<f64>,
     /// Loop rate in Hz, 100 to 10000 (default: that of the scene)
@@ -40,7 +40,7 @@ pub(crate) struct RunArguments {
     #[arg(long, value_enum, default_value_t)]
     clock: ClockOption,
     /// Seed of all random numbers
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, value_parser = whole, default_value_t = 0, value_name = "N")]
     seed: u64,
     /// Pin the loop to this core of the machine (real clock)
     #[arg(long, value_parser = core, value_name = "N")]
@@ -49,7 +49,7 @@ pub(crate) struct RunArguments {
     #[arg(long, value_name = "FILE.mcap")]
     record: Option<PathBuf>,
     /// Plot the run
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     /// Write the summary as JSON (- for standard output)
     #[arg(long, value_name = "FILE")]

@@ -4,7 +4,7 @@ use super::refused;
 use crate::rig::{DeviceRig, SimulatedRig, Waiting};
 use crate::sensor::{ForceSensor, SERIAL_SENSOR};
 use clap::Args;
-use flotor_command::options::{KeyValue, duration_s, number, settings};
+use flotor_command::options::{KeyValue, duration_s, number, settings, whole};
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, progress_bar};
 use flotor_hal::abi::PluginKind;
@@ -46,7 +46,7 @@ pub(super) struct RigArguments {
     #[arg(long, value_name = "TIME", default_value = "10min", requires = "device", value_parser = duration_s)]
     patience: f64,
     /// Seed of the simulated sensor's noise
-    #[arg(long, default_value_t = 1, value_name = "N", conflicts_with = "device")]
+    #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N", conflicts_with = "device")]
     pub(super) seed: u64,
     /// Folder to search for plugins (repeatable)
     #[arg(long = "plugin-path", value_name = "FOLDER")]

@@ -7,6 +7,7 @@ use crate::procedure::{Plan, Reading, measure};
 use crate::verify::{ErrorCurve, PROBE_N};
 use crate::{picture, thesis};
 use clap::Args;
+use flotor_command::options::svg_file;
 use flotor_command::{CommandError, print_result, progress_bar, style, write_text};
 use flotor_hal::VerticalCalibration;
 use flotor_session::calibration_file::{
@@ -48,7 +49,7 @@ pub(super) struct VerticalArguments {
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
     /// Plot readings, fit, residuals and the error before and after
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     /// Write the result as JSON (- for standard output)
     #[arg(long, value_name = "FILE")]

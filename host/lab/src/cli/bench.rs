@@ -4,7 +4,7 @@ use super::ProgressLine;
 use crate::Size;
 use crate::bench::{BenchDevice, Case, Hand, Plan, Split, TickCost, WholeTick, measure};
 use clap::Args;
-use flotor_command::options::KeyValue;
+use flotor_command::options::{KeyValue, svg_file};
 use flotor_command::tables::table;
 use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_hal::abi::PluginKind;
@@ -58,7 +58,7 @@ pub(crate) struct BenchArguments {
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
     /// Plot error over time
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     /// Write the measurements as JSON (- for standard output)
     #[arg(long, value_name = "FILE")]

@@ -73,12 +73,22 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
 }
 
 fn read_poses(path: &Path) -> Result<(Vec<String>, Vec<Handle>), CommandError> {
-    let text = read_text(path).map_err(|cause| CommandError::file(path, "cannot read the poses", cause))?;
+    let problem = |text: String| CommandError::Usage(format!("{}: {text}", path.display()));
+    let text = read_text(path).map_err(|cause| problem(format!("cannot read the poses: {cause}")))?;
+    if text.trim().is_empty() {
+        return Err(problem(format!("no poses; the header is {}", header_text())));
+    }
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
     let line = |at: Option<&csv::Position>| at.map_or(1, |at| line_of(&text, at));
     let malformed = |error: csv::Error| {
         let line = line(error.position());
-        CommandError::Usage(format!("{}:{line}: {error}", path.display()))
+        let problem = match error.kind() {
+            csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+                format!("{len} columns, but the header has {expected_len}")
+            }
+            _ => error.to_string(),
+        };
+        CommandError::Usage(format!("{}:{line}: {problem}", path.display()))
     };
     let header = reader.headers().map_err(malformed)?.clone();
     let columns = columns(path, &header)?;
@@ -131,8 +141,7 @@ fn columns(path: &Path, header: &csv::StringRecord) -> Result<[usize; 6], Comman
     let known = || POSE_COLUMNS.iter().copied().chain([ID_COLUMN]);
     if let Some(unknown) = header.iter().find(|name| !known().any(|column| column == *name)) {
         let hint = did_you_mean(unknown, known());
-        let expected = format!("[{ID_COLUMN},]{}", POSE_COLUMNS.join(","));
-        return Err(problem(format!("unknown column `{unknown}`{hint} (the header is {expected})")));
+        return Err(problem(format!("unknown column `{unknown}`{hint} (the header is {})", header_text())));
     }
     let mut columns = [0; 6];
     for (column, name) in columns.iter_mut().zip(POSE_COLUMNS) {
@@ -142,6 +151,11 @@ fn columns(path: &Path, header: &csv::StringRecord) -> Result<[usize; 6], Comman
             .ok_or_else(|| problem(format!("column `{name}` is missing")))?;
     }
     Ok(columns)
+}
+
+/// The header as people write it.
+fn header_text() -> String {
+    format!("[{ID_COLUMN},]{}", POSE_COLUMNS.join(","))
 }
 
 fn csv_text(ids: &[String], answers: &[Answer], details: &[Detail]) -> String {

@@ -2,7 +2,7 @@
 
 use crate::jitter::{JitterReport, LoopTiming, MissedMore, measure};
 use clap::Args;
-use flotor_command::options::{core, duration_s, rate_hz};
+use flotor_command::options::{core, duration_s, rate_hz, svg_file};
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::tables::table;
 use flotor_command::{CommandError, note, print_result, progress_bar, style, write_text};
@@ -33,7 +33,7 @@ pub(crate) struct JitterArguments {
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Plot both histograms
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
 }
 

@@ -16,7 +16,7 @@ use std::process::ExitCode;
 
 /// Measure plugins, loops and recordings; `flotor COMMAND` starts this program.
 #[derive(Parser)]
-#[command(name = "flotor", bin_name = "flotor", version, about, max_term_width = 110)]
+#[command(name = "flotor", bin_name = "flotor", version, max_term_width = 110)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,

@@ -2,7 +2,7 @@
 
 use crate::replay::{Compared, Coverage, Difference, DivergenceCause, Replay};
 use clap::Args;
-use flotor_command::options::{KeyValue, PluginKeyValue};
+use flotor_command::options::{KeyValue, PluginKeyValue, svg_file};
 use flotor_command::{CommandError, print_result, progress_bar, style, write_text};
 use flotor_hal::{DVec3, Wrench};
 use flotor_plot::{Axis, Figure, Panel, Series};
@@ -37,7 +37,7 @@ pub(crate) struct ReplayArguments {
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Plot recorded and replayed force
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
 }
 

@@ -3,7 +3,7 @@
 use crate::stability::theory::{Plant, Rendering, exact_limit_n_per_m, gil_limit_n_per_m};
 use crate::stability::{Case, Grip, LoopError, Row, default_cases, measure};
 use clap::Args;
-use flotor_command::options::{number, rate_hz};
+use flotor_command::options::{number, rate_hz, svg_file};
 use flotor_command::tables::{table, to_csv};
 use flotor_command::{CommandError, print_result, progress_bar, style, write_json, write_text};
 use flotor_hal::abi::PluginKind;
@@ -49,7 +49,7 @@ pub(crate) struct StabilityArguments {
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Plot stiffness over virtual damping: theory as lines, simulation as points
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
 }
 

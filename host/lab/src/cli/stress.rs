@@ -4,7 +4,7 @@ use super::ProgressLine;
 use crate::Size;
 use crate::stress::{Reach, StressOptions, score};
 use clap::Args;
-use flotor_command::options::{KeyValue, settings};
+use flotor_command::options::{KeyValue, settings, svg_file, whole};
 use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_hal::abi::PluginKind;
 use flotor_session::registry::Registry;
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 #[derive(Args)]
 #[command(after_help = "Nine measures: M0 totality, M1 continuity, M2 Lipschitz constant, M3 reciprocity,\n\
     M4 loop energy, M5 sampled energy, M6 closed loop, M7 cost, M8 determinism.\n\
-    `score` is the share of measures that passed.\n\n\
+    `score` is the share of measures that passed; docs/src/stress.md has the criterion of each.\n\n\
     Examples:\n  \
     flotor stress --model spring\n  \
     flotor stress --model spring --set variant=closed-form --json score.json --plot score.svg\n  \
@@ -26,17 +26,17 @@ pub(crate) struct StressArguments {
     /// Set a parameter of the model (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<KeyValue>,
-    /// Extent of the measurement
+    /// How many poses, motions and seeds are tried
     #[arg(long, value_enum, default_value = "short")]
     size: Size,
     /// Seed of poses and motions
-    #[arg(long, default_value_t = 1, value_name = "N")]
+    #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N")]
     seed: u64,
     /// Write the score as JSON (- for standard output)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Plot the score
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
 }
 

@@ -49,7 +49,7 @@ struct Loaded {
 #[non_exhaustive]
 pub enum LookupError {
     /// No plugin has the id.
-    #[error("no {}plugin `{id}`{}{}; `flotor plugins` lists what there is, {PATH_VARIABLE} adds folders",
+    #[error("no {}plugin `{id}`{}{} (`flotor plugins` lists all; {PATH_VARIABLE} adds folders)",
         kind.as_ref().map_or(String::new(), |kind| format!("{} ", kind.word())),
         nearest.as_ref().map_or(String::new(), |n| format!("; did you mean `{n}`?")),
         broken.as_ref().map_or(String::new(), |b| format!(" ({b})")))]

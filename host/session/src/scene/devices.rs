@@ -71,7 +71,7 @@ fn find(devices: &[DeviceUse], name: &str, location: &Location) -> Result<u16, S
     (0..).zip(devices).find(|(_, device)| device.name == name).map(|(number, _)| number).ok_or_else(|| {
         let names: Vec<&str> = devices.iter().map(|device| device.name.as_str()).collect();
         let hint = did_you_mean(name, names.iter().copied());
-        location.problem(format!("there is no device `{name}`{hint} (there are {})", names.join(", ")))
+        location.problem(format!("there is no device `{name}`{hint} (devices: {})", names.join(", ")))
     })
 }
 

@@ -341,6 +341,10 @@ impl Value<'_> {
         if let Some(number) = parse_number(&self.value) {
             return self.in_range(number, &range).map(|number| [number; 3]);
         }
+        if !matches!(self.value, DeValue::Array(_)) {
+            let (key, found) = (&self.key, self.value.type_str());
+            return Err(self.problem(format!("`{key}` is a number or a list of three, not {found}")));
+        }
         let numbers = self.numbers::<3>()?;
         for number in numbers {
             self.in_range(number, &range)?;
@@ -400,8 +404,14 @@ impl Value<'_> {
         if range.contains(&number) {
             return Ok(number);
         }
-        Err(self.problem(format!("`{}` = {number}: legal is {} to {}", self.key, range.start(), range.end())))
+        Err(self.problem(format!("`{}` = {number}: legal is {}", self.key, legal(range))))
     }
+}
+
+/// A range as an error or the reference says it.
+pub(super) fn legal(range: &RangeInclusive<f64>) -> String {
+    let (least, most) = (range.start(), range.end());
+    if most.is_finite() { format!("{least} to {most}") } else { format!("{least} or more") }
 }
 
 fn parse_number(value: &DeValue<'_>) -> Option<f64> {

@@ -1,8 +1,7 @@
 //! Every key a scene may have, as the reader itself looks for them: for the book, and for editors.
 
 use super::Scene;
-use super::reader::{Known, SceneError, Source, Takes};
-use std::ops::RangeInclusive;
+use super::reader::{Known, SceneError, Source, Takes, legal};
 use std::path::Path;
 
 /// A scene with every table there is, so that the reader looks for every key.
@@ -75,17 +74,10 @@ fn section((name, known): (String, Vec<Known>)) -> SectionReference {
 fn words(takes: &Takes) -> String {
     match takes {
         Takes::Value => String::new(),
-        Takes::Number(range) => format!("a number, {}", range_words(range)),
-        Takes::Three(range) => format!("three numbers, or one for all, {}", range_words(range)),
+        Takes::Number(range) => format!("a number, {}", legal(range)),
+        Takes::Three(range) => format!("three numbers, or one for all, {}", legal(range)),
         Takes::Table => "a table".to_owned(),
         Takes::Tables => "tables, any number of them".to_owned(),
-    }
-}
-
-fn range_words(range: &RangeInclusive<f64>) -> String {
-    match (range.start(), range.end()) {
-        (start, end) if end.is_infinite() => format!("{start} or more"),
-        (start, end) => format!("{start} to {end}"),
     }
 }
 

@@ -22,7 +22,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub enum ControlError {
     /// No plugin of the run has this name.
     #[error(
-        "there is no plugin `{name}`{} (there are {})",
+        "there is no plugin `{name}`{} (plugins: {})",
         nearest.as_ref().map_or(String::new(), |n| format!("; did you mean `{n}`?")),
         names.join(", ")
     )]

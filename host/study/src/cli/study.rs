@@ -22,7 +22,7 @@ use choices::{
     BoundaryChoice, FirstChoice, ForceWay, NoiseOption, PresentationOption, ProcedureChoice, range,
 };
 use clap::{Args, Subcommand, ValueEnum};
-use flotor_command::options::{PluginKeyValue, duration_s};
+use flotor_command::options::{PluginKeyValue, duration_s, real, whole};
 use flotor_command::say;
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, progress_bar, style};
@@ -41,9 +41,9 @@ use std::path::PathBuf;
     flotor study magnitude --subjects 8 --seed 3 --out ratings\n  \
     flotor study jnd --bases 20,40 --target 0.8 --side random --out other\n  \
     flotor study jnd --out data --resume                     resume an interrupted study\n  \
-    flotor study jnd --observer human --subject 3 --scene mlhd.toml --out people    a person, in front of the viewer\n  \
+    flotor study jnd --observer human --subject 3 --scene mlhd.toml --out people   a person\n  \
     flotor study jnd --observer human --subject 3 --out people --resume\n  \
-    flotor study magnitude --stimulus spring.wire_diameter_mm --set spring.mode=physical --range 0.4-0.8 --out d\n  \
+    flotor study magnitude --stimulus spring.gamma_n --range 10-40 --out d\n  \
     flotor study bias --runs 1000                            bias and error of each estimator")]
 pub(crate) struct StudyArguments {
     #[command(subcommand)]
@@ -91,7 +91,7 @@ struct Common {
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
     /// Seed of orders, presentations and simulated answers
-    #[arg(long, default_value_t = 1, value_name = "N")]
+    #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N")]
     seed: u64,
     /// Folder for the data
     #[arg(long, value_name = "DIR")]
@@ -155,7 +155,7 @@ struct JndArguments {
     #[command(flatten)]
     common: Common,
     /// Bases, in the unit of the stimulus (default: 17,26,35; for a force 3,6,9)
-    #[arg(long, value_delimiter = ',', value_name = "LIST")]
+    #[arg(long, value_delimiter = ',', value_parser = real, value_name = "LIST")]
     bases: Option<Vec<f64>>,
     /// Replications, in alternating modality
     #[arg(long, default_value_t = 4, value_name = "N")]

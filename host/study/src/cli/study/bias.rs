@@ -2,6 +2,7 @@
 
 use crate::bias::{BiasRow, observer_of, rows};
 use clap::Args;
+use flotor_command::options::whole;
 use flotor_command::{CommandError, print_result, progress_bar, style};
 use rayon::prelude::*;
 use std::path::PathBuf;
@@ -27,7 +28,7 @@ pub(super) struct BiasArguments {
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100), value_name = "N")]
     tracks: u32,
     /// Seed of the answers
-    #[arg(long, default_value_t = 1, value_name = "N")]
+    #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N")]
     seed: u64,
     /// Write the rows as JSON (- for standard output)
     #[arg(long, value_name = "FILE")]

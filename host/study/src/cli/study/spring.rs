@@ -3,6 +3,7 @@
 
 use crate::curve::{CurveError, FITTED, MeasuredCurve, ServedCurve, SpringFit};
 use clap::Args;
+use flotor_command::options::svg_file;
 use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_plot::{Axis, Figure, Panel, Series};
 use std::path::{Path, PathBuf};
@@ -26,7 +27,7 @@ pub(super) struct SpringArguments {
     #[arg(long, value_name = "MM")]
     coil_diameter_mm: Option<f64>,
     /// Plot the measurement and the fitted spring
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     /// Write a scene with the fitted spring, for `study jnd --scene` and `run`
     #[arg(long, value_name = "FILE.toml")]
