@@ -12,15 +12,14 @@
 //!                      Releasing                    |                emergency stop         -> EmergencyStopped
 //!                          | ramp over,             |
 //!                          v samples lost           |
-//!                       Stopped <-------------------+              Stopped, Faulted, EmergencyStopped:
-//!                                                                    nothing leads out
+//!                       Stopped <-------------------+              from Faulted only an emergency stop leads on,
+//!                                                                    from the other two nothing
 //! ```
 //!
 //! While nobody knows where the hand is there is no force, and none to fade out: not the models', nor the boundary's.
 //!
-//! The last three are where a run ends. No event leads out of them, so that an emergency stop latches: force comes
-//! back only with a new run, which opens and activates the device anew. A fault may still become an emergency
-//! stop, never the other way round.
+//! In the last three a run ends, and an emergency stop latches: force comes back only with a new run, which opens and
+//! activates the device anew. A fault may still become an emergency stop, never the other way round.
 
 use flotor_core::trace::Events;
 use flotor_hal::Fault;
