@@ -1,7 +1,7 @@
 //! Simulated subjects, all of them, several at a time.
 
 use crate::conduct::{ConductError, OutsideError, Presenter, conduct};
-use crate::dataset::{Dataset, DatasetError, Progress};
+use crate::dataset::{Dataset, DatasetError, Earlier, Progress};
 use crate::log::{Begin, FORMAT, LogWriter};
 use crate::observer::{Population, SimulatedSubject};
 use crate::protocol::{Protocol, SubjectNumber};
@@ -11,15 +11,6 @@ use serde_json::json;
 use std::num::NonZeroUsize;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// What to do about subjects who have begun before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Earlier {
-    /// Nobody may have.
-    Refuse,
-    /// Who is complete stays so, who broke off goes on.
-    Resume,
-}
 
 /// A study with simulated subjects.
 #[derive(Clone, Debug)]
@@ -109,9 +100,10 @@ impl Cohort {
         watch: &(dyn Fn() + Sync),
         stop: &AtomicBool,
     ) -> Result<(), CohortError> {
-        let waiting = self.subjects.iter().map(|subject| self.look_up(dataset, *subject));
-        let waiting = waiting.collect::<Result<Vec<_>, _>>()?;
-        let mut waiting: Vec<(SubjectNumber, Progress)> = waiting.into_iter().flatten().collect();
+        let progress =
+            |subject: &SubjectNumber| Ok((*subject, dataset.progress(&self.begin(*subject), self.earlier)?));
+        let mut waiting = self.subjects.iter().map(progress).collect::<Result<Vec<_>, CohortError>>()?;
+        waiting.retain(|(_, progress)| !matches!(progress, Progress::Complete));
         waiting.reverse(); // taken from the end
         let waiting = Mutex::new(waiting);
         let work = || {
@@ -132,36 +124,6 @@ impl Cohort {
         Ok(dataset.write_tables()?)
     }
 
-    /// Whether a subject has a turn.
-    fn look_up(
-        &self,
-        dataset: &Dataset,
-        subject: SubjectNumber,
-    ) -> Result<Option<(SubjectNumber, Progress)>, CohortError> {
-        let root = || dataset.root().to_path_buf();
-        let progress = dataset.progress(subject, self.protocol.task())?;
-        match (&progress, self.earlier) {
-            (Progress::New, _) => {}
-            (Progress::Complete(log) | Progress::Partial(log), Earlier::Resume) => {
-                let path = log.path().to_path_buf();
-                if let Some(what) = self.begin(subject).differs(&log.begin) {
-                    return Err(DatasetError::Changed { path, what }.into());
-                }
-                if matches!(progress, Progress::Complete(_)) {
-                    return Ok(None);
-                }
-            }
-            (Progress::Complete(_), Earlier::Refuse) => {
-                return Err(DatasetError::Duplicate { subject, root: root() }.into());
-            }
-            (Progress::Partial(log), Earlier::Refuse) => {
-                let trials = log.trials.len();
-                return Err(DatasetError::Unfinished { subject, trials, root: root() }.into());
-            }
-        }
-        Ok(Some((subject, progress)))
-    }
-
     fn turn(
         &self,
         dataset: &Dataset,
@@ -174,7 +136,7 @@ impl Cohort {
                 earlier.extend(log.answers().map(|(trial, _)| trial));
                 log.resume(&self.version).map_err(DatasetError::from)?
             }
-            Progress::New | Progress::Complete(_) => dataset.begin(self.begin(subject))?,
+            Progress::New | Progress::Complete => dataset.begin(self.begin(subject))?,
         };
         Ok(Turn { subject, earlier, sitting, log })
     }

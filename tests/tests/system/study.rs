@@ -226,7 +226,21 @@ fn a_subject_who_has_been_there_is_refused() {
     let another: Vec<&str> = arguments.iter().copied().chain(["--resume", "--seed", "9"]).collect();
     let ran = study(&another, &out).run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION));
-    assert!(ran.error().contains("seed"), "{ran:?}");
+    assert!(ran.error().contains("begun with --seed 1, not 9"), "{ran:?}");
+}
+
+/// A log of another experiment would make the folder unusable: it is not written.
+#[test]
+fn a_folder_keeps_its_experiment() {
+    let scratch = Scratch::default();
+    let out = scratch.path().join("data");
+    let small: Vec<&str> = SMALL.into_iter().chain(["--subjects", "1", "--apparatus", "none"]).collect();
+    assert_eq!(study(&small, &out).run().code, Some(exit_code::OK));
+    let refused = study(&["magnitude", "--subjects", "1", "--apparatus", "none"], &out).run();
+    assert_eq!(refused.code, Some(exit_code::CONFIGURATION));
+    assert!(refused.error().contains("sub-01_task-jnd_log.jsonl: begun with another protocol"), "{refused:?}");
+    let resumed: Vec<&str> = small.into_iter().chain(["--resume"]).collect();
+    assert_eq!(study(&resumed, &out).run().code, Some(exit_code::OK));
 }
 
 /// The trials of a log and what becomes of them, without what only the clock decides.

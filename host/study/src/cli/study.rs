@@ -9,9 +9,9 @@ mod spring;
 
 use crate::apparatus::rig::{Rig, RunEnded, TrialFiles};
 use crate::apparatus::{Apparatus, ApparatusError, Kinematics};
-use crate::cohort::{Cohort, CohortError, Earlier};
+use crate::cohort::{Cohort, CohortError};
 use crate::conduct::{ConductError, Nothing, OutsideError, Presenter};
-use crate::dataset::Dataset;
+use crate::dataset::{Dataset, Earlier};
 use crate::observer::Population;
 use crate::procedure::{Averaging, Procedure, QuestPlusRule, StepAtReversal, WeightedUpDownRule};
 use crate::protocol::{
@@ -273,6 +273,10 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
 }
 
 impl Common {
+    fn earlier(&self) -> Earlier {
+        if self.resume { Earlier::Resume } else { Earlier::Refuse }
+    }
+
     fn stimulus(&self, usual: &Subject) -> Result<Stimulus, CommandError> {
         let text = self.stimulus.as_deref().unwrap_or(usual.stimulus);
         let (model, parameter) = text.split_once('.').ok_or_else(|| {
@@ -378,7 +382,7 @@ fn simulate(common: &Common, protocol: Protocol, apparatus: Option<&Apparatus>) 
             |apparatus| json!({ "feel_s": common.feel, "scene": apparatus.description() }),
         ),
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        earlier: if common.resume { Earlier::Resume } else { Earlier::Refuse },
+        earlier: common.earlier(),
         protocol,
     };
     let about = u64::from(common.subjects) * cohort.protocol.presentations_about();

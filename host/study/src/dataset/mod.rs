@@ -31,7 +31,16 @@ pub enum Progress {
     /// Began, and did not come to the end.
     Partial(Box<SittingLog>),
     /// Came to the end.
-    Complete(Box<SittingLog>),
+    Complete,
+}
+
+/// What to do about subjects who have begun before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Earlier {
+    /// Nobody may have.
+    Refuse,
+    /// Who is complete stays so, who broke off goes on.
+    Resume,
 }
 
 /// What cannot be done with a dataset.
@@ -55,25 +64,26 @@ pub enum DatasetError {
     #[error("{}: no study (no logs under sourcedata/); give the folder of `study --out`", .0.display())]
     NoStudy(PathBuf),
     /// Sittings that do not belong together.
-    #[error("{}: differs from {} in {what}; a study has one protocol: use another folder", path.display(), other.display())]
+    #[error("{}: {what}, unlike {}; delete the file that does not belong to the study, or use another folder", path.display(), other.display())]
     Mixed {
         /// A log.
         path: PathBuf,
         /// Another.
         other: PathBuf,
         /// What differs.
-        what: &'static str,
+        what: String,
     },
-    /// A sitting that was begun otherwise than it is to go on.
-    #[error("{}: has another {what}; resume it with the same one, or use another folder", path.display())]
+    /// A study that was begun otherwise than it is to go on.
+    #[error("{}: {what}; use what it was begun with, or another folder", path.display())]
     Changed {
-        /// Its log.
+        /// One of its logs.
         path: PathBuf,
         /// What differs.
-        what: &'static str,
+        what: String,
     },
     /// A subject who has been there.
-    #[error("{subject} is already complete in {}; choose another number or folder", root.display())]
+    #[error("{subject} is already complete in {}; add --resume to skip complete subjects (simulated), choose another --subject \
+        (human), or use another folder", root.display())]
     Duplicate {
         /// Who.
         subject: SubjectNumber,
@@ -143,7 +153,7 @@ impl Dataset {
         for path in self.log_paths()? {
             let log = SittingLog::read(&path)?;
             let (begin, other) = first.get_or_insert_with(|| (log.begin.clone(), path.clone()));
-            if let Some(what) = log.begin.differs(begin) {
+            if let Some(what) = begin.differs(&log.begin) {
                 return Err(DatasetError::Mixed { path, other: other.clone(), what });
             }
             take(log)?;
@@ -164,25 +174,36 @@ impl Dataset {
         if paths.is_empty() { Err(DatasetError::NoStudy(self.root.clone())) } else { Ok(paths) }
     }
 
-    /// How far a subject has come.
+    /// How far a subject has come, if the sitting may begin or go on.
     ///
     /// # Errors
-    /// A log that cannot be used.
-    pub fn progress(&self, subject: SubjectNumber, task: &str) -> Result<Progress, DatasetError> {
-        let path = self.log_path(subject, task);
-        if !path.exists() {
-            return Ok(Progress::New);
-        }
+    /// A log that cannot be used, one that `earlier` forbids, or a study that was begun otherwise.
+    pub fn progress(&self, begin: &Begin, earlier: Earlier) -> Result<Progress, DatasetError> {
+        let (subject, root) = (begin.subject, self.root.clone());
+        let path = self.log_path(subject, begin.protocol.task());
         let log = match SittingLog::read(&path) {
+            _ if !path.exists() => None,
             // Killed before its first line was complete: nothing happened yet.
             Err(LogError { problem: crate::log::LogProblem::Empty, .. }) => {
                 self.file(&path, "cannot remove the empty log", std::fs::remove_file(&path))?;
-                return Ok(Progress::New);
+                None
             }
-            other => other?,
+            log => Some(Box::new(log?)),
         };
-        let log = Box::new(log);
-        Ok(if log.complete { Progress::Complete(log) } else { Progress::Partial(log) })
+        let Some(log) = log else {
+            // Before the first line is written: two studies in one folder would make it unusable.
+            let mut logs = self.log_paths().into_iter().flatten().map(|path| SittingLog::read(&path));
+            let other = logs.find_map(Result::ok);
+            return other.map_or(Ok(()), |other| same_study(begin, &other)).map(|()| Progress::New);
+        };
+        match earlier {
+            Earlier::Refuse if log.complete => Err(DatasetError::Duplicate { subject, root }),
+            Earlier::Refuse => Err(DatasetError::Unfinished { subject, trials: log.trials.len(), root }),
+            Earlier::Resume => {
+                same_study(begin, &log)?;
+                Ok(if log.complete { Progress::Complete } else { Progress::Partial(log) })
+            }
+        }
     }
 
     /// A new sitting with its log.
@@ -242,4 +263,10 @@ impl Dataset {
     ) -> Result<(), DatasetError> {
         result.map_err(|cause| DatasetError::File { path: path.into(), action, cause })
     }
+}
+
+/// Whether a sitting belongs to the study of a log.
+fn same_study(begin: &Begin, log: &SittingLog) -> Result<(), DatasetError> {
+    let changed = |what| DatasetError::Changed { path: log.path().to_path_buf(), what };
+    begin.differs(&log.begin).map_or(Ok(()), |what| Err(changed(what)))
 }

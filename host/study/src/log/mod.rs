@@ -71,16 +71,16 @@ pub struct Begin {
 }
 
 impl Begin {
-    /// What makes two sittings parts of different studies, if anything does; the subject and the version may differ.
+    /// What makes this a sitting of another study than an earlier one, as text; the subject and the version may differ.
     #[must_use]
-    pub fn differs(&self, other: &Self) -> Option<&'static str> {
+    pub fn differs(&self, earlier: &Self) -> Option<String> {
         let parts = [
-            ("protocol", self.protocol == other.protocol),
-            ("seed", self.seed == other.seed),
-            ("observer", self.observer == other.observer),
-            ("apparatus", self.apparatus == other.apparatus),
+            ("another protocol".to_owned(), self.protocol == earlier.protocol),
+            (format!("--seed {}, not {}", earlier.seed, self.seed), self.seed == earlier.seed),
+            ("another observer".to_owned(), self.observer == earlier.observer),
+            ("another apparatus".to_owned(), self.apparatus == earlier.apparatus),
         ];
-        parts.into_iter().find(|(_, same)| !same).map(|(what, _)| what)
+        parts.into_iter().find(|(_, same)| !same).map(|(what, _)| format!("begun with {what}"))
     }
 
     /// Digest of the configuration: equal for sittings that differ in the subject only.

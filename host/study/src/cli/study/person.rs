@@ -9,7 +9,7 @@ use crate::apparatus::rig::TrialFiles;
 use crate::apparatus::{Apparatus, Kinematics};
 use crate::conduct::Ending;
 use crate::dataset::{Dataset, DatasetError, Progress};
-use crate::log::{Begin, Event, FORMAT, SittingLog};
+use crate::log::{Begin, Event, FORMAT};
 use crate::protocol::{Protocol, SubjectNumber};
 use crate::screen::Attended;
 use flotor_command::say;
@@ -31,7 +31,13 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         observer: json!("human"),
         apparatus: apparatus.description(),
     };
-    let earlier = earlier(common, &dataset, &begin)?;
+    let earlier = match dataset.progress(&begin, common.earlier())? {
+        Progress::New => None,
+        Progress::Partial(log) => Some(log),
+        Progress::Complete => {
+            return Err(DatasetError::Duplicate { subject, root: common.out.clone() }.into());
+        }
+    };
     let files =
         (dataset.source_folder(subject).join("motion"), format!("{subject}_task-{}", protocol.task()));
     let stop = stop_on_signals();
@@ -120,28 +126,6 @@ fn subject(common: &Common, dataset: &Dataset, protocol: &Protocol) -> Result<Su
         let root = dataset.root().display();
         CommandError::Usage(format!("{root}: all subject numbers are taken; use another folder"))
     })
-}
-
-/// The incomplete sitting to resume, if any.
-fn earlier(
-    common: &Common,
-    dataset: &Dataset,
-    begin: &Begin,
-) -> Result<Option<Box<SittingLog>>, CommandError> {
-    let (subject, root) = (begin.subject, dataset.root().to_path_buf());
-    let progress = dataset.progress(subject, begin.protocol.task());
-    let refuse = |error: DatasetError| Err(error.into());
-    match progress? {
-        Progress::New => Ok(None),
-        Progress::Complete(_) => refuse(DatasetError::Duplicate { subject, root }),
-        Progress::Partial(log) if !common.resume => {
-            refuse(DatasetError::Unfinished { subject, trials: log.trials.len(), root })
-        }
-        Progress::Partial(log) => match begin.differs(&log.begin) {
-            Some(what) => refuse(DatasetError::Changed { path: log.path().to_path_buf(), what }),
-            None => Ok(Some(log)),
-        },
-    }
 }
 
 /// Noise if requested; a note or an error if this machine cannot play it.
