@@ -1,12 +1,29 @@
 //! Options that several commands share, and their parsers.
 
 use crate::CommandError;
-use clap::ValueEnum;
+use clap::{Command, Parser, ValueEnum};
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_servo::Core;
 pub use flotor_session::scene::{KeyValue, PluginKeyValue};
+use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
+use std::str::FromStr;
+
+/// The arguments of this process. A negative number is the value of its option, whose parser says what is legal: without
+/// this, clap takes it for another option. Not real-time.
+pub fn arguments<T: Parser>() -> T {
+    let matches = with_negative_numbers(T::command()).get_matches();
+    T::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+}
+
+fn with_negative_numbers(command: Command) -> Command {
+    let command = command.mut_args(|arg| {
+        let takes_values = arg.get_action().takes_values();
+        arg.allow_negative_numbers(takes_values)
+    });
+    command.mut_subcommands(with_negative_numbers)
+}
 
 /// `--clock`
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -48,36 +65,63 @@ pub fn duration_s(text: &str) -> Result<f64, String> {
 /// # Errors
 /// If the text is no rate, or not from 100 to 10000 Hz.
 pub fn rate_hz(text: &str) -> Result<f64, String> {
-    number(text, "Hz", "rate", 100.0..=10_000.0)
+    number("Hz", "rate", 100.0..=10_000.0)(text)
 }
 
-/// A number in a unit, which may be left out; errors call it `what`.
+/// The parser of a number in a unit, which may be left out; its errors call the number `what`.
+pub fn number(
+    unit: &'static str,
+    what: &'static str,
+    legal: RangeInclusive<f64>,
+) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| {
+        let number = text.trim().trim_end_matches(unit).trim().parse();
+        let number = number.map_err(|_| format!("invalid {what} `{text}`; write a number in {unit}"))?;
+        let (least, most) = (legal.start(), legal.end());
+        let legal = legal.contains(&number).then_some(number);
+        legal.ok_or_else(|| format!("the range is {least} to {most} {unit}"))
+    }
+}
+
+/// The parser of a whole number in a range.
+pub fn count<T: FromStr + PartialOrd + Display + Clone>(
+    legal: RangeInclusive<T>,
+) -> impl Fn(&str) -> Result<T, String> + Clone {
+    move |text| {
+        let number = text.trim().parse().ok().filter(|number| legal.contains(number));
+        number.ok_or_else(|| format!("write a whole number from {} to {}", legal.start(), legal.end()))
+    }
+}
+
+/// A file to write.
 ///
 /// # Errors
-/// If the text is no number in this unit, or not a legal one.
-pub fn number(text: &str, unit: &str, what: &str, legal: RangeInclusive<f64>) -> Result<f64, String> {
-    let number = text.trim().trim_end_matches(unit).trim().parse();
-    let number = number.map_err(|_| format!("invalid {what} `{text}`; write a number in {unit}"))?;
-    let (least, most) = (legal.start(), legal.end());
-    if legal.contains(&number) { Ok(number) } else { Err(format!("the range is {least} to {most} {unit}")) }
+/// If it has no name, or its folder does not exist.
+pub fn new_file(text: &str) -> Result<PathBuf, String> {
+    let file = PathBuf::from(text);
+    match file.parent() {
+        None => Err("name a file".to_owned()),
+        Some(folder) if folder.as_os_str().is_empty() || folder.is_dir() => Ok(file),
+        Some(folder) => Err(format!("no folder `{}`; create it first", folder.display())),
+    }
 }
 
 /// The file of a picture.
 ///
 /// # Errors
-/// If its name ends like that of another kind of picture.
+/// If it cannot be written, or its name ends like that of another kind of picture.
 pub fn svg_file(text: &str) -> Result<PathBuf, String> {
-    let file = PathBuf::from(text);
+    let file = new_file(text)?;
     let is_svg = file.extension().is_none_or(|extension| extension.eq_ignore_ascii_case("svg"));
     if is_svg { Ok(file) } else { Err("the picture is an SVG; name it FILE.svg".to_owned()) }
 }
 
-/// A number of a list.
+/// A number, such as a share.
 ///
 /// # Errors
 /// If the text is no number.
 pub fn real(text: &str) -> Result<f64, String> {
-    text.trim().parse().map_err(|_| format!("`{text}` is no number"))
+    text.trim().parse().map_err(|_| "write a number such as 0.75".to_owned())
 }
 
 /// A whole number from 0, such as a seed.
@@ -116,7 +160,7 @@ mod tests {
 
     #[test]
     fn a_number_may_have_its_unit_and_stays_in_its_range() {
-        let force = |text| number(text, "N", "force", 1.0..=50.0);
+        let force = number("N", "force", 1.0..=50.0);
         assert_eq!((force("10"), force(" 2.5 N ")), (Ok(10.0), Ok(2.5)));
         assert_eq!(force("ten N"), Err("invalid force `ten N`; write a number in N".to_owned()));
         for outside in ["0.5", "51N", "inf", "nan"] {
@@ -124,6 +168,29 @@ mod tests {
         }
         assert_eq!(rate_hz("1000 Hz"), Ok(1000.0));
         assert_eq!(rate_hz("99"), Err("the range is 100 to 10000 Hz".to_owned()));
+    }
+
+    #[test]
+    fn a_whole_number_stays_in_its_range() {
+        assert_eq!(count(1..=200_u32)(" 200 "), Ok(200));
+        for outside in ["0", "201", "-1", "2.5", "two", ""] {
+            assert_eq!(count(1..=200_u32)(outside), Err("write a whole number from 1 to 200".to_owned()));
+        }
+    }
+
+    #[test]
+    fn a_new_file_has_a_name_and_a_folder() {
+        assert_eq!(svg_file("run.svg"), Ok("run.svg".into()));
+        assert_eq!(svg_file(""), Err("name a file".to_owned()));
+        assert_eq!(new_file("nosuch/c.toml"), Err("no folder `nosuch`; create it first".to_owned()));
+    }
+
+    #[test]
+    fn a_negative_number_is_a_value_and_not_an_option() {
+        let seed = clap::Arg::new("seed").long("seed").value_parser(whole);
+        let command = with_negative_numbers(Command::new("test").arg(seed));
+        let error = command.try_get_matches_from(["test", "--seed", "-1"]).unwrap_err().to_string();
+        assert!(error.contains("write a whole number from 0"), "{error}");
     }
 
     #[test]

@@ -178,7 +178,10 @@ impl CalibrationFile {
     pub fn parse(file: &str, text: &str) -> Result<(Self, VerticalCalibration), CalibrationFileError> {
         let read: Self = toml::from_str(text).map_err(|error| {
             let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
-            let problem = error.message().lines().next().unwrap_or_default();
+            let message = error.message().lines().next().unwrap_or_default();
+            let cause =
+                message.split(", expected one of").next().unwrap_or_default().replace(" field ", " key ");
+            let problem = format!("is no calibration file ({cause})");
             CalibrationFileError::new(file, before.matches('\n').count() + 1, problem)
         })?;
         let whole = |problem: String| CalibrationFileError::new(file, 0, problem);
@@ -272,7 +275,9 @@ mod tests {
             assert_ne!(text, EXAMPLE, "{from} stands in the example");
             CalibrationFile::parse("c.toml", &text).unwrap_err().to_string()
         };
-        assert!(said("serial", "seriel").starts_with("c.toml:4: unknown field `seriel`"));
+        assert!(
+            said("serial", "seriel").starts_with("c.toml:4: is no calibration file (unknown key `seriel`)")
+        );
         assert!(said("[-7.0, 7.0]", "[-7.0, true]").starts_with("c.toml:6: "));
         assert!(said("format = 1", "format = 2").contains("format 2, this program reads 1"));
         assert!(said("1.05", "nan").contains("[vertical]"));

@@ -15,8 +15,8 @@ mod worker;
 
 use bridge::BRIDGE;
 use clap::{Args, CommandFactory, Parser, Subcommand};
-use flotor_command::exit_code_of;
 use flotor_command::separate::{Built, SeparateProgram};
+use flotor_command::{exit_code_of, options};
 use std::ffi::OsString;
 use std::process::ExitCode;
 
@@ -24,7 +24,7 @@ use std::process::ExitCode;
 #[derive(Parser)]
 #[command(name = "flotor", version, propagate_version = true, max_term_width = 110)]
 #[command(after_help = "Examples:\n  \
-    flotor                                            simulate spring 1 of the thesis in a hand for 10 s\n  \
+    flotor                                            simulate spring 1 of the thesis for 10 s\n  \
     flotor run --clock virtual --seed 1 --plot run.svg    the same, repeatable, as a picture\n  \
     flotor run scene.toml --set spring.variant=closed-form --record run.mcap\n  \
     flotor eval --model spring --set preset=thesis-2 --poses poses.csv --out -\n\n\
@@ -129,7 +129,7 @@ pub fn command_names() -> Vec<String> {
 /// Runs the command of this process.
 #[must_use]
 pub fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = options::arguments::<Arguments>();
     let result = match arguments.command {
         None => run::run(run::RunArguments::default()),
         Some(Command::Run(arguments)) => run::run(arguments),

@@ -31,7 +31,7 @@ pub(crate) struct RunArguments {
     /// Scene file (TOML); without it, the built-in demo
     scene: Option<PathBuf>,
     /// Duration of the run: 10s, 500ms, 2min; a number alone is in seconds (default: that of the scene)
-    #[arg(long, value_parser = duration_s, value_name = "TIME")]
+    #[arg(long, value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME")]
     duration: Option<f64>,
     /// Loop rate in Hz, 100 to 10000 (default: that of the scene)
     #[arg(long, value_parser = rate_hz, value_name = "HZ")]

@@ -1,9 +1,10 @@
 //! `flotor calibrate import`: somebody else's numbers as a calibration file.
 
-use super::{force_n, provenance, write_calibration};
+use super::{FORCES_N, provenance, write_calibration};
 use crate::thesis;
 use clap::Args;
 use flotor_command::CommandError;
+use flotor_command::options::{new_file, number, real};
 use flotor_command::say;
 use flotor_session::calibration_file::{
     CalibratedDevice, CalibrationFile, FORMAT, Quality, Source, VerticalCurve,
@@ -14,28 +15,21 @@ use std::path::PathBuf;
 #[derive(Args)]
 #[command(
     after_help = "The excess p(z) = c0 + c1 z + c2 z² ... in N (z in mm) was measured at a commanded force F; \
-    the file stores the\nratio 1 + p / F. Without --excess, the command uses the polynomial of CMU-RI-TR-07-21.\n\n\
+    the file stores the ratio 1 + p / F. Without --excess, the command uses the polynomial of CMU-RI-TR-07-21.\n\n\
     Examples:\n  \
     flotor calibrate import --out thesis.toml\n  \
-    flotor calibrate import --excess 0.19,-0.026,-0.0045 --at 10 --device maglev --serial 7 --out mine.toml"
+    flotor calibrate import --excess 0.19,-0.026,-0.0045 --at 10 --device maglev --out mine.toml"
 )]
 pub(super) struct ImportArguments {
     /// Coefficients of 1, z, z² ... in N, N/mm, N/mm² ...
-    #[arg(long, value_name = "C0,C1,...", value_delimiter = ',', allow_hyphen_values = true)]
+    #[arg(long, value_name = "C0,C1,...", value_delimiter = ',', value_parser = real, allow_hyphen_values = true)]
     excess: Vec<f64>,
     /// Commanded force of the measured excess, in N
-    #[arg(long, default_value = "10", value_name = "N", value_parser = force_n)]
+    #[arg(long, default_value = "10", value_name = "N", value_parser = number("N", "force", FORCES_N))]
     at: f64,
     /// Lowest and highest measured height, in mm
-    #[arg(
-        long,
-        value_name = "FROM,TO",
-        value_delimiter = ',',
-        num_args = 2,
-        default_value = "-7,7",
-        allow_hyphen_values = true
-    )]
-    range_mm: Vec<f64>,
+    #[arg(long, value_name = "FROM,TO", default_value = "-7,7", value_parser = heights_mm, allow_hyphen_values = true)]
+    range_mm: [f64; 2],
     /// Id of the device's plugin
     #[arg(long, default_value = "simulated", value_name = "ID")]
     device: String,
@@ -43,8 +37,13 @@ pub(super) struct ImportArguments {
     #[arg(long, default_value = "", value_name = "TEXT")]
     serial: String,
     /// Calibration file to write
-    #[arg(long, value_name = "FILE.toml")]
+    #[arg(long, value_parser = new_file, value_name = "FILE.toml")]
     out: PathBuf,
+}
+
+fn heights_mm(text: &str) -> Result<[f64; 2], String> {
+    let ends = text.split(',').map(real).collect::<Result<Vec<_>, _>>()?;
+    ends.try_into().map_err(|_| "write FROM,TO, such as -7,7".to_owned())
 }
 
 pub(super) fn run(arguments: &ImportArguments) -> Result<(), CommandError> {
@@ -55,8 +54,7 @@ pub(super) fn run(arguments: &ImportArguments) -> Result<(), CommandError> {
     if let Some(first) = coefficients.first_mut() {
         *first += 1.0;
     }
-    let range_mm = [range_mm.first(), range_mm.get(1)].map(|end| end.copied().unwrap_or(f64::NAN));
-    let vertical = VerticalCurve { range_mm, coefficients_per_mm: coefficients };
+    let vertical = VerticalCurve { range_mm: *range_mm, coefficients_per_mm: coefficients };
     vertical
         .calibration()
         .map_err(|invalid| CommandError::Usage(format!("invalid polynomial: {invalid}")))?;

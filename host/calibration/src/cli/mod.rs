@@ -10,6 +10,7 @@ use crate::CalibrationError;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use flotor_command::{CommandError, exit_code_of, options, write_text};
 use flotor_session::calibration_file::{CalibrationFile, Provenance, Source, today};
+use std::ops::RangeInclusive;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -35,7 +36,7 @@ pub fn command() -> clap::Command {
 /// Runs the command of this process.
 #[must_use]
 pub fn main() -> ExitCode {
-    let Command::Calibrate(arguments) = Arguments::parse().command;
+    let Command::Calibrate(arguments) = options::arguments::<Arguments>().command;
     exit_code_of(run(&arguments))
 }
 
@@ -64,6 +65,9 @@ fn run(arguments: &CalibrateArguments) -> Result<(), CommandError> {
     }
 }
 
+/// Legal commanded forces, N.
+const FORCES_N: RangeInclusive<f64> = 1.0..=50.0;
+
 fn provenance(source: Source, note: Option<String>) -> Provenance {
     let program = format!("flotor {}", env!("CARGO_PKG_VERSION"));
     Provenance { source, program, date: Some(today()), seed: None, note }
@@ -88,6 +92,42 @@ fn refused(error: CalibrationError) -> CommandError {
     }
 }
 
-fn force_n(text: &str) -> Result<f64, String> {
-    options::number(text, "N", "force", 1.0..=50.0)
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(arguments: &str) -> String {
+        let words = ["flotor", "calibrate"].into_iter().chain(arguments.split(' '));
+        match Arguments::try_parse_from(words) {
+            Ok(_) => String::new(),
+            Err(error) => error.to_string(),
+        }
+    }
+
+    #[test]
+    fn the_rig_is_simulated_or_a_device_with_its_sensor() {
+        assert!(refusal("vertical").contains("<--simulated|--device <ID>>"), "{}", refusal("vertical"));
+        assert!(refusal("vertical --device maglev").contains("--sensor <PORT>"));
+        for option in ["--sensor X", "--set a=b", "--patience 5s", "--sensor-plugin x", "--device maglev"] {
+            let refusal = refusal(&format!("vertical --simulated {option}"));
+            assert!(refusal.contains("cannot be used with"), "{option}: {refusal}");
+        }
+        assert_eq!(refusal("vertical --simulated --seed 3"), "");
+        assert_eq!(refusal("vertical --device maglev --sensor X --set a=b"), "");
+    }
+
+    #[test]
+    fn an_illegal_value_is_told_what_is_legal() {
+        for (arguments, words) in [
+            ("vertical --simulated --step-mm 0", "the range is 0.01 to 22 mm"),
+            ("vertical --simulated --steps 0", "write a whole number from 1 to 200"),
+            ("vertical --simulated --force -10,12", "the range is 1 to 50 N"),
+            ("vertical --simulated --out nosuch/c.toml", "no folder `nosuch`; create it first"),
+            ("import --out c.toml --excess x", "write a number such as 0.75"),
+            ("import --out c.toml --range-mm 7", "write FROM,TO, such as -7,7"),
+        ] {
+            assert!(refusal(arguments).contains(words), "{}", refusal(arguments));
+        }
+        assert_eq!(refusal("import --out c.toml --range-mm -7,7"), "");
+    }
 }

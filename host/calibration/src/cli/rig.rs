@@ -3,7 +3,7 @@
 use super::refused;
 use crate::rig::{DeviceRig, SimulatedRig, Waiting};
 use crate::sensor::{ForceSensor, SERIAL_SENSOR};
-use clap::Args;
+use clap::{ArgGroup, Args};
 use flotor_command::options::{KeyValue, duration_s, number, settings, whole};
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, progress_bar};
@@ -23,27 +23,28 @@ const REDRAWN: Duration = Duration::from_millis(100);
 
 /// Selection of the rig.
 #[derive(Args)]
+#[command(group = ArgGroup::new("rig").required(true))]
 pub(super) struct RigArguments {
     /// Use the simulated flotor in a simulated rig
-    #[arg(long, required_unless_present = "device", conflicts_with = "device")]
+    #[arg(long, group = "rig")]
     pub(super) simulated: bool,
-    /// Use the device of this plugin (id or file), with a force sensor
-    #[arg(long, value_name = "ID", requires = "sensor")]
+    /// Use the device of this plugin (id or file), with a force sensor (`--sensor`)
+    #[arg(long, value_name = "ID", requires = "sensor", group = "rig")]
     device: Option<String>,
     /// Set a parameter of the device (repeatable)
-    #[arg(long = "set", value_name = "KEY=VALUE", requires = "device")]
+    #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with = "simulated")]
     sets: Vec<KeyValue>,
     /// Serial port of the force sensor
-    #[arg(long, value_name = "PORT", requires = "device")]
+    #[arg(long, value_name = "PORT", conflicts_with = "simulated")]
     sensor: Option<String>,
     /// Plugin of the force sensor (id or file): a device with a parameter `port`
-    #[arg(long, value_name = "ID", default_value = SERIAL_SENSOR, requires = "device")]
+    #[arg(long, value_name = "ID", default_value = SERIAL_SENSOR, conflicts_with = "simulated")]
     sensor_plugin: String,
     /// Tolerance of the height of each stop, in mm
-    #[arg(long, value_name = "MM", default_value_t = 0.4, requires = "device", value_parser = tolerance_mm)]
+    #[arg(long, value_name = "MM", default_value_t = 0.4, conflicts_with = "simulated", value_parser = number("mm", "length", 0.005..=1.0))]
     tolerance_mm: f64,
     /// Time limit for moving the sensor to the next height
-    #[arg(long, value_name = "TIME", default_value = "10min", requires = "device", value_parser = duration_s)]
+    #[arg(long, value_name = "TIME", default_value = "10min", conflicts_with = "simulated", value_parser = duration_s, allow_hyphen_values = true)]
     patience: f64,
     /// Seed of the simulated sensor's noise
     #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N", conflicts_with = "device")]
@@ -100,8 +101,4 @@ fn guide(progress: &ProgressBar, stop: &StopSwitch) -> Guide {
         }
         if stop.is_stop_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })
-}
-
-fn tolerance_mm(text: &str) -> Result<f64, String> {
-    number(text, "mm", "length", 0.005..=1.0)
 }

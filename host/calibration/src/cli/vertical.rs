@@ -1,13 +1,13 @@
 //! `flotor calibrate vertical`: readings, fit, error before and after.
 
 use super::rig::RigArguments;
-use super::{force_n, provenance, refused, write_calibration};
+use super::{FORCES_N, provenance, refused, write_calibration};
 use crate::fit::{Candidate, Fit, fit};
 use crate::procedure::{Plan, Reading, measure};
 use crate::verify::{ErrorCurve, PROBE_N};
 use crate::{picture, thesis};
 use clap::Args;
-use flotor_command::options::svg_file;
+use flotor_command::options::{count, new_file, number, svg_file};
 use flotor_command::{CommandError, print_result, progress_bar, style, write_text};
 use flotor_hal::VerticalCalibration;
 use flotor_session::calibration_file::{
@@ -20,33 +20,33 @@ use std::path::PathBuf;
 #[derive(Args)]
 #[command(
     after_help = "The handle is locked in all axes but the vertical and pushes against a force sensor that \
-    is lowered step by step.\nThe sensor answers `R` with `F 1.234`, a force in N. The program requests one height after \
-    the other\nand reads the sensor while the handle rests there.\n\nExamples:\n  \
+    is lowered step by step. The sensor answers `R` with `F 1.234`, a force in N. The program requests one height after \
+    the other and reads the sensor while the handle rests there.\n\nExamples:\n  \
     flotor calibrate vertical --simulated\n  \
     flotor calibrate vertical --simulated --out calibration.toml --plot calibration.svg\n  \
     flotor calibrate vertical --simulated --force 8,10,12,14 --steps 28 --step-mm 0.5 --json -\n  \
-    flotor calibrate vertical --device maglev --set transport=usb --sensor /dev/ttyUSB0 --out mine.toml"
+    flotor calibrate vertical --device maglev --sensor /dev/ttyUSB0 --out mine.toml"
 )]
 pub(super) struct VerticalArguments {
     #[command(flatten)]
     rig: RigArguments,
     /// Commanded vertical forces in N, at least two
-    #[arg(long, value_name = "N", value_delimiter = ',', default_value = "10,12", value_parser = force_n)]
+    #[arg(long, value_name = "N", value_delimiter = ',', default_value = "10,12", value_parser = number("N", "force", FORCES_N), allow_hyphen_values = true)]
     force: Vec<f64>,
     /// Number of sweeps over all heights for each force
-    #[arg(long, default_value_t = 2, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100))]
+    #[arg(long, default_value_t = 2, value_name = "N", value_parser = count(1..=100_u32))]
     runs: u32,
     /// Steps down from the top
-    #[arg(long, default_value_t = 14, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=200))]
+    #[arg(long, default_value_t = 14, value_name = "N", value_parser = count(1..=200_u32))]
     steps: u32,
     /// Length of a step in mm
-    #[arg(long, default_value_t = 1.0, value_name = "MM")]
+    #[arg(long, default_value_t = 1.0, value_name = "MM", value_parser = number("mm", "length", 0.01..=22.0))]
     step_mm: f64,
     /// Readings of the force sensor at each height
-    #[arg(long, default_value_t = 10, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, default_value_t = 10, value_name = "N", value_parser = count(1..=1000_u32))]
     readings: u32,
     /// Write the calibration file
-    #[arg(long, value_name = "FILE.toml")]
+    #[arg(long, value_parser = new_file, value_name = "FILE.toml")]
     out: Option<PathBuf>,
     /// Plot readings, fit, residuals and the error before and after
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
@@ -108,10 +108,16 @@ pub(super) fn run(arguments: &VerticalArguments) -> Result<(), CommandError> {
 fn plan(arguments: &VerticalArguments) -> Result<Plan, CommandError> {
     let VerticalArguments { force, runs, steps, step_mm, readings, .. } = arguments;
     let half_mm = f64::from(*steps) * step_mm * 0.5;
-    if !(*step_mm > 0.0 && half_mm <= 11.0) {
+    if half_mm > 11.0 {
         return Err(CommandError::Usage(format!(
-            "--steps {steps} of {step_mm} mm: the handle reaches 11 mm to either side"
+            "--steps {steps} of {step_mm} mm: the handle reaches 11 mm to either side; choose steps of at most 22 mm in all"
         )));
+    }
+    if let [first, others @ ..] = force.as_slice()
+        && others.iter().all(|other| other == first)
+    {
+        let why = format!("--force {first}: give at least two different forces, such as 10,12");
+        return Err(CommandError::Usage(why));
     }
     Ok(Plan {
         forces_n: force.clone(),

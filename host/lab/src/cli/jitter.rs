@@ -21,7 +21,7 @@ use std::path::PathBuf;
 )]
 pub(crate) struct JitterArguments {
     /// Duration of the whole measurement
-    #[arg(long, value_parser = duration_s, value_name = "TIME", default_value = "20s")]
+    #[arg(long, value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME", default_value = "20s")]
     duration: f64,
     /// Loop rate in Hz, 100 to 10000
     #[arg(long, value_parser = rate_hz, value_name = "HZ", default_value = "1000")]

@@ -11,7 +11,7 @@ mod validate;
 use crate::Progress;
 use crate::replay::ReplayError;
 use clap::{CommandFactory, Parser, Subcommand};
-use flotor_command::{CommandError, exit_code_of, progress_bar};
+use flotor_command::{CommandError, exit_code_of, options, progress_bar};
 use std::process::ExitCode;
 
 /// Measure plugins, loops and recordings; `flotor COMMAND` starts this program.
@@ -42,7 +42,7 @@ pub fn command() -> clap::Command {
 /// Runs the command of this process.
 #[must_use]
 pub fn main() -> ExitCode {
-    exit_code_of(match Arguments::parse().command {
+    exit_code_of(match options::arguments::<Arguments>().command {
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
         Command::Validate(arguments) => validate::run(&arguments),

@@ -3,7 +3,7 @@
 use crate::stability::theory::{Plant, Rendering, exact_limit_n_per_m, gil_limit_n_per_m};
 use crate::stability::{Case, Grip, LoopError, Row, default_cases, measure};
 use clap::Args;
-use flotor_command::options::{number, rate_hz, svg_file};
+use flotor_command::options::{count, number, rate_hz, svg_file};
 use flotor_command::tables::{table, to_csv};
 use flotor_command::{CommandError, print_result, progress_bar, style, write_json, write_text};
 use flotor_hal::abi::PluginKind;
@@ -17,7 +17,7 @@ use std::path::PathBuf;
 #[derive(Args)]
 #[command(
     after_help = "Each case is bisected on the simulated flotor's own dynamics, in virtual time, until the \
-    vibration of a released\nhandle neither grows nor fades. Lists multiply: without any, a default grid is measured.\n\n\
+    vibration of a released handle neither grows nor fades. Lists multiply: without any, a default grid is measured.\n\n\
     Examples:\n  \
     flotor stability --plot stability.svg --csv stability.csv\n  \
     flotor stability --rate 1000,4000 --delay 0,1 --virtual-damping 0,15\n  \
@@ -28,16 +28,16 @@ pub(crate) struct StabilityArguments {
     #[arg(long, value_parser = rate_hz, value_name = "HZ", value_delimiter = ',')]
     rate: Vec<f64>,
     /// Whole periods from a sample to its force, 0 to 100
-    #[arg(long, value_parser = clap::value_parser!(u32).range(0..=100), value_name = "TICKS", value_delimiter = ',')]
+    #[arg(long, value_parser = count(0..=100_u32), value_name = "TICKS", value_delimiter = ',')]
     delay: Vec<u32>,
     /// Drag of the device in N s/m
-    #[arg(long, value_parser = damping, value_name = "B", value_delimiter = ',')]
+    #[arg(long, value_parser = number("N s/m", "damping", 0.0..=100_000.0), value_name = "B", value_delimiter = ',')]
     damping: Vec<f64>,
     /// Virtual damping (backward difference) in N s/m
-    #[arg(long, value_parser = damping, value_name = "B", value_delimiter = ',')]
+    #[arg(long, value_parser = number("N s/m", "damping", 0.0..=100_000.0), value_name = "B", value_delimiter = ',')]
     virtual_damping: Vec<f64>,
     /// Step of the position sensor in µm, 0 to 100
-    #[arg(long, value_parser = quantum_um, value_name = "UM", default_value = "0")]
+    #[arg(long, value_parser = number("µm", "step", 0.0..=100.0), value_name = "UM", default_value = "0")]
     quantum_um: f64,
     /// Grip of the hand on the handle
     #[arg(long, value_enum, default_value_t)]
@@ -203,12 +203,4 @@ fn stiffness_panel(first: &Case, plant: Plant, within: &[(&Case, &Row)]) -> Pane
             );
     }
     panel
-}
-
-fn damping(text: &str) -> Result<f64, String> {
-    number(text, "N s/m", "number", 0.0..=100_000.0)
-}
-
-fn quantum_um(text: &str) -> Result<f64, String> {
-    number(text, "µm", "number", 0.0..=100.0)
 }

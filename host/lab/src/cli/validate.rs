@@ -24,7 +24,7 @@ pub(crate) struct ValidateArguments {
     #[arg(long)]
     json: bool,
     /// Time limit of one rule: 10s, 500ms
-    #[arg(long, value_parser = duration_s, value_name = "TIME", default_value = "10s")]
+    #[arg(long, value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME", default_value = "10s")]
     timeout: f64,
     /// Check one rule in this process, and print the verdict as JSON
     #[arg(long, hide = true, value_parser = rule)]

@@ -5,7 +5,7 @@ mod study;
 
 use crate::dataset::DatasetError;
 use clap::{CommandFactory, Parser, Subcommand};
-use flotor_command::{CommandError, exit_code_of};
+use flotor_command::{CommandError, exit_code_of, options};
 use std::process::ExitCode;
 
 /// Run and analyse perception experiments; `flotor COMMAND` starts this program.
@@ -31,7 +31,7 @@ pub fn command() -> clap::Command {
 /// Runs the command of this process.
 #[must_use]
 pub fn main() -> ExitCode {
-    exit_code_of(match Arguments::parse().command {
+    exit_code_of(match options::arguments::<Arguments>().command {
         Command::Study(arguments) => study::run(&arguments),
         Command::Analyse(arguments) => analyse::run(&arguments),
     })
