@@ -15,7 +15,7 @@ use std::path::PathBuf;
 #[derive(Args)]
 #[command(
     after_help = "The command verifies every event log first and refuses a changed line with its number. It omits \
-    incomplete\nsittings, with a note.\n\n\
+    incomplete sittings, with a note.\n\n\
     Examples:\n  \
     flotor analyse data\n  \
     flotor analyse data --json result.json --type II"

@@ -22,7 +22,7 @@ use choices::{
     BoundaryChoice, FirstChoice, ForceWay, NoiseOption, PresentationOption, ProcedureChoice, range,
 };
 use clap::{Args, Subcommand, ValueEnum};
-use flotor_command::options::{PluginKeyValue, duration_s, real, whole};
+use flotor_command::options::{PluginKeyValue, count, duration_s, real, whole};
 use flotor_command::say;
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, progress_bar, style};
@@ -36,15 +36,15 @@ use std::path::PathBuf;
 /// Run a perception experiment
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    flotor study jnd --out data                              16 simulated subjects, thresholds of stiffness\n  \
-    flotor analyse data                                      Weber fractions, tests, effects\n  \
+    flotor study jnd --out data\n  \
+    flotor analyse data\n  \
     flotor study magnitude --subjects 8 --seed 3 --out ratings\n  \
     flotor study jnd --bases 20,40 --target 0.8 --side random --out other\n  \
-    flotor study jnd --out data --resume                     resume an interrupted study\n  \
-    flotor study jnd --observer human --subject 3 --scene mlhd.toml --out people   a person\n  \
+    flotor study jnd --out data --resume\n  \
+    flotor study jnd --observer human --subject 3 --scene mlhd.toml --out people\n  \
     flotor study jnd --observer human --subject 3 --out people --resume\n  \
     flotor study magnitude --stimulus spring.gamma_n --range 10-40 --out d\n  \
-    flotor study bias --runs 1000                            bias and error of each estimator")]
+    flotor study bias --runs 1000")]
 pub(crate) struct StudyArguments {
     #[command(subcommand)]
     task: Task,
@@ -78,6 +78,9 @@ enum ObserverOption {
     Human,
 }
 
+/// More threads than this help no machine.
+const MOST_JOBS: NonZeroUsize = NonZeroUsize::MIN.saturating_add(1023);
+
 /// Options of every experiment.
 #[derive(Args)]
 struct Common {
@@ -85,10 +88,10 @@ struct Common {
     #[arg(long, value_enum, default_value_t)]
     observer: ObserverOption,
     /// Number of subjects; their numbers start at 1
-    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=i64::from(SubjectNumber::MOST)), value_name = "N")]
+    #[arg(long, default_value_t = 16, value_parser = count(1..=SubjectNumber::MOST), value_name = "N")]
     subjects: u16,
     /// Simulated subjects in parallel (default: one per core)
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_parser = count(NonZeroUsize::MIN..=MOST_JOBS), value_name = "N")]
     jobs: Option<NonZeroUsize>,
     /// Seed of orders, presentations and simulated answers
     #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N")]
@@ -97,7 +100,7 @@ struct Common {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Number of the person (human; default: the first free one)
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=i64::from(SubjectNumber::MOST)), value_name = "N")]
+    #[arg(long, value_parser = count(1..=SubjectNumber::MOST), value_name = "N")]
     subject: Option<u16>,
     /// Scene of the stimuli (TOML); without it, a spring on the simulated flotor
     #[arg(long, value_name = "FILE")]
@@ -109,13 +112,13 @@ struct Common {
     #[arg(long, value_enum, default_value_t)]
     apparatus: PresentationOption,
     /// Time for which a simulated observer feels each stimulus
-    #[arg(long, default_value = "1s", value_parser = duration_s, value_name = "TIME")]
+    #[arg(long, default_value = "1s", value_parser = feel_s, allow_hyphen_values = true, value_name = "TIME")]
     feel: f64,
     /// Stored movement (default: full for people, summary for simulated observers)
     #[arg(long, value_enum)]
     kinematics: Option<Kinematics>,
     /// Trials between two rests, 0: no rests (human)
-    #[arg(long, default_value_t = 40, value_name = "N")]
+    #[arg(long, default_value_t = 40, value_parser = count(0..=100_000_u32), value_name = "N")]
     rest_every: u32,
     /// Screen for questions and answers (human)
     #[arg(long, value_enum, default_value_t)]
@@ -143,7 +146,7 @@ struct NoteArguments {
     #[arg(value_name = "DIR")]
     data: PathBuf,
     /// Number of the subject
-    #[arg(value_name = "SUBJECT", value_parser = clap::value_parser!(u16).range(1..=i64::from(SubjectNumber::MOST)))]
+    #[arg(value_name = "SUBJECT", value_parser = count(1..=SubjectNumber::MOST))]
     subject: u16,
     /// Text of the note, without names
     #[arg(value_name = "TEXT")]
@@ -155,34 +158,34 @@ struct JndArguments {
     #[command(flatten)]
     common: Common,
     /// Bases, in the unit of the stimulus (default: 17,26,35; for a force 3,6,9)
-    #[arg(long, value_delimiter = ',', value_parser = real, value_name = "LIST")]
+    #[arg(long, value_delimiter = ',', value_parser = real, allow_hyphen_values = true, value_name = "LIST")]
     bases: Option<Vec<f64>>,
     /// Replications, in alternating modality
-    #[arg(long, default_value_t = 4, value_name = "N")]
+    #[arg(long, default_value_t = 4, value_parser = count(1..=1000_u32), value_name = "N")]
     replications: u32,
     /// Adaptive procedure, which selects the next difference
     #[arg(long, value_enum, default_value_t)]
     procedure: ProcedureChoice,
     /// QUEST+: trials per track
-    #[arg(long, default_value_t = 18, value_name = "N")]
+    #[arg(long, default_value_t = 18, value_parser = count(1..=1000_u32), value_name = "N")]
     trials: u32,
     /// First difference, as a share of the base
-    #[arg(long, default_value_t = 0.40, value_name = "SHARE")]
+    #[arg(long, default_value_t = 0.40, value_parser = real, value_name = "SHARE")]
     initial: f64,
     /// First step down, as a share of the base
-    #[arg(long, default_value_t = 0.10, value_name = "SHARE")]
+    #[arg(long, default_value_t = 0.10, value_parser = real, value_name = "SHARE")]
     step: f64,
     /// Target share of correct answers
-    #[arg(long, default_value_t = 0.75, value_name = "SHARE")]
+    #[arg(long, default_value_t = 0.75, value_parser = real, value_name = "SHARE")]
     target: f64,
     /// Reversals that halve the step
-    #[arg(long, value_delimiter = ',', default_values_t = [2, 4], value_name = "LIST")]
+    #[arg(long, value_delimiter = ',', default_value = "2,4", value_parser = count(1..=200_u32), value_name = "LIST")]
     halve_at: Vec<u32>,
     /// Reversal that ends a track
-    #[arg(long, default_value_t = 8, value_name = "N")]
+    #[arg(long, default_value_t = 8, value_parser = count(1..=200_u32), value_name = "N")]
     stop_after: u32,
     /// First reversal whose difference counts for the threshold
-    #[arg(long, default_value_t = 4, value_name = "N")]
+    #[arg(long, default_value_t = 4, value_parser = count(1..=1000_u32), value_name = "N")]
     average_from: u32,
     /// Whether the trials of the first and last of these reversals count
     #[arg(long, value_enum, default_value_t)]
@@ -191,10 +194,10 @@ struct JndArguments {
     #[arg(long, value_enum, default_value_t)]
     step_at_reversal: StepAtReversal,
     /// Smallest difference, as a share of the base
-    #[arg(long, default_value_t = 0.0, value_name = "SHARE")]
+    #[arg(long, default_value_t = 0.0, value_parser = real, value_name = "SHARE")]
     floor: f64,
     /// Largest difference, as a share of the base
-    #[arg(long, default_value_t = 0.95, value_name = "SHARE")]
+    #[arg(long, default_value_t = 0.95, value_parser = real, value_name = "SHARE")]
     ceiling: f64,
     /// On which side of the base the comparison lies
     #[arg(long, value_enum, default_value_t)]
@@ -215,13 +218,13 @@ struct MagnitudeArguments {
     #[arg(long, default_value = "12-48", value_parser = range, value_name = "LEAST-MOST")]
     range: (f64, f64),
     /// Stimuli, at equal distances
-    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(3..=1000), value_name = "N")]
+    #[arg(long, default_value_t = 12, value_parser = count(3..=1000_u32), value_name = "N")]
     stimuli: u32,
     /// Replications in each modality
-    #[arg(long, default_value_t = 3, value_name = "N")]
+    #[arg(long, default_value_t = 3, value_parser = count(1..=1000_u32), value_name = "N")]
     replications: u32,
     /// Stimuli shown before each modality
-    #[arg(long, default_value_t = 5, value_name = "N")]
+    #[arg(long, default_value_t = 5, value_parser = count(0..=1000_u32), value_name = "N")]
     demo: u32,
 }
 
@@ -270,6 +273,11 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
             carry_out(&arguments.common, Protocol::Magnitude(arguments.protocol()?), None)
         }
     }
+}
+
+/// Seconds, and not none.
+fn feel_s(text: &str) -> Result<f64, String> {
+    duration_s(text).and_then(|s| if s > 0.0 { Ok(s) } else { Err("the range is above 0".to_owned()) })
 }
 
 impl Common {

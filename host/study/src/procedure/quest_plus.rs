@@ -32,10 +32,14 @@ impl QuestPlusRule {
     /// Names the first one.
     pub fn check(&self) -> Result<(), InvalidRule> {
         if self.trials == 0 {
-            return Err(InvalidRule::new("trials of a track", self.trials, "legal is 1 or more"));
+            return Err(InvalidRule::new("--trials", self.trials, "legal is 1 or more"));
         }
         if !(self.target > 0.5 && self.target < 1.0) {
-            return Err(InvalidRule::new("target", self.target, "legal is above 0.5 (guessing) and below 1"));
+            return Err(InvalidRule::new(
+                "--target",
+                self.target,
+                "legal is above 0.5 (guessing) and below 1",
+            ));
         }
         let [least, most] = self.deltas;
         if !(least > 0.0 && least < most && most < 1.0) {

@@ -85,20 +85,20 @@ impl Default for WeightedUpDownRule {
 
 /// A setting that cannot work.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{setting} is {value}; {legal}")]
+#[error("{setting} {value}: {legal}")]
 pub struct InvalidRule {
-    /// Its name.
+    /// Its option on the command line.
     pub setting: &'static str,
     /// Its value.
     pub value: String,
     /// What is legal.
-    pub legal: &'static str,
+    pub legal: String,
 }
 
 impl InvalidRule {
     /// A complaint about a setting.
-    pub fn new(setting: &'static str, value: impl ToString, legal: &'static str) -> Self {
-        Self { setting, value: value.to_string(), legal }
+    pub fn new(setting: &'static str, value: impl ToString, legal: impl Into<String>) -> Self {
+        Self { setting, value: value.to_string(), legal: legal.into() }
     }
 }
 
@@ -112,29 +112,29 @@ impl WeightedUpDownRule {
             let inside = value > least && value < most;
             if inside { Ok(()) } else { Err(InvalidRule::new(setting, value, legal)) }
         };
-        share("first step", self.first_step, 0.0, 1.0, "legal is above 0 and below 1")?;
-        share("target", self.target, 0.5, 1.0, "legal is above 0.5 (guessing) and below 1")?;
+        share("--step", self.first_step, 0.0, 1.0, "legal is above 0 and below 1")?;
+        share("--target", self.target, 0.5, 1.0, "legal is above 0.5 (guessing) and below 1")?;
         share(
-            "ceiling",
+            "--ceiling",
             self.ceiling,
             0.0,
             1.0,
             "legal is above 0 and below 1 (a base minus all of it is nothing)",
         )?;
         if !(self.floor >= 0.0 && self.floor < self.ceiling) {
-            return Err(InvalidRule::new("floor", self.floor, "legal is 0 to below the ceiling"));
+            return Err(InvalidRule::new("--floor", self.floor, "legal is 0 to below --ceiling"));
         }
         if !(self.initial_delta > self.floor && self.initial_delta <= self.ceiling) {
-            let legal = "legal is above the floor and up to the ceiling";
-            return Err(InvalidRule::new("initial difference", self.initial_delta, legal));
+            let legal = "legal is above --floor and up to --ceiling";
+            return Err(InvalidRule::new("--initial", self.initial_delta, legal));
         }
         if self.stop_after == 0 || self.average_from == 0 || self.average_from > self.stop_after {
-            let legal = "legal is 1 to the reversal that stops the track";
-            return Err(InvalidRule::new("first reversal that counts", self.average_from, legal));
+            let legal = format!("legal is 1 to --stop-after ({})", self.stop_after);
+            return Err(InvalidRule::new("--average-from", self.average_from, legal));
         }
         if self.trials_most < self.stop_after {
-            let legal = "a track needs more trials than reversals";
-            return Err(InvalidRule::new("largest number of trials", self.trials_most, legal));
+            let legal = format!("legal is 1 to {}, the most trials of a track", self.trials_most);
+            return Err(InvalidRule::new("--stop-after", self.stop_after, legal));
         }
         Ok(())
     }
@@ -359,13 +359,19 @@ mod tests {
         let refused = |change: fn(&mut WeightedUpDownRule)| {
             let mut rule = WeightedUpDownRule::default();
             change(&mut rule);
-            rule.check().unwrap_err().setting
+            rule.check().unwrap_err().to_string()
         };
         assert_eq!(WeightedUpDownRule::default().check(), Ok(()));
-        assert_eq!(refused(|rule| rule.target = 0.5), "target");
-        assert_eq!(refused(|rule| rule.first_step = f64::NAN), "first step");
-        assert_eq!(refused(|rule| rule.initial_delta = 0.0), "initial difference");
-        assert_eq!(refused(|rule| rule.floor = -0.1), "floor");
-        assert_eq!(refused(|rule| rule.average_from = 9), "first reversal that counts");
+        assert_eq!(
+            refused(|rule| rule.target = 0.5),
+            "--target 0.5: legal is above 0.5 (guessing) and below 1"
+        );
+        assert_eq!(refused(|rule| rule.first_step = f64::NAN), "--step NaN: legal is above 0 and below 1");
+        assert_eq!(
+            refused(|rule| rule.initial_delta = 0.0),
+            "--initial 0: legal is above --floor and up to --ceiling"
+        );
+        assert_eq!(refused(|rule| rule.floor = -0.1), "--floor -0.1: legal is 0 to below --ceiling");
+        assert_eq!(refused(|rule| rule.average_from = 9), "--average-from 9: legal is 1 to --stop-after (8)");
     }
 }

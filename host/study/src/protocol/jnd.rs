@@ -1,6 +1,8 @@
 //! Just noticeable difference: pairs of stimuli, an adaptive procedure for each base and modality.
 
-use super::{AtBoundary, FirstModality, ProtocolError, Stimulus, at_least_one, extremes, positive};
+use super::{
+    AtBoundary, FirstModality, ProtocolError, Stimulus, at_least_one, extremes, positive_and_different,
+};
 use crate::procedure::Procedure;
 use serde::{Deserialize, Serialize};
 
@@ -91,8 +93,8 @@ impl Default for JndProtocol {
 
 impl JndProtocol {
     pub(super) fn check(&self) -> Result<(), ProtocolError> {
-        positive("bases", &self.bases)?;
-        at_least_one("replications", self.replications)?;
+        positive_and_different("--bases", &self.bases)?;
+        at_least_one("--replications", self.replications)?;
         self.procedure.check()?;
         for (what, value) in [("close", self.demo.close), ("nearly equal", self.demo.nearly_equal)] {
             if !(0.0..1.0).contains(&value) {

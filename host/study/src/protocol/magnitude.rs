@@ -1,6 +1,8 @@
 //! Magnitude estimation with free modulus: one stimulus, any number.
 
-use super::{AtBoundary, FirstModality, ProtocolError, Stimulus, at_least_one, extremes, positive};
+use super::{
+    AtBoundary, FirstModality, ProtocolError, Stimulus, at_least_one, extremes, positive_and_different,
+};
 use serde::{Deserialize, Serialize};
 
 /// How ratings of subjects with different ranges are made comparable.
@@ -58,11 +60,11 @@ impl MagnitudeProtocol {
     }
 
     pub(super) fn check(&self) -> Result<(), ProtocolError> {
-        positive("stimuli", &self.values)?;
-        at_least_one("replications", self.replications)?;
+        positive_and_different("--range", &self.values)?;
+        at_least_one("--replications", self.replications)?;
         if self.values.len() < 3 {
             let value = self.values.len() as f64;
-            return Err(ProtocolError::Value { what: "stimuli", value, legal: "a trend needs 3 or more" });
+            return Err(ProtocolError::Value { what: "--stimuli", value, legal: "a trend needs 3 or more" });
         }
         Ok(())
     }

@@ -293,13 +293,20 @@ impl Protocol {
     }
 }
 
-fn positive(what: &'static str, values: &[f64]) -> Result<(), ProtocolError> {
+fn positive_and_different(what: &'static str, values: &[f64]) -> Result<(), ProtocolError> {
     if values.is_empty() {
         return Err(ProtocolError::Empty { list: what });
     }
-    let wrong = values.iter().find(|value| !(value.is_finite() && **value > 0.0));
+    let is_right = |value: f64| {
+        value.is_finite() && value > 0.0 && values.iter().filter(|other| **other == value).count() == 1
+    };
+    let wrong = values.iter().find(|value| !is_right(**value));
     wrong.map_or(Ok(()), |value| {
-        Err(ProtocolError::Value { what, value: *value, legal: "legal is a finite number above 0" })
+        Err(ProtocolError::Value {
+            what,
+            value: *value,
+            legal: "legal is a finite number above 0, each once",
+        })
     })
 }
 

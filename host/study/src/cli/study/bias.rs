@@ -2,7 +2,7 @@
 
 use crate::bias::{BiasRow, observer_of, rows};
 use clap::Args;
-use flotor_command::options::whole;
+use flotor_command::options::{count, whole};
 use flotor_command::{CommandError, print_result, progress_bar, style};
 use rayon::prelude::*;
 use std::path::PathBuf;
@@ -15,17 +15,17 @@ const OBSERVERS: [(f64, f64); 7] =
 #[derive(Args)]
 #[command(
     after_help = "thesis: mean of the differences from the 4th to the 8th reversal; map: the most likely \
-    observer, from the same trials;\nquestplus: 18 trials placed for the most information.\n\n\
+    observer, from the same trials; questplus: 18 trials placed for the most information.\n\n\
     Examples:\n  \
     flotor study bias --runs 1000\n  \
     flotor study bias --tracks 1 --json bias.json"
 )]
 pub(super) struct BiasArguments {
     /// Estimates per observer and method
-    #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(2..=1_000_000), value_name = "N")]
+    #[arg(long, default_value_t = 10_000, value_parser = count(2..=1_000_000_u32), value_name = "N")]
     runs: u32,
     /// Tracks per estimate
-    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100), value_name = "N")]
+    #[arg(long, default_value_t = 2, value_parser = count(1..=100_u32), value_name = "N")]
     tracks: u32,
     /// Seed of the answers
     #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N")]

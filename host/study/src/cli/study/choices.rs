@@ -3,6 +3,7 @@
 use crate::protocol::{AtBoundary, FirstModality};
 use crate::trial::Modality;
 use clap::ValueEnum;
+use flotor_command::options::real;
 
 /// `--first`
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
@@ -110,9 +111,8 @@ impl ForceWay {
 
 /// `LEAST-MOST`, of which the first is smaller.
 pub(super) fn range(text: &str) -> Result<(f64, f64), String> {
-    let number = |text: &str| text.trim().parse::<f64>().map_err(|_| format!("invalid number `{text}`"));
     let (least, most) = text.split_once('-').ok_or("write LEAST-MOST, like 12-48")?;
-    let (least, most) = (number(least)?, number(most)?);
+    let (least, most) = (real(least)?, real(most)?);
     if least < most {
         Ok((least, most))
     } else {
