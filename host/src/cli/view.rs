@@ -14,11 +14,11 @@ use std::process::Stdio;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     flotor view                                   the session in another terminal\n  \
-    flotor view zenoh/lab                         a session on another machine, see `flotor bridge --help`\n  \
+    flotor view zenoh/lab                         a session on another machine (`flotor bridge`)\n  \
     flotor run --clock virtual --record run.mcap && flotor view run.mcap\n  \
     flotor view --screenshot run.png run.mcap     a picture, without display or GPU\n  \
     flotor view --screenshot run.png --at 2.5 --look light --size 1920x1200 --scale 1.5 run.mcap\n  \
-    flotor view --measure 10 run.mcap             pictures drawn and processor time used in ten seconds")]
+    flotor view --measure 10 run.mcap             pictures drawn and processor time in 10 s")]
 pub(crate) struct ViewArguments {
     /// Recording, or zenoh/NAME for a remote session (default: the running host)
     #[arg(value_name = "FILE.mcap | zenoh/NAME")]

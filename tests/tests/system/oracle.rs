@@ -243,3 +243,22 @@ fn a_model_nobody_has_is_a_mistake() {
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
     assert!(ran.error().starts_with("no model plugin `sprang`; did you mean `spring`?"), "{ran:#?}");
 }
+
+#[test]
+fn poses_are_not_overwritten() {
+    let scratch = Scratch::default();
+    let file = scratch.file("poses.csv", &format!("{POSE_HEADER}\na,0,0,0,0,0,0\n"));
+    let file = file.display().to_string();
+    let same = ["eval", "--model", "spring", "--poses", &file, "--out", &file];
+    let ran = Flotor::with(same).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+    assert!(ran.error().contains("holds the poses; choose another file"), "{ran:#?}");
+}
+
+#[test]
+fn bench_lists_the_details_of_the_model() {
+    let ran = Flotor::with(["bench", "--case", "variant=energy", "--apart", "nosuch"]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+    assert!(ran.error().starts_with("--apart nosuch: no detail of the model; its details are ["), "{ran:#?}");
+    assert!(ran.error().contains("rod_share"), "{ran:#?}");
+}

@@ -4,9 +4,10 @@ use super::ProgressLine;
 use crate::Size;
 use crate::bench::{BenchDevice, Case, Hand, Plan, Split, TickCost, WholeTick, measure};
 use clap::Args;
-use flotor_command::options::{KeyValue, svg_file};
+use flotor_command::options::{KeyValue, new_file, number, svg_file};
 use flotor_command::tables::table;
 use flotor_command::{CommandError, print_result, style, write_text};
+use flotor_hal::Detail;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_session::registry::Registry;
@@ -16,8 +17,8 @@ use std::path::PathBuf;
 /// Measure cost and error of an evaluation, for many settings of a force model.
 #[derive(Args)]
 #[command(
-    after_help = "Without --case, the command compares the spring's variants and settings with its exact rod, or measures the defaults\n\
-    of another model. With --tick, it measures the whole tick around the model instead: device, mapping, envelope, trace.\n\
+    after_help = "Without --case, the command compares the spring's variants and settings with its exact rod, or measures the defaults \
+    of another model. With --tick, it measures the whole tick around the model instead: device, mapping, envelope, trace. \
     Times are wall clock: compare them within one run only.\n\n\
     Examples:\n  \
     flotor bench --csv bench.csv --plot bench.svg\n  \
@@ -43,9 +44,9 @@ pub(crate) struct BenchArguments {
     #[arg(long, value_name = "KEY=VALUE,...")]
     yardstick: Option<String>,
     /// Depth of the middle of the motion below home
-    #[arg(long, value_name = "MM", default_value_t = 4.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", default_value_t = 4.0, value_parser = number("mm", "depth", 0.0..=100.0))]
     depth_mm: f64,
-    /// Report calls separately in which this detail of the answer is above zero
+    /// Report calls separately in which this detail of the answer (a column of `eval --details`) is above zero
     #[arg(long, value_name = "DETAIL")]
     apart: Option<String>,
     /// Measure the whole tick around the model, on a scripted device and on the simulated flotor
@@ -55,7 +56,7 @@ pub(crate) struct BenchArguments {
     #[arg(long, value_enum, default_value = "short")]
     size: Size,
     /// Write every measurement as CSV
-    #[arg(long, value_name = "FILE.csv")]
+    #[arg(long, value_parser = new_file, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
     /// Plot error over time
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
@@ -140,6 +141,15 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
     let case = |text: &str| case(&plugin, &arguments.sets, text);
     let hand = Hand { depth_m: arguments.depth_mm / 1e3 };
     let cases = cases.into_iter().map(case).collect::<Result<Vec<_>, _>>()?;
+    if let (Some(detail), Some(case)) = (&arguments.apart, cases.first()) {
+        let model = plugin.create_model(&case.settings)?;
+        let known: Vec<&str> = model.details().iter().map(Detail::id).collect();
+        if !known.contains(&detail.as_str()) {
+            let known = known.join(", ");
+            let why = format!("--apart {detail}: no detail of the model; its details are [{known}]");
+            return Err(CommandError::Usage(why));
+        }
+    }
     let baseline = match &arguments.yardstick {
         Some(text) => {
             let name = case(text)?.name;

@@ -2,21 +2,21 @@
 
 use crate::evaluate::{Answer, Details, EvaluateError, Evaluation, Handle, Travel};
 use clap::Args;
-use flotor_command::options::{KeyValue, settings};
+use flotor_command::options::{KeyValue, new_file, settings};
 use flotor_command::tables::to_csv;
 use flotor_command::{CommandError, note, progress_bar, write_text};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::{DVec3, Detail};
-use flotor_session::registry::Registry;
+use flotor_session::registry::{Registry, is_same_file};
 use flotor_session::scene::did_you_mean;
 use std::path::{Path, PathBuf};
 
 /// Evaluate a force model at poses from a CSV file.
 #[derive(Args)]
 #[command(
-    after_help = "Poses: a header [id,]x_m,y_m,z_m,rx_rad,ry_rad,rz_rad and one row a pose, in the model frame (home is\n\
-    the origin, z up; rx, ry, rz is a rotation vector). nan and inf are legal. Result: id, force, torque, energy, status;\n\
-    with --details also the details of the model (the spring: branch, stable, seat_roll_rad,\n\
+    after_help = "Poses: a header [id,]x_m,y_m,z_m,rx_rad,ry_rad,rz_rad and one row a pose, in the model frame (home is \
+    the origin, z up; rx, ry, rz is a rotation vector). nan and inf are legal. Result: id, force, torque, energy, status; \
+    with --details also the details of the model (the spring: branch, stable, seat_roll_rad, \
     rod_share).\n\n\
     Examples:\n  \
     flotor eval --model spring --poses poses.csv --out wrenches.csv\n  \
@@ -34,7 +34,7 @@ pub(crate) struct EvalArguments {
     #[arg(long, value_name = "IN.csv")]
     poses: PathBuf,
     /// Wrenches (- for standard output)
-    #[arg(long, value_name = "OUT.csv", default_value = "-")]
+    #[arg(long, value_name = "OUT.csv", default_value = "-", value_parser = new_file)]
     out: PathBuf,
     /// Rows are successive poses of one handle (default: each pose is reached from home)
     #[arg(long)]
@@ -50,6 +50,10 @@ const POSE_COLUMNS: [&str; 6] = ["x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_ra
 const ID_COLUMN: &str = "id";
 
 pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
+    if is_same_file(&arguments.out, &arguments.poses) {
+        let out = arguments.out.display();
+        return Err(CommandError::Usage(format!("--out {out}: holds the poses; choose another file")));
+    }
     let plugin = Registry::search(&[]).load(&arguments.model, PluginKind::Model)?;
     let settings = settings(&plugin, &arguments.sets)?;
     // A refused setting is told before a long file is read.

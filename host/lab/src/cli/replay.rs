@@ -15,7 +15,7 @@ use std::time::Instant;
 /// Re-evaluate the models on a recorded trajectory: bit-exact, or with changed parameters.
 #[derive(Args)]
 #[command(
-    after_help = "Without a change the wrench must equal the recorded one bit for bit: the exit code is 1 if it does not. With --set\n\
+    after_help = "Without a change the wrench must equal the recorded one bit for bit: the exit code is 1 if it does not. With --set \
     or --model a difference is the expected result.\n\n\
     Examples:\n  flotor replay run.mcap\n  flotor replay run.mcap --set spring.variant=closed-form --plot difference.svg\n  \
     flotor replay run.mcap --model spring=./libmy_spring.so --json -\n  \

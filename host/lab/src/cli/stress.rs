@@ -12,8 +12,8 @@ use std::path::PathBuf;
 
 /// Score the numerical stability of a force model.
 #[derive(Args)]
-#[command(after_help = "Nine measures: M0 totality, M1 continuity, M2 Lipschitz constant, M3 reciprocity,\n\
-    M4 loop energy, M5 sampled energy, M6 closed loop, M7 cost, M8 determinism.\n\
+#[command(after_help = "Nine measures: M0 totality, M1 continuity, M2 Lipschitz constant, M3 reciprocity, \
+    M4 loop energy, M5 sampled energy, M6 closed loop, M7 cost, M8 determinism. \
     `score` is the share of measures that passed; docs/src/stress.md has the criterion of each.\n\n\
     Examples:\n  \
     flotor stress --model spring\n  \

@@ -244,7 +244,9 @@ pub fn load_file(path: &Path) -> Result<Plugin, LoadError> {
 }
 
 /// Whether two paths lead to one file. Not real-time.
-fn is_same_file(one: &Path, other: &Path) -> bool {
+/// Whether two paths lead to one file that exists. Not real-time.
+#[must_use]
+pub fn is_same_file(one: &Path, other: &Path) -> bool {
     let identity = |path: &Path| std::fs::metadata(path).map(|file| (file.dev(), file.ino()));
     matches!((identity(one), identity(other)), (Ok(one), Ok(other)) if one == other)
 }

@@ -3,9 +3,10 @@
 
 use crate::curve::{CurveError, FITTED, MeasuredCurve, ServedCurve, SpringFit};
 use clap::Args;
-use flotor_command::options::svg_file;
+use flotor_command::options::{new_file, number, svg_file};
 use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_plot::{Axis, Figure, Panel, Series};
+use flotor_session::registry::is_same_file;
 use std::path::{Path, PathBuf};
 
 #[derive(Args)]
@@ -13,27 +14,27 @@ use std::path::{Path, PathBuf};
     Examples:\n  \
     flotor study spring measured.csv --plot measured.svg\n  \
     flotor study spring measured.csv --scene real.toml\n  \
-    flotor study jnd --scene real.toml --bases 17 --out real      the real spring's gamma as the base\n  \
-    flotor study spring measured.csv --curve-scene as-measured.toml\n  \
-    flotor study jnd --scene as-measured.toml --stimulus measured.stiffness_scale --bases 1 --out curve")]
+    flotor study jnd --scene real.toml --bases 17 --out real\n  \
+    flotor study spring measured.csv --curve-scene curve.toml\n  \
+    flotor study jnd --scene curve.toml --stimulus measured.stiffness_scale --bases 1 --out curve")]
 pub(super) struct SpringArguments {
     /// Measured force over length or compression (CSV)
     #[arg(value_name = "FILE.csv")]
     curve: PathBuf,
     /// Length without load (default: the longest in the table; required for --scene if the table has compressions)
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_parser = number("mm", "length", 0.01..=1000.0), value_name = "MM")]
     free_length_mm: Option<f64>,
     /// Diameter of the coil between wire centres, for the scene (default: spring 1 of the thesis)
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_parser = number("mm", "length", 0.01..=1000.0), value_name = "MM")]
     coil_diameter_mm: Option<f64>,
     /// Plot the measurement and the fitted spring
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     /// Write a scene with the fitted spring, for `study jnd --scene` and `run`
-    #[arg(long, value_name = "FILE.toml")]
+    #[arg(long, value_parser = new_file, value_name = "FILE.toml")]
     scene: Option<PathBuf>,
     /// Write a scene with the measured curve itself, and the table that it reads
-    #[arg(long, value_name = "FILE.toml")]
+    #[arg(long, value_parser = new_file, value_name = "FILE.toml")]
     curve_scene: Option<PathBuf>,
     /// Write the fit as JSON (- for standard output)
     #[arg(long, value_name = "FILE")]
@@ -62,7 +63,7 @@ pub(super) fn run(arguments: &SpringArguments) -> Result<(), CommandError> {
     }
     if let Some(path) = &arguments.curve_scene {
         let table = path.with_extension("csv");
-        if same_file(&table, &arguments.curve) {
+        if is_same_file(&table, &arguments.curve) {
             let table = table.display();
             let why = format!(
                 "--curve-scene {}: `{table}` is the measurement itself; choose another name",
@@ -74,10 +75,6 @@ pub(super) fn run(arguments: &SpringArguments) -> Result<(), CommandError> {
         write_text(Some(path), || curve_scene(&table, &fit, &served, arguments.coil_diameter_mm))?;
     }
     Ok(())
-}
-
-fn same_file(one: &Path, other: &Path) -> bool {
-    matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
 }
 
 fn to_text(fit: &SpringFit, served: &ServedCurve) -> String {
