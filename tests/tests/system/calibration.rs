@@ -129,7 +129,11 @@ fn what_cannot_be_is_refused_in_one_line() {
     }
     let one_force = Flotor::with(["calibrate", "vertical", "--simulated", "--force", "10"]).run();
     assert_eq!(one_force.code, Some(exit_code::CONFIGURATION), "{one_force:#?}");
-    assert!(one_force.error().contains("--force 10: give at least two different forces"), "{}", one_force.error());
+    assert!(
+        one_force.error().contains("--force 10: give at least two different forces"),
+        "{}",
+        one_force.error()
+    );
     let far = Flotor::with(["calibrate", "vertical", "--simulated", "--steps", "30"]).run();
     assert_eq!(far.code, Some(exit_code::CONFIGURATION), "{far:#?}");
     assert!(far.error().contains("at most 22 mm in all"), "{}", far.error());

@@ -238,7 +238,10 @@ fn a_folder_keeps_its_experiment() {
     assert_eq!(study(&small, &out).run().code, Some(exit_code::OK));
     let refused = study(&["magnitude", "--subjects", "1", "--apparatus", "none"], &out).run();
     assert_eq!(refused.code, Some(exit_code::CONFIGURATION));
-    assert!(refused.error().contains("sub-01_task-jnd_log.jsonl: begun with another protocol"), "{refused:?}");
+    assert!(
+        refused.error().contains("sub-01_task-jnd_log.jsonl: begun with another protocol"),
+        "{refused:?}"
+    );
     let resumed: Vec<&str> = small.into_iter().chain(["--resume"]).collect();
     assert_eq!(study(&resumed, &out).run().code, Some(exit_code::OK));
 }
