@@ -275,9 +275,10 @@ mod tests {
             assert_ne!(text, EXAMPLE, "{from} stands in the example");
             CalibrationFile::parse("c.toml", &text).unwrap_err().to_string()
         };
-        assert!(
-            said("serial", "seriel").starts_with("c.toml:4: is no calibration file (unknown key `seriel`)")
-        );
+        let unknown =
+            "c.toml:4: is no calibration file (unknown key `seriel`, expected `plugin` or `serial`)";
+        assert_eq!(said("serial", "seriel"), unknown);
+        assert_eq!(said("format = 1", "model = 1"), "c.toml:1: is no calibration file (unknown key `model`)");
         assert!(said("[-7.0, 7.0]", "[-7.0, true]").starts_with("c.toml:6: "));
         assert!(said("format = 1", "format = 2").contains("format 2, this program reads 1"));
         assert!(said("1.05", "nan").contains("[vertical]"));
