@@ -188,7 +188,7 @@ fn a_wrong_file_is_told_with_file_and_line() {
 #[test]
 fn a_file_that_is_not_there_is_named() {
     let ran = Flotor::with(["eval", "--model", "spring", "--poses", "no/such.csv", "--out", "-"]).run();
-    assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
     assert!(ran.error().starts_with("no/such.csv: cannot read the poses: "), "{ran:#?}");
 }
 
