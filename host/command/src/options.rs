@@ -67,9 +67,21 @@ pub fn number(text: &str, unit: &str, what: &str, legal: RangeInclusive<f64>) ->
 /// # Errors
 /// If its name ends like that of another kind of picture.
 pub fn svg_file(text: &str) -> Result<PathBuf, String> {
+    file_of(text, "svg").ok_or_else(|| "the picture is an SVG; name it FILE.svg".to_owned())
+}
+
+/// The file of a recording.
+///
+/// # Errors
+/// If its name ends like that of another kind of file.
+pub fn mcap_file(text: &str) -> Result<PathBuf, String> {
+    file_of(text, "mcap").ok_or_else(|| "the recording is an MCAP file; name it FILE.mcap".to_owned())
+}
+
+/// A file that has this extension, or none.
+fn file_of(text: &str, kind: &str) -> Option<PathBuf> {
     let file = PathBuf::from(text);
-    let is_svg = file.extension().is_none_or(|extension| extension.eq_ignore_ascii_case("svg"));
-    if is_svg { Ok(file) } else { Err("the picture is an SVG; name it FILE.svg".to_owned()) }
+    file.extension().is_none_or(|extension| extension.eq_ignore_ascii_case(kind)).then_some(file)
 }
 
 /// A number of a list.
@@ -124,6 +136,17 @@ mod tests {
         }
         assert_eq!(rate_hz("1000 Hz"), Ok(1000.0));
         assert_eq!(rate_hz("99"), Err("the range is 100 to 10000 Hz".to_owned()));
+    }
+
+    #[test]
+    fn a_file_has_the_extension_of_its_kind_or_none() {
+        assert!(
+            [svg_file("a.SVG"), svg_file("a"), mcap_file("b/a.mcap"), mcap_file("/dev/full")]
+                .iter()
+                .all(Result::is_ok)
+        );
+        assert!(svg_file("a.mcap").is_err());
+        assert_eq!(mcap_file("r.txt"), Err("the recording is an MCAP file; name it FILE.mcap".to_owned()));
     }
 
     #[test]
