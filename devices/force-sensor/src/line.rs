@@ -44,8 +44,11 @@ impl SensorLine {
         let port = TTYPort::open(&serialport::new(path, BAUD).timeout(LOOK));
         let port = port.map_err(|error| {
             // The second program on a port finds it locked (TIOCEXCL), which serialport reports like this.
-            let is_busy = error.kind() == ErrorKind::NoDevice && std::path::Path::new(path).exists();
-            let cause = if is_busy { "another program uses it".to_owned() } else { error.description };
+            let cause = match error.kind() {
+                ErrorKind::NoDevice if std::path::Path::new(path).exists() => "another program uses it",
+                ErrorKind::Unknown if std::path::Path::new(path).exists() => "it is no serial port",
+                _ => error.description.as_str(),
+            };
             format!(
                 "no force sensor at {path}: {cause}; is it connected, and may this user use it (group dialout)?"
             )

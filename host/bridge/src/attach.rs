@@ -3,7 +3,7 @@
 use crate::link::LinkError;
 use crate::remote::{Errand, Remote, Told};
 use crate::request::Request;
-use flotor_live::{Ask, Directory, Publication, PublishError, Serve};
+use flotor_live::{Ask, Directory, Publication, PublishError, RefusalCause, Serve};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -25,11 +25,13 @@ pub enum AttachError {
 
 impl Serve for Errand {
     /// Carries the request to the remote host, and its answer back.
-    fn serve(&self, ask: Ask) -> Result<(), String> {
+    fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
         if matches!(ask, Ask::Swap { .. }) {
-            return Err("a model is swapped on the host's own machine, where its plugin's file is".to_owned());
+            let words = "a model is swapped on the host's own machine, where its plugin's file is";
+            return Err((RefusalCause::Request, words.to_owned()));
         }
-        Request::of_ask(ask).map_or(Ok(()), |request| self.run(request))
+        let done = Request::of_ask(ask).map_or(Ok(()), |request| self.run(request));
+        done.map_err(|words| (RefusalCause::Other, words))
     }
 }
 

@@ -102,17 +102,14 @@ impl CommandError {
         match self {
             Self::Usage(_) | Self::Read(_) => 2,
             Self::Run(error) => match error {
-                RunError::Scene(_) | RunError::Mismatch { .. } => 2,
-                RunError::Lookup(LookupError::Unknown { .. }) => 2,
-                RunError::Lookup(LookupError::Refused(error)) | RunError::Plugin(error) => {
-                    refusal_code(error)
-                }
+                wrong if wrong.is_configuration() => 2,
+                RunError::Lookup(_) | RunError::Plugin(_) => 3,
                 RunError::Hung { stuck, .. } => match stuck.place {
                     Place::Model(_) => 3,
                     Place::DeviceWait(_) | Place::DeviceRead(_) | Place::DeviceWrite(_) => 4,
                     Place::Waiting | Place::Host => 1,
                 },
-                RunError::Thread(_) | _ => 1,
+                _ => 1,
             },
             Self::PluginRefused(_) => 3,
             Self::DeviceFault(_)
@@ -129,12 +126,4 @@ impl CommandError {
 #[must_use]
 pub fn before_advice(words: &str) -> String {
     if words.is_empty() { String::new() } else { format!("{words}; ") }
-}
-
-/// Parameters that a plugin refuses are a configuration error; everything else is a refused plugin.
-fn refusal_code(error: &LoadError) -> u8 {
-    match error {
-        LoadError::Refused { refusal, .. } if refusal.kind == flotor_hal::RefusalKind::Parameter => 2,
-        _ => 3,
-    }
 }

@@ -111,9 +111,21 @@ pub fn new_file(text: &str) -> Result<PathBuf, String> {
 /// # Errors
 /// If it cannot be written, or its name ends like that of another kind of picture.
 pub fn svg_file(text: &str) -> Result<PathBuf, String> {
+    file_of(text, "svg")?.ok_or_else(|| "the picture is an SVG; name it FILE.svg".to_owned())
+}
+
+/// The file of a recording.
+///
+/// # Errors
+/// If it cannot be written, or its name ends like that of another kind of file.
+pub fn mcap_file(text: &str) -> Result<PathBuf, String> {
+    file_of(text, "mcap")?.ok_or_else(|| "the recording is an MCAP file; name it FILE.mcap".to_owned())
+}
+
+/// A new file, if it has this extension or none.
+fn file_of(text: &str, kind: &str) -> Result<Option<PathBuf>, String> {
     let file = new_file(text)?;
-    let is_svg = file.extension().is_none_or(|extension| extension.eq_ignore_ascii_case("svg"));
-    if is_svg { Ok(file) } else { Err("the picture is an SVG; name it FILE.svg".to_owned()) }
+    Ok(file.extension().is_none_or(|extension| extension.eq_ignore_ascii_case(kind)).then_some(file))
 }
 
 /// A number, such as a share.
@@ -191,6 +203,17 @@ mod tests {
         let command = with_negative_numbers(Command::new("test").arg(seed));
         let error = command.try_get_matches_from(["test", "--seed", "-1"]).unwrap_err().to_string();
         assert!(error.contains("write a whole number from 0"), "{error}");
+    }
+
+    #[test]
+    fn a_file_has_the_extension_of_its_kind_or_none() {
+        assert!(
+            [svg_file("a.SVG"), svg_file("a"), mcap_file("a.mcap"), mcap_file("/dev/full")]
+                .iter()
+                .all(Result::is_ok)
+        );
+        assert!(svg_file("a.mcap").is_err());
+        assert_eq!(mcap_file("r.txt"), Err("the recording is an MCAP file; name it FILE.mcap".to_owned()));
     }
 
     #[test]

@@ -27,6 +27,14 @@ pub enum LiveError {
         /// Where it was looked for.
         path: PathBuf,
     },
+    /// Others run, not the process that was named.
+    #[error("process {process} runs no session; running: {}", running.join(", "))]
+    OtherRuns {
+        /// The process that was named.
+        process: u32,
+        /// Process and title of those that run.
+        running: Vec<String>,
+    },
     /// The connection broke.
     #[error("the host does not answer: {0}; is the run over?")]
     Connection(#[from] io::Error),
@@ -94,10 +102,18 @@ impl Client {
     /// Watches the run of a process.
     ///
     /// # Errors
-    /// As [`Client::find`].
+    /// As [`Client::find`]; [`LiveError::OtherRuns`] if only other processes run.
     pub fn of_process(directory: &Directory, process: u32) -> Result<Self, LiveError> {
-        let runs = directory.runs().into_iter().filter(|run| run.process == process);
-        Self::first_of(directory, runs.collect())
+        let (runs, others): (Vec<_>, Vec<_>) =
+            directory.runs().into_iter().partition(|run| run.process == process);
+        if runs.is_empty() && !others.is_empty() {
+            let other = |run: &Found| match Self::connect(&run.path) {
+                Ok(client) => format!("{} \"{}\"", run.process, client.greeting.title),
+                Err(_) => run.process.to_string(),
+            };
+            return Err(LiveError::OtherRuns { process, running: others.iter().map(other).collect() });
+        }
+        Self::first_of(directory, runs)
     }
 
     fn first_of(directory: &Directory, runs: Vec<Found>) -> Result<Self, LiveError> {

@@ -60,8 +60,8 @@ pub use client::{Asker, Client, Event, LiveError};
 pub use directory::{Directory, DirectoryError, Found, Listener};
 pub use frame::{Frames, Kind, LongFrame, MOST_PAYLOAD, frame, ticks_from_payload, ticks_to_payload};
 pub use message::{
-    Answer, Ask, ChangeMessage, End, Greeting, Outcome, PanelParameter, PanelPlugin, ParameterShape, Request,
-    SetValue, Subject, WrenchLimits,
+    Answer, Ask, ChangeMessage, End, Greeting, Outcome, PanelParameter, PanelPlugin, ParameterShape,
+    RefusalCause, Request, SetValue, Subject, WrenchLimits,
 };
 pub use peer_socket::{CALL_PERIOD, FoundCoupling, PeerSocket};
 pub use server::{Publication, PublishError, Serve};

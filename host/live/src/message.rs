@@ -219,6 +219,22 @@ pub struct Answer {
     pub number: u64,
     /// Why not, in words; nothing if it was done, or passed on to the loop.
     pub refused: Option<String>,
+    /// What is wrong, if it was refused.
+    #[serde(default)]
+    pub cause: RefusalCause,
+}
+
+/// What is wrong with a request that is refused.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RefusalCause {
+    /// The request: what it names is not there, or not legal.
+    Request,
+    /// The plugin it names.
+    Plugin,
+    /// Something else, such as the moment.
+    #[default]
+    Other,
 }
 
 /// How a run ended.

@@ -88,7 +88,7 @@ impl RealTimeReport {
         }
         if let Privilege::Refused(reason) = &self.core {
             lines.push(format!(
-                "the loop runs on any core ({reason}): name one that this process may use; `grep Cpus_allowed_list \
+                "{reason}; the loop runs on any core. Name one that this process may use: `grep Cpus_allowed_list \
                  /proc/self/status` lists them"
             ));
         }
@@ -105,10 +105,12 @@ pub fn enter_real_time(core: Option<Core>) -> RealTimeReport {
 }
 
 /// Keeps the calling thread on one core; the process's other threads go where they did.
-fn pin(Core(number): Core) -> rustix::io::Result<()> {
+fn pin(Core(number): Core) -> Result<(), String> {
     let mut set = CpuSet::new();
     set.set(number);
+    // Of the calling thread: the system refuses nothing else.
     sched_setaffinity(None, &set)
+        .map_err(|_| format!("--core {number}: there is no such core, or this process may not use it"))
 }
 
 /// Asks for the priority of a worker for the calling thread. Not real-time; without it the worker is only slower.
@@ -163,7 +165,10 @@ mod tests {
         let core = Core::new(CpuSet::MAX_CPU - 1).expect("the last that can be named");
         let refused = std::thread::spawn(move || Privilege::of(pin(core))).join().expect("it does not panic");
         let report = RealTimeReport { core: refused, ..RealTimeReport::not_asked() };
-        assert!(report.advice().concat().contains("runs on any core"), "{report:?}");
+        let told = format!(
+            "--core {core}: there is no such core, or this process may not use it; the loop runs on any"
+        );
+        assert!(report.advice().concat().starts_with(&told), "{report:?}");
         assert_eq!(Core::new(CpuSet::MAX_CPU), None);
     }
 }

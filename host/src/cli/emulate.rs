@@ -34,13 +34,21 @@ pub(crate) fn run(arguments: &EmulateArguments) -> Result<(), CommandError> {
         say!("{}", help.trim_end());
         return Ok(());
     }
-    let is_id = !device.is_empty() && device.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
+    let is_id = device.starts_with(|c: char| c.is_ascii_alphabetic())
+        && device.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
     if !is_id {
         return Err(CommandError::Usage(format!(
-            "invalid device id `{device}`: use letters, digits, hyphens and underscores"
+            "`{device}` is no id of a device's plugin: it starts with a letter; `flotor emulate NAME --help` lists the options"
         )));
     }
     let program = format!("flotor-{device}-emulator");
-    let build = format!("cargo build --release -p {program}");
-    SeparateProgram { program: &program, built: Built::WithThis, build: &build }.become_with(arguments)
+    let build = "cargo build --release -p flotor-maglev-emulator";
+    let emulator = SeparateProgram { program: &program, built: Built::WithThis, build };
+    if device != "maglev" && emulator.command().is_err() {
+        let words = format!(
+            "there is no emulator `{program}` in the folder of `flotor`; `flotor emulate maglev` has one"
+        );
+        return Err(CommandError::Usage(words));
+    }
+    emulator.become_with(arguments)
 }

@@ -2,6 +2,7 @@
 
 use super::bridge::{BRIDGE, Way, is_remote};
 use clap::Args;
+use flotor_command::options::mcap_file;
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, first_error, report_line, style};
 use flotor_core::Change;
@@ -27,7 +28,7 @@ pub(crate) struct RecordArguments {
     #[arg(value_name = "zenoh/NAME")]
     source: Option<String>,
     /// The recording
-    #[arg(long, value_name = "FILE.mcap")]
+    #[arg(long, value_parser = mcap_file, value_name = "FILE.mcap")]
     out: PathBuf,
     #[command(flatten)]
     way: Way,

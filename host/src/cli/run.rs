@@ -2,7 +2,9 @@
 
 use crate::run_picture::RunPicture;
 use clap::Args;
-use flotor_command::options::{ClockOption, PluginKeyValue, core, duration_s, rate_hz, svg_file, whole};
+use flotor_command::options::{
+    ClockOption, PluginKeyValue, core, duration_s, mcap_file, rate_hz, svg_file, whole,
+};
 use flotor_command::stopping::{Keys, stop_on_signals};
 use flotor_command::{CommandError, first_error, note, print_result, progress_bar, style};
 use flotor_core::Change;
@@ -46,7 +48,7 @@ pub(crate) struct RunArguments {
     #[arg(long, value_parser = core, value_name = "N")]
     core: Option<Core>,
     /// Record every tick to an MCAP file (opens in Foxglove, Rerun, Python)
-    #[arg(long, value_name = "FILE.mcap")]
+    #[arg(long, value_parser = mcap_file, value_name = "FILE.mcap")]
     record: Option<PathBuf>,
     /// Plot the run
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
@@ -67,6 +69,11 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         ClockOption::Real => Clock::Real,
         ClockOption::Virtual => Clock::Virtual,
     };
+    if clock == Clock::Virtual && arguments.core.is_some() {
+        return Err(CommandError::Usage(
+            "--core needs the real clock: leave `--clock virtual` out".to_owned(),
+        ));
+    }
     let options = RunOptions { clock, seed: arguments.seed };
     let registry = Registry::search(&scene.plugin_folders);
     let mut session = Session::prepare(&scene, &registry, &options)?.on_core(arguments.core);

@@ -4,7 +4,7 @@ use clap::Args;
 use flotor_command::CommandError;
 use flotor_command::options::KeyValue;
 use flotor_command::say;
-use flotor_live::{Answer, Ask, ChangeMessage, Client, Directory, Event, LiveError, Subject};
+use flotor_live::{Answer, Ask, ChangeMessage, Client, Directory, Event, LiveError, RefusalCause, Subject};
 use flotor_session::scene::is_named;
 use std::path::MAIN_SEPARATOR;
 use std::time::{Duration, Instant};
@@ -91,8 +91,14 @@ fn swapped(client: &mut Client, ask: Ask, model: &str) -> Result<Option<ChangeMe
             break;
         }
         match client.next(left).map_err(lost)? {
-            Some(Event::Answer(Answer { number, refused })) if number == asked => {
-                refused.map_or(Ok(()), |reason| Err(CommandError::Failed(reason)))?;
+            Some(Event::Answer(Answer { number, refused, cause })) if number == asked => {
+                if let Some(reason) = refused {
+                    return Err(match cause {
+                        RefusalCause::Request => CommandError::Usage(reason),
+                        RefusalCause::Plugin => CommandError::PluginRefused(reason),
+                        RefusalCause::Other => CommandError::Failed(reason),
+                    });
+                }
                 is_answered = true;
                 until = Instant::now() + SWAP_LIMIT;
             }

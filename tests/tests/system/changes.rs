@@ -128,7 +128,7 @@ fn what_is_wrong_with_a_change_is_said_before_it_reaches_the_loop() {
         };
         assert_eq!(
             complaint("frist", "gamma_n", "20"),
-            "there is no plugin `frist`; did you mean `first`? (there are device, first, second)"
+            "there is no plugin `frist`; did you mean `first`? (plugins: device, first, second)"
         );
         assert_eq!(
             complaint("first", "gama_n", "20"),

@@ -301,12 +301,24 @@ fn a_model_of_a_run_of_the_program_is_replaced_from_another_terminal() {
         let arguments = ["swap"].iter().chain(arguments);
         Flotor::with(arguments).env("XDG_RUNTIME_DIR", &runtime).run()
     };
-    let unknown = swap(&["sprng"]);
-    assert_eq!(unknown.code, Some(exit_code::OTHER), "{unknown:?}");
-    assert!(unknown.error().contains("did you mean `spring`?"), "{unknown:?}");
+    let running_here = format!("process 1 runs no session; running: {} \"Test\"", client.greeting().process);
+    for (arguments, told) in [
+        (&["sprng"][..], "did you mean `spring`?"),
+        (
+            &["spring", "--set", "gama_n=3"],
+            "--set gama_n: [spring] no parameter `gama_n`; did you mean `gamma_n`?",
+        ),
+        (&["spring", "--set", "gamma_n=zz"], "`gamma_n` is a number in N, not `zz`"),
+        (&["spring", "--plugin", "wal"], "--plugin: no model plugin `wal`; did you mean `wall`?"),
+        (&["spring", "--run", "1"], &running_here),
+    ] {
+        let wrong = swap(arguments);
+        assert_eq!(wrong.code, Some(exit_code::CONFIGURATION), "{wrong:?}");
+        assert!(wrong.error().contains(told), "{wrong:?}");
+    }
     let no_plugin = scratch.file("libmine.so", b"not a plugin").display().to_string();
     let refused = swap(&["spring", "--plugin", &no_plugin]);
-    assert_eq!(refused.code, Some(exit_code::OTHER), "{refused:?}");
+    assert_eq!(refused.code, Some(exit_code::PLUGIN_REFUSED), "{refused:?}");
     let error = refused.error();
     assert!(error.starts_with("[spring] model unchanged: ") && error.contains("libmine.so"), "{error}");
 

@@ -202,6 +202,8 @@ fn a_calibration_that_cannot_be_says_why_and_lets_the_handle_down() {
     let missing = scratch.path().join("nowhere");
     let ran = calibrate(&emulator, &missing, &["vertical"]);
     assert!(ran.error().contains("no force sensor at"), "{}", ran.error());
+    let ran = calibrate(&emulator, Path::new("/dev/null"), &["vertical"]);
+    assert!(ran.error().contains("no force sensor at /dev/null: it is no serial port"), "{}", ran.error());
     let ran = Flotor::with(["calibrate", "vertical", "--device", "maglev"]).run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
 }

@@ -57,18 +57,6 @@ const WRONG_FILES: &[WrongFile] = &[
         remedy: "copy or build it again",
     },
     WrongFile {
-        name: "no file",
-        make: |scratch| scratch.path().join("missing.so"),
-        cause: "cannot read the plugin: No such file or directory",
-        remedy: "check the path",
-    },
-    WrongFile {
-        name: "a folder",
-        make: |scratch| scratch.folder("folder.so"),
-        cause: "s a directory", // in the words of the system or of the library
-        remedy: "check the path",
-    },
-    WrongFile {
         name: "a C library without an entry",
         make: |scratch| {
             let library = scratch.path().join("stranger.so");
@@ -312,9 +300,32 @@ fn a_device_is_no_model_and_a_model_no_device() {
     ];
     for (scene, cause) in wrong {
         let ran = run_scene(&scene);
-        assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
-        assert!(ran.error().contains(cause), "{ran:#?}");
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+        assert!(ran.error().contains("scene.toml:") && ran.error().contains(cause), "{ran:#?}");
     }
+}
+
+#[test]
+fn a_path_without_a_plugin_file_is_a_mistake_in_the_scene_or_command() {
+    let scratch = Scratch::default();
+    let missing = scratch.path().join("missing.so");
+    for (path, cause) in [(missing, "No such file"), (scratch.folder("folder.so"), "s a directory")] {
+        let ran = run_scene(&model_scene(&path));
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+        let told = format!("scene.toml:5: {}: cannot read the plugin: ", path.display());
+        assert!(ran.error().contains(&told) && ran.error().contains(cause), "{ran:#?}");
+        let ran = Flotor::with(["validate".as_ref(), path.as_os_str()]).run();
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+        assert!(
+            ran.error().ends_with("is no plugin file; `flotor plugins` lists the files of the ids"),
+            "{ran:#?}"
+        );
+    }
+    let ran = Flotor::with(["eval", "--model", "./missing.so", "--poses", "-"]).inside(scratch.path()).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+    let _ = scratch.file("bad.so", "I am no library.\n");
+    let ran = Flotor::with(["eval", "--model", "bad.so", "--poses", "-"]).inside(scratch.path()).run();
+    assert!(ran.error().contains("(a file is written with a folder: `./bad.so`)"), "{ran:#?}");
 }
 
 #[test]
@@ -667,5 +678,11 @@ fn emulate_helps_with_itself_until_a_name_is_given() {
     // There is no such emulator: who asks for its help is told so.
     let ran = Flotor::with(["emulate", "nothing", "--help"]).run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
-    assert!(ran.error().contains("flotor-nothing-emulator"), "{ran:#?}");
+    assert!(ran.error().contains("no emulator `flotor-nothing-emulator`"), "{ran:#?}");
+    let ran = Flotor::with(["emulate", "--port", "9999"]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+    assert!(ran.error().starts_with("`--port` is no id of a device's plugin"), "{ran:#?}");
+    let ran = Flotor::with(["emulate", "maglev", "--set", "preset=xx"]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+    assert!(ran.error().starts_with("--set preset=xx: `preset` = `xx`: legal is "), "{ran:#?}");
 }

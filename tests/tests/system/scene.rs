@@ -92,6 +92,22 @@ fn wrong_types_and_ranges_say_what_would_be_right() {
         ("motion_scale = 1.6666666666666667", "motion_scale = 0", "`model.mapping.motion_scale` = 0"),
         ("title = ", "title ", "scene.toml:1: not valid TOML"),
         (
+            "rate_hz = 1000",
+            "rate_hz = 1000,5",
+            "scene.toml:2: not valid TOML: `rate_hz = 1000,5`: the decimal",
+        ),
+        ("\"spring\"", "\"C:\\path.dll\"", "a backslash stands in single quotes: `plugin = 'C:\\path.dll'`"),
+        (
+            "[device]\nplugin",
+            "device",
+            "scene.toml:4: `device` is a table: write [device] and below it plugin = \"sim",
+        ),
+        (
+            "[model.mapping]\nmotion_scale",
+            "mapping",
+            "`model.mapping` is a table: write [model.mapping] and below it",
+        ),
+        (
             "plugin = \"spring\"",
             "plugin = \"spring\"\ndevice = []",
             "scene.toml:9: `model.device` names no device; name one at least",
@@ -153,6 +169,7 @@ fn parameters_are_checked_against_the_plugin_and_complain_with_file_and_line() {
         ("mass_gk = 1", "scene.toml:20: [device] no parameter `mass_gk`; did you mean `mass_kg`?"),
         ("mass_kg = -1", "scene.toml:20: [device] `mass_kg` = -1: legal is 0.01 to 10 kg"),
         ("hand = \"squeeze\"", "legal is oscillate | press | release | hold | open"),
+        ("mass_kg = true", "`mass_kg` is a number in kg, not `true`"),
         ("mass_kg = \"heavy\"", "`mass_kg` is a number in kg, not `heavy`"),
     ] {
         let scene = scratch.file("scene.toml", with_parameters(parameters));
@@ -168,6 +185,8 @@ fn what_the_command_line_gets_wrong_is_said_there() {
         (&["run", "--set", "sprng.gamma_n=17"][..], "there is no plugin `sprng`; did you mean `spring`?"),
         (&["run", "--set", "spring.gama_n=17"], "no parameter `gama_n`; did you mean `gamma_n`?"),
         (&["run", "--set", "spring.alpha_n_mm2=170"], "set `mode` to `alpha` as well"),
+        (&["run", "--clock", "virtual", "--core", "0"], "--core needs the real clock"),
+        (&["run", "--record", "out.bag"], "name it FILE.mcap"),
         (&["run", "no-such-scene.toml"], "no-such-scene.toml: cannot read the scene"),
     ] {
         let ran = Flotor::with(arguments).run();

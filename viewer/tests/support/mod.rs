@@ -15,7 +15,7 @@ use flotor_core::mapping::{Blend, MappingConfig};
 use flotor_core::trace::{Events, RECORD_WORDS, TickRecord};
 use flotor_live::{
     Answer, Ask, ChangeMessage, Directory, End, Frames, Greeting, Kind, Listener, Outcome, PROTOCOL,
-    PanelPlugin, Request, SetValue, Subject, WrenchLimits, frame, ticks_to_payload,
+    PanelPlugin, RefusalCause, Request, SetValue, Subject, WrenchLimits, frame, ticks_to_payload,
 };
 use flotor_record::{PluginDescription, Role, RunDescription};
 use flotor_sync::Words;
@@ -173,7 +173,8 @@ impl FakeHost {
             if let Some((kind, payload)) = self.frames.take().expect("they talk sense") {
                 assert_eq!(kind, Kind::Request);
                 let Request { number, ask } = serde_json::from_slice(payload).expect("a request");
-                let answer = Answer { number, refused: refused.map(str::to_owned) };
+                let cause = RefusalCause::Other;
+                let answer = Answer { number, refused: refused.map(str::to_owned), cause };
                 self.send(Kind::Answer, &serde_json::to_vec(&answer).expect("it is JSON"));
                 return ask;
             }

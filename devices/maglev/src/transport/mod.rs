@@ -104,6 +104,11 @@ pub enum OpenError {
         /// What it should look like.
         expected: &'static str,
     },
+    /// No host has that name.
+    UnknownHost {
+        /// The name.
+        host: String,
+    },
     /// The plugin was built without this transport.
     NotBuilt {
         /// The feature it needs.
@@ -125,6 +130,9 @@ impl std::fmt::Display for OpenError {
             }
             Self::Forbidden { address, remedy } => write!(f, "this user may not use {address}; {remedy}"),
             Self::Address { address, expected } => write!(f, "`address` = `{address}` is not {expected}"),
+            Self::UnknownHost { host } => {
+                write!(f, "no host `{host}` is known (`address`); check the name or use its IP address")
+            }
             Self::NotBuilt { feature } => write!(
                 f,
                 "this plugin was built without that transport; build it with `cargo build --release -p \

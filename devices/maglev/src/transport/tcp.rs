@@ -16,7 +16,11 @@ const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 pub fn connect(address: &str) -> Result<StreamLink<TcpStream>, OpenError> {
     let wrong =
         || OpenError::Address { address: address.to_owned(), expected: "host:port, like 127.0.0.1:5678" };
-    let target = address.to_socket_addrs().map_err(|_| wrong())?.next().ok_or_else(wrong)?;
+    let found = address.to_socket_addrs().map_err(|error| match (error.kind(), address.rsplit_once(':')) {
+        (ErrorKind::InvalidInput, _) | (_, None) => wrong(),
+        (_, Some((host, _))) => OpenError::UnknownHost { host: host.to_owned() },
+    });
+    let target = found?.next().ok_or_else(wrong)?;
     let stream = TcpStream::connect_timeout(&target, CONNECT_TIMEOUT);
     let stream = stream.and_then(|stream| prepared(stream).map(StreamLink::new));
     stream.map_err(|error| match error.kind() {
@@ -36,4 +40,27 @@ pub fn prepared(stream: TcpStream) -> std::io::Result<TcpStream> {
     stream.set_nodelay(true)?;
     stream.set_nonblocking(true)?;
     Ok(stream)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_host_is_no_malformed_address() {
+        // No name has a part of 64 letters: nobody is asked for it.
+        let host = "n".repeat(64);
+        let told = |address: &str| connect(address).err().map(|error| error.to_string()).unwrap_or_default();
+        assert_eq!(
+            told(&format!("{host}:1")),
+            format!("no host `{host}` is known (`address`); check the name or use its IP address")
+        );
+        for malformed in ["here", "127.0.0.1:port", ""] {
+            assert!(
+                told(malformed).ends_with("is not host:port, like 127.0.0.1:5678"),
+                "{}",
+                told(malformed)
+            );
+        }
+    }
 }

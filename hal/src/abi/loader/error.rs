@@ -9,7 +9,8 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum LoadError {
     /// The file cannot be read.
-    #[error("{}: cannot read the plugin: {cause}; check the path and its permissions", path.display())]
+    #[error("{}: cannot read the plugin: {cause}; check the path and its permissions",
+        std::path::absolute(path).as_ref().unwrap_or(path).display())]
     Unreadable {
         /// The file.
         path: PathBuf,
@@ -139,6 +140,19 @@ pub enum LoadError {
         /// Its reason.
         refusal: Refusal,
     },
+}
+
+impl LoadError {
+    /// True if the configuration is wrong: it names no file, a plugin of the other kind, or a parameter that the plugin
+    /// refuses. Otherwise the plugin is.
+    #[must_use]
+    pub fn is_configuration(&self) -> bool {
+        match self {
+            Self::Unreadable { .. } | Self::OtherKind { .. } => true,
+            Self::Refused { refusal, .. } => refusal.kind == RefusalKind::Parameter,
+            _ => false,
+        }
+    }
 }
 
 /// What to do about a refusal whose reason does not say it: a plugin that broke gives no remedy.

@@ -22,4 +22,4 @@ pub use library::Plugin;
 pub use metadata_file::{Metadata, read_metadata};
 pub use model::Model;
 pub(crate) use model::refusal_from;
-pub use setting::{Setting, SettingError};
+pub use setting::{Setting, SettingError, nearest};

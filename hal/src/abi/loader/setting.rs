@@ -17,11 +17,12 @@ pub struct Setting {
 #[non_exhaustive]
 pub enum SettingError {
     /// No parameter has this id.
-    #[error("no parameter `{id}`{}", nearest.as_ref().map_or(String::new(), |n| format!("; did you mean `{n}`?")))]
+    #[error("no parameter `{id}`; {}",
+        nearest.as_ref().map_or("`flotor plugins ID` lists them".to_owned(), |n| format!("did you mean `{n}`?")))]
     Unknown {
         /// The id in the request.
         id: String,
-        /// The most similar id there is.
+        /// The most similar id, if one is similar at all.
         nearest: Option<String>,
     },
     /// A number was expected.
@@ -69,7 +70,9 @@ impl Setting {
             }
             ParameterKind::Choice => {
                 let names = parameter.choices();
-                let choice = names.iter().position(|name| name.as_str() == value);
+                // A scene may write true or false.
+                let is_it = |name: &Str| matches!((name.as_str(), value), ("on", "true") | ("off", "false"));
+                let choice = names.iter().position(|name| name.as_str() == value || is_it(name));
                 let choice = choice.ok_or_else(|| SettingError::NotAChoice {
                     id: id.to_owned(),
                     value: value.to_owned(),
@@ -168,8 +171,38 @@ pub(super) fn live_index(schema: &[Parameter], index: usize, value: f64) -> Opti
 fn find(schema: &'static [Parameter], id: &str) -> Result<(u32, &'static Parameter), SettingError> {
     let found = (0u32..).zip(schema).find(|(_, parameter)| parameter.id() == id);
     found.ok_or_else(|| {
-        let similarity = |p: &&Parameter| (strsim::jaro_winkler(p.id(), id) * 1.0e6).round();
-        let nearest = schema.iter().max_by(|a, b| similarity(a).total_cmp(&similarity(b)));
-        SettingError::Unknown { id: id.to_owned(), nearest: nearest.map(|p| p.id().to_owned()) }
+        // Who writes `spring.gamma_n` has named the plugin twice.
+        let key = id.rsplit_once('.').map_or(id, |(_, key)| key);
+        let nearest = nearest(key, schema.iter().map(Parameter::id)).map(str::to_owned);
+        SettingError::Unknown { id: id.to_owned(), nearest }
     })
+}
+
+/// The known word most like `word`, if any is like it at all. Not real-time.
+pub fn nearest<'k>(word: &str, known: impl Iterator<Item = &'k str>) -> Option<&'k str> {
+    // Jaro-Winkler: a letter that is wrong, missing or swapped leaves 0.9 and more, an ending of its own (`rz_deg` for
+    // `rz_rad`) 0.84; words that only share letters (`jelly` and `wall`: 0.63, `balls` and `wall`: 0.78) stay below.
+    const ALIKE: f64 = 0.8;
+    let scored = known.map(|candidate| (strsim::jaro_winkler(word, candidate), candidate));
+    scored
+        .filter(|(score, _)| *score > ALIKE)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, candidate)| candidate)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_word_that_is_alike_is_suggested() {
+        let near = |word| nearest(word, ["gamma_n", "gravity", "wall"].into_iter());
+        assert_eq!(
+            (near("gama_n"), near("graviti"), near("wal")),
+            (Some("gamma_n"), Some("gravity"), Some("wall"))
+        );
+        for unlike in ["port", "jelly", "balls", ""] {
+            assert_eq!(near(unlike), None, "{unlike}");
+        }
+    }
 }

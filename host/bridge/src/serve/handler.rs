@@ -7,7 +7,7 @@ use crate::keys::Name;
 use crate::link::LinkError;
 use crate::request::{Gate, MAX_REQUEST_BYTES, Refusal, Request, Right};
 use crate::status::{State, Status};
-use flotor_live::{Answer, Asker, ChangeMessage, Client, Greeting};
+use flotor_live::{Answer, Asker, ChangeMessage, Client, Greeting, RefusalCause};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -280,6 +280,6 @@ impl Inside {
 
 /// What became of a letter. Nobody waits for whether it arrived.
 fn reply(query: &Query, refused: Option<String>) {
-    let answer = json(&Answer { number: 0, refused });
+    let answer = json(&Answer { number: 0, refused, cause: RefusalCause::Other });
     let _ = query.reply(query.key_expr(), answer).wait_now();
 }

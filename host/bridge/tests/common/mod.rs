@@ -14,7 +14,7 @@ use flotor_bridge::request::Right;
 use flotor_bridge::serve::{Service, serve};
 use flotor_core::Clock;
 use flotor_core::trace::{Events, RECORD_WORDS, TickRecord};
-use flotor_live::{Ask, Directory, Greeting, PROTOCOL, Publication, Serve, WrenchLimits};
+use flotor_live::{Ask, Directory, Greeting, PROTOCOL, Publication, RefusalCause, Serve, WrenchLimits};
 use flotor_record::RunDescription;
 use flotor_sync::Words;
 use std::net::TcpListener;
@@ -66,7 +66,7 @@ pub const SLOW: &str = "slow";
 pub struct Asked(pub Mutex<Vec<Ask>>);
 
 impl Serve for Asked {
-    fn serve(&self, ask: Ask) -> Result<(), String> {
+    fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
         self.0.lock().unwrap().push(ask.clone());
         match ask {
             Ask::Weight { model, .. } if model == SLOW => {
@@ -74,7 +74,7 @@ impl Serve for Asked {
                 Ok(())
             }
             Ask::Set { values } if values.iter().any(|value| value.parameter == "gamma") => {
-                Err("no parameter `gamma`; did you mean `gamma_n`?".to_owned())
+                Err((RefusalCause::Request, "no parameter `gamma`; did you mean `gamma_n`?".to_owned()))
             }
             _ => Ok(()),
         }

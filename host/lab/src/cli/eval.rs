@@ -8,7 +8,7 @@ use flotor_command::{CommandError, note, progress_bar, write_text};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::{DVec3, Detail};
 use flotor_session::registry::{Registry, is_same_file};
-use flotor_session::scene::did_you_mean;
+use flotor_session::scene::{cannot_read, did_you_mean};
 use std::path::{Path, PathBuf};
 
 /// Evaluate a force model at poses from a CSV file.
@@ -78,7 +78,7 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
 
 fn read_poses(path: &Path) -> Result<(Vec<String>, Vec<Handle>), CommandError> {
     let problem = |text: String| CommandError::Usage(format!("{}: {text}", path.display()));
-    let text = read_text(path).map_err(|cause| problem(format!("cannot read the poses: {cause}")))?;
+    let text = read_text(path).map_err(|cause| problem(cannot_read("the poses", &cause)))?;
     if text.trim().is_empty() {
         return Err(problem(format!("no poses; the header is {}", header_text())));
     }

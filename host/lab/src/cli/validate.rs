@@ -52,7 +52,10 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
         return Ok(());
     }
     if !arguments.plugin.is_file() {
-        return Err(CommandError::Usage(format!("{}: no such file", arguments.plugin.display())));
+        return Err(CommandError::Usage(format!(
+            "`{}` is no plugin file; `flotor plugins` lists the files of the ids",
+            arguments.plugin.display()
+        )));
     }
     let program = std::env::current_exe()
         .map_err(|cause| CommandError::file(Path::new("flotor"), "cannot find this program", cause))?;

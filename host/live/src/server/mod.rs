@@ -11,7 +11,9 @@
 mod outbox;
 mod watcher;
 
-use crate::{Ask, ChangeMessage, Directory, DirectoryError, End, Greeting, Kind, Listener, frame};
+use crate::{
+    Ask, ChangeMessage, Directory, DirectoryError, End, Greeting, Kind, Listener, RefusalCause, frame,
+};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_record::RunDescription;
@@ -50,8 +52,8 @@ pub trait Serve: Send + Sync {
     /// of it.
     ///
     /// # Errors
-    /// Why not, in words for people.
-    fn serve(&self, ask: Ask) -> Result<(), String>;
+    /// What is wrong, and why not in words for people.
+    fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)>;
 }
 
 /// A run that others may watch; over when dropped.

@@ -2,7 +2,7 @@
 
 use super::outbox::Outbox;
 use super::{Shared, thread};
-use crate::{Answer, Ask, Frames, Kind, Request, frame};
+use crate::{Answer, Ask, Frames, Kind, RefusalCause, Request, frame};
 use std::io::{ErrorKind, Write};
 use std::net::Shutdown;
 use std::os::unix::net::UnixStream;
@@ -123,13 +123,15 @@ fn read(mut stream: UnixStream, outbox: &Outbox, shared: &Shared) {
 }
 
 fn answer(payload: &[u8], outbox: &Outbox, shared: &Shared) -> Answer {
-    match serde_json::from_slice::<Request>(payload) {
-        Ok(Request { number, ask }) => Answer { number, refused: carry_out(ask, outbox, shared).err() },
-        Err(error) => Answer { number: 0, refused: Some(format!("no request this host knows: {error}")) },
-    }
+    let (number, done) = match serde_json::from_slice::<Request>(payload) {
+        Ok(Request { number, ask }) => (number, carry_out(ask, outbox, shared)),
+        Err(error) => (0, Err((RefusalCause::Request, format!("no request this host knows: {error}")))),
+    };
+    let (cause, refused) = done.err().map(|(cause, words)| (cause, Some(words))).unwrap_or_default();
+    Answer { number, refused, cause }
 }
 
-fn carry_out(ask: Ask, outbox: &Outbox, shared: &Shared) -> Result<(), String> {
+fn carry_out(ask: Ask, outbox: &Outbox, shared: &Shared) -> Result<(), (RefusalCause, String)> {
     match ask {
         Ask::Watch { every } => {
             outbox.want_ticks(every.max(1));

@@ -9,7 +9,7 @@ use crate::scene::nearest;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, read_metadata};
 use flotor_hal::abi::{Entry, PluginKind};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
-use std::path::{Path, PathBuf};
+use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// Environment variable with further plugin folders, separated like `PATH`.
@@ -52,7 +52,7 @@ pub enum LookupError {
     #[error("no {}plugin `{id}`{}{} (`flotor plugins` lists all; {PATH_VARIABLE} adds folders)",
         kind.as_ref().map_or(String::new(), |kind| format!("{} ", kind.word())),
         nearest.as_ref().map_or(String::new(), |n| format!("; did you mean `{n}`?")),
-        broken.as_ref().map_or(String::new(), |b| format!(" ({b})")))]
+        hint.as_ref().map_or(String::new(), |hint| format!(" ({hint})")))]
     Unknown {
         /// The id.
         id: String,
@@ -60,8 +60,8 @@ pub enum LookupError {
         kind: Option<PluginKind>,
         /// The most similar id of that kind.
         nearest: Option<String>,
-        /// A file of that name that could not be read as a plugin.
-        broken: Option<String>,
+        /// A file of that name, and why it is not meant or cannot be read as a plugin.
+        hint: Option<String>,
     },
     /// The plugin was found and refused.
     #[error(transparent)]
@@ -184,7 +184,7 @@ impl Registry {
     }
 
     fn find(&self, id: &str, kind: Option<PluginKind>) -> Result<Plugin, LookupError> {
-        if id.contains(std::path::MAIN_SEPARATOR) {
+        if id.contains(MAIN_SEPARATOR) {
             return Ok(self.open(Path::new(id))?);
         }
         let fits = |plugin: &Metadata| plugin.id == id && kind.is_none_or(|kind| plugin.kind == kind);
@@ -204,11 +204,15 @@ impl Registry {
     /// That no plugin (of a kind) has an id, with the nearest that one has.
     fn unknown(&self, id: &str, kind: Option<PluginKind>) -> LookupError {
         let candidates = self.found.iter().filter(|known| kind.is_none_or(|kind| known.kind == kind));
+        let here = Path::new(id)
+            .is_file()
+            .then(|| format!("a file is written with a folder: `.{MAIN_SEPARATOR}{id}`"));
+        let broken = || self.broken.iter().map(ToString::to_string).find(|text| text.contains(id));
         LookupError::Unknown {
             id: id.to_owned(),
             kind,
             nearest: nearest(id, candidates.map(|known| known.id.as_str())).map(str::to_owned),
-            broken: self.broken.iter().map(ToString::to_string).find(|text| text.contains(id)),
+            hint: here.or_else(broken),
         }
     }
 

@@ -145,7 +145,7 @@ impl ModelUse {
         other.plugin.parameters.extend(settings.iter().map(|(key, value)| ParameterText {
             key: (*key).to_owned(),
             value: (*value).to_owned(),
-            location: Location { file: PathBuf::from("swap"), line: 0 },
+            location: Location { file: PathBuf::from(format!("--set {key}")), line: 0 },
         }));
         other
     }
@@ -181,7 +181,7 @@ impl Scene {
     /// [`SceneError`] with file, line, key and remedy.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
         let text = std::fs::read_to_string(path).map_err(|error| {
-            Location { file: path.into(), line: 0 }.problem(format!("cannot read the scene: {error}"))
+            Location { file: path.into(), line: 0 }.problem(cannot_read("the scene", &error))
         })?;
         let mut scene = Self::parse(path, &text)?;
         let base = path.parent().unwrap_or(Path::new(""));
@@ -240,6 +240,15 @@ impl Scene {
         };
         root.finish()?;
         Ok(scene)
+    }
+}
+
+/// Why a text cannot be read, in words; `what` names it. Not real-time.
+#[must_use]
+pub fn cannot_read(what: &str, error: &std::io::Error) -> String {
+    match error.kind() {
+        std::io::ErrorKind::InvalidData => "is not a text file in UTF-8; save it as UTF-8".to_owned(),
+        _ => format!("cannot read {what}: {error}"),
     }
 }
 

@@ -4,6 +4,7 @@
 //! and what is left over at the end is unknown.
 
 use super::ParameterText;
+pub use flotor_hal::abi::loader::nearest;
 use std::borrow::Cow;
 use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};
@@ -105,8 +106,19 @@ impl<'t> Source<'t> {
 
     pub(super) fn parse(&'t self) -> Result<Section<'t>, SceneError> {
         let root = DeTable::parse(self.text).map_err(|error| {
-            let problem = error.message().lines().next().unwrap_or_default();
-            self.location(&error.span().unwrap_or(0..0)).problem(format!("not valid TOML: {problem}"))
+            let location = self.location(&error.span().unwrap_or(0..0));
+            let line = self.text.lines().nth(location.line - 1).unwrap_or_default().trim();
+            let line: String = line.chars().take(80).collect(); // a JSON file may have one line
+            let is_number =
+                |(a, b): (&str, &str)| a.ends_with(char::is_numeric) && b.starts_with(char::is_numeric);
+            let problem = if line.split_once(',').is_some_and(is_number) && !line.contains('[') {
+                format!("the decimal sign is a point: `{}`", line.replace(',', "."))
+            } else if line.contains('\\') {
+                format!("text with a backslash stands in single quotes: `{}`", line.replace('"', "'"))
+            } else {
+                error.message().lines().next().unwrap_or_default().to_owned()
+            };
+            location.problem(format!("not valid TOML: `{line}`: {problem}"))
         })?;
         Ok(Section {
             source: self,
@@ -221,7 +233,12 @@ impl<'t> Section<'t> {
                 Ok(vec![Section::from_value(source, name, Spanned::new(span, table))?])
             }
             other => {
-                let problem = format!("`{name}` is a table like [[{name}]], not {}", other.type_str());
+                let table = match (key, other.as_str()) {
+                    ("device", Some(id)) => format!("[device] and below it plugin = \"{id}\""),
+                    ("model", Some(id)) => format!("[[model]] and below it plugin = \"{id}\""),
+                    _ => format!("[[{name}]] and below it its keys"),
+                };
+                let problem = format!("`{name}` is a table: write {table}");
                 Err(source.location(&span).problem(problem))
             }
         }
@@ -238,7 +255,7 @@ impl<'t> Section<'t> {
                 DeValue::String(text) => text.into_owned(),
                 DeValue::Integer(number) => number.as_str().replace('_', ""),
                 DeValue::Float(number) => number.as_str().replace('_', ""),
-                DeValue::Boolean(flag) => if flag { "on" } else { "off" }.to_owned(),
+                DeValue::Boolean(flag) => flag.to_string(),
                 other => {
                     let (key, found) = (key.get_ref(), other.type_str());
                     let problem = format!("`{key}` is a number, a word or true/false, not {found}");
@@ -277,8 +294,8 @@ impl<'t> Section<'t> {
         let span = value.span();
         match value.into_inner() {
             DeValue::Table(table) => Ok(Section { source, name, span, table, known: Vec::new() }),
-            other => {
-                let problem = format!("`{name}` is a table like [{name}], not {}", other.type_str());
+            _ => {
+                let problem = format!("`{name}` is a table: write [{name}] and below it its keys");
                 Err(source.location(&span).problem(problem))
             }
         }
@@ -425,16 +442,4 @@ fn parse_number(value: &DeValue<'_>) -> Option<f64> {
 /// A hint at the known word most like `word`, to stand behind a complaint; empty if none is like it. Not real-time.
 pub fn did_you_mean<'k>(word: &str, known: impl Iterator<Item = &'k str>) -> String {
     nearest(word, known).map_or_else(String::new, |near| format!("; did you mean `{near}`?"))
-}
-
-/// The known word most like `word`, if any is like it at all.
-pub fn nearest<'k>(word: &str, known: impl Iterator<Item = &'k str>) -> Option<&'k str> {
-    // Jaro-Winkler: a letter that is wrong, missing or swapped leaves 0.9 and more, an ending of its own (`rz_deg` for
-    // `rz_rad`) 0.84; words that only share letters (`jelly` and `wall`: 0.63, `balls` and `wall`: 0.78) stay below.
-    const ALIKE: f64 = 0.8;
-    let scored = known.map(|candidate| (strsim::jaro_winkler(word, candidate), candidate));
-    scored
-        .filter(|(score, _)| *score > ALIKE)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, candidate)| candidate)
 }

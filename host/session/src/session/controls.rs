@@ -4,11 +4,12 @@
 
 use super::{PluginReport, prepare_model};
 use crate::registry::Registry;
-use crate::scene::{ModelUse, is_named, nearest};
+use crate::scene::{Location, ModelUse, is_named, nearest};
 use flotor_core::{Change, ChangeSubject};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Setting, SettingError};
 use flotor_hal::{LoopConfig, Mutability, Parameter};
+use flotor_live::RefusalCause;
 use flotor_servo::{
     ChangeReport, ChangeSender, Clock, HostSwaps, LayerReport, ModelHealth, PLUGIN, ParameterChange,
     Replacement, ReportReceiver, WEIGHT,
@@ -63,9 +64,11 @@ pub enum ControlError {
         model: String,
         /// Why.
         problem: String,
+        /// What is wrong.
+        cause: RefusalCause,
     },
     /// More changes wait than the loop takes in, or the model replaced last is still fading.
-    #[error("previous changes are still pending; try again in a moment")]
+    #[error("previous changes are pending, or a swap is still fading in; try again in a moment")]
     Busy,
     /// The loop has ended.
     #[error("the run is over")]
@@ -256,9 +259,13 @@ impl Controls {
         let refused = |error: super::RunError| ControlError::Refused {
             model: model.to_owned(),
             problem: error.to_string(),
+            cause: if error.is_configuration() { RefusalCause::Request } else { RefusalCause::Plugin },
         };
         let make = |number: &usize| {
-            let other = models.get(*number).ok_or(ControlError::Ended)?.replaced_by(plugin, settings);
+            let mut other = models.get(*number).ok_or(ControlError::Ended)?.replaced_by(plugin, settings);
+            if plugin.is_some() {
+                other.plugin.location = Location { file: "--plugin".into(), line: 0 };
+            }
             prepare_model(registry, &other, config, *clock).map_err(refused)
         };
         let made = numbers.iter().map(make).collect::<Result<Vec<_>, _>>()?;

@@ -76,6 +76,18 @@ pub enum RunError {
     },
 }
 
+impl RunError {
+    /// True if the scene or the command line is wrong, not a plugin.
+    #[must_use]
+    pub fn is_configuration(&self) -> bool {
+        match self {
+            Self::Scene(_) | Self::Mismatch { .. } | Self::Lookup(LookupError::Unknown { .. }) => true,
+            Self::Lookup(LookupError::Refused(error)) | Self::Plugin(error) => error.is_configuration(),
+            Self::Thread(_) | Self::Hung { .. } => false,
+        }
+    }
+}
+
 /// A plugin in a run, for reports and recordings.
 #[derive(Clone, Debug)]
 pub struct PluginReport {

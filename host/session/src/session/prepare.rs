@@ -4,7 +4,7 @@ use super::choice::chosen;
 use super::controls::{ControlError, NewValue, Parts, understands};
 use super::{PluginReport, RunError};
 use crate::calibration_file::{CalibrationFile, CalibrationFileError};
-use crate::registry::{LookupError, Registry};
+use crate::registry::Registry;
 use crate::scene::{
     Alternative, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, Pacing,
     ParameterText, PluginUse, Scene, SceneError,
@@ -20,9 +20,9 @@ use flotor_servo::{Clock, Engine, Layer, Replacement, ScheduledChange, Servo, St
 use std::borrow::Cow;
 
 pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
-    registry.load(&plugin.plugin, kind).map_err(|error| match error {
-        LookupError::Unknown { .. } => plugin.location.problem(error.to_string()).into(),
-        refused => refused.into(),
+    registry.load(&plugin.plugin, kind).map_err(|error| match RunError::from(error) {
+        wrong if wrong.is_configuration() => plugin.location.problem(wrong.to_string()).into(),
+        refused => refused,
     })
 }
 

@@ -20,7 +20,9 @@ use crate::scene::Scene;
 use crate::{ControlError, Controls, NewValue, Observer, PluginReport, Session};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
-use flotor_live::{Ask, Directory, Greeting, PROTOCOL, PanelPlugin, Publication, PublishError, Serve};
+use flotor_live::{
+    Ask, Directory, Greeting, PROTOCOL, PanelPlugin, Publication, PublishError, RefusalCause, Serve,
+};
 use flotor_record::RunDescription;
 use flotor_servo::StopSwitch;
 use std::path::PathBuf;
@@ -57,7 +59,7 @@ pub fn announce(
         protocol: PROTOCOL,
         flotor_version: env!("CARGO_PKG_VERSION").to_owned(),
         process: std::process::id(),
-        title: scene.title.clone(),
+        title: if scene.title.is_empty() { "untitled".to_owned() } else { scene.title.clone() },
         plugins: session.plugins().iter().map(panel).collect(),
         limits: session.limits(),
     };
@@ -120,7 +122,8 @@ impl Host {
         plugin: Option<&str>,
         settings: &[(String, String)],
     ) -> Result<(), ControlError> {
-        let refused = |problem: String| ControlError::Refused { model: model.to_owned(), problem };
+        let cause = RefusalCause::Other;
+        let refused = |problem: String| ControlError::Refused { model: model.to_owned(), problem, cause };
         let settings: Vec<(&str, &str)> = settings.iter().map(|(k, v)| (k.as_str(), v.as_str())).collect();
         let make = || {
             let mut registry = self.registry.lock().unwrap_or_else(PoisonError::into_inner);
@@ -137,18 +140,18 @@ impl Host {
     }
 }
 
-/// Why a model was not replaced, for whoever asked.
-fn swap_words(model: &str, error: &ControlError) -> String {
-    match error {
-        ControlError::Busy => {
-            format!("[{model}] the last swap is still fading in; try again in a moment")
-        }
-        other => other.to_string(),
-    }
+/// Why it was not done, for whoever asked.
+fn refused(error: &ControlError) -> (RefusalCause, String) {
+    let cause = match error {
+        ControlError::Refused { cause, .. } => *cause,
+        ControlError::Busy | ControlError::Ended => RefusalCause::Other,
+        _ => RefusalCause::Request,
+    };
+    (cause, error.to_string())
 }
 
 impl Serve for Host {
-    fn serve(&self, ask: Ask) -> Result<(), String> {
+    fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
         let Self { controls, stop, .. } = self;
         match ask {
             Ask::Watch { .. } | Ask::LookAway => {} // the publication's own
@@ -157,14 +160,14 @@ impl Serve for Host {
                     .iter()
                     .map(|new| NewValue { plugin: &new.plugin, parameter: &new.parameter, value: &new.value })
                     .collect();
-                controls.set_parameters(&values).map_err(|error| error.to_string())?;
+                controls.set_parameters(&values).map_err(|error| refused(&error))?;
             }
             Ask::Weight { model, weight } => {
-                controls.set_weight(&model, weight).map_err(|error| error.to_string())?;
+                controls.set_weight(&model, weight).map_err(|error| refused(&error))?;
             }
             Ask::Swap { model, plugin, settings } => {
                 let swapped = self.swap(&model, plugin.as_deref(), &settings);
-                swapped.map_err(|error| swap_words(&model, &error))?;
+                swapped.map_err(|error| refused(&error))?;
             }
             Ask::Stop => stop.stop(),
             Ask::EmergencyStop => stop.emergency_by_watcher(),

@@ -8,7 +8,7 @@ use crate::conduct::OutsideError;
 use crate::kinematics::KinematicsMeter;
 use crate::screen::Felt;
 use crate::trial::Trial;
-use flotor_live::{Ask, Directory, Serve};
+use flotor_live::{Ask, Directory, RefusalCause, Serve};
 use flotor_record::Recorder;
 use flotor_servo::{Clock, StopSwitch};
 use flotor_session::telemetry::{Watched, announce};
@@ -36,13 +36,14 @@ pub struct RealTimeRig<'a> {
 struct OnlyStop(StopSwitch);
 
 impl Serve for OnlyStop {
-    fn serve(&self, ask: Ask) -> Result<(), String> {
+    fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
         match ask {
             Ask::Watch { .. } | Ask::LookAway => {} // the publication's own
             Ask::Stop => self.0.stop(),
             Ask::EmergencyStop => self.0.emergency_by_watcher(),
             Ask::Set { .. } | Ask::Weight { .. } | Ask::Swap { .. } => {
-                return Err("an experiment is under way: what is felt is its own to change".to_owned());
+                let words = "an experiment is under way: what is felt is its own to change";
+                return Err((RefusalCause::Other, words.to_owned()));
             }
         }
         Ok(())

@@ -7,7 +7,8 @@ mod rig;
 mod usb;
 
 use clap::{Parser, ValueEnum};
-use flotor_hal::abi::loader::Setting;
+use flotor_hal::Refusal;
+use flotor_hal::abi::loader::{LoadError, Setting};
 use flotor_maglev::transport::stream::StreamLink;
 use flotor_maglev::transport::tcp::prepared;
 #[cfg(target_os = "linux")]
@@ -103,7 +104,8 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
-            ExitCode::from(1)
+            let is_plugins = error.downcast_ref().is_some_and(LoadError::is_configuration);
+            ExitCode::from(if is_plugins || error.is::<Refusal>() { 2 } else { 1 })
         }
     }
 }
@@ -115,7 +117,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     };
     let plugin = plant::load(arguments.plant.as_deref())?;
     let parse = |key: &str, value: &str| {
-        Setting::parse(plugin.parameters(), key, value).map_err(|error| error.to_string())
+        Setting::parse(plugin.parameters(), key, value)
+            .map_err(|error| Refusal::parameter(format!("--set {key}={value}: {error}")))
     };
     let mut settings = Vec::new();
     if let Some(link) = &arguments.calibration_rig {
@@ -124,7 +127,9 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         }
     }
     for text in &arguments.sets {
-        let (key, value) = text.split_once('=').ok_or_else(|| format!("--set {text} is not KEY=VALUE"))?;
+        let (key, value) = text
+            .split_once('=')
+            .ok_or_else(|| Refusal::parameter(format!("--set {text}: write KEY=VALUE")))?;
         settings.push(parse(key.trim(), value.trim())?);
     }
     let (mut plant, capabilities) = LoadedPlant::open(plugin, settings, arguments.seed)?;
