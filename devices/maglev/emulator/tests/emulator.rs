@@ -21,7 +21,7 @@ fn it_explains_itself() {
 #[test]
 fn wrong_arguments_cost_one_line() {
     let output = run(&["--plant", "/no/such/plugin.so"]);
-    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(output.status.code(), Some(2));
     let error = String::from_utf8(output.stderr).unwrap();
     assert!(
         error.starts_with("error: ") && error.contains("/no/such/plugin.so") && error.lines().count() == 1
