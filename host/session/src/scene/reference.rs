@@ -1,8 +1,7 @@
 //! Every key a scene may have, as the reader itself looks for them: for the book, and for editors.
 
 use super::Scene;
-use super::reader::{Known, SceneError, Source, Takes};
-use std::ops::RangeInclusive;
+use super::reader::{Known, SceneError, Source, Takes, range_words};
 use std::path::Path;
 
 /// A scene with every table there is, so that the reader looks for every key.
@@ -77,15 +76,12 @@ fn words(takes: &Takes) -> String {
         Takes::Value => String::new(),
         Takes::Number(range) => format!("a number, {}", range_words(range)),
         Takes::Three(range) => format!("three numbers, or one for all, {}", range_words(range)),
+        Takes::Bound(range) => format!(
+            "one number, a norm; three, one for each axis; or `{{ norm, axes }}`; {}",
+            range_words(range)
+        ),
         Takes::Table => "a table".to_owned(),
         Takes::Tables => "tables, any number of them".to_owned(),
-    }
-}
-
-fn range_words(range: &RangeInclusive<f64>) -> String {
-    match (range.start(), range.end()) {
-        (start, end) if end.is_infinite() => format!("{start} or more"),
-        (start, end) => format!("{start} to {end}"),
     }
 }
 

@@ -248,7 +248,7 @@ pub(super) fn pair(scene: &Scene, number: u16, device: &Capabilities, can_pace: 
     let is_felt = scene.models.iter().any(|model| model.device == number)
         || scene.couplings.iter().any(|coupling| coupling.ends.here().iter().any(|end| end.device == number));
     if is_felt {
-        mismatches.extend(unfelt(&scene.limits.force_n, device));
+        mismatches.extend(unfelt(&scene.limits.force_n.axes(), device));
     }
     mismatches
 }
