@@ -16,7 +16,9 @@ use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting
 use flotor_hal::{Axes, Capabilities, LoopConfig, Parameter, ParameterKind, Refusal};
 use flotor_servo::engine::asynchronous::AsynchronousModel;
 use flotor_servo::engine::process::{Worker, WorkerOrder};
-use flotor_servo::{Clock, Engine, Layer, Replacement, ScheduledChange, Servo, Standby, TimeBudget};
+use flotor_servo::{
+    Clock, Engine, Layer, Replacement, ScheduledChange, Servo, Standby, TimeBudget, pushes_at_home,
+};
 use std::borrow::Cow;
 
 pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
@@ -121,7 +123,16 @@ pub fn prepare_model(
                 Engine::Process(Worker::start(&order).map_err(|refusal| refused(plugin.metadata(), refusal))?)
             }
         };
-        Ok((engine, mapping.at(*place_m)))
+        let (mut engine, mapping) = (engine, mapping.at(*place_m));
+        if pushes_at_home(&engine.workspace_bounds(), &mapping) {
+            let problem = format!(
+                "at {:?} mm the model ends before the home of its device, and the wall at its end would push there; move it \
+                 (`position_mm`) or make it longer",
+                place_m.map(|m| m * 1.0e3)
+            );
+            return Err(complain(model, &problem).into());
+        }
+        Ok((engine, mapping))
     };
     let mut instances = model.places_m.iter().map(instance).collect::<Result<Vec<_>, RunError>>()?;
     let mut value = |index| instances.first_mut().map_or(f64::NAN, |(first, _)| first.parameter(index));
