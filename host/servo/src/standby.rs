@@ -52,6 +52,13 @@ impl Standby {
         most.fold([DVec3::ZERO; 2], |[force_n, torque_nm], [f, t]| [force_n.max(f), torque_nm.max(t)])
     }
 
+    /// Puts other envelopes before the devices, in order; a device without another keeps its own. Not real-time.
+    pub fn guard_with(&mut self, envelopes: Vec<Envelope>) {
+        for (guarded, envelope) in self.devices.iter_mut().zip(envelopes) {
+            guarded.envelope = envelope;
+        }
+    }
+
     /// Stops any of the devices, from wherever.
     pub fn stoppers(&self) -> Vec<Stopper> {
         self.devices.iter().map(|guarded| guarded.device.stopper()).collect()

@@ -199,6 +199,13 @@ fn a_calibration_that_cannot_be_says_why_and_lets_the_handle_down() {
     assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
     assert!(ran.error().contains("lost contact with the force sensor"), "{}", ran.error());
     emulator.wait_for(&["mode Disarmed"]);
+    let ran = calibrate(&emulator, &sensor, &["vertical", "--force", "30,25"]);
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+    assert!(
+        ran.error().contains("the plan needs 30 N; device and host exert at most 20 N"),
+        "{}",
+        ran.error()
+    );
     let missing = scratch.path().join("nowhere");
     let ran = calibrate(&emulator, &missing, &["vertical"]);
     assert!(ran.error().contains("no force sensor at"), "{}", ran.error());

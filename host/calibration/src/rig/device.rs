@@ -4,7 +4,7 @@ use super::holder::{Guard, Holder, Holding, REST_M};
 use super::{PERIOD_NS, Rest, Rig};
 use crate::CalibrationError;
 use crate::sensor::ForceSensor;
-use flotor_core::limits::{Boundary, Limits};
+use flotor_core::limits::{Boundary, CEILING, Limits};
 use flotor_hal::abi::loader::{OpenedDevice, Plugin, Setting};
 use flotor_hal::{Fault, LoopConfig, Refusal, VerticalCalibration};
 use flotor_servo::{Envelope, StopSwitch};
@@ -30,7 +30,7 @@ pub struct DeviceRig<W> {
     /// Nothing while it is held, and after it was lost.
     opened: Option<OpenedDevice>,
     holder: Option<Holder>,
-    /// Most vertical force the device takes, N.
+    /// Most vertical force the device takes and the host sends, N.
     most_n: f64,
     stop: StopSwitch,
     sensor: ForceSensor,
@@ -65,7 +65,7 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
         Ok(Self {
             opened: Some(opened),
             holder: None,
-            most_n,
+            most_n: most_n.min(CEILING.force_n),
             stop,
             sensor,
             restless: 0,
@@ -105,7 +105,8 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
         if let (None, Some(mut opened)) = (&self.holder, self.opened.take()) {
             let config = LoopConfig { period_ns: PERIOD_NS, seed: 0 };
             let capabilities = opened.capabilities().map_err(CalibrationError::Refused)?;
-            let envelope = Envelope::new(&Limits::default(), &without_wall(), &capabilities, PERIOD_NS);
+            let limits = Limits::default().under(CEILING);
+            let envelope = Envelope::new(&limits, &without_wall(), &capabilities, PERIOD_NS);
             let guard = Guard { envelope, stopper: opened.stopper(), stop: self.stop.clone() };
             let active = opened.activate(&config).map_err(|(opened, refusal)| {
                 self.opened = Some(opened);

@@ -13,7 +13,7 @@ use flotor_core::limits::Boundary;
 use flotor_core::mapping::Mapping;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting};
-use flotor_hal::{Axes, Capabilities, LoopConfig, Parameter, ParameterKind, Refusal};
+use flotor_hal::{Axes, Capabilities, Embodiment, LoopConfig, Parameter, ParameterKind, Refusal};
 use flotor_servo::engine::asynchronous::AsynchronousModel;
 use flotor_servo::engine::process::{Worker, WorkerOrder};
 use flotor_servo::{
@@ -60,6 +60,7 @@ fn calibrate(
 pub(super) struct Opened {
     pub(super) device: OpenedDevice,
     pub(super) capabilities: Capabilities,
+    pub(super) embodiment: Embodiment,
 }
 
 /// Loads and opens one device of a scene. Not real-time.
@@ -76,7 +77,8 @@ pub(super) fn open_device(
     if let Some(calibration) = calibration {
         calibrate(&plugin, &mut device, calibration)?;
     }
-    Ok((Opened { device, capabilities }, report))
+    let embodiment = plugin.device_info().map_or(Embodiment::Physical, |info| info.embodiment());
+    Ok((Opened { device, capabilities, embodiment }, report))
 }
 
 /// Loads one model of a scene and creates it in all its places. Not real-time.
