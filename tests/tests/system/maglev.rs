@@ -199,7 +199,7 @@ fn a_calibration_that_cannot_be_says_why_and_lets_the_handle_down() {
     assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
     assert!(ran.error().contains("lost contact with the force sensor"), "{}", ran.error());
     emulator.wait_for(&["mode Disarmed"]);
-    let ran = calibrate(&emulator, &sensor, &["vertical", "--force", "30,25"]);
+    let ran = calibrate(&emulator, &sensor, &["vertical", "--force", "10,30"]);
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
     assert!(
         ran.error().contains("the plan needs 30 N; device and host exert at most 20 N"),

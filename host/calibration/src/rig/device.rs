@@ -3,6 +3,7 @@
 use super::holder::{Guard, Holder, Holding, REST_M};
 use super::{PERIOD_NS, Rest, Rig};
 use crate::CalibrationError;
+use crate::procedure::Plan;
 use crate::sensor::ForceSensor;
 use flotor_core::limits::{Boundary, CEILING, Limits};
 use flotor_hal::abi::loader::{OpenedDevice, Plugin, Setting};
@@ -80,6 +81,17 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
     #[must_use]
     pub fn serial(&self) -> &str {
         &self.serial
+    }
+
+    /// That no force of a plan is too strong, before the first of them is measured.
+    ///
+    /// # Errors
+    /// [`CalibrationError::TooStrong`] with the first that is.
+    pub fn check(&self, plan: &Plan) -> Result<(), CalibrationError> {
+        let too_strong = plan.forces_n.iter().find(|command_n| **command_n > self.most_n);
+        too_strong.map_or(Ok(()), |command_n| {
+            Err(CalibrationError::TooStrong { command_n: *command_n, most_n: self.most_n })
+        })
     }
 
     /// Corrects the force by this from now on. The handle is let down before.
