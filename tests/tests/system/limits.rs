@@ -14,7 +14,7 @@ use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::{Watched, prepared, watch};
 use std::path::Path;
 
-/// A model that answers anything at all on a device of so many N along each axis, and a tenth of it in N·m.
+/// A model that answers anything at all on a device of so many N along each axis, and a twentieth of it in N·m.
 fn wild(most_n: f64, limits: &str) -> String {
     format!(
         "rate_hz = 1000\nduration_s = 5\n[device]\nplugin = \"{}\"\n[device.parameters]\nmax_force_n = {most_n}\n\
