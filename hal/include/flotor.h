@@ -219,6 +219,25 @@ typedef uint32_t FlotorFault;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
+// What a device moves when it is commanded, as a closed set.
+enum FlotorEmbodiment
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // Something that a hand can hold. What says nothing is this.
+    FlotorEmbodiment_Physical = 0,
+    // Numbers only: no command ever reaches anything that could push a hand.
+    FlotorEmbodiment_Simulated = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum FlotorEmbodiment FlotorEmbodiment;
+#else
+typedef uint32_t FlotorEmbodiment;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
 // One row of the layout table: a field, or a struct as a whole.
 typedef struct FlotorFieldLayout {
     // `Struct.field`, or `Struct` for the whole of it; filled up with zeros.
@@ -448,6 +467,10 @@ typedef struct FlotorDeviceInfo {
     struct FlotorStr id;
     struct FlotorStr name;
     struct FlotorStr doc;
+    // Code of an [`Embodiment`].
+    uint32_t embodiment;
+    // Reserved, 0.
+    uint32_t reserved;
 } FlotorDeviceInfo;
 
 // Which of the six axes a device senses or actuates: x, y, z, then rotation about x, y, z.
@@ -921,6 +944,8 @@ __attribute__((unused)) static const FlotorFieldLayout flotor_layouts[] = {
     FLOTOR_FIELD(DeviceInfo, id),
     FLOTOR_FIELD(DeviceInfo, name),
     FLOTOR_FIELD(DeviceInfo, doc),
+    FLOTOR_FIELD(DeviceInfo, embodiment),
+    FLOTOR_FIELD(DeviceInfo, reserved),
     FLOTOR_STRUCT(Host),
     FLOTOR_FIELD(Host, size),
     FLOTOR_FIELD(Host, abi_major),

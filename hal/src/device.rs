@@ -16,7 +16,7 @@ layout! {
         sensed, actuated, range_m, range_rad, resolution_m, max_force_n, max_torque_nm, max_force_slew_n_per_s,
         max_torque_slew_nm_per_s, max_stiffness_n_per_m, rate_hz, latency_s,
     }
-    DeviceInfo { id, name, doc }
+    DeviceInfo { id, name, doc, embodiment, reserved }
 }
 
 /// One tick as a device and a host see it. 24 bytes.
@@ -281,6 +281,27 @@ impl Capabilities {
     };
 }
 
+/// What a device moves when it is commanded, as a closed set.
+#[repr(u32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Embodiment {
+    /// Something that a hand can hold. What says nothing is this.
+    Physical = 0,
+    /// Numbers only: no command ever reaches anything that could push a hand.
+    Simulated = 1,
+}
+
+impl Embodiment {
+    /// Reads it from the boundary: whatever is unknown may push a hand.
+    #[must_use]
+    pub const fn from_code(code: u32) -> Self {
+        match code {
+            1 => Self::Simulated,
+            _ => Self::Physical,
+        }
+    }
+}
+
 /// What a device says about itself; constant, readable without opening it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
@@ -289,13 +310,36 @@ pub struct DeviceInfo {
     pub(crate) id: Str,
     pub(crate) name: Str,
     pub(crate) doc: Str,
+    /// Code of an [`Embodiment`].
+    pub(crate) embodiment: u32,
+    /// Reserved, 0.
+    pub(crate) reserved: u32,
 }
 
 impl DeviceInfo {
     /// `id` is what scenes and commands say ("simulated"); `name` and `doc` are for people.
     #[must_use]
     pub const fn new(id: &'static str, name: &'static str, doc: &'static str) -> Self {
-        Self { id: Str::new(id), name: Str::new(name), doc: Str::new(doc) }
+        Self {
+            id: Str::new(id),
+            name: Str::new(name),
+            doc: Str::new(doc),
+            embodiment: Embodiment::Physical as u32,
+            reserved: 0,
+        }
+    }
+
+    /// The same of a device that exists in numbers only. A host sends at most its ceiling to any other, unless a person
+    /// allows more.
+    #[must_use]
+    pub const fn simulated(self) -> Self {
+        Self { embodiment: Embodiment::Simulated as u32, ..self }
+    }
+
+    /// What it moves.
+    #[must_use]
+    pub const fn embodiment(&self) -> Embodiment {
+        Embodiment::from_code(self.embodiment)
     }
 
     /// What scenes and commands call it.

@@ -38,7 +38,7 @@ mod refusal;
 
 pub use abi::Choices;
 pub use device::{
-    ActiveDevice, Axes, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState, Fault,
+    ActiveDevice, Axes, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState, Embodiment, Fault,
     NothingToStop, SafeStop, Tick,
 };
 pub use extension::active_region::{ActiveRegion, ActiveRegionModel, RegionShape};

@@ -34,7 +34,7 @@ static uint32_t capabilities(FlotorInstance instance, FlotorCapabilities *out) {
         .range_m = {0.01, 0.01, 0.01},
         .range_rad = {0.1, 0.1, 0.1},
         .max_force_n = {10.0, 10.0, 10.0},
-        .max_torque_nm = {1.0, 1.0, 1.0},
+        .max_torque_nm = {0.5, 0.5, 0.5},
         .max_force_slew_n_per_s = 1.0e6,
         .max_torque_slew_nm_per_s = 1.0e6,
         .max_stiffness_n_per_m = 1.0e4,

@@ -65,6 +65,15 @@ pub fn watch(scene: &str) -> Watched {
     watch_on(Clock::Virtual, scene)
 }
 
+/// The same without the host's ceiling.
+///
+/// # Panics
+/// As [`prepared`].
+#[must_use]
+pub fn watch_strong(scene: &str) -> Watched {
+    keep(prepared(Clock::Virtual, scene).allow_strong())
+}
+
 /// The same with a seed of the caller's.
 ///
 /// # Panics

@@ -66,7 +66,8 @@ const RATE_HZ: [f64; 2] = [100.0, 10_000.0];
 
 impl Device for SimulatedFlotor {
     const INFO: DeviceInfo =
-        DeviceInfo::new("simulated", "Simulated flotor", "A 580 g levitated flotor held by a simulated hand");
+        DeviceInfo::new("simulated", "Simulated flotor", "A 580 g levitated flotor held by a simulated hand")
+            .simulated();
     const PARAMETERS: &'static [Parameter] = SCHEMA;
     type Active = RunningFlotor;
     type Stop = CoilSwitch;

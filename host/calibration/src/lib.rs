@@ -65,11 +65,13 @@ pub enum CalibrationError {
         height_mm: f64,
     },
     /// The plan asks for more than the device gives: what is cut off would be fitted as a loss.
-    #[error("the plan needs {command_n} N, the device exerts at most {most_n} N; plan smaller forces")]
+    #[error(
+        "the plan needs {command_n} N; device and host exert at most {most_n} N in a calibration: plan smaller forces"
+    )]
     TooStrong {
         /// What the plan asks for, N.
         command_n: f64,
-        /// What the device declares, N.
+        /// The less of what the device declares and the host's ceiling, N.
         most_n: f64,
     },
     /// Somebody stopped it.

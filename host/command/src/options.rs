@@ -1,9 +1,10 @@
 //! Options that several commands share, and their parsers.
 
 use crate::CommandError;
-use clap::{Command, Parser, ValueEnum};
+use clap::{Args, Command, Parser, ValueEnum};
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_servo::Core;
+use flotor_session::Strength;
 pub use flotor_session::scene::{KeyValue, PluginKeyValue};
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -33,6 +34,22 @@ pub enum ClockOption {
     Real,
     /// As fast as possible, bit-exact
     Virtual,
+}
+
+/// `--allow-strong`, of each command that runs a scene on a device.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct StrengthOption {
+    /// Lift the host's ceiling of 20 N and 1 N·m for devices that are not simulated
+    #[arg(long)]
+    allow_strong: bool,
+}
+
+impl StrengthOption {
+    /// What was said.
+    #[must_use]
+    pub fn strength(self) -> Strength {
+        if self.allow_strong { Strength::Strong } else { Strength::UnderCeiling }
+    }
 }
 
 /// Seconds from `10`, `10s`, `500ms`, `2min` or `1h`.

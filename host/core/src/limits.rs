@@ -2,21 +2,86 @@
 
 use crate::coupling::PassivityMode;
 
+/// How large a vector may be, in its unit: no longer than a norm in any direction, and along no axis more than
+/// its share. Both hold together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bound {
+    norm: f64,
+    axes: [f64; 3],
+}
+
+impl Bound {
+    /// No bound.
+    pub const NONE: Self = Self { norm: f64::INFINITY, axes: [f64::INFINITY; 3] };
+
+    /// A ball: vectors no longer than this.
+    #[must_use]
+    pub const fn ball(norm: f64) -> Self {
+        Self { norm, axes: [norm; 3] }
+    }
+
+    /// A box: no component larger than that of its axis.
+    #[must_use]
+    pub const fn box_of(axes: [f64; 3]) -> Self {
+        Self { norm: f64::INFINITY, axes }
+    }
+
+    /// What both allow. Not real-time.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        let norm = self.norm.min(other.norm);
+        let axis = |index: usize| self.axes[index].min(other.axes[index]).min(norm);
+        Self { norm, axes: std::array::from_fn(axis) }
+    }
+
+    /// The longest vector it allows may be no longer than this; infinity where there is only a box.
+    #[must_use]
+    pub const fn norm(&self) -> f64 {
+        self.norm
+    }
+
+    /// The most along each axis, never more than the norm.
+    #[must_use]
+    pub const fn axes(&self) -> [f64; 3] {
+        self.axes
+    }
+
+    /// The longest vector it allows: the corner of the box, or the norm if that is less. Not real-time.
+    #[must_use]
+    pub fn longest(&self) -> f64 {
+        let corner = self.axes.iter().map(|axis| axis * axis).sum::<f64>().sqrt();
+        corner.min(self.norm)
+    }
+}
+
+/// The most the host sends to a device that does not declare itself simulated: 20 N and 1 N·m in any direction. More than a
+/// hand wants of an object on a table, less than throws an arm; an adult's hand holds it.
+pub const CEILING: Ceiling = Ceiling { force_n: 20.0, torque_nm: 1.0 };
+
+/// Largest norms that a host sends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ceiling {
+    /// Force, N.
+    pub force_n: f64,
+    /// Torque, N·m.
+    pub torque_nm: f64,
+}
+
 /// What a scene allows; the device's declaration applies too, whichever is tighter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Largest force along each axis, N.
-    pub force_n: [f64; 3],
-    /// Largest torque about each axis, N·m.
-    pub torque_nm: [f64; 3],
-    /// Fastest change of force, N/s.
+    /// Largest force, N.
+    pub force_n: Bound,
+    /// Largest torque, N·m.
+    pub torque_nm: Bound,
+    /// Fastest change of force, N/s: the norm of the change.
     pub force_slew_n_per_s: f64,
-    /// Fastest change of torque, N·m/s.
+    /// Fastest change of torque, N·m/s: the norm of the change.
     pub torque_slew_nm_per_s: f64,
-    /// Velocity along each axis above which nothing may drive the handle on, m/s.
-    pub velocity_m_per_s: [f64; 3],
-    /// Angular velocity about each axis above which nothing may drive the handle on, rad/s.
-    pub angular_velocity_rad_per_s: [f64; 3],
+    /// Velocity above which nothing may drive the handle on, m/s.
+    pub velocity_m_per_s: Bound,
+    /// Angular velocity above which nothing may drive the handle on, rad/s.
+    pub angular_velocity_rad_per_s: Bound,
     /// Time over which the force fades in at the start and out at an orderly end, s.
     pub ramp_s: f64,
     /// Time without a tick after which the watchdog stops the device, s (real clock).
@@ -27,17 +92,29 @@ pub struct Limits {
     pub passivity: PassivityMode,
 }
 
+impl Limits {
+    /// The same, under a ceiling. Not real-time.
+    #[must_use]
+    pub fn under(self, ceiling: Ceiling) -> Self {
+        Self {
+            force_n: self.force_n.and(Bound::ball(ceiling.force_n)),
+            torque_nm: self.torque_nm.and(Bound::ball(ceiling.torque_nm)),
+            ..self
+        }
+    }
+}
+
 impl Default for Limits {
     fn default() -> Self {
         Self {
-            force_n: [f64::INFINITY; 3],
-            torque_nm: [f64::INFINITY; 3],
+            force_n: Bound::NONE,
+            torque_nm: Bound::NONE,
             force_slew_n_per_s: f64::INFINITY,
             torque_slew_nm_per_s: f64::INFINITY,
             // Long enough not to startle a hand, short enough not to be waited for.
             ramp_s: 0.2,
-            velocity_m_per_s: [f64::INFINITY; 3],
-            angular_velocity_rad_per_s: [f64::INFINITY; 3],
+            velocity_m_per_s: Bound::NONE,
+            angular_velocity_rad_per_s: Bound::NONE,
             // A hundred periods at 1 kHz: a loaded machine without real-time priority is late by tens of
             // milliseconds, and a hand that holds a force for a tenth of a second has not gone far.
             watchdog_s: 0.1,
@@ -76,5 +153,30 @@ impl Default for Boundary {
             stiffness_nm_per_rad: 50.0,
             damping_nms_per_rad: 0.15,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ball_and_a_box_hold_together() {
+        let both = Bound::ball(5.0).and(Bound::box_of([3.0, 9.0, 0.0]));
+        assert_eq!((both.norm(), both.axes()), (5.0, [3.0, 5.0, 0.0]));
+        assert_eq!(both, Bound::box_of([3.0, 9.0, 0.0]).and(Bound::ball(5.0)));
+        assert_eq!(both.and(Bound::NONE), both);
+        assert_eq!(both.longest(), 5.0, "the corner is at 5.83");
+        assert_eq!(Bound::box_of([3.0, 4.0, 0.0]).longest(), 5.0);
+        assert_eq!(Bound::ball(2.0).longest(), 2.0);
+        assert_eq!(Bound::NONE.longest(), f64::INFINITY);
+    }
+
+    #[test]
+    fn a_ceiling_raises_nothing() {
+        let limits = Limits { force_n: Bound::ball(3.0), ..Limits::default() }.under(CEILING);
+        assert_eq!((limits.force_n.norm(), limits.torque_nm.norm()), (3.0, 1.0));
+        let strong = Limits { force_n: Bound::box_of([55.0, 2.0, 140.0]), ..Limits::default() };
+        assert_eq!(strong.under(CEILING).force_n.axes(), [20.0, 2.0, 20.0]);
     }
 }

@@ -2,6 +2,9 @@
 //!
 //! The range is an ellipsoid of positions and one of rotation vectors; equal semi-axes make it the sphere of the
 //! thesis's boundary (section 3.2). Nearly every tick is inside, so that is seen first, without a root or an arc.
+//!
+//! Home is always well inside: a margin takes at most half of the range, and along an axis without range there is no wall.
+//! (Pairing has refused a margin that leaves nothing.)
 
 use flotor_core::limits::Boundary;
 use flotor_hal::{Capabilities, DVec3, DeviceState, Wrench, rotation_vector};
@@ -81,8 +84,9 @@ fn declared(limit: f64) -> f64 {
 
 /// Where translation or rotation may be, and what it meets outside. Metres and newtons, or radians and newton metres.
 struct Ellipsoid {
+    /// Without end on an axis without range, so that nothing there is beyond it.
     semi_axes: DVec3,
-    /// Their reciprocals; the largest number on an axis without range.
+    /// Their reciprocals.
     per_semi_axis: DVec3,
     /// Effort per way.
     stiffness: f64,
@@ -93,12 +97,16 @@ struct Ellipsoid {
 /// Squared distance from the centre, in semi-axes, below which rounding cannot make an inside of an outside.
 const SURELY_INSIDE: f64 = 1.0 - 1.0e-12;
 
+/// Part of the range that is free of the wall, whatever the margin.
+const LEAST_SHARE_OF_RANGE: f64 = 0.5;
+
 impl Ellipsoid {
     fn new(range: [f64; 3], margin: f64, stiffness: f64, damping: f64) -> Self {
-        let semi_axes = (DVec3::from_array(range) - margin).max(DVec3::ZERO);
-        // The largest number times nothing is nothing: an axis without range cannot move and needs no wall.
-        let per_semi_axis = semi_axes.recip().min(DVec3::splat(f64::MAX));
-        Self { semi_axes, per_semi_axis, stiffness, damping }
+        let range = DVec3::from_array(range);
+        let inside = (range - margin).max(range * LEAST_SHARE_OF_RANGE);
+        // Where nobody says how far the handle goes, nobody knows where a wall belongs.
+        let semi_axes = DVec3::select(range.cmpgt(DVec3::ZERO), inside, DVec3::INFINITY);
+        Self { semi_axes, per_semi_axis: semi_axes.recip(), stiffness, damping }
     }
 
     /// True only inside.
@@ -110,7 +118,8 @@ impl Ellipsoid {
     /// Spring and damper along the ray from the centre; `None` inside. Damping acts outwards only: the wall never
     /// pulls.
     fn push(&self, at: DVec3, velocity: DVec3) -> Option<DVec3> {
-        let beyond = DVec3::select(at.cmpeq(DVec3::ZERO), DVec3::ZERO, at / self.semi_axes).length();
+        let at = DVec3::select(self.semi_axes.cmpeq(DVec3::INFINITY), DVec3::ZERO, at);
+        let beyond = (at / self.semi_axes).length();
         if beyond.is_nan() || beyond <= 1.0 {
             return None;
         }
@@ -142,7 +151,42 @@ mod tests {
             outside += u32::from(pushed);
         }
         assert!((3000..7000).contains(&outside), "{outside} of 10 000");
-        assert!(!ellipsoid.surely_holds(DVec3::NAN) && !ellipsoid.surely_holds(DVec3::Z * 1.0e-300));
+        assert!(!ellipsoid.surely_holds(DVec3::NAN));
+    }
+
+    /// Whatever a device and a scene say, the wall leaves the handle alone at home, and a little beside it, where a sensor's
+    /// noise puts it.
+    #[test]
+    fn a_wall_never_pushes_at_home() {
+        let ranges = [0.0, 1.0e-9, 1.0e-4, 0.012, 1.0, f64::INFINITY];
+        let margins = [0.0, 5.0e-4, 0.012, 0.1, 1.5];
+        for (x, z, margin) in
+            ranges.iter().flat_map(|x| ranges.map(|z| (*x, z))).flat_map(|(x, z)| margins.map(|m| (x, z, m)))
+        {
+            let device = Capabilities { range_m: [x, 0.012, z], range_rad: [z, x, 0.12], ..CAPABILITIES };
+            let boundary = Boundary { margin_m: margin, margin_rad: margin, ..Boundary::default() };
+            let wall = BoundaryWall::new(&boundary, &device, 1_000_000);
+            let noise = |range: f64| if range > 0.0 { 0.2 * range.min(1.0) } else { 1.0e-3 };
+            for share in [0.0, 1.0e-9, 1.0] {
+                let mut state = DeviceState::HOME;
+                let rotation = DVec3::new(noise(z), noise(x), 0.02) * share;
+                let orientation = orientation_from_rotation_vector(rotation);
+                state.pose = Pose::new(DVec3::new(noise(x), 0.002, noise(z)) * share, orientation);
+                assert_eq!(
+                    wall.push(&state),
+                    None,
+                    "range {x} and {z}, margin {margin}, {share} of the noise"
+                );
+            }
+        }
+    }
+
+    /// A planar device that reports a height pushes in its plane only.
+    #[test]
+    fn an_axis_without_range_has_no_part_in_the_push() {
+        let ellipsoid = Ellipsoid::new([0.05, 0.04, 0.0], 5.0e-4, 1.0e4, 15.0);
+        let push = ellipsoid.push(DVec3::new(0.0505, 0.0, 0.3), DVec3::Z * 9.0).expect("a millimetre beyond");
+        assert!((push - DVec3::X * -10.0).length() < 1.0e-9, "{push}");
     }
 
     #[test]

@@ -5,25 +5,29 @@
 //! -> [passivity](super::passivity), and the limits once more if it took something away -> slew limit.
 //!
 //! The slew limit is last, so that no fault upstream, not even a model that vanishes, makes the force jump; the limits
-//! hold after it too, because the limited region is convex and the slew limit only moves along the line from the last
-//! wrench, which was inside, to the new one, which is.
+//! hold after it too, because the limited [regions](region) are convex and the slew limit only moves along the line from the
+//! last wrench, which was inside, to the new one, which is.
+
+mod region;
 
 use super::boundary::BoundaryWall;
 use super::passivity::Passivity;
 use super::state::Gate;
 use crate::port_energy::Controller;
-use flotor_core::limits::{Boundary, Limits};
+use flotor_core::limits::{Bound, Boundary, Limits};
 use flotor_core::trace::Events;
-use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Twist, Wrench};
+use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Wrench};
+use region::Region;
 
 /// Limits of force, torque and their change, and a wall at the edge of the range.
 pub struct Envelope {
-    /// The most that may be sent.
-    max_force_n: DVec3,
-    max_torque_nm: DVec3,
-    /// Velocity above which force components along it are scaled down.
-    max_twist: Twist,
-    /// Fastest change of force (N/s) and torque (N·m/s).
+    /// The most that may be sent, N and N·m.
+    force: Region,
+    torque: Region,
+    /// Velocity (m/s, rad/s) above which force components along it are scaled down.
+    velocity: Region,
+    spin: Region,
+    /// Fastest change of force (N/s) and torque (N·m/s), as norms.
     slew_per_s: [f64; 2],
     wall: BoundaryWall,
     passivity: Passivity,
@@ -35,19 +39,14 @@ impl Envelope {
     /// Combines what the scene allows with what the device declares; the tighter wins. Not real-time.
     #[must_use]
     pub fn new(limits: &Limits, boundary: &Boundary, device: &Capabilities, period_ns: u64) -> Self {
-        // A limit without end is the largest number: what is within a limit is finite.
-        let tighter = |scene: [f64; 3], device: [f64; 3]| {
-            DVec3::from_array(scene).min(DVec3::from_array(device)).min(DVec3::splat(f64::MAX))
-        };
-        let max_force_n = tighter(limits.force_n, device.max_force_n);
-        let max_torque_nm = tighter(limits.torque_nm, device.max_torque_nm);
+        let force_n = limits.force_n.and(Bound::box_of(device.max_force_n));
+        let torque_nm = limits.torque_nm.and(Bound::box_of(device.max_torque_nm));
+        let most = [force_n, torque_nm].map(|bound| DVec3::from_array(bound.axes()));
         Self {
-            max_force_n,
-            max_torque_nm,
-            max_twist: Twist {
-                linear_m_per_s: limits.velocity_m_per_s,
-                angular_rad_per_s: limits.angular_velocity_rad_per_s,
-            },
+            force: Region::of(force_n),
+            torque: Region::of(torque_nm),
+            velocity: Region::of(limits.velocity_m_per_s),
+            spin: Region::of(limits.angular_velocity_rad_per_s),
             slew_per_s: [
                 limits.force_slew_n_per_s.min(device.max_force_slew_n_per_s),
                 limits.torque_slew_nm_per_s.min(device.max_torque_slew_nm_per_s),
@@ -61,17 +60,17 @@ impl Envelope {
                     damping_nms_per_rad: boundary.damping_nms_per_rad,
                     period_s: period_ns as f64 * 1.0e-9,
                 },
-                [max_force_n, max_torque_nm],
+                most,
             ),
             period_ns,
             last: Wrench::ZERO,
         }
     }
 
-    /// The most that may reach the hand: force along each axis (N), torque about each (N·m).
+    /// The most that may reach the hand: force (N), torque (N·m).
     #[must_use]
-    pub fn most(&self) -> [DVec3; 2] {
-        [self.max_force_n, self.max_torque_nm]
+    pub fn most(&self) -> [Bound; 2] {
+        [self.force.bound(), self.torque.bound()]
     }
 
     /// The wrench that goes to the device for what the models ask. Real-time: bounded, no allocation.
@@ -109,14 +108,11 @@ impl Envelope {
     #[inline]
     fn limit_velocity(&self, wrench: Wrench, state: &DeviceState, events: &mut Events) -> Wrench {
         let (velocity, spin) = (state.twist.linear(), state.twist.angular());
-        let (max_velocity, max_spin) = (self.max_twist.linear(), self.max_twist.angular());
-        if is_within(velocity, max_velocity) && is_within(spin, max_spin) {
+        if self.velocity.holds(velocity) && self.spin.holds(spin) {
             return wrench;
         }
         events.insert(Events::VELOCITY_LIMITED);
-        // How many times the limit the fastest axis moves.
-        let excess = (velocity.abs() / max_velocity).max_element();
-        let spin_excess = (spin.abs() / max_spin).max_element();
+        let (excess, spin_excess) = (self.velocity.excess(velocity), self.spin.excess(spin));
         Wrench::new(
             without_drive(wrench.force(), velocity, excess),
             without_drive(wrench.torque(), spin, spin_excess),
@@ -134,19 +130,14 @@ impl Envelope {
     /// Scales force and torque down into their limits.
     #[inline(always)] // 3 ns: its wrench stays in registers
     fn limit_wrench(&self, wrench: Wrench, events: &mut Events) -> Wrench {
-        let (max_force, max_torque) = (self.max_force_n, self.max_torque_nm);
-        if is_within(wrench.force(), max_force) && is_within(wrench.torque(), max_torque) {
+        if self.force.holds(wrench.force()) && self.torque.holds(wrench.torque()) {
             return wrench;
         }
-        let force = shrink_into_box(wrench.force(), max_force);
-        let torque = shrink_into_box(wrench.torque(), max_torque);
-        // On an axis that is not driven nothing is limited: pairing has said that nothing is felt there.
-        let is_cut =
-            |before: DVec3, after: DVec3, most: DVec3| (before.cmpne(after) & most.cmpne(DVec3::ZERO)).any();
-        if is_cut(wrench.force(), force, max_force) {
+        let (force, torque) = (self.force.shrink(wrench.force()), self.torque.shrink(wrench.torque()));
+        if self.force.has_cut(wrench.force(), force) {
             events.insert(Events::FORCE_LIMITED);
         }
-        if is_cut(wrench.torque(), torque, max_torque) {
+        if self.torque.has_cut(wrench.torque(), torque) {
             events.insert(Events::TORQUE_LIMITED);
         }
         Wrench::new(force, torque)
@@ -173,7 +164,11 @@ impl Envelope {
         if force.is_some() || torque.is_some() {
             events.insert(Events::SLEW_LIMITED);
         }
-        Wrench::new(force.unwrap_or(wrench.force()), torque.unwrap_or(wrench.torque()))
+        // A rounding on the way may leave the region.
+        Wrench::new(
+            force.map_or(wrench.force(), |force| self.force.shrink(force)),
+            torque.map_or(wrench.torque(), |torque| self.torque.shrink(torque)),
+        )
     }
 }
 
@@ -187,12 +182,6 @@ fn guard(request: &Wrench, events: &mut Events) -> Wrench {
     Wrench::ZERO
 }
 
-/// True if no part of a vector is larger than `most` of its axis, nor NaN.
-#[inline]
-fn is_within(vector: DVec3, most: DVec3) -> bool {
-    vector.abs().cmple(most).all()
-}
-
 /// A force without the part along the velocity that adds to it, which fades from all at an excess of 1 to nothing at 2.
 fn without_drive(force: DVec3, velocity: DVec3, excess: f64) -> DVec3 {
     let along = velocity.normalize_or_zero();
@@ -202,15 +191,6 @@ fn without_drive(force: DVec3, velocity: DVec3, excess: f64) -> DVec3 {
         return DVec3::ZERO;
     }
     force - along * (drive * (excess - 1.0).clamp(0.0, 1.0))
-}
-
-/// The longest vector of the same direction inside the box, not longer than `vector`. Axes with a half side of zero are left
-/// out: what cannot be driven takes nothing from what can.
-fn shrink_into_box(vector: DVec3, half_sides: DVec3) -> DVec3 {
-    let vector = DVec3::select(half_sides.cmpeq(DVec3::ZERO), DVec3::ZERO, vector);
-    // 0/0 on such an axis is no excess.
-    let excess = (vector.abs() / half_sides).to_array().into_iter().fold(0.0, f64::max);
-    if excess <= 1.0 { vector } else { (vector / excess).clamp(-half_sides, half_sides) }
 }
 
 /// The point `most` from `from` on the way to `to`; `None` if `to` is no farther than that.
@@ -268,7 +248,11 @@ mod tests {
 
     #[test]
     fn nothing_gets_past_limits_and_slew_whatever_a_model_asks() {
-        let limits = Limits { force_n: [30.0, 50.0, 50.0], torque_slew_nm_per_s: 500.0, ..Limits::default() };
+        let limits = Limits {
+            force_n: Bound::box_of([30.0, 50.0, 50.0]),
+            torque_slew_nm_per_s: 500.0,
+            ..Limits::default()
+        };
         let mut envelope = envelope(&limits);
         // The tighter of scene and device.
         let (most_n, most_nm) = (DVec3::new(30.0, 40.0, 50.0), DVec3::new(5.0, 5.0, 10.0));
@@ -295,6 +279,75 @@ mod tests {
             );
             last = sent;
         }
+    }
+
+    /// Random numbers: a linear congruential generator (Knuth's MMIX) is random enough to ask for anything.
+    struct Requests(u64);
+
+    impl Requests {
+        /// Evenly between -1 and 1.
+        fn share(&mut self) -> f64 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        }
+
+        /// A vector of any direction, from a thousandth of `scale` to a thousand times it.
+        fn vector(&mut self, scale: f64) -> DVec3 {
+            let magnitude = scale * 10.0_f64.powf(3.0 * self.share());
+            DVec3::new(self.share(), self.share(), self.share()) * magnitude
+        }
+
+        fn wrench(&mut self) -> Wrench {
+            Wrench::new(self.vector(10.0), self.vector(0.5))
+        }
+    }
+
+    #[test]
+    fn no_request_gets_past_ball_box_device_and_slew_and_a_ball_keeps_the_direction() {
+        let ball = Limits { force_n: Bound::ball(10.0), torque_nm: Bound::ball(0.5), ..Limits::default() };
+        let boxed = Bound::box_of([9.0, 50.0, 4.0]);
+        let both = Limits {
+            force_n: ball.force_n.and(boxed),
+            force_slew_n_per_s: 3000.0,
+            torque_slew_nm_per_s: 200.0,
+            ..ball
+        };
+        let device = Capabilities { max_force_n: [40.0, 7.0, 100.0], ..DEVICE };
+        let guarded =
+            |limits: &Limits, device| Envelope::new(limits, &Boundary::default(), device, PERIOD_NS);
+        let unslewed = Capabilities {
+            max_force_slew_n_per_s: f64::INFINITY,
+            max_torque_slew_nm_per_s: f64::INFINITY,
+            ..DEVICE
+        };
+        let (mut tight, mut free) = (guarded(&both, &device), guarded(&ball, &unslewed));
+        let (mut requests, mut last) = (Requests(1), Wrench::ZERO);
+        let (mut at_the_ball, mut at_the_box) = (0, 0);
+        for index in 0..1_000_000 {
+            let request = requests.wrench();
+            let (sent, _) = apply(&mut tight, request, index);
+            // The limits hold to the bit; a step may be a rounding of the largest number longer.
+            assert!(sent.force().abs().cmple(DVec3::new(9.0, 7.0, 4.0)).all(), "{sent:?}");
+            assert!(sent.force().length_squared() <= 100.0, "{sent:?}");
+            assert!(sent.torque().length_squared() <= 0.25, "{sent:?}");
+            let [step_n, step_nm] =
+                [sent.force() - last.force(), sent.torque() - last.torque()].map(DVec3::length);
+            assert!(step_n <= 3.0 + 1.0e-13 && step_nm <= 0.2 + 1.0e-14, "{sent:?} after {last:?}");
+            last = sent;
+
+            let (short, _) = apply(&mut free, request, index);
+            assert!(short.force().length_squared() <= 100.0 && short.torque().length_squared() <= 0.25);
+            for (asked, sent, most) in
+                [(request.force(), short.force(), 10.0), (request.torque(), short.torque(), 0.5)]
+            {
+                let wanted = asked.length().min(most);
+                assert!((sent.length() - wanted).abs() <= 1.0e-14 * most, "{sent} of {asked}");
+                assert!(sent.cross(asked).length() <= 1.0e-12 * sent.length() * asked.length(), "{sent}");
+            }
+            at_the_ball += u32::from(request.force().length() > 10.0);
+            at_the_box += u32::from(sent.force().z.abs() == 4.0);
+        }
+        assert!(at_the_ball > 300_000 && at_the_box > 1_000, "{at_the_ball} and {at_the_box} of a million");
     }
 
     #[test]
@@ -328,7 +381,7 @@ mod tests {
     #[test]
     fn a_force_that_is_too_large_keeps_its_direction() {
         let asked = DVec3::new(100.0, 50.0, 0.0);
-        let limits = Limits { force_n: [20.0; 3], ..Limits::default() };
+        let limits = Limits { force_n: Bound::box_of([20.0; 3]), ..Limits::default() };
         let (sent, events) = apply(&mut envelope(&limits), Wrench::from_force(asked), 0);
         assert!(sent.force().cross(asked).length() < 1.0e-12);
         assert!(events.intersects(Events::FORCE_LIMITED));
@@ -359,7 +412,7 @@ mod tests {
 
     #[test]
     fn nothing_drives_a_handle_on_that_is_too_fast_and_braking_is_left() {
-        let limits = Limits { velocity_m_per_s: [1.0, 0.5, 1.0], ..Limits::default() };
+        let limits = Limits { velocity_m_per_s: Bound::box_of([1.0, 0.5, 1.0]), ..Limits::default() };
         let mut envelope = envelope(&limits);
         let mut sent = |velocity: DVec3, force: DVec3| {
             let mut state = DeviceState::HOME;
@@ -383,6 +436,19 @@ mod tests {
             DVec3::new(3.0, 2.0, 0.0),
             "each axis has its limit"
         );
+    }
+
+    #[test]
+    fn one_velocity_limit_is_for_the_speed() {
+        let limits = Limits { velocity_m_per_s: Bound::ball(1.0), ..Limits::default() };
+        let mut envelope = envelope(&limits);
+        let mut state = DeviceState::HOME;
+        state.twist.linear_m_per_s = [0.9, 1.2, 0.0]; // 1.5 m/s
+        let along = DVec3::new(0.6, 0.8, 0.0);
+        let mut events = Events::NONE;
+        let sent = envelope.apply(&Wrench::from_force(along), Gate::OPEN, &state, &tick(1), &mut events);
+        assert!((sent.force() - along * 0.5).length() < 1.0e-15, "{sent:?}");
+        assert!(events.intersects(Events::VELOCITY_LIMITED));
     }
 
     #[test]

@@ -41,7 +41,7 @@ pub use forces::CouplingOutcome;
 pub use forces::{Coupled, Forces, Port};
 pub use hot_swap::{HostSwaps, LoopSwaps, swap_queues};
 pub use models::ModelHealth;
-pub use models::{Layer, LayerReport, Replacement};
+pub use models::{Layer, LayerReport, Replacement, pushes_at_home};
 pub use parameters::{
     ChangeReport, ChangeSender, PLUGIN, ParameterChange, ParameterQueue, ReportReceiver, ScheduledChange,
     WEIGHT,

@@ -1,6 +1,7 @@
 //! Everything a servo is made of, its devices open and not yet energised.
 
 use crate::{Envelope, Forces, Heartbeat, LoopSwaps, ParameterQueue, RunConfig, Servo, Station};
+use flotor_core::limits::Bound;
 use flotor_hal::abi::loader::{OpenedDevice, Stopper};
 use flotor_hal::{Axes, DVec3, LoopConfig, Refusal};
 
@@ -46,8 +47,16 @@ impl Standby {
 
     /// The most that may reach a hand at any device: force along each axis (N), torque about each (N·m).
     pub fn most(&self) -> [DVec3; 2] {
-        let most = self.devices.iter().map(|guarded| guarded.envelope.most());
+        let axes = |bound: Bound| DVec3::from_array(bound.axes());
+        let most = self.devices.iter().map(|guarded| guarded.envelope.most().map(axes));
         most.fold([DVec3::ZERO; 2], |[force_n, torque_nm], [f, t]| [force_n.max(f), torque_nm.max(t)])
+    }
+
+    /// Puts other envelopes before the devices, in order; a device without another keeps its own. Not real-time.
+    pub fn guard_with(&mut self, envelopes: Vec<Envelope>) {
+        for (guarded, envelope) in self.devices.iter_mut().zip(envelopes) {
+            guarded.envelope = envelope;
+        }
     }
 
     /// Stops any of the devices, from wherever.

@@ -25,5 +25,5 @@ pub mod telemetry;
 pub use run_recording::RunRecording;
 pub use session::{
     ControlError, Controls, DeviceOutcome, Misbehaved, NewValue, Observer, Outcome, PluginReport, RunError,
-    RunOptions, Session, Steps, prepare_model,
+    RunOptions, Session, Steps, Strength, StrongDevice, prepare_model,
 };

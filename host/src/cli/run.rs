@@ -3,7 +3,7 @@
 use crate::run_picture::RunPicture;
 use clap::Args;
 use flotor_command::options::{
-    ClockOption, PluginKeyValue, core, duration_s, mcap_file, rate_hz, svg_file, whole,
+    ClockOption, PluginKeyValue, StrengthOption, core, duration_s, mcap_file, rate_hz, svg_file, whole,
 };
 use flotor_command::stopping::{Keys, stop_on_signals};
 use flotor_command::{CommandError, first_error, note, print_result, progress_bar, style};
@@ -28,7 +28,8 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:\n  \
     flotor run --duration 5s --plot run.svg\n  \
     flotor run scene.toml --clock virtual --seed 7 --record run.mcap --json run.json\n  \
-    flotor run --set spring.variant=closed-form --set device.hand=press")]
+    flotor run --set spring.variant=closed-form --set device.hand=press\n  \
+    flotor run maglev.toml --allow-strong                 more than 20 N and 1 N·m, where scene and device allow it")]
 pub(crate) struct RunArguments {
     /// Scene file (TOML); without it, the built-in demo
     scene: Option<PathBuf>,
@@ -59,6 +60,8 @@ pub(crate) struct RunArguments {
     /// Set a parameter of a plugin of the scene (repeatable)
     #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
     sets: Vec<PluginKeyValue>,
+    #[command(flatten)]
+    strength: StrengthOption,
 }
 
 pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
@@ -76,7 +79,9 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     }
     let options = RunOptions { clock, seed: arguments.seed };
     let registry = Registry::search(&scene.plugin_folders);
-    let mut session = Session::prepare(&scene, &registry, &options)?.on_core(arguments.core);
+    let session = Session::prepare(&scene, &registry, &options)?;
+    let mut session = session.with_strength(arguments.strength.strength()).on_core(arguments.core);
+    session.notices().into_iter().for_each(note);
     let links = peer_links(&mut session, clock)?;
     let plugins = session.plugins().to_vec();
     let description = describe(&scene, &options, &plugins);

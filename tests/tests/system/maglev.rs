@@ -9,7 +9,7 @@ use flotor_tests::library::{build_folder, plugin_file};
 use flotor_tests::process::Owned;
 use flotor_tests::program::{Flotor, Ran, Running, exit_code};
 use flotor_tests::scratch::Scratch;
-use flotor_tests::watched::watch;
+use flotor_tests::watched::{watch, watch_strong};
 use rustix::process::Signal;
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
@@ -199,6 +199,14 @@ fn a_calibration_that_cannot_be_says_why_and_lets_the_handle_down() {
     assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
     assert!(ran.error().contains("lost contact with the force sensor"), "{}", ran.error());
     emulator.wait_for(&["mode Disarmed"]);
+    let emulator = Emulator::listening("tcp", "127.0.0.1:0", &[]);
+    let ran = calibrate(&emulator, &sensor, &["vertical", "--force", "10,30"]);
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+    assert!(
+        ran.error().contains("the plan needs 30 N; device and host exert at most 20 N"),
+        "{}",
+        ran.error()
+    );
     let missing = scratch.path().join("nowhere");
     let ran = calibrate(&emulator, &missing, &["vertical"]);
     assert!(ran.error().contains("no force sensor at"), "{}", ran.error());
@@ -234,7 +242,7 @@ fn excess_force_is_one_event_with_a_beginning_and_an_end() {
     let hand: Vec<&str> = hand.iter().flat_map(|setting| ["--set", *setting]).collect();
     let emulator = Emulator::start("tcp", &[&["--pace", "lockstep"], hand.as_slice()].concat());
     let scene = emulator.scene("pace = \"lockstep\"").replace("duration_s = 60", "duration_s = 1.5");
-    let records = watch(&format!("{scene}[model.mapping]\nforce_scale = 20.0\n")).records;
+    let records = watch_strong(&format!("{scene}[model.mapping]\nforce_scale = 20.0\n")).records;
     let warned: Vec<bool> =
         records.iter().map(|record| record.events.intersects(Events::EXCESS_FORCE)).collect();
     assert_eq!((warned.first(), warned.last()), (Some(&false), Some(&true)));

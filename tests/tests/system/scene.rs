@@ -1,5 +1,6 @@
 //! An error of a scene is reported in one line: file, line, key, and the closest valid one.
 
+use flotor_core::limits::Bound;
 use flotor_session::scene::Scene;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
@@ -40,9 +41,31 @@ fn spoiled(piece: &str, wrong: &str) -> String {
 fn the_right_scene_is_read_whole() {
     let scene = Scene::parse(Path::new("scene.toml"), RIGHT).expect("nothing is wrong with it");
     assert_eq!(scene.title, "A spring");
-    assert_eq!(scene.limits.force_n, [30.0, 30.0, 60.0]);
+    assert_eq!(scene.limits.force_n, Bound::box_of([30.0, 30.0, 60.0]));
     assert_eq!(scene.models.len(), 1);
     assert!((scene.boundary.margin_m - 0.5e-3).abs() < 1.0e-18);
+}
+
+#[test]
+fn one_number_is_a_norm_three_are_axes_and_a_table_is_both() {
+    for (written, bound) in [
+        ("5", Bound::ball(5.0)),
+        ("[5, 6, 7]", Bound::box_of([5.0, 6.0, 7.0])),
+        ("{ norm = 5, axes = [9, 9, 3] }", Bound::ball(5.0).and(Bound::box_of([9.0, 9.0, 3.0]))),
+        ("inf", Bound::NONE),
+    ] {
+        for key in ["force_n", "torque_nm", "velocity_m_per_s", "angular_velocity_rad_per_s"] {
+            let text = RIGHT.replace("force_n = [30, 30, 60]", &format!("{key} = {written}"));
+            let limits = Scene::parse(Path::new("scene.toml"), &text).expect("it is legal").limits;
+            let read = match key {
+                "force_n" => limits.force_n,
+                "torque_nm" => limits.torque_nm,
+                "velocity_m_per_s" => limits.velocity_m_per_s,
+                _ => limits.angular_velocity_rad_per_s,
+            };
+            assert_eq!(read, bound, "{key} = {written}");
+        }
+    }
 }
 
 #[test]
@@ -79,8 +102,26 @@ fn wrong_types_and_ranges_say_what_would_be_right() {
         ("rate_hz = 1000", "rate_hz = \"fast\"", "scene.toml:2: `rate_hz` is a number"),
         ("rate_hz = 1000", "rate_hz = 5", "`rate_hz` = 5: legal is 100 to 10000"),
         ("rate_hz = 1000", "rate_hz = nan", "`rate_hz` = NaN: legal is 100 to 10000"),
-        ("[30, 30, 60]", "[30, 30]", "`limits.force_n` is a list of 3 numbers"),
-        ("[30, 30, 60]", "-1", "`limits.force_n` = -1"),
+        (
+            "[30, 30, 60]",
+            "[30, 30]",
+            "scene.toml:14: `limits.force_n` is one number, the largest norm, or three",
+        ),
+        (
+            "[30, 30, 60]",
+            "\"10 N\"",
+            "scene.toml:14: `limits.force_n` is one number, the largest norm, or three",
+        ),
+        ("[30, 30, 60]", "-1", "scene.toml:14: `limits.force_n` = -1: legal is 0 or more"),
+        ("[30, 30, 60]", "[30, nan, 60]", "`limits.force_n` = NaN: legal is 0 or more"),
+        ("[30, 30, 60]", "{ norm = 5 }", "scene.toml:14: `limits.force_n.axes` is missing"),
+        ("[30, 30, 60]", "{ norm = -5, axes = [1, 1, 1] }", "`limits.force_n.norm` = -5: legal is 0 or more"),
+        ("[30, 30, 60]", "{ norm = 5, axis = [1, 1, 1] }", "`limits.force_n.axis`; did you mean `axes`?"),
+        (
+            "force_n = [30, 30, 60]",
+            "velocity_m_per_s = 0",
+            "`limits.velocity_m_per_s` = 0: legal is 0 or more.000001",
+        ),
         ("[device]\nplugin = \"simulated\"", "", "scene.toml:1: `device` is missing"),
         ("plugin = \"spring\"", "", "`model.plugin` is missing"),
         ("plugin = \"spring\"", "plugin = 3", "`model.plugin` is text in quotes"),

@@ -170,6 +170,7 @@ fn simulated(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, Com
 fn device(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, CommandError> {
     let check = Plan { forces_n: plan.forces_n.iter().copied().take(1).collect(), runs: 1, ..plan.clone() };
     let (mut rig, progress) = arguments.rig.device_rig(plan.stops() + check.stops())?;
+    rig.check(plan).map_err(refused)?;
     let serial = rig.serial().to_owned();
     let readings = measure(&mut rig, plan, || progress.inc(1)).map_err(refused)?;
     let (fit, report) = (fit(&readings).map_err(refused)?, report(plan)?);

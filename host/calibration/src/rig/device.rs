@@ -3,8 +3,9 @@
 use super::holder::{Guard, Holder, Holding, REST_M};
 use super::{PERIOD_NS, Rest, Rig};
 use crate::CalibrationError;
+use crate::procedure::Plan;
 use crate::sensor::ForceSensor;
-use flotor_core::limits::{Boundary, Limits};
+use flotor_core::limits::{Boundary, CEILING, Limits};
 use flotor_hal::abi::loader::{OpenedDevice, Plugin, Setting};
 use flotor_hal::{Fault, LoopConfig, Refusal, VerticalCalibration};
 use flotor_servo::{Envelope, StopSwitch};
@@ -30,7 +31,7 @@ pub struct DeviceRig<W> {
     /// Nothing while it is held, and after it was lost.
     opened: Option<OpenedDevice>,
     holder: Option<Holder>,
-    /// Most vertical force the device takes, N.
+    /// Most vertical force the device takes and the host sends, N.
     most_n: f64,
     stop: StopSwitch,
     sensor: ForceSensor,
@@ -65,7 +66,7 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
         Ok(Self {
             opened: Some(opened),
             holder: None,
-            most_n,
+            most_n: most_n.min(CEILING.force_n),
             stop,
             sensor,
             restless: 0,
@@ -80,6 +81,17 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
     #[must_use]
     pub fn serial(&self) -> &str {
         &self.serial
+    }
+
+    /// That no force of a plan is too strong, before the first of them is measured.
+    ///
+    /// # Errors
+    /// [`CalibrationError::TooStrong`] with the first that is.
+    pub fn check(&self, plan: &Plan) -> Result<(), CalibrationError> {
+        let too_strong = plan.forces_n.iter().find(|command_n| **command_n > self.most_n);
+        too_strong.map_or(Ok(()), |command_n| {
+            Err(CalibrationError::TooStrong { command_n: *command_n, most_n: self.most_n })
+        })
     }
 
     /// Corrects the force by this from now on. The handle is let down before.
@@ -105,7 +117,8 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
         if let (None, Some(mut opened)) = (&self.holder, self.opened.take()) {
             let config = LoopConfig { period_ns: PERIOD_NS, seed: 0 };
             let capabilities = opened.capabilities().map_err(CalibrationError::Refused)?;
-            let envelope = Envelope::new(&Limits::default(), &without_wall(), &capabilities, PERIOD_NS);
+            let limits = Limits::default().under(CEILING);
+            let envelope = Envelope::new(&limits, &without_wall(), &capabilities, PERIOD_NS);
             let guard = Guard { envelope, stopper: opened.stopper(), stop: self.stop.clone() };
             let active = opened.activate(&config).map_err(|(opened, refusal)| {
                 self.opened = Some(opened);

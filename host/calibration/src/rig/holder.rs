@@ -256,6 +256,10 @@ fn hold(
         let vertical_n = if ran_away { -BRAKE_NS_PER_M * speed_m_per_s } else { pushed_n };
         let (asked, mut events) = (locked(&state, vertical_n), Events::NONE);
         let commanded = envelope.apply(&asked, gate, &state, &tick, &mut events);
+        if events.intersects(Events::FORCE_LIMITED) {
+            // Less than was ordered is never taken for it.
+            averages.begin_anew();
+        }
         heart.enter(index, Place::DeviceWrite(0));
         let written = device.write(&tick, &commanded);
         heart.enter(index, Place::Waiting);

@@ -78,7 +78,8 @@ impl SafeStop for NothingMoves {
 }
 
 impl Device for Scripted {
-    const INFO: DeviceInfo = DeviceInfo::new(SCRIPTED, "Scripted device", "A handle that follows a script");
+    const INFO: DeviceInfo =
+        DeviceInfo::new(SCRIPTED, "Scripted device", "A handle that follows a script").simulated();
     type Active = Following;
     type Stop = NothingMoves;
 

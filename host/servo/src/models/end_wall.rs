@@ -13,6 +13,13 @@ const DAMPING_NS_PER_M: f64 = 15.0;
 /// Its stiffness at 1 kHz and faster, N/m: that of the [boundary](flotor_core::limits::Boundary).
 const MOST_STIFFNESS_N_PER_M: f64 = 10_000.0;
 
+/// True if a wall at the end of a model in this place would push a handle at the home of its device. Real-time: bounded, no
+/// allocation.
+#[must_use]
+pub fn pushes_at_home(bounds: &WorkspaceBounds, mapping: &Mapping) -> bool {
+    bounds.is_bounded() && bounds.beyond(mapping.pose_to_model(&Pose::HOME).position()) != DVec3::ZERO
+}
+
 /// The wall of one object.
 pub(super) struct EndWall {
     bounds: WorkspaceBounds,
@@ -21,15 +28,21 @@ pub(super) struct EndWall {
 
 impl EndWall {
     /// A wall as stiff as the period allows; `None` for a model that has no end. Not real-time.
-    pub(super) fn new(bounds: &WorkspaceBounds, config: &LoopConfig) -> Option<Self> {
+    pub(super) fn new(bounds: &WorkspaceBounds, mapping: &Mapping, config: &LoopConfig) -> Option<Self> {
         let stable_n_per_m = stable_stiffness(DAMPING_NS_PER_M, config.period_ns);
         let stiffness_n_per_m = MOST_STIFFNESS_N_PER_M.min(stable_n_per_m);
-        bounds.is_bounded().then_some(Self { bounds: *bounds, stiffness_n_per_m })
+        bounds.is_bounded().then(|| {
+            let mut wall = Self { bounds: WorkspaceBounds::UNBOUNDED, stiffness_n_per_m };
+            wall.move_to(bounds, mapping);
+            wall
+        })
     }
 
-    /// The model ends elsewhere now, or nowhere. Real-time: bounded, no allocation.
-    pub(super) fn move_to(&mut self, bounds: &WorkspaceBounds) {
-        self.bounds = if bounds.is_bounded() { *bounds } else { WorkspaceBounds::UNBOUNDED };
+    /// The model ends elsewhere now, or nowhere; an end that would push at the home of the device is none. Real-time:
+    /// bounded, no allocation.
+    pub(super) fn move_to(&mut self, bounds: &WorkspaceBounds, mapping: &Mapping) {
+        let is_wall = bounds.is_bounded() && !pushes_at_home(bounds, mapping);
+        self.bounds = if is_wall { *bounds } else { WorkspaceBounds::UNBOUNDED };
     }
 
     /// Its push in the device frame on a handle at a pose in the model's frame that moves so in the device's; `None` within
@@ -59,7 +72,8 @@ mod tests {
     fn wall_at(period_ns: u64) -> EndWall {
         let inf = f64::INFINITY;
         let bounds = WorkspaceBounds::between([-inf, -inf, -1.0e-3], [inf; 3]);
-        EndWall::new(&bounds, &LoopConfig { period_ns, seed: 0 }).expect("it ends")
+        let mapping = Mapping::new(&MappingConfig::default());
+        EndWall::new(&bounds, &mapping, &LoopConfig { period_ns, seed: 0 }).expect("it ends")
     }
 
     /// The push of a wall on a handle that is and moves along z of the device.
@@ -106,7 +120,19 @@ mod tests {
     fn a_model_may_end_elsewhere_after_a_change() {
         let mapping = Mapping::new(&MappingConfig::default());
         let mut wall = wall_at(1_000_000);
-        wall.move_to(&WorkspaceBounds::UNBOUNDED);
+        wall.move_to(&WorkspaceBounds::UNBOUNDED, &mapping);
         assert_eq!(push(&wall, &mapping, -1.0, 0.0), None);
+    }
+
+    /// A model placed two millimetres above the device's home ends a millimetre above it.
+    #[test]
+    fn an_end_above_the_home_of_the_device_is_no_wall() {
+        let mapping = Mapping::new(&MappingConfig::default()).at([0.0, 0.0, 2.0e-3]);
+        let mut wall = wall_at(1_000_000);
+        let bounds = wall.bounds;
+        assert!(pushes_at_home(&bounds, &mapping) && push(&wall, &mapping, 0.0, 0.0).is_some());
+        wall.move_to(&bounds, &mapping);
+        assert_eq!(push(&wall, &mapping, 0.0, 0.0), None);
+        assert_eq!(push(&wall, &mapping, -9.0, 0.0), None, "not even far beyond");
     }
 }

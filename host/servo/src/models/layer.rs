@@ -129,7 +129,7 @@ impl Layer {
         let served = |(model, _): &(Engine, Mapping)| Demand::ALL.limited_to(model.serves());
         let demand = instances.first().map_or(Demand::ALL, served);
         let object = |(mut model, mapping): (Engine, Mapping)| {
-            let end = EndWall::new(&model.workspace_bounds(), config);
+            let end = EndWall::new(&model.workspace_bounds(), &mapping, config);
             Object { model, mapping, end, last: None, stepped_at: None, is_out: false }
         };
         let mut objects: Box<[Object]> = instances.into_iter().map(object).collect();
@@ -229,7 +229,7 @@ impl Layer {
                 continue;
             }
             if let Some(end) = &mut object.end {
-                end.move_to(&object.model.workspace_bounds());
+                end.move_to(&object.model.workspace_bounds(), &object.mapping);
             }
             if self.broad.bounds(index).is_some() {
                 let bounds = object.bounds();

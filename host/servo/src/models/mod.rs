@@ -10,6 +10,7 @@ mod fade;
 mod layer;
 mod slot;
 
+pub use end_wall::pushes_at_home;
 pub use layer::ModelHealth;
 pub use layer::{Layer, LayerReport};
 

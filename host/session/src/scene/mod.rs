@@ -397,8 +397,8 @@ fn legal_watchdog_s(watchdog_s: f64, rate_hz: f64, place: Location) -> Result<f6
 fn limits(mut section: Section<'_>, rate_hz: f64) -> Result<Limits, SceneError> {
     let default = Limits::default();
     let limits = Limits {
-        force_n: section.three("force_n", 0.0..=f64::INFINITY)?.unwrap_or(default.force_n),
-        torque_nm: section.three("torque_nm", 0.0..=f64::INFINITY)?.unwrap_or(default.torque_nm),
+        force_n: section.bound("force_n", 0.0..=f64::INFINITY)?.unwrap_or(default.force_n),
+        torque_nm: section.bound("torque_nm", 0.0..=f64::INFINITY)?.unwrap_or(default.torque_nm),
         force_slew_n_per_s: section
             .number("force_slew_n_per_s", 1.0..=f64::INFINITY)?
             .unwrap_or(default.force_slew_n_per_s),
@@ -406,10 +406,10 @@ fn limits(mut section: Section<'_>, rate_hz: f64) -> Result<Limits, SceneError> 
             .number("torque_slew_nm_per_s", 0.01..=f64::INFINITY)?
             .unwrap_or(default.torque_slew_nm_per_s),
         velocity_m_per_s: section
-            .three("velocity_m_per_s", 1.0e-6..=f64::INFINITY)?
+            .bound("velocity_m_per_s", 1.0e-6..=f64::INFINITY)?
             .unwrap_or(default.velocity_m_per_s),
         angular_velocity_rad_per_s: section
-            .three("angular_velocity_rad_per_s", 1.0e-6..=f64::INFINITY)?
+            .bound("angular_velocity_rad_per_s", 1.0e-6..=f64::INFINITY)?
             .unwrap_or(default.angular_velocity_rad_per_s),
         ramp_s: section.number("ramp_s", 0.0..=60.0)?.unwrap_or(default.ramp_s),
         watchdog_s: section

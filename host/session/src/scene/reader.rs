@@ -5,6 +5,7 @@
 
 use super::ParameterText;
 pub use flotor_hal::abi::loader::nearest;
+use flotor_core::limits::Bound;
 use std::borrow::Cow;
 use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};
@@ -79,6 +80,8 @@ pub(super) enum Takes {
     Number(RangeInclusive<f64>),
     /// Three of them, or one for all.
     Three(RangeInclusive<f64>),
+    /// One number, a norm; three, one for each axis; or a table with both.
+    Bound(RangeInclusive<f64>),
     /// A table.
     Table,
     /// A list of tables.
@@ -209,6 +212,29 @@ impl<'t> Section<'t> {
         range: RangeInclusive<f64>,
     ) -> Result<Option<[f64; 3]>, SceneError> {
         self.take_as(key, Takes::Three(range.clone())).map(|value| value.three(range)).transpose()
+    }
+
+    /// Takes the bound of a vector, if it is there, and checks that its numbers lie in `range`: a norm, a number for each
+    /// axis, or a table with both.
+    pub(super) fn bound(
+        &mut self,
+        key: &'static str,
+        range: RangeInclusive<f64>,
+    ) -> Result<Option<Bound>, SceneError> {
+        if matches!(self.table.get(key).map(Spanned::get_ref), Some(DeValue::Table(_)))
+            && let Some(mut both) = self.section(key)?
+        {
+            let norm = both.require("norm")?.number(range.clone())?;
+            let axes = both.require("axes")?.axes(range)?;
+            both.finish()?;
+            return Ok(Some(Bound::ball(norm).and(Bound::box_of(axes))));
+        }
+        let Some(value) = self.take_as(key, Takes::Bound(range.clone())) else { return Ok(None) };
+        match (parse_number(&value.value), &value.value) {
+            (Some(norm), _) => value.in_range(norm, &range).map(|norm| Some(Bound::ball(norm))),
+            (None, DeValue::Array(_)) => value.axes(range).map(|axes| Some(Bound::box_of(axes))),
+            (None, _) => Err(value.no_bound()),
+        }
     }
 
     /// Takes a sub-table, if it is there.
@@ -367,6 +393,20 @@ impl Value<'_> {
             self.in_range(number, &range)?;
         }
         Ok(numbers)
+    }
+
+    /// A number in `range` for each axis.
+    fn axes(self, range: RangeInclusive<f64>) -> Result<[f64; 3], SceneError> {
+        let axes = self.numbers::<3>().map_err(|_| self.no_bound())?;
+        axes.iter().try_for_each(|axis| self.in_range(*axis, &range).map(drop))?;
+        Ok(axes)
+    }
+
+    fn no_bound(&self) -> SceneError {
+        self.problem(format!(
+            "`{}` is one number, the largest norm, or three, the largest along each axis",
+            self.key
+        ))
     }
 
     /// A whole number in `range`.

@@ -76,6 +76,9 @@ fn words(takes: &Takes) -> String {
         Takes::Value => String::new(),
         Takes::Number(range) => format!("a number, {}", legal(range)),
         Takes::Three(range) => format!("three numbers, or one for all, {}", legal(range)),
+        Takes::Bound(range) => {
+            format!("one number, a norm; three, one for each axis; or `{{ norm, axes }}`; {}", legal(range))
+        }
         Takes::Table => "a table".to_owned(),
         Takes::Tables => "tables, any number of them".to_owned(),
     }

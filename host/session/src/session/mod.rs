@@ -1,23 +1,27 @@
 //! From a scene to a run: loads what the scene names, pairs it, runs the loop, lets others watch and change it.
 
+mod ceiling;
 mod choice;
 mod controls;
 mod prepare;
 mod steps;
 
+pub use ceiling::{Strength, StrongDevice};
 pub use controls::{ControlError, Controls, Misbehaved, NewValue};
 pub use prepare::prepare_model;
 pub use steps::Steps;
 
 use crate::registry::{LookupError, Registry};
 use crate::scene::{Pacing, Scene, SceneError};
+use ceiling::{norm_notice, under_ceiling};
 use controls::{ChangeLog, Parts};
 use flotor_core::Change;
 use flotor_core::MOST_DEVICES;
+use flotor_core::limits::Limits;
 use flotor_core::trace::TickRecord;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, Stopper};
-use flotor_hal::{DVec3, EnergyLedger, Fault, LoopConfig, Parameter};
+use flotor_hal::{Capabilities, DVec3, EnergyLedger, Fault, LoopConfig, Parameter};
 use flotor_live::WrenchLimits;
 use flotor_servo::coupling::{Line, Patience};
 use flotor_servo::{
@@ -125,6 +129,11 @@ pub struct Session {
     core: Option<Core>,
     plugins: Vec<PluginReport>,
     lines: Vec<(String, Line)>,
+    strength: Strength,
+    strong_devices: Vec<StrongDevice>,
+    /// Of the devices, in order, as scene and device allow: without the host's ceiling.
+    strong_envelopes: Vec<Envelope>,
+    norm_notice: Option<String>,
 }
 
 /// What is known after a run.
@@ -222,8 +231,19 @@ impl Session {
         let controls =
             Controls::new(parts.clone(), sender, &scene.models, (config, options.clock), host_swaps);
 
+        let capabilities: Vec<_> = opened.iter().map(|opened| opened.capabilities).collect();
+        let guard = |limits: &Limits, device: &Capabilities| {
+            Envelope::new(limits, &scene.boundary, device, period_ns)
+        };
+        let strong_envelopes = capabilities.iter().map(|device| guard(&scene.limits, device)).collect();
+        let strong_devices = scene.devices.iter().zip(&opened).filter_map(|(device, opened)| {
+            let names = [device.name.as_str(), device.plugin.plugin.as_str()];
+            StrongDevice::of(names, opened.embodiment, &scene.limits, &opened.capabilities)
+        });
+        let strong_devices = strong_devices.collect();
         let devices = opened.into_iter().map(|opened| {
-            let envelope = Envelope::new(&scene.limits, &scene.boundary, &opened.capabilities, period_ns);
+            let limits = under_ceiling(&scene.limits, opened.embodiment);
+            let envelope = guard(&limits, &opened.capabilities);
             Guarded { device: opened.device, sensed: opened.capabilities.sensed, envelope }
         });
         let devices: Vec<_> = devices.collect();
@@ -254,7 +274,47 @@ impl Session {
             core: None,
             plugins,
             lines,
-        })
+            strength: Strength::UnderCeiling,
+            strong_devices,
+            strong_envelopes,
+            norm_notice: norm_notice(&scene.limits, &capabilities),
+        }
+        .with_strength(Strength::of_the_environment()))
+    }
+
+    /// The same without the host's ceiling: the devices are as strong as they and the scene allow. Only a person who knows
+    /// the device should say so; a scene cannot. Not real-time.
+    #[must_use]
+    pub fn allow_strong(mut self) -> Self {
+        self.standby.guard_with(std::mem::take(&mut self.strong_envelopes));
+        self.strength = Strength::Strong;
+        self
+    }
+
+    /// [`Session::allow_strong`], if this is strong; otherwise the same. Not real-time.
+    #[must_use]
+    pub fn with_strength(self, strength: Strength) -> Self {
+        match (strength, self.strength) {
+            (Strength::Strong, Strength::UnderCeiling) => self.allow_strong(),
+            _ => self,
+        }
+    }
+
+    /// The devices that would get more without the host's ceiling, in the scene's order; none once that is
+    /// [lifted](Self::allow_strong).
+    #[must_use]
+    pub fn held_back(&self) -> &[StrongDevice] {
+        match self.strength {
+            Strength::UnderCeiling => &self.strong_devices,
+            Strength::Strong => &[],
+        }
+    }
+
+    /// What a person should know of the limits before the run, a line each. Not real-time.
+    #[must_use]
+    pub fn notices(&self) -> Vec<String> {
+        let strong = self.strong_devices.iter().map(|device| device.notice(self.strength));
+        self.norm_notice.iter().cloned().chain(strong).collect()
     }
 
     /// The same with the loop on this core, on the real clock.

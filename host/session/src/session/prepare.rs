@@ -13,10 +13,12 @@ use flotor_core::limits::Boundary;
 use flotor_core::mapping::Mapping;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting};
-use flotor_hal::{Axes, Capabilities, LoopConfig, Parameter, ParameterKind, Refusal};
+use flotor_hal::{Axes, Capabilities, Embodiment, LoopConfig, Parameter, ParameterKind, Refusal};
 use flotor_servo::engine::asynchronous::AsynchronousModel;
 use flotor_servo::engine::process::{Worker, WorkerOrder};
-use flotor_servo::{Clock, Engine, Layer, Replacement, ScheduledChange, Servo, Standby, TimeBudget};
+use flotor_servo::{
+    Clock, Engine, Layer, Replacement, ScheduledChange, Servo, Standby, TimeBudget, pushes_at_home,
+};
 use std::borrow::Cow;
 
 pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
@@ -58,6 +60,7 @@ fn calibrate(
 pub(super) struct Opened {
     pub(super) device: OpenedDevice,
     pub(super) capabilities: Capabilities,
+    pub(super) embodiment: Embodiment,
 }
 
 /// Loads and opens one device of a scene. Not real-time.
@@ -74,7 +77,8 @@ pub(super) fn open_device(
     if let Some(calibration) = calibration {
         calibrate(&plugin, &mut device, calibration)?;
     }
-    Ok((Opened { device, capabilities }, report))
+    let embodiment = plugin.device_info().map_or(Embodiment::Physical, |info| info.embodiment());
+    Ok((Opened { device, capabilities, embodiment }, report))
 }
 
 /// Loads one model of a scene and creates it in all its places. Not real-time.
@@ -121,7 +125,16 @@ pub fn prepare_model(
                 Engine::Process(Worker::start(&order).map_err(|refusal| refused(plugin.metadata(), refusal))?)
             }
         };
-        Ok((engine, mapping.at(*place_m)))
+        let (mut engine, mapping) = (engine, mapping.at(*place_m));
+        if pushes_at_home(&engine.workspace_bounds(), &mapping) {
+            let problem = format!(
+                "at {:?} mm the model ends before the home of its device, and the wall at its end would push there; move it \
+                 (`position_mm`) or make it longer",
+                place_m.map(|m| m * 1.0e3)
+            );
+            return Err(complain(model, &problem).into());
+        }
+        Ok((engine, mapping))
     };
     let mut instances = model.places_m.iter().map(instance).collect::<Result<Vec<_>, RunError>>()?;
     let mut value = |index| instances.first_mut().map_or(f64::NAN, |(first, _)| first.parameter(index));
@@ -248,7 +261,7 @@ pub(super) fn pair(scene: &Scene, number: u16, device: &Capabilities, can_pace: 
     let is_felt = scene.models.iter().any(|model| model.device == number)
         || scene.couplings.iter().any(|coupling| coupling.ends.here().iter().any(|end| end.device == number));
     if is_felt {
-        mismatches.extend(unfelt(&scene.limits.force_n, device));
+        mismatches.extend(unfelt(&scene.limits.force_n.axes(), device));
     }
     mismatches
 }

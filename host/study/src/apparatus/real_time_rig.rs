@@ -62,6 +62,7 @@ impl<'a> RealTimeRig<'a> {
     ) -> Result<Self, OutsideError> {
         let options = RunOptions { clock: Clock::Real, seed: 0 };
         let session = Session::prepare(apparatus.scene(), apparatus.registry(), &options)?;
+        let session = session.with_strength(apparatus.strength());
         let controls = session.controls();
         apparatus.show(&controls, false)?;
         let (shared, stop) = (Shared::default(), stop.clone());

@@ -3,13 +3,16 @@
 
 use crate::observer::HandManner;
 use crate::protocol::{Protocol, ProtocolError, Stimulus, SubjectNumber};
+use flotor_core::limits::CEILING;
 use flotor_hal::{Mutability, Parameter, ParameterKind};
 use flotor_record::RunDescription;
 use flotor_servo::Clock;
 use flotor_session::registry::Registry;
 use flotor_session::run_description::describe;
 use flotor_session::scene::{Location, ModelUse, ParameterText, Scene, nearest};
-use flotor_session::{ControlError, Controls, NewValue, PluginReport, RunError, RunOptions, Session};
+use flotor_session::{
+    ControlError, Controls, NewValue, PluginReport, RunError, RunOptions, Session, Strength, StrongDevice,
+};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -72,6 +75,15 @@ pub enum ApparatusError {
         /// What the model said.
         cause: Box<RunError>,
     },
+    /// The ceiling of the host could cut a stimulus off, and nobody would see it in the answers.
+    #[error(
+        "{device}, and the host sends at most {} N and {} N·m: a stimulus above that would be felt as another. Set `[limits] force_n` and `torque_nm` to no more than that, or give `--allow-strong`",
+        CEILING.force_n, CEILING.torque_nm
+    )]
+    HeldBack {
+        /// It.
+        device: StrongDevice,
+    },
     /// A simulated observer needs a hand to feel with.
     #[error(
         "the device `{device}` has no simulated hand for simulated observers (it lacks `{missing}`); use --observer human, a scene with the device `simulated`, or --apparatus none"
@@ -103,6 +115,8 @@ pub struct Apparatus {
     weight: f64,
     fade_s: f64,
     plugins: Vec<PluginReport>,
+    strength: Strength,
+    notices: Vec<String>,
 }
 
 /// The scene runs as long as the experiment lasts.
@@ -126,14 +140,31 @@ impl Apparatus {
     ///
     /// # Errors
     /// [`ApparatusError`], the first thing that cannot be.
-    pub fn check(mut scene: Scene, protocol: &Protocol) -> Result<Self, ApparatusError> {
+    pub fn check(scene: Scene, protocol: &Protocol) -> Result<Self, ApparatusError> {
+        Self::check_with(scene, protocol, Strength::UnderCeiling)
+    }
+
+    /// The same on devices of a strength. Where more than the host's ceiling could be commanded and is not allowed, the
+    /// experiment is refused. Not real-time; nothing is energised.
+    ///
+    /// # Errors
+    /// [`ApparatusError`], the first thing that cannot be.
+    pub fn check_with(
+        mut scene: Scene,
+        protocol: &Protocol,
+        strength: Strength,
+    ) -> Result<Self, ApparatusError> {
         scene.duration_s = DURATION_S;
         let registry = Registry::search(&scene.plugin_folders);
         let stimulus = protocol.stimulus().clone();
         let model = find_model(&scene, &stimulus)?;
         let (weight, fade_s, name) = (model.blend.weight, model.blend.fade_s, model.name.clone());
-        let session = Session::prepare(&scene, &registry, &options(Clock::Virtual, 0))?;
-        let plugins = session.plugins().to_vec();
+        let session =
+            Session::prepare(&scene, &registry, &options(Clock::Virtual, 0))?.with_strength(strength);
+        if let Some(device) = session.held_back().first() {
+            return Err(ApparatusError::HeldBack { device: device.clone() });
+        }
+        let (plugins, notices) = (session.plugins().to_vec(), session.notices());
         drop(session);
         let schema = plugins.iter().skip(1).find(|plugin| plugin.name == name);
         let parameter = find_number(schema.map_or(&[], |plugin| plugin.schema), &stimulus)?;
@@ -143,7 +174,7 @@ impl Apparatus {
             Mutability::Fixed => Route::Swap,
         };
         let stimulus = Stimulus { model: name, ..stimulus };
-        let apparatus = Self { scene, registry, stimulus, route, weight, fade_s, plugins };
+        let apparatus = Self { scene, registry, stimulus, route, weight, fade_s, plugins, strength, notices };
         for value in protocol.extremes() {
             let scene = apparatus.with_stimulus(value);
             let refused = |cause| ApparatusError::Refused {
@@ -154,6 +185,17 @@ impl Apparatus {
             Session::prepare(&scene, &apparatus.registry, &options(Clock::Virtual, 0)).map_err(refused)?;
         }
         Ok(apparatus)
+    }
+
+    /// What a person should know of the limits before the first trial, a line each.
+    #[must_use]
+    pub fn notices(&self) -> &[String] {
+        &self.notices
+    }
+
+    /// How strong its devices may be.
+    pub(super) fn strength(&self) -> Strength {
+        self.strength
     }
 
     /// Whether the first device has a hand a simulated observer can feel with.

@@ -22,7 +22,7 @@ use choices::{
     BoundaryChoice, FirstChoice, ForceWay, NoiseOption, PresentationOption, ProcedureChoice, range,
 };
 use clap::{Args, Subcommand, ValueEnum};
-use flotor_command::options::{PluginKeyValue, count, duration_s, real, whole};
+use flotor_command::options::{PluginKeyValue, StrengthOption, count, duration_s, real, whole};
 use flotor_command::say;
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, progress_bar, style};
@@ -138,6 +138,8 @@ struct Common {
     /// Response to a handle that leaves its range
     #[arg(long, value_enum, default_value_t)]
     boundary: BoundaryChoice,
+    #[command(flatten)]
+    strength: StrengthOption,
 }
 
 #[derive(Args)]
@@ -368,7 +370,9 @@ fn set(scene: &mut Scene, texts: &[&str]) -> Result<(), CommandError> {
 fn carry_out(common: &Common, protocol: Protocol, way: Option<ForceWay>) -> Result<(), CommandError> {
     protocol.check().map_err(|error| CommandError::Usage(error.to_string()))?;
     let scene = common.scene(protocol.stimulus(), way)?;
-    let apparatus = Apparatus::check(scene, &protocol).map_err(unfit)?;
+    let strength = common.strength.strength();
+    let apparatus = Apparatus::check_with(scene, &protocol, strength).map_err(unfit)?;
+    apparatus.notices().iter().for_each(flotor_command::note);
     match (common.observer, common.apparatus) {
         (ObserverOption::Human, _) => person::sit(common, &protocol, &apparatus),
         (ObserverOption::Simulated, PresentationOption::Scene) => {

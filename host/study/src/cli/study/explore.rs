@@ -5,10 +5,10 @@ use super::front::lines_of;
 use crate::apparatus::watch::Shared;
 use crate::kinematics::{KinematicsMeter, StimulusKinematics};
 use clap::Args;
-use flotor_command::options::PluginKeyValue;
+use flotor_command::options::{PluginKeyValue, StrengthOption};
 use flotor_command::say;
 use flotor_command::stopping::stop_on_signals;
-use flotor_command::{CommandError, style};
+use flotor_command::{CommandError, note, style};
 use flotor_core::Change;
 use flotor_hal::{Parameter, ParameterKind};
 use flotor_live::Directory;
@@ -49,6 +49,8 @@ pub(super) struct ExploreArguments {
     /// Set a parameter of a plugin of the scene (repeatable)
     #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
     sets: Vec<PluginKeyValue>,
+    #[command(flatten)]
+    strength: StrengthOption,
 }
 
 pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
@@ -57,6 +59,8 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     let registry = Registry::search(&scene.plugin_folders);
     let options = RunOptions { clock: Clock::Real, seed: 0 };
     let session = Session::prepare(&scene, &registry, &options)?;
+    let session = session.with_strength(arguments.strength.strength());
+    session.notices().into_iter().for_each(note);
     let model =
         scene.models.first().map(|model| model.name.clone()).ok_or_else(|| {
             CommandError::Usage(format!("{}: the scene has no model to explore", scene.title))

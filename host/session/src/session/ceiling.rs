@@ -1,0 +1,177 @@
+//! The host's ceiling: the most it sends to a device that does not declare itself simulated, unless a person allows more.
+
+use flotor_core::limits::{Bound, CEILING, Ceiling, Limits};
+use flotor_hal::{Capabilities, Embodiment};
+
+/// How strong the devices of a session may be.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Strength {
+    /// At most the host's [ceiling](CEILING), but for simulated devices.
+    #[default]
+    UnderCeiling,
+    /// As strong as scene and device allow: somebody has said so, and not in the scene.
+    Strong,
+}
+
+/// Variable that allows strong devices if it is 1.
+const VARIABLE: &str = "FLOTOR_ALLOW_STRONG";
+
+impl Strength {
+    /// What the environment says: `FLOTOR_ALLOW_STRONG=1` allows strong devices. Not real-time.
+    #[must_use]
+    pub fn of_the_environment() -> Self {
+        match std::env::var(VARIABLE).as_deref() {
+            Ok("1") => Self::Strong,
+            _ => Self::UnderCeiling,
+        }
+    }
+}
+
+/// A device that could get more than the ceiling: scene and device allow it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StrongDevice {
+    /// Name in the scene.
+    pub name: String,
+    /// Id of its plugin.
+    pub plugin: String,
+    /// The most that scene and device allow, N.
+    pub force_n: f64,
+    /// The most that scene and device allow, N·m.
+    pub torque_nm: f64,
+}
+
+impl StrongDevice {
+    /// If a device is one. Not real-time.
+    pub(super) fn of(
+        [name, plugin]: [&str; 2],
+        embodiment: Embodiment,
+        limits: &Limits,
+        device: &Capabilities,
+    ) -> Option<Self> {
+        let [force_n, torque_nm] = longest(limits, device);
+        let exceeds = force_n > CEILING.force_n || torque_nm > CEILING.torque_nm;
+        (embodiment == Embodiment::Physical && exceeds).then(|| Self {
+            name: name.to_owned(),
+            plugin: plugin.to_owned(),
+            force_n,
+            torque_nm,
+        })
+    }
+
+    /// What is reported of it at the start. Not real-time.
+    pub(super) fn notice(&self, strength: Strength) -> String {
+        let Ceiling { force_n, torque_nm } = CEILING;
+        match strength {
+            Strength::UnderCeiling => format!(
+                "{self}; the host sends at most {force_n} N and {torque_nm} N·m in any direction. `--allow-strong` sends more"
+            ),
+            Strength::Strong => format!(
+                "{self}, and the host sends it: `--allow-strong` lifted its ceiling of {force_n} N and {torque_nm} N·m"
+            ),
+        }
+    }
+}
+
+impl std::fmt::Display for StrongDevice {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { name, plugin, force_n, torque_nm } = self;
+        write!(f, "`{name}` ({plugin}): scene and device allow {force_n:.1} N and {torque_nm:.2} N·m")
+    }
+}
+
+/// The longest force (N) and torque (N·m) that scene and device allow.
+fn longest(limits: &Limits, device: &Capabilities) -> [f64; 2] {
+    let boxes = [device.max_force_n, device.max_torque_nm].map(Bound::box_of);
+    [limits.force_n.and(boxes[0]).longest(), limits.torque_nm.and(boxes[1]).longest()]
+}
+
+/// The limits of a device under the ceiling. Not real-time.
+pub(super) fn under_ceiling(limits: &Limits, embodiment: Embodiment) -> Limits {
+    match embodiment {
+        Embodiment::Physical => limits.under(CEILING),
+        Embodiment::Simulated => *limits,
+    }
+}
+
+/// What one number as a limit means now and did not mean when it held along each axis, where a device makes it differ. Not
+/// real-time.
+pub(super) fn norm_notice(limits: &Limits, devices: &[Capabilities]) -> Option<String> {
+    let forces = devices.iter().map(|device| device.max_force_n);
+    let torques = devices.iter().map(|device| device.max_torque_nm);
+    // Nobody declares how fast a handle can be.
+    let speeds = || devices.iter().map(|_| [f64::INFINITY; 3]);
+    let parts = [
+        changed("force_n", limits.force_n, forces, "N"),
+        changed("torque_nm", limits.torque_nm, torques, "N·m"),
+        changed("velocity_m_per_s", limits.velocity_m_per_s, speeds(), "m/s"),
+        changed("angular_velocity_rad_per_s", limits.angular_velocity_rad_per_s, speeds(), "rad/s"),
+    ];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    (!parts.is_empty()).then(|| format!("one number limits the norm, not each axis: {}", parts.join("; ")))
+}
+
+/// The same of one limit.
+fn changed(key: &str, bound: Bound, devices: impl Iterator<Item = [f64; 3]>, unit: &str) -> Option<String> {
+    let most = bound.norm();
+    if bound != Bound::ball(most) || most.is_infinite() {
+        return None;
+    }
+    let along_each_axis = |device| Bound::box_of([most; 3]).and(Bound::box_of(device)).longest();
+    let before = devices.map(along_each_axis).fold(0.0, f64::max);
+    // A rounding of the corner is no change.
+    (before > most * (1.0 + 1.0e-12)).then(|| {
+        format!(
+            "`limits.{key} = {most}` allowed up to {before:.2} {unit} and allows {most} {unit}; `[{most}, {most}, {most}]` \
+             limits each axis"
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLANAR: Capabilities = Capabilities {
+        max_force_n: [40.0, 30.0, 0.0],
+        max_torque_nm: [0.5, 0.0, 0.0],
+        ..Capabilities::UNDRIVEN
+    };
+
+    fn strong(embodiment: Embodiment, limits: &Limits) -> Option<StrongDevice> {
+        StrongDevice::of(["left", "arm"], embodiment, limits, &PLANAR)
+    }
+
+    #[test]
+    fn a_device_that_can_exceed_the_ceiling_is_strong_unless_it_is_simulated_or_limited() {
+        let found = strong(Embodiment::Physical, &Limits::default()).expect("50 N");
+        assert_eq!((found.force_n, found.torque_nm), (50.0, 0.5));
+        let said = found.notice(Strength::UnderCeiling);
+        assert!(said.contains("`left` (arm)") && said.contains("50.0 N"), "{said}");
+        assert!(said.contains("20 N and 1 N·m") && said.contains("--allow-strong"), "{said}");
+        assert_eq!(strong(Embodiment::Simulated, &Limits::default()), None);
+        let limited = |force_n| Limits { force_n, ..Limits::default() };
+        assert_eq!(strong(Embodiment::Physical, &limited(Bound::ball(20.0))), None);
+        assert_eq!(strong(Embodiment::Physical, &limited(Bound::box_of([12.0, 16.0, 9.0]))), None);
+        assert!(strong(Embodiment::Physical, &limited(Bound::box_of([20.0; 3]))).is_some(), "28.3 N");
+    }
+
+    #[test]
+    fn the_ceiling_is_for_what_may_push_a_hand() {
+        let limits = Limits { force_n: Bound::ball(30.0), ..Limits::default() };
+        let under = under_ceiling(&limits, Embodiment::Physical);
+        assert_eq!((under.force_n.norm(), under.torque_nm.norm()), (20.0, 1.0));
+        assert_eq!(under_ceiling(&limits, Embodiment::Simulated), limits);
+    }
+
+    #[test]
+    fn one_number_that_means_less_than_before_is_told_with_the_old_way() {
+        let told = |force_n| norm_notice(&Limits { force_n, ..Limits::default() }, &[PLANAR]);
+        let said = told(Bound::ball(5.0)).expect("7.07 N before");
+        assert!(said.contains("7.07 N") && said.contains("`[5, 5, 5]`") && !said.contains('\n'), "{said}");
+        assert_eq!(told(Bound::box_of([5.0; 3])), None);
+        assert_eq!(told(Bound::ball(50.0)), None, "the device's own corner");
+        assert_eq!(told(Bound::NONE), None);
+        let torque = Limits { torque_nm: Bound::ball(0.2), ..Limits::default() };
+        assert_eq!(norm_notice(&torque, &[PLANAR]), None, "one axis has no corner");
+    }
+}
