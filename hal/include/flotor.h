@@ -479,6 +479,10 @@ typedef struct FlotorAxes {
 } FlotorAxes;
 
 // What a device can do, as numbers a host compares with a model and enforces. 200 bytes, device frame.
+//
+// Every number is finite, none is negative, and they are the same from `open` on: a host refuses others before anything
+// is energised. An axis that is driven has a limit and, where it is sensed, a range; what is driven has a slew. Only the
+// slew of what is not driven may be infinite.
 typedef struct FlotorCapabilities {
     // Axes whose position is measured.
     struct FlotorAxes sensed;
@@ -498,7 +502,7 @@ typedef struct FlotorCapabilities {
     double max_force_slew_n_per_s;
     // Fastest change of torque the device accepts, N·m/s.
     double max_torque_slew_nm_per_s;
-    // Largest stiffness the device renders stably at its nominal rate, N/m.
+    // Largest stiffness the device renders stably at its nominal rate, N/m; 0: it says none.
     double max_stiffness_n_per_m;
     // Slowest and fastest loop the device runs at, Hz.
     double rate_hz[2];
@@ -830,6 +834,7 @@ typedef struct FlotorPacingTable {
 /* Sets of conditions: `{FLOTOR_CONDITIONS_SATURATED}` makes a FlotorConditions. */
 #define FLOTOR_CONDITIONS_SATURATED 1u
 #define FLOTOR_CONDITIONS_EXCESS_FORCE 2u
+#define FLOTOR_CONDITIONS_NOISY 4u
 /* What `shape` of a FlotorActiveRegion says. */
 #define FLOTOR_REGION_EVERYWHERE 0u
 #define FLOTOR_REGION_SPHERE 1u

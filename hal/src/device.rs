@@ -164,6 +164,9 @@ impl Conditions {
     pub const SATURATED: Conditions = Conditions { bits: 1 << 0 };
     /// The force requested of the device is more than it should be used with: warn the person who holds it.
     pub const EXCESS_FORCE: Conditions = Conditions { bits: 1 << 1 };
+    /// The pose was measured, with noise of at least a step of its numbers: that it stays the same to the bit for long
+    /// means that the sensor is stuck. A device that counts steps (an encoder at rest) does not say this.
+    pub const NOISY: Conditions = Conditions { bits: 1 << 2 };
 
     /// Both. Real-time: bounded, no allocation.
     #[inline]
@@ -204,7 +207,7 @@ impl DeviceState {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct Axes {
-    bits: u32,
+    pub(crate) bits: u32,
 }
 
 impl Axes {
@@ -233,6 +236,10 @@ impl Axes {
 }
 
 /// What a device can do, as numbers a host compares with a model and enforces. 200 bytes, device frame.
+///
+/// Every number is finite, none is negative, and they are the same from `open` on: a host refuses others before anything
+/// is energised. An axis that is driven has a limit and, where it is sensed, a range; what is driven has a slew. Only the
+/// slew of what is not driven may be infinite.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -255,7 +262,7 @@ pub struct Capabilities {
     pub max_force_slew_n_per_s: f64,
     /// Fastest change of torque the device accepts, N·m/s.
     pub max_torque_slew_nm_per_s: f64,
-    /// Largest stiffness the device renders stably at its nominal rate, N/m.
+    /// Largest stiffness the device renders stably at its nominal rate, N/m; 0: it says none.
     pub max_stiffness_n_per_m: f64,
     /// Slowest and fastest loop the device runs at, Hz.
     pub rate_hz: [f64; 2],

@@ -159,7 +159,12 @@ impl MaglevDevice {
         let watchdog_us = self.options.watchdog_us;
         let taken_off = match self.link.take_off(period_us, watchdog_us, PATIENCE) {
             Err(Unanswered::Lost) => {
-                (self.link, self.description) = connect(&self.options)?;
+                let (link, description) = connect(&self.options)?;
+                if description != self.description {
+                    let reason = "another controller answers than the one that was opened; start again";
+                    return Err(Refusal::resource(reason));
+                }
+                self.link = link;
                 self.link.take_off(period_us, watchdog_us, PATIENCE)
             }
             other => other,

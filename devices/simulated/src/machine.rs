@@ -87,8 +87,9 @@ impl Machine {
         let delivered = self.actuation.drive(commanded, wiring, simulation.state().position_m.z, dt_s);
         let stopped = self.move_and_sample(simulation, tick, delivered, fault);
         state.delivered = flotor_hal::Wrench::new(delivered.force_n, delivered.torque_nm);
-        state.conditions =
-            if self.actuation.is_saturated() { Conditions::SATURATED } else { Conditions::NONE };
+        let when = |is: bool, condition| if is { condition } else { Conditions::NONE };
+        state.conditions = when(self.actuation.is_saturated(), Conditions::SATURATED)
+            .with(when(self.sensing.is_noisy(), Conditions::NOISY));
 
         match fault {
             Some(FaultKind::CablePull) => return Cycle::Fault(Fault::Disconnected),

@@ -150,6 +150,13 @@ impl Sensing {
         })
     }
 
+    /// Whether the noise changes every sample: it is at least a step of the converters. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn is_noisy(&self) -> bool {
+        let SensingParameters { noise_m, step_m, .. } = self.parameters;
+        noise_m > 0.0 && noise_m >= step_m
+    }
+
     /// The six coordinates as the converters give them; nothing if a spot is beside its cell.
     fn measured_spots(&mut self, truth: &Pose, dt_s: f64) -> Option<Spots> {
         let mut spots = self.optics.spots(truth)?;

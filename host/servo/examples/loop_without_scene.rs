@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut device = Plugin::in_process(&flotor_simulated::FLOTOR_ENTRY)?.open_device(&[])?;
     let capabilities = device.capabilities()?;
     let envelope = Envelope::new(&Limits::default(), &Boundary::default(), &capabilities, config.period_ns);
-    let device = Guarded { device, sensed: capabilities.sensed, envelope };
+    let device = Guarded { device, capabilities, envelope };
 
     // The force model, where the handle's home is its own.
     let mut model = Plugin::in_process(&flotor_wall::FLOTOR_ENTRY)?.create_model(&[])?;

@@ -141,6 +141,9 @@ impl Coupled {
                 if end.is_alone() {
                     port.events.insert(Events::PARTNER_SILENT);
                 }
+                if end.is_implausible() {
+                    port.events.insert(Events::IMPLAUSIBLE_SAMPLE);
+                }
             }
         }
     }

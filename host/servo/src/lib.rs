@@ -18,6 +18,7 @@ mod hot_swap;
 mod models;
 mod parameters;
 mod passivity;
+mod plausibility;
 pub mod port_energy;
 mod queue;
 mod realtime;
@@ -46,6 +47,7 @@ pub use parameters::{
     ChangeReport, ChangeSender, PLUGIN, ParameterChange, ParameterQueue, ReportReceiver, ScheduledChange,
     WEIGHT,
 };
+pub use plausibility::{Implausible, ImplausibleSamples, PlausibilityCheck, Trust};
 pub use queue::{drain, queue};
 pub use realtime::{Core, Privilege, RealTimeReport};
 pub use realtime::{enter_real_time, enter_worker_priority, probe_real_time};
@@ -53,7 +55,7 @@ pub use run::{Loop, RunEnd};
 pub use servo::{RunConfig, Servo};
 pub use standby::{Guarded, Standby};
 pub use state::{Cause, EmergencySource, Gate, RunEvent, RunState};
-pub use station::Station;
+pub use station::{Reported, Station};
 pub use stop::StopSwitch;
 pub use timing::{Durations, Percentiles, Stage, Timing};
 pub use watchdog::{Heartbeat, start as start_watchdog};

@@ -10,13 +10,13 @@
 use crate::stage_timer::{Moment, StageTimer};
 use crate::timing::STAGE_SAMPLING;
 use crate::{
-    Cause, Due, EmergencySource, Forces, Heartbeat, LoopSwaps, ParameterQueue, Place, Port, RunEvent,
-    RunState, Stage, Station, StopSwitch, Timing, WEIGHT,
+    Cause, Due, EmergencySource, Forces, Heartbeat, LoopSwaps, ParameterQueue, Place, Port, Reported,
+    RunEvent, RunState, Stage, Station, StopSwitch, Timing, WEIGHT,
 };
 use flotor_core::trace::{Events, TickRecord};
+use flotor_hal::Tick;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::ActiveDevice;
-use flotor_hal::{Fault, Tick};
 
 /// What the run itself is told, beside device, models and envelope.
 #[derive(Clone, Copy, Debug)]
@@ -276,9 +276,12 @@ impl Servo {
         &self.heart
     }
 
-    /// The devices, in order, each with the first fault it reported.
-    pub fn devices(&mut self) -> impl Iterator<Item = (&mut ActiveDevice, Option<Fault>)> {
-        self.stations.iter_mut().map(|station| (&mut station.device, station.fault))
+    /// The devices, in order, each with what the run knows of it.
+    pub fn devices(&mut self) -> impl Iterator<Item = (&mut ActiveDevice, Reported)> {
+        self.stations.iter_mut().map(|station| {
+            let reported = station.reported();
+            (&mut station.device, reported)
+        })
     }
 
     /// All that asks for a wrench.

@@ -3,14 +3,14 @@
 use crate::{Envelope, Forces, Heartbeat, LoopSwaps, ParameterQueue, RunConfig, Servo, Station};
 use flotor_core::limits::Bound;
 use flotor_hal::abi::loader::{OpenedDevice, Stopper};
-use flotor_hal::{Axes, DVec3, LoopConfig, Refusal};
+use flotor_hal::{Capabilities, DVec3, LoopConfig, Refusal};
 
 /// A device that is opened, not energised, and what guards it.
 pub struct Guarded {
     /// The device.
     pub device: OpenedDevice,
-    /// The axes it senses.
-    pub sensed: Axes,
+    /// What it has said it can do: what its samples are checked against.
+    pub capabilities: Capabilities,
     /// What nothing gets past on its way there.
     pub envelope: Envelope,
 }
@@ -72,9 +72,11 @@ impl Standby {
         let stoppers = self.stoppers();
         let Self { devices, forces, parameters, swaps, config, run, heart } = self;
         let station = |(number, guarded): (usize, Guarded)| {
-            let Guarded { device, sensed, envelope } = guarded;
+            let Guarded { mut device, capabilities, envelope } = guarded;
+            // The loader refuses what is not what was told when the envelope was made.
+            device.capabilities().map_err(|refusal| (number, refusal))?;
             let device = device.activate(&config).map_err(|(_, refusal)| (number, refusal))?;
-            Ok(Station::new(device, envelope, sensed, config.period_ns))
+            Ok(Station::new(device, envelope, &capabilities, config.period_ns))
         };
         let stations =
             devices.into_iter().enumerate().map(station).collect::<Result<Vec<_>, (usize, Refusal)>>();

@@ -195,6 +195,8 @@ pub struct LinkSummary {
     pub silences: u64,
     /// The longest wait for a message, ms; always less than the watchdog waits.
     pub longest_wait_ms: f64,
+    /// Messages with a pose or a velocity that cannot be: they were not used.
+    pub implausible: u64,
     /// Counts of messages.
     pub carried: LinkCounts,
 }
@@ -256,14 +258,18 @@ pub struct RunFacts<'a> {
 impl LinkSummary {
     /// For people.
     fn to_text(&self) -> String {
-        let Self { heard_ticks, silences, longest_wait_ms, carried } = self;
+        let Self { heard_ticks, silences, longest_wait_ms, implausible, carried } = self;
         let LinkCounts { lost, overtaken, refused, .. } = carried;
         let silent = match silences {
             0 => format!("longest wait for a message {longest_wait_ms:.0} ms"),
             silences => format!("force removed {silences} times for want of messages"),
         };
+        let impossible = match implausible {
+            0 => String::new(),
+            count => format!(", {count} cannot be"),
+        };
         format!(
-            "messages in {heard_ticks} ticks, {silent}; {lost} lost, {overtaken} overtaken, {refused} refused"
+            "messages in {heard_ticks} ticks, {silent}; {lost} lost, {overtaken} overtaken, {refused} refused{impossible}"
         )
     }
 }
@@ -322,7 +328,8 @@ impl RunSummary {
             trace_digest: facts.trace_digest,
             dropped_records: outcome.dropped_records,
             wall_s: outcome.wall_s,
-            plugins: (facts.plugins.iter().map(|plugin| plugin_summary(plugin, outcome)))
+            plugins: (facts.plugins.iter().enumerate())
+                .map(|(number, plugin)| plugin_summary(number, plugin, outcome))
                 .chain(outcome.misbehaved.iter().map(misbehaved_summary))
                 .collect(),
         }
@@ -425,6 +432,7 @@ fn coupling_summary(
         heard_ticks: hearing.ticks,
         silences: hearing.silences,
         longest_wait_ms: hearing.longest_wait_ns as f64 * 1.0e-6,
+        implausible: hearing.implausible,
         carried: carried.unwrap_or_default(),
     };
     CouplingSummary {
@@ -463,13 +471,12 @@ fn health_words(health: &ModelHealth, words: &str) -> String {
     )
 }
 
-fn plugin_summary(plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
+/// The devices of a run come first.
+fn plugin_summary(number: usize, plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
+    let device = outcome.devices.get(number).and_then(|device| device.problem.clone());
     let model = outcome.models.iter().find(|(name, ..)| *name == plugin.name);
-    let health = match model {
-        Some((_, health, words)) => health_words(health, words),
-        None => "ok".to_owned(),
-    };
-    summary_of(plugin, health)
+    let model = model.map(|(_, health, words)| health_words(health, words));
+    summary_of(plugin, device.or(model).unwrap_or_else(|| "ok".to_owned()))
 }
 
 /// A plugin that was put in while the run was on.

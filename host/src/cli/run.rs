@@ -180,7 +180,7 @@ fn verdict(outcome: &Outcome, plugins: &[PluginReport], summary: &RunSummary) ->
             Err(CommandError::TooFast { samples_per_s, rate_hz: summary.rate_hz })
         }
         RunEnd::Watchdog(stuck) => Err(CommandError::Watchdog(stuck)),
-        RunEnd::Finished | RunEnd::Stopped => broken_models(summary),
+        RunEnd::Finished | RunEnd::Stopped => broken_models(outcome, summary),
     }
 }
 
@@ -240,8 +240,9 @@ fn end_words(outcome: &Outcome, rate_hz: f64) -> String {
 }
 
 /// A model that failed is a refused plugin, reported in the exit code as well, for scripts.
-fn broken_models(summary: &RunSummary) -> Result<(), CommandError> {
-    let broken = summary.plugins.iter().find(|plugin| plugin.health != "ok");
+fn broken_models(outcome: &Outcome, summary: &RunSummary) -> Result<(), CommandError> {
+    // The devices come first. One that failed has ended the run; what was borne of it is in the summary.
+    let broken = summary.plugins.iter().skip(outcome.devices.len()).find(|plugin| plugin.health != "ok");
     broken.map_or(Ok(()), |plugin| {
         let problem = format!(
             "{}: `{}` {}; run `flotor validate` for details",

@@ -62,6 +62,46 @@ static uint32_t capabilities(FlotorInstance instance, FlotorCapabilities *out) {
 #ifdef NEGATIVE_RESOLUTION
     out->resolution_m = -1.0e-6;
 #endif
+#ifdef NO_RANGE
+    memset(out->range_m, 0, sizeof out->range_m);
+#endif
+#ifdef ENDLESS_RANGE
+    out->range_rad[1] = INFINITY;
+#endif
+#ifdef ENDLESS_FORCE
+    out->max_force_n[2] = INFINITY;
+#endif
+#ifdef ABSURD_FORCE
+    out->max_force_n[0] = 1.0e308;
+#endif
+#ifdef NO_FORCE
+    out->max_force_n[1] = 0.0;
+#endif
+#ifdef NO_TORQUE
+    memset(out->max_torque_nm, 0, sizeof out->max_torque_nm);
+#endif
+#ifdef NEGATIVE_TORQUE
+    out->max_torque_nm[2] = -1.0;
+#endif
+#ifdef NO_SLEW
+    out->max_force_slew_n_per_s = 0.0;
+#endif
+#ifdef ENDLESS_SLEW
+    out->max_torque_slew_nm_per_s = INFINITY;
+#endif
+#ifdef ENDLESS_STIFFNESS
+    out->max_stiffness_n_per_m = INFINITY;
+#endif
+#ifdef SEVEN_AXES
+    out->sensed.bits = 0x7f;
+#endif
+#ifdef EVERY_AXIS
+    out->actuated.bits = 0xffffffff;
+#endif
+#ifdef CHANGES_ITS_MIND
+    static atomic_int calls;
+    out->max_force_n[2] += atomic_fetch_add(&calls, 1) > CHANGES_ITS_MIND;
+#endif
     return FlotorCallStatus_Ok;
 }
 

@@ -1,9 +1,12 @@
 //! The maglev plugin against its emulated controller, in processes of their own, over real links: equal trajectories
 //! with the simulated flotor, and what happens when one side dies, hangs, or talks nonsense.
 
-use flotor_core::trace::Events;
+use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::abi::loader::Setting;
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
+use flotor_maglev::protocol::stream::{Received, StreamDecoder, coded};
+use flotor_maglev::protocol::{Answer, AnswerFrame, Mode, Request, RequestFrame, Status};
+use flotor_servo::RunEnd;
 use flotor_session::registry::load_file;
 use flotor_tests::library::{build_folder, plugin_file};
 use flotor_tests::process::Owned;
@@ -11,10 +14,12 @@ use flotor_tests::program::{Flotor, Ran, Running, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::{watch, watch_strong};
 use rustix::process::Signal;
-use std::io::{BufRead, BufReader, Write};
-use std::net::TcpStream;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{ChildStdout, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 fn program(name: &str) -> PathBuf {
@@ -415,6 +420,125 @@ fn with_a_controller_every_rule_is_checked_and_holds() {
     assert_eq!(ran.stdout.matches("  ok ").count(), 7, "{}", ran.stdout);
     let ran = Flotor::with(["validate", &library, "--set", "addres=1"]).run();
     assert!(ran.stdout.contains("did you mean `address`?"), "{}", ran.stdout);
+}
+
+// ---------------------------------------------------------------- frames that are right and samples that cannot be
+
+/// Between a host and a controller: passes on what both say, but makes each status in flight after the first so many a lie.
+struct LyingLine {
+    address: String,
+    /// Requests of the host, each with the number of statuses in flight that had been passed on before.
+    requests: Arc<Mutex<Vec<(u32, Request)>>>,
+}
+
+impl LyingLine {
+    /// Statuses in flight that stay as they are.
+    const HONEST: u32 = 500;
+
+    fn to(controller: &str, mut lie: impl FnMut(u32, &mut Status) + Send + 'static) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("there is a free port");
+        let address = listener.local_addr().expect("it is bound").to_string();
+        let requests = Arc::new(Mutex::new(Vec::new()));
+        let (kept, controller) = (Arc::clone(&requests), controller.to_owned());
+        std::thread::spawn(move || {
+            let (mut host, _) = listener.accept().expect("the host connects");
+            let mut there = TcpStream::connect(controller).expect("the controller listens");
+            for end in [&host, &there] {
+                end.set_nodelay(true).expect("it is a connection");
+            }
+            let both = (host.try_clone().expect("a handle"), there.try_clone().expect("a handle"));
+            let in_flight = Arc::new(AtomicU32::new(0));
+            let passed = Arc::clone(&in_flight);
+            std::thread::spawn(move || {
+                let (mut from, mut to) = both;
+                pass_on(&mut from, &mut to, |packet| {
+                    if let Ok(frame) = RequestFrame::decode(&packet) {
+                        let after = passed.load(Ordering::SeqCst);
+                        kept.lock().expect("nobody panics with it").push((after, frame.request));
+                    }
+                    packet
+                });
+            });
+            pass_on(&mut there, &mut host, |packet| {
+                let Ok(mut frame) = AnswerFrame::decode(&packet) else { return packet };
+                let Answer::Status(status) = &mut frame.answer else { return packet };
+                if status.mode != Mode::Levitating {
+                    return packet;
+                }
+                let number = in_flight.fetch_add(1, Ordering::SeqCst);
+                if number >= Self::HONEST {
+                    lie(number, status);
+                }
+                frame.encode()
+            });
+        });
+        Self { address, requests }
+    }
+}
+
+/// Passes packets on until one end is closed.
+fn pass_on(from: &mut TcpStream, to: &mut TcpStream, mut change: impl FnMut([u8; 64]) -> [u8; 64]) {
+    let (mut decoder, mut chunk) = (StreamDecoder::default(), [0; 512]);
+    while let Ok(length @ 1..) = from.read(&mut chunk) {
+        for byte in &chunk[..length] {
+            let Some(Received::Packet(packet)) = decoder.push(*byte) else { continue };
+            let (bytes, length) = coded(&change(packet));
+            if to.write_all(&bytes[..length]).is_err() {
+                return;
+            }
+        }
+    }
+    let _ = to.shutdown(std::net::Shutdown::Both);
+}
+
+#[test]
+fn a_controller_whose_poses_cannot_be_loses_the_force_and_the_run() {
+    type Lie = fn(u32, &mut Status);
+    let lies: [(&str, Lie); 3] = [
+        ("range", |_, status| status.position_m[2] = -1.0e30),
+        ("range", |_, status| status.rotation_xyz = [0.0, 0.0, 1.0]),
+        ("speed", |number, status| {
+            // A linear congruential generator (Knuth's MMIX), its top bit.
+            let drawn = u64::from(number).wrapping_mul(6_364_136_223_846_793_005);
+            let drawn = (drawn ^ (drawn >> 29)).wrapping_mul(6_364_136_223_846_793_005);
+            status.position_m[2] = if drawn >> 63 == 0 { 0.011 } else { -0.011 };
+        }),
+    ];
+    for (why, lie) in lies {
+        // In lockstep, so that it takes as many ticks on every machine.
+        let emulator = Emulator::start("tcp", &["--pace", "lockstep"]);
+        let line = LyingLine::to(&emulator.address, lie);
+        let scene = emulator.scene("pace = \"lockstep\"").replace(&emulator.address, &line.address);
+        let run = watch(&scene.replace("duration_s = 60", "duration_s = 2"));
+        assert_eq!(run.outcome.end, RunEnd::DeviceFault(Fault::Protocol), "{why}");
+        let (_, words) = run.outcome.faulted().expect("it is faulty");
+        assert!(words.contains(&format!(" samples cannot be ({why} ")), "{words}");
+        let first = run.outcome.devices[0].implausible.first_tick().expect("there is one");
+        let force_n = |record: &TickRecord| record.commanded.force().length();
+        assert!(run.records.iter().any(|record| record.tick < first && force_n(record) > 0.5), "the control");
+        let lost = run.records.iter().find(|record| record.events.intersects(Events::HOLDING));
+        let lost = lost.expect("it was not believed").tick;
+        assert!(lost >= first + 10 && lost < first + 50, "{why}: {first} to {lost}");
+        assert!(
+            run.records.iter().filter(|record| record.tick > lost + 30).all(|record| force_n(record) == 0.0)
+        );
+
+        // What the controller itself was told: more before, and in the end nothing.
+        let requests = line.requests.lock().expect("nobody panics with it");
+        let commanded = |request: &Request| match request {
+            Request::Command { wrench, .. } => Some(wrench.map(f64::from)),
+            _ => None,
+        };
+        let strongest =
+            requests.iter().filter_map(|(_, request)| commanded(request)).map(|[.., z, _, _, _]| z.abs());
+        assert!(strongest.fold(0.0, f64::max) > 0.5, "{why}: the control");
+        let late = u32::try_from(lost - first + 40).expect("a small number") + LyingLine::HONEST;
+        let later =
+            requests.iter().filter(|(after, _)| *after > late).filter_map(|(_, request)| commanded(request));
+        let later: Vec<[f64; 6]> = later.collect();
+        assert!(later.len() > 20 && later.iter().all(|wrench| *wrench == later[0]), "{why}: {later:?}");
+        assert!(matches!(requests.last(), Some((_, Request::Disarm))), "{why}: {:?}", requests.last());
+    }
 }
 
 // ---------------------------------------------------------------- nonsense

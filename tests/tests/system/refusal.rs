@@ -491,7 +491,8 @@ fn a_device_that_fails_before_the_start_is_a_refused_plugin() {
         ("refuses-to-activate", "the power supply is off; switch it on"),
         (
             "nan-limit",
-            "its capability `max_force_n` is [NaN, NaN, NaN]; report this to the author of the plugin",
+            "its capability `max_force_n` is [NaN, NaN, NaN]: legal is 0 to 100000 N on each axis; report this to the \
+             author of the plugin",
         ),
     ];
     for (fault, cause) in wrong {
@@ -532,6 +533,104 @@ fn a_device_without_a_sample_gets_no_force_once_the_last_one_is_old() {
         assert_eq!(record.commanded, force, "tick {}", record.tick);
         assert_eq!(record.events.intersects(Events::NOT_FINITE), record.tick >= 7, "tick {}", record.tick);
     }
+}
+
+/// A run of the faulty device whose samples are odd from tick 50 on, and what the device itself says it was commanded: the
+/// vertical force of each tick, N.
+fn run_with_odd_samples(sample: &str) -> (Ran, Vec<(u64, f64)>) {
+    let scratch = Scratch::default();
+    let scene = faulty_scene("").replace("duration_s = 0.05", "duration_s = 1");
+    let (scene, log) = (scratch.file("scene.toml", scene), scratch.path().join("commanded"));
+    let sets = ["--set", &format!("device.sample={sample}"), "--set", "device.at_tick=50"]
+        .map(std::ffi::OsString::from);
+    let arguments = ["run".into(), scene.into_os_string(), "--clock".into(), "virtual".into()];
+    let flotor = Flotor::with(arguments.into_iter().chain(sets));
+    let ran = flotor.env(fixture_faulty_device::LOG_FILE_VARIABLE, &log.display().to_string()).run();
+    let text = std::fs::read_to_string(&log).unwrap_or_else(|_| panic!("it was never commanded: {ran:#?}"));
+    let command = |line: &str| {
+        let words: Vec<&str> = line.split(' ').collect();
+        let number = |place: usize| words[place].parse::<f64>().expect("a number");
+        assert!([1, 2, 4, 5, 6].iter().all(|place| number(*place) == 0.0), "{line}");
+        (words[0].parse().expect("a tick"), number(3))
+    };
+    (ran, text.lines().map(command).collect())
+}
+
+#[test]
+fn a_device_without_a_usable_sample_gets_no_force_and_is_named_with_the_reason() {
+    let good = run_with_odd_samples("nothing");
+    assert_eq!(good.0.code, Some(exit_code::OK), "{:#?}", good.0);
+    assert!(good.1.len() == 1000 && good.1.iter().all(|(_, force_n)| *force_n == 0.1), "the control run");
+
+    // Why, and the last tick with a force: ten samples that cannot be are borne. That the same sample comes again, or a
+    // noisy pose with the same bits, can be for a while.
+    let odd = [
+        ("far", "range", 59),
+        ("below", "range", 59),
+        ("long-quaternion", "quaternion", 59),
+        ("zero-quaternion", "quaternion", 59),
+        ("fast", "speed", 59),
+        ("old", "time", 59),
+        ("future", "time", 59),
+        ("backwards", "time", 60),
+        ("nan", "not finite", 59),
+        ("same-time", "time", 70),
+        ("stuck", "stuck", 109),
+    ];
+    for (sample, why, last) in odd {
+        let (ran, commanded) = run_with_odd_samples(sample);
+        assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{sample}: {ran:#?}");
+        for (tick, force_n) in &commanded {
+            assert_eq!(*force_n, if *tick <= last { 0.1 } else { 0.0 }, "{sample}: tick {tick}");
+        }
+        // 101 samples of this kind: a tenth of a second.
+        let told = format!(
+            "{}: device fault: 101 samples cannot be ({why} 101), the first at tick {}; ",
+            plugin_file(DEVICE).display(),
+            last - 9
+        );
+        assert!(ran.error().starts_with(&told), "{sample}: {ran:#?}");
+        assert!(ran.stdout.contains(&format!("({why} 101), the first at tick")), "the summary: {ran:#?}");
+        let event = if sample == "nan" { "not_finite 101" } else { "implausible_sample 101" };
+        assert!(ran.stdout.contains(event), "{sample}: {ran:#?}");
+    }
+}
+
+#[test]
+fn a_device_that_jumps_about_is_found_out_although_every_pose_could_be() {
+    for (sample, why) in [("teleports", "speed"), ("shakes", "acceleration")] {
+        let (ran, commanded) = run_with_odd_samples(sample);
+        assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{sample}: {ran:#?}");
+        assert!(ran.error().contains(&format!(" cannot be ({why} ")), "{sample}: {ran:#?}");
+        let with_force = commanded.iter().filter(|(tick, force_n)| *tick >= 50 && *force_n != 0.0).count();
+        assert!(with_force < 50, "{sample}: {with_force} ticks with a force before it is withdrawn");
+        assert!(ran.stdout.contains("holding "), "{sample}: {ran:#?}");
+    }
+}
+
+#[test]
+fn a_sample_in_ten_that_cannot_be_takes_the_force_away_and_a_single_one_is_borne_and_told() {
+    let (ran, commanded) = run_with_odd_samples("far-once-in-ten");
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    assert!(ran.stdout.contains("cannot be (range 95), the first at tick 50"), "{ran:#?}");
+    assert!(commanded.iter().all(|(_, force_n)| [0.0, 0.1].contains(force_n)));
+    assert!(commanded.iter().filter(|(tick, _)| *tick >= 300).all(|(_, force_n)| *force_n == 0.0));
+
+    let (ran, commanded) = run_with_odd_samples("far-once");
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    assert!(ran.stdout.contains("1 sample cannot be (range 1), the first at tick 50"), "{ran:#?}");
+    assert!(ran.stdout.contains("implausible_sample 1"), "{ran:#?}");
+    assert!(commanded.iter().all(|(_, force_n)| *force_n == 0.1), "nothing of it is felt");
+}
+
+#[test]
+fn a_device_that_takes_no_command_is_stopped_and_named() {
+    let (ran, commanded) = run_with_odd_samples("takes-nothing");
+    assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:#?}");
+    assert_eq!(commanded.last(), Some(&(49, 0.1)), "the control: it took those before");
+    let told =
+        format!("{}: device fault: it has not taken the last 101 commands; ", plugin_file(DEVICE).display());
+    assert!(ran.error().starts_with(&told), "{ran:#?}");
 }
 
 #[test]

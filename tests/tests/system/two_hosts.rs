@@ -321,6 +321,32 @@ fn a_cut_cable_leaves_both_devices_without_force_within_the_watchdog_and_two_mil
 }
 
 #[test]
+fn a_partner_that_tells_what_cannot_be_is_not_believed_and_soon_not_felt() {
+    let mut pair = struggle(&Registry::search(&[]));
+    let before_n =
+        pair.hosts[0].records.0.iter().map(|record| record.commanded.force().length()).fold(0.0, f64::max);
+    pair.cut();
+    let from = pair.hosts[0].records.0.len();
+    let last = pair.hosts[0].newest.expect("it was heard");
+    for tick in 1..=300 {
+        let mut dispatch = Dispatch { tick: last.tick + tick, ..last };
+        dispatch.state.pose.position_m[2] = -1.0e30;
+        pair.hosts[0].hear(dispatch);
+        pair.run(1);
+    }
+    let after = &pair.hosts[0].records.0[from..];
+    assert!(after.iter().all(|record| record.events.intersects(Events::IMPLAUSIBLE_SAMPLE)));
+    for (tick, record) in (0..).zip(after) {
+        let force_n = record.commanded.force().length();
+        // Without a message the pull is to where the partner was.
+        let most_n = if tick < WATCHDOG_TICKS + 2 { 2.0 * before_n } else { 0.0 };
+        assert!(force_n <= most_n, "{force_n} N in tick {tick}, {before_n} N before");
+    }
+    let hearing = pair.hosts[0].coupling().hearing.expect("its other end is elsewhere");
+    assert_eq!((hearing.implausible, hearing.silences), (300, 1));
+}
+
+#[test]
 fn a_mended_cable_is_taken_hold_of_slowly_and_no_tank_falls_below_zero() {
     let mut pair = struggle(&Registry::search(&[]));
     pair.cut();

@@ -81,6 +81,31 @@ fn every_mistake_of_a_device_is_found_under_its_rule() {
         ("NAN_STIFFNESS", "capabilities", "max_stiffness_n_per_m"),
         ("NAN_LATENCY", "capabilities", "latency_s"),
         ("NEGATIVE_RESOLUTION", "capabilities", "resolution_m"),
+        (
+            "NO_RANGE",
+            "capabilities",
+            "`range_m` is [0.0, 0.0, 0.0]: x is driven, so say how far it moves there",
+        ),
+        ("ENDLESS_RANGE", "capabilities", "`range_rad` is [0.1, inf, 0.1]: legal is 0 to 1000 rad"),
+        ("ENDLESS_FORCE", "capabilities", "`max_force_n` is [10.0, 10.0, inf]: legal is 0 to 100000 N"),
+        ("ABSURD_FORCE", "capabilities", "`max_force_n` is [1e308, 10.0, 10.0]: legal is 0 to 100000 N"),
+        (
+            "NO_FORCE",
+            "capabilities",
+            "`max_force_n` is [10.0, 0.0, 10.0]: y is driven, so say the most it gives",
+        ),
+        (
+            "NO_TORQUE",
+            "capabilities",
+            "`max_torque_nm` is [0.0, 0.0, 0.0]: x is driven, so say the most it gives",
+        ),
+        ("NEGATIVE_TORQUE", "capabilities", "`max_torque_nm` is [1.0, 1.0, -1.0]: legal is 0 to 100000 N·m"),
+        ("NO_SLEW", "capabilities", "`max_force_slew_n_per_s` is 0: its force could never change"),
+        ("ENDLESS_SLEW", "capabilities", "`max_torque_slew_nm_per_s` is inf: legal is 0 to"),
+        ("ENDLESS_STIFFNESS", "capabilities", "`max_stiffness_n_per_m` is inf: legal is 0 to"),
+        ("SEVEN_AXES", "capabilities", "`sensed` is 0b1111111: there are six axes"),
+        ("EVERY_AXIS", "capabilities", "`actuated` is 0b11111111111111111111111111111111: there are six"),
+        ("CHANGES_ITS_MIND=0", "capabilities", "capabilities changed from one call to the next"),
         ("STALE", "lifecycle", "no fresh sample within"),
         ("NO_QUATERNION", "lifecycle", "a quaternion of length 0"),
         ("NAN_DELIVERED", "lifecycle", "NaN"),
@@ -91,6 +116,39 @@ fn every_mistake_of_a_device_is_found_under_its_rule() {
     ];
     // Side by side: a device is checked in real time.
     mistakes.par_iter().for_each(|(mistake, rule, words)| assert_found("device", mistake, rule, words));
+}
+
+/// What no host can enforce does not get as far as a loop: the line names file, device, field and what to mend.
+#[test]
+fn a_run_refuses_a_device_whose_capabilities_cannot_be_enforced() {
+    let mistakes = [
+        ("NO_RANGE", "`range_m` is [0.0, 0.0, 0.0]: x is driven, so say how far it moves there"),
+        ("ENDLESS_RANGE", "`range_rad` is [0.1, inf, 0.1]: legal is 0 to 1000 rad on each axis"),
+        ("ENDLESS_FORCE", "`max_force_n` is [10.0, 10.0, inf]: legal is 0 to 100000 N on each axis"),
+        ("NO_TORQUE", "`max_torque_nm` is [0.0, 0.0, 0.0]: x is driven, so say the most it gives there"),
+        ("ENDLESS_SLEW", "`max_torque_slew_nm_per_s` is inf: legal is 0 to"),
+        ("RATES_REVERSED", "`rate_hz` is 10000 to 100 Hz: say the slowest rate first"),
+        ("NAN_LATENCY", "`latency_s` is NaN: legal is 0 to 10 s"),
+        ("SEVEN_AXES", "`sensed` is 0b1111111: there are six axes; set no bit beyond them"),
+        ("CHANGES_ITS_MIND=0", "its capabilities changed from one call to the next"),
+    ];
+    let run = |library: &Path| {
+        let scratch = Scratch::default();
+        let scene = format!("duration_s = 0.1\n[device]\nplugin = {library:?}\n");
+        let file = scratch.file("scene.toml", scene).display().to_string();
+        Flotor::with(["run", &file, "--clock", "virtual"]).run()
+    };
+    let scratch = Scratch::default();
+    let good = run(&compiled(&scratch, "device", &[]));
+    assert_eq!(good.code, Some(exit_code::OK), "the control: {good:#?}");
+    mistakes.par_iter().for_each(|(mistake, words)| {
+        let scratch = Scratch::default();
+        let library = compiled(&scratch, "device", &[mistake]);
+        let ran = run(&library);
+        assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{mistake}: {ran:#?}");
+        let device = format!("{}: `fixture-c-bad-device` refused: ", library.display());
+        assert!(ran.error().starts_with(&device) && ran.error().contains(words), "{mistake}: {ran:#?}");
+    });
 }
 
 #[test]

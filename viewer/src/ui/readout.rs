@@ -81,13 +81,14 @@ pub fn numbers(painter: &Painter, area: Rect, sample: &Sample, units: Units, pal
 /// What people should know about a moment, and what to do about it; most urgent first.
 #[must_use]
 pub fn warnings(sample: &Sample, facts: &SceneFacts) -> Vec<&'static str> {
-    const WORDS: [(Events, &str); 9] = [
+    const WORDS: [(Events, &str); 10] = [
         (Events::DEVICE_FAULT, "Device fault: force is off; see the log for what to do"),
         (Events::MODEL_FAULT, "A model failed: it gives no force any more; stop and look at the log"),
         (Events::FORCE_LIMITED, "Excess force: limited by the envelope; ease off"),
         (Events::TORQUE_LIMITED, "Excess torque: limited by the envelope; ease off"),
         (Events::BOUNDARY, "Outside the boundary: move back towards the middle"),
         (Events::STALE_SAMPLE, "Stale data: the device had no new sample; check its cable"),
+        (Events::IMPLAUSIBLE_SAMPLE, "Impossible sample: not used; check the device and its cable"),
         (Events::NOT_FINITE, "A number was not finite: counted as no force"),
         (Events::MISSED, "Late: ticks were missed; `flotor doctor` says how to keep time"),
         (Events::MODEL_DEGRADED, "The model left its domain: its answer is a safe continuation"),

@@ -1,5 +1,6 @@
 //! A device a host may use, in two types: opened (it answers) and active (it moves hands).
 
+use super::capabilities::{check, check_unchanged};
 use super::model::refusal_from;
 use super::setting::{Setting, index_of, live_index, to_raw};
 use crate::abi::{CallStatus, DeviceTable, Instance, Message};
@@ -36,12 +37,15 @@ impl Drop for Handle {
 /// A device that is opened: known, not energised.
 pub struct OpenedDevice {
     handle: Arc<Handle>,
+    /// What it has said it can do; nothing before it was asked.
+    told: Option<Capabilities>,
 }
 
 /// A device that is energised. Dropping it deactivates it.
 pub struct ActiveDevice {
     /// `None` only after `deactivate` has taken it.
     handle: Option<Arc<Handle>>,
+    told: Option<Capabilities>,
     instance: Instance,
     read: unsafe extern "C" fn(Instance, *const Tick, *mut DeviceState) -> u32,
     write: unsafe extern "C" fn(Instance, *const Tick, *const Wrench) -> u32,
@@ -87,7 +91,7 @@ impl OpenedDevice {
         if instance.is_null() {
             return Err(Refusal::broken("it reported success but opened nothing"));
         }
-        Ok(Self { handle: Arc::new(Handle { instance, table, extensions, parameters }) })
+        Ok(Self { handle: Arc::new(Handle { instance, table, extensions, parameters }), told: None })
     }
 
     /// What the device can be told.
@@ -105,16 +109,17 @@ impl OpenedDevice {
         unsafe { parameter(self.handle.instance, index) }
     }
 
-    /// What the device can do.
+    /// What the device can do: numbers a host can enforce, the same at every call.
     ///
     /// # Errors
-    /// A [`Refusal`] if the plugin failed or answered numbers that make no sense.
+    /// A [`Refusal`] if the plugin failed, answered numbers that no host can enforce, or others than before.
     pub fn capabilities(&mut self) -> Result<Capabilities, Refusal> {
         let ask = self.handle.table.capabilities;
         let Some(capabilities) = self.asked(ask, UNKNOWN) else {
             return Err(Refusal::broken(self.last_message()));
         };
-        check_capabilities(&capabilities)?;
+        check(&capabilities)?;
+        check_unchanged(self.told.get_or_insert(capabilities), &capabilities)?;
         Ok(capabilities)
     }
 
@@ -139,7 +144,7 @@ impl OpenedDevice {
         match refusal_from(code, &message) {
             Ok(()) => {
                 let instance = self.handle.instance;
-                Ok(ActiveDevice { handle: Some(self.handle), instance, read, write })
+                Ok(ActiveDevice { handle: Some(self.handle), told: self.told, instance, read, write })
             }
             Err(refusal) => Err((self, refusal)),
         }
@@ -223,7 +228,7 @@ impl ActiveDevice {
     pub fn deactivate(mut self) -> Option<OpenedDevice> {
         let handle = self.handle.take()?;
         match deactivate(&handle) {
-            CallStatus::Ok => Some(OpenedDevice { handle }),
+            CallStatus::Ok => Some(OpenedDevice { handle, told: self.told }),
             _ => None,
         }
     }
@@ -265,31 +270,3 @@ const UNKNOWN: Capabilities = Capabilities {
     rate_hz: [f64::NAN; 2],
     latency_s: f64::NAN,
 };
-
-/// Limits the envelope will enforce must be numbers: a NaN limit would limit nothing.
-fn check_capabilities(capabilities: &Capabilities) -> Result<(), Refusal> {
-    let positive = |value: f64| value > 0.0; // false for NaN; infinity is "no limit", said explicitly
-    let vectors = [
-        ("range_m", capabilities.range_m),
-        ("range_rad", capabilities.range_rad),
-        ("max_force_n", capabilities.max_force_n),
-        ("max_torque_nm", capabilities.max_torque_nm),
-    ];
-    for (name, values) in vectors {
-        if !values.iter().all(|value| *value >= 0.0) {
-            return Err(Refusal::broken(format!("its capability `{name}` is {values:?}")));
-        }
-    }
-    let scalars = [
-        ("max_force_slew_n_per_s", capabilities.max_force_slew_n_per_s),
-        ("max_torque_slew_nm_per_s", capabilities.max_torque_slew_nm_per_s),
-        ("rate_hz, slowest", capabilities.rate_hz[0]),
-        ("rate_hz, fastest", capabilities.rate_hz[1]),
-    ];
-    for (name, value) in scalars {
-        if !positive(value) {
-            return Err(Refusal::broken(format!("its capability `{name}` is {value}")));
-        }
-    }
-    Ok(())
-}

@@ -6,6 +6,7 @@
 //! layouts -> interface table. Nothing of the plugin runs before `dlopen`, and a file that fails before it
 //! never gets that far: a truncated library would otherwise raise SIGBUS inside `dlopen`.
 
+mod capabilities;
 mod check;
 mod device;
 mod error;

@@ -8,7 +8,7 @@ use crate::sensor::ForceSensor;
 use flotor_core::limits::{Boundary, CEILING, Limits};
 use flotor_hal::abi::loader::{OpenedDevice, Plugin, Setting};
 use flotor_hal::{Fault, LoopConfig, Refusal, VerticalCalibration};
-use flotor_servo::{Envelope, StopSwitch};
+use flotor_servo::{Envelope, PlausibilityCheck, StopSwitch};
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
@@ -119,7 +119,9 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
             let capabilities = opened.capabilities().map_err(CalibrationError::Refused)?;
             let limits = Limits::default().under(CEILING);
             let envelope = Envelope::new(&limits, &without_wall(), &capabilities, PERIOD_NS);
-            let guard = Guard { envelope, stopper: opened.stopper(), stop: self.stop.clone() };
+            let plausibility = PlausibilityCheck::new(&capabilities, PERIOD_NS);
+            let (stopper, stop) = (opened.stopper(), self.stop.clone());
+            let guard = Guard { envelope, plausibility, stopper, stop };
             let active = opened.activate(&config).map_err(|(opened, refusal)| {
                 self.opened = Some(opened);
                 CalibrationError::Refused(refusal)

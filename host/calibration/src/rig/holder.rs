@@ -9,7 +9,9 @@ use crate::CalibrationError;
 use flotor_core::trace::Events;
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
 use flotor_hal::{Cycle, DeviceState, Fault, Tick};
-use flotor_servo::{Envelope, Gate, Heartbeat, Place, StopSwitch, enter_real_time, start_watchdog};
+use flotor_servo::{
+    Envelope, Gate, Heartbeat, Place, PlausibilityCheck, StopSwitch, Trust, enter_real_time, start_watchdog,
+};
 use flotor_sync::{Observer, Publisher, Words, latest};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -119,6 +121,7 @@ pub(super) enum Holding {
 /// What stands between the thread and the device, and who may stop both.
 pub(super) struct Guard {
     pub(super) envelope: Envelope,
+    pub(super) plausibility: PlausibilityCheck,
     pub(super) stopper: Stopper,
     pub(super) stop: StopSwitch,
 }
@@ -139,12 +142,12 @@ impl Holder {
     pub(super) fn start(device: ActiveDevice, guard: Guard) -> std::io::Result<Self> {
         let (orders, ordered) = latest(Order::Push(0.0));
         let (publisher, reports) = latest(Averages::default().report(Holding::Changing));
-        let Guard { envelope, stopper, stop } = guard;
+        let Guard { envelope, plausibility, stopper, stop } = guard;
         let heart = Heartbeat::default();
         start_watchdog(heart.clone(), vec![stopper], stop.clone(), WATCHDOG_NS)?;
         let thread_heart = heart.clone();
         let hold = move || {
-            let device = hold(device, envelope, &thread_heart, &stop, &ordered, publisher);
+            let device = hold(device, envelope, plausibility, &thread_heart, &stop, &ordered, publisher);
             thread_heart.finish();
             device
         };
@@ -207,6 +210,7 @@ impl Drop for Holder {
 fn hold(
     mut device: ActiveDevice,
     mut envelope: Envelope,
+    mut plausibility: PlausibilityCheck,
     heart: &Heartbeat,
     stop: &StopSwitch,
     orders: &Observer<Order, ORDER_WORDS>,
@@ -242,7 +246,16 @@ fn hold(
             averages.begin_anew();
         }
         heart.enter(index, Place::DeviceRead(0));
-        let read = device.read(&tick, &mut state);
+        let last = state;
+        let mut read = device.read(&tick, &mut state);
+        // As in a run: what cannot be is as good as nothing, and too much of it a fault.
+        if read == Cycle::Fresh && plausibility.check(&tick, &state).is_err() {
+            state = last;
+            read = Cycle::Stale;
+        }
+        if plausibility.trust() == Trust::Lost {
+            read = Cycle::Fault(Fault::Protocol);
+        }
         stale_ticks = if read == Cycle::Fresh { 0 } else { stale_ticks.saturating_add(1) };
         let gate = if stale_ticks > STALE_TICKS_LIMIT { Gate::SHUT } else { Gate::OPEN };
         if gate == Gate::SHUT {

@@ -97,8 +97,8 @@ impl Device for Scripted {
             resolution_m: 0.0,
             max_force_n: [55.0, 55.0, 140.0],
             max_torque_nm: [6.3, 6.3, 12.2],
-            max_force_slew_n_per_s: f64::INFINITY,
-            max_torque_slew_nm_per_s: f64::INFINITY,
+            max_force_slew_n_per_s: 1.0e9, // nothing is limited
+            max_torque_slew_nm_per_s: 1.0e9,
             max_stiffness_n_per_m: 25.0e3,
             rate_hz: [100.0, 10_000.0],
             latency_s: 0.0,

@@ -60,6 +60,9 @@ struct Report {
     #[serde(flatten)]
     difference: Difference,
     why_apart: Option<DivergenceCause>,
+    /// What is wrong with recorded samples, by device.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    implausible: Vec<String>,
     recorded_s: f64,
     wall_s: f64,
 }
@@ -72,13 +75,14 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
     let started = Instant::now();
     let mut samples = Vec::new();
     let mut end_ns = 0;
-    let Compared { difference, coverage, why, ending, health } = replay.compare(|record, wrench| {
-        end_ns = record.time_ns;
-        progress.set_position(record.time_ns / 1_000_000);
-        if arguments.plot.is_some() {
-            samples.push(Sample { time_ns: record.time_ns, recorded: record.model, replayed: *wrench });
-        }
-    })?;
+    let Compared { difference, coverage, why, ending, implausible, health } =
+        replay.compare(|record, wrench| {
+            end_ns = record.time_ns;
+            progress.set_position(record.time_ns / 1_000_000);
+            if arguments.plot.is_some() {
+                samples.push(Sample { time_ns: record.time_ns, recorded: record.model, replayed: *wrench });
+            }
+        })?;
     progress.finish_and_clear();
 
     let recorded_s = end_ns as f64 * 1.0e-9;
@@ -90,6 +94,7 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
         coverage,
         difference,
         why_apart: why,
+        implausible: implausible.iter().map(|(device, found)| format!("{device}: {found}")).collect(),
         recorded_s,
         wall_s: started.elapsed().as_secs_f64(),
     };
@@ -155,6 +160,8 @@ fn to_text(arguments: &ReplayArguments, report: &Report) -> String {
     if let (Some(why), true) = (&report.why_apart, arguments.changes_anything()) {
         row("note", format!("the wrench differs for another reason as well: {why}"));
     }
+    let implausible = report.implausible.iter().map(|found| format!("not believable as recorded: {found}"));
+    implausible.for_each(|found| row("note", found));
     report.gaps().into_iter().for_each(|gap| row("note", gap));
     lines.join("\n")
 }

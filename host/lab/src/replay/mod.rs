@@ -16,10 +16,12 @@ use flotor_core::coupling::{CouplingDescription, CouplingEnds};
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeOutcome, ChangeSubject};
 use flotor_hal::abi::PluginKind;
-use flotor_hal::{DeviceState, LoopConfig, Tick, Wrench};
+use flotor_hal::{Axes, Capabilities, DeviceState, LoopConfig, Tick, Wrench};
 use flotor_record::{Ending, ReadError, Recording, Role, RunDescription};
 use flotor_servo::coupling::Patience;
-use flotor_servo::{Clock, Coupled, Forces, Heartbeat, ModelHealth, Port, Replacement};
+use flotor_servo::{
+    Clock, Coupled, Forces, Heartbeat, ImplausibleSamples, ModelHealth, PlausibilityCheck, Port, Replacement,
+};
 use flotor_session::registry::Registry;
 use flotor_session::scene::{
     Isolation, KeyValue, Location, ModelUse, ParameterText, PluginKeyValue, PluginUse,
@@ -91,6 +93,8 @@ pub struct Compared {
     pub why: Option<DivergenceCause>,
     /// Whether the recording has the run's end.
     pub ending: Ending,
+    /// Of each device that has some, by name: recorded samples that cannot be.
+    pub implausible: Vec<(String, ImplausibleSamples)>,
     /// Health of each model in this replay and its last message, in the scene's order.
     pub health: Vec<(ModelHealth, String)>,
 }
@@ -165,6 +169,7 @@ impl<'r> Replay<'r> {
     pub fn compare(mut self, mut look: impl FnMut(&TickRecord, &Wrench)) -> Result<Compared, ReplayError> {
         let mut difference = Difference::default();
         let mut evidence = Evidence::of(self.recording.run());
+        let mut plausibility = vec![any_device(self.config.period_ns); self.devices];
         let heart = Heartbeat::default(); // no watchdog observes a replay
         let mut ports = vec![Port::REST; self.devices];
         let mut records: Vec<TickRecord> = Vec::with_capacity(self.devices);
@@ -188,6 +193,9 @@ impl<'r> Replay<'r> {
                 ..DeviceState::HOME
             };
             port.events = Events::NONE;
+            if let Some(check) = plausibility.get_mut(usize::from(record.device)) {
+                look_at_sample(check, record);
+            }
             if records.len() < self.devices {
                 continue;
             }
@@ -212,8 +220,11 @@ impl<'r> Replay<'r> {
         }
         difference.finish();
         let why = if self.held.is_nothing() { evidence.cause() } else { evidence.other_cause() };
+        let names = self.recording.run().devices().map(|device| device.name.clone());
+        let found = plausibility.iter().map(PlausibilityCheck::found);
+        let implausible = names.zip(found).filter(|(_, found)| found.first_tick().is_some()).collect();
         let (ending, health) = (self.recording.ending(), self.forces.health());
-        Ok(Compared { difference, coverage: evidence.coverage, why, ending, health })
+        Ok(Compared { difference, coverage: evidence.coverage, why, ending, implausible, health })
     }
 }
 
@@ -299,6 +310,30 @@ impl Difference {
     pub fn is_bit_exact(&self) -> bool {
         self.differing_ticks == 0
     }
+}
+
+/// The check of the samples of a device of which nothing is known but that a hand holds it.
+fn any_device(period_ns: u64) -> PlausibilityCheck {
+    PlausibilityCheck::new(&Capabilities { sensed: Axes::ALL, ..Capabilities::UNDRIVEN }, period_ns)
+}
+
+/// Looks at what was a new sample in the run: where there was none, the last pose stands in the record.
+fn look_at_sample(check: &mut PlausibilityCheck, record: &TickRecord) {
+    let mut without = Events::STALE_SAMPLE;
+    for event in [Events::NOT_FINITE, Events::IMPLAUSIBLE_SAMPLE, Events::DEVICE_FAULT] {
+        without.insert(event);
+    }
+    if record.events.intersects(without) {
+        return;
+    }
+    let tick = Tick { index: record.tick, time_ns: record.time_ns, dt_ns: record.dt_ns };
+    let state = DeviceState {
+        pose: record.pose,
+        twist: record.twist,
+        sampled_ns: record.time_ns,
+        ..DeviceState::HOME
+    };
+    let _ = check.check(&tick, &state);
 }
 
 fn bits(wrench: &Wrench) -> [u64; 6] {

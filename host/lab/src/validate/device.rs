@@ -13,22 +13,18 @@ const TICK: Duration = Duration::from_millis(1);
 /// How far the length of a quaternion may be from one: rounding in single precision, ten times.
 const QUATERNION_TOLERANCE: f64 = 1.0e-6;
 
+/// How often a device is asked what it can do, before it is energised and after.
+const ASKED: usize = 10;
+
+/// The loader refuses what no host can enforce, and what is not what was told before.
 pub(super) fn capabilities(mut device: OpenedDevice) -> Result<(), String> {
-    // What the host enforces, it has checked when this comes back.
-    let told = device.capabilities().map_err(|refusal| refusal.to_string())?;
-    let [slowest_hz, fastest_hz] = told.rate_hz;
-    if !slowest_hz.is_finite() || !fastest_hz.is_finite() || slowest_hz > fastest_hz {
-        return Err(format!("its rates are {slowest_hz} to {fastest_hz} Hz"));
-    }
-    let finite = [("resolution_m", told.resolution_m), ("latency_s", told.latency_s)];
-    if let Some((name, value)) = finite.into_iter().find(|(_, value)| !value.is_finite() || *value < 0.0) {
-        return Err(format!("its capability `{name}` is {value}"));
-    }
-    // Infinite is allowed: no stiffness is too much for it.
-    if told.max_stiffness_n_per_m.is_nan() || told.max_stiffness_n_per_m < 0.0 {
-        return Err(format!("its capability `max_stiffness_n_per_m` is {}", told.max_stiffness_n_per_m));
-    }
-    Ok(())
+    let ask = |device: &mut OpenedDevice| {
+        (0..ASKED).try_for_each(|_| device.capabilities().map(drop)).map_err(|refusal| refusal.to_string())
+    };
+    ask(&mut device)?;
+    // One that cannot be energised breaks another rule.
+    let Ok(active) = device.activate(&CONFIG) else { return Ok(()) };
+    active.deactivate().map_or(Ok(()), |mut device| ask(&mut device))
 }
 
 pub(super) fn lifecycle(mut device: OpenedDevice) -> Result<(), String> {

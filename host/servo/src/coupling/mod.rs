@@ -25,6 +25,7 @@
 
 mod delay;
 mod end;
+mod peer_check;
 mod remote;
 mod tank;
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! One end of a coupling whose other end is on another host.
 
+use super::peer_check::PeerCheck;
 use super::{CouplingConfig, CouplingEnd, End, Grip, Pull};
 use flotor_core::peer::{DISPATCH_WORDS, Dispatch, PeerState, TankState};
 use flotor_hal::Tick;
@@ -32,6 +33,8 @@ pub struct Hearing {
     pub silences: u64,
     /// The longest wait for a message, ns.
     pub longest_wait_ns: u64,
+    /// Messages that cannot be true: they were not used.
+    pub implausible: u64,
     /// The partner's energy tank, as received last.
     pub partner: TankState,
 }
@@ -42,6 +45,7 @@ pub struct Hearing {
 /// is unknown. When messages arrive (again) the force fades in.
 pub struct RemoteEnd {
     end: End,
+    check: PeerCheck,
     patience: Patience,
     told: Publisher<Dispatch, DISPATCH_WORDS>,
     heard: Observer<Dispatch, DISPATCH_WORDS>,
@@ -51,6 +55,8 @@ pub struct RemoteEnd {
     run: Option<u64>,
     hold: Hold,
     hearing: Hearing,
+    /// Whether the message of this tick was not believed.
+    is_implausible: bool,
 }
 
 /// Whether the end holds on to its partner.
@@ -82,6 +88,7 @@ impl RemoteEnd {
         let (told, for_partner) = latest(NOBODY);
         let (from_partner, heard) = latest(NOBODY);
         let end = Self {
+            check: PeerCheck::new(end.mapping.motion_scale, patience.silence_ns),
             end: End::new(config, &end.mapping, period_s),
             patience,
             told,
@@ -90,6 +97,7 @@ impl RemoteEnd {
             run: None,
             hold: Hold::Released,
             hearing: Hearing::default(),
+            is_implausible: false,
         };
         (end, Line { told: for_partner, heard: from_partner })
     }
@@ -120,6 +128,13 @@ impl RemoteEnd {
         self.hold == Hold::Released
     }
 
+    /// True if the partner told in this tick what cannot be. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn is_implausible(&self) -> bool {
+        self.is_implausible
+    }
+
     /// This end's energy tank. Real-time: bounded, no allocation.
     #[must_use]
     pub fn tank(&self) -> TankState {
@@ -136,10 +151,17 @@ impl RemoteEnd {
     #[inline]
     fn listen(&mut self, now_ns: u64) {
         // A cell that is being written just now is looked at again in the next tick.
+        self.is_implausible = false;
         let newest = self.heard.read().filter(|(version, _)| *version != self.version);
         if let Some((version, dispatch)) = newest {
             self.version = version;
-            self.hear(&dispatch, now_ns);
+            match self.check.check(&dispatch, now_ns) {
+                Ok(()) => self.hear(&dispatch, now_ns),
+                Err(_) => {
+                    self.is_implausible = true;
+                    self.hearing.implausible += 1;
+                }
+            }
         }
         if let Hold::On { heard_ns, .. } = self.hold {
             let wait_ns = now_ns - heard_ns;

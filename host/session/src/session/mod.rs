@@ -25,9 +25,9 @@ use flotor_hal::{Capabilities, DVec3, EnergyLedger, Fault, LoopConfig, Parameter
 use flotor_live::WrenchLimits;
 use flotor_servo::coupling::{Line, Patience};
 use flotor_servo::{
-    Clock, Core, Coupled, CouplingOutcome, Envelope, Forces, Guarded, Loop, ModelHealth, ParameterQueue,
-    Place, RealTimeReport, RunConfig, RunEnd, Schedule, Servo, SpinWindow, Standby, StopSwitch, Stuck,
-    Timing, drain, enter_real_time, queue, start_watchdog, swap_queues,
+    Clock, Core, Coupled, CouplingOutcome, Envelope, Forces, Guarded, ImplausibleSamples, Loop, ModelHealth,
+    ParameterQueue, Place, RealTimeReport, Reported, RunConfig, RunEnd, Schedule, Servo, SpinWindow, Standby,
+    StopSwitch, Stuck, Timing, drain, enter_real_time, queue, start_watchdog, swap_queues,
 };
 use prepare::{Scheduled, activate};
 use std::time::{Duration, Instant};
@@ -173,11 +173,15 @@ impl Outcome {
 /// What is known of a device after a run.
 #[derive(Clone, Debug)]
 pub struct DeviceOutcome {
-    /// The first fault it reported.
+    /// The first fault, of the device itself or found by the host.
     pub fault: Option<Fault>,
+    /// Its samples that cannot be.
+    pub implausible: ImplausibleSamples,
+    /// What the host has found of its samples, or of how it takes commands.
+    pub problem: Option<String>,
     /// Its own energy balance, where it keeps one.
     pub ledger: Option<EnergyLedger>,
-    /// Its last words; empty if it had no reason to say any.
+    /// Its last words, or what the host has found; empty if it had no reason to say any.
     pub words: String,
 }
 
@@ -244,7 +248,7 @@ impl Session {
         let devices = opened.into_iter().map(|opened| {
             let limits = under_ceiling(&scene.limits, opened.embodiment);
             let envelope = guard(&limits, &opened.capabilities);
-            Guarded { device: opened.device, sensed: opened.capabilities.sensed, envelope }
+            Guarded { device: opened.device, capabilities: opened.capabilities, envelope }
         });
         let devices: Vec<_> = devices.collect();
         let period_s = period_ns as f64 * 1.0e-9;
@@ -384,10 +388,18 @@ impl Session {
             Clock::Real => self.run_real(observer, stop)?,
         };
         let Finished { mut servo, end, elapsed_ns, dropped_records, real_time } = finished;
-        let told = |(device, fault): (&mut ActiveDevice, Option<Fault>)| DeviceOutcome {
-            fault,
-            ledger: device.energy_ledger(),
-            words: device.last_message(),
+        let told = |(device, reported): (&mut ActiveDevice, Reported)| {
+            let problem = reported.problem();
+            DeviceOutcome {
+                fault: reported.fault,
+                implausible: reported.implausible,
+                ledger: device.energy_ledger(),
+                words: match &problem {
+                    Some(problem) if !reported.is_own_fault => problem.clone(),
+                    _ => device.last_message(),
+                },
+                problem,
+            }
         };
         let devices: Vec<DeviceOutcome> = servo.devices().map(told).collect();
         let couplings = servo.forces().coupling_outcomes();

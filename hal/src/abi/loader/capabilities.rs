@@ -1,0 +1,236 @@
+//! What a host can enforce of what a device says it can do. Not real-time.
+//!
+//! The envelope takes its limits from these numbers, the boundary its wall, the check of samples its bounds: one that is
+//! missing, endless or contradictory would leave a hand without them. Each refusal names the field and what to mend.
+
+use crate::{Axes, Capabilities, Refusal};
+
+/// A number of a capability, by its field. It may be nothing, but has an end: what is beyond no device of this world
+/// has, and is a mistake of unit or of memory.
+struct Number<T> {
+    field: &'static str,
+    value: T,
+    most: f64,
+    unit: &'static str,
+}
+
+/// The numbers of the three translations, or of the three rotations.
+struct Group {
+    /// Of x, y and z.
+    axes: [Axes; 3],
+    range: Number<[f64; 3]>,
+    limit: Number<[f64; 3]>,
+    slew: Number<f64>,
+}
+
+/// Faster than any loop, Hz.
+const MOST_RATE_HZ: f64 = 1.0e7;
+
+/// Refuses numbers that no host can enforce.
+pub(super) fn check(told: &Capabilities) -> Result<(), Refusal> {
+    for (field, axes) in [("sensed", told.sensed), ("actuated", told.actuated)] {
+        if !Axes::ALL.contains(axes) {
+            let found = format!("{:#b}", axes.bits);
+            return Err(wrong(field, &found, "there are six axes; set no bit beyond them"));
+        }
+    }
+    let translation = Group {
+        axes: [Axes::X, Axes::Y, Axes::Z],
+        range: number("range_m", told.range_m, 100.0, "m"),
+        limit: number("max_force_n", told.max_force_n, 1.0e5, "N"),
+        slew: number("max_force_slew_n_per_s", told.max_force_slew_n_per_s, 1.0e10, "N/s"),
+    };
+    let rotation = Group {
+        axes: [Axes { bits: 1 << 3 }, Axes { bits: 1 << 4 }, Axes { bits: 1 << 5 }],
+        range: number("range_rad", told.range_rad, 1.0e3, "rad"),
+        limit: number("max_torque_nm", told.max_torque_nm, 1.0e5, "N·m"),
+        slew: number("max_torque_slew_nm_per_s", told.max_torque_slew_nm_per_s, 1.0e10, "N·m/s"),
+    };
+    translation.check(told)?;
+    rotation.check(told)?;
+    let [slowest_hz, fastest_hz] = told.rate_hz;
+    number("resolution_m", told.resolution_m, 1.0, "m").has_an_end()?;
+    number("max_stiffness_n_per_m", told.max_stiffness_n_per_m, 1.0e10, "N/m").has_an_end()?;
+    number("latency_s", told.latency_s, 10.0, "s").has_an_end()?;
+    let are_rates = slowest_hz > 0.0 && slowest_hz <= fastest_hz && fastest_hz <= MOST_RATE_HZ; // false for NaN
+    if !are_rates {
+        let found = format!("{slowest_hz} to {fastest_hz} Hz");
+        let mend =
+            format!("say the slowest rate first, more than 0, and the fastest, at most {MOST_RATE_HZ} Hz");
+        return Err(wrong("rate_hz", &found, &mend));
+    }
+    Ok(())
+}
+
+/// Refuses numbers that are not those told before: the envelope is built once.
+pub(super) fn check_unchanged(before: &Capabilities, now: &Capabilities) -> Result<(), Refusal> {
+    if before == now {
+        return Ok(());
+    }
+    Err(Refusal::broken(format!(
+        "its capabilities changed from one call to the next; they are constant from `open` on: {before:?}, then {now:?}"
+    )))
+}
+
+impl Group {
+    fn check(&self, told: &Capabilities) -> Result<(), Refusal> {
+        let Self { axes, range, limit, slew } = self;
+        range.has_an_end()?;
+        limit.has_an_end()?;
+        let driven = axes.map(|axis| told.actuated.contains(axis));
+        let held = axes.map(|axis| told.actuated.contains(axis) && told.sensed.contains(axis));
+        limit
+            .is_more_than_nothing_on(driven, "say the most it gives there, or leave it out of `actuated`")?;
+        // Without a range the wall at its edge stands at home.
+        range.is_more_than_nothing_on(held, "say how far it moves there, or leave it out of `actuated`")?;
+        if driven == [false; 3] {
+            // Endless is the slew of nothing, and no slew is none either.
+            return if slew.value >= 0.0 { Ok(()) } else { Err(slew.wrong("legal is 0 and more")) };
+        }
+        slew.has_an_end()?;
+        if slew.value == 0.0 {
+            return Err(slew.wrong("its force could never change; say how fast it may"));
+        }
+        Ok(())
+    }
+}
+
+impl Number<f64> {
+    fn has_an_end(&self) -> Result<(), Refusal> {
+        let Self { value, most, unit, .. } = self;
+        if (0.0..=*most).contains(value) {
+            return Ok(()); // false for NaN
+        }
+        Err(self.wrong(&format!("legal is 0 to {most} {unit}")))
+    }
+
+    fn wrong(&self, mend: &str) -> Refusal {
+        wrong(self.field, &self.value.to_string(), mend)
+    }
+}
+
+impl Number<[f64; 3]> {
+    fn has_an_end(&self) -> Result<(), Refusal> {
+        let Self { field, value, most, unit } = self;
+        if value.iter().all(|value| (0.0..=*most).contains(value)) {
+            return Ok(()); // false for NaN
+        }
+        Err(wrong(field, &format!("{value:?}"), &format!("legal is 0 to {most} {unit} on each axis")))
+    }
+
+    fn is_more_than_nothing_on(&self, axes: [bool; 3], mend: &str) -> Result<(), Refusal> {
+        let Self { field, value, .. } = self;
+        let mut empty = ["x", "y", "z"].into_iter().zip(value.iter().zip(axes));
+        match empty.find(|(_, (value, is_needed))| *is_needed && **value == 0.0) {
+            None => Ok(()),
+            Some((name, _)) => {
+                Err(wrong(field, &format!("{value:?}"), &format!("{name} is driven, so {mend}")))
+            }
+        }
+    }
+}
+
+const fn number<T>(field: &'static str, value: T, most: f64, unit: &'static str) -> Number<T> {
+    Number { field, value, most, unit }
+}
+
+fn wrong(field: &str, found: &str, mend: &str) -> Refusal {
+    Refusal::broken(format!("its capability `{field}` is {found}: {mend}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HELD: Capabilities = Capabilities {
+        sensed: Axes::ALL,
+        actuated: Axes::ALL,
+        range_m: [0.012; 3],
+        range_rad: [0.12; 3],
+        resolution_m: 0.0,
+        max_force_n: [10.0; 3],
+        max_torque_nm: [1.0; 3],
+        max_force_slew_n_per_s: 1.0e6,
+        max_torque_slew_nm_per_s: 1.0e6,
+        max_stiffness_n_per_m: 1.0e4,
+        rate_hz: [100.0, 10_000.0],
+        latency_s: 0.0,
+    };
+    const PLANAR: Capabilities = Capabilities {
+        sensed: Axes::PLANE,
+        actuated: Axes::PLANE,
+        range_m: [0.08, 0.05, 0.0],
+        range_rad: [0.0; 3],
+        max_force_n: [3.0, 3.0, 0.0],
+        max_torque_nm: [0.0; 3],
+        max_torque_slew_nm_per_s: 0.0,
+        ..HELD
+    };
+
+    #[test]
+    fn what_devices_are_like_passes() {
+        let puck = Capabilities { sensed: Axes::ALL, range_m: [0.012; 3], ..Capabilities::UNDRIVEN };
+        let endless = Capabilities { max_torque_slew_nm_per_s: f64::INFINITY, ..PLANAR }; // of nothing
+        let silent = Capabilities { max_stiffness_n_per_m: 0.0, ..HELD }; // says nothing
+        let buzzer = Capabilities { sensed: Axes::NONE, range_m: [0.0; 3], range_rad: [0.0; 3], ..HELD };
+        for told in [HELD, PLANAR, puck, endless, silent, buzzer, Capabilities::UNDRIVEN] {
+            assert_eq!(check(&told), Ok(()), "{told:?}");
+        }
+    }
+
+    #[test]
+    fn every_number_has_to_be_one_that_can_be_enforced() {
+        // Where each number stands, and whether it may be nothing.
+        type Field = (&'static str, fn(&mut Capabilities) -> &mut f64, bool);
+        let fields: [Field; 11] = [
+            ("range_m", |told| &mut told.range_m[1], false),
+            ("range_rad", |told| &mut told.range_rad[2], false),
+            ("resolution_m", |told| &mut told.resolution_m, true),
+            ("max_force_n", |told| &mut told.max_force_n[0], false),
+            ("max_torque_nm", |told| &mut told.max_torque_nm[2], false),
+            ("max_force_slew_n_per_s", |told| &mut told.max_force_slew_n_per_s, false),
+            ("max_torque_slew_nm_per_s", |told| &mut told.max_torque_slew_nm_per_s, false),
+            ("max_stiffness_n_per_m", |told| &mut told.max_stiffness_n_per_m, true),
+            ("rate_hz", |told| &mut told.rate_hz[0], false),
+            ("rate_hz", |told| &mut told.rate_hz[1], false),
+            ("latency_s", |told| &mut told.latency_s, true),
+        ];
+        for (field, number, may_be_nothing) in fields {
+            for value in [f64::NAN, f64::INFINITY, -f64::INFINITY, -1.0e-9, 1.0e308, f64::MAX, 0.0] {
+                let mut told = HELD;
+                *number(&mut told) = value;
+                if value == 0.0 && may_be_nothing {
+                    assert_eq!(check(&told), Ok(()), "{field}");
+                    continue;
+                }
+                let reason = check(&told).expect_err(field).reason;
+                assert!(reason.starts_with(&format!("its capability `{field}")), "{value}: {reason}");
+                assert!(reason.contains(": ") && !reason.contains('\n'), "{reason}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_contradicts_itself_is_refused_with_what_to_mend() {
+        let cases = [
+            (Capabilities { rate_hz: [1000.0, 100.0], ..HELD }, "say the slowest rate first"),
+            (Capabilities { sensed: Axes { bits: 0x7f }, ..HELD }, "`sensed` is 0b1111111: there are six"),
+            (Capabilities { actuated: Axes { bits: u32::MAX }, ..HELD }, "set no bit beyond them"),
+            (Capabilities { max_torque_nm: [0.0; 3], ..HELD }, "x is driven, so say the most it gives there"),
+            (Capabilities { actuated: Axes::TRANSLATION, ..PLANAR }, "z is driven, so say the most it gives"),
+            (Capabilities { range_m: [0.0; 3], ..HELD }, "x is driven, so say how far it moves there"),
+        ];
+        for (told, words) in cases {
+            let reason = check(&told).expect_err(words).reason;
+            assert!(reason.contains(words), "{reason}");
+        }
+    }
+
+    #[test]
+    fn what_was_told_stays() {
+        assert_eq!(check_unchanged(&HELD, &HELD), Ok(()));
+        let more = Capabilities { max_force_n: [20.0; 3], ..HELD };
+        let reason = check_unchanged(&HELD, &more).expect_err("it changed").reason;
+        assert!(reason.contains("capabilities changed") && reason.contains("20.0"), "{reason}");
+    }
+}

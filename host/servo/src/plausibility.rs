@@ -1,0 +1,363 @@
+//! Whether a sample can be true: what stands between a device and everything that believes it.
+//!
+//! A pose that is finite may still be a kilometre away, a rotation that is none, a jump no hand can make, or a minute old; a
+//! model would answer it with all the force the envelope lets pass. A sample that cannot be is not used: the last one that
+//! could stays, as when a sample is missing. [`Trust`] says what follows: one is borne, several in a short time take the
+//! force away, more are a fault of the device.
+//!
+//! A bound is one that no handle passes: a sample within it may still be wrong, and the envelope limits what it does.
+#![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
+#![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
+
+use flotor_hal::{Axes, Capabilities, Conditions, DQuat, DVec3, DeviceState, Pose, Tick, Twist};
+
+/// How far the length of a quaternion may be from one: what single precision and a sloppy normalisation leave is a
+/// hundred times less.
+const LENGTH_TOLERANCE: f64 = 1.0e-3;
+/// How many times its range a device may report: it is asked where a handle is that has left it.
+const RANGES: f64 = 2.0;
+/// Where a handle may be along an axis whose device says no range, m: a room.
+const ROOM_M: f64 = 10.0;
+/// Fastest that a handle goes from one sample to the next: a throw leaves the hand at ten times the fastest reach (0.5
+/// m/s is fast within a workspace of centimetres), a wrist turns at 30 rad/s.
+pub(crate) const SPEED_M_PER_S: f64 = 5.0;
+const SPIN_RAD_PER_S: f64 = 50.0;
+/// Fastest change of that: 500 times that of a fall. Of a handle in a hand, a tap on a wall has a tenth of it.
+const ACCELERATION_M_PER_S2: f64 = 5.0e3;
+/// How many times the fastest a reported velocity may be: estimates from positions overshoot.
+const TWIST_OVERSHOOT: f64 = 2.0;
+/// What noise and a sample that was taken a little earlier or later add to a way: a tenth of a millimetre at each end, or
+/// the steps of the sensor where those are coarser; and a fifth of a degree.
+const SLACK_M: f64 = 2.0e-4;
+const SLACK_STEPS: f64 = 4.0;
+const SLACK_RAD: f64 = 4.0e-3;
+/// How far a sample's time may be from the loop's, beyond what periods and the device's latency explain, ns: ahead, where a
+/// device stamps when a late tick asks, and behind.
+const AHEAD_NS: u64 = 10_000_000;
+const BEHIND_NS: u64 = 100_000_000;
+/// The same in periods.
+const AHEAD_PERIODS: u64 = 2;
+const BEHIND_PERIODS: u64 = 40;
+/// Time without a usable sample after which there is no force: what is older than this is not where the hand is. In 10 ms a
+/// 10 Hz movement of 5 mm goes 3 mm.
+const STALE_LIMIT_NS: u64 = 10_000_000;
+/// Samples in a row that may be lost at any rate: one is normal.
+const STALE_TICKS_BORNE: u64 = 2;
+/// How much longer a pose with noise may stay the same to the bit.
+const STUCK_TIMES: u32 = 5;
+/// How much longer samples that cannot be are borne before the device counts as faulty.
+const FAULT_TIMES: u32 = 10;
+/// Samples that can be and make up for one that cannot: of a device that is wrong more often than once in so many, nothing
+/// is believed in the end.
+const GOOD_FOR_A_BAD: u32 = 20;
+
+/// Why a sample cannot be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Implausible {
+    /// A number is NaN or infinite.
+    NotFinite,
+    /// The orientation has not the length of a rotation.
+    Quaternion,
+    /// The pose is farther out than twice the range.
+    Range,
+    /// No handle gets from the last sample to this one in that time, or has that velocity.
+    Speed,
+    /// No handle changes its velocity that fast.
+    Acceleration,
+    /// It was taken in the future, long ago, before the last one, or is the last one again and again.
+    Time,
+    /// A pose with noise that has not changed in any bit.
+    Stuck,
+}
+
+impl Implausible {
+    /// All of them.
+    pub const ALL: [Implausible; 7] = [
+        Self::NotFinite,
+        Self::Quaternion,
+        Self::Range,
+        Self::Speed,
+        Self::Acceleration,
+        Self::Time,
+        Self::Stuck,
+    ];
+
+    /// For reports.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::NotFinite => "not finite",
+            Self::Quaternion => "quaternion",
+            Self::Range => "range",
+            Self::Speed => "speed",
+            Self::Acceleration => "acceleration",
+            Self::Time => "time",
+            Self::Stuck => "stuck",
+        }
+    }
+}
+
+/// What has been found of a device's samples in a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ImplausibleSamples {
+    /// How many, in the order of [`Implausible::ALL`].
+    counts: [u64; Implausible::ALL.len()],
+    /// Tick of the first.
+    first_tick: Option<u64>,
+}
+
+impl ImplausibleSamples {
+    /// How many could not be for this reason. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn count(&self, why: Implausible) -> u64 {
+        self.counts.get(why as usize).copied().unwrap_or(0)
+    }
+
+    /// Tick of the first. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn first_tick(&self) -> Option<u64> {
+        self.first_tick
+    }
+
+    fn add(&mut self, why: Implausible, tick: &Tick) {
+        if let Some(count) = self.counts.get_mut(why as usize) {
+            *count = count.saturating_add(1);
+        }
+        self.first_tick.get_or_insert(tick.index);
+    }
+}
+
+impl std::fmt::Display for ImplausibleSamples {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let total: u64 = self.counts.iter().sum();
+        let found = Implausible::ALL.into_iter().zip(self.counts).filter(|(_, count)| *count > 0);
+        let plural = if total == 1 { "" } else { "s" };
+        write!(f, "{total} sample{plural} cannot be (")?;
+        for (place, (why, count)) in found.enumerate() {
+            let comma = if place == 0 { "" } else { ", " };
+            write!(f, "{comma}{} {count}", why.word())?;
+        }
+        write!(f, "), the first at tick {}", self.first_tick.unwrap_or(0))
+    }
+}
+
+/// How far a device is believed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Trust {
+    /// What it says is used.
+    Full,
+    /// There have been too many samples that cannot be: no force for a while.
+    Withdrawn,
+    /// It goes on like that: the device is faulty.
+    Lost,
+}
+
+/// A sample that was believed, and when it came.
+#[derive(Clone, Copy)]
+struct Believed {
+    pose: Pose,
+    time_ns: u64,
+    sampled_ns: u64,
+    /// From the one before, m/s, over this time, s; at rest before there were two.
+    velocity: DVec3,
+    over_s: f64,
+}
+
+/// The check of the samples of one device.
+#[derive(Clone)]
+pub struct PlausibilityCheck {
+    /// A device that senses no pose may leave it as it likes.
+    has_pose: bool,
+    /// Per metre from home, and per sine of half a rotation from home: their vector is longer than one outside of what can
+    /// be.
+    per_reach: DVec3,
+    per_turn: DVec3,
+    slack_m: f64,
+    ahead_ns: u64,
+    behind_ns: u64,
+    stale_ticks: u32,
+    last: Option<Believed>,
+    /// Samples in a row that are the one before, by their time, and by all bits of their pose.
+    repeated: u32,
+    unmoved: u32,
+    /// Grows by [`GOOD_FOR_A_BAD`] with each sample that cannot be, falls by one with each that can.
+    distrust: u32,
+    found: ImplausibleSamples,
+}
+
+impl PlausibilityCheck {
+    /// For a device that can do this, in a loop of this period. Not real-time.
+    #[must_use]
+    pub fn new(device: &Capabilities, period_ns: u64) -> Self {
+        let reach_m = device.range_m.map(|range_m| if range_m > 0.0 { RANGES * range_m } else { ROOM_M });
+        // Twice the sine of half an angle is never more than the angle.
+        let per_turn = device.range_rad.map(|range| if range > 0.0 { 2.0 / (RANGES * range) } else { 0.0 });
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some seconds
+        let latency_ns = (device.latency_s * 1.0e9) as u64;
+        let period_ns = period_ns.max(1);
+        Self {
+            has_pose: device.sensed != Axes::NONE,
+            per_reach: DVec3::from_array(reach_m).recip(),
+            per_turn: DVec3::from_array(per_turn),
+            slack_m: SLACK_M.max(SLACK_STEPS * device.resolution_m),
+            ahead_ns: AHEAD_NS + AHEAD_PERIODS * period_ns,
+            behind_ns: BEHIND_NS.max(BEHIND_PERIODS * period_ns) + latency_ns,
+            stale_ticks: stale_ticks_limit(period_ns),
+            last: None,
+            repeated: 0,
+            unmoved: 0,
+            distrust: 0,
+            found: ImplausibleSamples::default(),
+        }
+    }
+
+    /// Looks at a new sample; one that can be is the last one from now on.
+    ///
+    /// # Errors
+    /// Why it cannot be.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[inline]
+    pub fn check(&mut self, tick: &Tick, sample: &DeviceState) -> Result<(), Implausible> {
+        let checked = self.look(tick, sample);
+        match checked {
+            Ok(()) => self.distrust = self.distrust.saturating_sub(1),
+            Err(why) => {
+                self.distrust = self.distrust.saturating_add(GOOD_FOR_A_BAD).min(self.fault_limit() + 1);
+                self.found.add(why, tick);
+            }
+        }
+        checked
+    }
+
+    /// How far the device is believed by now. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn trust(&self) -> Trust {
+        if self.distrust <= GOOD_FOR_A_BAD * self.stale_ticks {
+            Trust::Full
+        } else if self.distrust <= self.fault_limit() {
+            Trust::Withdrawn
+        } else {
+            Trust::Lost
+        }
+    }
+
+    /// What was found. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn found(&self) -> ImplausibleSamples {
+        self.found
+    }
+
+    fn fault_limit(&self) -> u32 {
+        GOOD_FOR_A_BAD * FAULT_TIMES * self.stale_ticks
+    }
+
+    #[inline]
+    fn look(&mut self, tick: &Tick, sample: &DeviceState) -> Result<(), Implausible> {
+        if !sample.is_finite() {
+            return Err(Implausible::NotFinite);
+        }
+        if !self.has_pose {
+            return Ok(());
+        }
+        let DeviceState { pose, twist, sampled_ns, .. } = sample;
+        if !is_rotation(pose.orientation()) {
+            return Err(Implausible::Quaternion);
+        }
+        let (out, turned) = (pose.position() * self.per_reach, pose.orientation().xyz() * self.per_turn);
+        if out.length_squared() > 1.0 || turned.length_squared() > 1.0 {
+            return Err(Implausible::Range);
+        }
+        if is_too_fast(twist) {
+            return Err(Implausible::Speed);
+        }
+        if *sampled_ns > tick.time_ns.saturating_add(self.ahead_ns)
+            || sampled_ns.saturating_add(self.behind_ns) < tick.time_ns
+        {
+            return Err(Implausible::Time);
+        }
+        let mut believed = Believed {
+            pose: *pose,
+            time_ns: tick.time_ns,
+            sampled_ns: *sampled_ns,
+            velocity: DVec3::ZERO,
+            over_s: 0.0,
+        };
+        if let Some(last) = self.last {
+            self.follow(&last, sample)?;
+            let over_s = tick.time_ns.saturating_sub(last.time_ns) as f64 * 1.0e-9;
+            believed.velocity = self.moved(&last, pose, over_s)?;
+            believed.over_s = over_s;
+        }
+        self.last = Some(believed);
+        Ok(())
+    }
+
+    /// That it is a sample after the last one, and not that one again.
+    #[inline]
+    fn follow(&mut self, last: &Believed, sample: &DeviceState) -> Result<(), Implausible> {
+        if sample.sampled_ns < last.sampled_ns {
+            return Err(Implausible::Time);
+        }
+        // Before the first sample has come through a device with latency, it has nothing but where it started.
+        let is_repeated = sample.sampled_ns == last.sampled_ns && last.sampled_ns > 0;
+        self.repeated = if is_repeated { self.repeated.saturating_add(1) } else { 0 };
+        if self.repeated > self.stale_ticks {
+            return Err(Implausible::Time);
+        }
+        let is_unmoved = sample.conditions.contains(Conditions::NOISY) && sample.pose == last.pose;
+        self.unmoved = if is_unmoved { self.unmoved.saturating_add(1) } else { 0 };
+        if self.unmoved > STUCK_TIMES * self.stale_ticks {
+            return Err(Implausible::Stuck);
+        }
+        Ok(())
+    }
+
+    /// That a handle can have moved so far in this time, s; its mean velocity, m/s.
+    #[inline]
+    fn moved(&self, last: &Believed, pose: &Pose, over_s: f64) -> Result<DVec3, Implausible> {
+        let way = pose.position() - last.pose.position();
+        let turn = (pose.orientation() * last.pose.orientation().conjugate()).xyz() * 2.0;
+        let most_m = SPEED_M_PER_S * over_s + self.slack_m;
+        let most_rad = SPIN_RAD_PER_S * over_s + SLACK_RAD;
+        if way.length_squared() > most_m * most_m || turn.length_squared() > most_rad * most_rad {
+            return Err(Implausible::Speed);
+        }
+        if over_s <= 0.0 {
+            return Ok(last.velocity); // a first tick twice: no loop of ours
+        }
+        // Means over two intervals lie half of both apart.
+        let apart_s = 0.5 * (over_s + last.over_s);
+        let slack = if last.over_s > 0.0 { 1.0 + over_s / last.over_s } else { 1.0 };
+        let most_m = ACCELERATION_M_PER_S2 * apart_s * over_s + self.slack_m * slack;
+        if (way - last.velocity * over_s).length_squared() > most_m * most_m && last.over_s > 0.0 {
+            return Err(Implausible::Acceleration);
+        }
+        Ok(way / over_s)
+    }
+}
+
+/// Ticks without a usable sample that are borne in a loop of this period. Not real-time.
+pub(crate) fn stale_ticks_limit(period_ns: u64) -> u32 {
+    let ticks = (STALE_LIMIT_NS / period_ns.max(1)).max(STALE_TICKS_BORNE);
+    u32::try_from(ticks).unwrap_or(u32::MAX)
+}
+
+/// True if a quaternion has the length of one. Real-time: bounded, no allocation.
+#[inline]
+pub(crate) fn is_rotation(quaternion: DQuat) -> bool {
+    (quaternion.length_squared() - 1.0).abs() <= 2.0 * LENGTH_TOLERANCE // false for NaN
+}
+
+/// True if no handle moves like that. Real-time: bounded, no allocation.
+#[inline]
+pub(crate) fn is_too_fast(twist: &Twist) -> bool {
+    let per_speed = TWIST_OVERSHOOT * SPEED_M_PER_S;
+    let per_spin = TWIST_OVERSHOOT * SPIN_RAD_PER_S;
+    twist.linear().length_squared() > per_speed * per_speed
+        || twist.angular().length_squared() > per_spin * per_spin
+}
+
+#[cfg(test)]
+mod tests;
