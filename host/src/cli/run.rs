@@ -3,7 +3,7 @@
 use crate::run_picture::RunPicture;
 use clap::Args;
 use flotor_command::options::{ClockOption, PluginKeyValue, core, duration_s, rate_hz};
-use flotor_command::stopping::{Keys, stop_on_signals};
+use flotor_command::stopping::{Keys, stop_run_on_signals};
 use flotor_command::{CommandError, first_error, note, print_result, progress_bar, style};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
@@ -61,7 +61,7 @@ pub(crate) struct RunArguments {
 
 pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     // First of all: a signal during loading ends the run, too.
-    let stop = stop_on_signals();
+    let stop = stop_run_on_signals();
     let scene = scene(&arguments)?;
     let clock = match arguments.clock {
         ClockOption::Real => Clock::Real,
@@ -70,6 +70,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let options = RunOptions { clock, seed: arguments.seed };
     let registry = Registry::search(&scene.plugin_folders);
     let mut session = Session::prepare(&scene, &registry, &options)?.on_core(arguments.core);
+    session.warnings().iter().for_each(note);
     let links = peer_links(&mut session, clock)?;
     let plugins = session.plugins().to_vec();
     let description = describe(&scene, &options, &plugins);
@@ -129,6 +130,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let text = || format!("{}\n{}", style::title(&summary.title), summary.to_text());
     let printed = print_result(arguments.json.as_deref(), &summary, text);
     outcome.real_time.advice().into_iter().for_each(note);
+    outcome.later_warnings().iter().for_each(note);
     // Scripts need the outcome of the run first, a missing file second.
     first_error([verdict(&outcome, &plugins, &summary), recorded, drawn, printed])
 }

@@ -9,7 +9,7 @@ use crate::CalibrationError;
 use flotor_core::trace::Events;
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
 use flotor_hal::{Cycle, DeviceState, Fault, Tick};
-use flotor_servo::{Envelope, Gate, Heartbeat, Place, StopSwitch, enter_real_time, start_watchdog};
+use flotor_servo::{Envelope, Gate, Heartbeat, LastStop, Place, StopSwitch, enter_real_time, start_watchdog};
 use flotor_sync::{Observer, Publisher, Words, latest};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -141,9 +141,11 @@ impl Holder {
         let (publisher, reports) = latest(Averages::default().report(Holding::Changing));
         let Guard { envelope, stopper, stop } = guard;
         let heart = Heartbeat::default();
-        start_watchdog(heart.clone(), vec![stopper], stop.clone(), WATCHDOG_NS)?;
+        start_watchdog(heart.clone(), vec![stopper.clone()], stop.clone(), WATCHDOG_NS)?;
         let thread_heart = heart.clone();
         let hold = move || {
+            let name = "the device of the rig".to_owned();
+            let _last_stop = LastStop::arm(vec![stopper], vec![name], thread_heart.clone());
             let device = hold(device, envelope, &thread_heart, &stop, &ordered, publisher);
             thread_heart.finish();
             device
