@@ -7,7 +7,7 @@ use flotor_haply::pantograph::Pantograph;
 use flotor_record::Recording;
 use flotor_tests::holds_ticks;
 use flotor_tests::library::compile_c_file;
-use flotor_tests::program::{Flotor, Ran, Running, exit_code};
+use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::tools::{Tool, required};
 use flotor_tests::workspace_root;

@@ -28,7 +28,7 @@ struct Guarded {
     message: Vec<u8>,
 }
 
-/// Guards what the host, whose process has this number, hands over on standard input; returns when the host has said that
+/// Guards the devices that the host, whose process has this number, passes on standard input; returns when the host has said that
 /// its devices are stopped, or after they were stopped from here.
 ///
 /// # Errors
