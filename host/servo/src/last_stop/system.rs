@@ -61,8 +61,8 @@ pub(super) fn install() {
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     STACK.with(|_| ());
-    // SAFETY: a function without arguments that may be called at the end of the process.
     AT_EXIT.call_once(|| {
+        // SAFETY: a function without arguments that may be called at the end of the process.
         let _ = unsafe { libc::atexit(at_exit) };
     });
     for signal in (1..).take(SIGNALS - 1).filter(|signal| !HARMLESS.contains(signal)) {

@@ -50,7 +50,7 @@ pub fn serve(host: i32) -> io::Result<()> {
             }
             (Some(Packet::Begin), _) => break,
             // It has gone before anything was energised, or is no host.
-            _ => return Err(io::Error::other("nobody hands over any devices")),
+            _ => return Err(io::Error::other("nobody passes any devices")),
         }
     }
     let Some(process) = host_number.and_then(|host| pidfd_open(host, PidfdFlags::empty()).ok()) else {
