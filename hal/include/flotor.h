@@ -32,6 +32,9 @@
 // Number of coefficients a calibration has room for: a polynomial of degree seven.
 #define FLOTOR_CALIBRATION_COEFFICIENTS 8
 
+// Bytes a message may have at most.
+#define FLOTOR_STOP_MESSAGE_BYTES 64
+
 // Status of one call through a table.
 enum FlotorCallStatus
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -773,6 +776,33 @@ typedef struct FlotorCalibrationTable {
                                    struct FlotorMessage *message);
 } FlotorCalibrationTable;
 
+// How a device is stopped without its host. 88 bytes.
+typedef struct FlotorIndependentStop {
+    // Time from the end of the host's commands, or from the message, until the device is in its safe state, ns.
+    uint64_t within_ns;
+    // A file descriptor of the host's process, open for writing until the device is closed; the host duplicates it. -1: the
+    // device stops by itself when no command comes.
+    int32_t descriptor;
+    // Bytes of the message, 1 to 64; 0 with descriptor -1.
+    uint32_t length;
+    // What is written to the descriptor, up to three times: the same bytes at any time, also after half a command.
+    uint8_t message[FLOTOR_STOP_MESSAGE_BYTES];
+    // A value of [`StoppedState`].
+    uint32_t state;
+    // Reserved, 0.
+    uint32_t reserved;
+} FlotorIndependentStop;
+
+// `flotor.independent-stop/1`: see [`IndependentStopDevice`]. Belongs to the opened phase.
+typedef struct FlotorIndependentStopTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // How the device is stopped without its host; a [`crate::abi::CallStatus`] code. Not real-time.
+    uint32_t (*independent_stop)(FlotorInstance instance, struct FlotorIndependentStop *stop);
+} FlotorIndependentStopTable;
+
 // `flotor.pacing/1`: see [`PacingDevice`].
 typedef struct FlotorPacingTable {
     // Bytes of this table as the plugin knows it.
@@ -795,6 +825,7 @@ typedef struct FlotorPacingTable {
 #define FLOTOR_INTERFACE_CENTERLINE "flotor.centerline/1"
 #define FLOTOR_INTERFACE_DETAILS "flotor.details/1"
 #define FLOTOR_INTERFACE_ENERGY_LEDGER "flotor.energy-ledger/1"
+#define FLOTOR_INTERFACE_INDEPENDENT_STOP "flotor.independent-stop/1"
 #define FLOTOR_INTERFACE_LINEAR_FIELD "flotor.linear-field/1"
 #define FLOTOR_INTERFACE_PACING "flotor.pacing/1"
 #define FLOTOR_INTERFACE_VARIANT "flotor.variant/1"
@@ -1067,6 +1098,17 @@ __attribute__((unused)) static const FlotorFieldLayout flotor_layouts[] = {
     FLOTOR_FIELD(EnergyLedgerTable, size),
     FLOTOR_FIELD(EnergyLedgerTable, reserved),
     FLOTOR_FIELD(EnergyLedgerTable, ledger),
+    FLOTOR_STRUCT(IndependentStop),
+    FLOTOR_FIELD(IndependentStop, within_ns),
+    FLOTOR_FIELD(IndependentStop, descriptor),
+    FLOTOR_FIELD(IndependentStop, length),
+    FLOTOR_FIELD(IndependentStop, message),
+    FLOTOR_FIELD(IndependentStop, state),
+    FLOTOR_FIELD(IndependentStop, reserved),
+    FLOTOR_STRUCT(IndependentStopTable),
+    FLOTOR_FIELD(IndependentStopTable, size),
+    FLOTOR_FIELD(IndependentStopTable, reserved),
+    FLOTOR_FIELD(IndependentStopTable, independent_stop),
     FLOTOR_STRUCT(PacingTable),
     FLOTOR_FIELD(PacingTable, size),
     FLOTOR_FIELD(PacingTable, reserved),

@@ -48,6 +48,11 @@ pub use extension::calibration::{
 pub use extension::centerline::{CenterlineInfo, CenterlineModel};
 pub use extension::details::{Detail, DetailsModel};
 pub use extension::energy_ledger::{EnergyLedger, EnergyLedgerDevice};
+#[cfg(feature = "loader")]
+pub use extension::independent_stop::means::Independence;
+pub use extension::independent_stop::{
+    IndependentStop, IndependentStopDevice, STOP_MESSAGE_BYTES, StoppedState,
+};
 pub use extension::linear_field::{LinearField, LinearFieldModel};
 pub use extension::pacing::{PacingDevice, SampleWait};
 pub use extension::variant::{VariantInfo, VariantModel};

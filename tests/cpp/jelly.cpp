@@ -1,4 +1,5 @@
-// A force model in C++: a jelly that gives way in every direction, and declares its active region.
+// A force model in C++: a jelly that gives way in every direction, and declares its active region. THROWS lets an exception
+// out of tick 300.
 #include "flotor.h"
 #include <cmath>
 #include <cstring>
@@ -18,6 +19,11 @@ public:
     // Real-time: bounded, no allocation.
     uint32_t step(const FlotorInput &input, FlotorOutput &output) const {
         output = FlotorOutput{};
+#ifdef THROWS
+        if (input.tick >= 300) {
+            throw 1;
+        }
+#endif
         for (int axis = 0; axis < 3; axis++) {
             const double at_m = input.pose.position_m[axis];
             // Also for what is no number: farther off its energy could be none.

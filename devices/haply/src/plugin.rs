@@ -6,12 +6,13 @@ use crate::protocol::{Arm, Direction, torques};
 use flotor_hal::glam::DVec2;
 use flotor_hal::{
     ActiveDevice, Axes, Capabilities, Choices, Conditions, Cycle, DQuat, DVec3, Device, DeviceInfo,
-    DeviceState, Fault, LoopConfig, Parameter, Pose, Refusal, SafeStop, Settings, Tick, Twist, Wrench,
-    choices, export_device, math,
+    DeviceState, Fault, IndependentStop, IndependentStopDevice, LoopConfig, Parameter, Pose, Refusal,
+    SafeStop, Settings, StoppedState, Tick, Twist, Wrench, choices, export_device, math,
 };
 use serialport::TTYPort;
 use std::f64::consts::TAU;
 use std::io::Write;
+use std::os::fd::AsRawFd;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -19,6 +20,8 @@ use std::time::Duration;
 /// How long a board may take to answer for the first time: one that begins anew with the opening of its port is
 /// back within a second or two.
 const PATIENCE: Duration = Duration::from_secs(3);
+/// Time from a request to the torque, ns: what the slowest board takes (4 ms at 57 600 baud), and a frame of USB.
+const STOP_NS: u64 = 5_000_000;
 /// Lengths of the arms of both hardware versions, m (hAPI, `Pantograph`).
 const INNER_M: f64 = 0.07;
 const OUTER_M: f64 = 0.09;
@@ -93,6 +96,8 @@ pub struct HaplyDevice {
     cutoff_hz: f64,
     timeout: Duration,
     parameters: [f64; SCHEMA.len()],
+    /// Of the port of `stop`.
+    descriptor: i32,
     stop: Arc<Stop>,
 }
 
@@ -166,6 +171,7 @@ impl Device for HaplyDevice {
             cutoff_hz: settings.number_or_default("velocity_cutoff_hz"),
             timeout: Duration::from_secs_f64(settings.number_or_default("timeout_ms") * 1.0e-3),
             parameters,
+            descriptor: port.as_raw_fd(),
             stop: Arc::new(Stop { is_stopped: AtomicBool::new(false), port: Mutex::new(port) }),
         })
     }
@@ -320,4 +326,11 @@ impl Drop for HaplyDevice {
     }
 }
 
-export_device!(HaplyDevice);
+impl IndependentStopDevice for HaplyDevice {
+    /// The board keeps the last torque for ever. What is left of half a request is cut off by what comes again.
+    fn independent_stop(&self) -> IndependentStop {
+        IndependentStop::by_message(self.descriptor, &torques([0.0; 2]), StoppedState::Zero, STOP_NS)
+    }
+}
+
+export_device!(HaplyDevice, independent_stop);

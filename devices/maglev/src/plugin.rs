@@ -9,8 +9,8 @@ use crate::transport::{self, Kind, LinkLost};
 use crate::warning::ExcessForce;
 use flotor_hal::{
     ActiveDevice, Axes, CalibrationDevice, Capabilities, Conditions, Cycle, DQuat, DVec3, Device, DeviceInfo,
-    DeviceState, Fault, LoopConfig, OutOfRange, Parameter, Pose, Refusal, SafeStop, Settings, Tick, Twist,
-    VerticalCalibration, Wrench, export_device,
+    DeviceState, Fault, IndependentStop, IndependentStopDevice, LoopConfig, OutOfRange, Parameter, Pose,
+    Refusal, SafeStop, Settings, StoppedState, Tick, Twist, VerticalCalibration, Wrench, export_device,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -380,4 +380,13 @@ fn fault(status: &Status) -> Option<Fault> {
     Some(found.map_or(Fault::Protocol, |(_, fault)| *fault))
 }
 
-export_device!(MaglevDevice, calibration);
+impl IndependentStopDevice for MaglevDevice {
+    /// The controller obeys a command for three periods and then only damps; after its watchdog it lands. A message from
+    /// elsewhere would not be heard: a frame bears the session, which begins with activation, and a sequence number.
+    fn independent_stop(&self) -> IndependentStop {
+        let watchdog_us = self.options.watchdog_us.min(self.description.longest_watchdog_us);
+        IndependentStop::by_itself(StoppedState::Landed, u64::from(watchdog_us) * 1000)
+    }
+}
+
+export_device!(MaglevDevice, calibration, independent_stop);

@@ -12,8 +12,9 @@ use crate::workspace::{
 };
 use flotor_hal::{
     ActiveDevice, Axes, CalibrationDevice, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState,
-    EnergyLedger, EnergyLedgerDevice, Fault, LoopConfig, PacingDevice, Parameter, Pose, Refusal, SafeStop,
-    SampleWait, Settings, Tick, Twist, VerticalCalibration, export_device,
+    EnergyLedger, EnergyLedgerDevice, Fault, IndependentStop, IndependentStopDevice, LoopConfig,
+    PacingDevice, Parameter, Pose, Refusal, SafeStop, SampleWait, Settings, StoppedState, Tick, Twist,
+    VerticalCalibration, export_device,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -248,4 +249,11 @@ impl RunningFlotor {
     }
 }
 
-export_device!(SimulatedFlotor, calibration, pacing, energy_ledger);
+impl IndependentStopDevice for SimulatedFlotor {
+    /// It is a part of the host's process, and gone with it.
+    fn independent_stop(&self) -> IndependentStop {
+        IndependentStop::by_itself(StoppedState::Zero, 0)
+    }
+}
+
+export_device!(SimulatedFlotor, calibration, pacing, energy_ledger, independent_stop);

@@ -7,6 +7,7 @@ pub mod calibration;
 pub mod centerline;
 pub mod details;
 pub mod energy_ledger;
+pub mod independent_stop;
 pub mod linear_field;
 pub mod pacing;
 pub mod variant;
@@ -53,6 +54,7 @@ extensions! {
     DeviceExtensions {
         calibration: CalibrationTable,
         energy_ledger: EnergyLedgerTable,
+        independent_stop: IndependentStopTable,
         pacing: PacingTable,
     }
 }

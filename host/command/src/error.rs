@@ -1,7 +1,7 @@
 //! Why a command failed, and its exit code.
 //!
 //! Exit codes are a contract: 0 ok, 2 usage or configuration, 3 a plugin was refused, 4 device fault, 1 else;
-//! 130 after the third signal that asks for an end.
+//! 130 after the third signal that asks for an end, or the first one before anything is energised.
 
 use flotor_hal::Fault;
 use flotor_hal::abi::loader::LoadError;

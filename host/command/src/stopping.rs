@@ -1,18 +1,25 @@
 //! How a person ends a run: Ctrl-C in order; the space bar or `kill -USR1` at once.
 //!
 //! If an orderly end takes too long, the user repeats the signal: the second one is an emergency stop, the
-//! third ends the process.
+//! third ends the process, as does the second one some seconds later. Before anything is energised, the first does.
+//!
+//! The signals are blocked in every thread, and a thread of their own waits for them: a plugin that installs handlers or
+//! blocks signals takes none of them away.
 
 use super::note;
-use flotor_servo::StopSwitch;
+use flotor_servo::last_stop::{block_signals, leave_process, stop_all, wait_for_signal, was_armed};
+use flotor_servo::{StopSwitch, enter_guard_priority};
 use rustix::process::getpgrp;
 use rustix::termios::{LocalModes, OptionalActions, Termios, isatty, tcgetattr, tcgetpgrp, tcsetattr};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGUSR1, SIGXFSZ};
-use signal_hook::{flag, low_level};
+use signal_hook::consts::{
+    SIGALRM, SIGHUP, SIGINT, SIGPROF, SIGQUIT, SIGTERM, SIGTSTP, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU,
+    SIGXFSZ,
+};
+use signal_hook::flag;
 use std::io::{self, Read, stdin};
-use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
 /// Exit code after a third signal, when nothing else has ended the process: 128 + SIGINT, as shells have it.
@@ -28,31 +35,66 @@ const ENDING: [i32; 5] = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP];
 /// terminal that closes tells the shell, which tells its jobs. A person takes longer.
 const ONE_REQUEST: Duration = Duration::from_millis(100);
 
+/// How long a run may take to end after an emergency stop: what holds it up then is left behind.
+const LAST_PATIENCE: Duration = Duration::from_secs(5);
+/// How long devices may take to be told to stop when a process is left.
+const STOP_PATIENCE: Duration = Duration::from_millis(50);
+
+/// What the first signal means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum First {
+    /// End in order.
+    InOrder,
+    /// The same, once a run has energised something; before, nothing has to be put in order.
+    InOrderOnceEnergised,
+}
+
 /// A switch that the first signal of `ENDING` uses in order and the second at once (the third ends the
-/// process), and `SIGUSR1` at once.
+/// process), and `SIGUSR1` at once. Called before there are other threads.
 pub fn stop_on_signals() -> StopSwitch {
+    heard(First::InOrder)
+}
+
+/// The same for a run that is yet to be prepared: as long as nothing has been energised, the first one ends the process,
+/// whatever a plugin is at.
+pub fn stop_run_on_signals() -> StopSwitch {
+    heard(First::InOrderOnceEnergised)
+}
+
+/// Whatever asks this process to end does not: it ends by itself.
+pub fn outlive_signals() {
+    let signals = [SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGXFSZ];
+    if let Err(error) = block_signals(&[&ENDING[..], &signals].concat()) {
+        note(format_args!("cannot block signals: {error}"));
+    }
+}
+
+fn heard(first: First) -> StopSwitch {
     let stop = StopSwitch::default();
-    if let Err(error) = register(&stop) {
-        note(format_args!("cannot install signal handlers, so signals kill the run: {error}"));
+    if let Err(error) = register(first, &stop) {
+        note(format_args!("cannot take signals, so signals kill the run: {error}"));
     }
     stop
 }
 
-fn register(stop: &StopSwitch) -> io::Result<()> {
-    let (asked, asking) = UnixStream::pair()?;
-    let insisted = stop.clone();
-    let thread = std::thread::Builder::new().name("flotor-signals".to_owned());
-    thread.spawn(move || attend(asked, &insisted))?;
+fn register(first: First, stop: &StopSwitch) -> io::Result<()> {
     // Started with `nohup`, a run is to outlive its terminal.
-    let heard = ENDING.into_iter().filter(|signal| *signal != SIGHUP || !is_ignored(SIGHUP));
-    for signal in heard {
-        // In the handler: an orderly end waits for no thread.
-        flag::register(signal, stop.stop_flag())?;
-        low_level::pipe::register(signal, asking.try_clone()?)?;
+    let heard: Vec<i32> = ENDING
+        .into_iter()
+        .filter(|signal| *signal != SIGHUP || !is_ignored(SIGHUP))
+        .chain([SIGUSR1])
+        .collect();
+    block_signals(&heard)?;
+    // A thread that does not block them, because a library has unblocked them, does no harm when it takes one.
+    for signal in &heard {
+        let flag = if *signal == SIGUSR1 { stop.emergency_flag() } else { stop.stop_flag() };
+        flag::register(*signal, flag)?;
     }
-    flag::register(SIGUSR1, stop.emergency_flag())?;
     // Otherwise a file at its size limit would end the process, not the recording.
     flag::register(SIGXFSZ, Arc::<AtomicBool>::default())?;
+    let stop = stop.clone();
+    let thread = std::thread::Builder::new().name("flotor-signals".to_owned());
+    thread.spawn(move || attend(&heard, first, &stop))?;
     Ok(())
 }
 
@@ -64,19 +106,43 @@ fn is_ignored(signal: i32) -> bool {
     (ignored >> (signal - 1)) & 1 == 1 // the lowest bit is signal 1
 }
 
-/// Reads a byte for each signal that requests an end. Ends with the process: the handlers keep the other end
-/// open.
-fn attend(mut asked: UnixStream, stop: &StopSwitch) {
+/// Waits for signals as long as the process lives.
+fn attend(signals: &[i32], first: First, stop: &StopSwitch) {
+    // Above a loop that hogs its core.
+    enter_guard_priority();
     let mut insistence = Insistence::default();
-    let mut signal = [0];
-    while asked.read_exact(&mut signal).is_ok() {
+    loop {
+        let Some(signal) = wait_for_signal(signals, LAST_PATIENCE) else {
+            if insistence.is_out_of_patience(Instant::now()) {
+                leave();
+            }
+            continue;
+        };
+        if signal == SIGUSR1 {
+            stop.emergency_flag().store(true, Ordering::Relaxed);
+            continue;
+        }
         match insistence.answer(Instant::now()) {
-            Answer::InOrder => {} // the handler has seen to it
+            Answer::InOrder if first == First::InOrderOnceEnergised && !was_armed() => leave(),
+            Answer::InOrder => stop.stop(),
             Answer::AtOnce => stop.emergency_flag().store(true, Ordering::Relaxed),
-            // Without what a process does at its end: that may be what hangs.
-            Answer::Leave => low_level::exit(INTERRUPTED),
+            Answer::Leave => leave(),
         }
     }
+}
+
+/// Stops the devices and ends the process, without what a process does at its end: that may be what hangs, and so may a
+/// device's stop.
+fn leave() -> ! {
+    let (done, stopped) = channel();
+    let stopping = std::thread::Builder::new().spawn(move || {
+        stop_all();
+        let _ = done.send(());
+    });
+    if stopping.is_ok() {
+        let _ = stopped.recv_timeout(STOP_PATIENCE);
+    }
+    leave_process(INTERRUPTED)
 }
 
 /// Answer to a signal that requests an end.
@@ -94,6 +160,13 @@ struct Insistence {
 }
 
 impl Insistence {
+    /// The run was to end at once, and that was some time ago.
+    fn is_out_of_patience(&self, now: Instant) -> bool {
+        self.last.is_some_and(|(since, answer)| {
+            answer == Answer::AtOnce && now.duration_since(since) >= LAST_PATIENCE
+        })
+    }
+
     fn answer(&mut self, now: Instant) -> Answer {
         let answer = match self.last {
             Some((since, answer)) if now.duration_since(since) < ONE_REQUEST => return answer,
@@ -176,6 +249,11 @@ mod tests {
         assert_eq!([0, 1, 99].map(&mut after_ms), [Answer::InOrder; 3], "one request, however many signals");
         assert_eq!([100, 199].map(&mut after_ms), [Answer::AtOnce; 2]);
         assert_eq!([200, 300, 301].map(&mut after_ms), [Answer::Leave; 3]);
+        let (mut insistence, later) = (Insistence::default(), start + LAST_PATIENCE);
+        assert_eq!(insistence.answer(start - LAST_PATIENCE), Answer::InOrder);
+        assert!(!insistence.is_out_of_patience(later), "an orderly end may take its time");
+        assert_eq!(insistence.answer(start), Answer::AtOnce);
+        assert!(!insistence.is_out_of_patience(start) && insistence.is_out_of_patience(later));
     }
 
     #[test]

@@ -90,6 +90,8 @@ pub struct Limits {
     pub emergency_buttons: u32,
     /// What is done about energy that comes out of the port without having gone in.
     pub passivity: PassivityMode,
+    /// A device that nothing stops when the host's process is gone is refused.
+    pub require_independent_stop: bool,
 }
 
 impl Limits {
@@ -120,6 +122,7 @@ impl Default for Limits {
             watchdog_s: 0.1,
             emergency_buttons: 0,
             passivity: PassivityMode::Observe,
+            require_independent_stop: false,
         }
     }
 }

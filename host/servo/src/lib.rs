@@ -2,6 +2,7 @@
 //!
 //! - [`Servo`]: the tick; [`Clock`] decides when it happens, [`Envelope`] what may reach a hand.
 //! - [`coupling`]: virtual coupling of two devices, over any delay; [`port_energy`]: what crosses a port.
+//! - [`last_stop`], [`watchdog_process`]: a process that dies takes the force along.
 //! - [`engine`]: where a model executes: in the loop, asynchronously at a rate of its own, or in a process of its own.
 //!
 //! Knows neither scenes nor files: the caller provides opened devices and prepared models.
@@ -15,6 +16,7 @@ pub mod engine;
 mod envelope;
 mod forces;
 mod hot_swap;
+pub mod last_stop;
 mod models;
 mod parameters;
 mod passivity;
@@ -31,6 +33,7 @@ mod station;
 mod stop;
 mod timing;
 mod watchdog;
+pub mod watchdog_process;
 
 pub use budget::Overrun;
 pub use budget::TimeBudget;
@@ -41,6 +44,7 @@ pub use envelope::Envelope;
 pub use forces::CouplingOutcome;
 pub use forces::{Coupled, Forces, Port};
 pub use hot_swap::{HostSwaps, LoopSwaps, swap_queues};
+pub use last_stop::{LastStop, Unwound};
 pub use models::ModelHealth;
 pub use models::{Layer, LayerReport, Replacement, pushes_at_home};
 pub use parameters::{
@@ -50,7 +54,7 @@ pub use parameters::{
 pub use plausibility::{Implausible, ImplausibleSamples, PlausibilityCheck, Trust};
 pub use queue::{drain, queue};
 pub use realtime::{Core, Privilege, RealTimeReport};
-pub use realtime::{enter_real_time, enter_worker_priority, probe_real_time};
+pub use realtime::{enter_guard_priority, enter_real_time, enter_worker_priority, probe_real_time};
 pub use run::{Loop, RunEnd};
 pub use servo::{RunConfig, Servo};
 pub use standby::{Guarded, Standby};

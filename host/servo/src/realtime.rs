@@ -119,6 +119,11 @@ pub fn enter_worker_priority() {
     let _ = enter_priority(WORKER_PRIORITY);
 }
 
+/// Asks for the priority of who stops devices in the end, for the calling thread. Not real-time; without it, best effort.
+pub fn enter_guard_priority() {
+    let _ = enter_priority(WATCHDOG_PRIORITY);
+}
+
 /// Asks for a real-time priority for the calling thread. Not real-time.
 pub(super) fn enter_priority(priority: u8) -> Privilege {
     let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);

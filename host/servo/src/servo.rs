@@ -10,8 +10,8 @@
 use crate::stage_timer::{Moment, StageTimer};
 use crate::timing::STAGE_SAMPLING;
 use crate::{
-    Cause, Due, EmergencySource, Forces, Heartbeat, LoopSwaps, ParameterQueue, Place, Port, Reported,
-    RunEvent, RunState, Stage, Station, StopSwitch, Timing, WEIGHT,
+    Cause, Due, EmergencySource, Forces, Heartbeat, LastStop, LoopSwaps, ParameterQueue, Place, Port, Reported,
+    RunEvent, RunState, Stage, Station, StopSwitch, Timing, Unwound, WEIGHT,
 };
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::Tick;
@@ -33,6 +33,8 @@ pub struct RunConfig {
 
 /// The loop's state: devices with their envelopes, and all that asks for a wrench.
 pub struct Servo {
+    /// First: nothing of a loop that a plugin unwinds goes before its devices are stopped.
+    _unwound: Option<Unwound>,
     stations: Box<[Station]>,
     /// Of the devices, in the same order.
     ports: Box<[Port]>,
@@ -44,6 +46,8 @@ pub struct Servo {
     run: RunState,
     timing: Timing,
     stage_timer: StageTimer,
+    /// Last: a process may die of what closes devices and destroys models.
+    _last_stop: Option<LastStop>,
 }
 
 impl Servo {
@@ -57,6 +61,8 @@ impl Servo {
         heart: Heartbeat,
     ) -> Self {
         Self {
+            _unwound: None,
+            _last_stop: None,
             ports: vec![Port::REST; stations.len()].into(),
             stations: stations.into(),
             forces,
@@ -68,6 +74,12 @@ impl Servo {
             timing: Timing::default(),
             stage_timer: StageTimer::new(),
         }
+    }
+
+    /// The same, stopped if the process dies. Not real-time.
+    pub(crate) fn guarded_by(mut self, last_stop: Option<(Unwound, LastStop)>) -> Self {
+        (self._unwound, self._last_stop) = last_stop.unzip();
+        self
     }
 
     /// One tick; `leave` gets what it leaves behind, a record for each device. Real-time: bounded by devices and models,

@@ -1,6 +1,6 @@
 //! Everything a servo is made of, its devices open and not yet energised.
 
-use crate::{Envelope, Forces, Heartbeat, LoopSwaps, ParameterQueue, RunConfig, Servo, Station};
+use crate::{Envelope, Forces, Heartbeat, LastStop, LoopSwaps, ParameterQueue, RunConfig, Servo, Station};
 use flotor_core::limits::Bound;
 use flotor_hal::abi::loader::{OpenedDevice, Stopper};
 use flotor_hal::{Capabilities, DVec3, LoopConfig, Refusal};
@@ -64,12 +64,14 @@ impl Standby {
         self.devices.iter().map(|guarded| guarded.device.stopper()).collect()
     }
 
-    /// Energises the devices, in order. Not real-time; may block.
+    /// Energises the devices, in order, on the thread that will loop. `names` are those of the devices, then of the models,
+    /// for whom it may concern if the process dies. Not real-time; may block.
     ///
     /// # Errors
     /// The number of the device that says no, and why; then none stays energised.
-    pub fn activate(self) -> Result<Servo, (usize, Refusal)> {
+    pub fn activate(self, names: Vec<String>) -> Result<Servo, (usize, Refusal)> {
         let stoppers = self.stoppers();
+        let last_stop = LastStop::arm(stoppers.clone(), names, self.heart());
         let Self { devices, forces, parameters, swaps, config, run, heart } = self;
         let station = |(number, guarded): (usize, Guarded)| {
             let Guarded { mut device, capabilities, envelope } = guarded;
@@ -81,6 +83,6 @@ impl Standby {
         let stations =
             devices.into_iter().enumerate().map(station).collect::<Result<Vec<_>, (usize, Refusal)>>();
         let stations = stations.inspect_err(|_| stoppers.iter().for_each(Stopper::safe_stop))?;
-        Ok(Servo::new(stations, forces, parameters, swaps, run, heart))
+        Ok(Servo::new(stations, forces, parameters, swaps, run, heart).guarded_by(last_stop))
     }
 }

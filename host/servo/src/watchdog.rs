@@ -5,6 +5,7 @@
 //! does not come back; the devices are then stopped from here, without the loop's help.
 
 use super::clock::{monotonic_ns, sleep_until};
+use super::last_stop::{SignalGuard, TakenSignals, end_dying, is_dying};
 use super::realtime::{WATCHDOG_PRIORITY, enter_priority};
 use super::stop::StopSwitch;
 use flotor_core::MOST_DEVICES;
@@ -50,6 +51,11 @@ impl Place {
         }
     }
 
+    /// Whether the code that runs there is a plugin's.
+    pub(crate) const fn is_a_plugins(self) -> bool {
+        !matches!(self, Self::Waiting | Self::Host)
+    }
+
     #[inline]
     const fn code(self) -> u64 {
         match self {
@@ -91,6 +97,8 @@ struct Shared {
     done: AtomicBool,
     /// The beat at which the watchdog stopped the device, plus one; 0 if it has not.
     bitten: AtomicU64,
+    /// Signals of the host that were taken away while the loop ran, one bit each.
+    taken: AtomicU64,
 }
 
 /// Bits of a beat that tell the place.
@@ -118,7 +126,18 @@ impl Heartbeat {
         self.shared.done.store(true, Ordering::Release);
     }
 
-    fn is_done(&self) -> bool {
+    /// Where the loop is. Real-time: bounded, no allocation.
+    pub(crate) fn now(&self) -> Stuck {
+        Stuck::at(self.beat())
+    }
+
+    /// Signals that a plugin took away from the host while the loop ran, and that the watchdog has taken back.
+    #[must_use]
+    pub fn signals_taken(&self) -> TakenSignals {
+        TakenSignals::from_bits(self.shared.taken.load(Ordering::Relaxed))
+    }
+
+    pub(crate) fn is_done(&self) -> bool {
         self.shared.done.load(Ordering::Acquire)
     }
 
@@ -150,6 +169,10 @@ impl Stuck {
 const LOOKS: u64 = 8;
 /// Longest time between two looks, ns: an emergency stop is passed on within it even if the loop is stuck.
 const LONGEST_LOOK_NS: u64 = 1_000_000;
+/// Looks for which a process may be dying: half a second.
+const DYING_LOOKS: u32 = 500;
+/// Looks between two at whether the signals are still the host's: a tenth of a second.
+const SIGNAL_LOOKS: u64 = 100;
 
 /// Starts the watchdog's thread: the `stoppers` of all devices are used when `heart` has not changed for `limit_ns`, or when the
 /// emergency stop is pressed. Not real-time; ends with [`Heartbeat::finish`].
@@ -170,8 +193,23 @@ pub fn start(
         let mut last = heart.beat();
         let mut changed_ns = monotonic_ns();
         let mut stopped = false;
-        while !heart.is_done() {
+        let mut dying_looks = 0;
+        let signals = SignalGuard::take();
+        for look in 1_u64.. {
+            if heart.is_done() {
+                return;
+            }
+            if look.is_multiple_of(SIGNAL_LOOKS) {
+                heart.shared.taken.fetch_or(signals.put_back().bits(), Ordering::Relaxed);
+            }
             sleep_until(monotonic_ns() + look_ns);
+            if is_dying() {
+                dying_looks += 1;
+                if dying_looks > DYING_LOOKS {
+                    end_dying();
+                }
+                continue;
+            }
             let (beat, now_ns) = (heart.beat(), monotonic_ns());
             if stop.emergency().is_some() && !stopped {
                 stoppers.iter().for_each(Stopper::safe_stop);

@@ -138,6 +138,9 @@ pub struct RunSummary {
     pub dropped_records: u64,
     /// Wall-clock time, s.
     pub wall_s: f64,
+    /// What people should know, a sentence each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// The plugins and every parameter in force.
     pub plugins: Vec<PluginSummary>,
 }
@@ -328,6 +331,7 @@ impl RunSummary {
             trace_digest: facts.trace_digest,
             dropped_records: outcome.dropped_records,
             wall_s: outcome.wall_s,
+            warnings: outcome.warnings.clone(),
             plugins: (facts.plugins.iter().enumerate())
                 .map(|(number, plugin)| plugin_summary(number, plugin, outcome))
                 .chain(outcome.misbehaved.iter().map(misbehaved_summary))
@@ -400,6 +404,9 @@ impl RunSummary {
         for plugin in &self.plugins {
             let health = if plugin.health == "ok" { String::new() } else { format!("  {}", plugin.health) };
             row(plugin.kind, format!("{} {} ({}){health}", plugin.id, plugin.version, plugin.file));
+        }
+        for warning in &self.warnings {
+            row("warning", warning.clone());
         }
         row("digest", self.trace_digest.clone());
         lines.join("\n")

@@ -11,6 +11,7 @@ mod record;
 mod run;
 mod swap;
 mod view;
+mod watchdog;
 mod worker;
 
 use bridge::BRIDGE;
@@ -105,6 +106,9 @@ enum Command {
     /// A process that holds one force model, started by `run` for `isolation = "process"`
     #[command(hide = true)]
     Worker(worker::WorkerArguments),
+    /// A process that stops devices when the host is gone, started by `run`
+    #[command(hide = true)]
+    Watchdog(watchdog::WatchdogArguments),
     /// Print a completion script for a shell
     Completions {
         /// The shell
@@ -153,6 +157,7 @@ pub fn main() -> ExitCode {
         Some(Command::Emulate(arguments)) => emulate::run(&arguments),
         Some(Command::Doctor(arguments)) => doctor::run(&arguments),
         Some(Command::Worker(arguments)) => worker::run(arguments),
+        Some(Command::Watchdog(arguments)) => watchdog::run(arguments),
         Some(Command::Completions { shell }) => {
             clap_complete::generate(shell, &mut Arguments::command(), "flotor", &mut std::io::stdout());
             Ok(())

@@ -5,7 +5,7 @@ use clap::Args;
 use flotor_command::options::{
     ClockOption, PluginKeyValue, StrengthOption, core, duration_s, mcap_file, rate_hz, svg_file, whole,
 };
-use flotor_command::stopping::{Keys, stop_on_signals};
+use flotor_command::stopping::{Keys, stop_run_on_signals};
 use flotor_command::{CommandError, first_error, note, print_result, progress_bar, style};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
@@ -66,7 +66,7 @@ pub(crate) struct RunArguments {
 
 pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     // First of all: a signal during loading ends the run, too.
-    let stop = stop_on_signals();
+    let stop = stop_run_on_signals();
     let scene = scene(&arguments)?;
     let clock = match arguments.clock {
         ClockOption::Real => Clock::Real,
@@ -82,6 +82,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let session = Session::prepare(&scene, &registry, &options)?;
     let mut session = session.with_strength(arguments.strength.strength()).on_core(arguments.core);
     session.notices().into_iter().for_each(note);
+    session.warnings().iter().for_each(note);
     let links = peer_links(&mut session, clock)?;
     let plugins = session.plugins().to_vec();
     let description = describe(&scene, &options, &plugins);
@@ -141,6 +142,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let text = || format!("{}\n{}", style::title(&summary.title), summary.to_text());
     let printed = print_result(arguments.json.as_deref(), &summary, text);
     outcome.real_time.advice().into_iter().for_each(note);
+    outcome.later_warnings().iter().for_each(note);
     // Scripts need the outcome of the run first, a missing file second.
     first_error([verdict(&outcome, &plugins, &summary), recorded, drawn, printed])
 }

@@ -1,7 +1,7 @@
 //! `flotor worker`: the process that holds one force model, started by `flotor run`.
 
 use clap::Args;
-use flotor_command::{CommandError, stopping};
+use flotor_command::CommandError;
 use flotor_servo::engine::process;
 use flotor_session::registry::load_file;
 use std::path::PathBuf;
@@ -11,6 +11,9 @@ use std::path::PathBuf;
 pub(super) struct WorkerArguments {
     /// The plugin's shared library
     plugin: PathBuf,
+    /// Number of the host's process
+    #[arg(long)]
+    host: i32,
     /// Nominal time between ticks, ns
     #[arg(long)]
     period_ns: u64,
@@ -23,10 +26,8 @@ pub(super) struct WorkerArguments {
 }
 
 pub(super) fn run(arguments: WorkerArguments) -> Result<(), CommandError> {
-    // A terminal signals both worker and host, and the host still steps the model while the force fades out. A
-    // worker ends with its host, so nobody listens to the switch.
-    let _ = stopping::stop_on_signals();
-    let WorkerArguments { plugin, period_ns, seed, sets } = arguments;
-    process::serve(&process::WorkerArguments { plugin, period_ns, seed, sets }, load_file)
+    // Signals end it as they end any process: a terminal's do not come here, because it is of a group of its own.
+    let WorkerArguments { plugin, host, period_ns, seed, sets } = arguments;
+    process::serve(&process::WorkerArguments { plugin, host, period_ns, seed, sets }, load_file)
         .map_err(|error| CommandError::Usage(format!("`flotor worker` is started by `flotor run`: {error}")))
 }

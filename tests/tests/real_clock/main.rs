@@ -1,5 +1,6 @@
 //! What depends on the machine's clock: in a program of its own and one test after the other, so that nothing else runs beside it.
 
+mod deaths;
 mod end_of_run;
 mod jitter;
 

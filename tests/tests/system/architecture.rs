@@ -324,6 +324,10 @@ const UNSAFE: &[(&str, &str)] = &[
         "host/servo/src/engine/process/memory.rs",
         "memory that a model in a process of its own shares with the loop: a mapping",
     ),
+    (
+        "host/servo/src/last_stop/system.rs",
+        "handlers of deadly signals on a stack of their own, a hook in `exit`, signals that are waited for",
+    ),
     ("tests/tests/realtime.rs", "an allocator that counts, to see that a tick does not allocate"),
 ];
 

@@ -131,8 +131,9 @@ mod tests {
     use super::*;
     use crate::extension::{
         active_region::ActiveRegionTable, calibration::CalibrationTable, centerline::CenterlineTable,
-        details::DetailsTable, energy_ledger::EnergyLedgerTable, linear_field::LinearFieldTable,
-        pacing::PacingTable, variant::VariantTable, workspace_bounds::WorkspaceBoundsTable,
+        details::DetailsTable, energy_ledger::EnergyLedgerTable, independent_stop::IndependentStopTable,
+        linear_field::LinearFieldTable, pacing::PacingTable, variant::VariantTable,
+        workspace_bounds::WorkspaceBoundsTable,
     };
 
     /// One byte short of the shortest tables there are.
@@ -177,6 +178,7 @@ mod tests {
         is_held_to_its_length::<DeviceTable>();
         is_held_to_its_length::<EnergyLedgerTable>();
         is_held_to_its_length::<CalibrationTable>();
+        is_held_to_its_length::<IndependentStopTable>();
         is_held_to_its_length::<PacingTable>();
     }
 }

@@ -10,7 +10,8 @@ use flotor_core::trace::Events;
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
 use flotor_hal::{Cycle, DeviceState, Fault, Tick};
 use flotor_servo::{
-    Envelope, Gate, Heartbeat, Place, PlausibilityCheck, StopSwitch, Trust, enter_real_time, start_watchdog,
+    Envelope, Gate, Heartbeat, LastStop, Place, PlausibilityCheck, StopSwitch, Trust, enter_real_time,
+    start_watchdog,
 };
 use flotor_sync::{Observer, Publisher, Words, latest};
 use std::thread::JoinHandle;
@@ -144,9 +145,11 @@ impl Holder {
         let (publisher, reports) = latest(Averages::default().report(Holding::Changing));
         let Guard { envelope, plausibility, stopper, stop } = guard;
         let heart = Heartbeat::default();
-        start_watchdog(heart.clone(), vec![stopper], stop.clone(), WATCHDOG_NS)?;
+        start_watchdog(heart.clone(), vec![stopper.clone()], stop.clone(), WATCHDOG_NS)?;
         let thread_heart = heart.clone();
         let hold = move || {
+            let name = "the device of the rig".to_owned();
+            let _last_stop = LastStop::arm(vec![stopper], vec![name], thread_heart.clone());
             let device = hold(device, envelope, plausibility, &thread_heart, &stop, &ordered, publisher);
             thread_heart.finish();
             device

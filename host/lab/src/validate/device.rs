@@ -49,6 +49,8 @@ pub(super) fn lifecycle(mut device: OpenedDevice) -> Result<(), String> {
 
 pub(super) fn safe_stop(mut device: OpenedDevice) -> Result<(), String> {
     let push = push(&device.capabilities().map_err(|refusal| refusal.to_string())?);
+    // Only its description is checked: the message is for a device that has no host any more.
+    let _ = device.independent_stop().map_err(|refusal| refusal.to_string())?;
     let stopper = device.stopper();
     let mut running = Running::start(device)?;
     if push != Wrench::ZERO {

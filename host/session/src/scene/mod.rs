@@ -421,6 +421,11 @@ fn limits(mut section: Section<'_>, rate_hz: f64) -> Result<Limits, SceneError> 
             .transpose()?
             .map_or(default.emergency_buttons, |button| 1 << button),
         passivity: section.take("passivity").map(passivity).transpose()?.unwrap_or(default.passivity),
+        require_independent_stop: section
+            .take("require_independent_stop")
+            .map(|value| value.truth())
+            .transpose()?
+            .unwrap_or(default.require_independent_stop),
     };
     section.finish()?;
     Ok(limits)

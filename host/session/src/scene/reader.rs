@@ -346,6 +346,16 @@ impl Value<'_> {
         }
     }
 
+    /// `true` or `false`.
+    pub(super) fn truth(self) -> Result<bool, SceneError> {
+        match self.value {
+            DeValue::Boolean(truth) => Ok(truth),
+            ref other => {
+                Err(self.problem(format!("`{}` is true or false, not {}", self.key, other.type_str())))
+            }
+        }
+    }
+
     /// One of a few words, each of which means something.
     pub(super) fn one_of<T: Copy>(self, words: &[(&str, T)]) -> Result<T, SceneError> {
         let legal: Vec<&str> = words.iter().map(|(word, _)| *word).collect();

@@ -135,6 +135,8 @@ struct Supervised {
     busy: Vec<bool>,
     /// With the number of the model and which of its plugins it was: of each file the first, so that there is an end to them.
     misbehaved: Vec<(usize, u16, Misbehaved)>,
+    /// What people should know of plugins that came later, a sentence each.
+    warnings: Vec<String>,
 }
 
 impl Supervised {
@@ -179,7 +181,12 @@ impl Controls {
         (config, clock): (LoopConfig, Clock),
         swaps: HostSwaps,
     ) -> Self {
-        let supervised = Supervised { swaps, busy: vec![false; models.len()], misbehaved: Vec::new() };
+        let supervised = Supervised {
+            swaps,
+            busy: vec![false; models.len()],
+            misbehaved: Vec::new(),
+            warnings: Vec::new(),
+        };
         let (changes, supervised) = (Mutex::new(changes), Mutex::new(supervised));
         Self {
             shared: Arc::new(Shared { parts, changes, models: models.to_vec(), config, clock, supervised }),
@@ -270,6 +277,7 @@ impl Controls {
         };
         let made = numbers.iter().map(make).collect::<Result<Vec<_>, _>>()?;
         for (number, (layer, report)) in numbers.into_iter().zip(made) {
+            supervised.warnings.extend(report.warning());
             let generation = parts.put_in(number, report);
             let model = u32::try_from(number).unwrap_or(u32::MAX); // a scene has fewer models
             let replacement = Replacement { model, generation, layer: Box::new(layer) };
@@ -281,6 +289,12 @@ impl Controls {
             pushed.map_err(|_| ControlError::Busy)?;
         }
         Ok(())
+    }
+
+    /// What people should know of plugins that came later, a sentence each. Not real-time.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let mut supervised = self.shared.supervised.lock().unwrap_or_else(PoisonError::into_inner);
+        std::mem::take(&mut supervised.warnings)
     }
 
     /// Drops models the loop has handed back, unless somebody else is at it. Not real-time.

@@ -24,6 +24,8 @@ use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, Stopper};
 use flotor_hal::{Capabilities, DVec3, EnergyLedger, Fault, LoopConfig, Parameter};
 use flotor_live::WrenchLimits;
 use flotor_servo::coupling::{Line, Patience};
+use flotor_servo::last_stop::TakenSignals;
+use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{
     Clock, Core, Coupled, CouplingOutcome, Envelope, Forces, Guarded, ImplausibleSamples, Loop, ModelHealth,
     ParameterQueue, Place, RealTimeReport, Reported, RunConfig, RunEnd, Schedule, Servo, SpinWindow, Standby,
@@ -65,6 +67,11 @@ pub enum RunError {
     /// The servo's thread could not be started or died.
     #[error("the servo thread {0}; no device was moved")]
     Thread(&'static str),
+    /// The scene requires a stop that does not depend on this process, and there is none.
+    #[error(
+        "no watchdog process: {0}; `[limits] require_independent_stop = true` asks for one, so remove that line or mend this"
+    )]
+    WatchdogProcess(std::io::Error),
     /// A call of the loop did not return; the watchdog has stopped the device.
     #[error(
         "`{who}` did not return from {} in tick {}; the watchdog stopped the device after {} ms",
@@ -105,6 +112,18 @@ pub struct PluginReport {
     pub settings: Vec<(String, String)>,
     /// Every parameter with the value in force before the run, as text.
     pub parameters: Vec<(String, String)>,
+    /// Signals of the host that it took away while it was made, and that were taken back.
+    pub signals_taken: TakenSignals,
+}
+
+impl PluginReport {
+    /// That it took signals of the host away, if it did.
+    pub(crate) fn warning(&self) -> Option<String> {
+        let Self { name, signals_taken, .. } = self;
+        (!signals_taken.is_none()).then(|| {
+            format!("`{name}` took {signals_taken} away from the host while it was made; the host has taken them back")
+        })
+    }
 }
 
 /// Looks at every tick, off the loop.
@@ -134,6 +153,9 @@ pub struct Session {
     /// Of the devices, in order, as scene and device allow: without the host's ceiling.
     strong_envelopes: Vec<Envelope>,
     norm_notice: Option<String>,
+    warnings: Vec<String>,
+    /// Stops what has a means of its own to be stopped, if this process is gone (real clock only).
+    watchdog_process: Option<WatchdogProcess>,
 }
 
 /// What is known after a run.
@@ -158,9 +180,19 @@ pub struct Outcome {
     pub models: Vec<(String, ModelHealth, String)>,
     /// Of the plugins that took the place of a model later, those that did not behave.
     pub misbehaved: Vec<Misbehaved>,
+    /// What people should know, a sentence each: first what was known before the run.
+    pub warnings: Vec<String>,
+    /// How many of them were.
+    known_before: usize,
 }
 
 impl Outcome {
+    /// The warnings that came up in the run.
+    #[must_use]
+    pub fn later_warnings(&self) -> &[String] {
+        self.warnings.get(self.known_before..).unwrap_or_default()
+    }
+
     /// Which device faulted, and its last words.
     #[must_use]
     pub fn faulted(&self) -> Option<(usize, &str)> {
@@ -221,11 +253,18 @@ impl Session {
             plugins.push(report);
         }
         for (number, (device, opened)) in (0..).zip(scene.devices.iter().zip(&opened)) {
-            let mismatches = prepare::pair(scene, number, &opened.capabilities, opened.device.can_pace());
+            let mut mismatches = prepare::pair(scene, number, &opened.capabilities, opened.device.can_pace());
+            mismatches
+                .extend(opened.without_independent_stop().filter(|_| scene.limits.require_independent_stop));
             if !mismatches.is_empty() {
                 return Err(RunError::Mismatch { device: device.plugin.plugin.clone(), mismatches });
             }
         }
+        let mut warnings: Vec<String> = plugins.iter().filter_map(PluginReport::warning).collect();
+        let watchdog_process = match options.clock {
+            Clock::Real => prepare::watchdog_process(scene, &opened, &mut warnings)?,
+            Clock::Virtual => None,
+        };
         let parts = Parts::new(&plugins);
         let Scheduled { changes, replacements } =
             prepare::schedule(scene, &parts, registry, &config, options.clock)?;
@@ -282,6 +321,8 @@ impl Session {
             strong_devices,
             strong_envelopes,
             norm_notice: norm_notice(&scene.limits, &capabilities),
+            warnings,
+            watchdog_process,
         }
         .with_strength(Strength::of_the_environment()))
     }
@@ -319,6 +360,12 @@ impl Session {
     pub fn notices(&self) -> Vec<String> {
         let strong = self.strong_devices.iter().map(|device| device.notice(self.strength));
         self.norm_notice.iter().cloned().chain(strong).collect()
+    }
+
+    /// What people should know before this runs, a sentence each.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// The same with the loop on this core, on the real clock.
@@ -379,8 +426,10 @@ impl Session {
     /// # Errors
     /// [`RunError::Plugin`] if a device refuses to be energised, [`RunError::Thread`] if the servo's thread cannot be had,
     /// [`RunError::Hung`] if it does not come back: it is left behind then, and the process should end soon.
-    pub fn run(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Outcome, RunError> {
+    pub fn run(mut self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Outcome, RunError> {
         let started = Instant::now();
+        let (mut warnings, heart) = (std::mem::take(&mut self.warnings), self.standby.heart());
+        let known_before = warnings.len();
         let names: Vec<String> = self.plugins.iter().map(|plugin| plugin.name.clone()).collect();
         let controls = self.controls.clone();
         let finished = match self.clock {
@@ -408,7 +457,16 @@ impl Session {
         let models = models.map(|(name, (health, words))| (name, health, words)).collect();
         let timing = servo.into_timing();
         let wall_s = started.elapsed().as_secs_f64();
+        warnings.extend(controls.warnings());
+        let taken = heart.signals_taken();
+        if !taken.is_none() {
+            warnings.push(format!(
+                "a plugin took {taken} away from the host during the run; the host has taken them back"
+            ));
+        }
         Ok(Outcome {
+            warnings,
+            known_before,
             end,
             timing,
             elapsed_ns,
@@ -436,6 +494,7 @@ impl Session {
             }
             if runner.end().is_some() {
                 stoppers.iter().for_each(Stopper::safe_stop);
+                runner.servo().heart().finish();
             }
             for record in batch.drain(..) {
                 changes.up_to(record.tick, |change| observer.change(change));
@@ -459,6 +518,7 @@ impl Session {
             watchdog_ns,
             core,
             plugins,
+            watchdog_process,
             ..
         } = self;
         let mut look = |record: TickRecord| {
@@ -496,6 +556,8 @@ impl Session {
             // Here, whatever the thread that looks on is at, and while the watchdog still watches.
             stoppers.iter().for_each(Stopper::safe_stop);
             runner.servo().heart().finish();
+            // From here on nothing is energised.
+            drop(watchdog_process);
             watchdog.map_err(|_| RunError::Thread("got no watchdog"))?;
             Ok::<_, RunError>(Finished::of(runner, dropped_records, real_time))
         });

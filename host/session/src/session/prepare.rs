@@ -13,9 +13,13 @@ use flotor_core::limits::Boundary;
 use flotor_core::mapping::Mapping;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting};
-use flotor_hal::{Axes, Capabilities, Embodiment, LoopConfig, Parameter, ParameterKind, Refusal};
+use flotor_hal::{
+    Axes, Capabilities, Embodiment, Independence, LoopConfig, Parameter, ParameterKind, Refusal,
+};
 use flotor_servo::engine::asynchronous::AsynchronousModel;
 use flotor_servo::engine::process::{Worker, WorkerOrder};
+use flotor_servo::last_stop::{SignalGuard, TakenSignals};
+use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{
     Clock, Engine, Layer, Replacement, ScheduledChange, Servo, Standby, TimeBudget, pushes_at_home,
 };
@@ -36,7 +40,8 @@ pub(super) fn refused(metadata: &Metadata, refusal: Refusal) -> RunError {
 
 /// Energises the devices of a run right before its first tick. Not real-time.
 pub(super) fn activate(standby: Standby, plugins: &[PluginReport]) -> Result<Servo, RunError> {
-    standby.activate().map_err(|(device, refusal)| match plugins.get(device) {
+    let names = plugins.iter().map(|plugin| plugin.name.clone()).collect();
+    standby.activate(names).map_err(|(device, refusal)| match plugins.get(device) {
         Some(report) => refused(&report.metadata, refusal),
         None => RunError::Thread("names a device that the scene has not"),
     })
@@ -61,6 +66,48 @@ pub(super) struct Opened {
     pub(super) device: OpenedDevice,
     pub(super) capabilities: Capabilities,
     pub(super) embodiment: Embodiment,
+    /// What stops it when this process is gone.
+    independence: Option<Independence>,
+}
+
+impl Opened {
+    /// That nothing stops it when this process is gone, if so: what drives nothing needs no stop.
+    pub(super) fn without_independent_stop(&self) -> Option<String> {
+        (self.independence.is_none() && self.capabilities.actuated != Axes::NONE).then(|| {
+            "nothing stops it if this program is killed: its plugin lacks the extension `flotor.independent-stop/1`; remove \
+             `[limits] require_independent_stop`, and keep a hand at its power switch"
+                .to_owned()
+        })
+    }
+}
+
+/// Starts the process that stops devices when this one is gone, and says which devices nothing stops then. Not real-time.
+pub(super) fn watchdog_process(
+    scene: &Scene,
+    opened: &[Opened],
+    warnings: &mut Vec<String>,
+) -> Result<Option<WatchdogProcess>, RunError> {
+    for (device, opened) in scene.devices.iter().zip(opened) {
+        if opened.without_independent_stop().is_some() {
+            warnings.push(format!(
+                "nothing stops `{}` if this program is killed: its plugin lacks the extension \
+                 `flotor.independent-stop/1`; keep a hand at its power switch",
+                device.name
+            ));
+        }
+    }
+    let names = scene.devices.iter().map(|device| device.name.as_str());
+    let means = names.zip(opened).filter_map(|(name, opened)| Some((name, opened.independence.as_ref()?)));
+    match WatchdogProcess::start(means) {
+        Ok(process) => Ok(process),
+        Err(error) if scene.limits.require_independent_stop => Err(RunError::WatchdogProcess(error)),
+        Err(error) => {
+            warnings.push(format!(
+                "no watchdog process ({error}): nothing stops the devices if this program is killed"
+            ));
+            Ok(None)
+        }
+    }
 }
 
 /// Loads and opens one device of a scene. Not real-time.
@@ -69,16 +116,19 @@ pub(super) fn open_device(
     device: &DeviceUse,
 ) -> Result<(Opened, PluginReport), RunError> {
     let DeviceUse { name, plugin: used, calibration } = device;
+    let signals = SignalGuard::take();
     let plugin = load(registry, used, PluginKind::Device)?;
     let settings = settings(&plugin, name, &used.parameters)?;
     let mut device = plugin.open_device(&settings)?;
     let capabilities = device.capabilities().map_err(|refusal| refused(plugin.metadata(), refusal))?;
-    let report = report(&plugin, name, used, &settings, |index| device.parameter(index));
+    let independence = device.independent_stop().map_err(|refusal| refused(plugin.metadata(), refusal))?;
+    let mut report = report(&plugin, name, used, &settings, |index| device.parameter(index));
     if let Some(calibration) = calibration {
         calibrate(&plugin, &mut device, calibration)?;
     }
+    report.signals_taken = signals.put_back();
     let embodiment = plugin.device_info().map_or(Embodiment::Physical, |info| info.embodiment());
-    Ok((Opened { device, capabilities, embodiment }, report))
+    Ok((Opened { device, capabilities, embodiment, independence }, report))
 }
 
 /// Loads one model of a scene and creates it in all its places. Not real-time.
@@ -91,6 +141,7 @@ pub fn prepare_model(
     config: &LoopConfig,
     clock: Clock,
 ) -> Result<(Layer, PluginReport), RunError> {
+    let signals = SignalGuard::take();
     let plugin = load(registry, &model.plugin, PluginKind::Model)?;
     let settings = settings(&plugin, &model.name, &model.plugin.parameters)?;
     let budget_ns = budget_ns(model, clock, config.period_ns);
@@ -143,7 +194,8 @@ pub fn prepare_model(
         // Nobody waits for it any longer than that, or at all.
         (Isolation::Process, _) | (_, Some(_)) => TimeBudget::default(),
     };
-    let report = report(&plugin, &model.name, &model.plugin, &settings, &mut value);
+    let mut report = report(&plugin, &model.name, &model.plugin, &settings, &mut value);
+    report.signals_taken = signals.put_back();
     Ok((Layer::new(instances, &model.blend, budget, config), report))
 }
 
@@ -214,6 +266,7 @@ fn report(
         schema: plugin.parameters(),
         settings: written.collect(),
         parameters: in_force(plugin, settings, value),
+        signals_taken: TakenSignals::default(),
     }
 }
 

@@ -2,6 +2,7 @@
 //! own: it writes samples to a player of the system, where there is one.
 
 use flotor_core::Random;
+use flotor_servo::last_stop::spawn_unblocked;
 use std::io::Write;
 use std::process::{Child, Command, Stdio};
 use std::thread::JoinHandle;
@@ -31,13 +32,9 @@ impl WhiteNoise {
     #[must_use]
     pub fn start() -> Option<Self> {
         PLAYERS.iter().find_map(|(name, arguments)| {
-            let player = Command::new(name)
-                .args(*arguments)
-                .stdin(Stdio::piped())
-                .stdout(Stdio::null())
-                .stderr(Stdio::null())
-                .spawn();
-            let mut player = player.ok()?;
+            let mut player = Command::new(name);
+            player.args(*arguments).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null());
+            let mut player = spawn_unblocked(&mut player).ok()?;
             let mut pipe = player.stdin.take()?;
             let feeder = std::thread::Builder::new().name("flotor-noise".to_owned()).spawn(move || {
                 let mut random = Random::new(0, 0);

@@ -7,6 +7,7 @@ use crate::enter_worker_priority;
 use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
 use flotor_hal::abi::{CallStatus, PluginKind};
 use flotor_hal::{LoopConfig, Memory, Output, Refusal, RefusalKind};
+use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 use std::io;
 use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
@@ -15,10 +16,12 @@ use std::sync::atomic::Ordering;
 /// How often a worker nobody asks anything looks whether its host is still there, ns.
 const HOST_CHECK_NS: u64 = 500_000_000;
 
-/// What a worker is started with. Standard input is the shared memory, which takes the greeting, too:
+/// What a worker is started with, beside its host's number. Standard input is the shared memory, which takes the greeting, too:
 /// standard output belongs to the plugin.
 #[derive(Clone, Debug)]
 pub struct WorkerArguments {
+    /// Number of the host's process.
+    pub host: i32,
     /// The plugin's shared library.
     pub plugin: PathBuf,
     /// Nominal time between ticks, ns.
@@ -37,8 +40,14 @@ pub type LoadFile = fn(&Path) -> Result<Plugin, LoadError>;
 /// # Errors
 /// Standard input is not the memory: nobody started this as a worker.
 pub fn serve(arguments: &WorkerArguments, load: LoadFile) -> io::Result<()> {
+    // Before anything of the plugin runs: whatever that does, it ends with its host. The host may have gone before.
+    set_parent_process_death_signal(Some(Signal::KILL))?;
+    let host = Pid::from_raw(arguments.host);
+    let has_gone = || getppid() != host;
+    if has_gone() {
+        return Ok(());
+    }
     let memory = SharedMemory::map(io::stdin().as_fd())?;
-    let host = rustix::process::getppid();
     let (greeting, model) = match prepare(arguments, load) {
         Ok((model, parameters)) => {
             let serves = shared_words::DEMANDS.map(|demand| model.serves().contains(demand));
@@ -47,7 +56,6 @@ pub fn serve(arguments: &WorkerArguments, load: LoadFile) -> io::Result<()> {
         }
         Err(refusal) => (Greeting::Refused { kind: refusal.kind as u32, reason: refusal.reason }, None),
     };
-    let has_gone = || rustix::process::getppid() != host;
     let greeted = greet(&memory, &serde_json::to_string(&greeting)?, has_gone);
     let (Some(mut done), Some(mut model)) = (greeted, model) else { return Ok(()) };
     enter_worker_priority();

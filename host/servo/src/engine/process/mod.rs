@@ -13,6 +13,7 @@ mod parent;
 mod shared_words;
 
 pub use child::{LoadFile, WorkerArguments, serve};
+pub(crate) use parent::program;
 pub use parent::{Worker, WorkerOrder};
 
 use serde::{Deserialize, Serialize};

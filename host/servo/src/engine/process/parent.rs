@@ -4,15 +4,18 @@ use super::child::WHOLE;
 use super::memory::{SharedMemory, create_file};
 use super::shared_words::{DEMANDS, NO_DEMAND, Order, wait_for_change};
 use super::{Greeting, Reply};
+use crate::last_stop::spawn_unblocked;
 use crate::monotonic_ns;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{Demand, Input, LoopConfig, Memory, Output, Refusal, RefusalKind};
 use std::io;
 use std::os::fd::AsFd;
-use std::os::unix::process::ExitStatusExt;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
+use std::sync::OnceLock;
 use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Sender, channel};
 
 /// What a worker is to be.
 pub struct WorkerOrder<'a> {
@@ -52,11 +55,15 @@ impl Worker {
         let memory = SharedMemory::map(file.as_fd()).map_err(no_worker)?;
         let mut command = Command::new(program().map_err(no_worker)?);
         command.arg("worker").arg(order.plugin);
+        command.args(["--host", &std::process::id().to_string()]);
         command.args(["--period-ns", &order.config.period_ns.to_string()]);
         command.args(["--seed", &order.config.seed.to_string()]);
         command.args(order.sets.iter().map(|(key, value)| format!("--set={key}={value}")));
         // What a model prints goes where it does no harm, as long as it lives: to the host's errors.
-        let child = command.stdin(file).stdout(io::stderr()).spawn().map_err(no_worker)?;
+        command.stdin(file).stdout(io::stderr());
+        // What a terminal sends is the host's affair: it still needs the model while the force fades out.
+        command.process_group(0);
+        let child = spawn(command).map_err(no_worker)?;
         let mut worker = Self {
             child,
             memory,
@@ -226,9 +233,33 @@ pub(super) fn heard(memory: &SharedMemory, mut has_ended: impl FnMut() -> bool) 
     }
 }
 
+/// A process to be started, and where it goes.
+type Start = (Command, Sender<io::Result<Child>>);
+
+/// Starts a process from a thread that stays as long as this process: a worker ends with the *thread* that started it, and
+/// one that exchanges a model may be gone before the run is.
+fn spawn(command: Command) -> io::Result<Child> {
+    static STARTER: OnceLock<Sender<Start>> = OnceLock::new();
+    let gone = || io::Error::other("the thread that starts processes is gone");
+    let starter = STARTER.get_or_init(|| {
+        let (starter, orders) = channel::<Start>();
+        let thread = std::thread::Builder::new().name("flotor-starter".to_owned());
+        // Without the thread nobody listens, and `send` says so.
+        let _ = thread.spawn(move || {
+            for (mut command, reply) in orders {
+                let _ = reply.send(spawn_unblocked(&mut command));
+            }
+        });
+        starter
+    });
+    let (reply, child) = channel();
+    starter.send((command, reply)).map_err(|_| gone())?;
+    child.recv().map_err(|_| gone())?
+}
+
 /// The program that can be a worker: this one, or, for a program that only uses the library, `flotor` beside it or
 /// in the folder above.
-fn program() -> io::Result<PathBuf> {
+pub(crate) fn program() -> io::Result<PathBuf> {
     let name = format!("flotor{}", std::env::consts::EXE_SUFFIX);
     let own = std::env::current_exe()?;
     if own.file_name().is_some_and(|own| *own == *name) {

@@ -4,6 +4,7 @@ use super::{JsonLines, lines_of};
 use flotor_command::CommandError;
 use flotor_command::separate::{Running, SeparateProgram};
 use flotor_servo::StopSwitch;
+use flotor_servo::last_stop::spawn_unblocked;
 use std::io::BufReader;
 use std::process::{ChildStdin, Stdio};
 use std::time::Duration;
@@ -29,7 +30,7 @@ impl Window {
         command.stdin(Stdio::piped()).stdout(Stdio::piped());
         let failed =
             |cause| CommandError::file(SeparateProgram::VIEWER.program.as_ref(), "cannot be started", cause);
-        let mut viewer = Running(command.spawn().map_err(failed)?);
+        let mut viewer = Running(spawn_unblocked(&mut command).map_err(failed)?);
         let (Some(input), Some(output)) = (viewer.0.stdin.take(), viewer.0.stdout.take()) else {
             return Err(CommandError::Failed("cannot open the pipes of the viewer".to_owned()));
         };

@@ -1,0 +1,237 @@
+//! Extension `flotor.independent-stop/1`: what stops a device when the host's process is gone, whatever became of it.
+//!
+//! A device that keeps its last command offers a handle and a message; a process beside the host, which runs nothing of any
+//! plugin, holds both and writes the message when the host is gone. A device that stops by itself says how soon.
+
+use crate::Device;
+use crate::abi::instance::fill;
+use crate::abi::interface::table;
+use crate::abi::layout::layout;
+#[cfg(feature = "loader")]
+use crate::abi::loader::OpenedDevice;
+use crate::abi::{DevicePlug, Instance};
+#[cfg(feature = "loader")]
+use crate::{Refusal, extension::independent_stop::means::Independence};
+
+/// Bytes a message may have at most.
+pub const STOP_MESSAGE_BYTES: usize = 64;
+/// The descriptor of a device that stops by itself.
+const BY_ITSELF: i32 = -1;
+
+/// What a device exerts once it is stopped. In C as a number of this value.
+#[repr(u32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StoppedState {
+    /// No force.
+    Zero = 0,
+    /// It sets the handle down by itself, and then exerts none.
+    Landed = 1,
+}
+
+/// How a device is stopped without its host. 88 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct IndependentStop {
+    /// Time from the end of the host's commands, or from the message, until the device is in its safe state, ns.
+    pub(crate) within_ns: u64,
+    /// A file descriptor of the host's process, open for writing until the device is closed; the host duplicates it. -1: the
+    /// device stops by itself when no command comes.
+    pub(crate) descriptor: i32,
+    /// Bytes of the message, 1 to 64; 0 with descriptor -1.
+    pub(crate) length: u32,
+    /// What is written to the descriptor, up to three times: the same bytes at any time, also after half a command.
+    pub(crate) message: [u8; STOP_MESSAGE_BYTES],
+    /// A value of [`StoppedState`].
+    pub(crate) state: u32,
+    /// Reserved, 0.
+    pub(crate) reserved: u32,
+}
+
+impl IndependentStop {
+    /// A device that stops when this message is written to this descriptor, which is open for writing until the device is
+    /// closed. A message that is too long is none, and refused by the host.
+    #[must_use]
+    pub fn by_message(descriptor: i32, message: &[u8], state: StoppedState, within_ns: u64) -> Self {
+        let mut bytes = [0; STOP_MESSAGE_BYTES];
+        bytes.iter_mut().zip(message).for_each(|(place, byte)| *place = *byte);
+        let length = u32::try_from(message.len()).unwrap_or(u32::MAX);
+        Self { within_ns, descriptor, length, message: bytes, state: state as u32, reserved: 0 }
+    }
+
+    /// A device whose controller stops it when no command has come for this time; 0: it is gone with the host's process.
+    #[must_use]
+    pub const fn by_itself(state: StoppedState, within_ns: u64) -> Self {
+        let message = [0; STOP_MESSAGE_BYTES];
+        Self { within_ns, descriptor: BY_ITSELF, length: 0, message, state: state as u32, reserved: 0 }
+    }
+}
+
+/// A device that is stopped even if nothing of the host is left.
+pub trait IndependentStopDevice: Device {
+    /// How. Asked once, after opening; it holds until the device is closed. Not real-time.
+    fn independent_stop(&self) -> IndependentStop;
+}
+
+/// `flotor.independent-stop/1`: see [`IndependentStopDevice`]. Belongs to the opened phase.
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct IndependentStopTable {
+    /// Bytes of this table as the plugin knows it.
+    pub size: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
+    /// How the device is stopped without its host; a [`crate::abi::CallStatus`] code. Not real-time.
+    pub independent_stop: Option<unsafe extern "C" fn(instance: Instance, stop: *mut IndependentStop) -> u32>,
+}
+
+layout! {
+    IndependentStop { within_ns, descriptor, length, message, state, reserved }
+    IndependentStopTable { size, reserved, independent_stop }
+}
+unsafe extern "C" fn independent_stop<D: IndependentStopDevice>(
+    instance: Instance,
+    stop: *mut IndependentStop,
+) -> u32 {
+    // SAFETY: the contract of every table call.
+    unsafe { fill::<DevicePlug<D>, _>(instance, stop, |phase| Ok(phase.opened()?.independent_stop())) }
+}
+
+table!(IndependentStopTable: "flotor.independent-stop/1", D: [IndependentStopDevice] {
+    reserved: 0,
+    independent_stop: Some(independent_stop::<D>),
+});
+
+/// The host's side.
+#[cfg(feature = "loader")]
+pub mod means {
+    use super::{BY_ITSELF, IndependentStop, STOP_MESSAGE_BYTES, StoppedState};
+    use crate::Refusal;
+    use rustix::fs::{OFlags, fcntl_getfl};
+    use rustix::io::fcntl_dupfd_cloexec;
+    use std::os::fd::{BorrowedFd, OwnedFd};
+
+    /// Lowest number of a duplicate: not one of the three that every process has.
+    const LOWEST_DESCRIPTOR: i32 = 3;
+
+    /// What stops a device without its host.
+    #[derive(Debug)]
+    pub enum Independence {
+        /// A message on a handle of its own.
+        Message {
+            /// Where to.
+            handle: OwnedFd,
+            /// What.
+            message: Vec<u8>,
+            /// What the device is then.
+            state: StoppedState,
+        },
+        /// Its own controller, after this many ns without a command.
+        Itself {
+            /// How soon, ns.
+            within_ns: u64,
+            /// What the device is then.
+            state: StoppedState,
+        },
+    }
+
+    impl Independence {
+        /// What a plugin said, with a duplicate of its descriptor.
+        pub(super) fn of(told: &IndependentStop) -> Result<Self, Refusal> {
+            let wrong = |what: String| Refusal::broken(format!("its independent stop {what}"));
+            let state = match told.state {
+                0 => StoppedState::Zero,
+                1 => StoppedState::Landed,
+                other => return Err(wrong(format!("leads to a state {other}, legal is 0 or 1"))),
+            };
+            let length = told.length as usize;
+            if told.descriptor == BY_ITSELF {
+                return match length {
+                    0 => Ok(Self::Itself { within_ns: told.within_ns, state }),
+                    _ => Err(wrong("has a message and no descriptor".to_owned())),
+                };
+            }
+            let message = told.message.get(..length).filter(|message| !message.is_empty());
+            let Some(message) = message.map(<[u8]>::to_vec) else {
+                return Err(wrong(format!("has {length} bytes, legal is 1 to {STOP_MESSAGE_BYTES}")));
+            };
+            if told.descriptor < 0 {
+                return Err(wrong(format!("names the descriptor {}", told.descriptor)));
+            }
+            // SAFETY: the plugin keeps it open until the device is closed (contract), and the device is open; a number that
+            // is none is told by the system.
+            let theirs = unsafe { BorrowedFd::borrow_raw(told.descriptor) };
+            let no_use = |error| wrong(format!("names the descriptor {}: {error}", told.descriptor));
+            let mode = fcntl_getfl(theirs).map_err(no_use)?;
+            if !mode.intersects(OFlags::WRONLY | OFlags::RDWR) {
+                return Err(wrong(format!(
+                    "names the descriptor {}, which cannot be written",
+                    told.descriptor
+                )));
+            }
+            let handle = fcntl_dupfd_cloexec(theirs, LOWEST_DESCRIPTOR).map_err(no_use)?;
+            Ok(Self::Message { handle, message, state })
+        }
+    }
+}
+
+#[cfg(feature = "loader")]
+impl OpenedDevice {
+    /// What stops the device when the host's process is gone; `None` if nothing does. Not real-time.
+    ///
+    /// # Errors
+    /// A [`Refusal`] if what the plugin says cannot be used.
+    pub fn independent_stop(&mut self) -> Result<Option<Independence>, Refusal> {
+        let ask = self.extensions().independent_stop.and_then(|table| table.independent_stop);
+        if ask.is_none() {
+            return Ok(None);
+        }
+        // What it does not fill is refused.
+        let unfilled = IndependentStop::by_message(BY_ITSELF, &[0], StoppedState::Zero, 0);
+        let Some(told) = self.asked(ask, unfilled) else {
+            return Err(Refusal::broken("it does not say how it is stopped without its host"));
+        };
+        Independence::of(&told).map(Some)
+    }
+}
+
+#[cfg(all(test, feature = "loader"))]
+mod tests {
+    use super::*;
+    use std::io::Read;
+    use std::os::fd::AsRawFd;
+
+    #[test]
+    fn a_message_and_a_handle_are_kept_beyond_the_plugins_own() {
+        let (mut reader, writer) = std::io::pipe().expect("a pipe");
+        let told = IndependentStop::by_message(writer.as_raw_fd(), b"stop", StoppedState::Zero, 0);
+        let means = Independence::of(&told).expect("it is right");
+        drop(writer);
+        let Independence::Message { handle, message, state } = means else { panic!("{means:?}") };
+        assert_eq!((message.as_slice(), state), (&b"stop"[..], StoppedState::Zero));
+        drop(handle);
+        assert_eq!(reader.read(&mut [0; 4]).expect("it ends"), 0, "nobody holds the other end any more");
+    }
+
+    #[test]
+    fn what_cannot_be_used_is_refused() {
+        let (reader, _writer) = std::io::pipe().expect("a pipe");
+        let right = IndependentStop::by_message(reader.as_raw_fd(), b"stop", StoppedState::Zero, 0);
+        for (wrong, words) in [
+            (right, "cannot be written"),
+            (IndependentStop { descriptor: 1_000_000, ..right }, "names the descriptor 1000000"),
+            (IndependentStop { descriptor: -7, ..right }, "names the descriptor -7"),
+            (IndependentStop { length: 65, ..right }, "has 65 bytes"),
+            (IndependentStop { length: 0, ..right }, "has 0 bytes"),
+            (IndependentStop { state: 2, ..right }, "state 2"),
+            (IndependentStop { descriptor: -1, ..right }, "no descriptor"),
+        ] {
+            let refused = Independence::of(&wrong).expect_err("it is wrong").to_string();
+            assert!(refused.contains(words), "{refused}");
+        }
+        let own = IndependentStop::by_itself(StoppedState::Landed, 5);
+        let own = Independence::of(&own).expect("it is right");
+        assert!(matches!(own, Independence::Itself { within_ns: 5, state: StoppedState::Landed }));
+    }
+}

@@ -1,0 +1,63 @@
+//! A line of text that needs no memory of its own.
+
+/// Bytes of a line, the end included: names are short, and the end of what is longer is cut off.
+const BYTES: usize = 512;
+
+/// A line that is being written.
+pub(super) struct Line {
+    bytes: [u8; BYTES],
+    len: usize,
+}
+
+impl Default for Line {
+    fn default() -> Self {
+        Self { bytes: [0; BYTES], len: 0 }
+    }
+}
+
+impl Line {
+    /// The line with its end.
+    pub(super) fn as_bytes(&mut self) -> &[u8] {
+        let len = self.len.min(BYTES - 1);
+        if let Some(end) = self.bytes.get_mut(len) {
+            *end = b'\n';
+        }
+        self.bytes.get(..=len).unwrap_or_default()
+    }
+}
+
+impl std::fmt::Write for Line {
+    fn write_str(&mut self, text: &str) -> std::fmt::Result {
+        for byte in text.bytes() {
+            // A name is a plugin's, and the terminal is not.
+            let byte = if byte.is_ascii_control() { b'?' } else { byte };
+            match self.bytes.get_mut(self.len) {
+                Some(place) if self.len < BYTES - 1 => *place = byte,
+                _ => return Err(std::fmt::Error),
+            }
+            self.len += 1;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fmt::Write;
+
+    #[test]
+    fn a_line_ends_and_holds_no_other_ends() {
+        let mut line = Line::default();
+        write!(line, "tick {}\n\u{1b}[2J", 17).expect("it fits");
+        assert_eq!(line.as_bytes(), b"tick 17??[2J\n");
+    }
+
+    #[test]
+    fn a_line_that_is_too_long_is_cut() {
+        let mut line = Line::default();
+        assert!(write!(line, "{}", "x".repeat(10_000)).is_err());
+        assert_eq!(line.as_bytes().len(), BYTES);
+        assert_eq!(line.as_bytes().last(), Some(&b'\n'));
+    }
+}

@@ -1,0 +1,260 @@
+//! A process that dies takes the force along: whatever ends it while devices are energised, they are stopped first.
+//!
+//! A device keeps its last command, some of them for ever. So as long as a run has energised devices, signals that would
+//! end the process, and `exit`, come here first: every device's `safe_stop` is called, by contract possible from any
+//! thread without lock or allocation; one line says whose code it was; the process ends with code 3.
+//!
+//! What nobody can catch (`_exit`, `exec`, SIGKILL, a stack that overflows in a thread without an alternate one) is left to
+//! a process of its own: [`crate::watchdog_process`].
+
+mod line;
+mod system;
+
+pub use system::{SignalGuard, TakenSignals, block_signals, leave_process, spawn_unblocked, wait_for_signal};
+
+use crate::{Heartbeat, Place, Stuck};
+use flotor_hal::abi::loader::Stopper;
+use line::Line;
+use std::mem::ManuallyDrop;
+use std::sync::atomic::{AtomicBool, AtomicI32, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+
+/// Exit code of a process whose devices were stopped here: that of a plugin that failed.
+const ENDED: i32 = 3;
+/// Runs of one process that can be armed at a time; further ones, of simulations side by side, are not.
+const MOST_RUNS: usize = 256;
+/// Looks of a second thread that dies at whether the first one has ended the process, and the time between two, ns.
+const LOOKS: u32 = 50;
+const LOOK_NS: u64 = 10_000_000;
+
+/// A run whose devices are energised.
+struct Armed {
+    stoppers: Box<[Stopper]>,
+    /// Of the devices, then of the models, as the scene has them.
+    names: Box<[String]>,
+    heart: Heartbeat,
+    /// Number that the system gives the loop's thread.
+    thread: i32,
+}
+
+/// The runs of this process. Locked for a few instructions by whoever begins or ends a run, and only tried by who dies: what
+/// cannot be locked has no energised device yet, or none any more.
+static RUNS: [Mutex<Option<Arc<Armed>>>; MOST_RUNS] = [const { Mutex::new(None) }; MOST_RUNS];
+/// Whether there has ever been a run.
+static WAS_ARMED: AtomicBool = AtomicBool::new(false);
+/// Number of the thread in which this process dies; 0: it does not.
+static DYING: AtomicI32 = AtomicI32::new(0);
+/// The next device to be stopped, counted through all runs: a stop that dies itself is not tried again.
+static NEXT: AtomicUsize = AtomicUsize::new(0);
+
+/// How a process dies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Death {
+    /// A signal, and the process that sent it, if one did.
+    Signal { signal: i32, sender: Option<i32> },
+    /// Somebody called `exit`.
+    Exit,
+    /// The loop's thread was ended, as by `pthread_exit`.
+    Thread,
+}
+
+/// True while a run has energised devices. Takes no lock that is held, allocates nothing.
+#[must_use]
+pub fn is_armed() -> bool {
+    RUNS.iter().filter_map(glance).any(|run| run.as_ref().is_some_and(|run| !run.is_over()))
+}
+
+/// True once a run has energised devices.
+#[must_use]
+pub fn was_armed() -> bool {
+    WAS_ARMED.load(Ordering::Acquire)
+}
+
+/// Stops every device of every run of this process, from any thread. Not real-time.
+pub fn stop_all() {
+    for run in &RUNS {
+        let run = lock(run).clone();
+        run.iter().flat_map(|run| &run.stoppers).for_each(Stopper::safe_stop);
+    }
+}
+
+/// The runs there are, for one who dies: they are never let go again, because what closes a device allocates, and the
+/// allocator may be what died.
+fn runs() -> impl Iterator<Item = ManuallyDrop<Arc<Armed>>> {
+    RUNS.iter().filter_map(|run| glance(run)?.clone()).map(ManuallyDrop::new)
+}
+
+fn glance(run: &Mutex<Option<Arc<Armed>>>) -> Option<MutexGuard<'_, Option<Arc<Armed>>>> {
+    match run.try_lock() {
+        Ok(run) => Some(run),
+        Err(TryLockError::Poisoned(run)) => Some(run.into_inner()),
+        Err(TryLockError::WouldBlock) => None,
+    }
+}
+
+fn lock(run: &Mutex<Option<Arc<Armed>>>) -> MutexGuard<'_, Option<Arc<Armed>>> {
+    run.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Keeps a run armed as long as it lives: until its devices are closed and its models gone.
+pub struct LastStop {
+    place: usize,
+}
+
+/// What stands before the devices and models of a run where they are dropped: a loop that is unwound by neither its end nor
+/// a panic is being ended by a plugin, and the devices are stopped before anything else of it goes.
+pub struct Unwound(Arc<Armed>);
+
+impl LastStop {
+    /// Arms a run on the thread that will loop: its devices are stopped when the process dies. `names` are those of the
+    /// devices, in the order of `stoppers`, then of the models. Not real-time.
+    #[must_use]
+    pub fn arm(stoppers: Vec<Stopper>, names: Vec<String>, heart: Heartbeat) -> Option<(Unwound, Self)> {
+        let thread = system::thread_number();
+        let armed = Arc::new(Armed { stoppers: stoppers.into(), names: names.into(), heart, thread });
+        system::install();
+        for (place, run) in RUNS.iter().enumerate() {
+            let mut run = lock(run);
+            if run.is_none() {
+                *run = Some(Arc::clone(&armed));
+                WAS_ARMED.store(true, Ordering::Release);
+                return Some((Unwound(armed), Self { place }));
+            }
+        }
+        None
+    }
+}
+
+impl Drop for LastStop {
+    fn drop(&mut self) {
+        let armed = RUNS.get(self.place).and_then(|run| lock(run).take());
+        drop(armed); // outside the lock: it may close a device
+    }
+}
+
+impl Drop for Unwound {
+    fn drop(&mut self) {
+        let Self(run) = self;
+        if run.is_over() {
+            return;
+        }
+        if std::thread::panicking() {
+            run.stoppers.iter().for_each(Stopper::safe_stop);
+        } else if run.heart.now().place.is_a_plugins() {
+            die(Death::Thread);
+        }
+    }
+}
+
+impl Armed {
+    /// Its loop has ended, or the watchdog has stopped its devices: nothing of it is energised.
+    fn is_over(&self) -> bool {
+        self.heart.is_done() || self.heart.bitten().is_some()
+    }
+
+    fn name(&self, place: Place) -> &str {
+        let index = match place {
+            Place::Waiting | Place::Host => return "host",
+            Place::DeviceWait(device) | Place::DeviceRead(device) | Place::DeviceWrite(device) => {
+                usize::from(device)
+            }
+            Place::Model(model) => self.stoppers.len() + model,
+        };
+        self.names.get(index).map_or("a plugin", String::as_str)
+    }
+}
+
+/// Called in a signal handler or in `exit`: no lock, no allocation. Returns if no run is energised: then this is no affair
+/// of ours.
+fn end_if_armed(death: Death) {
+    if is_armed() {
+        die(death);
+    }
+}
+
+/// Whether this process is dying: somebody stops its devices, and will end it.
+pub(crate) fn is_dying() -> bool {
+    DYING.load(Ordering::Acquire) != 0
+}
+
+/// Ends a process that has been dying for too long, because a device's stop does not come back: the other devices are stopped.
+pub(crate) fn end_dying() -> ! {
+    stop_the_rest();
+    system::say(b"error: the process was ended, and a device did not come back from `safe_stop`\n");
+    leave_process(ENDED)
+}
+
+/// Stops everything, says so, and ends the process.
+fn die(death: Death) -> ! {
+    let own = system::thread_number();
+    match DYING.compare_exchange(0, own, Ordering::AcqRel, Ordering::Acquire) {
+        Ok(_) => {}
+        // A stop that died: on with the next device.
+        Err(first) if first == own => {}
+        Err(_) => {
+            // The first one is at it, and will not come back from here; unless a device's stop does not come back to it.
+            for _ in 0..LOOKS {
+                crate::sleep_until(crate::monotonic_ns() + LOOK_NS);
+            }
+        }
+    }
+    stop_the_rest();
+    let mut line = Line::default();
+    describe(&mut line, death, own);
+    system::say(line.as_bytes());
+    system::end_by(death, ENDED)
+}
+
+/// Stops each device of each run that nobody has begun to stop.
+fn stop_the_rest() {
+    let mut first = 0;
+    for run in runs() {
+        for (index, stopper) in run.stoppers.iter().enumerate() {
+            let number = first + index;
+            if NEXT.compare_exchange(number, number + 1, Ordering::AcqRel, Ordering::Acquire).is_ok() {
+                stopper.safe_stop();
+            }
+        }
+        first += run.stoppers.len();
+    }
+}
+
+/// One line: what it was, in which tick, in whose code.
+fn describe(line: &mut Line, death: Death, own: i32) {
+    use std::fmt::Write;
+    let is_own = |run: &ManuallyDrop<Arc<Armed>>| run.thread == own;
+    let own_run = runs().find(|run| is_own(run) && !run.is_over());
+    let Some(run) = own_run.or_else(|| runs().find(|run| !run.is_over())) else {
+        let _ = write!(line, "error: the process was ended; every device was told to stop");
+        return;
+    };
+    let Stuck { tick, place } = run.heart.now();
+    let in_loop = is_own(&run);
+    let culprit = in_loop && place.is_a_plugins();
+    // What is cut off a line that is too long is its end.
+    let _ = match (culprit, in_loop) {
+        (true, _) => write!(line, "error: `{}` ended the process in {}", run.name(place), place.call()),
+        (false, true) => write!(line, "error: the process was ended in {}", place.call()),
+        (false, false) => {
+            let mut name = [0; system::NAME_BYTES];
+            let name = system::thread_name(&mut name);
+            write!(line, "error: the process was ended in its thread `{name}`")
+        }
+    };
+    let _ = write!(line, ", tick {tick}: ");
+    let _ = match death {
+        Death::Signal { signal, sender } => {
+            let told = write!(line, "signal {signal} ({})", system::signal_words(signal));
+            sender.map_or(told, |sender| write!(line, ", sent by process {sender}"))
+        }
+        Death::Exit => write!(line, "it called `exit`"),
+        Death::Thread => write!(line, "it ended the thread of the loop"),
+    };
+    if !culprit {
+        let _ = write!(line, "; the loop was in {} of `{}`; its plugins:", place.call(), run.name(place));
+        for name in &run.names {
+            let _ = write!(line, " `{name}`");
+        }
+    }
+    let _ = write!(line, "; every device was told to stop");
+}

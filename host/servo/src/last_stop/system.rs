@@ -1,0 +1,427 @@
+//! What the system does with a process that dies: signals, the stack they are taken on, `exit`.
+//!
+//! Nothing that runs in a handler allocates, locks or formats into memory of its own.
+#![allow(unsafe_code)] // handlers of deadly signals and of `exit` cannot be made without; tests/tests/system/architecture.rs
+
+use super::{Death, end_if_armed};
+use libc::{c_int, c_void, sigaction, siginfo_t, sigset_t};
+use std::io;
+use std::mem::MaybeUninit;
+use std::process::{Child, Command};
+use std::sync::{Mutex, Once, OnceLock, PoisonError};
+use std::time::Duration;
+
+/// What an instruction that cannot be carried out raises, and `abort`: nobody but the process itself means them.
+const RAISED: [c_int; 7] =
+    [libc::SIGSEGV, libc::SIGBUS, libc::SIGFPE, libc::SIGILL, libc::SIGABRT, libc::SIGSYS, libc::SIGTRAP];
+/// What asks a process to end: one without handlers of its own ends by them, as whoever sends them expects.
+const ASKING: [c_int; 5] = [libc::SIGINT, libc::SIGTERM, libc::SIGHUP, libc::SIGQUIT, libc::SIGPIPE];
+/// What ends no process by itself, or cannot be caught.
+const HARMLESS: [c_int; 9] = [
+    libc::SIGKILL,
+    libc::SIGSTOP,
+    libc::SIGTSTP,
+    libc::SIGTTIN,
+    libc::SIGTTOU,
+    libc::SIGCHLD,
+    libc::SIGCONT,
+    libc::SIGURG,
+    libc::SIGWINCH,
+];
+/// Signals that stay the host's, whatever a plugin does: what is raised, what asks a run to end, the emergency stop.
+const KEPT: [c_int; 13] = [
+    libc::SIGSEGV,
+    libc::SIGBUS,
+    libc::SIGFPE,
+    libc::SIGILL,
+    libc::SIGABRT,
+    libc::SIGSYS,
+    libc::SIGTRAP,
+    libc::SIGINT,
+    libc::SIGTERM,
+    libc::SIGHUP,
+    libc::SIGQUIT,
+    libc::SIGTSTP,
+    libc::SIGUSR1,
+];
+/// Numbers of signals, 1 to 64; two of them belong to the C library, which says so.
+const SIGNALS: usize = 65;
+/// Bytes of the alternate stack: frames of a handler with the widest registers take some 12 KiB, a device's stop little.
+const STACK_BYTES: usize = 128 * 1024;
+/// Bytes of a thread's name with its end.
+pub(super) const NAME_BYTES: usize = 16;
+
+/// What stood there before a handler of ours.
+static BEFORE: [OnceLock<sigaction>; SIGNALS] = [const { OnceLock::new() }; SIGNALS];
+
+/// Takes every signal that would end the process, in this thread on a stack of its own, and `exit`. Again for each run: a
+/// plugin may have put something else there. Not real-time.
+pub(super) fn install() {
+    static AT_EXIT: Once = Once::new();
+    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+    let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    STACK.with(|_| ());
+    AT_EXIT.call_once(|| {
+        // SAFETY: a function without arguments that may be called at the end of the process.
+        let _ = unsafe { libc::atexit(at_exit) };
+    });
+    for signal in (1..).take(SIGNALS - 1).filter(|signal| !HARMLESS.contains(signal)) {
+        let Some(found) = action(signal) else { continue };
+        let is_ours = found.sa_sigaction == handler();
+        if is_ours || found.sa_sigaction != libc::SIG_DFL && !RAISED.contains(&signal) {
+            continue;
+        }
+        if let Some(before) = usize::try_from(signal).ok().and_then(|signal| BEFORE.get(signal)) {
+            before.get_or_init(|| found);
+        }
+        let mut ours = found;
+        ours.sa_sigaction = handler();
+        ours.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK | libc::SA_NODEFER | libc::SA_RESTART;
+        // A stop that dies itself is taken; a timer that runs out in the middle of one waits.
+        ours.sa_mask = all_but(&RAISED);
+        set_action(signal, &ours);
+    }
+}
+
+fn handler() -> libc::sighandler_t {
+    on_signal as extern "C" fn(c_int, *mut siginfo_t, *mut c_void) as libc::sighandler_t
+}
+
+extern "C" fn on_signal(signal: c_int, info: *mut siginfo_t, _: *mut c_void) {
+    // SAFETY: the system passes the handler of a signal, installed with SA_SIGINFO, a description of it.
+    let (code, sender) = unsafe { ((*info).si_code, (*info).si_pid()) };
+    let was_sent = [libc::SI_USER, libc::SI_TKILL, libc::SI_QUEUE].contains(&code);
+    let sender = Some(sender).filter(|sender| was_sent && *sender != process_number());
+    end_if_armed(Death::Signal { signal, sender });
+    // No run: as if we had never been here.
+    let before = usize::try_from(signal).ok().and_then(|signal| BEFORE.get(signal)?.get());
+    if let Some(before) = before {
+        set_action(signal, before);
+    }
+    // An instruction that failed fails once more where it stands.
+    if code <= 0 || !RAISED.contains(&signal) {
+        raise(signal);
+    }
+}
+
+extern "C" fn at_exit() {
+    end_if_armed(Death::Exit);
+}
+
+/// Ends the process: by the signal that asked it to, if that is what one is for; else with a code.
+pub(super) fn end_by(death: Death, code: i32) -> ! {
+    if let Death::Signal { signal, .. } = death
+        && ASKING.contains(&signal)
+    {
+        // SAFETY: plain data, all of whose bits may be zero: the default action.
+        let default = unsafe { MaybeUninit::<sigaction>::zeroed().assume_init() };
+        set_action(signal, &default);
+        raise(signal);
+    }
+    leave_process(code)
+}
+
+/// Ends the process at once: nothing of what a process does at its end is done. Real-time: never returns.
+pub fn leave_process(code: i32) -> ! {
+    // SAFETY: takes nothing and never returns.
+    unsafe { libc::_exit(code) }
+}
+
+/// Sends a signal to the calling thread, which takes it before this returns.
+fn raise(signal: c_int) {
+    let set = set_of(&[signal]);
+    // SAFETY: an initialised set, and a null pointer where nothing is to be written.
+    unsafe {
+        libc::raise(signal);
+        libc::pthread_sigmask(libc::SIG_UNBLOCK, &raw const set, std::ptr::null_mut());
+    }
+}
+
+/// Writes to standard error, once: a reader that is gone is no reason to stay.
+pub(super) fn say(bytes: &[u8]) {
+    // SAFETY: the bytes are there for the call, and as many as said.
+    let _ = unsafe { libc::write(libc::STDERR_FILENO, bytes.as_ptr().cast(), bytes.len()) };
+}
+
+/// The number of the calling thread.
+pub(super) fn thread_number() -> i32 {
+    // SAFETY: takes nothing, and cannot fail.
+    unsafe { libc::gettid() }
+}
+
+fn process_number() -> i32 {
+    // SAFETY: takes nothing, and cannot fail.
+    unsafe { libc::getpid() }
+}
+
+/// The name of the calling thread.
+pub(super) fn thread_name(name: &mut [u8; NAME_BYTES]) -> &str {
+    // SAFETY: the system writes 16 bytes at most, which are there for the call.
+    unsafe { libc::prctl(libc::PR_GET_NAME, name.as_mut_ptr()) };
+    let length = name.iter().position(|byte| *byte == 0).unwrap_or(NAME_BYTES);
+    std::str::from_utf8(name.get(..length).unwrap_or_default()).unwrap_or_default()
+}
+
+/// What a signal says, for people.
+pub(super) fn signal_words(signal: c_int) -> &'static str {
+    match signal {
+        libc::SIGSEGV => "SIGSEGV: memory that is not its own, or a stack that is full",
+        libc::SIGBUS => "SIGBUS: memory that is not there",
+        libc::SIGFPE => "SIGFPE: a calculation that traps",
+        libc::SIGILL => "SIGILL: an instruction that does not exist",
+        libc::SIGABRT => "SIGABRT: it gave up, as after an exception nobody catches",
+        libc::SIGSYS => "SIGSYS: a forbidden system call",
+        libc::SIGTRAP => "SIGTRAP: a breakpoint",
+        libc::SIGXCPU => "SIGXCPU: its limit of processor time",
+        libc::SIGXFSZ => "SIGXFSZ: its limit of file size",
+        libc::SIGUSR2 => "SIGUSR2",
+        libc::SIGALRM => "SIGALRM: a timer",
+        libc::SIGVTALRM => "SIGVTALRM: a timer",
+        libc::SIGPROF => "SIGPROF: a timer",
+        _ => name_of(signal).unwrap_or("a signal nobody takes"),
+    }
+}
+
+fn name_of(signal: c_int) -> Option<&'static str> {
+    Some(match signal {
+        libc::SIGSEGV => "SIGSEGV",
+        libc::SIGBUS => "SIGBUS",
+        libc::SIGFPE => "SIGFPE",
+        libc::SIGILL => "SIGILL",
+        libc::SIGABRT => "SIGABRT",
+        libc::SIGSYS => "SIGSYS",
+        libc::SIGTRAP => "SIGTRAP",
+        libc::SIGINT => "SIGINT",
+        libc::SIGTERM => "SIGTERM",
+        libc::SIGHUP => "SIGHUP",
+        libc::SIGQUIT => "SIGQUIT",
+        libc::SIGTSTP => "SIGTSTP",
+        libc::SIGUSR1 => "SIGUSR1",
+        libc::SIGPIPE => "SIGPIPE",
+        _ => return None,
+    })
+}
+
+// ---------------------------------------------------------------- the stack
+
+thread_local! {
+    /// Where the handlers of this thread run.
+    static STACK: AlternateStack = AlternateStack::of_this_thread();
+}
+
+/// Memory in which a handler runs where the thread's own stack is full.
+struct AlternateStack {
+    memory: *mut [u8],
+}
+
+impl AlternateStack {
+    fn of_this_thread() -> Self {
+        let memory = Box::into_raw(vec![0_u8; STACK_BYTES].into_boxed_slice());
+        let stack = libc::stack_t { ss_sp: memory.cast(), ss_flags: 0, ss_size: STACK_BYTES };
+        // SAFETY: memory of this length that stays until `drop`, which takes it away from the system first.
+        unsafe { libc::sigaltstack(&raw const stack, std::ptr::null_mut()) };
+        Self { memory }
+    }
+}
+
+impl Drop for AlternateStack {
+    fn drop(&mut self) {
+        let none = libc::stack_t { ss_sp: std::ptr::null_mut(), ss_flags: libc::SS_DISABLE, ss_size: 0 };
+        // SAFETY: no handler runs on it, as this thread is here; after this call none will.
+        let is_free = unsafe { libc::sigaltstack(&raw const none, std::ptr::null_mut()) } == 0;
+        if is_free {
+            // SAFETY: made by `Box::into_raw`, and nobody uses it any more.
+            drop(unsafe { Box::from_raw(self.memory) });
+        }
+    }
+}
+
+// ---------------------------------------------------------------- signals that stay the host's
+
+/// Blocks signals in the calling thread and in all that it starts from now on; [`wait_for_signal`] takes them. Not real-time.
+///
+/// # Errors
+/// What the system says.
+pub fn block_signals(signals: &[i32]) -> io::Result<()> {
+    let set = set_of(signals);
+    // SAFETY: an initialised set, and a null pointer where nothing is to be written.
+    match unsafe { libc::pthread_sigmask(libc::SIG_BLOCK, &raw const set, std::ptr::null_mut()) } {
+        0 => Ok(()),
+        code => Err(io::Error::from_raw_os_error(code)),
+    }
+}
+
+/// Waits for one of these signals, which are blocked in every thread; `None` after `patience`. Not real-time.
+#[must_use]
+pub fn wait_for_signal(signals: &[i32], patience: Duration) -> Option<i32> {
+    let set = set_of(signals);
+    let seconds = libc::time_t::try_from(patience.as_secs()).unwrap_or(libc::time_t::MAX);
+    let patience = libc::timespec { tv_sec: seconds, tv_nsec: patience.subsec_nanos().into() };
+    // SAFETY: an initialised set and time, and a null pointer where nothing is to be written.
+    let signal = unsafe { libc::sigtimedwait(&raw const set, std::ptr::null_mut(), &raw const patience) };
+    (signal > 0).then_some(signal)
+}
+
+/// Starts a process that blocks no signal, whatever the calling thread does: it would else inherit that. Not real-time.
+///
+/// # Errors
+/// What the system says.
+pub fn spawn_unblocked(command: &mut Command) -> io::Result<Child> {
+    let before = blocked();
+    set_blocked(&set_of(&[]));
+    let child = command.spawn();
+    set_blocked(&before);
+    child
+}
+
+/// How the host's signals are taken, and which the calling thread blocks: to be put back after a plugin was called.
+pub struct SignalGuard {
+    actions: [Option<sigaction>; KEPT.len()],
+    blocked: sigset_t,
+}
+
+/// Signals of the host that somebody took away.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TakenSignals {
+    bits: u64,
+}
+
+impl SignalGuard {
+    /// How they are taken now. Not real-time.
+    #[must_use]
+    pub fn take() -> Self {
+        Self { actions: KEPT.map(action), blocked: blocked() }
+    }
+
+    /// Puts back what has changed since, and says what that was. Not real-time.
+    pub fn put_back(&self) -> TakenSignals {
+        let mut taken = TakenSignals::default();
+        let blocked = blocked();
+        for (signal, before) in KEPT.into_iter().zip(&self.actions) {
+            // Ours, if another run of this process has begun meanwhile.
+            if let (Some(now), Some(before)) = (action(signal), before)
+                && now.sa_sigaction != handler()
+                && (now.sa_sigaction, now.sa_flags) != (before.sa_sigaction, before.sa_flags)
+            {
+                set_action(signal, before);
+                taken.add(signal);
+            }
+            if holds(&blocked, signal) && !holds(&self.blocked, signal) {
+                taken.add(signal);
+            }
+        }
+        set_blocked(&self.blocked);
+        taken
+    }
+}
+
+impl TakenSignals {
+    /// None.
+    #[must_use]
+    pub const fn is_none(self) -> bool {
+        self.bits == 0
+    }
+
+    /// One bit a signal, for a word that threads share.
+    #[must_use]
+    pub(crate) const fn bits(self) -> u64 {
+        self.bits
+    }
+
+    /// The set of such a word.
+    pub(crate) const fn from_bits(bits: u64) -> Self {
+        Self { bits }
+    }
+
+    fn add(&mut self, signal: c_int) {
+        self.bits |= 1 << (signal - 1);
+    }
+}
+
+/// Their names, with commas.
+impl std::fmt::Display for TakenSignals {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let taken = KEPT.into_iter().filter(|signal| self.bits >> (signal - 1) & 1 == 1);
+        let names: Vec<&str> = taken.filter_map(name_of).collect();
+        f.write_str(&names.join(", "))
+    }
+}
+
+// ---------------------------------------------------------------- calls of the system
+
+/// How a signal is taken; `None` for one that is not ours to ask about.
+fn action(signal: c_int) -> Option<sigaction> {
+    let mut found = MaybeUninit::<sigaction>::zeroed();
+    // SAFETY: nothing is changed, and the system writes to memory that is there for the call.
+    let code = unsafe { libc::sigaction(signal, std::ptr::null(), found.as_mut_ptr()) };
+    // SAFETY: plain data, all of whose bits may be zero, and written if the call went well.
+    (code == 0).then(|| unsafe { found.assume_init() })
+}
+
+/// Takes a signal like that: as the system said it was taken, or by the handler of this module.
+fn set_action(signal: c_int, action: &sigaction) {
+    // SAFETY: an initialised action whose handler, if any, was there before or is `on_signal`, which may run at any time.
+    let _ = unsafe { libc::sigaction(signal, action, std::ptr::null_mut()) };
+}
+
+fn set_of(signals: &[c_int]) -> sigset_t {
+    let mut set = MaybeUninit::<sigset_t>::zeroed();
+    // SAFETY: memory that is there for the call, which initialises it; plain data.
+    let mut set = unsafe {
+        libc::sigemptyset(set.as_mut_ptr());
+        set.assume_init()
+    };
+    for signal in signals {
+        // SAFETY: an initialised set.
+        unsafe { libc::sigaddset(&raw mut set, *signal) };
+    }
+    set
+}
+
+fn all_but(signals: &[c_int]) -> sigset_t {
+    let mut set = set_of(&[]);
+    // SAFETY: an initialised set, here and below.
+    unsafe { libc::sigfillset(&raw mut set) };
+    for signal in signals {
+        // SAFETY: as above.
+        unsafe { libc::sigdelset(&raw mut set, *signal) };
+    }
+    set
+}
+
+fn blocked() -> sigset_t {
+    let mut set = set_of(&[]);
+    // SAFETY: nothing is changed, and the system writes to memory that is there for the call.
+    unsafe { libc::pthread_sigmask(libc::SIG_BLOCK, std::ptr::null(), &raw mut set) };
+    set
+}
+
+fn set_blocked(set: &sigset_t) {
+    // SAFETY: an initialised set, and a null pointer where nothing is to be written.
+    unsafe { libc::pthread_sigmask(libc::SIG_SETMASK, set, std::ptr::null_mut()) };
+}
+
+fn holds(set: &sigset_t, signal: c_int) -> bool {
+    // SAFETY: an initialised set.
+    unsafe { libc::sigismember(set, signal) == 1 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signals_that_were_taken_away_are_put_back_and_named() {
+        std::thread::spawn(|| {
+            let kept = SignalGuard::take();
+            assert_eq!(kept.put_back(), TakenSignals::default());
+            block_signals(&[libc::SIGQUIT, libc::SIGCHLD]).expect("they can be blocked");
+            let taken = kept.put_back();
+            assert_eq!(taken.to_string(), "SIGQUIT");
+            assert!(!holds(&blocked(), libc::SIGQUIT) && !holds(&blocked(), libc::SIGCHLD));
+            assert_eq!(TakenSignals::from_bits(taken.bits()), taken);
+        })
+        .join()
+        .expect("it holds");
+    }
+}

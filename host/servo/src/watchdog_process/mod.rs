@@ -1,0 +1,40 @@
+//! The watchdog process: it stops devices whose host is gone, whatever ended that: SIGKILL, `_exit`, `exec`, a limit of the
+//! machine.
+//!
+//! The host starts its own program once more, as `flotor watchdog`, and hands it, over the socket that is its standard input,
+//! for each device a handle and a message of the device's own (extension `flotor.independent-stop/1`). It runs nothing of any
+//! plugin. When the socket closes without an end in order, or the host's process has ended, it writes the messages. It is of
+//! a process group of its own and takes no signal that asks it to end: it ends with its host, right after.
+
+mod guard;
+mod host;
+
+pub use guard::serve;
+pub use host::WatchdogProcess;
+
+/// Bytes of the longest packet between the two: what it says, and a message or a name.
+const PACKET_BYTES: usize = 128;
+
+/// First byte of a packet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+enum Packet {
+    /// To the process: a device's message, and its handle beside it.
+    Device = b'd',
+    /// To the process: the name of that device, for people.
+    Name = b'n',
+    /// To the process: these were all.
+    Begin = b'b',
+    /// From the process: it is on guard.
+    Ready = b'r',
+    /// To the process: the devices are stopped, nobody has to guard them any more.
+    End = b'e',
+}
+
+impl Packet {
+    fn of(byte: u8) -> Option<Self> {
+        [Self::Device, Self::Name, Self::Begin, Self::Ready, Self::End]
+            .into_iter()
+            .find(|packet| *packet as u8 == byte)
+    }
+}

@@ -1,0 +1,21 @@
+//! `flotor watchdog`: the process that stops devices when the host is gone, started by `flotor run`.
+
+use clap::Args;
+use flotor_command::{CommandError, stopping};
+use flotor_servo::watchdog_process;
+
+/// Arguments of the watchdog process. Its standard input is a socket to its host.
+#[derive(Args, Clone, Copy, Debug)]
+pub(super) struct WatchdogArguments {
+    /// Number of the host's process
+    #[arg(long)]
+    host: i32,
+}
+
+pub(super) fn run(arguments: WatchdogArguments) -> Result<(), CommandError> {
+    // Whoever signals all processes of a run ends the host; this one has to be there then.
+    stopping::outlive_signals();
+    let refused =
+        |error| CommandError::Usage(format!("`flotor watchdog` is started by `flotor run`: {error}"));
+    watchdog_process::serve(arguments.host).map_err(refused)
+}
