@@ -10,8 +10,8 @@
 use crate::stage_timer::{Moment, StageTimer};
 use crate::timing::STAGE_SAMPLING;
 use crate::{
-    Cause, Due, EmergencySource, Forces, Heartbeat, LastStop, LoopSwaps, ParameterQueue, Place, Port, Reported,
-    RunEvent, RunState, Stage, Station, StopSwitch, Timing, Unwound, WEIGHT,
+    Cause, Due, EmergencySource, Forces, Heartbeat, LastStop, LoopSwaps, ParameterQueue, Place, Port,
+    Reported, RunEvent, RunState, Stage, Station, StopSwitch, Timing, Unwound, WEIGHT,
 };
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::Tick;

@@ -4,8 +4,8 @@
 //! and what is left over at the end is unknown.
 
 use super::ParameterText;
-pub use flotor_hal::abi::loader::nearest;
 use flotor_core::limits::Bound;
+pub use flotor_hal::abi::loader::nearest;
 use std::borrow::Cow;
 use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};

@@ -94,7 +94,7 @@ impl RunError {
         match self {
             Self::Scene(_) | Self::Mismatch { .. } | Self::Lookup(LookupError::Unknown { .. }) => true,
             Self::Lookup(LookupError::Refused(error)) | Self::Plugin(error) => error.is_configuration(),
-            Self::Thread(_) | Self::Hung { .. } => false,
+            Self::Thread(_) | Self::Hung { .. } | Self::WatchdogProcess(_) => false,
         }
     }
 }
