@@ -120,7 +120,7 @@ fn wrong_types_and_ranges_say_what_would_be_right() {
         (
             "force_n = [30, 30, 60]",
             "velocity_m_per_s = 0",
-            "`limits.velocity_m_per_s` = 0: legal is 0 or more.000001",
+            "`limits.velocity_m_per_s` = 0: legal is 0.000001 or more",
         ),
         ("[device]\nplugin = \"simulated\"", "", "scene.toml:1: `device` is missing"),
         ("plugin = \"spring\"", "", "`model.plugin` is missing"),

@@ -99,7 +99,7 @@ fn every_mistake_of_a_device_is_found_under_its_rule() {
             "capabilities",
             "`max_torque_nm` is [0.0, 0.0, 0.0]: x is driven, so say the most it gives",
         ),
-        ("NEGATIVE_TORQUE", "capabilities", "`max_torque_nm` is [1.0, 1.0, -1.0]: legal is 0 to 100000 N·m"),
+        ("NEGATIVE_TORQUE", "capabilities", "`max_torque_nm` is [0.5, 0.5, -1.0]: legal is 0 to 100000 N·m"),
         ("NO_SLEW", "capabilities", "`max_force_slew_n_per_s` is 0: its force could never change"),
         ("ENDLESS_SLEW", "capabilities", "`max_torque_slew_nm_per_s` is inf: legal is 0 to"),
         ("ENDLESS_STIFFNESS", "capabilities", "`max_stiffness_n_per_m` is inf: legal is 0 to"),

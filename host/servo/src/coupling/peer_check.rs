@@ -47,7 +47,7 @@ impl PeerCheck {
             return Err(Implausible::Quaternion);
         }
         let position = pose.position();
-        if position.length_squared() > (REACH_M * self.scale).powi(2) {
+        if position.length() > REACH_M * self.scale {
             return Err(Implausible::Range);
         }
         let unscaled = Twist::new(twist.linear() / self.scale, twist.angular());
