@@ -139,7 +139,7 @@ fn recording_in(scratch: &Scratch) -> PathBuf {
 /// Ticks of a recording that nobody finished, up to its last chunk.
 fn recorded_ticks(scratch: &Scratch) -> usize {
     let recording = Recording::open(&recording_in(scratch)).expect("it can be read");
-    recording.map(|record| record.expect("whole up to its last chunk")).count()
+    recording.inspect(|record| assert!(record.is_ok(), "whole up to its last chunk")).count()
 }
 
 /// Runs the fixture that dies so to the end of the process: the board is at rest then.

@@ -249,7 +249,7 @@ fn a_model_nobody_has_is_a_mistake() {
 #[test]
 fn poses_are_not_overwritten() {
     let scratch = Scratch::default();
-    let file = scratch.file("poses.csv", &format!("{POSE_HEADER}\na,0,0,0,0,0,0\n"));
+    let file = scratch.file("poses.csv", format!("{POSE_HEADER}\na,0,0,0,0,0,0\n"));
     let file = file.display().to_string();
     let same = ["eval", "--model", "spring", "--poses", &file, "--out", &file];
     let ran = Flotor::with(same).run();

@@ -38,14 +38,14 @@ impl Drop for Handle {
 pub struct OpenedDevice {
     handle: Arc<Handle>,
     /// What it has said it can do; nothing before it was asked.
-    told: Option<Capabilities>,
+    told: Option<Box<Capabilities>>,
 }
 
 /// A device that is energised. Dropping it deactivates it.
 pub struct ActiveDevice {
     /// `None` only after `deactivate` has taken it.
     handle: Option<Arc<Handle>>,
-    told: Option<Capabilities>,
+    told: Option<Box<Capabilities>>,
     instance: Instance,
     read: unsafe extern "C" fn(Instance, *const Tick, *mut DeviceState) -> u32,
     write: unsafe extern "C" fn(Instance, *const Tick, *const Wrench) -> u32,
@@ -119,7 +119,7 @@ impl OpenedDevice {
             return Err(Refusal::broken(self.last_message()));
         };
         check(&capabilities)?;
-        check_unchanged(self.told.get_or_insert(capabilities), &capabilities)?;
+        check_unchanged(self.told.get_or_insert_with(|| Box::new(capabilities)), &capabilities)?;
         Ok(capabilities)
     }
 
@@ -228,7 +228,7 @@ impl ActiveDevice {
     pub fn deactivate(mut self) -> Option<OpenedDevice> {
         let handle = self.handle.take()?;
         match deactivate(&handle) {
-            CallStatus::Ok => Some(OpenedDevice { handle, told: self.told }),
+            CallStatus::Ok => Some(OpenedDevice { handle, told: self.told.take() }),
             _ => None,
         }
     }
