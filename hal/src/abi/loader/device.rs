@@ -164,7 +164,7 @@ impl OpenedDevice {
             // SAFETY: a live instance, used by this thread only (`&mut`), an out pointer valid for the call.
             unsafe { last_message(self.handle.instance, &raw mut message) };
         }
-        message.as_str().to_owned()
+        message.for_people()
     }
 }
 
@@ -215,7 +215,7 @@ impl ActiveDevice {
             // SAFETY: as in `read`; the out pointer is valid for the call.
             unsafe { last_message(self.instance, &raw mut message) };
         }
-        message.as_str().to_owned()
+        message.for_people()
     }
 
     /// Zero wrench, then opened again. Not real-time. `None` if the plugin broke.

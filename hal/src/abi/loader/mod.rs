@@ -13,6 +13,7 @@ mod interfaces;
 mod library;
 mod metadata_file;
 mod model;
+mod schema;
 mod setting;
 
 pub use device::{ActiveDevice, OpenedDevice, Stopper};

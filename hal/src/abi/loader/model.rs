@@ -162,7 +162,7 @@ impl Model {
             // SAFETY: as in `prepare`.
             unsafe { last_message(self.instance, &raw mut message) };
         }
-        message.as_str().to_owned()
+        message.for_people()
     }
 }
 
@@ -180,9 +180,9 @@ pub(crate) fn refusal_from(code: u32, message: &Message) -> Result<(), Refusal> 
     if code == 0 {
         return Ok(());
     }
-    let reason = match message.as_str() {
-        "" => format!("no reason given (code {code})"),
-        text => text.to_owned(),
+    let reason = match message.for_people() {
+        text if text.is_empty() => format!("no reason given (code {code})"),
+        text => text,
     };
     Err(Refusal { kind: RefusalKind::from_code(code), reason })
 }
