@@ -9,6 +9,7 @@
 mod check;
 mod device;
 mod error;
+mod float_control;
 mod interfaces;
 mod library;
 mod metadata_file;
@@ -18,6 +19,7 @@ mod setting;
 
 pub use device::{ActiveDevice, OpenedDevice, Stopper};
 pub use error::LoadError;
+pub(crate) use float_control::keeping_floats;
 pub(crate) use interfaces::Offers;
 pub use library::Plugin;
 pub use metadata_file::{Metadata, read_metadata};
