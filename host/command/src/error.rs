@@ -104,6 +104,7 @@ impl CommandError {
             Self::Run(error) => match error {
                 RunError::Scene(_) | RunError::Mismatch { .. } => 2,
                 RunError::Lookup(LookupError::Unknown { .. }) => 2,
+                RunError::Calls(_) | RunError::Lookup(LookupError::Calls(_)) => 3,
                 RunError::Lookup(LookupError::Refused(error)) | RunError::Plugin(error) => {
                     refusal_code(error)
                 }

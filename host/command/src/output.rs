@@ -11,15 +11,21 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::print_line(format_args!($($text)*)) };
 }
 
-/// The exit code of a command; its error is printed. Not real-time.
+/// The exit code of a command; its error is printed. Ends the process itself where code of a plugin has not returned: what a
+/// process does at its end might wait for it. Not real-time.
 pub fn exit_code_of(result: Result<(), CommandError>) -> ExitCode {
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
+    let code = match result {
+        Ok(()) => 0,
         Err(error) => {
             print_error_line(format_args!("{} {error}", style::error("error:")));
-            ExitCode::from(error.exit_code())
+            error.exit_code()
         }
+    };
+    if flotor_session::is_left_behind() {
+        let _ = std::io::stdout().flush();
+        signal_hook::low_level::exit(code.into());
     }
+    ExitCode::from(code)
 }
 
 /// What `say!` does.

@@ -56,9 +56,11 @@ impl Events {
     pub const EXCESS_FORCE: Events = Events { bits: 1 << 19 };
     /// Nothing is heard of a coupling's other end, on another host: the coupling does not pull.
     pub const PARTNER_SILENT: Events = Events { bits: 1 << 20 };
+    /// A plugin left rounding mode, flush-to-zero or traps of the loop's thread changed; they were put back at once.
+    pub const FLOAT_ENVIRONMENT: Events = Events { bits: 1 << 21 };
 
     /// Names of the bits, lowest first: for reports and recordings.
-    pub const NAMES: [&'static str; 21] = [
+    pub const NAMES: [&'static str; 22] = [
         "stale_sample",
         "not_finite",
         "force_limited",
@@ -80,6 +82,7 @@ impl Events {
         "model_overrun",
         "excess_force",
         "partner_silent",
+        "float_environment",
     ];
 
     /// Adds events. Real-time: bounded, no allocation.

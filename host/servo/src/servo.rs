@@ -212,6 +212,9 @@ impl Servo {
             if let Some(failed) = station.write(tick, port) {
                 *run = run.after(failed, tick.time_ns, config.ramp_ns);
             }
+            if station.device.has_changed_floats() {
+                port.events.insert(Events::FLOAT_ENVIRONMENT);
+            }
         }
     }
 
@@ -260,10 +263,15 @@ impl Servo {
         }
     }
 
-    /// Ends the loop: the devices are deactivated, what was measured remains. Not real-time.
-    pub fn into_timing(self) -> Timing {
-        drop(self.stations);
-        self.timing
+    /// Ends the loop: what it was made of, and what was measured. No code of a plugin runs. Not real-time.
+    pub fn dismantle(self) -> Dismantled {
+        let device = |station: Station| (station.device, station.fault);
+        Dismantled {
+            devices: self.stations.into_iter().map(device).collect(),
+            forces: self.forces,
+            swaps: self.swaps,
+            timing: self.timing,
+        }
     }
 
     /// Where the run stands after the last tick.
@@ -285,6 +293,18 @@ impl Servo {
     pub fn forces(&mut self) -> &mut Forces {
         &mut self.forces
     }
+}
+
+/// What is left of a servo. Dropping it runs code of its plugins.
+pub struct Dismantled {
+    /// The devices, in order, still energised, each with the first fault it reported.
+    pub devices: Vec<(ActiveDevice, Option<Fault>)>,
+    /// All that asked for a wrench.
+    pub forces: Forces,
+    /// Models that were on their way in.
+    pub swaps: LoopSwaps,
+    /// What was measured.
+    pub timing: Timing,
 }
 
 /// Which of two devices' samples decides: the higher.

@@ -55,15 +55,16 @@ impl Standby {
         self.devices.iter().map(|guarded| guarded.device.stopper()).collect()
     }
 
-    /// Energises the devices, in order. Not real-time; may block.
+    /// Energises the devices, in order; `enters` hears of the number of each before. Not real-time; may block.
     ///
     /// # Errors
     /// The number of the device that says no, and why; then none stays energised.
-    pub fn activate(self) -> Result<Servo, (usize, Refusal)> {
+    pub fn activate(self, enters: impl Fn(usize)) -> Result<Servo, (usize, Refusal)> {
         let stoppers = self.stoppers();
         let Self { devices, forces, parameters, swaps, config, run, heart } = self;
         let station = |(number, guarded): (usize, Guarded)| {
             let Guarded { device, sensed, envelope } = guarded;
+            enters(number);
             let device = device.activate(&config).map_err(|(_, refusal)| (number, refusal))?;
             Ok(Station::new(device, envelope, sensed, config.period_ns))
         };

@@ -65,6 +65,13 @@ impl Tally {
         std::array::from_fn(|bit| self.event_ticks[bit] + u64::from(self.events.bits() >> bit & 1))
     }
 
+    /// Time of the last tick, ns.
+    #[must_use]
+    pub fn last_ns(&self) -> u64 {
+        let last = |device: &DeviceTally| device.last.as_ref().map(|(record, _)| record.time_ns);
+        self.devices.iter().filter_map(last).max().unwrap_or(0)
+    }
+
     /// Largest of a number of all devices.
     fn largest(&self, number: impl Fn(&DeviceTally) -> f64) -> f64 {
         self.devices.iter().map(number).fold(0.0, f64::max)
@@ -322,10 +329,18 @@ impl RunSummary {
             trace_digest: facts.trace_digest,
             dropped_records: outcome.dropped_records,
             wall_s: outcome.wall_s,
-            plugins: (facts.plugins.iter().map(|plugin| plugin_summary(plugin, outcome)))
+            plugins: (facts.plugins.iter().enumerate().map(|plugin| plugin_summary(plugin, outcome)))
                 .chain(outcome.misbehaved.iter().map(misbehaved_summary))
                 .collect(),
         }
+    }
+
+    /// The same with what a plugin did that ended the run.
+    #[must_use]
+    pub fn blaming(mut self, name: &str, what: &str) -> Self {
+        let cause = self.plugins.iter_mut().filter(|plugin| plugin.name == name);
+        cause.for_each(|plugin| what.clone_into(&mut plugin.health));
+        self
     }
 
     /// The run in one line, under the title of a picture.
@@ -454,20 +469,31 @@ fn health_words(health: &ModelHealth, words: &str) -> String {
     if let Some(tick) = health.first_late {
         return format!("late in {} ticks, the first at tick {tick}", health.late_ticks);
     }
-    health.first_rejected.map_or_else(
+    if let Some(tick) = health.first_rejected {
+        let count = health.rejected_ticks;
+        return format!(
+            "{count} answers were not finite, the first at tick {tick}; each counted as no force"
+        );
+    }
+    health.first_float_change.map_or_else(
         || "ok".to_owned(),
         |tick| {
-            let count = health.rejected_ticks;
-            format!("{count} answers were not finite, the first at tick {tick}; each counted as no force")
+            let ticks = health.float_changes;
+            format!("changed the floating-point environment in {ticks} ticks, the first at tick {tick}; it was put back each time")
         },
     )
 }
 
-fn plugin_summary(plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
+fn plugin_summary((number, plugin): (usize, &PluginReport), outcome: &Outcome) -> PluginSummary {
+    // The devices come first.
+    let float_changes = outcome.devices.get(number).map_or(0, |device| device.float_changes);
     let model = outcome.models.iter().find(|(name, ..)| *name == plugin.name);
-    let health = match model {
-        Some((_, health, words)) => health_words(health, words),
-        None => "ok".to_owned(),
+    let health = match (model, float_changes) {
+        (Some((_, health, words)), _) => health_words(health, words),
+        (None, 0) => "ok".to_owned(),
+        (None, calls) => {
+            format!("changed the floating-point environment in {calls} calls; it was put back each time")
+        }
     };
     summary_of(plugin, health)
 }

@@ -4,7 +4,7 @@ use crate::run_picture::RunPicture;
 use clap::Args;
 use flotor_command::options::{ClockOption, PluginKeyValue, core, duration_s, rate_hz};
 use flotor_command::stopping::{Keys, stop_on_signals};
-use flotor_command::{CommandError, first_error, note, print_result, progress_bar, style};
+use flotor_command::{CommandError, first_error, note, print_result, progress_bar, style, write_json};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_live::Directory;
@@ -100,7 +100,28 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     progress.finish_and_clear();
     let outcome = match outcome {
         Ok(outcome) => outcome,
-        Err(error) => return first_error([Err(error.into()), recording.finish(&[]).map_err(Into::into)]),
+        Err(error) => {
+            let recorded = recording.finish(&[]).map_err(Into::into);
+            let told = match (&error, &arguments.json) {
+                (RunError::Hung { who, stuck, .. }, Some(json)) => {
+                    let elapsed_ns = tally.last_ns();
+                    let facts = RunFacts {
+                        title: &scene.title,
+                        clock: clock_word,
+                        seed: arguments.seed,
+                        rate_hz: scene.rate_hz,
+                        plugins: &plugins,
+                        couplings: &[],
+                        carried: &[],
+                        trace_digest: digest.finish(),
+                    };
+                    let summary = RunSummary::new(facts, &Outcome::of_hung_loop(*stuck, elapsed_ns), &tally);
+                    write_json(json, &summary.blaming(who, &error.to_string()))
+                }
+                _ => Ok(()),
+            };
+            return first_error([Err(error.into()), recorded, told]);
+        }
     };
 
     let carried: Vec<(String, LinkCounts)> =
@@ -129,8 +150,13 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let text = || format!("{}\n{}", style::title(&summary.title), summary.to_text());
     let printed = print_result(arguments.json.as_deref(), &summary, text);
     outcome.real_time.advice().into_iter().for_each(note);
+    let verdict = verdict(&outcome, &plugins, &summary);
+    // Last of all: the code of a plugin may hang, or end the process.
+    let Outcome { unresponsive, remains, .. } = outcome;
+    let freed = remains.free();
+    let freed = unresponsive.map_or(freed, Err).map_err(|hung| CommandError::PluginRefused(hung.to_string()));
     // Scripts need the outcome of the run first, a missing file second.
-    first_error([verdict(&outcome, &plugins, &summary), recorded, drawn, printed])
+    first_error([verdict, freed, recorded, drawn, printed])
 }
 
 /// Notes for readers of the recording: why the run ended, which plugins failed, which ticks are missing.

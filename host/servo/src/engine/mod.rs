@@ -26,6 +26,8 @@ pub enum Stepped {
     Answered,
     /// None in time; there may be one in a later tick.
     Late,
+    /// None for so long that what it answered before does not hold any more.
+    Silent,
     /// The model broke: it panicked, or answered outside the contract.
     Broken,
     /// Its process has ended.
@@ -127,6 +129,16 @@ impl Engine {
             Self::Here(model) => model.memory(),
             Self::Process(worker) => worker.memory(),
             Self::Asynchronous(model) => model.memory(),
+        }
+    }
+
+    /// Calls so far that left the floating-point environment of the loop's thread changed; what a model changes elsewhere
+    /// stays there. Real-time: bounded, no allocation.
+    #[inline]
+    pub fn float_changes(&self) -> u64 {
+        match self {
+            Self::Here(model) => model.float_changes(),
+            Self::Process(_) | Self::Asynchronous(_) => 0,
         }
     }
 

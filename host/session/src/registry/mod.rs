@@ -5,6 +5,7 @@
 mod stamp;
 
 use self::stamp::{FileStamp, hash_of};
+use crate::calls::{self, Call, CallError, attended};
 use crate::scene::nearest;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, read_metadata};
 use flotor_hal::abi::{Entry, PluginKind};
@@ -66,6 +67,9 @@ pub enum LookupError {
     /// The plugin was found and refused.
     #[error(transparent)]
     Refused(#[from] LoadError),
+    /// Its initialisers do not return.
+    #[error(transparent)]
+    Calls(#[from] CallError),
 }
 
 impl Registry {
@@ -185,7 +189,7 @@ impl Registry {
 
     fn find(&self, id: &str, kind: Option<PluginKind>) -> Result<Plugin, LookupError> {
         if id.contains(std::path::MAIN_SEPARATOR) {
-            return Ok(self.open(Path::new(id))?);
+            return self.open(Path::new(id));
         }
         let fits = |plugin: &Metadata| plugin.id == id && kind.is_none_or(|kind| plugin.kind == kind);
         if let Some(linked) = self.linked.iter().find(|plugin| fits(plugin.metadata())) {
@@ -197,7 +201,7 @@ impl Registry {
                 let Metadata { path, id, kind: found, .. } = found.clone();
                 Err(LoadError::OtherKind { path, id, found: found.word(), wanted: kind.word() }.into())
             }
-            _ => Ok(self.open(&found.path)?),
+            _ => self.open(&found.path),
         }
     }
 
@@ -214,23 +218,33 @@ impl Registry {
 
     /// Loads a file, or gives what was loaded before if the file is unchanged: libraries are never unloaded, and a
     /// thousand models of one plugin share one mapping of it.
-    fn open(&self, path: &Path) -> Result<Plugin, LoadError> {
+    fn open(&self, path: &Path) -> Result<Plugin, LookupError> {
         // Taken before the bytes are read: whoever writes meanwhile is noticed the next time.
-        let Ok(stamp) = FileStamp::of(path) else { return load_file(path) }; // it says what is wrong
+        let Ok(stamp) = FileStamp::of(path) else { return load_in_time(path) }; // it says what is wrong
         let mut loaded = self.loaded.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = loaded.iter().find(|known| known.path == path && known.stamp.is_same_as(&stamp))
         {
             return Ok(known.plugin.clone());
         }
-        let Ok(hash) = hash_of(path) else { return load_file(path) };
+        let Ok(hash) = hash_of(path) else { return load_in_time(path) };
         if let Some(known) = loaded.iter_mut().find(|known| known.path == path && known.hash == hash) {
             known.stamp = stamp;
             return Ok(known.plugin.clone());
         }
-        let plugin = load_file(path)?;
+        let plugin = load_in_time(path)?;
         loaded.push(Loaded { path: path.into(), stamp, hash, plugin: plugin.clone() });
         Ok(plugin)
     }
+}
+
+/// Loads a plugin file, but waits no longer than a limit for its initialisers.
+fn load_in_time(path: &Path) -> Result<Plugin, LookupError> {
+    let path = path.to_path_buf();
+    let loaded = attended(calls::limit(), move |progress| {
+        progress.enter(&path.display().to_string(), Call::Load);
+        load_file(&path)
+    });
+    Ok(loaded??)
 }
 
 /// Loads a plugin file. The one place of the host that does. Not real-time; runs the plugin's code.

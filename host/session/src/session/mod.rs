@@ -3,29 +3,32 @@
 mod choice;
 mod controls;
 mod prepare;
+mod remains;
 mod steps;
 
 pub use controls::{ControlError, Controls, Misbehaved, NewValue};
 pub use prepare::prepare_model;
+pub use remains::Remains;
 pub use steps::Steps;
 
+use crate::calls::{Call, CallError, END_LIMIT, Progress, Unresponsive, attended, leave_behind, limit};
 use crate::registry::{LookupError, Registry};
 use crate::scene::{Pacing, Scene, SceneError};
-use controls::{ChangeLog, Parts};
+use controls::{ChangeLog, Parts, Settled};
 use flotor_core::Change;
 use flotor_core::MOST_DEVICES;
 use flotor_core::trace::TickRecord;
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, Stopper};
+use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, OpenedDevice, Stopper};
 use flotor_hal::{DVec3, EnergyLedger, Fault, LoopConfig, Parameter};
 use flotor_live::WrenchLimits;
 use flotor_servo::coupling::{Line, Patience};
 use flotor_servo::{
-    Clock, Core, Coupled, CouplingOutcome, Envelope, Forces, Guarded, Loop, ModelHealth, ParameterQueue,
-    Place, RealTimeReport, RunConfig, RunEnd, Schedule, Servo, SpinWindow, Standby, StopSwitch, Stuck,
-    Timing, drain, enter_real_time, queue, start_watchdog, swap_queues,
+    Clock, Core, Coupled, CouplingOutcome, Dismantled, Envelope, Forces, Guarded, Layer, LayerReport, Loop,
+    ModelHealth, ParameterQueue, Place, RealTimeReport, RunConfig, RunEnd, Schedule, Servo, SpinWindow,
+    Standby, StopSwitch, Stuck, Timing, drain, enter_real_time, queue, start_watchdog, swap_queues,
 };
-use prepare::{Scheduled, activate};
+use prepare::{Scheduled, activate, activate_here};
 use std::time::{Duration, Instant};
 
 /// How a scene is to be run.
@@ -58,6 +61,9 @@ pub enum RunError {
         /// What does not fit, each with a remedy.
         mismatches: Vec<String>,
     },
+    /// A plugin did not return from a call before the run.
+    #[error(transparent)]
+    Calls(#[from] CallError),
     /// The servo's thread could not be started or died.
     #[error("the servo thread {0}; no device was moved")]
     Thread(&'static str),
@@ -137,9 +143,32 @@ pub struct Outcome {
     pub models: Vec<(String, ModelHealth, String)>,
     /// Of the plugins that took the place of a model later, those that did not behave.
     pub misbehaved: Vec<Misbehaved>,
+    /// The first plugin that did not return from a call right after the run.
+    pub unresponsive: Option<Unresponsive>,
+    /// The plugins themselves. To be freed or dropped after all that depends on no plugin: their code may hang.
+    pub remains: Remains,
 }
 
 impl Outcome {
+    /// What is known of a run whose loop did not come back: how it ended, and for how long it was observed.
+    #[must_use]
+    pub fn of_hung_loop(stuck: Stuck, elapsed_ns: u64) -> Self {
+        Self {
+            end: RunEnd::Watchdog(stuck),
+            timing: Timing { ticks: stuck.tick, ..Timing::default() },
+            elapsed_ns,
+            wall_s: elapsed_ns as f64 * 1.0e-9,
+            dropped_records: 0,
+            real_time: RealTimeReport::not_asked(),
+            devices: Vec::new(),
+            couplings: Vec::new(),
+            models: Vec::new(),
+            misbehaved: Vec::new(),
+            unresponsive: None,
+            remains: Remains::default(),
+        }
+    }
+
     /// Which device faulted, and its last words.
     #[must_use]
     pub fn faulted(&self) -> Option<(usize, &str)> {
@@ -158,6 +187,8 @@ pub struct DeviceOutcome {
     pub ledger: Option<EnergyLedger>,
     /// Its last words; empty if it had no reason to say any.
     pub words: String,
+    /// Calls that left the floating-point environment of the loop's thread changed; it was put back each time.
+    pub float_changes: u64,
 }
 
 /// Records that fit between loop and observers: four seconds at 1 kHz.
@@ -311,18 +342,27 @@ impl Session {
             Clock::Virtual => self.run_virtual(observer, stop)?,
             Clock::Real => self.run_real(observer, stop)?,
         };
-        let Finished { mut servo, end, elapsed_ns, dropped_records, real_time } = finished;
-        let told = |(device, fault): (&mut ActiveDevice, Option<Fault>)| DeviceOutcome {
-            fault,
-            ledger: device.energy_ledger(),
-            words: device.last_message(),
-        };
-        let devices: Vec<DeviceOutcome> = servo.devices().map(told).collect();
-        let couplings = servo.forces().coupling_outcomes();
-        let (health, misbehaved) = controls.settle(servo.forces().reports());
-        let models = names.into_iter().skip(devices.len()).zip(health);
+        let Finished { servo, end, elapsed_ns, dropped_records, real_time } = finished;
+        let Dismantled { devices, forces, swaps, timing } = servo.dismantle();
+        let mut unresponsive = None;
+        let (mut told, mut closing) = (Vec::new(), Vec::new());
+        let model_names = names.get(devices.len()..).unwrap_or_default();
+        for (name, (device, fault)) in names.iter().zip(devices) {
+            let (outcome, opened) = deactivate(name, device, fault, &mut unresponsive);
+            told.push(outcome);
+            closing.extend(opened.map(|opened| (name.clone(), opened)));
+        }
+        let couplings = forces.coupling_outcomes();
+        // No tick will take them any more.
+        let waiting = swaps.into_layers().into_iter();
+        let (layers, reports) = last_words(model_names, (forces, controls.take_retired()), &mut unresponsive);
+        let Settled { first: health, misbehaved, hung } = controls.settle(reports);
+        unresponsive = unresponsive.or(hung);
+        let models = model_names.iter().cloned().zip(health);
         let models = models.map(|(name, (health, words))| (name, health, words)).collect();
-        let timing = servo.into_timing();
+        let name = |number: usize| model_names.get(number).cloned().unwrap_or_default();
+        let layers = layers.into_iter().chain(waiting).map(|(number, layer)| (name(number), layer)).collect();
+        let remains = Remains::new(closing, layers);
         let wall_s = started.elapsed().as_secs_f64();
         Ok(Outcome {
             end,
@@ -331,10 +371,12 @@ impl Session {
             wall_s,
             dropped_records,
             real_time,
-            devices,
+            devices: told,
             couplings,
             models,
             misbehaved,
+            unresponsive,
+            remains,
         })
     }
 
@@ -386,6 +428,8 @@ impl Session {
         // Not scoped: a thread that is stuck in a plugin has to be left behind.
         let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
         let (loop_heart, loop_plugins) = (heart.clone(), plugins.clone());
+        let (progress, all_stoppers) = (Progress::default(), standby.stoppers());
+        let loop_progress = progress.clone();
         let servo_thread = thread.spawn(move || {
             let real_time = enter_real_time(core);
             let spin = match pacing {
@@ -394,7 +438,7 @@ impl Session {
             };
             // Last of all that takes time.
             let stoppers = standby.stoppers();
-            let servo = activate(standby, &loop_plugins)?;
+            let servo = activate_here(standby, &loop_plugins, &loop_progress)?;
             let schedule = match spin {
                 Some(window) => Schedule::start_real(period_ns, window),
                 None => Schedule::start_paced(period_ns),
@@ -420,10 +464,16 @@ impl Session {
         while !servo_thread.is_finished() {
             drain(&mut receiver, &mut look);
             controls.sweep();
+            if let Err(hung) = progress.look(limit()) {
+                // Others may be energised by now.
+                all_stoppers.iter().for_each(Stopper::safe_stop);
+                return Err(CallError::from(hung).into());
+            }
             bitten = bitten.or_else(|| heart.bitten().map(|stuck| (stuck, Instant::now())));
             if let Some((stuck, since)) = bitten
                 && since.elapsed() > COME_BACK
             {
+                leave_behind();
                 return Err(hung(stuck, &plugins, watchdog_ns));
             }
             std::thread::sleep(OBSERVER_PERIOD);
@@ -431,6 +481,58 @@ impl Session {
         let finished = servo_thread.join().map_err(|_| RunError::Thread("panicked"))??;
         drain(&mut receiver, &mut look);
         Ok(finished)
+    }
+}
+
+/// De-energises a device that was told to stop: what it says of the run, and the device unless its plugin broke or hangs.
+fn deactivate(
+    name: &str,
+    mut device: ActiveDevice,
+    fault: Option<Fault>,
+    unresponsive: &mut Option<Unresponsive>,
+) -> (DeviceOutcome, Option<OpenedDevice>) {
+    let (who, float_changes) = (name.to_owned(), device.float_changes());
+    let told = attended(END_LIMIT, move |progress| {
+        progress.enter(&who, Call::Deactivate);
+        let ledger = device.energy_ledger();
+        let words = device.last_message();
+        (DeviceOutcome { fault, ledger, words, float_changes }, device.deactivate())
+    });
+    told.unwrap_or_else(|error| {
+        note(error, unresponsive);
+        (DeviceOutcome { fault, ledger: None, words: String::new(), float_changes }, None)
+    })
+}
+
+/// Layers, each with the number of its model.
+type Layers = Vec<(usize, Box<Layer>)>;
+
+/// What became of each layer in the loop and of those it handed back, with the last words of those that did not behave; and
+/// the layers, unless one of those hangs.
+fn last_words(
+    names: &[String],
+    (mut forces, mut retired): (Forces, Layers),
+    unresponsive: &mut Option<Unresponsive>,
+) -> (Layers, Vec<LayerReport>) {
+    let names = names.to_vec();
+    let told = attended(END_LIMIT, move |progress: &Progress| {
+        let asks =
+            |model: usize| progress.enter(names.get(model).map_or("", String::as_str), Call::LastMessage);
+        let mut reports: Vec<LayerReport> =
+            retired.iter_mut().map(|(model, layer)| layer.report(*model, || asks(*model))).collect();
+        reports.extend(forces.reports(asks));
+        (forces.into_layers().chain(retired).collect(), reports)
+    });
+    told.unwrap_or_else(|error| {
+        note(error, unresponsive);
+        (Vec::new(), Vec::new())
+    })
+}
+
+/// Keeps the first plugin that did not return.
+fn note(error: CallError, unresponsive: &mut Option<Unresponsive>) {
+    if let CallError::Unresponsive(hung) = error {
+        unresponsive.get_or_insert(hung);
     }
 }
 

@@ -4,6 +4,7 @@ use super::choice::chosen;
 use super::controls::{ControlError, NewValue, Parts, understands};
 use super::{PluginReport, RunError};
 use crate::calibration_file::{CalibrationFile, CalibrationFileError};
+use crate::calls::{Call, Progress, attended, attended_while, keeping_machine, limit};
 use crate::registry::{LookupError, Registry};
 use crate::scene::{
     Alternative, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, Pacing,
@@ -12,7 +13,7 @@ use crate::scene::{
 use flotor_core::limits::Boundary;
 use flotor_core::mapping::Mapping;
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting};
+use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting, Stopper};
 use flotor_hal::{Axes, Capabilities, LoopConfig, Parameter, ParameterKind, Refusal};
 use flotor_servo::engine::asynchronous::AsynchronousModel;
 use flotor_servo::engine::process::{Worker, WorkerOrder};
@@ -32,9 +33,25 @@ pub(super) fn refused(metadata: &Metadata, refusal: Refusal) -> RunError {
     RunError::Plugin(LoadError::Refused { path, id, refusal })
 }
 
-/// Energises the devices of a run right before its first tick. Not real-time.
+/// Energises the devices of a run right before its first tick, each within a time limit. Not real-time.
 pub(super) fn activate(standby: Standby, plugins: &[PluginReport]) -> Result<Servo, RunError> {
-    standby.activate().map_err(|(device, refusal)| match plugins.get(device) {
+    let (plugins, stoppers) = (plugins.to_vec(), standby.stoppers());
+    let activated = attended(limit(), move |progress| activate_here(standby, &plugins, progress));
+    activated.inspect_err(|_| stoppers.iter().for_each(Stopper::safe_stop))?
+}
+
+/// The same on this thread; somebody else looks at the progress. Not real-time.
+pub(super) fn activate_here(
+    standby: Standby,
+    plugins: &[PluginReport],
+    progress: &Progress,
+) -> Result<Servo, RunError> {
+    let enters = |device: usize| {
+        progress.enter(plugins.get(device).map_or("", |plugin| plugin.name.as_str()), Call::Activate);
+    };
+    let activated = standby.activate(enters);
+    progress.leave();
+    activated.map_err(|(device, refusal)| match plugins.get(device) {
         Some(report) => refused(&report.metadata, refusal),
         None => RunError::Thread("names a device that the scene has not"),
     })
@@ -68,45 +85,112 @@ pub(super) fn open_device(
     let DeviceUse { name, plugin: used, calibration } = device;
     let plugin = load(registry, used, PluginKind::Device)?;
     let settings = settings(&plugin, name, &used.parameters)?;
-    let mut device = plugin.open_device(&settings)?;
-    let capabilities = device.capabilities().map_err(|refusal| refused(plugin.metadata(), refusal))?;
-    let report = report(&plugin, name, used, &settings, |index| device.parameter(index));
+    let (who, opening, given) = (name.clone(), plugin.clone(), settings.clone());
+    let open = move |progress: &Progress| {
+        progress.enter(&who, Call::Open);
+        let mut device = opening.open_device(&given)?;
+        let capabilities = device.capabilities().map_err(|refusal| refused(opening.metadata(), refusal))?;
+        let values: Vec<f64> = (0..opening.parameters().len()).map(|index| device.parameter(index)).collect();
+        Ok::<_, RunError>((device, capabilities, values))
+    };
+    let (mut device, capabilities, values) = keeping_machine(name, || attended(limit(), open))??;
+    let report = report(&plugin, name, used, &settings, |index| value_at(&values, index));
     if let Some(calibration) = calibration {
         calibrate(&plugin, &mut device, calibration)?;
     }
     Ok((Opened { device, capabilities }, report))
 }
 
+/// A number of a plugin's parameter; NaN if it has none.
+fn value_at(values: &[f64], index: usize) -> f64 {
+    values.get(index).copied().unwrap_or(f64::NAN)
+}
+
 /// Loads one model of a scene and creates it in all its places. Not real-time.
 ///
 /// # Errors
-/// [`RunError`]: the plugin is unknown, was refused, or said no.
+/// [`RunError`]: the plugin is unknown, was refused, said no, or does not return.
 pub fn prepare_model(
     registry: &Registry,
     model: &ModelUse,
     config: &LoopConfig,
     clock: Clock,
 ) -> Result<(Layer, PluginReport), RunError> {
+    prepare_model_while(registry, model, config, clock, || true)
+}
+
+/// The same only while it is wanted.
+pub(super) fn prepare_model_while(
+    registry: &Registry,
+    model: &ModelUse,
+    config: &LoopConfig,
+    clock: Clock,
+    is_wanted: impl Fn() -> bool,
+) -> Result<(Layer, PluginReport), RunError> {
     let plugin = load(registry, &model.plugin, PluginKind::Model)?;
     let settings = settings(&plugin, &model.name, &model.plugin.parameters)?;
-    let budget_ns = budget_ns(model, clock, config.period_ns);
-    let mapping = Mapping::new(&model.mapping);
-    let instance = |place_m: &[f64; 3]| {
+    let making = Making {
+        plugin: plugin.clone(),
+        settings: settings.clone(),
+        model: model.clone(),
+        config: *config,
+        clock,
+    };
+    let make = move |progress: &Progress| making.layer(progress);
+    let (layer, values) = keeping_machine(&model.name, || attended_while(limit(), is_wanted, make))??;
+    let report = report(&plugin, &model.name, &model.plugin, &settings, |index| value_at(&values, index));
+    Ok((layer, report))
+}
+
+/// All it takes to create a model.
+struct Making {
+    plugin: Plugin,
+    settings: Vec<Setting>,
+    model: ModelUse,
+    config: LoopConfig,
+    clock: Clock,
+}
+
+impl Making {
+    /// The model in all its places, and the values of its parameters in force. Runs the plugin's code.
+    fn layer(&self, progress: &Progress) -> Result<(Layer, Vec<f64>), RunError> {
+        let Self { plugin, model, config, clock, .. } = self;
+        let budget_ns = budget_ns(model, *clock, config.period_ns);
+        let mapping = Mapping::new(&model.mapping);
+        let instance = |place_m: &[f64; 3]| Ok((self.engine(budget_ns, progress)?, mapping.at(*place_m)));
+        let mut instances = model.places_m.iter().map(instance).collect::<Result<Vec<_>, RunError>>()?;
+        let mut value = |index| instances.first_mut().map_or(f64::NAN, |(first, _)| first.parameter(index));
+        let values = (0..plugin.parameters().len()).map(&mut value).collect();
+        let budget = match (model.isolation, &model.field) {
+            (Isolation::None, None) => TimeBudget::new(budget_ns),
+            // Nobody waits for it any longer than that: how often is the same rule.
+            (Isolation::Process, _) => TimeBudget::new(Some(budget_ns.unwrap_or(PATIENCE_NS))),
+            (Isolation::None, Some(_)) => TimeBudget::default(),
+        };
+        Ok((Layer::new(instances, &model.blend, budget, config), values))
+    }
+
+    /// One instance, wherever it is to run.
+    fn engine(&self, budget_ns: Option<u64>, progress: &Progress) -> Result<Engine, RunError> {
+        let Self { plugin, settings, model, config, clock } = self;
+        progress.enter(&model.name, Call::Create);
         let engine = match (model.isolation, &model.field) {
             (Isolation::None, None) => {
-                let mut instance = plugin.create_model(&settings)?;
+                let mut instance = plugin.create_model(settings)?;
+                progress.enter(&model.name, Call::Prepare);
                 instance.prepare(config).map_err(|refusal| refused(plugin.metadata(), refusal))?;
                 Engine::Here(instance)
             }
             (Isolation::None, Some(timing)) => {
-                let instance = plugin.create_model(&settings)?;
+                let instance = plugin.create_model(settings)?;
                 if !instance.has_linear_field() {
                     let problem =
                         "it has no linear field, so it can only run in the loop; remove `[model.field]`";
                     return Err(complain(model, problem).into());
                 }
+                progress.enter(&model.name, Call::Prepare);
                 let slow =
-                    AsynchronousModel::start(instance, plugin.parameters().len(), timing, config, clock);
+                    AsynchronousModel::start(instance, plugin.parameters().len(), timing, config, *clock);
                 Engine::Asynchronous(Box::new(slow.map_err(|refusal| refused(plugin.metadata(), refusal))?))
             }
             (Isolation::Process, _) => {
@@ -117,21 +201,13 @@ pub fn prepare_model(
                     sets: keys.zip(values).collect(),
                     config: *config,
                     patience_ns: budget_ns.unwrap_or(PATIENCE_NS),
+                    making: limit(),
                 };
                 Engine::Process(Worker::start(&order).map_err(|refusal| refused(plugin.metadata(), refusal))?)
             }
         };
-        Ok((engine, mapping.at(*place_m)))
-    };
-    let mut instances = model.places_m.iter().map(instance).collect::<Result<Vec<_>, RunError>>()?;
-    let mut value = |index| instances.first_mut().map_or(f64::NAN, |(first, _)| first.parameter(index));
-    let budget = match (model.isolation, &model.field) {
-        (Isolation::None, None) => TimeBudget::new(budget_ns),
-        // Nobody waits for it any longer than that, or at all.
-        (Isolation::Process, _) | (_, Some(_)) => TimeBudget::default(),
-    };
-    let report = report(&plugin, &model.name, &model.plugin, &settings, &mut value);
-    Ok((Layer::new(instances, &model.blend, budget, config), report))
+        Ok(engine)
+    }
 }
 
 /// What a scene says of a model that cannot be.

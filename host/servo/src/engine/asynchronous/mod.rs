@@ -116,7 +116,7 @@ impl AsynchronousModel {
         }
         let since_ns = *self.since_ns.get_or_insert(input.time_ns);
         if input.time_ns.saturating_sub(self.newest_ns.unwrap_or(since_ns)) > self.oldest_ns {
-            return Stepped::Late;
+            return Stepped::Silent;
         }
         let (wrench, is_valid) = self.fields.at(&input.pose, input.time_ns);
         let status = if is_valid { StepStatus::Ok } else { StepStatus::Clamped };

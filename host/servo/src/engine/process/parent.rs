@@ -13,6 +13,7 @@ use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
 
 /// What a worker is to be.
 pub struct WorkerOrder<'a> {
@@ -24,6 +25,8 @@ pub struct WorkerOrder<'a> {
     pub config: LoopConfig,
     /// How long the loop waits for an answer, ns.
     pub patience_ns: u64,
+    /// How long making the model may take.
+    pub making: Duration,
 }
 
 /// A model in a process of its own.
@@ -68,7 +71,7 @@ impl Worker {
             serves: NO_DEMAND,
             remembers: Memory::PathDependent,
         };
-        let greeting = worker.greeting();
+        let greeting = worker.greeting(order.making);
         match serde_json::from_str(&greeting) {
             Ok(Greeting::Ready { parameters, serves, remembers }) => {
                 worker.remembers = if remembers { Memory::PathDependent } else { Memory::Stateless };
@@ -90,10 +93,11 @@ impl Worker {
         }
     }
 
-    /// What the worker says first, once its model is made; nothing if its process ended before. Not real-time.
-    fn greeting(&mut self) -> String {
-        let child = &mut self.child;
-        let has_ended = || child.try_wait().is_ok_and(|end| end.is_some());
+    /// What the worker says first, once its model is made; nothing if its process ended before, or takes longer than it may.
+    /// Not real-time.
+    fn greeting(&mut self, making: Duration) -> String {
+        let (child, started) = (&mut self.child, Instant::now());
+        let has_ended = || started.elapsed() > making || child.try_wait().is_ok_and(|end| end.is_some());
         let Some((number, text)) = heard(&self.memory, has_ended) else { return String::new() };
         self.number = number;
         text
