@@ -24,8 +24,9 @@ fn plugin_that(scratch: &Scratch, kind: &str, habit: &str) -> PathBuf {
 /// A scene of such a device and such a model, called `jelly`; `more` are further lines of the model and tables.
 fn scene_of(scratch: &Scratch, device: &str, model: &str, more: &str) -> String {
     let [device, model] = [plugin_that(scratch, "device", device), plugin_that(scratch, "model", model)];
+    let isolation = if more.contains("isolation") { "" } else { "isolation = \"none\"\n" };
     format!(
-        "duration_s = 0.2\n[device]\nname = \"handle\"\nplugin = \"{}\"\n[[model]]\nname = \"jelly\"\nplugin = \"{}\"\n{more}",
+        "duration_s = 0.2\n[device]\nname = \"handle\"\nplugin = \"{}\"\n[[model]]\nname = \"jelly\"\nplugin = \"{}\"\n{isolation}{more}",
         device.display(),
         model.display()
     )
@@ -175,6 +176,72 @@ fn a_late_answer_from_another_process_costs_a_tick_and_not_the_run() {
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     let overruns = summary(&scratch)["events"]["model_overrun"].as_u64().unwrap_or(0);
     assert!((1..50).contains(&overruns), "each is counted: {overruns}");
+}
+
+/// The processes that are children of one.
+fn children(of: u32) -> usize {
+    let path = format!("/proc/{of}/task/{of}/children");
+    std::fs::read_to_string(path).map_or(0, |list| list.split_whitespace().count())
+        + std::fs::read_dir(format!("/proc/{of}/task")).map_or(0, |tasks| {
+            let children = |task: std::fs::DirEntry| std::fs::read_to_string(task.path().join("children"));
+            let others = tasks.flatten().filter(|task| *task.file_name() != *of.to_string());
+            others.filter_map(|task| children(task).ok()).map(|list| list.split_whitespace().count()).sum()
+        })
+}
+
+#[test]
+fn a_model_from_outside_runs_in_a_process_of_its_own_where_a_hand_is_and_only_there() {
+    let scratch = Scratch::default();
+    let scene = |device: &str, isolation: &str| {
+        let model = plugin_that(&scratch, "model", HONEST);
+        let device = match device {
+            "real" => plugin_that(&scratch, "device", HONEST).display().to_string(),
+            simulated => simulated.to_owned(),
+        };
+        let text = format!(
+            "duration_s = 60\n[device]\nplugin = \"{device}\"\n[[model]]\nplugin = \"{}\"\n{isolation}\n\
+             [limits]\nwatchdog_ms = 60000\n",
+            model.display()
+        );
+        scratch.file("scene.toml", text).display().to_string()
+    };
+    let processes = |scene: &str| {
+        let recording = scratch.path().join("run.mcap");
+        let _ = std::fs::remove_file(&recording);
+        let running = Flotor::with(["run", scene, "--record", &recording.display().to_string()]).start();
+        let started = Instant::now();
+        while !holds_ticks(&recording) && started.elapsed() < Duration::from_secs(20) {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        children(running.id())
+    };
+    assert_eq!(processes(&scene("real", "")), 1, "from outside, and felt");
+    assert_eq!(processes(&scene("real", "isolation = \"none\"")), 0, "the scene decides");
+    assert_eq!(processes(&scene("simulated", "")), 0, "no hand");
+    assert_eq!(processes(&scene("simulated", "isolation = \"process\"")), 1, "the scene decides");
+}
+
+#[test]
+fn every_extension_works_in_a_process_of_its_own_with_the_same_bits() {
+    let spring = "plugin = \"spring\"\n";
+    let wall = "plugin = \"wall\"\n[model.parameters]\nshape = \"ball\"\n";
+    let membrane = "plugin = \"membrane\"\n[model.field]\nrate_hz = 200\n";
+    for model in [spring, wall, membrane] {
+        let forces = |isolation: &str| -> Vec<_> {
+            let (plugin, tables) = model.split_once('\n').expect("two lines");
+            let scene = format!(
+                "duration_s = 1\n[device]\nplugin = \"simulated\"\n[device.parameters]\nhand = \"press\"\n\
+                 [[model]]\n{plugin}\nisolation = \"{isolation}\"\n{tables}"
+            );
+            watch(&scene)
+                .records
+                .iter()
+                .map(|record| (record.pose, record.commanded, record.events))
+                .collect()
+        };
+        let (here, there) = (forces("none"), forces("process"));
+        assert_eq!(here, there, "{model}");
+    }
 }
 
 // ---------------------------------------------------------------- the state of the machine

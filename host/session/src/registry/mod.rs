@@ -80,10 +80,7 @@ impl Registry {
         if let Some(path) = std::env::var_os(PATH_VARIABLE) {
             folders.extend(std::env::split_paths(&path).filter(|folder| !folder.as_os_str().is_empty()));
         }
-        if let Some(own) = std::env::current_exe().ok().as_deref().and_then(Path::parent) {
-            // `deps` before the folder itself: `cargo run` refreshes only `deps`, and an older copy may lie above it.
-            folders.extend([own.join("deps"), own.to_path_buf(), own.join("plugins")]);
-        }
+        folders.extend(own_folders());
         let mut registry = Self {
             linked: Vec::new(),
             found: Vec::new(),
@@ -235,6 +232,24 @@ impl Registry {
         loaded.push(Loaded { path: path.into(), stamp, hash, plugin: plugin.clone() });
         Ok(plugin)
     }
+}
+
+/// Where the plugins of this installation are: beside the program.
+fn own_folders() -> Vec<PathBuf> {
+    let program = std::env::current_exe().ok();
+    let Some(own) = program.as_deref().and_then(Path::parent) else { return Vec::new() };
+    // `deps` before the folder itself: `cargo run` refreshes only `deps`, and an older copy may lie above it.
+    vec![own.join("deps"), own.to_path_buf(), own.join("plugins")]
+}
+
+/// Whether a plugin belongs to this installation: it is linked into the program, or lies beside it or in
+/// `../lib/flotor/plugins`. Not real-time.
+pub(crate) fn is_installed(plugin: &Path) -> bool {
+    let mut folders = own_folders();
+    folders.extend(folders.get(1).map(|own| own.join("../lib/flotor/plugins")));
+    let Ok(file) = plugin.canonicalize() else { return plugin.as_os_str().is_empty() };
+    let folder = file.parent();
+    folders.iter().any(|own| own.canonicalize().is_ok_and(|own| Some(own.as_path()) == folder))
 }
 
 /// Loads a plugin file, but waits no longer than a limit for its initialisers.

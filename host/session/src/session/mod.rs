@@ -220,6 +220,13 @@ impl Session {
             opened.push(device);
             plugins.push(report);
         }
+        let mut scene = scene.clone();
+        let simulated: Vec<bool> =
+            plugins.iter().map(|device| prepare::is_simulated(&device.metadata)).collect();
+        for model in &mut scene.models {
+            prepare::settle_isolation(model, options.clock, &simulated);
+        }
+        let scene = &scene;
         let mut models = Vec::new();
         for model in &scene.models {
             let (layer, report) = prepare_model(registry, model, &config, options.clock)?;

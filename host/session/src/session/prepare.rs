@@ -5,7 +5,7 @@ use super::controls::{ControlError, NewValue, Parts, understands};
 use super::{PluginReport, RunError};
 use crate::calibration_file::{CalibrationFile, CalibrationFileError};
 use crate::calls::{Call, Progress, attended, attended_while, keeping_machine, limit};
-use crate::registry::{LookupError, Registry};
+use crate::registry::{LookupError, Registry, is_installed};
 use crate::scene::{
     Alternative, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, Pacing,
     ParameterText, PluginUse, Scene, SceneError,
@@ -130,6 +130,7 @@ pub(super) fn prepare_model_while(
     let plugin = load(registry, &model.plugin, PluginKind::Model)?;
     let settings = settings(&plugin, &model.name, &model.plugin.parameters)?;
     let making = Making {
+        isolation: isolation(model, plugin.metadata(), clock)?,
         plugin: plugin.clone(),
         settings: settings.clone(),
         model: model.clone(),
@@ -142,8 +143,48 @@ pub(super) fn prepare_model_while(
     Ok((layer, report))
 }
 
+/// Whether a device only simulates one: then no hand is at it.
+pub(super) fn is_simulated(device: &Metadata) -> bool {
+    device.id == SIMULATED
+}
+
+/// The device that simulates one.
+const SIMULATED: &str = "simulated";
+
+/// Where no hand is, the origin of a model does not matter.
+pub(super) fn settle_isolation(model: &mut ModelUse, clock: Clock, simulated: &[bool]) {
+    let is_felt = clock == Clock::Real && simulated.get(usize::from(model.device)) != Some(&true);
+    if model.isolation == Isolation::ByOrigin && !is_felt {
+        model.isolation = Isolation::None;
+    }
+}
+
+/// Most objects of a model that get a process each without the scene saying so.
+const MOST_PROCESSES: usize = 64;
+
+/// What stands between a model and the host, its origin looked at.
+fn isolation(model: &ModelUse, plugin: &Metadata, clock: Clock) -> Result<Isolation, SceneError> {
+    let is_outside = clock == Clock::Real && !is_installed(&plugin.path);
+    match model.isolation {
+        Isolation::ByOrigin if is_outside && model.places_m.len() > MOST_PROCESSES => {
+            let objects = model.places_m.len();
+            Err(complain(
+                model,
+                &format!(
+                    "it comes from outside the installation, and each of its {objects} objects would have a process of its own; \
+                     say `isolation = \"process\"` or `isolation = \"none\"`"
+                ),
+            ))
+        }
+        Isolation::ByOrigin if is_outside => Ok(Isolation::Process),
+        Isolation::ByOrigin => Ok(Isolation::None),
+        said => Ok(said),
+    }
+}
+
 /// All it takes to create a model.
 struct Making {
+    isolation: Isolation,
     plugin: Plugin,
     settings: Vec<Setting>,
     model: ModelUse,
@@ -161,52 +202,52 @@ impl Making {
         let mut instances = model.places_m.iter().map(instance).collect::<Result<Vec<_>, RunError>>()?;
         let mut value = |index| instances.first_mut().map_or(f64::NAN, |(first, _)| first.parameter(index));
         let values = (0..plugin.parameters().len()).map(&mut value).collect();
-        let budget = match (model.isolation, &model.field) {
-            (Isolation::None, None) => TimeBudget::new(budget_ns),
+        let budget = match (self.isolation, &model.field) {
             // Nobody waits for it any longer than that: how often is the same rule.
-            (Isolation::Process, _) => TimeBudget::new(Some(budget_ns.unwrap_or(PATIENCE_NS))),
-            (Isolation::None, Some(_)) => TimeBudget::default(),
+            (Isolation::Process, None) => TimeBudget::new(Some(budget_ns.unwrap_or(PATIENCE_NS))),
+            (_, None) => TimeBudget::new(budget_ns),
+            (_, Some(_)) => TimeBudget::default(),
         };
         Ok((Layer::new(instances, &model.blend, budget, config), values))
     }
 
     /// One instance, wherever it is to run.
     fn engine(&self, budget_ns: Option<u64>, progress: &Progress) -> Result<Engine, RunError> {
-        let Self { plugin, settings, model, config, clock } = self;
+        let Self { isolation, plugin, settings, model, config, clock } = self;
+        let no = |refusal| refused(plugin.metadata(), refusal);
         progress.enter(&model.name, Call::Create);
-        let engine = match (model.isolation, &model.field) {
-            (Isolation::None, None) => {
-                let mut instance = plugin.create_model(settings)?;
-                progress.enter(&model.name, Call::Prepare);
-                instance.prepare(config).map_err(|refusal| refused(plugin.metadata(), refusal))?;
-                Engine::Here(instance)
-            }
-            (Isolation::None, Some(timing)) => {
-                let instance = plugin.create_model(settings)?;
-                if !instance.has_linear_field() {
-                    let problem =
-                        "it has no linear field, so it can only run in the loop; remove `[model.field]`";
-                    return Err(complain(model, problem).into());
-                }
-                progress.enter(&model.name, Call::Prepare);
-                let slow =
-                    AsynchronousModel::start(instance, plugin.parameters().len(), timing, config, *clock);
-                Engine::Asynchronous(Box::new(slow.map_err(|refusal| refused(plugin.metadata(), refusal))?))
-            }
-            (Isolation::Process, _) => {
+        let mut engine = match isolation {
+            Isolation::Process => {
                 let keys = model.plugin.parameters.iter().map(|parameter| parameter.key.clone());
                 let values = settings.iter().map(|setting| setting.display());
+                let in_the_loop = model.field.is_none().then_some(budget_ns).flatten();
                 let order = WorkerOrder {
                     plugin: &plugin.metadata().path,
                     sets: keys.zip(values).collect(),
-                    config: *config,
-                    patience_ns: budget_ns.unwrap_or(PATIENCE_NS),
+                    config: model
+                        .field
+                        .as_ref()
+                        .map_or(*config, |field| AsynchronousModel::config(field, config)),
+                    // Nobody in the loop waits for a field.
+                    patience_ns: in_the_loop.unwrap_or(PATIENCE_NS),
                     making: limit(),
                 };
-                Engine::Process(Worker::start(&order).map_err(|refusal| refused(plugin.metadata(), refusal))?)
+                Engine::Process(Worker::start(&order).map_err(no)?)
             }
+            Isolation::ByOrigin | Isolation::None => Engine::Here(plugin.create_model(settings)?),
         };
-        Ok(engine)
+        let Some(timing) = &model.field else {
+            progress.enter(&model.name, Call::Prepare);
+            engine.prepare(config).map_err(no)?;
+            return Ok(engine);
+        };
+        if !engine.has_linear_field() {
+            let problem = "it has no linear field, so it can only run in the loop; remove `[model.field]`";
+            return Err(complain(model, problem).into());
+        }
+        progress.enter(&model.name, Call::Prepare);
+        let slow = AsynchronousModel::start(engine, plugin.parameters().len(), timing, config, *clock);
+        Ok(Engine::Asynchronous(Box::new(slow.map_err(no)?)))
     }
 }
 

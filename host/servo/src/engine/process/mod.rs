@@ -29,6 +29,8 @@ enum Greeting {
         serves: [bool; 3],
         /// Whether its answer depends on the path.
         remembers: bool,
+        /// Whether it has a linear field.
+        has_field: bool,
     },
     /// The plugin was refused, or said no.
     Refused {

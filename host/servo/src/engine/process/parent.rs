@@ -6,7 +6,10 @@ use super::shared_words::{DEMANDS, NO_DEMAND, Order, wait_for_change};
 use super::{Greeting, Reply};
 use crate::monotonic_ns;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{Demand, Input, LoopConfig, Memory, Output, Refusal, RefusalKind};
+use flotor_hal::{
+    ActiveRegion, Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, RefusalKind,
+    WorkspaceBounds,
+};
 use std::io;
 use std::os::fd::AsFd;
 use std::os::unix::process::ExitStatusExt;
@@ -42,6 +45,7 @@ pub struct Worker {
     parameters: Vec<Option<f64>>,
     serves: Demand,
     remembers: Memory,
+    has_field: bool,
 }
 
 impl Worker {
@@ -70,10 +74,12 @@ impl Worker {
             parameters: Vec::new(),
             serves: NO_DEMAND,
             remembers: Memory::PathDependent,
+            has_field: false,
         };
         let greeting = worker.greeting(order.making);
         match serde_json::from_str(&greeting) {
-            Ok(Greeting::Ready { parameters, serves, remembers }) => {
+            Ok(Greeting::Ready { parameters, serves, remembers, has_field }) => {
+                worker.has_field = has_field;
                 worker.remembers = if remembers { Memory::PathDependent } else { Memory::Stateless };
                 worker.parameters = parameters;
                 let served =
@@ -123,6 +129,33 @@ impl Worker {
             |memory| memory.put_input(input),
             |memory| (memory.status(), memory.output()),
         )
+    }
+
+    /// Whether it has a linear field.
+    pub fn has_linear_field(&self) -> bool {
+        self.has_field
+    }
+
+    /// The field at an input. Not real-time: waits as long as it may.
+    pub fn linear_field(&mut self, input: &Input) -> Reply<(CallStatus, LinearField)> {
+        let patience_ns = self.patience_ns;
+        self.request(
+            Order::Field,
+            patience_ns,
+            |memory| memory.put_input(input),
+            |memory| (memory.status(), memory.field()),
+        )
+    }
+
+    /// Where the model can act; everywhere while it is at a request whose answer may change that. Real-time: bounded, no
+    /// allocation.
+    pub fn active_region(&self) -> ActiveRegion {
+        if self.is_behind { ActiveRegion::EVERYWHERE } else { self.memory.region() }
+    }
+
+    /// Where the model ends. Real-time: bounded, no allocation.
+    pub fn workspace_bounds(&self) -> WorkspaceBounds {
+        self.memory.bounds()
     }
 
     /// Changes a live parameter at a tick boundary. Real-time: waits as long as it may, no allocation.
