@@ -2,7 +2,6 @@
  * one place of its life; `hang();` is there for it. */
 #define _GNU_SOURCE
 #include "flotor.h"
-#include <fenv.h>
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stdlib.h>

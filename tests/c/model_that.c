@@ -2,7 +2,6 @@
  * of its life; `hang();` and `leave();` are there for it. */
 #define _GNU_SOURCE
 #include "flotor.h"
-#include <fenv.h>
 #include <math.h>
 #include <sched.h>
 #include <stdio.h>

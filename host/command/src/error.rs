@@ -6,8 +6,8 @@
 use flotor_hal::Fault;
 use flotor_hal::abi::loader::LoadError;
 use flotor_servo::{EmergencySource, Place, Stuck};
-use flotor_session::RunError;
 use flotor_session::registry::LookupError;
+use flotor_session::{Call, CallError, RunError};
 use std::path::{Path, PathBuf};
 
 /// Why a command failed, with its exit code.
@@ -104,6 +104,10 @@ impl CommandError {
             Self::Run(error) => match error {
                 RunError::Scene(_) | RunError::Mismatch { .. } => 2,
                 RunError::Lookup(LookupError::Unknown { .. }) => 2,
+                // Nobody knows whether it exerts a force.
+                RunError::Calls(CallError::Unresponsive(hung)) if hung.call == Call::SafeStop => 4,
+                RunError::Calls(CallError::Stopped)
+                | RunError::Lookup(LookupError::Calls(CallError::Stopped)) => 1,
                 RunError::Calls(_) | RunError::Lookup(LookupError::Calls(_)) => 3,
                 RunError::Lookup(LookupError::Refused(error)) | RunError::Plugin(error) => {
                     refusal_code(error)

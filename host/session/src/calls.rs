@@ -5,6 +5,7 @@
 //! loop the watchdog does the same. Not real-time.
 
 use crate::machine::MachineState;
+use flotor_servo::StopSwitch;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -39,7 +40,9 @@ pub enum Call {
     Open,
     /// A device is energised.
     Activate,
-    /// A device ends its energy account and is de-energised.
+    /// A device is told to stop at the end of a run.
+    SafeStop,
+    /// A device ends its energy balance and is de-energised.
     Deactivate,
     /// It says why a call failed.
     LastMessage,
@@ -57,6 +60,7 @@ impl fmt::Display for Call {
             Self::Prepare => "`prepare`",
             Self::Open => "`open`",
             Self::Activate => "`activate`",
+            Self::SafeStop => "`safe_stop`",
             Self::Deactivate => "`deactivate`",
             Self::LastMessage => "`last_message`",
             Self::Destroy => "`destroy`",
@@ -116,12 +120,23 @@ impl fmt::Display for Notice {
 }
 
 static TELL: OnceLock<fn(&Notice)> = OnceLock::new();
+static STOP: OnceLock<StopSwitch> = OnceLock::new();
 static LEFT_BEHIND: AtomicBool = AtomicBool::new(false);
 
 /// Lets a program tell its user whose code is waited for, once a call has taken 5 s, and what plugins change of the process.
 /// The first one set stays.
 pub fn tell_notices(tell: fn(&Notice)) {
     let _ = TELL.set(tell);
+}
+
+/// Lets the user stop a process that waits for a call before a run: nothing is energised then. The first one set stays.
+pub fn stop_waits_with(stop: &StopSwitch) {
+    let _ = STOP.set(stop.clone());
+}
+
+/// Nobody has asked for an end.
+pub(crate) fn is_to_begin() -> bool {
+    STOP.get().is_none_or(|stop| !stop.is_stop_asked() && stop.emergency().is_none())
 }
 
 fn tell(notice: &Notice) {
@@ -288,7 +303,7 @@ pub(crate) fn attended_while<T: Send + 'static>(
     body: impl FnOnce(&Progress) -> T + Send + 'static,
 ) -> Result<T, CallError> {
     let calls = Attended::start(limit, body).map_err(|_| CallError::NoThread)?;
-    calls.wait_while(is_wanted).map_err(|unresponsive| unresponsive.map_or(CallError::TooLate, Into::into))
+    calls.wait_while(is_wanted).map_err(|unresponsive| unresponsive.map_or(CallError::Stopped, Into::into))
 }
 
 /// Why there is no result of a call.
@@ -300,9 +315,9 @@ pub enum CallError {
     /// The system has no thread for it.
     #[error("cannot start a thread for the calls of a plugin")]
     NoThread,
-    /// The run it was for ended before.
-    #[error("the run was over before it was made")]
-    TooLate,
+    /// The run it was for was stopped or over before.
+    #[error("the run was stopped before `create`, `open` or the like returned")]
+    Stopped,
 }
 
 #[cfg(test)]

@@ -24,7 +24,9 @@ mod session;
 pub mod summary;
 pub mod telemetry;
 
-pub use calls::{Call, CallError, LIMIT_VARIABLE, Notice, Unresponsive, is_left_behind, tell_notices};
+pub use calls::{
+    Call, CallError, LIMIT_VARIABLE, Notice, Unresponsive, is_left_behind, stop_waits_with, tell_notices,
+};
 pub use run_recording::RunRecording;
 pub use session::{
     ControlError, Controls, DeviceOutcome, Misbehaved, NewValue, Observer, Outcome, PluginReport, Remains,

@@ -4,7 +4,9 @@ use crate::run_picture::RunPicture;
 use clap::Args;
 use flotor_command::options::{ClockOption, PluginKeyValue, core, duration_s, rate_hz};
 use flotor_command::stopping::{Keys, stop_on_signals};
-use flotor_command::{CommandError, first_error, note, print_result, progress_bar, style, write_json};
+use flotor_command::{
+    CommandError, first_error, keep_results_apart, note, print_result, progress_bar, style, write_json,
+};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_live::Directory;
@@ -17,8 +19,11 @@ use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
 use flotor_session::summary::{RunFacts, RunSummary, Tally};
 use flotor_session::telemetry::{LinkCounts, PeerLink, Watched, publish, start_peer_link};
-use flotor_session::{Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session};
+use flotor_session::{
+    Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session, stop_waits_with,
+};
 use indicatif::ProgressBar;
+use rustix::process::{Resource, getrlimit};
 use std::path::PathBuf;
 
 /// Run a scene in the servo loop.
@@ -62,7 +67,14 @@ pub(crate) struct RunArguments {
 pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     // First of all: a signal during loading ends the run, too.
     let stop = stop_on_signals();
+    stop_waits_with(&stop);
+    if arguments.json.as_deref().is_some_and(|json| json.as_os_str() == "-") {
+        keep_results_apart()?;
+    }
     let scene = scene(&arguments)?;
+    if matches!(arguments.clock, ClockOption::Real) {
+        enough_files()?;
+    }
     let clock = match arguments.clock {
         ClockOption::Real => Clock::Real,
         ClockOption::Virtual => Clock::Virtual,
@@ -195,6 +207,19 @@ fn verdict(outcome: &Outcome, plugins: &[PluginReport], summary: &RunSummary) ->
         }
         RunEnd::Watchdog(stuck) => Err(CommandError::Watchdog(stuck)),
         RunEnd::Finished | RunEnd::Stopped => broken_models(summary),
+    }
+}
+
+/// Files a run in real time has open at most, with a margin: plugins, recording, socket, sixteen watchers.
+const OPEN_FILES: u64 = 64;
+
+/// A run that finds no descriptor has no signal handlers, no recording or no socket, while a hand is at the device.
+fn enough_files() -> Result<(), CommandError> {
+    match getrlimit(Resource::Nofile).current {
+        Some(most) if most < OPEN_FILES => Err(CommandError::Usage(format!(
+            "only {most} files may be open, and a run in real time needs {OPEN_FILES}; `ulimit -n {OPEN_FILES}` allows them"
+        ))),
+        _ => Ok(()),
     }
 }
 

@@ -7,6 +7,7 @@ use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::watch;
 use flotor_tests::workspace_root;
+use rustix::process::Signal;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -64,7 +65,7 @@ fn named(ran: &Ran, who: &str, call: &str) -> bool {
 // ---------------------------------------------------------------- the end of a run
 
 #[test]
-fn a_plugin_that_hangs_at_the_end_costs_neither_the_recording_nor_the_report_and_is_named() {
+fn a_plugin_that_hangs_at_the_end_costs_neither_the_recording_nor_the_summary_and_is_named() {
     let cases = [
         (HONEST, "IN_DESTROY=hang();", "jelly", "`destroy`"),
         ("IN_DEACTIVATE=hang();", HONEST, "handle", "`deactivate`"),
@@ -83,7 +84,7 @@ fn a_plugin_that_hangs_at_the_end_costs_neither_the_recording_nor_the_report_and
 }
 
 #[test]
-fn a_model_that_ends_the_process_when_it_is_freed_costs_neither_the_recording_nor_the_report() {
+fn a_model_that_ends_the_process_when_it_is_freed_costs_neither_the_recording_nor_the_summary() {
     let scratch = Scratch::default();
     let ran = run(&scratch, &scene_of(&scratch, HONEST, "IN_DESTROY=leave();", ""), "virtual");
     assert!(ran.stdout.contains("digest"), "{ran:?}");
@@ -94,13 +95,61 @@ fn a_model_that_ends_the_process_when_it_is_freed_costs_neither_the_recording_no
 #[test]
 fn a_loop_that_hangs_leaves_a_summary_for_machines() {
     let scratch = Scratch::default();
-    let hangs = "IN_STEP=if (input->tick == 100) { hang(); }";
+    let hangs = "IN_STEP=if (input->tick >= 100) { hang(); }";
     let ran = run(&scratch, &scene_of(&scratch, HONEST, hangs, ""), "real");
     assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:?}");
     let summary = summary(&scratch);
-    assert_eq!((summary["end"].as_str(), summary["ticks"].as_u64()), (Some("watchdog"), Some(100)));
+    assert_eq!(summary["end"], "watchdog");
+    let tick = summary["ticks"].as_u64().expect("a number");
     let health = summary["plugins"][1]["health"].as_str().unwrap_or_default();
-    assert!(health.starts_with("`jelly` did not return from `step` in tick 100"), "{health}");
+    assert!(health.starts_with(&format!("`jelly` did not return from `step` in tick {tick};")), "{health}");
+}
+
+#[test]
+fn a_device_that_hangs_when_it_is_told_to_stop_is_named() {
+    let scratch = Scratch::default();
+    let ran = run(&scratch, &scene_of(&scratch, "IN_STOP=hang();", HONEST, ""), "real");
+    assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:?}");
+    assert!(named(&ran, "handle", "`safe_stop`"), "{ran:?}");
+    assert_eq!(ending(&scratch), Ending::Finished);
+}
+
+#[test]
+fn three_signals_end_a_run_whose_device_hangs_when_it_is_told_to_stop() {
+    let scratch = Scratch::default();
+    let scene = scene_of(&scratch, "IN_STOP=hang();", HONEST, "[limits]\nwatchdog_ms = 60000\n");
+    let scene = scratch.file("scene.toml", scene).display().to_string();
+    let recording = scratch.path().join("run.mcap");
+    let record = recording.display().to_string();
+    let running = Flotor::with(["run", &scene, "--duration", "60s", "--record", &record]).start();
+    let started = Instant::now();
+    while !holds_ticks(&recording) && started.elapsed() < Duration::from_secs(20) {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    for _ in 0..3 {
+        running.signal(Signal::INT);
+        std::thread::sleep(Duration::from_millis(500));
+    }
+    assert_eq!(running.wait().code, Some(130));
+}
+
+#[test]
+fn what_a_model_prints_does_not_mix_with_a_summary_for_machines() {
+    let scratch = Scratch::default();
+    let talks = "IN_CREATE=puts(\"good morning\");";
+    let scene = scratch.file("scene.toml", scene_of(&scratch, HONEST, talks, "")).display().to_string();
+    let ran = Flotor::with(["run", &scene, "--clock", "virtual", "--json", "-"]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let summary: serde_json::Value = serde_json::from_str(&ran.stdout).expect("nothing but JSON");
+    assert_eq!(summary["end"], "finished");
+    assert!(ran.stderr.contains("good morning"), "{ran:?}");
+}
+
+#[test]
+fn a_run_in_real_time_without_room_for_files_is_refused() {
+    let ran = Flotor::with(["run", "--duration", "1s"]).through_shell("ulimit -n 20; exec \"$@\"").run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    assert!(ran.error().starts_with("only 20 files may be open"), "{ran:?}");
 }
 
 // ---------------------------------------------------------------- before a run
@@ -137,6 +186,23 @@ fn a_user_who_waits_is_told_for_whom() {
     let ran = Flotor::with(["run", &scene]).env("FLOTOR_CALL_LIMIT_S", "6").run();
     let told = "note: waiting for `jelly` to return from `create`, for up to 6 s\n";
     assert!(ran.stderr.starts_with(told), "{ran:?}");
+}
+
+#[test]
+fn one_signal_ends_a_process_that_waits_for_a_plugin_before_a_run() {
+    let scratch = Scratch::default();
+    let (begun, file) = (scratch.path().join("begun"), scratch.path().display().to_string());
+    let hangs = "IN_CREATE=fclose(fopen(\"begun\", \"w\")); hang();";
+    let scene = scratch.file("scene.toml", scene_of(&scratch, HONEST, hangs, "")).display().to_string();
+    let running = Flotor::with(["run", &scene]).inside(file.as_ref()).start();
+    let started = Instant::now();
+    while !begun.exists() && started.elapsed() < Duration::from_secs(20) {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    running.signal(Signal::INT);
+    let ran = running.wait();
+    assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:?}");
+    assert!(ran.stderr.contains("the run was stopped before"), "{ran:?}");
 }
 
 #[test]
@@ -246,11 +312,11 @@ fn every_extension_works_in_a_process_of_its_own_with_the_same_bits() {
 
 // ---------------------------------------------------------------- the state of the machine
 
-/// What a plugin may leave changed in the thread that calls it: rounding, flush to zero, traps.
+/// What a plugin may leave changed in the thread that calls it: it rounds up, flushes to zero, traps at what is invalid.
 const FLOAT_HABITS: [&str; 3] = [
-    "IN_STEP=fesetround(FE_UPWARD);",
+    "IN_STEP=__builtin_ia32_ldmxcsr(0x5f80);",
     "IN_STEP=__builtin_ia32_ldmxcsr(0x9fc0);",
-    "IN_STEP=feenableexcept(FE_INEXACT);",
+    "IN_STEP=__builtin_ia32_ldmxcsr(0x1900);",
 ];
 
 #[cfg(target_arch = "x86_64")]
@@ -288,7 +354,7 @@ fn a_model_that_rounds_otherwise_changes_no_other_number_and_is_named() {
 fn a_device_that_rounds_otherwise_changes_no_number_and_is_named() {
     let scratch = Scratch::default();
     for clock in ["virtual", "real"] {
-        let habit = "IN_READ=fesetround(FE_UPWARD);";
+        let habit = "IN_READ=__builtin_ia32_ldmxcsr(0x5f80);";
         let more = "[limits]\nwatchdog_ms = 60000\n";
         let ran = run(&scratch, &scene_of(&scratch, habit, HONEST, more), clock);
         assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:?}");
@@ -302,7 +368,7 @@ fn a_device_that_rounds_otherwise_changes_no_number_and_is_named() {
 #[test]
 fn what_a_plugin_changes_of_the_process_while_it_is_made_is_put_back_and_named() {
     let folder = "IN_CREATE=if (chdir(\"/\")) { abort(); }";
-    let files = "IN_CREATE=struct rlimit few = {64, 4096}; setrlimit(RLIMIT_NOFILE, &few);";
+    let files = "IN_CREATE=struct rlimit few; getrlimit(RLIMIT_NOFILE, &few); few.rlim_cur = 64; setrlimit(RLIMIT_NOFILE, &few);";
     let cores = "IN_PREPARE=cpu_set_t one; CPU_ZERO(&one); CPU_SET(0, &one); sched_setaffinity(getpid(), sizeof one, &one);";
     let nice = "IN_PREPARE=setpriority(PRIO_PROCESS, getpid(), 19);";
     for (habit, what) in [
@@ -317,4 +383,17 @@ fn what_a_plugin_changes_of_the_process_while_it_is_made_is_put_back_and_named()
         let told = format!("note: `jelly` changed {what} of the host; put back\n");
         assert_eq!(ran.stderr, told, "{ran:?}");
     }
+}
+
+// ---------------------------------------------------------------- files
+
+#[test]
+fn poses_that_are_not_text_are_refused_with_their_line() {
+    let scratch = Scratch::default();
+    let header = b"x_m,y_m,z_m,rx_rad,ry_rad,rz_rad\n0,0,0,0,0,0\n".to_vec();
+    let poses = scratch.file("poses.csv", [header, b"0,0,\xff,0,0,0\n".to_vec()].concat());
+    let poses = poses.display().to_string();
+    let ran = Flotor::with(["eval", "--model", "spring", "--poses", &poses, "--out", "-"]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    assert!(ran.error().starts_with(&format!("{poses}:3: ")), "{ran:?}");
 }

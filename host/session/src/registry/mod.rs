@@ -5,7 +5,7 @@
 mod stamp;
 
 use self::stamp::{FileStamp, hash_of};
-use crate::calls::{self, Call, CallError, attended};
+use crate::calls::{self, Call, CallError, attended_while};
 use crate::scene::nearest;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, read_metadata};
 use flotor_hal::abi::{Entry, PluginKind};
@@ -255,7 +255,7 @@ pub(crate) fn is_installed(plugin: &Path) -> bool {
 /// Loads a plugin file, but waits no longer than a limit for its initialisers.
 fn load_in_time(path: &Path) -> Result<Plugin, LookupError> {
     let path = path.to_path_buf();
-    let loaded = attended(calls::limit(), move |progress| {
+    let loaded = attended_while(calls::limit(), calls::is_to_begin, move |progress| {
         progress.enter(&path.display().to_string(), Call::Load);
         load_file(&path)
     });

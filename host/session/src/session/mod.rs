@@ -29,6 +29,8 @@ use flotor_servo::{
     Standby, StopSwitch, Stuck, Timing, drain, enter_real_time, queue, start_watchdog, swap_queues,
 };
 use prepare::{Scheduled, activate, activate_here};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 /// How a scene is to be run.
@@ -437,6 +439,9 @@ impl Session {
         let (loop_heart, loop_plugins) = (heart.clone(), plugins.clone());
         let (progress, all_stoppers) = (Progress::default(), standby.stoppers());
         let loop_progress = progress.clone();
+        // Number of the device that is being stopped, from 1: looked at from here, as `safe_stop` may hang too.
+        let stopping = Arc::new(AtomicUsize::new(0));
+        let loop_stopping = Arc::clone(&stopping);
         let servo_thread = thread.spawn(move || {
             let real_time = enter_real_time(core);
             let spin = match pacing {
@@ -461,19 +466,36 @@ impl Session {
                 });
             }
             // Here, whatever the thread that looks on is at, and while the watchdog still watches.
-            stoppers.iter().for_each(Stopper::safe_stop);
+            for (number, stopper) in (1..).zip(&stoppers) {
+                loop_stopping.store(number, Ordering::Relaxed);
+                stopper.safe_stop();
+            }
+            loop_stopping.store(0, Ordering::Relaxed);
             runner.servo().heart().finish();
             watchdog.map_err(|_| RunError::Thread("got no watchdog"))?;
             Ok::<_, RunError>(Finished::of(runner, dropped_records, real_time))
         });
         let servo_thread = servo_thread.map_err(|_| RunError::Thread("could not be started"))?;
         let mut bitten = None;
+        let mut stopping_since = None;
         while !servo_thread.is_finished() {
             drain(&mut receiver, &mut look);
             controls.sweep();
             if let Err(hung) = progress.look(limit()) {
                 // Others may be energised by now.
                 all_stoppers.iter().for_each(Stopper::safe_stop);
+                return Err(CallError::from(hung).into());
+            }
+            stopping_since = match stopping.load(Ordering::Relaxed) {
+                0 => None,
+                number => Some(stopping_since.unwrap_or((number, Instant::now()))),
+            };
+            if let Some((number, since)) = stopping_since
+                && since.elapsed() > END_LIMIT
+            {
+                leave_behind();
+                let who = plugins.get(number - 1).map_or_else(String::new, |plugin| plugin.name.clone());
+                let hung = Unresponsive { who, call: Call::SafeStop, limit: END_LIMIT };
                 return Err(CallError::from(hung).into());
             }
             bitten = bitten.or_else(|| heart.bitten().map(|stuck| (stuck, Instant::now())));

@@ -4,7 +4,7 @@ use super::choice::chosen;
 use super::controls::{ControlError, NewValue, Parts, understands};
 use super::{PluginReport, RunError};
 use crate::calibration_file::{CalibrationFile, CalibrationFileError};
-use crate::calls::{Call, Progress, attended, attended_while, keeping_machine, limit};
+use crate::calls::{Call, Progress, attended_while, is_to_begin, keeping_machine, limit};
 use crate::registry::{LookupError, Registry, is_installed};
 use crate::scene::{
     Alternative, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, Pacing,
@@ -36,7 +36,8 @@ pub(super) fn refused(metadata: &Metadata, refusal: Refusal) -> RunError {
 /// Energises the devices of a run right before its first tick, each within a time limit. Not real-time.
 pub(super) fn activate(standby: Standby, plugins: &[PluginReport]) -> Result<Servo, RunError> {
     let (plugins, stoppers) = (plugins.to_vec(), standby.stoppers());
-    let activated = attended(limit(), move |progress| activate_here(standby, &plugins, progress));
+    let activated =
+        attended_while(limit(), is_to_begin, move |progress| activate_here(standby, &plugins, progress));
     activated.inspect_err(|_| stoppers.iter().for_each(Stopper::safe_stop))?
 }
 
@@ -93,7 +94,8 @@ pub(super) fn open_device(
         let values: Vec<f64> = (0..opening.parameters().len()).map(|index| device.parameter(index)).collect();
         Ok::<_, RunError>((device, capabilities, values))
     };
-    let (mut device, capabilities, values) = keeping_machine(name, || attended(limit(), open))??;
+    let (mut device, capabilities, values) =
+        keeping_machine(name, || attended_while(limit(), is_to_begin, open))??;
     let report = report(&plugin, name, used, &settings, |index| value_at(&values, index));
     if let Some(calibration) = calibration {
         calibrate(&plugin, &mut device, calibration)?;
@@ -116,7 +118,7 @@ pub fn prepare_model(
     config: &LoopConfig,
     clock: Clock,
 ) -> Result<(Layer, PluginReport), RunError> {
-    prepare_model_while(registry, model, config, clock, || true)
+    prepare_model_while(registry, model, config, clock, is_to_begin)
 }
 
 /// The same only while it is wanted.

@@ -53,6 +53,6 @@ fn free<T: Send + 'static>(who: String, call: Call, what: T) -> Result<(), Unres
     match freed {
         Err(CallError::Unresponsive(hung)) => Err(hung),
         // Without a thread it was dropped where it was.
-        Ok(()) | Err(CallError::NoThread | CallError::TooLate) => Ok(()),
+        Ok(()) | Err(CallError::NoThread | CallError::Stopped) => Ok(()),
     }
 }
