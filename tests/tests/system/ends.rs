@@ -176,6 +176,7 @@ fn a_plugin_that_hangs_before_a_run_is_named_and_ends_it() {
     let isolated = scene_of(&scratch, HONEST, "IN_CREATE=hang();", "isolation = \"process\"\n");
     let ran = run(&scratch, &isolated, "virtual");
     assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:?}");
+    assert!(ran.error().contains("`create` or `prepare` did not return within 0.9 s"), "{ran:?}");
 }
 
 #[test]
@@ -290,7 +291,7 @@ fn a_model_from_outside_runs_in_a_process_of_its_own_where_a_hand_is_and_only_th
 #[test]
 fn every_extension_works_in_a_process_of_its_own_with_the_same_bits() {
     let spring = "plugin = \"spring\"\n";
-    let wall = "plugin = \"wall\"\n[model.parameters]\nshape = \"ball\"\n";
+    let wall = "plugin = \"wall\"\n[model.parameters]\nshape = \"sphere\"\n";
     let membrane = "plugin = \"membrane\"\n[model.field]\nrate_hz = 200\n";
     for model in [spring, wall, membrane] {
         let forces = |isolation: &str| -> Vec<_> {

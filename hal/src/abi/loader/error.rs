@@ -118,7 +118,7 @@ pub enum LoadError {
         missing: &'static str,
     },
     /// Its list of parameters has counts or texts no host reads.
-    #[error("{}: its list of parameters cannot be read: {problem}", path.display())]
+    #[error("{}: its list of parameters cannot be read: {problem}; correct it and build the plugin again", path.display())]
     Schema {
         /// The file.
         path: PathBuf,

@@ -232,7 +232,8 @@ impl Making {
                         .map_or(*config, |field| AsynchronousModel::config(field, config)),
                     // Nobody in the loop waits for a field.
                     patience_ns: in_the_loop.unwrap_or(PATIENCE_NS),
-                    making: limit(),
+                    // Less than what is waited for here: the worker must not be left behind.
+                    making: limit().mul_f64(0.9),
                 };
                 Engine::Process(Worker::start(&order).map_err(no)?)
             }

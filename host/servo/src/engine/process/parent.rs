@@ -92,8 +92,15 @@ impl Worker {
             }
             Err(_) => {
                 // It may be there all the same, saying nothing that makes sense: nobody waits for that.
+                let is_late = greeting.is_empty() && worker.child.try_wait().is_ok_and(|end| end.is_none());
                 let _ = worker.child.kill();
                 let end = worker.child.wait().map_err(no_worker)?;
+                if is_late {
+                    let making_s = order.making.as_secs_f64();
+                    return Err(Refusal::broken(format!(
+                        "`create` or `prepare` did not return within {making_s} s in its process"
+                    )));
+                }
                 Err(Refusal::broken(format!("its process ended before the model was made ({end})")))
             }
         }
