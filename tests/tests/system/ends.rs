@@ -314,6 +314,7 @@ fn every_extension_works_in_a_process_of_its_own_with_the_same_bits() {
 // ---------------------------------------------------------------- the state of the machine
 
 /// What a plugin may leave changed in the thread that calls it: it rounds up, flushes to zero, traps at what is invalid.
+#[cfg(target_arch = "x86_64")]
 const FLOAT_HABITS: [&str; 3] = [
     "IN_STEP=__builtin_ia32_ldmxcsr(0x5f80);",
     "IN_STEP=__builtin_ia32_ldmxcsr(0x9fc0);",
