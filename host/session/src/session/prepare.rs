@@ -19,6 +19,7 @@ use flotor_servo::engine::asynchronous::AsynchronousModel;
 use flotor_servo::engine::process::{Worker, WorkerOrder};
 use flotor_servo::{Clock, Engine, Layer, Replacement, ScheduledChange, Servo, Standby, TimeBudget};
 use std::borrow::Cow;
+use std::time::Duration;
 
 pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
     registry.load(&plugin.plugin, kind).map_err(|error| match error {
@@ -139,8 +140,13 @@ pub(super) fn prepare_model_while(
         config: *config,
         clock,
     };
+    let most = match making.isolation {
+        // A worker that is not made in time has to be ended, not left behind.
+        Isolation::Process => limit() + END_OF_A_WORKER,
+        Isolation::ByOrigin | Isolation::None => limit(),
+    };
     let make = move |progress: &Progress| making.layer(progress);
-    let (layer, values) = keeping_machine(&model.name, || attended_while(limit(), is_wanted, make))??;
+    let (layer, values) = keeping_machine(&model.name, || attended_while(most, is_wanted, make))??;
     let report = report(&plugin, &model.name, &model.plugin, &settings, |index| value_at(&values, index));
     Ok((layer, report))
 }
@@ -160,6 +166,9 @@ pub(super) fn settle_isolation(model: &mut ModelUse, clock: Clock, simulated: &[
         model.isolation = Isolation::None;
     }
 }
+
+/// How long it may take to end a worker whose model was not made in time.
+const END_OF_A_WORKER: Duration = Duration::from_secs(10);
 
 /// Most objects of a model that get a process each without the scene saying so.
 const MOST_PROCESSES: usize = 64;
@@ -232,8 +241,7 @@ impl Making {
                         .map_or(*config, |field| AsynchronousModel::config(field, config)),
                     // Nobody in the loop waits for a field.
                     patience_ns: in_the_loop.unwrap_or(PATIENCE_NS),
-                    // Less than what is waited for here: the worker must not be left behind.
-                    making: limit().mul_f64(0.9),
+                    making: limit(),
                 };
                 Engine::Process(Worker::start(&order).map_err(no)?)
             }
