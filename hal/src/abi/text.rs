@@ -66,6 +66,20 @@ impl Str {
     }
 }
 
+#[cfg(feature = "loader")]
+impl Str {
+    /// Its length, as its maker says.
+    pub(crate) const fn bytes(&self) -> usize {
+        if self.ptr.is_null() { 0 } else { self.len }
+    }
+
+    /// What a foreign plugin may have made.
+    #[cfg(test)]
+    pub(crate) const fn of_raw(ptr: *const u8, len: usize) -> Self {
+        Self { ptr, len }
+    }
+}
+
 impl fmt::Debug for Str {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Debug::fmt(self.as_str(), f)
@@ -104,6 +118,20 @@ impl Choices {
         }
         // SAFETY: not null, not larger than memory; `new` stored pointer and length of one static slice, a plugin's own data likewise.
         unsafe { std::slice::from_raw_parts(self.ptr, self.len) }
+    }
+}
+
+#[cfg(feature = "loader")]
+impl Choices {
+    /// How many there are, as their maker says.
+    pub(crate) const fn count(&self) -> usize {
+        if self.ptr.is_null() { 0 } else { self.len }
+    }
+
+    /// What a foreign plugin may have made.
+    #[cfg(test)]
+    pub(crate) const fn of_raw(ptr: *const Str, len: usize) -> Self {
+        Self { ptr, len }
     }
 }
 
@@ -154,6 +182,23 @@ impl Message {
             Err(error) => std::str::from_utf8(bytes.get(..error.valid_up_to()).unwrap_or(&[])).unwrap_or(""),
         }
     }
+
+    /// The sentence for a person and a terminal, whatever a foreign plugin wrote, up to its first null: what is not UTF-8 as
+    /// a replacement character, control characters but the end of a line escaped. Not real-time.
+    #[cfg(feature = "loader")]
+    pub(crate) fn for_people(&self) -> String {
+        let bytes = self.text.get(..self.len as usize).unwrap_or(&self.text);
+        let bytes = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
+        let mut text = String::with_capacity(bytes.len());
+        for character in String::from_utf8_lossy(bytes).chars() {
+            if character.is_control() && character != '\n' {
+                text.extend(character.escape_default());
+            } else {
+                text.push(character);
+            }
+        }
+        text
+    }
 }
 
 layout! {
@@ -182,6 +227,17 @@ mod tests {
         message.text[2] = 0xff;
         message.len = u32::MAX;
         assert_eq!(message.as_str(), "ok");
+    }
+
+    #[cfg(feature = "loader")]
+    #[test]
+    fn a_reason_is_told_whatever_its_bytes() {
+        let mut message = Message::default();
+        message.set("no table ??\x1b[2J of forces\n");
+        message.text[9] = 0xff;
+        assert_eq!(message.for_people(), "no table \u{fffd}?\\u{1b}[2J of forces\n");
+        message.len = u32::MAX;
+        assert!(message.for_people().ends_with("of forces\n"), "what was not written is not told");
     }
 
     #[test]

@@ -6,8 +6,8 @@
 use flotor_hal::Fault;
 use flotor_hal::abi::loader::LoadError;
 use flotor_servo::{EmergencySource, Place, Stuck};
-use flotor_session::RunError;
 use flotor_session::registry::LookupError;
+use flotor_session::{Call, CallError, RunError};
 use std::path::{Path, PathBuf};
 
 /// Why a command failed, with its exit code.
@@ -103,7 +103,11 @@ impl CommandError {
             Self::Usage(_) | Self::Read(_) => 2,
             Self::Run(error) => match error {
                 wrong if wrong.is_configuration() => 2,
-                RunError::Lookup(_) | RunError::Plugin(_) => 3,
+                // Nobody knows whether it exerts a force.
+                RunError::Calls(CallError::Unresponsive(hung)) if hung.call == Call::SafeStop => 4,
+                RunError::Calls(CallError::Stopped)
+                | RunError::Lookup(LookupError::Calls(CallError::Stopped)) => 1,
+                RunError::Lookup(_) | RunError::Plugin(_) | RunError::Calls(_) => 3,
                 RunError::Hung { stuck, .. } => match stuck.place {
                     Place::Model(_) => 3,
                     Place::DeviceWait(_) | Place::DeviceRead(_) | Place::DeviceWrite(_) => 4,

@@ -58,9 +58,11 @@ impl Events {
     pub const PARTNER_SILENT: Events = Events { bits: 1 << 20 };
     /// A device, or a coupling's other end, reported what cannot be: it was not used.
     pub const IMPLAUSIBLE_SAMPLE: Events = Events { bits: 1 << 21 };
+    /// A plugin left rounding mode, flush-to-zero or traps of the loop's thread changed; they were put back at once.
+    pub const FLOAT_ENVIRONMENT: Events = Events { bits: 1 << 22 };
 
     /// Names of the bits, lowest first: for reports and recordings.
-    pub const NAMES: [&'static str; 22] = [
+    pub const NAMES: [&'static str; 23] = [
         "stale_sample",
         "not_finite",
         "force_limited",
@@ -83,6 +85,7 @@ impl Events {
         "excess_force",
         "partner_silent",
         "implausible_sample",
+        "float_environment",
     ];
 
     /// Adds events. Real-time: bounded, no allocation.

@@ -19,6 +19,15 @@ pub(super) enum Allowed {
     Nothing,
 }
 
+/// Whether there was an answer at the end of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Answer {
+    /// There was.
+    There,
+    /// A process that was waited for, or is still at an earlier step, had none.
+    Missing,
+}
+
 /// The time one model may take, and how it keeps to it.
 #[derive(Clone, Debug, Default)]
 pub struct TimeBudget {
@@ -67,9 +76,11 @@ impl TimeBudget {
 
     /// Books a step that began at [`Self::begin`]; true if it took too long. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn end(&mut self, begun_ns: u64, tick: u64, now_ns: u64) -> bool {
+    pub(super) fn end(&mut self, begun_ns: u64, answer: Answer, tick: u64, now_ns: u64) -> bool {
         let Some(limit_ns) = self.limit_ns else { return false };
-        self.book(monotonic_ns() - begun_ns, limit_ns, tick, now_ns)
+        let took_ns = monotonic_ns() - begun_ns;
+        let least_ns = if answer == Answer::Missing { limit_ns.saturating_add(1) } else { 0 };
+        self.book(took_ns.max(least_ns), limit_ns, tick, now_ns)
     }
 
     fn book(&mut self, took_ns: u64, limit_ns: u64, tick: u64, now_ns: u64) -> bool {
@@ -137,10 +148,19 @@ mod tests {
     }
 
     #[test]
+    fn a_missing_answer_is_late_however_soon_that_was_known() {
+        let mut budget = TimeBudget::new(Some(u64::MAX - 1));
+        let begun_ns = monotonic_ns();
+        assert!(!budget.end(begun_ns, Answer::There, 0, 0));
+        assert!((1..=5).all(|tick| budget.end(begun_ns, Answer::Missing, tick, 0)));
+        assert_eq!(budget.overrun().map(|overrun| overrun.tick), Some(5));
+    }
+
+    #[test]
     fn without_a_limit_nobody_looks_at_the_clock() {
         let mut budget = TimeBudget::new(None);
         assert_eq!(budget.begin(), None);
-        assert!((0..100).all(|tick| !budget.end(0, tick, tick)));
+        assert!((0..100).all(|tick| !budget.end(0, Answer::Missing, tick, tick)));
         assert_eq!(budget.allowed(u64::MAX), Allowed::Asked);
     }
 }

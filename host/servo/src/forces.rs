@@ -260,9 +260,15 @@ impl Forces {
         self.stacks.iter().any(ModelStack::is_fading)
     }
 
-    /// What is known of every layer that is in place or fading out. Not real-time.
-    pub fn reports(&mut self) -> Vec<LayerReport> {
-        self.stacks.iter_mut().flat_map(ModelStack::reports).collect()
+    /// What is known of every layer that is in place or fading out; `asks` hears of the model that is asked next what it
+    /// said last. Not real-time.
+    pub fn reports(&mut self, asks: impl Fn(usize)) -> Vec<LayerReport> {
+        self.stacks.iter_mut().flat_map(|stack| stack.reports(&asks)).collect()
+    }
+
+    /// All layers, each with the number of its model. Not real-time.
+    pub fn into_layers(self) -> impl Iterator<Item = (usize, Box<Layer>)> {
+        self.stacks.into_iter().flat_map(ModelStack::into_layers)
     }
 
     /// Of every model, health and last words of the layer in place, in the scene's order. Not real-time.

@@ -56,7 +56,7 @@ pub use queue::{drain, queue};
 pub use realtime::{Core, Privilege, RealTimeReport};
 pub use realtime::{enter_guard_priority, enter_real_time, enter_worker_priority, probe_real_time};
 pub use run::{Loop, RunEnd};
-pub use servo::{RunConfig, Servo};
+pub use servo::{Dismantled, RunConfig, Servo};
 pub use standby::{Guarded, Standby};
 pub use state::{Cause, EmergencySource, Gate, RunEvent, RunState};
 pub use station::{Reported, Station};

@@ -65,16 +65,18 @@ impl Standby {
     }
 
     /// Energises the devices, in order, on the thread that will loop. `names` are those of the devices, then of the models,
-    /// for whom it may concern if the process dies. Not real-time; may block.
+    /// for whom it may concern if the process dies; `enters` hears of the number of each device before. Not real-time; may
+    /// block.
     ///
     /// # Errors
     /// The number of the device that says no, and why; then none stays energised.
-    pub fn activate(self, names: Vec<String>) -> Result<Servo, (usize, Refusal)> {
+    pub fn activate(self, names: Vec<String>, enters: impl Fn(usize)) -> Result<Servo, (usize, Refusal)> {
         let stoppers = self.stoppers();
         let last_stop = LastStop::arm(stoppers.clone(), names, self.heart());
         let Self { devices, forces, parameters, swaps, config, run, heart } = self;
         let station = |(number, guarded): (usize, Guarded)| {
             let Guarded { mut device, capabilities, envelope } = guarded;
+            enters(number);
             // The loader refuses what is not what was told when the envelope was made.
             device.capabilities().map_err(|refusal| (number, refusal))?;
             let device = device.activate(&config).map_err(|(_, refusal)| (number, refusal))?;

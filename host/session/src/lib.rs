@@ -13,7 +13,9 @@
 //! - [`calibration_file`]: the correction of a device's vertical force, as measured and kept.
 
 pub mod calibration_file;
+mod calls;
 pub mod headless;
+mod machine;
 pub mod registry;
 pub mod run_description;
 mod run_recording;
@@ -22,8 +24,11 @@ mod session;
 pub mod summary;
 pub mod telemetry;
 
+pub use calls::{
+    Call, CallError, LIMIT_VARIABLE, Notice, Unresponsive, is_left_behind, stop_waits_with, tell_notices,
+};
 pub use run_recording::RunRecording;
 pub use session::{
-    ControlError, Controls, DeviceOutcome, Misbehaved, NewValue, Observer, Outcome, PluginReport, RunError,
-    RunOptions, Session, Steps, Strength, StrongDevice, prepare_model,
+    ControlError, Controls, DeviceOutcome, Misbehaved, NewValue, Observer, Outcome, PluginReport, Remains,
+    RunError, RunOptions, Session, Steps, Strength, StrongDevice, prepare_model,
 };

@@ -65,6 +65,13 @@ impl Tally {
         std::array::from_fn(|bit| self.event_ticks[bit] + u64::from(self.events.bits() >> bit & 1))
     }
 
+    /// Time of the last tick, ns.
+    #[must_use]
+    pub fn last_ns(&self) -> u64 {
+        let last = |device: &DeviceTally| device.last.as_ref().map(|(record, _)| record.time_ns);
+        self.devices.iter().filter_map(last).max().unwrap_or(0)
+    }
+
     /// Largest of a number of all devices.
     fn largest(&self, number: impl Fn(&DeviceTally) -> f64) -> f64 {
         self.devices.iter().map(number).fold(0.0, f64::max)
@@ -339,6 +346,14 @@ impl RunSummary {
         }
     }
 
+    /// The same with what a plugin did that ended the run.
+    #[must_use]
+    pub fn blaming(mut self, name: &str, what: &str) -> Self {
+        let cause = self.plugins.iter_mut().filter(|plugin| plugin.name == name);
+        cause.for_each(|plugin| what.clone_into(&mut plugin.health));
+        self
+    }
+
     /// The run in one line, under the title of a picture.
     #[must_use]
     pub fn one_line(&self) -> String {
@@ -469,21 +484,32 @@ fn health_words(health: &ModelHealth, words: &str) -> String {
     if let Some(tick) = health.first_late {
         return format!("late in {} ticks, the first at tick {tick}", health.late_ticks);
     }
-    health.first_rejected.map_or_else(
+    if let Some(tick) = health.first_rejected {
+        let count = health.rejected_ticks;
+        return format!(
+            "{count} answers were not finite, the first at tick {tick}; each counted as no force"
+        );
+    }
+    health.first_float_change.map_or_else(
         || "ok".to_owned(),
         |tick| {
-            let count = health.rejected_ticks;
-            format!("{count} answers were not finite, the first at tick {tick}; each counted as no force")
+            let ticks = health.float_changes;
+            format!("changed the floating-point environment in {ticks} ticks, the first at tick {tick}; it was put back each time")
         },
     )
 }
 
 /// The devices of a run come first.
 fn plugin_summary(number: usize, plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
-    let device = outcome.devices.get(number).and_then(|device| device.problem.clone());
+    let device = outcome.devices.get(number);
+    let float_changes = device.map_or(0, |device| device.float_changes);
+    let float_changes = (float_changes > 0).then(|| {
+        format!("changed the floating-point environment in {float_changes} calls; it was put back each time")
+    });
+    let problem = device.and_then(|device| device.problem.clone());
     let model = outcome.models.iter().find(|(name, ..)| *name == plugin.name);
     let model = model.map(|(_, health, words)| health_words(health, words));
-    summary_of(plugin, device.or(model).unwrap_or_else(|| "ok".to_owned()))
+    summary_of(plugin, problem.or(float_changes).or(model).unwrap_or_else(|| "ok".to_owned()))
 }
 
 /// A plugin that was put in while the run was on.

@@ -134,6 +134,7 @@ pub fn command_names() -> Vec<String> {
 #[must_use]
 pub fn main() -> ExitCode {
     let arguments = options::arguments::<Arguments>();
+    flotor_session::tell_notices(|notice| flotor_command::note(notice));
     let result = match arguments.command {
         None => run::run(run::RunArguments::default()),
         Some(Command::Run(arguments)) => run::run(arguments),

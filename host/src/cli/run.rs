@@ -6,7 +6,9 @@ use flotor_command::options::{
     ClockOption, PluginKeyValue, StrengthOption, core, duration_s, mcap_file, rate_hz, svg_file, whole,
 };
 use flotor_command::stopping::{Keys, stop_run_on_signals};
-use flotor_command::{CommandError, first_error, note, print_result, progress_bar, style};
+use flotor_command::{
+    CommandError, first_error, keep_results_apart, note, print_result, progress_bar, style, write_json,
+};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_live::Directory;
@@ -19,8 +21,11 @@ use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
 use flotor_session::summary::{RunFacts, RunSummary, Tally};
 use flotor_session::telemetry::{LinkCounts, PeerLink, Watched, publish, start_peer_link};
-use flotor_session::{Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session};
+use flotor_session::{
+    Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session, stop_waits_with,
+};
 use indicatif::ProgressBar;
+use rustix::process::{Resource, getrlimit};
 use std::path::PathBuf;
 
 /// Run a scene in the servo loop.
@@ -67,7 +72,14 @@ pub(crate) struct RunArguments {
 pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     // First of all: a signal during loading ends the run, too.
     let stop = stop_run_on_signals();
+    stop_waits_with(&stop);
+    if arguments.json.as_deref().is_some_and(|json| json.as_os_str() == "-") {
+        keep_results_apart()?;
+    }
     let scene = scene(&arguments)?;
+    if matches!(arguments.clock, ClockOption::Real) {
+        enough_files()?;
+    }
     let clock = match arguments.clock {
         ClockOption::Real => Clock::Real,
         ClockOption::Virtual => Clock::Virtual,
@@ -113,7 +125,28 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     progress.finish_and_clear();
     let outcome = match outcome {
         Ok(outcome) => outcome,
-        Err(error) => return first_error([Err(error.into()), recording.finish(&[]).map_err(Into::into)]),
+        Err(error) => {
+            let recorded = recording.finish(&[]).map_err(Into::into);
+            let told = match (&error, &arguments.json) {
+                (RunError::Hung { who, stuck, .. }, Some(json)) => {
+                    let elapsed_ns = tally.last_ns();
+                    let facts = RunFacts {
+                        title: &scene.title,
+                        clock: clock_word,
+                        seed: arguments.seed,
+                        rate_hz: scene.rate_hz,
+                        plugins: &plugins,
+                        couplings: &[],
+                        carried: &[],
+                        trace_digest: digest.finish(),
+                    };
+                    let summary = RunSummary::new(facts, &Outcome::of_hung_loop(*stuck, elapsed_ns), &tally);
+                    write_json(json, &summary.blaming(who, &error.to_string()))
+                }
+                _ => Ok(()),
+            };
+            return first_error([Err(error.into()), recorded, told]);
+        }
     };
 
     let carried: Vec<(String, LinkCounts)> =
@@ -143,8 +176,13 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let printed = print_result(arguments.json.as_deref(), &summary, text);
     outcome.real_time.advice().into_iter().for_each(note);
     outcome.later_warnings().iter().for_each(note);
+    let verdict = verdict(&outcome, &plugins, &summary);
+    // Last of all: the code of a plugin may hang, or end the process.
+    let Outcome { unresponsive, remains, .. } = outcome;
+    let freed = remains.free();
+    let freed = unresponsive.map_or(freed, Err).map_err(|hung| CommandError::PluginRefused(hung.to_string()));
     // Scripts need the outcome of the run first, a missing file second.
-    first_error([verdict(&outcome, &plugins, &summary), recorded, drawn, printed])
+    first_error([verdict, freed, recorded, drawn, printed])
 }
 
 /// Notes for readers of the recording: why the run ended, which plugins failed, which ticks are missing.
@@ -183,6 +221,19 @@ fn verdict(outcome: &Outcome, plugins: &[PluginReport], summary: &RunSummary) ->
         }
         RunEnd::Watchdog(stuck) => Err(CommandError::Watchdog(stuck)),
         RunEnd::Finished | RunEnd::Stopped => broken_models(outcome, summary),
+    }
+}
+
+/// Files a run in real time has open at most, with a margin: plugins, recording, socket, sixteen watchers.
+const OPEN_FILES: u64 = 64;
+
+/// A run that finds no descriptor has no signal handlers, no recording or no socket, while a hand is at the device.
+fn enough_files() -> Result<(), CommandError> {
+    match getrlimit(Resource::Nofile).current {
+        Some(most) if most < OPEN_FILES => Err(CommandError::Usage(format!(
+            "only {most} files may be open, and a run in real time needs {OPEN_FILES}; `ulimit -n {OPEN_FILES}` allows them"
+        ))),
+        _ => Ok(()),
     }
 }
 

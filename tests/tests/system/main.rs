@@ -11,6 +11,7 @@ mod composition;
 mod crash;
 mod determinism;
 mod documents;
+mod ends;
 mod force_sensor;
 mod golden;
 mod haply;

@@ -118,6 +118,14 @@ pub enum LoadError {
         /// Which function, or the whole table.
         missing: &'static str,
     },
+    /// Its list of parameters has counts or texts no host reads.
+    #[error("{}: its list of parameters cannot be read: {problem}; correct it and build the plugin again", path.display())]
+    Schema {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
     /// The plugin is of the other kind.
     #[error("{}: `{id}` is a {found}, a {wanted} is needed here; name another plugin", path.display())]
     OtherKind {

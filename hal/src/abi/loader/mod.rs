@@ -10,14 +10,17 @@ mod capabilities;
 mod check;
 mod device;
 mod error;
+mod float_control;
 mod interfaces;
 mod library;
 mod metadata_file;
 mod model;
+mod schema;
 mod setting;
 
 pub use device::{ActiveDevice, OpenedDevice, Stopper};
 pub use error::LoadError;
+pub(crate) use float_control::keeping_floats;
 pub(crate) use interfaces::Offers;
 pub use library::Plugin;
 pub use metadata_file::{Metadata, read_metadata};

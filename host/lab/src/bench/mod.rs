@@ -17,6 +17,7 @@
 mod error;
 mod path;
 mod reach_hand;
+mod round_trip;
 pub mod scripted;
 mod split;
 mod tables;
@@ -26,6 +27,7 @@ mod whole_tick;
 pub use error::Distance;
 pub use path::Hand;
 pub use reach_hand::{Losses, Sampling};
+pub use round_trip::time_round_trips;
 pub use split::{Speed, SplitTimes};
 pub use tables::{BenchReport, CaseRow, SplitRow};
 pub use times::Times;

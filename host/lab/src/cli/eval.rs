@@ -9,6 +9,7 @@ use flotor_hal::abi::PluginKind;
 use flotor_hal::{DVec3, Detail};
 use flotor_session::registry::{Registry, is_same_file};
 use flotor_session::scene::{cannot_read, did_you_mean};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Evaluate a force model at poses from a CSV file.
@@ -77,10 +78,16 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
 }
 
 fn read_poses(path: &Path) -> Result<(Vec<String>, Vec<Handle>), CommandError> {
-    let problem = |text: String| CommandError::Usage(format!("{}: {text}", path.display()));
-    let text = read_text(path).map_err(|cause| problem(cannot_read("the poses", &cause)))?;
+    let problem = |text: String| CommandError::Usage(format!("{}{text}", path.display()));
+    let bytes =
+        read_bytes(path).map_err(|cause| problem(format!(": {}", cannot_read("the poses", &cause))))?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let before = error.as_bytes().get(..error.utf8_error().valid_up_to()).unwrap_or_default();
+        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+        problem(format!(":{line}: this is not UTF-8; save the poses as UTF-8"))
+    })?;
     if text.trim().is_empty() {
-        return Err(problem(format!("no poses; the header is {}", header_text())));
+        return Err(problem(format!(": no poses; the header is {}", header_text())));
     }
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
     let line = |at: Option<&csv::Position>| at.map_or(1, |at| line_of(&text, at));
@@ -120,14 +127,16 @@ fn read_poses(path: &Path) -> Result<(Vec<String>, Vec<Handle>), CommandError> {
     Ok((ids, handles))
 }
 
-fn read_text(path: &Path) -> std::io::Result<String> {
+fn read_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
     if path.as_os_str() != "-" {
-        return std::fs::read_to_string(path);
+        return std::fs::read(path);
     }
     if std::io::IsTerminal::is_terminal(&std::io::stdin()) {
         note("reading poses from the terminal; end with Ctrl-D");
     }
-    std::io::read_to_string(std::io::stdin().lock())
+    let mut bytes = Vec::new();
+    std::io::stdin().lock().read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// Line, from 1, on which a record stands. The reader's own count ends before blank lines it is about to skip.

@@ -34,7 +34,7 @@ struct Armed {
     names: Box<[String]>,
     heart: Heartbeat,
     /// Number that the system gives the loop's thread.
-    thread: i32,
+    thread: AtomicI32,
 }
 
 /// The runs of this process. Locked for a few instructions by whoever begins or ends a run, and only tried by who dies: what
@@ -110,7 +110,7 @@ impl LastStop {
     /// devices, in the order of `stoppers`, then of the models. Not real-time.
     #[must_use]
     pub fn arm(stoppers: Vec<Stopper>, names: Vec<String>, heart: Heartbeat) -> Option<(Unwound, Self)> {
-        let thread = system::thread_number();
+        let thread = AtomicI32::new(system::thread_number());
         let armed = Arc::new(Armed { stoppers: stoppers.into(), names: names.into(), heart, thread });
         system::install();
         for (place, run) in RUNS.iter().enumerate() {
@@ -122,6 +122,14 @@ impl LastStop {
             }
         }
         None
+    }
+
+    /// From now on the loop of the run is this thread, which energised nothing itself. Not real-time.
+    pub(crate) fn follow_here(&self) {
+        if let Some(run) = RUNS.get(self.place).and_then(|run| lock(run).clone()) {
+            run.thread.store(system::thread_number(), Ordering::Release);
+            system::install();
+        }
     }
 }
 
@@ -222,7 +230,7 @@ fn stop_the_rest() {
 /// One line: what it was, in which tick, in whose code.
 fn describe(line: &mut Line, death: Death, own: i32) {
     use std::fmt::Write;
-    let is_own = |run: &ManuallyDrop<Arc<Armed>>| run.thread == own;
+    let is_own = |run: &ManuallyDrop<Arc<Armed>>| run.thread.load(Ordering::Acquire) == own;
     let own_run = runs().find(|run| is_own(run) && !run.is_over());
     let Some(run) = own_run.or_else(|| runs().find(|run| !run.is_over())) else {
         let _ = write!(line, "error: the process was ended; every device was told to stop");

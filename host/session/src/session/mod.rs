@@ -4,34 +4,40 @@ mod ceiling;
 mod choice;
 mod controls;
 mod prepare;
+mod remains;
 mod steps;
 
 pub use ceiling::{Strength, StrongDevice};
 pub use controls::{ControlError, Controls, Misbehaved, NewValue};
 pub use prepare::prepare_model;
+pub use remains::Remains;
 pub use steps::Steps;
 
+use crate::calls::{Call, CallError, END_LIMIT, Progress, Unresponsive, attended, leave_behind, limit};
 use crate::registry::{LookupError, Registry};
 use crate::scene::{Pacing, Scene, SceneError};
 use ceiling::{norm_notice, under_ceiling};
-use controls::{ChangeLog, Parts};
+use controls::{ChangeLog, Parts, Settled};
 use flotor_core::Change;
 use flotor_core::MOST_DEVICES;
 use flotor_core::limits::Limits;
 use flotor_core::trace::TickRecord;
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, Stopper};
-use flotor_hal::{Capabilities, DVec3, EnergyLedger, Fault, LoopConfig, Parameter};
+use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, OpenedDevice, Stopper};
+use flotor_hal::{Capabilities, DVec3, Embodiment, EnergyLedger, Fault, LoopConfig, Parameter};
 use flotor_live::WrenchLimits;
 use flotor_servo::coupling::{Line, Patience};
 use flotor_servo::last_stop::TakenSignals;
 use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{
-    Clock, Core, Coupled, CouplingOutcome, Envelope, Forces, Guarded, ImplausibleSamples, Loop, ModelHealth,
-    ParameterQueue, Place, RealTimeReport, Reported, RunConfig, RunEnd, Schedule, Servo, SpinWindow, Standby,
-    StopSwitch, Stuck, Timing, drain, enter_real_time, queue, start_watchdog, swap_queues,
+    Clock, Core, Coupled, CouplingOutcome, Dismantled, Envelope, Forces, Guarded, ImplausibleSamples, Layer,
+    LayerReport, Loop, ModelHealth, ParameterQueue, Place, RealTimeReport, Reported, RunConfig, RunEnd,
+    Schedule, Servo, SpinWindow, Standby, StopSwitch, Stuck, Timing, drain, enter_real_time, queue,
+    start_watchdog, swap_queues,
 };
-use prepare::{Scheduled, activate};
+use prepare::{Scheduled, activate, activate_here};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 /// How a scene is to be run.
@@ -64,6 +70,9 @@ pub enum RunError {
         /// What does not fit, each with a remedy.
         mismatches: Vec<String>,
     },
+    /// A plugin did not return from a call before the run.
+    #[error(transparent)]
+    Calls(#[from] CallError),
     /// The servo's thread could not be started or died.
     #[error("the servo thread {0}; no device was moved")]
     Thread(&'static str),
@@ -94,7 +103,11 @@ impl RunError {
         match self {
             Self::Scene(_) | Self::Mismatch { .. } | Self::Lookup(LookupError::Unknown { .. }) => true,
             Self::Lookup(LookupError::Refused(error)) | Self::Plugin(error) => error.is_configuration(),
-            Self::Thread(_) | Self::Hung { .. } | Self::WatchdogProcess(_) => false,
+            Self::Thread(_)
+            | Self::Hung { .. }
+            | Self::WatchdogProcess(_)
+            | Self::Calls(_)
+            | Self::Lookup(LookupError::Calls(_)) => false,
         }
     }
 }
@@ -184,6 +197,10 @@ pub struct Outcome {
     pub warnings: Vec<String>,
     /// How many of them were.
     known_before: usize,
+    /// The first plugin that did not return from a call right after the run.
+    pub unresponsive: Option<Unresponsive>,
+    /// The plugins themselves. To be freed or dropped after all that depends on no plugin: their code may hang.
+    pub remains: Remains,
 }
 
 impl Outcome {
@@ -191,6 +208,26 @@ impl Outcome {
     #[must_use]
     pub fn later_warnings(&self) -> &[String] {
         self.warnings.get(self.known_before..).unwrap_or_default()
+    }
+    /// What is known of a run whose loop did not come back: how it ended, and for how long it was observed.
+    #[must_use]
+    pub fn of_hung_loop(stuck: Stuck, elapsed_ns: u64) -> Self {
+        Self {
+            end: RunEnd::Watchdog(stuck),
+            timing: Timing { ticks: stuck.tick, ..Timing::default() },
+            elapsed_ns,
+            wall_s: elapsed_ns as f64 * 1.0e-9,
+            dropped_records: 0,
+            real_time: RealTimeReport::not_asked(),
+            devices: Vec::new(),
+            couplings: Vec::new(),
+            models: Vec::new(),
+            misbehaved: Vec::new(),
+            warnings: Vec::new(),
+            known_before: 0,
+            unresponsive: None,
+            remains: Remains::default(),
+        }
     }
 
     /// Which device faulted, and its last words.
@@ -215,6 +252,8 @@ pub struct DeviceOutcome {
     pub ledger: Option<EnergyLedger>,
     /// Its last words, or what the host has found; empty if it had no reason to say any.
     pub words: String,
+    /// Calls that left the floating-point environment of the loop's thread changed; it was put back each time.
+    pub float_changes: u64,
 }
 
 /// Records that fit between loop and observers: four seconds at 1 kHz.
@@ -246,6 +285,13 @@ impl Session {
             opened.push(device);
             plugins.push(report);
         }
+        let mut scene = scene.clone();
+        let simulated: Vec<bool> =
+            opened.iter().map(|device| device.embodiment == Embodiment::Simulated).collect();
+        for model in &mut scene.models {
+            prepare::settle_isolation(model, options.clock, &simulated);
+        }
+        let scene = &scene;
         let mut models = Vec::new();
         for model in &scene.models {
             let (layer, report) = prepare_model(registry, model, &config, options.clock)?;
@@ -436,26 +482,27 @@ impl Session {
             Clock::Virtual => self.run_virtual(observer, stop)?,
             Clock::Real => self.run_real(observer, stop)?,
         };
-        let Finished { mut servo, end, elapsed_ns, dropped_records, real_time } = finished;
-        let told = |(device, reported): (&mut ActiveDevice, Reported)| {
-            let problem = reported.problem();
-            DeviceOutcome {
-                fault: reported.fault,
-                implausible: reported.implausible,
-                ledger: device.energy_ledger(),
-                words: match &problem {
-                    Some(problem) if !reported.is_own_fault => problem.clone(),
-                    _ => device.last_message(),
-                },
-                problem,
-            }
-        };
-        let devices: Vec<DeviceOutcome> = servo.devices().map(told).collect();
-        let couplings = servo.forces().coupling_outcomes();
-        let (health, misbehaved) = controls.settle(servo.forces().reports());
-        let models = names.into_iter().skip(devices.len()).zip(health);
+        let Finished { servo, end, elapsed_ns, dropped_records, real_time } = finished;
+        let Dismantled { devices, last_stop, forces, swaps, timing } = servo.dismantle();
+        let mut unresponsive = None;
+        let (mut told, mut closing) = (Vec::new(), Vec::new());
+        let model_names = names.get(devices.len()..).unwrap_or_default();
+        for (name, (device, reported)) in names.iter().zip(devices) {
+            let (outcome, opened) = deactivate(name, device, reported, &mut unresponsive);
+            told.push(outcome);
+            closing.extend(opened.map(|opened| (name.clone(), opened)));
+        }
+        let couplings = forces.coupling_outcomes();
+        // No tick will take them any more.
+        let waiting = swaps.into_layers().into_iter();
+        let (layers, reports) = last_words(model_names, (forces, controls.take_retired()), &mut unresponsive);
+        let Settled { first: health, misbehaved, hung } = controls.settle(reports);
+        unresponsive = unresponsive.or(hung);
+        let models = model_names.iter().cloned().zip(health);
         let models = models.map(|(name, (health, words))| (name, health, words)).collect();
-        let timing = servo.into_timing();
+        let name = |number: usize| model_names.get(number).cloned().unwrap_or_default();
+        let layers = layers.into_iter().chain(waiting).map(|(number, layer)| (name(number), layer)).collect();
+        let remains = Remains::new(closing, layers, last_stop);
         let wall_s = started.elapsed().as_secs_f64();
         warnings.extend(controls.warnings());
         let taken = heart.signals_taken();
@@ -473,10 +520,12 @@ impl Session {
             wall_s,
             dropped_records,
             real_time,
-            devices,
+            devices: told,
             couplings,
             models,
             misbehaved,
+            unresponsive,
+            remains,
         })
     }
 
@@ -530,6 +579,11 @@ impl Session {
         // Not scoped: a thread that is stuck in a plugin has to be left behind.
         let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
         let (loop_heart, loop_plugins) = (heart.clone(), plugins.clone());
+        let (progress, all_stoppers) = (Progress::default(), standby.stoppers());
+        let loop_progress = progress.clone();
+        // Number of the device that is being stopped, from 1: looked at from here, as `safe_stop` may hang too.
+        let stopping = Arc::new(AtomicUsize::new(0));
+        let loop_stopping = Arc::clone(&stopping);
         let servo_thread = thread.spawn(move || {
             let real_time = enter_real_time(core);
             let spin = match pacing {
@@ -538,7 +592,7 @@ impl Session {
             };
             // Last of all that takes time.
             let stoppers = standby.stoppers();
-            let servo = activate(standby, &loop_plugins)?;
+            let servo = activate_here(standby, &loop_plugins, &loop_progress)?;
             let schedule = match spin {
                 Some(window) => Schedule::start_real(period_ns, window),
                 None => Schedule::start_paced(period_ns),
@@ -554,7 +608,11 @@ impl Session {
                 });
             }
             // Here, whatever the thread that looks on is at, and while the watchdog still watches.
-            stoppers.iter().for_each(Stopper::safe_stop);
+            for (number, stopper) in (1..).zip(&stoppers) {
+                loop_stopping.store(number, Ordering::Relaxed);
+                stopper.safe_stop();
+            }
+            loop_stopping.store(0, Ordering::Relaxed);
             runner.servo().heart().finish();
             // From here on nothing is energised.
             drop(watchdog_process);
@@ -563,13 +621,32 @@ impl Session {
         });
         let servo_thread = servo_thread.map_err(|_| RunError::Thread("could not be started"))?;
         let mut bitten = None;
+        let mut stopping_since = None;
         while !servo_thread.is_finished() {
             drain(&mut receiver, &mut look);
             controls.sweep();
+            if let Err(hung) = progress.look(limit()) {
+                // Others may be energised by now.
+                all_stoppers.iter().for_each(Stopper::safe_stop);
+                return Err(CallError::from(hung).into());
+            }
+            stopping_since = match stopping.load(Ordering::Relaxed) {
+                0 => None,
+                number => Some(stopping_since.unwrap_or((number, Instant::now()))),
+            };
+            if let Some((number, since)) = stopping_since
+                && since.elapsed() > END_LIMIT
+            {
+                leave_behind();
+                let who = plugins.get(number - 1).map_or_else(String::new, |plugin| plugin.name.clone());
+                let hung = Unresponsive { who, call: Call::SafeStop, limit: END_LIMIT };
+                return Err(CallError::from(hung).into());
+            }
             bitten = bitten.or_else(|| heart.bitten().map(|stuck| (stuck, Instant::now())));
             if let Some((stuck, since)) = bitten
                 && since.elapsed() > COME_BACK
             {
+                leave_behind();
                 return Err(hung(stuck, &plugins, watchdog_ns));
             }
             std::thread::sleep(OBSERVER_PERIOD);
@@ -577,6 +654,63 @@ impl Session {
         let finished = servo_thread.join().map_err(|_| RunError::Thread("panicked"))??;
         drain(&mut receiver, &mut look);
         Ok(finished)
+    }
+}
+
+/// De-energises a device that was told to stop: what it says of the run, and the device unless its plugin broke or hangs.
+fn deactivate(
+    name: &str,
+    mut device: ActiveDevice,
+    reported: Reported,
+    unresponsive: &mut Option<Unresponsive>,
+) -> (DeviceOutcome, Option<OpenedDevice>) {
+    let (who, float_changes) = (name.to_owned(), device.float_changes());
+    let told = attended(END_LIMIT, move |progress| {
+        progress.enter(&who, Call::Deactivate);
+        let ledger = device.energy_ledger();
+        let words = device.last_message();
+        (ledger, words, device.deactivate())
+    });
+    let (ledger, words, opened) = told.unwrap_or_else(|error| {
+        note(error, unresponsive);
+        (None, String::new(), None)
+    });
+    let problem = reported.problem();
+    let found = problem.clone().filter(|_| !reported.is_own_fault);
+    let Reported { fault, implausible, .. } = reported;
+    let words = found.unwrap_or(words);
+    (DeviceOutcome { fault, implausible, problem, ledger, words, float_changes }, opened)
+}
+
+/// Layers, each with the number of its model.
+type Layers = Vec<(usize, Box<Layer>)>;
+
+/// What became of each layer in the loop and of those it handed back, with the last words of those that did not behave; and
+/// the layers, unless one of those hangs.
+fn last_words(
+    names: &[String],
+    (mut forces, mut retired): (Forces, Layers),
+    unresponsive: &mut Option<Unresponsive>,
+) -> (Layers, Vec<LayerReport>) {
+    let names = names.to_vec();
+    let told = attended(END_LIMIT, move |progress: &Progress| {
+        let asks =
+            |model: usize| progress.enter(names.get(model).map_or("", String::as_str), Call::LastMessage);
+        let mut reports: Vec<LayerReport> =
+            retired.iter_mut().map(|(model, layer)| layer.report(*model, || asks(*model))).collect();
+        reports.extend(forces.reports(asks));
+        (forces.into_layers().chain(retired).collect(), reports)
+    });
+    told.unwrap_or_else(|error| {
+        note(error, unresponsive);
+        (Vec::new(), Vec::new())
+    })
+}
+
+/// Keeps the first plugin that did not return.
+fn note(error: CallError, unresponsive: &mut Option<Unresponsive>) {
+    if let CallError::Unresponsive(hung) = error {
+        unresponsive.get_or_insert(hung);
     }
 }
 
