@@ -241,6 +241,25 @@ typedef uint32_t FlotorEmbodiment;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
+// What a device exerts once it is stopped. In C as a number of this value.
+enum FlotorStoppedState
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // No force.
+    FlotorStoppedState_Zero = 0,
+    // It sets the handle down by itself, and then exerts none.
+    FlotorStoppedState_Landed = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum FlotorStoppedState FlotorStoppedState;
+#else
+typedef uint32_t FlotorStoppedState;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
 // One row of the layout table: a field, or a struct as a whole.
 typedef struct FlotorFieldLayout {
     // `Struct.field`, or `Struct` for the whole of it; filled up with zeros.
