@@ -24,7 +24,7 @@ pub struct Sweep {
 
 enum Subject {
     Run { scene: Box<Scene>, folders: Vec<PathBuf> },
-    Eval { plugin: Plugin },
+    Eval { plugin: Box<Plugin> },
 }
 
 /// One task: rows `first..first + count` of the plan.
@@ -125,7 +125,7 @@ impl Sweep {
                 let plugin = registry.load(model, PluginKind::Model)?;
                 check_model_axes(&plan, &plugin)?;
                 digest_file(&mut context, &plugin.metadata().path)?;
-                (Subject::Eval { plugin }, EVAL_COLUMNS.as_slice())
+                (Subject::Eval { plugin: Box::new(plugin) }, EVAL_COLUMNS.as_slice())
             }
             Question::Run { scene, duration_s } => {
                 let mut scene = match scene {

@@ -164,7 +164,7 @@ fn a_wrong_file_is_told_with_file_and_line() {
             format!("1: unknown column `rz_deg`; did you mean `rz_rad`? (the header is {expected})"),
         ),
         ("x_m,y_m,z_m,rx_rad,ry_rad\n0,0,0,0,0\n".to_owned(), "1: column `rz_rad` is missing".to_owned()),
-        (String::new(), "1: column `x_m` is missing".to_owned()),
+        (String::new(), format!(" no poses; the header is {expected}")),
         (
             format!("{POSE_HEADER}\n{good}\nb,0,0,zero,0,0,0\n"),
             "3: z_m must be a number, not `zero`".to_owned(),

@@ -759,7 +759,7 @@ fn an_id_is_looked_for_among_plugins_of_both_kinds_and_nothing_unlike_it_is_sugg
     for (id, told) in [
         ("simulatd", "no plugin `simulatd`; did you mean `simulated`?"),
         ("sprang", "no plugin `sprang`; did you mean `spring`?"),
-        ("jelly", "no plugin `jelly`; `flotor plugins` lists"),
+        ("jelly", "no plugin `jelly` (`flotor plugins` lists all; FLOTOR_PLUGIN_PATH adds folders)"),
     ] {
         let ran = Flotor::with(["plugins", id]).run();
         assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");

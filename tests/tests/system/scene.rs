@@ -227,7 +227,6 @@ fn what_the_command_line_gets_wrong_is_said_there() {
         (&["run", "--set", "spring.gama_n=17"], "no parameter `gama_n`; did you mean `gamma_n`?"),
         (&["run", "--set", "spring.alpha_n_mm2=170"], "set `mode` to `alpha` as well"),
         (&["run", "--clock", "virtual", "--core", "0"], "--core needs the real clock"),
-        (&["run", "--record", "out.bag"], "name it FILE.mcap"),
         (&["run", "no-such-scene.toml"], "no-such-scene.toml: cannot read the scene"),
     ] {
         let ran = Flotor::with(arguments).run();
@@ -239,6 +238,9 @@ fn what_the_command_line_gets_wrong_is_said_there() {
     {
         assert_eq!(Flotor::with(arguments).run().code, Some(exit_code::CONFIGURATION), "{arguments:?}");
     }
+    let recording = Flotor::with(["run", "--record", "out.bag"]).run();
+    assert_eq!(recording.code, Some(exit_code::CONFIGURATION), "{recording:?}");
+    assert!(recording.stderr.contains("name it FILE.mcap"), "{recording:?}");
 }
 
 #[test]

@@ -288,7 +288,7 @@ fn what_is_wrong_with_devices_and_couplings_is_said() {
         (format!("{two}[[model]]\nplugin = \"spring\"\n"), "the scene has several devices: say which"),
         (
             format!("{two}[[model]]\nplugin = \"spring\"\ndevice = \"rigth\"\n"),
-            "there is no device `rigth`; did you mean `right`? (there are left, right)",
+            "there is no device `rigth`; did you mean `right`? (devices: left, right)",
         ),
         (
             "[device]\nplugin = \"a\"\n[[model]]\nplugin = \"wall\"\n[[model]]\nplugin = \"wall\"\n"

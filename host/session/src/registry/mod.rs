@@ -186,20 +186,17 @@ impl Registry {
 
     fn find(&self, id: &str, kind: Option<PluginKind>) -> Result<Plugin, LookupError> {
         if id.contains(MAIN_SEPARATOR) {
-            return self.open(Path::new(id));
+            let plugin = self.open(Path::new(id))?;
+            check_kind(plugin.metadata(), kind)?;
+            return Ok(plugin);
         }
         let fits = |plugin: &Metadata| plugin.id == id && kind.is_none_or(|kind| plugin.kind == kind);
         if let Some(linked) = self.linked.iter().find(|plugin| fits(plugin.metadata())) {
             return Ok(linked.clone());
         }
         let found = self.found.iter().find(|known| known.id == id).ok_or_else(|| self.unknown(id, kind))?;
-        match kind {
-            Some(kind) if found.kind != kind => {
-                let Metadata { path, id, kind: found, .. } = found.clone();
-                Err(LoadError::OtherKind { path, id, found: found.word(), wanted: kind.word() }.into())
-            }
-            _ => self.open(&found.path),
-        }
+        check_kind(found, kind)?;
+        self.open(&found.path)
     }
 
     /// That no plugin (of a kind) has an id, with the nearest that one has.
@@ -282,4 +279,11 @@ pub fn load_file(path: &Path) -> Result<Plugin, LoadError> {
 pub fn is_same_file(one: &Path, other: &Path) -> bool {
     let identity = |path: &Path| std::fs::metadata(path).map(|file| (file.dev(), file.ino()));
     matches!((identity(one), identity(other)), (Ok(one), Ok(other)) if one == other)
+}
+
+/// Refuses a plugin of the other kind.
+fn check_kind(plugin: &Metadata, kind: Option<PluginKind>) -> Result<(), LoadError> {
+    let Some(kind) = kind.filter(|kind| *kind != plugin.kind) else { return Ok(()) };
+    let Metadata { path, id, kind: found, .. } = plugin.clone();
+    Err(LoadError::OtherKind { path, id, found: found.word(), wanted: kind.word() })
 }
