@@ -112,6 +112,7 @@ impl CommandError {
                     Place::DeviceWait(_) | Place::DeviceRead(_) | Place::DeviceWrite(_) => 4,
                     Place::Waiting | Place::Host => 1,
                 },
+                RunError::Latched(_) => 4,
                 RunError::Thread(_) | _ => 1,
             },
             Self::PluginRefused(_) => 3,

@@ -2,10 +2,12 @@
 
 mod choice;
 mod controls;
+mod latch;
 mod prepare;
 mod steps;
 
 pub use controls::{ControlError, Controls, Misbehaved, NewValue};
+pub use latch::{LatchGuard, LatchWatch};
 pub use prepare::prepare_model;
 pub use steps::Steps;
 
@@ -18,7 +20,7 @@ use flotor_core::trace::TickRecord;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, Stopper};
 use flotor_hal::{DVec3, EnergyLedger, Fault, LoopConfig, Parameter};
-use flotor_live::WrenchLimits;
+use flotor_live::{Directory, Pressed, WrenchLimits};
 use flotor_servo::coupling::{Line, Patience};
 use flotor_servo::{
     Clock, Core, Coupled, CouplingOutcome, Envelope, Forces, Guarded, Loop, ModelHealth, ParameterQueue,
@@ -61,6 +63,9 @@ pub enum RunError {
     /// The servo's thread could not be started or died.
     #[error("the servo thread {0}; no device was moved")]
     Thread(&'static str),
+    /// The emergency stop of the machine is pressed, or was while the run started; nothing was energised.
+    #[error("{}", latch::latched_words(.0.as_ref()))]
+    Latched(Option<Pressed>),
     /// A call of the loop did not return; the watchdog has stopped the device.
     #[error(
         "`{who}` did not return from {} in tick {}; the watchdog stopped the device after {} ms",
@@ -113,6 +118,7 @@ pub struct Session {
     core: Option<Core>,
     plugins: Vec<PluginReport>,
     lines: Vec<(String, Line)>,
+    latch: LatchGuard,
 }
 
 /// What is known after a run.
@@ -181,6 +187,7 @@ impl Session {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
         let duration_ns = (scene.duration_s * 1.0e9).round() as u64;
         let config = LoopConfig { period_ns, seed: options.seed };
+        let latch = LatchGuard::of_this_user();
 
         let mut plugins = Vec::new();
         let mut opened = Vec::new();
@@ -242,6 +249,7 @@ impl Session {
             core: None,
             plugins,
             lines,
+            latch,
         })
     }
 
@@ -251,12 +259,25 @@ impl Session {
         Self { core, ..self }
     }
 
+    /// The same with the latch of another folder than that of this user's runs, from now on.
+    #[must_use]
+    pub fn latched_in(self, directory: &Directory) -> Self {
+        Self { latch: LatchGuard::of(directory), ..self }
+    }
+
+    /// The latch that stops this run and that it presses; none on the virtual clock, where no hand is held.
+    #[must_use]
+    pub fn latch(&self) -> Option<&LatchGuard> {
+        (self.clock == Clock::Real).then_some(&self.latch)
+    }
+
     /// The loop itself, its devices energised, for whoever paces it differently; the stoppers must be used before it is
     /// dropped. Not real-time.
     ///
     /// # Errors
-    /// [`RunError::Plugin`] if a device says no; then none is energised.
+    /// [`RunError::Plugin`] if a device says no, [`RunError::Latched`]; then none is energised.
     pub fn into_loop(self) -> Result<(Servo, Vec<Stopper>), RunError> {
+        self.latch().map_or(Ok(()), LatchGuard::check)?;
         let stoppers = self.standby.stoppers();
         Ok((activate(self.standby, &self.plugins)?, stoppers))
     }
@@ -302,7 +323,8 @@ impl Session {
     ///
     /// # Errors
     /// [`RunError::Plugin`] if a device refuses to be energised, [`RunError::Thread`] if the servo's thread cannot be had,
-    /// [`RunError::Hung`] if it does not come back: it is left behind then, and the process should end soon.
+    /// [`RunError::Hung`] if it does not come back: it is left behind then, and the process should end soon;
+    /// [`RunError::Latched`] if the emergency stop of the machine is pressed, on the real clock.
     pub fn run(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Outcome, RunError> {
         let started = Instant::now();
         let names: Vec<String> = self.plugins.iter().map(|plugin| plugin.name.clone()).collect();
@@ -375,8 +397,11 @@ impl Session {
             watchdog_ns,
             core,
             plugins,
+            latch,
             ..
         } = self;
+        // Before the look at the latch that counts: a press after that is seen here.
+        let _watch = latch.watch(stop).map_err(|_| RunError::Thread(latch::NO_WATCH))?;
         let mut look = |record: TickRecord| {
             changes.up_to(record.tick, |change| observer.change(change));
             observer.observe(&record);
@@ -385,7 +410,7 @@ impl Session {
         let loop_stop = stop.clone();
         // Not scoped: a thread that is stuck in a plugin has to be left behind.
         let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
-        let (loop_heart, loop_plugins) = (heart.clone(), plugins.clone());
+        let (loop_heart, loop_plugins, loop_latch) = (heart.clone(), plugins.clone(), latch.clone());
         let servo_thread = thread.spawn(move || {
             let real_time = enter_real_time(core);
             let spin = match pacing {
@@ -394,6 +419,7 @@ impl Session {
             };
             // Last of all that takes time.
             let stoppers = standby.stoppers();
+            loop_latch.check()?;
             let servo = activate(standby, &loop_plugins)?;
             let schedule = match spin {
                 Some(window) => Schedule::start_real(period_ns, window),
@@ -430,6 +456,10 @@ impl Session {
         }
         let finished = servo_thread.join().map_err(|_| RunError::Thread("panicked"))??;
         drain(&mut receiver, &mut look);
+        // A button or the device itself closes no switch, which would have pressed by now.
+        if let (RunEnd::EmergencyStop(source), None) = (finished.end, stop.emergency()) {
+            latch.press(source);
+        }
         Ok(finished)
     }
 }

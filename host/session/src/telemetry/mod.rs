@@ -17,12 +17,12 @@ pub use peer_link::{LinkCounts, PeerLink, start_peer_link};
 
 use crate::registry::Registry;
 use crate::scene::Scene;
-use crate::{ControlError, Controls, NewValue, Observer, PluginReport, Session};
+use crate::{ControlError, Controls, LatchGuard, NewValue, Observer, PluginReport, Session};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_live::{Ask, Directory, Greeting, PROTOCOL, PanelPlugin, Publication, PublishError, Serve};
 use flotor_record::RunDescription;
-use flotor_servo::StopSwitch;
+use flotor_servo::{EmergencySource, StopSwitch};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -38,7 +38,8 @@ pub fn publish(
     stop: &StopSwitch,
 ) -> Result<Publication, PublishError> {
     let folders = scene.plugin_folders.clone();
-    let host = Host { controls: session.controls(), stop: stop.clone(), folders, registry: Mutex::new(None) };
+    let (controls, stop, latch) = (session.controls(), stop.clone(), session.latch().cloned());
+    let host = Host { controls, stop, latch, folders, registry: Mutex::new(None) };
     announce(directory, scene, run, session, Arc::new(host))
 }
 
@@ -106,6 +107,8 @@ impl<O: Observer> Observer for Watched<O> {
 struct Host {
     controls: Controls,
     stop: StopSwitch,
+    /// Pressed by an emergency stop before that is answered.
+    latch: Option<LatchGuard>,
     /// Where the scene has plugins looked for.
     folders: Vec<PathBuf>,
     /// Searched when the first model is replaced; kept, so that a file that has not changed is not mapped once more.
@@ -149,7 +152,7 @@ fn swap_words(model: &str, error: &ControlError) -> String {
 
 impl Serve for Host {
     fn serve(&self, ask: Ask) -> Result<(), String> {
-        let Self { controls, stop, .. } = self;
+        let Self { controls, stop, latch, .. } = self;
         match ask {
             Ask::Watch { .. } | Ask::LookAway => {} // the publication's own
             Ask::Set { values } => {
@@ -167,7 +170,11 @@ impl Serve for Host {
                 swapped.map_err(|error| swap_words(&model, &error))?;
             }
             Ask::Stop => stop.stop(),
-            Ask::EmergencyStop => stop.emergency_by_watcher(),
+            Ask::EmergencyStop => {
+                stop.emergency_by_watcher();
+                let problem = latch.as_ref().and_then(|latch| latch.press(EmergencySource::Watcher));
+                return problem.map_or(Ok(()), |problem| Err(format!("this run stops, no other: {problem}")));
+            }
         }
         Ok(())
     }
