@@ -57,8 +57,11 @@ impl Events {
     /// Nothing is heard of a coupling's other end, on another host: the coupling does not pull.
     pub const PARTNER_SILENT: Events = Events { bits: 1 << 20 };
 
+    /// The other end of a coupling, on another host, claimed more than is believed: a motion too fast, or too much energy.
+    pub const PARTNER_LIMITED: Events = Events { bits: 1 << 21 };
+
     /// Names of the bits, lowest first: for reports and recordings.
-    pub const NAMES: [&'static str; 21] = [
+    pub const NAMES: [&'static str; 22] = [
         "stale_sample",
         "not_finite",
         "force_limited",
@@ -80,6 +83,7 @@ impl Events {
         "model_overrun",
         "excess_force",
         "partner_silent",
+        "partner_limited",
     ];
 
     /// Adds events. Real-time: bounded, no allocation.

@@ -19,15 +19,15 @@ use flotor_core::MOST_DEVICES;
 use flotor_core::trace::TickRecord;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, Stopper};
-use flotor_hal::{DVec3, EnergyLedger, Fault, LoopConfig, Parameter};
+use flotor_hal::{Capabilities, DVec3, EnergyLedger, Fault, LoopConfig, Parameter};
 use flotor_live::{Directory, Pressed, WrenchLimits};
-use flotor_servo::coupling::{Line, Patience};
+use flotor_servo::coupling::{Line, Patience, Reach};
 use flotor_servo::{
     Clock, Core, Coupled, CouplingOutcome, Envelope, Forces, Guarded, Loop, ModelHealth, ParameterQueue,
     Place, RealTimeReport, RunConfig, RunEnd, Schedule, Servo, SpinWindow, Standby, StopSwitch, Stuck,
     Timing, drain, enter_real_time, queue, start_watchdog, swap_queues,
 };
-use prepare::{Scheduled, activate};
+use prepare::{Opened, Scheduled, activate};
 use std::time::{Duration, Instant};
 
 /// How a scene is to be run.
@@ -217,6 +217,11 @@ impl Session {
         let controls =
             Controls::new(parts.clone(), sender, &scene.models, (config, options.clock), host_swaps);
 
+        let reach = |opened: &Opened| {
+            let Capabilities { range_m, range_rad, .. } = opened.capabilities;
+            Reach { range_m, range_rad }
+        };
+        let reaches: Vec<Reach> = opened.iter().map(reach).collect();
         let devices = opened.into_iter().map(|opened| {
             let envelope = Envelope::new(&scene.limits, &scene.boundary, &opened.capabilities, period_ns);
             Guarded { device: opened.device, sensed: opened.capabilities.sensed, envelope }
@@ -230,7 +235,9 @@ impl Session {
         let patience = Patience { silence_ns: watchdog_ns, fade_ns: ramp_ns };
         let mut lines = Vec::new();
         let couplings = scene.couplings.iter().map(|coupling| {
-            let (coupled, line) = Coupled::new(coupling, period_s, patience);
+            let here = coupling.ends.here().first().and_then(|end| reaches.get(usize::from(end.device)));
+            let reach = here.copied().unwrap_or_default();
+            let (coupled, line) = Coupled::new(coupling, period_s, patience, reach);
             lines.extend(line.map(|line| (coupling.name.clone(), line)));
             coupled
         });

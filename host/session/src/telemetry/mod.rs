@@ -11,9 +11,11 @@
 //! A model that somebody wants in place of another is loaded and made here, on a thread of its own, and goes to the loop when
 //! it is ready.
 
+mod pairing;
 mod peer_link;
 
-pub use peer_link::{LinkCounts, PeerLink, start_peer_link};
+pub use pairing::{LinkCounts, Pairing};
+pub use peer_link::{PeerLink, start_peer_link};
 
 use crate::registry::Registry;
 use crate::scene::Scene;
