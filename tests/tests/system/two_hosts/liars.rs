@@ -82,7 +82,7 @@ const LIES: [(&str, Lie); 12] = [
 #[test]
 fn no_lie_brings_out_more_than_was_checked_here_or_throws_the_handle() {
     let registry = Registry::search(&[]);
-    let ticks = TestSize::of_this_run().pick(5_000, 100_000);
+    let ticks = TestSize::of_this_run().pick(5_000, 100_000) as u64;
     for (name, lie) in LIES {
         let duration_s = 1.0e-3 * ticks as f64 + 1.0;
         let mut host =
