@@ -240,7 +240,7 @@ impl Coupler {
             match dispatch {
                 Some(Ok(dispatch)) => {
                     of_callback.answered.store(dispatch.partner, Ordering::Relaxed);
-                    drop(sender.try_send(dispatch));
+                    let _ = sender.try_send(dispatch);
                 }
                 _ => {
                     of_callback.refused.fetch_add(1, Ordering::Relaxed);
