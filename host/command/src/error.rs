@@ -109,6 +109,7 @@ impl CommandError {
                     Place::DeviceWait(_) | Place::DeviceRead(_) | Place::DeviceWrite(_) => 4,
                     Place::Waiting | Place::Host => 1,
                 },
+                RunError::Latched(_) => 4,
                 _ => 1,
             },
             Self::PluginRefused(_) => 3,

@@ -5,7 +5,7 @@
 use super::Heartbeat;
 use super::models::{Layer, LayerReport, ModelHealth, ModelStack, Replacement};
 use crate::coupling::{
-    Coupling, CouplingDescription, CouplingEnds, Grip, Hearing, Line, Patience, Pull, RemoteEnd, Tank,
+    Coupling, CouplingDescription, CouplingEnds, Grip, Hearing, Line, Patience, Pull, Reach, RemoteEnd, Tank,
     TankState,
 };
 use flotor_core::trace::Events;
@@ -90,8 +90,13 @@ pub enum Coupled {
 }
 
 impl Coupled {
-    /// With the line for the peer state, if one end is on another host. Not real-time.
-    pub fn new(description: &CouplingDescription, period_s: f64, patience: Patience) -> (Self, Option<Line>) {
+    /// With the line for the peer state, if one end is on another host; `reach` is that of the device here. Not real-time.
+    pub fn new(
+        description: &CouplingDescription,
+        period_s: f64,
+        patience: Patience,
+        reach: Reach,
+    ) -> (Self, Option<Line>) {
         let CouplingDescription { config, ends, .. } = description;
         match ends {
             CouplingEnds::Here(ends) => {
@@ -100,7 +105,7 @@ impl Coupled {
                 (Self::Here { coupling, devices, pulls: [Pull::default(); 2] }, None)
             }
             CouplingEnds::Remote(here) => {
-                let (end, line) = RemoteEnd::new(config, here, period_s, patience);
+                let (end, line) = RemoteEnd::new(config, here, period_s, patience, reach);
                 let device = usize::from(here.device);
                 (Self::Remote { end: Box::new(end), device, pull: Pull::default() }, Some(line))
             }
@@ -143,6 +148,9 @@ impl Coupled {
                 }
                 if end.is_implausible() {
                     port.events.insert(Events::IMPLAUSIBLE_SAMPLE);
+                }
+                if end.is_cut() {
+                    port.events.insert(Events::PARTNER_LIMITED);
                 }
             }
         }

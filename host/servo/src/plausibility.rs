@@ -20,7 +20,7 @@ const RANGES: f64 = 2.0;
 const ROOM_M: f64 = 10.0;
 /// Fastest that a handle goes from one sample to the next: a throw leaves the hand at ten times the fastest reach (0.5
 /// m/s is fast within a workspace of centimetres), a wrist turns at 30 rad/s.
-pub(crate) const SPEED_M_PER_S: f64 = 5.0;
+const SPEED_M_PER_S: f64 = 5.0;
 const SPIN_RAD_PER_S: f64 = 50.0;
 /// Fastest change of that: 500 times that of a fall. Of a handle in a hand, a tap on a wall has a tenth of it.
 const ACCELERATION_M_PER_S2: f64 = 5.0e3;
@@ -346,7 +346,7 @@ pub(crate) fn stale_ticks_limit(period_ns: u64) -> u32 {
 
 /// True if a quaternion has the length of one. Real-time: bounded, no allocation.
 #[inline]
-pub(crate) fn is_rotation(quaternion: DQuat) -> bool {
+fn is_rotation(quaternion: DQuat) -> bool {
     (quaternion.length_squared() - 1.0).abs() <= 2.0 * LENGTH_TOLERANCE // false for NaN
 }
 

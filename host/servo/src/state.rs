@@ -31,6 +31,8 @@ pub enum EmergencySource {
     Key,
     /// The signal `SIGUSR1`, or a second one that asks for an end.
     Signal,
+    /// The latch of the machine: the emergency stop of another run, or of the network.
+    Latch,
     /// A program that watches the run: the viewer.
     Watcher,
     /// A button of the device that the scene names.
@@ -46,6 +48,7 @@ impl EmergencySource {
         match self {
             Self::Key => "key",
             Self::Signal => "signal",
+            Self::Latch => "pressed at another run or on the network",
             Self::Watcher => "a program that watches",
             Self::Button => "button of the device",
             Self::Device => "the device's own",

@@ -24,6 +24,6 @@ pub mod telemetry;
 
 pub use run_recording::RunRecording;
 pub use session::{
-    ControlError, Controls, DeviceOutcome, Misbehaved, NewValue, Observer, Outcome, PluginReport, RunError,
-    RunOptions, Session, Steps, Strength, StrongDevice, prepare_model,
+    ControlError, Controls, DeviceOutcome, LatchGuard, LatchWatch, Misbehaved, NewValue, Observer, Outcome,
+    PluginReport, RunError, RunOptions, Session, Steps, Strength, StrongDevice, prepare_model,
 };

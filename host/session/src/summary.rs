@@ -178,7 +178,8 @@ pub struct DeviceSummary {
 pub struct CouplingSummary {
     /// Name in the scene.
     pub name: String,
-    /// The lowest the tank of each end ever was, J: below zero, the coupling has generated energy.
+    /// The lowest the tank of each end ever was, J: below zero, more has come out there than this end had and was told of. That of an
+    /// end on another host is what that host says of itself, and proves nothing.
     pub lowest_j: [f64; 2],
     /// What the hand at each end has put in altogether less what came out, J.
     pub gone_in_j: [f64; 2],
@@ -202,6 +203,16 @@ pub struct LinkSummary {
     pub implausible: u64,
     /// Counts of messages.
     pub carried: LinkCounts,
+    /// The partner's run, as text: when it began, ns since 1970; empty without one.
+    pub partner: String,
+    /// The energy that was believed of the partner, J: no more than this and what the hand here had put in came out here.
+    pub believed_j: f64,
+    /// Energy it claimed beyond what can be checked here, J.
+    pub cut_j: f64,
+    /// Way it claimed beyond what a hand can do, m.
+    pub cut_path_m: f64,
+    /// How often a partner was let go because of its claims.
+    pub let_go: u32,
 }
 
 /// Energy balance of a run.
@@ -261,8 +272,8 @@ pub struct RunFacts<'a> {
 impl LinkSummary {
     /// For people.
     fn to_text(&self) -> String {
-        let Self { heard_ticks, silences, longest_wait_ms, implausible, carried } = self;
-        let LinkCounts { lost, overtaken, refused, .. } = carried;
+        let Self { heard_ticks, silences, longest_wait_ms, implausible, carried, .. } = self;
+        let LinkCounts { lost, overtaken, refused, others, .. } = carried;
         let silent = match silences {
             0 => format!("longest wait for a message {longest_wait_ms:.0} ms"),
             silences => format!("force removed {silences} times for want of messages"),
@@ -271,8 +282,25 @@ impl LinkSummary {
             0 => String::new(),
             count => format!(", {count} cannot be"),
         };
+        let partner = match self.partner.as_str() {
+            "" => "no partner".to_owned(),
+            run => format!("partner: run {run}"),
+        };
+        let others = match others {
+            0 => String::new(),
+            others => format!(", {others} of other runs not let in"),
+        };
+        let cut = match (self.cut_j > 0.0 || self.cut_path_m > 0.0, self.let_go) {
+            (false, 0) => String::new(),
+            (_, times) => format!(
+                "; not believed: {:.3} mJ, {:.1} mm; let go {times} times because of it",
+                self.cut_j * 1.0e3,
+                self.cut_path_m * 1.0e3
+            ),
+        };
         format!(
-            "messages in {heard_ticks} ticks, {silent}; {lost} lost, {overtaken} overtaken, {refused} refused{impossible}"
+            "{partner}; messages in {heard_ticks} ticks, {silent}; {lost} lost, {overtaken} overtaken, {refused} \
+             refused{impossible}{others}{cut}"
         )
     }
 }
@@ -387,8 +415,15 @@ impl RunSummary {
         for CouplingSummary { name, lowest_j, given_up_j, link, .. } in &self.couplings {
             let [first, second] = lowest_j.map(|joule| joule * 1.0e3);
             let heat_mj = given_up_j.iter().sum::<f64>() * 1.0e3;
-            let tanks =
-                format!("tanks never below {first:+.3} and {second:+.3} mJ, {heat_mj:.3} mJ dissipated");
+            let tanks = match link {
+                None => {
+                    format!("tanks never below {first:+.3} and {second:+.3} mJ, {heat_mj:.3} mJ dissipated")
+                }
+                Some(link) => format!(
+                    "tank never below {first:+.3} mJ with {:.3} mJ believed of the partner, whose own says {second:+.3} mJ",
+                    link.believed_j * 1.0e3
+                ),
+            };
             row("coupling", format!("{name}: {tanks}"));
             link.iter().for_each(|link| row("link", format!("{name}: {}", link.to_text())));
         }
@@ -441,6 +476,11 @@ fn coupling_summary(
         longest_wait_ms: hearing.longest_wait_ns as f64 * 1.0e-6,
         implausible: hearing.implausible,
         carried: carried.unwrap_or_default(),
+        partner: if hearing.run == 0 { String::new() } else { hearing.run.to_string() },
+        believed_j: hearing.believed_j,
+        cut_j: hearing.cut.energy_j,
+        cut_path_m: hearing.cut.path_m,
+        let_go: hearing.let_go,
     };
     CouplingSummary {
         name: coupling.name.clone(),

@@ -8,6 +8,7 @@ mod emulate;
 mod new;
 mod plugins;
 mod record;
+mod release;
 mod run;
 mod swap;
 mod view;
@@ -89,6 +90,8 @@ enum Command {
     Record(record::RecordArguments),
     /// Hot-swap a model of a running session, without a jump in the force
     Swap(swap::SwapArguments),
+    /// Release the emergency stop of this machine: runs may start again
+    Release(release::ReleaseArguments),
     /// Publish a running host on a network, or show a remote one here
     Bridge(Separate),
     /// Sweep a model or a scene over parameters, poses and seeds into a Parquet table
@@ -149,6 +152,7 @@ pub fn main() -> ExitCode {
         Some(Command::Stress(separate)) => LAB.carry_out("stress", &separate.arguments),
         Some(Command::Record(arguments)) => record::run(&arguments),
         Some(Command::Swap(arguments)) => swap::run(&arguments),
+        Some(Command::Release(arguments)) => release::run(&arguments),
         Some(Command::Bridge(separate)) => BRIDGE.become_with(&separate.arguments),
         Some(Command::Sweep(separate)) => SWEEP.become_with(&separate.arguments),
         Some(Command::Study(separate)) => STUDY.carry_out("study", &separate.arguments),

@@ -9,7 +9,7 @@ use flotor_command::stopping::{Keys, stop_run_on_signals};
 use flotor_command::{CommandError, first_error, note, print_result, progress_bar, style};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
-use flotor_live::Directory;
+use flotor_live::{Directory, Latch};
 use flotor_record::{Note, Recorder, Severity, TraceDigest};
 use flotor_servo::RunEnd;
 use flotor_servo::coupling::Line;
@@ -106,6 +106,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     };
     let keys = (clock == Clock::Real).then(|| Keys::listen(&stop)).flatten();
     let mut watched = Watched { observer: watchers, publication };
+    let latch = session.latch().map(|guard| guard.latch().clone());
     let outcome = session.run(&mut watched, &stop);
     drop(keys);
     let Watched { observer: Watchers { tally, digest, mut recording, plot, progress }, publication } =
@@ -143,6 +144,9 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let printed = print_result(arguments.json.as_deref(), &summary, text);
     outcome.real_time.advice().into_iter().for_each(note);
     outcome.later_warnings().iter().for_each(note);
+    if let (RunEnd::EmergencyStop(_), Some(latch)) = (outcome.end, latch) {
+        note_latch(&latch);
+    }
     // Scripts need the outcome of the run first, a missing file second.
     first_error([verdict(&outcome, &plugins, &summary), recorded, drawn, printed])
 }
@@ -166,6 +170,17 @@ fn notes(outcome: &Outcome, summary: &RunSummary) -> Vec<Note> {
         notes.push(note(Severity::Error, "flotor", end_words(outcome, summary.rate_hz)));
     }
     notes
+}
+
+/// What an emergency stop means for other runs of this machine.
+fn note_latch(latch: &Latch) {
+    match latch.length() {
+        Some(_) => note("all runs of this machine are stopped, and none starts until `flotor release`"),
+        None => {
+            let path = latch.path().display();
+            note(format_args!("the emergency stop is of this run only: {path} cannot be written"));
+        }
+    }
 }
 
 /// What the end of the run means for the exit code.

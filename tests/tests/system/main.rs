@@ -15,6 +15,7 @@ mod force_sensor;
 mod golden;
 mod haply;
 mod isolation;
+mod latch;
 mod limits;
 mod live;
 mod maglev;

@@ -9,6 +9,7 @@ use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, progress_bar};
 use flotor_hal::abi::PluginKind;
 use flotor_servo::StopSwitch;
+use flotor_session::LatchGuard;
 use flotor_session::registry::Registry;
 use indicatif::ProgressBar;
 use std::ops::ControlFlow;
@@ -80,6 +81,7 @@ impl RigArguments {
         let progress = progress_bar(stops, "{pos}/{len}  {wide_bar}\n{msg}");
         progress.enable_steady_tick(REDRAWN);
         let stop = stop_on_signals();
+        LatchGuard::of_this_user().obey(&stop)?;
         let guide = guide(&progress, &stop);
         let rig = DeviceRig::open(&plugin, &settings, sensor, close_m, patience, stop, guide);
         Ok((rig.map_err(refused)?, progress))

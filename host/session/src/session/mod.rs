@@ -3,11 +3,13 @@
 mod ceiling;
 mod choice;
 mod controls;
+mod latch;
 mod prepare;
 mod steps;
 
 pub use ceiling::{Strength, StrongDevice};
 pub use controls::{ControlError, Controls, Misbehaved, NewValue};
+pub use latch::{LatchGuard, LatchWatch};
 pub use prepare::prepare_model;
 pub use steps::Steps;
 
@@ -22,8 +24,8 @@ use flotor_core::trace::TickRecord;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, Stopper};
 use flotor_hal::{Capabilities, DVec3, EnergyLedger, Fault, LoopConfig, Parameter};
-use flotor_live::WrenchLimits;
-use flotor_servo::coupling::{Line, Patience};
+use flotor_live::{Directory, Pressed, WrenchLimits};
+use flotor_servo::coupling::{Line, Patience, Reach};
 use flotor_servo::last_stop::TakenSignals;
 use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{
@@ -72,6 +74,9 @@ pub enum RunError {
         "no watchdog process: {0}; `[limits] require_independent_stop = true` asks for one, so remove that line or mend this"
     )]
     WatchdogProcess(std::io::Error),
+    /// The emergency stop of the machine is pressed, or was while the run started; nothing was energised.
+    #[error("{}", latch::latched_words(.0.as_ref()))]
+    Latched(Option<Pressed>),
     /// A call of the loop did not return; the watchdog has stopped the device.
     #[error(
         "`{who}` did not return from {} in tick {}; the watchdog stopped the device after {} ms",
@@ -94,7 +99,7 @@ impl RunError {
         match self {
             Self::Scene(_) | Self::Mismatch { .. } | Self::Lookup(LookupError::Unknown { .. }) => true,
             Self::Lookup(LookupError::Refused(error)) | Self::Plugin(error) => error.is_configuration(),
-            Self::Thread(_) | Self::Hung { .. } | Self::WatchdogProcess(_) => false,
+            Self::Thread(_) | Self::Hung { .. } | Self::WatchdogProcess(_) | Self::Latched(_) => false,
         }
     }
 }
@@ -156,6 +161,7 @@ pub struct Session {
     warnings: Vec<String>,
     /// Stops what has a means of its own to be stopped, if this process is gone (real clock only).
     watchdog_process: Option<WatchdogProcess>,
+    latch: LatchGuard,
 }
 
 /// What is known after a run.
@@ -238,6 +244,7 @@ impl Session {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
         let duration_ns = (scene.duration_s * 1.0e9).round() as u64;
         let config = LoopConfig { period_ns, seed: options.seed };
+        let latch = LatchGuard::of_this_user();
 
         let mut plugins = Vec::new();
         let mut opened = Vec::new();
@@ -298,7 +305,10 @@ impl Session {
         let patience = Patience { silence_ns: watchdog_ns, fade_ns: ramp_ns };
         let mut lines = Vec::new();
         let couplings = scene.couplings.iter().map(|coupling| {
-            let (coupled, line) = Coupled::new(coupling, period_s, patience);
+            let here = coupling.ends.here().first().and_then(|end| capabilities.get(usize::from(end.device)));
+            let reach = here.map(|device| Reach { range_m: device.range_m, range_rad: device.range_rad });
+            let reach = reach.unwrap_or_default();
+            let (coupled, line) = Coupled::new(coupling, period_s, patience, reach);
             lines.extend(line.map(|line| (coupling.name.clone(), line)));
             coupled
         });
@@ -323,6 +333,7 @@ impl Session {
             norm_notice: norm_notice(&scene.limits, &capabilities),
             warnings,
             watchdog_process,
+            latch,
         }
         .with_strength(Strength::of_the_environment()))
     }
@@ -374,12 +385,25 @@ impl Session {
         Self { core, ..self }
     }
 
+    /// The same with the latch of another folder than that of this user's runs, from now on.
+    #[must_use]
+    pub fn latched_in(self, directory: &Directory) -> Self {
+        Self { latch: LatchGuard::of(directory), ..self }
+    }
+
+    /// The latch that stops this run and that it presses; none on the virtual clock, where no hand is held.
+    #[must_use]
+    pub fn latch(&self) -> Option<&LatchGuard> {
+        (self.clock == Clock::Real).then_some(&self.latch)
+    }
+
     /// The loop itself, its devices energised, for whoever paces it differently; the stoppers must be used before it is
     /// dropped. Not real-time.
     ///
     /// # Errors
-    /// [`RunError::Plugin`] if a device says no; then none is energised.
+    /// [`RunError::Plugin`] if a device says no, [`RunError::Latched`]; then none is energised.
     pub fn into_loop(self) -> Result<(Servo, Vec<Stopper>), RunError> {
+        self.latch().map_or(Ok(()), LatchGuard::check)?;
         let stoppers = self.standby.stoppers();
         Ok((activate(self.standby, &self.plugins)?, stoppers))
     }
@@ -425,7 +449,8 @@ impl Session {
     ///
     /// # Errors
     /// [`RunError::Plugin`] if a device refuses to be energised, [`RunError::Thread`] if the servo's thread cannot be had,
-    /// [`RunError::Hung`] if it does not come back: it is left behind then, and the process should end soon.
+    /// [`RunError::Hung`] if it does not come back: it is left behind then, and the process should end soon;
+    /// [`RunError::Latched`] if the emergency stop of the machine is pressed, on the real clock.
     pub fn run(mut self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Outcome, RunError> {
         let started = Instant::now();
         let (mut warnings, heart) = (std::mem::take(&mut self.warnings), self.standby.heart());
@@ -519,8 +544,11 @@ impl Session {
             core,
             plugins,
             watchdog_process,
+            latch,
             ..
         } = self;
+        // Before the look at the latch that counts: a press after that is seen here.
+        let _watch = latch.watch(stop).map_err(|_| RunError::Thread(latch::NO_WATCH))?;
         let mut look = |record: TickRecord| {
             changes.up_to(record.tick, |change| observer.change(change));
             observer.observe(&record);
@@ -529,7 +557,7 @@ impl Session {
         let loop_stop = stop.clone();
         // Not scoped: a thread that is stuck in a plugin has to be left behind.
         let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
-        let (loop_heart, loop_plugins) = (heart.clone(), plugins.clone());
+        let (loop_heart, loop_plugins, loop_latch) = (heart.clone(), plugins.clone(), latch.clone());
         let servo_thread = thread.spawn(move || {
             let real_time = enter_real_time(core);
             let spin = match pacing {
@@ -538,6 +566,7 @@ impl Session {
             };
             // Last of all that takes time.
             let stoppers = standby.stoppers();
+            loop_latch.check()?;
             let servo = activate(standby, &loop_plugins)?;
             let schedule = match spin {
                 Some(window) => Schedule::start_real(period_ns, window),
@@ -576,6 +605,10 @@ impl Session {
         }
         let finished = servo_thread.join().map_err(|_| RunError::Thread("panicked"))??;
         drain(&mut receiver, &mut look);
+        // A button or the device itself closes no switch, which would have pressed by now.
+        if let (RunEnd::EmergencyStop(source), None) = (finished.end, stop.emergency()) {
+            latch.press(source);
+        }
         Ok(finished)
     }
 }
