@@ -20,6 +20,7 @@ mod maglev;
 mod oracle;
 mod parsers;
 mod physics;
+mod planted;
 mod plugins;
 mod reach;
 mod reference;
