@@ -32,6 +32,7 @@ mod scaffold;
 mod scene;
 mod simulated;
 mod study;
+mod supply;
 mod swap;
 mod teleoperation;
 mod two_hosts;
