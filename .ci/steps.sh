@@ -178,6 +178,19 @@ fuzz() {
         --target-dir target/fuzz --bin decode -- -max_total_time=60 -print_final_stats=1
 }
 
+# Advisories, licences and sources of all workspaces by deny.toml. The daily tests compare licences and sources without it; it
+# needs the network, for the advisories, and `cargo install cargo-deny --locked`.
+deny() {
+    local workspace
+    if ! command -v cargo-deny >/dev/null; then
+        echo "skipped: cargo-deny is not installed"
+        return 0
+    fi
+    for workspace in . host/python host/bridge host/sweep; do
+        cargo deny --manifest-path "$workspace/Cargo.toml" check --config deny.toml advisories licenses sources
+    done
+}
+
 # The Python wheel as a user installs it, and its tests against the command: models, runs, sweeps on threads and Dask; and the
 # Python of the book, with the package that it names for recordings.
 wheel() {

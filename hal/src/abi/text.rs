@@ -132,6 +132,15 @@ impl Default for Message {
 }
 
 impl Message {
+    /// What is wrong with a message of a foreign plugin: it is longer than a message can be, or not text.
+    #[must_use]
+    pub fn problem(&self) -> Option<String> {
+        let Some(bytes) = self.text.get(..self.len as usize) else {
+            return Some(format!("a message of {} bytes, above the limit of {MESSAGE_BYTES}", self.len));
+        };
+        std::str::from_utf8(bytes).is_err().then(|| "a message that is not UTF-8".to_owned())
+    }
+
     /// Stores as much of `text` as fits, cut at a character. Real-time: bounded, no allocation.
     #[allow(clippy::cast_possible_truncation)] // at most MESSAGE_BYTES
     pub fn set(&mut self, text: &str) {
@@ -165,6 +174,20 @@ layout! {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_message_that_is_none_is_told() {
+        let mut message = Message::default();
+        message.set("ok");
+        assert_eq!(message.problem(), None);
+        message.text[1] = 0xff;
+        assert_eq!(message.problem().as_deref(), Some("a message that is not UTF-8"));
+        message.len = 4_000_000_000;
+        assert_eq!(
+            message.problem().as_deref(),
+            Some("a message of 4000000000 bytes, above the limit of 508")
+        );
+    }
 
     #[test]
     fn a_message_is_cut_at_a_character() {

@@ -1,6 +1,6 @@
 //! Measurements of plugins, loops and recordings.
 //!
-//! - [`evaluate`]: a force model at given poses.
+//! - [`evaluate`]: a force model at given [`poses`].
 //! - [`stress`]: numerical stability of a force model.
 //! - [`mod@validate`]: a plugin against the rules of the contract.
 //! - [`mod@bench`]: cost and error of an evaluation.
@@ -17,6 +17,7 @@ pub mod cli;
 pub mod evaluate;
 pub mod jitter;
 mod plant;
+pub mod poses;
 pub mod replay;
 pub mod sampling;
 pub mod stability;

@@ -36,6 +36,8 @@ enum Role {
     /// What the programs share: options, output, errors.
     Command,
     Lab,
+    /// An allocator for one process of the lab.
+    Guard,
     Calibration,
     Study,
     Host,
@@ -46,8 +48,8 @@ enum Role {
 }
 
 use Role::{
-    Calibration, Command, Contract, Core, Emulator, Fixture, Host, Lab, Live, Plot, Plugin, Record, Servo,
-    Session, Statistics, Study, Sync, Tests, Viewer,
+    Calibration, Command, Contract, Core, Emulator, Fixture, Guard, Host, Lab, Live, Plot, Plugin, Record,
+    Servo, Session, Statistics, Study, Sync, Tests, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
@@ -62,6 +64,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("host/statistics", Statistics, &[]),
     ("host/plot", Plot, &[]),
     ("host/command", Command, &[Contract, Sync, Core, Servo, Record, Live, Session]),
+    ("host/lab/guard", Guard, &[]),
     ("host/lab", Lab, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command]),
     ("host/calibration", Calibration, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command]),
     ("host/study", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Statistics, Command]),
@@ -83,6 +86,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
             Command,
             Statistics,
             Lab,
+            Guard,
             Calibration,
             Study,
             Plugin,
@@ -306,6 +310,10 @@ const UNSAFE: &[(&str, &str)] = &[
     (
         "host/session/src/registry/mod.rs",
         "the one place of the host that loads a plugin file, which the user guarantees",
+    ),
+    (
+        "host/lab/guard/src/lib.rs",
+        "an allocator in the place of the C library's, for the one process in which `validate` looks for overruns",
     ),
     ("viewer/src/shape.rs", "the one place of the viewer that loads a plugin file"),
     (

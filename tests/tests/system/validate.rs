@@ -5,7 +5,7 @@
 use flotor_tests::library::{compile_c_file, plugin_file};
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
-use flotor_tests::workspace_root;
+use flotor_tests::{TestSize, crate_name_of, plugin_folders, workspace_root};
 use rayon::prelude::*;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -48,6 +48,13 @@ fn assert_nothing_found(library: &Path) {
 #[test]
 fn every_mistake_of_a_model_is_found_under_its_rule() {
     let mistakes = [
+        ("CHOICES_WITHOUT_END", "loads", "1125899906842624 choices"),
+        ("PARAMETERS_WITHOUT_END", "loads", "1000000 parameters"),
+        ("PARAMETERS_NOWHERE", "loads", "1 parameters at a null pointer"),
+        ("TEXT_OF_BYTES", "loads", "not UTF-8"),
+        ("TEXT_WITHOUT_END", "loads", "1125899906842624 bytes"),
+        ("TEXT_NOWHERE", "schema", "lacks an id or a doc"),
+        ("OTHER_ID", "loads", "the id `fixture-c-other-model`, but its metadata say `fixture-c-bad-model`"),
         ("NAN_IN_MOTION", "finite-in-motion", "NaN"),
         ("NAN_IN_MOTION", "live-parameters", "NaN"),
         ("CRASHES_IN_MOTION", "finite-in-motion", "by signal 11"),
@@ -165,6 +172,26 @@ fn what_is_right_passes() {
     for (name, macro_name) in right {
         assert_nothing_found(&compiled(&Scratch::default(), name, &[macro_name]));
     }
+}
+
+/// Every rule, times included: at full size a hundred times each, eight at a time, which are each other's load.
+#[test]
+fn no_shipped_plugin_is_accused() {
+    let size = TestSize::of_this_run();
+    let plugins =
+        plugin_folders().into_iter().map(|folder| (plugin_file(&crate_name_of(&folder)), Vec::new()));
+    let full = (plugin_file("flotor-simulated"), vec!["--set", "preset=full"]);
+    let all: Vec<_> = plugins.chain([full]).collect();
+    let runs = (0..size.pick(1, 100)).flat_map(|_| &all).collect::<Vec<_>>();
+    let pool =
+        rayon::ThreadPoolBuilder::new().num_threads(size.pick(1, 8)).build().expect("threads can be started");
+    pool.install(|| {
+        runs.par_iter().for_each(|(library, settings)| {
+            let arguments = ["validate".as_ref(), library.as_os_str(), "--json".as_ref()];
+            let ran = Flotor::with(arguments.into_iter().chain(settings.iter().map(AsRef::as_ref))).run();
+            assert_eq!(ran.code, Some(exit_code::OK), "{}: {ran:#?}", library.display());
+        });
+    });
 }
 
 #[test]

@@ -108,6 +108,14 @@ pub enum LoadError {
         /// Which struct and field, on both sides.
         difference: String,
     },
+    /// What the plugin declares (ids, texts, parameters) cannot be.
+    #[error("{}: it declares {cause}; correct its tables and build it again", path.display())]
+    BadDeclaration {
+        /// The file.
+        path: PathBuf,
+        /// What, and what is wrong with it.
+        cause: String,
+    },
     /// The plugin does not offer the interface its kind promises, or a required function is missing in it.
     #[error("{}: `{interface}` lacks {missing}; a plugin must offer it", path.display())]
     MissingFunction {

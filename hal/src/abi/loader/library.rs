@@ -1,5 +1,6 @@
 //! A loaded plugin: a private copy of its file, opened once, never unloaded.
 
+use super::declaration;
 use super::interfaces::Interface;
 use super::model::{Model, ModelTables};
 use super::{LoadError, Metadata, OpenedDevice, Setting, check, metadata_file};
@@ -58,7 +59,10 @@ impl Plugin {
         let entry = unsafe { open_private_copy(&metadata, copy) }?;
         // SAFETY: null, or what the metadata call the entry, in a library that is never unloaded; that it keeps the
         // contract is the caller's trust in the file.
-        unsafe { Self::from_entry(metadata, entry, Runtime::Own) }
+        let plugin = unsafe { Self::from_entry(metadata, entry, Runtime::Own) }?;
+        declaration::check(&plugin.interface, &plugin.metadata.id)
+            .map_err(|cause| LoadError::BadDeclaration { path: path.into(), cause })?;
+        Ok(plugin)
     }
 
     /// Wraps a plugin that is linked into this program: for debuggers, sanitizers and tests. Not real-time;

@@ -3,11 +3,12 @@
 //!
 //! Order of a load, each step cheaper and safer than the next:
 //! file -> ELF section with metadata -> contract version -> private copy -> `dlopen` -> entry -> kind ->
-//! layouts -> interface table. Nothing of the plugin runs before `dlopen`, and a file that fails before it
+//! layouts -> interface table -> declarations. Nothing of the plugin runs before `dlopen`, and a file that fails before it
 //! never gets that far: a truncated library would otherwise raise SIGBUS inside `dlopen`.
 
 mod capabilities;
 mod check;
+mod declaration;
 mod device;
 mod error;
 mod interfaces;

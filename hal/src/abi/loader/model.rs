@@ -80,6 +80,17 @@ impl Model {
         self.parameters
     }
 
+    /// What is wrong with its last message, whatever it is about: that it is too long for one, or no text. Not real-time.
+    #[must_use]
+    pub fn message_problem(&mut self) -> Option<String> {
+        let mut message = Message::default();
+        if let Some(last_message) = self.table.last_message {
+            // SAFETY: a live instance, used by this thread only (`&mut`), an out pointer valid for the call.
+            unsafe { last_message(self.instance, &raw mut message) };
+        }
+        message.problem()
+    }
+
     /// Which demands it can serve, with the settings it was created with.
     #[must_use]
     pub fn serves(&self) -> Demand {

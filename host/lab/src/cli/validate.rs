@@ -23,7 +23,10 @@ pub(crate) struct ValidateArguments {
     /// Print JSON
     #[arg(long)]
     json: bool,
-    /// Time limit of one rule: 10s, 500ms
+    /// Check only this rule of the contract (repeatable)
+    #[arg(long, value_parser = rule, value_name = "RULE")]
+    only: Vec<Check>,
+    /// Time limit of one rule, of a processor and of waiting: 10s, 500ms
     #[arg(long, value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME", default_value = "10s")]
     timeout: f64,
     /// Check one rule in this process, and print the verdict as JSON
@@ -67,7 +70,8 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
         }
         command
     };
-    let findings = validate(&arguments.plugin, Duration::from_secs_f64(arguments.timeout), one_rule);
+    let findings =
+        validate(&arguments.plugin, &arguments.only, Duration::from_secs_f64(arguments.timeout), one_rule);
     let violated = findings.iter().filter(|finding| finding.violation.is_some()).count();
     if arguments.json {
         write_json(Path::new("-"), &findings)?;

@@ -2,7 +2,8 @@
 
 use super::path::CONFIG;
 use super::rule::Check;
-use super::{Figures, Seen, device, live_parameters, locked, model, passive};
+use super::untouched::{Host, untouched};
+use super::{Figures, Seen, device, guarded, life, live_parameters, locked, model, passive};
 use crate::subject::prepared;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Model, OpenedDevice, Plugin, Setting, read_metadata};
@@ -23,6 +24,7 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
         return Ok(None);
     }
     let told = |error: LoadError| error.to_string();
+    let before = Host::now();
     let plugin = load_file(path)?;
     let parse = |set: &KeyValue| {
         let (key, value) = set.pair();
@@ -31,7 +33,6 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
     let settings = settings.iter().map(parse).collect::<Result<Vec<_>, Seen>>()?;
     let subject = Subject { plugin, settings };
     let of_model = |check: fn(&mut Model) -> Result<(), String>| check(&mut subject.prepared_model()?);
-    let is_device = subject.plugin.metadata().kind == PluginKind::Device;
     match wanted {
         Check::FiniteInMotion => of_model(model::finite_in_motion)?,
         Check::LiveParameters => live_parameters::live_parameters(&subject)?,
@@ -41,8 +42,12 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
         Check::Contract(rule) => match rule {
             Rule::Metadata | Rule::Loads => {}
             Rule::Schema => schema(subject.plugin.parameters())?,
-            Rule::Defaults if is_device => drop(subject.device()?),
+            Rule::Defaults if subject.is_device() => drop(subject.device()?),
             Rule::Defaults => drop(subject.plugin.create_model(&subject.settings).map_err(told)?),
+            Rule::Extensions => life::live(&subject, &mut |_| Ok(()))?,
+            Rule::HostUntouched => untouched(&subject, &before)?,
+            Rule::InsideMemory => guarded::inside_memory(&subject)?,
+            Rule::DeviceTime => device::time(subject.device()?)?,
             Rule::Capabilities => device::capabilities(subject.device()?)?,
             Rule::Lifecycle => device::lifecycle(subject.device()?)?,
             Rule::SafeStop => device::safe_stop(subject.device()?)?,
@@ -52,7 +57,7 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
             Rule::ResetRepeats => of_model(model::reset_repeats)?,
             Rule::TimeBudget => of_model(model::time_budget)?,
             Rule::Independent => model::independent(&subject)?,
-            Rule::NoThreads => of_model(model::no_threads)?,
+            Rule::NoThreads => model::no_threads(&mut subject.prepared_model()?, before.threads())?,
             Rule::EnergyGradient => of_model(model::energy_gradient)?,
             unknown => return Err(format!("this host cannot check `{}`", unknown.id()).into()),
         },
@@ -70,12 +75,19 @@ impl From<String> for Seen {
 impl From<LoadError> for Seen {
     fn from(error: LoadError) -> Self {
         match error {
-            LoadError::Refused { refusal, .. } if refusal.kind == RefusalKind::Resource => {
+            LoadError::Refused { refusal, .. }
+                if refusal.kind == RefusalKind::Resource && is_told(&refusal.reason) =>
+            {
                 Self::Missing(refusal.reason)
             }
             other => Self::Violation(other.to_string()),
         }
     }
+}
+
+/// Whether a refusal says what is missing. The loader puts words in the place of none, and a sign in that of no text.
+fn is_told(reason: &str) -> bool {
+    !reason.starts_with("no reason given") && !reason.contains(char::REPLACEMENT_CHARACTER)
 }
 
 /// What is checked: a plugin, and how its instances are set.
@@ -90,7 +102,15 @@ impl Subject {
         prepared(&self.plugin, &self.settings, CONFIG.seed).map_err(|error| error.to_string())
     }
 
-    fn device(&self) -> Result<OpenedDevice, LoadError> {
+    pub(super) fn is_device(&self) -> bool {
+        self.plugin.metadata().kind == PluginKind::Device
+    }
+
+    pub(super) fn settings(&self) -> &[Setting] {
+        &self.settings
+    }
+
+    pub(super) fn device(&self) -> Result<OpenedDevice, LoadError> {
         self.plugin.open_device(&self.settings)
     }
 }

@@ -2,7 +2,7 @@
 
 use super::path::CONFIG;
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice};
-use flotor_hal::{Axes, Capabilities, Cycle, DVec3, DeviceState, Fault, Tick, Wrench};
+use flotor_hal::{Axes, Capabilities, Conditions, Cycle, DVec3, DeviceState, Fault, Tick, Wrench};
 use std::time::{Duration, Instant};
 
 /// How long a device may take for what is to happen soon: a sample, a force, its end.
@@ -32,19 +32,64 @@ pub(super) fn lifecycle(mut device: OpenedDevice) -> Result<(), String> {
     for _ in 0..2 {
         let mut running = Running::start(device)?;
         let started = Instant::now();
-        let mut has_sampled = false;
-        while running.ticks < TICKS || !has_sampled {
-            has_sampled |= running.turn(&Wrench::ZERO)? == Cycle::Fresh;
-            if running.ticks >= TICKS && !has_sampled {
+        let mut samples = 0;
+        // One sample may be what the device had before; another shows that they come.
+        while running.ticks < TICKS || samples < 2 || !running.takes_commands() {
+            samples += u64::from(running.turn(&Wrench::ZERO)? == Cycle::Fresh);
+            if running.ticks >= TICKS {
                 if started.elapsed() > PATIENCE {
-                    return Err(format!("no fresh sample within {PATIENCE:?}"));
+                    return Err(match samples {
+                        0 => format!("no fresh sample within {PATIENCE:?}"),
+                        1 => format!("no second sample within {PATIENCE:?}"),
+                        _ => format!("no write took a command within {PATIENCE:?}"),
+                    });
                 }
                 std::thread::sleep(TICK);
             }
         }
+        if let Sampled { count: 2.., first, last } = running.sampled
+            && first == last
+        {
+            return Err(format!("every sample says that it was taken at {first} ns"));
+        }
         device = running.device.deactivate().ok_or("deactivate failed")?;
     }
     Ok(())
+}
+
+/// Times each call as a loop would feel it. A machine under load delays some of them: of reads and writes the fastest
+/// quarter counts, of stops the fastest of three.
+pub(super) fn time(mut device: OpenedDevice) -> Result<(), String> {
+    const TICKS: u64 = 200;
+    const STOP: Duration = Duration::from_millis(100);
+    let stopper = device.stopper();
+    let mut stops = Vec::new();
+    for _ in 0..3 {
+        let started = Instant::now();
+        let mut running = Running::start(device)?;
+        within("activate", started.elapsed(), PATIENCE)?;
+        for _ in 0..TICKS {
+            let _ = running.turn(&Wrench::ZERO)?;
+        }
+        // What is slower than 1 kHz has the time of its own rate.
+        let period_s = (CONFIG.period_ns as f64 * 1.0e-9).max(1.0 / running.told.rate_hz[1]);
+        let limit = Duration::from_secs_f64(period_s / 2.0);
+        for (call, took) in ["read", "write"].into_iter().zip(&mut running.took) {
+            took.sort_unstable();
+            within(call, took.get(took.len() / 4).copied().unwrap_or_default(), limit)?;
+        }
+        let started = Instant::now();
+        stopper.safe_stop();
+        stops.push(started.elapsed());
+        let started = Instant::now();
+        device = running.device.deactivate().ok_or("deactivate failed")?;
+        within("deactivate", started.elapsed(), PATIENCE)?;
+    }
+    within("safe_stop", stops.into_iter().min().unwrap_or_default(), STOP)
+}
+
+fn within(call: &str, took: Duration, limit: Duration) -> Result<(), String> {
+    if took <= limit { Ok(()) } else { Err(format!("{call} takes {took:?}, above the limit of {limit:?}")) }
 }
 
 pub(super) fn safe_stop(mut device: OpenedDevice) -> Result<(), String> {
@@ -70,15 +115,36 @@ fn push(told: &Capabilities) -> Wrench {
 }
 
 /// A device in a loop without a model.
-struct Running {
-    device: ActiveDevice,
+pub(super) struct Running {
+    pub(super) device: ActiveDevice,
+    told: Capabilities,
     state: DeviceState,
     ticks: u64,
-    has_pose: bool,
+    commands_taken: u64,
+    sampled: Sampled,
+    /// Of reads and of writes.
+    took: [Vec<Duration>; 2],
 }
 
+/// What fresh samples say about their time.
+#[derive(Clone, Copy, Default)]
+struct Sampled {
+    count: u64,
+    first: u64,
+    last: u64,
+}
+
+/// How far a handle may be, in ranges: a little beyond is a matter of calibration.
+const FARTHEST: f64 = 2.0;
+
+/// All conditions of the contract.
+const KNOWN: Conditions = Conditions::SATURATED.with(Conditions::EXCESS_FORCE);
+
+/// How far ahead of its tick a sample may be, ns: a tick is scheduled, and here no clock waits for it.
+const AHEAD_NS: u64 = 60_000_000_000;
+
 /// Why a tick could not be used.
-struct Trouble {
+pub(super) struct Trouble {
     fault: Option<Fault>,
     words: String,
 }
@@ -90,15 +156,22 @@ impl From<Trouble> for String {
 }
 
 impl Running {
-    fn start(mut device: OpenedDevice) -> Result<Self, String> {
-        // A sensor without a pose may leave it as it likes.
-        let has_pose = !device.capabilities().is_ok_and(|told| told.sensed == Axes::NONE);
+    pub(super) fn start(mut device: OpenedDevice) -> Result<Self, String> {
+        let told = device.capabilities().map_err(|refusal| refusal.to_string())?;
         let device = device.activate(&CONFIG).map_err(|(_, refusal)| refusal.to_string())?;
-        Ok(Self { device, state: DeviceState::HOME, ticks: 0, has_pose })
+        Ok(Self {
+            device,
+            told,
+            state: DeviceState::HOME,
+            ticks: 0,
+            commands_taken: 0,
+            sampled: Sampled::default(),
+            took: [Vec::new(), Vec::new()],
+        })
     }
 
     /// One tick: a sample, and a wrench.
-    fn turn(&mut self, wrench: &Wrench) -> Result<Cycle, Trouble> {
+    pub(super) fn turn(&mut self, wrench: &Wrench) -> Result<Cycle, Trouble> {
         let index = self.ticks;
         let dt_ns = if index == 0 { 0 } else { CONFIG.period_ns };
         let tick = Tick { index, time_ns: index * CONFIG.period_ns, dt_ns };
@@ -107,23 +180,63 @@ impl Running {
             let words = format!("{call} at tick {index}: {}", fault.advice());
             Trouble { fault: Some(fault), words }
         };
+        let started = Instant::now();
         let sampled = self.device.read(&tick, &mut self.state);
+        let read = started.elapsed();
         if let Cycle::Fault(fault) = sampled {
             return Err(fault_of("read", fault));
         }
-        let state = &self.state;
-        let nonsense = |words: String| Err(Trouble { fault: None, words });
-        if !state.is_finite() || !state.delivered.is_finite() {
-            return nonsense(format!("read at tick {index} gave {state:?}"));
+        self.plausible(sampled, &tick)
+            .map_err(|words| Trouble { fault: None, words: format!("read at tick {index} gave {words}") })?;
+        let started = Instant::now();
+        let taken = self.device.write(&tick, wrench);
+        for (took, time) in self.took.iter_mut().zip([read, started.elapsed()]) {
+            took.push(time);
         }
-        let length = state.pose.orientation().length();
-        if self.has_pose && sampled == Cycle::Fresh && (length - 1.0).abs() > QUATERNION_TOLERANCE {
-            return nonsense(format!("read at tick {index} gave a quaternion of length {length}, not 1"));
-        }
-        if let Cycle::Fault(fault) = self.device.write(&tick, wrench) {
+        if let Cycle::Fault(fault) = taken {
             return Err(fault_of("write", fault));
         }
+        self.commands_taken += u64::from(taken == Cycle::Fresh);
         Ok(sampled)
+    }
+
+    /// Whether a sample can be.
+    fn plausible(&mut self, sampled: Cycle, tick: &Tick) -> Result<(), String> {
+        let state = &self.state;
+        if !state.is_finite() || !state.delivered.is_finite() {
+            return Err(format!("{state:?}"));
+        }
+        // A sensor without a pose may leave it as it likes.
+        if sampled != Cycle::Fresh || self.told.sensed == Axes::NONE {
+            return Ok(());
+        }
+        let length = state.pose.orientation().length();
+        if (length - 1.0).abs() > QUATERNION_TOLERANCE {
+            return Err(format!("a quaternion of length {length}, not 1"));
+        }
+        let (position_m, range_m) = (state.pose.position(), DVec3::from_array(self.told.range_m));
+        let is_far = position_m.abs().cmpgt(range_m * FARTHEST) & range_m.cmpgt(DVec3::ZERO);
+        if is_far.any() {
+            return Err(format!("{position_m} m, beyond {FARTHEST} times its range {range_m} m"));
+        }
+        if !KNOWN.contains(state.conditions) {
+            return Err(format!("conditions that the contract does not know: {:?}", state.conditions));
+        }
+        let Sampled { count, first, last } = self.sampled;
+        let now = state.sampled_ns;
+        if now > tick.time_ns.saturating_add(AHEAD_NS) {
+            return Err(format!("a sample of {now} ns at {} ns", tick.time_ns));
+        }
+        if count > 0 && now < last {
+            return Err(format!("a sample of {now} ns after one of {last} ns"));
+        }
+        self.sampled = Sampled { count: count + 1, first: if count == 0 { now } else { first }, last: now };
+        Ok(())
+    }
+
+    /// Whether it has taken a command; one that drives nothing need not.
+    fn takes_commands(&self) -> bool {
+        self.commands_taken > 0 || self.told.actuated == Axes::NONE
     }
 
     fn delivers(&self) -> bool {

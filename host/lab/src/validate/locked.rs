@@ -9,7 +9,7 @@
 //! counted by the kernel.
 
 use super::Seen;
-use super::path::{finite, walk};
+use super::path::walk;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Input, Output};
@@ -29,8 +29,7 @@ pub(super) const C_LIBRARY: (&str, &str) =
 /// How the process ends in which a step called the system.
 pub(super) const CAUGHT: Signal = Signal::SYS;
 
-/// Steps in which a model may still make what belongs to its thread, and steps after them.
-const FIRST_STEPS: usize = 100;
+/// Steps; the first is locked in, too: a loop has no other.
 const STEPS: usize = 1000;
 
 /// How often the thread is looked at.
@@ -50,7 +49,7 @@ pub(super) fn system_calls(model: Model) -> Result<(), Seen> {
     let of_thread = Arc::clone(&stage);
     let _ = std::thread::spawn(move || walk_locked_in(model, &ready, &of_thread));
     let ended = |_| Seen::Violation("its thread ended before the test".to_owned());
-    let thread = told.recv().map_err(ended)?.map_err(Seen::Violation)?;
+    let thread = told.recv().map_err(ended)?;
     let folder = PathBuf::from(format!("/proc/self/task/{thread}"));
     if !folder.exists() {
         return Err(Seen::Missing("the system has no /proc, which the test needs".to_owned()));
@@ -79,15 +78,9 @@ pub(super) fn system_calls(model: Model) -> Result<(), Seen> {
 }
 
 /// What the thread does: never ends once it is locked in.
-fn walk_locked_in(mut model: Model, ready: &Sender<Result<i32, String>>, stage: &AtomicU8) {
-    let inputs: Vec<Input> = walk((FIRST_STEPS + STEPS) as u64).collect();
-    let (first, others) = inputs.split_at(FIRST_STEPS);
-    let began = first.iter().try_for_each(|input| finite(&mut model, input).map(|_| ()));
-    let has_begun = began.is_ok();
-    let _ = ready.send(began.map(|()| gettid().as_raw_nonzero().get()));
-    if !has_begun {
-        return;
-    }
+fn walk_locked_in(mut model: Model, ready: &Sender<i32>, stage: &AtomicU8) {
+    let inputs: Vec<Input> = walk(STEPS as u64).collect();
+    let _ = ready.send(gettid().as_raw_nonzero().get());
     while stage.load(Ordering::Acquire) == WAITING {
         std::hint::spin_loop();
     }
@@ -97,7 +90,7 @@ fn walk_locked_in(mut model: Model, ready: &Sender<Result<i32, String>>, stage: 
         return;
     }
     let mut is_answered = true;
-    for input in others {
+    for input in &inputs {
         is_answered &= model.step(input, &mut output) == CallStatus::Ok;
     }
     stage.store(if is_answered { DONE } else { FAILED }, Ordering::Release);

@@ -1,19 +1,23 @@
 //! Checks a plugin against the rules of the contract, from outside as a host does: each rule in its own process, so that a
 //! plugin that crashes or hangs costs one rule.
-
 //!
-//! - `rule`: what is checked; `checks`: one of it, in this process.
+//! - `rule`: what is checked; `checks`: one of it, in this process; `patience`: how long that may take.
+//! - `life`: every call of an instance; `untouched` and `guarded` look at what each leaves behind.
 //! - `path`: where a model is asked; `model`, `live_parameters`, `passive`, `locked`: what is asked of it.
 //! - `device`: what is asked of a device.
 
 mod checks;
 mod device;
+mod guarded;
+mod life;
 mod live_parameters;
 mod locked;
 mod model;
 mod passive;
 mod path;
+mod patience;
 mod rule;
+mod untouched;
 
 pub use checks::check;
 pub use rule::Check;
@@ -27,8 +31,8 @@ use std::io::{self, Read, Seek, Write};
 use std::os::fd::AsFd;
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
-use std::process::{Child, Command, ExitStatus, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Command, ExitStatus, Stdio};
+use std::time::Duration;
 
 /// Outcome of one rule.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -111,14 +115,16 @@ impl Verdict {
     }
 }
 
-/// How often a process is looked at.
-const LOOK: Duration = Duration::from_millis(2);
-
 /// Checks a plugin file against every rule that applies; stops at the first that makes the rest pointless. Not
-/// real-time. A rule may take `patience`; `program` starts this program once more, to check one rule of the file and
-/// to [deliver](Verdict::deliver) the verdict.
+/// real-time. A rule may take `patience` of a processor, and wait as long; `program` starts this program once more, to check one rule of the file and
+/// to [deliver](Verdict::deliver) the verdict. `only` names the rules to check; empty: all.
 #[must_use]
-pub fn validate(path: &Path, patience: Duration, program: impl Fn(Check) -> Command) -> Vec<Finding> {
+pub fn validate(
+    path: &Path,
+    only: &[Check],
+    patience: Duration,
+    program: impl Fn(Check) -> Command,
+) -> Vec<Finding> {
     let mut findings = Vec::new();
     let mut note = |check: Check, verdict: Verdict| {
         let is_violated = matches!(verdict.seen, Some(Seen::Violation(_)));
@@ -131,17 +137,26 @@ pub fn validate(path: &Path, patience: Duration, program: impl Fn(Check) -> Comm
     let verdict = read.as_ref().map(|_| None).map_err(|error| Seen::Violation(error.to_string()));
     note(metadata, Verdict::of(verdict));
     let Ok(kind) = read.map(|known| known.kind) else { return findings };
-    for check in Check::all().filter(|check| *check != metadata && check.applies_to(kind)) {
+    let is_wanted = |check: &Check| only.is_empty() || only.contains(check);
+    let checks = Check::all().filter(|check| *check != metadata && check.applies_to(kind));
+    for check in checks.filter(is_wanted) {
         let mut command = program(check);
-        if check == Check::SystemCalls {
-            let (name, value) = locked::C_LIBRARY;
-            command.env(name, value);
+        match check {
+            Check::SystemCalls => drop(command.env(locked::C_LIBRARY.0, locked::C_LIBRARY.1)),
+            Check::Contract(Rule::InsideMemory) => guarded::with_guard(&mut command),
+            _ => {}
         }
         let outcome = in_own_process(check, command, patience);
         let is_fatal = matches!(check, Check::Contract(Rule::Loads | Rule::Defaults));
         let stops = is_fatal || matches!(outcome, Ok(None));
         let verdict = match outcome {
             Ok(Some(verdict)) => verdict,
+            // Its allocator is slow, and whether a call ends is seen without it.
+            Ok(None) if check == Check::Contract(Rule::InsideMemory) => {
+                let late =
+                    format!("a life of an instance takes more than {patience:?} with the guarding allocator");
+                Verdict { seen: Some(Seen::Missing(late)), figures: None }
+            }
             Ok(None) => Verdict::violated(format!(
                 "it did not return within {patience:?}; the rules after it were not checked"
             )),
@@ -160,8 +175,13 @@ fn died(check: Check, end: ExitStatus) -> String {
     if check == Check::SystemCalls && signal == locked::CAUGHT.as_raw() {
         return "a step allocated memory or made another system call".to_owned();
     }
-    // A thread that is locked in may not read the clock of the processor either.
-    let hint = if check == Check::SystemCalls { "; here a step that reads the time causes this" } else { "" };
+    let hint = match (check, signal) {
+        // A thread that is locked in may not read the clock of the processor either.
+        (Check::SystemCalls, _) => "; here a step that reads the time causes this",
+        (Check::Contract(Rule::InsideMemory), _) => ": a call left its memory, or damaged a block",
+        (Check::Contract(Rule::HostUntouched), 8) => ": a call left floating-point traps enabled",
+        _ => "",
+    };
     format!("the process died by signal {signal}{hint}")
 }
 
@@ -170,7 +190,7 @@ fn in_own_process(check: Check, mut command: Command, patience: Duration) -> io:
     // A file, not a pipe: nobody has to empty it. What a plugin prints is its own business.
     let mut told = File::from(memfd_create("flotor-verdict", MemfdFlags::CLOEXEC)?);
     let mut child = command.stdin(told.try_clone()?).stdout(Stdio::null()).stderr(Stdio::null()).spawn()?;
-    let Some(end) = wait(&mut child, patience)? else { return Ok(None) };
+    let Some(end) = patience::wait(&mut child, patience)? else { return Ok(None) };
     let mut text = Vec::new();
     told.rewind()?;
     told.read_to_end(&mut text)?;
@@ -178,18 +198,4 @@ fn in_own_process(check: Check, mut command: Command, patience: Duration) -> io:
         Ok(verdict) if end.success() => verdict,
         _ => Verdict::violated(died(check, end)),
     }))
-}
-
-/// Waits for the end of a process; `None` if it took too long and was ended.
-fn wait(child: &mut Child, patience: Duration) -> io::Result<Option<ExitStatus>> {
-    let started = Instant::now();
-    while started.elapsed() < patience {
-        if let Some(end) = child.try_wait()? {
-            return Ok(Some(end));
-        }
-        std::thread::sleep(LOOK);
-    }
-    child.kill()?;
-    child.wait()?;
-    Ok(None)
 }
