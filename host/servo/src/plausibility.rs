@@ -38,8 +38,7 @@ const BEHIND_NS: u64 = 100_000_000;
 /// The same in periods.
 const AHEAD_PERIODS: u64 = 2;
 const BEHIND_PERIODS: u64 = 40;
-/// Time without a usable sample after which there is no force: what is older than this is not where the hand is. In 10 ms a
-/// 10 Hz movement of 5 mm goes 3 mm.
+/// The force is zero after this time without a usable sample: the hand may have moved by 3 mm (10 Hz, amplitude 5 mm).
 const STALE_LIMIT_NS: u64 = 10_000_000;
 /// Samples in a row that may be lost at any rate: one is normal.
 const STALE_TICKS_BORNE: u64 = 2;

@@ -26,7 +26,7 @@ struct Believed {
 }
 
 impl PeerCheck {
-    /// For an end that scales motion like this and waits so long for a message. Not real-time.
+    /// For an end with this motion scale, which waits at most `silence_ns` for a message. Not real-time.
     pub(super) fn new(motion_scale: f64, silence_ns: u64) -> Self {
         Self { scale: motion_scale.max(1.0), late_ns: silence_ns, last: None }
     }

@@ -1,4 +1,4 @@
-//! A process that dies takes the force along: whatever ends it while devices are energised, they are stopped first.
+//! Stops all energised devices before this process ends by a signal, by `exit`, or by the end of the loop's thread.
 //!
 //! A device keeps its last command, some of them for ever. So as long as a run has energised devices, signals that would
 //! end the process, and `exit`, come here first: every device's `safe_stop` is called, by contract possible from any
@@ -101,8 +101,8 @@ pub struct LastStop {
     place: usize,
 }
 
-/// What stands before the devices and models of a run where they are dropped: a loop that is unwound by neither its end nor
-/// a panic is being ended by a plugin, and the devices are stopped before anything else of it goes.
+/// Stops the devices when a plugin ends the loop's thread. A loop drops this before its devices and models: if neither its
+/// end nor a panic is the reason, a plugin called something like `pthread_exit`.
 pub struct Unwound(Arc<Armed>);
 
 impl LastStop {
@@ -164,8 +164,7 @@ impl Armed {
     }
 }
 
-/// Called in a signal handler or in `exit`: no lock, no allocation. Returns if no run is energised: then this is no affair
-/// of ours.
+/// Called in a signal handler or in `exit`: no lock, no allocation. Returns if no run is energised.
 fn end_if_armed(death: Death) {
     if is_armed() {
         die(death);

@@ -17,7 +17,7 @@ use std::process::{Child, Command, Stdio};
 /// How long the process may take to be on guard.
 const PATIENCE: Timespec = Timespec { tv_sec: 5, tv_nsec: 0 };
 
-/// A process that stops devices when this one is gone. Dropped, it is told that they are stopped, and ends.
+/// The watchdog process of this host. Dropping it reports that the devices are stopped, and ends it.
 pub struct WatchdogProcess {
     child: Child,
     link: OwnedFd,

@@ -213,7 +213,7 @@ pub struct DeviceOutcome {
     pub problem: Option<String>,
     /// Its own energy balance, where it keeps one.
     pub ledger: Option<EnergyLedger>,
-    /// Its last words, or what the host has found; empty if it had no reason to say any.
+    /// Its last message, or what the host found wrong with it; empty if there is neither.
     pub words: String,
 }
 
