@@ -1,0 +1,90 @@
+//! Prepared laws on disk, so that a description is solved once.
+//!
+//! A file holds its description in full, its numbers and a sum over both; one that differs anywhere is ignored and made
+//! anew. Without a folder to write to, every start prepares. Not real-time.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::PathBuf;
+
+/// First bytes of a file. The version changes when the same description would give other numbers.
+const MAGIC: &[u8; 16] = b"flotor-solid 01\n";
+
+/// `FNV-1a` over 64 bits: finds damage, proves nothing.
+fn digest(bytes: &[u8]) -> u64 {
+    bytes
+        .iter()
+        .fold(0xcbf2_9ce4_8422_2325, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// `$XDG_CACHE_HOME/flotor`, else `~/.cache/flotor`; relative folders do not count.
+fn folder() -> Option<PathBuf> {
+    let own = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).filter(|path| path.is_absolute());
+    let home = || std::env::var_os("HOME").map(PathBuf::from).filter(|path| path.is_absolute());
+    own.or_else(|| home().map(|home| home.join(".cache"))).map(|cache| cache.join("flotor"))
+}
+
+fn file(description: &str) -> Option<PathBuf> {
+    let mut name = String::from("solid-");
+    write!(name, "{:016x}", digest(description.as_bytes())).ok()?;
+    Some(folder()?.join(name))
+}
+
+fn encode(description: &str, numbers: &[f64]) -> Vec<u8> {
+    let mut bytes = MAGIC.to_vec();
+    bytes.extend((description.len() as u64).to_le_bytes());
+    bytes.extend(description.as_bytes());
+    numbers.iter().for_each(|number| bytes.extend(number.to_le_bytes()));
+    bytes.extend(digest(&bytes).to_le_bytes());
+    bytes
+}
+
+fn decode(description: &str, bytes: &[u8]) -> Option<Vec<f64>> {
+    let (body, sum) = bytes.split_last_chunk::<8>()?;
+    if u64::from_le_bytes(*sum) != digest(body) {
+        return None;
+    }
+    let rest = body.strip_prefix(MAGIC)?;
+    let rest = rest.strip_prefix(&(description.len() as u64).to_le_bytes())?;
+    let (chunks, left) = rest.strip_prefix(description.as_bytes())?.as_chunks::<8>();
+    left.is_empty().then(|| chunks.iter().map(|chunk| f64::from_le_bytes(*chunk)).collect())
+}
+
+/// The numbers of a description, if they are there and whole.
+#[must_use]
+pub fn load(description: &str) -> Option<Vec<f64>> {
+    decode(description, &fs::read(file(description)?).ok()?)
+}
+
+/// Keeps numbers. Says nothing if that fails: the next start prepares again.
+pub fn store(description: &str, numbers: &[f64]) {
+    let Some(path) = file(description) else { return };
+    let Some(folder) = path.parent() else { return };
+    if fs::create_dir_all(folder).is_err() {
+        return;
+    }
+    // Never half a file under the final name, whoever else prepares the same.
+    let own = path.with_extension(format!("{}.tmp", std::process::id()));
+    if fs::write(&own, encode(description, numbers)).is_err() || fs::rename(&own, &path).is_err() {
+        let _ = fs::remove_file(&own);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_differs_anywhere_is_no_file() {
+        let numbers = [1.0, -0.0, f64::MIN_POSITIVE];
+        let bytes = encode("block", &numbers);
+        assert_eq!(decode("block", &bytes).as_deref(), Some(&numbers[..]));
+        assert_eq!(decode("beam", &bytes), None);
+        for i in 0..bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[i] ^= 1;
+            assert_eq!(decode("block", &damaged), None, "byte {i}");
+            assert_eq!(decode("block", &bytes[..i]), None, "cut at {i}");
+        }
+    }
+}

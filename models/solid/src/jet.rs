@@ -1,0 +1,121 @@
+//! A number with its derivatives along x, y and z: forces are exact derivatives of an energy, never differences.
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// A value and its gradient. Real-time: bounded, no allocation.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Jet {
+    /// The value.
+    pub value: f64,
+    /// Its derivatives along x, y, z.
+    pub slope: [f64; 3],
+}
+
+impl Jet {
+    /// A number that does not change.
+    #[must_use]
+    pub const fn constant(value: f64) -> Self {
+        Self { value, slope: [0.0; 3] }
+    }
+
+    /// A coordinate.
+    #[must_use]
+    pub fn variable(value: f64, axis: usize) -> Self {
+        let mut slope = [0.0; 3];
+        slope[axis] = 1.0;
+        Self { value, slope }
+    }
+
+    /// A function of this number, given its value and derivative here.
+    #[must_use]
+    pub fn chain(self, value: f64, derivative: f64) -> Self {
+        Self { value, slope: self.slope.map(|s| s * derivative) }
+    }
+
+    /// Square root; of zero it is zero with slope zero, as for a length at the origin.
+    #[must_use]
+    pub fn sqrt(self) -> Self {
+        let root = self.value.sqrt();
+        self.chain(root, if root > 0.0 { 0.5 / root } else { 0.0 })
+    }
+
+    /// Reciprocal.
+    #[must_use]
+    pub fn recip(self) -> Self {
+        let inverse = 1.0 / self.value;
+        self.chain(inverse, -inverse * inverse)
+    }
+
+    /// The larger of it and a number; slope zero where they are equal.
+    #[must_use]
+    pub fn at_least(self, least: f64) -> Self {
+        if self.value > least { self } else { Self::constant(least) }
+    }
+
+    /// Its size.
+    #[must_use]
+    pub fn abs(self) -> Self {
+        if self.value < 0.0 { -self } else { self }
+    }
+}
+
+impl Add for Jet {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self { value: self.value + other.value, slope: [0, 1, 2].map(|i| self.slope[i] + other.slope[i]) }
+    }
+}
+
+impl Sub for Jet {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        Self { value: self.value - other.value, slope: [0, 1, 2].map(|i| self.slope[i] - other.slope[i]) }
+    }
+}
+
+impl Mul for Jet {
+    type Output = Self;
+    #[allow(clippy::suspicious_arithmetic_impl)] // the product rule
+    fn mul(self, other: Self) -> Self {
+        Self {
+            value: self.value * other.value,
+            slope: [0, 1, 2].map(|i| self.slope[i] * other.value + self.value * other.slope[i]),
+        }
+    }
+}
+
+impl Div for Jet {
+    type Output = Self;
+    #[allow(clippy::suspicious_arithmetic_impl)] // its derivative is in the reciprocal
+    fn div(self, other: Self) -> Self {
+        self * other.recip()
+    }
+}
+
+impl Neg for Jet {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self { value: -self.value, slope: self.slope.map(|s| -s) }
+    }
+}
+
+impl Add<f64> for Jet {
+    type Output = Self;
+    fn add(self, other: f64) -> Self {
+        Self { value: self.value + other, ..self }
+    }
+}
+
+impl Sub<f64> for Jet {
+    type Output = Self;
+    fn sub(self, other: f64) -> Self {
+        Self { value: self.value - other, ..self }
+    }
+}
+
+impl Mul<f64> for Jet {
+    type Output = Self;
+    fn mul(self, other: f64) -> Self {
+        Self { value: self.value * other, slope: self.slope.map(|s| s * other) }
+    }
+}

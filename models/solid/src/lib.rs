@@ -1,0 +1,38 @@
+//! An elastic solid, touched with a sphere, a punch or a plate.
+//!
+//! Linear elasticity, small strains, with the exact rotation of the tool. All that is slow is solved before the loop and kept
+//! in a cache; a tick evaluates one energy and its gradient.
+//!
+//! - [`basis`], [`grid`], [`dissection`], [`dense`]: finite elements of any order on a block, and their sparse Cholesky
+//!   factorisation with one order of sums.
+//! - [`half_space`]: the field of forces on an elastic half-space, which carries the pole of every contact.
+//! - [`remainder`], [`table`]: what a block does that a half-space would not, by finite elements.
+//! - [`sphere`]: contact of a sphere in contact space. [`punch`], [`plate`]: rigid patches bonded to a surface.
+//! - [`prepare`], [`law`], [`cache`]: from a description to a law.
+//! - [`atlas`], [`rigid`], [`friction`]: the laws, as a tick evaluates them; [`jet`], [`spline`] under them.
+//! - `plugin`: parameters and the contract.
+
+// Indices name the components of vectors and tensors, in several at once.
+#![allow(clippy::needless_range_loop)]
+
+pub mod atlas;
+pub mod basis;
+pub mod cache;
+pub mod dense;
+pub mod dissection;
+pub mod friction;
+pub mod grid;
+pub mod half_space;
+pub mod jet;
+pub mod law;
+pub mod plate;
+mod plugin;
+pub mod prepare;
+pub mod punch;
+pub mod remainder;
+pub mod rigid;
+pub mod sphere;
+pub mod spline;
+pub mod table;
+
+pub use plugin::{FLOTOR_ENTRY, Solid};

@@ -1,0 +1,184 @@
+//! The solid as a plugin: parameters, the law they name, and one handle's friction.
+
+use crate::friction::Friction;
+use crate::law::{Description, Law, Tool};
+use flotor_hal::{
+    Choices, DVec3, Demand, Detail, DetailsModel, ForceModel, Input, Memory, ModelInfo, OutOfRange, Output,
+    Parameter, Refusal, Settings, StepStatus, VariantInfo, VariantModel, Wrench, choices,
+};
+
+/// Farther from home than this along an axis there is no handle, m: the answer is that at the edge, and says so.
+const REACH_M: f64 = 10.0;
+
+const BODIES: Choices = choices!["block", "beam", "cylinder", "half-space", "file"];
+const TOOLS: Choices = choices!["sphere", "plate", "punch-round", "punch-square"];
+const BONDS: Choices = choices!["bonded", "frictionless"];
+const RESOLUTIONS: Choices = choices!["quick", "standard", "fine"];
+
+/// Index of the one live parameter.
+const YOUNGS_MODULUS: usize = 4;
+
+const SCHEMA: &[Parameter] = &[
+    Parameter::choice("body", BODIES, 0, "What is touched; block: bottom clamped; beam: clamped at -x"),
+    Parameter::real(
+        "size_x_mm",
+        "mm",
+        1.0,
+        2000.0,
+        80.0,
+        "Side along x of a block or a beam (200 by default)",
+    ),
+    Parameter::real(
+        "size_y_mm",
+        "mm",
+        1.0,
+        2000.0,
+        80.0,
+        "Side along y of a block or a beam (40 by default)",
+    ),
+    Parameter::real(
+        "size_z_mm",
+        "mm",
+        1.0,
+        2000.0,
+        80.0,
+        "Side along z of a block or a beam (40 by default)",
+    ),
+    Parameter::real("youngs_modulus_pa", "Pa", 1.0, 1.0e9, 1.0e4, "Young's modulus").live(),
+    Parameter::real("poisson_ratio", "1", 0.0, 0.49, 0.3, "Poisson's ratio"),
+    Parameter::choice("tool", TOOLS, 0, "What touches: a sphere, or what is bonded to a face"),
+    Parameter::real("tool_radius_mm", "mm", 0.1, 500.0, 12.7, "Radius of the sphere or of the round punch"),
+    Parameter::real("tool_side_mm", "mm", 0.1, 1000.0, 20.0, "Side of the square punch"),
+    Parameter::choice("bond", BONDS, 0, "How a punch holds the surface"),
+    Parameter::real("friction", "1", 0.0, 10.0, 0.0, "Coefficient of friction of the sphere"),
+    Parameter::choice(
+        "resolution",
+        RESOLUTIONS,
+        1,
+        "Elements and contact cells of the preparation; a tick costs the same",
+    ),
+    Parameter::file("file", choices![], "A mesh for body `file`"),
+];
+
+const DETAILS: &[Detail] = &[
+    Detail::number("depth_m", "m", "How far the face is inside the sphere"),
+    Detail::number("mesh_error", "1", "Estimated relative error of the stiffness that comes from the mesh"),
+];
+
+/// An elastic solid and the tool that touches it.
+pub struct Solid {
+    law: Law,
+    mesh_error: f64,
+    youngs_modulus_pa: f64,
+    friction: Friction,
+    depth_m: f64,
+    parameters: [f64; SCHEMA.len()],
+}
+
+/// Values in force: sizes of a beam have defaults of their own.
+fn resolve(settings: &Settings<'_>) -> [f64; SCHEMA.len()] {
+    let mut values = [0.0; SCHEMA.len()];
+    let beam = BODIES.as_slice()[settings.choice_or_default("body")].as_str() == "beam";
+    for (value, parameter) in values.iter_mut().zip(SCHEMA) {
+        let id = parameter.id();
+        let own = match id {
+            "size_x_mm" if beam => Some(200.0),
+            "size_y_mm" | "size_z_mm" if beam => Some(40.0),
+            _ => None,
+        };
+        *value = settings.number(id).or(own).unwrap_or(parameter.default());
+    }
+    values
+}
+
+impl ForceModel for Solid {
+    const INFO: ModelInfo =
+        ModelInfo::new("solid", "Solid", "An elastic solid, touched with a sphere, a punch or a plate")
+            .serving(Demand::ALL)
+            .with_memory(Memory::PathDependent);
+
+    const PARAMETERS: &'static [Parameter] = SCHEMA;
+
+    fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        let parameters = resolve(settings);
+        let description = Description::new(settings, |id| {
+            SCHEMA.iter().position(|parameter| parameter.id() == id).map_or(f64::NAN, |i| parameters[i])
+        })?;
+        let (law, mesh_error) = description.prepare()?;
+        let reach_m = match description.tool {
+            Tool::Sphere { radius_m } => radius_m,
+            _ => 0.0,
+        };
+        let friction =
+            Friction::new(settings.number_or_default("friction"), description.poisson_ratio, reach_m);
+        let youngs_modulus_pa = parameters[YOUNGS_MODULUS];
+        Ok(Self { law, mesh_error, youngs_modulus_pa, friction, depth_m: f64::NAN, parameters })
+    }
+
+    fn step(&mut self, input: &Input) -> Output {
+        if !input.pose.is_finite() {
+            self.depth_m = f64::NAN;
+            return Output::new(Wrench::ZERO, f64::NAN, StepStatus::InvalidInput);
+        }
+        let position_m = input.pose.position();
+        let reached_m = position_m.clamp(DVec3::splat(-REACH_M), DVec3::splat(REACH_M));
+        let mut status = if reached_m == position_m { StepStatus::Ok } else { StepStatus::Clamped };
+        let modulus = self.youngs_modulus_pa;
+        let (wrench, energy_j) = match &self.law {
+            Law::Bonded(patch) => {
+                let (wrench, energy_j) = patch.answer(reached_m, input.pose.orientation());
+                (Wrench::new(wrench.force() * modulus, wrench.torque() * modulus), energy_j * modulus)
+            }
+            Law::Sphere(atlas) => {
+                let centre_m = reached_m + DVec3::Z * atlas.radius_m;
+                let answer = atlas.answer(centre_m.to_array());
+                self.depth_m = answer.depth_m;
+                if answer.depth_m > atlas.deepest_m {
+                    status = StepStatus::Clamped;
+                }
+                let normal_n = DVec3::from_array(answer.energy.slope) * -modulus;
+                let rubbing = self.friction.follow(reached_m, normal_n, modulus);
+                (Wrench::from_force(normal_n + rubbing.0), answer.energy.value * modulus + rubbing.1)
+            }
+        };
+        Output::new(wrench, energy_j, status)
+    }
+
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+        if index != YOUNGS_MODULUS {
+            return Err(OutOfRange { min: f64::NAN, max: f64::NAN, value });
+        }
+        self.parameters[index] = value;
+        self.youngs_modulus_pa = value;
+        Ok(())
+    }
+
+    fn parameter(&self, index: usize) -> f64 {
+        self.parameters.get(index).copied().unwrap_or(f64::NAN)
+    }
+
+    fn reset(&mut self) {
+        self.friction.release();
+        self.depth_m = f64::NAN;
+    }
+}
+
+impl VariantModel for Solid {
+    /// Only friction remembers.
+    fn variant_info(&self) -> VariantInfo {
+        let memory = if self.friction.is_smooth() { Memory::Stateless } else { Memory::PathDependent };
+        VariantInfo::new(Demand::ALL, memory)
+    }
+}
+
+impl DetailsModel for Solid {
+    const DETAILS: &'static [Detail] = DETAILS;
+
+    fn details(&self, values: &mut [f64]) {
+        for (value, number) in values.iter_mut().zip([self.depth_m, self.mesh_error]) {
+            *value = number;
+        }
+    }
+}
+
+flotor_hal::export_model!(Solid, variant, details);

@@ -1,0 +1,321 @@
+//! From a description of a solid and a tool to its law: everything slow, before the loop.
+
+use crate::atlas::{Atlas, Ground};
+use crate::dense::NotPositive;
+use crate::half_space::HalfSpace;
+use crate::remainder::{Face, Fineness, Remainder, Size};
+use crate::sphere::{Contact, Patch, Problem};
+use crate::spline::{Curve, End, Volume};
+use crate::table::Table;
+
+/// Depths beyond this share of the radius have no answer: the force of a linear solid falls, and the contact snaps through.
+const DEEPEST: f64 = 1.2;
+/// Contacts are solved a little deeper, so that the law ends smoothly.
+const DEEPEST_SOLVED: f64 = 1.25;
+/// Depths, evenly spread over the root of depth over radius.
+const LEVELS: usize = 14;
+/// The same for the half-space, which is solved once.
+const PROFILE_LEVELS: usize = 30;
+/// Cells of the half-space's patch from the middle to the rim.
+const PROFILE_RINGS: i32 = 10;
+/// Distances of the points of the remainder's table from an edge, in halves of a side.
+const TABLE_SHARES: [f64; 9] = [1.0, 0.8, 0.62, 0.47, 0.34, 0.23, 0.145, 0.08, 0.03];
+/// Places of the sphere along half a side, from the middle to where the ratio ends.
+const PLACES: [f64; 9] = [0.0, 0.25, 0.44, 0.59, 0.7, 0.785, 0.86, 0.93, 1.0];
+
+/// How finely a sphere's law is prepared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Resolution {
+    /// Elements of the remainder.
+    pub fineness: Fineness,
+    /// Cells of a contact from its middle to its rim.
+    pub rings: i32,
+}
+
+/// A sphere's law, and how good it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prepared {
+    /// The law, for a Young's modulus of 1 Pa.
+    pub atlas: Atlas,
+    /// Estimated relative error of the stiffness that comes from the elements: two grids compared.
+    pub mesh_error: f64,
+}
+
+/// Side of a cell such that the contact fills about four fifths of the patch, m: Hertz's radius, less at large depth.
+fn cell_m(radius_m: f64, depth_m: f64, rings: i32) -> f64 {
+    1.25 * (radius_m * depth_m).sqrt() / (1.0 + 0.12 * depth_m / radius_m) / f64::from(rings)
+}
+
+/// Contacts with a half-space at depths of these roots, in radii of a sphere of radius one.
+fn unbounded(solid: &HalfSpace, rings: i32, roots: &[f64]) -> Vec<Contact> {
+    let patch = Patch::new(solid, rings);
+    let mut contacts: Vec<Contact> = Vec::with_capacity(roots.len());
+    for root in roots {
+        let depth_m = root * root;
+        let problem = Problem {
+            radius_m: 1.0,
+            depth_m,
+            cell_m: cell_m(1.0, depth_m, rings),
+            on_face: &[],
+            smooth: &[],
+        };
+        let contact = patch.solve(&problem, contacts.last());
+        contacts.push(contact);
+    }
+    contacts
+}
+
+/// Hertz's energy of a sphere of radius one at a root of depth, for a modulus of one.
+fn hertz(poisson_ratio: f64, root: f64) -> f64 {
+    8.0 / 15.0 / (1.0 - poisson_ratio * poisson_ratio) * flotor_hal::math::powi(root, 5)
+}
+
+/// Energy over Hertz's. The cells' own error is that of the smallest depth, where Hertz is exact, and divided out.
+fn profile(solid: &HalfSpace) -> Curve {
+    let top = DEEPEST_SOLVED.sqrt();
+    let mut roots = vec![0.01];
+    roots.extend((1..=PROFILE_LEVELS).map(|level| top * level as f64 / PROFILE_LEVELS as f64));
+    let contacts = unbounded(solid, PROFILE_RINGS, &roots);
+    let shares: Vec<f64> = roots
+        .iter()
+        .zip(&contacts)
+        .map(|(root, contact)| contact.energy_j / hertz(solid.poisson_ratio, *root))
+        .collect();
+    let values = shares.iter().map(|share| share / shares[0]).collect();
+    roots[0] = 0.0;
+    Curve::new(roots, values, [End::Parabola; 2])
+}
+
+/// How the ratios of a face end: level in the middle of the block, where it is a mirror image of itself.
+fn ends(face: Face) -> [[End; 2]; 3] {
+    let along_q = if face == Face::Top { [End::Level, End::Parabola] } else { [End::Parabola; 2] };
+    [[End::Level, End::Parabola], along_q, [End::Parabola; 2]]
+}
+
+fn atlas(solid: &HalfSpace, radius_m: f64, profile: Curve, ground: Ground) -> Atlas {
+    Atlas {
+        radius_m,
+        hertz: 8.0 / 15.0 / (1.0 - solid.poisson_ratio * solid.poisson_ratio) * radius_m.sqrt(),
+        profile,
+        deepest_m: DEEPEST * radius_m,
+        ground,
+    }
+}
+
+/// A sphere on a half-space. Not real-time.
+#[must_use]
+pub fn sphere_on_half_space(poisson_ratio: f64, radius_m: f64) -> Prepared {
+    let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
+    Prepared { atlas: atlas(&solid, radius_m, profile(&solid), Ground::HalfSpace), mesh_error: 0.0 }
+}
+
+/// A sphere on a block. Not real-time: some seconds.
+///
+/// # Errors
+/// [`NotPositive`] if the numbers do not describe a solid.
+pub fn sphere_on_block(
+    poisson_ratio: f64,
+    radius_m: f64,
+    size: Size,
+    resolution: Resolution,
+) -> Result<Prepared, NotPositive> {
+    let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
+    let remainder = Remainder::new(size, solid, resolution.fineness)?;
+    let rounding_m = rounding_m(size, radius_m);
+    let builder = Builder { solid, size, radius_m, rounding_m, remainder: &remainder, resolution };
+    let top = builder.ratios(Face::Top);
+    let side_x = builder.ratios(Face::SideX);
+    let side_y = if size.half_x_m == size.half_y_m { side_x.clone() } else { builder.ratios(Face::SideY) };
+    let ratios = Box::new([top, side_x, side_y]);
+    let mesh_error = builder.mesh_error()?;
+    let ground = Ground::Block { size, ratios, rounding_m };
+    Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid), ground), mesh_error })
+}
+
+/// Radius of a block's edges for a sphere, m.
+fn rounding_m(size: Size, radius_m: f64) -> f64 {
+    let least_m = (2.0 * size.half_x_m).min(2.0 * size.half_y_m).min(size.height_m);
+    (0.02 * least_m).min(0.25 * radius_m)
+}
+
+impl Prepared {
+    /// All that was solved, for the cache. Not real-time.
+    #[must_use]
+    pub fn to_numbers(&self) -> Vec<f64> {
+        let mut numbers = vec![self.mesh_error];
+        self.atlas.profile.write_numbers(&mut numbers);
+        if let Ground::Block { ratios, .. } = &self.atlas.ground {
+            ratios.iter().for_each(|volume| volume.write_numbers(&mut numbers));
+        }
+        numbers
+    }
+
+    /// The same law from these numbers, bit for bit; `None` if they are not those of such a law. Without a size: on a
+    /// half-space. Not real-time.
+    #[must_use]
+    pub fn from_numbers(
+        mut numbers: &[f64],
+        poisson_ratio: f64,
+        radius_m: f64,
+        size: Option<Size>,
+    ) -> Option<Self> {
+        let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
+        let (&mesh_error, rest) = numbers.split_first()?;
+        numbers = rest;
+        let profile = Curve::from_numbers(&mut numbers, [End::Parabola; 2])?;
+        let ground = match size {
+            None => Ground::HalfSpace,
+            Some(size) => {
+                let mut next = |face| Volume::from_numbers(&mut numbers, ends(face));
+                let ratios = Box::new([next(Face::Top)?, next(Face::SideX)?, next(Face::SideY)?]);
+                Ground::Block { size, ratios, rounding_m: rounding_m(size, radius_m) }
+            }
+        };
+        numbers.is_empty().then(|| Self { atlas: atlas(&solid, radius_m, profile, ground), mesh_error })
+    }
+}
+
+struct Builder<'a> {
+    solid: HalfSpace,
+    size: Size,
+    radius_m: f64,
+    rounding_m: f64,
+    remainder: &'a Remainder,
+    resolution: Resolution,
+}
+
+/// Distances from the middle of a side, in the table of remainders.
+fn table_nodes(half_m: f64) -> Vec<f64> {
+    TABLE_SHARES.iter().map(|share| half_m * (1.0 - share)).collect()
+}
+
+/// The same from bottom to top.
+fn table_heights(height_m: f64) -> Vec<f64> {
+    let half_m = 0.5 * height_m;
+    let up = table_nodes(half_m);
+    // The clamped end is smoother: every second point is enough.
+    let below = up.iter().skip(1).step_by(2).rev().map(|x| -half_m - x);
+    below.chain(up.iter().map(|x| x - half_m)).collect()
+}
+
+impl Builder<'_> {
+    fn half_along(&self, axis: usize) -> f64 {
+        [self.size.half_x_m, self.size.half_y_m, 0.5 * self.size.height_m][axis]
+    }
+
+    /// Where along an axis the sphere's law is solved, m: from the middle to twice the rounding before the edge, or from the
+    /// bottom to the top.
+    fn places(&self, axis: usize) -> Vec<f64> {
+        let half_m = self.half_along(axis);
+        let up: Vec<f64> = PLACES.iter().map(|share| share * (half_m - 2.0 * self.rounding_m)).collect();
+        if axis < 2 {
+            return up;
+        }
+        let below = up.iter().skip(1).step_by(2).rev().map(|x| -half_m - x);
+        let mut all: Vec<f64> = below.collect();
+        let bottom = 2.0 * self.rounding_m - 2.0 * half_m;
+        if all[0] > bottom {
+            all.insert(0, bottom);
+        }
+        all.extend(up.iter().map(|x| x - half_m));
+        all
+    }
+
+    fn table(&self, face: Face) -> Table {
+        let [p, q, _] = face.axes();
+        let nodes = |axis: usize| {
+            if axis < 2 { table_nodes(self.half_along(axis)) } else { table_heights(self.size.height_m) }
+        };
+        Table::new(self.remainder, face, [&nodes(p), &nodes(q)])
+    }
+
+    /// Ratio of the block's energy to that of a half-space over place and root of depth over radius.
+    fn ratios(&self, face: Face) -> Volume {
+        let [p, q, _] = face.axes();
+        let table = self.table(face);
+        let rings = self.resolution.rings;
+        let patch = Patch::new(&self.solid, rings);
+        let roots: Vec<f64> =
+            (1..=LEVELS).map(|level| DEEPEST_SOLVED.sqrt() * level as f64 / LEVELS as f64).collect();
+        let reference = unbounded(&self.solid, rings, &roots);
+        let places = [self.places(p), self.places(q)];
+        let counts = [places[0].len(), places[1].len()];
+        let mut values = vec![1.0; counts[0] * counts[1] * (LEVELS + 1)];
+        let symmetric = face == Face::Top && self.size.half_x_m == self.size.half_y_m;
+        for j in 0..counts[1] {
+            for i in 0..counts[0] {
+                let at = |level: usize, i: usize, j: usize| (level * counts[1] + j) * counts[0] + i;
+                if symmetric && i < j {
+                    continue;
+                }
+                let column =
+                    self.column(&patch, &table, face, [places[0][i], places[1][j]], &roots, &reference);
+                for (level, ratio) in column.into_iter().enumerate() {
+                    values[at(level + 1, i, j)] = ratio;
+                    if symmetric {
+                        values[at(level + 1, j, i)] = ratio;
+                    }
+                }
+            }
+        }
+        let mut levels = vec![0.0];
+        levels.extend(roots);
+        let [a, b] = places;
+        Volume::new([a, b, levels], &values, ends(face))
+    }
+
+    /// Ratios at one place, for growing depth.
+    fn column(
+        &self,
+        patch: &Patch,
+        table: &Table,
+        face: Face,
+        place_m: [f64; 2],
+        roots: &[f64],
+        reference: &[Contact],
+    ) -> Vec<f64> {
+        let [p, q, _] = face.axes();
+        let inside = |axis: usize, x: f64| {
+            if axis < 2 { x.abs() <= self.half_along(axis) } else { -self.size.height_m <= x && x <= 0.0 }
+        };
+        let radius_m = self.radius_m;
+        let mut ratios: Vec<f64> = Vec::with_capacity(roots.len());
+        let mut start: Option<Contact> = None;
+        for (root, unbounded) in roots.iter().zip(reference) {
+            let depth_m = radius_m * root * root;
+            let cell_m = cell_m(radius_m, depth_m, self.resolution.rings);
+            let points: Vec<[f64; 2]> =
+                patch.points_m(cell_m).iter().map(|at| [at[0] + place_m[0], at[1] + place_m[1]]).collect();
+            let on_face: Vec<bool> = points.iter().map(|at| inside(p, at[0]) && inside(q, at[1])).collect();
+            let smooth = table.among(&points);
+            let problem = Problem { radius_m, depth_m, cell_m, on_face: &on_face, smooth: &smooth };
+            let contact = patch.solve(&problem, start.as_ref());
+            let ratio = contact.energy_j / (unbounded.energy_j * radius_m * radius_m * radius_m);
+            let before = ratios.last().copied().unwrap_or(1.0);
+            if contact.residual < 1.0e-4 && (ratio / before - 1.0).abs() < 0.3 {
+                ratios.push(ratio);
+                start = Some(contact);
+            } else {
+                // It has snapped through: on with what was.
+                let earlier = ratios.len().checked_sub(2).map_or(1.0, |i| ratios[i]);
+                ratios.push(2.0 * before - earlier);
+            }
+        }
+        ratios
+    }
+
+    /// Change of the stiffness under the sphere between these elements and coarser ones, in the middle and at a quarter of
+    /// the side from an edge: twice the share of the remainder, by a contact of half the sphere's radius.
+    fn mesh_error(&self) -> Result<f64, NotPositive> {
+        let Fineness { across, high, order } = self.resolution.fineness;
+        let coarse = Fineness { across: across.div_ceil(2).max(1), high: high.div_ceil(2).max(1), order };
+        let other = Remainder::new(self.size, self.solid, coarse)?;
+        let nu = self.solid.poisson_ratio;
+        let unbounded = (1.0 - nu * nu) / self.radius_m; // 1 / (2 E* a), a = R / 2
+        let points = [[0.0, 0.0], [0.75 * self.size.half_x_m, 0.0]];
+        let at = |remainder: &Remainder, k: usize| {
+            remainder.responses(Face::Top, &points[k..=k], &points[k..=k])[0][0][0][2][2]
+        };
+        Ok((0..2).map(|k| (at(self.remainder, k) - at(&other, k)).abs() / unbounded).fold(0.0, f64::max))
+    }
+}

@@ -1,0 +1,53 @@
+//! A rigid patch of a surface: what a bonded plate or punch feels, from one quadratic energy.
+//!
+//! Every point of the patch is moved by `u = t + (R - I) X`, `X` from the patch's centre: twelve numbers, linear in the
+//! displacement, with the exact rotation `R`. The energy is `1/2 v.K v` in those twelve; force and torque are its
+//! derivatives with respect to the movement of the hand.
+
+use flotor_hal::{DMat3, DQuat, DVec3, Wrench};
+
+/// Number of the numbers: three of `t`, nine of `R - I`.
+pub const MODES: usize = 12;
+
+/// Stiffness of a patch: translation along x, y, z first, then `R - I`, entry `(i, j)` at `3 + 3 i + j`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RigidPatch {
+    /// Symmetric and positive semidefinite, N/m, N and N m.
+    pub stiffness: [[f64; MODES]; MODES],
+}
+
+impl RigidPatch {
+    /// Index of entry `(i, j)` of `R - I`.
+    #[must_use]
+    pub const fn entry(i: usize, j: usize) -> usize {
+        3 + 3 * i + j
+    }
+
+    /// Wrench on the hand, and stored energy, J. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn answer(&self, position_m: DVec3, orientation: DQuat) -> (Wrench, f64) {
+        let rotation = DMat3::from_quat(orientation);
+        let columns = [rotation.x_axis, rotation.y_axis, rotation.z_axis];
+        let mut modes = [0.0; MODES];
+        modes[..3].copy_from_slice(&position_m.to_array());
+        for (j, column) in columns.iter().enumerate() {
+            for (i, value) in column.to_array().into_iter().enumerate() {
+                modes[Self::entry(i, j)] = value - if i == j { 1.0 } else { 0.0 };
+            }
+        }
+        let mut slope = [0.0; MODES];
+        let mut energy_j = 0.0;
+        for ((target, row), mode) in slope.iter_mut().zip(&self.stiffness).zip(&modes) {
+            *target = row.iter().zip(&modes).map(|(k, v)| k * v).sum();
+            energy_j += 0.5 * *target * mode;
+        }
+        let force_n = -DVec3::new(slope[0], slope[1], slope[2]);
+        let mut torque_nm = DVec3::ZERO;
+        for (j, column) in columns.into_iter().enumerate() {
+            let moment =
+                DVec3::new(slope[Self::entry(0, j)], slope[Self::entry(1, j)], slope[Self::entry(2, j)]);
+            torque_nm -= column.cross(moment);
+        }
+        (Wrench::new(force_n, torque_nm), energy_j)
+    }
+}

@@ -1,0 +1,238 @@
+//! A frictionless rigid sphere against a deformed face: contact on a patch of cells that comes along with the sphere.
+//!
+//! Each cell carries a pressure along the normal of the sphere *at the displaced cell*, and no cell comes inside:
+//! `|X + u(X) - c| >= R`, `p >= 0`, one of them with equality. The displacement is that of a half-space under even loads on
+//! square cells, a table that scales with one over the cell, plus the remainder of the block. A solve alternates between
+//! the pressures for given normals (an active set and a Cholesky factorisation) and the normals for given pressures.
+
+use crate::dense;
+use crate::half_space::{Block, HalfSpace};
+
+/// Cells of a patch, and the half-space between any two of them.
+#[derive(Clone, Debug)]
+pub struct Patch {
+    /// Cells from the middle to the rim.
+    rings: i32,
+    /// Cells, in units of a cell.
+    cells: Vec<[i32; 2]>,
+    /// Displacement for a unit force on a cell of side one, by offset of the target from the source.
+    kernel: Vec<Block>,
+}
+
+/// One contact problem. Lengths in m, the unit of force that of the half-space's modulus.
+#[derive(Clone, Copy, Debug)]
+pub struct Problem<'a> {
+    /// Radius of the sphere.
+    pub radius_m: f64,
+    /// How far the undisplaced face is inside the sphere.
+    pub depth_m: f64,
+    /// Side of a cell.
+    pub cell_m: f64,
+    /// Which cells lie on the face; all, if empty.
+    pub on_face: &'a [bool],
+    /// Remainder between the cells: for each target, for each source; none, if empty.
+    pub smooth: &'a [Block],
+}
+
+/// What a solve found; the start of the next.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contact {
+    /// Stored energy, J.
+    pub energy_j: f64,
+    /// Force on the sphere, along `p`, `q`, `w`, N.
+    pub force_n: [f64; 3],
+    /// Distance of the farthest cell in contact from the middle, in cells.
+    pub reach: f64,
+    /// Largest change of a normal in the last step: zero in the limit.
+    pub residual: f64,
+    normals: Vec<[f64; 3]>,
+    active: Vec<bool>,
+}
+
+/// Steps until a solve gives up.
+const MOST_STEPS: usize = 300;
+/// A solve ends when no normal turns by more, rad.
+const TOLERANCE: f64 = 1.0e-8;
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn times(block: &Block, v: [f64; 3]) -> [f64; 3] {
+    [dot(block[0], v), dot(block[1], v), dot(block[2], v)]
+}
+
+impl Patch {
+    /// A disc of cells. Not real-time.
+    #[must_use]
+    pub fn new(solid: &HalfSpace, rings: i32) -> Self {
+        let side = -rings..=rings;
+        let cells: Vec<[i32; 2]> = side
+            .clone()
+            .flat_map(|j| side.clone().map(move |i| [i, j]))
+            .filter(|[i, j]| i * i + j * j <= rings * rings)
+            .collect();
+        let span = -2 * rings..=2 * rings;
+        let kernel = span
+            .clone()
+            .flat_map(|j| span.clone().map(move |i| [f64::from(i), f64::from(j)]))
+            .map(|[i, j]| {
+                // Corners of the source, seen from the target.
+                let corner = |x: f64, y: f64| [x - i, y - j];
+                solid.polygon(&[corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)])
+            })
+            .collect();
+        Self { rings, cells, kernel }
+    }
+
+    /// Number of cells.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// Where the cells are relative to the middle, m.
+    #[must_use]
+    pub fn points_m(&self, cell_m: f64) -> Vec<[f64; 2]> {
+        self.cells.iter().map(|cell| cell.map(|c| f64::from(c) * cell_m)).collect()
+    }
+
+    #[allow(clippy::cast_sign_loss)] // offsets lie within twice the rings
+    fn between(&self, target: usize, source: usize) -> &Block {
+        let [i, j] =
+            [0, 1].map(|k| (self.cells[target][k] - self.cells[source][k] + 2 * self.rings) as usize);
+        &self.kernel[j * (4 * self.rings as usize + 1) + i]
+    }
+
+    /// Solves a contact. Starts from another one near by; without, from the shape of an undeformed contact, which a sphere
+    /// that is deeper than about half its radius does not come back from. Not real-time.
+    #[must_use]
+    pub fn solve(&self, problem: &Problem<'_>, start: Option<&Contact>) -> Contact {
+        let count = self.cells.len();
+        let points = self.points_m(problem.cell_m);
+        let height = problem.radius_m - problem.depth_m;
+        let compliance: Vec<Block> = (0..count * count)
+            .map(|pair| {
+                let mut block =
+                    self.between(pair / count, pair % count).map(|row| row.map(|u| u / problem.cell_m));
+                if let Some(extra) = problem.smooth.get(pair) {
+                    for (row, more) in block.iter_mut().zip(extra) {
+                        row.iter_mut().zip(more).for_each(|(u, m)| *u += m);
+                    }
+                }
+                block
+            })
+            .collect();
+        let on_face = |cell: usize| problem.on_face.get(cell).copied().unwrap_or(true);
+        let away: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1], -height]).collect();
+        let (mut normals, mut active) = start.map_or_else(
+            || {
+                let half_chord = 0.7 * (problem.radius_m * problem.depth_m).sqrt();
+                let near = |a: &[f64; 3]| (a[0] * a[0] + a[1] * a[1]).sqrt() < half_chord;
+                let normals = away.iter().map(|a| a.map(|c| c / dot(*a, *a).sqrt())).collect();
+                (normals, away.iter().map(near).collect())
+            },
+            |start| (start.normals.clone(), start.active.clone()),
+        );
+        (0..count).filter(|&cell| !on_face(cell)).for_each(|cell| active[cell] = false);
+        let mut displaced = vec![[0.0; 3]; count];
+        let mut contact = Contact {
+            energy_j: 0.0,
+            force_n: [0.0; 3],
+            reach: 0.0,
+            residual: f64::INFINITY,
+            normals: Vec::new(),
+            active: Vec::new(),
+        };
+        let mut relaxation = 1.0;
+        for step in 0..MOST_STEPS {
+            let forces = pressures(&compliance, count, &normals, &away, problem.radius_m, &mut active);
+            for (target, u) in displaced.iter_mut().enumerate() {
+                *u = [0.0; 3];
+                for (source, force) in &forces {
+                    let part = times(&compliance[target * count + source], *force);
+                    u.iter_mut().zip(part).for_each(|(sum, p)| *sum += p);
+                }
+            }
+            let mut joined = 0;
+            let mut residual: f64 = 0.0;
+            for cell in 0..count {
+                let out = [0, 1, 2].map(|k| away[cell][k] + displaced[cell][k]);
+                let distance = dot(out, out).sqrt();
+                let turned = out.map(|c| c / distance);
+                if active[cell] {
+                    let change = [0, 1, 2].map(|k| turned[k] - normals[cell][k]);
+                    residual = residual.max(dot(change, change).sqrt());
+                } else if on_face(cell) && distance < problem.radius_m * (1.0 - 1.0e-9) {
+                    active[cell] = true;
+                    joined += 1;
+                }
+                let mixed = [0, 1, 2].map(|k| normals[cell][k] + relaxation * (turned[k] - normals[cell][k]));
+                let length = dot(mixed, mixed).sqrt();
+                normals[cell] = mixed.map(|c| c / length);
+            }
+            if residual > contact.residual && step > 3 {
+                relaxation = (0.8 * relaxation).max(0.2);
+            }
+            contact.residual = residual;
+            if joined == 0 && residual < TOLERANCE || step + 1 == MOST_STEPS {
+                contact.energy_j =
+                    0.5 * forces.iter().map(|(cell, force)| dot(*force, displaced[*cell])).sum::<f64>();
+                for (_, force) in &forces {
+                    contact.force_n.iter_mut().zip(force).for_each(|(sum, f)| *sum -= f);
+                }
+                break;
+            }
+        }
+        contact.reach = (0..count)
+            .filter(|&cell| active[cell])
+            .map(|cell| self.cells[cell].map(f64::from))
+            .map(|[i, j]| (i * i + j * j).sqrt())
+            .fold(0.0, f64::max);
+        contact.normals = normals;
+        contact.active = active;
+        contact
+    }
+}
+
+/// Forces of the active cells that put each onto the sphere along its normal; cells that would pull are let off.
+fn pressures(
+    compliance: &[Block],
+    count: usize,
+    normals: &[[f64; 3]],
+    away: &[[f64; 3]],
+    radius_m: f64,
+    active: &mut [bool],
+) -> Vec<(usize, [f64; 3])> {
+    loop {
+        let cells: Vec<usize> = (0..count).filter(|&cell| active[cell]).collect();
+        let size = cells.len();
+        let mut matrix = vec![0.0; size * size];
+        for (column, &source) in cells.iter().enumerate() {
+            for (row, &target) in cells.iter().enumerate().skip(column) {
+                let moved = times(&compliance[target * count + source], normals[source]);
+                matrix[column * size + row] = dot(normals[target], moved);
+            }
+        }
+        let mut pressures: Vec<f64> =
+            cells.iter().map(|&cell| radius_m - dot(normals[cell], away[cell])).collect();
+        if dense::factor(&mut matrix, size, size).is_err() {
+            return Vec::new();
+        }
+        dense::solve(&matrix, size, &mut pressures);
+        let mut pulling = false;
+        for (&cell, &pressure) in cells.iter().zip(&pressures) {
+            if pressure < 0.0 {
+                active[cell] = false;
+                pulling = true;
+            }
+        }
+        if !pulling {
+            return cells
+                .iter()
+                .zip(&pressures)
+                .map(|(&cell, &pressure)| (cell, normals[cell].map(|c| c * pressure)))
+                .collect();
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! The remainder of a face, for any two points of it: values at a grid of points, and cubics through them.
+
+use crate::half_space::Block;
+use crate::remainder::{Face, Remainder};
+
+/// Remainder of a face between all pairs of a grid of points.
+#[derive(Clone, Debug)]
+pub struct Table {
+    /// Coordinates along `p` and `q`, m, ascending.
+    nodes_m: [Vec<f64>; 2],
+    /// For each source, for each target: displacement at the target of a unit force at the source, m/N. `p` runs first.
+    blocks: Vec<Block>,
+}
+
+/// Nodes around a coordinate, and their shares: a cubic, or as many nodes as there are.
+#[derive(Clone, Copy, Debug)]
+pub struct Window {
+    first: usize,
+    shares: [f64; 4],
+}
+
+/// The cubic through the four nodes around a coordinate; constant outside the first and last.
+#[must_use]
+pub fn window(nodes: &[f64], coordinate: f64) -> Window {
+    let count = nodes.len().min(4);
+    let at = coordinate.clamp(nodes[0], nodes[nodes.len() - 1]);
+    let below = nodes.iter().take_while(|&&node| node <= at).count();
+    let first = below.saturating_sub(2).min(nodes.len() - count);
+    let mut shares = [0.0; 4];
+    for (i, share) in shares.iter_mut().enumerate().take(count) {
+        *share = 1.0;
+        for j in (0..count).filter(|&j| j != i) {
+            *share *= (at - nodes[first + j]) / (nodes[first + i] - nodes[first + j]);
+        }
+    }
+    Window { first, shares }
+}
+
+/// Both signs of non-negative coordinates, ascending.
+fn mirrored(half: &[f64]) -> Vec<f64> {
+    let negative = half.iter().rev().filter(|&&x| x > 0.0).map(|x| -x);
+    negative.chain(half.iter().copied()).collect()
+}
+
+impl Table {
+    /// Solves for all points. `half_m` are coordinates in the quarter of positive x and y: along `p` from zero on, along `q`
+    /// from zero on (top) or all of them (a side). Not real-time.
+    #[must_use]
+    pub fn new(remainder: &Remainder, face: Face, half_m: [&[f64]; 2]) -> Self {
+        let quarter: Vec<[f64; 2]> =
+            half_m[1].iter().flat_map(|&q| half_m[0].iter().map(move |&p| [p, q])).collect();
+        let answers = remainder.responses(face, &quarter, &quarter);
+        let nodes_m =
+            [mirrored(half_m[0]), if face == Face::Top { mirrored(half_m[1]) } else { half_m[1].to_vec() }];
+        let count = [nodes_m[0].len(), nodes_m[1].len()];
+        // Where a signed coordinate is found in the quarter.
+        let fold = |k: usize, index: usize| {
+            let zeros = count[k] - half_m[k].len();
+            if index >= zeros { (index - zeros, 1.0) } else { (half_m[k].len() - 1 - index, -1.0) }
+        };
+        let total = count[0] * count[1];
+        let mut blocks = vec![[[0.0; 3]; 3]; total * total];
+        for source in 0..total {
+            let (sp, flip_p) = fold(0, source % count[0]);
+            let (sq, flip_q) = fold(1, source / count[0]);
+            for target in 0..total {
+                let (tp, side_p) = fold(0, target % count[0]);
+                let (tq, side_q) = fold(1, target / count[0]);
+                // Both mirrored so that the source lies in the quarter; the target may then lie in another.
+                let (x, y) = match face {
+                    Face::Top => (flip_p * side_p, flip_q * side_q),
+                    Face::SideX => (1.0, flip_p * side_p),
+                    Face::SideY => (flip_p * side_p, 1.0),
+                };
+                let mirror = usize::from(x < 0.0) + 2 * usize::from(y < 0.0);
+                let block = answers[sq * half_m[0].len() + sp][tq * half_m[0].len() + tp][mirror];
+                let flip = [flip_p, flip_q, 1.0];
+                for i in 0..3 {
+                    for j in 0..3 {
+                        blocks[source * total + target][i][j] = flip[i] * flip[j] * block[i][j];
+                    }
+                }
+            }
+        }
+        // Betti: what the one does at the other is what the other does at the one. Elements and quadrature break it by little.
+        for source in 0..total {
+            for target in 0..=source {
+                let (one, two) = (blocks[source * total + target], blocks[target * total + source]);
+                for i in 0..3 {
+                    for j in 0..3 {
+                        let mean = 0.5 * (one[i][j] + two[j][i]);
+                        blocks[source * total + target][i][j] = mean;
+                        blocks[target * total + source][j][i] = mean;
+                    }
+                }
+            }
+        }
+        Self { nodes_m, blocks }
+    }
+
+    /// Remainder between all pairs of these points, m/N: for each target, for each source. Not real-time.
+    #[must_use]
+    pub fn among(&self, points_m: &[[f64; 2]]) -> Vec<Block> {
+        let count = self.nodes_m[0].len();
+        let total = count * self.nodes_m[1].len();
+        let windows: Vec<[Window; 2]> =
+            points_m.iter().map(|at| [0, 1].map(|k| window(&self.nodes_m[k], at[k]))).collect();
+        // Only nodes that some point needs.
+        let mut used = vec![usize::MAX; total];
+        let mut nodes = Vec::new();
+        let mut shares: Vec<Vec<(usize, f64)>> = Vec::with_capacity(points_m.len());
+        for [p, q] in &windows {
+            let mut own = Vec::with_capacity(16);
+            for (j, sq) in q.shares.iter().enumerate().filter(|(_, s)| **s != 0.0) {
+                for (i, sp) in p.shares.iter().enumerate().filter(|(_, s)| **s != 0.0) {
+                    let node = (q.first + j) * count + p.first + i;
+                    if used[node] == usize::MAX {
+                        used[node] = nodes.len();
+                        nodes.push(node);
+                    }
+                    own.push((used[node], sp * sq));
+                }
+            }
+            shares.push(own);
+        }
+        // First the sources, then the targets.
+        let mut half = vec![[[0.0; 3]; 3]; nodes.len() * points_m.len()];
+        for (node, &target) in nodes.iter().enumerate() {
+            for (point, own) in shares.iter().enumerate() {
+                let sum = &mut half[node * points_m.len() + point];
+                for &(source, share) in own {
+                    add_scaled(sum, &self.blocks[nodes[source] * total + target], share);
+                }
+            }
+        }
+        let mut all = vec![[[0.0; 3]; 3]; points_m.len() * points_m.len()];
+        for (target, own) in shares.iter().enumerate() {
+            for &(node, share) in own {
+                for source in 0..points_m.len() {
+                    let part = half[node * points_m.len() + source];
+                    add_scaled(&mut all[target * points_m.len() + source], &part, share);
+                }
+            }
+        }
+        all
+    }
+}
+
+fn add_scaled(sum: &mut Block, block: &Block, share: f64) {
+    for (row, values) in sum.iter_mut().zip(block) {
+        row.iter_mut().zip(values).for_each(|(s, v)| *s += share * v);
+    }
+}

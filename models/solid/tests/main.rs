@@ -1,0 +1,6 @@
+//! The solid against tables made elsewhere, and against the laws no solid may break.
+
+mod contact;
+mod rows;
+mod solver;
+mod table;

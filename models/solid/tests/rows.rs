@@ -1,0 +1,133 @@
+//! The open rows of the reference tables, at the standard resolution. Bounds are those the tables' makers set.
+
+use crate::table::{Row, rows};
+use flotor_hal::{DVec3, Wrench, orientation_from_rotation_vector};
+use flotor_solid::half_space::HalfSpace;
+use flotor_solid::law::{Body, Description, Law, RESOLUTIONS, Tool};
+use flotor_solid::punch::{Bond, Outline};
+use flotor_solid::remainder::{Face, Remainder, Size};
+use flotor_solid::table::Table;
+
+const STANDARD: usize = 1;
+const CUBE: Size = Size { half_x_m: 0.04, half_y_m: 0.04, height_m: 0.08 };
+
+fn block(row: &Row) -> Size {
+    let side: Vec<f64> =
+        row.text("block_mm").split('x').map(|mm| mm.parse::<f64>().expect("a side") * 1.0e-3).collect();
+    Size { half_x_m: 0.5 * side[0], half_y_m: 0.5 * side[1], height_m: side[2] }
+}
+
+fn solve(body: Body, tool: Tool, poisson_ratio: f64) -> Law {
+    Description { body, tool, poisson_ratio, resolution: STANDARD }.solve().expect("a solid").0
+}
+
+/// Errors of force and of torque over an arm, relative to both together.
+fn errors(law: &Law, row: &Row, arm_m: f64) -> (f64, f64) {
+    let Law::Bonded(patch) = law else { panic!("a rigid patch") };
+    let rotation = orientation_from_rotation_vector(row.vector(["rx_rad", "ry_rad", "rz_rad"]));
+    let (wrench, energy_j) = patch.answer(row.vector(["x_m", "y_m", "z_m"]), rotation);
+    let modulus = row.number("E_pa");
+    let (force, torque) = (row.vector(["fx_n", "fy_n", "fz_n"]), row.vector(["tx_nm", "ty_nm", "tz_nm"]));
+    let size = force.length() + torque.length() / arm_m;
+    let wrench = Wrench::new(wrench.force() * modulus, wrench.torque() * modulus);
+    let f = (wrench.force() - force).length() / size;
+    let m = (wrench.torque() - torque).length() / arm_m / size;
+    println!(
+        "{} force {f:.4} torque {m:.4} energy {:+.4}",
+        row.text("id"),
+        energy_j * modulus / row.number("energy_j") - 1.0
+    );
+    (f, m)
+}
+
+#[test]
+fn a_plate_at_the_end_of_a_beam() {
+    for nu in [0.3, 0.45] {
+        let law = solve(Body::Beam { size_m: [0.2, 0.04, 0.04] }, Tool::Plate, nu);
+        for row in rows("a_cantilever_plate.csv").iter().filter(|row| row.number("nu") == nu) {
+            let (f, m) = errors(&law, row, 0.02);
+            assert!(f < 0.02 && m < 0.02, "{}: {f} {m}", row.text("id"));
+        }
+    }
+}
+
+#[test]
+fn a_punch_on_a_block() {
+    let round = Outline::Round { radius_m: 0.005 };
+    let square = Outline::Square { half_m: 0.01 };
+    for (file, outline, arm_m, torque_bound) in
+        [("c_punch.csv", round, 0.005, 0.07), ("d_torque.csv", square, 0.01, 0.06)]
+    {
+        let mut solved: Option<(Size, f64, Bond, Law)> = None;
+        for row in &rows(file) {
+            let (size, nu) = (block(row), row.number("nu"));
+            let frictionless = row.text("category") == "punch_frictionless";
+            let bond = if frictionless { Bond::Frictionless } else { Bond::Bonded };
+            if !solved.as_ref().is_some_and(|(s, n, b, _)| *s == size && *n == nu && *b == bond) {
+                solved = Some((size, nu, bond, solve(Body::Block(size), Tool::Punch { outline, bond }, nu)));
+            }
+            let law = &solved.as_ref().expect("just solved").3;
+            let (f, m) = errors(law, row, arm_m);
+            assert!(f < 0.03 && m < torque_bound, "{}: {f} {m}", row.text("id"));
+        }
+    }
+}
+
+#[test]
+fn a_sphere_on_a_block() {
+    // Each takes some seconds to prepare: quick size has one.
+    let is_full = std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size == "full");
+    for nu in [0.3, 0.45] {
+        for radius_m in [0.005, 0.0127] {
+            if !is_full && (nu, radius_m) != (0.3, 0.0127) {
+                continue;
+            }
+            let law = solve(Body::Block(CUBE), Tool::Sphere { radius_m }, nu);
+            let Law::Sphere(atlas) = law else { panic!("a sphere") };
+            let table = rows("b_block_sphere.csv");
+            for row in table.iter().filter(|row| row.number("nu") == nu && row.number("radius_m") == radius_m)
+            {
+                let answer = atlas.answer(row.vector(["cx_m", "cy_m", "cz_m"]).to_array());
+                let modulus = row.number("E_pa");
+                let force = DVec3::from_array(answer.energy.slope) * -modulus;
+                let truth = row.vector(["fx_n", "fy_n", "fz_n"]);
+                let error = (force - truth).length() / truth.length();
+                let energy = answer.energy.value * modulus / row.number("energy_j") - 1.0;
+                println!("{} force {error:.4} energy {energy:+.4}", row.text("id"));
+                let bound = if row.text("category").ends_with("deep") { 0.05 } else { 0.03 };
+                assert!(error < bound, "{}: {error}", row.text("id"));
+            }
+        }
+    }
+}
+
+/// Displacement of the top face under an even load on a disc, at points and distances of the table.
+#[test]
+fn a_loaded_disc_on_a_block() {
+    let corners: Vec<[f64; 2]> = (0..64)
+        .map(|k| {
+            let angle = std::f64::consts::TAU * f64::from(k) / 64.0;
+            // A polygon with the area of the disc.
+            let radius = 0.005 * (std::f64::consts::TAU / 64.0 / (std::f64::consts::TAU / 64.0).sin()).sqrt();
+            [radius * angle.cos(), radius * angle.sin()]
+        })
+        .collect();
+    let area = std::f64::consts::PI * 0.005 * 0.005;
+    for row in rows("c_surface.csv").iter().filter(|row| row.text("at") != "mean") {
+        let solid = HalfSpace { youngs_modulus_pa: row.number("E_pa"), poisson_ratio: row.number("nu") };
+        let distance = row.text("at").parse::<f64>().unwrap_or(0.0) * 1.0e-3;
+        let at = [0.8 * distance, 0.6 * distance];
+        let seen: Vec<[f64; 2]> = corners.iter().map(|c| [c[0] - at[0], c[1] - at[1]]).collect();
+        let size = block(row);
+        let remainder = Remainder::new(size, solid, RESOLUTIONS[STANDARD].fineness).expect("a solid");
+        // The remainder of the disc is that of its middle: smooth over forty millimetres and more.
+        let nodes = [0.0, 0.6 * distance.max(0.001), 0.8 * distance.max(0.001)];
+        let table = Table::new(&remainder, Face::Top, [&nodes, &nodes]);
+        let smooth = table.among(&[[0.0; 2], at])[2][2][2];
+        let uz_m = (solid.polygon(&seen)[2][2] / area + smooth) * row.number("patch_force_n");
+        let error = uz_m / row.number("uz_m") - 1.0;
+        println!("{} {error:+.4}", row.text("id"));
+        let bound = if distance >= 0.01 { 0.01 } else { 0.02 };
+        assert!(error.abs() < bound, "{}: {error}", row.text("id"));
+    }
+}
