@@ -12,7 +12,7 @@
 //!   fourth order in the angles by [`shape`] and [`quartic`]; [`angle`] gives angles without `acos`, and [`saturation`]
 //!   keeps the law smooth close to buckling.
 //! - [`rod`]: the exact rod, past buckling too, with a memory of where it was.
-//! - [`rod_blend`]: from the law `energy` to the rod where it is better, as one energy.
+//! - [`rod_blend`]: from the law `energy` to the rod where it is better, as one energy; `rod_share` says where.
 //! - [`held`]: a law with what a real coil adds to it: [`contact`] of its coils, and the twist and the off-axis ends of
 //!   its [`wire`].
 //! - [`seat`]: a lower plate that may roll up on its rim and lift off.
@@ -44,6 +44,7 @@ pub mod response;
 pub mod rigidity;
 pub mod rod;
 pub mod rod_blend;
+mod rod_share;
 pub mod saturation;
 pub mod seat;
 pub mod shape;

@@ -11,7 +11,7 @@
 
 use crate::precision::Precision;
 use crate::preset::Preset;
-use crate::rigidity::{Geometry, Material, Spring, Stiffness};
+use crate::rigidity::{Geometry, LEAST_POISSON_RATIO, Material, Spring, Stiffness};
 use crate::rod::Accuracy;
 use crate::seat::Friction;
 use flotor_hal::{Choices, OutOfRange, Parameter, Refusal, Settings, choices};
@@ -276,7 +276,7 @@ impl Choice {
         let Some(parameter) = SCHEMA.get(index) else {
             return OutOfRange { min: f64::NAN, max: f64::NAN, value };
         };
-        // Coils must not touch at rest, the coil be wider than the wire, Poisson's ratio below one half.
+        // Coils must not touch at rest, the coil be wider than the wire, Poisson's ratio E/(2 G) - 1 be possible.
         let (min, max) = match parameter.id() {
             "free_length_mm" => (geometry.solid_length_m() / MM, f64::INFINITY),
             "coil_diameter_mm" => (geometry.wire_diameter_m / MM, f64::INFINITY),
@@ -285,8 +285,14 @@ impl Choice {
                 (0.0, touching_m.min(geometry.coil_diameter_m) / MM)
             }
             "active_coils" => (0.0, geometry.free_length_m / geometry.wire_diameter_m),
-            "youngs_modulus_mpa" => (0.0, 3.0 * material.shear_modulus_pa / MPA),
-            "shear_modulus_mpa" => (material.youngs_modulus_pa / 3.0 / MPA, f64::INFINITY),
+            "youngs_modulus_mpa" => {
+                let shear_mpa = material.shear_modulus_pa / MPA;
+                (2.0 * (1.0 + LEAST_POISSON_RATIO) * shear_mpa, 3.0 * shear_mpa)
+            }
+            "shear_modulus_mpa" => {
+                let youngs_mpa = material.youngs_modulus_pa / MPA;
+                (youngs_mpa / 3.0, youngs_mpa / (2.0 * (1.0 + LEAST_POISSON_RATIO)))
+            }
             _ => (0.0, f64::INFINITY),
         };
         OutOfRange { min: min.max(parameter.min()), max: max.min(parameter.max()), value }

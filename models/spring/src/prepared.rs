@@ -50,18 +50,25 @@ pub(crate) struct Insight {
 impl Prepared {
     /// Not real-time: the rod allocates.
     pub(crate) fn new(choice: &Choice) -> Self {
-        let Choice { spring, stiffness, precision, variant, seat, friction, rod_blend, .. } = choice;
+        let Choice { spring, stiffness, precision, variant, seat, friction, rod_blend, coil_contact, .. } =
+            choice;
         match (variant, seat) {
             (Variant::Thesis, _) => Self::Thesis(Thesis::new(spring, *stiffness, *precision)),
             (Variant::ClosedForm, _) => {
                 Self::ClosedForm(ClosedForm::new(spring, Form::Printed).with_precision(*precision))
             }
             (Variant::CurrentLength, _) => Self::ClosedForm(ClosedForm::new(spring, Form::CurrentLength)),
-            (Variant::Energy, SeatChoice::Fixed) if *rod_blend == Switch::On => {
-                Self::RodBlend(held_blend(choice))
-            }
+            // Where coils touch, the rod knows where along the bulge.
+            (Variant::Energy, SeatChoice::Fixed) if *rod_blend == Switch::On => match coil_contact {
+                Switch::Off => Self::RodBlend(held_blend(choice)),
+                Switch::On => Self::Rod(exact_rod(choice)),
+            },
             (Variant::Energy, SeatChoice::Free) if *rod_blend == Switch::On => {
-                Self::FreeRodBlend(held_blend(choice), Seat::new(spring, *friction))
+                let seat = Seat::new(spring, *friction);
+                match coil_contact {
+                    Switch::Off => Self::FreeRodBlend(held_blend(choice), seat),
+                    Switch::On => Self::FreeRod(exact_rod(choice), seat),
+                }
             }
             (Variant::Energy, SeatChoice::Fixed) => Self::Energy(energy(choice)),
             (Variant::Energy, SeatChoice::Free) => {
@@ -120,9 +127,9 @@ impl Prepared {
         match self {
             Self::ClosedForm(law) => contract::step(law, input),
             Self::Energy(held) if held.is_plain() => contract::step(&held.law, input),
-            Self::RodBlend(held) if held.is_plain() && held.law.is_energy_alone(&contract::pose(input)) => {
+            Self::RodBlend(held) if held.is_plain() && !held.law.blends(&contract::pose(input)) => {
                 held.law.leave();
-                contract::step(&held.law.energy().law, input)
+                contract::step(held.law.energy(), input)
             }
             _ => contract::output(&self.respond(&contract::pose(input), contract::demand(input))),
         }
@@ -153,8 +160,8 @@ impl Prepared {
         match self {
             Self::ClosedForm(law) => batch.respond(law, inputs, outputs),
             Self::Energy(held) if held.is_plain() => batch.respond(&held.law, inputs, outputs),
-            Self::RodBlend(held) if held.is_plain() && held.law.energy().is_plain() => {
-                batch.respond(&held.law.energy().law, inputs, outputs);
+            Self::RodBlend(held) if held.is_plain() => {
+                batch.respond(held.law.energy(), inputs, outputs);
                 blend_some(&mut held.law, inputs, outputs);
             }
             _ => return false,
@@ -241,16 +248,22 @@ fn rod(choice: &Choice) -> Held<Rod> {
     Held { law, contact: None, wire: wire(choice) }
 }
 
+/// Each equilibrium to rounding, with the servo's polynomials.
+fn exact_rod(choice: &Choice) -> Held<Rod> {
+    let law = Rod::to_rounding(&choice.spring, coils(choice));
+    Held { law, contact: None, wire: wire(choice) }
+}
+
 /// For a base that asks for the least energy: the servo's rod is too coarse to be minimised.
 fn rod_to_tip(choice: &Choice) -> Held<Rod> {
     match choice.accuracy {
-        Accuracy::Servo => Held { law: Rod::to_rounding(&choice.spring, coils(choice)), ..rod(choice) },
+        Accuracy::Servo => exact_rod(choice),
         Accuracy::Tight => rod(choice),
     }
 }
 
 fn held_blend(choice: &Choice) -> Held<RodBlend> {
-    Held { law: RodBlend::new(&choice.spring, coils(choice)), contact: None, wire: wire(choice) }
+    Held { law: RodBlend::new(&choice.spring), contact: None, wire: wire(choice) }
 }
 
 fn coils(choice: &Choice) -> Coils {

@@ -46,6 +46,10 @@ impl Material {
     }
 }
 
+/// Positive moduli put the ratio above -1, at which a solid has no resistance to a change of volume: within a hundredth of
+/// that it is none.
+pub(crate) const LEAST_POISSON_RATIO: f64 = -0.99;
+
 /// Which constant is given; the others follow. The thesis calls these the modes 0 to 3 of `change`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stiffness {
@@ -131,9 +135,8 @@ impl Spring {
         }
         check_shape(&geometry)?;
         let poisson_ratio = material.poisson_ratio();
-        // The lower end needs no test: E > 0 and G > 0 put the ratio above -1.
-        if poisson_ratio >= 0.5 {
-            return Err(ParameterError::ImpossiblePoissonRatio { poisson_ratio });
+        if !(LEAST_POISSON_RATIO..0.5).contains(&poisson_ratio) {
+            return Err(ParameterError::ImpossiblePoissonRatio { poisson_ratio, material });
         }
         let spring = Self::unchecked(geometry, material, stiffness);
         // Extreme but positive parameters can still overflow or underflow in the products of the rigidities.
@@ -297,6 +300,8 @@ pub enum ParameterError {
     ImpossiblePoissonRatio {
         /// `E / (2 G) - 1`.
         poisson_ratio: f64,
+        /// The two moduli.
+        material: Material,
     },
 }
 
@@ -319,9 +324,12 @@ impl fmt::Display for ParameterError {
                 solid_length_m * 1e3,
                 free_length_m * 1e3
             ),
-            Self::ImpossiblePoissonRatio { poisson_ratio } => write!(
+            Self::ImpossiblePoissonRatio { poisson_ratio, material } => write!(
                 f,
-                "Young's and shear modulus give a Poisson ratio of {poisson_ratio:.4}, it must lie between -1 and 0.5"
+                "Young's modulus {} MPa and shear modulus {} MPa give a Poisson ratio of {poisson_ratio:.6}, it must lie \
+                 between -1 and 0.5",
+                material.youngs_modulus_pa * 1e-6,
+                material.shear_modulus_pa * 1e-6
             ),
         }
     }
@@ -399,6 +407,13 @@ mod tests {
         assert!(matches!(refuse(thin, material, stiffness), ParameterError::CoilNotWiderThanWire { .. }));
         let dense = Geometry { active_coils: 40.0, ..geometry };
         assert!(matches!(refuse(dense, material, stiffness), ParameterError::SolidAtRest { .. }));
+        // A Young's modulus in another unit than the shear modulus: the refusal has both.
+        let mixed_up = Material { youngs_modulus_pa: 1e6, ..material };
+        let reason = refuse(geometry, mixed_up, stiffness).to_string();
+        assert!(
+            reason.contains("1 MPa") && reason.contains("75842 MPa") && reason.contains("-0.99999"),
+            "{reason}"
+        );
         let rubbery = Material { shear_modulus_pa: material.youngs_modulus_pa / 3.0, ..material };
         assert!(matches!(
             refuse(geometry, rubbery, stiffness),

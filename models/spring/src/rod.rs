@@ -42,6 +42,7 @@ use plate::Plate;
 pub(crate) mod basis;
 pub(crate) mod contact;
 mod curve;
+mod descent;
 mod equilibrium;
 mod functional;
 pub(crate) mod matrix;
@@ -96,6 +97,16 @@ impl State {
         self.unstable_directions == 0
     }
 }
+
+/// Each equilibrium to rounding, so that nothing of the past is left in an answer.
+const TO_ROUNDING: Effort = Effort {
+    most_steps: 10,
+    most_matrices: 6,
+    matrix_life: 8,
+    tolerance: 1e-13,
+    // A step costs a ninth of a matrix: better several with an old one, as long as they contract.
+    renewal: 1e-3,
+};
 
 /// The exact rod of one spring, following the pose from tick to tick.
 #[derive(Clone, Debug, PartialEq)]
@@ -165,15 +176,7 @@ impl Rod {
     /// ([`crate::seat`]). Not real-time: allocates.
     #[must_use]
     pub fn to_rounding(spring: &Spring, coils: Coils) -> Self {
-        let effort = Effort {
-            most_steps: 10,
-            most_matrices: 6,
-            matrix_life: 8,
-            tolerance: 1e-13,
-            // A step costs a ninth of a matrix: better several with an old one, as long as they contract.
-            renewal: 1e-3,
-        };
-        let equilibrium = Equilibrium::new(Ratios::new(spring, coils), effort);
+        let equilibrium = Equilibrium::new(Ratios::new(spring, coils), TO_ROUNDING);
         Self::solved_by(Solver::Servo(Box::new(equilibrium)), spring, coils)
     }
 

@@ -14,11 +14,18 @@
 //! Lifting costs `R P |s|` to first order, an energy with a tip at `s = 0`: that is what keeps the plate
 //! seated while `|M_base| <= P R`.
 //!
-//! The base slides where the force along the ground exceeds the friction of the axial force (Coulomb), until it does
-//! not; it stays where it slid to. That costs energy, and is the one thing here that is not conservative.
+//! The rim rubs on the ground. Where the force along the ground and the torque about the base's normal, over the radius,
+//! together exceed the friction of the axial force, the base slides and spins until they do not, and stays there. That
+//! costs energy, and is the one thing here that is not conservative.
+//!
+//! A spring that would be pulled hangs from the upper plate, without load: its base goes, tilts and turns with it. It
+//! touches down where its rim meets the ground, with no stored energy, and stands there as it hung. It leaves the ground
+//! where a hanging rim would. Friction holds no more than three times what a straight spring
+//! shortened as far would press down: as the hanging rim comes free, friction fades and with it all that it holds, so lifting off is
+//! continuous. (Coulomb's law alone lets a bent spring jam in its friction beyond that, and snap.)
 //!
 //! Derivation: the book, chapter "The spring"; the step with a tip is the proximal Newton step of Lee, Sun
-//! and Saunders (2014).
+//! and Saunders (2014); one bound for force and torque of friction: Howe and Cutkosky (1996), a limit surface.
 
 use flotor_hal::glam::{DMat2, DQuat, DVec2, DVec3};
 use flotor_hal::math;
@@ -31,17 +38,24 @@ use crate::rigidity::Spring;
 use crate::validity::Validity;
 
 /// Evaluations of the law per tick at most.
-const MOST_EVALUATIONS: u32 = 8;
+const MOST_EVALUATIONS: u32 = 16;
 /// Change of the tilt that counts as none (rad), of a law that leaves nothing open.
 const TOLERANCE_RAD: f64 = 1e-11;
+/// Change of the stored energy that counts as none, of the stiffness by the tilt.
+const ENERGY_TOLERANCE: f64 = 1e-13;
+/// Part of a step that is left of one that went too far.
+const SHORTER: f64 = 0.25;
 /// Largest change of the tilt between evaluations (rad).
 const LONGEST_STEP_RAD: f64 = 0.05;
 /// Largest tilt (rad): beyond it the plate would stand on edge.
-const LARGEST_TILT_RAD: f64 = 1.2;
+const LARGEST_TILT_RAD: f64 = 1.5;
 /// Newton steps on the secular equation; it is nearly straight, three give all digits.
 const SECULAR_STEPS: u32 = 8;
 /// Share of the friction by which the force along the ground may exceed it: no coefficient is known as well.
 const FRICTION_TOLERANCE: f64 = 1e-6;
+/// Most that friction holds, of the force of a straight spring shortened as far. More than any pose of the reference tables
+/// asks for, and few enough that lifting off is gradual.
+const STEEPEST: f64 = 3.0;
 /// A sliding base is moved by what the stiffness along the ground makes of the excess; as observed, but within this
 /// factor of that at rest.
 const STIFFNESS_RANGE: f64 = 8.0;
@@ -76,13 +90,32 @@ pub struct Seat {
     /// Curvature by the tilt as observed, without the tip (N·m/rad).
     curvature: DMat2,
     lifted: bool,
+    /// Stiffness along the axis at rest (N/m).
+    axial_n_per_m: f64,
     /// Coefficient of friction on the ground.
     friction: f64,
-    /// Where the base has slid to (m).
+    /// Where the base has slid to (m), and how far it has turned about its normal (rad).
     slide_m: DVec2,
+    turn_rad: f64,
     /// Stiffness along the ground at rest, and as observed (N/m).
     lateral_n_per_m: f64,
     sliding_n_per_m: f64,
+}
+
+/// Where a base stood in a tick, what was felt there, and the slope of the energy without its tip.
+struct Stood {
+    at: Standing,
+    response: Response,
+    stored_j: f64,
+    slope: Option<DVec2>,
+}
+
+/// Where a base stands.
+#[derive(Clone, Copy)]
+struct Standing {
+    tilt_rad: DVec2,
+    slide_m: DVec2,
+    turn_rad: f64,
 }
 
 /// The base at a tilt.
@@ -107,8 +140,10 @@ impl Seat {
             tilt_rad: DVec2::ZERO,
             curvature: DMat2::from_diagonal(DVec2::splat(stiffness_nm_per_rad)),
             lifted: false,
+            axial_n_per_m: spring.axial_stiffness_n_per_m(),
             friction: friction.coefficient,
             slide_m: DVec2::ZERO,
+            turn_rad: 0.0,
             lateral_n_per_m: spring.lateral_stiffness_n_per_m(),
             sliding_n_per_m: spring.lateral_stiffness_n_per_m(),
         }
@@ -117,20 +152,36 @@ impl Seat {
     /// Takes other parameters at a tick boundary and keeps the tilt. Real-time: bounded, no allocation.
     pub fn set_spring(&mut self, spring: &Spring, friction: Friction) {
         let fresh = Self::new(spring, friction);
-        *self = Self { tilt_rad: self.tilt_rad, slide_m: self.slide_m, lifted: self.lifted, ..fresh };
+        let Self { tilt_rad, slide_m, turn_rad, lifted, .. } = *self;
+        *self = Self { tilt_rad, slide_m, turn_rad, lifted, ..fresh };
     }
 
     /// Seated again, where it was at first. Real-time: bounded, no allocation.
     pub fn reset(&mut self) {
-        self.sit_down();
-        self.slide_m = DVec2::ZERO;
+        self.stand(&Standing { tilt_rad: DVec2::ZERO, slide_m: DVec2::ZERO, turn_rad: 0.0 });
+        self.lifted = false;
+    }
+
+    /// Stands at a place, with nothing known of the spring there.
+    fn stand(&mut self, at: &Standing) {
+        (self.tilt_rad, self.slide_m, self.turn_rad) = (at.tilt_rad, at.slide_m, at.turn_rad);
+        self.curvature = DMat2::from_diagonal(DVec2::splat(self.stiffness_nm_per_rad));
         self.sliding_n_per_m = self.lateral_n_per_m;
     }
 
-    fn sit_down(&mut self) {
-        self.tilt_rad = DVec2::ZERO;
-        self.curvature = DMat2::from_diagonal(DVec2::splat(self.stiffness_nm_per_rad));
-        self.lifted = false;
+    /// The base of a spring that hangs from the upper plate, and how high its rim is above the ground (m).
+    fn hanging(&self, pose: &Pose) -> (Standing, f64) {
+        let normal = pose.orientation * DVec3::Z;
+        let center_m = pose.position_m + DVec3::Z * self.free_length_m - normal * self.free_length_m;
+        let sine = normal.truncate().length();
+        let lean = if sine > 0.0 { normal.truncate() / sine } else { DVec2::ZERO };
+        let standing = Standing {
+            tilt_rad: lean * math::atan2(sine, normal.z).min(LARGEST_TILT_RAD),
+            // The rim point it would stand on is where a base that had rolled there would have it.
+            slide_m: center_m.truncate() - lean * (self.rim_radius_m * (1.0 - normal.z)),
+            turn_rad: 2.0 * math::atan2(pose.orientation.z, pose.orientation.w),
+        };
+        (standing, center_m.z - self.rim_radius_m * sine)
     }
 
     /// Tilt of the base (rad), a vector towards the rim point it stands on; zero while seated.
@@ -157,49 +208,123 @@ impl Seat {
     /// tick. Real-time: bounded, no allocation; two to three evaluations of the law while the base moves, one
     /// while seated.
     pub fn step<S: HeldSpring>(&mut self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
-        let wanted = demand.max(Demand::Wrench);
+        if !pose.is_valid() {
+            return Response::none(Validity::InvalidInput);
+        }
+        let (standing, height_m) = self.hanging(pose);
+        let was_lifted = std::mem::replace(&mut self.lifted, height_m > 0.0);
+        if self.lifted {
+            return in_the_air(demand);
+        }
+        if was_lifted {
+            self.stand(&standing);
+        }
         let noise_rad = spring.noise_rad();
-        self.lifted = false;
+        // The last place of the base in this tick at which it stood, and what was felt there.
+        let mut last: Option<Stood> = None;
         let mut slid: Option<(f64, f64)> = None;
-        let mut previous: Option<(DVec2, DVec2)> = None;
         let mut tip_nm = None;
-        let mut response = Response::none(Validity::NotConverged);
+        let (mut has_sat_down, mut failures) = (false, 0);
         for _ in 0..MOST_EVALUATIONS {
             let base = self.base();
-            response = self.held(spring, pose, &base, wanted);
+            let response = self.held(spring, pose, &base, Demand::WrenchAndEnergy);
             if !matches!(response.validity, Validity::Ok | Validity::Clamped) {
-                return response;
+                return only(response, demand);
             }
-            if response.force_n.z <= 0.0 {
-                return self.lift(&response);
+            let stored_j = response.energy_j.unwrap_or_default();
+            if let Some(stood) = &last {
+                // Too far: it would lose the ground, or gain energy.
+                let most_j = stood.stored_j + ENERGY_TOLERANCE * self.stiffness_nm_per_rad;
+                if response.force_n.z <= 0.0 || stored_j > most_j {
+                    if let (Some(before), Some(tip_nm)) = (stood.slope, tip_nm) {
+                        let slope = self.slope(pose, &base, &response) - tip_nm * base.direction;
+                        self.observe(self.tilt_rad - stood.at.tilt_rad, slope - before, noise_rad);
+                    }
+                    failures += 1;
+                    // Shorter; where that was no help, the other way as well: near where the base tips over no model of
+                    // the energy says which way is down.
+                    let part = match (slid.take(), failures) {
+                        (Some(_), _) | (None, 1) => SHORTER,
+                        (None, even) if even % 2 == 0 => -1.0,
+                        _ => -SHORTER,
+                    };
+                    self.go_back_to(&stood.at, part);
+                    continue;
+                }
+            } else if response.force_n.z <= 0.0 {
+                // Nothing holds it there any more: it stands as it would have hung.
+                if has_sat_down {
+                    return in_the_air(demand);
+                }
+                self.stand(&standing);
+                has_sat_down = true;
+                continue;
             }
             // What lifting costs to first order; the rest of the energy has no tip. Off the tip any other number would
             // do, as long as it stays the same: the rest is then a smooth function, and its curvature can be observed.
             if base.angle_rad == 0.0 || tip_nm.is_none() {
-                (tip_nm, previous) = (Some(self.rim_radius_m * response.force_n.z), None);
+                tip_nm = Some(self.rim_radius_m * response.force_n.z);
+                last = last.map(|stood| Stood { slope: None, ..stood });
             }
             let tip_nm = tip_nm.unwrap_or_default();
             let slope = self.slope(pose, &base, &response) - tip_nm * base.direction;
-            if let Some((tilt, old_slope)) = previous {
-                self.observe(self.tilt_rad - tilt, slope - old_slope, noise_rad);
+            if let Some(Stood { slope: Some(before), at, .. }) = &last {
+                self.observe(self.tilt_rad - at.tilt_rad, slope - *before, noise_rad);
             }
-            previous = Some((self.tilt_rad, slope));
             let goal = tipped_minimum(self.curvature, self.curvature * self.tilt_rad - slope, tip_nm);
-            let step = (goal - self.tilt_rad).clamp_length_max(LONGEST_STEP_RAD);
-            let excess_n = self.excess_n(&response);
-            if let Some((distance_m, before_n)) = slid {
-                self.observe_sliding((before_n - excess_n) / distance_m);
+            let mut step = (goal - self.tilt_rad).clamp_length_max(LONGEST_STEP_RAD);
+            let whole_slope = slope + tip_nm * base.direction;
+            if base.angle_rad > 0.0 && step.dot(whole_slope) > 0.0 {
+                // Where the curvature is no cup the model's best is not downhill.
+                step = (whole_slope / -self.stiffness_nm_per_rad).clamp_length_max(LONGEST_STEP_RAD);
             }
-            slid = None;
-            if excess_n > FRICTION_TOLERANCE * self.friction * response.force_n.z {
-                slid = Some((self.slide(&response, excess_n), excess_n));
-                previous = None;
-            } else if step.length() <= noise_rad.max(TOLERANCE_RAD) {
+            step = (self.tilt_rad + step).clamp_length_max(LARGEST_TILT_RAD) - self.tilt_rad;
+            let pull_n = self.pull_n(pose, &base, &response);
+            // Coulomb's, and no more than what would press down a straight spring that is shortened as far.
+            let straight_n = -height_m * self.axial_n_per_m;
+            let friction_n =
+                (self.friction * response.force_n.z).min(self.friction.min(STEEPEST) * straight_n);
+            let excess_n = pull_n.length() - friction_n;
+            let tolerance_n = FRICTION_TOLERANCE * friction_n;
+            if let (Some((distance_m, before_n)), Some(stood)) = (slid.take(), &last) {
+                self.observe_sliding((before_n - excess_n) / distance_m);
+                if excess_n < -tolerance_n {
+                    // Friction holds it short of here: by the straight line between the two.
+                    let part = before_n / (before_n - excess_n);
+                    self.go_back_to(&stood.at, part);
+                    slid = Some((distance_m * part, before_n));
+                    continue;
+                }
+            }
+            let at = self.standing();
+            let slides = excess_n > tolerance_n;
+            // After a slide the slope is another one at the same tilt: nothing to observe.
+            last = Some(Stood { at, response, stored_j, slope: (!slides).then_some(slope) });
+            if slides {
+                slid = Some((self.slide(pull_n, excess_n), excess_n));
+                continue;
+            }
+            if step.length() <= noise_rad.max(TOLERANCE_RAD) {
                 return only(response, demand);
             }
-            self.tilt_rad = (self.tilt_rad + step).clamp_length_max(LARGEST_TILT_RAD);
+            failures = 0;
+            self.tilt_rad += step;
         }
+        // On its way: it stays where it last stood.
+        let Some(Stood { at, response, .. }) = last else { return Response::none(Validity::NotConverged) };
+        (self.tilt_rad, self.slide_m, self.turn_rad) = (at.tilt_rad, at.slide_m, at.turn_rad);
         only(Response { validity: Validity::NotConverged, ..response }, demand)
+    }
+
+    fn standing(&self) -> Standing {
+        Standing { tilt_rad: self.tilt_rad, slide_m: self.slide_m, turn_rad: self.turn_rad }
+    }
+
+    /// Back to where it stood, but for a part of the way.
+    fn go_back_to(&mut self, at: &Standing, part: f64) {
+        self.tilt_rad = at.tilt_rad.lerp(self.tilt_rad, part);
+        self.slide_m = at.slide_m.lerp(self.slide_m, part);
+        self.turn_rad = at.turn_rad + part * (self.turn_rad - at.turn_rad);
     }
 
     /// The sections of the spring where its base is now: `draw` gives those of the held spring at a pose. Not
@@ -228,17 +353,18 @@ impl Seat {
         true
     }
 
-    /// By how much the force along the ground exceeds the friction (N).
-    fn excess_n(&self, response: &Response) -> f64 {
-        response.force_n.truncate().length() - self.friction * response.force_n.z
+    /// What the spring pulls its base with along the ground, and turns it with about its normal, over the radius (N).
+    fn pull_n(&self, pose: &Pose, base: &Base, response: &Response) -> DVec3 {
+        let turning_nm = self.moment_nm(pose, base, response).dot(base.rotation * DVec3::Z);
+        (-response.force_n.truncate()).extend(turning_nm / self.rim_radius_m)
     }
 
-    /// Slides the base the way it is pulled; returns how far (m).
-    fn slide(&mut self, response: &Response, excess_n: f64) -> f64 {
-        let along = response.force_n.truncate();
+    /// Slides and turns the base the way it is pulled; returns how far (m).
+    fn slide(&mut self, pull_n: DVec3, excess_n: f64) -> f64 {
         let distance_m = (excess_n / self.sliding_n_per_m).min(LONGEST_SLIDE * self.free_length_m);
-        // The spring pulls its base the other way than the hand.
-        self.slide_m -= along * (distance_m / along.length());
+        let way_m = pull_n * (distance_m / pull_n.length());
+        self.slide_m += way_m.truncate();
+        self.turn_rad += way_m.z / self.rim_radius_m;
         distance_m
     }
 
@@ -252,7 +378,8 @@ impl Seat {
     /// The base as it is now.
     fn base(&self) -> Base {
         let base = Base::new(self.tilt_rad, self.rim_radius_m);
-        Base { center_m: base.center_m + self.slide_m.extend(0.0), ..base }
+        let rotation = base.rotation * DQuat::from_rotation_z(self.turn_rad);
+        Base { rotation, center_m: base.center_m + self.slide_m.extend(0.0), ..base }
     }
 
     /// A pose as the base sees it.
@@ -267,7 +394,7 @@ impl Seat {
 
     /// The law's answer with the base at a tilt, in the model frame.
     fn held<S: HeldSpring>(&self, spring: &mut S, pose: &Pose, base: &Base, demand: Demand) -> Response {
-        if base.angle_rad == 0.0 && base.center_m == DVec3::ZERO {
+        if base.angle_rad == 0.0 && base.center_m == DVec3::ZERO && self.turn_rad == 0.0 {
             return spring.respond(pose, demand);
         }
         let response = spring.respond(&self.relative(pose, base), demand);
@@ -278,12 +405,16 @@ impl Seat {
         }
     }
 
+    /// Moment of the spring on its base, about the base's centre.
+    fn moment_nm(&self, pose: &Pose, base: &Base, response: &Response) -> DVec3 {
+        let arm_m = pose.position_m + DVec3::Z * self.free_length_m - base.center_m;
+        -(response.torque_nm + arm_m.cross(response.force_n))
+    }
+
     /// Derivative of the stored energy by the tilt: minus the work of the spring on the moving base.
     fn slope(&self, pose: &Pose, base: &Base, response: &Response) -> DVec2 {
-        let rise = DVec3::new(0.0, 0.0, self.free_length_m);
-        let arm_m = pose.position_m + rise - base.center_m;
         let force_n = response.force_n;
-        let moment_nm = -(response.torque_nm + arm_m.cross(force_n));
+        let moment_nm = self.moment_nm(pose, base, response);
         if base.angle_rad == 0.0 {
             // Along u the base turns about z x u and rises by R; the second part is the tip's.
             return DVec2::new(-moment_nm.y, moment_nm.x);
@@ -312,18 +443,12 @@ impl Seat {
             self.curvature += update * (1.0 / along);
         }
     }
+}
 
-    /// A spring that would be pulled leaves its seat and carries nothing.
-    fn lift(&mut self, response: &Response) -> Response {
-        self.sit_down();
-        self.lifted = true;
-        Response {
-            force_n: DVec3::ZERO,
-            torque_nm: DVec3::ZERO,
-            energy_j: response.energy_j.map(|_| 0.0),
-            validity: response.validity,
-        }
-    }
+/// The wrench of a spring that carries nothing.
+fn in_the_air(demand: Demand) -> Response {
+    let energy_j = (demand >= Demand::WrenchAndEnergy).then_some(0.0);
+    Response { energy_j, ..Response::none(Validity::Ok) }
 }
 
 impl Base {
@@ -366,7 +491,8 @@ fn tipped_minimum(curvature: DMat2, pull: DVec2, tip: f64) -> DVec2 {
 /// What was demanded of a complete response.
 fn only(response: Response, demand: Demand) -> Response {
     match demand {
-        Demand::Force => Response { torque_nm: DVec3::ZERO, ..response },
-        Demand::Wrench | Demand::WrenchAndEnergy => response,
+        Demand::Force => Response { torque_nm: DVec3::ZERO, energy_j: None, ..response },
+        Demand::Wrench => Response { energy_j: None, ..response },
+        Demand::WrenchAndEnergy => response,
     }
 }

@@ -1,6 +1,6 @@
 //! One energy from two laws: what is felt is its gradient everywhere, and nothing jumps where they meet.
 
-use crate::sample::Sampler;
+use crate::sample::{Sampler, of};
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_spring::energy::EnergyForm;
 use flotor_spring::held::HeldSpring;
@@ -8,9 +8,131 @@ use flotor_spring::pose::Pose;
 use flotor_spring::preset::Preset;
 use flotor_spring::response::{Demand, Response};
 use flotor_spring::rigidity::Spring;
-use flotor_spring::rod::{Accuracy, Coils, Rod};
+use flotor_spring::rod::{Accuracy, Rod};
 use flotor_spring::rod_blend::RodBlend;
 use flotor_spring::validity::Validity;
+use std::time::Instant;
+
+/// Poses of a hand that turns the plate by up to 30 degrees in all and shoves it by up to 0.24 free lengths, from stretched
+/// to `most` of the way to nothing.
+fn reached(spring: &Spring, most: f64, count: u32) -> Vec<(DVec3, DVec3)> {
+    let (mut sampler, free_length_m) = (Sampler::new(2026), spring.geometry().free_length_m);
+    let mut poses = Vec::new();
+    while poses.len() < count as usize {
+        let (aside, turned) = (sampler.vector([1.0, 1.0, 0.0]), sampler.vector([1.0; 3]));
+        let down = 0.5 * (most - 0.2) + 0.5 * (most + 0.2) * sampler.signed();
+        if aside.length() < 1.0 && turned.length() < 1.0 {
+            let position_m = (0.24 * aside - DVec3::Z * down) * free_length_m;
+            poses.push((position_m, 30f64.to_radians() * turned));
+        }
+    }
+    poses
+}
+
+/// The exact rod at a pose, walked there.
+fn exact(
+    spring: &Spring,
+    accuracy: Accuracy,
+    (position_m, rotation_rad): (DVec3, DVec3),
+) -> Option<Response> {
+    let mut rod = Rod::new(spring, accuracy);
+    for step in 0..=400 {
+        let part = (f64::from(step) / 100.0).min(1.0);
+        let answer = rod.step(
+            &Pose::from_rotation_vector(position_m * part, rotation_rad * part),
+            Demand::WrenchAndEnergy,
+        );
+        if part >= 1.0 && answer.validity == Validity::Ok {
+            return Some(answer);
+        }
+    }
+    None
+}
+
+/// What a pose turned by so much takes, cold, µs: the fastest of ten rounds. Printed, not asserted.
+fn time_us(spring: &Spring, most: f64, degrees: f64) -> f64 {
+    let turned = |(position_m, rotation_rad): (DVec3, DVec3)| {
+        let part = if degrees < 30.0 { 0.2 } else { 1.0 };
+        let rotation_rad = rotation_rad.normalize_or_zero() * degrees.to_radians();
+        Pose::from_rotation_vector(position_m * part, rotation_rad)
+    };
+    let poses: Vec<Pose> = reached(spring, most, 200).into_iter().map(turned).collect();
+    let mut law = RodBlend::new(spring);
+    let rounds = (0..10).map(|_| {
+        let begin = Instant::now();
+        for pose in &poses {
+            let _ = std::hint::black_box(law.respond(std::hint::black_box(pose), Demand::Wrench));
+        }
+        begin.elapsed().as_secs_f64() * 1e6 / poses.len() as f64
+    });
+    rounds.fold(f64::INFINITY, f64::min)
+}
+
+/// Up to rotations of 30 degrees, however the axis points, full shear, and as far down as the coils or buckling allow: five
+/// millinewtons, what a position that is known to ten micrometres is worth.
+#[test]
+fn the_default_law_is_the_rod_to_five_millinewtons() {
+    // Springs 1 and 2 to short of their solid lengths at 70 and 80 %, the others to short of buckling at 54.5 and 8.28 %.
+    for (preset, most) in Preset::ALL.into_iter().zip([0.68, 0.68, 0.54, 0.082]) {
+        let spring = preset.spring();
+        let (mut law, count) = (RodBlend::new(&spring), of(1000, 60));
+        // The servo's rod errs by less than 1e-4 N, a fiftieth of the bound.
+        let accuracy = if count == 1000 { Accuracy::Tight } else { Accuracy::Servo };
+        let (mut worst_n, mut worst_nm, mut answered) = (0.0f64, 0.0f64, 0);
+        for (position_m, rotation_rad) in reached(&spring, most, count) {
+            let Some(truth) = exact(&spring, accuracy, (position_m, rotation_rad)) else { continue };
+            answered += 1;
+            law.reset();
+            let pose = Pose::from_rotation_vector(position_m, rotation_rad);
+            let answer = law.respond(&pose, Demand::WrenchAndEnergy);
+            assert_eq!(answer.validity, Validity::Ok, "{preset:?} {pose:?}");
+            worst_n = worst_n.max((answer.force_n - truth.force_n).length());
+            worst_nm = worst_nm.max((answer.torque_nm - truth.torque_nm).length());
+        }
+        let [large_us, small_us] = [30.0, 2.0].map(|degrees| time_us(&spring, most, degrees));
+        println!(
+            "{preset:?}: {answered} poses, error up to {worst_n:.1e} N, {worst_nm:.1e} N m; {large_us:.2} µs a pose at 30 \
+             degrees, {small_us:.2} µs at 2"
+        );
+        assert!(answered * 20 > 19 * count, "{preset:?}: {answered} of {count}");
+        assert!(worst_n < 5e-3, "{preset:?}: {worst_n:e} N");
+        // A lever of a tenth of the free length.
+        assert!(worst_nm < 5e-4 * spring.geometry().free_length_m / 0.06, "{preset:?}: {worst_nm:e} N m");
+    }
+}
+
+/// The share depends on shear, tilt, twist and length; whichever it is that mixes, the wrench is the energy's gradient.
+#[test]
+fn wrench_is_the_gradient_wherever_the_laws_are_mixed() {
+    for (preset, most) in Preset::ALL.into_iter().zip([0.6, 0.6, 0.5, 0.08]) {
+        let spring = preset.spring();
+        let free_length_m = spring.geometry().free_length_m;
+        let (mut law, mut mixed) = (RodBlend::new(&spring), 0);
+        for (position_m, rotation_rad) in reached(&spring, most, 400) {
+            let pose = Pose::from_rotation_vector(position_m * 0.6, rotation_rad * 0.5);
+            let here = law.respond(&pose, Demand::WrenchAndEnergy);
+            if law.share() < 0.02 || law.share() > 0.98 {
+                continue;
+            }
+            mixed += 1;
+            let mut slope = |at: &dyn Fn(f64) -> Pose, h: f64| {
+                let mut energy = |s: f64| law.respond(&at(s * h), Demand::WrenchAndEnergy).energy_j.unwrap();
+                (8.0 * (energy(1.0) - energy(-1.0)) - energy(2.0) + energy(-2.0)) / (12.0 * h)
+            };
+            for axis in DVec3::AXES {
+                let moved = |s: f64| Pose { position_m: pose.position_m + axis * s, ..pose };
+                let turned =
+                    |s: f64| Pose { orientation: DQuat::from_axis_angle(axis, s) * pose.orientation, ..pose };
+                let force_n = -slope(&moved, 1e-4 * free_length_m);
+                let torque_nm = -slope(&turned, 1e-4);
+                // Fourth order in a step of a thousandth of the way through the mix, and rounding of 1e-17 J over it.
+                assert!((force_n - here.force_n.dot(axis)).abs() < 1e-7, "{preset:?} {pose:?}");
+                assert!((torque_nm - here.torque_nm.dot(axis)).abs() < 1e-9, "{preset:?} {pose:?}");
+            }
+        }
+        assert!(mixed > 20, "{preset:?}: {mixed} poses are mixed");
+    }
+}
 
 /// Spring 3 from rest to past its buckling, sheared and tilted a little.
 fn at(compression: f64) -> Pose {
@@ -32,7 +154,7 @@ fn settled<S: HeldSpring>(law: &mut S, pose: &Pose) -> Response {
 #[test]
 fn the_share_goes_from_one_law_to_the_other() {
     let spring = Preset::Thesis3.spring();
-    let (mut law, energy) = (RodBlend::new(&spring, Coils::Pass), EnergyForm::new(&spring));
+    let (mut law, energy) = (RodBlend::new(&spring), EnergyForm::new(&spring));
     let mut rod = Rod::new(&spring, Accuracy::Servo);
     let (mut last_share, mut shared) = (0.0, 0);
     for step in 0..=1200 {
@@ -51,8 +173,9 @@ fn the_share_goes_from_one_law_to_the_other() {
             assert!(law.rod_state().is_none());
         }
         if law.share() == 1.0 && exact.validity == Validity::Ok && answer.validity == Validity::Ok {
-            // Two rods with other pasts, each converged to the servo's tolerance.
-            assert!((answer.force_n - exact.force_n).length() < 1e-5, "{step}");
+            // Eight polynomials instead of ten: a fifth of the bound of the law.
+            let apart_n = (answer.force_n - exact.force_n).length();
+            assert!(apart_n < 1e-3, "{step}: {apart_n:e} N, {answer:?} {exact:?}");
         }
     }
     assert!(last_share == 1.0 && shared > 50, "{shared} steps blend");
@@ -63,7 +186,7 @@ fn wrench_is_the_gradient_of_the_one_energy() {
     let spring = Preset::Thesis3.spring();
     let h = 1e-6;
     for wanted in [0.2, 0.5, 0.8] {
-        let mut law = RodBlend::new(&spring, Coils::Pass);
+        let mut law = RodBlend::new(&spring);
         let mut compression = 0.0;
         while law.share() < wanted {
             compression += 1e-3;
@@ -94,11 +217,11 @@ fn wrench_is_the_gradient_where_the_chord_lies_down() {
     let free_length_m = spring.geometry().free_length_m;
     let (h, mut shares) = (1e-6, Vec::new());
     // Chords of 0.4 free lengths, where the rod is alone as long as they stand.
-    for degrees in [55.0f64, 64.0, 68.0, 72.0, 80.0] {
+    for degrees in [60.0f64, 68.0, 70.5, 73.0, 80.0] {
         let (sine, cosine) = degrees.to_radians().sin_cos();
         let rise = DVec3::new(0.8 * sine, -0.6 * sine, cosine) * (0.4 * free_length_m);
         let pose = Pose::from_rotation_vector(rise - DVec3::Z * free_length_m, DVec3::new(0.03, 0.02, 0.05));
-        let mut law = RodBlend::new(&spring, Coils::Pass);
+        let mut law = RodBlend::new(&spring);
         let here = settled(&mut law, &pose);
         shares.push(law.share());
         for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
@@ -108,7 +231,7 @@ fn wrench_is_the_gradient_where_the_chord_lies_down() {
             };
             let pair = |n: f64| energy(n) - energy(-n);
             let slope_n = (8.0 * pair(1.0) - pair(2.0)) / (12.0 * h);
-            // Fourth order in a step of a two thousandth of the way from 60 to 75.5 degrees, and 1e-17 J of rounding over it.
+            // Fourth order in a step of a two thousandth of the way from 66 to 78 degrees, and 1e-17 J of rounding over it.
             assert!((slope_n + here.force_n.dot(axis)).abs() < 1e-8, "{degrees} {axis}: {slope_n} {here:?}");
         }
     }
@@ -120,7 +243,7 @@ fn wrench_is_the_gradient_where_the_chord_lies_down() {
 #[test]
 fn nothing_jumps_where_the_laws_meet() {
     let spring = Preset::Thesis3.spring();
-    let mut law = RodBlend::new(&spring, Coils::Pass);
+    let mut law = RodBlend::new(&spring);
     let forces: Vec<DVec3> = (0..=4000)
         .map(|step| law.respond(&at(0.2 + 0.18 * f64::from(step) / 4000.0), Demand::Force).force_n)
         .collect();
@@ -154,13 +277,13 @@ fn short_of_buckling_the_answer_depends_on_the_pose_alone() {
     // Spring 1 blends past 60 % and never buckles; spring 3 blends past 24 % and buckles past 54 %.
     for (preset, compressions) in [(Preset::Thesis1, [0.5, 0.9]), (Preset::Thesis3, [0.15, 0.45])] {
         let spring = preset.spring();
-        let mut wandering = RodBlend::new(&spring, Coils::Pass);
+        let mut wandering = RodBlend::new(&spring);
         let mut blended = 0;
         for pose in scattered(&spring, compressions, 500) {
             let found = wandering.respond(&pose, Demand::WrenchAndEnergy);
             assert_eq!(found.validity, Validity::Ok, "{preset:?} {pose:?}");
             blended += u32::from(wandering.share() > 0.0);
-            let first = RodBlend::new(&spring, Coils::Pass).respond(&pose, Demand::WrenchAndEnergy);
+            let first = RodBlend::new(&spring).respond(&pose, Demand::WrenchAndEnergy);
             assert_eq!(found, first, "{preset:?} {pose:?}");
             assert_eq!(wandering.respond(&pose, Demand::WrenchAndEnergy), first, "{preset:?} {pose:?}");
         }
@@ -170,7 +293,7 @@ fn short_of_buckling_the_answer_depends_on_the_pose_alone() {
 
 #[test]
 fn only_a_spring_that_can_buckle_remembers() {
-    let remembers = Preset::ALL.map(|preset| RodBlend::new(&preset.spring(), Coils::Pass).remembers());
+    let remembers = Preset::ALL.map(|preset| RodBlend::new(&preset.spring()).remembers());
     // Haringx: never below 5.326 diameters.
     assert_eq!(remembers, [false, false, true, true]);
 }
@@ -178,6 +301,40 @@ fn only_a_spring_that_can_buckle_remembers() {
 /// Most of the way a shape goes in a tick: the root mean square slope of `p = tan(lean / 2)`, `LONGEST_WAY` of
 /// `src/rod/equilibrium.rs`.
 const LONGEST_WAY: f64 = 0.1;
+
+/// The bound holds on the tick on which a branch ends, too: there the shape before is no prediction for the one after.
+#[test]
+fn the_tick_that_leaves_an_equilibrium_is_bounded_like_the_others() {
+    for (preset, compressions) in
+        [(Preset::Thesis3, [0.555, 0.60, 0.66]), (Preset::Slender, [0.09, 0.12, 0.2])]
+    {
+        let spring = preset.spring();
+        let free_length_m = spring.geometry().free_length_m;
+        let bound_nm = LONGEST_WAY * 2.0 * 2.0f64.sqrt() * spring.rigidities().alpha_n_m2 / free_length_m;
+        for compression in compressions {
+            let pose = |part: f64, tilt_rad: f64| {
+                let position_m = DVec3::new(0.0, 2e-3, -compression) * (part * free_length_m);
+                Pose::from_rotation_vector(position_m, DVec3::X * tilt_rad)
+            };
+            let (mut law, mut most_nm, mut left) = (Rod::new(&spring, Accuracy::Servo), 0.0f64, 0);
+            for step in 0..2000 {
+                let _ = law.step(&pose(f64::from(step) / 2000.0, 0.1), Demand::Wrench);
+            }
+            let mut last = law.step(&pose(1.0, 0.1), Demand::Wrench);
+            // Through the level at 0.3 rad/s and 1 kHz, there and back.
+            for tick in (0..=700).chain((0..700).rev()) {
+                let answer = law.step(&pose(1.0, 0.1 - 3e-4 * f64::from(tick)), Demand::Wrench);
+                left += u32::from(answer.validity == Validity::NotConverged && last.validity == Validity::Ok);
+                most_nm = most_nm.max((answer.torque_nm - last.torque_nm).length());
+                last = answer;
+            }
+            println!("{preset:?} {compression}: {most_nm:.1e} N m of {bound_nm:.1e}, {left} snaps");
+            // The bound is of first order in the slope of the bulge; the next order, of a lean of a third of a radian,
+            // and the motion of the plate itself add a few percent.
+            assert!(most_nm < 1.1 * bound_nm, "{preset:?} {compression}: {most_nm:e} of {bound_nm:e}");
+        }
+    }
+}
 
 /// Rocked through the level, a buckled spring swings its bulge to the other side in its own time, where a law that chose
 /// by the pose alone would turn it over at once. The shapes of a bulge are sines, `p = A sin(2 pi S)`; the slope at the
@@ -188,7 +345,7 @@ fn past_buckling_the_bulge_does_not_jump() {
     let free_length_m = spring.geometry().free_length_m;
     let down = DVec3::NEG_Z * (0.57 * free_length_m);
     let tilted = |part: f64, tilt_rad: f64| Pose::from_rotation_vector(down * part, DVec3::X * tilt_rad);
-    let mut law = RodBlend::new(&spring, Coils::Pass);
+    let mut law = RodBlend::new(&spring);
     for step in 0..400 {
         let _ = law.respond(&tilted(f64::from(step) / 400.0, 1e-3), Demand::Force);
     }

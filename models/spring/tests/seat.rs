@@ -1,6 +1,6 @@
 //! The spring on its seat against reference tables, and the properties of a free base.
 
-use crate::sample::{Sampler, Workspace};
+use crate::sample::{Sampler, Workspace, of};
 use crate::table::{preset, rows};
 #[allow(dead_code)] // each test needs its part of the helpers
 use flotor_hal::glam::{DQuat, DVec2, DVec3};
@@ -11,6 +11,7 @@ use flotor_spring::preset::Preset;
 use flotor_spring::response::{Demand, Response};
 use flotor_spring::rigidity::Spring;
 use flotor_spring::rod::{Accuracy, Coils, Rod};
+use flotor_spring::rod_blend::RodBlend;
 use flotor_spring::seat::{Friction, Seat};
 use flotor_spring::validity::Validity;
 
@@ -199,11 +200,143 @@ fn a_free_spring_cannot_be_pulled() {
     let answer = seat.step(&mut law, &pose, Demand::WrenchAndEnergy);
     assert_eq!((answer.force_n, answer.torque_nm, answer.energy_j), (DVec3::ZERO, DVec3::ZERO, Some(0.0)));
     assert!(seat.is_lifted());
-    // Down again, it stands as before.
-    let down = Pose::from_rotation_vector(DVec3::new(0.0, 0.0, -2e-3), DVec3::ZERO);
+    // Down again, it stands under the plate.
+    let down = Pose::from_rotation_vector(DVec3::new(1e-3, 0.0, -2e-3), DVec3::ZERO);
     let answer = seat.step(&mut law, &down, Demand::Wrench);
     assert!(!seat.is_lifted() && seat.tilt_rad() == DVec2::ZERO);
     assert!((answer.force_n.z - spring.axial_stiffness_n_per_m() * 2e-3).abs() < 1e-12);
+}
+
+/// A law on a free seat, moved one step a tick; what the hand puts in, by the trapezoidal rule, and the largest step of the
+/// force.
+struct Hand<S> {
+    law: S,
+    seat: Seat,
+    pose: Pose,
+    felt: Response,
+    work_j: f64,
+    exchanged_j: f64,
+    step_n: f64,
+}
+
+impl<S: HeldSpring> Hand<S> {
+    fn new(spring: &Spring, mut law: S, friction: f64) -> Self {
+        let mut seat = Seat::new(spring, Friction { coefficient: friction });
+        let felt = seat.step(&mut law, &Pose::HOME, Demand::WrenchAndEnergy);
+        Self { law, seat, pose: Pose::HOME, felt, work_j: 0.0, exchanged_j: 0.0, step_n: 0.0 }
+    }
+
+    fn tick(&mut self, position_m: DVec3, rotation_rad: DVec3) {
+        let pose = Pose::from_rotation_vector(position_m, rotation_rad);
+        let felt = self.seat.step(&mut self.law, &pose, Demand::WrenchAndEnergy);
+        let moved_m = pose.position_m - self.pose.position_m;
+        let turned_rad = (pose.orientation * self.pose.orientation.conjugate()).to_scaled_axis();
+        let work_j = -0.5 * (felt.force_n + self.felt.force_n).dot(moved_m)
+            - 0.5 * (felt.torque_nm + self.felt.torque_nm).dot(turned_rad);
+        self.work_j += work_j;
+        self.exchanged_j += work_j.abs();
+        self.step_n = self.step_n.max((felt.force_n - self.felt.force_n).length());
+        (self.pose, self.felt) = (pose, felt);
+    }
+
+    /// In a straight line, in steps of two micrometres.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand steps
+    fn go(&mut self, position_m: DVec3) {
+        let from_m = self.pose.position_m;
+        let steps = ((position_m - from_m).length() / 2e-6).ceil() as u32;
+        for step in 1..=steps {
+            self.tick(from_m.lerp(position_m, f64::from(step) / f64::from(steps)), DVec3::ZERO);
+        }
+    }
+}
+
+/// Lifted, taken aside, put down, pressed and taken back, pressed: no lap gives the hand anything, and nothing jumps.
+#[test]
+fn a_spring_that_is_set_down_elsewhere_stands_there_without_load() {
+    let spring = Preset::Thesis1.spring();
+    let mm = |x: f64, z: f64| DVec3::new(x, 0.0, z) * 1e-3;
+    for friction in [10.0, 1.0, 0.3] {
+        for aside_mm in [2.0, 4.0, 6.0] {
+            let mut hand = Hand::new(&spring, EnergyForm::new(&spring), friction);
+            hand.go(mm(0.0, 0.5));
+            assert!(hand.seat.is_lifted());
+            hand.go(mm(aside_mm, 0.5));
+            hand.go(mm(aside_mm, -3.0));
+            // It stands right under the plate.
+            let pressed_n = spring.axial_stiffness_n_per_m() * 3e-3;
+            assert!((hand.felt.force_n - DVec3::Z * pressed_n).length() < 1e-9, "{:?}", hand.felt);
+            hand.go(mm(0.0, -3.0));
+            hand.go(mm(0.0, 0.5));
+            assert!(hand.work_j > -1e-6 * hand.exchanged_j, "{friction} {aside_mm}: {} J", hand.work_j);
+            // Two micrometres of the axial stiffness; as it lifts off as much sideways, and of a base on
+            // its rim L0/D times that again downwards.
+            let geometry = spring.geometry();
+            let tipping = 1.0 + geometry.free_length_m / geometry.coil_diameter_m;
+            let most_n = 1.5 * 2e-6 * spring.axial_stiffness_n_per_m() * (1.0 + friction.min(3.0) * tipping);
+            assert!(hand.step_n < most_n, "{friction} {aside_mm}: a step of {} N", hand.step_n);
+        }
+    }
+}
+
+/// Turned in the air, it is put down turned.
+#[test]
+fn a_spring_that_is_set_down_turned_is_not_twisted() {
+    let spring = Preset::Thesis1.spring();
+    let mut hand = Hand::new(&spring, EnergyForm::new(&spring), 10.0);
+    hand.go(DVec3::Z * 1e-3);
+    for step in 1..=500 {
+        hand.tick(DVec3::Z * 1e-3, DVec3::Z * 1e-3 * f64::from(step));
+    }
+    for step in 1..=1000 {
+        hand.tick(DVec3::Z * (1e-3 - 3e-6 * f64::from(step)), DVec3::Z * 0.5);
+    }
+    assert!(hand.felt.torque_nm.length() < 1e-12, "{:?}", hand.felt);
+    assert!((hand.felt.force_n.z - spring.axial_stiffness_n_per_m() * 2e-3).abs() < 1e-9, "{:?}", hand.felt);
+}
+
+/// Random laps of a hand in all six dimensions, through the air and over the ground, rolling and sliding.
+#[test]
+fn no_lap_through_the_air_generates_energy() {
+    let mut sampler = Sampler::new(40);
+    let (mut lifted, mut landed) = (0, 0);
+    for lap in 0..of(200, 16) {
+        let preset = Preset::ALL[(lap % 4) as usize];
+        let spring = preset.spring();
+        let free_length_m = spring.geometry().free_length_m;
+        let friction = [10.0, 1.0, 0.2][(lap % 3) as usize];
+        let mut hand = Hand::new(&spring, RodBlend::new(&spring), friction);
+        // Two harmonics with zero at the start; down by a little less than up.
+        let [aside, turned] =
+            [[(); 4].map(|()| sampler.vector([1.0; 3])), [(); 4].map(|()| sampler.vector([1.0; 3]))];
+        let ticks = 40_000;
+        let at = |tick: i32| {
+            let phase = std::f64::consts::TAU * f64::from(tick) / f64::from(ticks);
+            let weights = [phase.sin(), 1.0 - phase.cos(), (2.0 * phase).sin(), 1.0 - (2.0 * phase).cos()];
+            let sum =
+                |parts: &[DVec3; 4]| parts.iter().zip(weights).map(|(part, w)| *part * w).sum::<DVec3>();
+            let size = if preset == Preset::Slender { 0.02 } else { 0.06 };
+            (sum(&aside) * DVec3::new(0.05, 0.05, size) * free_length_m, sum(&turned) * 0.06)
+        };
+        let mut was_lifted = hand.seat.is_lifted();
+        for tick in 1..=2 * ticks {
+            let (position_m, rotation_rad) = at(tick);
+            hand.tick(position_m, rotation_rad);
+            if hand.seat.is_lifted() != was_lifted {
+                was_lifted = !was_lifted;
+                (lifted, landed) = (lifted + u32::from(was_lifted), landed + u32::from(!was_lifted));
+            }
+        }
+        // Home again: what is stored now was put in.
+        let made_j = hand.felt.energy_j.unwrap() - hand.work_j;
+        println!("{lap} {preset:?} {friction}: {:.1e} of {:.1e} J", made_j, hand.exchanged_j);
+        // The trapezoidal rule meets each landing to second order in the tick.
+        assert!(
+            made_j <= 1e-6 * hand.exchanged_j,
+            "{preset:?} {friction}: {made_j:e} of {:e} J",
+            hand.exchanged_j
+        );
+    }
+    assert!(lifted > 10 && landed > 10, "{lifted} and {landed}");
 }
 
 #[test]
@@ -220,5 +353,32 @@ fn every_pose_gets_a_finite_answer() {
         }
         let bad = Pose::from_rotation_vector(DVec3::new(f64::NAN, 0.0, 0.0), DVec3::ZERO);
         assert_eq!(seat.step(&mut law, &bad, Demand::Wrench).validity, Validity::InvalidInput);
+    }
+}
+
+/// Half as far again as the workspace a base may tip over, where no tilt is of least energy; how many poses stay without one is
+/// printed, not hidden.
+#[test]
+fn far_out_a_base_has_an_answer_if_not_always_a_place() {
+    for preset in [Preset::Thesis1, Preset::Thesis3] {
+        let spring = preset.spring();
+        let (mut sampler, mut stuck, count) = (Sampler::new(5), 0, of(60, 6));
+        for _ in 0..count {
+            let (position_m, rotation_rad) = (sampler.vector([0.03; 3]), sampler.vector([0.183; 3]));
+            let (mut law, mut seat) = (RodBlend::new(&spring), Seat::new(&spring, Friction::STICKING));
+            let mut validity = Validity::Ok;
+            for tick in 1..=2700 {
+                let part = (f64::from(tick) / 700.0).min(1.0);
+                if tick > 700 && validity != Validity::NotConverged {
+                    break;
+                }
+                let pose = Pose::from_rotation_vector(position_m * part, rotation_rad * part);
+                let answer = seat.step(&mut law, &pose, Demand::WrenchAndEnergy);
+                assert!(answer.force_n.is_finite() && answer.torque_nm.is_finite(), "{preset:?} {pose:?}");
+                validity = answer.validity;
+            }
+            stuck += u32::from(validity == Validity::NotConverged);
+        }
+        println!("{preset:?}: {stuck} of {count} poses stay without a place");
     }
 }

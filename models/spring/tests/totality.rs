@@ -73,7 +73,8 @@ fn a_cold_rod_answers_every_pose() {
     for preset in Preset::ALL {
         let spring = preset.spring();
         let mut rod = Rod::new(&spring, Accuracy::Servo);
-        let mut blending = RodBlend::new(&spring, Coils::Touch);
+        let mut touching = Rod::to_rounding(&spring, Coils::Touch);
+        let mut blending = RodBlend::new(&spring);
         let mut sampler = Sampler::new(7);
         for workspace in [WILD, DEVICE] {
             for _ in 0..of(12_500) {
@@ -81,6 +82,7 @@ fn a_cold_rod_answers_every_pose() {
                 rod.reset();
                 (0..4).for_each(|_| is_sound(&rod.step(&pose, Demand::WrenchAndEnergy), &pose));
                 is_sound(&blending.respond(&pose, Demand::WrenchAndEnergy), &pose);
+                is_sound(&touching.step(&pose, Demand::WrenchAndEnergy), &pose);
             }
         }
     }

@@ -68,8 +68,13 @@ impl Proxy {
         let outwards_m_per_s = velocity_m_per_s.dot(proxy.normal);
         let normal_n =
             (surface.stiffness_n_per_m * depth_m - surface.damping_ns_per_m * outwards_m_per_s).max(0.0);
+        let mut along_n = along_m * surface.stiffness_n_per_m;
+        if normal_n < surface.stiffness_n_per_m * depth_m {
+            // Damping relieves a handle that leaves; the cone is that of the force it feels.
+            along_n = along_n.clamp_length_max(surface.friction * normal_n);
+        }
         Pull {
-            force_n: proxy.normal * normal_n + along_m * surface.stiffness_n_per_m,
+            force_n: proxy.normal * normal_n + along_n,
             energy_j: 0.5 * surface.stiffness_n_per_m * stretch_m.length_squared(),
         }
     }

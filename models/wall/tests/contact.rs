@@ -50,6 +50,21 @@ fn friction_holds_up_to_the_cone_and_slides_on_it() {
     }
 }
 
+/// A handle that leaves fast enough for damping to take all of the normal force feels no friction either.
+#[test]
+fn the_cone_is_that_of_the_force_that_is_felt() {
+    let surface = Surface { damping_ns_per_m: 20.0, ..ROUGH };
+    let mut proxy = Proxy::default();
+    for position_m in [DVec3::Z * 0.001, DVec3::Z * -0.002] {
+        let _ = proxy.follow(&Shape::Plane, &surface, position_m, DVec3::ZERO);
+    }
+    let aside = DVec3::new(0.005, 0.0, -0.002);
+    for (outwards_m_per_s, normal_n) in [(0.0, 4.0), (0.1, 2.0), (0.2, 0.0), (0.5, 0.0)] {
+        let pull = proxy.follow(&Shape::Plane, &surface, aside, DVec3::Z * outwards_m_per_s);
+        assert!((pull.force_n - DVec3::new(-0.5 * normal_n, 0.0, normal_n)).length() < 1.0e-12, "{pull:?}");
+    }
+}
+
 #[test]
 fn on_a_ball_the_sliding_pull_lies_on_the_cone() {
     let path = [DVec3::Z * 0.001, DVec3::Z * -0.002, DVec3::new(0.008, 0.0, -0.004)];

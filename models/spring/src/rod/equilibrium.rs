@@ -12,6 +12,7 @@
 use flotor_hal::glam::{DVec2, DVec3};
 
 use super::curve::Curve;
+use super::descent::{Descent, Found};
 use super::functional::{Curvature, Functional, Ratios, Reaction, Shape, Value, joined};
 use super::matrix::{Factored, added, dot, length, product};
 use super::plate::{Plate, or_zero};
@@ -21,13 +22,13 @@ use crate::pose::Pose;
 use crate::response::Demand;
 use crate::rigidity::Spring;
 
-/// Longest change of shape in a tick, beyond what the plates' motion predicts, as the root mean square slope of `p`. A full
-/// bulge has about 3.
+/// Longest change of shape in a tick that ends in no equilibrium, as the root mean square slope of `p`; of one that does,
+/// beyond what the plates' motion predicts. A full bulge has about 3.
 const LONGEST_WAY: f64 = 0.1;
 /// Longest step where the way is not felt, but only its end.
 const LONGEST_UNFELT_STEP: f64 = 0.4;
 /// How often a search that is not felt may begin anew.
-const MOST_SEARCHES: u32 = 6;
+const MOST_SEARCHES: u32 = 3;
 /// Curvature that counts as none. Bending has 4; the softest stable directions have 1e-5; rounding makes
 /// 1e-14.
 const NEUTRAL: f64 = 1.0e-9;
@@ -109,6 +110,7 @@ pub(crate) struct Equilibrium<const K: usize, const N: usize, const Q: usize> {
     shape: Shape<N>,
     history: History<N>,
     matrix: KeptMatrix<N>,
+    descent: Descent<N>,
     damping: f64,
     stride: Stride,
     unstable_directions: usize,
@@ -177,6 +179,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
             shape: [0.0; N],
             history: History::new(Plate::HOME, [0.0; N]),
             matrix: KeptMatrix::none(),
+            descent: Descent::new(),
             damping: LEAST_DAMPING,
             stride: Stride::FELT,
             unstable_directions: 0,
@@ -225,14 +228,27 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         self.work = Work::default();
         self.stride = Stride::FELT;
         self.shape = self.history.predict(plate);
-        let outcome = self.search(plate, demand);
+        let mut outcome = self.search(plate, demand);
+        if matches!(outcome, Outcome::Moving(_)) && distance(&self.shape, &before) > LONGEST_WAY {
+            // The branch ends between the last tick and this one, and the prediction went across: from where it was.
+            self.shape = before;
+            outcome = self.search(plate, demand);
+        }
         self.remember(plate, &before, &outcome);
         outcome
     }
 
-    /// The equilibrium at a pose, whatever was before: from the shape of the linear column, in one go. What happens on
-    /// the way is not felt, so it may go faster. Real-time: bounded, no allocation.
+    /// The equilibrium at a pose, whatever was before: from the straight column where that has not buckled, else from
+    /// the shape of the linear column, in one go. What happens on the way is not felt, so it may go faster. Real-time:
+    /// bounded, no allocation.
     pub(crate) fn find(&mut self, spring: &Spring, pose: &Pose, plate: &Plate, demand: Demand) -> Outcome {
+        if let Some(Found { shape, reading, energies }) = self.descent.find(&self.functional, plate) {
+            self.work = Work { evaluations: energies, ..Work::default() };
+            self.history.restart(plate, &shape);
+            self.shape = shape;
+            (self.matrix.steps_left, self.damping, self.unstable_directions) = (0, LEAST_DAMPING, 0);
+            return Outcome::Settled(reading);
+        }
         self.reset();
         self.stride = Stride::UNFELT;
         if let Some(start) = start::linear(self.functional.basis(), spring, pose) {

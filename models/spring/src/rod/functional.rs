@@ -24,6 +24,7 @@ use flotor_hal::glam::{DMat3, DVec2, DVec3};
 use super::Coils;
 use super::basis::Basis;
 use super::contact::{self, Contact};
+use super::equilibrium::Reading;
 use super::matrix::dot;
 use super::plate::Plate;
 use super::section::{Along, Curvatures, Load, Sections};
@@ -128,7 +129,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
     }
 
     /// Energy, load and slope. Real-time: bounded, no allocation.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn value(&self, shape: &Shape<N>, plate: &Plate) -> Value<N, Q> {
         let sections = self.sections(shape, plate);
         let integrals = sections.integrate(&self.basis.weight);
@@ -169,7 +170,14 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
         }
     }
 
-    #[inline]
+    /// Energy and what the plates feel, and the slope. Real-time: bounded, no allocation.
+    #[inline(always)]
+    pub(crate) fn reading(&self, shape: &Shape<N>, plate: &Plate) -> (Reading, Shape<N>) {
+        let Value { energy, slope, by_lean, load, .. } = self.value(shape, plate);
+        (Reading { energy, force: load.force, by_lean, torsion: load.torsion }, slope)
+    }
+
+    #[inline(always)]
     fn sections(&self, shape: &Shape<N>, plate: &Plate) -> Sections<Q> {
         let (mut lean, mut rate) = ([[0.0; Q]; 2], [[0.0; Q]; 2]);
         let (x, y) = shape.split_at(K);
@@ -260,7 +268,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
     }
 
     /// Sums over the stations of a field times each bubble and another times its slope.
-    #[inline]
+    #[inline(always)]
     fn projected(&self, by_lean: &Along<Q>, by_rate: &Along<Q>) -> [f64; K] {
         let mut sums = [0.0; K];
         for i in 0..Q {
@@ -272,7 +280,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
 }
 
 /// `sum += factor * vector`
-#[inline]
+#[inline(always)]
 fn add_products<const M: usize>(sum: &mut [f64; M], vector: &[f64; M], factor: f64) {
     for i in 0..M {
         sum[i] += factor * vector[i];
@@ -280,7 +288,7 @@ fn add_products<const M: usize>(sum: &mut [f64; M], vector: &[f64; M], factor: f
 }
 
 /// Both components one after the other.
-#[inline]
+#[inline(always)]
 pub(super) fn joined<const K: usize, const N: usize>(x: &[f64; K], y: &[f64; K]) -> Shape<N> {
     let mut shape = [0.0; N];
     for (entry, value) in shape.iter_mut().zip(x.iter().chain(y)) {
@@ -290,7 +298,7 @@ pub(super) fn joined<const K: usize, const N: usize>(x: &[f64; K], y: &[f64; K])
 }
 
 /// Solves a definite 3x3 system by cofactors.
-#[inline]
+#[inline(always)]
 fn solve_symmetric(matrix: &DMat3, right: DVec3) -> DVec3 {
     let (a, b, c) = (matrix.x_axis, matrix.y_axis, matrix.z_axis);
     // The rows of the inverse are the cross products of the columns over the determinant.

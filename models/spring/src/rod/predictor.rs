@@ -27,6 +27,12 @@ impl<const N: usize> History<N> {
         Self { plates: [plate; DEPTH], shapes: [shape; DEPTH], length: 1 }
     }
 
+    /// Forgets all but one equilibrium. Real-time: bounded, no allocation.
+    #[inline]
+    pub(crate) fn restart(&mut self, plate: &Plate, shape: &Shape<N>) {
+        (self.plates[0], self.shapes[0], self.length) = (*plate, *shape, 1);
+    }
+
     /// Where the plates were last.
     pub(crate) fn plate(&self) -> &Plate {
         &self.plates[0]

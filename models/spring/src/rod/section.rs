@@ -64,7 +64,7 @@ pub(crate) struct Load {
 }
 
 impl<const Q: usize> Sections<Q> {
-    #[inline]
+    #[inline(always)]
     pub(crate) fn new(lean: [Along<Q>; 2], lean_rate: [Along<Q>; 2]) -> Self {
         let ([x, y], [dx, dy]) = (&lean, &lean_rate);
         let (mut scale, mut normal, mut area_rate) = ([0.0; Q], [[0.0; Q]; 3], [0.0; Q]);
@@ -81,7 +81,7 @@ impl<const Q: usize> Sections<Q> {
         Self { lean, lean_rate, scale, normal, area_rate }
     }
 
-    #[inline]
+    #[inline(always)]
     pub(crate) fn integrate(&self, weight: &Along<Q>) -> Integrals {
         let (w, [dx, dy], [nx, ny, nz]) = (&self.scale, &self.lean_rate, &self.normal);
         let [mut bending, mut winding, mut drop] = [[0.0; Q]; 3];
@@ -107,7 +107,7 @@ impl<const Q: usize> Sections<Q> {
     }
 
     /// First derivatives of `l` by `p` and by `p'`, each times the weight.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn slopes(&self, load: &Load, weight: &Along<Q>) -> [[Along<Q>; 2]; 2] {
         let ([x, y], [dx, dy]) = (&self.lean, &self.lean_rate);
         let mut by_lean = [[0.0; Q]; 2];
@@ -156,7 +156,7 @@ impl<const Q: usize> Sections<Q> {
     }
 
     /// `n.d`, its slope by `p`, and `1 + delta n.d`.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn potential(&self, load: &Load, i: usize) -> Potential {
         let (x, y, w, n) = (self.lean[0][i], self.lean[1][i], self.scale[i], load.force);
         let level = n.x * x + n.y * y + n.z;
