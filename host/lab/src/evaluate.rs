@@ -5,11 +5,11 @@
 //! converged. Where every pose is reached from home the ways are independent, and all processors walk them.
 
 use super::PERIOD_NS;
-use super::subject::{Subject, call, steps, walk};
-use super::trajectory::at;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
 use flotor_hal::{DVec3, Demand, Input, Memory, Output, Pose, StepStatus, Twist, Wrench};
+use flotor_judge::subject::{Subject, call, steps, walk};
+use flotor_judge::trajectory::at;
 use rayon::prelude::*;
 
 /// Position and rotation vector of a handle in the model frame, m and rad.
@@ -54,6 +54,8 @@ pub enum Travel {
     FromHome,
     /// Each pose is reached from the one before.
     Successive,
+    /// Each pose is that of the next tick of a loop: one step, wherever it comes from.
+    PerTick,
 }
 
 /// Whether a model also returns its details.
@@ -109,6 +111,10 @@ impl<'a> Evaluation<'a> {
     ) -> Result<Vec<Answer>, EvaluateError> {
         let mut walker = self.walker()?;
         match (walker.subject.memory(), self.travel) {
+            (_, Travel::PerTick) => {
+                let tick = |handle: &Handle| walker.tick_at(*handle).inspect(|_| on_answer());
+                handles.iter().map(tick).collect()
+            }
             (Memory::Stateless, _) => walker.evaluate_directly(handles, on_answer),
             (Memory::PathDependent, Travel::Successive) => {
                 let walk = |handle: &Handle| walker.walk_to(*handle).inspect(|_| on_answer());
@@ -175,6 +181,12 @@ impl Walker<'_> {
             }
         }
         Ok(answers)
+    }
+
+    /// One step at a pose.
+    fn tick_at(&mut self, handle: Handle) -> Result<Answer, EvaluateError> {
+        let output = self.step(handle.pose())?;
+        self.answer(handle, &output)
     }
 
     /// Takes the handle from where it is to a pose and holds it there until the model has converged.

@@ -75,6 +75,7 @@ pub fn measure(
     progress: impl Fn(u64) + Send,
 ) -> Result<JitterReport, RunError> {
     let period_ns = session.period_ns();
+    session.latch().map_or(Ok(()), |latch| latch.obey(stop))?;
     let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
     std::thread::scope(|scope| {
         let measured = thread.spawn_scoped(scope, move || {

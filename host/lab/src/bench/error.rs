@@ -1,8 +1,8 @@
 //! How far answers lie from the reference's.
 
-use crate::subject::{call, input_of};
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Input, Pose, StepStatus, Wrench};
+use flotor_judge::subject::{call, input_of};
 use serde::Serialize;
 
 /// Answers a model may need at the first pose until it has converged, ticks.

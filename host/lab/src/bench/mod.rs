@@ -17,6 +17,7 @@
 mod error;
 mod path;
 mod reach_hand;
+mod round_trip;
 pub mod scripted;
 mod split;
 mod tables;
@@ -26,15 +27,16 @@ mod whole_tick;
 pub use error::Distance;
 pub use path::Hand;
 pub use reach_hand::{Losses, Sampling};
+pub use round_trip::time_round_trips;
 pub use split::{Speed, SplitTimes};
 pub use tables::{BenchReport, CaseRow, SplitRow};
 pub use times::Times;
 pub use whole_tick::{BenchDevice, TickCost, WholeTick};
 
-use super::subject::prepared;
 use super::{Progress, Size};
 use flotor_hal::Demand;
 use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
+use flotor_judge::subject::prepared;
 
 /// One setting of the model.
 #[derive(Clone, Debug)]

@@ -1,7 +1,7 @@
 //! The motion every case goes along: smooth, in all six coordinates, never at rest for long.
 
-use crate::trajectory::{Series, Trajectory};
 use flotor_hal::{DVec3, Pose};
+use flotor_judge::trajectory::{Series, Trajectory};
 use std::f64::consts::TAU;
 
 /// Amplitudes and frequencies. Within ±4 mm and ±2°, at 1 to 3 Hz: what a hand

@@ -7,9 +7,9 @@
 
 use super::error::answer;
 use super::path::Hand;
-use crate::trajectory::{Trajectory, sensed};
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{DVec3, Pose};
+use flotor_judge::trajectory::{Trajectory, sensed};
 use serde::Serialize;
 
 /// How a device samples a hand.

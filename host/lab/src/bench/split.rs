@@ -2,9 +2,9 @@
 //! has two speeds, and a mean of both describes neither.
 
 use super::times::{call_ns, inputs};
-use crate::call_timer::{overhead_ns, quantile};
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Pose};
+use flotor_judge::call_timer::{overhead_ns, quantile};
 use serde::Serialize;
 
 /// Calls for which a detail is above zero, and the others.

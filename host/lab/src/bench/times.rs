@@ -4,10 +4,10 @@
 //! so on to the end of it, round after round. What disturbs one slice disturbs its neighbours too, and quotients of
 //! neighbouring slices are those of a quiet machine.
 
-use crate::call_timer::{net_ns, overhead_ns, quantile};
-use crate::subject::input_of;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Input, Memory, Output, Pose};
+use flotor_judge::call_timer::{net_ns, overhead_ns, quantile};
+use flotor_judge::subject::input_of;
 use serde::Serialize;
 use std::hint::black_box;
 use std::time::Instant;

@@ -5,10 +5,10 @@
 //! their own. The middle of many batches counts: a neighbour on the machine spoils some of them.
 
 use super::scripted::{SCRIPTED, SCRIPTED_ENTRY};
-use crate::call_timer::{net_ns, quantile};
 use flotor_core::trace::TickRecord;
 use flotor_hal::SampleWait;
 use flotor_hal::abi::loader::Stopper;
+use flotor_judge::call_timer::{net_ns, quantile};
 use flotor_servo::{Clock, Schedule, Servo, StopSwitch, drain, queue};
 use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
@@ -31,11 +31,13 @@ pub enum BenchDevice {
     Scripted,
     /// The simulated flotor, preset `plain`, in its hand.
     Simulated,
+    /// The scripted handle, with the model in a process of its own.
+    Isolated,
 }
 
 impl BenchDevice {
     /// All of them.
-    pub const ALL: [BenchDevice; 2] = [BenchDevice::Scripted, BenchDevice::Simulated];
+    pub const ALL: [BenchDevice; 3] = [BenchDevice::Scripted, BenchDevice::Simulated, BenchDevice::Isolated];
 
     /// Name in a table.
     #[must_use]
@@ -43,16 +45,20 @@ impl BenchDevice {
         match self {
             Self::Scripted => "on a scripted device",
             Self::Simulated => "on the simulated flotor",
+            Self::Isolated => "in a process of its own",
         }
     }
 
     /// The scene: one device, one model with its defaults.
     fn scene(self, model: &str) -> String {
         let device = match self {
-            Self::Scripted => SCRIPTED,
+            Self::Scripted | Self::Isolated => SCRIPTED,
             Self::Simulated => "simulated",
         };
-        format!("[device]\nplugin = \"{device}\"\n[[model]]\nplugin = \"{model}\"\n")
+        let isolation = if self == Self::Isolated { "process" } else { "none" };
+        format!(
+            "[device]\nplugin = \"{device}\"\n[[model]]\nplugin = \"{model}\"\nisolation = \"{isolation}\"\n"
+        )
     }
 }
 

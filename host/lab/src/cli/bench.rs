@@ -2,7 +2,7 @@
 
 use super::ProgressLine;
 use crate::Size;
-use crate::bench::{BenchDevice, Case, Hand, Plan, Split, TickCost, WholeTick, measure};
+use crate::bench::{BenchDevice, Case, Hand, Plan, Split, TickCost, WholeTick, measure, time_round_trips};
 use clap::Args;
 use flotor_command::options::{KeyValue, new_file, number, svg_file};
 use flotor_command::tables::table;
@@ -17,8 +17,8 @@ use std::path::PathBuf;
 /// Measure cost and error of an evaluation, for many settings of a force model.
 #[derive(Args)]
 #[command(
-    after_help = "Without --case, the command compares the spring's variants and settings with its exact rod, or measures the defaults \
-    of another model. With --tick, it measures the whole tick around the model instead: device, mapping, envelope, trace. \
+    after_help = "Without --case, the command compares the variants and settings of the spring with its exact variant, `rod`. It measures \
+    any other model with default settings. With --tick, it measures the whole tick around the model instead: device, mapping, envelope, trace. \
     Times are wall clock: compare them within one run only.\n\n\
     Examples:\n  \
     flotor bench --csv bench.csv --plot bench.svg\n  \
@@ -46,10 +46,11 @@ pub(crate) struct BenchArguments {
     /// Depth of the middle of the motion below home
     #[arg(long, value_name = "MM", default_value_t = 4.0, value_parser = number("mm", "depth", 0.0..=100.0))]
     depth_mm: f64,
-    /// Report calls separately in which this detail of the answer (a column of `eval --details`) is above zero
+    /// Report separately the calls that return more than zero for this detail (a column of `eval --details`)
     #[arg(long, value_name = "DETAIL")]
     apart: Option<String>,
-    /// Measure the whole tick around the model, on a scripted device and on the simulated flotor
+    /// Measure the whole tick around the model: on a scripted device, on the simulated flotor, and with the model in a process
+    /// of its own
     #[arg(long, conflicts_with_all = ["cases", "sets", "reference", "yardstick", "apart", "csv", "plot"])]
     tick: bool,
     /// Extent of the measurement
@@ -106,6 +107,28 @@ struct TickRow {
     cost: TickCost,
 }
 
+/// What the whole tick costs, and what a process of its own adds to it.
+#[derive(Serialize)]
+struct TickReport {
+    ticks: Vec<TickRow>,
+    /// To another thread and back, through the system's futexes.
+    round_trip: TickCost,
+    /// What a model in a process of its own adds to a tick, in round trips.
+    isolation_in_round_trips: f64,
+}
+
+impl TickReport {
+    fn new(ticks: Vec<TickRow>, round_trip: TickCost) -> Self {
+        let median = |device| ticks.iter().find(|row| row.device == device).map(|row| row.cost.median_ns);
+        let added_ns = median(BenchDevice::Isolated).zip(median(BenchDevice::Scripted));
+        let added_ns = added_ns.map_or(f64::NAN, |(isolated, here)| isolated - here);
+        Self { ticks, round_trip, isolation_in_round_trips: added_ns / round_trip.median_ns }
+    }
+}
+
+/// How much slower what waits for another thread is, roughly: so many fewer batches take as long.
+const SLOWER: usize = 20;
+
 /// `--tick`
 fn time_ticks(arguments: &BenchArguments) -> Result<(), CommandError> {
     let batches = match arguments.size {
@@ -113,20 +136,30 @@ fn time_ticks(arguments: &BenchArguments) -> Result<(), CommandError> {
         Size::Full => 50_000,
     };
     let row = |device: BenchDevice| {
+        let batches = if device == BenchDevice::Isolated { batches / SLOWER } else { batches };
         let cost = WholeTick::prepare(device, &arguments.model)?.time(batches);
         Ok(TickRow { device, cost })
     };
     let rows = BenchDevice::ALL.into_iter().map(row).collect::<Result<Vec<_>, CommandError>>()?;
+    let report = TickReport::new(rows, time_round_trips(batches / SLOWER));
     let text = || {
         let title = format!("a tick with `{}`, trace on, virtual clock: ns", arguments.model);
-        let cells =
-            rows.iter().map(|TickRow { device, cost: TickCost { median_ns, p99_ns, fastest_ns } }| {
-                let [median, p99, fastest] = [median_ns, p99_ns, fastest_ns].map(|ns| format!("{ns:.0}"));
-                [device.name().to_owned(), median, p99, fastest]
-            });
-        [vec![style::title(&title)], table(["", "median", "p99", "fastest"], cells)].concat().join("\n")
+        let cells = |name: &str, cost: &TickCost| {
+            let TickCost { median_ns, p99_ns, fastest_ns } = cost;
+            let [median, p99, fastest] = [median_ns, p99_ns, fastest_ns].map(|ns| format!("{ns:.0}"));
+            [name.to_owned(), median, p99, fastest]
+        };
+        let rows = report.ticks.iter().map(|TickRow { device, cost }| cells(device.name(), cost));
+        let rows = rows.chain([cells("futex round trip", &report.round_trip)]);
+        let ratio = format!(
+            "a process of its own adds {:.1} futex round trips to a tick",
+            report.isolation_in_round_trips
+        );
+        [vec![style::title(&title)], table(["", "median", "p99", "fastest"], rows), vec![ratio]]
+            .concat()
+            .join("\n")
     };
-    print_result(arguments.json.as_deref(), &rows, text)
+    print_result(arguments.json.as_deref(), &report, text)
 }
 
 fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {

@@ -13,7 +13,7 @@ use flotor_session::scene::Scene;
 use flotor_session::{RunError, RunOptions, Session};
 use std::path::PathBuf;
 
-/// Measure the timing of the servo on this machine, next to a bare loop.
+/// Measure the timing of the servo on this machine, compared with a bare loop.
 #[derive(Args)]
 #[command(
     after_help = "Servo and bare loop alternate every second, with the same spin window, priority, core and load.\n\n\

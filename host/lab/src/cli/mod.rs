@@ -42,6 +42,7 @@ pub fn command() -> clap::Command {
 /// Runs the command of this process.
 #[must_use]
 pub fn main() -> ExitCode {
+    flotor_session::tell_notices(|notice| flotor_command::note(notice));
     exit_code_of(match options::arguments::<Arguments>().command {
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),

@@ -27,10 +27,11 @@ pub(crate) struct ReplayArguments {
     /// Set a parameter of a model of the recording (repeatable)
     #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
     sets: Vec<PluginKeyValue>,
-    /// Evaluate another model instead of a recorded one (repeatable): NAME in the recording, id or file of a plugin
+    /// Evaluate another model instead of a recorded one (repeatable): NAME is the recorded model, PLUGIN the id or file
+    /// of the other
     #[arg(long = "model", value_name = "NAME=PLUGIN")]
     models: Vec<KeyValue>,
-    /// Folder to search for plugins (repeatable): for plugins that the scene named by their files
+    /// Folder to search for plugins (repeatable); needed if the scene of the run named a plugin by its file
     #[arg(long = "plugin-path", value_name = "FOLDER")]
     folders: Vec<PathBuf>,
     /// Write the difference as JSON (- for standard output)
@@ -160,7 +161,7 @@ fn to_text(arguments: &ReplayArguments, report: &Report) -> String {
     if let (Some(why), true) = (&report.why_apart, arguments.changes_anything()) {
         row("note", format!("the wrench differs for another reason as well: {why}"));
     }
-    let implausible = report.implausible.iter().map(|found| format!("not believable as recorded: {found}"));
+    let implausible = report.implausible.iter().map(|found| format!("as recorded: {found}"));
     implausible.for_each(|found| row("note", found));
     report.gaps().into_iter().for_each(|gap| row("note", gap));
     lines.join("\n")

@@ -1,4 +1,4 @@
-//! `flotor stability`: the stiffest spring that stays stable on the simulated device, next to theory.
+//! `flotor stability`: the stiffest spring that stays stable on the simulated device, compared with theory.
 
 use crate::stability::theory::{Plant, Rendering, exact_limit_n_per_m, gil_limit_n_per_m};
 use crate::stability::{Case, Grip, LoopError, Row, default_cases, measure};
@@ -13,11 +13,12 @@ use flotor_session::registry::Registry;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Find the largest stable stiffness of a virtual spring, next to theory.
+/// Find the largest stable stiffness of a virtual spring, compared with theory.
 #[derive(Args)]
 #[command(
-    after_help = "Each case is bisected on the simulated flotor's own dynamics, in virtual time, until the \
-    vibration of a released handle neither grows nor fades. Lists multiply: without any, a default grid is measured.\n\n\
+    after_help = "For each case, the command bisects the stiffness on the dynamics of the simulated flotor, in \
+    virtual time, until the vibration of a released handle neither grows nor fades. Each combination of the listed \
+    values is a case; without any list, the command measures a default grid.\n\n\
     Examples:\n  \
     flotor stability --plot stability.svg --csv stability.csv\n  \
     flotor stability --rate 1000,4000 --delay 0,1 --virtual-damping 0,15\n  \

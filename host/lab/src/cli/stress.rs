@@ -2,18 +2,21 @@
 
 use super::ProgressLine;
 use crate::Size;
-use crate::stress::{Reach, StressOptions, score};
-use clap::Args;
-use flotor_command::options::{KeyValue, settings, svg_file, whole};
+use clap::{Args, ValueEnum};
+use flotor_command::options::{KeyValue, duration_s, settings, svg_file, whole};
 use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_hal::abi::PluginKind;
+use flotor_judge::stress::{Part, Reach, StressOptions, Symmetry, deliver, score_in_processes};
 use flotor_session::registry::Registry;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
 
 /// Score the numerical stability of a force model.
 #[derive(Args)]
-#[command(after_help = "Nine measures: M0 totality, M1 continuity, M2 Lipschitz constant, M3 reciprocity, \
-    M4 loop energy, M5 sampled energy, M6 closed loop, M7 cost, M8 determinism. \
+#[command(after_help = "Ten measures: M0 totality, M1 continuity, M2 Lipschitz constant, M3 reciprocity, \
+    M4 loop energy, M5 sampled energy, M6 closed loop, M7 cost, M8 determinism, M9 search for the worst; \
+    with --symmetry also M10. Each is made in its own process: a call that does not return costs one measure. \
     `score` is the share of measures that passed; docs/src/stress.md has the criterion of each.\n\n\
     Examples:\n  \
     flotor stress --model spring\n  \
@@ -32,6 +35,18 @@ pub(crate) struct StressArguments {
     /// Seed of poses and motions
     #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N")]
     seed: u64,
+    /// A symmetry that the model is declared to have: M10 looks whether it keeps it
+    #[arg(long, value_enum)]
+    symmetry: Option<Symmetry>,
+    /// Make only this measure (repeatable)
+    #[arg(long, value_parser = measure, value_name = "M0")]
+    only: Vec<Part>,
+    /// Time limit of one call: 10s, 500ms
+    #[arg(long, value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME", default_value = "10s")]
+    timeout: f64,
+    /// Make one measure in this process, and write the result into the file that is standard input
+    #[arg(long, hide = true, value_parser = part)]
+    deliver: Option<Part>,
     /// Write the score as JSON (- for standard output)
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -40,13 +55,42 @@ pub(crate) struct StressArguments {
     plot: Option<PathBuf>,
 }
 
+fn measure(id: &str) -> Result<Part, String> {
+    Part::of_measure(id).ok_or_else(|| format!("unknown measure `{id}`; there are M0 to M10"))
+}
+
+fn part(word: &str) -> Result<Part, String> {
+    Part::from_word(word).ok_or_else(|| format!("unknown part `{word}`"))
+}
+
 pub(crate) fn run(arguments: &StressArguments) -> Result<(), CommandError> {
     let plugin = Registry::search(&[]).load(&arguments.model, PluginKind::Model)?;
     let settings = settings(&plugin, &arguments.sets)?;
-    let options = StressOptions { size: arguments.size, seed: arguments.seed, reach: Reach::default() };
-    let line = ProgressLine::new();
-    let report = score(&plugin, &settings, &options, &line)?;
-    line.0.finish_and_clear();
+    let StressArguments { size, seed, symmetry, .. } = *arguments;
+    let options = StressOptions { size, seed, reach: Reach::default(), symmetry };
+    let patience = Duration::from_secs_f64(arguments.timeout);
+    if let Some(part) = arguments.deliver {
+        let line = ProgressLine::new();
+        let delivered = deliver(&plugin, &settings, &options, part, patience, &line);
+        line.0.finish_and_clear();
+        return delivered.map_err(|error| CommandError::Failed(error.to_string()));
+    }
+    let program = std::env::current_exe()
+        .map_err(|cause| CommandError::file(Path::new("flotor"), "cannot find this program", cause))?;
+    let one_part = |part: Part| {
+        let mut command = Command::new(&program);
+        command.args(["stress", "--deliver", part.word(), "--size", size.word()]);
+        command.arg(format!("--seed={seed}")).arg(format!("--timeout={}", arguments.timeout));
+        command.arg("--model").arg(&arguments.model);
+        for (key, value) in arguments.sets.iter().map(KeyValue::pair) {
+            command.arg("--set").arg(format!("{key}={value}"));
+        }
+        if let Some(symmetry) = symmetry.and_then(|symmetry| symmetry.to_possible_value()) {
+            command.arg("--symmetry").arg(symmetry.get_name());
+        }
+        command
+    };
+    let report = score_in_processes(&plugin, &settings, &options, &arguments.only, patience, one_part)?;
     let text = || format!("{}\n{}", style::title(&report.subject()), report.to_text());
     print_result(arguments.json.as_deref(), &report, text)?;
     write_text(arguments.plot.as_deref(), || report.to_svg())

@@ -1,10 +1,10 @@
 //! `flotor validate`: a plugin file against the rules of the contract.
 
-use crate::validate::{Check, Figures, Finding, Verdict, check, validate};
 use clap::Args;
 use flotor_command::options::{KeyValue, duration_s};
 use flotor_command::say;
 use flotor_command::{CommandError, style, write_json};
+use flotor_judge::validate::{Check, Figures, Finding, Verdict, check, validate};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -23,7 +23,10 @@ pub(crate) struct ValidateArguments {
     /// Print JSON
     #[arg(long)]
     json: bool,
-    /// Time limit of one rule: 10s, 500ms
+    /// Check only this rule of the contract (repeatable)
+    #[arg(long, value_parser = rule, value_name = "RULE")]
+    only: Vec<Check>,
+    /// Limit of the processor time and of the waiting time of each rule: 10s, 500ms
     #[arg(long, value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME", default_value = "10s")]
     timeout: f64,
     /// Check one rule in this process, and print the verdict as JSON
@@ -53,7 +56,7 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     }
     if !arguments.plugin.is_file() {
         return Err(CommandError::Usage(format!(
-            "`{}` is no plugin file; `flotor plugins` lists the files of the ids",
+            "`{}` is not a plugin file; `flotor plugins` lists the file of each id",
             arguments.plugin.display()
         )));
     }
@@ -67,7 +70,8 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
         }
         command
     };
-    let findings = validate(&arguments.plugin, Duration::from_secs_f64(arguments.timeout), one_rule);
+    let findings =
+        validate(&arguments.plugin, &arguments.only, Duration::from_secs_f64(arguments.timeout), one_rule);
     let violated = findings.iter().filter(|finding| finding.violation.is_some()).count();
     if arguments.json {
         write_json(Path::new("-"), &findings)?;

@@ -18,7 +18,7 @@ use flotor_core::{Change, ChangeOutcome, ChangeSubject};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::{Axes, Capabilities, DeviceState, LoopConfig, Tick, Wrench};
 use flotor_record::{Ending, ReadError, Recording, Role, RunDescription};
-use flotor_servo::coupling::Patience;
+use flotor_servo::coupling::{Patience, Reach};
 use flotor_servo::{
     Clock, Coupled, Forces, Heartbeat, ImplausibleSamples, ModelHealth, PlausibilityCheck, Port, Replacement,
 };
@@ -144,7 +144,8 @@ impl<'r> Replay<'r> {
             return Err(ReplayError::Apart { coupling: coupling.name.clone() });
         }
         let couplings = recording.run().couplings.iter();
-        let couplings = couplings.map(|coupling| Coupled::new(coupling, period_s, NOBODY_TO_WAIT_FOR).0);
+        let couplings = couplings
+            .map(|coupling| Coupled::new(coupling, period_s, NOBODY_TO_WAIT_FOR, Reach::default()).0);
         let forces = Forces::new(devices, layers, couplings.collect());
         Ok(Self { registry, config, recording, uses, devices, forces, plugins, held })
     }

@@ -1,4 +1,4 @@
-//! The stiffest virtual spring that stays stable on a device: measured on the simulated flotor, next to theory.
+//! The stiffest virtual spring that stays stable on a device: measured on the simulated flotor, compared with theory.
 //!
 //! A servo renders a spring by sampling the handle's position `x` once a period `T` and a zero-order hold
 //! of the force until the next sample,

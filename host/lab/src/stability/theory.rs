@@ -10,8 +10,8 @@
 //!   9:011005): a linear rule for little damping, short delay and fast sampling.
 
 use super::search::largest_stable;
-pub use crate::plant::Plant;
 use flotor_hal::math;
+pub use flotor_judge::plant::Plant;
 use std::convert::Infallible;
 use std::f64::consts::PI;
 

@@ -1,0 +1,24 @@
+//! Times of single calls.
+
+use std::time::Instant;
+
+/// Time since a moment less what the clock costs, ns.
+#[must_use]
+pub fn net_ns(overhead_ns: f64, begin: Instant) -> f64 {
+    (begin.elapsed().as_nanos() as f64 - overhead_ns).max(0.0)
+}
+
+/// What reading the clock twice costs: the median of many.
+#[must_use]
+pub fn overhead_ns() -> f64 {
+    let mut samples: Vec<f64> = (0..1001).map(|_| net_ns(0.0, Instant::now())).collect();
+    quantile(&mut samples, 0.5)
+}
+
+/// The value a part of the samples lies below; NaN of nothing.
+pub fn quantile(samples: &mut [f64], part: f64) -> f64 {
+    samples.sort_by(f64::total_cmp);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let index = (samples.len() as f64 * part) as usize;
+    samples.get(index.min(samples.len().saturating_sub(1))).copied().unwrap_or(f64::NAN)
+}

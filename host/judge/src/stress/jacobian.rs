@@ -1,0 +1,185 @@
+//! Derivative of the wrench by the pose, from differences, with what the differences leave uncertain.
+//!
+//! Coordinates are shifts of the handle and small turns in the model frame (from the left, as angular
+//! velocity is), angles as lengths and torques as forces at the device's lever arm: every entry is a
+//! stiffness in N/m.
+
+use super::LEVER_M;
+use crate::subject::Subject;
+use flotor_hal::{DVec3, Pose, Wrench, orientation_from_rotation_vector};
+
+/// A 6 x 6 matrix, rows first.
+pub(super) type Matrix = [[f64; 6]; 6];
+
+/// Half steps to try, m: short ones lose to rounding, long ones to curvature, and which loses less depends on
+/// the model and on the pose.
+const STEPS_M: [f64; 3] = [1.0e-4, 1.0e-5, 1.0e-6];
+
+/// Relative difference of two answers at one pose up to which they are one: what solvers leave.
+const SAME: f64 = 1.0e-6;
+/// Of the derivative.
+const COLUMNS: f64 = 6.0;
+
+/// Size of a wrench with its torque at the lever arm, N.
+fn size_n(wrench: &Wrench) -> f64 {
+    wrench.force().length() + wrench.torque().length() / LEVER_M
+}
+
+/// The derivative at a pose.
+pub(super) struct Jacobian {
+    /// Row: component of force, then torque; column: shift, then turn; N/m at the lever arm.
+    pub(super) entries: Matrix,
+    /// Estimated error, Frobenius norm, N/m.
+    pub(super) error: f64,
+    /// Wrench at the pose itself.
+    pub(super) wrench: Wrench,
+}
+
+impl Jacobian {
+    /// By central differences of fourth order, with the step of least uncertainty; nothing if the model gives
+    /// no answer around the pose.
+    pub(super) fn at(subject: &mut Subject<'_>, pose: Pose) -> Option<Self> {
+        let wrench = subject.ask(pose).ok()?.wrench;
+        let (mut tried, mut apart_n) = (Vec::with_capacity(STEPS_M.len()), 0.0);
+        for step_m in STEPS_M {
+            let coarse = central(subject, pose, step_m)?;
+            let fine = central(subject, pose, 0.5 * step_m)?;
+            // Richardson: the error of second order cancels, and what it was bounds what is left.
+            let entries = combine(&fine, 4.0 / 3.0, &coarse, -1.0 / 3.0);
+            let error = norm(&combine(&entries, 1.0, &fine, -1.0));
+            tried.push((step_m, Self { entries, error, wrench }));
+            let again = subject.ask(pose).ok()?.wrench;
+            apart_n = f64::max(apart_n, size_n(&(again - wrench)));
+        }
+        // A model with memory may have gone over to another of its answers on the way: then there is no derivative here.
+        let is_one_answer = apart_n <= SAME * size_n(&wrench).max(SAME);
+        let with_noise = |(step_m, jacobian): (f64, Self)| {
+            // What a solver leaves open of an answer is, over the step, as uncertain in each of the columns.
+            let noise = if is_one_answer { COLUMNS * apart_n / step_m } else { f64::INFINITY };
+            Self { error: jacobian.error + noise, ..jacobian }
+        };
+        tried.into_iter().map(with_noise).min_by(|a, b| a.error.total_cmp(&b.error))
+    }
+
+    /// What is left of `J - J^T` when `J` is taken in coordinates: turns do not commute, so even the
+    /// derivative of an energy's torque by turns is only symmetric after half the torque's cross product is
+    /// taken off. (With the turn `d` from this pose the generalised torque is `M(d) - d x M / 2` to first
+    /// order.)
+    pub(super) fn asymmetry(&self) -> f64 {
+        let half_torque = self.wrench.torque() * (0.5 / (LEVER_M * LEVER_M));
+        let mut entries = self.entries;
+        for (axis, unit) in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().enumerate() {
+            let taken_off = unit.cross(half_torque).to_array();
+            for (row, value) in taken_off.into_iter().enumerate() {
+                entries[3 + row][3 + axis] -= value;
+            }
+        }
+        norm(&combine(&entries, 1.0, &transposed(&entries), -1.0))
+    }
+
+    /// Frobenius norm, N/m.
+    pub(super) fn norm(&self) -> f64 {
+        norm(&self.entries)
+    }
+
+    /// Largest gain, N/m: the largest singular value.
+    pub(super) fn stiffness(&self) -> f64 {
+        largest_singular_value(&self.entries)
+    }
+
+    /// Largest gain of one block (0 linear, 1 angular), N/m at the lever arm.
+    pub(super) fn block_stiffness(&self, rows: usize, columns: usize) -> f64 {
+        let inside = |row: usize, column: usize| row / 3 == rows && column / 3 == columns;
+        let block: Matrix = std::array::from_fn(|row| {
+            std::array::from_fn(|column| if inside(row, column) { self.entries[row][column] } else { 0.0 })
+        });
+        largest_singular_value(&block)
+    }
+}
+
+fn central(subject: &mut Subject<'_>, pose: Pose, step_m: f64) -> Option<Matrix> {
+    let mut by_column = [[0.0; 6]; 6];
+    for (column, slopes) in by_column.iter_mut().enumerate() {
+        let mut ask = |step_m: f64| subject.ask(moved(pose, column, step_m)).ok().map(|answer| answer.wrench);
+        let (up, down) = (ask(step_m)?, ask(-step_m)?);
+        let slope = (up + down * -1.0) * (0.5 / step_m);
+        let components = slope.force().to_array().into_iter().chain((slope.torque() / LEVER_M).to_array());
+        for (to, component) in slopes.iter_mut().zip(components) {
+            *to = component;
+        }
+    }
+    Some(transposed(&by_column))
+}
+
+fn moved(pose: Pose, column: usize, step_m: f64) -> Pose {
+    let unit = [DVec3::X, DVec3::Y, DVec3::Z][column % 3];
+    if column < 3 {
+        return Pose::new(pose.position() + unit * step_m, pose.orientation());
+    }
+    let turn = orientation_from_rotation_vector(unit * (step_m / LEVER_M));
+    Pose::new(pose.position(), turn * pose.orientation())
+}
+
+fn combine(a: &Matrix, by: f64, b: &Matrix, and_by: f64) -> Matrix {
+    std::array::from_fn(|row| std::array::from_fn(|column| a[row][column] * by + b[row][column] * and_by))
+}
+
+fn transposed(matrix: &Matrix) -> Matrix {
+    std::array::from_fn(|row| std::array::from_fn(|column| matrix[column][row]))
+}
+
+fn norm(matrix: &Matrix) -> f64 {
+    matrix.iter().flatten().map(|entry| entry * entry).sum::<f64>().sqrt()
+}
+
+/// Eigenvalues of `A^T A` by Jacobi's rotations: a dozen sweeps leave nothing off the diagonal.
+fn largest_singular_value(matrix: &Matrix) -> f64 {
+    let mut square: Matrix = std::array::from_fn(|i| {
+        std::array::from_fn(|j| (0..6).map(|row| matrix[row][i] * matrix[row][j]).sum())
+    });
+    for _ in 0..12 {
+        for p in 0..6 {
+            for q in p + 1..6 {
+                rotate(&mut square, p, q);
+            }
+        }
+    }
+    (0..6).map(|i| square[i][i]).fold(0.0, f64::max).sqrt()
+}
+
+/// One rotation of Jacobi's method (Golub and Van Loan, section 8.5).
+fn rotate(matrix: &mut Matrix, p: usize, q: usize) {
+    if matrix[p][q] == 0.0 {
+        return;
+    }
+    let theta = (matrix[q][q] - matrix[p][p]) / (2.0 * matrix[p][q]);
+    let tangent = theta.signum() / (theta.abs() + (1.0 + theta * theta).sqrt());
+    let cosine = 1.0 / (1.0 + tangent * tangent).sqrt();
+    let sine = tangent * cosine;
+    for row in matrix.iter_mut() {
+        (row[p], row[q]) = (cosine * row[p] - sine * row[q], sine * row[p] + cosine * row[q]);
+    }
+    let (row_p, row_q) = (matrix[p], matrix[q]);
+    matrix[p] = std::array::from_fn(|k| cosine * row_p[k] - sine * row_q[k]);
+    matrix[q] = std::array::from_fn(|k| sine * row_p[k] + cosine * row_q[k]);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_singular_value_of_a_known_matrix() {
+        // A rotation in each block does not change singular values: 5 in the first plane, 3 in the last.
+        let (sine, cosine) = 0.7_f64.sin_cos();
+        let mut matrix = [[0.0; 6]; 6];
+        for (at, value) in [(0, 5.0), (4, 3.0)] {
+            matrix[at][at] = value * cosine;
+            matrix[at][at + 1] = -value * sine;
+            matrix[at + 1][at] = value * sine;
+            matrix[at + 1][at + 1] = value * cosine;
+        }
+        assert!((largest_singular_value(&matrix) - 5.0).abs() < 1.0e-14);
+        assert_eq!(largest_singular_value(&[[0.0; 6]; 6]), 0.0);
+    }
+}

@@ -1,0 +1,133 @@
+//! The score as a whole: numbers for machines, a table for people.
+
+use super::continuity::Jump;
+use super::measure::{Measure, PoseRecord, Verdict};
+use super::poses::Reach;
+use super::{Decades, Setup, Size};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// The stability score of a force model. The names are a contract: scripts rely on them.
+#[derive(Clone, Debug, Serialize)]
+pub struct StressReport {
+    /// Id of the model.
+    pub model: String,
+    /// Version of the plugin.
+    pub version: String,
+    /// What was set, as a person would type it.
+    pub settings: BTreeMap<String, String>,
+    /// How much was asked.
+    pub size: Size,
+    /// Seed of poses and motions.
+    pub seed: u64,
+    /// Workspace in the model frame.
+    pub reach: Reach,
+    /// Share of the measures that passed.
+    pub score: f64,
+    /// The measures, M0 to M10.
+    pub measures: Vec<Measure>,
+    /// How quantities are spread, for pictures.
+    pub distributions: Distributions,
+}
+
+/// How quantities are spread.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Distributions {
+    /// M1: largest change of wrench over pieces of each length.
+    pub jumps: Vec<Jump>,
+    /// M2: largest gain at each pose, N/m.
+    pub gains_n_per_m: Decades,
+    /// M4: work of a lap on the hand over all work exchanged; 1e-18 stands for none.
+    pub loop_energies: Decades,
+    /// M7: time of a call, ns.
+    pub calls_ns: Decades,
+}
+
+impl StressReport {
+    pub(super) fn new(setup: &Setup<'_>, measures: Vec<Measure>, distributions: Distributions) -> Self {
+        let schema = setup.plugin.parameters();
+        let named = |setting: &flotor_hal::abi::loader::Setting| {
+            let parameter = schema.get(setting.index())?;
+            Some((parameter.id().to_owned(), setting.display()))
+        };
+        let passed = measures.iter().filter(|measure| measure.verdict == Verdict::Pass).count();
+        let metadata = setup.plugin.metadata();
+        Self {
+            model: metadata.id.clone(),
+            version: metadata.version.clone(),
+            settings: setup.settings.iter().filter_map(named).collect(),
+            size: setup.options.size,
+            seed: setup.options.seed,
+            reach: setup.options.reach,
+            score: passed as f64 / measures.len().max(1) as f64,
+            measures,
+            distributions,
+        }
+    }
+
+    /// What was scored, in one line.
+    #[must_use]
+    pub fn subject(&self) -> String {
+        let settings = self.settings_text();
+        let settings = if settings.is_empty() { settings } else { format!(" ({settings})") };
+        format!("{} {}{settings}, {}, seed {}", self.model, self.version, self.size.word(), self.seed)
+    }
+
+    pub(super) fn settings_text(&self) -> String {
+        let settings: Vec<String> =
+            self.settings.iter().map(|(key, value)| format!("{key}={value}")).collect();
+        settings.join(", ")
+    }
+
+    /// The table for people.
+    #[must_use]
+    pub fn to_text(&self) -> String {
+        let mut lines: Vec<String> = self.measures.iter().flat_map(rows).collect();
+        let count = |verdict| self.measures.iter().filter(|measure| measure.verdict == verdict).count();
+        lines.push(format!(
+            "  score {:.2}: {} passed, {} noted, {} failed",
+            self.score,
+            count(Verdict::Pass),
+            count(Verdict::Note),
+            count(Verdict::Fail)
+        ));
+        lines.join("\n")
+    }
+}
+
+fn rows(measure: &Measure) -> Vec<String> {
+    let bound = measure.bound.map_or(String::new(), |bound| format!("<= {}", number(bound, &measure.unit)));
+    let value = number(measure.value, &measure.unit);
+    let Measure { id, name, verdict, comment, pose, .. } = measure;
+    let mut rows =
+        vec![format!("  {:<5} {id}  {name:<19} {value:>15}  {bound:<18} {comment}", verdict.word())];
+    // Where to look is only worth a line when there is something to look at.
+    if let (Some(pose), true) = (pose, *verdict != Verdict::Pass) {
+        rows.push(format!("            worst at {}", place(pose)));
+    }
+    rows.into_iter().map(|row| row.trim_end().to_owned()).collect()
+}
+
+fn place(pose: &PoseRecord) -> String {
+    let [x, y, z] = pose.position_m.map(|metres| short(metres * 1.0e3));
+    if let Some(quaternion) = pose.orientation_xyzw {
+        let [i, j, k, w] = quaternion.map(short);
+        return format!("({x}, {y}, {z}) mm, quaternion ({i}, {j}, {k}, {w})");
+    }
+    let [rx, ry, rz] = pose.rotation_rad.map(short);
+    format!("({x}, {y}, {z}) mm, ({rx}, {ry}, {rz}) rad")
+}
+
+/// Four digits, with an exponent only where it helps.
+fn short(number: f64) -> String {
+    match number.abs() {
+        magnitude if magnitude == 0.0 || (1.0e-3..1.0e4).contains(&magnitude) => {
+            format!("{number:.4}").trim_end_matches('0').trim_end_matches('.').to_owned()
+        }
+        _ => format!("{number:.2e}"),
+    }
+}
+
+fn number(value: f64, unit: &str) -> String {
+    format!("{} {unit}", short(value)).trim_end().to_owned()
+}

@@ -1,0 +1,300 @@
+//! M9, search: the worst that an opponent finds who looks for it.
+//!
+//! Even coverage finds what fills a share of the workspace. What is worse the nearer one comes (a pole, a handing over
+//! between two formulas, a swirl around an axis) is found sooner by going uphill. No derivative is needed: of many points
+//! the best is varied at random, what is better replaces it, and the size of the variations follows the share that is (a
+//! (1+1) evolution strategy with the rule of one success in five; Rechenberg, *Evolutionsstrategie*, 1973).
+//!
+//! Three goals, each from several starts with seeds of their own:
+//! - *step*: what stands out along a short line, in pieces of 1, 0.1 and 0.01 mm; then closed in on as in M1, to 1e-8 mm;
+//! - *energy*: the work of a small closed ellipse in any two of all directions, over the most that forces as large could
+//!   have done on it;
+//! - *size*: the largest wrench, next to which numbers stop being finite.
+//!
+//! It stays in the workspace, and where the model says it ends: what that does not mean to answer is nobody's to find.
+//!
+//! What lies alone in a flat field, as a hole of a tenth of a millimetre does, no search can find faster than chance.
+
+use super::continuity::{FELT_N, FELT_NM, HARMLESS, Jumps, Line, PIECES_MM, changes, close_in, standing_out};
+use super::energy::{CONSERVATIVE, Lap, samples};
+use super::measure::{Measure, PoseRecord, Verdict};
+use super::poses::Reach;
+use super::sweep::sweep;
+use super::{LEVER_M, Setup};
+use crate::sampling::Random;
+use crate::subject::Subject;
+use crate::tally::{Worst, tally};
+use crate::trajectory::{Series, Trajectory};
+use flotor_hal::abi::loader::LoadError;
+use flotor_hal::{DVec3, Memory, Pose, WorkspaceBounds, rotation_vector};
+use std::array::from_fn;
+
+const NAME: &str = "search";
+/// Numbers of a point: a pose, and two directions.
+const NUMBERS: usize = 18;
+/// Variations of a start; a model with memory, which is walked to each, gets fewer.
+const TRIES: usize = 240;
+const TRIES_WITH_MEMORY: usize = 60;
+/// Share of the tries that are points anywhere, before the best is varied.
+const ANYWHERE: usize = 4;
+/// Size of the first variations, of the workspace; what it grows by after a success, and how many failures take that back.
+const FIRST_SIZE: f64 = 0.3;
+const LEAST_SIZE: f64 = 1.0e-6;
+const GROWTH: f64 = 1.5;
+/// Pieces of a line, m, from stage to stage, and how many are looked at.
+const STAGES_M: [f64; 3] = [1.0e-3, 1.0e-4, 1.0e-5];
+const PIECES: usize = 12;
+/// Samples of an ellipse, and its largest half axis, of the workspace.
+const SAMPLES: usize = 64;
+const ELLIPSE: f64 = 0.1;
+
+/// Coordinates from -1 to 1.
+type Point = [f64; NUMBERS];
+
+tally! {
+    struct Tally {
+        tries: u64,
+        jumps: Jumps,
+        energy: Worst,
+        size: Worst,
+        troubles: u64,
+        trouble_at: Option<Pose>,
+    }
+}
+
+/// One opponent: what it may ask, and where.
+struct Opponent<'a, 'b> {
+    subject: &'a mut Subject<'b>,
+    reach: Reach,
+    /// Where the model ends: what it says beyond, nobody feels.
+    bounds: WorkspaceBounds,
+    random: Random,
+    tries: usize,
+    tally: Tally,
+}
+
+impl Opponent<'_, '_> {
+    /// The best point for a goal: from the best of many, or from a known one.
+    fn climb(&mut self, from: Option<Point>, mut goal: impl FnMut(&mut Self, &Point) -> f64) -> (Point, f64) {
+        let anywhere = if from.is_some() { 0 } else { self.tries / ANYWHERE };
+        let mut best = from.unwrap_or([0.0; NUMBERS]);
+        let mut height = goal(self, &best);
+        for _ in 0..anywhere {
+            let point = from_fn(|_| self.random.symmetric());
+            let here = goal(self, &point);
+            if here > height {
+                (best, height) = (point, here);
+            }
+        }
+        let mut size = FIRST_SIZE;
+        for _ in anywhere..self.tries {
+            let point = best.map(|at| (at + size * self.random.symmetric()).clamp(-1.0, 1.0));
+            let here = goal(self, &point);
+            if here > height {
+                (best, height, size) = (point, here, (size * GROWTH).min(1.0));
+            } else {
+                // Four failures take back what one success gave.
+                size = (size / GROWTH.sqrt().sqrt()).max(LEAST_SIZE);
+            }
+        }
+        self.tally.tries += self.tries as u64;
+        (best, height)
+    }
+
+    fn pose(&self, point: &Point) -> Pose {
+        let pose = self.reach.pose(from_fn(|axis| 0.5 * (1.0 + point[axis])));
+        Pose::new(pose.position() - self.bounds.beyond(pose.position()), pose.orientation())
+    }
+
+    /// A line in the middle of the point's pose, in the direction of its second six numbers.
+    fn line(&self, point: &Point) -> Line {
+        let pose = self.pose(point);
+        let [_, _, _, _, _, _, x, y, z, rx, ry, rz, ..] = *point;
+        let (along, around) = (DVec3::new(x, y, z), DVec3::new(rx, ry, rz));
+        let length = (along.length_squared() + around.length_squared()).sqrt().max(f64::MIN_POSITIVE);
+        let (along_m, along_rad) = (along / length, around / (length * LEVER_M));
+        Line {
+            position_m: pose.position(),
+            rotation_rad: rotation_vector(pose.orientation()),
+            along_m,
+            along_rad,
+        }
+    }
+
+    /// The piece that stands out most along a line, and by how much.
+    fn outstanding(&mut self, line: &Line, piece_m: f64) -> (usize, f64) {
+        let start_m = -0.5 * piece_m * PIECES as f64;
+        let changes = changes(self.subject, line, start_m, piece_m, PIECES);
+        let is_inside = |index: usize| {
+            let pose = line.pose(start_m + piece_m * index as f64);
+            self.reach.holds(pose) && self.bounds.beyond(pose.position()) == DVec3::ZERO
+        };
+        let inside = (0..PIECES).filter(|index| is_inside(*index) && is_inside(index + 1));
+        let heights = inside.map(|index| (index, standing_out(&changes, index)));
+        heights.max_by(|(_, a), (_, b)| a.total_cmp(b)).unwrap_or((0, 0.0))
+    }
+
+    fn step(&mut self) {
+        let mut from = None;
+        for piece_m in STAGES_M {
+            let goal = |own: &mut Self, point: &Point| own.outstanding(&own.line(point), piece_m).1;
+            let (mut best, _) = self.climb(from, goal);
+            // The piece in the middle of the next, shorter line.
+            let line = self.line(&best);
+            let (index, _) = self.outstanding(&line, piece_m);
+            let start_m = (index as f64 - 0.5 * PIECES as f64) * piece_m;
+            if piece_m <= PIECES_MM[0] * 1.0e-3 {
+                close_in(self.subject, self.reach, &line, start_m, &mut self.tally.jumps);
+                return;
+            }
+            let middle = line.pose(start_m + 0.5 * piece_m);
+            let [position_m, rotation_rad] = self.reach.sizes();
+            let place = middle
+                .position_m
+                .map(|x| x / position_m)
+                .into_iter()
+                .chain(rotation_vector(middle.orientation()).to_array().map(|turn| turn / rotation_rad));
+            best.iter_mut().zip(place).for_each(|(to, from)| *to = from.clamp(-1.0, 1.0));
+            from = Some(best);
+        }
+    }
+
+    /// What a lap of an ellipse makes, of the most that its forces could have done.
+    fn made(&mut self, point: &Point) -> f64 {
+        let pose = self.pose(point);
+        let [_, _, _, _, _, _, x, y, z, rx, ry, rz, u, v, w, ru, rv, rw] = *point;
+        let [position_m, rotation_rad] = self.reach.sizes().map(|size| ELLIPSE * size);
+        let path = Trajectory {
+            position: Series::ellipse(
+                pose.position(),
+                DVec3::new(x, y, z) * position_m,
+                DVec3::new(u, v, w) * position_m,
+            ),
+            rotation: Series::ellipse(
+                rotation_vector(pose.orientation()),
+                DVec3::new(rx, ry, rz) * rotation_rad,
+                DVec3::new(ru, rv, rw) * rotation_rad,
+            ),
+        };
+        let memory = self.subject.memory();
+        if memory == Memory::PathDependent && samples(self.subject, &path, SAMPLES).is_none() {
+            return 0.0;
+        }
+        let Some(samples) = samples(self.subject, &path, SAMPLES) else { return 0.0 };
+        let lap = Lap::from_samples(&samples, memory);
+        let most_j = samples.iter().map(|sample| sample.most_j).sum::<f64>() / SAMPLES as f64;
+        if most_j > 0.0 { lap.made_j(memory) / most_j } else { 0.0 }
+    }
+
+    fn energy(&mut self) {
+        let (best, made) = self.climb(None, Self::made);
+        let pose = self.pose(&best);
+        self.tally.energy.offer(made, pose);
+    }
+
+    fn size(&mut self) {
+        let (best, size_n) = self.climb(None, |own, point| {
+            let pose = own.pose(point);
+            match own.subject.ask(pose) {
+                Ok(output) => output.wrench.force().length() + output.wrench.torque().length() / LEVER_M,
+                Err(trouble) => {
+                    own.tally.troubles += 1;
+                    own.tally.trouble_at.get_or_insert(trouble.pose);
+                    0.0
+                }
+            }
+        });
+        let pose = self.pose(&best);
+        self.tally.size.offer(size_n, pose);
+    }
+}
+
+/// Goals of an opponent.
+const GOALS: u64 = 3;
+
+/// Sends an opponent for each goal from several starts.
+pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
+    let reach = setup.options.reach;
+    let total = sweep(setup, NAME, GOALS * setup.share(800, 2), |subject, block| {
+        let tries = match subject.memory() {
+            Memory::Stateless => TRIES,
+            Memory::PathDependent => TRIES_WITH_MEMORY,
+        };
+        let random = Random::new(setup.options.seed, block);
+        let bounds = subject.model().workspace_bounds();
+        let mut opponent = Opponent { subject, reach, bounds, random, tries, tally: Tally::default() };
+        match block % GOALS {
+            0 => opponent.step(),
+            1 => opponent.energy(),
+            _ => opponent.size(),
+        }
+        opponent.tally
+    })?;
+    Ok(judge(&total))
+}
+
+fn judge(total: &Tally) -> Measure {
+    let last = PIECES_MM.len() - 1;
+    let (force, torque) = (total.jumps.force[last], total.jumps.torque[last]);
+    // Each in its own bound: the graver is shown.
+    let graded = [
+        (force, FELT_N * HARMLESS, Verdict::of(force.value, FELT_N * HARMLESS, FELT_N), "step of force"),
+        (
+            torque,
+            FELT_NM * HARMLESS,
+            Verdict::of(torque.value, FELT_NM * HARMLESS, FELT_NM),
+            "step of torque",
+        ),
+        (
+            total.energy,
+            CONSERVATIVE,
+            Verdict::of(total.energy.value, CONSERVATIVE, CONSERVATIVE),
+            "energy of a lap",
+        ),
+    ];
+    let (worst, bound, _, what) = graded
+        .into_iter()
+        .max_by(|(a, of_a, ..), (b, of_b, ..)| (a.value / of_a).total_cmp(&(b.value / of_b)))
+        .unwrap_or(graded[0]);
+    let mut verdict = graded.iter().map(|(.., verdict, _)| *verdict).max().unwrap_or(Verdict::Pass);
+    let mut comment = format!("{what}, in its bound, after {} tries", total.tries);
+    let mut pose = worst.pose;
+    if total.troubles > 0 {
+        verdict = Verdict::Fail;
+        comment = format!("{} of {} tries got no answer", total.troubles, total.tries);
+        pose = total.trouble_at;
+    }
+    let value = Worst { value: worst.value / bound, pose };
+    let measure = Measure::of(["M9", NAME, ""], &value, [1.0, 1.0], comment)
+        .count("tries", total.tries)
+        .count("tries without answer", total.troubles)
+        .with("largest force step over 1e-8 mm", force.value, "N")
+        .with("largest torque step over 1e-8 mm", torque.value, "N·m")
+        .with("largest energy of a lap, of what its forces could do", total.energy.value, "")
+        .with("largest wrench", total.size.value, "N");
+    Measure { verdict, pose: pose.map(PoseRecord::from), ..measure }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A peak a thousandth of the space wide on a slope that leads to it: chance needs a million tries in two dimensions.
+    #[test]
+    fn what_is_worse_the_nearer_one_comes_is_found() {
+        let plugin = super::super::tests::honest();
+        let mut subject = Subject::new(&plugin, &[], 1).unwrap();
+        let reach = Reach::default();
+        let mut opponent = Opponent {
+            subject: &mut subject,
+            reach,
+            bounds: WorkspaceBounds::UNBOUNDED,
+            random: Random::new(1, 1),
+            tries: 400,
+            tally: Tally::default(),
+        };
+        let distance = |point: &Point| ((point[0] - 0.3).powi(2) + (point[1] + 0.2).powi(2)).sqrt();
+        let (best, _) = opponent.climb(None, |_, point| 1.0 / (1.0e-6 + distance(point)));
+        assert!(distance(&best) < 1.0e-3, "{}", distance(&best));
+    }
+}

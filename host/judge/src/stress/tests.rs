@@ -1,0 +1,442 @@
+//! Small laws with one known flaw each: the measures meant for it fail, and no other.
+
+use super::{Measure, Setup, Size, StressOptions, StressReport, Verdict, measure_all};
+use flotor_hal::abi::loader::Plugin;
+use flotor_hal::abi::model_entry;
+use flotor_hal::{
+    DVec3, Demand, ForceModel, Input, Memory, ModelInfo, Output, Pose, Refusal, Settings, Wrench,
+    rotation_vector,
+};
+use std::marker::PhantomData;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// A force as a function of the pose.
+trait Law: Send + 'static {
+    const MEMORY: Memory = Memory::Stateless;
+    fn wrench(pose: &Pose) -> Wrench;
+
+    /// J, of a law that reports it.
+    fn energy(_pose: &Pose) -> f64 {
+        f64::NAN
+    }
+}
+
+/// A law as a plugin.
+struct Lawful<L>(PhantomData<L>);
+
+impl<L: Law> ForceModel for Lawful<L> {
+    const INFO: ModelInfo =
+        ModelInfo::new("lawful", "Lawful", "A law under test").serving(Demand::ALL).with_memory(L::MEMORY);
+
+    fn create(_settings: &Settings<'_>) -> Result<Self, Refusal> {
+        Ok(Self(PhantomData))
+    }
+
+    fn step(&mut self, input: &Input) -> Output {
+        let unit = (input.pose.orientation().length() - 1.0).abs() < 1.0e-6;
+        if !input.pose.is_finite() || !unit {
+            return Output::new(Wrench::ZERO, f64::NAN, flotor_hal::StepStatus::InvalidInput);
+        }
+        // A spring of a million metres is stretched far enough.
+        let position_m = input.pose.position().clamp_length_max(1.0e6);
+        let pose = Pose::new(position_m, input.pose.orientation());
+        Output::new(L::wrench(&pose), L::energy(&pose), flotor_hal::StepStatus::Ok)
+    }
+}
+
+/// A plugin without a flaw.
+pub(super) fn honest() -> Plugin {
+    Plugin::in_process(Box::leak(Box::new(model_entry::<Lawful<Linear>>()))).unwrap()
+}
+
+/// A fraction of a short run: every kind of pose, some of each.
+fn stress<L: Law>() -> StressReport {
+    let plugin = Plugin::in_process(Box::leak(Box::new(model_entry::<Lawful<L>>()))).unwrap();
+    let part = 10 * super::part_of(Size::Short, L::MEMORY);
+    let options = StressOptions::default();
+    measure_all(&Setup { plugin: &plugin, settings: &[], options, part, progress: &() }).unwrap()
+}
+
+fn measure<'a>(report: &'a StressReport, id: &str) -> &'a Measure {
+    report.measures.iter().find(|measure| measure.id == id).unwrap()
+}
+
+fn value(report: &StressReport, id: &str, name: &str) -> f64 {
+    measure(report, id).values.iter().find(|quantity| quantity.name == name).unwrap().value
+}
+
+fn with(report: &StressReport, verdict: Verdict) -> Vec<&str> {
+    let with = report.measures.iter().filter(|measure| measure.verdict == verdict);
+    with.map(|measure| measure.id.as_ref()).collect()
+}
+
+/// Stiffness of the test springs, N/m; the same about the lever arm, so that all six directions are alike.
+const STIFFNESS_N_PER_M: f64 = 500.0;
+
+/// An isotropic spring of this stiffness. Its torque `-k r`, `r` the rotation vector, is the gradient of `k
+/// r²/2`: the left Jacobian of the rotations leaves `r` alone.
+fn spring(pose: &Pose, stiffness_n_per_m: f64) -> Wrench {
+    let torsion = stiffness_n_per_m * super::LEVER_M * super::LEVER_M;
+    Wrench::new(pose.position() * -stiffness_n_per_m, rotation_vector(pose.orientation()) * -torsion)
+}
+
+/// What it stores.
+fn stored_j(pose: &Pose) -> f64 {
+    let turned_m = rotation_vector(pose.orientation()) * super::LEVER_M;
+    0.5 * STIFFNESS_N_PER_M * (pose.position().length_squared() + turned_m.length_squared())
+}
+
+struct Linear;
+impl Law for Linear {
+    fn wrench(pose: &Pose) -> Wrench {
+        spring(pose, STIFFNESS_N_PER_M)
+    }
+
+    fn energy(pose: &Pose) -> f64 {
+        stored_j(pose)
+    }
+}
+
+#[test]
+fn an_honest_spring_passes_everything() {
+    let report = stress::<Linear>();
+    assert_eq!(with(&report, Verdict::Pass).len(), 10, "{}", report.to_text());
+    assert_eq!(report.score, 1.0);
+    // Isotropic and linear: the gain is the stiffness, to the rounding of differences.
+    let gain = value(&report, "M2", "force by shift");
+    assert!((gain / STIFFNESS_N_PER_M - 1.0).abs() < 1.0e-8, "{gain}");
+    // About the lever arm too, but for (a/2) / sin(a/2) of a rotation vector's derivative at angle a <= 0.212
+    // rad.
+    let gain = measure(&report, "M2").value;
+    assert!((1.0..1.0019).contains(&(gain / STIFFNESS_N_PER_M)), "{gain}");
+    assert_eq!(value(&report, "M2", "renderable share, b = 0.5 N s/m"), 1.0);
+    // A zero-order hold of a linear force generates k T / 2 per unit of damping (Colgate and Schenkel);
+    // turns of a few hundredths of a radian that do not commute change it in the third digit at most.
+    let damping = measure(&report, "M5").value;
+    assert!((damping / (0.5 * STIFFNESS_N_PER_M * 1.0e-3) - 1.0).abs() < 1.0e-3, "{damping}");
+}
+
+#[test]
+fn the_closed_loop_tips_over_where_theory_says() {
+    // Exact limits of a 580 g flotor, where the spectral radius of the sampled linear loop reaches one, N/m.
+    let report = stress::<Linear>();
+    let exact = [
+        ("b = 0.5 N s/m, delay 0", 1000.1),
+        ("b = 2 N s/m, delay 0", 4002.3),
+        ("b = 0.5 N s/m, delay 1", 333.4),
+    ];
+    for (case, exact) in exact {
+        let seen = value(&report, "M6", &format!("stiffness limit, {case}"));
+        // The growth that can be seen in ten seconds tells the limit to 1 %.
+        assert!((seen / exact - 1.0).abs() < 0.02, "{case}: {seen}");
+    }
+}
+
+/// One percent more energy than work.
+struct Boastful;
+impl Law for Boastful {
+    fn wrench(pose: &Pose) -> Wrench {
+        spring(pose, STIFFNESS_N_PER_M)
+    }
+
+    fn energy(pose: &Pose) -> f64 {
+        1.01 * stored_j(pose)
+    }
+}
+
+#[test]
+fn an_energy_that_is_not_the_work_is_found() {
+    let report = stress::<Boastful>();
+    assert_eq!(with(&report, Verdict::Fail), ["M4"], "{}", report.to_text());
+    let seen = value(&report, "M4", "largest difference of energy and work, of what is stored");
+    // A hundredth of what was stored, of which the model reports 1.01; the trapezoidal rule adds half its tolerance at most.
+    assert!((seen - 0.01 / 1.01).abs() < 5.0e-4, "{seen}");
+}
+
+/// Its torque turns the handle away from where its energy is least.
+struct TurnsAway;
+impl Law for TurnsAway {
+    fn wrench(pose: &Pose) -> Wrench {
+        let pull = spring(pose, 0.2 * STIFFNESS_N_PER_M);
+        Wrench::new(pull.force(), -pull.torque())
+    }
+
+    fn energy(pose: &Pose) -> f64 {
+        0.2 * stored_j(pose)
+    }
+}
+
+#[test]
+fn a_torque_of_the_wrong_sign_is_found_by_its_energy_and_where_it_comes_to_rest() {
+    let report = stress::<TurnsAway>();
+    for id in ["M4", "M6"] {
+        assert_eq!(measure(&report, id).verdict, Verdict::Fail, "{}", report.to_text());
+    }
+}
+
+/// Finite everywhere but at quaternions that are no rotations.
+struct Trusting;
+impl ForceModel for Trusting {
+    const INFO: ModelInfo = ModelInfo::new("trusting", "Trusting", "A model under test");
+
+    fn create(_settings: &Settings<'_>) -> Result<Self, Refusal> {
+        Ok(Self)
+    }
+
+    fn step(&mut self, input: &Input) -> Output {
+        let norm = input.pose.orientation().length();
+        if !input.pose.is_finite() {
+            return Output::new(Wrench::ZERO, f64::NAN, flotor_hal::StepStatus::InvalidInput);
+        }
+        let wrong = if (norm - 1.0).abs() > 1.0e-3 { f64::NAN } else { 1.0 };
+        (spring(&Pose::new(input.pose.position().clamp_length_max(1.0e6), Pose::HOME.orientation()), 100.0)
+            * wrong)
+            .into()
+    }
+}
+
+#[test]
+fn a_pose_that_is_no_rotation_is_printed_as_it_was_given() {
+    let plugin = Plugin::in_process(Box::leak(Box::new(model_entry::<Trusting>()))).unwrap();
+    let part = 10 * super::part_of(Size::Short, Memory::Stateless);
+    let options = StressOptions::default();
+    let setup = Setup { plugin: &plugin, settings: &[], options, part, progress: &() };
+    let measure = super::totality::measure(&setup).unwrap();
+    assert_eq!(measure.verdict, Verdict::Fail);
+    let [i, j, k, w] = measure.pose.unwrap().orientation_xyzw.expect("it is no rotation");
+    assert!((i * i + j * j + k * k + w * w - 1.0).abs() > 1.0e-3);
+}
+
+/// A spring with a field on top, `U = k x²/2 + c x . (R a)`: conservative, and its torque is far from zero.
+struct Lever;
+impl Law for Lever {
+    fn wrench(pose: &Pose) -> Wrench {
+        let arm_n = pose.orientation() * DVec3::new(0.3, -0.2, 0.4);
+        spring(pose, STIFFNESS_N_PER_M) + Wrench::new(-arm_n, -arm_n.cross(pose.position()))
+    }
+}
+
+#[test]
+fn torque_of_a_conservative_law_is_not_taken_for_asymmetry() {
+    let report = stress::<Lever>();
+    assert!(with(&report, Verdict::Fail).is_empty(), "{}", report.to_text());
+}
+
+struct Walked;
+impl Law for Walked {
+    const MEMORY: Memory = Memory::PathDependent;
+    fn wrench(pose: &Pose) -> Wrench {
+        spring(pose, STIFFNESS_N_PER_M)
+    }
+}
+
+#[test]
+fn a_model_with_memory_is_walked_and_judged_alike() {
+    let report = stress::<Walked>();
+    assert_eq!(with(&report, Verdict::Pass).len(), 10, "{}", report.to_text());
+}
+
+struct Jumping;
+impl Law for Jumping {
+    fn wrench(pose: &Pose) -> Wrench {
+        let step_n = if pose.position().z > 3.0e-3 { -0.5 } else { 0.0 };
+        spring(pose, STIFFNESS_N_PER_M) + Wrench::from_force(DVec3::Z * step_n)
+    }
+}
+
+#[test]
+fn a_jump_is_found_and_measured() {
+    let report = stress::<Jumping>();
+    assert_eq!(with(&report, Verdict::Fail), ["M1", "M9"], "{}", report.to_text());
+    let worst = measure(&report, "M1");
+    // The step, plus what the spring adds over 1e-8 mm.
+    assert!((worst.value - 0.5).abs() < 1.0e-7, "{}", worst.value);
+    let z_m = worst.pose.unwrap().position_m[2];
+    assert!((z_m - 3.0e-3).abs() < 1.0e-10, "closed in to the last piece: {z_m}");
+}
+
+struct Swirling;
+impl Law for Swirling {
+    fn wrench(pose: &Pose) -> Wrench {
+        let around = DVec3::Z.cross(pose.position());
+        spring(pose, STIFFNESS_N_PER_M) + Wrench::from_force(around)
+    }
+}
+
+#[test]
+fn a_swirl_is_neither_reciprocal_nor_conservative() {
+    let report = stress::<Swirling>();
+    assert_eq!(with(&report, Verdict::Fail), ["M3", "M4", "M9"], "{}", report.to_text());
+    // J - J^T has two entries of 2 N/m; J is k times the identity and two entries of 1 N/m.
+    let expected = 8.0_f64.sqrt() / (6.0 * STIFFNESS_N_PER_M.powi(2) + 2.0).sqrt();
+    assert!((measure(&report, "M3").value / expected - 1.0).abs() < 1.0e-4);
+}
+
+struct Forgetful;
+impl Law for Forgetful {
+    fn wrench(pose: &Pose) -> Wrench {
+        // Turning pushes, pushing does not turn. 0.05 N/rad.
+        let pitch_rad = rotation_vector(pose.orientation()).x;
+        spring(pose, STIFFNESS_N_PER_M) + Wrench::from_force(DVec3::Y * 0.05 * pitch_rad)
+    }
+}
+
+#[test]
+fn a_forgotten_coupling_breaks_reciprocity_and_can_be_pumped() {
+    let report = stress::<Forgetful>();
+    assert_eq!(with(&report, Verdict::Fail), ["M3", "M4", "M9"], "{}", report.to_text());
+}
+
+struct NeverAnswers;
+impl Law for NeverAnswers {
+    fn wrench(_pose: &Pose) -> Wrench {
+        Wrench::from_force(DVec3::NAN)
+    }
+}
+
+#[test]
+fn no_answer_is_no_pass() {
+    let report = stress::<NeverAnswers>();
+    assert_eq!(with(&report, Verdict::Fail), ["M0", "M9"], "{}", report.to_text());
+    // It is quick about it, and NaN after NaN.
+    assert_eq!(with(&report, Verdict::Pass), ["M7", "M8"], "{}", report.to_text());
+}
+
+struct NothingAtHome;
+impl Law for NothingAtHome {
+    fn wrench(pose: &Pose) -> Wrench {
+        if pose.position() == DVec3::ZERO && pose.orientation().xyz() == DVec3::ZERO {
+            return Wrench::from_force(DVec3::NAN);
+        }
+        spring(pose, STIFFNESS_N_PER_M)
+    }
+}
+
+#[test]
+fn nan_at_home_is_named() {
+    let report = stress::<NothingAtHome>();
+    assert_eq!(with(&report, Verdict::Fail), ["M0", "M9"], "{}", report.to_text());
+    let totality = measure(&report, "M0");
+    assert_eq!(totality.pose.unwrap().position_m, [0.0; 3]);
+    assert!(totality.comment.contains("home"), "{}", totality.comment);
+}
+
+struct PanicsAtHome;
+impl Law for PanicsAtHome {
+    fn wrench(pose: &Pose) -> Wrench {
+        assert!(pose.position() != DVec3::ZERO || pose.orientation().xyz() != DVec3::ZERO, "no law at home");
+        spring(pose, STIFFNESS_N_PER_M)
+    }
+}
+
+#[test]
+fn a_panic_is_named_and_the_score_goes_on() {
+    let report = stress::<PanicsAtHome>();
+    assert_eq!(with(&report, Verdict::Fail), ["M0", "M9"], "{}", report.to_text());
+    assert!(measure(&report, "M0").comment.contains("no law at home"));
+    assert!(value(&report, "M0", "panics") >= 1.0);
+    assert_eq!(measure(&report, "M4").verdict, Verdict::Pass);
+}
+
+struct Stiff;
+impl Law for Stiff {
+    fn wrench(pose: &Pose) -> Wrench {
+        spring(pose, 10.0 * STIFFNESS_N_PER_M)
+    }
+}
+
+#[test]
+fn a_stiff_spring_is_too_stiff_for_a_sampled_loop() {
+    // 2 b / T = 4000 N/m at most, and k T / 2 = 2.5 N s/m of damping: one condition seen from both ends.
+    let report = stress::<Stiff>();
+    assert_eq!(with(&report, Verdict::Fail), ["M2", "M5"], "{}", report.to_text());
+    assert_eq!(value(&report, "M2", "renderable share, b = 2 N s/m"), 0.0);
+}
+
+struct Whirling;
+impl Law for Whirling {
+    fn wrench(pose: &Pose) -> Wrench {
+        // A circular force that beats the damping: b sqrt(k / m) = 7 N/m.
+        let around = DVec3::Z.cross(pose.position()) * 60.0;
+        spring(pose, 0.2 * STIFFNESS_N_PER_M) + Wrench::from_force(around)
+    }
+}
+
+#[test]
+fn a_soft_model_that_diverges_has_no_excuse() {
+    let report = stress::<Whirling>();
+    assert_eq!(measure(&report, "M6").verdict, Verdict::Fail, "{}", report.to_text());
+    assert!(measure(&report, "M2").value < 1000.0);
+}
+
+struct Weight;
+impl Law for Weight {
+    fn wrench(_pose: &Pose) -> Wrench {
+        Wrench::from_force(DVec3::Z * -3.0)
+    }
+}
+
+#[test]
+fn a_weight_is_carried_off_and_does_not_diverge() {
+    let report = stress::<Weight>();
+    assert_eq!(measure(&report, "M6").verdict, Verdict::Note, "{}", report.to_text());
+    assert_eq!(value(&report, "M6", "releases carried off"), value(&report, "M6", "releases"));
+    assert!(with(&report, Verdict::Fail).is_empty(), "{}", report.to_text());
+}
+
+struct Slow;
+impl Law for Slow {
+    fn wrench(pose: &Pose) -> Wrench {
+        // Twice the bound, in a corner that few measures visit.
+        if pose.position().z > 29.0e-3 && pose.position().z < 31.0e-3 {
+            let begin = Instant::now();
+            while begin.elapsed() < Duration::from_micros(200) {}
+        }
+        spring(pose, STIFFNESS_N_PER_M)
+    }
+}
+
+#[test]
+fn a_slow_corner_is_found() {
+    let report = stress::<Slow>();
+    assert_eq!(with(&report, Verdict::Fail), ["M7"], "{}", report.to_text());
+    let z_m = measure(&report, "M7").pose.unwrap().position_m[2];
+    assert!(z_m > 29.0e-3, "{z_m}");
+}
+
+static CALLS: AtomicU64 = AtomicU64::new(0);
+
+struct Moody;
+impl Law for Moody {
+    fn wrench(pose: &Pose) -> Wrench {
+        // Another answer every time, by less than anybody feels.
+        let mood = CALLS.fetch_add(1, Ordering::Relaxed) % 3;
+        let whim_n = if mood == 1 { 1.0e-10 } else { 0.0 };
+        spring(pose, STIFFNESS_N_PER_M) + Wrench::from_force(DVec3::X * whim_n)
+    }
+}
+
+#[test]
+fn answers_that_depend_on_nothing_are_found() {
+    let report = stress::<Moody>();
+    assert_eq!(with(&report, Verdict::Fail), ["M8"], "{}", report.to_text());
+}
+
+#[test]
+fn the_same_seed_gives_the_same_score() {
+    let (first, second) = (stress::<Lever>(), stress::<Lever>());
+    for (a, b) in first.measures.iter().zip(&second.measures).filter(|(a, _)| a.id != "M7") {
+        // Compared as text: absent numbers are NaN, which differs from itself.
+        assert_eq!(serde_json::to_string(a).unwrap(), serde_json::to_string(b).unwrap());
+    }
+}
+
+#[test]
+fn the_picture_shows_all_four_distributions() {
+    let svg = stress::<Linear>().to_svg();
+    for words in ["M1", "M2", "M4", "M7", "score"] {
+        assert!(svg.contains(words), "{words}");
+    }
+    assert!(!svg.contains("no data"), "every panel has something to show");
+}

@@ -1,0 +1,36 @@
+//! Whether calls stay inside the memory that is theirs or was given to them.
+//!
+//! The process of this rule is started with an allocator of its own (`host/lab/guard`), in which every block ends at a
+//! page that nobody may touch: a read or write past its end ends the process there, and a damaged edge is found when
+//! the block is freed. Input and output of a call are blocks, too.
+
+use super::Seen;
+use super::checks::Subject;
+use super::life::live;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The name of the allocator's file: beside this program, where cargo and the installation put libraries.
+const LIBRARY: &str = "libflotor_guard.so";
+
+/// Starts the process of a command with the allocator, if it is here.
+pub(super) fn with_guard(command: &mut Command) {
+    if let Some(library) = Path::new(command.get_program()).parent().and_then(beside) {
+        command.env("LD_PRELOAD", library);
+    }
+}
+
+fn beside(folder: &Path) -> Option<PathBuf> {
+    // `deps` first, as for plugins: cargo refreshes only that.
+    let folders = ["deps", ".", "../lib/flotor"];
+    folders.map(|place| folder.join(place).join(LIBRARY)).into_iter().find(|file| file.is_file())
+}
+
+/// Lives one life of an instance under the allocator.
+pub(super) fn inside_memory(subject: &Subject) -> Result<(), Seen> {
+    let mapped = std::fs::read_to_string("/proc/self/maps").unwrap_or_default();
+    if !mapped.contains(LIBRARY) {
+        return Err(Seen::Missing(format!("{LIBRARY} is not beside this program")));
+    }
+    live(subject, &mut |_, _| Ok(()))
+}

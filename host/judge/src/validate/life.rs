@@ -1,0 +1,143 @@
+//! One life of an instance: every call that a host makes of it, in a host's order, what it offers beside its main
+//! interface included. Three rules share it; each looks at something else between the calls.
+
+use super::Seen;
+use super::checks::Subject;
+use super::device::Running;
+use super::path::{CONFIG, finite, walk};
+use flotor_hal::abi::CallStatus;
+use flotor_hal::abi::loader::{Model, OpenedDevice};
+use flotor_hal::extension::linear_field::LinearField;
+use flotor_hal::{Input, Mutability, Output, Parameter, Pose, Wrench};
+
+/// Steps of a model, and ticks of a device.
+const STEPS: u64 = 300;
+/// Points of a centerline: what the viewer asks for at most.
+const POINTS: usize = 65;
+
+/// Hears the name of each call when it is over, and how many calls so far left the floating-point mode changed: the loader puts it
+/// back at once.
+pub(super) type After<'a> = &'a mut dyn FnMut(&str, u64) -> Result<(), String>;
+
+/// Lives it. Fails if a call fails, or `after` does.
+pub(super) fn live(subject: &Subject, after: After<'_>) -> Result<(), Seen> {
+    if subject.is_device() {
+        return device(subject.device()?, after);
+    }
+    let mut model = subject.plugin.create_model(subject.settings())?;
+    after("create", model.float_changes())?;
+    model.prepare(&CONFIG).map_err(|refusal| format!("prepare refused: {refusal}"))?;
+    after("prepare", model.float_changes())?;
+    steps(&mut model)?;
+    after("step", model.float_changes())?;
+    settings(&mut model, subject.plugin.parameters())?;
+    after("set_parameter", model.float_changes())?;
+    extensions(&mut model, after)?;
+    if let Some(problem) = model.message_problem() {
+        return Err(format!("last_message gave {problem}").into());
+    }
+    after("last_message", model.float_changes())?;
+    if model.reset() != CallStatus::Ok {
+        return Err("reset failed".to_owned().into());
+    }
+    after("reset", model.float_changes())?;
+    drop(model);
+    Ok(after("destroy", 0)?)
+}
+
+/// One by one, and as a batch. Input and output are blocks of memory of their own: what is written beside them is seen.
+fn steps(model: &mut Model) -> Result<(), String> {
+    for sent in walk(STEPS) {
+        let (input, mut output) = (Box::new(sent), Box::<Output>::default());
+        if model.step(&input, &mut output) != CallStatus::Ok {
+            return Err(format!("step {} failed: it {}", sent.tick, model.last_message()));
+        }
+        if *input != sent {
+            return Err(format!("step {} changed its input", sent.tick));
+        }
+    }
+    let inputs: Vec<Input> = walk(STEPS).collect();
+    let mut outputs = vec![Output::default(); inputs.len()];
+    match model.step_batch(&inputs, &mut outputs) {
+        CallStatus::Ok => Ok(()),
+        other => Err(format!("step_batch returned {other:?}")),
+    }
+}
+
+fn settings(model: &mut Model, parameters: &[Parameter]) -> Result<(), String> {
+    for (index, parameter) in parameters.iter().enumerate() {
+        let value = model.parameter(index);
+        if parameter.mutability() == Mutability::Live && value.is_finite() {
+            // A number that follows from others may be refused; `live-parameters` looks at that.
+            let _ = model.set_parameter(index, value);
+        }
+    }
+    works(model, "set_parameter")
+}
+
+/// What it offers, each twice: at home, and on its path.
+fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
+    for input in [Some(Input::at_rest(Pose::HOME)), walk(100).last()].into_iter().flatten() {
+        let _ = model.active_region();
+        works(model, "active-region")?;
+        let _ = model.workspace_bounds();
+        works(model, "workspace-bounds")?;
+        if model.has_linear_field() {
+            let mut field = Box::new(LinearField::NONE);
+            let answer = model.linear_field(&input, &mut field);
+            works(model, "linear-field")?;
+            if answer != CallStatus::Ok || !field.is_finite() {
+                return Err(format!("linear-field answered {answer:?}: {field:?}"));
+            }
+        }
+        let drawn = model.centerline().map(|mut line| (line.info(), line.points(&input, POINTS)));
+        works(model, "centerline")?;
+        if let Some((info, points)) = drawn {
+            let is_drawn = points.is_some_and(|points| points.iter().all(Pose::is_finite));
+            if info.is_none() || !is_drawn {
+                return Err("centerline gave no finite points".to_owned());
+            }
+        }
+        let mut values = vec![f64::NAN; model.details().len()];
+        let answer = model.read_details(&mut values);
+        works(model, "details")?;
+        if !matches!(answer, CallStatus::Ok | CallStatus::Unsupported) {
+            return Err(format!("details answered {answer:?}"));
+        }
+    }
+    after("an extension", model.float_changes())
+}
+
+/// An instance that has panicked answers nothing any more; its next step has the message.
+fn works(model: &mut Model, asked: &str) -> Result<(), String> {
+    let answer = finite(model, &Input::at_rest(Pose::HOME));
+    answer.map(|_| ()).map_err(|words| format!("after {asked}, {words}"))
+}
+
+fn device(mut device: OpenedDevice, after: After<'_>) -> Result<(), Seen> {
+    after("open", 0)?;
+    device.capabilities().map_err(|refusal| refusal.to_string())?;
+    after("capabilities", 0)?;
+    for index in 0..device.parameters().len() {
+        let _ = device.parameter(index);
+    }
+    drop(device.serial());
+    after("an extension", 0)?;
+    let stopper = device.stopper();
+    let mut running = Running::start(device)?;
+    after("activate", running.device.float_changes())?;
+    for _ in 0..STEPS {
+        let _ = running.turn(&Wrench::ZERO).map_err(String::from)?;
+    }
+    after("read and write", running.device.float_changes())?;
+    let _ = running.device.energy_ledger();
+    drop(running.device.last_message());
+    after("an extension", running.device.float_changes())?;
+    stopper.safe_stop();
+    drop(stopper);
+    after("safe_stop", running.device.float_changes())?;
+    let device = running.device.deactivate().ok_or_else(|| "deactivate failed".to_owned())?;
+    after("deactivate", 0)?;
+    drop(device);
+    Ok(after("close", 0)?)
+}

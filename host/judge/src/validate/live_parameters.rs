@@ -1,0 +1,81 @@
+//! Live parameters: whether a new value takes effect.
+
+use super::checks::Subject;
+use super::model::processor_time;
+use super::path::{CONFIG, finite, walk};
+use flotor_hal::abi::CallStatus;
+use flotor_hal::abi::loader::Model;
+use flotor_hal::{Mutability, Parameter};
+use std::time::Duration;
+
+/// How often a value is set, to tell how long that takes.
+const TIMES: usize = 33;
+
+/// Sets each live parameter to its value, to the ends of its range and to its default. Each has its own instance, because
+/// the value of one may change the range of another.
+pub(super) fn live_parameters(subject: &Subject) -> Result<(), String> {
+    let is_live = |(_, parameter): &(usize, &Parameter)| parameter.mutability() == Mutability::Live;
+    let mut taken = Vec::new();
+    for (index, parameter) in subject.plugin.parameters().iter().enumerate().filter(is_live) {
+        let mut model = subject.prepared_model()?;
+        walk(10).try_for_each(|input| finite(&mut model, &input).map(|_| ()))?;
+        let own = model.parameter(index);
+        let own = if own.is_finite() { own } else { parameter.default() };
+        // Where a number follows from others, a model refuses it whatever its value.
+        taken.push(set(&mut model, index, parameter, own)?);
+        for value in [parameter.min(), parameter.max(), parameter.default()] {
+            let _ = set(&mut model, index, parameter, value)?;
+        }
+    }
+    if !taken.is_empty() && taken.iter().all(|took| *took == Took::Refused) {
+        return Err("it refuses every live parameter, even with its present value".to_owned());
+    }
+    Ok(())
+}
+
+/// Result of setting a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Took {
+    /// It is in force.
+    Taken,
+    /// It does not fit the others, and the one before stays.
+    Refused,
+}
+
+fn set(model: &mut Model, index: usize, parameter: &Parameter, value: f64) -> Result<Took, String> {
+    let id = parameter.id();
+    let before = model.parameter(index);
+    let mut took = Vec::with_capacity(TIMES);
+    let mut last = CallStatus::Ok;
+    for _ in 0..TIMES {
+        let started = processor_time();
+        last = model.set_parameter(index, value);
+        took.push(processor_time().saturating_sub(started));
+    }
+    let (outcome, expected) = match last {
+        CallStatus::Ok => (Took::Taken, value),
+        CallStatus::OutOfRange => (Took::Refused, before),
+        CallStatus::Unsupported => {
+            return Err(format!("`{id}` is declared live, but the plugin has no `set_parameter`"));
+        }
+        CallStatus::Panicked => return Err(format!("`{id}` = {value}: it {}", model.last_message())),
+        CallStatus::WrongPhase => return Err(format!("setting `{id}` = {value} returned {last:?}")),
+    };
+    took.sort_unstable();
+    // The one in the middle: what disturbs this process for a moment does not count.
+    let usual = took.get(TIMES / 2).copied().unwrap_or_default();
+    let limit = Duration::from_nanos(CONFIG.period_ns / 2);
+    if usual > limit {
+        return Err(format!("setting `{id}` to {value} takes {usual:?}, above the limit of {limit:?}"));
+    }
+    // A model need not tell the value in force; if it does, it is the one. A conversion of units may round.
+    let read_back = model.parameter(index);
+    let is_told = read_back.is_finite() && expected.is_finite();
+    if is_told && (read_back - expected).abs() > 1.0e-9 * read_back.abs().max(expected.abs()) {
+        return Err(format!("`{id}` was set to {value} (answer {last:?}), but reads back {read_back}"));
+    }
+    walk(10).try_for_each(|input| {
+        finite(model, &input).map(|_| ()).map_err(|words| format!("with `{id}` = {value}, {words}"))
+    })?;
+    Ok(outcome)
+}

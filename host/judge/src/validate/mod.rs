@@ -1,0 +1,200 @@
+//! Checks a plugin against the rules of the contract, from outside as a host does: each rule in its own process, so that a
+//! plugin that crashes or hangs costs one rule.
+//!
+//! - `rule`: what is checked; `checks`: one of it, in this process; `patience`: how long that may take.
+//! - `life`: every call of an instance; `untouched` and `guarded` look at what each leaves behind.
+//! - `path`: where a model is asked; `model`, `live_parameters`, `passive`, `locked`: what is asked of it.
+//! - `device`: what is asked of a device.
+
+mod checks;
+mod device;
+mod guarded;
+mod life;
+mod live_parameters;
+mod locked;
+mod model;
+mod passive;
+mod path;
+mod patience;
+mod rule;
+mod untouched;
+
+pub use checks::check;
+pub use rule::Check;
+
+use flotor_hal::abi::loader::read_metadata;
+use flotor_hal::conformance::Rule;
+use rustix::fs::{MemfdFlags, memfd_create};
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::{self, Read, Seek, Write};
+use std::os::fd::AsFd;
+use std::os::unix::process::ExitStatusExt;
+use std::path::Path;
+use std::process::{Command, ExitStatus, Stdio};
+use std::time::Duration;
+
+/// Outcome of one rule.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// Short name of the rule.
+    pub rule: &'static str,
+    /// What it demands.
+    pub text: &'static str,
+    /// The violation.
+    pub violation: Option<String>,
+    /// Why it could not be checked here: something that the plugin needs is missing.
+    pub unchecked: Option<String>,
+    /// What was measured on the way.
+    pub figures: Option<Figures>,
+}
+
+/// Measurements of a model without memory near home. No contract limits them, but a person can distinguish newtons per
+/// metre from newtons per millimetre.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Figures {
+    /// Largest stiffness, N/m.
+    pub stiffness_n_per_m: f64,
+    /// Largest damping, N·s/m.
+    pub damping_ns_per_m: f64,
+}
+
+impl Finding {
+    fn new(check: Check, verdict: Verdict) -> Self {
+        let Verdict { seen, figures } = verdict;
+        let (violation, unchecked) = match seen {
+            None => (None, None),
+            Some(Seen::Violation(seen)) => (Some(seen), None),
+            Some(Seen::Missing(what)) => (None, Some(what)),
+        };
+        Self { rule: check.id(), text: check.text(), violation, unchecked, figures }
+    }
+}
+
+/// Why a rule is not known to hold.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Seen {
+    /// It does not.
+    Violation(String),
+    /// The plugin needs something that is not there (a device, a permission): neither its fault nor a proof.
+    Missing(String),
+}
+
+/// Result of the process that checks one rule.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// `None` if the rule holds, else what was seen.
+    pub seen: Option<Seen>,
+    /// What was measured on the way.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub figures: Option<Figures>,
+}
+
+impl Verdict {
+    /// The verdict on one rule, of this process.
+    pub fn of(checked: Result<Option<Figures>, Seen>) -> Self {
+        match checked {
+            Ok(figures) => Self { seen: None, figures },
+            Err(seen) => Self { seen: Some(seen), figures: None },
+        }
+    }
+
+    fn violated(seen: String) -> Self {
+        Self { seen: Some(Seen::Violation(seen)), figures: None }
+    }
+
+    /// Writes it where the process that started this one looks for it: into the file that is standard input. What the
+    /// plugin prints, and however much, goes elsewhere.
+    ///
+    /// # Errors
+    /// Standard input is no such file.
+    pub fn deliver(&self) -> io::Result<()> {
+        let mut file = File::from(io::stdin().as_fd().try_clone_to_owned()?);
+        file.write_all(&serde_json::to_vec(self)?)
+    }
+}
+
+/// Checks a plugin file against every rule that applies; stops at the first that makes the rest pointless. Not
+/// real-time. A rule may take `patience` of a processor, and wait as long; `program` starts this program once more, to check one rule of the file and
+/// to [deliver](Verdict::deliver) the verdict. `only` names the rules to check; empty: all.
+#[must_use]
+pub fn validate(
+    path: &Path,
+    only: &[Check],
+    patience: Duration,
+    program: impl Fn(Check) -> Command,
+) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let mut note = |check: Check, verdict: Verdict| {
+        let is_violated = matches!(verdict.seen, Some(Seen::Violation(_)));
+        findings.push(Finding::new(check, verdict));
+        is_violated
+    };
+    // Reads the file and runs nothing of it.
+    let metadata = Check::Contract(Rule::Metadata);
+    let read = read_metadata(path);
+    let verdict = read.as_ref().map(|_| None).map_err(|error| Seen::Violation(error.to_string()));
+    note(metadata, Verdict::of(verdict));
+    let Ok(kind) = read.map(|known| known.kind) else { return findings };
+    let is_wanted = |check: &Check| only.is_empty() || only.contains(check);
+    let checks = Check::all().filter(|check| *check != metadata && check.applies_to(kind));
+    for check in checks.filter(is_wanted) {
+        let mut command = program(check);
+        match check {
+            Check::SystemCalls => drop(command.env(locked::C_LIBRARY.0, locked::C_LIBRARY.1)),
+            Check::Contract(Rule::InsideMemory) => guarded::with_guard(&mut command),
+            _ => {}
+        }
+        let outcome = in_own_process(check, command, patience);
+        let is_fatal = matches!(check, Check::Contract(Rule::Loads | Rule::Defaults));
+        let stops = is_fatal || matches!(outcome, Ok(None));
+        let verdict = match outcome {
+            Ok(Some(verdict)) => verdict,
+            // Its allocator is slow, and whether a call ends is seen without it.
+            Ok(None) if check == Check::Contract(Rule::InsideMemory) => {
+                let late =
+                    format!("a life of an instance takes more than {patience:?} with the guarding allocator");
+                Verdict { seen: Some(Seen::Missing(late)), figures: None }
+            }
+            Ok(None) => Verdict::violated(format!(
+                "it did not return within {patience:?}; the rules after it were not checked"
+            )),
+            Err(error) => Verdict::violated(format!("cannot be checked: {error}")),
+        };
+        if note(check, verdict) && stops {
+            break;
+        }
+    }
+    findings
+}
+
+/// Explains an end without a verdict.
+fn died(check: Check, end: ExitStatus) -> String {
+    let Some(signal) = end.signal() else { return format!("the process ended without a verdict ({end})") };
+    if check == Check::SystemCalls && signal == locked::CAUGHT.as_raw() {
+        return "a step allocated memory or made another system call".to_owned();
+    }
+    let hint = match check {
+        // A thread that is locked in may not read the clock of the processor either.
+        Check::SystemCalls => "; here a step that reads the time causes this",
+        Check::Contract(Rule::InsideMemory) => ": a call left its memory, or damaged a block",
+        _ => "",
+    };
+    format!("the process died by signal {signal}{hint}")
+}
+
+/// Runs the check of one rule in its own process; `None` if it took too long.
+fn in_own_process(check: Check, mut command: Command, patience: Duration) -> io::Result<Option<Verdict>> {
+    // A file, not a pipe: nobody has to empty it. What a plugin prints is its own business.
+    let mut told = File::from(memfd_create("flotor-verdict", MemfdFlags::CLOEXEC)?);
+    let mut child = command.stdin(told.try_clone()?).stdout(Stdio::null()).stderr(Stdio::null()).spawn()?;
+    let Some(end) = patience::wait(&mut child, patience)? else { return Ok(None) };
+    let mut text = Vec::new();
+    told.rewind()?;
+    told.read_to_end(&mut text)?;
+    Ok(Some(match serde_json::from_slice(&text) {
+        Ok(verdict) if end.success() => verdict,
+        _ => Verdict::violated(died(check, end)),
+    }))
+}

@@ -1,0 +1,223 @@
+//! Rules of a force model: numbers, repeatability, time, threads, energy, activity.
+
+use super::checks::Subject;
+use super::path::{CONFIG, FAST, directions, finite, grid, step, walk, walk_at};
+use super::untouched::threads;
+use crate::subject::input_of;
+use flotor_hal::abi::CallStatus;
+use flotor_hal::abi::loader::Model;
+use flotor_hal::{
+    ActiveRegion, DQuat, DVec3, Demand, Input, Memory, Output, Pose, RegionShape, Twist, Wrench,
+};
+use rustix::time::{ClockId, clock_gettime};
+use std::time::Duration;
+
+fn finite_at(model: &mut Model, pose: Pose) -> Result<(), String> {
+    finite(model, &Input::at_rest(pose)).map(|_| ())
+}
+
+pub(super) fn near_home(model: &mut Model) -> Result<(), String> {
+    finite_at(model, Pose::HOME)?;
+    for size_m in [1.0e-12, 1.0e-6, 1.0e-3, 5.0e-3] {
+        grid(size_m, size_m * 10.0).try_for_each(|pose| finite_at(model, pose))?;
+    }
+    Ok(())
+}
+
+pub(super) fn finite_in_motion(model: &mut Model) -> Result<(), String> {
+    for speed in [1.0, FAST] {
+        walk_at(speed, 3000).try_for_each(|input| finite(model, &input).map(|_| ()))?;
+    }
+    Ok(())
+}
+
+pub(super) fn not_finite(model: &mut Model) -> Result<(), String> {
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for axis in 0..7 {
+            let mut pose = Pose::HOME;
+            let numbers = pose.position_m.iter_mut().chain(&mut pose.orientation_xyzw);
+            numbers.skip(axis).take(1).for_each(|number| *number = bad);
+            finite_at(model, pose)?;
+        }
+    }
+    finite_at(model, Pose::HOME) // and it still works afterwards
+}
+
+pub(super) fn far_poses(model: &mut Model) -> Result<(), String> {
+    for size_m in [0.03, 1.0, 1.0e9, 1.0e300] {
+        grid(size_m, 3.0).try_for_each(|pose| finite_at(model, pose))?;
+    }
+    Ok(())
+}
+
+pub(super) fn reset_repeats(model: &mut Model) -> Result<(), String> {
+    // In motion first, with the time of a loop: what is integrated shows there and nowhere else.
+    let run = |model: &mut Model| -> Result<Vec<Output>, String> {
+        let at_rest = grid(2.0e-3, 0.05).map(Input::at_rest);
+        walk(500).chain(at_rest).map(|input| step(model, &input)).collect()
+    };
+    let first = run(model)?;
+    match model.reset() {
+        CallStatus::Ok => {}
+        other => return Err(format!("reset returned {other:?}")),
+    }
+    let second = run(model)?;
+    let differs = first.iter().zip(&second).position(|(a, b)| a.wrench != b.wrench);
+    differs
+        .map_or(Ok(()), |index| Err(format!("pose {index} of the same path gave another answer after reset")))
+}
+
+/// Time this thread had a processor: what others do on it does not count. A step that waits is found by the lock.
+pub(super) fn processor_time() -> Duration {
+    let now = clock_gettime(ClockId::ThreadCPUTime);
+    Duration::try_from(now).unwrap_or_default()
+}
+
+pub(super) fn time_budget(model: &mut Model) -> Result<(), String> {
+    const STEPS: usize = 1000;
+    let mut took = Vec::with_capacity(STEPS);
+    for input in walk(STEPS as u64) {
+        let started = processor_time();
+        // Failing is quick: it would pass.
+        step(model, &input)?;
+        took.push(processor_time().saturating_sub(started));
+    }
+    took.sort_unstable();
+    let usual = took.get(STEPS * 99 / 100).copied().unwrap_or_default();
+    let limit = Duration::from_nanos(CONFIG.period_ns / 2);
+    if usual <= limit {
+        return Ok(());
+    }
+    Err(format!("the 99th percentile of a step is {usual:?} of a processor, above the limit of {limit:?}"))
+}
+
+/// Wrenches of a walk; two models may be walked in turns.
+fn walked(models: &mut [&mut Model]) -> Result<Vec<Vec<Wrench>>, String> {
+    let mut wrenches = vec![Vec::new(); models.len()];
+    for input in walk(500) {
+        for (model, wrenches) in models.iter_mut().zip(&mut wrenches) {
+            wrenches.push(step(model, &input)?.wrench);
+        }
+    }
+    Ok(wrenches)
+}
+
+pub(super) fn independent(subject: &Subject) -> Result<(), String> {
+    let make = || subject.prepared_model();
+    let alone = walked(&mut [&mut make()?])?;
+    let alone = alone.first().cloned().unwrap_or_default();
+    let in_turns = walked(&mut [&mut make()?, &mut make()?])?;
+    if in_turns.iter().any(|wrenches| *wrenches != alone) {
+        return Err("two instances stepped alternately give other answers than one alone".to_owned());
+    }
+    // Made here, used there: a loop has a thread of its own.
+    let elsewhere: Vec<_> = [make()?, make()?]
+        .map(|mut model| std::thread::spawn(move || walked(&mut [&mut model])))
+        .into_iter()
+        .map(|thread| thread.join().map_err(|_| "a thread panicked".to_owned())?)
+        .collect::<Result<_, String>>()?;
+    if elsewhere.iter().flatten().any(|wrenches| *wrenches != alone) {
+        return Err("two instances stepped on two threads give other answers than one alone".to_owned());
+    }
+    Ok(())
+}
+
+/// Compares with the number of threads before the library was loaded.
+pub(super) fn no_threads(model: &mut Model, before: usize) -> Result<(), String> {
+    let more = |when: &str| match threads().saturating_sub(before) {
+        0 => Ok(()),
+        more => Err(format!("the process has {more} more threads after {when}")),
+    };
+    more("create and prepare")?;
+    let _ = walked(&mut [model])?;
+    more("500 steps")
+}
+
+/// Compares force and torque with the energy over steps of a micrometre and of a hundredth of a milliradian at poses of a
+/// walk. A kink in the law may lie between two of them, so that a few may differ, but not one in ten.
+pub(super) fn energy_gradient(model: &mut Model) -> Result<(), String> {
+    const STEP_M: f64 = 1.0e-6;
+    const STEP_RAD: f64 = 1.0e-5;
+    if model.memory() != Memory::Stateless || !model.serves().contains(Demand::ENERGY) {
+        return Ok(());
+    }
+    // Components of force and of torque, each with what the energy says of it.
+    let (mut forces, mut torques) = (Vec::new(), Vec::new());
+    for input in walk(2000).step_by(20) {
+        let (position, orientation) = (input.pose.position(), input.pose.orientation());
+        let here = step(model, &input)?.wrench;
+        for axis in DVec3::AXES {
+            let moved = |along: f64| Pose::new(position + axis * along, orientation);
+            let turned = |angle: f64| Pose::new(position, DQuat::from_axis_angle(axis, angle) * orientation);
+            let mut slope = |pose: &dyn Fn(f64) -> Pose, size: f64| -> Result<f64, String> {
+                let ahead_j = step(model, &Input::at_rest(pose(size)))?.energy_j;
+                let behind_j = step(model, &Input::at_rest(pose(-size)))?.energy_j;
+                Ok((ahead_j - behind_j) / (2.0 * size))
+            };
+            forces.push((here.force().dot(axis), -slope(&moved, STEP_M)?));
+            torques.push((here.torque().dot(axis), -slope(&turned, STEP_RAD)?));
+        }
+    }
+    agree(&forces, ["force", "N"])?;
+    agree(&torques, ["torque", "N·m"])
+}
+
+/// Whether components and those of the energy's gradient are the same, to a five hundredth of the largest: rounding of the
+/// energy over the step and the curvature of the law are far below that.
+fn agree(seen: &[(f64, f64)], [what, unit]: [&str; 2]) -> Result<(), String> {
+    const TOLERATED: usize = 10;
+    const SAME: f64 = 0.002;
+    let seen: Vec<_> = seen.iter().filter(|(_, gradient)| gradient.is_finite()).collect();
+    let largest = seen.iter().fold(0.0, |largest: f64, (own, _)| largest.max(own.abs()));
+    let differs = |(own, gradient): &&&(f64, f64)| (own - gradient).abs() > SAME * largest;
+    let different = seen.iter().filter(differs).count();
+    if different * TOLERATED <= seen.len() {
+        return Ok(());
+    }
+    let example = seen.iter().find(differs).map_or(String::new(), |(own, gradient)| {
+        format!(": {own:.4} {unit} instead of the {gradient:.4} {unit} of the energy's gradient")
+    });
+    Err(format!("{what} and energy disagree in {different} of {} places{example}", seen.len()))
+}
+
+/// Steps the model around its active region: a host does not step it there and assumes zero.
+pub(super) fn activity(model: &mut Model) -> Result<(), String> {
+    let region = model.active_region();
+    if region.shape() == RegionShape::Everywhere {
+        return Ok(());
+    }
+    let turned = DQuat::from_scaled_axis(DVec3::new(0.1, -0.2, 0.05));
+    let mut ticks = 0..;
+    for position_m in around(&region).filter(|position_m| !region.contains(*position_m)) {
+        let outwards = (position_m - region.center()).normalize_or_zero();
+        for velocity_m_per_s in [DVec3::ZERO, outwards * 0.1, outwards * -0.1] {
+            // From the middle each time: what was felt inside must be over outside.
+            for pose in [Pose::new(region.center(), DQuat::IDENTITY), Pose::new(position_m, turned)] {
+                let tick = ticks.next().unwrap_or(0);
+                let twist = Twist::new(velocity_m_per_s, DVec3::ZERO);
+                let output = finite(model, &Input { twist, ..input_of(tick, pose) })?;
+                let acts = output.wrench != Wrench::ZERO || output.energy_j.abs() > 0.0;
+                if acts && !region.contains(pose.position()) {
+                    return Err(format!(
+                        "at {position_m} m, outside its active region, it returned {:?} and {} J",
+                        output.wrench, output.energy_j
+                    ));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Positions around a region: a hair outside, a little, and far.
+fn around(region: &ActiveRegion) -> impl Iterator<Item = DVec3> {
+    let (center_m, half_m, shape) = (region.center(), region.half_sides(), region.shape());
+    directions().filter(|direction| *direction != DVec3::ZERO).flat_map(move |direction| {
+        [1.0e-9, 1.0e-3, 1.0].map(move |gap| {
+            // Relative as well: a hair of a large region is more than rounding takes away.
+            let outside_m = half_m * (1.0 + gap) + DVec3::splat(gap);
+            let direction = if shape == RegionShape::Sphere { direction.normalize() } else { direction };
+            center_m + direction * outside_m
+        })
+    })
+}
