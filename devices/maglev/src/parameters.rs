@@ -2,24 +2,30 @@
 
 use crate::boundary::{Walls, thesis_nm_per_rad};
 use crate::facts;
-use crate::transport::Kind;
-use flotor_hal::{Choices, Parameter, Settings, choices};
+use crate::ml_api;
+use crate::transport::{Kind, tcp};
+use flotor_hal::{Choices, Parameter, Refusal, Settings, choices};
+use std::path::Path;
 use std::time::Duration;
 
+const PROTOCOLS: Choices = choices!["flotor", "ml-api"];
 const TRANSPORTS: Choices = choices!["tcp", "serial", "usb", "hid"];
 const PACES: Choices = choices!["real", "lockstep"];
-const GRAVITY: Choices = choices!["off", "defy"];
+const GRAVITY: Choices = choices!["auto", "off", "defy"];
 const WALLS: Choices = choices!["off", "maker", "thesis"];
-
-/// Where an emulator listens unless told otherwise.
-const DEFAULT_ADDRESS: &str = "127.0.0.1:5678";
 
 /// The schema.
 pub(crate) const SCHEMA: &[Parameter] = &[
+    Parameter::choice(
+        "protocol",
+        PROTOCOLS,
+        0,
+        "What the controller speaks: flotor (on every transport), or the ML API 1.5b of the Maglev 200 (tcp)",
+    ),
     Parameter::choice("transport", TRANSPORTS, 0, "How the controller is reached"),
     Parameter::text(
         "address",
-        "Where: host:port (default 127.0.0.1:5678), a serial port's path, or vendor:product in hex (usb, hid)",
+        "Where: host:port (default 127.0.0.1, port 5679, with ml-api 5678), a serial port's path, or vendor:product in hex (usb, hid)",
     ),
     Parameter::choice(
         "pace",
@@ -56,7 +62,37 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "gravity",
         GRAVITY,
         0,
-        "Gravity compensation: off (the controller or the scene does it), defy (measured at take-off, then applied)",
+        "Gravity compensation: off (the controller or the scene does it), defy (measured at take-off, then applied); \
+         auto: off, with ml-api defy",
+    ),
+    Parameter::real(
+        "fade_ms",
+        "ms",
+        0.0,
+        10_000.0,
+        1000.0,
+        "With ml-api: time in which the controller's gains fade before forces take their place",
+    ),
+    Parameter::real(
+        "boundary_mm",
+        "mm",
+        1.0,
+        12.5,
+        12.0,
+        "With ml-api: radius of the controller's own boundary sphere",
+    ),
+    Parameter::real(
+        "velocity_cutoff_hz",
+        "Hz",
+        1.0,
+        5000.0,
+        200.0,
+        "With ml-api: velocity is the difference of poses, smoothed below this frequency",
+    ),
+    Parameter::file(
+        "first_contact",
+        choices![],
+        "With ml-api: report of tests/hardware/first_contact.py; its parameters take the place of the defaults",
     ),
     Parameter::real("landing_ms", "ms", 0.0, 10_000.0, 0.0, "Time in which the handle is let down at the end"),
     Parameter::choice(
@@ -126,9 +162,26 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     .live(),
 ];
 
+/// What the controller speaks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Protocol {
+    Flotor,
+    MlApi,
+}
+
+/// Who carries the handle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Gravity {
+    /// What the protocol's controllers need.
+    Auto,
+    Off,
+    Defy,
+}
+
 /// Everything but the walls, which change while the loop runs.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Options {
+    pub(crate) protocol: Protocol,
     pub(crate) kind: Kind,
     pub(crate) address: String,
     pub(crate) lockstep: bool,
@@ -138,27 +191,59 @@ pub(crate) struct Options {
     /// Time for coming home; none: at once.
     pub(crate) take_off: Duration,
     pub(crate) landing: Duration,
-    pub(crate) defy_gravity: bool,
+    pub(crate) gravity: Gravity,
+    /// Time in which gains fade.
+    pub(crate) fade: Duration,
 }
 
 impl Options {
-    pub(crate) fn new(settings: &Settings<'_>) -> Self {
-        let milliseconds = |id| Duration::from_secs_f64(settings.number_or_default(id) * 1.0e-3);
-        Self {
-            kind: match settings.choice_or_default("transport") {
-                1 => Kind::Serial,
-                2 => Kind::Usb,
-                3 => Kind::Hid,
-                _ => Kind::Tcp,
-            },
-            address: settings.text("address").unwrap_or(DEFAULT_ADDRESS).to_owned(),
+    pub(crate) fn new(settings: &Settings<'_>, values: &Values) -> Result<Self, Refusal> {
+        let milliseconds = |id| Duration::from_secs_f64(values.value(id) * 1.0e-3);
+        let protocol = match settings.choice_or_default("protocol") {
+            1 => Protocol::MlApi,
+            _ => Protocol::Flotor,
+        };
+        let kind = match settings.choice_or_default("transport") {
+            1 => Kind::Serial,
+            2 => Kind::Usb,
+            3 => Kind::Hid,
+            _ => Kind::Tcp,
+        };
+        let port = match (protocol, kind) {
+            (Protocol::Flotor, _) => tcp::PORT,
+            (Protocol::MlApi, Kind::Tcp) => ml_api::PORT,
+            (Protocol::MlApi, _) => {
+                let reason =
+                    "the ML API is spoken over TCP only; remove `transport`, or say `protocol = \"flotor\"`";
+                return Err(Refusal::parameter(reason));
+            }
+        };
+        Ok(Self {
+            protocol,
+            kind,
+            address: settings.text("address").map_or_else(|| format!("127.0.0.1:{port}"), str::to_owned),
             lockstep: settings.choice_or_default("pace") == 1,
             watchdog_us: u32::try_from(milliseconds("watchdog_ms").as_micros()).unwrap_or(u32::MAX),
             timeout: milliseconds("timeout_ms"),
-            feedforward_n: settings.number_or_default("feedforward_n"),
+            feedforward_n: values.value("feedforward_n"),
             take_off: milliseconds("takeoff_ms"),
             landing: milliseconds("landing_ms"),
-            defy_gravity: settings.choice_or_default("gravity") == 1,
+            gravity: match settings.choice_or_default("gravity") {
+                1 => Gravity::Off,
+                2 => Gravity::Defy,
+                _ => Gravity::Auto,
+            },
+            fade: milliseconds("fade_ms"),
+        })
+    }
+
+    /// Whether gravity is measured at take-off, and carried by the plugin. Under force commands the controller of the ML API
+    /// carries nothing by itself.
+    pub(crate) fn finds_gravity(&self) -> bool {
+        match self.gravity {
+            Gravity::Auto => self.protocol == Protocol::MlApi,
+            Gravity::Off => false,
+            Gravity::Defy => true,
         }
     }
 }
@@ -170,8 +255,45 @@ pub(crate) struct Values {
 }
 
 impl Values {
-    pub(crate) fn new(settings: &Settings<'_>) -> Self {
-        Self { values: SCHEMA.iter().map(|parameter| settings.number_or_default(parameter.id())).collect() }
+    /// What the scene sets, else what a first contact has found, else the defaults.
+    pub(crate) fn new(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        let mut values = Self { values: SCHEMA.iter().map(Parameter::default).collect() };
+        if let Some(report) = settings.text("first_contact") {
+            values.learn(Path::new(report))?;
+        }
+        for (index, parameter) in SCHEMA.iter().enumerate() {
+            if let Some(value) = settings.number(parameter.id()) {
+                values.set(index, value);
+            }
+        }
+        Ok(values)
+    }
+
+    /// Takes over the numbers of the table `device.parameters` of what a first contact has found.
+    fn learn(&mut self, report: &Path) -> Result<(), Refusal> {
+        let wrong = |why: &dyn std::fmt::Display| {
+            Refusal::parameter(format!("first_contact = \"{}\": {why}", report.display()))
+        };
+        let text = std::fs::read_to_string(report).map_err(|error| wrong(&error))?;
+        let table: toml::Table = text.parse().map_err(|error: toml::de::Error| wrong(&error))?;
+        let parameters = table.get("device").and_then(|device| device.get("parameters"));
+        let Some(parameters) = parameters.and_then(toml::Value::as_table) else {
+            return Err(wrong(
+                &"there is no table [device.parameters]; the script writes it after the third step",
+            ));
+        };
+        for (id, value) in parameters {
+            let Some(index) = SCHEMA.iter().position(|parameter| parameter.id() == id) else {
+                return Err(wrong(&format_args!("the device has no parameter `{id}`")));
+            };
+            #[allow(clippy::cast_precision_loss)] // numbers that people write
+            let number = value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64));
+            let checked = number.ok_or("a number is expected".to_owned()).and_then(|number| {
+                SCHEMA[index].check(number).map_err(|error| error.to_string()).map(|_| number)
+            });
+            self.set(index, checked.map_err(|why| wrong(&format_args!("{id} = {value}: {why}")))?);
+        }
+        Ok(())
     }
 
     pub(crate) fn get(&self, index: usize) -> f64 {
@@ -184,7 +306,7 @@ impl Values {
         }
     }
 
-    fn value(&self, id: &str) -> f64 {
+    pub(crate) fn value(&self, id: &str) -> f64 {
         SCHEMA.iter().position(|parameter| parameter.id() == id).map_or(f64::NAN, |index| self.get(index))
     }
 

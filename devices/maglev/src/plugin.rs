@@ -1,68 +1,58 @@
-//! The device as a plugin: opened over a link, armed and taken off by activation.
+//! The device as a plugin, whichever protocol its controller speaks: this file is the choice between the two.
 
-use crate::boundary::Walls;
-use crate::flight::Holder;
-use crate::host_link::{Heard, HostLink, Unanswered};
-use crate::parameters::{Options, SCHEMA, Values};
-use crate::protocol::{Condition, Description, Mode, Rejections, Request, Status};
-use crate::transport::{self, Kind, LinkLost};
-use crate::warning::ExcessForce;
+use crate::ml_client::stop::LandSwitch;
+use crate::ml_device::{MlActive, MlDevice};
+use crate::own_device::{CoilSwitch, OwnActive, OwnDevice};
+use crate::parameters::{Options, Protocol, SCHEMA, Values};
+use crate::protocol::Rejections;
+use crate::shaping::Shaping;
 use flotor_hal::{
-    ActiveDevice, Axes, CalibrationDevice, Capabilities, Conditions, Cycle, DQuat, DVec3, Device, DeviceInfo,
-    DeviceState, Fault, IndependentStop, IndependentStopDevice, LoopConfig, OutOfRange, Parameter, Pose,
-    Refusal, SafeStop, Settings, StoppedState, Tick, Twist, VerticalCalibration, Wrench, export_device,
+    ActiveDevice, CalibrationDevice, Capabilities, Cycle, Device, DeviceInfo, DeviceState, IndependentStop,
+    IndependentStopDevice, LoopConfig, OutOfRange, PacingDevice, Parameter, Refusal, SafeStop, SampleWait,
+    Settings, Tick, VerticalCalibration, Wrench, export_device,
 };
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
-/// How long a controller may take to describe itself, to arm and take off, and to switch off.
-const PATIENCE: Duration = Duration::from_secs(2);
-/// How long a lockstep tick waits: a delayed emulator is not a fault.
-const LOCKSTEP_PATIENCE: Duration = Duration::from_secs(10);
-/// Periods a command is valid for: one more than it takes to replace it. A host that has missed two deadlines has
-/// no say until it is back, long before the watchdog ends its session.
-const VALID_PERIODS: u64 = 3;
-/// Rounding of a unit quaternion's vector part in `f32`, squared.
-const LENGTH_TOLERANCE: f64 = 1.0e-5;
-
-/// The magnetic-levitation device, opened: the controller has described itself, its coils are off.
+/// The magnetic-levitation device, opened: the controller has said who it is, its coils are off.
 pub struct MaglevDevice {
     options: Options,
     values: Values,
-    link: HostLink,
-    description: Description,
-    calibration: VerticalCalibration,
-    stopped: Arc<AtomicBool>,
+    opened: Opened,
+}
+
+/// Behind one of the protocols.
+enum Opened {
+    Own(Box<OwnDevice>),
+    MlApi(Box<MlDevice>),
 }
 
 /// The device, levitating.
 pub struct LevitatingDevice {
-    opened: MaglevDevice,
-    walls: Option<Walls>,
+    options: Options,
+    values: Values,
+    active: Active,
     period_s: f64,
-    period_us: u64,
-    /// Sequence number of the command whose answer a lockstep tick waits for.
-    awaited: Option<u32>,
-    /// The status of take-off, until a newer one comes.
-    first: Option<Status>,
-    /// The newest status: where landing begins.
-    newest: Status,
-    /// Weight that was found at take-off and is carried, N.
-    weight_n: f64,
-    /// What was commanded last, as the scene sees it: walls included, correction not.
-    commanded: Wrench,
-    warning: ExcessForce,
-    state: DeviceState,
-    heard_ns: u64,
 }
 
-/// Asks the device to switch off at its next tick; if there is none, the controller's watchdog sees to it.
-pub struct CoilSwitch(Arc<AtomicBool>);
+enum Active {
+    Own(Box<OwnActive>),
+    MlApi(Box<MlActive>),
+}
 
-impl SafeStop for CoilSwitch {
+/// Stops the device from any thread.
+pub enum Switch {
+    /// Coils off at the next tick.
+    Coils(CoilSwitch),
+    /// A Land frame, at once.
+    Land(LandSwitch),
+}
+
+impl SafeStop for Switch {
     fn safe_stop(&self) {
-        self.0.store(true, Ordering::Release);
+        match self {
+            Self::Coils(switch) => switch.safe_stop(),
+            Self::Land(switch) => switch.safe_stop(),
+        }
     }
 }
 
@@ -74,64 +64,52 @@ impl Device for MaglevDevice {
     );
     const PARAMETERS: &'static [Parameter] = SCHEMA;
     type Active = LevitatingDevice;
-    type Stop = CoilSwitch;
+    type Stop = Switch;
 
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
-        let options = Options::new(settings);
-        let (link, description) = connect(&options)?;
-        Ok(Self {
-            options,
-            values: Values::new(settings),
-            link,
-            description,
-            calibration: VerticalCalibration::NONE,
-            stopped: Arc::new(AtomicBool::new(false)),
-        })
+        let values = Values::new(settings)?;
+        let options = Options::new(settings, &values)?;
+        let opened = match options.protocol {
+            Protocol::Flotor => Opened::Own(Box::new(OwnDevice::open(&options)?)),
+            Protocol::MlApi => Opened::MlApi(Box::new(MlDevice::open(&options)?)),
+        };
+        Ok(Self { options, values, opened })
     }
 
     fn capabilities(&self) -> Capabilities {
-        let Description { range_m, range_rad, max_force_n, max_torque_nm, rate_hz, .. } = self.description;
-        Capabilities {
-            sensed: axes(self.description.sensed),
-            actuated: axes(self.description.actuated),
-            range_m: range_m.map(f64::from),
-            range_rad: range_rad.map(f64::from),
-            resolution_m: f64::from(self.description.resolution_m),
-            max_force_n: max_force_n.map(f64::from),
-            max_torque_nm: max_torque_nm.map(f64::from),
-            max_force_slew_n_per_s: f64::from(self.description.force_slew_n_per_s),
-            max_torque_slew_nm_per_s: f64::from(self.description.torque_slew_nm_per_s),
-            max_stiffness_n_per_m: f64::from(self.description.max_stiffness_n_per_m),
-            rate_hz: rate_hz.map(f64::from),
-            latency_s: f64::from(self.description.latency_us) * 1.0e-6,
+        match &self.opened {
+            Opened::Own(device) => device.capabilities(),
+            Opened::MlApi(device) => device.capabilities(self.options.lockstep),
         }
     }
 
-    fn stopper(&self) -> CoilSwitch {
-        CoilSwitch(Arc::clone(&self.stopped))
+    fn stopper(&self) -> Switch {
+        match &self.opened {
+            Opened::Own(device) => Switch::Coils(device.stopper()),
+            Opened::MlApi(device) => Switch::Land(LandSwitch(Arc::clone(device.stop()))),
+        }
     }
 
-    fn activate(mut self, config: &LoopConfig) -> Result<LevitatingDevice, (Self, Refusal)> {
-        match self.take_off(config) {
-            Ok((first, weight_n)) => {
-                let mut active = LevitatingDevice {
-                    newest: first,
-                    weight_n,
-                    walls: None,
-                    period_s: config.period_ns as f64 * 1.0e-9,
-                    period_us: config.period_ns / 1000,
-                    awaited: None,
-                    first: Some(first),
-                    commanded: Wrench::ZERO,
-                    warning: ExcessForce::default(),
-                    state: DeviceState::HOME,
-                    heard_ns: 0,
-                    opened: self,
-                };
+    fn activate(self, config: &LoopConfig) -> Result<LevitatingDevice, (Self, Refusal)> {
+        let Self { options, values, opened } = self;
+        let active = match opened {
+            Opened::Own(device) => device
+                .activate(config)
+                .map(Active::Own)
+                .map_err(|(device, refusal)| (Opened::Own(device), refusal)),
+            Opened::MlApi(device) => device
+                .activate(&options, &values, config)
+                .map(Active::MlApi)
+                .map_err(|(device, refusal)| (Opened::MlApi(device), refusal)),
+        };
+        match active {
+            Ok(active) => {
+                let period_s = config.period_ns as f64 * 1.0e-9;
+                let mut active = LevitatingDevice { options, values, active, period_s };
                 active.build_walls();
                 Ok(active)
             }
-            Err(refusal) => Err((self, refusal)),
+            Err((opened, refusal)) => Err((Self { options, values, opened }, refusal)),
         }
     }
 
@@ -142,85 +120,27 @@ impl Device for MaglevDevice {
 
 impl CalibrationDevice for MaglevDevice {
     fn serial(&self) -> String {
-        self.description.serial_text()
+        match &self.opened {
+            Opened::Own(device) => device.serial(),
+            Opened::MlApi(device) => device.serial(),
+        }
     }
 
     fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
-        self.calibration = *calibration;
+        match &mut self.opened {
+            Opened::Own(device) => device.calibration = *calibration,
+            Opened::MlApi(device) => device.calibration = *calibration,
+        }
         Ok(())
     }
 }
 
-impl MaglevDevice {
-    /// Begins a session, brings the handle home if that is wanted, and weighs it; a link that broke since (unplugged,
-    /// plugged in again) is opened anew.
-    fn take_off(&mut self, config: &LoopConfig) -> Result<(Status, f64), Refusal> {
-        let period_us = u32::try_from(config.period_ns / 1000).unwrap_or(u32::MAX);
-        let watchdog_us = self.options.watchdog_us;
-        let taken_off = match self.link.take_off(period_us, watchdog_us, PATIENCE) {
-            Err(Unanswered::Lost) => {
-                let (link, description) = connect(&self.options)?;
-                if description != self.description {
-                    let reason = "another controller answers than the one that was opened; start again";
-                    return Err(Refusal::resource(reason));
-                }
-                self.link = link;
-                self.link.take_off(period_us, watchdog_us, PATIENCE)
-            }
-            other => other,
-        };
-        let status = taken_off.map_err(|unanswered| refused(&self.options, unanswered))?;
-        self.stopped.store(false, Ordering::Release);
-        if self.options.take_off.is_zero() {
-            return Ok((status, 0.0));
+impl IndependentStopDevice for MaglevDevice {
+    fn independent_stop(&self) -> IndependentStop {
+        match &self.opened {
+            Opened::Own(device) => device.independent_stop(),
+            Opened::MlApi(device) => device.stop().independent(),
         }
-        let holder = self.holder(period_us);
-        let (status, found_n) =
-            holder.take_off(&mut self.link, status, self.options.take_off).map_err(|why| {
-                let _ = self.link.disarm(PATIENCE);
-                Refusal::resource(format!("homing failed: {why}; check that the handle is free to move"))
-            })?;
-        Ok((status, if self.options.defy_gravity { found_n } else { 0.0 }))
-    }
-
-    fn holder(&self, period_us: u32) -> Holder {
-        Holder {
-            period_us,
-            delay_s: f64::from(self.description.latency_us) * 1.0e-6,
-            lockstep: self.options.lockstep,
-        }
-    }
-}
-
-/// Opens the link and asks who is there.
-fn connect(options: &Options) -> Result<(HostLink, Description), Refusal> {
-    let transport = transport::open(options.kind, &options.address).map_err(Refusal::resource)?;
-    let mut link = HostLink::new(transport);
-    let description = link.describe(PATIENCE).map_err(|unanswered| refused(options, unanswered))?;
-    Ok((link, description))
-}
-
-fn refused(options: &Options, unanswered: Unanswered) -> Refusal {
-    let Options { kind, address, .. } = options;
-    let hint = match kind {
-        Kind::Tcp => "; `flotor emulate maglev` starts one without hardware",
-        Kind::Serial | Kind::Usb | Kind::Hid => "",
-    };
-    Refusal::resource(match unanswered {
-        Unanswered::Lost => {
-            format!("the controller at {address} closed the connection; does another program use it?")
-        }
-        Unanswered::Silent => format!("no controller of this device answers at {address}{hint}"),
-    })
-}
-
-fn axes(bits: u8) -> Axes {
-    let all = |mask| bits & mask == mask;
-    match (all(0b00_0111), all(0b11_1000)) {
-        (true, true) => Axes::ALL,
-        (true, false) => Axes::TRANSLATION,
-        (false, true) => Axes::ROTATION,
-        (false, false) => Axes::NONE,
     }
 }
 
@@ -228,165 +148,78 @@ impl ActiveDevice for LevitatingDevice {
     type Opened = MaglevDevice;
 
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
-        let heard = match self.look() {
-            Ok(heard) => heard,
-            Err(LinkLost) => return Cycle::Fault(Fault::Disconnected),
-        };
-        let status = heard.map(|heard| heard.status).or_else(|| self.first.take());
-        let Some(status) = status else {
-            #[allow(clippy::cast_possible_truncation)] // ten seconds at most
-            let timeout_ns = self.opened.options.timeout.as_nanos() as u64;
-            let silence_ns = tick.time_ns.saturating_sub(self.heard_ns);
-            *state = self.state;
-            return if silence_ns > timeout_ns { Cycle::Fault(Fault::Timeout) } else { Cycle::Stale };
-        };
-        self.heard_ns = tick.time_ns;
-        self.newest = status;
-        let Some(sample) = sample(&status) else { return Cycle::Fault(Fault::Protocol) };
-        let when = |is: bool, condition| if is { condition } else { Conditions::NONE };
-        let saturated = when(status.condition.contains(Condition::LIMITED), Conditions::SATURATED);
-        let excess = when(self.warning.is_active(), Conditions::EXCESS_FORCE);
-        self.state = DeviceState {
-            conditions: saturated.with(excess),
-            delivered: if status.mode == Mode::Levitating { self.commanded } else { Wrench::ZERO },
-            sampled_ns: tick.time_ns,
-            ..sample
-        };
-        *state = self.state;
-        match fault(&status) {
-            // Switched off because somebody asked for it: the pose is still worth having.
-            _ if self.is_stopped() => Cycle::Fresh,
-            Some(fault) => Cycle::Fault(fault),
-            None => Cycle::Fresh,
+        match &mut self.active {
+            Active::Own(device) => device.read(tick, state),
+            Active::MlApi(device) => device.read(tick, state),
         }
     }
 
     fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle {
-        let request = if self.is_stopped() {
-            // Whatever the next status still says: nothing is asked of the coils any more.
-            self.commanded = Wrench::ZERO;
-            self.state.delivered = Wrench::ZERO;
-            Request::Disarm
-        } else {
-            self.command(wrench)
-        };
-        #[allow(clippy::cast_possible_truncation)] // the clock on the wire wraps
-        match self.opened.link.send(request, (tick.time_ns / 1000) as u32) {
-            Ok(()) => {
-                self.awaited = Some(self.opened.link.sequence());
-                Cycle::Fresh
-            }
-            Err(LinkLost) => Cycle::Fault(Fault::Disconnected),
+        match &mut self.active {
+            Active::Own(device) => device.write(tick, wrench),
+            Active::MlApi(device) => device.write(wrench),
         }
     }
 
     fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
-        self.opened.values.set(index, value);
+        self.values.set(index, value);
         self.build_walls();
         Ok(())
     }
 
-    fn deactivate(mut self) -> MaglevDevice {
-        if !self.opened.options.landing.is_zero() && !self.is_stopped() && fault(&self.newest).is_none() {
-            let holder = self.opened.holder(u32::try_from(self.period_us).unwrap_or(u32::MAX));
-            // Whatever goes wrong: it is switched off next.
-            let _ =
-                holder.land(&mut self.opened.link, self.newest, self.opened.options.landing, self.weight_n);
+    fn deactivate(self) -> MaglevDevice {
+        let opened = match self.active {
+            Active::Own(device) => Opened::Own(device.deactivate()),
+            Active::MlApi(device) => Opened::MlApi(device.deactivate()),
+        };
+        MaglevDevice { options: self.options, values: self.values, opened }
+    }
+}
+
+impl PacingDevice for LevitatingDevice {
+    /// The ticks of the ML API set a pace; the controller of the other protocol answers commands, and has none of its own.
+    fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
+        match &mut self.active {
+            Active::Own(_) => SampleWait::NotPaced,
+            Active::MlApi(device) => device.wait_for_sample(timeout_ns),
         }
-        // Gone or silent: its own watchdog switches it off.
-        let _ = self.opened.link.disarm(PATIENCE);
-        self.opened
     }
 }
 
 impl LevitatingDevice {
-    /// Answers of the controller that were not used, by reason.
+    /// Answers of the controller that were not used, by reason; the ML API has none.
     #[must_use]
-    pub fn rejections(&self) -> &Rejections {
-        self.opened.link.rejections()
-    }
-
-    fn is_stopped(&self) -> bool {
-        self.opened.stopped.load(Ordering::Acquire)
-    }
-
-    fn build_walls(&mut self) {
-        let delay_s = f64::from(self.opened.description.latency_us) * 1.0e-6;
-        self.walls = self.opened.values.walls().map(|walls| walls.stabilised(self.period_s, delay_s));
-    }
-
-    /// The newest status, if there is one; in lockstep, the one that answers the last command.
-    fn look(&mut self) -> Result<Option<Heard>, LinkLost> {
-        let awaited = self.awaited.take().filter(|_| self.opened.options.lockstep);
-        match awaited {
-            Some(awaited) => self.opened.link.wait_for(awaited, LOCKSTEP_PATIENCE),
-            None => self.opened.link.take(),
+    pub fn rejections(&self) -> Option<&Rejections> {
+        match &self.active {
+            Active::Own(device) => Some(device.rejections()),
+            Active::MlApi(_) => None,
         }
     }
 
-    /// The command for a wrench: walls added, total vertical force corrected.
-    fn command(&mut self, wrench: &Wrench) -> Request {
-        let wrench = if wrench.is_finite() { *wrench } else { Wrench::ZERO };
-        let walls = self.walls.as_ref().map_or(Wrench::ZERO, |walls| walls.wrench(&self.state));
-        self.commanded = wrench + walls;
-        let force_n = self.commanded.force();
-        self.warning.look(force_n);
-        let (own_n, height_m) = (self.opened.options.feedforward_n, self.state.pose.position().z);
-        let total_n = force_n.z + self.weight_n + own_n;
-        let z = self.opened.calibration.command_n(total_n, height_m) - own_n;
-        let ([fx, fy, _], [tx, ty, tz]) = (force_n.to_array(), self.commanded.torque_nm);
-        #[allow(clippy::cast_possible_truncation)] // f32 is what the wire has
-        let wrench = [fx, fy, z, tx, ty, tz].map(|value| value as f32);
-        let valid_us = u16::try_from(VALID_PERIODS * self.period_us).unwrap_or(u16::MAX);
-        Request::Command { wrench, valid_us }
+    /// Ticks of the controller that were older than the one that was used; nothing where there are no ticks.
+    #[must_use]
+    pub fn dropped_ticks(&self) -> Option<u64> {
+        match &self.active {
+            Active::Own(_) => None,
+            Active::MlApi(device) => Some(device.dropped_ticks()),
+        }
+    }
+
+    fn shaping(&mut self) -> &mut Shaping {
+        match &mut self.active {
+            Active::Own(device) => &mut device.shaping,
+            Active::MlApi(device) => &mut device.shaping,
+        }
+    }
+
+    fn build_walls(&mut self) {
+        let delay_s = match &self.active {
+            Active::Own(device) => device.latency_s(),
+            Active::MlApi(_) => MlDevice::latency_s(self.options.lockstep),
+        };
+        let walls = self.values.walls().map(|walls| walls.stabilised(self.period_s, delay_s));
+        self.shaping().walls = walls;
     }
 }
 
-/// Pose and velocity of a status; nothing if its rotation is none.
-fn sample(status: &Status) -> Option<DeviceState> {
-    let vector = DVec3::from_array(status.rotation_xyz.map(f64::from));
-    let rest = 1.0 - vector.length_squared();
-    if rest < -LENGTH_TOLERANCE {
-        return None;
-    }
-    let orientation = DQuat::from_xyzw(vector.x, vector.y, vector.z, rest.max(0.0).sqrt()).normalize();
-    let scaled = |steps: [i16; 3], step: f64| DVec3::from_array(steps.map(f64::from)) * step;
-    Some(DeviceState {
-        pose: Pose::new(DVec3::from_array(status.position_m.map(f64::from)), orientation),
-        twist: Twist::new(
-            scaled(status.velocity_steps, Status::VELOCITY_STEP_M_PER_S),
-            scaled(status.spin_steps, Status::SPIN_STEP_RAD_PER_S),
-        ),
-        ..DeviceState::HOME
-    })
-}
-
-/// What a status means to the host: anything but obeying is a fault.
-fn fault(status: &Status) -> Option<Fault> {
-    if status.mode == Mode::Levitating {
-        return None;
-    }
-    const FAULTS: [(Condition, Fault); 7] = [
-        (Condition::SENSOR_RANGE, Fault::SensorOutOfRange),
-        (Condition::EDGE, Fault::SensorOutOfRange),
-        (Condition::OVERLOAD, Fault::OverCurrent),
-        (Condition::OVER_TEMPERATURE, Fault::OverTemperature),
-        (Condition::OVER_SPEED, Fault::OverSpeed),
-        (Condition::WATCHDOG, Fault::Timeout),
-        (Condition::LINK_LOST, Fault::Disconnected),
-    ];
-    let found = FAULTS.iter().find(|(condition, _)| status.condition.contains(*condition));
-    // Disarmed by somebody else, and nothing is wrong.
-    Some(found.map_or(Fault::Protocol, |(_, fault)| *fault))
-}
-
-impl IndependentStopDevice for MaglevDevice {
-    /// The controller obeys a command for three periods and then only damps; after its watchdog it lands. A message from
-    /// elsewhere would not be heard: a frame bears the session, which begins with activation, and a sequence number.
-    fn independent_stop(&self) -> IndependentStop {
-        let watchdog_us = self.options.watchdog_us.min(self.description.longest_watchdog_us);
-        IndependentStop::by_itself(StoppedState::Landed, u64::from(watchdog_us) * 1000)
-    }
-}
-
-export_device!(MaglevDevice, calibration, independent_stop);
+export_device!(MaglevDevice, calibration, pacing, independent_stop);

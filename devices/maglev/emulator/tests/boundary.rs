@@ -110,7 +110,7 @@ fn push(walls: &Walls, outward: DVec3, push_n: f64, run_up_m: f64, delay_ticks: 
         let (pose, twist) = (Pose::new(sensed, DQuat::IDENTITY), Twist::new(v, DVec3::ZERO));
         under_way.push_back(walls.wrench(&DeviceState { pose, twist, ..DeviceState::HOME }));
         let command = under_way.pop_front().expect("one was just pushed");
-        let sample = Sample { pose, twist, in_range: sensed.length() <= EDGE_M, too_hot: false };
+        let sample = Sample { pose, twist, in_range: sensed.length() <= EDGE_M, ..Sample::HOME };
         let driven = device.cycle(&command, &sample);
         assert!(driven.is_finite());
         assert!(driven.force().abs().cmple(DVec3::new(55.0, 55.0, 140.0)).all(), "{driven:?}");

@@ -122,7 +122,7 @@ impl std::fmt::Display for OpenError {
             Self::Missing { address, cause } => {
                 write!(
                     f,
-                    "no controller at {address} ({cause}); is it connected and on? `address` says where it is"
+                    "no controller at {address} ({cause}); is it connected and switched on? The parameter `address` must be its address"
                 )
             }
             Self::Busy { address } => {

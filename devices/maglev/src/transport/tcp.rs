@@ -6,6 +6,8 @@ use std::io::ErrorKind;
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
+/// Where a controller of Flotor's own protocol listens; 5678 is the ML API's.
+pub const PORT: u16 = 5679;
 /// How long a connection may take to come about.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 
@@ -14,16 +16,23 @@ const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 /// # Errors
 /// [`OpenError`].
 pub fn connect(address: &str) -> Result<StreamLink<TcpStream>, OpenError> {
+    open(address).map(StreamLink::new)
+}
+
+/// A connection to `host:port` that neither waits nor collects small frames to large ones. Not real-time.
+///
+/// # Errors
+/// [`OpenError`].
+pub fn open(address: &str) -> Result<TcpStream, OpenError> {
     let wrong =
-        || OpenError::Address { address: address.to_owned(), expected: "host:port, like 127.0.0.1:5678" };
+        || OpenError::Address { address: address.to_owned(), expected: "host:port, like 127.0.0.1:5679" };
     let found = address.to_socket_addrs().map_err(|error| match (error.kind(), address.rsplit_once(':')) {
         (ErrorKind::InvalidInput, _) | (_, None) => wrong(),
         (_, Some((host, _))) => OpenError::UnknownHost { host: host.to_owned() },
     });
     let target = found?.next().ok_or_else(wrong)?;
     let stream = TcpStream::connect_timeout(&target, CONNECT_TIMEOUT);
-    let stream = stream.and_then(|stream| prepared(stream).map(StreamLink::new));
-    stream.map_err(|error| match error.kind() {
+    stream.and_then(prepared).map_err(|error| match error.kind() {
         ErrorKind::PermissionDenied => OpenError::Forbidden {
             address: address.to_owned(),
             remedy: "a firewall or sandbox forbids the connection".to_owned(),
@@ -57,7 +66,7 @@ mod tests {
         );
         for malformed in ["here", "127.0.0.1:port", ""] {
             assert!(
-                told(malformed).ends_with("is not host:port, like 127.0.0.1:5678"),
+                told(malformed).ends_with("is not host:port, like 127.0.0.1:5679"),
                 "{}",
                 told(malformed)
             );

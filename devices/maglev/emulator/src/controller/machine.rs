@@ -34,11 +34,14 @@ pub struct Sample {
     pub in_range: bool,
     /// True if a coil is too hot.
     pub too_hot: bool,
+    /// Buttons, one bit each.
+    pub buttons: u32,
 }
 
 impl Sample {
     /// At home, at rest.
-    pub const HOME: Self = Self { pose: Pose::HOME, twist: Twist::ZERO, in_range: true, too_hot: false };
+    pub const HOME: Self =
+        Self { pose: Pose::HOME, twist: Twist::ZERO, in_range: true, too_hot: false, buttons: 0 };
 }
 
 /// What is to be answered.

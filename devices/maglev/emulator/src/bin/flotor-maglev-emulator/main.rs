@@ -1,8 +1,11 @@
 //! The controller of the magnetic-levitation device without the device: its firmware and protocol on a real link,
 //! over the simulated flotor. `flotor emulate maglev` starts it.
 
+mod ml_api;
 mod plant;
+mod proxy;
 mod rig;
+mod stator;
 #[cfg(target_os = "linux")]
 mod usb;
 
@@ -10,7 +13,7 @@ use clap::{Parser, ValueEnum};
 use flotor_hal::Refusal;
 use flotor_hal::abi::loader::{LoadError, Setting};
 use flotor_maglev::transport::stream::StreamLink;
-use flotor_maglev::transport::tcp::prepared;
+use flotor_maglev::transport::tcp::{self, prepared};
 #[cfg(target_os = "linux")]
 use flotor_maglev_emulator::gadget::Personality;
 use flotor_maglev_emulator::{Emulator, Event, Pace, controller_config};
@@ -27,17 +30,21 @@ use std::sync::atomic::AtomicBool;
 #[command(name = "flotor emulate maglev", version, max_term_width = 110)]
 #[command(after_help = "The first line on standard output says where to connect.\n\nExamples:\n  \
     flotor emulate maglev\n  \
+    flotor emulate maglev --protocol ml-api\n  \
     flotor emulate maglev --transport pty --link /tmp/flotor-tty\n  \
     sudo modprobe vhci_hcd && sudo flotor emulate maglev --transport usb\n  \
     flotor emulate maglev --pace lockstep --set preset=full --set hand=press --once\n  \
     flotor emulate maglev --calibration-rig /tmp/flotor-force")]
 struct Arguments {
+    /// What it speaks
+    #[arg(long, value_enum, default_value = "flotor")]
+    protocol: ProtocolOption,
     /// What the host connects by
     #[arg(long, value_enum, default_value = "tcp")]
     transport: TransportOption,
-    /// Tcp: where to listen (port 0: any free one)
-    #[arg(long, default_value = "127.0.0.1:5678", value_name = "HOST:PORT")]
-    listen: String,
+    /// Tcp: where to listen (port 0: any free one; default 127.0.0.1, port 5679, with the ML API 5678)
+    #[arg(long, value_name = "HOST:PORT")]
+    listen: Option<String>,
     /// Pty: a name for the terminal, as a symbolic link
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
@@ -69,6 +76,16 @@ struct Arguments {
     /// End when the first host is gone
     #[arg(long)]
     once: bool,
+    #[command(flatten)]
+    ml_api: ml_api::MlApiArguments,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ProtocolOption {
+    /// Flotor's own protocol, on every transport
+    Flotor,
+    /// The ML API 1.5b of the Maglev 200, on TCP: for every program written for that device
+    MlApi,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -111,6 +128,9 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    if let Some(device) = &arguments.ml_api.device {
+        return proxy::become_host(device, arguments);
+    }
     let pace = match arguments.pace {
         PaceOption::Real => Pace::RealTime,
         PaceOption::Lockstep => Pace::Lockstep,
@@ -121,6 +141,15 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
             .map_err(|error| Refusal::parameter(format!("--set {key}={value}: {error}")))
     };
     let mut settings = Vec::new();
+    let defaults = match arguments.protocol {
+        ProtocolOption::MlApi if arguments.calibration_rig.is_none() => arguments.ml_api.plant_defaults(),
+        ProtocolOption::MlApi | ProtocolOption::Flotor => &[],
+    };
+    let is_set =
+        |key: &str| arguments.sets.iter().any(|text| text.split('=').next().map(str::trim) == Some(key));
+    for (key, value) in defaults.iter().filter(|(key, _)| !is_set(key)) {
+        settings.push(parse(key, value)?);
+    }
     if let Some(link) = &arguments.calibration_rig {
         for (key, value) in rig::settings(link, arguments.rig_step_mm, arguments.rig_stop_s)? {
             settings.push(parse(key, &value)?);
@@ -138,6 +167,9 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         let port = rig::serve(link, force.clone())?;
         plant.sense(force)?;
         say(&format!("force-sensor {}", port.display()));
+    }
+    if arguments.protocol == ProtocolOption::MlApi {
+        return ml_api::serve(plant, pace, arguments);
     }
     let config = controller_config(&capabilities, pace, &arguments.serial);
     let mut emulator = Emulator::new(config, pace, plant);
@@ -168,7 +200,7 @@ fn within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> 
     if (least..=most).contains(&number) {
         Ok(number)
     } else {
-        Err(format!("legal is {least} to {most} {unit}"))
+        Err(format!("must be {least} to {most} {unit}"))
     }
 }
 
@@ -180,11 +212,17 @@ fn link_to(target: &Path, link: &Path) -> Result<(), Box<dyn Error>> {
     std::os::unix::fs::symlink(target, link).map_err(|error| format!("{}: {error}", link.display()).into())
 }
 
-fn serve_tcp(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    let listener = TcpListener::bind(&arguments.listen).map_err(|error| {
-        format!("cannot listen at {}: {error}; --listen 127.0.0.1:0 takes any", arguments.listen)
-    })?;
+/// Listens where it is said, or at this port of this machine, and says where.
+fn listen(arguments: &Arguments, port: u16) -> Result<TcpListener, Box<dyn Error>> {
+    let at = arguments.listen.clone().unwrap_or_else(|| format!("127.0.0.1:{port}"));
+    let listener = TcpListener::bind(&at)
+        .map_err(|error| format!("cannot listen at {at}: {error}; --listen 127.0.0.1:0 takes any"))?;
     say(&format!("listening tcp {}", listener.local_addr()?));
+    Ok(listener)
+}
+
+fn serve_tcp(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    let listener = listen(arguments, tcp::PORT)?;
     loop {
         let (stream, from) = listener.accept()?;
         say(&format!("connected {from}"));

@@ -119,6 +119,7 @@ impl Plant for LoadedPlant {
             twist: self.state.twist,
             in_range: matches!(fault, None | Some(Fault::OverTemperature)),
             too_hot: fault == Some(Fault::OverTemperature),
+            buttons: self.state.buttons,
         }
     }
 

@@ -1,0 +1,311 @@
+//! Requests: what is looked up, what is changed, what begins.
+
+use super::machine::{Command, Controller, Flight, narrow, vector};
+use super::procedure::Ticket;
+use flotor_maglev::ml_api::{
+    Axis, AxisMode, Cell, Function, GainSet, Pid, Reply, Request, Results, Six, Status, Version, WirePose,
+};
+
+/// What the controller calls itself.
+const VERSION: &[u8] = b"1.5b-flotor";
+/// Slowest and fastest servo rate, Hz.
+const SERVO_HZ: [f32; 2] = [100.0, 10_000.0];
+/// Largest voltage of the spare output.
+const AUX_LIMIT_V: f32 = 10.0;
+/// Reach of a cell, m.
+const CELL_LIMIT_M: f32 = 9.0e-3;
+
+/// What comes of a request.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Answer {
+    /// This, at once.
+    Now(Reply),
+    /// The reply of a procedure, when it is over.
+    When(Ticket),
+}
+
+impl Controller {
+    /// Obeys a request. What concerns connections (disconnecting, callbacks) is the server's and only confirmed here.
+    pub fn answer(&mut self, request: &Request) -> Answer {
+        match *request {
+            Request::Plain(Function::FindGravity) => self.find_gravity(),
+            Request::Plain(Function::Land) => self.land_for_a_client(),
+            Request::Plain(Function::Takeoff) => self.take_off_for_a_client(),
+            Request::OfSet(Function::ResetGainVecAxes, set) => Answer::When(self.begin_reset(set)),
+            Request::Plain(function) => Answer::Now(match self.look_up(function) {
+                Some(results) => Reply::ok(results),
+                None => Reply::status(self.act(function)),
+            }),
+            Request::OfAxis(Function::GetForceAxis, axis) => {
+                Answer::Now(Reply::ok(Results::Number(self.forces()[axis as usize])))
+            }
+            Request::OfSet(_, set) => Answer::Now(Reply::ok(Results::Gains(*self.gains.set(set)))),
+            Request::GetGainVecAxis(set, axis) => {
+                Answer::Now(Reply::ok(Results::Pid(self.gains.of(set, axis))))
+            }
+            Request::GetGainVecSingle(set, axis, gain) => {
+                Answer::Now(Reply::ok(Results::Number(self.gains.one(set, axis, gain))))
+            }
+            _ => Answer::Now(Reply::status(self.set(request))),
+        }
+    }
+
+    fn refused(function: Function, status: Status) -> Answer {
+        Answer::Now(Reply::failed(Some(function), status))
+    }
+
+    fn take_off_for_a_client(&mut self) -> Answer {
+        match self.flight {
+            _ if !self.faults.is_empty() => Self::refused(Function::Takeoff, self.cause_status()),
+            // From wherever it is: also on its way down.
+            Flight::Landed | Flight::Landing => Answer::When(self.begin_take_off()),
+            Flight::TakingOff | Flight::Flying => Self::refused(Function::Takeoff, Status::TAKEN_OFF),
+        }
+    }
+
+    fn land_for_a_client(&mut self) -> Answer {
+        match self.flight {
+            Flight::Landed => Self::refused(Function::Land, Status::LANDED),
+            // A second one waits with the first.
+            Flight::Landing => Answer::When(self.last_ticket),
+            Flight::TakingOff | Flight::Flying => Answer::When(self.begin_landing()),
+        }
+    }
+
+    fn find_gravity(&mut self) -> Answer {
+        match self.flight {
+            Flight::Flying => {
+                self.command = Command::Position;
+                Answer::When(self.begin_search())
+            }
+            _ => Self::refused(Function::FindGravity, Status::LANDED),
+        }
+    }
+
+    /// The wrench in force, as the wire has it.
+    fn forces(&self) -> Six {
+        let applied = self.applied();
+        narrow(applied.force(), applied.torque())
+    }
+
+    fn look_up(&self, function: Function) -> Option<Results> {
+        let desired = WirePose { out_of_range: false, at: self.desired_told() };
+        Some(match function {
+            Function::GetActualPosition => Results::Pose(self.pose()),
+            Function::GetAxisModes => Results::Modes(self.modes),
+            Function::GetBoundaryRadius => Results::Number(self.boundary_radius_m),
+            Function::GetButtonStatus => Results::Buttons(self.buttons()),
+            Function::GetCellPosition if self.pose().out_of_range => Results::Cells([Cell::default(); 3]),
+            Function::GetCellPosition => Results::Cells(self.coils.cells(&self.sample.pose)),
+            Function::GetCurrentLimits => Results::Six(self.coils.limits_a),
+            Function::GetCurrents => Results::Six(self.currents_a()),
+            Function::GetDesiredPosition => Results::Pose(desired),
+            Function::GetFault => Results::Fault(self.faults),
+            Function::GetForces => Results::Six(self.forces()),
+            Function::GetFrame => Results::Pose(WirePose { out_of_range: false, at: self.frame }),
+            Function::GetGainVecGrasp => Results::Pid(self.grasp.gains),
+            Function::GetGraspCurrent => Results::Number(self.grasp.current_a),
+            Function::GetGraspCurrentLimit => Results::Number(self.grasp.limit_a),
+            Function::GetGravity => Results::Six(self.gravity),
+            Function::GetLatCellLimit => Results::Number(CELL_LIMIT_M),
+            Function::GetLatCellOffset => Results::CellOffsets(self.cell_offsets),
+            Function::GetRawCellData => Results::Voltages(self.coils.voltages(&self.sample.pose)),
+            Function::GetServoFrequency => Results::Number(self.servo_hz),
+            Function::GetSpeedLimits => Results::Six(self.speed_limits),
+            Function::GetTemp => Results::Six(self.temperatures_c()),
+            Function::GetVelocity => Results::Six(self.velocity()),
+            Function::GetVersion => Results::Version(Version::new(VERSION)),
+            _ => return None,
+        })
+    }
+
+    #[allow(clippy::cast_possible_truncation)] // f32 is what the wire has
+    fn currents_a(&self) -> Six {
+        match self.command {
+            Command::Currents(currents_a) if self.faults.is_empty() => currents_a,
+            _ => self.coils.driven(&self.wanted()).0.map(|current| current as f32),
+        }
+    }
+
+    /// The desired position, within the ranges of constrained axes.
+    fn desired_told(&self) -> Six {
+        let mut told = self.desired_told;
+        for axis in Axis::ALL {
+            let [least, most] = self.ranges[axis as usize];
+            if self.modes[axis as usize] == AxisMode::Constrained {
+                told[axis as usize] = told[axis as usize].max(least).min(most);
+            }
+        }
+        told
+    }
+
+    /// What has neither arguments nor results.
+    fn act(&mut self, function: Function) -> Status {
+        match function {
+            Function::DefyGravity => {
+                let carried = Axis::ALL.map(|axis| {
+                    let ff = self.gravity[axis as usize];
+                    (axis, Pid { ff, ..self.gains.of(GainSet::Normal, axis) })
+                });
+                self.gains.take(GainSet::Normal, &carried)
+            }
+            Function::ResetFault => {
+                let left = self.causes();
+                if left != self.faults {
+                    self.set_faults(left);
+                }
+                if left.is_empty() { Status::OK } else { self.cause_status() }
+            }
+            Function::Shutdown => {
+                self.end_procedure(Status::OFF_LINE);
+                let mut anew = Self::new(self.config);
+                // Calls that wait for a procedure still get their reply.
+                (anew.finished, anew.last_ticket) = (std::mem::take(&mut self.finished), self.last_ticket);
+                anew.injected = self.injected;
+                anew.observe(&self.sample);
+                *self = anew;
+                Status::OK
+            }
+            _ => Status::OK,
+        }
+    }
+
+    fn set(&mut self, request: &Request) -> Status {
+        let moves = matches!(
+            request.function(),
+            Function::SetCurrents
+                | Function::SetDesiredPosition
+                | Function::SetForceAxis
+                | Function::SetForces
+                | Function::SetVelocity
+        );
+        let drives =
+            moves && !matches!(request.function(), Function::SetDesiredPosition | Function::SetVelocity);
+        match self.flight {
+            Flight::TakingOff | Flight::Landing if moves => return Status::OFF_LINE,
+            // A program that goes on commanding after it has landed does not lift the flotor with bare forces.
+            Flight::Landed if drives => return Status::LANDED,
+            _ => {}
+        }
+        match *request {
+            Request::ConstrainAxis { axis, range: range @ [least, most] } => {
+                if !(least.is_finite() && most.is_finite() && least <= most) {
+                    return Status::POSITION;
+                }
+                self.ranges[axis as usize] = range;
+                self.modes[axis as usize] = AxisMode::Constrained;
+                Status::OK
+            }
+            Request::OfAxis(Function::LockAxis, axis) => {
+                self.locked_at[axis as usize] = self.at[axis as usize];
+                self.modes[axis as usize] = AxisMode::Locked;
+                Status::OK
+            }
+            Request::OfAxis(_, axis) => {
+                self.modes[axis as usize] = AxisMode::Normal;
+                Status::OK
+            }
+            Request::Number(function, value) => self.set_number(function, value),
+            Request::Six(function, values) => self.set_six(function, values),
+            Request::Pose(function, pose) => self.set_pose(function, pose),
+            Request::SetForceAxis(axis, force) => {
+                let mut forces = match self.command {
+                    Command::Forces(forces) => forces,
+                    _ => [0.0; 6],
+                };
+                forces[axis as usize] = force;
+                self.set_six(Function::SetForces, forces)
+            }
+            Request::SetGainVecAxes(set, gains) => {
+                self.gains.take(set, &Axis::ALL.map(|axis| (axis, gains[axis as usize])))
+            }
+            Request::SetGainVecAxis(set, axis, pid) => self.gains.take(set, &[(axis, pid)]),
+            Request::SetGainVecSingle(set, axis, gain, value) => {
+                let mut pid = self.gains.of(set, axis);
+                *pid.gain_mut(gain) = value;
+                self.gains.take(set, &[(axis, pid)])
+            }
+            Request::SetGainVecGrasp(pid) => {
+                self.grasp.gains = pid;
+                Status::OK
+            }
+            Request::SetLatCellOffset(offsets) => {
+                self.cell_offsets = offsets;
+                Status::OK
+            }
+            // Of the server.
+            _ => Status::OK,
+        }
+    }
+
+    fn set_number(&mut self, function: Function, value: f32) -> Status {
+        match function {
+            Function::SetAuxDac if value.is_finite() => {
+                self.aux_v = value.clamp(-AUX_LIMIT_V, AUX_LIMIT_V);
+            }
+            Function::SetBoundaryRadius if value.is_finite() && value >= 0.0 => {
+                self.boundary_radius_m = value;
+            }
+            Function::SetBoundaryRadius => return Status::POSITION,
+            Function::SetServoFrequency if (SERVO_HZ[0]..=SERVO_HZ[1]).contains(&value) => {
+                self.servo_hz = value;
+            }
+            Function::SetServoFrequency => return Status::FREQUENCY,
+            Function::SetGraspCurrent if value.is_finite() => self.grasp.current_a = value,
+            Function::SetGraspCurrentLimit if value.is_finite() => self.grasp.limit_a = value,
+            _ => return Status::CURRENT,
+        }
+        Status::OK
+    }
+
+    fn set_six(&mut self, function: Function, values: Six) -> Status {
+        let is_finite = values.iter().all(|value| value.is_finite());
+        match function {
+            Function::SetForces if is_finite => self.command = Command::Forces(values),
+            Function::SetForces => return Status::FORCE,
+            Function::SetCurrents if is_finite => {
+                let (within, clipped) = self.coils.clipped(&values);
+                self.command = Command::Currents(within);
+                return if clipped { Status::CURRENT } else { Status::OK };
+            }
+            Function::SetCurrentLimits if is_finite && values.iter().all(|value| *value >= 0.0) => {
+                self.coils.limits_a = values;
+            }
+            Function::SetCurrentLimits | Function::SetCurrents => return Status::CURRENT,
+            Function::SetGravity if is_finite => self.gravity = values,
+            Function::SetGravity => return Status::FORCE,
+            Function::SetSpeedLimits if is_finite && values.iter().all(|value| *value >= 0.0) => {
+                self.speed_limits = values;
+            }
+            Function::SetSpeedLimits => return Status::SPEED,
+            Function::SetVelocity if is_finite => {
+                self.desired = self.at_target();
+                self.command = Command::Velocity(values);
+            }
+            _ => return Status::SPEED,
+        }
+        Status::OK
+    }
+
+    /// Where the flotor is sent from when it is told a velocity: its target while it follows one, else where it is.
+    fn at_target(&self) -> [f64; 6] {
+        match self.command {
+            Command::Position | Command::Velocity(_) => self.desired,
+            Command::Forces(_) | Command::Currents(_) => self.at,
+        }
+    }
+
+    fn set_pose(&mut self, function: Function, pose: WirePose) -> Status {
+        if !pose.at.iter().all(|value| value.is_finite()) {
+            return Status::POSITION;
+        }
+        if function == Function::SetFrame {
+            self.frame = pose.at;
+        } else {
+            self.desired = pose.at.map(f64::from);
+            self.desired_told = narrow(vector(&self.desired, 0), vector(&self.desired, 3));
+            self.command = Command::Position;
+        }
+        Status::OK
+    }
+}

@@ -1,0 +1,400 @@
+//! The state of the machine, its cycle, and the law that makes the wrench.
+
+use super::coils::CoilSet;
+use super::gains::Gains;
+use super::procedure::{Procedure, Ticket};
+use crate::controller::Sample;
+use flotor_hal::{DVec3, Wrench};
+use flotor_maglev::ml_api::{
+    Axis, AxisMode, Buttons, CellOffset, Event, FaultBits, Pid, Reply, Six, Status, angles,
+};
+
+/// What a force command does to the gains.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ForceCommand {
+    /// It takes their place.
+    Replaces,
+    /// It comes on top of them.
+    Adds,
+}
+
+/// What becomes of a flotor in the air whose client is gone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Silence {
+    /// It lands.
+    Lands,
+    /// It stays where it is.
+    Ignored,
+}
+
+/// Who may command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Commanders {
+    /// The first client that does, until it is gone; the others are told so.
+    One,
+    /// Everybody.
+    All,
+}
+
+/// What a controller is made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ControllerConfig {
+    /// What a force command does to the gains.
+    pub force_command: ForceCommand,
+    /// What becomes of a flotor whose client is gone.
+    pub silence: Silence,
+    /// Who may command.
+    pub commanders: Commanders,
+    /// Longest time a force stays without an acknowledged tick while ticks are wanted, s.
+    pub watchdog_s: f64,
+    /// Height of a flotor on its stator, m: where landing ends.
+    pub floor_m: f64,
+}
+
+impl ControllerConfig {
+    /// Bypass, landing, one commander, half a second, and a floor 9.5 mm below home.
+    pub const DEFAULT: Self = Self {
+        force_command: ForceCommand::Replaces,
+        silence: Silence::Lands,
+        commanders: Commanders::One,
+        watchdog_s: 0.5,
+        floor_m: -9.5e-3,
+    };
+}
+
+/// What the flotor does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flight {
+    /// It lies on the stator, the gains give no force.
+    Landed,
+    /// It is being lifted.
+    TakingOff,
+    /// It is in the air.
+    Flying,
+    /// It is being let down.
+    Landing,
+}
+
+/// What the last command was: position, velocity, force and current exclude one another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Command {
+    Position,
+    Velocity(Six),
+    Forces(Six),
+    Currents(Six),
+}
+
+/// A fault that is made on purpose.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Injected(pub FaultBits);
+
+/// Replies and events that have room before anybody takes them.
+pub(super) const KEPT: usize = 64;
+
+/// Boundary sphere and constraints crossed: -1, 0, 1 for each axis, then 1 outside the sphere.
+type Sides = [i32; 7];
+
+/// The controller.
+#[derive(Clone, Debug)]
+pub struct Controller {
+    pub(super) config: ControllerConfig,
+    pub(super) gains: Gains,
+    pub(super) coils: CoilSet,
+    pub(super) flight: Flight,
+    pub(super) procedure: Option<(Ticket, Procedure)>,
+    pub(super) finished: Vec<(Ticket, Reply)>,
+    pub(super) last_ticket: Ticket,
+    pub(super) command: Command,
+    pub(super) modes: [AxisMode; 6],
+    pub(super) locked_at: [f64; 6],
+    pub(super) ranges: [[f32; 2]; 6],
+    pub(super) desired: [f64; 6],
+    pub(super) desired_told: Six,
+    pub(super) integral: [f64; 6],
+    /// What finding gravity adds, N and N·m.
+    pub(super) trim: [f64; 6],
+    /// Gains while landing, and the share of them that is left.
+    pub(super) landing: ([Pid; 6], f64),
+    pub(super) faults: FaultBits,
+    pub(super) injected: Injected,
+    pub(super) sample: Sample,
+    /// Position and angles, default frame.
+    pub(super) at: [f64; 6],
+    pub(super) speed: [f64; 6],
+    pub(super) frame: Six,
+    pub(super) gravity: Six,
+    pub(super) boundary_radius_m: f32,
+    pub(super) speed_limits: Six,
+    pub(super) servo_hz: f32,
+    pub(super) cell_offsets: [CellOffset; 3],
+    pub(super) grasp: Grasp,
+    pub(super) aux_v: f32,
+    sides: Sides,
+    buttons: Buttons,
+    was_too_hot: bool,
+    pub(super) events: Vec<Event>,
+}
+
+/// What is kept of a grasp that the machine does not have.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Grasp {
+    pub(super) gains: Pid,
+    pub(super) current_a: f32,
+    pub(super) limit_a: f32,
+}
+
+impl Controller {
+    /// A controller whose flotor lies on the stator.
+    #[must_use]
+    pub fn new(config: ControllerConfig) -> Self {
+        Self {
+            config,
+            gains: Gains::default(),
+            coils: CoilSet::default(),
+            flight: Flight::Landed,
+            procedure: None,
+            finished: Vec::with_capacity(KEPT),
+            last_ticket: Ticket::default(),
+            command: Command::Position,
+            modes: [AxisMode::Normal; 6],
+            locked_at: [0.0; 6],
+            ranges: [[0.0; 2]; 6],
+            desired: [0.0; 6],
+            desired_told: [0.0; 6],
+            integral: [0.0; 6],
+            trim: [0.0; 6],
+            landing: ([Pid::ZERO; 6], 0.0),
+            faults: FaultBits::NONE,
+            injected: Injected::default(),
+            sample: Sample::HOME,
+            at: [0.0; 6],
+            speed: [0.0; 6],
+            frame: [0.0; 6],
+            gravity: [0.0; 6],
+            boundary_radius_m: 0.012,
+            speed_limits: [2.0, 2.0, 2.0, 20.0, 20.0, 20.0],
+            servo_hz: 1000.0,
+            cell_offsets: [CellOffset::default(); 3],
+            grasp: Grasp::default(),
+            aux_v: 0.0,
+            sides: [0; 7],
+            buttons: Buttons::default(),
+            was_too_hot: false,
+            events: Vec::with_capacity(KEPT),
+        }
+    }
+
+    /// What it does.
+    #[must_use]
+    pub fn config(&self) -> &ControllerConfig {
+        &self.config
+    }
+
+    /// What the flotor does.
+    #[must_use]
+    pub fn flight(&self) -> Flight {
+        self.flight
+    }
+
+    /// What is wrong.
+    #[must_use]
+    pub fn faults(&self) -> FaultBits {
+        self.faults
+    }
+
+    /// Servo rate, Hz.
+    #[must_use]
+    pub fn servo_hz(&self) -> f64 {
+        f64::from(self.servo_hz)
+    }
+
+    /// True while a procedure is in progress.
+    #[must_use]
+    pub fn is_busy(&self) -> bool {
+        self.procedure.is_some()
+    }
+
+    /// True while the flotor is held by a force that a client has to keep up.
+    #[must_use]
+    pub fn is_driven_by_forces(&self) -> bool {
+        self.flight == Flight::Flying && matches!(self.command, Command::Forces(_) | Command::Currents(_))
+    }
+
+    /// Makes faults on purpose; nothing ends it.
+    pub fn inject(&mut self, injected: Injected) {
+        self.injected = injected;
+    }
+
+    /// What happened since the last call.
+    pub fn take_events(&mut self) -> impl Iterator<Item = Event> + '_ {
+        self.events.drain(..)
+    }
+
+    /// The pose as clients see it, in their frame.
+    #[must_use]
+    pub fn pose(&self) -> flotor_maglev::ml_api::WirePose {
+        let out_of_range = !self.is_in_range();
+        let user = angles::orientation(three(&self.frame, 3));
+        let position = user * vector(&self.at, 0) - three(&self.frame, 0);
+        let turn = angles::angles(user * angles::orientation(vector(&self.at, 3)));
+        flotor_maglev::ml_api::WirePose { out_of_range, at: narrow(position, turn) }
+    }
+
+    /// Velocity in the clients' frame.
+    pub(super) fn velocity(&self) -> Six {
+        let user = angles::orientation(three(&self.frame, 3));
+        narrow(user * vector(&self.speed, 0), user * vector(&self.speed, 3))
+    }
+
+    /// Begins a servo interval of this length, s: takes the sample it starts with and carries procedures on.
+    pub fn sense(&mut self, sample: &Sample, dt_s: f64) {
+        self.observe(sample);
+        self.watch();
+        self.advance(dt_s);
+    }
+
+    /// The wrench over the interval, s: what the newest command asks for, within the limits of the coils.
+    pub fn drive(&mut self, dt_s: f64) -> Wrench {
+        let wanted = self.wanted();
+        if self.flight == Flight::Flying {
+            for axis in Axis::ALL {
+                let off = self.target(axis) - self.at[axis as usize];
+                self.integral[axis as usize] += off * dt_s;
+            }
+        }
+        let (currents_a, driven) = self.coils.driven(&wanted);
+        self.coils.carry(&currents_a, dt_s);
+        driven
+    }
+
+    /// Takes a sample without acting on it: before time begins.
+    pub fn observe(&mut self, sample: &Sample) {
+        if sample.in_range && sample.pose.is_finite() && sample.twist.is_finite() {
+            let (position, turn) = (sample.pose.position(), angles::angles(sample.pose.orientation()));
+            let (linear, angular) = (sample.twist.linear(), sample.twist.angular());
+            self.at = [position.x, position.y, position.z, turn.x, turn.y, turn.z];
+            self.speed = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z];
+        }
+        self.sample = *sample;
+    }
+
+    fn is_in_range(&self) -> bool {
+        self.sample.in_range
+            && self.sample.pose.is_finite()
+            && !self.injected.0.contains(FaultBits::SENSOR_RANGE)
+    }
+
+    /// Faults whose cause is there now.
+    pub(super) fn causes(&self) -> FaultBits {
+        let too_fast = self.speed.iter().zip(&self.speed_limits).any(|(speed, limit)| {
+            // A limit that a client made zero would fault at the first bit of noise: that is what it asked for.
+            speed.abs() > f64::from(*limit)
+        });
+        let when = |is: bool, fault| if is { fault } else { FaultBits::NONE };
+        self.injected
+            .0
+            .with(when(!self.is_in_range(), FaultBits::SENSOR_RANGE))
+            .with(when(self.is_too_hot(), FaultBits::OVER_TEMPERATURE))
+            .with(when(self.coils.is_overloaded(), FaultBits::OVER_CURRENT))
+            .with(when(too_fast, FaultBits::OVER_SPEED))
+    }
+
+    fn is_too_hot(&self) -> bool {
+        self.coils.is_too_hot()
+            || self.sample.too_hot
+            || self.injected.0.contains(FaultBits::OVER_TEMPERATURE)
+    }
+
+    /// Looks for faults and for what clients want to know of.
+    fn watch(&mut self) {
+        let found = self.faults.with(self.causes());
+        if found != self.faults {
+            self.set_faults(found);
+            self.drop_flotor();
+        }
+        let hot = self.is_too_hot();
+        if hot && !self.was_too_hot {
+            self.events.push(Event::Overtemp(self.temperatures_c()));
+        }
+        self.was_too_hot = hot;
+        let sides = self.sides_now();
+        if sides != self.sides {
+            self.sides = sides;
+            self.events.push(Event::Boundary(sides));
+        }
+        let buttons = self.buttons();
+        if buttons != self.buttons {
+            self.buttons = buttons;
+            self.events.push(Event::Button(buttons));
+        }
+    }
+
+    pub(super) fn set_faults(&mut self, faults: FaultBits) {
+        self.faults = faults;
+        self.events.push(Event::Fault(faults));
+    }
+
+    /// A fault switches the coils off.
+    fn drop_flotor(&mut self) {
+        self.end_procedure(self.cause_status());
+        self.flight = Flight::Landed;
+        self.command = Command::Position;
+        self.integral = [0.0; 6];
+        self.trim = [0.0; 6];
+    }
+
+    /// What says a refusal because of a fault.
+    pub(super) fn cause_status(&self) -> Status {
+        let causes = [
+            (FaultBits::OVER_TEMPERATURE, Status::OVERHEATED),
+            (FaultBits::OVER_CURRENT, Status::CURRENT),
+            (FaultBits::SENSOR_RANGE, Status::POSITION),
+            (FaultBits::OVER_SPEED, Status::SPEED),
+        ];
+        let found = causes.iter().find(|(fault, _)| self.faults.contains(*fault));
+        found.map_or(Status::OFF_LINE, |(_, status)| *status)
+    }
+
+    /// Temperatures, °C; one made up where over-temperature is.
+    pub(super) fn temperatures_c(&self) -> Six {
+        let mut all = self.coils.temperatures_c();
+        if self.is_too_hot() && !self.coils.is_too_hot() {
+            all[0] = 260.0;
+        }
+        all
+    }
+
+    pub(super) fn buttons(&self) -> Buttons {
+        Buttons { left: self.sample.buttons & 1 != 0, right: self.sample.buttons & 2 != 0 }
+    }
+
+    fn sides_now(&self) -> Sides {
+        let mut sides = [0; 7];
+        for axis in Axis::ALL {
+            sides[axis as usize] = i32::from(self.side(axis));
+        }
+        let outside = vector(&self.at, 0).length() > f64::from(self.boundary_radius_m);
+        sides[6] = i32::from(outside);
+        sides
+    }
+}
+
+/// Three of six numbers.
+pub(super) fn vector(six: &[f64; 6], first: usize) -> DVec3 {
+    let at = |index: usize| six.get(index).copied().unwrap_or(0.0);
+    DVec3::new(at(first), at(first + 1), at(first + 2))
+}
+
+fn three(six: &Six, first: usize) -> DVec3 {
+    vector(&six.map(f64::from), first)
+}
+
+pub(super) fn wrench(six: &[f64; 6]) -> Wrench {
+    Wrench::new(vector(six, 0), vector(six, 3))
+}
+
+/// As the wire has it.
+#[allow(clippy::cast_possible_truncation)]
+pub(super) fn narrow(linear: DVec3, angular: DVec3) -> Six {
+    [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z].map(|value| value as f32)
+}

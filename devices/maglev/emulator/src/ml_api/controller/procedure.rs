@@ -1,0 +1,213 @@
+//! What takes seconds: taking off, landing, finding gravity, gliding to default gains. One at a time; a new one takes the
+//! place of the one before.
+
+use super::machine::{Command, Controller, Flight, KEPT, narrow, vector};
+use flotor_hal::DVec3;
+use flotor_maglev::ml_api::{GainSet, Pid, Reply, Results, Status};
+
+/// Which call waits for a procedure.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Ticket(u64);
+
+/// How fast the target glides, m/s and rad/s.
+const GLIDE_M_PER_S: f64 = 15.0e-3;
+const GLIDE_RAD_PER_S: f64 = 0.2;
+/// Home is reached within this, m and rad ...
+const HOME_M: f64 = 1.0e-3;
+const HOME_RAD: f64 = 0.02;
+/// ... or when the target has been there for so long, s: a hand may hold the flotor elsewhere.
+const HOME_PATIENCE_S: f64 = 2.0;
+/// How long gains take to fade at the end of landing, s.
+const FADE_S: f64 = 0.4;
+/// How long gains take to glide to their defaults, s.
+const RESET_S: f64 = 2.0;
+/// Finding gravity: time to settle, s, samples that are averaged, and rounds at most.
+const SETTLE_S: f64 = 0.25;
+const SAMPLES: u32 = 50;
+const ROUNDS: u32 = 30;
+/// What is left when it is found, N and N·m.
+const FOUND_N: f64 = 2.0e-3;
+const FOUND_NM: f64 = 1.0e-4;
+
+/// A procedure in progress.
+#[derive(Clone, Debug)]
+pub(super) enum Procedure {
+    TakeOff { at_home_s: f64 },
+    Land { faded_s: f64 },
+    FindGravity(Search),
+    ResetGains { set: GainSet, from: [Pid; 6], elapsed_s: f64 },
+}
+
+/// A search for the wrench that holds the flotor.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Search {
+    settled_s: f64,
+    sums: [f64; 6],
+    samples: u32,
+    rounds: u32,
+}
+
+impl Controller {
+    /// The reply to a procedure that is over; nothing while it goes on.
+    #[must_use]
+    pub fn reply(&self, ticket: Ticket) -> Option<Reply> {
+        self.finished.iter().find(|(of, _)| *of == ticket).map(|(_, reply)| *reply)
+    }
+
+    /// Lands if there is anything to land, without anybody who waits for it.
+    pub fn land(&mut self) {
+        if matches!(self.flight, Flight::TakingOff | Flight::Flying) {
+            self.begin_landing();
+        }
+    }
+
+    pub(super) fn begin_take_off(&mut self) -> Ticket {
+        self.gains.glide(GainSet::Normal, &[Pid::ZERO; 6], 1.0);
+        (self.desired, self.command) = (self.at, Command::Position);
+        self.integral = [0.0; 6];
+        self.flight = Flight::TakingOff;
+        self.begin(Procedure::TakeOff { at_home_s: 0.0 })
+    }
+
+    pub(super) fn begin_landing(&mut self) -> Ticket {
+        (self.desired, self.command) = (self.at, Command::Position);
+        self.integral = [0.0; 6];
+        self.landing = (self.gains.landing(), 1.0);
+        self.flight = Flight::Landing;
+        self.begin(Procedure::Land { faded_s: 0.0 })
+    }
+
+    pub(super) fn begin_search(&mut self) -> Ticket {
+        self.begin(Procedure::FindGravity(Search::default()))
+    }
+
+    pub(super) fn begin_reset(&mut self, set: GainSet) -> Ticket {
+        let from = *self.gains.set(set);
+        self.begin(Procedure::ResetGains { set, from, elapsed_s: 0.0 })
+    }
+
+    fn begin(&mut self, procedure: Procedure) -> Ticket {
+        self.end_procedure(Status::REPLACED);
+        self.last_ticket.0 += 1;
+        self.procedure = Some((self.last_ticket, procedure));
+        self.last_ticket
+    }
+
+    /// Ends what is in progress, with an error unless it is done.
+    pub(super) fn end_procedure(&mut self, status: Status) {
+        self.trim = [0.0; 6];
+        if let Some((ticket, procedure)) = self.procedure.take() {
+            let results = match procedure {
+                Procedure::FindGravity(_) => Results::Six([0.0; 6]),
+                _ => Results::None,
+            };
+            self.finish(ticket, Reply { status, results });
+        }
+    }
+
+    fn finish(&mut self, ticket: Ticket, reply: Reply) {
+        // Several may wait for one, and whoever waited may be gone: the newest are kept.
+        if self.finished.len() >= KEPT {
+            self.finished.remove(0);
+        }
+        self.finished.push((ticket, reply));
+    }
+
+    /// Carries the procedure on by a cycle, s; velocity commands too.
+    pub(super) fn advance(&mut self, dt_s: f64) {
+        if let (Command::Velocity(speeds), Flight::Flying) = (self.command, self.flight) {
+            for (desired, speed) in self.desired.iter_mut().zip(speeds) {
+                *desired += f64::from(speed) * dt_s;
+            }
+            self.desired_told = narrow(vector(&self.desired, 0), vector(&self.desired, 3));
+        }
+        let Some((ticket, mut procedure)) = self.procedure.take() else { return };
+        let reply = match &mut procedure {
+            Procedure::TakeOff { at_home_s } => self.take_off(at_home_s, dt_s),
+            Procedure::Land { faded_s } => self.let_down(faded_s, dt_s),
+            Procedure::FindGravity(search) => self.search(search, dt_s),
+            Procedure::ResetGains { set, from, elapsed_s } => {
+                *elapsed_s += dt_s;
+                #[allow(clippy::cast_possible_truncation)] // a share
+                self.gains.glide(*set, from, (*elapsed_s / RESET_S).min(1.0) as f32);
+                (*elapsed_s >= RESET_S).then_some(Reply::status(Status::OK))
+            }
+        };
+        match reply {
+            Some(reply) => self.finish(ticket, reply),
+            None => self.procedure = Some((ticket, procedure)),
+        }
+    }
+
+    fn take_off(&mut self, at_home_s: &mut f64, dt_s: f64) -> Option<Reply> {
+        if !self.glide(&[0.0; 6], dt_s) {
+            return None;
+        }
+        *at_home_s += dt_s;
+        let is_home = vector(&self.at, 0).length() < HOME_M && vector(&self.at, 3).length() < HOME_RAD;
+        (is_home || *at_home_s > HOME_PATIENCE_S).then(|| {
+            self.flight = Flight::Flying;
+            self.desired_told = [0.0; 6];
+            Reply::status(Status::OK)
+        })
+    }
+
+    fn let_down(&mut self, faded_s: &mut f64, dt_s: f64) -> Option<Reply> {
+        let floor = [0.0, 0.0, self.config.floor_m, 0.0, 0.0, 0.0];
+        if !self.glide(&floor, dt_s) {
+            return None;
+        }
+        *faded_s += dt_s;
+        self.landing.1 = (1.0 - *faded_s / FADE_S).max(0.0);
+        (*faded_s >= FADE_S).then(|| {
+            self.flight = Flight::Landed;
+            (self.desired, self.desired_told) = ([0.0; 6], [0.0; 6]);
+            Reply::status(Status::OK)
+        })
+    }
+
+    /// Moves the target by a step; true if it is there.
+    fn glide(&mut self, to: &[f64; 6], dt_s: f64) -> bool {
+        let step = |from: DVec3, to: DVec3, most: f64| {
+            let way = to - from;
+            if way.length() <= most { (to, true) } else { (from + way.normalize() * most, false) }
+        };
+        let (position, there) = step(vector(&self.desired, 0), vector(to, 0), GLIDE_M_PER_S * dt_s);
+        let (turn, turned) = step(vector(&self.desired, 3), vector(to, 3), GLIDE_RAD_PER_S * dt_s);
+        self.desired = [position.x, position.y, position.z, turn.x, turn.y, turn.z];
+        there && turned
+    }
+
+    /// Averages the error and adds what the gains make of it, until it is small.
+    fn search(&mut self, search: &mut Search, dt_s: f64) -> Option<Reply> {
+        search.settled_s += dt_s;
+        if search.settled_s < SETTLE_S {
+            return None;
+        }
+        for (index, sum) in search.sums.iter_mut().enumerate() {
+            *sum += self.desired[index] - self.at[index];
+        }
+        search.samples += 1;
+        if search.samples < SAMPLES {
+            return None;
+        }
+        let normal = *self.gains.set(GainSet::Normal);
+        let mut is_found = true;
+        for (index, pid) in normal.iter().enumerate() {
+            let missing = f64::from(pid.p) * search.sums[index] / f64::from(SAMPLES);
+            self.trim[index] += missing;
+            is_found &= missing.abs() < if index < 3 { FOUND_N } else { FOUND_NM };
+        }
+        *search = Search { rounds: search.rounds + 1, ..Search::default() };
+        if !is_found && search.rounds < ROUNDS {
+            return None;
+        }
+        let mut found = [0.0; 6];
+        for (index, pid) in normal.iter().enumerate() {
+            found[index] = f64::from(pid.ff) + self.trim[index];
+        }
+        self.trim = [0.0; 6];
+        let status = if is_found { Status::OK } else { Status::TIMER };
+        Some(Reply { status, results: Results::Six(narrow(vector(&found, 0), vector(&found, 3))) })
+    }
+}

@@ -1,0 +1,242 @@
+//! The controller over a free body: what its procedures find has a closed form, and what it is told it says again.
+
+use super::{Answer, Controller, ControllerConfig, Flight, ForceCommand, Ticket};
+use crate::controller::Sample;
+use flotor_hal::{DVec3, Pose, Twist, Wrench};
+use flotor_maglev::ml_api::*;
+
+const MASS_KG: f64 = 0.555;
+const GRAVITY: f64 = 9.806_65;
+/// A servo interval: a millisecond.
+const DT_S: f64 = 1.0e-3;
+/// Where the body comes to rest, m.
+const FLOOR_M: f64 = -9.5e-3;
+
+/// A point of mass above a floor that takes all of a fall, under the controller.
+struct Rig {
+    controller: Controller,
+    position: DVec3,
+    velocity: DVec3,
+}
+
+impl Rig {
+    fn new(force_command: ForceCommand) -> Self {
+        let controller = Controller::new(ControllerConfig { force_command, ..ControllerConfig::DEFAULT });
+        Self { controller, position: DVec3::Z * FLOOR_M, velocity: DVec3::ZERO }
+    }
+
+    fn sample(&self) -> Sample {
+        let pose = Pose { position_m: self.position.to_array(), ..Pose::HOME };
+        Sample { pose, twist: Twist::new(self.velocity, DVec3::ZERO), ..Sample::HOME }
+    }
+
+    fn step(&mut self) -> Wrench {
+        self.controller.sense(&self.sample(), DT_S);
+        let wrench = self.controller.drive(DT_S);
+        self.velocity += (wrench.force() / MASS_KG - DVec3::Z * GRAVITY) * DT_S;
+        self.position += self.velocity * DT_S;
+        if self.position.z < FLOOR_M {
+            (self.position.z, self.velocity) = (FLOOR_M, DVec3::ZERO);
+        }
+        wrench
+    }
+
+    fn run(&mut self, milliseconds: u32) {
+        for _ in 0..milliseconds {
+            self.step();
+        }
+    }
+
+    fn call(&mut self, request: Request) -> Reply {
+        match self.controller.answer(&request) {
+            Answer::Now(reply) => reply,
+            Answer::When(ticket) => self.finish(ticket),
+        }
+    }
+
+    fn finish(&mut self, ticket: Ticket) -> Reply {
+        for _ in 0..60_000 {
+            self.step();
+            if let Some(reply) = self.controller.reply(ticket) {
+                return reply;
+            }
+        }
+        panic!("the procedure has no end");
+    }
+
+    fn plain(&mut self, function: Function) -> Reply {
+        self.call(Request::Plain(function))
+    }
+
+    fn six(&mut self, function: Function) -> Six {
+        match self.plain(function).results {
+            Results::Six(values) => values,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn status(&mut self, request: Request) -> Status {
+        self.call(request).status
+    }
+
+    fn flying(force_command: ForceCommand) -> Self {
+        let mut rig = Self::new(force_command);
+        assert_eq!(rig.plain(Function::Takeoff).status, Status::OK);
+        rig.run(1000);
+        rig
+    }
+}
+
+#[test]
+fn taking_off_sags_by_what_the_gains_do_not_carry_and_gravity_takes_the_sag_away() {
+    let mut rig = Rig::flying(ForceCommand::Replaces);
+    // Weight less the feed-forward of 3.5 N, over 10 000 N/m.
+    let sag = (MASS_KG * GRAVITY - 3.5) / 10_000.0;
+    assert!((rig.position.z + sag).abs() < 1.0e-6, "{}", rig.position.z);
+    let gravity = rig.six(Function::FindGravity);
+    // Within what the procedure calls found.
+    assert!((f64::from(gravity[2]) - MASS_KG * GRAVITY).abs() < 5.0e-3, "{gravity:?}");
+    assert_eq!(rig.six(Function::GetGravity), [0.0; 6], "it is not stored by finding it");
+    assert_eq!(rig.status(Request::Six(Function::SetGravity, gravity)), Status::OK);
+    assert_eq!(rig.plain(Function::DefyGravity).status, Status::OK);
+    rig.run(2000);
+    assert!(rig.position.z.abs() < 1.0e-6, "{}", rig.position.z);
+}
+
+#[test]
+fn landing_ends_on_the_floor_without_force() {
+    let mut rig = Rig::flying(ForceCommand::Replaces);
+    assert_eq!(rig.plain(Function::Takeoff).status, Status::TAKEN_OFF);
+    assert_eq!(rig.plain(Function::Land).status, Status::OK);
+    assert_eq!((rig.controller.flight(), rig.position.z), (Flight::Landed, FLOOR_M));
+    assert_eq!(rig.step(), Wrench::ZERO);
+    assert_eq!(rig.plain(Function::Land).status, Status::LANDED);
+    assert_eq!(rig.status(Request::Six(Function::SetForces, [9.0; 6])), Status::LANDED);
+    assert_eq!(rig.step(), Wrench::ZERO);
+    assert_eq!(rig.plain(Function::FindGravity), Reply::failed(Some(Function::FindGravity), Status::LANDED));
+}
+
+#[test]
+fn a_force_command_replaces_the_gains_or_comes_on_top_of_them() {
+    let forces = [0.5, -0.25, 5.5, 0.125, -0.0625, 0.25];
+    for (kind, on_top) in [(ForceCommand::Replaces, 0.0), (ForceCommand::Adds, 1.0)] {
+        let mut rig = Rig::flying(kind);
+        let held = f64::from(rig.six(Function::GetForces)[2]);
+        assert_eq!(rig.status(Request::Six(Function::SetForces, forces)), Status::OK);
+        let found = rig.six(Function::GetForces);
+        let expected = 5.5 + on_top * held;
+        // The rounding of the wire.
+        assert!((f64::from(found[2]) - expected).abs() < 1.0e-6, "{kind:?}: {found:?}");
+        // Without gains both are the same, to the bit.
+        for set in [GainSet::Normal, GainSet::Locked, GainSet::Constrained] {
+            assert_eq!(rig.status(Request::SetGainVecAxes(set, [Pid::ZERO; 6])), Status::OK);
+        }
+        assert_eq!(rig.six(Function::GetForces), forces, "{kind:?}");
+        assert_eq!(rig.status(Request::SetForceAxis(Axis::Y, 1.0)), Status::OK);
+        assert_eq!(rig.six(Function::GetForces), [0.5, 1.0, 5.5, 0.125, -0.0625, 0.25]);
+    }
+}
+
+#[test]
+fn locks_hold_and_constraints_push_back() {
+    let mut rig = Rig::flying(ForceCommand::Replaces);
+    let to = |x: f32| WirePose { at: [x, 0.0, 0.0, 0.0, 0.0, 0.0], ..WirePose::default() };
+    assert_eq!(rig.status(Request::OfAxis(Function::LockAxis, Axis::X)), Status::OK);
+    assert_eq!(rig.status(Request::Pose(Function::SetDesiredPosition, to(3.0e-3))), Status::OK);
+    rig.run(1000);
+    assert!(rig.position.x.abs() < 1.0e-6, "{}", rig.position.x);
+    assert_eq!(rig.status(Request::OfAxis(Function::UnlockAxis, Axis::X)), Status::OK);
+    rig.run(1000);
+    assert!((rig.position.x - 3.0e-3).abs() < 1.0e-6, "{}", rig.position.x);
+    let range = [-1.0e-3, 1.0e-3];
+    assert_eq!(rig.status(Request::ConstrainAxis { axis: Axis::X, range }), Status::OK);
+    rig.run(1000);
+    assert!((rig.position.x - 1.0e-3).abs() < 2.0e-6, "{}", rig.position.x);
+    // A push of 2.4 N beyond the range goes as deep as the constrained gains let it.
+    rig.position.x = 1.5e-3;
+    rig.controller.sense(&rig.sample(), 0.0);
+    let back = f64::from(rig.six(Function::GetForces)[0]);
+    assert!((back + 4800.0 * 0.5e-3).abs() < 1.0e-4, "{back}");
+    let sides: Vec<Event> = rig.controller.take_events().collect();
+    assert!(sides.contains(&Event::Boundary([1, 0, 0, 0, 0, 0, 0])), "{sides:?}");
+}
+
+#[test]
+fn the_boundary_pushes_back_on_top_of_a_force_command() {
+    let mut rig = Rig::flying(ForceCommand::Replaces);
+    assert_eq!(rig.status(Request::Number(Function::SetBoundaryRadius, 4.0e-3)), Status::OK);
+    assert_eq!(rig.status(Request::Six(Function::SetForces, [0.0, 0.0, 5.0, 0.0, 0.0, 0.0])), Status::OK);
+    (rig.position, rig.velocity) = (DVec3::Z * -5.0e-3, DVec3::ZERO);
+    rig.controller.sense(&rig.sample(), 0.0);
+    let force = f64::from(rig.six(Function::GetForces)[2]);
+    assert!((force - (5.0 + 15_000.0 * 1.0e-3)).abs() < 1.0e-3, "{force}");
+}
+
+#[test]
+fn a_fault_switches_off_and_stays_until_its_cause_is_gone() {
+    let mut rig = Rig::flying(ForceCommand::Replaces);
+    let limits = [1.0e-9; 6];
+    assert_eq!(rig.status(Request::Six(Function::SetSpeedLimits, limits)), Status::OK);
+    rig.velocity.x = 1.0e-3;
+    rig.step();
+    assert_eq!((rig.controller.faults(), rig.step()), (FaultBits::OVER_SPEED, Wrench::ZERO));
+    assert_eq!(rig.plain(Function::Takeoff).status, Status::SPEED);
+    assert_eq!(rig.plain(Function::ResetFault).status, Status::SPEED, "it is falling");
+    rig.run(1000);
+    assert_eq!(rig.plain(Function::ResetFault).status, Status::OK);
+    let faults: Vec<Event> =
+        rig.controller.take_events().filter(|event| matches!(event, Event::Fault(_))).collect();
+    assert_eq!(faults, [Event::Fault(FaultBits::OVER_SPEED), Event::Fault(FaultBits::NONE)]);
+    assert_eq!(rig.status(Request::Six(Function::SetSpeedLimits, [2.0; 6])), Status::OK);
+    assert_eq!(rig.plain(Function::Takeoff).status, Status::OK);
+}
+
+#[test]
+fn values_come_back_as_they_were_set_and_wrong_ones_are_refused() {
+    let mut rig = Rig::flying(ForceCommand::Replaces);
+    let six = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+    for (set, get) in [
+        (Function::SetGravity, Function::GetGravity),
+        (Function::SetSpeedLimits, Function::GetSpeedLimits),
+        (Function::SetCurrentLimits, Function::GetCurrentLimits),
+    ] {
+        assert_eq!(rig.status(Request::Six(set, six)), Status::OK);
+        assert_eq!(rig.six(get), six);
+    }
+    assert_eq!(rig.status(Request::Six(Function::SetCurrents, six)), Status::CURRENT);
+    assert_eq!(rig.six(Function::GetCurrents), [1.0, 2.0, 3.0, 3.5, 3.5, 3.5]);
+    for (request, status) in [
+        (Request::Number(Function::SetServoFrequency, 99.0), Status::FREQUENCY),
+        (Request::Number(Function::SetServoFrequency, f32::NAN), Status::FREQUENCY),
+        (Request::Six(Function::SetSpeedLimits, [-1.0; 6]), Status::SPEED),
+        (Request::Six(Function::SetForces, [f32::INFINITY; 6]), Status::FORCE),
+        (Request::SetGainVecSingle(GainSet::Normal, Axis::X, Gain::P, -1.0), Status::GAIN_RANGE),
+    ] {
+        assert_eq!(rig.status(request), status, "{request:?}");
+    }
+    let home = Request::Pose(Function::SetDesiredPosition, WirePose::default());
+    assert_eq!(rig.status(home), Status::OK);
+    let pid = Pid { p: 1.0, i: 2.0, d: 3.0, ff: 4.0 };
+    assert_eq!(rig.status(Request::SetGainVecAxis(GainSet::Boundary, Axis::Rz, pid)), Status::OK);
+    let one = rig.call(Request::GetGainVecSingle(GainSet::Boundary, Axis::Rz, Gain::D));
+    assert_eq!(one, Reply::ok(Results::Number(3.0)));
+    assert_eq!(rig.call(Request::OfSet(Function::ResetGainVecAxes, GainSet::Boundary)).status, Status::OK);
+    let reset = rig.call(Request::GetGainVecAxis(GainSet::Boundary, Axis::Rz));
+    assert_eq!(reset, Reply::ok(Results::Pid(Pid { p: 15.0, i: 0.0, d: 0.15, ff: 0.0 })));
+}
+
+#[test]
+fn a_users_frame_moves_and_turns_the_pose_and_nothing_else() {
+    let mut rig = Rig::flying(ForceCommand::Replaces);
+    rig.position = DVec3::new(1.0e-3, 2.0e-3, 3.0e-3);
+    rig.controller.observe(&rig.sample());
+    let quarter = std::f32::consts::FRAC_PI_2;
+    let frame = WirePose { at: [0.5e-3, 0.0, 0.0, 0.0, 0.0, quarter], ..WirePose::default() };
+    assert_eq!(rig.status(Request::Pose(Function::SetFrame, frame)), Status::OK);
+    assert_eq!(rig.plain(Function::GetFrame), Reply::ok(Results::Pose(frame)));
+    // R x - t, with a quarter turn about z: (x, y) becomes (-y, x).
+    let expected = [-2.5e-3, 1.0e-3, 3.0e-3, 0.0, 0.0, quarter];
+    let told = rig.controller.pose().at;
+    assert!(told.iter().zip(expected).all(|(told, expected)| (told - expected).abs() < 1.0e-8), "{told:?}");
+    assert_eq!(rig.plain(Function::GetDesiredPosition), Reply::ok(Results::Pose(WirePose::default())));
+}

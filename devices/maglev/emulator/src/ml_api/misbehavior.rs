@@ -1,0 +1,272 @@
+//! What goes wrong on purpose: on a connection, on the tick, in the machine; once, when the flotor is in a state.
+
+use super::controller::Flight;
+use flotor_maglev::ml_api::{FaultBits, Status};
+use std::fmt;
+use std::str::FromStr;
+
+/// How long a fault of the machine lasts, s.
+const MACHINE_FAULT_S: f64 = 0.5;
+
+/// What goes wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MisbehaviorKind {
+    /// The client is never answered again.
+    Silence,
+    /// Half a reply, and then nothing.
+    HalfFrame,
+    /// The client's connections are closed in order.
+    Close,
+    /// They are reset.
+    Reset,
+    /// A reply comes three seconds late.
+    Stall,
+    /// A reply is four bytes short.
+    WrongLength,
+    /// Every so many calls are answered with this status.
+    Status(Status, u32),
+    /// A tick comes 50 ms late.
+    LateTick,
+    /// The machine has this fault.
+    Machine(FaultBits),
+}
+
+/// When it does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum When {
+    /// At once.
+    Anytime,
+    /// In a state of the flotor.
+    In(Flight),
+    /// In the air with ticks wanted.
+    Ticking,
+}
+
+/// What goes wrong, and when.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Misbehavior {
+    /// What.
+    pub kind: MisbehaviorKind,
+    /// When.
+    pub when: When,
+    /// How long after that began, s.
+    pub after_s: f64,
+}
+
+/// What cannot be read as a misbehavior.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unknown(String);
+
+impl fmt::Display for Unknown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "`{}` is no fault: write KIND[@STATE][+MS]; kinds: silence, half-frame, close, reset, stall, wrong-length, \
+             status=CODE/N, late-tick, out-of-range, over-temperature, over-current, over-speed; states: landed, \
+             taking-off, flying, ticking, landing",
+            self.0
+        )
+    }
+}
+
+impl std::error::Error for Unknown {}
+
+impl FromStr for Misbehavior {
+    type Err = Unknown;
+
+    fn from_str(text: &str) -> Result<Self, Unknown> {
+        let unknown = || Unknown(text.to_owned());
+        let (rest, after_s) = match text.split_once('+') {
+            Some((rest, ms)) => (rest, ms.parse::<f64>().map_err(|_| unknown())? * 1.0e-3),
+            None => (text, 0.0),
+        };
+        let (kind, when) = match rest.split_once('@') {
+            Some((kind, state)) => {
+                let when = match state {
+                    "landed" => When::In(Flight::Landed),
+                    "taking-off" => When::In(Flight::TakingOff),
+                    "flying" => When::In(Flight::Flying),
+                    "landing" => When::In(Flight::Landing),
+                    "ticking" => When::Ticking,
+                    _ => return Err(unknown()),
+                };
+                (kind, when)
+            }
+            None => (rest, When::Anytime),
+        };
+        let kind = match kind {
+            "silence" => MisbehaviorKind::Silence,
+            "half-frame" => MisbehaviorKind::HalfFrame,
+            "close" => MisbehaviorKind::Close,
+            "reset" => MisbehaviorKind::Reset,
+            "stall" => MisbehaviorKind::Stall,
+            "wrong-length" => MisbehaviorKind::WrongLength,
+            "late-tick" => MisbehaviorKind::LateTick,
+            "out-of-range" => MisbehaviorKind::Machine(FaultBits::SENSOR_RANGE),
+            "over-temperature" => MisbehaviorKind::Machine(FaultBits::OVER_TEMPERATURE),
+            "over-current" => MisbehaviorKind::Machine(FaultBits::OVER_CURRENT),
+            "over-speed" => MisbehaviorKind::Machine(FaultBits::OVER_SPEED),
+            other => {
+                let (code, every) = other
+                    .strip_prefix("status=")
+                    .and_then(|rest| rest.split_once('/'))
+                    .ok_or_else(unknown)?;
+                let status = Status(code.parse().map_err(|_| unknown())?);
+                let every = every.parse().ok().filter(|every| *every > 0).ok_or_else(unknown)?;
+                MisbehaviorKind::Status(status, every)
+            }
+        };
+        Ok(Self { kind, when, after_s })
+    }
+}
+
+/// What is done to a call.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Deed {
+    /// It is answered.
+    Answer,
+    /// Nothing is sent, now and later.
+    Silence,
+    /// Half of the reply is sent, and nothing later.
+    HalfFrame,
+    /// The connections are closed in order.
+    Close,
+    /// They are reset.
+    Reset,
+    /// The reply comes late.
+    Stall,
+    /// The reply is four bytes short.
+    WrongLength,
+    /// The reply says this and nothing is done.
+    Status(Status),
+}
+
+/// Misbehaviors that are still to come, and the client that suffers.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Plan {
+    pending: Vec<(Misbehavior, f64)>,
+    calls: u32,
+    silenced: Option<u64>,
+    machine: Option<(FaultBits, f64)>,
+    is_tick_late: bool,
+}
+
+impl Plan {
+    pub(super) fn new(misbehaviors: Vec<Misbehavior>) -> Self {
+        Self { pending: misbehaviors.into_iter().map(|one| (one, 0.0)).collect(), ..Self::default() }
+    }
+
+    /// A servo interval of this length, s, in this state; what the machine has for a fault.
+    pub(super) fn advance(&mut self, flight: Flight, is_ticking: bool, dt_s: f64) -> FaultBits {
+        for (one, in_state_s) in &mut self.pending {
+            *in_state_s = if is_now(one.when, flight, is_ticking) { *in_state_s + dt_s } else { 0.0 };
+        }
+        if let Some((_, left_s)) = &mut self.machine {
+            *left_s -= dt_s;
+        }
+        self.machine = self.machine.filter(|(_, left_s)| *left_s > 0.0);
+        if let Some(MisbehaviorKind::Machine(bits)) =
+            self.take(|kind| matches!(kind, MisbehaviorKind::Machine(_)))
+        {
+            self.machine = Some((bits, MACHINE_FAULT_S));
+        }
+        self.is_tick_late |= self.take(|kind| kind == MisbehaviorKind::LateTick).is_some();
+        self.machine.map_or(FaultBits::NONE, |(bits, _)| bits)
+    }
+
+    /// The first that is due of some kind.
+    fn take(&mut self, is_wanted: impl Fn(MisbehaviorKind) -> bool) -> Option<MisbehaviorKind> {
+        let is_due =
+            |(one, in_state_s): &(Misbehavior, f64)| is_wanted(one.kind) && *in_state_s > one.after_s;
+        let place = self.pending.iter().position(is_due)?;
+        Some(self.pending.remove(place).0.kind)
+    }
+
+    /// Whether the next tick is to come late; once.
+    pub(super) fn delays_tick(&mut self) -> bool {
+        std::mem::take(&mut self.is_tick_late)
+    }
+
+    /// Whether a client is never answered again.
+    pub(super) fn has_silenced(&self, client: u64) -> bool {
+        self.silenced == Some(client)
+    }
+
+    /// What is done to a client's next call.
+    pub(super) fn deed(&mut self, client: u64) -> Deed {
+        if self.has_silenced(client) {
+            return Deed::Silence;
+        }
+        let every = self.pending.iter().find_map(|(one, in_state_s)| match one.kind {
+            MisbehaviorKind::Status(status, every) if *in_state_s > one.after_s => Some((status, every)),
+            _ => None,
+        });
+        if let Some((status, every)) = every {
+            self.calls += 1;
+            return if self.calls.is_multiple_of(every) { Deed::Status(status) } else { Deed::Answer };
+        }
+        let on_a_connection = |kind| {
+            !matches!(
+                kind,
+                MisbehaviorKind::Machine(_) | MisbehaviorKind::LateTick | MisbehaviorKind::Status(..)
+            )
+        };
+        let deed = match self.take(on_a_connection) {
+            Some(MisbehaviorKind::Silence) => Deed::Silence,
+            Some(MisbehaviorKind::HalfFrame) => Deed::HalfFrame,
+            Some(MisbehaviorKind::Close) => Deed::Close,
+            Some(MisbehaviorKind::Reset) => Deed::Reset,
+            Some(MisbehaviorKind::Stall) => Deed::Stall,
+            Some(MisbehaviorKind::WrongLength) => Deed::WrongLength,
+            _ => Deed::Answer,
+        };
+        if matches!(deed, Deed::Silence | Deed::HalfFrame) {
+            self.silenced = Some(client);
+        }
+        deed
+    }
+}
+
+fn is_now(when: When, flight: Flight, is_ticking: bool) -> bool {
+    match when {
+        When::Anytime => true,
+        When::In(state) => state == flight,
+        When::Ticking => flight == Flight::Flying && is_ticking,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_are_read_as_they_are_written() {
+        let read = |text: &str| text.parse::<Misbehavior>();
+        let expected = Misbehavior {
+            kind: MisbehaviorKind::Status(Status(5), 10),
+            when: When::In(Flight::Flying),
+            after_s: 0.2,
+        };
+        assert_eq!(read("status=5/10@flying+200"), Ok(expected));
+        assert_eq!(read("reset").map(|one| one.when), Ok(When::Anytime));
+        for wrong in ["", "rest", "status=5/0", "reset@up", "reset+soon", "status=x/1"] {
+            assert!(read(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn one_call_in_the_right_state_suffers_and_the_next_does_not() {
+        let mut plan = Plan::new(vec!["reset@flying+5".parse().expect("as written")]);
+        for (flight, deed) in [
+            (Flight::Landed, Deed::Answer),
+            (Flight::Flying, Deed::Answer),
+            (Flight::Flying, Deed::Reset),
+            (Flight::Flying, Deed::Answer),
+        ] {
+            for _ in 0..4 {
+                assert_eq!(plan.advance(flight, false, 1.0e-3), FaultBits::NONE);
+            }
+            assert_eq!(plan.deed(1), deed);
+        }
+    }
+}

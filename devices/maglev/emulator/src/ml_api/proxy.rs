@@ -1,0 +1,129 @@
+//! Any device for programs that were written for the Maglev 200: the controller as a force model.
+//!
+//! The host runs the device, with its envelope, its watchdog and its recording; this model takes the handle's pose for the
+//! flotor's, and what the clients command through the controller for its wrench. A tick of the loop is a servo interval; a
+//! command acts from the next tick on.
+
+use super::controller::{Commanders, Controller, ControllerConfig, ForceCommand, Silence};
+use super::server::{Hub, Server};
+use crate::controller::Sample;
+use flotor_hal::{
+    Choices, ForceModel, Input, LoopConfig, Memory, ModelInfo, Output, Parameter, Refusal, Settings,
+    StepStatus, Wrench, choices, export_model,
+};
+use std::net::TcpListener;
+use std::sync::Arc;
+
+const FORCE_COMMANDS: Choices = choices!["replace", "add"];
+const COMMANDERS: Choices = choices!["one", "all"];
+const SILENCE: Choices = choices!["land", "ignore"];
+
+const SCHEMA: &[Parameter] = &[
+    Parameter::text(
+        "listen",
+        "Where clients connect, as host:port; without it nobody does, and there is no force",
+    ),
+    Parameter::choice("force_command", FORCE_COMMANDS, 0, "What a force command does to the gains"),
+    Parameter::choice("commanders", COMMANDERS, 0, "Who may command: the first client that does, or all"),
+    Parameter::choice(
+        "on_silence",
+        SILENCE,
+        0,
+        "What becomes of a flotor in the air whose client is gone or acknowledges no tick",
+    ),
+    Parameter::real(
+        "watchdog_ms",
+        "ms",
+        1.0,
+        60_000.0,
+        500.0,
+        "Longest time without an acknowledged tick while a client drives by forces and wants ticks",
+    ),
+];
+
+/// The controller as a model.
+pub struct MlApiModel {
+    hub: Arc<Hub>,
+    listen: Option<String>,
+    server: Option<Server>,
+    values: [f64; SCHEMA.len()],
+    period_s: f64,
+    /// What was answered last: a step never waits for a client's call.
+    wrench: Wrench,
+}
+
+impl ForceModel for MlApiModel {
+    const INFO: ModelInfo = ModelInfo::new(
+        "ml-api",
+        "Maglev 200 controller",
+        "Programs written for the ML API of the Maglev 200 command the device, over TCP",
+    )
+    .with_memory(Memory::PathDependent);
+    const PARAMETERS: &'static [Parameter] = SCHEMA;
+
+    fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        let config = ControllerConfig {
+            force_command: match settings.choice_or_default("force_command") {
+                1 => ForceCommand::Adds,
+                _ => ForceCommand::Replaces,
+            },
+            commanders: match settings.choice_or_default("commanders") {
+                1 => Commanders::All,
+                _ => Commanders::One,
+            },
+            silence: match settings.choice_or_default("on_silence") {
+                1 => Silence::Ignored,
+                _ => Silence::Lands,
+            },
+            watchdog_s: settings.number_or_default("watchdog_ms") * 1.0e-3,
+            ..ControllerConfig::DEFAULT
+        };
+        let mut values = [0.0; SCHEMA.len()];
+        for (value, parameter) in values.iter_mut().zip(SCHEMA) {
+            *value = settings.number_or_default(parameter.id());
+        }
+        Ok(Self {
+            // Nobody writes lines in a tick.
+            hub: Arc::new(Hub::new(Controller::new(config), Vec::new(), false, Box::new(|_| ()))),
+            listen: settings.text("listen").map(str::to_owned),
+            server: None,
+            values,
+            period_s: 1.0e-3,
+            wrench: Wrench::ZERO,
+        })
+    }
+
+    fn prepare(&mut self, config: &LoopConfig) -> Result<(), Refusal> {
+        self.period_s = config.period_ns as f64 * 1.0e-9;
+        let (Some(listen), None) = (&self.listen, &self.server) else { return Ok(()) };
+        let refused = |error| Refusal::resource(format!("cannot listen at {listen}: {error}"));
+        let listener = TcpListener::bind(listen).map_err(refused)?;
+        let address = listener.local_addr().map_err(refused)?;
+        self.server = Some(Server::start(listener, Arc::clone(&self.hub)).map_err(refused)?);
+        println!("listening tcp {address}");
+        Ok(())
+    }
+
+    /// One call of the system at most, which wakes the threads of the connections.
+    fn step(&mut self, input: &Input) -> Output {
+        if !(input.pose.is_finite() && input.twist.is_finite()) {
+            return Output::new(Wrench::ZERO, f64::NAN, StepStatus::InvalidInput);
+        }
+        let sample = Sample { pose: input.pose, twist: input.twist, buttons: input.buttons, ..Sample::HOME };
+        let dt_s = if input.dt_ns == 0 { self.period_s } else { input.dt_s() };
+        if let Some(wrench) = self.hub.try_cycle(&sample, dt_s) {
+            self.wrench = wrench;
+        }
+        self.wrench.into()
+    }
+
+    fn parameter(&self, index: usize) -> f64 {
+        self.values.get(index).copied().unwrap_or(f64::NAN)
+    }
+
+    fn reset(&mut self) {
+        self.wrench = Wrench::ZERO;
+    }
+}
+
+export_model!(MlApiModel);

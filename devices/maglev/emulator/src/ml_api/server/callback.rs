@@ -1,0 +1,66 @@
+//! A callback connection: an event, its acknowledgement, the next event.
+
+use super::control::{is_gone, send, token_reply};
+use super::hub::{Hub, Id};
+use super::state::{CallbackEnd, Next};
+use flotor_maglev::ml_api::{Event, Intake, Taken};
+use std::net::{Shutdown, TcpStream};
+use std::time::Duration;
+
+/// How often a connection that waits is looked after.
+const LOOK: Duration = Duration::from_millis(50);
+/// How late a tick comes that is to come late.
+const LATE: Duration = Duration::from_millis(50);
+
+/// Serves a connection that has asked for its token, until it is gone.
+pub(super) fn serve(mut stream: TcpStream, hub: &Hub, token: Id) {
+    let ready = stream.set_read_timeout(Some(LOOK)).is_ok();
+    if ready && send(&mut stream, token_reply(token).bytes()) {
+        let end = tell(&mut stream, hub, token);
+        if end == CallbackEnd::Close {
+            let _ = stream.shutdown(Shutdown::Both);
+        }
+    }
+    hub.callback_gone(token);
+}
+
+/// Tells events until there is an end.
+fn tell(stream: &mut TcpStream, hub: &Hub, token: Id) -> CallbackEnd {
+    let mut intake = Intake::default();
+    loop {
+        let event = match hub.next(token, LOOK) {
+            Some(Next::Event(event)) => event,
+            Some(Next::LateTick(event)) => {
+                std::thread::sleep(LATE);
+                event
+            }
+            Some(Next::End(CallbackEnd::Asked)) => Event::End,
+            Some(Next::End(end)) => return end,
+            None => {
+                if is_gone(stream) {
+                    return CallbackEnd::Gone;
+                }
+                continue;
+            }
+        };
+        if !send(stream, event.encode().bytes()) {
+            return CallbackEnd::Gone;
+        }
+        loop {
+            match intake.take(stream) {
+                // Whatever the handler returned: nothing is known to depend on it.
+                Taken::Frame(_) => break,
+                Taken::Malformed | Taken::Lost => return CallbackEnd::Gone,
+                Taken::Nothing => {
+                    if let Some(end) = hub.is_over(token) {
+                        return end;
+                    }
+                }
+            }
+        }
+        hub.acknowledged(token);
+        if event == Event::End {
+            return CallbackEnd::Asked;
+        }
+    }
+}

@@ -1,0 +1,269 @@
+//! The state that connections and servo loop share: the controller, the clients, what is to be told to whom.
+
+use super::state::{Callback, CallbackEnd, Client, EVENTS, Next, State};
+use crate::controller::Sample;
+use crate::ml_api::controller::{Answer, Controller, Flight, Silence, Ticket};
+use crate::ml_api::misbehavior::{Deed, Misbehavior, Plan};
+use flotor_hal::Wrench;
+use flotor_maglev::ml_api::{EventKind, Reply, Request, Unreadable};
+use std::collections::VecDeque;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Where lines about what happens go.
+pub type Log = Box<dyn Fn(std::fmt::Arguments<'_>) + Send + Sync>;
+
+/// Number of a connection; that of a callback connection is its token.
+pub(super) type Id = u64;
+
+/// The shared state.
+pub struct Hub {
+    state: Mutex<State>,
+    changed: Condvar,
+    log: Log,
+}
+
+/// What is to be done with a call.
+pub(super) struct Handled {
+    pub(super) deed: Deed,
+    pub(super) answer: Answer,
+}
+
+impl Hub {
+    /// A controller that nobody is connected to. `restarts_with_ticks`: registering for ticks starts the plant anew.
+    #[must_use]
+    pub fn new(
+        controller: Controller,
+        misbehaviors: Vec<Misbehavior>,
+        restarts_with_ticks: bool,
+        log: Log,
+    ) -> Self {
+        let state = State::new(controller, Plan::new(misbehaviors), restarts_with_ticks);
+        Self { state: Mutex::new(state), changed: Condvar::new(), log }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // A thread that panicked left whole values behind: no state spans two of them.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    // ------------------------------------------------------------ of the servo loop
+
+    /// Servo interval, s.
+    #[must_use]
+    pub fn period_s(&self) -> f64 {
+        1.0 / self.state().controller.servo_hz()
+    }
+
+    /// True if the plant is to start anew; once.
+    #[must_use]
+    pub fn takes_restart(&self) -> bool {
+        std::mem::take(&mut self.state().is_restart_wanted)
+    }
+
+    /// Begins a servo interval: takes its sample, tells clients of it.
+    pub fn begin(&self, sample: &Sample, dt_s: f64) {
+        self.state().begin(sample, dt_s, &self.log);
+        self.changed.notify_all();
+    }
+
+    /// A whole servo interval, for a loop that may not wait: nothing if a connection has the state just now. Real-time:
+    /// bounded, no allocation; one call of the system.
+    #[must_use]
+    pub fn try_cycle(&self, sample: &Sample, dt_s: f64) -> Option<Wrench> {
+        let mut state = self.state.try_lock().ok()?;
+        state.begin(sample, dt_s, &self.log);
+        let wrench = state.controller.drive(dt_s);
+        drop(state);
+        self.changed.notify_all();
+        Some(wrench)
+    }
+
+    /// The wrench over the interval.
+    #[must_use]
+    pub fn drive(&self, dt_s: f64) -> Wrench {
+        self.state().controller.drive(dt_s)
+    }
+
+    /// Takes a sample without beginning an interval.
+    pub fn observe(&self, sample: &Sample) {
+        self.state().controller.observe(sample);
+    }
+
+    /// Waits until no tick is on its way, or until the time is over; true if somebody wants ticks at all.
+    #[must_use]
+    pub fn wait_for_ticks_taken(&self, patience: Duration) -> TickWait {
+        let until = Instant::now() + patience;
+        let mut state = self.state();
+        loop {
+            let mut wanted = state.clients.iter().filter(|client| client.wants(EventKind::Tick)).peekable();
+            if wanted.peek().is_none() {
+                return if state.controller.is_busy() { TickWait::Busy } else { TickWait::Unwanted };
+            }
+            let open = wanted.any(|client| {
+                let callback =
+                    state.callbacks.iter().find(|callback| client.callback == Some(callback.token));
+                callback.is_some_and(|callback| callback.tick.is_some() || callback.tick_open_s.is_some())
+            });
+            let rest = until.saturating_duration_since(Instant::now());
+            if !open {
+                return TickWait::Taken;
+            }
+            if rest.is_zero() {
+                return TickWait::Open;
+            }
+            state = self.changed.wait_timeout(state, rest).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    // ------------------------------------------------------------ of control connections
+
+    pub(super) fn connect(&self, from: &str) -> Id {
+        let mut state = self.state();
+        let id = state.next_id;
+        state.next_id += 1;
+        state.clients.push(Client { id, callback: None, registered: Vec::new() });
+        drop(state);
+        (self.log)(format_args!("connected {from} client={id}"));
+        id
+    }
+
+    /// A client is gone: what it held in the air lands.
+    pub(super) fn disconnect(&self, id: Id) {
+        let mut state = self.state();
+        let Some(place) = state.clients.iter().position(|client| client.id == id) else { return };
+        let client = state.clients.remove(place);
+        if let Some(callback) = state.callback(client.callback) {
+            callback.end.get_or_insert(CallbackEnd::Gone);
+        }
+        if state.commander == Some(id) {
+            state.commander = None;
+            let lands = state.controller.config().silence == Silence::Lands;
+            if lands && matches!(state.controller.flight(), Flight::TakingOff | Flight::Flying) {
+                (self.log)(format_args!("landing why=client-lost client={id}"));
+                state.controller.land();
+            }
+        }
+        state.log_changes(&self.log);
+        drop(state);
+        self.changed.notify_all();
+        (self.log)(format_args!("closed client={id}"));
+    }
+
+    /// Handles a request, or what could not be read as one.
+    pub(super) fn handle(&self, id: Id, request: Result<Request, Unreadable>) -> Handled {
+        let mut state = self.state();
+        let deed = state.plan.deed(id);
+        let answer = match (deed, request) {
+            (Deed::Status(status), request) => {
+                let function =
+                    request.map_or_else(|unreadable| unreadable.function, |request| Some(request.function()));
+                Answer::Now(Reply::failed(function, status))
+            }
+            (_, Err(unreadable)) => Answer::Now(Reply::failed(unreadable.function, unreadable.status)),
+            (_, Ok(request)) => state.obey(id, &request),
+        };
+        if deed == Deed::Close || deed == Deed::Reset {
+            let end = if deed == Deed::Close { CallbackEnd::Close } else { CallbackEnd::Gone };
+            let token =
+                state.clients.iter().find(|client| client.id == id).and_then(|client| client.callback);
+            if let Some(callback) = state.callback(token) {
+                callback.end = Some(end);
+            }
+        }
+        state.log_changes(&self.log);
+        drop(state);
+        self.changed.notify_all();
+        Handled { deed, answer }
+    }
+
+    /// The reply of a procedure; nothing if it is not over in time.
+    pub(super) fn wait_for_reply(&self, ticket: Ticket, patience: Duration) -> Option<Reply> {
+        let until = Instant::now() + patience;
+        let mut state = self.state();
+        loop {
+            let reply = state.controller.reply(ticket);
+            let rest = until.saturating_duration_since(Instant::now());
+            if reply.is_some() || rest.is_zero() {
+                return reply;
+            }
+            state = self.changed.wait_timeout(state, rest).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    // ------------------------------------------------------------ of callback connections
+
+    /// A connection that was taken for a client carries events from now on; its token.
+    pub(super) fn becomes_callback(&self, id: Id) -> Id {
+        let mut state = self.state();
+        state.clients.retain(|client| client.id != id);
+        if state.commander == Some(id) {
+            state.commander = None;
+        }
+        state.callbacks.push(Callback {
+            token: id,
+            events: VecDeque::with_capacity(EVENTS),
+            tick: None,
+            tick_open_s: None,
+            end: None,
+        });
+        id
+    }
+
+    /// What is to be sent next; nothing if there is nothing in time.
+    pub(super) fn next(&self, token: Id, patience: Duration) -> Option<Next> {
+        let until = Instant::now() + patience;
+        let mut state = self.state();
+        loop {
+            if let Some(next) = state.take_next(token) {
+                return Some(next);
+            }
+            let rest = until.saturating_duration_since(Instant::now());
+            if rest.is_zero() {
+                return None;
+            }
+            state = self.changed.wait_timeout(state, rest).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// What was sent is acknowledged.
+    pub(super) fn acknowledged(&self, token: Id) {
+        if let Some(callback) = self.state().callback(Some(token)) {
+            callback.tick_open_s = None;
+        }
+        self.changed.notify_all();
+    }
+
+    /// Whether a callback connection is to end without a word.
+    pub(super) fn is_over(&self, token: Id) -> Option<CallbackEnd> {
+        let mut state = self.state();
+        state
+            .callback(Some(token))
+            .map_or(Some(CallbackEnd::Gone), |callback| callback.end.filter(|end| *end != CallbackEnd::Asked))
+    }
+
+    /// A callback connection is gone.
+    pub(super) fn callback_gone(&self, token: Id) {
+        let mut state = self.state();
+        state.callbacks.retain(|callback| callback.token != token);
+        for client in state.clients.iter_mut().filter(|client| client.callback == Some(token)) {
+            client.callback = None;
+            client.registered.clear();
+        }
+        drop(state);
+        self.changed.notify_all();
+    }
+}
+
+/// Whether ticks are on their way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TickWait {
+    /// Nobody wants any, and a procedure is in progress.
+    Busy,
+    /// Nobody wants any.
+    Unwanted,
+    /// All are acknowledged.
+    Taken,
+    /// One still is.
+    Open,
+}

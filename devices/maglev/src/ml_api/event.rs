@@ -1,0 +1,121 @@
+//! Events: what a controller says unasked, on the callback connection, and what a client answers.
+
+use super::frame::{Fields, Frame};
+use super::values::{Buttons, FaultBits, Six, WirePose};
+
+/// Number of the event that ends a callback connection, and of the function that asks for it.
+const END: i32 = 71;
+
+/// Events a client can register for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EventKind {
+    /// A button changed.
+    Button = 74,
+    /// A boundary was crossed.
+    Boundary = 75,
+    /// A coil is too hot.
+    Overtemp = 76,
+    /// The fault bits changed.
+    Fault = 77,
+    /// A servo interval.
+    Tick = 78,
+}
+
+/// What happened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event {
+    /// A button changed.
+    Button(Buttons),
+    /// A boundary was crossed: for each axis -1 below its range, 1 above, 0 inside; 1 at last outside the sphere.
+    Boundary([i32; 7]),
+    /// A coil is too hot: all temperatures, °C.
+    Overtemp(Six),
+    /// The fault bits changed.
+    Fault(FaultBits),
+    /// A servo interval, and the pose it began with.
+    Tick(WirePose),
+    /// No more events: the connection ends.
+    End,
+}
+
+impl Event {
+    /// Which kind it is; nothing for the end.
+    #[must_use]
+    pub const fn kind(&self) -> Option<EventKind> {
+        Some(match self {
+            Self::Button(_) => EventKind::Button,
+            Self::Boundary(_) => EventKind::Boundary,
+            Self::Overtemp(_) => EventKind::Overtemp,
+            Self::Fault(_) => EventKind::Fault,
+            Self::Tick(_) => EventKind::Tick,
+            Self::End => return None,
+        })
+    }
+
+    /// As bytes.
+    #[must_use]
+    pub fn encode(&self) -> Frame {
+        let mut frame = Frame::new(self.kind().map_or(END, |kind| kind as i32));
+        match self {
+            Self::Button(buttons) => frame.int(buttons.left.into()).int(buttons.right.into()),
+            Self::Boundary(sides) => {
+                for side in sides {
+                    frame.int(*side);
+                }
+                &mut frame
+            }
+            Self::Overtemp(temperatures) => frame.floats(temperatures),
+            Self::Fault(bits) => frame.put(&bits.0.to_le_bytes()),
+            Self::Tick(pose) => frame.int(pose.out_of_range.into()).floats(&pose.at),
+            Self::End => &mut frame,
+        };
+        frame
+    }
+
+    /// Reads a frame. Total: any bytes give an event or nothing.
+    #[must_use]
+    pub fn decode(frame: &[u8]) -> Option<Self> {
+        let (id, mut fields) = Fields::of(frame)?;
+        const BUTTON: i32 = EventKind::Button as i32;
+        const BOUNDARY: i32 = EventKind::Boundary as i32;
+        const OVERTEMP: i32 = EventKind::Overtemp as i32;
+        const FAULT: i32 = EventKind::Fault as i32;
+        const TICK: i32 = EventKind::Tick as i32;
+        Some(match id {
+            END => Self::End,
+            BUTTON => Self::Button(Buttons { left: fields.int()? != 0, right: fields.int()? != 0 }),
+            BOUNDARY => {
+                let mut sides = [0; 7];
+                for side in &mut sides {
+                    *side = fields.int()?;
+                }
+                Self::Boundary(sides)
+            }
+            OVERTEMP => Self::Overtemp(fields.floats()?),
+            FAULT => Self::Fault(FaultBits(u32::from_le_bytes(fields.array()?))),
+            TICK => Self::Tick(WirePose { out_of_range: fields.int()? != 0, at: fields.floats()? }),
+            _ => return None,
+        })
+    }
+}
+
+/// What a client's handler returned; the order of events is the only thing that says to which.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Acknowledgement(pub i32);
+
+impl Acknowledgement {
+    /// Of an event without a handler, and of the end.
+    pub const UNHANDLED: Self = Self(-1);
+
+    /// As bytes.
+    #[must_use]
+    pub fn encode(self) -> Frame {
+        Frame::new(self.0)
+    }
+
+    /// Reads a frame; nothing if it is malformed.
+    #[must_use]
+    pub fn decode(frame: &[u8]) -> Option<Self> {
+        Fields::of(frame).map(|(value, _)| Self(value))
+    }
+}

@@ -1,0 +1,124 @@
+//! Frames out of a stream of bytes: whole ones, whatever pieces they come in.
+
+use super::frame::{LONGEST_BYTES, SHORTEST_BYTES};
+use std::io::{ErrorKind, Read};
+
+/// What a look at a stream found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Taken {
+    /// A whole frame of this many bytes, to be had from [`Intake::frame`] until the next look.
+    Frame(usize),
+    /// Nothing more has arrived.
+    Nothing,
+    /// A length that no frame has: where the next one begins is not known.
+    Malformed,
+    /// The other side is gone.
+    Lost,
+}
+
+/// Bytes that arrived and were not used yet.
+#[derive(Clone, Debug)]
+pub struct Intake {
+    bytes: [u8; LONGEST_BYTES],
+    filled: usize,
+    /// Bytes of the frame that was told last: gone with the next look.
+    told: usize,
+}
+
+impl Default for Intake {
+    fn default() -> Self {
+        Self { bytes: [0; LONGEST_BYTES], filled: 0, told: 0 }
+    }
+}
+
+impl Intake {
+    /// The frame that was told of last.
+    #[must_use]
+    pub fn frame(&self) -> &[u8] {
+        self.bytes.get(..self.told).unwrap_or_default()
+    }
+
+    /// The next frame of a stream; one call of the system at most if the stream does not block.
+    pub fn take(&mut self, stream: &mut impl Read) -> Taken {
+        self.bytes.copy_within(self.told..self.filled, 0);
+        self.filled -= self.told;
+        self.told = 0;
+        loop {
+            match self.length() {
+                Some(Err(())) => return Taken::Malformed,
+                Some(Ok(length)) if length <= self.filled => {
+                    self.told = length;
+                    return Taken::Frame(length);
+                }
+                _ => {}
+            }
+            let room = self.bytes.get_mut(self.filled..).unwrap_or_default();
+            match stream.read(room) {
+                Ok(0) => return Taken::Lost,
+                Ok(read) => self.filled += read,
+                Err(error) => match error.kind() {
+                    ErrorKind::WouldBlock | ErrorKind::TimedOut => return Taken::Nothing,
+                    ErrorKind::Interrupted => {}
+                    _ => return Taken::Lost,
+                },
+            }
+        }
+    }
+
+    /// True if some bytes of a frame have arrived and others have not.
+    #[must_use]
+    pub fn is_in_the_middle(&self) -> bool {
+        self.filled > self.told
+    }
+
+    /// Length of the frame that begins here; an error if no frame has it.
+    fn length(&self) -> Option<Result<usize, ()>> {
+        let head = self.bytes.get(..self.filled)?.first_chunk()?;
+        let length = usize::try_from(i32::from_le_bytes(*head)).unwrap_or(0);
+        Some(if (SHORTEST_BYTES..=LONGEST_BYTES).contains(&length) { Ok(length) } else { Err(()) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Gives its pieces one at a time, and then nothing.
+    struct Pieces(Vec<Vec<u8>>);
+
+    impl Read for Pieces {
+        fn read(&mut self, room: &mut [u8]) -> std::io::Result<usize> {
+            if self.0.is_empty() {
+                return Err(ErrorKind::WouldBlock.into());
+            }
+            self.0.remove(0).as_slice().read(room)
+        }
+    }
+
+    #[test]
+    fn frames_come_whole_from_single_bytes_and_from_one_piece() {
+        let frames = [[8, 0, 0, 0, 1, 0, 0, 0].to_vec(), [12, 0, 0, 0, 2, 0, 0, 0, 9, 9, 9, 9].to_vec()];
+        let all: Vec<u8> = frames.concat();
+        for mut stream in [Pieces(all.iter().map(|byte| vec![*byte]).collect()), Pieces(vec![all.clone()])] {
+            let mut intake = Intake::default();
+            for frame in &frames {
+                assert_eq!(intake.take(&mut stream), Taken::Frame(frame.len()));
+                assert_eq!(intake.frame(), frame);
+            }
+            assert_eq!(intake.take(&mut stream), Taken::Nothing);
+            assert!(!intake.is_in_the_middle());
+        }
+    }
+
+    #[test]
+    fn a_length_that_no_frame_has_is_told() {
+        for length in [0_i32, 7, -1, 513, i32::MIN] {
+            let mut stream = Pieces(vec![length.to_le_bytes().to_vec()]);
+            assert_eq!(Intake::default().take(&mut stream), Taken::Malformed, "{length}");
+        }
+        let mut half = Intake::default();
+        assert_eq!(half.take(&mut Pieces(vec![vec![12, 0, 0, 0, 1]])), Taken::Nothing);
+        assert!(half.is_in_the_middle());
+        assert_eq!(half.take(&mut [].as_slice()), Taken::Lost);
+    }
+}

@@ -1,0 +1,40 @@
+//! The ML API 1.5b: what the controller of the Maglev 200 speaks on TCP port 5678. One codec for both ends.
+//!
+//! ```text
+//! request   length i32, function i32, arguments        client to controller, control connection
+//! reply     length i32, status   i32, results          controller to client
+//! event     length i32, event    i32, payload          controller to client, callback connection
+//! answer    8      i32, value    i32                   client to controller
+//! ```
+//!
+//! Little endian, every number 4 bytes, no checksum, no number that pairs a reply with its request: one call is outstanding
+//! on a connection at a time. Metres, radians, seconds, newtons, amperes, degrees Celsius; axes x, y, z and the rotations
+//! about them, the device frame.
+//!
+//! - [`frame`]: bytes of one frame, written and read; [`intake`] cuts them out of a stream.
+//! - [`values`]: what fields mean; [`angles`]: three angles as an orientation.
+//! - [`request`], [`reply`], [`event`]: what is said, and as which bytes.
+//!
+//! Real-time throughout: bounded, no allocation.
+
+pub mod angles;
+pub mod event;
+pub mod frame;
+pub mod function;
+pub mod intake;
+pub mod reply;
+pub mod request;
+pub mod values;
+
+pub use event::{Acknowledgement, Event, EventKind};
+pub use frame::Frame;
+pub use function::Function;
+pub use intake::{Intake, Taken};
+pub use reply::{Reply, Results};
+pub use request::{Request, Unreadable};
+pub use values::{
+    Axis, AxisMode, Buttons, Cell, CellOffset, FaultBits, Gain, GainSet, Pid, Six, Status, Version, WirePose,
+};
+
+/// The port every controller and every client uses.
+pub const PORT: u16 = 5678;

@@ -1,0 +1,205 @@
+//! Replies: a status, and always the full results. A client decodes results whatever the status says, so that a reply that
+//! is cut short would give it numbers of an earlier one.
+
+use super::frame::{Fields, Frame};
+use super::function::Function;
+use super::values::{AxisMode, Buttons, Cell, CellOffset, FaultBits, Pid, Six, Status, Version, WirePose};
+
+/// Results of a function. Units of [`super`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Results {
+    /// None.
+    None,
+    /// One number.
+    Number(f32),
+    /// Six numbers.
+    Six(Six),
+    /// A pose.
+    Pose(WirePose),
+    /// How each axis is controlled.
+    Modes([AxisMode; 6]),
+    /// Buttons.
+    Buttons(Buttons),
+    /// Light spots.
+    Cells([Cell; 3]),
+    /// What is wrong.
+    Fault(FaultBits),
+    /// Gains of all axes.
+    Gains([Pid; 6]),
+    /// Gains of an axis.
+    Pid(Pid),
+    /// Where the cells sit.
+    CellOffsets([CellOffset; 3]),
+    /// Voltages, four a cell.
+    Voltages([f32; 12]),
+    /// The version.
+    Version(Version),
+    /// The name of a callback connection.
+    Token(i32),
+}
+
+/// What a controller answers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reply {
+    /// Whether it was done.
+    pub status: Status,
+    /// Results, of the function's kind.
+    pub results: Results,
+}
+
+impl Results {
+    /// The results of a function with all numbers zero: what goes with an error.
+    #[must_use]
+    pub fn zero(function: Function) -> Self {
+        match function {
+            Function::FindGravity
+            | Function::GetCurrentLimits
+            | Function::GetCurrents
+            | Function::GetForces
+            | Function::GetGravity
+            | Function::GetSpeedLimits
+            | Function::GetTemp
+            | Function::GetVelocity => Self::Six([0.0; 6]),
+            Function::GetActualPosition | Function::GetDesiredPosition | Function::GetFrame => {
+                Self::Pose(WirePose::default())
+            }
+            Function::GetAxisModes => Self::Modes([AxisMode::Normal; 6]),
+            Function::GetBoundaryRadius
+            | Function::GetForceAxis
+            | Function::GetGainVecSingle
+            | Function::GetGraspCurrent
+            | Function::GetGraspCurrentLimit
+            | Function::GetLatCellLimit
+            | Function::GetServoFrequency => Self::Number(0.0),
+            Function::GetButtonStatus => Self::Buttons(Buttons::default()),
+            Function::GetCellPosition => Self::Cells([Cell::default(); 3]),
+            Function::GetFault => Self::Fault(FaultBits::NONE),
+            Function::GetGainVecAxes => Self::Gains([Pid::ZERO; 6]),
+            Function::GetGainVecAxis | Function::GetGainVecGrasp => Self::Pid(Pid::ZERO),
+            Function::GetLatCellOffset => Self::CellOffsets([CellOffset::default(); 3]),
+            Function::GetRawCellData => Self::Voltages([0.0; 12]),
+            Function::GetVersion => Self::Version(Version::default()),
+            Function::RequestToken => Self::Token(0),
+            _ => Self::None,
+        }
+    }
+
+    fn write<'f>(&self, frame: &'f mut Frame) -> &'f mut Frame {
+        match self {
+            Self::None => {}
+            Self::Number(value) => return frame.float(*value),
+            Self::Six(values) => return frame.floats(values),
+            Self::Pose(pose) => return frame.int(pose.out_of_range.into()).floats(&pose.at),
+            Self::Modes(modes) => {
+                // The first two once more: the vendor's decoder reads two further numbers over them.
+                for mode in modes.iter().chain(modes.iter().take(2)) {
+                    frame.int(*mode as i32);
+                }
+            }
+            Self::Buttons(buttons) => return frame.int(buttons.left.into()).int(buttons.right.into()),
+            Self::Cells(cells) => {
+                for cell in cells {
+                    frame.float(cell.x).float(cell.y).put(if cell.is_valid { b"1" } else { b"0" });
+                }
+            }
+            Self::Fault(bits) => return frame.put(&bits.0.to_le_bytes()),
+            Self::Gains(gains) => {
+                for pid in gains {
+                    frame.pid(*pid);
+                }
+            }
+            Self::Pid(pid) => return frame.pid(*pid),
+            Self::CellOffsets(cells) => {
+                for cell in cells {
+                    frame.floats(&[cell.x, cell.y, cell.t]);
+                }
+            }
+            Self::Voltages(values) => return frame.floats(values),
+            Self::Version(version) => return frame.put(version.text().as_bytes()).put(&[0]),
+            Self::Token(token) => return frame.int(*token),
+        }
+        frame
+    }
+
+    fn read(function: Function, fields: &mut Fields<'_>) -> Option<Self> {
+        Some(match Self::zero(function) {
+            Self::None => Self::None,
+            Self::Number(_) => Self::Number(fields.float()?),
+            Self::Six(_) => Self::Six(fields.floats()?),
+            Self::Pose(_) => Self::Pose(WirePose { out_of_range: fields.int()? != 0, at: fields.floats()? }),
+            Self::Modes(mut modes) => {
+                for mode in &mut modes {
+                    *mode = AxisMode::of(fields.int()?)?;
+                }
+                Self::Modes(modes)
+            }
+            Self::Buttons(_) => {
+                Self::Buttons(Buttons { left: fields.int()? != 0, right: fields.int()? != 0 })
+            }
+            Self::Cells(mut cells) => {
+                for cell in &mut cells {
+                    let (x, y, [flag]) = (fields.float()?, fields.float()?, fields.array()?);
+                    *cell = Cell { x, y, is_valid: flag != b'0' };
+                }
+                Self::Cells(cells)
+            }
+            Self::Fault(_) => Self::Fault(FaultBits(u32::from_le_bytes(fields.array()?))),
+            Self::Gains(mut gains) => {
+                for pid in &mut gains {
+                    *pid = fields.pid()?;
+                }
+                Self::Gains(gains)
+            }
+            Self::Pid(_) => Self::Pid(fields.pid()?),
+            Self::CellOffsets(mut cells) => {
+                for cell in &mut cells {
+                    let [x, y, t] = fields.floats()?;
+                    *cell = CellOffset { x, y, t };
+                }
+                Self::CellOffsets(cells)
+            }
+            Self::Voltages(_) => Self::Voltages(fields.floats()?),
+            Self::Version(_) => {
+                let end = fields.rest().iter().position(|byte| *byte == 0)?;
+                Self::Version(Version::new(fields.rest().get(..end)?))
+            }
+            Self::Token(_) => Self::Token(fields.int()?),
+        })
+    }
+}
+
+impl Reply {
+    /// Done, with these results.
+    #[must_use]
+    pub const fn ok(results: Results) -> Self {
+        Self { status: Status::OK, results }
+    }
+
+    /// Done, or why not; a function without results.
+    #[must_use]
+    pub const fn status(status: Status) -> Self {
+        Self { status, results: Results::None }
+    }
+
+    /// Not done: full results of zeros. What has no function has no results.
+    #[must_use]
+    pub fn failed(function: Option<Function>, status: Status) -> Self {
+        Self { status, results: function.map_or(Results::None, Results::zero) }
+    }
+
+    /// As bytes.
+    #[must_use]
+    pub fn encode(&self) -> Frame {
+        let mut frame = Frame::new(self.status.0);
+        self.results.write(&mut frame);
+        frame
+    }
+
+    /// Reads the frame that answers a function. Total: any bytes give a reply or nothing; one that is shorter than the
+    /// function's results is none.
+    #[must_use]
+    pub fn decode(function: Function, frame: &[u8]) -> Option<Self> {
+        let (status, mut fields) = Fields::of(frame)?;
+        Some(Self { status: Status(status), results: Results::read(function, &mut fields)? })
+    }
+}

@@ -1,0 +1,260 @@
+//! Requests: a function and its arguments.
+
+use super::event::EventKind;
+use super::frame::{Fields, Frame};
+use super::function::Function;
+use super::values::{Axis, CellOffset, Gain, GainSet, Pid, Six, Status, WirePose};
+
+/// What a client asks. Units of [`super`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Request {
+    /// A function without arguments.
+    Plain(Function),
+    /// Keeps an axis between two values, m or rad.
+    ConstrainAxis {
+        /// Which.
+        axis: Axis,
+        /// Smallest and largest value.
+        range: [f32; 2],
+    },
+    /// A function of one axis: its force, locking, unlocking.
+    OfAxis(Function, Axis),
+    /// A function of one gain set: reading or resetting it.
+    OfSet(Function, GainSet),
+    /// Gains of an axis.
+    GetGainVecAxis(GainSet, Axis),
+    /// One gain.
+    GetGainVecSingle(GainSet, Axis, Gain),
+    /// Begins or ends events; the client's process id.
+    Register(Function, i32),
+    /// A function of one number: radius m, voltage V, current A, frequency Hz.
+    Number(Function, f32),
+    /// A function of six numbers: currents A, speeds m/s and rad/s, wrenches N and N·m.
+    Six(Function, Six),
+    /// A function of a pose: desired position, frame.
+    Pose(Function, WirePose),
+    /// Force of one axis, N or N·m.
+    SetForceAxis(Axis, f32),
+    /// Gains of all axes.
+    SetGainVecAxes(GainSet, [Pid; 6]),
+    /// Gains of an axis.
+    SetGainVecAxis(GainSet, Axis, Pid),
+    /// Gains of the grasp.
+    SetGainVecGrasp(Pid),
+    /// One gain.
+    SetGainVecSingle(GainSet, Axis, Gain, f32),
+    /// Where the cells sit.
+    SetLatCellOffset([CellOffset; 3]),
+    /// The callback connection of this token is the client's.
+    MapToken(i32),
+}
+
+/// A request that cannot be obeyed, and what is to be answered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unreadable {
+    /// The function, if there is one of that number.
+    pub function: Option<Function>,
+    /// Why not.
+    pub status: Status,
+}
+
+impl Request {
+    /// The function.
+    #[must_use]
+    pub const fn function(&self) -> Function {
+        match *self {
+            Self::Plain(function)
+            | Self::OfAxis(function, _)
+            | Self::OfSet(function, _)
+            | Self::Register(function, _)
+            | Self::Number(function, _)
+            | Self::Six(function, _)
+            | Self::Pose(function, _) => function,
+            Self::ConstrainAxis { .. } => Function::ConstrainAxis,
+            Self::GetGainVecAxis(..) => Function::GetGainVecAxis,
+            Self::GetGainVecSingle(..) => Function::GetGainVecSingle,
+            Self::SetForceAxis(..) => Function::SetForceAxis,
+            Self::SetGainVecAxes(..) => Function::SetGainVecAxes,
+            Self::SetGainVecAxis(..) => Function::SetGainVecAxis,
+            Self::SetGainVecGrasp(_) => Function::SetGainVecGrasp,
+            Self::SetGainVecSingle(..) => Function::SetGainVecSingle,
+            Self::SetLatCellOffset(_) => Function::SetLatCellOffset,
+            Self::MapToken(_) => Function::MapToken,
+        }
+    }
+
+    /// Registers for events.
+    #[must_use]
+    pub const fn register(kind: EventKind, process: i32) -> Self {
+        let function = match kind {
+            EventKind::Button => Function::RegisterButton,
+            EventKind::Boundary => Function::RegisterBoundary,
+            EventKind::Overtemp => Function::RegisterOvertemp,
+            EventKind::Fault => Function::RegisterFault,
+            EventKind::Tick => Function::RegisterTick,
+        };
+        Self::Register(function, process)
+    }
+
+    /// As bytes.
+    #[must_use]
+    pub fn encode(&self) -> Frame {
+        let mut frame = Frame::new(self.function().id());
+        match *self {
+            Self::Plain(_) => &mut frame,
+            Self::ConstrainAxis { axis, range } => frame.int(axis as i32).floats(&range),
+            Self::OfAxis(_, axis) => frame.int(axis as i32),
+            Self::OfSet(_, set) => frame.int(set as i32),
+            Self::GetGainVecAxis(set, axis) => frame.int(set as i32).int(axis as i32),
+            Self::GetGainVecSingle(set, axis, gain) => {
+                frame.int(set as i32).int(axis as i32).int(gain as i32)
+            }
+            Self::Register(_, process) => frame.int(process),
+            Self::Number(_, value) => frame.float(value),
+            Self::Six(_, values) => frame.floats(&values),
+            Self::Pose(_, pose) => frame.int(pose.out_of_range.into()).floats(&pose.at),
+            Self::SetForceAxis(axis, force) => frame.int(axis as i32).float(force),
+            Self::SetGainVecAxes(set, gains) => {
+                frame.int(set as i32);
+                for pid in gains {
+                    frame.pid(pid);
+                }
+                &mut frame
+            }
+            Self::SetGainVecAxis(set, axis, pid) => frame.int(set as i32).int(axis as i32).pid(pid),
+            Self::SetGainVecGrasp(pid) => frame.pid(pid),
+            Self::SetGainVecSingle(set, axis, gain, value) => {
+                frame.int(set as i32).int(axis as i32).int(gain as i32).float(value)
+            }
+            Self::SetLatCellOffset(cells) => {
+                for cell in cells {
+                    frame.floats(&[cell.x, cell.y, cell.t]);
+                }
+                &mut frame
+            }
+            Self::MapToken(token) => frame.int(token),
+        };
+        frame
+    }
+
+    /// Reads a frame. Total: any bytes give a request or what is to be answered; bytes behind the arguments are ignored.
+    ///
+    /// # Errors
+    /// [`Unreadable`].
+    pub fn decode(frame: &[u8]) -> Result<Self, Unreadable> {
+        let unknown = Unreadable { function: None, status: Status::UNKNOWN };
+        let (id, fields) = Fields::of(frame).ok_or(unknown)?;
+        let function = Function::of(id).ok_or(unknown)?;
+        Arguments { fields, function }.read()
+    }
+}
+
+/// Arguments of a function that are being read.
+struct Arguments<'a> {
+    fields: Fields<'a>,
+    function: Function,
+}
+
+impl Arguments<'_> {
+    fn read(mut self) -> Result<Request, Unreadable> {
+        let function = self.function;
+        Ok(match function {
+            Function::ConstrainAxis => {
+                Request::ConstrainAxis { axis: self.axis()?, range: [self.float()?, self.float()?] }
+            }
+            Function::GetForceAxis | Function::LockAxis | Function::UnlockAxis => {
+                Request::OfAxis(function, self.axis()?)
+            }
+            Function::GetGainVecAxes | Function::ResetGainVecAxes => Request::OfSet(function, self.set()?),
+            Function::GetGainVecAxis => Request::GetGainVecAxis(self.set()?, self.axis()?),
+            Function::GetGainVecSingle => Request::GetGainVecSingle(self.set()?, self.axis()?, self.gain()?),
+            Function::SetAuxDac
+            | Function::SetBoundaryRadius
+            | Function::SetGraspCurrent
+            | Function::SetGraspCurrentLimit
+            | Function::SetServoFrequency => Request::Number(function, self.float()?),
+            Function::SetCurrentLimits
+            | Function::SetCurrents
+            | Function::SetForces
+            | Function::SetGravity
+            | Function::SetSpeedLimits
+            | Function::SetVelocity => Request::Six(function, self.six()?),
+            Function::SetDesiredPosition | Function::SetFrame => {
+                // The flag is whatever the caller's memory held.
+                self.int()?;
+                Request::Pose(function, WirePose { out_of_range: false, at: self.six()? })
+            }
+            Function::SetForceAxis => Request::SetForceAxis(self.axis()?, self.float()?),
+            Function::SetGainVecAxes => {
+                let set = self.set()?;
+                let mut gains = [Pid::ZERO; 6];
+                for pid in &mut gains {
+                    *pid = self.pid()?;
+                }
+                Request::SetGainVecAxes(set, gains)
+            }
+            Function::SetGainVecAxis => Request::SetGainVecAxis(self.set()?, self.axis()?, self.pid()?),
+            Function::SetGainVecGrasp => Request::SetGainVecGrasp(self.pid()?),
+            Function::SetGainVecSingle => {
+                Request::SetGainVecSingle(self.set()?, self.axis()?, self.gain()?, self.float()?)
+            }
+            Function::SetLatCellOffset => {
+                let mut cells = [CellOffset::default(); 3];
+                for cell in &mut cells {
+                    *cell = CellOffset { x: self.float()?, y: self.float()?, t: self.float()? };
+                }
+                Request::SetLatCellOffset(cells)
+            }
+            Function::MapToken => Request::MapToken(self.int()?),
+            _ if function.registers().is_some() || function.unregisters().is_some() => {
+                Request::Register(function, self.int()?)
+            }
+            _ => Request::Plain(function),
+        })
+    }
+
+    fn unreadable(&self, status: Status) -> Unreadable {
+        Unreadable { function: Some(self.function), status }
+    }
+
+    fn int(&mut self) -> Result<i32, Unreadable> {
+        self.fields.int().ok_or(self.unreadable(Status::COMMUNICATION))
+    }
+
+    fn float(&mut self) -> Result<f32, Unreadable> {
+        self.fields.float().ok_or(self.unreadable(Status::COMMUNICATION))
+    }
+
+    fn six(&mut self) -> Result<Six, Unreadable> {
+        self.fields.floats().ok_or(self.unreadable(Status::COMMUNICATION))
+    }
+
+    fn pid(&mut self) -> Result<Pid, Unreadable> {
+        self.fields.pid().ok_or(self.unreadable(Status::COMMUNICATION))
+    }
+
+    fn axis(&mut self) -> Result<Axis, Unreadable> {
+        Axis::of(self.int()?).ok_or(self.unreadable(Status::AXIS))
+    }
+
+    fn set(&mut self) -> Result<GainSet, Unreadable> {
+        GainSet::of(self.int()?).ok_or(self.unreadable(Status::GAIN_TYPE))
+    }
+
+    fn gain(&mut self) -> Result<Gain, Unreadable> {
+        Gain::of(self.int()?).ok_or(self.unreadable(Status::GAIN_TYPE))
+    }
+}
+
+impl Frame {
+    pub(super) fn pid(&mut self, pid: Pid) -> &mut Self {
+        self.floats(&[pid.p, pid.i, pid.d, pid.ff])
+    }
+}
+
+impl Fields<'_> {
+    pub(super) fn pid(&mut self) -> Option<Pid> {
+        let [p, i, d, ff] = self.floats()?;
+        Some(Pid { p, i, d, ff })
+    }
+}

@@ -1,0 +1,337 @@
+//! From the first call to levitation, and back. Not real-time, but for the calls of a tick.
+
+use super::connection::{Control, Events, Line, NoResults};
+use crate::ml_api::{
+    Acknowledgement, Event, EventKind, FaultBits, Function, GainSet, Pid, Request, Results, Six, Status,
+    WirePose,
+};
+use crate::transport::OpenError;
+use std::time::{Duration, Instant};
+
+/// How long a call may take, and one that moves the flotor.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(1);
+const PROCEDURE_PATIENCE: Duration = Duration::from_secs(30);
+/// How often faults are reset before it is given up, and the pause between two times.
+const RESETS: u32 = 10;
+const RESET_PAUSE: Duration = Duration::from_millis(500);
+/// Steps in which gains fade.
+const FADE_STEPS: u32 = 20;
+/// What registers for the same events again: any number will do.
+const PROCESS: i32 = 1;
+/// Events of a session; ticks last, because they begin at once.
+const KINDS: [EventKind; 5] =
+    [EventKind::Fault, EventKind::Overtemp, EventKind::Boundary, EventKind::Button, EventKind::Tick];
+/// Gains that must not act beside a force command. The boundary's stay: it is the controller's own wall.
+const FORCED: [GainSet; 3] = [GainSet::Normal, GainSet::Locked, GainSet::Constrained];
+
+/// What a controller says about itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Facts {
+    pub(crate) version: crate::ml_api::Version,
+    pub(crate) current_limits_a: Six,
+    pub(crate) speed_limits: Six,
+}
+
+/// What a session is to be like.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Plan {
+    pub(crate) rate_hz: f32,
+    pub(crate) boundary_m: f32,
+    pub(crate) finds_gravity: bool,
+    pub(crate) fade: Duration,
+}
+
+/// What was reached.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct TakenOff {
+    /// The first tick.
+    pub(crate) pose: WirePose,
+    /// What carries the flotor, N and N·m.
+    pub(crate) gravity: Six,
+}
+
+/// Why taking off failed: at what, and why.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Failed {
+    At(Function, NoResults),
+    Faulted(FaultBits),
+    NoTick,
+}
+
+impl std::fmt::Display for Failed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::At(function, why) => write!(f, "{function:?}: {why}"),
+            Self::Faulted(bits) => write!(
+                f,
+                "the controller stays faulted ({bits}); hold the handle inside the range of its sensors"
+            ),
+            Self::NoTick => f.write_str("the controller sends no ticks"),
+        }
+    }
+}
+
+/// A session with a controller.
+pub(crate) struct Session {
+    control: Control,
+    events: Option<Events>,
+    address: String,
+    /// Gains before they were faded.
+    kept: [[Pid; 6]; 3],
+    /// Ticks that came and are not acknowledged.
+    owed: u32,
+    dropped: u64,
+}
+
+impl Session {
+    /// Connects and asks who is there.
+    pub(crate) fn open(address: &str) -> Result<Self, OpenError> {
+        Ok(Self {
+            control: Control::new(Line::open(address)?),
+            events: None,
+            address: address.to_owned(),
+            kept: [[Pid::ZERO; 6]; 3],
+            owed: 0,
+            dropped: 0,
+        })
+    }
+
+    pub(crate) fn is_lost(&self) -> bool {
+        self.control.is_lost()
+    }
+
+    /// Ticks that were older than the one that was used.
+    pub(crate) fn dropped_ticks(&self) -> u64 {
+        self.dropped
+    }
+
+    fn call(&mut self, request: &Request) -> Result<Results, Failed> {
+        self.call_within(request, PATIENCE)
+    }
+
+    fn call_within(&mut self, request: &Request, patience: Duration) -> Result<Results, Failed> {
+        self.control.call(request, patience).map_err(|why| Failed::At(request.function(), why))
+    }
+
+    fn six(&mut self, function: Function) -> Result<Six, Failed> {
+        match self.call(&Request::Plain(function))? {
+            Results::Six(values) => Ok(values),
+            _ => Err(Failed::At(function, NoResults::Malformed)),
+        }
+    }
+
+    /// What the controller says about itself.
+    pub(crate) fn facts(&mut self) -> Result<Facts, Failed> {
+        let version = match self.call(&Request::Plain(Function::GetVersion))? {
+            Results::Version(version) => version,
+            _ => return Err(Failed::At(Function::GetVersion, NoResults::Malformed)),
+        };
+        let (current_limits_a, speed_limits) =
+            (self.six(Function::GetCurrentLimits)?, self.six(Function::GetSpeedLimits)?);
+        Ok(Facts { version, current_limits_a, speed_limits })
+    }
+
+    /// Faults cleared, lifted, weighed, gains faded to forces, ticks coming: what is left is commanding.
+    pub(crate) fn take_off(&mut self, plan: &Plan) -> Result<TakenOff, Failed> {
+        self.clear_faults()?;
+        self.call(&Request::Number(Function::SetServoFrequency, plan.rate_hz))?;
+        match self.call_within(&Request::Plain(Function::Takeoff), PROCEDURE_PATIENCE) {
+            Ok(_) | Err(Failed::At(_, NoResults::Refused(Status::TAKEN_OFF))) => {}
+            Err(failed) => return Err(failed),
+        }
+        let gravity = self.carry(plan)?;
+        self.call(&Request::Number(Function::SetBoundaryRadius, plan.boundary_m))?;
+        for kind in KINDS {
+            if kind == EventKind::Tick {
+                self.fade_to_forces(plan.fade, gravity)?;
+            }
+            self.register(kind)?;
+        }
+        let until = Instant::now() + PATIENCE;
+        while Instant::now() < until {
+            if let Some(Event::Tick(pose)) = self.next_event(PATIENCE).map_err(|_| Failed::NoTick)? {
+                return Ok(TakenOff { pose, gravity });
+            }
+        }
+        Err(Failed::NoTick)
+    }
+
+    fn clear_faults(&mut self) -> Result<(), Failed> {
+        let mut left = FaultBits::NONE;
+        for attempt in 0..RESETS {
+            if attempt > 0 {
+                std::thread::sleep(RESET_PAUSE);
+            }
+            // That it is refused is told better by what is left.
+            match self.call(&Request::Plain(Function::ResetFault)) {
+                Ok(_) => {}
+                Err(refused @ Failed::At(_, NoResults::Refused(Status::RECEIVE_ONLY))) => {
+                    return Err(refused);
+                }
+                Err(Failed::At(_, NoResults::Refused(_))) => {}
+                Err(failed) => return Err(failed),
+            }
+            left = match self.call(&Request::Plain(Function::GetFault))? {
+                Results::Fault(bits) => bits,
+                _ => return Err(Failed::At(Function::GetFault, NoResults::Malformed)),
+            };
+            if left.is_empty() {
+                return Ok(());
+            }
+        }
+        Err(Failed::Faulted(left))
+    }
+
+    /// Finds what carries the flotor, and lets the controller carry it until forces do.
+    fn carry(&mut self, plan: &Plan) -> Result<Six, Failed> {
+        if !plan.finds_gravity {
+            return Ok([0.0; 6]);
+        }
+        let found = self.call_within(&Request::Plain(Function::FindGravity), PROCEDURE_PATIENCE)?;
+        let Results::Six(gravity) = found else {
+            return Err(Failed::At(Function::FindGravity, NoResults::Malformed));
+        };
+        self.call(&Request::Six(Function::SetGravity, gravity))?;
+        self.call(&Request::Plain(Function::DefyGravity))?;
+        Ok(gravity)
+    }
+
+    fn register(&mut self, kind: EventKind) -> Result<(), Failed> {
+        if self.events.is_none() {
+            let (events, token) = Events::open(&self.address, PATIENCE)
+                .map_err(|why| Failed::At(Function::RequestToken, why))?;
+            self.call(&Request::MapToken(token))?;
+            self.events = Some(events);
+        }
+        self.call(&Request::register(kind, PROCESS)).map(|_| ())
+    }
+
+    /// Fades the gains until nothing but the carrying feed-forward is left, and puts a force command in its place. In the
+    /// end all three sets are zero: whether a force command replaces the gains or comes on top of them, it is the same force.
+    fn fade_to_forces(&mut self, fade: Duration, gravity: Six) -> Result<(), Failed> {
+        for (place, set) in FORCED.into_iter().enumerate() {
+            self.kept[place] = match self.call(&Request::OfSet(Function::GetGainVecAxes, set))? {
+                Results::Gains(gains) => gains,
+                _ => return Err(Failed::At(Function::GetGainVecAxes, NoResults::Malformed)),
+            };
+        }
+        let [normal, ..] = self.kept;
+        if !fade.is_zero() {
+            for step in 1..=FADE_STEPS {
+                #[allow(clippy::cast_precision_loss)] // a few steps
+                let left = 1.0 - step as f32 / FADE_STEPS as f32;
+                let faded =
+                    normal.map(|pid| Pid { p: pid.p * left, i: pid.i * left, d: pid.d * left, ..pid });
+                self.call(&Request::SetGainVecAxes(GainSet::Normal, faded))?;
+                std::thread::sleep(fade / FADE_STEPS);
+            }
+        }
+        self.call(&Request::Six(Function::SetForces, gravity))?;
+        for set in FORCED {
+            self.call(&Request::SetGainVecAxes(set, [Pid::ZERO; 6]))?;
+        }
+        Ok(())
+    }
+
+    /// Ticks end, the gains of before hold the flotor where it is, and it lands. Whatever goes wrong: the next call tries.
+    pub(crate) fn land(&mut self, at: Option<WirePose>) {
+        for kind in KINDS.into_iter().rev() {
+            let function = match kind {
+                EventKind::Tick => Function::UnregisterTick,
+                EventKind::Button => Function::UnregisterButton,
+                EventKind::Boundary => Function::UnregisterBoundary,
+                EventKind::Overtemp => Function::UnregisterOvertemp,
+                EventKind::Fault => Function::UnregisterFault,
+            };
+            let _ = self.call(&Request::Register(function, PROCESS));
+        }
+        if let Some(pose) = at {
+            for (place, set) in FORCED.into_iter().enumerate() {
+                let _ = self.call(&Request::SetGainVecAxes(set, self.kept[place]));
+            }
+            let _ = self.call(&Request::Pose(Function::SetDesiredPosition, pose));
+        }
+        let _ = self.call_within(&Request::Plain(Function::Land), PROCEDURE_PATIENCE);
+        // Ticks that were on their way.
+        while let Ok(Some(_)) = self.next_event(Duration::ZERO) {}
+        let _ = self.acknowledge_ticks();
+    }
+
+    // ------------------------------------------------------------ in a tick
+
+    /// The next event; all but ticks are acknowledged. Real-time: bounded, no allocation.
+    pub(crate) fn next_event(&mut self, budget: Duration) -> Result<Option<Event>, NoResults> {
+        let Some(events) = &mut self.events else { return Err(NoResults::Lost) };
+        let event = match events.next(budget) {
+            Ok(event) => event,
+            Err(why) => {
+                self.events = None;
+                return Err(why);
+            }
+        };
+        match event {
+            Some(Event::Tick(_)) => {
+                self.dropped += u64::from(self.owed > 0);
+                self.owed += 1;
+            }
+            Some(_) => events.acknowledge(Acknowledgement(0))?,
+            None => {}
+        }
+        Ok(event)
+    }
+
+    /// Lets the controller go on: the ticks that came are dealt with. Real-time: bounded, no allocation.
+    pub(crate) fn acknowledge_ticks(&mut self) -> Result<(), NoResults> {
+        let Some(events) = &mut self.events else { return Err(NoResults::Lost) };
+        while self.owed > 0 {
+            events.acknowledge(Acknowledgement(0))?;
+            self.owed -= 1;
+        }
+        Ok(())
+    }
+
+    /// Commands a wrench; true if the controller has confirmed it within the budget. One that is not confirmed yet is
+    /// waited for first, and the new one is left out if it is still missing. Real-time: bounded, no allocation.
+    pub(crate) fn command(&mut self, wrench: Six, budget: Duration) -> Result<bool, NoResults> {
+        if self.control.outstanding_since().is_some() && !self.is_confirmed(budget)? {
+            return Ok(false);
+        }
+        self.control.begin(&Request::Six(Function::SetForces, wrench))?;
+        self.is_confirmed(budget)
+    }
+
+    /// Since when a command has not been confirmed.
+    pub(crate) fn unconfirmed_since(&self) -> Option<Instant> {
+        self.control.outstanding_since()
+    }
+
+    fn is_confirmed(&mut self, budget: Duration) -> Result<bool, NoResults> {
+        match self.control.finish(budget)? {
+            None => Ok(false),
+            Some(reply) if reply.status.is_ok() => Ok(true),
+            Some(reply) => Err(NoResults::Refused(reply.status)),
+        }
+    }
+}
+
+impl Drop for Session {
+    /// Leaves in the two steps of the protocol; a connection that is lost is reset.
+    fn drop(&mut self) {
+        if self.control.is_lost() {
+            return;
+        }
+        if self.events.is_some() {
+            if self.call(&Request::Plain(Function::StopCallbacks)).is_err() {
+                return;
+            }
+            let until = Instant::now() + PATIENCE;
+            while Instant::now() < until {
+                match self.next_event(PATIENCE) {
+                    Ok(Some(Event::End)) | Err(_) => break,
+                    Ok(_) => drop(self.acknowledge_ticks()),
+                }
+            }
+        }
+        let _ = self.call(&Request::Plain(Function::Disconnect));
+    }
+}

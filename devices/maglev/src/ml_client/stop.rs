@@ -1,0 +1,78 @@
+//! The stop: one Land frame, on a connection that nothing else uses. No force in the air is no safe state: the flotor
+//! would fall.
+
+use super::connection::Line;
+use crate::ml_api::{Frame, Function, Request};
+use crate::transport::OpenError;
+use flotor_hal::{IndependentStop, SafeStop, StoppedState};
+use std::io::{Read, Write};
+use std::os::fd::AsRawFd;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+
+/// Longest time a controller takes to land, ns.
+const LANDING_NS: u64 = 30_000_000_000;
+
+/// What the loop and whoever stops it share.
+pub(crate) struct Stop {
+    is_stopped: AtomicBool,
+    /// Held by whoever stops or reopens: neither waits for the other.
+    line: Mutex<Line>,
+    frame: Frame,
+}
+
+impl Stop {
+    /// Opens the connection. Not real-time.
+    pub(crate) fn open(address: &str) -> Result<Self, OpenError> {
+        let frame = Request::Plain(Function::Land).encode();
+        Ok(Self { is_stopped: AtomicBool::new(false), line: Mutex::new(Line::open(address)?), frame })
+    }
+
+    /// True once somebody has stopped the device. Real-time: bounded, no allocation.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.is_stopped.load(Ordering::Acquire)
+    }
+
+    /// Begins anew; replies to earlier stops are not needed. Not real-time.
+    pub(crate) fn rearm(&self) {
+        if let Ok(line) = self.line.lock() {
+            let mut replies = [0; 64];
+            while line.stream().read(&mut replies).is_ok_and(|length| length > 0) {}
+        }
+        self.is_stopped.store(false, Ordering::Release);
+    }
+
+    /// Connects again, to a controller that was gone. Not real-time.
+    pub(crate) fn reopen(&self, address: &str) -> Result<(), OpenError> {
+        let anew = Line::open(address)?;
+        if let Ok(mut line) = self.line.lock() {
+            *line = anew;
+        }
+        Ok(())
+    }
+
+    /// Sends the frame, once, without waiting for anything.
+    fn stop(&self) {
+        if self.is_stopped.swap(true, Ordering::AcqRel) {
+            return;
+        }
+        if let Ok(line) = self.line.try_lock() {
+            let _ = line.stream().write(self.frame.bytes());
+        }
+    }
+
+    /// How the device is stopped without its host.
+    pub(crate) fn independent(&self) -> IndependentStop {
+        let descriptor = self.line.lock().map_or(-1, |line| line.stream().as_raw_fd());
+        IndependentStop::by_message(descriptor, self.frame.bytes(), StoppedState::Landed, LANDING_NS)
+    }
+}
+
+/// Lands the flotor, from any thread.
+pub struct LandSwitch(pub(crate) Arc<Stop>);
+
+impl SafeStop for LandSwitch {
+    fn safe_stop(&self) {
+        self.0.stop();
+    }
+}

@@ -1,0 +1,327 @@
+//! The device behind Flotor's own protocol: armed and taken off by activation, on any transport.
+
+use crate::flight::Holder;
+use crate::host_link::{Heard, HostLink, Unanswered};
+use crate::parameters::Options;
+use crate::protocol::{Condition, Description, Mode, Rejections, Request, Status};
+use crate::shaping::Shaping;
+use crate::transport::{self, Kind, LinkLost};
+use flotor_hal::{
+    Axes, Capabilities, Conditions, Cycle, DQuat, DVec3, DeviceState, Fault, IndependentStop, LoopConfig,
+    Pose, Refusal, SafeStop, StoppedState, Tick, Twist, VerticalCalibration, Wrench,
+};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// How long a controller may take to describe itself, to arm and take off, and to switch off.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// How long a lockstep tick waits: a delayed emulator is not a fault.
+const LOCKSTEP_PATIENCE: Duration = Duration::from_secs(10);
+/// Periods a command is valid for: one more than it takes to replace it. A host that has missed two deadlines has
+/// no say until it is back, long before the watchdog ends its session.
+const VALID_PERIODS: u64 = 3;
+/// Rounding of a unit quaternion's vector part in `f32`, squared.
+const LENGTH_TOLERANCE: f64 = 1.0e-5;
+
+/// The device, opened: the controller has described itself, its coils are off.
+pub(crate) struct OwnDevice {
+    options: Options,
+    link: HostLink,
+    description: Description,
+    pub(crate) calibration: VerticalCalibration,
+    stopped: Arc<AtomicBool>,
+}
+
+/// The device, levitating.
+pub(crate) struct OwnActive {
+    opened: Box<OwnDevice>,
+    pub(crate) shaping: Shaping,
+    period_us: u64,
+    /// Sequence number of the command whose answer a lockstep tick waits for.
+    awaited: Option<u32>,
+    /// The status of take-off, until a newer one comes.
+    first: Option<Status>,
+    /// The newest status: where landing begins.
+    newest: Status,
+    state: DeviceState,
+    heard_ns: u64,
+}
+
+/// Asks the device to switch off at its next tick; if there is none, the controller's watchdog sees to it.
+pub struct CoilSwitch(Arc<AtomicBool>);
+
+impl SafeStop for CoilSwitch {
+    fn safe_stop(&self) {
+        self.0.store(true, Ordering::Release);
+    }
+}
+
+impl OwnDevice {
+    pub(crate) fn open(options: &Options) -> Result<Self, Refusal> {
+        let (link, description) = connect(options)?;
+        Ok(Self {
+            options: options.clone(),
+            link,
+            description,
+            calibration: VerticalCalibration::NONE,
+            stopped: Arc::new(AtomicBool::new(false)),
+        })
+    }
+
+    pub(crate) fn capabilities(&self) -> Capabilities {
+        let Description { range_m, range_rad, max_force_n, max_torque_nm, rate_hz, .. } = self.description;
+        Capabilities {
+            sensed: axes(self.description.sensed),
+            actuated: axes(self.description.actuated),
+            range_m: range_m.map(f64::from),
+            range_rad: range_rad.map(f64::from),
+            resolution_m: f64::from(self.description.resolution_m),
+            max_force_n: max_force_n.map(f64::from),
+            max_torque_nm: max_torque_nm.map(f64::from),
+            max_force_slew_n_per_s: f64::from(self.description.force_slew_n_per_s),
+            max_torque_slew_nm_per_s: f64::from(self.description.torque_slew_nm_per_s),
+            max_stiffness_n_per_m: f64::from(self.description.max_stiffness_n_per_m),
+            rate_hz: rate_hz.map(f64::from),
+            latency_s: self.latency_s(),
+        }
+    }
+
+    pub(crate) fn latency_s(&self) -> f64 {
+        f64::from(self.description.latency_us) * 1.0e-6
+    }
+
+    pub(crate) fn stopper(&self) -> CoilSwitch {
+        CoilSwitch(Arc::clone(&self.stopped))
+    }
+
+    pub(crate) fn serial(&self) -> String {
+        self.description.serial_text()
+    }
+
+    /// The controller obeys a command for three periods and then only damps; after its watchdog it lands. A message from
+    /// elsewhere would not be heard: a frame bears the session, which begins with activation, and a sequence number.
+    pub(crate) fn independent_stop(&self) -> IndependentStop {
+        let watchdog_us = self.options.watchdog_us.min(self.description.longest_watchdog_us);
+        IndependentStop::by_itself(StoppedState::Landed, u64::from(watchdog_us) * 1000)
+    }
+
+    pub(crate) fn activate(
+        mut self: Box<Self>,
+        config: &LoopConfig,
+    ) -> Result<Box<OwnActive>, (Box<Self>, Refusal)> {
+        match self.take_off(config) {
+            Ok((first, weight_n)) => Ok(Box::new(OwnActive {
+                newest: first,
+                shaping: Shaping::new(
+                    self.calibration,
+                    Wrench::from_force(DVec3::Z * weight_n),
+                    self.options.feedforward_n,
+                ),
+                period_us: config.period_ns / 1000,
+                awaited: None,
+                first: Some(first),
+                state: DeviceState::HOME,
+                heard_ns: 0,
+                opened: self,
+            })),
+            Err(refusal) => Err((self, refusal)),
+        }
+    }
+
+    /// Begins a session, brings the handle home if that is wanted, and weighs it; a link that broke since (unplugged,
+    /// plugged in again) is opened anew.
+    fn take_off(&mut self, config: &LoopConfig) -> Result<(Status, f64), Refusal> {
+        let period_us = u32::try_from(config.period_ns / 1000).unwrap_or(u32::MAX);
+        let watchdog_us = self.options.watchdog_us;
+        let taken_off = match self.link.take_off(period_us, watchdog_us, PATIENCE) {
+            Err(Unanswered::Lost) => {
+                let (link, description) = connect(&self.options)?;
+                if description != self.description {
+                    let reason = "another controller answers than the one that was opened; start again";
+                    return Err(Refusal::resource(reason));
+                }
+                self.link = link;
+                self.link.take_off(period_us, watchdog_us, PATIENCE)
+            }
+            other => other,
+        };
+        let status = taken_off.map_err(|unanswered| refused(&self.options, unanswered))?;
+        self.stopped.store(false, Ordering::Release);
+        if self.options.take_off.is_zero() {
+            return Ok((status, 0.0));
+        }
+        let holder = self.holder(period_us);
+        let (status, found_n) =
+            holder.take_off(&mut self.link, status, self.options.take_off).map_err(|why| {
+                let _ = self.link.disarm(PATIENCE);
+                Refusal::resource(format!("homing failed: {why}; check that the handle is free to move"))
+            })?;
+        Ok((status, if self.options.finds_gravity() { found_n } else { 0.0 }))
+    }
+
+    fn holder(&self, period_us: u32) -> Holder {
+        Holder { period_us, delay_s: self.latency_s(), lockstep: self.options.lockstep }
+    }
+}
+
+/// Opens the link and asks who is there.
+fn connect(options: &Options) -> Result<(HostLink, Description), Refusal> {
+    let transport = transport::open(options.kind, &options.address).map_err(Refusal::resource)?;
+    let mut link = HostLink::new(transport);
+    let description = link.describe(PATIENCE).map_err(|unanswered| refused(options, unanswered))?;
+    Ok((link, description))
+}
+
+fn refused(options: &Options, unanswered: Unanswered) -> Refusal {
+    let Options { kind, address, .. } = options;
+    let hint = match kind {
+        Kind::Tcp => "; `flotor emulate maglev` starts one without hardware",
+        Kind::Serial | Kind::Usb | Kind::Hid => "",
+    };
+    Refusal::resource(match unanswered {
+        Unanswered::Lost => {
+            format!("the controller at {address} closed the connection; does another program use it?")
+        }
+        Unanswered::Silent => format!("no controller of this device answers at {address}{hint}"),
+    })
+}
+
+fn axes(bits: u8) -> Axes {
+    let all = |mask| bits & mask == mask;
+    match (all(0b00_0111), all(0b11_1000)) {
+        (true, true) => Axes::ALL,
+        (true, false) => Axes::TRANSLATION,
+        (false, true) => Axes::ROTATION,
+        (false, false) => Axes::NONE,
+    }
+}
+
+impl OwnActive {
+    pub(crate) fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
+        let heard = match self.look() {
+            Ok(heard) => heard,
+            Err(LinkLost) => return Cycle::Fault(Fault::Disconnected),
+        };
+        let status = heard.map(|heard| heard.status).or_else(|| self.first.take());
+        let Some(status) = status else {
+            #[allow(clippy::cast_possible_truncation)] // ten seconds at most
+            let timeout_ns = self.opened.options.timeout.as_nanos() as u64;
+            let silence_ns = tick.time_ns.saturating_sub(self.heard_ns);
+            *state = self.state;
+            return if silence_ns > timeout_ns { Cycle::Fault(Fault::Timeout) } else { Cycle::Stale };
+        };
+        self.heard_ns = tick.time_ns;
+        self.newest = status;
+        let Some(sample) = sample(&status) else { return Cycle::Fault(Fault::Protocol) };
+        let when = |is: bool, condition| if is { condition } else { Conditions::NONE };
+        let saturated = when(status.condition.contains(Condition::LIMITED), Conditions::SATURATED);
+        let excess = when(self.shaping.warning.is_active(), Conditions::EXCESS_FORCE);
+        let is_levitating = status.mode == Mode::Levitating;
+        self.state = DeviceState {
+            conditions: saturated.with(excess),
+            delivered: if is_levitating { self.shaping.commanded } else { Wrench::ZERO },
+            sampled_ns: tick.time_ns,
+            ..sample
+        };
+        *state = self.state;
+        match fault(&status) {
+            // Switched off because somebody asked for it: the pose is still worth having.
+            _ if self.is_stopped() => Cycle::Fresh,
+            Some(fault) => Cycle::Fault(fault),
+            None => Cycle::Fresh,
+        }
+    }
+
+    pub(crate) fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle {
+        let request = if self.is_stopped() {
+            // Whatever the next status still says: nothing is asked of the coils any more.
+            self.shaping.commanded = Wrench::ZERO;
+            self.state.delivered = Wrench::ZERO;
+            Request::Disarm
+        } else {
+            let valid_us = u16::try_from(VALID_PERIODS * self.period_us).unwrap_or(u16::MAX);
+            Request::Command { wrench: self.shaping.command(wrench, &self.state), valid_us }
+        };
+        #[allow(clippy::cast_possible_truncation)] // the clock on the wire wraps
+        match self.opened.link.send(request, (tick.time_ns / 1000) as u32) {
+            Ok(()) => {
+                self.awaited = Some(self.opened.link.sequence());
+                Cycle::Fresh
+            }
+            Err(LinkLost) => Cycle::Fault(Fault::Disconnected),
+        }
+    }
+
+    pub(crate) fn deactivate(mut self) -> Box<OwnDevice> {
+        if !self.opened.options.landing.is_zero() && !self.is_stopped() && fault(&self.newest).is_none() {
+            let holder = self.opened.holder(u32::try_from(self.period_us).unwrap_or(u32::MAX));
+            let (landing, weight_n) = (self.opened.options.landing, self.shaping.weight.force().z);
+            // Whatever goes wrong: it is switched off next.
+            let _ = holder.land(&mut self.opened.link, self.newest, landing, weight_n);
+        }
+        // Gone or silent: its own watchdog switches it off.
+        let _ = self.opened.link.disarm(PATIENCE);
+        self.opened
+    }
+
+    /// Answers of the controller that were not used, by reason.
+    pub(crate) fn rejections(&self) -> &Rejections {
+        self.opened.link.rejections()
+    }
+
+    pub(crate) fn latency_s(&self) -> f64 {
+        self.opened.latency_s()
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.opened.stopped.load(Ordering::Acquire)
+    }
+
+    /// The newest status, if there is one; in lockstep, the one that answers the last command.
+    fn look(&mut self) -> Result<Option<Heard>, LinkLost> {
+        let awaited = self.awaited.take().filter(|_| self.opened.options.lockstep);
+        match awaited {
+            Some(awaited) => self.opened.link.wait_for(awaited, LOCKSTEP_PATIENCE),
+            None => self.opened.link.take(),
+        }
+    }
+}
+
+/// Pose and velocity of a status; nothing if its rotation is none.
+fn sample(status: &Status) -> Option<DeviceState> {
+    let vector = DVec3::from_array(status.rotation_xyz.map(f64::from));
+    let rest = 1.0 - vector.length_squared();
+    if rest < -LENGTH_TOLERANCE {
+        return None;
+    }
+    let orientation = DQuat::from_xyzw(vector.x, vector.y, vector.z, rest.max(0.0).sqrt()).normalize();
+    let scaled = |steps: [i16; 3], step: f64| DVec3::from_array(steps.map(f64::from)) * step;
+    Some(DeviceState {
+        pose: Pose::new(DVec3::from_array(status.position_m.map(f64::from)), orientation),
+        twist: Twist::new(
+            scaled(status.velocity_steps, Status::VELOCITY_STEP_M_PER_S),
+            scaled(status.spin_steps, Status::SPIN_STEP_RAD_PER_S),
+        ),
+        ..DeviceState::HOME
+    })
+}
+
+/// What a status means to the host: anything but obeying is a fault.
+fn fault(status: &Status) -> Option<Fault> {
+    if status.mode == Mode::Levitating {
+        return None;
+    }
+    const FAULTS: [(Condition, Fault); 7] = [
+        (Condition::SENSOR_RANGE, Fault::SensorOutOfRange),
+        (Condition::EDGE, Fault::SensorOutOfRange),
+        (Condition::OVERLOAD, Fault::OverCurrent),
+        (Condition::OVER_TEMPERATURE, Fault::OverTemperature),
+        (Condition::OVER_SPEED, Fault::OverSpeed),
+        (Condition::WATCHDOG, Fault::Timeout),
+        (Condition::LINK_LOST, Fault::Disconnected),
+    ];
+    let found = FAULTS.iter().find(|(condition, _)| status.condition.contains(*condition));
+    // Disarmed by somebody else, and nothing is wrong.
+    Some(found.map_or(Fault::Protocol, |(_, fault)| *fault))
+}
