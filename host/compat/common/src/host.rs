@@ -1,0 +1,302 @@
+//! The one run of a process: prepared when it is asked for first, begun by the first open device, ended with the program.
+
+use crate::process::{at_end, guarded, is_copy, is_first, library, notice_copies, quietly};
+use crate::run::{LockstepRun, Prepared, tell};
+use crate::settings::{Pace, Settings, said};
+use crate::station::Station;
+use flotor_servo::{Clock, StopSwitch, guest, monotonic_ns};
+use flotor_session::registry::Registry;
+use flotor_session::scene::Scene;
+use flotor_session::{RunOptions, Session, program};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// What a program finds that names no scene.
+const SCENE: &str = include_str!("../scene.toml");
+/// A run lasts as long as the program: longer than anybody waits, s.
+const NO_END_S: f64 = 31_536_000.0;
+/// How long the first ticks may take to come.
+const BEGIN: Duration = Duration::from_secs(10);
+/// How long the end of the run may take: force fades out, plugins close their devices.
+const END: Duration = Duration::from_secs(20);
+/// Pause between two looks at either.
+const LOOK: Duration = Duration::from_millis(1);
+
+static HOST: OnceLock<Option<Host>> = OnceLock::new();
+/// Whether somebody pressed the emergency stop.
+static IS_STOPPED: AtomicBool = AtomicBool::new(false);
+
+/// Somebody pressed the emergency stop.
+pub(crate) fn note_emergency_stop() {
+    IS_STOPPED.store(true, Ordering::Release);
+}
+
+/// The run of this process; none in a copy of it, or where the scene cannot be run, which was reported once. Prepares the scene
+/// when it is called first. Not real-time.
+#[must_use]
+pub fn host() -> Option<&'static Host> {
+    if is_copy() {
+        return None;
+    }
+    let prepare = || {
+        let prepared = guarded(Err("it panicked".to_owned()), || quietly(Host::prepare));
+        prepared.map_err(|problem| tell(&problem)).ok()
+    };
+    HOST.get_or_init(prepare).as_ref()
+}
+
+/// The run of this process, if anybody has asked for it yet. Not real-time.
+fn host_so_far() -> Option<&'static Host> {
+    if is_copy() { None } else { HOST.get()?.as_ref() }
+}
+
+/// The devices of the run of this process, if there is one.
+pub(crate) fn stations_so_far() -> &'static [Station] {
+    host_so_far().map_or(&[], Host::stations)
+}
+
+/// A run, its devices and its pace.
+pub struct Host {
+    stations: Vec<Station>,
+    pace: Pace,
+    period_ns: u64,
+    stop: StopSwitch,
+    stage: Mutex<Stage>,
+}
+
+/// How far the run has come.
+enum Stage {
+    Prepared(Box<Prepared>),
+    Beside(JoinHandle<()>),
+    Lockstep(Box<LockstepRun>),
+    Over,
+}
+
+impl Host {
+    fn prepare() -> Result<Self, String> {
+        let mut settings = Settings::read(said)?;
+        if !is_first() {
+            settings.keep_apart(library().as_deref().and_then(Path::file_stem).unwrap_or_default());
+        }
+        let folder = library().and_then(|file| file.parent().map(Path::to_path_buf)).unwrap_or_default();
+        guest::be_guest(settings.signals, executable(&folder));
+        let scene = match &settings.scene {
+            Some(path) => Scene::load(path),
+            None => Scene::parse(Path::new("built-in scene of programs"), SCENE),
+        };
+        let mut scene = scene.map_err(|error| error.to_string())?;
+        scene.plugin_folders.extend(plugin_folders(&folder));
+        scene.duration_s = NO_END_S;
+        let connected = program::connect(&mut scene);
+        let (clock, pace) = match settings.pace {
+            Pace::Real => (Clock::Real, Pace::Real),
+            Pace::Lockstep => (Clock::Virtual, Pace::Lockstep),
+        };
+        let options = RunOptions { clock, seed: settings.seed };
+        let registry = Registry::search(&scene.plugin_folders);
+        let mut session = Session::prepare(&scene, &registry, &options).map_err(|error| error.to_string())?;
+        session.warnings().iter().for_each(|warning| tell(warning));
+        let period_ns = session.period_ns();
+        let limits = session.limits();
+        let capabilities = session.capabilities().to_vec();
+        let stations = connected.into_iter().zip(capabilities).map(|(connected, capabilities)| {
+            let number = usize::from(connected.device);
+            let report = session.plugins().get(number);
+            let name = report.map_or_else(String::new, |report| report.name.clone());
+            let plugin = report.map_or_else(String::new, |report| report.metadata.id.clone());
+            let tap = session.tap(connected.device);
+            Station::new([name, plugin], connected, capabilities, &limits, tap, period_ns)
+        });
+        let stations = stations.collect();
+        notice_copies();
+        let stage = Stage::Prepared(Box::new(Prepared { session, scene, options, settings }));
+        Ok(Self { stations, pace, period_ns, stop: StopSwitch::default(), stage: Mutex::new(stage) })
+    }
+
+    /// The devices of the scene, in its order.
+    #[must_use]
+    pub fn stations(&self) -> &[Station] {
+        &self.stations
+    }
+
+    /// The device of this number.
+    #[must_use]
+    pub fn station(&self, number: usize) -> Option<&Station> {
+        self.stations.get(number)
+    }
+
+    /// Who makes time go on.
+    #[must_use]
+    pub fn pace(&self) -> Pace {
+        self.pace
+    }
+
+    /// Nominal time between ticks, ns.
+    #[must_use]
+    pub fn period_ns(&self) -> u64 {
+        self.period_ns
+    }
+
+    /// Time as the program should see it, ns: the machine's monotonic clock, or in lockstep that of the run.
+    #[must_use]
+    pub fn now_ns(&self) -> u64 {
+        match self.pace {
+            Pace::Real => monotonic_ns(),
+            Pace::Lockstep => self.stations.first().map_or(0, |station| station.ticks() * self.period_ns),
+        }
+    }
+
+    /// Lets time pass for the program: it sleeps, or in lockstep the run goes on for as long. Not real-time.
+    pub fn sleep(&self, time: Duration) {
+        if self.pace == Pace::Real {
+            return std::thread::sleep(time);
+        }
+        let ticks = time.as_nanos().div_ceil(u128::from(self.period_ns.max(1)));
+        for _ in 0..ticks {
+            if !self.advance() {
+                return;
+            }
+        }
+    }
+
+    /// Opens a device: the first one begins the run. Whether it is there. Takes some 50 ms once, nothing later; moves nothing. Not
+    /// real-time.
+    pub fn open(&self, number: usize) -> bool {
+        let Some(station) = self.stations.get(number) else { return false };
+        if !self.begin() {
+            return false;
+        }
+        station.note_opened();
+        true
+    }
+
+    /// Begins the run, if nobody has; whether it goes on.
+    fn begin(&self) -> bool {
+        let mut stage = self.stage();
+        match std::mem::replace(&mut *stage, Stage::Over) {
+            Stage::Prepared(prepared) => {
+                *stage = quietly(|| self.start(*prepared));
+                at_end(end_with_the_program);
+            }
+            begun => *stage = begun,
+        }
+        match &*stage {
+            Stage::Lockstep(_) => true,
+            Stage::Beside(thread) => !thread.is_finished(),
+            Stage::Prepared(_) | Stage::Over => false,
+        }
+    }
+
+    fn start(&self, prepared: Prepared) -> Stage {
+        if self.pace == Pace::Lockstep {
+            return match prepared.in_lockstep(&self.stop) {
+                Ok(mut run) => {
+                    run.advance(); // there is a pose from the start on
+                    Stage::Lockstep(Box::new(run))
+                }
+                Err(problem) => {
+                    tell(&problem);
+                    Stage::Over
+                }
+            };
+        }
+        let stop = self.stop.clone();
+        let thread = std::thread::Builder::new().name("flotor-run".to_owned());
+        let run = move || {
+            guarded((), || prepared.run(&stop, stations_so_far()));
+        };
+        let Ok(thread) = thread.spawn(run) else {
+            tell("there is no thread for the run");
+            return Stage::Over;
+        };
+        let since = Instant::now();
+        while self.stations.iter().any(|station| station.ticks() == 0) {
+            if thread.is_finished() || since.elapsed() > BEGIN {
+                break;
+            }
+            std::thread::sleep(LOOK);
+        }
+        Stage::Beside(thread)
+    }
+
+    /// Whether force can reach a hand: the run goes on.
+    #[must_use]
+    pub fn is_running(&self) -> bool {
+        match &*self.stage() {
+            Stage::Lockstep(_) => true,
+            Stage::Beside(thread) => !thread.is_finished(),
+            Stage::Prepared(_) | Stage::Over => false,
+        }
+    }
+
+    /// Whether the run ended because somebody pressed the emergency stop, not because a device is lost.
+    #[must_use]
+    pub fn is_stopped_for_safety(&self) -> bool {
+        IS_STOPPED.load(Ordering::Acquire)
+    }
+
+    /// In lockstep, one tick; whether there was one. Not real-time.
+    pub fn advance(&self) -> bool {
+        match &mut *self.stage() {
+            Stage::Lockstep(run) => run.advance(),
+            Stage::Prepared(_) | Stage::Beside(_) | Stage::Over => false,
+        }
+    }
+
+    /// Waits until there is a tick that the caller has not seen, a period usually and never longer than 10 ms; in lockstep the
+    /// call makes it. Whether there was one. Not real-time.
+    pub fn wait(&self, station: &Station) -> bool {
+        match self.pace {
+            Pace::Real => station.wait_for_tick(),
+            // Several devices share a tick: the first that is commanded makes it.
+            Pace::Lockstep if self.stations.len() > 1 => {
+                station.has_unseen_tick() || self.advance() && station.has_unseen_tick()
+            }
+            Pace::Lockstep => self.advance(),
+        }
+    }
+
+    /// Ends the run in order: force fades out, the recording is closed, the summary is written. Not real-time.
+    pub fn end(&self) {
+        self.stations.iter().for_each(Station::disable);
+        let stage = std::mem::replace(&mut *self.stage(), Stage::Over);
+        match stage {
+            Stage::Lockstep(run) => run.finish(&self.stations),
+            Stage::Beside(thread) => {
+                self.stop.stop();
+                let since = Instant::now();
+                while !thread.is_finished() && since.elapsed() < END {
+                    std::thread::sleep(LOOK);
+                }
+            }
+            Stage::Prepared(_) | Stage::Over => {}
+        }
+    }
+
+    fn stage(&self) -> MutexGuard<'_, Stage> {
+        self.stage.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+extern "C" fn end_with_the_program() {
+    guarded((), || host_so_far().into_iter().for_each(Host::end));
+}
+
+/// The `flotor` executable of the installation or build folder that a library lies in.
+fn executable(folder: &Path) -> Option<PathBuf> {
+    let name = format!("flotor{}", std::env::consts::EXE_SUFFIX);
+    // lib/flotor/compat/NAME is four folders below the installation.
+    let installed = folder.ancestors().nth(4).map(|root| root.join("bin").join(&name));
+    let beside = [folder.join(&name), folder.join("..").join(&name)];
+    let told = said("FLOTOR_PROGRAM").map(PathBuf::from);
+    told.into_iter().chain(beside).chain(installed).find(|file| file.is_file())
+}
+
+/// Where the plugins of that installation or build folder are.
+fn plugin_folders(folder: &Path) -> Vec<PathBuf> {
+    let installed = folder.ancestors().nth(2).map(|root| root.join("plugins"));
+    [folder.join("deps"), folder.to_path_buf(), folder.join("..")].into_iter().chain(installed).collect()
+}

@@ -1,0 +1,94 @@
+//! The process of the program: its copies, its end, its signals, and where this library lies in it.
+
+use std::os::linux::net::SocketAddrExt;
+use std::os::unix::net::{SocketAddr, UnixDatagram};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Once, OnceLock};
+
+/// Whether this is a copy of the process that prepared the run: the devices are not its own.
+static IS_COPY: AtomicBool = AtomicBool::new(false);
+
+/// True in a child that `fork` made after the scene was prepared: a drop-in does nothing there.
+pub(crate) fn is_copy() -> bool {
+    IS_COPY.load(Ordering::Relaxed)
+}
+
+extern "C" fn note_copy() {
+    IS_COPY.store(true, Ordering::Relaxed);
+}
+
+/// Lets copies of this process know that they are. Not real-time.
+pub(crate) fn notice_copies() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        // SAFETY: a function that takes nothing and stores one word, which is legal in a child of a process with threads.
+        unsafe { libc::pthread_atfork(None, None, Some(note_copy)) };
+    });
+}
+
+/// Calls `end` when the process ends by `exit` or by the end of `main`. Not real-time.
+pub(crate) fn at_end(end: extern "C" fn()) {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        // SAFETY: a function that takes nothing; the library stays loaded (it is linked so that it is never unloaded).
+        unsafe { libc::atexit(end) };
+    });
+}
+
+/// Whether this is the first drop-in of the process that prepares a run: a second one has a run of its own, and must not write
+/// into the first one's files. Not real-time.
+pub(crate) fn is_first() -> bool {
+    static CLAIM: OnceLock<Option<UnixDatagram>> = OnceLock::new();
+    let claim = || {
+        let space = std::fs::read_link("/proc/self/ns/pid").unwrap_or_default();
+        let name = format!("flotor-drop-in {} {}", space.display(), std::process::id());
+        UnixDatagram::bind_addr(&SocketAddr::from_abstract_name(name).ok()?).ok()
+    };
+    // A name that nobody else in this process has; the system takes it back at its end.
+    CLAIM.get_or_init(claim).is_some()
+}
+
+/// Runs `body`, and lets no signal of the program be taken by threads that it starts: they belong to the program's own. What an
+/// instruction raises is taken as ever. Not real-time.
+pub fn quietly<T>(body: impl FnOnce() -> T) -> T {
+    const RAISED: [i32; 7] =
+        [libc::SIGSEGV, libc::SIGBUS, libc::SIGFPE, libc::SIGILL, libc::SIGABRT, libc::SIGSYS, libc::SIGTRAP];
+    let mut before = std::mem::MaybeUninit::<libc::sigset_t>::zeroed();
+    // SAFETY: sets on this stack, initialised by the first call or by the system before they are read.
+    let is_blocked = unsafe {
+        let mut all = std::mem::MaybeUninit::<libc::sigset_t>::zeroed();
+        libc::sigfillset(all.as_mut_ptr());
+        for signal in RAISED {
+            libc::sigdelset(all.as_mut_ptr(), signal);
+        }
+        libc::pthread_sigmask(libc::SIG_SETMASK, all.as_ptr(), before.as_mut_ptr()) == 0
+    };
+    let value = body();
+    if is_blocked {
+        // SAFETY: the set the system wrote above.
+        unsafe { libc::pthread_sigmask(libc::SIG_SETMASK, before.as_ptr(), std::ptr::null_mut()) };
+    }
+    value
+}
+
+/// Runs what a program called; a panic stays inside, and the program gets `fallback`.
+pub fn guarded<T>(fallback: T, body: impl FnOnce() -> T) -> T {
+    catch_unwind(AssertUnwindSafe(body)).unwrap_or(fallback)
+}
+
+/// The file this library was loaded from, links followed. Not real-time.
+#[must_use]
+pub fn library() -> Option<PathBuf> {
+    let here = library as fn() -> Option<PathBuf> as usize;
+    let maps = std::fs::read_to_string("/proc/self/maps").ok()?;
+    let holds = |line: &&str| {
+        let range = line.split_ascii_whitespace().next().and_then(|range| range.split_once('-'));
+        let number = |text| usize::from_str_radix(text, 16).ok();
+        range.and_then(|(from, to)| Some(number(from)? <= here && here < number(to)?)).unwrap_or(false)
+    };
+    let line = maps.lines().find(holds)?;
+    let path = line.find('/').and_then(|start| line.get(start..))?;
+    PathBuf::from(path).canonicalize().ok()
+}

@@ -1,0 +1,304 @@
+//! The run behind a program: recorded, shown to observers, reported when it is over.
+
+use crate::host::{note_emergency_stop, stations_so_far};
+use crate::settings::{Pace, Settings};
+use crate::station::Station;
+use flotor_core::Change;
+use flotor_core::trace::TickRecord;
+use flotor_hal::DVec3;
+use flotor_live::Directory;
+use flotor_record::{Note, Recorder, RunDescription, Severity, TraceDigest};
+use flotor_servo::{RunEnd, StopSwitch};
+use flotor_session::run_description::describe;
+use flotor_session::scene::Scene;
+use flotor_session::summary::{RunFacts, RunSummary, Tally};
+use flotor_session::telemetry::{Watched, publish};
+use flotor_session::{
+    Lockstep, Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session,
+};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// A prepared run with all it takes to report it.
+pub(crate) struct Prepared {
+    pub(crate) session: Session,
+    pub(crate) scene: Scene,
+    pub(crate) options: RunOptions,
+    pub(crate) settings: Settings,
+}
+
+/// What is looked at in every tick.
+struct Watchers {
+    tally: Tally,
+    digest: TraceDigest,
+    recording: RunRecording,
+    asked: Vec<Asked>,
+    draft: Option<Draft>,
+}
+
+/// The summary so far: what is left of it if the program is killed.
+struct Draft {
+    path: PathBuf,
+    title: String,
+    /// When it was written last.
+    written: Option<Instant>,
+}
+
+/// How often the summary so far is written, and how often it is looked whether it is time, ticks.
+const DRAFT_PERIOD: Duration = Duration::from_millis(500);
+const DRAFT_LOOK: u64 = 64;
+
+impl Draft {
+    /// Writes it, whole or not at all, if it is time.
+    fn update(&mut self, record: &TickRecord, asked: &[Asked]) {
+        let is_fresh = |written: Instant| written.elapsed() < DRAFT_PERIOD;
+        if !record.tick.is_multiple_of(DRAFT_LOOK) || self.written.is_some_and(is_fresh) {
+            return;
+        }
+        self.written = Some(Instant::now());
+        let lines: Vec<String> =
+            stations_so_far().iter().zip(asked).map(|(station, asked)| line(station, *asked)).collect();
+        let ran_s = record.time_ns as f64 * 1.0e-9;
+        let text = format!("{}\n  ran        {ran_s:.3} s so far\n  {}\n", self.title, lines.join("\n  "));
+        let new = self.path.with_extension("new");
+        // Without room for it the run goes on without.
+        let _ = std::fs::write(&new, text).and_then(|()| std::fs::rename(&new, &self.path));
+    }
+}
+
+/// What a program asked for at a device, at most.
+#[derive(Clone, Copy, Default)]
+struct Asked {
+    force_n: f64,
+    torque_nm: f64,
+    applied_n: f64,
+    applied_nm: f64,
+}
+
+impl Observer for Watchers {
+    fn change(&mut self, change: &Change) {
+        self.recording.change(change);
+    }
+
+    fn observe(&mut self, record: &TickRecord) {
+        self.tally.observe(record);
+        self.digest.update(record);
+        self.recording.observe(record);
+        let device = usize::from(record.device);
+        if self.asked.len() <= device {
+            self.asked.resize_with(device + 1, Asked::default);
+        }
+        if let Some(asked) = self.asked.get_mut(device) {
+            asked.force_n = asked.force_n.max(length(record.model.force()));
+            asked.torque_nm = asked.torque_nm.max(length(record.model.torque()));
+            asked.applied_n = asked.applied_n.max(record.commanded.force().length());
+            asked.applied_nm = asked.applied_nm.max(record.commanded.torque().length());
+        }
+        if let (0, Some(draft)) = (record.device, &mut self.draft) {
+            draft.update(record, &self.asked);
+        }
+    }
+}
+
+/// Length of a vector, also of one that is too long to be squared.
+fn length(vector: DVec3) -> f64 {
+    let largest = vector.abs().max_element();
+    if largest > 0.0 && largest.is_finite() { (vector / largest).length() * largest } else { largest }
+}
+
+/// What is known of a run beside its ticks.
+struct Facts {
+    scene: Scene,
+    settings: Settings,
+    seed: u64,
+    plugins: Vec<PluginReport>,
+}
+
+impl Prepared {
+    /// Everything that looks at the run, and what its report needs.
+    fn watched(&self, stop: &StopSwitch) -> Result<(Watched<Watchers>, Facts), String> {
+        let Self { session, scene, options, settings } = self;
+        let plugins = session.plugins().to_vec();
+        let description: RunDescription = describe(scene, options, &plugins);
+        let recorder = settings.record.as_deref().map(|path| Recorder::create(path, &description));
+        let recorder = recorder.transpose().map_err(|error| error.to_string())?;
+        let publication = publish(&Directory::of_this_user(), scene, &description, session, stop);
+        let watchers = Watchers {
+            tally: Tally::default(),
+            digest: TraceDigest::new(),
+            recording: RunRecording::new(recorder),
+            asked: Vec::new(),
+            draft: settings.report.as_deref().filter(|path| path.as_os_str() != "-").map(|path| Draft {
+                path: so_far(path),
+                title: scene.title.clone(),
+                written: None,
+            }),
+        };
+        let facts = Facts { scene: scene.clone(), settings: settings.clone(), seed: options.seed, plugins };
+        Ok((Watched { observer: watchers, publication: publication.ok() }, facts))
+    }
+
+    /// The whole run on this thread, until somebody stops it or the device faults. Not real-time.
+    pub(crate) fn run(self, stop: &StopSwitch, stations: &[Station]) {
+        let (mut watched, facts) = match self.watched(stop) {
+            Ok(watched) => watched,
+            Err(problem) => return tell(&problem),
+        };
+        match self.session.run(&mut watched, stop) {
+            Ok(outcome) => {
+                if let RunEnd::EmergencyStop(_) = outcome.end {
+                    note_emergency_stop();
+                }
+                facts.report(watched, outcome, stations);
+            }
+            Err(error) => {
+                let _ = watched.observer.recording.finish(&[]);
+                tell(&error.to_string());
+            }
+        }
+    }
+
+    /// The run, to be advanced by the program. Not real-time.
+    pub(crate) fn in_lockstep(self, stop: &StopSwitch) -> Result<LockstepRun, String> {
+        let (watched, facts) = self.watched(stop)?;
+        let lockstep = self.session.into_lockstep().map_err(|error: RunError| error.to_string())?;
+        Ok(LockstepRun { lockstep, watched, facts, stop: stop.clone() })
+    }
+}
+
+/// A run that the program's calls advance.
+pub(crate) struct LockstepRun {
+    lockstep: Lockstep,
+    watched: Watched<Watchers>,
+    facts: Facts,
+    stop: StopSwitch,
+}
+
+impl LockstepRun {
+    /// One tick; whether there was one. Not real-time.
+    pub(crate) fn advance(&mut self) -> bool {
+        self.lockstep.advance(&mut self.watched, &self.stop).is_none()
+    }
+
+    /// Ends and reports it. Not real-time.
+    pub(crate) fn finish(self, stations: &[Station]) {
+        let Self { lockstep, watched, facts, .. } = self;
+        let outcome = lockstep.finish();
+        facts.report(watched, outcome, stations);
+    }
+}
+
+impl Facts {
+    /// Finishes the recording and writes the summary where it is wanted.
+    fn report(self, watched: Watched<Watchers>, outcome: Outcome, stations: &[Station]) {
+        let Self { scene, settings, seed, plugins } = self;
+        let Watched { observer: Watchers { tally, digest, mut recording, asked, .. }, publication } = watched;
+        let facts = RunFacts {
+            title: &scene.title,
+            clock: if settings.pace == Pace::Real { "real" } else { "virtual" },
+            seed,
+            rate_hz: scene.rate_hz,
+            plugins: &plugins,
+            couplings: &scene.couplings,
+            carried: &[],
+            trace_digest: digest.finish(),
+        };
+        let summary = RunSummary::new(facts, &outcome, &tally);
+        let mut lines: Vec<String> =
+            stations.iter().zip(&asked).map(|(station, asked)| line(station, *asked)).collect();
+        lines.extend(end_of(&outcome));
+        let notes: Vec<Note> = lines
+            .iter()
+            .map(|text| Note {
+                time_ns: outcome.elapsed_ns,
+                severity: Severity::Info,
+                source: "flotor".to_owned(),
+                text: text.clone(),
+            })
+            .collect();
+        if let Err(error) = recording.finish(&notes) {
+            tell(&error.to_string());
+        }
+        if let Some(publication) = publication {
+            publication.end("the program ended");
+        }
+        if let Some(path) = &settings.report {
+            write(path, format!("{}\n{}\n  {}\n", summary.title, summary.to_text(), lines.join("\n  ")));
+            let _ = std::fs::remove_file(so_far(path));
+        }
+        if let Some(path) = &settings.json {
+            write(path, serde_json::to_string_pretty(&summary).unwrap_or_default() + "\n");
+        }
+        // Last of all: the code of a plugin may hang, or end the process.
+        if let Err(hung) = outcome.remains.free() {
+            tell(&hung.to_string());
+        }
+    }
+}
+
+/// A force, for people: one that no hand was meant to feel as a power of ten.
+fn newtons(force_n: f64) -> String {
+    if force_n < 1.0e6 { format!("{force_n:.3} N") } else { format!("{force_n:.1e} N") }
+}
+
+/// What a program asked of a station and what the hand got.
+fn line(station: &Station, asked: Asked) -> String {
+    let counts = station.counts();
+    let mut line = format!(
+        "program    `{}` opened {}; {} wrenches; asked for {} and {:.4} N·m at most, the hand got {:.3} N and {:.4} N·m",
+        station.name(),
+        if station.opened() == 1 { "once".to_owned() } else { format!("{} times", station.opened()) },
+        counts.commands,
+        newtons(asked.force_n),
+        asked.torque_nm,
+        asked.applied_n,
+        asked.applied_nm
+    );
+    if counts.refused > 0 {
+        line += &format!("; {} refused, not finite", counts.refused);
+    }
+    if counts.lapses > 0 {
+        line += &format!(
+            "; {} expired for want of another, faded for {} ticks",
+            counts.lapses, counts.lapsed_ticks
+        );
+    }
+    line
+}
+
+/// Why the run ended before the program did, if so.
+fn end_of(outcome: &Outcome) -> Option<String> {
+    match outcome.end {
+        RunEnd::Finished | RunEnd::Stopped => None,
+        RunEnd::DeviceFault(fault) => Some(format!("the run ended before the program: {}", fault.advice())),
+        other => Some(format!("the run ended before the program: {other:?}")),
+    }
+}
+
+/// Writes a result, to standard error if it is named `-`.
+fn write(path: &Path, text: String) {
+    if path.as_os_str() == "-" {
+        return tell_plainly(text.trim_end());
+    }
+    if let Err(error) = std::fs::write(path, text) {
+        tell(&format!("cannot write `{}`: {error}", path.display()));
+    }
+}
+
+/// Where the summary so far is, for when the program is killed.
+fn so_far(report: &Path) -> PathBuf {
+    let mut name = report.as_os_str().to_owned();
+    name.push(".so-far");
+    PathBuf::from(name)
+}
+
+/// A line for the person at the program.
+pub(crate) fn tell(problem: &str) {
+    tell_plainly(&format!("flotor: {problem}"));
+}
+
+/// To standard error, which may be closed: a library does not panic for want of it.
+fn tell_plainly(text: &str) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stderr(), "{text}");
+}

@@ -1,0 +1,117 @@
+//! What the environment says: a program that is not changed by a line has no other way to be told.
+
+use flotor_servo::guest::Signals;
+use std::ffi::OsStr;
+use std::path::PathBuf;
+
+/// Who makes time go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// The machine's clock: the program runs at its own rate.
+    Real,
+    /// The program's calls: a tick for each, without waiting, repeatable.
+    Lockstep,
+}
+
+/// How a program is to be served.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Settings {
+    /// `FLOTOR_SCENE`: the scene; without it a simulated flotor with a hand.
+    pub(crate) scene: Option<PathBuf>,
+    /// `FLOTOR_RECORD`: the recording (MCAP).
+    pub(crate) record: Option<PathBuf>,
+    /// `FLOTOR_REPORT`: where the summary goes, for people; `-` is standard error. While the program runs there is one so far
+    /// beside it.
+    pub(crate) report: Option<PathBuf>,
+    /// `FLOTOR_JSON`: where the summary goes as JSON.
+    pub(crate) json: Option<PathBuf>,
+    /// `FLOTOR_PACE`: `real` or `lockstep`.
+    pub(crate) pace: Pace,
+    /// `FLOTOR_SEED`: seed of all random numbers.
+    pub(crate) seed: u64,
+    /// `FLOTOR_SIGNALS`: `stop` to stop the devices when the program dies of a signal.
+    pub(crate) signals: Signals,
+}
+
+/// The value of a variable, if it is set and not empty. Not real-time.
+#[must_use]
+pub fn said(variable: &str) -> Option<String> {
+    std::env::var(variable).ok().filter(|value| !value.is_empty())
+}
+
+impl Settings {
+    /// Puts the name of a library into the names of all files: another drop-in of this process writes to the others.
+    pub(crate) fn keep_apart(&mut self, library: &OsStr) {
+        for file in [&mut self.record, &mut self.report, &mut self.json].into_iter().flatten() {
+            if file.as_os_str() == "-" {
+                continue;
+            }
+            let mut name = file.file_stem().unwrap_or_default().to_owned();
+            name.push("-");
+            name.push(library);
+            if let Some(extension) = file.extension() {
+                name.push(".");
+                name.push(extension);
+            }
+            file.set_file_name(name);
+        }
+    }
+
+    /// As the environment says.
+    ///
+    /// # Errors
+    /// The variable, what it says and what it may say.
+    pub(crate) fn read(said: impl Fn(&str) -> Option<String>) -> Result<Self, String> {
+        let file = |variable| said(variable).map(PathBuf::from);
+        let wrong =
+            |variable: &str, value: &str, legal: &str| Err(format!("{variable}={value}: must be {legal}"));
+        let pace = match said("FLOTOR_PACE").as_deref() {
+            None | Some("real") => Pace::Real,
+            Some("lockstep") => Pace::Lockstep,
+            Some(other) => return wrong("FLOTOR_PACE", other, "`real` or `lockstep`"),
+        };
+        let signals = match said("FLOTOR_SIGNALS").as_deref() {
+            None | Some("leave") => Signals::Theirs,
+            Some("stop") => Signals::StopFirst,
+            Some(other) => return wrong("FLOTOR_SIGNALS", other, "`leave` or `stop`"),
+        };
+        let seed = match said("FLOTOR_SEED").map(|text| (text.parse(), text)) {
+            None => 0,
+            Some((Ok(seed), _)) => seed,
+            Some((Err(_), text)) => return wrong("FLOTOR_SEED", &text, "a whole number"),
+        };
+        Ok(Self {
+            scene: file("FLOTOR_SCENE"),
+            record: file("FLOTOR_RECORD"),
+            report: file("FLOTOR_REPORT"),
+            json: file("FLOTOR_JSON"),
+            pace,
+            seed,
+            signals,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(of: &str, value: &str) -> Result<Settings, String> {
+        Settings::read(|variable| (variable == of).then(|| value.to_owned()))
+    }
+
+    #[test]
+    fn what_is_not_said_has_a_default_and_what_is_wrong_is_named() {
+        let plain = Settings::read(|_| None).expect("nothing is wrong");
+        assert_eq!((plain.pace, plain.signals, plain.seed), (Pace::Real, Signals::Theirs, 0));
+        assert_eq!(read("FLOTOR_PACE", "lockstep").map(|settings| settings.pace), Ok(Pace::Lockstep));
+        assert_eq!(
+            read("FLOTOR_PACE", "fast"),
+            Err("FLOTOR_PACE=fast: must be `real` or `lockstep`".to_owned())
+        );
+        let mut recorded = read("FLOTOR_RECORD", "/tmp/run.mcap").expect("it is a file");
+        recorded.keep_apart("libHD".as_ref());
+        assert_eq!(recorded.record, Some(PathBuf::from("/tmp/run-libHD.mcap")));
+        assert!(read("FLOTOR_SEED", "-1").is_err_and(|said| said.contains("whole number")));
+    }
+}

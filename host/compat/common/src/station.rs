@@ -1,0 +1,318 @@
+//! A device as a program sees it: where the handle is, what the hand feels, and the next tick.
+
+use flotor_core::mapping::Mapping;
+use flotor_core::trace::TickRecord;
+use flotor_hal::{Axes as Driven, Capabilities, DQuat, DVec3, Wrench};
+use flotor_live::WrenchLimits;
+use flotor_servo::{monotonic_ns, sleep_until};
+use flotor_session::Tap;
+use flotor_session::program::{Connected, NotFinite, Port, ProgramCounts};
+use std::sync::Mutex;
+use std::sync::PoisonError;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// Longest wait for a tick, ns.
+const LONGEST_WAIT_NS: u64 = 10_000_000;
+/// Pause between two looks at a tick that is due, ns.
+const LOOK_NS: u64 = 20_000;
+/// How long after its deadline a tick is over, usually, ns.
+const TICK_NS: u64 = 30_000;
+/// Time over which the rate of commands is measured, ns.
+const RATE_WINDOW_NS: u64 = 500_000_000;
+
+/// Which axes a device has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axes {
+    /// Translations only.
+    Three,
+    /// Translations and rotations that are sensed, without torque.
+    ThreeAndWrist,
+    /// All, driven.
+    Six,
+}
+
+/// A device of the scene, in the frame of its program model.
+pub struct Station {
+    name: String,
+    plugin: String,
+    port: Port,
+    mapping: Mapping,
+    capabilities: Capabilities,
+    /// The most that may reach the hand: N, N·m.
+    most: [f64; 2],
+    tap: Tap,
+    period_ns: u64,
+    opened: AtomicU64,
+    is_open: AtomicBool,
+    /// The tick the program has waited for last.
+    waited: AtomicU64,
+    /// When a wait returned last, ns of the machine's clock.
+    returned_ns: AtomicU64,
+    /// When the loop began, as near as was seen, ns of the machine's clock.
+    begun_ns: AtomicU64,
+    rate: Mutex<Rate>,
+}
+
+/// Commands per time.
+#[derive(Clone, Copy, Debug, Default)]
+struct Rate {
+    since_ns: u64,
+    commands: u64,
+    hz: f64,
+}
+
+/// A device at the end of a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct State {
+    /// Number of ticks so far.
+    pub ticks: u64,
+    /// Position of the handle, m, Flotor's axes.
+    pub position_m: DVec3,
+    /// Its orientation.
+    pub orientation: DQuat,
+    /// Its velocity, m/s.
+    pub velocity_m_per_s: DVec3,
+    /// Its angular velocity, rad/s.
+    pub angular_velocity_rad_per_s: DVec3,
+    /// Buttons, one bit each.
+    pub buttons: u32,
+    /// What was sent to the device, after all limits.
+    pub applied: Wrench,
+}
+
+impl Station {
+    pub(crate) fn new(
+        [name, plugin]: [String; 2],
+        connected: Connected,
+        capabilities: Capabilities,
+        limits: &WrenchLimits,
+        tap: Tap,
+        period_ns: u64,
+    ) -> Self {
+        let Connected { port, mapping, .. } = connected;
+        let largest = |axes: [f64; 3], told: &[Option<f64>; 3], norm: Option<f64>| {
+            let axis = |(most, told): (f64, &Option<f64>)| told.map_or(most, |told| told.min(most));
+            let axes = axes.into_iter().zip(told).map(axis);
+            let most = axes.fold(0.0, f64::max);
+            norm.map_or(most, |norm| norm.min(most))
+        };
+        let most = [
+            largest(capabilities.max_force_n, &limits.force_n, limits.force_norm_n),
+            largest(capabilities.max_torque_nm, &limits.torque_nm, limits.torque_norm_nm),
+        ];
+        Self {
+            name,
+            plugin,
+            port,
+            mapping,
+            capabilities,
+            most,
+            tap,
+            period_ns,
+            opened: AtomicU64::new(0),
+            is_open: AtomicBool::new(false),
+            waited: AtomicU64::new(0),
+            returned_ns: AtomicU64::new(0),
+            begun_ns: AtomicU64::new(u64::MAX),
+            rate: Mutex::new(Rate::default()),
+        }
+    }
+
+    /// Its name in the scene.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Id of its plugin.
+    #[must_use]
+    pub fn plugin(&self) -> &str {
+        &self.plugin
+    }
+
+    /// Which axes it has.
+    #[must_use]
+    pub fn axes(&self) -> Axes {
+        let Capabilities { sensed, actuated, .. } = self.capabilities;
+        match (sensed.contains(Driven::ROTATION), actuated.contains(Driven::ROTATION)) {
+            (true, true) => Axes::Six,
+            (true, false) => Axes::ThreeAndWrist,
+            (false, _) => Axes::Three,
+        }
+    }
+
+    /// Largest displacement of the handle from the centre along x, y, z, m.
+    #[must_use]
+    pub fn range_m(&self) -> DVec3 {
+        let [x, y, z] = self.capabilities.range_m;
+        let range_m = DVec3::new(x, y, z) / self.mapping.length_to_device(1.0);
+        // Of a device that says none: what a desktop device has.
+        if range_m.max_element() > 0.0 { range_m } else { DVec3::splat(0.05) }
+    }
+
+    /// The most that reaches the hand: force, N, and torque, N·m.
+    #[must_use]
+    pub fn most(&self) -> [f64; 2] {
+        self.most
+    }
+
+    /// Largest stiffness it renders, N/m; 0: it says none.
+    #[must_use]
+    pub fn max_stiffness_n_per_m(&self) -> f64 {
+        self.capabilities.max_stiffness_n_per_m
+    }
+
+    /// What was counted of the program's commands.
+    #[must_use]
+    pub fn counts(&self) -> ProgramCounts {
+        self.port.counts()
+    }
+
+    /// How often it was opened.
+    #[must_use]
+    pub fn opened(&self) -> u64 {
+        self.opened.load(Ordering::Relaxed)
+    }
+
+    /// Whether it is open.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.is_open.load(Ordering::Acquire)
+    }
+
+    pub(crate) fn note_opened(&self) {
+        if !self.is_open.swap(true, Ordering::AcqRel) {
+            self.opened.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Closes it: no force from the next tick on. Whether it was open.
+    pub fn close(&self) -> bool {
+        self.disable();
+        self.port.keep_valid_for(0);
+        self.is_open.swap(false, Ordering::AcqRel)
+    }
+
+    /// Lets force through: it fades in.
+    pub fn enable(&self) {
+        if !self.port.is_enabled() {
+            self.port.enable();
+        }
+    }
+
+    /// No force from the next tick on.
+    pub fn disable(&self) {
+        self.port.disable();
+    }
+
+    /// Whether force is let through.
+    #[must_use]
+    pub fn is_enabled(&self) -> bool {
+        self.port.is_enabled()
+    }
+
+    /// For how long a wrench is valid, ns; 0: what the scene says.
+    pub fn keep_valid_for(&self, valid_ns: u64) {
+        self.port.keep_valid_for(valid_ns);
+    }
+
+    /// What the hand is to feel, Flotor's axes, from the next tick on.
+    ///
+    /// # Errors
+    /// [`NotFinite`]: the wrench before stays.
+    pub fn command(&self, wrench: &Wrench, now_ns: u64) -> Result<(), NotFinite> {
+        self.port.command(wrench)?;
+        let mut rate = self.rate.lock().unwrap_or_else(PoisonError::into_inner);
+        rate.commands += 1;
+        let elapsed_ns = now_ns.saturating_sub(rate.since_ns);
+        if elapsed_ns >= RATE_WINDOW_NS {
+            let hz = rate.commands as f64 / (elapsed_ns as f64 * 1.0e-9);
+            *rate = Rate { since_ns: now_ns, commands: 0, hz: if rate.since_ns == 0 { 0.0 } else { hz } };
+        }
+        Ok(())
+    }
+
+    /// Commands per second, lately.
+    #[must_use]
+    pub fn command_rate_hz(&self) -> f64 {
+        self.rate.lock().unwrap_or_else(PoisonError::into_inner).hz
+    }
+
+    /// Ticks so far.
+    #[must_use]
+    pub fn ticks(&self) -> u64 {
+        self.newest().0
+    }
+
+    /// The device at the end of the newest tick.
+    #[must_use]
+    pub fn state(&self) -> State {
+        let (ticks, record) = self.newest();
+        let pose = self.mapping.pose_to_model(&record.pose);
+        let twist = self.mapping.twist_to_model(&record.twist);
+        State {
+            ticks,
+            position_m: pose.position(),
+            orientation: pose.orientation(),
+            velocity_m_per_s: twist.linear(),
+            angular_velocity_rad_per_s: twist.angular(),
+            buttons: record.buttons,
+            applied: self.mapping.wrench_to_model(&record.commanded),
+        }
+    }
+
+    fn newest(&self) -> (u64, TickRecord) {
+        loop {
+            // A record takes tens of nanoseconds to be written.
+            if let Some(newest) = self.tap.read() {
+                return newest;
+            }
+            std::hint::spin_loop();
+        }
+    }
+
+    /// Whether there is a tick that nobody has waited for; it counts as waited for then.
+    pub(crate) fn has_unseen_tick(&self) -> bool {
+        let ticks = self.ticks();
+        self.waited.fetch_max(ticks, Ordering::AcqRel) < ticks
+    }
+
+    /// Takes one of the ticks that a program in a loop was too late for.
+    fn takes_late_tick(&self, ticks: u64, now_ns: u64) -> bool {
+        if now_ns.saturating_sub(self.returned_ns.load(Ordering::Relaxed)) > LONGEST_WAIT_NS {
+            self.waited.store(ticks, Ordering::Relaxed); // it is not in a loop
+            return false;
+        }
+        let take = |waited| (waited < ticks).then_some(waited + 1);
+        self.waited.fetch_update(Ordering::AcqRel, Ordering::Relaxed, take).is_ok()
+    }
+
+    /// Waits for the next tick on the machine's clock. A program in a loop that comes late by a few ticks does not wait until
+    /// it has made up for them: it keeps the rate of the loop, though it needs now more and now less than a period.
+    pub(crate) fn wait_for_tick(&self) -> bool {
+        let entered_ns = monotonic_ns();
+        let (entered, _) = self.newest();
+        if self.takes_late_tick(entered, entered_ns) {
+            self.returned_ns.fetch_max(entered_ns, Ordering::Relaxed);
+            return true;
+        }
+        let mut now_ns = entered_ns;
+        loop {
+            let (ticks, record) = self.newest();
+            if ticks > entered {
+                self.waited.fetch_max(entered + 1, Ordering::AcqRel);
+                self.returned_ns.fetch_max(now_ns, Ordering::Relaxed);
+                return true;
+            }
+            if now_ns - entered_ns >= LONGEST_WAIT_NS {
+                return false;
+            }
+            let begun_ns = now_ns.saturating_sub(record.time_ns);
+            let begun_ns = self.begun_ns.fetch_min(begun_ns, Ordering::Relaxed).min(begun_ns);
+            let due_ns = begun_ns + record.time_ns + self.period_ns + TICK_NS;
+            let until_ns = due_ns.max(now_ns + LOOK_NS).min(entered_ns + LONGEST_WAIT_NS);
+            sleep_until(until_ns);
+            now_ns = monotonic_ns();
+        }
+    }
+}

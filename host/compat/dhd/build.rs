@@ -1,0 +1,10 @@
+//! How the library is linked: its name for the loader; never unloaded, because its threads go on; its own calls stay its own.
+
+fn main() {
+    println!("cargo:rerun-if-changed=build.rs");
+    if std::env::var("CARGO_CFG_TARGET_OS").is_ok_and(|system| system == "linux") {
+        for argument in ["-soname,libdrd.so.3", "-z,nodelete", "-Bsymbolic"] {
+            println!("cargo:rustc-cdylib-link-arg=-Wl,{argument}");
+        }
+    }
+}

@@ -1,0 +1,270 @@
+//! A device between the program and its station: what the program set and may ask back, and what it commanded.
+
+use crate::error::Code;
+use crate::regulation::Regulation;
+use flotor_compat::{Axes, Frame, Host, Station, host, said};
+use flotor_hal::{DVec3, Wrench, math};
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+pub(crate) const FRAME: Frame = Frame::TowardsRightUp;
+/// Devices that are served at most; an id is the number of the device.
+pub(crate) const MOST: usize = 16;
+
+/// The device that an id of -1 means; -1: none.
+static DEFAULT: AtomicI32 = AtomicI32::new(-1);
+/// Whether calls for experts are allowed, in the whole process.
+static EXPERT: AtomicBool = AtomicBool::new(false);
+static DEVICES: [Mutex<Device>; MOST] = [const { Mutex::new(Device::NEW) }; MOST];
+
+/// Whether the program lets force through.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Switch {
+    /// It has not said: its first command does.
+    Unsaid,
+    On,
+    Off,
+}
+
+/// What the program set.
+pub(crate) struct Device {
+    pub(crate) switch: Switch,
+    /// Commanded last, in the axes of the interface: N and N·m.
+    pub(crate) force_n: DVec3,
+    pub(crate) torque_nm: DVec3,
+    /// Limits of the program's own; negative: none.
+    pub(crate) most: [f64; 3],
+    pub(crate) vibration: [f64; 2],
+    pub(crate) mass_kg: f64,
+    pub(crate) gravity: bool,
+    pub(crate) brakes: bool,
+    pub(crate) watchdog: u8,
+    /// Wrenches that had expired when force was enabled last.
+    pub(crate) lapses: u64,
+    pub(crate) has_been_stopped: bool,
+    pub(crate) velocity_threshold: u32,
+    /// About x, about z, of the device, rad.
+    pub(crate) angles_rad: [f64; 3],
+    pub(crate) parameters: [[f64; 3]; 8],
+    pub(crate) gains: [f64; 4],
+    pub(crate) priorities: [i32; 2],
+    pub(crate) filters: bool,
+    pub(crate) regulation: Regulation,
+}
+
+impl Device {
+    const NEW: Self = Self {
+        switch: Switch::Unsaid,
+        force_n: DVec3::ZERO,
+        torque_nm: DVec3::ZERO,
+        most: [-1.0; 3],
+        vibration: [0.0; 2],
+        mass_kg: 0.1,
+        gravity: true,
+        brakes: true,
+        watchdog: 0,
+        lapses: 0,
+        has_been_stopped: false,
+        velocity_threshold: 0,
+        angles_rad: [0.0; 3],
+        parameters: [[1.0, 0.2, 10.0]; 8],
+        gains: [0.0, 0.0, 0.0, 1.0],
+        priorities: [0, 0],
+        filters: false,
+        regulation: Regulation::OFF,
+    };
+}
+
+/// An open device.
+pub(crate) struct Open {
+    pub(crate) host: &'static Host,
+    pub(crate) station: &'static Station,
+    pub(crate) number: usize,
+}
+
+impl Open {
+    /// What the program set.
+    pub(crate) fn device(&self) -> MutexGuard<'static, Device> {
+        device(self.number)
+    }
+}
+
+fn device(number: usize) -> MutexGuard<'static, Device> {
+    // A number is checked before it gets here; the first device stands in for none.
+    let device = DEVICES.get(number).unwrap_or(&DEVICES[0]);
+    device.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The device of an id, open or not; -1 is the default one.
+pub(crate) fn any(id: i8) -> Result<Open, Code> {
+    let number = if id < 0 { DEFAULT.load(Ordering::Acquire) } else { i32::from(id) };
+    let number = usize::try_from(number).ok().filter(|number| *number < MOST).ok_or(Code::NoDevice)?;
+    let host = host().ok_or(Code::NoDevice)?;
+    let station = host.station(number).ok_or(Code::NoDevice)?;
+    Ok(Open { host, station, number })
+}
+
+/// The device of an id, if it is open.
+pub(crate) fn open(id: i8) -> Result<Open, Code> {
+    any(id).and_then(|open| if open.station.is_open() { Ok(open) } else { Err(Code::NoDevice) })
+}
+
+/// The same, if it is not lost.
+pub(crate) fn live(id: i8) -> Result<Open, Code> {
+    open(id).and_then(|open| if open.host.is_running() { Ok(open) } else { Err(Code::Com) })
+}
+
+/// The same, in expert mode.
+pub(crate) fn expert(id: i8) -> Result<Open, Code> {
+    if EXPERT.load(Ordering::Acquire) { live(id) } else { Err(Code::ExpertModeDisabled) }
+}
+
+pub(crate) fn set_expert(on: bool) {
+    EXPERT.store(on, Ordering::Release);
+}
+
+/// Devices there are.
+pub(crate) fn count() -> usize {
+    host().map_or(0, |host| host.stations().len().min(MOST))
+}
+
+/// Opens a device, which becomes the default one; its id.
+pub(crate) fn open_number(number: usize) -> Result<i32, Code> {
+    let host = host().filter(|_| number < count()).ok_or(Code::NoDevice)?;
+    let id = i32::try_from(number).map_err(|_| Code::NoDevice)?;
+    let was_open = host.station(number).is_some_and(Station::is_open);
+    if !was_open {
+        if !host.open(number) {
+            return Err(Code::NoDevice);
+        }
+        *device(number) = Device::NEW;
+    }
+    DEFAULT.store(id, Ordering::Release);
+    Ok(id)
+}
+
+/// Opens the first device that is not open and fits.
+pub(crate) fn open_first(fits: impl Fn(&Open) -> bool) -> Result<i32, Code> {
+    let free = (0..count()).find(|number| {
+        let open = i8::try_from(*number).map_err(|_| Code::NoDevice).and_then(any);
+        open.is_ok_and(|open| !open.station.is_open() && fits(&open))
+    });
+    open_number(free.ok_or(Code::NoDevice)?)
+}
+
+/// Closes a device; another open one becomes the default.
+pub(crate) fn close(id: i8) -> Result<i32, Code> {
+    let closing = open(id)?;
+    closing.device().regulation = Regulation::OFF;
+    closing.station.close();
+    let own = i32::try_from(closing.number).unwrap_or(-1);
+    let is_open = |number: &usize| closing.host.station(*number).is_some_and(Station::is_open);
+    let next = (0..count()).find(is_open).and_then(|number| i32::try_from(number).ok()).unwrap_or(-1);
+    let _ = DEFAULT.compare_exchange(own, next, Ordering::AcqRel, Ordering::Acquire);
+    Ok(0)
+}
+
+/// The default device.
+pub(crate) fn default() -> Result<i32, Code> {
+    let id = DEFAULT.load(Ordering::Acquire);
+    if id < 0 { Err(Code::NoDevice) } else { Ok(id) }
+}
+
+/// Makes an open device the default one.
+pub(crate) fn set_default(id: i8) -> Result<i32, Code> {
+    let open = open(id)?;
+    DEFAULT.store(i32::try_from(open.number).unwrap_or(-1), Ordering::Release);
+    Ok(0)
+}
+
+/// Which device of the maker it stands for: `FLOTOR_DHD_TYPE` says another number. An unknown one would stop a program.
+pub(crate) fn kind(station: &Station) -> i32 {
+    let told = said("FLOTOR_DHD_TYPE").and_then(|text| text.parse().ok());
+    told.unwrap_or(match station.axes() {
+        Axes::Three => 33,
+        Axes::ThreeAndWrist => 34,
+        Axes::Six => 108,
+    })
+}
+
+impl Open {
+    pub(crate) fn has_wrist(&self) -> bool {
+        self.station.axes() != Axes::Three
+    }
+
+    pub(crate) fn has_active_wrist(&self) -> bool {
+        self.station.axes() == Axes::Six
+    }
+
+    /// Position, m, and rows of the rotation matrix.
+    pub(crate) fn pose(&self) -> (DVec3, [[f64; 3]; 3]) {
+        let state = self.station.state();
+        (FRAME.of_flotor(state.position_m), FRAME.rotation(state.orientation))
+    }
+
+    /// Lets force through or not.
+    pub(crate) fn set_switch(&self, device: &mut Device, switch: Switch) {
+        device.switch = switch;
+        if switch == Switch::On {
+            device.lapses = self.station.counts().lapses;
+            device.has_been_stopped = false;
+            self.station.enable();
+        } else {
+            (device.force_n, device.torque_nm) = (DVec3::ZERO, DVec3::ZERO);
+            device.regulation = Regulation::OFF;
+            self.station.disable();
+        }
+    }
+
+    /// Sends force and torque of the program, in its own limits, together with those of the regulation. Whether they were scaled
+    /// down, now or by the envelope later.
+    pub(crate) fn send(&self, device: &mut Device, force_n: DVec3, torque_nm: DVec3) -> Result<bool, Code> {
+        if !(force_n.is_finite() && torque_nm.is_finite()) {
+            return Err(Code::Invalid);
+        }
+        let own = |vector: DVec3, most: f64| if most < 0.0 { vector } else { shortened(vector, most) };
+        let [most_n, most_nm, _] = device.most;
+        (device.force_n, device.torque_nm) = (own(force_n, most_n), own(torque_nm, most_nm));
+        if device.switch == Switch::Unsaid {
+            self.set_on_by_command(device);
+        }
+        self.send_again(device);
+        let [limit_n, limit_nm] = self.station.most();
+        let is_long = |vector: DVec3, most: f64| length(vector) > most;
+        let is_cut = (device.force_n, device.torque_nm) != (force_n, torque_nm);
+        let is_limited = is_long(force_n, limit_n) || self.has_active_wrist() && is_long(torque_nm, limit_nm);
+        Ok(is_cut || is_limited)
+    }
+
+    fn set_on_by_command(&self, device: &mut Device) {
+        device.switch = Switch::On;
+        device.lapses = self.station.counts().lapses;
+        self.station.enable();
+    }
+
+    /// Sends what the program commanded last, with what the regulation and a vibration add now.
+    pub(crate) fn send_again(&self, device: &mut Device) {
+        let now_ns = self.host.now_ns();
+        let [frequency_hz, amplitude_n] = device.vibration;
+        let phase = frequency_hz * (now_ns % 1_000_000_000_000) as f64 * 1.0e-9;
+        let shake_n = amplitude_n * math::sin(std::f64::consts::TAU * (phase - phase.floor()));
+        let state = self.station.state();
+        let (held_n, held_nm) = device.regulation.wrench(&state, now_ns);
+        let force_n = FRAME.to_flotor(device.force_n + DVec3::Z * shake_n) + held_n;
+        let torque_nm = FRAME.to_flotor(device.torque_nm) + held_nm;
+        // What is not finite was refused before; a sum of huge numbers is cut off by the port in the same way.
+        let _ = self.station.command(&Wrench::new(force_n, torque_nm), now_ns);
+    }
+}
+
+/// Length of a vector that may be too large to be squared.
+fn length(vector: DVec3) -> f64 {
+    let largest = vector.abs().max_element();
+    if largest > 0.0 { (vector / largest).length() * largest } else { 0.0 }
+}
+
+/// The same direction, no longer than this.
+fn shortened(vector: DVec3, most: f64) -> DVec3 {
+    let length = length(vector);
+    if length <= most || length == 0.0 { vector } else { vector / length * most }
+}

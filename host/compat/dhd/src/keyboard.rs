@@ -1,0 +1,81 @@
+//! Keys of the terminal, for programs that ask the SDK for them, and threads for those that ask it for one.
+
+use crate::error::{Code, DONE, failed};
+use std::ffi::{c_char, c_int, c_void};
+use std::mem::MaybeUninit;
+use std::sync::{Mutex, Once, PoisonError};
+
+/// Standard input.
+const INPUT: c_int = 0;
+/// The terminal as it was before it gave single keys.
+static BEFORE: Mutex<Option<libc::termios>> = Mutex::new(None);
+
+/// Lets the terminal give keys as they are pressed, until the program ends.
+fn take_keys() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let mut terminal = MaybeUninit::<libc::termios>::zeroed();
+        // SAFETY: written by the system if standard input is a terminal, else left as it is.
+        if unsafe { libc::tcgetattr(INPUT, terminal.as_mut_ptr()) } != 0 {
+            return;
+        }
+        // SAFETY: plain data that the system has written.
+        let mut terminal = unsafe { terminal.assume_init() };
+        *BEFORE.lock().unwrap_or_else(PoisonError::into_inner) = Some(terminal);
+        terminal.c_lflag &= !(libc::ICANON | libc::ECHO);
+        // SAFETY: settings that the system gave, two flags changed; a function that takes nothing.
+        unsafe {
+            libc::tcsetattr(INPUT, libc::TCSANOW, &raw const terminal);
+            libc::atexit(give_keys_back);
+        }
+    });
+}
+
+extern "C" fn give_keys_back() {
+    if let Ok(Some(terminal)) = BEFORE.try_lock().map(|mut before| before.take()) {
+        // SAFETY: settings that the system gave.
+        unsafe { libc::tcsetattr(INPUT, libc::TCSANOW, &raw const terminal) };
+    }
+}
+
+/// Bytes that wait to be read.
+fn waiting() -> c_int {
+    let mut bytes: c_int = 0;
+    // SAFETY: the system writes one number that is there for the call.
+    if unsafe { libc::ioctl(INPUT, libc::FIONREAD, &raw mut bytes) } == 0 { bytes } else { 0 }
+}
+
+/// What a thread of the program is.
+type Body = extern "C" fn(*mut c_void) -> *mut c_void;
+
+export! {
+    /// Whether a key was pressed.
+    fn dhdKbHit() -> bool [false] {
+        take_keys();
+        waiting() > 0
+    }
+    /// The key, or 0.
+    fn dhdKbGet() -> c_char [0] {
+        take_keys();
+        let mut key: u8 = 0;
+        if waiting() == 0 {
+            return 0;
+        }
+        // SAFETY: one byte that is there for the call.
+        let read = unsafe { libc::read(INPUT, (&raw mut key).cast(), 1) };
+        if read == 1 { c_char::from_ne_bytes([key]) } else { 0 }
+    }
+    /// Starts a thread of the program; its priority stays that of the others.
+    fn dhdStartThread(body: Option<Body>, data: *mut c_void, _priority: c_int) -> c_int [-1] {
+        let Some(body) = body else { return failed(Code::NullArgument) };
+        let mut thread = MaybeUninit::<libc::pthread_t>::uninit();
+        // SAFETY: a place for the number of the thread, no attributes, and what the program wants to be called with its own data.
+        let code = unsafe { libc::pthread_create(thread.as_mut_ptr(), std::ptr::null(), body, data) };
+        if code != 0 {
+            return failed(Code::NotAvailable);
+        }
+        // SAFETY: written by the call that succeeded; nobody waits for the thread.
+        unsafe { libc::pthread_detach(thread.assume_init()) };
+        DONE
+    }
+}

@@ -1,0 +1,46 @@
+//! `libdrd.so` and `libdhd.so`: the 233 functions of Force Dimension's SDK, answered by the devices of a Flotor scene. One file
+//! serves both names, so that there is one state whichever of them a program calls.
+//!
+//! Lengths in m, forces in N, torques in N·m, angles in rad; x towards the user, y right, z up. A result of 0 is success, 2 a
+//! command that was scaled down, -1 an error, whose number the calling thread may ask for. What sets a force waits for the
+//! next tick, and so paces the program. What a Flotor device does not have (encoders, motors, joints, a gripper) is answered
+//! as the SDK answers for a device without it.
+//!
+//! Source: the public header of the interface, version 3.17, and how a dozen open programs use it: names, numbers and behaviour
+//! only.
+#![allow(unsafe_code)] // C entry points; listed in tests/tests/system/architecture.rs
+#![allow(non_snake_case)] // the names are another maker's
+
+/// Exports entry points: what panics stays inside, and the program gets the value in brackets. A pointer is null or leads to as
+/// many values as the entry point says.
+macro_rules! export {
+    ($($(#[$meta:meta])* fn $name:ident($($argument:ident: $type:ty),* $(,)?) -> $result:ty [$fallback:expr] $body:block)*) => {
+        $(
+            $(#[$meta])*
+            #[unsafe(no_mangle)]
+            #[allow(clippy::too_many_arguments, clippy::unused_unit)] // as the interface has it
+            pub(crate) extern "C" fn $name($($argument: $type),*) -> $result {
+                flotor_compat::guarded($fallback, || $body)
+            }
+        )*
+    };
+}
+
+mod absent;
+mod basic;
+mod device;
+mod error;
+mod expert;
+mod force;
+mod kept;
+mod keyboard;
+mod motion;
+mod regulation;
+
+use std::ffi::c_char;
+
+/// The mark of a drop-in.
+#[unsafe(no_mangle)]
+pub extern "C" fn flotor_dropin() -> *const c_char {
+    flotor_compat::MARKER.as_ptr().cast()
+}

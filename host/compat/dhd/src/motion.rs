@@ -1,0 +1,224 @@
+//! Regulation and motion: holding the handle, moving it, following the program.
+
+use crate::basic::{angles, put3, read, read_live, turning};
+use crate::device::{FRAME, Open, Switch, live, open};
+use crate::error::{Code, DONE, failed, result};
+use crate::kept::{POSITION_MOVE, ROTATION_MOVE};
+use crate::regulation::{self, Regulation};
+use flotor_compat::pointer::{In, Out};
+use flotor_hal::{DQuat, DVec3, rotation_vector};
+use std::ffi::c_int;
+use std::time::Duration;
+
+/// Longest motion that a call waits for, in periods of the loop.
+const LONGEST_WAIT_TICKS: u64 = 120_000;
+
+fn begin(id: i8) -> c_int {
+    result(live(id).map(|open| {
+        regulation::start(&open);
+        DONE
+    }))
+}
+
+/// Orientation of angles about x, then y, then z, as a rotation vector in Flotor's axes.
+fn turned(angles_rad: DVec3) -> DVec3 {
+    let DVec3 { x, y, z } = angles_rad;
+    let turn = DQuat::from_rotation_x(x) * DQuat::from_rotation_y(y) * DQuat::from_rotation_z(z);
+    FRAME.to_flotor(rotation_vector(turn))
+}
+
+/// Where a motion goes.
+#[derive(Clone, Copy)]
+struct Goal {
+    position_m: Option<DVec3>,
+    angles_rad: Option<DVec3>,
+}
+
+/// How a program wants to get there.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Way {
+    /// Along a line, and the call returns when it is there.
+    Blocking,
+    /// Along a line.
+    Line,
+    /// At once.
+    Follow,
+}
+
+fn way(block: bool) -> Way {
+    if block { Way::Blocking } else { Way::Line }
+}
+
+fn go(id: i8, goal: Goal, way: Way) -> c_int {
+    let vectors = [goal.position_m, goal.angles_rad];
+    if vectors.into_iter().flatten().any(|vector| !vector.is_finite()) {
+        return failed(Code::Invalid);
+    }
+    let open = match live(id) {
+        Ok(open) => open,
+        Err(code) => return failed(code),
+    };
+    {
+        let mut device = open.device();
+        if !device.regulation.is_running {
+            return failed(Code::NoRegulation);
+        }
+        let now_ns = open.host.now_ns();
+        let fastest = |index: usize| {
+            let speed = device.parameters.get(index).map_or(0.1, |[_, speed, _]| *speed);
+            (way != Way::Follow).then_some(speed)
+        };
+        let (fastest_m, fastest_rad) = (fastest(POSITION_MOVE), fastest(ROTATION_MOVE));
+        if let Some(position_m) = goal.position_m {
+            device.regulation.move_to(FRAME.to_flotor(position_m), fastest_m, now_ns);
+        }
+        if let Some(angles_rad) = goal.angles_rad {
+            device.regulation.turn_to(turned(angles_rad), fastest_rad, now_ns);
+        }
+        open.send_again(&mut device);
+    }
+    if way == Way::Blocking {
+        wait_for_end(&open);
+    }
+    DONE
+}
+
+fn wait_for_end(open: &Open) {
+    for _ in 0..LONGEST_WAIT_TICKS {
+        let is_moving = open.device().regulation.is_moving(open.host.now_ns());
+        if !is_moving || !open.host.is_running() {
+            return;
+        }
+        regulation::follow(open);
+        open.host.sleep(Duration::from_nanos(open.host.period_ns()));
+    }
+}
+
+fn regulate(id: i8, axis: usize, on: bool) -> c_int {
+    read(id, |open| {
+        let state = open.station.state();
+        let mut device = open.device();
+        device.regulation.axes.get_mut(axis).into_iter().for_each(|kept| *kept = on);
+        // What is regulated from now on stays where it is.
+        device.regulation.hold(&state);
+    })
+}
+
+fn eight(place: In<f64>) -> Option<Goal> {
+    let [x, y, z, a, b, g, _, _] = place.get_all()?;
+    Some(Goal { position_m: Some(DVec3::new(x, y, z)), angles_rad: Some(DVec3::new(a, b, g)) })
+}
+
+fn position(x: f64, y: f64, z: f64) -> Goal {
+    Goal { position_m: Some(DVec3::new(x, y, z)), angles_rad: None }
+}
+
+fn rotation(a: f64, b: f64, g: f64) -> Goal {
+    Goal { position_m: None, angles_rad: Some(DVec3::new(a, b, g)) }
+}
+
+export! {
+    /// Always: then nobody moves a device to find out where it is.
+    fn drdIsInitialized(id: i8) -> bool [false] { open(id).is_ok() }
+    /// Whether it can be regulated.
+    fn drdIsSupported(id: i8) -> bool [false] { open(id).is_ok() }
+    /// Whether it is regulated.
+    fn drdIsRunning(id: i8) -> bool [false] { open(id).is_ok_and(|open| open.device().regulation.is_running) }
+    /// Whether a motion is under way.
+    fn drdIsMoving(id: i8) -> bool [false] {
+        open(id).is_ok_and(|open| open.device().regulation.is_moving(open.host.now_ns()))
+    }
+    /// Nothing is to be found out: holds the device.
+    fn drdAutoInit(id: i8) -> c_int [-1] { begin(id) }
+    /// Nothing is to be found out: holds the device.
+    fn drdCheckInit(id: i8) -> c_int [-1] { begin(id) }
+    /// Nothing is to be found out: holds the device.
+    fn drdPrecisionInit(id: i8) -> c_int [-1] { begin(id) }
+    /// Holds the device where it is.
+    fn drdStart(id: i8) -> c_int [-1] { begin(id) }
+    /// Does not hold it any more; force stays on if it is to.
+    fn drdStop(keeps_force: bool, id: i8) -> c_int [-1] {
+        read(id, |open| {
+            let mut device = open.device();
+            device.regulation = Regulation::OFF;
+            let (force_n, torque_nm) = (DVec3::ZERO, DVec3::ZERO);
+            (device.force_n, device.torque_nm) = (force_n, torque_nm);
+            if keeps_force {
+                open.send_again(&mut device);
+            } else {
+                open.set_switch(&mut device, Switch::Off);
+            }
+        })
+    }
+    /// Holds it where it is.
+    fn drdHold(id: i8) -> c_int [-1] {
+        result(live(id).and_then(|open| {
+            let state = open.station.state();
+            let mut device = open.device();
+            if !device.regulation.is_running {
+                return Err(Code::NoRegulation);
+            }
+            device.regulation.hold(&state);
+            Ok(DONE)
+        }))
+    }
+    /// Whether the position is regulated.
+    fn drdRegulatePos(on: bool, id: i8) -> c_int [-1] { regulate(id, 0, on) }
+    /// Whether the orientation is regulated.
+    fn drdRegulateRot(on: bool, id: i8) -> c_int [-1] { regulate(id, 1, on) }
+    /// Whether a gripper is regulated.
+    fn drdRegulateGrip(on: bool, id: i8) -> c_int [-1] { regulate(id, 2, on) }
+    /// Moves to a position, m.
+    fn drdMoveToPos(x: f64, y: f64, z: f64, block: bool, id: i8) -> c_int [-1] { go(id, position(x, y, z), way(block)) }
+    /// Turns to angles, rad.
+    fn drdMoveToRot(a: f64, b: f64, g: f64, block: bool, id: i8) -> c_int [-1] { go(id, rotation(a, b, g), way(block)) }
+    /// There is no gripper to move.
+    fn drdMoveToGrip(_gap: f64, _block: bool, id: i8) -> c_int [-1] {
+        go(id, Goal { position_m: None, angles_rad: None }, Way::Follow)
+    }
+    /// Moves to a position, m, and turns to angles, rad.
+    fn drdMoveTo(place: In<f64>, block: bool, id: i8) -> c_int [-1] {
+        eight(place).map_or_else(|| failed(Code::NullArgument), |goal| go(id, goal, way(block)))
+    }
+    /// Follows a position, m.
+    fn drdTrackPos(x: f64, y: f64, z: f64, id: i8) -> c_int [-1] { go(id, position(x, y, z), Way::Follow) }
+    /// Follows angles, rad.
+    fn drdTrackRot(a: f64, b: f64, g: f64, id: i8) -> c_int [-1] { go(id, rotation(a, b, g), Way::Follow) }
+    /// There is no gripper to follow.
+    fn drdTrackGrip(_gap: f64, id: i8) -> c_int [-1] {
+        go(id, Goal { position_m: None, angles_rad: None }, Way::Follow)
+    }
+    /// Position, m, angles, rad, 0 of a gripper, and rows of the rotation matrix.
+    fn drdGetPositionAndOrientation(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, gap: Out<f64>, matrix: Out<f64>, id: i8) -> c_int [-1] {
+        read_live(id, |open| {
+            let (position_m, rows) = open.pose();
+            put3([x, y, z], position_m);
+            put3([a, b, g], angles(&rows));
+            gap.put(0.0);
+            matrix.put_all(rows.as_flattened());
+        })
+    }
+    /// Velocity, m/s, angular velocity, rad/s, and 0 of a gripper.
+    fn drdGetVelocity(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, gap: Out<f64>, id: i8) -> c_int [-1] {
+        read_live(id, |open| {
+            put3([x, y, z], FRAME.of_flotor(open.station.state().velocity_m_per_s));
+            put3([a, b, g], turning(open));
+            gap.put(0.0);
+        })
+    }
+    /// Rate of the loop, kHz.
+    fn drdGetCtrlFreq(id: i8) -> f64 [0.0] {
+        open(id).map_or(0.0, |open| 1.0e6 / open.host.period_ns().max(1) as f64)
+    }
+    /// Sleeps to the next tick.
+    fn drdWaitForTick(id: i8) -> () [()] {
+        match live(id) {
+            Ok(open) => {
+                regulation::follow(&open);
+                open.host.wait(open.station);
+            }
+            // A loop without a device does not go round for nothing.
+            Err(_) => std::thread::sleep(Duration::from_millis(1)),
+        }
+    }
+}

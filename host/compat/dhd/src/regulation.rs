@@ -1,0 +1,163 @@
+//! Regulation: a virtual spring that holds the handle, moves it along a straight line, or follows the program.
+//!
+//! The original regulates encoders with motors of its own. Here a spring and a damper at the handle do, inside the envelope:
+//! soft enough for any device, so a hand that holds against it wins.
+
+use crate::device::{self, Open};
+use flotor_compat::{Pace, State, quietly};
+use flotor_hal::{DQuat, DVec3, orientation_from_rotation_vector, rotation_vector};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Spring and damper of the position, N/m and N·s/m.
+const STIFFNESS: [f64; 2] = [400.0, 4.0];
+/// Spring and damper of the orientation, N·m/rad and N·m·s/rad.
+const TURNING: [f64; 2] = [0.5, 0.005];
+/// Shortest motion, s.
+const SHORTEST_S: f64 = 0.1;
+/// Peak over mean speed of a motion with a smooth start and end.
+const PEAK: f64 = 1.875;
+
+/// Whether the handle is regulated, and where to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Regulation {
+    pub(crate) is_running: bool,
+    /// Position, rotation, gripper.
+    pub(crate) axes: [bool; 3],
+    position: Motion,
+    rotation: Motion,
+}
+
+/// A straight line from one place to another, or one place.
+#[derive(Clone, Copy, Debug)]
+struct Motion {
+    from: DVec3,
+    to: DVec3,
+    since_ns: u64,
+    until_ns: u64,
+}
+
+impl Motion {
+    const NONE: Self = Self { from: DVec3::ZERO, to: DVec3::ZERO, since_ns: 0, until_ns: 0 };
+
+    fn at(place: DVec3) -> Self {
+        Self { from: place, to: place, ..Self::NONE }
+    }
+
+    fn new(from: DVec3, to: DVec3, fastest: f64, now_ns: u64) -> Self {
+        let time_s = (PEAK * (to - from).length() / fastest.max(1.0e-3)).clamp(SHORTEST_S, 60.0);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a minute
+        let time_ns = (time_s * 1.0e9) as u64;
+        Self { from, to, since_ns: now_ns, until_ns: now_ns + time_ns }
+    }
+
+    fn place(&self, now_ns: u64) -> DVec3 {
+        let length_ns = self.until_ns.saturating_sub(self.since_ns);
+        if length_ns == 0 || now_ns >= self.until_ns {
+            return self.to;
+        }
+        let part = now_ns.saturating_sub(self.since_ns) as f64 / length_ns as f64;
+        // Minimum jerk.
+        let done = part * part * part * (10.0 + part * (6.0 * part - 15.0));
+        self.from + (self.to - self.from) * done
+    }
+}
+
+impl Regulation {
+    pub(crate) const OFF: Self =
+        Self { is_running: false, axes: [true; 3], position: Motion::NONE, rotation: Motion::NONE };
+
+    /// Holds the handle where it is.
+    pub(crate) fn hold(&mut self, state: &State) {
+        self.position = Motion::at(state.position_m);
+        self.rotation = Motion::at(rotation_vector(state.orientation));
+    }
+
+    /// Moves it to a place, or lets it follow one; in Flotor's axes, with so much speed at most.
+    pub(crate) fn move_to(&mut self, place_m: DVec3, fastest: Option<f64>, now_ns: u64) {
+        let from = self.position.place(now_ns);
+        self.position =
+            fastest.map_or(Motion::at(place_m), |fastest| Motion::new(from, place_m, fastest, now_ns));
+    }
+
+    /// The same for the orientation, a rotation vector.
+    pub(crate) fn turn_to(&mut self, turned_rad: DVec3, fastest: Option<f64>, now_ns: u64) {
+        let from = self.rotation.place(now_ns);
+        self.rotation =
+            fastest.map_or(Motion::at(turned_rad), |fastest| Motion::new(from, turned_rad, fastest, now_ns));
+    }
+
+    pub(crate) fn is_moving(&self, now_ns: u64) -> bool {
+        self.is_running && now_ns < self.position.until_ns.max(self.rotation.until_ns)
+    }
+
+    /// Force and torque that hold the handle, Flotor's axes, N and N·m.
+    pub(crate) fn wrench(&self, state: &State, now_ns: u64) -> (DVec3, DVec3) {
+        let [position, rotation, _] = self.axes.map(|is_on| is_on && self.is_running);
+        let mut wrench = (DVec3::ZERO, DVec3::ZERO);
+        if position {
+            let [stiffness, damping] = STIFFNESS;
+            wrench.0 = (self.position.place(now_ns) - state.position_m) * stiffness
+                - state.velocity_m_per_s * damping;
+        }
+        if rotation {
+            let [stiffness, damping] = TURNING;
+            let target: DQuat = orientation_from_rotation_vector(self.rotation.place(now_ns));
+            let away = rotation_vector(target * state.orientation.conjugate());
+            wrench.1 = away * stiffness - state.angular_velocity_rad_per_s * damping;
+        }
+        wrench
+    }
+}
+
+/// Whether there is a thread that regulates.
+static HAS_THREAD: AtomicBool = AtomicBool::new(false);
+
+/// Begins to hold a device: in real time a thread of its own sends anew each tick; in lockstep every call that makes a tick
+/// does.
+pub(crate) fn start(open: &Open) {
+    let state = open.station.state();
+    {
+        let mut device = open.device();
+        open.set_switch(&mut device, crate::device::Switch::On);
+        device.regulation = Regulation { is_running: true, ..Regulation::OFF };
+        device.regulation.hold(&state);
+        open.send_again(&mut device);
+    }
+    if open.host.pace() == Pace::Lockstep || HAS_THREAD.swap(true, Ordering::AcqRel) {
+        return;
+    }
+    let thread = std::thread::Builder::new().name("flotor-drd".to_owned());
+    if quietly(|| thread.spawn(regulate)).is_err() {
+        HAS_THREAD.store(false, Ordering::Release);
+    }
+}
+
+/// Holds all devices that are regulated, as long as there are any.
+fn regulate() {
+    loop {
+        let mut first = None;
+        for id in (0..).take(device::count()) {
+            let Ok(open) = device::live(id) else { continue };
+            let mut device = open.device();
+            if device.regulation.is_running {
+                open.send_again(&mut device);
+                drop(device);
+                first = first.or(Some(open));
+            }
+        }
+        let Some(open) = first else { break };
+        // Not the tick of the program: that one waits for its own.
+        std::thread::sleep(std::time::Duration::from_nanos(open.host.period_ns()));
+    }
+    HAS_THREAD.store(false, Ordering::Release);
+}
+
+/// In lockstep, what the thread would have done for this tick.
+pub(crate) fn follow(open: &Open) {
+    if open.host.pace() == Pace::Lockstep {
+        let mut device = open.device();
+        if device.regulation.is_running {
+            open.send_again(&mut device);
+        }
+    }
+}

@@ -1,0 +1,532 @@
+//! A device between the program and its station: what a frame saw and set, and which capabilities are on.
+
+use crate::NO_DEVICE;
+use crate::error::Code;
+use crate::parameter::{
+    ANGULAR_VELOCITY, BUTTONS, CALIBRATION_STYLE, DRIVER_VERSION, ENCODERS, FIRMWARE_VERSION, FORCE,
+    FORCE_CLAMPING, FORCE_OUTPUT, GIMBAL_ANGLES, GIMBAL_TORQUE, IMPULSE_LIMIT, INKWELL_SWITCH, INPUT_DOF,
+    INSTANTANEOUS_RATE, JOINT_ANGLES, JOINT_TORQUE, Kind, MAX_CONTINUOUS_FORCE, MAX_CONTINUOUS_TORQUE,
+    MAX_DAMPING, MAX_FORCE, MAX_STIFFNESS, MAX_TORQUE, MAX_TORQUE_DAMPING, MAX_TORQUE_STIFFNESS, MODEL_TYPE,
+    MOTOR_TEMPERATURE, ONE_FRAME_LIMIT, OUTPUT_DOF, PINCH, POSITION, RAMPING_RATE, SAFETY_SWITCH,
+    SERIAL_NUMBER, STATUS_LIGHT, TABLETOP_OFFSET, TORQUE, TRANSFORM, UPDATE_RATE, VELOCITY, VELOCITY_LIMIT,
+    VENDOR, VERSION, Values, WORKSPACES,
+};
+use crate::scheduler::Scheduler;
+use flotor_compat::{Axes, Frame, Host, Station, host, said};
+use flotor_hal::{DVec3, Wrench, math};
+use std::collections::BTreeMap;
+use std::ffi::{CStr, CString, c_uint};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+const FRAME: Frame = Frame::RightUpTowards;
+/// Millimetres in a metre, and mN·m in a N·m.
+const MILLI: f64 = 1.0e3;
+/// Devices that are served at most; a handle is the number of the device.
+const MOST: usize = 16;
+/// Names that mean the first device.
+const FIRST: [&str; 4] = ["", "Default Device", "Default PHANToM", "Default PHANTOM"];
+/// Capabilities from this number on, one bit each; all but the first are on when a device is initialised.
+const FIRST_CAPABILITY: c_uint = FORCE_OUTPUT;
+const CAPABILITIES: c_uint = 5;
+const AT_FIRST: u32 = 0b1_1110;
+/// Nominal length of an arm, m: a device that has none is given joint angles of one that would reach there.
+const ARM_M: f64 = 0.2;
+
+/// The current device of the process.
+pub(crate) struct Current(AtomicU32);
+
+pub(crate) static CURRENT: Current = Current(AtomicU32::new(NO_DEVICE));
+
+impl Current {
+    pub(crate) fn get(&self) -> c_uint {
+        self.0.load(Ordering::Acquire)
+    }
+
+    /// Whether that is an initialised device.
+    pub(crate) fn set(&self, handle: c_uint) -> bool {
+        let is_there = Devices::lock(handle).is_some_and(|device| device.is_initialised);
+        if is_there {
+            self.0.store(handle, Ordering::Release);
+        }
+        is_there
+    }
+}
+
+/// All devices.
+pub(crate) struct Devices;
+
+static DEVICES: [Mutex<Device>; MOST] = [const { Mutex::new(Device::NONE) }; MOST];
+
+/// What a frame sees of a device.
+#[derive(Clone, Copy)]
+struct Snapshot {
+    position_mm: DVec3,
+    velocity_mm_per_s: DVec3,
+    angular_velocity_rad_per_s: DVec3,
+    rows: [[f64; 3]; 3],
+    buttons: u32,
+    /// Applied to the hand, N and N·m, axes of the interface.
+    applied: [DVec3; 2],
+}
+
+const AT_HOME: Snapshot = Snapshot {
+    position_mm: DVec3::ZERO,
+    velocity_mm_per_s: DVec3::ZERO,
+    angular_velocity_rad_per_s: DVec3::ZERO,
+    rows: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+    buttons: 0,
+    applied: [DVec3::ZERO; 2],
+};
+
+/// When a frame began: in which tick of the scheduler, or of the loop outside of it.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum When {
+    Scheduled(u64),
+    Outside(u64),
+}
+
+/// A device of the program.
+pub(crate) struct Device {
+    is_initialised: bool,
+    number: usize,
+    capabilities: u32,
+    depth: u32,
+    begun: Option<When>,
+    now: Snapshot,
+    last: Snapshot,
+    /// What was set in this frame, N and mN·m.
+    force_n: Option<DVec3>,
+    torque_mnm: Option<DVec3>,
+    /// What was sent last, Flotor's axes.
+    sent: Wrench,
+    light: u32,
+    velocity_limit_mm_per_s: f64,
+    impulse_limit_n_per_ms: f64,
+    ramping_n_per_s: f64,
+}
+
+impl Devices {
+    fn lock(handle: c_uint) -> Option<MutexGuard<'static, Device>> {
+        let device = DEVICES.get(usize::try_from(handle).ok()?)?;
+        Some(device.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Something with the current device.
+    pub(crate) fn with_current<T>(body: impl FnOnce(&mut Device) -> T) -> Result<T, Code> {
+        match Self::lock(CURRENT.get()) {
+            Some(mut device) if device.is_initialised => Ok(body(&mut device)),
+            _ => Err(Code::InvalidOperation),
+        }
+    }
+
+    /// The first device that is initialised, for who needs the tick of any.
+    pub(crate) fn any() -> Option<(&'static Host, &'static Station)> {
+        let number = (0..)
+            .take(MOST)
+            .find(|handle| Self::lock(*handle).is_some_and(|device| device.is_initialised))?;
+        let host = host()?;
+        Some((host, host.station(usize::try_from(number).ok()?)?))
+    }
+
+    /// Force of all devices comes on or goes, as scheduler and capabilities say.
+    pub(crate) fn follow_scheduler() {
+        (0..).take(MOST).filter_map(Self::lock).for_each(|device| device.follow_switches());
+    }
+}
+
+/// Opens the device of this name and makes it current.
+pub(crate) fn init(name: Option<&str>) -> Result<c_uint, Code> {
+    let host = host().ok_or(Code::DeviceFault)?;
+    let name = name.unwrap_or_default();
+    let named = || host.stations().iter().position(|station| station.name() == name);
+    let number = if FIRST.contains(&name) { Some(0) } else { named() };
+    let number =
+        number.filter(|number| *number < MOST.min(host.stations().len())).ok_or(Code::DeviceFault)?;
+    let handle = c_uint::try_from(number).map_err(|_| Code::DeviceFault)?;
+    let mut device = Devices::lock(handle).ok_or(Code::DeviceFault)?;
+    if device.is_initialised {
+        return Err(Code::AlreadyInitiated);
+    }
+    if !host.open(number) {
+        return Err(Code::DeviceFault);
+    }
+    *device = Device { is_initialised: true, number, capabilities: AT_FIRST, ..Device::NONE };
+    device.look();
+    device.last = device.now;
+    drop(device);
+    CURRENT.0.store(handle, Ordering::Release);
+    Ok(handle)
+}
+
+/// Closes a device; whether it was open.
+pub(crate) fn disable(handle: c_uint) -> bool {
+    let Some(mut device) = Devices::lock(handle).filter(|device| device.is_initialised) else { return false };
+    device.station().into_iter().for_each(|(_, station)| {
+        station.close();
+    });
+    *device = Device::NONE;
+    drop(device);
+    let _ = CURRENT.0.compare_exchange(handle, NO_DEVICE, Ordering::AcqRel, Ordering::Acquire);
+    if Devices::any().is_none() {
+        Scheduler::forget();
+    }
+    true
+}
+
+/// Begins a frame; outside of the scheduler it waits for a tick that had none yet.
+pub(crate) fn begin_frame(handle: c_uint) -> Result<(), Code> {
+    let mut device = Devices::lock(handle).filter(|device| device.is_initialised).ok_or(Code::BadHandle)?;
+    CURRENT.0.store(handle, Ordering::Release);
+    let (host, station) = device.station().ok_or(Code::CommError)?;
+    let mut when = device.when(station);
+    if device.depth > 0 {
+        if device.begun == Some(when) || matches!(when, When::Outside(_)) {
+            device.depth += 1;
+            return Ok(());
+        }
+        // The last one was never ended.
+        device.depth = 0;
+        device.send(host, station)?;
+    }
+    if device.begun == Some(when) && device.capability(ONE_FRAME_LIMIT) == Some(true) {
+        if matches!(when, When::Scheduled(_)) {
+            return Err(Code::IllegalBegin);
+        }
+        drop(device);
+        host.wait(station);
+        device = Devices::lock(handle).filter(|device| device.is_initialised).ok_or(Code::BadHandle)?;
+        when = device.when(station);
+    }
+    (device.depth, device.begun) = (1, Some(when));
+    (device.force_n, device.torque_mnm) = (None, None);
+    device.last = device.now;
+    device.look();
+    alive(host)
+}
+
+/// Whether the run goes on; if not, whether the device is lost, which ends a program's loop, or stopped for safety.
+fn alive(host: &Host) -> Result<(), Code> {
+    match (host.is_running(), host.is_stopped_for_safety()) {
+        (true, _) => Ok(()),
+        (false, true) => Err(Code::ForceError),
+        (false, false) => Err(Code::CommError),
+    }
+}
+
+/// Ends a frame; one outside of the scheduler that sets a force waits for the tick that sees it.
+pub(crate) fn end_frame(handle: c_uint) -> Result<(), Code> {
+    let mut device = Devices::lock(handle).filter(|device| device.is_initialised).ok_or(Code::BadHandle)?;
+    if device.depth == 0 {
+        return Err(Code::IllegalEnd);
+    }
+    device.depth -= 1;
+    if device.depth > 0 {
+        return Ok(());
+    }
+    let (host, station) = device.station().ok_or(Code::CommError)?;
+    let waits = device.has_set() && !Scheduler::is_here();
+    let sent = device.send(host, station);
+    drop(device);
+    if waits {
+        host.wait(station);
+    }
+    sent
+}
+
+/// A text of the interface or of the current device.
+pub(crate) fn text(parameter: c_uint) -> Result<&'static CStr, Code> {
+    match parameter {
+        VERSION | DRIVER_VERSION => Ok(c"3.4.0"),
+        VENDOR => Ok(c"Flotor"),
+        MODEL_TYPE | SERIAL_NUMBER => {
+            let (number, plugin) = Devices::with_current(|device| {
+                let plugin = device.station().map(|(_, station)| station.plugin().to_owned());
+                (device.number, plugin.unwrap_or_default())
+            })?;
+            let text = match parameter {
+                MODEL_TYPE => said("FLOTOR_HD_MODEL").unwrap_or_else(|| format!("Flotor {plugin}")),
+                _ => format!("flotor-{number}"),
+            };
+            Ok(kept(text))
+        }
+        _ => Err(Code::InvalidEnum),
+    }
+}
+
+/// The same text at the same place for as long as the process lives.
+fn kept(text: String) -> &'static CStr {
+    static TEXTS: Mutex<BTreeMap<String, &'static CStr>> = Mutex::new(BTreeMap::new());
+    let mut texts = TEXTS.lock().unwrap_or_else(PoisonError::into_inner);
+    let keep =
+        |text: &String| &*Box::leak(CString::new(text.as_str()).unwrap_or_default().into_boxed_c_str());
+    let kept = keep_once(&mut texts, text, keep);
+    drop(texts);
+    kept
+}
+
+fn keep_once(
+    texts: &mut BTreeMap<String, &'static CStr>,
+    text: String,
+    keep: impl FnOnce(&String) -> &'static CStr,
+) -> &'static CStr {
+    texts.entry(text).or_insert_with_key(keep)
+}
+
+impl Device {
+    const NONE: Self = Self {
+        is_initialised: false,
+        number: 0,
+        capabilities: 0,
+        depth: 0,
+        begun: None,
+        now: AT_HOME,
+        last: AT_HOME,
+        force_n: None,
+        torque_mnm: None,
+        sent: Wrench::ZERO,
+        light: 0,
+        velocity_limit_mm_per_s: 850.0,
+        impulse_limit_n_per_ms: 0.2,
+        ramping_n_per_s: 3.0,
+    };
+
+    fn station(&self) -> Option<(&'static Host, &'static Station)> {
+        let host = host()?;
+        Some((host, host.station(self.number)?))
+    }
+
+    fn when(&self, station: &Station) -> When {
+        if Scheduler::is_here() { When::Scheduled(Scheduler::tick()) } else { When::Outside(station.ticks()) }
+    }
+
+    /// Takes a snapshot.
+    fn look(&mut self) {
+        let Some((_, station)) = self.station() else { return };
+        let state = station.state();
+        self.now = Snapshot {
+            position_mm: FRAME.of_flotor(state.position_m) * MILLI,
+            velocity_mm_per_s: FRAME.of_flotor(state.velocity_m_per_s) * MILLI,
+            angular_velocity_rad_per_s: FRAME.of_flotor(state.angular_velocity_rad_per_s),
+            rows: FRAME.rotation(state.orientation),
+            buttons: state.buttons & 0xF,
+            applied: [state.applied.force(), state.applied.torque()].map(|part| FRAME.of_flotor(part)),
+        };
+    }
+
+    fn has_set(&self) -> bool {
+        self.force_n.is_some() || self.torque_mnm.is_some()
+    }
+
+    /// Sends what was set in the frame; without that what was sent before stays until it expires.
+    fn send(&mut self, host: &Host, station: &Station) -> Result<(), Code> {
+        if !self.has_set() {
+            return Ok(());
+        }
+        let (force_n, torque_mnm) = (self.force_n.take(), self.torque_mnm.take());
+        if let Some(force_n) = force_n {
+            self.sent.force_n = FRAME.to_flotor(force_n).to_array();
+        }
+        if let Some(torque_mnm) = torque_mnm {
+            self.sent.torque_nm = (FRAME.to_flotor(torque_mnm) / MILLI).to_array();
+        }
+        station.command(&self.sent, host.now_ns()).map_err(|_| Code::InvalidValue)?;
+        let is_too_much = self.sent.force().length() > station.most()[0];
+        if is_too_much && self.capability(FORCE_CLAMPING) == Some(false) {
+            return Err(Code::ExceededMaxForce);
+        }
+        alive(host)
+    }
+
+    fn bit(capability: c_uint) -> Option<u32> {
+        match capability {
+            // Limits that are capabilities too.
+            VELOCITY_LIMIT | IMPULSE_LIMIT => Some(1 << (capability - VELOCITY_LIMIT + CAPABILITIES)),
+            _ => {
+                capability.checked_sub(FIRST_CAPABILITY).filter(|bit| *bit < CAPABILITIES).map(|bit| 1 << bit)
+            }
+        }
+    }
+
+    fn capability(&self, capability: c_uint) -> Option<bool> {
+        if capability == STATUS_LIGHT {
+            return Some(self.light != 0);
+        }
+        Self::bit(capability).map(|bit| self.capabilities & bit != 0)
+    }
+
+    pub(crate) fn is_on(&self, capability: c_uint) -> Result<bool, Code> {
+        self.capability(capability).ok_or(Code::InvalidEnum)
+    }
+
+    pub(crate) fn switch(&mut self, capability: c_uint, on: bool) -> Result<(), Code> {
+        if capability == STATUS_LIGHT {
+            self.light = u32::from(on);
+            return Ok(());
+        }
+        let bit = Self::bit(capability).ok_or(Code::InvalidEnum)?;
+        self.capabilities = if on { self.capabilities | bit } else { self.capabilities & !bit };
+        self.follow_switches();
+        Ok(())
+    }
+
+    /// Force comes on with the scheduler and the capability, and goes with either.
+    fn follow_switches(&self) {
+        if !self.is_initialised {
+            return;
+        }
+        let is_on = self.capability(FORCE_OUTPUT) == Some(true) && Scheduler::is_running();
+        self.station()
+            .into_iter()
+            .for_each(|(_, station)| if is_on { station.enable() } else { station.disable() });
+    }
+
+    /// Sets a parameter; the last value in a frame wins.
+    pub(crate) fn set(&mut self, parameter: c_uint, values: [f64; 6]) -> Result<(), Code> {
+        let [x, y, z, ..] = values;
+        if !(x.is_finite() && y.is_finite() && z.is_finite()) {
+            return Err(Code::InvalidValue);
+        }
+        match parameter {
+            VELOCITY_LIMIT => self.velocity_limit_mm_per_s = x,
+            IMPULSE_LIMIT => self.impulse_limit_n_per_ms = x,
+            RAMPING_RATE => self.ramping_n_per_s = x,
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturated, then masked
+            STATUS_LIGHT => self.light = x as u32 & 0x7,
+            _ if self.depth == 0 => return Err(Code::FrameError),
+            _ if parameter == FORCE[0] => self.force_n = Some(DVec3::new(x, y, z)),
+            _ if parameter == TORQUE[0] => self.torque_mnm = Some(DVec3::new(x, y, z)),
+            // Torques of joints that the device does not have.
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// The values of a parameter in this frame, or in the last one.
+    pub(crate) fn value(&self, parameter: c_uint) -> Result<Values, Code> {
+        let (_, station) = self.station().ok_or(Code::CommError)?;
+        let seen = [&self.now, &self.last];
+        let frames = |[now, last]: [c_uint; 2]| match parameter {
+            _ if parameter == now => Some(0),
+            _ if parameter == last => Some(1),
+            _ => None,
+        };
+        let of = |ids: [c_uint; 2]| frames(ids).and_then(|index| seen.get(index).copied());
+        let vector = |vector: DVec3| Values::real(vector.to_array());
+        if let Some(seen) = of(POSITION) {
+            return Ok(vector(seen.position_mm));
+        }
+        if let Some(seen) = of(TRANSFORM) {
+            return Ok(Values::real(transform(seen)));
+        }
+        if let Some(seen) = of(BUTTONS) {
+            return Ok(Values::integer(seen.buttons));
+        }
+        if let Some(seen) = of(VELOCITY) {
+            return Ok(vector(seen.velocity_mm_per_s));
+        }
+        if let Some(seen) = of(ANGULAR_VELOCITY) {
+            return Ok(vector(seen.angular_velocity_rad_per_s));
+        }
+        if let Some(seen) = of(JOINT_ANGLES) {
+            return Ok(vector(joint_angles(seen.position_mm / MILLI)));
+        }
+        if let Some(seen) = of(GIMBAL_ANGLES) {
+            return Ok(vector(gimbal_angles(&seen.rows)));
+        }
+        // Current force reads 0 until it is set in this frame: programs add to it.
+        let [force_n, torque_nm] = self.now.applied;
+        match frames(FORCE) {
+            Some(0) => return Ok(vector(self.force_n.unwrap_or_default())),
+            Some(_) => return Ok(vector(force_n)),
+            None => {}
+        }
+        match frames(TORQUE) {
+            Some(0) => return Ok(vector(self.torque_mnm.unwrap_or_default())),
+            Some(_) => return Ok(vector(torque_nm * MILLI)),
+            None => {}
+        }
+        if frames(JOINT_TORQUE).or(frames(GIMBAL_TORQUE)).is_some() {
+            return Ok(vector(DVec3::ZERO));
+        }
+        if of(ENCODERS).is_some() {
+            return Ok(Values::new(Kind::Long, &encoders(&self.now)));
+        }
+        if PINCH.contains(&parameter) {
+            return Ok(Values::real([0.0]));
+        }
+        // In the well means without force, and the safety switch is closed by whoever holds the device.
+        if SAFETY_SWITCH.contains(&parameter) {
+            return Ok(Values::boolean(false));
+        }
+        if INKWELL_SWITCH.contains(&parameter) {
+            return Ok(Values::boolean(true));
+        }
+        self.constant(parameter, station)
+    }
+
+    /// What does not depend on a frame.
+    fn constant(&self, parameter: c_uint, station: &Station) -> Result<Values, Code> {
+        let six = station.axes() != Axes::Three;
+        let [force_n, torque_nm] = station.most();
+        let range_mm = FRAME.of_flotor(station.range_m()).abs() * MILLI;
+        let stiffness_n_per_mm = match station.max_stiffness_n_per_m() {
+            none if none <= 0.0 => 1.0,
+            stiffness_n_per_m => stiffness_n_per_m / MILLI,
+        };
+        Ok(match parameter {
+            _ if WORKSPACES.contains(&parameter) => {
+                let [x, y, z] = range_mm.to_array();
+                Values::real([-x, -y, -z, x, y, z])
+            }
+            FIRMWARE_VERSION => Values::real([1.0]),
+            TABLETOP_OFFSET => Values::real([range_mm.y]),
+            INPUT_DOF => Values::integer(if six { 6 } else { 3 }),
+            OUTPUT_DOF => Values::integer(if station.axes() == Axes::Six { 6 } else { 3 }),
+            CALIBRATION_STYLE => Values::integer(2),
+            UPDATE_RATE | INSTANTANEOUS_RATE => Values::integer(Scheduler::rate_hz()),
+            MAX_STIFFNESS => Values::real([stiffness_n_per_mm]),
+            MAX_DAMPING => Values::real([stiffness_n_per_mm * 1.0e-3]),
+            MAX_FORCE | MAX_CONTINUOUS_FORCE => Values::real([force_n]),
+            MAX_TORQUE | MAX_CONTINUOUS_TORQUE => Values::real([torque_nm * MILLI]),
+            MAX_TORQUE_STIFFNESS | MAX_TORQUE_DAMPING => Values::real([0.0]),
+            MOTOR_TEMPERATURE => Values::real(&[0.0; 6][..if six { 6 } else { 3 }]),
+            VELOCITY_LIMIT => Values::real([self.velocity_limit_mm_per_s]),
+            IMPULSE_LIMIT => Values::real([self.impulse_limit_n_per_ms]),
+            RAMPING_RATE => Values::real([self.ramping_n_per_s]),
+            STATUS_LIGHT => Values::integer(self.light),
+            _ => return Err(Code::InvalidEnum),
+        })
+    }
+}
+
+/// Column by column, the translation in the last one.
+fn transform(seen: &Snapshot) -> [f64; 16] {
+    let at_mm = seen.position_mm.to_array();
+    std::array::from_fn(|index| match (index / 4, index % 4) {
+        (3, 3) => 1.0,
+        (_, 3) => 0.0,
+        (3, row) => at_mm[row],
+        (column, row) => seen.rows[row][column],
+    })
+}
+
+/// Turret, thigh and shin of a nominal arm that reaches there, rad: left, up and up are positive.
+fn joint_angles(DVec3 { x, y, z }: DVec3) -> DVec3 {
+    DVec3::new(math::atan2(-x, ARM_M), math::atan2(y, ARM_M), math::atan2(y - z, ARM_M))
+}
+
+/// Angles of a nominal gimbal, rad: about y, then x, then z; right is positive, up negative, clockwise positive.
+fn gimbal_angles(rows: &[[f64; 3]; 3]) -> DVec3 {
+    let pitch = math::asin((-rows[1][2]).clamp(-1.0, 1.0));
+    let yaw = math::atan2(rows[0][2], rows[2][2]);
+    let roll = math::atan2(rows[1][0], rows[1][1]);
+    DVec3::new(-yaw, -pitch, -roll)
+}
+
+/// Counts of nominal encoders: 0.01 mm, and 0.1 mrad.
+fn encoders(seen: &Snapshot) -> [f64; 6] {
+    let DVec3 { x, y, z } = seen.position_mm * 100.0;
+    let DVec3 { x: yaw, y: pitch, z: roll } = gimbal_angles(&seen.rows) * 1.0e4;
+    [x, y, z, yaw, pitch, roll].map(f64::round)
+}

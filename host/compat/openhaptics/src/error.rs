@@ -1,0 +1,110 @@
+//! The stack of errors, one for each thread: the newest comes first, and whoever takes one takes it away.
+
+use std::cell::RefCell;
+use std::ffi::{CStr, c_int, c_uint};
+
+/// Errors that are kept for a thread; older ones are forgotten.
+const MOST: usize = 64;
+
+/// What went wrong. The numbers are the interface's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub(crate) enum Code {
+    InvalidEnum = 0x0100,
+    InvalidValue = 0x0101,
+    InvalidOperation = 0x0102,
+    InvalidInputType = 0x0103,
+    BadHandle = 0x0104,
+    ExceededMaxForce = 0x0201,
+    ForceError = 0x0204,
+    DeviceFault = 0x0300,
+    AlreadyInitiated = 0x0301,
+    CommError = 0x0302,
+    TimerError = 0x0304,
+    IllegalBegin = 0x0400,
+    IllegalEnd = 0x0401,
+    FrameError = 0x0402,
+    SchedulerFull = 0x0501,
+}
+
+/// `HDErrorInfo`, 12 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ErrorInfo {
+    code: c_uint,
+    internal: c_int,
+    device: c_uint,
+}
+
+const NONE: ErrorInfo = ErrorInfo { code: 0, internal: 0, device: super::NO_DEVICE };
+
+thread_local! {
+    static ERRORS: RefCell<Vec<ErrorInfo>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Puts an error on the stack of this thread.
+pub(crate) fn raise(code: Code, device: c_uint) {
+    let _ = ERRORS.try_with(|errors| {
+        let mut errors = errors.borrow_mut();
+        if errors.len() == MOST {
+            errors.remove(0);
+        }
+        errors.push(ErrorInfo { code: code as c_uint, internal: 0, device });
+    });
+}
+
+/// Takes the newest error away.
+pub(crate) fn take() -> ErrorInfo {
+    ERRORS.try_with(|errors| errors.borrow_mut().pop()).ok().flatten().unwrap_or(NONE)
+}
+
+/// Forgets all of this thread.
+pub(crate) fn clear() {
+    let _ = ERRORS.try_with(|errors| errors.borrow_mut().clear());
+}
+
+/// For people.
+pub(crate) fn words(code: c_uint) -> &'static CStr {
+    match code {
+        0x0000 => c"no error",
+        0x0100 => c"a number that names nothing here",
+        0x0101 => c"a value that cannot be used",
+        0x0102 => c"not possible now",
+        0x0103 => c"another type of value",
+        0x0104 => c"no such device",
+        0x0200 => c"the motors are warm",
+        0x0201 => c"more force than the device gives",
+        0x0202 => c"force that changes too fast",
+        0x0203 => c"a handle that moves too fast",
+        0x0204 => c"force is stopped for safety",
+        0x0300 => c"the device is not there",
+        0x0301 => c"the device is initialised already",
+        0x0302 => c"the device is lost",
+        0x0303 => c"the connection to the device is not configured",
+        0x0304 => c"there is no timer",
+        0x0400 => c"a frame that cannot begin",
+        0x0401 => c"a frame that cannot end",
+        0x0402 => c"only possible in a frame",
+        0x0500 => c"a priority that cannot be used",
+        0x0501 => c"the scheduler is full",
+        0x0600 => c"no licence",
+        _ => c"unknown error",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_newest_comes_first_and_threads_have_their_own() {
+        assert_eq!(size_of::<ErrorInfo>(), 12);
+        raise(Code::InvalidEnum, 0);
+        raise(Code::BadHandle, 7);
+        assert_eq!(std::thread::spawn(take).join().map(|info| info.code).ok(), Some(0));
+        assert_eq!([take(), take(), take()].map(|info| info.code), [0x0104, 0x0100, 0]);
+        (0..1000).for_each(|_| raise(Code::FrameError, 0));
+        clear();
+        assert_eq!(take(), NONE);
+    }
+}

@@ -1,0 +1,352 @@
+//! The scheduler: one thread for all devices, which calls the program once a tick, higher priority first.
+
+use crate::device::Devices;
+use flotor_compat::{guarded, quietly};
+use std::cell::Cell;
+use std::ffi::{c_int, c_uint, c_ulong, c_ushort, c_void};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// What the program schedules: 0 is done, anything else goes on. It may end its thread: an interpreter that is shut down does.
+pub(crate) type Callback = unsafe extern "C-unwind" fn(*mut c_void) -> c_uint;
+
+/// Callbacks that are called in a tick at most.
+const MOST: usize = 64;
+
+unsafe extern "C" {
+    /// As the C library has it, for a body that may be unwound by the end of its thread.
+    fn pthread_create(
+        thread: *mut c_ulong,
+        attributes: *const c_void,
+        body: extern "C-unwind" fn(*mut c_void) -> *mut c_void,
+        data: *mut c_void,
+    ) -> c_int;
+    fn pthread_join(thread: c_ulong, result: *mut *mut c_void) -> c_int;
+}
+
+/// A thread of the system, without the frames of the standard library's: those would catch what ends a thread, and abort.
+struct Thread(c_ulong);
+
+impl Thread {
+    fn start(body: extern "C-unwind" fn(*mut c_void) -> *mut c_void) -> Option<Self> {
+        let mut thread = 0;
+        // SAFETY: a place for the number of the thread, no attributes, and a body that takes nothing.
+        let code = unsafe { pthread_create(&raw mut thread, std::ptr::null(), body, std::ptr::null_mut()) };
+        (code == 0).then_some(Self(thread))
+    }
+
+    fn join(self) {
+        // SAFETY: a thread that was started and that nobody else waits for; its result is not wanted.
+        unsafe { pthread_join(self.0, std::ptr::null_mut()) };
+    }
+}
+
+/// How long an unscheduling waits for a call that is under way.
+const LONGEST_CALL: Duration = Duration::from_secs(1);
+/// Pause where there is no tick to wait for.
+const NO_TICK: Duration = Duration::from_millis(1);
+
+/// A callback in the list.
+#[derive(Clone, Copy)]
+struct Entry {
+    handle: u64,
+    priority: c_ushort,
+    callback: Callback,
+    data: Data,
+}
+
+/// What the program wants to get back.
+#[derive(Clone, Copy)]
+struct Data(*mut c_void);
+
+// SAFETY: the program schedules it for another thread: what it points at is its own affair.
+unsafe impl Send for Data {}
+
+struct List {
+    /// By priority, then in the order of scheduling.
+    entries: Vec<Entry>,
+    next: u64,
+    thread: Option<Thread>,
+}
+
+static LIST: Mutex<List> = Mutex::new(List { entries: Vec::new(), next: 1, thread: None });
+/// Somebody was taken out, or came in.
+static CHANGED: Condvar = Condvar::new();
+static IS_RUNNING: AtomicBool = AtomicBool::new(false);
+static RATE_HZ: AtomicU32 = AtomicU32::new(1000);
+static TICK: AtomicU64 = AtomicU64::new(0);
+/// The callback that is being called; 0: none.
+static UNDER_WAY: AtomicU64 = AtomicU64::new(0);
+static TICK_BEGAN: Mutex<Option<Instant>> = Mutex::new(None);
+
+thread_local! {
+    static IS_SCHEDULER: Cell<bool> = const { Cell::new(false) };
+}
+
+fn list() -> MutexGuard<'static, List> {
+    LIST.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Entry {
+    /// Calls the program; whether it wants to be called again.
+    fn call(&self) -> bool {
+        // SAFETY: whoever scheduled it guarantees that it may be called with these data until it is taken out.
+        unsafe { (self.callback)(self.data.0) != 0 }
+    }
+}
+
+/// The body of the thread. While the program is called, nothing here would have to be dropped, and nothing catches: the program may
+/// end the thread.
+extern "C-unwind" fn run(_data: *mut c_void) -> *mut c_void {
+    IS_SCHEDULER.with(|here| here.set(true));
+    while Scheduler::is_running() {
+        let calls = guarded([None; MOST], Scheduler::next_calls);
+        for entry in calls.iter().flatten() {
+            if !guarded(false, || Scheduler::enter(entry)) {
+                continue;
+            }
+            let goes_on = entry.call();
+            guarded((), || Scheduler::leave(entry, goes_on));
+        }
+    }
+    std::ptr::null_mut()
+}
+
+/// The scheduler of the process.
+pub(crate) struct Scheduler;
+
+impl Scheduler {
+    /// Whether the calling thread is the scheduler's.
+    pub(crate) fn is_here() -> bool {
+        IS_SCHEDULER.try_with(Cell::get).unwrap_or(false)
+    }
+
+    pub(crate) fn is_running() -> bool {
+        IS_RUNNING.load(Ordering::Acquire)
+    }
+
+    /// Number of its ticks so far.
+    pub(crate) fn tick() -> u64 {
+        TICK.load(Ordering::Acquire)
+    }
+
+    pub(crate) fn rate_hz() -> u32 {
+        RATE_HZ.load(Ordering::Relaxed)
+    }
+
+    /// Whether the rate is one of those there are.
+    pub(crate) fn set_rate(rate_hz: c_ulong) -> bool {
+        let rate_hz = u32::try_from(rate_hz).ok().filter(|rate_hz| [500, 1000].contains(rate_hz));
+        rate_hz.inspect(|rate_hz| RATE_HZ.store(*rate_hz, Ordering::Relaxed)).is_some()
+    }
+
+    /// Starts it, if it does not run; whether it runs.
+    pub(crate) fn start() -> bool {
+        let mut list = list();
+        if Self::is_running() {
+            return true;
+        }
+        // One that was stopped by a callback of its own is about to end.
+        if let Some(thread) = list.thread.take() {
+            drop(list);
+            thread.join();
+            list = self::list();
+        }
+        IS_RUNNING.store(true, Ordering::Release);
+        list.thread = quietly(|| Thread::start(run));
+        let is_started = list.thread.is_some();
+        IS_RUNNING.store(is_started, Ordering::Release);
+        drop(list);
+        Devices::follow_scheduler();
+        is_started
+    }
+
+    /// Stops it: no force, and nothing of the program is called any more when this returns.
+    pub(crate) fn stop() {
+        IS_RUNNING.store(false, Ordering::Release);
+        Devices::follow_scheduler();
+        CHANGED.notify_all();
+        if Self::is_here() {
+            return;
+        }
+        let thread = list().thread.take();
+        if let Some(thread) = thread {
+            thread.join();
+        }
+    }
+
+    /// What is to be called in the next tick, in order; nothing if there is no tick.
+    fn next_calls() -> [Option<Entry>; MOST] {
+        let mut calls = [None; MOST];
+        if !Self::wait_for_tick() {
+            return calls;
+        }
+        TICK.fetch_add(1, Ordering::AcqRel);
+        *TICK_BEGAN.lock().unwrap_or_else(PoisonError::into_inner) = Some(Instant::now());
+        calls.iter_mut().zip(&list().entries).for_each(|(call, entry)| *call = Some(*entry));
+        calls
+    }
+
+    /// Whether an entry is still to be called; it counts as under way then.
+    fn enter(entry: &Entry) -> bool {
+        let list = list();
+        let is_in = Self::is_running() && list.is_in(entry.handle);
+        if is_in {
+            UNDER_WAY.store(entry.handle, Ordering::Release);
+        }
+        is_in
+    }
+
+    /// An entry was called; one that is done is taken out.
+    fn leave(entry: &Entry, goes_on: bool) {
+        UNDER_WAY.store(0, Ordering::Release);
+        if !goes_on {
+            Self::take_out(entry.handle);
+        }
+    }
+
+    /// Waits for the next tick of the program's rate; whether there is anything to call.
+    fn wait_for_tick() -> bool {
+        let is_idle = list().entries.is_empty();
+        let Some((host, station)) = Devices::any() else {
+            std::thread::sleep(NO_TICK);
+            return !is_idle;
+        };
+        // Without anybody to call, time does not go on in lockstep: it is the calls that make it.
+        if is_idle && host.pace() == flotor_compat::Pace::Lockstep {
+            let list = list();
+            let wait = |list: &mut List| list.entries.is_empty() && Self::is_running();
+            let _ = CHANGED.wait_timeout_while(list, Duration::from_millis(100), wait);
+            return false;
+        }
+        let period_ns = 1_000_000_000 / u64::from(Self::rate_hz());
+        let ticks = (period_ns / host.period_ns().max(1)).max(1);
+        for _ in 0..ticks {
+            if !host.wait(station) {
+                std::thread::sleep(NO_TICK); // the device is lost: the program hears of it in its frame
+                break;
+            }
+        }
+        !is_idle
+    }
+
+    /// Schedules a callback, if there is room for it; at once on the scheduler's own thread.
+    ///
+    /// # Safety
+    /// `callback` may be called with `data` from any thread until it is taken out.
+    pub(crate) unsafe fn asynchronous(
+        callback: Callback,
+        data: *mut c_void,
+        priority: c_ushort,
+    ) -> Option<c_ulong> {
+        let mut list = list();
+        if list.entries.len() >= MOST {
+            return None;
+        }
+        let handle = list.next;
+        list.next += 1;
+        let entry = Entry { handle, priority, callback, data: Data(data) };
+        if Self::is_here() {
+            drop(list);
+            if !entry.call() {
+                return Some(handle);
+            }
+            list = self::list();
+        }
+        list.put(entry);
+        drop(list);
+        CHANGED.notify_all();
+        Some(handle)
+    }
+
+    /// Calls a callback until it is done, on the scheduler's thread if it runs and is another one.
+    ///
+    /// # Safety
+    /// `callback` may be called with `data` from any thread until this returns.
+    pub(crate) unsafe fn synchronous(callback: Callback, data: *mut c_void, priority: c_ushort) {
+        if Self::is_here() || !Self::is_running() {
+            let entry = Entry { handle: 0, priority, callback, data: Data(data) };
+            while entry.call() {
+                if let Some((host, station)) = Devices::any() {
+                    host.wait(station);
+                } else {
+                    std::thread::sleep(NO_TICK);
+                }
+            }
+            return;
+        }
+        // SAFETY: by the contract of this function; it returns only when the callback is taken out.
+        let Some(handle) = (unsafe { Self::asynchronous(callback, data, priority) }) else {
+            return crate::error::raise(crate::error::Code::SchedulerFull, crate::NO_DEVICE);
+        };
+        Self::wait_until_out(handle);
+        // A scheduler that stopped meanwhile calls nobody any more.
+        Self::unschedule(handle);
+    }
+
+    fn wait_until_out(handle: u64) {
+        let is_in = |list: &mut List| list.is_in(handle) && Self::is_running();
+        let mut list = list();
+        while is_in(&mut list) {
+            let waited = CHANGED.wait_timeout(list, Duration::from_millis(100));
+            (list, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// Takes a callback out, and waits for a call of it that is under way elsewhere; whether it was in.
+    pub(crate) fn unschedule(handle: c_ulong) -> bool {
+        let was_in = Self::take_out(handle);
+        let since = Instant::now();
+        while UNDER_WAY.load(Ordering::Acquire) == handle
+            && !Self::is_here()
+            && since.elapsed() < LONGEST_CALL
+        {
+            std::thread::sleep(Duration::from_micros(50));
+        }
+        was_in
+    }
+
+    /// Forgets all callbacks, if it does not run: the program has closed its last device, and may have let go of what they use.
+    pub(crate) fn forget() {
+        if !Self::is_running() {
+            list().entries.clear();
+            CHANGED.notify_all();
+        }
+    }
+
+    fn take_out(handle: u64) -> bool {
+        let mut list = list();
+        let before = list.entries.len();
+        list.entries.retain(|entry| entry.handle != handle);
+        let was_in = list.entries.len() < before;
+        drop(list);
+        CHANGED.notify_all();
+        was_in
+    }
+
+    /// Whether a callback is still scheduled, waiting for its end if that is wanted.
+    pub(crate) fn is_scheduled(handle: c_ulong, waits: bool) -> bool {
+        if waits && !Self::is_here() {
+            Self::wait_until_out(handle);
+        }
+        list().is_in(handle)
+    }
+
+    /// Seconds since the tick began.
+    pub(crate) fn since_tick_s() -> f64 {
+        let began = *TICK_BEGAN.lock().unwrap_or_else(PoisonError::into_inner);
+        began.map_or(0.0, |began| began.elapsed().as_secs_f64())
+    }
+}
+
+impl List {
+    fn put(&mut self, entry: Entry) {
+        let place = self.entries.iter().position(|there| there.priority < entry.priority);
+        self.entries.insert(place.unwrap_or(self.entries.len()), entry);
+    }
+
+    fn is_in(&self, handle: u64) -> bool {
+        self.entries.iter().any(|entry| entry.handle == handle)
+    }
+}

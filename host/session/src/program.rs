@@ -1,0 +1,495 @@
+//! The program as a source of force: a force model whose wrench comes from a program in the same process.
+//!
+//! ```text
+//!  program                                             loop
+//!  Port::command(wrench) -> latest-value cell -> model `program` -> mapping -> envelope -> device
+//!  pose, wrench applied  <- Tap, latest-value cell  <------------------------------------- record of the tick
+//! ```
+//!
+//! In a scene it is a model like any other (`plugin = "program"`): mapped, mixed, limited and recorded. A wrench is valid for a
+//! stated time after the tick that saw it first; then it fades to zero, which is counted. Force fades in when the program
+//! enables it. Neither side waits for the other.
+
+use crate::scene::{ModelUse, Scene};
+use flotor_core::mapping::Mapping;
+use flotor_hal::abi::{Entry, model_entry};
+use flotor_hal::{
+    Demand, ForceModel, Input, Memory, ModelInfo, Output, Parameter, Refusal, Settings, StepStatus, Wrench,
+};
+use flotor_sync::{Observer, Publisher, Words, latest};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// What scenes call the model.
+pub const ID: &str = "program";
+
+/// The model, for a registry. Without a program that has made a [`Port`] it refuses to be made.
+pub static ENTRY: Entry = model_entry::<ProgramModel>();
+
+/// The model of a scene without one.
+const MODEL: &str = "[device]\nplugin = \"none\"\n[[model]]\nplugin = \"program\"\n";
+
+/// What a program orders.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Order {
+    wrench: Wrench,
+    /// So many so far: the same wrench again is valid anew.
+    commands: u64,
+    /// So many times enabled and disabled: odd if enabled.
+    gate: u64,
+    /// Validity of its own, ns; 0: that of the scene.
+    valid_ns: u64,
+}
+
+impl Words<9> for Order {
+    #[inline]
+    fn to_words(&self) -> [u64; 9] {
+        let Wrench { force_n: [fx, fy, fz], torque_nm: [tx, ty, tz] } = self.wrench;
+        let [fx, fy, fz, tx, ty, tz] = [fx, fy, fz, tx, ty, tz].map(f64::to_bits);
+        [fx, fy, fz, tx, ty, tz, self.commands, self.gate, self.valid_ns]
+    }
+
+    #[inline]
+    fn from_words(&[fx, fy, fz, tx, ty, tz, commands, gate, valid_ns]: &[u64; 9]) -> Self {
+        let [fx, fy, fz, tx, ty, tz] = [fx, fy, fz, tx, ty, tz].map(f64::from_bits);
+        let wrench = Wrench { force_n: [fx, fy, fz], torque_nm: [tx, ty, tz] };
+        Self { wrench, commands, gate, valid_ns }
+    }
+}
+
+const NOTHING: Order = Order { wrench: Wrench::ZERO, commands: 0, gate: 0, valid_ns: 0 };
+
+/// What is counted of a program.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ProgramCounts {
+    /// Wrenches it commanded.
+    pub commands: u64,
+    /// Of these, refused because they were not finite.
+    pub refused: u64,
+    /// How often a wrench expired and faded because no other came.
+    pub lapses: u64,
+    /// Ticks in which an expired wrench faded or was gone.
+    pub lapsed_ticks: u64,
+}
+
+#[derive(Debug, Default)]
+struct Lapses {
+    count: AtomicU64,
+    ticks: AtomicU64,
+}
+
+/// The model's end of a port, until a model takes it.
+struct ModelEnd {
+    orders: Observer<Order, 9>,
+    lapses: Arc<Lapses>,
+}
+
+/// Ports that no model has taken yet.
+static FREE: Mutex<Vec<(u32, ModelEnd)>> = Mutex::new(Vec::new());
+static NEXT: AtomicU32 = AtomicU32::new(1);
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A wrench with a number that is not finite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("a wrench has a number that is not finite; the one before stays")]
+pub struct NotFinite;
+
+/// The program's end: where it says what it wants the hand to feel, in the model's frame. Any thread may use it.
+#[derive(Debug)]
+pub struct Port {
+    number: u32,
+    orders: Mutex<(Order, Publisher<Order, 9>)>,
+    refused: AtomicU64,
+    lapses: Arc<Lapses>,
+}
+
+impl Default for Port {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Port {
+    /// A port that gives no force until it is enabled; the next model of this [number](Self::number) takes it. Not real-time.
+    #[must_use]
+    pub fn new() -> Self {
+        let (publisher, orders) = latest(NOTHING);
+        let (number, lapses) = (NEXT.fetch_add(1, Ordering::Relaxed), Arc::<Lapses>::default());
+        lock(&FREE).push((number, ModelEnd { orders, lapses: Arc::clone(&lapses) }));
+        Self { number, orders: Mutex::new((NOTHING, publisher)), refused: AtomicU64::new(0), lapses }
+    }
+
+    /// The value of the model's parameter `port` that means this one.
+    #[must_use]
+    pub fn number(&self) -> u32 {
+        self.number
+    }
+
+    /// What the hand is to feel from the next tick on, N and N·m on the hand, for as long as it is valid. Bounded; may wait
+    /// for another thread of the program that is in the same call.
+    ///
+    /// # Errors
+    /// [`NotFinite`]; the wrench before stays until it expires.
+    pub fn command(&self, wrench: &Wrench) -> Result<(), NotFinite> {
+        if !wrench.is_finite() {
+            self.refused.fetch_add(1, Ordering::Relaxed);
+            return Err(NotFinite);
+        }
+        self.change(|order| {
+            order.wrench = *wrench;
+            order.commands += 1;
+        });
+        Ok(())
+    }
+
+    /// Lets force through, which fades in from the next tick on. Bounded, as [`Self::command`].
+    pub fn enable(&self) {
+        self.change(|order| order.gate += 1 - order.gate % 2);
+    }
+
+    /// No force from the next tick on, whatever was commanded. Bounded, as [`Self::command`].
+    pub fn disable(&self) {
+        self.change(|order| {
+            order.gate += order.gate % 2;
+            order.wrench = Wrench::ZERO;
+        });
+    }
+
+    /// Whether force is let through.
+    #[must_use]
+    pub fn is_enabled(&self) -> bool {
+        lock(&self.orders).0.gate % 2 == 1
+    }
+
+    /// For how long a wrench is valid, ns, instead of the model's `valid_ms`; 0: that.
+    pub fn keep_valid_for(&self, valid_ns: u64) {
+        self.change(|order| order.valid_ns = valid_ns);
+    }
+
+    /// What was counted so far.
+    #[must_use]
+    pub fn counts(&self) -> ProgramCounts {
+        let refused = self.refused.load(Ordering::Relaxed);
+        ProgramCounts {
+            commands: lock(&self.orders).0.commands + refused,
+            refused,
+            lapses: self.lapses.count.load(Ordering::Relaxed),
+            lapsed_ticks: self.lapses.ticks.load(Ordering::Relaxed),
+        }
+    }
+
+    fn change(&self, change: impl FnOnce(&mut Order)) {
+        let mut orders = lock(&self.orders);
+        let (order, publisher) = &mut *orders;
+        change(order);
+        publisher.publish(order);
+    }
+}
+
+/// A port in a scene.
+#[derive(Debug)]
+pub struct Connected {
+    /// The program's end.
+    pub port: Port,
+    /// Number of the device it is on.
+    pub device: u16,
+    /// Between the frame of the device and that of the program.
+    pub mapping: Mapping,
+}
+
+/// Gives each device of a scene a port: the first model `program` on it takes it; a device without one gets one that adds to its
+/// other models. In the scene's order. Not real-time.
+#[must_use]
+pub fn connect(scene: &mut Scene) -> Vec<Connected> {
+    let connect = |device: u16| {
+        let is_ours = |model: &&mut ModelUse| model.plugin.plugin == ID && model.device == device;
+        if !scene.models.iter_mut().any(|model| is_ours(&model)) {
+            // A text of our own, which a test reads.
+            let added =
+                Scene::parse(std::path::Path::new("built-in program"), MODEL).map(|scene| scene.models);
+            let named = scene.devices.get(usize::from(device)).map_or("", |device| device.name.as_str());
+            let name = if device == 0 { ID.to_owned() } else { format!("{ID}-{named}") };
+            scene.models.extend(added.unwrap_or_default().into_iter().map(|model| ModelUse {
+                device,
+                name: name.clone(),
+                ..model
+            }));
+        }
+        let port = Port::new();
+        let model = scene.models.iter_mut().find(is_ours);
+        let mapping = model.map(|model| {
+            *model = model.replaced_by(None, &[("port", &port.number().to_string())]);
+            let place = model.places_m.first().copied().unwrap_or_default();
+            Mapping::new(&model.mapping).at(place)
+        });
+        Connected { port, device, mapping: mapping.unwrap_or_else(|| Mapping::new(&Default::default())) }
+    };
+    let devices = u16::try_from(scene.devices.len()).unwrap_or(u16::MAX);
+    (0..devices).map(connect).collect()
+}
+
+/// The force model. Times are those of ticks, so that a run on the virtual clock can be repeated.
+struct ProgramModel {
+    end: ModelEnd,
+    valid_ns: u64,
+    fade_ns: u64,
+    ramp_ns: u64,
+    order: Order,
+    version: u64,
+    /// The tick that saw the newest wrench first, ns.
+    commanded_ns: u64,
+    /// From when on force fades in, ns, and for how long.
+    since_ns: u64,
+    rise_ns: u64,
+    has_lapsed: bool,
+}
+
+impl ForceModel for ProgramModel {
+    const INFO: ModelInfo = ModelInfo::new(
+        ID,
+        "Program",
+        "The wrench that a program in the same process commands, for a limited time",
+    )
+    .serving(Demand::WRENCH)
+    .with_memory(Memory::PathDependent);
+
+    const PARAMETERS: &'static [Parameter] = &[
+        Parameter::real(
+            "port",
+            "",
+            0.0,
+            4.0e9,
+            0.0,
+            "Which program: set by `flotor lend` and the drop-in libraries",
+        ),
+        Parameter::real(
+            "valid_ms",
+            "ms",
+            1.0,
+            60_000.0,
+            50.0,
+            "How long a wrench is valid without another one",
+        ),
+        Parameter::real(
+            "fade_ms",
+            "ms",
+            0.0,
+            60_000.0,
+            50.0,
+            "Time in which an expired wrench fades to zero",
+        ),
+        Parameter::real(
+            "ramp_ms",
+            "ms",
+            0.0,
+            60_000.0,
+            200.0,
+            "Time in which force fades in once it is enabled",
+        ),
+    ];
+
+    fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        let number = settings.number_or_default("port");
+        let mut free = lock(&FREE);
+        let place = free.iter().position(|(free, _)| f64::from(*free) == number);
+        let Some((_, end)) = place.map(|place| free.swap_remove(place)) else {
+            return Err(Refusal::parameter(
+                "no program commands this model; `flotor lend SCENE -- PROGRAM` starts one, and it has one place only",
+            ));
+        };
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a minute
+        let ns = |id| (settings.number_or_default(id) * 1.0e6).round() as u64;
+        Ok(Self {
+            end,
+            valid_ns: ns("valid_ms"),
+            fade_ns: ns("fade_ms"),
+            ramp_ns: ns("ramp_ms"),
+            order: NOTHING,
+            version: 0,
+            commanded_ns: 0,
+            since_ns: 0,
+            rise_ns: 0,
+            has_lapsed: false,
+        })
+    }
+
+    fn step(&mut self, input: &Input) -> Output {
+        let now_ns = input.time_ns;
+        // One that is being written is seen in the next tick.
+        if let Some((version, order)) = self.end.orders.read()
+            && version != self.version
+        {
+            self.version = version;
+            self.follow(order, now_ns);
+        }
+        let Order { wrench, gate, valid_ns, .. } = self.order;
+        if gate.is_multiple_of(2) || wrench == Wrench::ZERO {
+            self.has_lapsed = false;
+            return Wrench::ZERO.into();
+        }
+        let valid_ns = if valid_ns == 0 { self.valid_ns } else { valid_ns };
+        let over_ns = now_ns.saturating_sub(self.commanded_ns).saturating_sub(valid_ns);
+        let risen = smooth(now_ns.saturating_sub(self.since_ns), self.rise_ns);
+        if over_ns == 0 {
+            return (wrench * risen).into();
+        }
+        if !self.has_lapsed {
+            self.has_lapsed = true;
+            self.end.lapses.count.fetch_add(1, Ordering::Relaxed);
+        }
+        self.end.lapses.ticks.fetch_add(1, Ordering::Relaxed);
+        let left = risen * (1.0 - smooth(over_ns, self.fade_ns));
+        Output::new(wrench * left, f64::NAN, StepStatus::OutOfDomain)
+    }
+
+    fn parameter(&self, index: usize) -> f64 {
+        let ms = |ns: u64| ns as f64 * 1.0e-6;
+        [f64::NAN, ms(self.valid_ns), ms(self.fade_ns), ms(self.ramp_ns)]
+            .get(index)
+            .copied()
+            .unwrap_or(f64::NAN)
+    }
+}
+
+impl ProgramModel {
+    /// What a new order means for the times.
+    fn follow(&mut self, order: Order, now_ns: u64) {
+        if order.gate != self.order.gate {
+            (self.since_ns, self.rise_ns, self.has_lapsed) = (now_ns, self.ramp_ns, false);
+            self.commanded_ns = now_ns;
+        }
+        if order.commands != self.order.commands {
+            if self.has_lapsed {
+                // It comes back as it went.
+                (self.since_ns, self.rise_ns, self.has_lapsed) = (now_ns, self.fade_ns, false);
+            }
+            self.commanded_ns = now_ns;
+        }
+        self.order = order;
+    }
+}
+
+/// From 0 to 1 over `length_ns`, with zero slope at both ends.
+fn smooth(elapsed_ns: u64, length_ns: u64) -> f64 {
+    if elapsed_ns >= length_ns {
+        return 1.0;
+    }
+    let part = elapsed_ns as f64 / length_ns as f64;
+    part * part * (3.0 - 2.0 * part)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_hal::abi::CallStatus;
+    use flotor_hal::abi::loader::{Model, Plugin, Setting};
+    use flotor_hal::{DVec3, Pose};
+
+    const PUSH: Wrench = Wrench { force_n: [1.0, -2.0, 3.0], torque_nm: [0.1, 0.0, 0.0] };
+
+    /// A port and its model: valid for 50 ms, fading for 50 ms, rising for 200 ms.
+    fn connected() -> (Port, Model) {
+        let port = Port::new();
+        let model = model(port.number()).expect("its port is free");
+        (port, model)
+    }
+
+    fn model(port: u32) -> Result<Model, String> {
+        let plugin = Plugin::in_process(&ENTRY).expect("it is a plugin");
+        let setting =
+            Setting::number(plugin.parameters(), "port", f64::from(port)).expect("it is a parameter");
+        plugin.create_model(&[setting]).map_err(|error| error.to_string())
+    }
+
+    fn at(model: &mut Model, time_ms: u64) -> (Wrench, Option<StepStatus>) {
+        let input = Input { time_ns: time_ms * 1_000_000, tick: time_ms, ..Input::at_rest(Pose::HOME) };
+        let mut output = Output::default();
+        assert_eq!(model.step(&input, &mut output), CallStatus::Ok);
+        (output.wrench, output.status())
+    }
+
+    #[test]
+    fn a_model_without_a_program_is_refused_and_so_is_a_second_one() {
+        assert!(model(0).is_err_and(|said| said.contains("flotor lend")));
+        let (port, _model) = connected();
+        assert!(model(port.number()).is_err());
+    }
+
+    #[test]
+    fn nothing_is_felt_before_the_program_enables_force_and_then_it_fades_in() {
+        let (port, mut model) = connected();
+        port.command(&PUSH).expect("it is finite");
+        assert_eq!(at(&mut model, 0), (Wrench::ZERO, Some(StepStatus::Ok)));
+        port.enable();
+        let mut last = 0.0;
+        for time_ms in 1..=201 {
+            port.command(&PUSH).expect("it is finite");
+            let (wrench, _) = at(&mut model, time_ms);
+            let part = wrench.force_n[0];
+            // Steepest slope of the fade: 1.5 in 200 ms.
+            assert!(part >= last && part - last <= 1.5 / 200.0 + 1.0e-12, "{time_ms}: {part} after {last}");
+            last = part;
+        }
+        assert_eq!(at(&mut model, 202), (PUSH, Some(StepStatus::Ok)));
+        port.disable();
+        assert_eq!(at(&mut model, 203).0, Wrench::ZERO);
+        assert_eq!(port.counts().lapses, 0);
+    }
+
+    #[test]
+    fn a_wrench_expires_fades_to_zero_is_counted_once_and_comes_back_without_a_step() {
+        let (port, mut model) = connected();
+        port.enable();
+        for time_ms in 0..=300 {
+            port.command(&PUSH).expect("it is finite");
+            at(&mut model, time_ms);
+        }
+        assert_eq!(at(&mut model, 350), (PUSH, Some(StepStatus::Ok)), "50 ms after the last one");
+        let (half, status) = at(&mut model, 375);
+        assert!(
+            (half.force() - PUSH.force() * 0.5).length() < 1.0e-12 && status == Some(StepStatus::OutOfDomain)
+        );
+        assert_eq!(at(&mut model, 400).0.force(), DVec3::ZERO);
+        assert_eq!(port.counts(), ProgramCounts { commands: 301, refused: 0, lapses: 1, lapsed_ticks: 2 });
+        port.command(&PUSH).expect("it is finite");
+        assert_eq!(at(&mut model, 401).0.force(), DVec3::ZERO, "from zero");
+        assert_eq!(at(&mut model, 451).0, PUSH, "and back in 50 ms");
+    }
+
+    #[test]
+    fn zero_needs_no_repetition_and_a_number_that_is_not_finite_changes_nothing() {
+        let (port, mut model) = connected();
+        port.enable();
+        port.command(&Wrench::ZERO).expect("it is finite");
+        at(&mut model, 0);
+        assert_eq!(at(&mut model, 10_000), (Wrench::ZERO, Some(StepStatus::Ok)));
+        port.command(&PUSH).expect("it is finite");
+        at(&mut model, 10_001);
+        let broken = Wrench { force_n: [f64::NAN, 0.0, 0.0], ..PUSH };
+        assert_eq!(port.command(&broken), Err(NotFinite));
+        assert_eq!(at(&mut model, 10_040).0, PUSH);
+        port.keep_valid_for(5_000_000);
+        let (fading, _) = at(&mut model, 10_041);
+        assert!(fading.force().length() < PUSH.force().length(), "a validity of its own: {fading:?}");
+        assert_eq!(port.counts(), ProgramCounts { commands: 3, refused: 1, lapses: 1, lapsed_ticks: 1 });
+    }
+
+    #[test]
+    fn each_device_of_a_scene_gets_a_port_and_a_named_one_is_kept() {
+        let text = "[[device]]\nname = \"left\"\nplugin = \"simulated\"\n[[device]]\nname = \"right\"\nplugin = \"simulated\"\n\
+                    [[model]]\nname = \"mine\"\nplugin = \"program\"\ndevice = \"right\"\n[model.parameters]\nvalid_ms = 20\n";
+        let mut scene = Scene::parse(std::path::Path::new("two"), text).expect("it is a scene");
+        let ports = connect(&mut scene);
+        assert_eq!(ports.iter().map(|connected| connected.device).collect::<Vec<_>>(), [0, 1]);
+        let told = |name: &str| {
+            let model = scene.models.iter().find(|model| model.name == name).expect("it is there");
+            let values = model.plugin.parameters.iter().map(|parameter| parameter.value.clone());
+            (model.device, values.collect::<Vec<_>>())
+        };
+        assert_eq!(told("mine"), (1, vec!["20".to_owned(), ports[1].port.number().to_string()]));
+        assert_eq!(told("program"), (0, vec![ports[0].port.number().to_string()]));
+    }
+}

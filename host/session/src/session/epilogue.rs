@@ -1,0 +1,128 @@
+//! The end of a run: its devices de-energised, its models asked for their last words, and what is known put together.
+
+use super::controls::Settled;
+use super::{Controls, DeviceOutcome, Finished, Outcome, Remains};
+use crate::calls::{Call, CallError, Progress, Unresponsive, attended, end_limit};
+use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice};
+use flotor_servo::{Dismantled, Forces, Heartbeat, Layer, LayerReport, Reported};
+use std::time::Instant;
+
+/// What a run knows at its beginning and tells at its end.
+pub(super) struct Epilogue {
+    pub(super) started: Instant,
+    pub(super) warnings: Vec<String>,
+    pub(super) heart: Heartbeat,
+    pub(super) names: Vec<String>,
+    pub(super) controls: Controls,
+}
+
+impl Epilogue {
+    /// De-energises the devices and puts together what is known of the run.
+    pub(super) fn conclude(self, finished: Finished) -> Outcome {
+        let Self { started, mut warnings, heart, names, controls } = self;
+        let Finished { servo, end, elapsed_ns, dropped_records, real_time, warning } = finished;
+        warnings.extend(warning);
+        let known_before = warnings.len();
+        let Dismantled { devices, last_stop, forces, swaps, timing } = servo.dismantle();
+        let mut unresponsive = None;
+        let (mut told, mut closing) = (Vec::new(), Vec::new());
+        let model_names = names.get(devices.len()..).unwrap_or_default();
+        for (name, (device, reported)) in names.iter().zip(devices) {
+            let (outcome, opened) = deactivate(name, device, reported, &mut unresponsive);
+            told.push(outcome);
+            closing.extend(opened.map(|opened| (name.clone(), opened)));
+        }
+        let couplings = forces.coupling_outcomes();
+        // No tick will take them any more.
+        let waiting = swaps.into_layers().into_iter();
+        let (layers, reports) = last_words(model_names, (forces, controls.take_retired()), &mut unresponsive);
+        let Settled { first: health, misbehaved, hung } = controls.settle(reports);
+        unresponsive = unresponsive.or(hung);
+        let models = model_names.iter().cloned().zip(health);
+        let models = models.map(|(name, (health, words))| (name, health, words)).collect();
+        let name = |number: usize| model_names.get(number).cloned().unwrap_or_default();
+        let layers = layers.into_iter().chain(waiting).map(|(number, layer)| (name(number), layer)).collect();
+        let remains = Remains::new(closing, layers, last_stop);
+        let wall_s = started.elapsed().as_secs_f64();
+        warnings.extend(controls.warnings());
+        let taken = heart.signals_taken();
+        if !taken.is_none() {
+            warnings.push(format!(
+                "a plugin took {taken} away from the host during the run; the host has taken them back"
+            ));
+        }
+        Outcome {
+            warnings,
+            known_before,
+            end,
+            timing,
+            elapsed_ns,
+            wall_s,
+            dropped_records,
+            real_time,
+            devices: told,
+            couplings,
+            models,
+            misbehaved,
+            unresponsive,
+            remains,
+        }
+    }
+}
+
+/// De-energises a device that was told to stop: what it says of the run, and the device unless its plugin broke or hangs.
+fn deactivate(
+    name: &str,
+    mut device: ActiveDevice,
+    reported: Reported,
+    unresponsive: &mut Option<Unresponsive>,
+) -> (DeviceOutcome, Option<OpenedDevice>) {
+    let (who, float_changes) = (name.to_owned(), device.float_changes());
+    let told = attended(end_limit(), move |progress| {
+        progress.enter(&who, Call::Deactivate);
+        let ledger = device.energy_ledger();
+        let words = device.last_message();
+        (ledger, words, device.deactivate())
+    });
+    let (ledger, words, opened) = told.unwrap_or_else(|error| {
+        note(error, unresponsive);
+        (None, String::new(), None)
+    });
+    let problem = reported.problem();
+    let found = problem.clone().filter(|_| !reported.is_own_fault);
+    let Reported { fault, implausible, .. } = reported;
+    let words = found.unwrap_or(words);
+    (DeviceOutcome { fault, implausible, problem, ledger, words, float_changes }, opened)
+}
+
+/// Layers, each with the number of its model.
+type Layers = Vec<(usize, Box<Layer>)>;
+
+/// What became of each layer in the loop and of those it handed back, with the last words of those that did not behave; and
+/// the layers, unless one of those hangs.
+fn last_words(
+    names: &[String],
+    (mut forces, mut retired): (Forces, Layers),
+    unresponsive: &mut Option<Unresponsive>,
+) -> (Layers, Vec<LayerReport>) {
+    let names = names.to_vec();
+    let told = attended(end_limit(), move |progress: &Progress| {
+        let asks =
+            |model: usize| progress.enter(names.get(model).map_or("", String::as_str), Call::LastMessage);
+        let mut reports: Vec<LayerReport> =
+            retired.iter_mut().map(|(model, layer)| layer.report(*model, || asks(*model))).collect();
+        reports.extend(forces.reports(asks));
+        (forces.into_layers().chain(retired).collect(), reports)
+    });
+    told.unwrap_or_else(|error| {
+        note(error, unresponsive);
+        (Vec::new(), Vec::new())
+    })
+}
+
+/// Keeps the first plugin that did not return.
+fn note(error: CallError, unresponsive: &mut Option<Unresponsive>) {
+    if let CallError::Unresponsive(hung) = error {
+        unresponsive.get_or_insert(hung);
+    }
+}

@@ -1,0 +1,70 @@
+//! A run on the virtual clock that somebody else advances, tick by tick, and that ends with a report like any other.
+
+use super::prepare::activate;
+use super::{
+    ChangeLog, Controls, Epilogue, Finished, Observer, Outcome, RealTimeReport, RunError, Session, TapEnds,
+    publish_to,
+};
+use flotor_hal::abi::loader::Stopper;
+use flotor_servo::{Loop, RunEnd, Schedule, StopSwitch};
+
+/// A run that goes on when it is told to. If it is dropped before its end, the devices are stopped.
+pub struct Lockstep {
+    runner: Loop,
+    controls: Controls,
+    changes: ChangeLog,
+    taps: TapEnds,
+    stoppers: Stoppers,
+    epilogue: Epilogue,
+}
+
+/// Stops what is left when it goes.
+struct Stoppers(Vec<Stopper>);
+
+impl Drop for Stoppers {
+    fn drop(&mut self) {
+        self.0.iter().for_each(Stopper::safe_stop);
+    }
+}
+
+impl Session {
+    /// The same run, one tick for each call of [`Lockstep::advance`], whatever the clock of the session: without waiting, and
+    /// repeatable. Not real-time.
+    ///
+    /// # Errors
+    /// [`RunError`] if a device refuses to be energised; then none is.
+    pub fn into_lockstep(self) -> Result<Lockstep, RunError> {
+        let epilogue = self.epilogue();
+        let Session { standby, controls, changes, taps, period_ns, duration_ns, plugins, .. } = self;
+        let stoppers = Stoppers(standby.stoppers());
+        let runner = Loop::new(activate(standby, &plugins)?, Schedule::start_virtual(period_ns), duration_ns);
+        Ok(Lockstep { runner, controls, changes, taps, stoppers, epilogue })
+    }
+}
+
+impl Lockstep {
+    /// One tick; the observer is told of it and of what changed before it. How the run ended, if it has: then there was no
+    /// tick. Not real-time: the observer is not.
+    pub fn advance(&mut self, observer: &mut dyn Observer, stop: &StopSwitch) -> Option<RunEnd> {
+        let Self { runner, controls, changes, taps, .. } = self;
+        if runner.end().is_some() {
+            return runner.end();
+        }
+        runner.advance(stop, |record| {
+            publish_to(taps, record);
+            changes.up_to(record.tick, |change| observer.change(change));
+            observer.observe(record);
+        });
+        controls.sweep();
+        runner.end()
+    }
+
+    /// Stops the devices: what is known of the run. Not real-time.
+    #[must_use]
+    pub fn finish(self) -> Outcome {
+        let Self { mut runner, stoppers, epilogue, .. } = self;
+        drop(stoppers);
+        runner.servo().heart().finish();
+        epilogue.conclude(Finished::of(runner, 0, RealTimeReport::not_asked()))
+    }
+}

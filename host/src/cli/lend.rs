@@ -1,0 +1,339 @@
+//! `flotor lend`: somebody's program on a Flotor device, without a changed line: a drop-in library answers where the program
+//! calls its maker's.
+
+mod program;
+
+use clap::{Args, ValueEnum};
+use flotor_command::options::{mcap_file, whole};
+use flotor_command::stopping::stop_on_signals;
+use flotor_command::{CommandError, note, say};
+use flotor_servo::StopSwitch;
+use flotor_servo::last_stop::spawn_unblocked;
+use program::Program;
+use rustix::process::{Pid, Signal, kill_process};
+use std::ffi::OsString;
+use std::os::unix::fs::{DirBuilderExt, symlink};
+use std::os::unix::process::ExitStatusExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus};
+use std::time::{Duration, Instant};
+
+/// Run a program that was written for another maker's device on a Flotor device, inside its limits.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    flotor lend -- python3 my_openhaptics_script.py      on the simulated flotor, held by a hand\n  \
+    flotor lend --api dhd maglev.toml -- ./surgery       on the device of a scene, inside its limits\n  \
+    flotor lend --pace lockstep --record run.mcap -- ./my_test   one tick a call: repeatable, faster than real time\n\n\
+    Environment of the program: FLOTOR_SIGNALS=stop stops the devices when it dies of a signal; FLOTOR_DHD_TYPE,\n\
+    FLOTOR_HD_MODEL and FLOTOR_PHANTOM_TYPE say which device it is told of. The exit code is that of the program.")]
+pub(crate) struct LendArguments {
+    /// The interface the program was written for (default: whichever of them it calls)
+    #[arg(long, value_name = "dhd|openhaptics|chai3d")]
+    api: Option<String>,
+    /// Who makes time go on
+    #[arg(long, value_enum, default_value_t = PaceOption::Real)]
+    pace: PaceOption,
+    /// Seed of all random numbers
+    #[arg(long, value_parser = whole, default_value_t = 0, value_name = "N")]
+    seed: u64,
+    /// Record every tick to an MCAP file
+    #[arg(long, value_parser = mcap_file, value_name = "FILE.mcap")]
+    record: Option<PathBuf>,
+    /// Write the summary as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Scene file (TOML); without it, a simulated flotor held by a hand
+    scene: Option<PathBuf>,
+    /// The program and its arguments
+    #[arg(last = true, required = true, value_name = "PROGRAM")]
+    program: Vec<OsString>,
+}
+
+/// Who makes time go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum PaceOption {
+    /// The machine's clock: the program runs at its own rate
+    Real,
+    /// The program: each of its calls is a tick
+    Lockstep,
+}
+
+/// An interface of another maker.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Api {
+    /// Force Dimension's DHD and DRD
+    Dhd,
+    /// 3D Systems' OpenHaptics (HDAPI)
+    Openhaptics,
+    /// CHAI3D's way to a Phantom
+    Chai3d,
+}
+
+impl Api {
+    const ALL: [Self; 3] = [Self::Dhd, Self::Openhaptics, Self::Chai3d];
+
+    /// The interface of this name.
+    fn of_word(word: &str) -> Result<Self, CommandError> {
+        Self::ALL.into_iter().find(|api| api.word() == word).ok_or_else(|| {
+            CommandError::Usage(format!(
+                "there is no drop-in library for `--api {word}`; there are {}. Leave it out, and the program finds all of them",
+                Self::ALL.map(Self::word).join(", ")
+            ))
+        })
+    }
+
+    /// What `--api` says.
+    fn word(self) -> &'static str {
+        match self {
+            Self::Dhd => "dhd",
+            Self::Openhaptics => "openhaptics",
+            Self::Chai3d => "chai3d",
+        }
+    }
+
+    /// The library that cargo builds, and the crate.
+    fn built(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Dhd => ("libdrd.so", "flotor-dhd"),
+            Self::Openhaptics => ("libHD.so", "flotor-openhaptics"),
+            Self::Chai3d => ("libhdPhantom.so", "flotor-chai3d"),
+        }
+    }
+
+    /// The names by which programs look for it; the last one is that of an installation.
+    fn names(self) -> &'static [&'static str] {
+        match self {
+            Self::Dhd => &[
+                "libdhd.so",
+                "libdhd.so.3",
+                "libdhd.so.3.17.6",
+                "libdrd.so",
+                "libdrd.so.3",
+                "libdrd.so.3.17.6",
+            ],
+            // Programs that are linked with the layer above load it, and call nothing of it.
+            Self::Openhaptics => {
+                &["libHL.so", "libHL.so.3.4", "libHD.so.3.0", "libHD.so.3.4", "libHD.so.3.4.0", "libHD.so"]
+            }
+            Self::Chai3d => &["libhdPhantom.so"],
+        }
+    }
+
+    /// Names in a program that is linked with it, or looks for it.
+    fn marks(self) -> &'static [&'static str] {
+        match self {
+            Self::Dhd => &["libdhd.so", "libdrd.so"],
+            Self::Openhaptics => &["libHD.so"],
+            Self::Chai3d => &["libhdPhantom.so"],
+        }
+    }
+
+    /// The library, in the installation or the build folder that a program lies in.
+    fn library(self, own: &Path) -> Result<PathBuf, CommandError> {
+        let folder = own.parent().unwrap_or(Path::new("."));
+        let (built, package) = self.built();
+        let installed = folder.join("../lib/flotor/compat").join(self.word());
+        let installed = self.names().iter().rev().map(|name| installed.join(name));
+        let beside = [folder.join(built), folder.join("deps").join(built)];
+        installed.chain(beside).find(|file| file.is_file()).ok_or_else(|| {
+            let release = if folder.ends_with("debug") { "" } else { " --release" };
+            CommandError::Usage(format!(
+                "the drop-in library for `--api {}` is missing: neither `{}` nor `../lib/flotor/compat/{}`; `cargo build{release} \
+                 -p {package}` builds it",
+                self.word(),
+                folder.join(built).display(),
+                self.word()
+            ))
+        })
+    }
+}
+
+/// A folder of our own with links to the libraries, gone when dropped.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new() -> Result<Self, CommandError> {
+        let path = std::env::temp_dir().join(format!("flotor-lend-{}", std::process::id()));
+        // Left behind by a process of this number that was killed.
+        let _ = std::fs::remove_dir_all(&path);
+        let made = std::fs::DirBuilder::new().mode(0o700).create(&path);
+        made.map_err(|cause| CommandError::file(&path, "cannot make a folder for the libraries", cause))?;
+        Ok(Self(path))
+    }
+
+    /// Puts a library there under the names of its interface, where loader and SDK variables look.
+    fn put(&self, api: Api, library: &Path) -> Result<(), CommandError> {
+        let library = library.canonicalize().unwrap_or_else(|_| library.to_path_buf());
+        let sdk = self.0.join(format!("lib/release/lin-{}-gcc", std::env::consts::ARCH));
+        // One old client looks for a folder `lib` in the folder of the libraries.
+        let folders = match api {
+            Api::Dhd => vec![self.0.clone(), sdk.clone(), sdk.join("lib")],
+            Api::Openhaptics | Api::Chai3d => vec![self.0.clone()],
+        };
+        for folder in folders {
+            let linked = std::fs::create_dir_all(&folder)
+                .and_then(|()| api.names().iter().try_for_each(|name| symlink(&library, folder.join(name))));
+            linked.map_err(|cause| CommandError::file(&folder, "cannot link the libraries", cause))?;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+pub(crate) fn run(arguments: LendArguments) -> Result<(), CommandError> {
+    let stop = stop_on_signals();
+    let [name, rest @ ..] = arguments.program.as_slice() else {
+        return Err(CommandError::Usage(
+            "which program? `flotor lend [SCENE] -- PROGRAM ARGUMENTS`".to_owned(),
+        ));
+    };
+    let api = arguments.api.as_deref().map(Api::of_word).transpose()?;
+    let program = Program::find(name)?;
+    program.check(api)?;
+    let own = std::env::current_exe().map_err(|cause| CommandError::Failed(cause.to_string()))?;
+    let folder = Folder::new()?;
+    for wanted in api.map_or(Api::ALL.to_vec(), |api| vec![api]) {
+        match wanted.library(&own) {
+            Ok(library) => folder.put(wanted, &library)?,
+            // Of those that nobody named, the ones that the program does not call may be missing.
+            Err(missing) if api.is_some() || program.calls(wanted) => return Err(missing),
+            Err(_) => {}
+        }
+    }
+    // CHAI3D looks at this one first, and calls nothing of it.
+    let (beside, phantom) = (folder.0.join("libHD.so"), folder.0.join("libhdPhantom.so"));
+    if !beside.exists() && phantom.exists() {
+        let _ = symlink(&phantom, &beside);
+    }
+    if !folder.0.join("lib").exists() && !beside.exists() {
+        return Err(Api::Dhd
+            .library(&own)
+            .err()
+            .unwrap_or_else(|| CommandError::Failed("no library".to_owned())));
+    }
+    let report = folder.0.join("report.txt");
+    let mut command = Command::new(&program.path);
+    command.args(rest);
+    environment(&mut command, &arguments, &folder.0, &report, &own)?;
+    let child = spawn_unblocked(&mut command)
+        .map_err(|cause| CommandError::file(&program.path, "cannot be started", cause))?;
+    let status = wait(child, &stop);
+    tell(&status, &program, &report, api)?;
+    drop(folder);
+    match (status.code(), status.signal()) {
+        (Some(0), _) => Ok(()),
+        (Some(code), _) => std::process::exit(code),
+        (None, signal) => std::process::exit(128 + signal.unwrap_or_default()),
+    }
+}
+
+/// All a drop-in is told.
+fn environment(
+    command: &mut Command,
+    arguments: &LendArguments,
+    folder: &Path,
+    report: &Path,
+    own: &Path,
+) -> Result<(), CommandError> {
+    let before = std::env::var_os("LD_LIBRARY_PATH").filter(|path| !path.is_empty());
+    let folders = std::iter::once(folder.to_path_buf())
+        .chain(before.iter().flat_map(std::env::split_paths).collect::<Vec<_>>());
+    let path = std::env::join_paths(folders).map_err(|error| CommandError::Failed(error.to_string()))?;
+    command.env("LD_LIBRARY_PATH", path);
+    if folder.join("lib").is_dir() {
+        for variable in ["FDSDK", "FORCEDIM_SDK"] {
+            command.env(variable, folder);
+        }
+    }
+    let absolute = |path: &Path| {
+        std::path::absolute(path).map_err(|cause| CommandError::file(path, "cannot be found", cause))
+    };
+    if let Some(scene) = &arguments.scene {
+        if !scene.is_file() {
+            return Err(CommandError::Usage(format!(
+                "`{}` is no scene: there is no such file; the program stands after `--`",
+                scene.display()
+            )));
+        }
+        command.env("FLOTOR_SCENE", absolute(scene)?);
+    }
+    if let Some(record) = &arguments.record {
+        command.env("FLOTOR_RECORD", absolute(record)?);
+    }
+    if let Some(json) = &arguments.json {
+        command.env("FLOTOR_JSON", absolute(json)?);
+    }
+    command.env("FLOTOR_PACE", if arguments.pace == PaceOption::Real { "real" } else { "lockstep" });
+    command.env("FLOTOR_SEED", arguments.seed.to_string());
+    command.env("FLOTOR_REPORT", report).env("FLOTOR_PROGRAM", own);
+    Ok(())
+}
+
+/// How long a program may take to end once it is asked to, before it is asked again.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// Pause between two looks at it.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// Waits for the program. The terminal asks it to end as well; if it does not, or was asked by nobody else, this does.
+fn wait(mut child: Child, stop: &StopSwitch) -> ExitStatus {
+    let process = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
+    let send = |signal| process.map(|process| kill_process(process, signal));
+    let mut asked: Option<Instant> = None;
+    let mut was_told = false;
+    loop {
+        match child.try_wait() {
+            Ok(Some(status)) => return status,
+            Err(_) => return ExitStatus::from_raw(1 << 8),
+            Ok(None) => {}
+        }
+        if stop.emergency().is_some() {
+            let _ = send(Signal::KILL);
+        } else if stop.is_stop_asked() {
+            let since = *asked.get_or_insert_with(Instant::now);
+            if !was_told && since.elapsed() > PATIENCE {
+                was_told = true;
+                let _ = send(Signal::TERM);
+            }
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+/// What became of the program and of the run behind it.
+fn tell(status: &ExitStatus, program: &Program, report: &Path, api: Option<Api>) -> Result<(), CommandError> {
+    let name = program.path.display();
+    if let Ok(text) = std::fs::read_to_string(report) {
+        say!("{}", text.trim_end());
+        return Ok(());
+    }
+    let mut so_far = report.as_os_str().to_owned();
+    so_far.push(".so-far");
+    if let Ok(text) = std::fs::read_to_string(&so_far) {
+        say!("{}", text.trim_end());
+        match status.signal() {
+            Some(signal) => note(format_args!(
+                "`{name}` was ended by signal {signal}: this is its summary up to half a second before"
+            )),
+            None => note(format_args!(
+                "`{name}` ended without an end of its run: this is its summary up to half a second before"
+            )),
+        }
+        return Ok(());
+    }
+    if status.code() == Some(0) || status.signal().is_some() {
+        let which = api.map_or_else(
+            || "none of dhd, openhaptics and chai3d".to_owned(),
+            |api| format!("nothing of `--api {}`", api.word()),
+        );
+        note(format_args!(
+            "`{name}` opened no device: it called {which}, or has its maker's library linked in; linked in, it has to be linked \
+             anew with the library of `flotor lend`"
+        ));
+    }
+    Ok(())
+}

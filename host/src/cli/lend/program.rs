@@ -1,0 +1,154 @@
+//! The program that is to be lent a device: where it is, and whether a library can be put in its way.
+
+use super::Api;
+use flotor_command::CommandError;
+use std::ffi::OsStr;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+
+/// Bytes of a program that are looked through for names of libraries.
+const MOST_BYTES: u64 = 512 << 20;
+
+/// A program.
+pub(super) struct Program {
+    pub(super) path: PathBuf,
+    /// Its file, if it is a native one.
+    native: Option<Native>,
+}
+
+/// What a native program's file says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Native {
+    is_dynamic: bool,
+    /// Which interfaces its file names, in the order of [`Api::ALL`].
+    names: [bool; 3],
+}
+
+impl Program {
+    /// Finds it, as a shell would.
+    pub(super) fn find(name: &OsStr) -> Result<Self, CommandError> {
+        let is_program = |path: &PathBuf| {
+            std::fs::metadata(path).is_ok_and(|file| file.is_file() && file.permissions().mode() & 0o111 != 0)
+        };
+        let given = Path::new(name);
+        let found = if given.components().count() > 1 {
+            Some(given.to_path_buf()).filter(is_program)
+        } else {
+            let path = std::env::var_os("PATH").unwrap_or_default();
+            std::env::split_paths(&path).map(|folder| folder.join(given)).find(is_program)
+        };
+        let Some(path) = found else {
+            let here = given.is_file();
+            let help = match (here, given.components().count()) {
+                (true, 1) => "; a program of this folder is written `./NAME`",
+                (true, _) => "; it may not be executed: `chmod +x` it, or name the interpreter before it",
+                (false, _) => "; it stands after `--`, and is searched for as a shell does",
+            };
+            return Err(CommandError::Usage(format!("there is no program `{}`{help}", given.display())));
+        };
+        let native = read_native(&path);
+        Ok(Self { path, native })
+    }
+
+    /// Whether its file names an interface.
+    pub(super) fn calls(&self, api: Api) -> bool {
+        self.native.is_some_and(|native| native.calls(api))
+    }
+
+    /// Whether a library can be put in its way.
+    pub(super) fn check(&self, api: Option<Api>) -> Result<(), CommandError> {
+        let Some(native) = self.native else { return Ok(()) };
+        let name = self.path.display();
+        if !native.is_dynamic {
+            return Err(CommandError::Usage(format!(
+                "`{name}` is statically linked: no library can be put in its way; link it with the shared library (`flotor lend` \
+                 brings libdhd, libdrd, libHD and libhdPhantom)"
+            )));
+        }
+        let Some(api) = api.filter(|api| !native.calls(*api)) else { return Ok(()) };
+        match Api::ALL.into_iter().find(|other| native.calls(*other)) {
+            Some(other) => Err(CommandError::Usage(format!(
+                "`{name}` calls {}, not `--api {}`: say `--api {}`, or leave it out",
+                other.marks().join(" and "),
+                api.word(),
+                other.word()
+            ))),
+            // It may find a library by a name that it puts together.
+            None => Ok(()),
+        }
+    }
+}
+
+impl Native {
+    fn calls(self, api: Api) -> bool {
+        Api::ALL.into_iter().zip(self.names).any(|(other, named)| other == api && named)
+    }
+}
+
+/// What the file of a native program says; nothing of a script.
+fn read_native(path: &Path) -> Option<Native> {
+    let length = std::fs::metadata(path).ok()?.len();
+    if length > MOST_BYTES {
+        return None;
+    }
+    let bytes = std::fs::read(path).ok()?;
+    let is_dynamic = has_interpreter(&bytes)?;
+    let holds = |mark: &&str| bytes.windows(mark.len()).any(|window| window == mark.as_bytes());
+    Some(Native { is_dynamic, names: Api::ALL.map(|api| api.marks().iter().any(holds)) })
+}
+
+/// Whether a 64-bit ELF program asks for a loader; nothing if it is none.
+fn has_interpreter(bytes: &[u8]) -> Option<bool> {
+    /// Segment that names the loader.
+    const INTERPRETER: u32 = 3;
+    let number = |at: usize, length: usize| {
+        let bytes = bytes.get(at..at.checked_add(length)?)?;
+        Some(bytes.iter().rev().fold(0_u64, |number, byte| number << 8 | u64::from(*byte)))
+    };
+    if bytes.get(..5)? != b"\x7fELF\x02" {
+        return None;
+    }
+    let first = usize::try_from(number(0x20, 8)?).ok()?;
+    let (size, count) = (usize::try_from(number(0x36, 2)?).ok()?, usize::try_from(number(0x38, 2)?).ok()?);
+    let kinds = (0..count).map(|index| number(first.checked_add(index.checked_mul(size)?)?, 4));
+    Some(kinds.flatten().any(|kind| kind == u64::from(INTERPRETER)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A header with one segment of a kind.
+    fn elf(kind: u32) -> Vec<u8> {
+        let mut bytes = vec![0; 0x40 + 0x38];
+        bytes[..5].copy_from_slice(b"\x7fELF\x02");
+        (bytes[0x20], bytes[0x36], bytes[0x38]) = (0x40, 0x38, 1);
+        bytes[0x40..0x44].copy_from_slice(&kind.to_le_bytes());
+        bytes
+    }
+
+    #[test]
+    fn a_program_without_a_loader_is_told_from_one_with() {
+        assert_eq!(has_interpreter(&elf(3)), Some(true));
+        assert_eq!(has_interpreter(&elf(1)), Some(false));
+        assert_eq!(has_interpreter(b"#!/bin/sh\n"), None);
+        // Cut off anywhere: no answer, no panic.
+        assert!((0..0x44).all(|length| has_interpreter(&elf(3)[..length]) != Some(true)));
+    }
+
+    #[test]
+    fn a_static_program_and_one_of_another_interface_are_refused_in_one_line() {
+        let refused = |native, api| {
+            let program = Program { path: PathBuf::from("/usr/bin/demo"), native: Some(native) };
+            program.check(api).map_err(|error| error.to_string())
+        };
+        let plain = Native { is_dynamic: true, names: [false, true, false] };
+        let said = refused(Native { is_dynamic: false, ..plain }, None).expect_err("it is static");
+        assert!(said.contains("statically linked") && !said.contains('\n'), "{said}");
+        let said = refused(plain, Some(Api::Dhd)).expect_err("it is another interface");
+        assert!(said.contains("--api openhaptics") && !said.contains('\n'), "{said}");
+        assert_eq!(refused(plain, None), Ok(()));
+        assert_eq!(refused(plain, Some(Api::Openhaptics)), Ok(()));
+        assert_eq!(refused(Native { names: [false; 3], ..plain }, Some(Api::Chai3d)), Ok(()));
+    }
+}

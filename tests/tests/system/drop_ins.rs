@@ -1,0 +1,254 @@
+//! Programs of other makers' interfaces: the libraries that stand in for theirs export what those do, drive any device inside its
+//! limits, and whatever a program does, neither limits nor summary go with it.
+
+use flotor_record::Recording;
+use flotor_tests::library::build_folder;
+use flotor_tests::program::{Flotor, Ran, exit_code};
+use flotor_tests::scratch::Scratch;
+use flotor_tests::side_by_side::show_each;
+use flotor_tests::tools::{self, Tool};
+use flotor_tests::{TestSize, workspace_root};
+use object::read::elf::ElfFile64;
+use object::{Object, ObjectSymbol};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+/// What a plugin looks for before it loads a maker's library.
+const MARKER: &str = "flotor_dropin";
+
+const HD: &str = "hdInitDevice hdDisableDevice hdMakeCurrentDevice hdGetCurrentDevice hdBeginFrame hdEndFrame \
+    hdGetBooleanv hdGetIntegerv hdGetFloatv hdGetDoublev hdGetLongv hdGetString hdSetBooleanv hdSetIntegerv hdSetFloatv \
+    hdSetDoublev hdSetLongv hdEnable hdDisable hdIsEnabled hdGetError hdGetErrorString hdCheckCalibration \
+    hdCheckCalibrationStyle hdUpdateCalibration hdUpdateCalibrationMessage hdStartScheduler hdStopScheduler \
+    hdSetSchedulerRate hdScheduleAsynchronous hdScheduleSynchronous hdUnschedule hdWaitForCompletion \
+    hdGetSchedulerTimeStamp hdScaleGimbalAngles hdDeploymentLicense";
+
+const PHANTOM: &str = "hdPhantomGetNumDevices hdPhantomOpen hdPhantomClose hdPhantomGetPosition \
+    hdPhantomGetLinearVelocity hdPhantomGetRotation hdPhantomGetButtons hdPhantomSetForce hdPhantomSetTorque \
+    hdPhantomSetForceAndTorque hdPhantomGetWorkspaceRadius hdPhantomGetType hdPhantomStartServo hdPhantomStopServo";
+
+/// Largest force of the built-in scene, N.
+const MOST_N: f64 = 8.0;
+
+/// Builds the libraries, which no plain build makes.
+fn built() -> PathBuf {
+    static BUILT: OnceLock<()> = OnceLock::new();
+    BUILT.get_or_init(|| {
+        let mut cargo = Command::new(env!("CARGO"));
+        cargo.args([
+            "build",
+            "--offline",
+            "--quiet",
+            "-p",
+            "flotor-dhd",
+            "-p",
+            "flotor-openhaptics",
+            "-p",
+            "flotor-chai3d",
+        ]);
+        if !cfg!(debug_assertions) {
+            cargo.arg("--release");
+        }
+        let output = cargo.current_dir(workspace_root()).output().expect("cargo starts");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    });
+    build_folder()
+}
+
+/// What a library exports, sorted.
+fn exported(library: &Path) -> Vec<String> {
+    let bytes = std::fs::read(library).expect("it is built");
+    let file: ElfFile64<'_> = ElfFile64::parse(&*bytes).expect("it is a library");
+    let mut names: Vec<String> = file
+        .dynamic_symbols()
+        .filter(|symbol| symbol.is_definition() && symbol.is_global())
+        .map(|symbol| symbol.name().expect("a name is text").to_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn each_library_exports_the_names_of_its_interface_and_a_mark() {
+    let folder = built();
+    let dhd = std::fs::read_to_string(workspace_root().join("tests/data/cases/dhd-names.txt"))
+        .expect("the table is there");
+    let cases = [
+        ("libdrd.so", dhd.as_str(), 233, "libdrd.so.3"),
+        ("libHD.so", HD, 36, "libHD.so.3.4"),
+        ("libhdPhantom.so", PHANTOM, 14, "libhdPhantom.so"),
+    ];
+    for (library, names, count, own_name) in cases {
+        let mut expected: Vec<&str> = names.split_whitespace().collect();
+        assert_eq!(expected.len(), count, "{library}");
+        expected.push(MARKER);
+        expected.sort_unstable();
+        assert_eq!(exported(&folder.join(library)), expected, "{library}");
+        let bytes = std::fs::read(folder.join(library)).expect("it is built");
+        let text = format!("\0{own_name}\0");
+        assert!(
+            bytes.windows(text.len()).any(|window| window == text.as_bytes()),
+            "{library} calls itself otherwise"
+        );
+    }
+}
+
+/// The program in C that looks for a Phantom, compiled.
+fn phantom(scratch: &Scratch) -> PathBuf {
+    let program = scratch.path().join("phantom");
+    let mut compiler = Command::new("cc");
+    compiler.args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-o"]).arg(&program);
+    compiler.arg(workspace_root().join("tests/c/programs/phantom.c")).args(["-ldl", "-lm", "-lpthread"]);
+    let output = compiler.output().expect("a C compiler is installed; the README asks for one");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    program
+}
+
+/// Lends it the built-in device.
+fn lent(program: &Path, options: &[&str], way: &str, calls: usize) -> Ran {
+    let (program, calls) = (program.display().to_string(), calls.to_string());
+    let arguments = [&["lend"], options, &["--", &program, way, &calls]].concat();
+    Flotor::with(arguments).run()
+}
+
+/// A fact the program has printed.
+fn fact(ran: &Ran, name: &str) -> f64 {
+    let line = ran.stdout.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
+    line.and_then(|number| number.parse().ok()).unwrap_or_else(|| panic!("no {name}: {ran:?}"))
+}
+
+/// Largest force that was sent, N, and ticks of a recording; all of it is finite.
+fn largest_n(recording: &Path) -> (f64, usize) {
+    let mut largest = (0.0_f64, 0);
+    for record in Recording::open(recording).expect("it can be read") {
+        let Ok(record) = record else { break }; // cut off where the program was killed
+        assert!(record.commanded.is_finite() && record.pose.is_finite(), "{record:?}");
+        largest = (largest.0.max(record.commanded.force().length()), largest.1 + 1);
+    }
+    largest
+}
+
+#[test]
+fn a_program_drives_a_device_without_a_changed_line_and_in_lockstep_bit_for_bit() {
+    if !tools::required(Tool::Cc) {
+        return;
+    }
+    built();
+    let scratch = Scratch::default();
+    let program = phantom(&scratch);
+    let summary = scratch.path().join("summary.json");
+    let options = ["--pace", "lockstep", "--json", &summary.display().to_string()];
+    let run = || {
+        let ran = lent(&program, &options, "plain", 3000);
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+        let text = std::fs::read_to_string(&summary).expect("a summary was requested");
+        (ran, serde_json::from_str::<Value>(&text).expect("it is JSON"))
+    };
+    let (ran, first) = run();
+    assert!(ran.stdout.contains("type Flotor simulated\nradius 0.012\n"), "{ran:?}");
+    // The hand moves the handle by some millimetres; rotations are orthonormal to rounding.
+    assert!(fact(&ran, "highest") - fact(&ran, "lowest") > 1.0e-3, "{ran:?}");
+    assert!(fact(&ran, "slant") < 1.0e-12, "{ran:?}");
+    // Velocity against differences of positions: at most what a tick of acceleration makes, 8 N on a kilogram.
+    assert!(fact(&ran, "lag") < 0.03, "{ran:?}");
+    assert_eq!(fact(&ran, "failed"), 0.0);
+    assert!(ran.stdout.contains("close 0\nclose -1\nafter -1\n"), "{ran:?}");
+    // One tick at the start, one for each command; the last, which was refused, made none.
+    assert_eq!(first["ticks"], 3001);
+    assert_eq!(run().1["trace_digest"], first["trace_digest"]);
+}
+
+#[test]
+fn nothing_a_program_does_gets_past_the_limits_or_takes_report_and_recording_with_it() {
+    if !tools::required(Tool::Cc) {
+        return;
+    }
+    built();
+    let scratch = Scratch::default();
+    let program = phantom(&scratch);
+    let calls = TestSize::of_this_run().pick(2_000, 1_000_000);
+    // In lockstep a tick a call: as many as are wanted. What depends on time or dies runs in real time.
+    let cases = [
+        ("steps", "lockstep", calls),
+        ("huge", "lockstep", calls),
+        ("nan", "lockstep", calls),
+        ("plain", "real", 600),
+        ("steps", "real", 600),
+        ("stall", "real", 250),
+        ("fork", "real", 600),
+        ("threads", "real", 50),
+        ("forget", "real", 600),
+        ("kill", "real", 1600),
+        ("crash", "real", 1600),
+    ];
+    show_each(&cases, |(way, pace, calls)| {
+        let recording = scratch.path().join(format!("{way}-{pace}.mcap"));
+        let ran =
+            lent(&program, &["--pace", pace, "--record", &recording.display().to_string()], way, *calls);
+        let (largest_n, ticks) = largest_n(&recording);
+        assert!(largest_n <= MOST_N * (1.0 + 1.0e-12), "{way}: {largest_n} N");
+        assert!(
+            ticks > 100 && ran.stdout.contains("  program    `device` opened "),
+            "{way}: {ticks} ticks, {ran:?}"
+        );
+        let expected = match *way {
+            "kill" => 128 + 9,
+            "crash" => 128 + 6,
+            _ => exit_code::OK,
+        };
+        assert_eq!(ran.code, Some(expected), "{way}: {ran:?}");
+        match *way {
+            "steps" | "huge" => assert!(largest_n > 0.9 * MOST_N, "{way}: only {largest_n} N"),
+            "nan" => assert!(ran.stdout.contains("refused, not finite"), "{ran:?}"),
+            "stall" => assert!(ran.stdout.contains("expired for want of another"), "{ran:?}"),
+            "fork" => assert!(ran.stdout.contains("child 0\n"), "{ran:?}"),
+            "kill" | "crash" => assert!(ran.stdout.contains("s so far"), "{ran:?}"),
+            _ => {}
+        }
+    });
+}
+
+#[test]
+fn what_cannot_be_lent_is_said_in_one_line_with_what_helps() {
+    if !tools::required(Tool::Cc) {
+        return;
+    }
+    built();
+    let scratch = Scratch::default();
+    let program = phantom(&scratch).display().to_string();
+    let source =
+        scratch.file("linked.c", "const char *name = \"libHD.so\"; int main(void) { return name == 0; }\n");
+    let compile = |output: &str, options: &[&str]| {
+        let output = scratch.path().join(output);
+        let compiled = Command::new("cc").args(options).arg("-o").arg(&output).arg(&source).output();
+        compiled.is_ok_and(|compiled| compiled.status.success()).then(|| output.display().to_string())
+    };
+    let linked = compile("linked", &[]).expect("it compiles");
+    let mut cases = vec![
+        (vec!["--api", "falcon", "--", &program], "dhd, openhaptics, chai3d"),
+        (vec!["--", "no-such-program"], "there is no program `no-such-program`"),
+        (vec!["--api", "dhd", "--", &linked], "--api openhaptics"),
+        (vec!["no-such-scene.toml", "--", &program], "`no-such-scene.toml` is no scene"),
+    ];
+    let fixed = compile("static", &["-static"]);
+    if let Some(fixed) = &fixed {
+        cases.push((vec!["--", fixed], "statically linked"));
+    }
+    for (arguments, said) in cases {
+        let ran = Flotor::with([vec!["lend"], arguments.clone()].concat()).run();
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{arguments:?}: {ran:?}");
+        assert!(ran.error().contains(said), "{arguments:?}: {ran:?}");
+        assert_eq!(ran.stderr.trim_end().lines().count(), 1, "{arguments:?}: {ran:?}");
+    }
+    // Without a library: a program in a folder of its own.
+    let alone = scratch.folder("alone").join("flotor");
+    // By a process of its own: a file that this one has open for writing cannot be started while another test forks.
+    let copied = Command::new("cp").arg(build_folder().join("flotor")).arg(&alone).status();
+    assert!(copied.is_ok_and(|copied| copied.success()), "it can be copied");
+    let output =
+        Command::new(&alone).args(["lend", "--api", "chai3d", "--", &program]).output().expect("it starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("-p flotor-chai3d` builds it") && said.trim_end().lines().count() == 1, "{said}");
+}
