@@ -51,8 +51,8 @@ pub enum ScaffoldError {
     InsideWorkspace(PathBuf),
     /// The contract's sources are not where this program was built.
     #[error(
-        "the sources of the contract (`hal/`) are neither above this program nor at {}; set \
-         --hal PATH",
+        "the sources of the contract (`hal/`) are neither in a folder above this program nor at {}; give \
+         their folder with --hal PATH",
         .0.display()
     )]
     NoContract(PathBuf),
@@ -75,7 +75,7 @@ pub struct Scaffold {
     /// Its folder.
     pub folder: PathBuf,
     /// Its files, relative to the folder, the one to edit first.
-    pub files: Vec<&'static str>,
+    pub files: Vec<String>,
     /// The command that builds it, in its folder.
     pub build: String,
     /// The built library, relative to the folder.
@@ -103,11 +103,13 @@ pub fn scaffold(
     }
     let folder = parent.join(name.id());
     make_folder(&folder)?;
-    if language == Language::Rust {
-        make_folder(&folder.join("src"))?;
-    }
     for (path, template) in files {
-        write(&folder.join(text.fill(path)), &text.fill(template))?;
+        let file = folder.join(text.fill(path));
+        if let Some(below) = file.parent() {
+            let made = std::fs::create_dir_all(below);
+            made.map_err(|cause| ScaffoldError::Write { path: below.into(), cause })?;
+        }
+        write(&file, &text.fill(template))?;
     }
     if language == Language::Rust
         && let Some(lock) = contract.lock_file()
@@ -116,7 +118,7 @@ pub fn scaffold(
     }
     Ok(Scaffold {
         folder,
-        files: files.iter().map(|(path, _)| *path).collect(),
+        files: files.iter().map(|(path, _)| text.fill(path)).collect(),
         build: text.fill(BUILD),
         library: text.fill("path/to/library/libyour_name.so"),
     })
@@ -127,16 +129,21 @@ fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'sta
     const IGNORE: (&str, &str) = (".gitignore", "/target\n/lib*.so\n");
     const MODEL_SCENE: (&str, &str) = ("scene.toml", include_str!("templates/model-scene.toml"));
     const DEVICE_SCENE: (&str, &str) = ("scene.toml", include_str!("templates/device-scene.toml"));
+    const MODEL_TEST: (&str, &str) = ("your-name.test.toml", include_str!("templates/model.test.toml"));
+    const MODEL_CURVE: (&str, &str) = ("your-name.csv", include_str!("templates/model.csv"));
+    const WORKFLOW: (&str, &str) = (".github/workflows/haptics.yml", include_str!("templates/workflow.yml"));
     const MANIFEST: (&str, &str) = ("Cargo.toml", include_str!("templates/rust/manifest.toml"));
     match (kind, language) {
         (PluginKind::Model, Language::Rust) => {
-            &[("src/lib.rs", include_str!("templates/rust/model.rs")), MODEL_SCENE, MANIFEST, IGNORE]
+            const MODEL: (&str, &str) = ("src/lib.rs", include_str!("templates/rust/model.rs"));
+            &[MODEL, MODEL_SCENE, MODEL_TEST, MODEL_CURVE, WORKFLOW, MANIFEST, IGNORE]
         }
         (PluginKind::Device, Language::Rust) => {
             &[("src/lib.rs", include_str!("templates/rust/device.rs")), DEVICE_SCENE, MANIFEST, IGNORE]
         }
         (PluginKind::Model, Language::C) => {
-            &[("plugin.c", include_str!("templates/c/model.c")), MODEL_SCENE, IGNORE]
+            const MODEL: (&str, &str) = ("plugin.c", include_str!("templates/c/model.c"));
+            &[MODEL, MODEL_SCENE, MODEL_TEST, MODEL_CURVE, WORKFLOW, IGNORE]
         }
         (PluginKind::Device, Language::C) => {
             &[("plugin.c", include_str!("templates/c/device.c")), DEVICE_SCENE, IGNORE]
@@ -148,19 +155,26 @@ fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'sta
 const BUILD: &str = "BUILD_COMMAND";
 
 /// What stands in the templates, and what comes instead; also in what came for those before.
-struct Placeholders([(&'static str, String); 7]);
+struct Placeholders([(&'static str, String); 8]);
 
 impl Placeholders {
     fn new(name: &PluginName, language: Language, contract: &ContractFolder) -> Result<Self, ScaffoldError> {
-        let (build, built_in) = match language {
-            Language::Rust => ("cargo build --release", "target/release"),
+        let (build, built_in, on_a_forge) = match language {
+            // The manifest has the folder of the contract on the author's machine.
+            Language::Rust => (
+                "cargo build --release",
+                "target/release",
+                r#"sed -i "s|path = \".*/hal\"|path = \"$PWD/flotor/hal\"|" Cargo.toml && cargo build --release"#,
+            ),
             Language::C => (
                 "cc -std=c11 -O2 -Wall -Wextra -shared -fPIC -I\"path/to/hal/include\" -o libyour_name.so plugin.c -lm",
                 ".",
+                "cc -std=c11 -O2 -shared -fPIC -Iflotor/hal/include -o libyour_name.so plugin.c -lm",
             ),
         };
         Ok(Self([
             (BUILD, build.to_owned()),
+            ("WORKFLOW_BUILD", on_a_forge.to_owned()),
             ("path/to/library", built_in.to_owned()),
             ("your-name", name.id().to_owned()),
             ("your_name", name.symbol()),
@@ -176,7 +190,7 @@ impl Placeholders {
 
     /// Whether the Rust template uses a type that the plugin's own would hide.
     fn clashes_with(&self, template: &str) -> bool {
-        let [_, _, _, _, (_, type_name), ..] = &self.0;
+        let [_, _, _, _, _, (_, type_name), ..] = &self.0;
         let code = template.lines().filter(|line| !line.trim_start().starts_with("//"));
         let mut words = code.flat_map(|line| line.split(|c: char| !c.is_alphanumeric() && c != '_'));
         words.any(|word| word == type_name)

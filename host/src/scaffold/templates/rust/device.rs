@@ -27,7 +27,8 @@ impl Device for YourName {
     type Active = ActiveYourName;
     type Stop = Stop;
 
-    // Look for the hardware here. Missing, busy or forbidden is a `Refusal::resource` that says what to do.
+    // Look for the hardware here. If it is missing, busy or forbidden, return a `Refusal::resource` that says what to
+    // do.
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
         let amplitude_m = settings.number_or_default("amplitude_mm") * 1.0e-3;
         Ok(Self { amplitude_m, stopped: Arc::default() })

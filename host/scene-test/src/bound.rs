@@ -1,0 +1,152 @@
+//! What a number of a run is expected to be.
+
+use serde_json::Value;
+
+/// What is expected of one value.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Bound {
+    /// Not below, not above; at least one of the two.
+    Range { min: Option<f64>, max: Option<f64> },
+    /// No further away than this.
+    Near { value: f64, within: f64 },
+    /// Exactly this number.
+    Number(f64),
+    /// Exactly this word.
+    Word(String),
+    /// Exactly this truth.
+    Flag(bool),
+}
+
+/// How a value misses its bound. A run that is shortened or simplified must miss it in the same way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Miss {
+    Below,
+    Above,
+    /// Another word, or no value.
+    Other,
+}
+
+impl Bound {
+    /// Reads a bound. A table that has other keys than those of a bound is a level of the path: `None`.
+    pub(crate) fn read(value: &toml::Value) -> Result<Option<Self>, String> {
+        const KEYS: [&str; 4] = ["min", "max", "value", "within"];
+        let table = match value {
+            toml::Value::Table(table) => table,
+            toml::Value::String(word) => return Ok(Some(Self::Word(word.clone()))),
+            toml::Value::Boolean(flag) => return Ok(Some(Self::Flag(*flag))),
+            other => return number(other).map(|number| Some(Self::Number(number))),
+        };
+        if !table.keys().any(|key| KEYS.contains(&key.as_str())) {
+            return Ok(None);
+        }
+        if let Some(unknown) = table.keys().find(|key| !KEYS.contains(&key.as_str())) {
+            return Err(format!("unknown key `{unknown}` of a bound; write min, max, or value and within"));
+        }
+        let get = |key: &str| table.get(key).map(number).transpose();
+        match (get("min")?, get("max")?, get("value")?, get("within")?) {
+            (Some(min), Some(max), None, None) if min > max => {
+                Err(format!("min = {min} is above max = {max}: nothing passes"))
+            }
+            (min, max, None, None) => Ok(Some(Self::Range { min, max })),
+            (None, None, Some(value), Some(within)) if within >= 0.0 => {
+                Ok(Some(Self::Near { value, within }))
+            }
+            (None, None, Some(_), Some(_)) => Err("within must be 0 or more".to_owned()),
+            _ => Err("write { min, max }, one of them, or { value, within }".to_owned()),
+        }
+    }
+
+    /// How a value misses it, if it does. NaN and a missing value miss every bound.
+    pub(crate) fn missed_by(&self, value: Option<&Value>) -> Option<Miss> {
+        let got = value.and_then(Value::as_f64).unwrap_or(f64::NAN);
+        let (least, most) = match self {
+            Self::Word(word) => {
+                return (value.and_then(Value::as_str) != Some(word)).then_some(Miss::Other);
+            }
+            Self::Flag(flag) => {
+                return (value.and_then(Value::as_bool) != Some(*flag)).then_some(Miss::Other);
+            }
+            Self::Number(number) => (*number, *number),
+            Self::Near { value, within } => (value - within, value + within),
+            Self::Range { min, max } => (min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY)),
+        };
+        match got {
+            _ if got.is_nan() => Some(Miss::Other),
+            _ if got < least => Some(Miss::Below),
+            _ if got > most => Some(Miss::Above),
+            _ => None,
+        }
+    }
+
+    /// Whether a value of this kind could meet it.
+    pub(crate) fn fits(&self, value: &Value) -> bool {
+        match (self, value) {
+            (_, Value::Null) => true,
+            (Self::Word(_), value) => value.is_string(),
+            (Self::Flag(_), value) => value.is_boolean(),
+            (_, value) => value.is_number(),
+        }
+    }
+
+    /// In words.
+    pub(crate) fn text(&self) -> String {
+        match self {
+            Self::Range { min: Some(min), max: Some(max) } => format!("{min} to {max}"),
+            Self::Range { min: Some(min), .. } => format!("at least {min}"),
+            Self::Range { max, .. } => format!("at most {}", max.unwrap_or(f64::INFINITY)),
+            Self::Near { value, within } => format!("{value} within {within}"),
+            Self::Number(number) => number.to_string(),
+            Self::Word(word) => word.clone(),
+            Self::Flag(flag) => flag.to_string(),
+        }
+    }
+}
+
+/// A finite number of a test file.
+pub(crate) fn number(value: &toml::Value) -> Result<f64, String> {
+    let number = match value {
+        toml::Value::Integer(number) => *number as f64,
+        toml::Value::Float(number) => *number,
+        other => return Err(format!("write a number, not a {}", other.type_str())),
+    };
+    if number.is_finite() { Ok(number) } else { Err("write a finite number".to_owned()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn bound(text: &str) -> Result<Option<Bound>, String> {
+        let table: toml::Table = format!("b = {text}").parse().unwrap();
+        Bound::read(&table["b"])
+    }
+
+    #[test]
+    fn a_bound_is_met_from_edge_to_edge_and_never_by_nan() {
+        let range = bound("{ min = -1e-3, max = 2 }").unwrap().unwrap();
+        for (value, miss) in [(-1e-3, None), (2.0, None), (2.1, Some(Miss::Above)), (-1.0, Some(Miss::Below))]
+        {
+            assert_eq!(range.missed_by(Some(&json!(value))), miss, "{value}");
+        }
+        for bad in [json!(null), json!("NaN"), json!([])] {
+            assert_eq!(range.missed_by(Some(&bad)), Some(Miss::Other));
+        }
+        assert_eq!(range.missed_by(None), Some(Miss::Other));
+        let near = bound("{ value = 2.4, within = 0.1 }").unwrap().unwrap();
+        assert_eq!(near.missed_by(Some(&json!(2.45))), None);
+        assert_eq!(near.missed_by(Some(&json!(2.2))), Some(Miss::Below));
+        assert_eq!(bound("\"ok\"").unwrap().unwrap().missed_by(Some(&json!("failed"))), Some(Miss::Other));
+        assert_eq!(bound("0").unwrap().unwrap().missed_by(Some(&json!(0))), None);
+    }
+
+    #[test]
+    fn a_bound_that_nothing_or_everything_meets_is_an_error() {
+        for text in
+            ["{ min = 2, max = 1 }", "{ value = 1 }", "{ min = nan }", "{ min = 1, mx = 2 }", "[1]", "inf"]
+        {
+            assert!(bound(text).is_err(), "{text}");
+        }
+        assert_eq!(bound("{ port_end_j = 1 }"), Ok(None), "a level of the path");
+    }
+}

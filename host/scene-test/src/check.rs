@@ -1,0 +1,382 @@
+//! Carrying out a case, and judging what comes of it.
+
+use crate::bound::{Bound, Miss};
+use crate::case::{Case, Check, combinations};
+use crate::curve::POSE;
+use crate::file::{TestFile, Validate};
+use crate::minimise::shortest;
+use crate::numbers::at;
+use crate::process::{Flotor, Ran};
+use serde::Serialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What came of a case.
+#[derive(Debug, Serialize)]
+pub(crate) struct Outcome {
+    pub(crate) case: String,
+    pub(crate) scene: PathBuf,
+    pub(crate) passed: bool,
+    pub(crate) failures: Vec<Failure>,
+    /// The values that were judged, by path.
+    pub(crate) values: BTreeMap<String, Value>,
+    /// The command that shows the failure again.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) repeat: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) picture: Option<PathBuf>,
+    #[serde(skip)]
+    pub(crate) digest: Option<String>,
+}
+
+/// One expectation that was not met.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Failure {
+    pub(crate) what: String,
+    pub(crate) expected: String,
+    pub(crate) got: String,
+    #[serde(skip)]
+    pub(crate) miss: Option<Miss>,
+}
+
+impl Failure {
+    fn new(what: impl Into<String>, expected: impl Into<String>, got: impl Into<String>) -> Self {
+        Self { what: what.into(), expected: expected.into(), got: got.into(), miss: None }
+    }
+
+    /// As one line, for people.
+    pub(crate) fn line(&self) -> String {
+        format!("{}: expected {}, got {}", self.what, self.expected, self.got)
+    }
+}
+
+/// A model of a scene.
+#[derive(Clone, Debug)]
+pub(crate) struct Model {
+    pub(crate) name: String,
+    pub(crate) file: String,
+}
+
+/// The models that a run names.
+pub(crate) fn models(json: &Value) -> Vec<Model> {
+    let text = |plugin: &Value, key: &str| plugin.get(key).and_then(Value::as_str).map(str::to_owned);
+    let plugins = json.get("plugins").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+    let models = plugins.iter().filter(|plugin| text(plugin, "kind").as_deref() == Some("model"));
+    models
+        .filter_map(|model| Some(Model { name: text(model, "name")?, file: text(model, "file")? }))
+        .collect()
+}
+
+/// The arguments of a run.
+pub(crate) fn run_arguments(
+    file: &TestFile,
+    seed: u64,
+    set: &[(String, String)],
+    duration: Option<&str>,
+) -> Vec<String> {
+    let scene = file.scene.display().to_string();
+    let mut arguments: Vec<String> =
+        ["run", &scene, "--clock", "virtual", "--seed"].into_iter().map(str::to_owned).collect();
+    arguments.push(seed.to_string());
+    for (key, value) in set {
+        arguments.extend(["--set".to_owned(), format!("{key}={value}")]);
+    }
+    if let Some(duration) = duration {
+        arguments.extend(["--duration".to_owned(), duration.to_owned()]);
+    }
+    arguments
+}
+
+/// A command line that a shell reads as these arguments of `flotor`.
+pub(crate) fn command_line(arguments: &[String]) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_./=,:@+%".contains(c);
+    let quoted = arguments.iter().map(|word| {
+        let plain = !word.is_empty() && word.chars().all(is_plain);
+        if plain { format!(" {word}") } else { format!(" '{}'", word.replace('\'', "'\\''")) }
+    });
+    format!("flotor{}", quoted.collect::<String>())
+}
+
+/// Carries out a case. `models` are those of its scene, or why they are not known.
+pub(crate) fn check(
+    flotor: &Flotor,
+    case: &Case<'_>,
+    models: &Result<Vec<Model>, String>,
+    plots: Option<&Path>,
+) -> Outcome {
+    let mut outcome = Outcome {
+        case: case.name(),
+        scene: case.file.scene.clone(),
+        passed: false,
+        failures: Vec::new(),
+        values: BTreeMap::new(),
+        repeat: None,
+        picture: None,
+        digest: None,
+    };
+    // A check of a plugin has no picture of its own: the scene shows what the plugin does.
+    let settings = combinations(&case.file.set).swap_remove(0);
+    let scene = run_arguments(case.file, case.file.seeds[0], &settings, case.file.duration.as_deref());
+    let mut plotted = Some(scene);
+    match (&case.check, models) {
+        (Check::Run { seed, set }, _) => {
+            let judged = run(flotor, case, *seed, set, case.file.duration.as_deref());
+            let arguments = run_arguments(case.file, *seed, set, case.file.duration.as_deref());
+            if let Some(first) = judged.failures.first() {
+                outcome.repeat = Some(command_line(&shortest(flotor, case, first, judged.json.as_ref())));
+            }
+            if let Some(json) = &judged.json {
+                let paths = case.file.expect.iter().map(|expectation| &expectation.path);
+                outcome.values =
+                    paths.filter_map(|path| Some((path.clone(), at(json, path)?.clone()))).collect();
+                outcome.digest = at(json, "trace_digest").and_then(Value::as_str).map(str::to_owned);
+            }
+            (outcome.failures, plotted) = (judged.failures, Some(arguments));
+        }
+        (_, Err(why)) => outcome.failures.push(Failure::new("the scene", "one that runs", why)),
+        (Check::Curve, Ok(models)) => curve(flotor, case.file, models, &mut outcome),
+        (Check::Golden, Ok(models)) => plotted = golden(flotor, case.file, models, &mut outcome),
+        (Check::Validate, Ok(models)) => validate(flotor, case.file, models, &mut outcome),
+        (Check::Stress, Ok(models)) => plotted = stress(flotor, case.file, models, &mut outcome),
+    }
+    outcome.passed = outcome.failures.is_empty();
+    if let (false, Some(folder), Some(mut arguments)) = (outcome.passed, plots, plotted) {
+        let plain = |c: char| if c.is_alphanumeric() || "-_.=".contains(c) { c } else { '-' };
+        let picture = folder.join(outcome.case.chars().map(plain).collect::<String>() + ".svg");
+        arguments.extend(["--plot".to_owned(), picture.display().to_string()]);
+        let _ = flotor.run(arguments, "");
+        outcome.picture = picture.is_file().then_some(picture);
+    }
+    outcome
+}
+
+/// A run, judged.
+pub(crate) struct Judged {
+    pub(crate) failures: Vec<Failure>,
+    pub(crate) json: Option<Value>,
+}
+
+/// Carries out a run of a case, with its settings or fewer, and judges it.
+pub(crate) fn run(
+    flotor: &Flotor,
+    case: &Case<'_>,
+    seed: u64,
+    set: &[(String, String)],
+    duration: Option<&str>,
+) -> Judged {
+    let summary = |set: &[(String, String)]| {
+        let mut arguments = run_arguments(case.file, seed, set, duration);
+        arguments.extend(["--json".to_owned(), "-".to_owned()]);
+        let ran = flotor.run(arguments, "").map_err(|late| Failure::new("the run", "an end", late))?;
+        match ran.json() {
+            Some(json) => Ok((ran, json)),
+            None => Err(Failure::new("the run", "a summary", ran.error)),
+        }
+    };
+    let (ran, json) = match summary(set) {
+        Ok(answered) => answered,
+        Err(failure) => return Judged { failures: vec![failure], json: None },
+    };
+    let mut failures = judge(case, &ran, &json);
+    if let Some(reference) = &case.file.reference {
+        let is_replaced = |key: &str| reference.set.iter().any(|(other, _)| other == key);
+        let kept = set.iter().filter(|(key, _)| !is_replaced(key)).chain(&reference.set);
+        match summary(&kept.cloned().collect::<Vec<_>>()) {
+            Err(failure) => {
+                failures.push(Failure { what: format!("reference: {}", failure.what), ..failure })
+            }
+            Ok((_, other)) => failures.extend(reference.within.iter().filter_map(|(path, within)| {
+                let value = at(&other, path).and_then(Value::as_f64).unwrap_or(f64::NAN);
+                let bound = Bound::Near { value, within: *within };
+                missed(&format!("{path} against the reference"), &bound, at(&json, path))
+            })),
+        }
+    }
+    Judged { failures, json: Some(json) }
+}
+
+fn judge(case: &Case<'_>, ran: &Ran, json: &Value) -> Vec<Failure> {
+    let Case { file, label, .. } = case;
+    let mut failures = Vec::new();
+    if !file.expect.iter().any(|expectation| expectation.path == "end") {
+        failures.extend(missed("end", &Bound::Word("finished".to_owned()), at(json, "end")));
+        let ended = failures.is_empty() && ran.code != Some(0);
+        failures.extend(ended.then(|| Failure::new("the run", "exit code 0", &ran.error)));
+    }
+    let expected = file.expect.iter();
+    failures.extend(
+        expected.filter_map(|expected| missed(&expected.path, &expected.bound, at(json, &expected.path))),
+    );
+    let digest = file.digests.get(label).map(|digest| Bound::Word(digest.clone()));
+    failures.extend(digest.and_then(|digest| missed("trace_digest", &digest, at(json, "trace_digest"))));
+    failures
+}
+
+fn missed(what: &str, bound: &Bound, value: Option<&Value>) -> Option<Failure> {
+    let miss = bound.missed_by(value)?;
+    let got = match value {
+        None => "no value".to_owned(),
+        Some(Value::String(word)) => word.clone(),
+        Some(value) => value.to_string(),
+    };
+    Some(Failure { miss: Some(miss), ..Failure::new(what, bound.text(), got) })
+}
+
+fn curve(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outcome) {
+    let Some(curve) = &file.curve else { return };
+    let named = |model: &&Model| curve.model.as_ref().is_none_or(|name| *name == model.name);
+    let mut chosen = models.iter().filter(named);
+    let (Some(model), None) = (chosen.next(), chosen.next()) else {
+        let names: Vec<&str> = models.iter().map(|model| model.name.as_str()).collect();
+        let has = format!("{} models ({})", names.len(), names.join(", "));
+        outcome.failures.push(Failure::new("curve", "one model, or its name in `model`", has));
+        return;
+    };
+    let mut arguments = with_settings(&["eval", "--model", &model.file], &curve.set);
+    arguments.extend(["--poses".to_owned(), "-".to_owned()]);
+    let tolerance = |index: usize| if index < 3 { curve.within_n } else { curve.within_nm };
+    let answers = match flotor.run(&arguments, &curve.points.poses()) {
+        Ok(ran) if ran.code == Some(0) => ran.stdout,
+        Ok(Ran { error, .. }) | Err(error) => {
+            return outcome.failures.push(Failure::new("curve", "an evaluation", error));
+        }
+    };
+    match curve.points.worst(&answers, tolerance) {
+        Ok(None) => {}
+        Err(error) => outcome.failures.push(Failure::new("curve", "an answer for each pose", error)),
+        Ok(Some(worst)) => {
+            let pose: Vec<String> = worst.pose.iter().map(ToString::to_string).collect();
+            let place = POSE.iter().zip(worst.pose).filter(|(_, number)| *number != 0.0);
+            let place: Vec<String> = place.map(|(name, number)| format!("{name} = {number}")).collect();
+            let place = if place.is_empty() { "home".to_owned() } else { place.join(", ") };
+            let index = crate::curve::WRENCH.iter().position(|column| *column == worst.column).unwrap_or(0);
+            let expected = format!("{} within {}", worst.expected, tolerance(index));
+            let got = format!("{} ({})", worst.got, worst.status);
+            outcome.failures.push(Failure::new(format!("{} at {place}", worst.column), expected, got));
+            let header = POSE.join(",");
+            let eval = command_line(&arguments);
+            outcome.repeat = Some(format!("printf '{header}\\n{}\\n' | {eval}", pose.join(",")));
+        }
+    }
+}
+
+fn golden(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outcome) -> Option<Vec<String>> {
+    let golden = file.golden.as_ref()?;
+    let mut arguments = vec!["replay".to_owned(), golden.recording.display().to_string()];
+    for folder in models.iter().filter_map(|model| Path::new(&model.file).parent()) {
+        arguments.extend(["--plugin-path".to_owned(), folder.display().to_string()]);
+    }
+    outcome.repeat = Some(command_line(&arguments));
+    let asked: Vec<String> = arguments.iter().cloned().chain(["--json".to_owned(), "-".to_owned()]).collect();
+    let answered = flotor.run(asked, "");
+    let error = answered.as_ref().map_or_else(Clone::clone, |ran| ran.error.clone());
+    match answered.ok().and_then(|ran| ran.json()) {
+        None => outcome.failures.push(Failure::new("golden", "a replay", error)),
+        Some(json) => {
+            let first =
+                at(&json, "first_tick").map_or(String::new(), |tick| format!(", first at tick {tick}"));
+            for (what, path, within) in
+                [("force", "max_force_n", golden.within_n), ("torque", "max_torque_nm", golden.within_nm)]
+            {
+                let bound = Bound::Range { min: None, max: Some(within) };
+                let failure =
+                    missed(&format!("difference of {what} from the recording"), &bound, at(&json, path));
+                outcome.failures.extend(
+                    failure.map(|failure| Failure { got: format!("{}{first}", failure.got), ..failure }),
+                );
+            }
+            let complete = missed("complete", &Bound::Flag(true), at(&json, "complete"));
+            outcome.failures.extend(complete);
+        }
+    }
+    outcome.repeat.take_if(|_| outcome.failures.is_empty());
+    Some(arguments)
+}
+
+fn validate(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outcome) {
+    let files: Vec<String> = match &file.validate {
+        Some(Validate::File(file)) => vec![file.display().to_string()],
+        _ => models.iter().map(|model| model.file.clone()).collect(),
+    };
+    for plugin in files {
+        let answered = flotor.run(["validate", &plugin, "--json"], "");
+        let error = answered.as_ref().map_or_else(Clone::clone, |ran| ran.error.clone());
+        let findings = answered.ok().and_then(|ran| ran.json());
+        let Some(Value::Array(findings)) = findings else {
+            outcome.failures.push(Failure::new("validate", "an answer", error));
+            continue;
+        };
+        for finding in &findings {
+            let word = |key: &str| finding.get(key).and_then(Value::as_str);
+            let unchecked = || word("unchecked").map(|why| format!("it could not be checked: {why}"));
+            let Some(seen) = word("violation").map(str::to_owned).or_else(unchecked) else { continue };
+            let rule = word("rule").unwrap_or_default();
+            let says = word("text").unwrap_or_default();
+            outcome.failures.push(Failure::new(format!("rule {rule}"), says, seen));
+            let arguments = ["validate", &plugin, "--only", rule].map(str::to_owned);
+            outcome.repeat.get_or_insert_with(|| command_line(&arguments));
+        }
+    }
+}
+
+fn stress(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outcome) -> Option<Vec<String>> {
+    let stress = file.stress.as_ref()?;
+    let mut failing = None;
+    for model in models {
+        let arguments =
+            with_settings(&["stress", "--model", &model.file, "--size", &stress.size], &stress.set);
+        let asked: Vec<String> =
+            arguments.iter().cloned().chain(["--json".to_owned(), "-".to_owned()]).collect();
+        let answered = flotor.run(asked, "");
+        let error = answered.as_ref().map_or_else(Clone::clone, |ran| ran.error.clone());
+        let before = outcome.failures.len();
+        match answered.ok().and_then(|ran| ran.json()) {
+            None => outcome.failures.push(Failure::new("stress", "an answer", error)),
+            Some(json) => outcome.failures.extend(stress.pass.iter().filter_map(|id| measure(&json, id))),
+        }
+        if outcome.failures.len() > before {
+            failing.get_or_insert(arguments);
+        }
+    }
+    outcome.repeat = failing.as_deref().map(command_line);
+    failing
+}
+
+/// A measure of a stress test that failed, or is not there.
+fn measure(json: &Value, id: &str) -> Option<Failure> {
+    let measures = json.get("measures").and_then(Value::as_array);
+    let has_id = |measure: &&Value| measure.get("id").and_then(Value::as_str) == Some(id);
+    let Some(found) = measures.and_then(|measures| measures.iter().find(has_id)) else {
+        return Some(Failure::new(id, "a measure", "none"));
+    };
+    let word = |key: &str| found.get(key).and_then(Value::as_str).unwrap_or_default();
+    let number = |key: &str| found.get(key).map_or(String::new(), ToString::to_string);
+    let failed = || {
+        let unit = word("unit");
+        let expected = format!("at most {} {unit}", number("bound"));
+        let got = format!("{} {unit} ({})", number("value"), word("remark"));
+        Failure::new(format!("{id} {}", word("name")), expected.trim_end(), got)
+    };
+    (word("verdict") == "fail").then(failed)
+}
+
+fn with_settings(command: &[&str], set: &[(String, String)]) -> Vec<String> {
+    let mut arguments: Vec<String> = command.iter().map(ToString::to_string).collect();
+    for (key, value) in set {
+        arguments.extend(["--set".to_owned(), format!("{key}={value}")]);
+    }
+    arguments
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_line_survives_a_shell() {
+        let arguments = ["run", "my scene.toml", "--set", "a.b=it's"].map(str::to_owned);
+        let line = command_line(&arguments);
+        assert_eq!(line, "flotor run 'my scene.toml' --set 'a.b=it'\\''s'");
+    }
+}

@@ -1,0 +1,426 @@
+//! `NAME.test.toml`: which scene, with what, and what is expected of it.
+
+use crate::bound::{Bound, number};
+use crate::curve::Points;
+use crate::numbers::did_you_mean;
+use flotor_command::CommandError;
+use flotor_command::options::duration_s;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use toml::{Spanned, Value};
+
+/// The end of the name of every such file.
+pub(crate) const SUFFIX: &str = ".test.toml";
+
+/// A file with expectations, checked as far as is possible without running a plugin.
+#[derive(Debug)]
+pub(crate) struct TestFile {
+    pub(crate) path: PathBuf,
+    /// Its path without the suffix: what its cases are called.
+    pub(crate) name: String,
+    pub(crate) text: String,
+    pub(crate) scene: PathBuf,
+    pub(crate) seeds: Vec<u64>,
+    pub(crate) duration: Option<String>,
+    /// `PLUGIN.PARAMETER` and the values it takes: the cases are their product.
+    pub(crate) set: Vec<(String, Vec<String>)>,
+    pub(crate) expect: Vec<Expectation>,
+    pub(crate) reference: Option<Reference>,
+    pub(crate) curve: Option<Curve>,
+    pub(crate) golden: Option<Golden>,
+    pub(crate) validate: Option<Validate>,
+    pub(crate) stress: Option<Stress>,
+    /// Digests by the name of a case: only where somebody wrote them.
+    pub(crate) digests: BTreeMap<String, String>,
+}
+
+/// What is expected of one value of a run.
+#[derive(Debug)]
+pub(crate) struct Expectation {
+    pub(crate) path: String,
+    /// Where its key stands in the text, bytes.
+    pub(crate) at: usize,
+    pub(crate) bound: Bound,
+}
+
+/// Other settings with which the same numbers must come out.
+#[derive(Debug)]
+pub(crate) struct Reference {
+    pub(crate) set: Vec<(String, String)>,
+    /// Largest difference by the path of a number.
+    pub(crate) within: Vec<(String, f64)>,
+}
+
+/// A force-position curve.
+#[derive(Debug)]
+pub(crate) struct Curve {
+    pub(crate) points: Points,
+    pub(crate) within_n: f64,
+    pub(crate) within_nm: f64,
+    pub(crate) model: Option<String>,
+    pub(crate) set: Vec<(String, String)>,
+}
+
+/// A recording that the models must reproduce.
+#[derive(Debug)]
+pub(crate) struct Golden {
+    pub(crate) recording: PathBuf,
+    pub(crate) within_n: f64,
+    pub(crate) within_nm: f64,
+}
+
+/// Which plugins `flotor validate` checks.
+#[derive(Debug)]
+pub(crate) enum Validate {
+    /// The models of the scene.
+    Models,
+    File(PathBuf),
+}
+
+/// The stress test of the models of the scene.
+#[derive(Debug)]
+pub(crate) struct Stress {
+    pub(crate) size: String,
+    /// Measures that must not fail.
+    pub(crate) pass: Vec<String>,
+    pub(crate) set: Vec<(String, String)>,
+}
+
+/// The file as it is written.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    scene: Spanned<PathBuf>,
+    #[serde(default)]
+    seeds: Option<Spanned<Vec<u64>>>,
+    duration: Option<Spanned<Value>>,
+    #[serde(default)]
+    set: BTreeMap<Spanned<String>, Value>,
+    #[serde(default)]
+    expect: BTreeMap<Spanned<String>, Value>,
+    reference: Option<Spanned<WrittenReference>>,
+    curve: Option<Spanned<WrittenCurve>>,
+    golden: Option<Spanned<WrittenGolden>>,
+    validate: Option<Spanned<Value>>,
+    stress: Option<Spanned<WrittenStress>>,
+    #[serde(default)]
+    digests: BTreeMap<String, String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenReference {
+    set: BTreeMap<String, Value>,
+    within: BTreeMap<String, Value>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenCurve {
+    file: Spanned<PathBuf>,
+    within_n: f64,
+    #[serde(default)]
+    within_nm: f64,
+    model: Option<String>,
+    #[serde(default)]
+    set: BTreeMap<String, Value>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenGolden {
+    recording: Spanned<PathBuf>,
+    within_n: f64,
+    #[serde(default)]
+    within_nm: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum WrittenStress {
+    Size(String),
+    Table(StressTable),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StressTable {
+    size: String,
+    pass: Option<Vec<String>>,
+    #[serde(default)]
+    set: BTreeMap<String, Value>,
+}
+
+/// The measures of a stress test that no load of the machine can change: all but the cost.
+const MEASURES: [&str; 9] = ["M0", "M1", "M2", "M3", "M4", "M5", "M6", "M7", "M8"];
+const COST: &str = "M7";
+
+impl TestFile {
+    /// Reads and checks a file.
+    ///
+    /// # Errors
+    /// `FILE:LINE: what is wrong`.
+    pub(crate) fn read(path: &Path) -> Result<Self, CommandError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|cause| CommandError::Usage(format!("{}: cannot read: {cause}", path.display())))?;
+        Self::parse(path, &text)
+            .map_err(|(at, wrong)| CommandError::Usage(format!("{}: {wrong}", place(path, &text, at))))
+    }
+
+    fn parse(path: &Path, text: &str) -> Result<Self, Wrong> {
+        let written: Written = toml::from_str(text).map_err(|error| {
+            (error.span().map_or(0, |span| span.start), with_nearest(error.message()).replace('\n', " "))
+        })?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let existing = |file: &Spanned<PathBuf>| {
+            let found = folder.join(file.get_ref());
+            let missing = || (file.span().start, format!("there is no file {}", found.display()));
+            if found.is_file() { Ok(found.clone()) } else { Err(missing()) }
+        };
+        let scene = existing(&written.scene)?;
+        let seeds = match &written.seeds {
+            None => vec![1],
+            Some(none) if none.get_ref().is_empty() => {
+                return Err((none.span().start, "no seed, no case; write at least one".to_owned()));
+            }
+            Some(seeds) => seeds.get_ref().clone(),
+        };
+        let duration = written.duration.as_ref().map(|duration| {
+            let text = scalar(duration.get_ref()).map_err(|wrong| (duration.span().start, wrong))?;
+            duration_s(&text).map_err(|wrong| (duration.span().start, wrong)).map(|_| text)
+        });
+        let set = settings_with_values(&written.set)?;
+        let expect = expectations(&written.expect)?;
+        let reference = written.reference.map(|reference| {
+            let at = reference.span().start;
+            let WrittenReference { set, within } = reference.into_inner();
+            let set = settings(&set).map_err(|wrong| (at, wrong))?;
+            let mut numbers = Vec::new();
+            for (path, value) in &within {
+                flatten(path, value, &mut |path, value| {
+                    numbers.push((path.to_owned(), number(value)?));
+                    Ok(())
+                })
+                .map_err(|wrong| (at, wrong))?;
+            }
+            if numbers.is_empty() {
+                return Err((at, "no number to compare; write within = { peak_force_n = 0.01 }".to_owned()));
+            }
+            Ok(Reference { set, within: numbers })
+        });
+        let curve = written.curve.map(|curve| -> Result<Curve, Wrong> {
+            let at = curve.span().start;
+            let WrittenCurve { file, within_n, within_nm, model, set } = curve.into_inner();
+            let points = Points::read(&existing(&file)?).map_err(|wrong| (file.span().start, wrong))?;
+            let set = settings(&set).map_err(|wrong| (at, wrong))?;
+            Ok(Curve { points, within_n, within_nm, model, set })
+        });
+        let golden = written.golden.map(|golden| -> Result<Golden, Wrong> {
+            let WrittenGolden { recording, within_n, within_nm } = golden.into_inner();
+            Ok(Golden { recording: existing(&recording)?, within_n, within_nm })
+        });
+        let validate = match &written.validate {
+            None => None,
+            Some(value) => match value.get_ref() {
+                Value::Boolean(true) => Some(Validate::Models),
+                Value::Boolean(false) => None,
+                Value::String(file) => Some(Validate::File(folder.join(file))),
+                _ => return Err((value.span().start, "write true, or the path of a plugin file".to_owned())),
+            },
+        };
+        let stress = written.stress.map(|stress| {
+            let at = stress.span().start;
+            stress_of(stress.into_inner()).map_err(|wrong| (at, wrong))
+        });
+        let file = Self {
+            path: path.to_owned(),
+            name: path.display().to_string().trim_end_matches(SUFFIX).to_owned(),
+            text: text.to_owned(),
+            scene,
+            seeds,
+            duration: duration.transpose()?,
+            set,
+            expect,
+            reference: reference.transpose()?,
+            curve: curve.transpose()?,
+            golden: golden.transpose()?,
+            validate,
+            stress: stress.transpose()?,
+            digests: written.digests,
+        };
+        file.expects_something()
+    }
+
+    fn expects_something(self) -> Result<Self, Wrong> {
+        let Self { expect, reference, curve, golden, validate, stress, digests, .. } = &self;
+        let checks_a_plugin = curve.is_some() || golden.is_some() || validate.is_some() || stress.is_some();
+        let nothing = expect.is_empty() && reference.is_none() && digests.is_empty() && !checks_a_plugin;
+        if nothing { Err((0, "nothing is expected; write at least [expect]".to_owned())) } else { Ok(self) }
+    }
+
+    /// `FILE:LINE` of a place in its text.
+    pub(crate) fn place(&self, at: usize) -> String {
+        place(&self.path, &self.text, at)
+    }
+}
+
+/// Where, bytes from the start, and what.
+type Wrong = (usize, String);
+
+fn place(path: &Path, text: &str, at: usize) -> String {
+    let before = text.get(..at).unwrap_or_default();
+    format!("{}:{}", path.display(), before.matches('\n').count() + 1)
+}
+
+/// The parser's message about an unknown key, with the nearest one in place of the list.
+fn with_nearest(message: &str) -> String {
+    let mut words = message.split('`').skip(1).step_by(2);
+    match (message.starts_with("unknown field"), words.next()) {
+        (true, Some(unknown)) => format!("unknown key `{unknown}`{}", did_you_mean(unknown, words)),
+        _ => message.to_owned(),
+    }
+}
+
+/// Leaves of nested tables, with their dotted keys: `a.b = 1` and `"a.b" = 1` are the same.
+fn flatten<'v>(
+    key: &str,
+    value: &'v Value,
+    leaf: &mut dyn FnMut(&str, &'v Value) -> Result<(), String>,
+) -> Result<(), String> {
+    match value {
+        Value::Table(table) => {
+            table.iter().try_for_each(|(below, value)| flatten(&format!("{key}.{below}"), value, leaf))
+        }
+        value => leaf(key, value),
+    }
+}
+
+fn scalar(value: &Value) -> Result<String, String> {
+    match value {
+        Value::String(text) => Ok(text.clone()),
+        Value::Integer(_) | Value::Float(_) | Value::Boolean(_) => Ok(value.to_string()),
+        other => Err(format!("write a number or a word, not a {}", other.type_str())),
+    }
+}
+
+fn settings(written: &BTreeMap<String, Value>) -> Result<Vec<(String, String)>, String> {
+    let mut found = Vec::new();
+    for (key, value) in written {
+        flatten(key, value, &mut |key, value| {
+            found.push((key.to_owned(), scalar(value)?));
+            Ok(())
+        })?;
+    }
+    Ok(found)
+}
+
+fn settings_with_values(
+    written: &BTreeMap<Spanned<String>, Value>,
+) -> Result<Vec<(String, Vec<String>)>, Wrong> {
+    let mut found = Vec::new();
+    for (key, value) in written {
+        let wrong = |wrong| (key.span().start, wrong);
+        flatten(key.get_ref(), value, &mut |key, value| {
+            if !key.contains('.') {
+                return Err(format!("`{key}` is not PLUGIN.PARAMETER, such as spring.preset"));
+            }
+            let values = match value {
+                Value::Array(values) => values.iter().map(scalar).collect::<Result<Vec<_>, _>>()?,
+                one => vec![scalar(one)?],
+            };
+            if values.is_empty() {
+                return Err(format!("no value for `{key}`, no case; write at least one"));
+            }
+            found.push((key.to_owned(), values));
+            Ok(())
+        })
+        .map_err(wrong)?;
+    }
+    Ok(found)
+}
+
+fn expectations(written: &BTreeMap<Spanned<String>, Value>) -> Result<Vec<Expectation>, Wrong> {
+    fn below(path: &str, at: usize, value: &Value, found: &mut Vec<Expectation>) -> Result<(), String> {
+        match (Bound::read(value).map_err(|wrong| format!("`{path}`: {wrong}"))?, value) {
+            (Some(bound), _) => found.push(Expectation { path: path.to_owned(), at, bound }),
+            (None, Value::Table(table)) if !table.is_empty() => {
+                for (key, value) in table {
+                    below(&format!("{path}.{key}"), at, value, found)?;
+                }
+            }
+            _ => return Err(format!("`{path}`: no bound")),
+        }
+        Ok(())
+    }
+    let mut found = Vec::new();
+    for (key, value) in written {
+        let at = key.span().start;
+        below(key.get_ref(), at, value, &mut found).map_err(|wrong| (at, wrong))?;
+    }
+    Ok(found)
+}
+
+fn stress_of(written: WrittenStress) -> Result<Stress, String> {
+    let (size, pass, set) = match written {
+        WrittenStress::Size(size) => (size, None, BTreeMap::new()),
+        WrittenStress::Table(StressTable { size, pass, set }) => (size, pass, set),
+    };
+    if !["short", "full"].contains(&size.as_str()) {
+        return Err(format!("unknown size `{size}`; write short or full"));
+    }
+    let all = || MEASURES.iter().filter(|measure| **measure != COST).map(ToString::to_string).collect();
+    let pass = pass.unwrap_or_else(all);
+    if let Some(unknown) = pass.iter().find(|measure| !MEASURES.contains(&measure.as_str())) {
+        return Err(format!("unknown measure `{unknown}`; they are {}", MEASURES.join(", ")));
+    }
+    Ok(Stress { size, pass, set: settings(&set)? })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Line and message of what is wrong with a file that has this after the scene.
+    fn wrong(rest: &str) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("scene.toml"), "").unwrap();
+        let path = folder.path().join("jelly.test.toml");
+        std::fs::write(&path, format!("scene = \"scene.toml\"\n{rest}")).unwrap();
+        let error =
+            TestFile::read(&path).map(|_| "nothing".to_owned()).unwrap_or_else(|error| error.to_string());
+        error.replace(&path.display().to_string(), "F")
+    }
+
+    #[test]
+    fn each_mistake_is_told_with_its_line() {
+        for (rest, says) in [
+            ("seedz = [1]", "F:2: unknown key `seedz`; did you mean `seeds`?"),
+            ("\n[curve]\nfle = \"a\"\nwithin_n = 1", "did you mean `file`?"),
+            ("seeds = []", "F:2: no seed"),
+            ("duration = \"5 parsec\"", "F:2: unknown unit of time `parsec`"),
+            ("[set]\nspring = 3", "F:3: `spring` is not PLUGIN.PARAMETER"),
+            ("[expect]\nlate_ticks = 0\npeak_force_n = { min = 2, max = 1 }", "F:4: `peak_force_n`: min = 2"),
+            ("stress = \"shrt\"\n", "F:2: unknown size `shrt`"),
+            ("[stress]\nsize = \"short\"\npass = [\"M9\"]", "unknown measure `M9`"),
+            ("[golden]\nrecording = \"no.mcap\"\nwithin_n = 1", "F:3: there is no file"),
+            ("", "nothing is expected"),
+            ("validate = 3", "F:2: write true, or the path"),
+            ("[expect]\nend = \"finished\"", "nothing"),
+        ] {
+            let told = wrong(rest);
+            assert!(told.contains(says), "{rest}: {told}");
+        }
+    }
+
+    #[test]
+    fn keys_with_dots_are_tables_and_tables_are_keys_with_dots() {
+        let parse = |text: &str| {
+            let table: BTreeMap<Spanned<String>, Value> = toml::from_str(text).unwrap();
+            settings_with_values(&table).unwrap()
+        };
+        let expected = vec![("spring.preset".to_owned(), vec!["a".to_owned(), "b".to_owned()])];
+        assert_eq!(parse("spring.preset = [\"a\", \"b\"]"), expected);
+        assert_eq!(parse("\"spring.preset\" = [\"a\", \"b\"]"), expected);
+    }
+}

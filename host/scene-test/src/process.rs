@@ -1,0 +1,116 @@
+//! `flotor` as a process of its own.
+
+use flotor_command::CommandError;
+use flotor_command::separate::{Built, SeparateProgram};
+use serde_json::Value;
+use std::ffi::OsStr;
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// The program whose commands the checks are made of.
+pub(crate) struct Flotor {
+    /// Longest time of one process.
+    pub(crate) limit: Duration,
+}
+
+/// What came of a process.
+pub(crate) struct Ran {
+    /// Exit code; `None` if a signal ended it.
+    pub(crate) code: Option<i32>,
+    pub(crate) stdout: String,
+    /// The last line of standard error, or how it ended if it said nothing.
+    pub(crate) error: String,
+}
+
+impl Ran {
+    /// The JSON on standard output.
+    pub(crate) fn json(&self) -> Option<Value> {
+        serde_json::from_str(&self.stdout).ok()
+    }
+}
+
+impl Flotor {
+    /// The program itself, beside this one.
+    const PROGRAM: SeparateProgram<'static> =
+        SeparateProgram { program: "flotor", built: Built::WithThis, build: "cargo build --release" };
+
+    /// An error here and now instead of one in every case.
+    pub(crate) fn with_limit(limit: Duration) -> Result<Self, CommandError> {
+        Self::PROGRAM.command().map(|_| Self { limit })
+    }
+
+    /// Carries out a command.
+    ///
+    /// # Errors
+    /// In words: it could not be started, or took too long and was killed.
+    pub(crate) fn run<I: AsRef<OsStr>>(
+        &self,
+        arguments: impl IntoIterator<Item = I>,
+        input: &str,
+    ) -> Result<Ran, String> {
+        self.try_run(arguments, input).map_err(|cause| match cause {
+            Trouble::Missing(error) => error.to_string(),
+            Trouble::System(cause) => format!("cannot run flotor: {cause}"),
+            Trouble::Late => format!("it had not ended after {} s, and was killed", self.limit.as_secs_f64()),
+        })
+    }
+
+    fn try_run<I: AsRef<OsStr>>(
+        &self,
+        arguments: impl IntoIterator<Item = I>,
+        input: &str,
+    ) -> Result<Ran, Trouble> {
+        // Files and not pipes: a process that it leaves behind may hold the other end open for ever.
+        let [mut stdin, mut stdout, mut stderr] =
+            [tempfile::tempfile()?, tempfile::tempfile()?, tempfile::tempfile()?];
+        stdin.write_all(input.as_bytes())?;
+        stdin.seek(SeekFrom::Start(0))?;
+        let mut command = Self::PROGRAM.command().map_err(Trouble::Missing)?;
+        command.args(arguments).env("NO_COLOR", "1").stdin(Stdio::from(stdin));
+        command.stdout(stdout.try_clone()?).stderr(stderr.try_clone()?);
+        let code = self.wait(&mut command)?;
+        let stdout = text(&mut stdout)?;
+        let said = text(&mut stderr)?;
+        let last = said.lines().rev().find(|line| line.starts_with("error: ")).or(said.lines().last());
+        let silent = || code.map_or("a signal ended it".to_owned(), |code| format!("exit code {code}"));
+        let error = last.map_or_else(silent, |line| line.trim_start_matches("error: ").to_owned());
+        let error = if code.is_none() { format!("it was killed by a signal: {error}") } else { error };
+        Ok(Ran { code, stdout, error })
+    }
+
+    fn wait(&self, command: &mut Command) -> Result<Option<i32>, Trouble> {
+        let mut process = command.spawn()?;
+        let started = Instant::now();
+        loop {
+            if let Some(status) = process.try_wait()? {
+                return Ok(status.code());
+            }
+            if started.elapsed() > self.limit {
+                process.kill()?;
+                process.wait()?;
+                return Err(Trouble::Late);
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+}
+
+fn text(file: &mut std::fs::File) -> std::io::Result<String> {
+    let mut bytes = Vec::new();
+    file.seek(SeekFrom::Start(0))?;
+    file.read_to_end(&mut bytes)?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+enum Trouble {
+    Missing(CommandError),
+    System(std::io::Error),
+    Late,
+}
+
+impl From<std::io::Error> for Trouble {
+    fn from(cause: std::io::Error) -> Self {
+        Self::System(cause)
+    }
+}

@@ -1,0 +1,131 @@
+//! The results: for people, as JSON, and as JUnit XML.
+//!
+//! Nothing in them depends on time or on the number of jobs. A file of results appears whole, at the end, or not at all.
+
+use crate::check::Outcome;
+use flotor_command::{CommandError, report_line, style, write_json};
+use serde::Serialize;
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::Path;
+
+/// The results of all cases, in the order of the cases.
+#[derive(Serialize)]
+pub(crate) struct Report {
+    pub(crate) passed: usize,
+    pub(crate) failed: usize,
+    pub(crate) cases: Vec<Outcome>,
+}
+
+impl Report {
+    pub(crate) fn new(cases: Vec<Outcome>) -> Self {
+        let passed = cases.iter().filter(|case| case.passed).count();
+        Self { passed, failed: cases.len() - passed, cases }
+    }
+
+    /// A line for each case, its failures below it, and a summary.
+    pub(crate) fn to_text(&self) -> String {
+        let mut lines = Vec::new();
+        for case in &self.cases {
+            let word = if case.passed { "ok    ".to_owned() } else { style::error("FAILED") };
+            lines.push(format!("{word}  {}", case.case));
+            lines.extend(case.failures.iter().map(|failure| format!("          {}", failure.line())));
+            lines.extend(case.repeat.iter().map(|command| format!("          $ {command}")));
+            lines.extend(case.picture.iter().map(|file| format!("          see {}", file.display())));
+        }
+        let count = self.cases.len();
+        lines.push(match self.failed {
+            0 => format!("{count} of {count} cases passed"),
+            failed => format!("{failed} of {count} cases failed"),
+        });
+        lines.join("\n")
+    }
+
+    /// JUnit XML: a suite, a case for each of ours.
+    pub(crate) fn to_junit(&self) -> String {
+        let (tests, failures) = (self.cases.len(), self.failed);
+        let mut text = format!(
+            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites tests=\"{tests}\" failures=\"{failures}\">\n  \
+             <testsuite name=\"flotor\" tests=\"{tests}\" failures=\"{failures}\" errors=\"0\" skipped=\"0\">\n"
+        );
+        for case in &self.cases {
+            let (suite, label) = case.case.split_once(": ").unwrap_or(("", &case.case));
+            // Writing to a string cannot fail.
+            let _ =
+                write!(text, "    <testcase classname=\"{}\" name=\"{}\"", escaped(suite), escaped(label));
+            let Some(first) = case.failures.first() else {
+                text.push_str("/>\n");
+                continue;
+            };
+            let details: Vec<String> = case.failures.iter().map(|failure| failure.line()).collect();
+            let repeat = case.repeat.iter().map(|command| format!("\n$ {command}")).collect::<String>();
+            let details = escaped(&(details.join("\n") + &repeat));
+            let message = escaped(&first.line());
+            let _ = writeln!(
+                text,
+                ">\n      <failure message=\"{message}\">{details}</failure>\n    </testcase>"
+            );
+        }
+        text + "  </testsuite>\n</testsuites>\n"
+    }
+}
+
+/// Text of an attribute or an element; a character that XML cannot hold becomes a question mark.
+fn escaped(text: &str) -> String {
+    let one = |c: char| match c {
+        '&' => "&amp;".to_owned(),
+        '<' => "&lt;".to_owned(),
+        '>' => "&gt;".to_owned(),
+        '"' => "&quot;".to_owned(),
+        '\n' => "&#10;".to_owned(),
+        c if c.is_control() || ('\u{fffe}'..='\u{ffff}').contains(&c) => "?".to_owned(),
+        c => c.to_string(),
+    };
+    text.chars().map(one).collect()
+}
+
+/// Removes the results of an earlier call: one that is killed must leave none.
+pub(crate) fn remove(path: &Path) -> Result<(), CommandError> {
+    match std::fs::remove_file(path) {
+        Err(cause) if cause.kind() != std::io::ErrorKind::NotFound => {
+            Err(CommandError::file(path, "cannot remove the earlier result", cause))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes a file that appears whole.
+pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), CommandError> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let written = tempfile::NamedTempFile::new_in(folder).and_then(|mut file| {
+        file.write_all(text.as_bytes())?;
+        file.as_file().sync_all()?;
+        // A scratch file is for its owner alone; a result is for those who may read the folder.
+        let mode = std::os::unix::fs::PermissionsExt::from_mode(0o644);
+        file.as_file().set_permissions(mode)?;
+        file.persist(path).map_err(|error| error.error)
+    });
+    written.map(drop).map_err(|cause| CommandError::file(path, "cannot write the result", cause))
+}
+
+/// Prints the results, and writes them where they are wanted.
+pub(crate) fn deliver(
+    report: &Report,
+    json: Option<&Path>,
+    junit: Option<&Path>,
+) -> Result<(), CommandError> {
+    let to_output = json.is_some_and(is_output);
+    let printed = if to_output { Ok(()) } else { report_line(format_args!("{}", report.to_text())) };
+    let json = json.map_or(Ok(()), |path| match serde_json::to_string_pretty(report) {
+        _ if is_output(path) => write_json(path, report),
+        Ok(text) => write_whole(path, &(text + "\n")),
+        Err(error) => Err(CommandError::Failed(error.to_string())),
+    });
+    let junit = junit.map_or(Ok(()), |path| write_whole(path, &report.to_junit()));
+    flotor_command::first_error([printed, json, junit])
+}
+
+/// Whether a path means standard output.
+pub(crate) fn is_output(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}

@@ -1,0 +1,283 @@
+//! `flotor test` as a user meets it: green for what is right, red with a cause and a command for what is not, and the same report
+//! whatever the number of jobs and parts.
+
+use flotor_tests::library::plugin_file;
+use flotor_tests::program::{Flotor, Ran, exit_code};
+use flotor_tests::scratch::Scratch;
+use flotor_tests::tools::{Tool, required};
+use flotor_tests::workspace_root;
+use quick_xml::Reader;
+use quick_xml::events::Event;
+use rustix::process::Signal;
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+fn test(folder: &Path, arguments: &[&str]) -> Ran {
+    Flotor::with(["test"].iter().chain(arguments)).inside(folder).run()
+}
+
+/// A folder with a scene of the model that fails on request, and what is expected of it.
+fn faulty(expectations: &str) -> Scratch {
+    let scratch = Scratch::default();
+    let model = plugin_file("fixture-faulty-model");
+    let scene = format!(
+        "duration_s = 0.2\n[device]\nplugin = \"simulated\"\n[[model]]\nplugin = {model:?}\nname = \"faulty\"\n"
+    );
+    let _ = scratch.file("scene.toml", scene);
+    let _ = scratch.file("faulty.test.toml", format!("scene = \"scene.toml\"\n{expectations}"));
+    scratch
+}
+
+const WITH_A_CRASH: &str = "[set]\nfaulty.fault = [\"none\", \"aborts\", \"nan\"]\nfaulty.at_tick = [50]\n\
+    device.hand_stiffness_n_per_m = [1900]\n[expect]\nlate_ticks = 0\n\"plugins.faulty.health\" = \"ok\"\n";
+
+fn json(ran: &Ran) -> Value {
+    serde_json::from_str(&ran.stdout).unwrap_or_else(|error| panic!("{error}: {ran:#?}"))
+}
+
+// ---------------------------------------------------------------- what is right
+
+#[test]
+fn the_scenes_of_the_repository_pass() {
+    let ran = test(&workspace_root(), &["host/scenes"]);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    assert!(ran.stdout.contains("ok      host/scenes/demo: validate\n"), "{}", ran.stdout);
+}
+
+/// Makes the generator's model in C, with changes of its source, and builds it as its author is told.
+fn made(scratch: &Scratch, changes: &[(&str, &str)]) -> PathBuf {
+    let ran = Flotor::with(["new", "model", "jelly", "--language", "c"]).inside(scratch.path()).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    assert!(ran.stdout.contains("flotor test jelly.test.toml"), "{}", ran.stdout);
+    let folder = scratch.path().join("jelly");
+    let mut source = std::fs::read_to_string(folder.join("plugin.c")).expect("it was made");
+    for (from, to) in changes {
+        assert!(source.contains(from), "the template has no {from}");
+        source = source.replace(from, to);
+    }
+    std::fs::write(folder.join("plugin.c"), source).expect("a scratch folder can be written to");
+    let told = ran.stdout.lines().map(str::trim).find(|line| line.starts_with("cc ")).expect("it says how");
+    let built = Command::new("sh").args(["-c", told]).current_dir(&folder).status().expect("sh starts");
+    assert!(built.success(), "{told}");
+    folder
+}
+
+#[test]
+fn the_model_of_the_generator_passes_and_has_a_workflow() {
+    if !required(Tool::Cc) {
+        return;
+    }
+    let scratch = Scratch::default();
+    let folder = made(&scratch, &[]);
+    let ran = test(&folder, &["jelly.test.toml", "--junit", "results.xml"]);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    assert_eq!(junit(&folder.join("results.xml")), (5, 0));
+    let workflow =
+        std::fs::read_to_string(folder.join(".github/workflows/haptics.yml")).expect("it was made");
+    assert!(workflow.contains("flotor test jelly.test.toml --junit results.xml"), "{workflow}");
+    assert!(!workflow.contains(scratch.path().to_str().expect("a plain name")), "no path of this machine");
+}
+
+// ---------------------------------------------------------------- what is not
+
+#[test]
+fn a_defect_of_the_model_is_found_with_its_cause_and_a_picture() {
+    if !required(Tool::Cc) {
+        return;
+    }
+    const FORCE: &str = "output->wrench.force_n[2] = model->stiffness_n_per_m * depth_m;";
+    for (name, from, to, case, says) in [
+        (
+            "sign",
+            FORCE,
+            "output->wrench.force_n[2] = -model->stiffness_n_per_m * depth_m;",
+            "curve",
+            "fz_n at z_m",
+        ),
+        ("default", ".default_ = 500.0", ".default_ = 505.0", "curve", "got 2.02"),
+        (
+            "allocation",
+            FORCE,
+            "void *volatile lost = malloc(64); free(lost); output->wrench.force_n[2] = model->stiffness_n_per_m * depth_m;",
+            "validate",
+            "rule no-system-calls",
+        ),
+        (
+            "nan",
+            FORCE,
+            "output->wrench.force_n[2] = depth_m > 0.001 && depth_m < 0.0015 ? NAN : model->stiffness_n_per_m * depth_m;",
+            "seed 1",
+            "answers were not finite",
+        ),
+    ] {
+        let scratch = Scratch::default();
+        let folder = made(&scratch, &[(from, to)]);
+        let ran = test(&folder, &["jelly.test.toml", "--filter", case, "--plots", "pictures"]);
+        assert_eq!(ran.code, Some(exit_code::OTHER), "{name}: {ran:#?}");
+        assert!(ran.stdout.contains(says), "{name}: {}", ran.stdout);
+        assert!(ran.stdout.contains(&format!("FAILED  jelly: {case}\n")), "{name}: {}", ran.stdout);
+        let pictures = std::fs::read_dir(folder.join("pictures")).expect("the folder was made").count();
+        assert_eq!(pictures, 1, "{name}");
+    }
+}
+
+#[test]
+fn a_plugin_that_crashes_fails_its_case_alone_and_the_command_repeats_it() {
+    let scratch = faulty(WITH_A_CRASH);
+    let ran = test(scratch.path(), &["--json", "-"]);
+    assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
+    let report = json(&ran);
+    assert_eq!((&report["passed"], &report["failed"]), (&Value::from(1), &Value::from(2)), "{report:#}");
+    let case = |fault: &str| {
+        let cases = report["cases"].as_array().expect("cases");
+        let named = |case: &&Value| case["case"].as_str().is_some_and(|name| name.contains(fault));
+        cases.iter().find(named).unwrap_or_else(|| panic!("{report:#}"))
+    };
+    assert_eq!(case("fault=none")["passed"], true);
+    // Neither the stiffness of the hand nor the tick matters: it crashes in the first one too.
+    let repeat = case("fault=aborts")["repeat"].as_str().expect("a command");
+    assert!(!repeat.contains("hand_stiffness"), "{repeat}");
+    assert!(repeat.ends_with("--set faulty.fault=aborts --duration 0.001s"), "{repeat}");
+    let words: Vec<&str> = repeat.split(' ').skip(1).collect();
+    let again = Flotor::with(&words).inside(scratch.path()).run();
+    assert_eq!(again.code, Some(exit_code::PLUGIN_REFUSED), "{repeat}: {again:#?}");
+}
+
+#[test]
+fn a_failing_run_is_shortened_to_the_first_tick_that_fails() {
+    let scratch = faulty("[expect]\n\"plugins.faulty.health\" = \"ok\"\nend = \"finished\"\n");
+    let text = std::fs::read_to_string(scratch.path().join("scene.toml")).expect("it was written");
+    let _ = scratch.file("scene.toml", text + "[model.parameters]\nfault = \"nan-once\"\nat_tick = 50\n");
+    let ran = test(scratch.path(), &[]);
+    assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
+    assert!(ran.stdout.contains("--duration 0.051s"), "{}", ran.stdout);
+}
+
+#[test]
+fn what_is_wrong_in_a_file_is_told_before_anything_runs() {
+    for (expectations, says) in [
+        ("[expect]\npeak_force = 1\n", "faulty.test.toml:3: a run has no number `peak_force`; did you mean"),
+        ("[expect]\npeak_force_n = \"big\"\n", "faulty.test.toml:3: `peak_force_n` is"),
+        ("[set]\nfaulty.falt = [1]\n[expect]\nend = \"finished\"\n", "did you mean `fault`?"),
+        ("[set]\nfaulty.fault = [\"none\", \"odd\"]\n[expect]\nend = \"finished\"\n", "faulty.test.toml: "),
+        ("[expct]\nend = \"finished\"\n", "faulty.test.toml:2: unknown key `expct`; did you mean `expect`?"),
+    ] {
+        let scratch = faulty(expectations);
+        let ran = test(scratch.path(), &["--junit", "results.xml"]);
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+        assert!(ran.error().contains(says), "{ran:#?}");
+        assert!(!scratch.path().join("results.xml").exists());
+    }
+    let ran = test(Scratch::default().path(), &[]);
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "no test is no success: {ran:#?}");
+    let ran = test(faulty(WITH_A_CRASH).path(), &["--filter", "nothing"]);
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+}
+
+#[test]
+fn a_reference_and_a_golden_recording_are_compared_within_a_tolerance() {
+    for (fault, code) in [("none", exit_code::OK), ("pumps", exit_code::OTHER)] {
+        let scratch = faulty(
+            "[expect]\nend = \"finished\"\n[golden]\nrecording = \"golden.mcap\"\nwithin_n = 1e-9\n\
+             [reference]\nset = { faulty.fault = \"none\" }\nwithin = { peak_force_n = 1e-6 }\n",
+        );
+        let record = ["run", "scene.toml", "--clock", "virtual", "--seed", "1", "--record", "golden.mcap"];
+        let fault = format!("faulty.fault={fault}");
+        let record = Flotor::with(record.into_iter().chain(["--set", &fault])).inside(scratch.path()).run();
+        assert_eq!(record.code, Some(exit_code::OK), "{record:#?}");
+        let text = std::fs::read_to_string(scratch.path().join("scene.toml")).expect("it was written");
+        let word = fault.rsplit('=').next().unwrap_or_default();
+        let _ = scratch.file("scene.toml", format!("{text}[model.parameters]\nfault = \"{word}\"\n"));
+        let ran = test(scratch.path(), &["--filter", "seed"]);
+        assert_eq!(ran.code, Some(code), "{ran:#?}");
+        assert!(code == 0 || ran.stdout.contains("peak_force_n against the reference"), "{}", ran.stdout);
+        let ran = test(scratch.path(), &["--filter", "golden"]);
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    }
+}
+
+// ---------------------------------------------------------------- reports
+
+/// Numbers of cases and of failures, by a parser of XML that knows nothing of us.
+fn junit(file: &Path) -> (usize, usize) {
+    let text = std::fs::read_to_string(file).expect("the results were written");
+    let mut reader = Reader::from_str(&text);
+    let (mut cases, mut failures) = (0, 0);
+    loop {
+        match reader.read_event().unwrap_or_else(|error| panic!("{error}: {text}")) {
+            Event::Start(element) | Event::Empty(element) => {
+                for attribute in element.attributes() {
+                    assert!(!attribute.unwrap_or_else(|error| panic!("{error}: {text}")).value.is_empty());
+                }
+                cases += usize::from(element.name().as_ref() == b"testcase");
+                failures += usize::from(element.name().as_ref() == b"failure");
+            }
+            Event::Eof => return (cases, failures),
+            _ => {}
+        }
+    }
+}
+
+#[test]
+fn the_number_of_jobs_changes_nothing() {
+    let scratch = faulty(WITH_A_CRASH);
+    let report = |jobs: &str| {
+        let ran = test(scratch.path(), &["--jobs", jobs, "--json", "-", "--junit", "results.xml"]);
+        let xml = scratch.path().join("results.xml");
+        assert_eq!(junit(&xml), (3, 2));
+        (ran.stdout, std::fs::read(xml).expect("it was written"))
+    };
+    assert_eq!(report("1"), report("4"));
+}
+
+#[test]
+fn the_parts_add_up_to_the_whole() {
+    let scratch = faulty(&format!("seeds = [1, 2, 3, 4, 5]\n{WITH_A_CRASH}"));
+    let listed = |arguments: &[&str]| {
+        let ran = test(scratch.path(), &[&["--list"], arguments].concat());
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+        ran.stdout.lines().map(str::to_owned).collect::<Vec<_>>()
+    };
+    let whole = listed(&[]);
+    assert_eq!(whole.len(), 15);
+    let parts: Vec<String> =
+        ["1/3", "2/3", "3/3"].iter().flat_map(|part| listed(&["--shard", part])).collect();
+    assert_eq!(parts.len(), whole.len());
+    assert_eq!(parts.into_iter().collect::<BTreeSet<_>>(), whole.into_iter().collect());
+}
+
+#[test]
+fn a_killed_test_leaves_no_report_not_even_an_old_one() {
+    let scratch = faulty("duration = \"1000s\"\n[expect]\nend = \"finished\"\n");
+    let results = scratch.file("results.xml", "<testsuites/>");
+    let running =
+        Flotor::with(["test", "--junit", "results.xml", "--jobs", "1"]).inside(scratch.path()).start();
+    while results.exists() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    running.signal(Signal::KILL);
+    assert_eq!(running.wait().code, None);
+    assert!(!results.exists());
+}
+
+#[test]
+fn blessing_changes_the_numbers_and_writes_digests_only_where_asked() {
+    let scratch = faulty("[expect]\npeak_force_n = { value = 100.0, within = 0.001 } # of the hand\n");
+    let text = || std::fs::read_to_string(scratch.path().join("faulty.test.toml")).expect("it is there");
+    let ran = test(scratch.path(), &["--bless"]);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    assert!(ran.stdout.contains("faulty.test.toml:3: peak_force_n: 100 becomes "), "{}", ran.stdout);
+    assert!(!text().contains("value = 100.0") && text().contains("# of the hand"), "{}", text());
+    assert!(!text().contains("digests"), "{}", text());
+    let ran = test(scratch.path(), &["--bless", "--digest"]);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    assert!(text().contains("[digests]\n\"seed 1\" = \"xxh3:"), "{}", text());
+    assert_eq!(test(scratch.path(), &[]).code, Some(exit_code::OK));
+    let _ = scratch.file("faulty.test.toml", text().replace("xxh3:", "xxh3:0"));
+    let ran = test(scratch.path(), &[]);
+    assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
+    assert!(ran.stdout.contains("trace_digest: expected xxh3:0"), "{}", ran.stdout);
+}
