@@ -39,8 +39,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let standby = Standby::new(vec![device], forces, parameters, swaps, config, run);
 
     let stoppers = standby.stoppers();
-    let servo =
-        standby.activate(vec!["device".to_owned(), "wall".to_owned()]).map_err(|(_, refusal)| refusal)?;
+    let names = vec!["device".to_owned(), "wall".to_owned()];
+    let servo = standby.activate(names, |_| ()).map_err(|(_, refusal)| refusal)?;
     let mut looped = Loop::new(servo, Schedule::start_virtual(config.period_ns), 1_000_000_000);
     let mut peak_n = 0.0_f64;
     while looped.end().is_none() {

@@ -19,6 +19,15 @@ pub(super) enum Allowed {
     Nothing,
 }
 
+/// Whether there was an answer at the end of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Answer {
+    /// There was.
+    There,
+    /// A process that was waited for, or is still at an earlier step, had none.
+    Missing,
+}
+
 /// The time one model may take, and how it keeps to it.
 #[derive(Clone, Debug, Default)]
 pub struct TimeBudget {
@@ -67,9 +76,11 @@ impl TimeBudget {
 
     /// Books a step that began at [`Self::begin`]; true if it took too long. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn end(&mut self, begun_ns: u64, tick: u64, now_ns: u64) -> bool {
+    pub(super) fn end(&mut self, begun_ns: u64, answer: Answer, tick: u64, now_ns: u64) -> bool {
         let Some(limit_ns) = self.limit_ns else { return false };
-        self.book(monotonic_ns() - begun_ns, limit_ns, tick, now_ns)
+        let took_ns = monotonic_ns() - begun_ns;
+        let least_ns = if answer == Answer::Missing { limit_ns.saturating_add(1) } else { 0 };
+        self.book(took_ns.max(least_ns), limit_ns, tick, now_ns)
     }
 
     fn book(&mut self, took_ns: u64, limit_ns: u64, tick: u64, now_ns: u64) -> bool {
@@ -93,54 +104,4 @@ impl TimeBudget {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const LIMIT_NS: u64 = 500;
-
-    fn booked(steps_ns: &[u64]) -> TimeBudget {
-        let mut budget = TimeBudget::new(Some(LIMIT_NS));
-        for (tick, took_ns) in (0..).zip(steps_ns) {
-            budget.book(*took_ns, LIMIT_NS, tick, tick * 1_000_000);
-        }
-        budget
-    }
-
-    #[test]
-    fn five_overruns_in_a_row_are_too_many_and_four_are_not() {
-        assert_eq!(booked(&[501; 4]).overrun(), None);
-        let overrun = Overrun { tick: 4, longest_ns: 900, limit_ns: LIMIT_NS };
-        assert_eq!(booked(&[501, 501, 900, 501, 501]).overrun(), Some(overrun));
-    }
-
-    #[test]
-    fn a_step_in_time_makes_up_for_one_that_was_not() {
-        let one_in_two: Vec<u64> = (0..1000).map(|tick| 500 + tick % 2).collect();
-        assert_eq!(booked(&one_in_two).overrun(), None);
-        // Two in three gain one in three ticks.
-        let two_in_three: Vec<u64> = (0..1000).map(|tick| 500 + u64::from(tick % 3 > 0)).collect();
-        assert_eq!(booked(&two_in_three).overrun().map(|overrun| overrun.tick), Some(11));
-    }
-
-    #[test]
-    fn who_is_slow_in_four_ticks_of_five_is_out_soon() {
-        let steps: Vec<u64> = (0..100).map(|tick| if tick % 5 == 4 { 10 } else { 3_000_000 }).collect();
-        assert_eq!(booked(&steps).overrun().map(|overrun| overrun.tick), Some(6));
-    }
-
-    #[test]
-    fn who_is_out_fades_and_is_not_asked() {
-        let budget = booked(&[501; 5]); // out at 4 ms
-        assert_eq!(budget.allowed(4_000_000), Allowed::Fading(1.0));
-        assert_eq!(budget.allowed(29_000_000), Allowed::Fading(0.5));
-        assert_eq!(budget.allowed(54_000_000), Allowed::Nothing);
-    }
-
-    #[test]
-    fn without_a_limit_nobody_looks_at_the_clock() {
-        let mut budget = TimeBudget::new(None);
-        assert_eq!(budget.begin(), None);
-        assert!((0..100).all(|tick| !budget.end(0, tick, tick)));
-        assert_eq!(budget.allowed(u64::MAX), Allowed::Asked);
-    }
-}
+mod tests;

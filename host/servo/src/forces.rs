@@ -5,7 +5,7 @@
 use super::Heartbeat;
 use super::models::{Layer, LayerReport, ModelHealth, ModelStack, Replacement};
 use crate::coupling::{
-    Coupling, CouplingDescription, CouplingEnds, Grip, Hearing, Line, Patience, Pull, RemoteEnd, Tank,
+    Coupling, CouplingDescription, CouplingEnds, Grip, Hearing, Line, Patience, Pull, Reach, RemoteEnd, Tank,
     TankState,
 };
 use flotor_core::trace::Events;
@@ -90,8 +90,13 @@ pub enum Coupled {
 }
 
 impl Coupled {
-    /// With the line for the peer state, if one end is on another host. Not real-time.
-    pub fn new(description: &CouplingDescription, period_s: f64, patience: Patience) -> (Self, Option<Line>) {
+    /// With the line for the peer state, if one end is on another host; `reach` is that of the device here. Not real-time.
+    pub fn new(
+        description: &CouplingDescription,
+        period_s: f64,
+        patience: Patience,
+        reach: Reach,
+    ) -> (Self, Option<Line>) {
         let CouplingDescription { config, ends, .. } = description;
         match ends {
             CouplingEnds::Here(ends) => {
@@ -100,7 +105,7 @@ impl Coupled {
                 (Self::Here { coupling, devices, pulls: [Pull::default(); 2] }, None)
             }
             CouplingEnds::Remote(here) => {
-                let (end, line) = RemoteEnd::new(config, here, period_s, patience);
+                let (end, line) = RemoteEnd::new(config, here, period_s, patience, reach);
                 let device = usize::from(here.device);
                 (Self::Remote { end: Box::new(end), device, pull: Pull::default() }, Some(line))
             }
@@ -143,6 +148,9 @@ impl Coupled {
                 }
                 if end.is_implausible() {
                     port.events.insert(Events::IMPLAUSIBLE_SAMPLE);
+                }
+                if end.is_cut() {
+                    port.events.insert(Events::PARTNER_LIMITED);
                 }
             }
         }
@@ -260,9 +268,15 @@ impl Forces {
         self.stacks.iter().any(ModelStack::is_fading)
     }
 
-    /// What is known of every layer that is in place or fading out. Not real-time.
-    pub fn reports(&mut self) -> Vec<LayerReport> {
-        self.stacks.iter_mut().flat_map(ModelStack::reports).collect()
+    /// What is known of every layer that is in place or fading out; `asks` hears of the model that is asked next what it
+    /// said last. Not real-time.
+    pub fn reports(&mut self, asks: impl Fn(usize)) -> Vec<LayerReport> {
+        self.stacks.iter_mut().flat_map(|stack| stack.reports(&asks)).collect()
+    }
+
+    /// All layers, each with the number of its model. Not real-time.
+    pub fn into_layers(self) -> impl Iterator<Item = (usize, Box<Layer>)> {
+        self.stacks.into_iter().flat_map(ModelStack::into_layers)
     }
 
     /// Of every model, health and last words of the layer in place, in the scene's order. Not real-time.

@@ -72,6 +72,13 @@ impl LoopSwaps {
         }
     }
 
+    /// What was not put in, each with the number of its model. Not real-time.
+    pub fn into_layers(mut self) -> Vec<(usize, Box<Layer>)> {
+        let scheduled = self.schedule.into_iter().filter_map(|(_, replacement)| replacement);
+        let arriving = std::iter::from_fn(|| self.arriving.pop().ok());
+        scheduled.chain(arriving).map(|replacement| (replacement.model as usize, replacement.layer)).collect()
+    }
+
     /// The next replacement whose time has come.
     #[inline]
     fn due(&mut self, tick: &Tick) -> Option<Replacement> {

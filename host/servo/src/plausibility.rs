@@ -20,7 +20,7 @@ const RANGES: f64 = 2.0;
 const ROOM_M: f64 = 10.0;
 /// Fastest that a handle goes from one sample to the next: a throw leaves the hand at ten times the fastest reach (0.5
 /// m/s is fast within a workspace of centimetres), a wrist turns at 30 rad/s.
-pub(crate) const SPEED_M_PER_S: f64 = 5.0;
+const SPEED_M_PER_S: f64 = 5.0;
 const SPIN_RAD_PER_S: f64 = 50.0;
 /// Fastest change of that: 500 times that of a fall. Of a handle in a hand, a tap on a wall has a tenth of it.
 const ACCELERATION_M_PER_S2: f64 = 5.0e3;
@@ -131,7 +131,7 @@ impl std::fmt::Display for ImplausibleSamples {
         let total: u64 = self.counts.iter().sum();
         let found = Implausible::ALL.into_iter().zip(self.counts).filter(|(_, count)| *count > 0);
         let plural = if total == 1 { "" } else { "s" };
-        write!(f, "{total} sample{plural} cannot be (")?;
+        write!(f, "{total} implausible sample{plural} (")?;
         for (place, (why, count)) in found.enumerate() {
             let comma = if place == 0 { "" } else { ", " };
             write!(f, "{comma}{} {count}", why.word())?;
@@ -157,8 +157,8 @@ struct Believed {
     pose: Pose,
     time_ns: u64,
     sampled_ns: u64,
-    /// From the one before, m/s, over this time, s; at rest before there were two.
-    velocity: DVec3,
+    /// Way from the one before, m, and its time, s; zero before there were two.
+    way: DVec3,
     over_s: f64,
 }
 
@@ -254,18 +254,24 @@ impl PlausibilityCheck {
 
     #[inline]
     fn look(&mut self, tick: &Tick, sample: &DeviceState) -> Result<(), Implausible> {
-        if !sample.is_finite() {
-            return Err(Implausible::NotFinite);
-        }
         if !self.has_pose {
-            return Ok(());
+            return if sample.is_finite() { Ok(()) } else { Err(Implausible::NotFinite) };
         }
+        // Each bound is put so that a number which is not finite is outside of it.
+        let looked = self.within_bounds(tick, sample).and_then(|()| self.after_last(tick, sample));
+        looked.map_err(|why| if sample.is_finite() { why } else { Implausible::NotFinite })
+    }
+
+    /// That a handle can be there and that fast, at this time.
+    #[inline]
+    fn within_bounds(&self, tick: &Tick, sample: &DeviceState) -> Result<(), Implausible> {
         let DeviceState { pose, twist, sampled_ns, .. } = sample;
         if !is_rotation(pose.orientation()) {
             return Err(Implausible::Quaternion);
         }
         let (out, turned) = (pose.position() * self.per_reach, pose.orientation().xyz() * self.per_turn);
-        if out.length_squared() > 1.0 || turned.length_squared() > 1.0 {
+        let is_in_range = out.length_squared() <= 1.0 && turned.length_squared() <= 1.0;
+        if !is_in_range {
             return Err(Implausible::Range);
         }
         if is_too_fast(twist) {
@@ -276,18 +282,19 @@ impl PlausibilityCheck {
         {
             return Err(Implausible::Time);
         }
-        let mut believed = Believed {
-            pose: *pose,
-            time_ns: tick.time_ns,
-            sampled_ns: *sampled_ns,
-            velocity: DVec3::ZERO,
-            over_s: 0.0,
-        };
+        Ok(())
+    }
+
+    /// That a handle can have come there from the last sample; this one is the last from now on.
+    #[inline]
+    fn after_last(&mut self, tick: &Tick, sample: &DeviceState) -> Result<(), Implausible> {
+        let DeviceState { pose, sampled_ns, .. } = *sample;
+        let mut believed =
+            Believed { pose, time_ns: tick.time_ns, sampled_ns, way: DVec3::ZERO, over_s: 0.0 };
         if let Some(last) = self.last {
             self.follow(&last, sample)?;
             let over_s = tick.time_ns.saturating_sub(last.time_ns) as f64 * 1.0e-9;
-            believed.velocity = self.moved(&last, pose, over_s)?;
-            believed.over_s = over_s;
+            (believed.way, believed.over_s) = self.moved(&last, &pose, over_s)?;
         }
         self.last = Some(believed);
         Ok(())
@@ -313,27 +320,32 @@ impl PlausibilityCheck {
         Ok(())
     }
 
-    /// That a handle can have moved so far in this time, s; its mean velocity, m/s.
+    /// That a handle can have moved so far in this time, s; its way, m, and the time it had for it, s.
     #[inline]
-    fn moved(&self, last: &Believed, pose: &Pose, over_s: f64) -> Result<DVec3, Implausible> {
+    fn moved(&self, last: &Believed, pose: &Pose, over_s: f64) -> Result<(DVec3, f64), Implausible> {
         let way = pose.position() - last.pose.position();
-        let turn = (pose.orientation() * last.pose.orientation().conjugate()).xyz() * 2.0;
+        // Of two quaternions of one rotation the nearer: twice their distance is the angle between, as far as it is small.
+        let (now, before) = (pose.orientation(), last.pose.orientation());
+        let nearer = if now.dot(before) < 0.0 { -now } else { now };
+        let turn = (nearer - before) * 2.0;
         let most_m = SPEED_M_PER_S * over_s + self.slack_m;
         let most_rad = SPIN_RAD_PER_S * over_s + SLACK_RAD;
         if way.length_squared() > most_m * most_m || turn.length_squared() > most_rad * most_rad {
             return Err(Implausible::Speed);
         }
         if over_s <= 0.0 {
-            return Ok(last.velocity); // a first tick twice: no loop of ours
+            return Ok((last.way, last.over_s)); // a first tick twice: no loop of ours
         }
-        // Means over two intervals lie half of both apart.
-        let apart_s = 0.5 * (over_s + last.over_s);
-        let slack = if last.over_s > 0.0 { 1.0 + over_s / last.over_s } else { 1.0 };
-        let most_m = ACCELERATION_M_PER_S2 * apart_s * over_s + self.slack_m * slack;
-        if (way - last.velocity * over_s).length_squared() > most_m * most_m && last.over_s > 0.0 {
-            return Err(Implausible::Acceleration);
+        if last.over_s > 0.0 {
+            // Mean velocities over two intervals lie half of both apart in time; their change times the later interval is a way.
+            let ratio = over_s / last.over_s;
+            let most_m =
+                ACCELERATION_M_PER_S2 * 0.5 * (over_s + last.over_s) * over_s + self.slack_m * (1.0 + ratio);
+            if (way - last.way * ratio).length_squared() > most_m * most_m {
+                return Err(Implausible::Acceleration);
+            }
         }
-        Ok(way / over_s)
+        Ok((way, over_s))
     }
 }
 
@@ -349,13 +361,14 @@ pub(crate) fn is_rotation(quaternion: DQuat) -> bool {
     (quaternion.length_squared() - 1.0).abs() <= 2.0 * LENGTH_TOLERANCE // false for NaN
 }
 
-/// True if no handle moves like that. Real-time: bounded, no allocation.
+/// True if no handle moves like that, or a number is NaN. Real-time: bounded, no allocation.
 #[inline]
 pub(crate) fn is_too_fast(twist: &Twist) -> bool {
     let per_speed = TWIST_OVERSHOOT * SPEED_M_PER_S;
     let per_spin = TWIST_OVERSHOOT * SPIN_RAD_PER_S;
-    twist.linear().length_squared() > per_speed * per_speed
-        || twist.angular().length_squared() > per_spin * per_spin
+    let is_possible = twist.linear().length_squared() <= per_speed * per_speed
+        && twist.angular().length_squared() <= per_spin * per_spin;
+    !is_possible
 }
 
 #[cfg(test)]

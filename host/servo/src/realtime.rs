@@ -1,11 +1,12 @@
 //! Asks the system for a quiet place for the loop, and says aloud what it refused.
 
+use crate::guest::is_guest;
 use rustix::mm::{MlockAllFlags, mlockall};
 use rustix::thread::{CpuSet, sched_setaffinity};
 use thread_priority::unix::{
     RealtimeThreadSchedulePolicy, ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
 };
-use thread_priority::{ThreadPriority, ThreadPriorityValue};
+use thread_priority::{Error, ThreadPriority, ThreadPriorityValue};
 
 /// Priority of the loop: below the kernel's own threads (99), above everything ordinary.
 const LOOP_PRIORITY: u8 = 80;
@@ -88,7 +89,7 @@ impl RealTimeReport {
         }
         if let Privilege::Refused(reason) = &self.core {
             lines.push(format!(
-                "{reason}; the loop runs on any core. Name one that this process may use: `grep Cpus_allowed_list \
+                "{reason}; the loop is not pinned to a core. Name one that this process may use: `grep Cpus_allowed_list \
                  /proc/self/status` lists them"
             ));
         }
@@ -99,7 +100,11 @@ impl RealTimeReport {
 /// Asks for real-time priority for the calling thread, and for a core if one is named, and locks the process's memory. Not
 /// real-time.
 pub fn enter_real_time(core: Option<Core>) -> RealTimeReport {
-    let memory_lock = Privilege::of(mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE));
+    // The memory of another program is its own: locked, its next allocation might fail.
+    let memory_lock = match is_guest() {
+        true => Privilege::NotAsked,
+        false => Privilege::of(mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE)),
+    };
     let core = core.map_or(Privilege::NotAsked, |core| Privilege::of(pin(core)));
     RealTimeReport { fifo: enter_priority(LOOP_PRIORITY), memory_lock, core }
 }
@@ -130,7 +135,10 @@ pub(super) fn enter_priority(priority: u8) -> Privilege {
     let granted =
         ThreadPriorityValue::try_from(priority).map_err(|error| error.to_string()).and_then(|value| {
             set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Crossplatform(value), policy)
-                .map_err(|error| error.to_string())
+                .map_err(|error| match error {
+                    Error::OS(code) => std::io::Error::from_raw_os_error(code).to_string(),
+                    other => other.to_string(),
+                })
         });
     Privilege::of(granted)
 }
@@ -171,7 +179,7 @@ mod tests {
         let refused = std::thread::spawn(move || Privilege::of(pin(core))).join().expect("it does not panic");
         let report = RealTimeReport { core: refused, ..RealTimeReport::not_asked() };
         let told = format!(
-            "--core {core}: there is no such core, or this process may not use it; the loop runs on any"
+            "--core {core}: there is no such core, or this process may not use it; the loop is not pinned to a"
         );
         assert!(report.advice().concat().starts_with(&told), "{report:?}");
         assert_eq!(Core::new(CpuSet::MAX_CPU), None);

@@ -19,15 +19,19 @@ pub enum RunEnd {
     EmergencyStop(EmergencySource),
     /// The device sets the pace, and it is a faster one than the scene says: this many samples a second.
     TooFast(u32),
+    /// The scene asks the device to set the pace, and with its settings it sets none.
+    NotPaced,
     /// A tick took so long that the watchdog stopped the device; then it came back.
     Watchdog(Stuck),
+    /// The watchdog process was gone, without which the scene does not run: it ended in order.
+    Unguarded,
 }
 
 impl RunEnd {
     /// What it means that a device does not set the pace it should.
     fn without_pace(lost: PaceLost) -> Self {
         match lost {
-            PaceLost::NotPaced => Self::DeviceFault(Fault::Broken),
+            PaceLost::NotPaced => Self::NotPaced,
             PaceLost::TooFast { samples, elapsed_ns } => {
                 let per_s = samples.saturating_mul(1_000_000_000) / elapsed_ns.max(1);
                 Self::TooFast(u32::try_from(per_s).unwrap_or(u32::MAX))

@@ -14,9 +14,9 @@ use crate::{
     Reported, RunEvent, RunState, Stage, Station, StopSwitch, Timing, Unwound, WEIGHT,
 };
 use flotor_core::trace::{Events, TickRecord};
-use flotor_hal::Tick;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::ActiveDevice;
+use flotor_hal::{Tick, Wrench};
 
 /// What the run itself is told, beside device, models and envelope.
 #[derive(Clone, Copy, Debug)]
@@ -74,6 +74,11 @@ impl Servo {
             timing: Timing::default(),
             stage_timer: StageTimer::new(),
         }
+    }
+
+    /// This thread loops from now on, not the one that energised the devices. Not real-time.
+    pub fn follow_here(&self) {
+        self._last_stop.iter().for_each(LastStop::follow_here);
     }
 
     /// The same, stopped if the process dies. Not real-time.
@@ -221,8 +226,15 @@ impl Servo {
         let Self { stations, ports, heart, run, config, .. } = self;
         for (device, (station, port)) in (0..).zip(stations.iter_mut().zip(ports)) {
             heart.enter(tick.index, Place::DeviceWrite(device));
+            if heart.is_silenced() {
+                port.commanded = Wrench::ZERO; // by the stop
+                continue;
+            }
             if let Some(failed) = station.write(tick, port) {
                 *run = run.after(failed, tick.time_ns, config.ramp_ns);
+            }
+            if station.device.has_changed_floats() {
+                port.events.insert(Events::FLOAT_ENVIRONMENT);
             }
         }
     }
@@ -272,10 +284,19 @@ impl Servo {
         }
     }
 
-    /// Ends the loop: the devices are deactivated, what was measured remains. Not real-time.
-    pub fn into_timing(self) -> Timing {
-        drop(self.stations);
-        self.timing
+    /// Ends the loop: what it was made of, and what was measured. No code of a plugin runs. Not real-time.
+    pub fn dismantle(self) -> Dismantled {
+        let device = |station: Station| {
+            let reported = station.reported();
+            (station.device, reported)
+        };
+        Dismantled {
+            devices: self.stations.into_iter().map(device).collect(),
+            last_stop: self._last_stop,
+            forces: self.forces,
+            swaps: self.swaps,
+            timing: self.timing,
+        }
     }
 
     /// Where the run stands after the last tick.
@@ -300,6 +321,20 @@ impl Servo {
     pub fn forces(&mut self) -> &mut Forces {
         &mut self.forces
     }
+}
+
+/// What is left of a servo. Dropping it runs code of its plugins.
+pub struct Dismantled {
+    /// The devices, in order, still energised, each with what the run knows of it.
+    pub devices: Vec<(ActiveDevice, Reported)>,
+    /// Stops the devices if the process dies of what closes them and frees the models.
+    pub last_stop: Option<LastStop>,
+    /// All that asked for a wrench.
+    pub forces: Forces,
+    /// Models that were on their way in.
+    pub swaps: LoopSwaps,
+    /// What was measured.
+    pub timing: Timing,
 }
 
 /// Which of two devices' samples decides: the higher.

@@ -3,7 +3,7 @@
 use crate::{Envelope, Forces, Heartbeat, LastStop, LoopSwaps, ParameterQueue, RunConfig, Servo, Station};
 use flotor_core::limits::Bound;
 use flotor_hal::abi::loader::{OpenedDevice, Stopper};
-use flotor_hal::{Capabilities, DVec3, LoopConfig, Refusal};
+use flotor_hal::{Capabilities, LoopConfig, Refusal};
 
 /// A device that is opened, not energised, and what guards it.
 pub struct Guarded {
@@ -45,11 +45,16 @@ impl Standby {
         self.heart.clone()
     }
 
-    /// The most that may reach a hand at any device: force along each axis (N), torque about each (N·m).
-    pub fn most(&self) -> [DVec3; 2] {
-        let axes = |bound: Bound| DVec3::from_array(bound.axes());
-        let most = self.devices.iter().map(|guarded| guarded.envelope.most().map(axes));
-        most.fold([DVec3::ZERO; 2], |[force_n, torque_nm], [f, t]| [force_n.max(f), torque_nm.max(t)])
+    /// The most that may reach a hand at any device: force (N), torque (N·m), each with the longest there is as its norm.
+    pub fn most(&self) -> [Bound; 2] {
+        let most = self.devices.iter().map(|guarded| guarded.envelope.most());
+        let larger = |a: Bound, b: Bound| {
+            let axes = std::array::from_fn(|axis| a.axes()[axis].max(b.axes()[axis]));
+            Bound::box_of(axes).and(Bound::ball(a.longest().max(b.longest())))
+        };
+        most.fold([Bound::ball(0.0); 2], |[force_n, torque_nm], [f, t]| {
+            [larger(force_n, f), larger(torque_nm, t)]
+        })
     }
 
     /// Puts other envelopes before the devices, in order; a device without another keeps its own. Not real-time.
@@ -65,16 +70,18 @@ impl Standby {
     }
 
     /// Energises the devices, in order, on the thread that will loop. `names` are those of the devices, then of the models,
-    /// for whom it may concern if the process dies. Not real-time; may block.
+    /// for whom it may concern if the process dies; `enters` hears of the number of each device before. Not real-time; may
+    /// block.
     ///
     /// # Errors
     /// The number of the device that says no, and why; then none stays energised.
-    pub fn activate(self, names: Vec<String>) -> Result<Servo, (usize, Refusal)> {
+    pub fn activate(self, names: Vec<String>, enters: impl Fn(usize)) -> Result<Servo, (usize, Refusal)> {
         let stoppers = self.stoppers();
         let last_stop = LastStop::arm(stoppers.clone(), names, self.heart());
         let Self { devices, forces, parameters, swaps, config, run, heart } = self;
         let station = |(number, guarded): (usize, Guarded)| {
             let Guarded { mut device, capabilities, envelope } = guarded;
+            enters(number);
             // The loader refuses what is not what was told when the envelope was made.
             device.capabilities().map_err(|refusal| (number, refusal))?;
             let device = device.activate(&config).map_err(|(_, refusal)| (number, refusal))?;

@@ -13,6 +13,7 @@ pub struct StopSwitch {
     by_key: Arc<AtomicBool>,
     by_signal: Arc<AtomicBool>,
     by_watcher: Arc<AtomicBool>,
+    by_latch: Arc<AtomicBool>,
 }
 
 impl StopSwitch {
@@ -29,6 +30,11 @@ impl StopSwitch {
     /// The emergency stop of a program that watches the run. Real-time: bounded, no allocation.
     pub fn emergency_by_watcher(&self) {
         self.by_watcher.store(true, Ordering::Relaxed);
+    }
+
+    /// The emergency stop of this machine, pressed elsewhere. Real-time: bounded, no allocation.
+    pub fn emergency_by_latch(&self) {
+        self.by_latch.store(true, Ordering::Relaxed);
     }
 
     /// True if an orderly end is asked for. Real-time: bounded, no allocation.
@@ -48,7 +54,10 @@ impl StopSwitch {
         if self.by_watcher.load(Ordering::Relaxed) {
             return Some(EmergencySource::Watcher);
         }
-        self.by_signal.load(Ordering::Relaxed).then_some(EmergencySource::Signal)
+        if self.by_signal.load(Ordering::Relaxed) {
+            return Some(EmergencySource::Signal);
+        }
+        self.by_latch.load(Ordering::Relaxed).then_some(EmergencySource::Latch)
     }
 
     /// The flag a signal handler sets for an orderly end.

@@ -5,13 +5,13 @@
 //! does not come back; the devices are then stopped from here, without the loop's help.
 
 use super::clock::{monotonic_ns, sleep_until};
-use super::last_stop::{SignalGuard, TakenSignals, end_dying, is_dying};
+use super::last_stop::{SignalGuard, TakenSignals, end_dying, is_dying, take_sent};
 use super::realtime::{WATCHDOG_PRIORITY, enter_priority};
 use super::stop::StopSwitch;
 use flotor_core::MOST_DEVICES;
 use flotor_hal::abi::loader::Stopper;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering, fence};
 use std::thread::JoinHandle;
 
 /// Whose code the loop is running.
@@ -99,6 +99,8 @@ struct Shared {
     bitten: AtomicU64,
     /// Signals of the host that were taken away while the loop ran, one bit each.
     taken: AtomicU64,
+    /// Another thread stops the devices: the loop commands nothing any more.
+    silenced: AtomicBool,
 }
 
 /// Bits of a beat that tell the place.
@@ -109,7 +111,7 @@ impl Heartbeat {
     /// Notes whose code runs next. Real-time: bounded, no allocation.
     #[inline]
     pub fn enter(&self, tick: u64, place: Place) {
-        self.shared.beat.store(tick << PLACE_BITS | place.code() & PLACE_MASK, Ordering::Relaxed);
+        self.shared.beat.store(tick << PLACE_BITS | place.code() & PLACE_MASK, Ordering::Release);
     }
 
     /// Where the loop was when the watchdog stopped the device, if it has. Real-time: bounded, no allocation.
@@ -124,6 +126,26 @@ impl Heartbeat {
     /// Tells the watchdog that the loop is over.
     pub fn finish(&self) {
         self.shared.done.store(true, Ordering::Release);
+    }
+
+    /// Whoever stops the devices from another thread calls this before: the loop commands nothing from now on, so that no force comes
+    /// after a stop. Waits for a command that is under way, but not for one that hangs. Safe in a signal handler.
+    pub(crate) fn silence(&self) {
+        self.shared.silenced.store(true, Ordering::Relaxed);
+        // The loop notes that it commands, then looks; here it is the other way round: one of both sees the other.
+        fence(Ordering::SeqCst);
+        let (beat, until_ns) = (self.beat(), monotonic_ns() + LONGEST_COMMAND_NS);
+        let commands = matches!(Stuck::at(beat).place, Place::DeviceWrite(_));
+        while commands && self.beat() == beat && monotonic_ns() < until_ns {
+            sleep_until(monotonic_ns() + COMMAND_LOOK_NS);
+        }
+    }
+
+    /// Whether the loop, which has just noted that it commands, may not do so. Real-time: bounded, no allocation.
+    #[inline]
+    pub(crate) fn is_silenced(&self) -> bool {
+        fence(Ordering::SeqCst);
+        self.shared.silenced.load(Ordering::Relaxed)
     }
 
     /// Where the loop is. Real-time: bounded, no allocation.
@@ -142,7 +164,7 @@ impl Heartbeat {
     }
 
     fn beat(&self) -> u64 {
-        self.shared.beat.load(Ordering::Relaxed)
+        self.shared.beat.load(Ordering::Acquire)
     }
 
     fn bite(&self, beat: u64) {
@@ -169,6 +191,9 @@ impl Stuck {
 const LOOKS: u64 = 8;
 /// Longest time between two looks, ns: an emergency stop is passed on within it even if the loop is stuck.
 const LONGEST_LOOK_NS: u64 = 1_000_000;
+/// Longest time a command to a device that does not hang takes, and the time between two looks at it, ns.
+const LONGEST_COMMAND_NS: u64 = 1_000_000;
+const COMMAND_LOOK_NS: u64 = 20_000;
 /// Looks for which a process may be dying: half a second.
 const DYING_LOOKS: u32 = 500;
 /// Looks between two at whether the signals are still the host's: a tenth of a second.
@@ -189,6 +214,7 @@ pub fn start(
     thread.spawn(move || {
         // Above the loop, which may be what hogs the core. Without the right to it, best effort.
         let _ = enter_priority(WATCHDOG_PRIORITY);
+        take_sent();
         let look_ns = (limit_ns / LOOKS).min(LONGEST_LOOK_NS);
         let mut last = heart.beat();
         let mut changed_ns = monotonic_ns();
@@ -212,12 +238,14 @@ pub fn start(
             }
             let (beat, now_ns) = (heart.beat(), monotonic_ns());
             if stop.emergency().is_some() && !stopped {
+                heart.silence();
                 stoppers.iter().for_each(Stopper::safe_stop);
                 stopped = true;
             }
             if beat != last {
                 (last, changed_ns) = (beat, now_ns);
             } else if now_ns - changed_ns > limit_ns && !heart.is_done() {
+                heart.silence();
                 stoppers.iter().for_each(Stopper::safe_stop);
                 heart.bite(beat);
                 return;
@@ -227,34 +255,4 @@ pub fn start(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_beat_tells_tick_and_place() {
-        let heart = Heartbeat::default();
-        for place in [
-            Place::Waiting,
-            Place::Host,
-            Place::DeviceWait(0),
-            Place::DeviceWait(MOST_DEVICES - 1),
-            Place::DeviceRead(0),
-            Place::DeviceRead(MOST_DEVICES - 1),
-            Place::DeviceWrite(0),
-            Place::DeviceWrite(MOST_DEVICES - 1),
-            Place::Model(0),
-            Place::Model(9999),
-        ] {
-            heart.enter(123_456_789_012, place);
-            assert_eq!(Stuck::at(heart.beat()), Stuck { tick: 123_456_789_012, place });
-        }
-    }
-
-    #[test]
-    fn the_first_beat_can_be_bitten_too() {
-        let heart = Heartbeat::default();
-        assert_eq!(heart.bitten(), None);
-        heart.bite(0);
-        assert_eq!(heart.bitten(), Some(Stuck { tick: 0, place: Place::Waiting }));
-    }
-}
+mod tests;

@@ -88,10 +88,15 @@ impl End {
         self.partner = Some(*peer);
     }
 
-    /// Another partner sends from this peer state on, or the first. Real-time: bounded, no allocation.
+    /// All that was ever passed on to the partner, J. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn meet(&mut self, peer: &PeerState) {
-        self.tank.meet(peer.told_j);
+    pub(super) fn told_j(&self) -> f64 {
+        self.tank.told_j()
+    }
+
+    /// From the device's frame to the shared one.
+    pub(super) fn mapping(&self) -> &Mapping {
+        &self.mapping
     }
 
     /// What this end asks for. Real-time: bounded, no allocation.

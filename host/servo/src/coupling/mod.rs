@@ -4,7 +4,8 @@
 //! passed on ([`PeerState`], some ticks old), and pulls its own handle there. It keeps an energy tank ([`Tank`]): what
 //! its hand puts in, less what comes out, plus what the partner has passed on. As long as no tank is below zero, the
 //! pair generates no energy, *whatever the delay*, constant or not, and even if messages get lost: the energy passed on
-//! is sent as a running total.
+//! is sent as a running total. That holds for ends that tell the truth; what one on another host claims is believed only as far as it
+//! can be checked here (`claims`), so that a lie brings out no more than that.
 //!
 //! ```text
 //!  hand  <-- wrench --  End   -- PeerState: pose, twist, energy passed on -->  End  -- wrench -->  hand
@@ -23,14 +24,15 @@
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
+mod claims;
 mod delay;
 mod end;
-mod peer_check;
 mod remote;
 mod tank;
 #[cfg(test)]
 mod tests;
 
+pub use claims::{Cut, Reach};
 pub use end::End;
 pub use flotor_core::coupling::{
     CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MOST_DELAY_TICKS, PassivityMode,

@@ -1,9 +1,9 @@
 //! One end of a coupling whose other end is on another host.
 
-use super::peer_check::PeerCheck;
+use super::claims::{Claims, Cut, Reach};
 use super::{CouplingConfig, CouplingEnd, End, Grip, Pull};
 use flotor_core::peer::{DISPATCH_WORDS, Dispatch, PeerState, TankState};
-use flotor_hal::Tick;
+use flotor_hal::{DeviceState, Tick};
 use flotor_sync::{Observer, Publisher, latest};
 
 /// How long an end goes by what it heard last.
@@ -18,10 +18,12 @@ pub struct Patience {
 /// Where the peer state leaves the loop and enters it, for a peer link. Neither side ever waits for the other: only the
 /// newest counts.
 pub struct Line {
-    /// What this end sent last. Its `run` is 0: the peer link knows when the run began.
+    /// What this end sent last. Its `run` is 0: the peer link knows when the run began, and who is the partner.
     pub told: Observer<Dispatch, DISPATCH_WORDS>,
     /// What this end is to hear, newest last.
     pub heard: Publisher<Dispatch, DISPATCH_WORDS>,
+    /// Time without a message after which the partner is gone, ns.
+    pub silence_ns: u64,
 }
 
 /// How an end has heard its partner.
@@ -35,8 +37,16 @@ pub struct Hearing {
     pub longest_wait_ns: u64,
     /// Messages that cannot be true: they were not used.
     pub implausible: u64,
+    /// The partner's run; 0 without one so far.
+    pub run: u64,
     /// The partner's energy tank, as received last.
     pub partner: TankState,
+    /// The energy that was believed of partners, J: with what the hand here has put in, the most that can have come out here.
+    pub believed_j: f64,
+    /// What of their claims was not believed.
+    pub cut: Cut,
+    /// How often a partner was let go because of its claims.
+    pub let_go: u32,
 }
 
 /// An end, and the line to its partner.
@@ -45,19 +55,24 @@ pub struct Hearing {
 /// is unknown. When messages arrive (again) the force fades in.
 pub struct RemoteEnd {
     end: End,
-    check: PeerCheck,
     patience: Patience,
     told: Publisher<Dispatch, DISPATCH_WORDS>,
     heard: Observer<Dispatch, DISPATCH_WORDS>,
     /// Version of the message taken in last.
     version: u64,
-    /// The partner's run.
-    run: Option<u64>,
+    /// The partner's run, and since when it names this one.
+    partner: Option<(u64, u64)>,
     hold: Hold,
+    claims: Claims,
+    /// The run that was let go because of its claims.
+    refused: Option<u64>,
     hearing: Hearing,
     /// Whether the message of this tick was not believed.
     is_implausible: bool,
 }
+
+/// So many partners are let go because of their claims; then no other is heard.
+const MOST_LET_GO: u32 = 3;
 
 /// Whether the end holds on to its partner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,6 +86,8 @@ enum Hold {
 /// What the cells hold before the first message. It is never taken in.
 const NOBODY: Dispatch = Dispatch {
     run: 0,
+    partner: 0,
+    since: 0,
     tick: 0,
     state: PeerState { pose: flotor_hal::Pose::HOME, twist: flotor_hal::Twist::ZERO, told_j: 0.0 },
     tank: TankState { level_j: 0.0, lowest_j: 0.0, gone_in_j: 0.0, given_up_j: 0.0 },
@@ -84,34 +101,45 @@ impl RemoteEnd {
         end: &CouplingEnd,
         period_s: f64,
         patience: Patience,
+        reach: Reach,
     ) -> (Self, Line) {
         let (told, for_partner) = latest(NOBODY);
         let (from_partner, heard) = latest(NOBODY);
+        let end = End::new(config, &end.mapping, period_s);
         let end = Self {
-            check: PeerCheck::new(end.mapping.motion_scale, patience.silence_ns),
-            end: End::new(config, &end.mapping, period_s),
+            claims: Claims::new(config, end.mapping(), reach, period_s),
+            end,
             patience,
             told,
             heard,
             version: 0,
-            run: None,
+            partner: None,
             hold: Hold::Released,
+            refused: None,
             hearing: Hearing::default(),
             is_implausible: false,
         };
-        (end, Line { told: for_partner, heard: from_partner })
+        (end, Line { told: for_partner, heard: from_partner, silence_ns: patience.silence_ns })
     }
 
     /// One tick: what this end asks for. Real-time: bounded, no allocation.
     #[inline]
     pub fn step(&mut self, tick: &Tick, grip: Grip<'_>) -> Pull {
         self.end.observe(grip.state, &grip.held);
-        self.listen(tick.time_ns);
+        self.claims.pass(self.end.told_j());
+        self.listen(tick.time_ns, grip.state);
         let state = match self.hold {
             Hold::Released => self.end.call(grip.state),
             Hold::On { .. } => self.end.tell(grip.state),
         };
-        self.told.publish(&Dispatch { run: 0, tick: tick.index, state, tank: self.end.tank().state() });
+        self.told.publish(&Dispatch {
+            run: 0,
+            partner: 0,
+            since: 0,
+            tick: tick.index,
+            state,
+            tank: self.end.tank().state(),
+        });
         match self.hold {
             Hold::Released => self.end.let_go(),
             Hold::On { since_ns, .. } => {
@@ -135,6 +163,13 @@ impl RemoteEnd {
         self.is_implausible
     }
 
+    /// True if a claim of the partner was cut in this tick. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn is_cut(&self) -> bool {
+        self.claims.is_cut()
+    }
+
     /// This end's energy tank. Real-time: bounded, no allocation.
     #[must_use]
     pub fn tank(&self) -> TankState {
@@ -144,23 +179,22 @@ impl RemoteEnd {
     /// How the partner was heard. Real-time: bounded, no allocation.
     #[must_use]
     pub fn hearing(&self) -> Hearing {
-        self.hearing
+        Hearing { believed_j: self.claims.believed_j(), cut: self.claims.cut(), ..self.hearing }
     }
 
     /// Takes in what is new, or notices that nothing is.
     #[inline]
-    fn listen(&mut self, now_ns: u64) {
+    fn listen(&mut self, now_ns: u64, here: &DeviceState) {
         // A cell that is being written just now is looked at again in the next tick.
         self.is_implausible = false;
         let newest = self.heard.read().filter(|(version, _)| *version != self.version);
         if let Some((version, dispatch)) = newest {
             self.version = version;
-            match self.check.check(&dispatch, now_ns) {
-                Ok(()) => self.hear(&dispatch, now_ns),
-                Err(_) => {
-                    self.is_implausible = true;
-                    self.hearing.implausible += 1;
-                }
+            if self.claims.can_be(&dispatch.state, self.end.mapping()) {
+                self.hear(&dispatch, now_ns, here);
+            } else {
+                self.is_implausible = true;
+                self.hearing.implausible += 1;
             }
         }
         if let Hold::On { heard_ns, .. } = self.hold {
@@ -175,13 +209,34 @@ impl RemoteEnd {
     }
 
     #[inline]
-    fn hear(&mut self, dispatch: &Dispatch, now_ns: u64) {
-        if self.run.replace(dispatch.run) != Some(dispatch.run) {
-            // Another run may be anywhere: it is taken hold of as slowly as the first.
-            self.end.meet(&dispatch.state);
+    fn hear(&mut self, dispatch: &Dispatch, now_ns: u64, here: &DeviceState) {
+        if self.refused == Some(dispatch.run) || self.hearing.let_go >= MOST_LET_GO {
+            return;
+        }
+        let partner = (dispatch.run, dispatch.since);
+        let before = self.partner.replace(partner);
+        if before != Some(partner) {
+            // Another run may be anywhere: it is taken hold of as slowly as the first, and so is one that comes back from another.
+            self.claims.meet(&dispatch.state, before.is_none_or(|(run, _)| run != dispatch.run));
             self.hold = Hold::Released;
         }
-        self.end.hear(&dispatch.state);
+        let silent_ns = match self.hold {
+            Hold::Released => {
+                self.claims.forget_place();
+                0
+            }
+            Hold::On { heard_ns, .. } => now_ns - heard_ns,
+        };
+        let mapping = self.end.mapping();
+        let believed = self.claims.believe(&dispatch.state, here, mapping, silent_ns as f64 * 1.0e-9);
+        self.end.hear(&believed);
+        if self.claims.is_too_much() {
+            self.refused = Some(dispatch.run);
+            self.hearing.let_go += 1;
+            self.hold = Hold::Released;
+            return;
+        }
+        self.hearing.run = dispatch.run;
         self.hearing.ticks += 1;
         self.hearing.partner = dispatch.tank;
         let since_ns = match self.hold {

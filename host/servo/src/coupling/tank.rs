@@ -16,8 +16,6 @@ pub struct Tank {
     told_j: f64,
     /// All that the partner has ever passed on, as it was told last.
     heard_j: f64,
-    /// What of that was for others, as a negative number, and what partners before it have passed on.
-    heard_before_j: f64,
     given_up_j: f64,
 }
 
@@ -48,15 +46,6 @@ impl Tank {
             self.level_j += told_j - self.heard_j;
             self.heard_j = told_j;
         }
-    }
-
-    /// From here on another partner tells, or the first: what it had passed on before, `told_j`, was for somebody else.
-    ///
-    /// Real-time: bounded, no allocation.
-    #[inline]
-    pub(super) fn meet(&mut self, told_j: f64) {
-        self.heard_before_j += self.heard_j - told_j;
-        self.heard_j = told_j;
     }
 
     /// All that was ever passed on to the partner, J.
@@ -111,6 +100,6 @@ impl Tank {
     /// Imbalance: what has come and gone, less what is there, J.
     #[must_use]
     pub fn imbalance_j(&self) -> f64 {
-        self.gone_in_j + self.heard_before_j + self.heard_j - self.told_j - self.given_up_j - self.level_j
+        self.gone_in_j + self.heard_j - self.told_j - self.given_up_j - self.level_j
     }
 }

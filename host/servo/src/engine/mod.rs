@@ -6,7 +6,9 @@ pub mod process;
 use asynchronous::AsynchronousModel;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
-use flotor_hal::{ActiveRegion, Demand, Input, Memory, Output, WorkspaceBounds};
+use flotor_hal::{
+    ActiveRegion, Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, WorkspaceBounds,
+};
 use process::{Reply, Worker};
 
 /// A model, wherever it runs.
@@ -26,6 +28,8 @@ pub enum Stepped {
     Answered,
     /// None in time; there may be one in a later tick.
     Late,
+    /// None for so long that what it answered before does not hold any more.
+    Silent,
     /// The model broke: it panicked, or answered outside the contract.
     Broken,
     /// Its process has ended.
@@ -103,21 +107,61 @@ impl Engine {
         }
     }
 
-    /// Where the model can act; an asynchronous one, or one in a process of its own, is always stepped. Real-time:
-    /// bounded, no allocation.
+    /// Where the model can act; an asynchronous one is always stepped. Real-time: bounded, no allocation.
     pub fn active_region(&mut self) -> ActiveRegion {
         match self {
             Self::Here(model) => model.active_region(),
-            Self::Process(_) | Self::Asynchronous(_) => ActiveRegion::EVERYWHERE,
+            Self::Process(worker) => worker.active_region(),
+            Self::Asynchronous(_) => ActiveRegion::EVERYWHERE,
         }
     }
 
-    /// Where the model ends; an asynchronous one, or one in a process of its own, has no end. Real-time: bounded, no
-    /// allocation.
+    /// Where the model ends; an asynchronous one has no end. Real-time: bounded, no allocation.
     pub fn workspace_bounds(&mut self) -> WorkspaceBounds {
         match self {
             Self::Here(model) => model.workspace_bounds(),
-            Self::Process(_) | Self::Asynchronous(_) => WorkspaceBounds::UNBOUNDED,
+            Self::Process(worker) => worker.workspace_bounds(),
+            Self::Asynchronous(_) => WorkspaceBounds::UNBOUNDED,
+        }
+    }
+
+    /// Whether it has a linear field. Not real-time.
+    pub fn has_linear_field(&self) -> bool {
+        match self {
+            Self::Here(model) => model.has_linear_field(),
+            Self::Process(worker) => worker.has_linear_field(),
+            Self::Asynchronous(_) => false,
+        }
+    }
+
+    /// The field at an input; `field` is only meaningful for [`Stepped::Answered`]. Not real-time.
+    pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
+        let answered = |status| match status {
+            CallStatus::Ok => Stepped::Answered,
+            _ => Stepped::Broken,
+        };
+        match self {
+            Self::Here(model) => answered(model.linear_field(input, field)),
+            Self::Process(worker) => match worker.linear_field(input) {
+                Reply::Answered((status, answer)) => {
+                    *field = answer;
+                    answered(status)
+                }
+                Reply::Late => Stepped::Late,
+                Reply::Gone => Stepped::Gone,
+            },
+            Self::Asynchronous(_) => Stepped::Broken,
+        }
+    }
+
+    /// Last chance for the model to allocate; one in a process of its own had it there. Not real-time.
+    ///
+    /// # Errors
+    /// The model's [`Refusal`].
+    pub fn prepare(&mut self, config: &LoopConfig) -> Result<(), Refusal> {
+        match self {
+            Self::Here(model) => model.prepare(config),
+            Self::Process(_) | Self::Asynchronous(_) => Ok(()),
         }
     }
 
@@ -127,6 +171,16 @@ impl Engine {
             Self::Here(model) => model.memory(),
             Self::Process(worker) => worker.memory(),
             Self::Asynchronous(model) => model.memory(),
+        }
+    }
+
+    /// Calls so far that left the floating-point environment of the loop's thread changed; what a model changes elsewhere
+    /// stays there. Real-time: bounded, no allocation.
+    #[inline]
+    pub fn float_changes(&self) -> u64 {
+        match self {
+            Self::Here(model) => model.float_changes(),
+            Self::Process(_) | Self::Asynchronous(_) => 0,
         }
     }
 

@@ -10,7 +10,11 @@
 mod line;
 mod system;
 
-pub use system::{SignalGuard, TakenSignals, block_signals, leave_process, spawn_unblocked, wait_for_signal};
+pub(crate) use system::take_sent;
+pub use system::{
+    SignalGuard, TakenSignals, block_signals, leave_process, leave_sent_signals_to_the_loop, spawn_unblocked,
+    wait_for_signal,
+};
 
 use crate::{Heartbeat, Place, Stuck};
 use flotor_hal::abi::loader::Stopper;
@@ -34,7 +38,7 @@ struct Armed {
     names: Box<[String]>,
     heart: Heartbeat,
     /// Number that the system gives the loop's thread.
-    thread: i32,
+    thread: AtomicI32,
 }
 
 /// The runs of this process. Locked for a few instructions by whoever begins or ends a run, and only tried by who dies: what
@@ -74,6 +78,7 @@ pub fn was_armed() -> bool {
 pub fn stop_all() {
     for run in &RUNS {
         let run = lock(run).clone();
+        run.iter().for_each(|run| run.heart.silence());
         run.iter().flat_map(|run| &run.stoppers).for_each(Stopper::safe_stop);
     }
 }
@@ -110,7 +115,7 @@ impl LastStop {
     /// devices, in the order of `stoppers`, then of the models. Not real-time.
     #[must_use]
     pub fn arm(stoppers: Vec<Stopper>, names: Vec<String>, heart: Heartbeat) -> Option<(Unwound, Self)> {
-        let thread = system::thread_number();
+        let thread = AtomicI32::new(system::thread_number());
         let armed = Arc::new(Armed { stoppers: stoppers.into(), names: names.into(), heart, thread });
         system::install();
         for (place, run) in RUNS.iter().enumerate() {
@@ -122,6 +127,14 @@ impl LastStop {
             }
         }
         None
+    }
+
+    /// From now on the loop of the run is this thread, which energised nothing itself. Not real-time.
+    pub(crate) fn follow_here(&self) {
+        if let Some(run) = RUNS.get(self.place).and_then(|run| lock(run).clone()) {
+            run.thread.store(system::thread_number(), Ordering::Release);
+            system::install();
+        }
     }
 }
 
@@ -206,8 +219,12 @@ fn die(death: Death) -> ! {
 
 /// Stops each device of each run that nobody has begun to stop.
 fn stop_the_rest() {
-    let mut first = 0;
+    let (own, mut first) = (system::thread_number(), 0);
     for run in runs() {
+        // A loop that dies itself commands nothing any more.
+        if run.thread.load(Ordering::Acquire) != own {
+            run.heart.silence();
+        }
         for (index, stopper) in run.stoppers.iter().enumerate() {
             let number = first + index;
             if NEXT.compare_exchange(number, number + 1, Ordering::AcqRel, Ordering::Acquire).is_ok() {
@@ -221,7 +238,7 @@ fn stop_the_rest() {
 /// One line: what it was, in which tick, in whose code.
 fn describe(line: &mut Line, death: Death, own: i32) {
     use std::fmt::Write;
-    let is_own = |run: &ManuallyDrop<Arc<Armed>>| run.thread == own;
+    let is_own = |run: &ManuallyDrop<Arc<Armed>>| run.thread.load(Ordering::Acquire) == own;
     let own_run = runs().find(|run| is_own(run) && !run.is_over());
     let Some(run) = own_run.or_else(|| runs().find(|run| !run.is_over())) else {
         let _ = write!(line, "error: the process was ended; every device was told to stop");

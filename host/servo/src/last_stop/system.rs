@@ -3,11 +3,13 @@
 //! Nothing that runs in a handler allocates, locks or formats into memory of its own.
 #![allow(unsafe_code)] // handlers of deadly signals and of `exit` cannot be made without; tests/tests/system/architecture.rs
 
-use super::{Death, end_if_armed};
+use super::{Death, end_if_armed, is_armed};
+use crate::guest::{is_guest, leaves_signals};
 use libc::{c_int, c_void, sigaction, siginfo_t, sigset_t};
 use std::io;
 use std::mem::MaybeUninit;
 use std::process::{Child, Command};
+use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::{Mutex, Once, OnceLock, PoisonError};
 use std::time::Duration;
 
@@ -28,6 +30,9 @@ const HARMLESS: [c_int; 9] = [
     libc::SIGURG,
     libc::SIGWINCH,
 ];
+/// What a timer, a limit or another program sends to the process as a whole.
+const SENT: [c_int; 7] =
+    [libc::SIGUSR2, libc::SIGALRM, libc::SIGVTALRM, libc::SIGPROF, libc::SIGXCPU, libc::SIGIO, libc::SIGPWR];
 /// Signals that stay the host's, whatever a plugin does: what is raised, what asks a run to end, the emergency stop.
 const KEPT: [c_int; 13] = [
     libc::SIGSEGV,
@@ -51,6 +56,13 @@ const STACK_BYTES: usize = 128 * 1024;
 /// Bytes of a thread's name with its end.
 pub(super) const NAME_BYTES: usize = 16;
 
+/// The process that has armed a run: a copy of it, made by `fork`, has the same devices, but they are not its own.
+static OWN_PROCESS: AtomicI32 = AtomicI32::new(0);
+
+fn is_own_process() -> bool {
+    OWN_PROCESS.load(Ordering::Acquire) == process_number()
+}
+
 /// What stood there before a handler of ours.
 static BEFORE: [OnceLock<sigaction>; SIGNALS] = [const { OnceLock::new() }; SIGNALS];
 
@@ -60,11 +72,16 @@ pub(super) fn install() {
     static AT_EXIT: Once = Once::new();
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    STACK.with(|_| ());
+    OWN_PROCESS.store(process_number(), Ordering::Release);
     AT_EXIT.call_once(|| {
         // SAFETY: a function without arguments that may be called at the end of the process.
         let _ = unsafe { libc::atexit(at_exit) };
     });
+    if leaves_signals() {
+        return;
+    }
+    STACK.with(|_| ());
+    take_sent();
     for signal in (1..).take(SIGNALS - 1).filter(|signal| !HARMLESS.contains(signal)) {
         let Some(found) = action(signal) else { continue };
         let is_ours = found.sa_sigaction == handler();
@@ -83,6 +100,25 @@ pub(super) fn install() {
     }
 }
 
+/// Keeps deadly signals that are sent to the whole process from this thread and all that it starts from now on: threads of a
+/// run that wait for no processor take them, its loop and its watchdog. Not real-time.
+///
+/// # Errors
+/// What the system says.
+pub fn leave_sent_signals_to_the_loop() -> io::Result<()> {
+    block_signals(&SENT)
+}
+
+/// From now on this thread takes them, unless they are another program's. Not real-time.
+pub(crate) fn take_sent() {
+    if leaves_signals() {
+        return;
+    }
+    let set = set_of(&SENT);
+    // SAFETY: an initialised set, and a null pointer where nothing is to be written.
+    unsafe { libc::pthread_sigmask(libc::SIG_UNBLOCK, &raw const set, std::ptr::null_mut()) };
+}
+
 fn handler() -> libc::sighandler_t {
     on_signal as extern "C" fn(c_int, *mut siginfo_t, *mut c_void) as libc::sighandler_t
 }
@@ -92,7 +128,9 @@ extern "C" fn on_signal(signal: c_int, info: *mut siginfo_t, _: *mut c_void) {
     let (code, sender) = unsafe { ((*info).si_code, (*info).si_pid()) };
     let was_sent = [libc::SI_USER, libc::SI_TKILL, libc::SI_QUEUE].contains(&code);
     let sender = Some(sender).filter(|sender| was_sent && *sender != process_number());
-    end_if_armed(Death::Signal { signal, sender });
+    if is_own_process() {
+        end_if_armed(Death::Signal { signal, sender });
+    }
     // No run: as if we had never been here.
     let before = usize::try_from(signal).ok().and_then(|signal| BEFORE.get(signal)?.get());
     if let Some(before) = before {
@@ -105,11 +143,24 @@ extern "C" fn on_signal(signal: c_int, info: *mut siginfo_t, _: *mut c_void) {
 }
 
 extern "C" fn at_exit() {
-    end_if_armed(Death::Exit);
+    if is_armed() && is_own_process() {
+        // A stop that calls `exit` itself comes here once more.
+        // SAFETY: as where it was registered first.
+        let _ = unsafe { libc::atexit(at_exit) };
+        end_if_armed(Death::Exit);
+    }
 }
 
 /// Ends the process: by the signal that asked it to, if that is what one is for; else with a code.
 pub(super) fn end_by(death: Death, code: i32) -> ! {
+    if let Death::Signal { signal, .. } = death
+        && is_guest()
+        && let Some(before) = usize::try_from(signal).ok().and_then(|signal| BEFORE.get(signal)?.get())
+    {
+        // The program's own way to die, be it a handler or the default.
+        set_action(signal, before);
+        raise(signal);
+    }
     if let Death::Signal { signal, .. } = death
         && ASKING.contains(&signal)
     {
@@ -165,15 +216,15 @@ pub(super) fn thread_name(name: &mut [u8; NAME_BYTES]) -> &str {
 /// What a signal says, for people.
 pub(super) fn signal_words(signal: c_int) -> &'static str {
     match signal {
-        libc::SIGSEGV => "SIGSEGV: memory that is not its own, or a stack that is full",
-        libc::SIGBUS => "SIGBUS: memory that is not there",
-        libc::SIGFPE => "SIGFPE: a calculation that traps",
-        libc::SIGILL => "SIGILL: an instruction that does not exist",
-        libc::SIGABRT => "SIGABRT: it gave up, as after an exception nobody catches",
-        libc::SIGSYS => "SIGSYS: a forbidden system call",
-        libc::SIGTRAP => "SIGTRAP: a breakpoint",
-        libc::SIGXCPU => "SIGXCPU: its limit of processor time",
-        libc::SIGXFSZ => "SIGXFSZ: its limit of file size",
+        libc::SIGSEGV => "SIGSEGV: invalid memory access, or stack overflow",
+        libc::SIGBUS => "SIGBUS: memory access error",
+        libc::SIGFPE => "SIGFPE: arithmetic error",
+        libc::SIGILL => "SIGILL: illegal instruction",
+        libc::SIGABRT => "SIGABRT: abort, as after an uncaught exception",
+        libc::SIGSYS => "SIGSYS: forbidden system call",
+        libc::SIGTRAP => "SIGTRAP: breakpoint",
+        libc::SIGXCPU => "SIGXCPU: processor time limit",
+        libc::SIGXFSZ => "SIGXFSZ: file size limit",
         libc::SIGUSR2 => "SIGUSR2",
         libc::SIGALRM => "SIGALRM: a timer",
         libc::SIGVTALRM => "SIGVTALRM: a timer",
@@ -296,6 +347,9 @@ impl SignalGuard {
     /// Puts back what has changed since, and says what that was. Not real-time.
     pub fn put_back(&self) -> TakenSignals {
         let mut taken = TakenSignals::default();
+        if is_guest() {
+            return taken; // who changed them may be the program itself
+        }
         let blocked = blocked();
         for (signal, before) in KEPT.into_iter().zip(&self.actions) {
             // Ours, if another run of this process has begun meanwhile.

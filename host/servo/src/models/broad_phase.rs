@@ -63,7 +63,7 @@ struct Grid {
     per_m: DVec3,
     /// Cells along each axis.
     counts: [usize; 3],
-    /// Objects of each cell, in order.
+    /// Objects of each cell, in order; empty if no cell has any.
     objects: Box<[Box<[u32]>]>,
 }
 
@@ -83,7 +83,9 @@ impl BroadPhase {
                 _ => always.push(object),
             }
         }
-        grid.objects = in_cells.into_iter().map(Vec::into_boxed_slice).collect();
+        if in_cells.iter().any(|objects| !objects.is_empty()) {
+            grid.objects = in_cells.into_iter().map(Vec::into_boxed_slice).collect();
+        }
         Self { bounds: bounds.into(), always, grid }
     }
 
@@ -100,14 +102,23 @@ impl BroadPhase {
     ) {
         let (mut in_cell, mut always) = (self.grid.objects_at(position_m), &*self.always);
         loop {
-            let number = match (in_cell.first(), always.first()) {
-                (Some(a), Some(b)) => *a.min(b),
-                (Some(number), None) | (None, Some(number)) => *number,
-                (None, None) => return,
+            let number = match (in_cell, always) {
+                ([], []) => return,
+                ([], [number, rest @ ..]) => {
+                    always = rest;
+                    *number
+                }
+                ([number, rest @ ..], []) => {
+                    in_cell = rest;
+                    *number
+                }
+                ([a, after_a @ ..], [b, after_b @ ..]) => {
+                    // One that is looked at always may be in the cell, too.
+                    in_cell = if a <= b { after_a } else { in_cell };
+                    always = if b <= a { after_b } else { always };
+                    *a.min(b)
+                }
             };
-            // One that is looked at always may be in the cell, too.
-            in_cell = in_cell.strip_prefix(&[number]).unwrap_or(in_cell);
-            always = always.strip_prefix(&[number]).unwrap_or(always);
             let is_near = self.bounds(number as usize).is_none_or(|bounds| bounds.contains(position_m));
             if let Some(object) = objects.get_mut(number as usize)
                 && is_near
@@ -190,6 +201,9 @@ impl Grid {
     /// The objects of the cell at a position. Outside the grid the nearest cell: its objects' boxes are then compared.
     #[inline]
     fn objects_at(&self, position_m: DVec3) -> &[u32] {
+        if self.objects.is_empty() {
+            return &[];
+        }
         let [_, y_cells, z_cells] = self.counts;
         let [x, y, z] = self.coordinates(position_m);
         self.objects.get((x * y_cells + y) * z_cells + z).map_or(&[], |objects| objects)
@@ -197,107 +211,4 @@ impl Grid {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// SplitMix64 (Steele, Lea, Flood 2014) as numbers in -1..1.
-    fn random(state: &mut u64) -> f64 {
-        *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut word = *state;
-        word = (word ^ (word >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        word = (word ^ (word >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        let part = (word ^ (word >> 31)) as f64 / u64::MAX as f64;
-        2.0 * part - 1.0
-    }
-
-    fn random_point(state: &mut u64) -> DVec3 {
-        DVec3::new(random(state), random(state), random(state))
-    }
-
-    fn near(phase: &BroadPhase, position_m: DVec3) -> Vec<usize> {
-        let mut objects: Vec<usize> = (0..phase.bounds.len()).collect();
-        let mut met = Vec::new();
-        phase.for_each_near(&mut objects, position_m, |object| met.push(*object));
-        met
-    }
-
-    /// Boxes of all sizes, some objects without one, and what comparing with each of them finds.
-    #[test]
-    fn it_finds_what_comparing_with_every_box_finds_in_order() {
-        let mut state = 7;
-        for (objects, size) in [(0, 0.1), (1, 0.1), (3, 2.0), (500, 0.01), (500, 0.3), (2000, 0.0)] {
-            let bounds: Vec<Option<Bounds>> = (0..objects)
-                .map(|object| {
-                    let half = DVec3::splat(size) * random_point(&mut state).abs();
-                    (object % 97 != 5).then(|| Bounds::about(random_point(&mut state), half))
-                })
-                .collect();
-            let phase = BroadPhase::new(bounds.clone());
-            let mut any = 0;
-            for _ in 0..2000 {
-                let at = 1.3 * random_point(&mut state);
-                let inside = |(_, bounds): &(usize, &Option<Bounds>)| bounds.is_none_or(|b| b.contains(at));
-                let expected: Vec<usize> =
-                    bounds.iter().enumerate().filter(inside).map(|(object, _)| object).collect();
-                any += expected.len();
-                assert_eq!(near(&phase, at), expected, "{objects} objects of {size} at {at}");
-            }
-            assert!(any > 0 || objects < 2 || size == 0.0);
-        }
-    }
-
-    #[test]
-    fn a_box_is_rounded_outwards() {
-        let mut state = 3;
-        for _ in 0..1000 {
-            let (center, half) = (random_point(&mut state), random_point(&mut state).abs());
-            let bounds = Bounds::about(center, half);
-            assert!(bounds.contains(center - half) && bounds.contains(center + half));
-        }
-    }
-
-    #[test]
-    fn a_handle_that_is_nowhere_wakes_only_what_acts_anywhere() {
-        let bounds = vec![Some(Bounds::about(DVec3::ZERO, DVec3::ONE)), None];
-        assert_eq!(near(&BroadPhase::new(bounds), DVec3::NAN), [1]);
-    }
-
-    #[test]
-    fn without_boxes_all_are_near_wherever_the_handle_is_until_one_gets_a_box() {
-        let mut phase = BroadPhase::new(vec![None; 3]);
-        assert_eq!(near(&phase, DVec3::NAN), [0, 1, 2]);
-        phase.watch_always(1, Some(Bounds::about(DVec3::ZERO, DVec3::ONE)));
-        assert_eq!(near(&phase, DVec3::X * 5.0), [0, 2]);
-    }
-
-    #[test]
-    fn an_object_that_has_grown_is_found_where_it_is_now() {
-        let object = |x| Some(Bounds::about(DVec3::X * x, DVec3::splat(0.1)));
-        let mut phase = BroadPhase::new((0..20).map(|index| object(f64::from(index))).collect());
-        assert_eq!(near(&phase, DVec3::X * 5.5), [] as [usize; 0]);
-        for _ in 0..3 {
-            phase.watch_always(5, Some(Bounds::about(DVec3::X * 5.0, DVec3::splat(0.6))));
-        }
-        phase.watch_always(7, None);
-        assert_eq!(near(&phase, DVec3::X * 5.5), [5, 7]);
-        assert_eq!(near(&phase, DVec3::X * 5.0), [5, 7]);
-    }
-
-    /// A box takes 56 bytes, its number in the list of those that are always looked at 4, and in each of the up to 8 cells it
-    /// lies in another 4; the cells themselves are fewer than the objects.
-    #[test]
-    fn ten_thousand_objects_side_by_side_take_less_than_100_bytes_each() {
-        let at = |index: u32| {
-            DVec3::new(f64::from(index % 22), f64::from(index / 22 % 22), f64::from(index / 484)) * 1.0e-3
-        };
-        let bounds = (0..10_000).map(|i| Some(Bounds::about(at(i), DVec3::splat(0.45e-3)))).collect();
-        let phase = BroadPhase::new(bounds);
-        let in_cells = phase.grid.objects.iter().map(|cell| size_of_val(cell) + size_of_val(&**cell));
-        let bytes = size_of_val(&*phase.bounds)
-            + phase.always.capacity() * size_of::<u32>()
-            + in_cells.sum::<usize>();
-        assert!(bytes <= 10_000 * 100, "{bytes}");
-        let most = phase.grid.objects.iter().map(|cell| cell.len()).max();
-        assert!(most <= Some(27), "a cell holds {most:?} objects");
-    }
-}
+mod tests;

@@ -2,7 +2,7 @@
 
 use super::broad_phase::{Bounds, BroadPhase};
 use super::end_wall::EndWall;
-use crate::budget::{Allowed, Overrun, TimeBudget};
+use crate::budget::{Allowed, Answer, Overrun, TimeBudget};
 use crate::engine::{Engine, Stepped};
 use flotor_core::mapping::{Blend, Mapping};
 use flotor_core::trace::Events;
@@ -22,24 +22,37 @@ pub struct ModelHealth {
     pub first_rejected: Option<u64>,
     /// The tick at which its process was found to have ended; from then on it is out.
     pub lost_at: Option<u64>,
-    /// Ticks without an answer in time from a process of its own.
+    /// Ticks in which an asynchronous model had not answered for too long.
     pub late_ticks: u64,
     /// The first of them.
     pub first_late: Option<u64>,
+    /// Ticks without an answer in time from a process of its own. Alone they are no fault: its time budget says how many
+    /// are borne.
+    pub late_answers: u64,
     /// How it was too slow, if it was taken out for that.
     pub overrun: Option<Overrun>,
+    /// Ticks after which the floating-point environment was another; it was put back each time.
+    pub float_changes: u64,
+    /// The first of them.
+    pub first_float_change: Option<u64>,
 }
 
 impl ModelHealth {
     /// True if there is nothing to be said.
     #[must_use]
     pub fn is_good(&self) -> bool {
-        *self == Self::default()
+        *self == Self { late_answers: self.late_answers, ..Self::default() }
     }
 
     fn reject(&mut self, tick: u64) {
         self.rejected_ticks += 1;
         self.first_rejected.get_or_insert(tick);
+    }
+
+    #[cold]
+    fn change_floats(&mut self, tick: u64) {
+        self.float_changes += 1;
+        self.first_float_change.get_or_insert(tick);
     }
 
     fn late(&mut self, tick: u64) {
@@ -58,6 +71,8 @@ struct Object {
     last: Option<Output>,
     /// The tick it was stepped at last.
     stepped_at: Option<u64>,
+    /// Its calls that changed the floating-point environment, as far as they are counted.
+    float_changes: u64,
     /// It panicked, or its process has ended: it is never called again.
     is_out: bool,
 }
@@ -112,7 +127,7 @@ pub struct LayerReport {
     pub generation: u16,
     /// How it behaved.
     pub health: ModelHealth,
-    /// What it said last; may be empty.
+    /// What it said last, if it did not behave; may be empty.
     pub words: String,
 }
 
@@ -130,7 +145,7 @@ impl Layer {
         let demand = instances.first().map_or(Demand::ALL, served);
         let object = |(mut model, mapping): (Engine, Mapping)| {
             let end = EndWall::new(&model.workspace_bounds(), &mapping, config);
-            Object { model, mapping, end, last: None, stepped_at: None, is_out: false }
+            Object { model, mapping, end, last: None, stepped_at: None, float_changes: 0, is_out: false }
         };
         let mut objects: Box<[Object]> = instances.into_iter().map(object).collect();
         let bounds = objects.iter_mut().map(Object::bounds).collect();
@@ -146,6 +161,11 @@ impl Layer {
             health: ModelHealth::default(),
             generation: 0,
         }
+    }
+
+    /// How often its model had been replaced when it was put in.
+    pub fn generation(&self) -> u16 {
+        self.generation
     }
 
     /// How it is mixed with the others.
@@ -166,10 +186,12 @@ impl Layer {
     pub(super) fn step(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
         match self.budget.allowed(tick.time_ns) {
             Allowed::Asked => {
-                let begun_ns = self.budget.begin();
+                let (begun_ns, late_answers) = (self.budget.begin(), self.health.late_answers);
                 let share = self.ask(tick, state, events);
                 if let Some(begun_ns) = begun_ns {
-                    if self.budget.end(begun_ns, tick.index, tick.time_ns) {
+                    let is_there = self.health.late_answers == late_answers;
+                    let answer = if is_there { Answer::There } else { Answer::Missing };
+                    if self.budget.end(begun_ns, answer, tick.index, tick.time_ns) {
                         events.insert(Events::MODEL_OVERRUN);
                         self.health.overrun = self.budget.overrun();
                     }
@@ -246,10 +268,17 @@ impl Layer {
         self.health
     }
 
-    /// What is known of it, in place of the model numbered `model`. Not real-time.
-    pub fn report(&mut self, model: usize) -> LayerReport {
+    /// What is known of it, in place of the model numbered `model`. Only one that did not behave is asked what it said, and
+    /// `asks` hears of it before. Not real-time.
+    pub fn report(&mut self, model: usize, asks: impl FnOnce()) -> LayerReport {
         let Self { generation, health, .. } = *self;
-        LayerReport { model, generation, health, words: self.last_message() }
+        let words = if health.is_good() {
+            String::new()
+        } else {
+            asks();
+            self.last_message()
+        };
+        LayerReport { model, generation, health, words }
     }
 
     /// What the first instance that has anything to say said last. Not real-time.
@@ -292,7 +321,13 @@ impl Object {
         }
         self.stepped_at = Some(input.tick);
         let mut output = Output::new(Wrench::ZERO, 0.0, StepStatus::Ok);
-        match self.model.step(input, &mut output) {
+        let stepped = self.model.step(input, &mut output);
+        if self.model.float_changes() != self.float_changes {
+            self.float_changes = self.model.float_changes();
+            events.insert(Events::FLOAT_ENVIRONMENT);
+            health.change_floats(input.tick);
+        }
+        match stepped {
             Stepped::Answered if output.wrench.is_finite() && output.status().is_some() => {
                 if self.model.may_be_late() {
                     self.last = Some(output);
@@ -306,6 +341,11 @@ impl Object {
             }
             // One tick may pass with the answer before; a second one in a row finds none.
             Stepped::Late => {
+                events.insert(Events::MODEL_OVERRUN);
+                health.late_answers += 1;
+                self.last.take()
+            }
+            Stepped::Silent => {
                 events.insert(Events::MODEL_OVERRUN);
                 health.late(input.tick);
                 self.last.take()

@@ -179,7 +179,12 @@ impl ModelStack {
     }
 
     /// What is known of every layer that is here. Not real-time.
-    pub(crate) fn reports(&mut self) -> impl Iterator<Item = LayerReport> {
-        self.slots.iter_mut().flat_map(Slot::reports)
+    pub(crate) fn reports(&mut self, asks: &impl Fn(usize)) -> impl Iterator<Item = LayerReport> {
+        self.slots.iter_mut().flat_map(|slot| slot.reports(asks))
+    }
+
+    /// All layers, each with the number of its model. Not real-time.
+    pub(crate) fn into_layers(self) -> impl Iterator<Item = (usize, Box<Layer>)> {
+        self.slots.into_iter().flat_map(Slot::into_layers)
     }
 }

@@ -126,9 +126,16 @@ impl Slot {
     }
 
     /// What is known of all its layers. Not real-time.
-    pub(super) fn reports(&mut self) -> impl Iterator<Item = LayerReport> {
+    pub(super) fn reports(&mut self, asks: &impl Fn(usize)) -> impl Iterator<Item = LayerReport> {
         let Self { number, current, leaving, .. } = self;
         let number = *number;
-        leaving.iter_mut().chain(std::iter::once(current)).map(move |layer| layer.report(number))
+        let layers = leaving.iter_mut().chain(std::iter::once(current));
+        layers.map(move |layer| layer.report(number, || asks(number)))
+    }
+
+    /// All its layers, each with the number of the model. Not real-time.
+    pub(super) fn into_layers(self) -> impl Iterator<Item = (usize, Box<Layer>)> {
+        let Self { number, current, leaving, .. } = self;
+        leaving.into_iter().chain(std::iter::once(current)).map(move |layer| (number, layer))
     }
 }

@@ -71,6 +71,14 @@ impl WatchdogProcess {
         Ok(())
     }
 
+    /// Whether it has ended before it was told to, whatever ended it. Not real-time.
+    #[must_use]
+    pub fn is_gone(&self) -> bool {
+        // It says nothing more: whatever there is to see is the end of the link.
+        let mut link = [PollFd::new(&self.link, PollFlags::IN)];
+        poll(&mut link, Some(&Timespec { tv_sec: 0, tv_nsec: 0 })).is_ok_and(|seen| seen > 0)
+    }
+
     fn wait_until_ready(&self) -> io::Result<()> {
         let mut answer = [0; 1];
         let mut link = [PollFd::new(&self.link, PollFlags::IN)];

@@ -13,11 +13,10 @@
 mod cross_fade;
 mod thread;
 
-use crate::{Clock, Stepped};
+use crate::{Clock, Engine, Stepped};
 use cross_fade::CrossFade;
 use flotor_core::mapping::FieldTiming;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, StepStatus};
 use thread::ModelThread;
 
@@ -59,23 +58,30 @@ pub enum Arrival {
 }
 
 impl AsynchronousModel {
-    /// Prepares the model for its own rate and starts it. Not real-time.
+    /// The loop a model with this timing is prepared for: a field cannot come more often than the loop looks.
+    #[must_use]
+    pub fn config(timing: &FieldTiming, config: &LoopConfig) -> LoopConfig {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked: 0.1 ms to 1 s
+        let period_ns = (1.0e9 / timing.rate_hz).round() as u64;
+        LoopConfig { period_ns: period_ns.max(config.period_ns), ..*config }
+    }
+
+    /// Prepares the model for its own rate ([`Self::config`]) and starts it, wherever it runs. Not real-time.
     ///
     /// # Errors
     /// The model's [`Refusal`], or why there is no thread.
     pub fn start(
-        mut model: Model,
+        mut model: Engine,
         parameters: usize,
         timing: &FieldTiming,
         config: &LoopConfig,
         clock: Clock,
     ) -> Result<Self, Refusal> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked: 0.1 ms to 1 s
-        let [period_ns, latency_ns] =
-            [1.0 / timing.rate_hz, timing.latency_s].map(|seconds| (seconds * 1.0e9).round() as u64);
-        // A field cannot come more often than the loop looks.
-        let period_ns = period_ns.max(config.period_ns);
-        model.prepare(&LoopConfig { period_ns, ..*config })?;
+        let latency_ns = (timing.latency_s * 1.0e9).round() as u64;
+        let config = Self::config(timing, config);
+        let period_ns = config.period_ns;
+        model.prepare(&config)?;
         let parameters = (0..parameters).map(|index| model.parameter(index)).collect();
         let (serves, memory) = (model.serves(), model.memory());
         let computing = match clock {
@@ -116,7 +122,7 @@ impl AsynchronousModel {
         }
         let since_ns = *self.since_ns.get_or_insert(input.time_ns);
         if input.time_ns.saturating_sub(self.newest_ns.unwrap_or(since_ns)) > self.oldest_ns {
-            return Stepped::Late;
+            return Stepped::Silent;
         }
         let (wrench, is_valid) = self.fields.at(&input.pose, input.time_ns);
         let status = if is_valid { StepStatus::Ok } else { StepStatus::Clamped };
@@ -168,7 +174,7 @@ impl AsynchronousModel {
 
 /// A model computed in the loop at multiples of its period; its fields are held back.
 struct Inline {
-    model: Model,
+    model: Engine,
     period_ns: u64,
     latency_ns: u64,
     /// When it looks next, ns.
@@ -179,7 +185,7 @@ struct Inline {
 }
 
 impl Inline {
-    fn new(model: Model, period_ns: u64, latency_ns: u64) -> Self {
+    fn new(model: Engine, period_ns: u64, latency_ns: u64) -> Self {
         Self { model, period_ns, latency_ns, next_ns: 0, looked_ns: None, held_back: None }
     }
 
@@ -190,11 +196,15 @@ impl Inline {
             let dt_ns = self.looked_ns.map_or(0, |before_ns| input.time_ns - before_ns);
             self.looked_ns = Some(input.time_ns);
             let mut field = LinearField::NONE;
-            if self.model.linear_field(&Input { dt_ns, ..*input }, &mut field) != CallStatus::Ok {
-                return Arrival::Broken;
+            match self.model.linear_field(&Input { dt_ns, ..*input }, &mut field) {
+                Stepped::Answered => {
+                    field.time_ns = input.time_ns;
+                    self.held_back = Some((input.time_ns + self.latency_ns, field));
+                }
+                // Its field may come the next time.
+                Stepped::Late | Stepped::Silent => {}
+                Stepped::Broken | Stepped::Gone => return Arrival::Broken,
             }
-            field.time_ns = input.time_ns;
-            self.held_back = Some((input.time_ns + self.latency_ns, field));
         }
         due.map_or(Arrival::Nothing, |(_, field)| Arrival::Field(field))
     }

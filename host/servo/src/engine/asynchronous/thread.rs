@@ -3,9 +3,8 @@
 //! Loop and thread share two latest-value cells, a queue of orders and two flags; neither waits for the other.
 
 use super::Arrival;
-use crate::enter_worker_priority;
+use crate::{Engine, Stepped, enter_worker_priority};
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Input, LinearField, Pose, Refusal, Twist, Wrench};
 use flotor_sync::{Observer, Publisher, Words, latest};
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -121,7 +120,7 @@ impl ModelThread {
     ///
     /// # Errors
     /// The system has no thread to give.
-    pub(super) fn start(model: Model, period_ns: u64) -> Result<Self, Refusal> {
+    pub(super) fn start(model: Engine, period_ns: u64) -> Result<Self, Refusal> {
         let at_home = Look { pose: Pose::HOME, twist: Twist::ZERO, time_ns: 0, tick: 0, buttons: 0 };
         let (looks, seen) = latest(at_home);
         let (sent, fields) = latest(Sent(LinearField::NONE));
@@ -195,7 +194,7 @@ impl Drop for ModelThread {
 
 /// The thread's end.
 struct Computer {
-    model: Model,
+    model: Engine,
     demand: Demand,
     looks: Observer<Look, LOOK_WORDS>,
     fields: Publisher<Sent, FIELD_WORDS>,
@@ -252,12 +251,16 @@ impl Computer {
         self.looked_ns = Some(time_ns);
         let input = Input { pose, twist, time_ns, dt_ns, tick, buttons, demand: self.demand };
         let mut field = LinearField::NONE;
-        let status = self.model.linear_field(&input, &mut field);
-        if status == CallStatus::Ok {
-            field.time_ns = time_ns;
-            self.fields.publish(&Sent(field));
+        match self.model.linear_field(&input, &mut field) {
+            Stepped::Answered => {
+                field.time_ns = time_ns;
+                self.fields.publish(&Sent(field));
+                CallStatus::Ok
+            }
+            // Its field may come the next time.
+            Stepped::Late | Stepped::Silent => CallStatus::Ok,
+            Stepped::Broken | Stepped::Gone => CallStatus::Panicked,
         }
-        status
     }
 }
 

@@ -6,7 +6,7 @@ use super::shared_words::{self, Order, wait_for_change};
 use crate::enter_worker_priority;
 use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
 use flotor_hal::abi::{CallStatus, PluginKind};
-use flotor_hal::{LoopConfig, Memory, Output, Refusal, RefusalKind};
+use flotor_hal::{LinearField, LoopConfig, Memory, Output, Refusal, RefusalKind};
 use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 use std::io;
 use std::os::fd::AsFd;
@@ -49,10 +49,12 @@ pub fn serve(arguments: &WorkerArguments, load: LoadFile) -> io::Result<()> {
     }
     let memory = SharedMemory::map(io::stdin().as_fd())?;
     let (greeting, model) = match prepare(arguments, load) {
-        Ok((model, parameters)) => {
+        Ok((mut model, parameters)) => {
+            put_extent(&mut model, &memory);
             let serves = shared_words::DEMANDS.map(|demand| model.serves().contains(demand));
             let remembers = model.memory() == Memory::PathDependent;
-            (Greeting::Ready { parameters, serves, remembers }, Some(model))
+            let has_field = model.has_linear_field();
+            (Greeting::Ready { parameters, serves, remembers, has_field }, Some(model))
         }
         Err(refusal) => (Greeting::Refused { kind: refusal.kind as u32, reason: refusal.reason }, None),
     };
@@ -88,11 +90,25 @@ fn obey(model: &mut Model, memory: &SharedMemory) -> CallStatus {
         Some(Order::SetParameter) => {
             let value = f64::from_bits(memory.value.load(Ordering::Relaxed));
             let index = usize::try_from(memory.parameter.load(Ordering::Relaxed)).unwrap_or(usize::MAX);
-            model.set_parameter(index, value)
+            let status = model.set_parameter(index, value);
+            put_extent(model, memory);
+            status
+        }
+        Some(Order::Field) => {
+            let mut field = LinearField::NONE;
+            let status = model.linear_field(&memory.input(), &mut field);
+            memory.put_field(&field);
+            status
         }
         Some(Order::Reset) => model.reset(),
         None => CallStatus::Unsupported,
     }
+}
+
+/// Where the model can act and where it ends, with the parameters now in force.
+fn put_extent(model: &mut Model, memory: &SharedMemory) {
+    memory.put_region(&model.active_region());
+    memory.put_bounds(&model.workspace_bounds());
 }
 
 type Prepared = (Model, Vec<Option<f64>>);

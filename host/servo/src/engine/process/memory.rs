@@ -16,6 +16,12 @@ use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64};
 pub(super) const INPUT_WORDS: usize = 17;
 /// Words of a step's answer: six of the wrench, the energy, the status.
 pub(super) const OUTPUT_WORDS: usize = 8;
+/// Words of where a model can act: shape, centre, half the sides.
+pub(super) const REGION_WORDS: usize = 7;
+/// Words of where it ends: lower and upper.
+pub(super) const BOUNDS_WORDS: usize = 6;
+/// Words of a linear field: pose, wrench, stiffness, validity, time.
+pub(super) const FIELD_WORDS: usize = 7 + 6 + 36 + 3;
 /// Bytes of a model's last words.
 pub(super) const MESSAGE_BYTES: usize = 508;
 
@@ -35,6 +41,9 @@ pub(super) struct SharedPage {
     pub(super) value: AtomicU64,
     pub(super) input: [AtomicU64; INPUT_WORDS],
     pub(super) output: [AtomicU64; OUTPUT_WORDS],
+    pub(super) region: [AtomicU64; REGION_WORDS],
+    pub(super) bounds: [AtomicU64; BOUNDS_WORDS],
+    pub(super) field: [AtomicU64; FIELD_WORDS],
     pub(super) message_len: AtomicU32,
     pub(super) message: [AtomicU8; MESSAGE_BYTES],
 }

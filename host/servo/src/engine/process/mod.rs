@@ -3,7 +3,8 @@
 //! The host starts its own program once more, as `flotor worker`, which loads the plugin and makes the model. The
 //! two share one page of memory. A step is a request there; the worker sleeps until one comes, the loop sleeps until
 //! it is answered, but no longer than the model's time. A late answer costs one tick with the last force and none
-//! after that, until the worker has caught up; a worker that has ended stays disabled.
+//! after that, until the worker has caught up; a worker that is late in five ticks more than in time is disabled, as a
+//! model in the loop would be, and one that has ended too.
 //!
 //! The library is loaded into the host as well, for its schema, but no model of it is made there.
 
@@ -29,6 +30,8 @@ enum Greeting {
         serves: [bool; 3],
         /// Whether its answer depends on the path.
         remembers: bool,
+        /// Whether it has a linear field.
+        has_field: bool,
     },
     /// The plugin was refused, or said no.
     Refused {

@@ -7,7 +7,10 @@ use super::{Greeting, Reply};
 use crate::last_stop::spawn_unblocked;
 use crate::monotonic_ns;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{Demand, Input, LoopConfig, Memory, Output, Refusal, RefusalKind};
+use flotor_hal::{
+    ActiveRegion, Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, RefusalKind,
+    WorkspaceBounds,
+};
 use std::io;
 use std::os::fd::AsFd;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
@@ -16,6 +19,7 @@ use std::process::{Child, Command};
 use std::sync::OnceLock;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Sender, channel};
+use std::time::{Duration, Instant};
 
 /// What a worker is to be.
 pub struct WorkerOrder<'a> {
@@ -27,6 +31,8 @@ pub struct WorkerOrder<'a> {
     pub config: LoopConfig,
     /// How long the loop waits for an answer, ns.
     pub patience_ns: u64,
+    /// How long making the model may take.
+    pub making: Duration,
 }
 
 /// A model in a process of its own.
@@ -42,6 +48,7 @@ pub struct Worker {
     parameters: Vec<Option<f64>>,
     serves: Demand,
     remembers: Memory,
+    has_field: bool,
 }
 
 impl Worker {
@@ -74,10 +81,12 @@ impl Worker {
             parameters: Vec::new(),
             serves: NO_DEMAND,
             remembers: Memory::PathDependent,
+            has_field: false,
         };
-        let greeting = worker.greeting();
+        let greeting = worker.greeting(order.making);
         match serde_json::from_str(&greeting) {
-            Ok(Greeting::Ready { parameters, serves, remembers }) => {
+            Ok(Greeting::Ready { parameters, serves, remembers, has_field }) => {
+                worker.has_field = has_field;
                 worker.remembers = if remembers { Memory::PathDependent } else { Memory::Stateless };
                 worker.parameters = parameters;
                 let served =
@@ -90,17 +99,25 @@ impl Worker {
             }
             Err(_) => {
                 // It may be there all the same, saying nothing that makes sense: nobody waits for that.
+                let is_late = greeting.is_empty() && worker.child.try_wait().is_ok_and(|end| end.is_none());
                 let _ = worker.child.kill();
                 let end = worker.child.wait().map_err(no_worker)?;
+                if is_late {
+                    let making_s = order.making.as_secs_f64();
+                    return Err(Refusal::broken(format!(
+                        "`create` or `prepare` did not return within {making_s} s in its process"
+                    )));
+                }
                 Err(Refusal::broken(format!("its process ended before the model was made ({end})")))
             }
         }
     }
 
-    /// What the worker says first, once its model is made; nothing if its process ended before. Not real-time.
-    fn greeting(&mut self) -> String {
-        let child = &mut self.child;
-        let has_ended = || child.try_wait().is_ok_and(|end| end.is_some());
+    /// What the worker says first, once its model is made; nothing if its process ended before, or takes longer than it may.
+    /// Not real-time.
+    fn greeting(&mut self, making: Duration) -> String {
+        let (child, started) = (&mut self.child, Instant::now());
+        let has_ended = || started.elapsed() > making || child.try_wait().is_ok_and(|end| end.is_some());
         let Some((number, text)) = heard(&self.memory, has_ended) else { return String::new() };
         self.number = number;
         text
@@ -126,6 +143,33 @@ impl Worker {
             |memory| memory.put_input(input),
             |memory| (memory.status(), memory.output()),
         )
+    }
+
+    /// Whether it has a linear field.
+    pub fn has_linear_field(&self) -> bool {
+        self.has_field
+    }
+
+    /// The field at an input. Not real-time: waits as long as it may.
+    pub fn linear_field(&mut self, input: &Input) -> Reply<(CallStatus, LinearField)> {
+        let patience_ns = self.patience_ns;
+        self.request(
+            Order::Field,
+            patience_ns,
+            |memory| memory.put_input(input),
+            |memory| (memory.status(), memory.field()),
+        )
+    }
+
+    /// Where the model can act; everywhere while it is at a request whose answer may change that. Real-time: bounded, no
+    /// allocation.
+    pub fn active_region(&self) -> ActiveRegion {
+        if self.is_behind { ActiveRegion::EVERYWHERE } else { self.memory.region() }
+    }
+
+    /// Where the model ends. Real-time: bounded, no allocation.
+    pub fn workspace_bounds(&self) -> WorkspaceBounds {
+        self.memory.bounds()
     }
 
     /// Changes a live parameter at a tick boundary. Real-time: waits as long as it may, no allocation.
@@ -260,6 +304,9 @@ fn spawn(command: Command) -> io::Result<Child> {
 /// The program that can be a worker: this one, or, for a program that only uses the library, `flotor` beside it or
 /// in the folder above.
 pub(crate) fn program() -> io::Result<PathBuf> {
+    if let Some(program) = crate::guest::program() {
+        return Ok(program.clone());
+    }
     let name = format!("flotor{}", std::env::consts::EXE_SUFFIX);
     let own = std::env::current_exe()?;
     if own.file_name().is_some_and(|own| *own == *name) {

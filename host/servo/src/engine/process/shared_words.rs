@@ -1,8 +1,11 @@
 //! What host and worker say to each other, as words in shared memory.
 
-use super::memory::{INPUT_WORDS, OUTPUT_WORDS, SharedPage};
+use super::memory::{BOUNDS_WORDS, FIELD_WORDS, INPUT_WORDS, OUTPUT_WORDS, REGION_WORDS, SharedPage};
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{Demand, Input, Output, Pose, StepStatus, Twist, Wrench};
+use flotor_hal::{
+    ActiveRegion, Demand, Input, LinearField, Output, Pose, RegionShape, StepStatus, Twist, WorkspaceBounds,
+    Wrench,
+};
 use rustix::thread::futex;
 use rustix::time::Timespec;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -13,6 +16,7 @@ pub(super) enum Order {
     Step,
     SetParameter,
     Reset,
+    Field,
 }
 
 impl Order {
@@ -21,6 +25,7 @@ impl Order {
             Self::Step => 0,
             Self::SetParameter => 1,
             Self::Reset => 2,
+            Self::Field => 3,
         }
     }
 
@@ -29,6 +34,7 @@ impl Order {
             0 => Self::Step,
             1 => Self::SetParameter,
             2 => Self::Reset,
+            3 => Self::Field,
             _ => return None,
         })
     }
@@ -127,6 +133,65 @@ impl SharedPage {
         self.output.iter().zip(words).for_each(|(slot, word)| slot.store(word, Ordering::Relaxed));
     }
 
+    pub(super) fn put_region(&self, region: &ActiveRegion) {
+        let shape = match region.shape() {
+            RegionShape::Everywhere => 0,
+            RegionShape::Sphere => 1,
+            RegionShape::Box => 2,
+        };
+        let numbers = region.center().to_array().into_iter().chain(region.half_sides().to_array());
+        put(&self.region, [shape].into_iter().chain(numbers.map(f64::to_bits)));
+    }
+
+    pub(super) fn region(&self) -> ActiveRegion {
+        let words: [u64; REGION_WORDS] = std::array::from_fn(|i| load(self.region.get(i)));
+        let [shape, cx, cy, cz, hx, hy, hz] = words;
+        let [center_m, half_sides_m] = [[cx, cy, cz], [hx, hy, hz]].map(|three| three.map(f64::from_bits));
+        let [radius_m, ..] = half_sides_m;
+        // Numbers that make no sense are everywhere, too.
+        match shape {
+            1 => ActiveRegion::sphere(center_m, radius_m),
+            2 => ActiveRegion::cuboid(center_m, half_sides_m),
+            _ => ActiveRegion::EVERYWHERE,
+        }
+    }
+
+    pub(super) fn put_bounds(&self, bounds: &WorkspaceBounds) {
+        put(&self.bounds, bounds.ends_m().into_iter().flatten().map(f64::to_bits));
+    }
+
+    pub(super) fn bounds(&self) -> WorkspaceBounds {
+        let words: [u64; BOUNDS_WORDS] = std::array::from_fn(|i| load(self.bounds.get(i)));
+        let [lx, ly, lz, ux, uy, uz] = words.map(f64::from_bits);
+        WorkspaceBounds::between([lx, ly, lz], [ux, uy, uz])
+    }
+
+    pub(super) fn put_field(&self, field: &LinearField) {
+        put(&self.field, field_words(field));
+    }
+
+    pub(super) fn field(&self) -> LinearField {
+        let words: [u64; FIELD_WORDS] = std::array::from_fn(|i| load(self.field.get(i)));
+        let mut numbers = words.iter().map(|word| f64::from_bits(*word));
+        let mut next = || numbers.next().unwrap_or(f64::NAN);
+        let anchor = Pose {
+            position_m: std::array::from_fn(|_| next()),
+            orientation_xyzw: std::array::from_fn(|_| next()),
+        };
+        let wrench =
+            Wrench { force_n: std::array::from_fn(|_| next()), torque_nm: std::array::from_fn(|_| next()) };
+        let stiffness = std::array::from_fn(|_| std::array::from_fn(|_| next()));
+        let (valid_m, valid_rad) = (next(), next());
+        LinearField {
+            anchor,
+            wrench,
+            stiffness,
+            valid_m,
+            valid_rad,
+            time_ns: words.last().copied().unwrap_or(0),
+        }
+    }
+
     pub(super) fn output(&self) -> Output {
         let words: [u64; OUTPUT_WORDS] = std::array::from_fn(|i| load(self.output.get(i)));
         let [fx, fy, fz, tx, ty, tz, energy_j, status] = words;
@@ -145,6 +210,19 @@ pub(super) const NO_DEMAND: Demand = Demand::FORCE.limited_to(Demand::TORQUE);
 /// In the order of their bits here.
 pub(super) const DEMANDS: [Demand; 3] = [Demand::FORCE, Demand::TORQUE, Demand::ENERGY];
 
+/// A field as words.
+fn field_words(field: &LinearField) -> impl Iterator<Item = u64> {
+    let LinearField { anchor, wrench, stiffness, valid_m, valid_rad, time_ns } = *field;
+    let numbers = anchor.position_m.into_iter().chain(anchor.orientation_xyzw);
+    let numbers = numbers.chain(wrench.force_n).chain(wrench.torque_nm);
+    let numbers = numbers.chain(stiffness.into_iter().flatten()).chain([valid_m, valid_rad]);
+    numbers.map(f64::to_bits).chain([time_ns])
+}
+
+fn put(slots: &[AtomicU64], words: impl Iterator<Item = u64>) {
+    slots.iter().zip(words).for_each(|(slot, word)| slot.store(word, Ordering::Relaxed));
+}
+
 fn load(word: Option<&AtomicU64>) -> u64 {
     word.map_or(0, |word| word.load(Ordering::Relaxed))
 }
@@ -161,48 +239,4 @@ pub(super) fn wait_for_change(word: &AtomicU32, value: u32, timeout_ns: u64) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::memory::{SharedMemory, create_file};
-    use super::*;
-    use flotor_hal::{DQuat, DVec3};
-
-    #[test]
-    fn input_and_output_cross_bit_for_bit() {
-        let memory = SharedMemory::map(create_file().expect("an anonymous file")).expect("mapped");
-        let input = Input {
-            pose: Pose::new(DVec3::new(1.0, f64::NAN, -0.0), DQuat::from_xyzw(0.1, 0.2, 0.3, 0.4)),
-            twist: Twist::new(DVec3::new(5.0, 6.0, 7.0), DVec3::new(8.0, f64::INFINITY, 5.0e-324)),
-            time_ns: u64::MAX,
-            dt_ns: 11,
-            tick: 12,
-            buttons: u32::MAX,
-            demand: Demand::FORCE.with(Demand::ENERGY),
-        };
-        memory.put_input(&input);
-        assert_eq!(format!("{:?}", memory.input()), format!("{input:?}"));
-        let wrench = Wrench { force_n: [1.0, -2.0, 3.0], torque_nm: [4.0, 5.0, -6.0] };
-        let output = Output::new(wrench, 7.5, StepStatus::Clamped);
-        memory.put_output(&output);
-        assert_eq!(memory.output(), output);
-    }
-
-    #[test]
-    fn a_status_no_contract_knows_is_no_answer() {
-        let memory = SharedMemory::map(create_file().expect("an anonymous file")).expect("mapped");
-        memory.output.iter().for_each(|word| word.store(u64::MAX, Ordering::Relaxed));
-        assert!(!memory.output().wrench.is_finite());
-    }
-
-    #[test]
-    fn words_that_do_not_fit_are_cut() {
-        let memory = SharedMemory::map(create_file().expect("an anonymous file")).expect("mapped");
-        memory.put_message(&"x".repeat(10_000));
-        assert_eq!(memory.message().len(), super::super::memory::MESSAGE_BYTES);
-    }
-
-    #[test]
-    fn some_other_file_is_not_mapped() {
-        let file = std::fs::File::open("/dev/null").expect("there is one");
-        assert!(SharedMemory::map(file).is_err());
-    }
-}
+mod tests;

@@ -1,0 +1,286 @@
+//! What a partner on another host is believed: nothing that a hand on a device like ours could not have done.
+//!
+//! Its message is a claim. One that no device could make, of a place, an orientation or a velocity, is not used at all. Of all
+//! others, the pose counts as far as this device reaches, and moves no faster than a hand. The energy that it says it has passed on counts up to
+//! what can be checked here: what this end has passed on itself, and the work of a hand that moved as the claimed pose did, against
+//! the coupling, with the power of a hand. The rest is cut and counted; who is cut too much is a partner no longer.
+
+use crate::plausibility::{is_rotation, is_too_fast};
+use flotor_core::coupling::CouplingConfig;
+use flotor_core::mapping::Mapping;
+use flotor_core::peer::PeerState;
+use flotor_hal::{DVec3, DeviceState, Pose, Twist, orientation_from_rotation_vector, rotation_vector};
+
+/// How far the device here reaches, device frame: semi-axes of an ellipsoid of positions (m) and of one of rotation vectors (rad).
+/// An axis without a range (0) is not looked at.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reach {
+    /// Along each axis, m.
+    pub range_m: [f64; 3],
+    /// About each axis, rad.
+    pub range_rad: [f64; 3],
+}
+
+/// What was not believed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cut {
+    /// Energy, J, in the shared frame.
+    pub energy_j: f64,
+    /// Way of the claimed position that was too fast, m, device frame.
+    pub path_m: f64,
+    /// The same of the orientation, rad.
+    pub turn_rad: f64,
+}
+
+/// Fastest hand, m/s and rad/s: several times the speed of a hand that holds a handle.
+const FASTEST_M_PER_S: f64 = 2.0;
+const FASTEST_RAD_PER_S: f64 = 30.0;
+/// What may come at once, because a message was late: so much time of the fastest motion, s.
+const AT_ONCE_S: f64 = 0.01;
+/// What a hand can put into a handle, W, over longer than [`BURST_S`]; at once the work of so much time.
+const HAND_W: f64 = 1.0;
+const BURST_S: f64 = 0.2;
+/// How old what an end sees of the other is at most where the coupling is of use, s: its spring is longer there than here.
+const OLDEST_S: f64 = 0.1;
+/// How much more than the work that is seen here may have been done there.
+const MORE: f64 = 2.0;
+/// What a partner may have had before it was heard of, J: a full reserve and as much in its spring. It counts as work of its hand:
+/// who comes again and again has put in no more.
+const AT_FIRST_J: f64 = 0.02;
+/// Who is cut by more than one of these within some [`MEMORY_S`] is no partner.
+const TOO_MUCH: Cut = Cut { energy_j: 0.05, path_m: 0.25, turn_rad: 12.5 };
+/// Time after which a third is left of what was cut, s.
+const MEMORY_S: f64 = 1.0;
+/// How far from the middle a partner may be, in the shared frame of devices that are not scaled, m: the range of its device
+/// is not known here; that of the largest arms is less.
+const FARTHEST_M: f64 = 2.0;
+
+/// What is believed of one partner. Energies in the shared frame.
+pub(super) struct Claims {
+    reach: Reach,
+    config: CouplingConfig,
+    energy_scale: f64,
+    period_s: f64,
+    /// Where it was believed to be last, device frame: position and rotation vector.
+    last: Option<[DVec3; 2]>,
+    /// What it claimed to have passed on, and what of that was believed, J.
+    claimed_j: f64,
+    believed_j: f64,
+    /// What it may still claim, J; what a hand may still have done, J.
+    open_j: f64,
+    hand_j: f64,
+    /// What this end had passed on in the last tick, J.
+    told_j: f64,
+    /// How far it may still have come, m and rad.
+    way: [f64; 2],
+    cut: Cut,
+    recent: Cut,
+    is_cut: bool,
+}
+
+impl Claims {
+    /// Not real-time.
+    pub(super) fn new(config: &CouplingConfig, mapping: &Mapping, reach: Reach, period_s: f64) -> Self {
+        Self {
+            reach,
+            config: *config,
+            energy_scale: mapping.energy_scale(),
+            period_s,
+            last: None,
+            claimed_j: 0.0,
+            believed_j: 0.0,
+            open_j: 0.0,
+            hand_j: HAND_W * BURST_S / mapping.energy_scale(),
+            told_j: 0.0,
+            way: [0.0; 2],
+            cut: Cut::default(),
+            recent: Cut::default(),
+            is_cut: false,
+        }
+    }
+
+    /// Whether any device could be there and move like that; what could not is no message. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn can_be(&self, peer: &PeerState, mapping: &Mapping) -> bool {
+        // From metres of a device to the shared frame; the partner's may be another, but then is not smaller than one.
+        let scale = mapping.length_to_device(1.0).recip().max(1.0);
+        let PeerState { pose, twist, .. } = peer;
+        let unscaled = Twist::new(twist.linear() / scale, twist.angular());
+        pose.is_finite()
+            && twist.is_finite()
+            && is_rotation(pose.orientation())
+            && pose.position().length() <= FARTHEST_M * scale
+            && !is_too_fast(&unscaled)
+    }
+
+    /// A partner claims from this state on: what it had passed on before was for somebody else. One that is not another remains
+    /// answerable for its claims of before. Real-time: bounded, no allocation.
+    pub(super) fn meet(&mut self, peer: &PeerState, is_another: bool) {
+        self.last = None;
+        if is_another {
+            self.recent = Cut::default();
+        }
+        let had_j = AT_FIRST_J.min(self.hand_j);
+        (self.claimed_j, self.open_j, self.hand_j) = (peer.told_j, had_j, self.hand_j - had_j);
+    }
+
+    /// It was not heard of for a while: where it is now is where it begins. Real-time: bounded, no allocation.
+    pub(super) fn forget_place(&mut self) {
+        self.last = None;
+    }
+
+    /// A tick has gone by; `told_j` is all that this end has ever passed on. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn pass(&mut self, told_j: f64) {
+        let period_s = self.period_s;
+        let shared = |hand: f64| hand / self.energy_scale;
+        self.open_j += (told_j - self.told_j).max(0.0);
+        self.open_j = self.open_j.min(shared(HAND_W * BURST_S) + AT_FIRST_J);
+        self.told_j = told_j;
+        self.hand_j = (self.hand_j + shared(HAND_W * period_s)).min(shared(HAND_W * BURST_S));
+        for (way, fastest) in self.way.iter_mut().zip([FASTEST_M_PER_S, FASTEST_RAD_PER_S]) {
+            *way = (*way + fastest * period_s).min(fastest * (AT_ONCE_S + period_s));
+        }
+        let kept = 1.0 - (period_s / MEMORY_S).min(1.0);
+        let Cut { energy_j, path_m, turn_rad } = &mut self.recent;
+        [energy_j, path_m, turn_rad].into_iter().for_each(|number| *number *= kept);
+        self.is_cut = false;
+    }
+
+    /// What is believed of a claim, while the handle here is at `here` (device frame) and was not told anything for `silent_s`; its
+    /// energy is the running total of what was believed. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn believe(
+        &mut self,
+        peer: &PeerState,
+        here: &DeviceState,
+        mapping: &Mapping,
+        silent_s: f64,
+    ) -> PeerState {
+        let claimed = [
+            mapping.position_to_device(peer.pose.position()),
+            mapping.rotation().conjugate() * rotation_vector(peer.pose.orientation()),
+        ];
+        let within = [reached(claimed[0], self.reach.range_m), reached(claimed[1], self.reach.range_rad)];
+        // A partner with more range than this device is no liar: that is told, and not held against it.
+        self.is_cut = within != claimed;
+        let last = self.last.unwrap_or(within);
+        let mut believed = within;
+        let mut moved = [0.0; 2];
+        for (index, fastest) in [FASTEST_M_PER_S, FASTEST_RAD_PER_S].into_iter().enumerate() {
+            let (Some(to), Some(from), Some(way), Some(moved)) =
+                (believed.get_mut(index), last.get(index), self.way.get_mut(index), moved.get_mut(index))
+            else {
+                continue;
+            };
+            let step = *to - *from;
+            let (length, most) = (step.length(), way.max(fastest * silent_s));
+            if length > most {
+                *to = *from + step * (most / length);
+                self.is_cut = true;
+                let beyond = length - most;
+                let places = if index == 0 {
+                    [&mut self.cut.path_m, &mut self.recent.path_m]
+                } else {
+                    [&mut self.cut.turn_rad, &mut self.recent.turn_rad]
+                };
+                places.into_iter().for_each(|place| *place += beyond);
+            }
+            *moved = length.min(most);
+            *way = (*way - *moved).max(0.0);
+        }
+        self.last = Some(believed);
+        // What is believed as it was claimed stays so to the bit.
+        let pose = if believed == claimed {
+            peer.pose
+        } else {
+            let pose = Pose::new(believed[0], orientation_from_rotation_vector(believed[1]));
+            mapping.pose_to_model(&pose)
+        };
+        let [path_m, turn_rad] = moved;
+        let moved = [path_m / mapping.length_to_device(1.0), turn_rad];
+        let here = (mapping.pose_to_model(&here.pose), mapping.twist_to_model(&here.twist));
+        let told_j = self.energy(peer.told_j, &pose, &here, moved, silent_s);
+        PeerState { pose, twist: bounded_twist(&peer.twist, mapping), told_j }
+    }
+
+    /// The energy that is believed: all of it so far, J.
+    fn energy(
+        &mut self,
+        told_j: f64,
+        pose: &Pose,
+        (here, motion): &(Pose, Twist),
+        [path_m, turn_rad]: [f64; 2],
+        silent_s: f64,
+    ) -> f64 {
+        let config = &self.config;
+        let time_s = silent_s.max(self.period_s);
+        // Both hands move while the states of each other are on their way.
+        let speed_m_per_s = path_m / time_s + motion.linear().length();
+        let speed_rad_per_s = turn_rad / time_s + motion.angular().length();
+        let away_m = (pose.position() - here.position()).length() + speed_m_per_s * OLDEST_S;
+        let turned_rad = rotation_vector(pose.orientation() * here.orientation().conjugate()).length()
+            + speed_rad_per_s * OLDEST_S;
+        let force_n = config.stiffness_n_per_m * away_m + config.damping_ns_per_m * speed_m_per_s;
+        let torque_nm =
+            config.stiffness_nm_per_rad * turned_rad + config.damping_nms_per_rad * speed_rad_per_s;
+        let work_j = (MORE * (force_n * path_m + torque_nm * turn_rad)).min(self.hand_j);
+        self.hand_j -= work_j;
+        self.open_j += work_j;
+        let claim_j = (told_j - self.claimed_j).max(0.0);
+        let believed_j = claim_j.min(self.open_j);
+        self.claimed_j = self.claimed_j.max(told_j);
+        self.open_j -= believed_j;
+        self.believed_j += believed_j;
+        let beyond_j = claim_j - believed_j;
+        // Sums of some thousand terms of up to 10 mJ.
+        if beyond_j > 1.0e-12 {
+            self.is_cut = true;
+            self.cut.energy_j += beyond_j;
+            self.recent.energy_j += beyond_j;
+        }
+        self.believed_j
+    }
+
+    /// Whether something was cut in this tick. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn is_cut(&self) -> bool {
+        self.is_cut
+    }
+
+    /// Whether more was cut than a partner may claim too much. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn is_too_much(&self) -> bool {
+        let Cut { energy_j, path_m, turn_rad } = self.recent;
+        energy_j > TOO_MUCH.energy_j || path_m > TOO_MUCH.path_m || turn_rad > TOO_MUCH.turn_rad
+    }
+
+    /// All that was ever cut, of any partner.
+    pub(super) fn cut(&self) -> Cut {
+        self.cut
+    }
+
+    /// All the energy that was ever believed, of any partner, J: no more than this, and what the hand here has put in, comes out.
+    pub(super) fn believed_j(&self) -> f64 {
+        self.believed_j
+    }
+}
+
+/// No faster than a hand, in the frame of the device.
+fn bounded_twist(twist: &Twist, mapping: &Mapping) -> Twist {
+    let most_m_per_s = FASTEST_M_PER_S / mapping.length_to_device(1.0);
+    Twist::new(
+        twist.linear().clamp_length_max(most_m_per_s),
+        twist.angular().clamp_length_max(FASTEST_RAD_PER_S),
+    )
+}
+
+/// The vector, or the point of the ellipsoid in its direction.
+fn reached(vector: DVec3, range: [f64; 3]) -> DVec3 {
+    let parts = vector.to_array().into_iter().zip(range).filter(|(_, range)| *range > 0.0);
+    let outside = parts.map(|(part, range)| part / range).map(|ratio| ratio * ratio).sum::<f64>().sqrt();
+    if outside > 1.0 { vector / outside } else { vector }
+}
+
+#[cfg(test)]
+mod tests;
