@@ -34,7 +34,9 @@ fn end_words(end: &RunEnd) -> String {
         RunEnd::TooFast(samples_per_s) => {
             format!("the device sends {samples_per_s} samples a second, too many")
         }
+        RunEnd::NotPaced => "the device does not set the pace".to_owned(),
         RunEnd::Watchdog(_) => "a tick took longer than the watchdog allows".to_owned(),
+        RunEnd::Unguarded => "the watchdog process was gone".to_owned(),
         RunEnd::Finished | RunEnd::Stopped => "it was stopped".to_owned(),
     }
 }

@@ -31,6 +31,7 @@ pub fn command() -> clap::Command {
 /// Runs the command of this process.
 #[must_use]
 pub fn main() -> ExitCode {
+    flotor_session::tell_notices(|notice| flotor_command::note(notice));
     exit_code_of(match options::arguments::<Arguments>().command {
         Command::Study(arguments) => study::run(&arguments),
         Command::Analyse(arguments) => analyse::run(&arguments),

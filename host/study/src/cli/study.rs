@@ -129,13 +129,13 @@ struct Common {
     /// Resume incomplete subjects, skip complete ones
     #[arg(long)]
     resume: bool,
-    /// Varied parameter: MODEL.PARAMETER (default: spring.gamma_n, for a force load.force_n)
+    /// Varied parameter: MODEL.PARAMETER (default: spring.gamma_n; in `study force`: load.force_n)
     #[arg(long, value_name = "MODEL.KEY")]
     stimulus: Option<String>,
-    /// First modality
+    /// First modality, vision and haptics (vh) or haptics alone (h)
     #[arg(long, value_enum, default_value_t, value_name = "MODALITY")]
     first: FirstChoice,
-    /// Response to a handle that leaves its range
+    /// If the handle leaves its range: repeat the trial (at most three times) or keep its answer
     #[arg(long, value_enum, default_value_t)]
     boundary: BoundaryChoice,
     #[command(flatten)]
@@ -159,7 +159,8 @@ struct NoteArguments {
 struct JndArguments {
     #[command(flatten)]
     common: Common,
-    /// Bases, in the unit of the stimulus (default: 17,26,35; for a force 3,6,9)
+    /// Bases, in the unit of the stimulus; each pair is a base and a comparison that differs from it (default: 17,26,35;
+    /// for a force 3,6,9)
     #[arg(long, value_delimiter = ',', value_parser = real, allow_hyphen_values = true, value_name = "LIST")]
     bases: Option<Vec<f64>>,
     /// Replications, in alternating modality
@@ -189,10 +190,10 @@ struct JndArguments {
     /// First reversal whose difference counts for the threshold
     #[arg(long, default_value_t = 4, value_parser = count(1..=1000_u32), value_name = "N")]
     average_from: u32,
-    /// Whether the trials of the first and last of these reversals count
+    /// Whether the threshold includes the trials of the first and of the last counted reversal
     #[arg(long, value_enum, default_value_t)]
     averaging: Averaging,
-    /// Step at a reversal that halves it
+    /// Step size used at a reversal that halves the step size
     #[arg(long, value_enum, default_value_t)]
     step_at_reversal: StepAtReversal,
     /// Smallest difference, as a share of the base

@@ -32,13 +32,13 @@ impl QuestPlusRule {
     /// Names the first one.
     pub fn check(&self) -> Result<(), InvalidRule> {
         if self.trials == 0 {
-            return Err(InvalidRule::new("--trials", self.trials, "legal is 1 or more"));
+            return Err(InvalidRule::new("--trials", self.trials, "must be 1 or more"));
         }
         if !(self.target > 0.5 && self.target < 1.0) {
             return Err(InvalidRule::new(
                 "--target",
                 self.target,
-                "legal is above 0.5 (guessing) and below 1",
+                "must be above 0.5 (guessing) and below 1",
             ));
         }
         let [least, most] = self.deltas;
@@ -46,7 +46,7 @@ impl QuestPlusRule {
             return Err(InvalidRule::new(
                 "smallest difference",
                 least,
-                "legal is above 0 and below the largest",
+                "must be above 0 and below the largest",
             ));
         }
         Ok(())

@@ -112,28 +112,28 @@ impl WeightedUpDownRule {
             let inside = value > least && value < most;
             if inside { Ok(()) } else { Err(InvalidRule::new(setting, value, legal)) }
         };
-        share("--step", self.first_step, 0.0, 1.0, "legal is above 0 and below 1")?;
-        share("--target", self.target, 0.5, 1.0, "legal is above 0.5 (guessing) and below 1")?;
+        share("--step", self.first_step, 0.0, 1.0, "must be above 0 and below 1")?;
+        share("--target", self.target, 0.5, 1.0, "must be above 0.5 (guessing) and below 1")?;
         share(
             "--ceiling",
             self.ceiling,
             0.0,
             1.0,
-            "legal is above 0 and below 1 (a base minus all of it is nothing)",
+            "must be above 0 and below 1 (a base minus all of it is nothing)",
         )?;
         if !(self.floor >= 0.0 && self.floor < self.ceiling) {
-            return Err(InvalidRule::new("--floor", self.floor, "legal is 0 to below --ceiling"));
+            return Err(InvalidRule::new("--floor", self.floor, "must be 0 to below --ceiling"));
         }
         if !(self.initial_delta > self.floor && self.initial_delta <= self.ceiling) {
-            let legal = "legal is above --floor and up to --ceiling";
+            let legal = "must be above --floor and up to --ceiling";
             return Err(InvalidRule::new("--initial", self.initial_delta, legal));
         }
         if self.stop_after == 0 || self.average_from == 0 || self.average_from > self.stop_after {
-            let legal = format!("legal is 1 to --stop-after ({})", self.stop_after);
+            let legal = format!("must be 1 to --stop-after ({})", self.stop_after);
             return Err(InvalidRule::new("--average-from", self.average_from, legal));
         }
         if self.trials_most < self.stop_after {
-            let legal = format!("legal is 1 to {}, the most trials of a track", self.trials_most);
+            let legal = format!("must be 1 to {}, the most trials of a track", self.trials_most);
             return Err(InvalidRule::new("--stop-after", self.stop_after, legal));
         }
         Ok(())
@@ -271,107 +271,4 @@ impl WeightedUpDown {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use Judgement::{Correct, Unsure, Wrong};
-
-    /// D2/D1 and D3/D1 of Kaernbach's equations for two alternatives.
-    #[test]
-    fn step_ratios() {
-        let table = [(2.0 / 3.0, 2.0, 0.5), (0.70, 7.0 / 3.0, 2.0 / 3.0), (0.75, 3.0, 1.0), (0.80, 4.0, 1.5)];
-        for (target, wrong, unsure) in table {
-            let rule = WeightedUpDownRule { target, ..WeightedUpDownRule::default() };
-            assert!((rule.wrong_ratio() - wrong).abs() < 1.0e-12);
-            assert!((rule.unsure_ratio() - unsure).abs() < 1.0e-12);
-        }
-    }
-
-    /// A track by hand: every difference, reversal, halving and the mean.
-    #[test]
-    fn a_track_by_hand() {
-        let mut track = WeightedUpDown::new(&WeightedUpDownRule::default());
-        // Answer, difference it was given at (in percent), reversals after it.
-        let script = [
-            (Correct, 40.0, 0),
-            (Correct, 30.0, 0),
-            (Wrong, 20.0, 1),   // up by 30
-            (Correct, 50.0, 2), // halved to 5, at once
-            (Correct, 45.0, 2),
-            (Unsure, 40.0, 3),  // up by 5
-            (Correct, 45.0, 4), // halved to 2.5; counts from here
-            (Correct, 42.5, 4),
-            (Unsure, 40.0, 5),
-            (Correct, 42.5, 6),
-            (Wrong, 40.0, 7), // up by 7.5
-            (Correct, 47.5, 8),
-        ];
-        for (index, (judgement, percent, reversals)) in script.into_iter().enumerate() {
-            assert!((track.delta() * 100.0 - percent).abs() < 1.0e-9, "trial {index}: {}", track.delta());
-            assert!(!track.is_done());
-            let before = track.reversals();
-            assert_eq!(track.answer(judgement), reversals > before, "trial {index}");
-            assert_eq!(track.reversals(), reversals, "trial {index}");
-        }
-        assert!(track.is_done());
-        let mean = (45.0 + 42.5 + 40.0 + 42.5 + 40.0 + 47.5) / 600.0;
-        assert!((track.threshold().unwrap() - mean).abs() < 1.0e-12);
-    }
-
-    #[test]
-    fn what_was_left_open_changes_what_it_says() {
-        let threshold = |rule: WeightedUpDownRule| {
-            let mut track = WeightedUpDown::new(&rule);
-            for judgement in [Wrong, Correct, Wrong, Correct, Wrong, Correct, Wrong, Correct, Wrong] {
-                track.answer(judgement);
-            }
-            track.threshold().unwrap()
-        };
-        let base = WeightedUpDownRule { initial_delta: 0.3, ..WeightedUpDownRule::default() };
-        let with = |change: fn(&mut WeightedUpDownRule)| {
-            let mut rule = base.clone();
-            change(&mut rule);
-            threshold(rule)
-        };
-        let default = threshold(base.clone());
-        assert_ne!(default, with(|rule| rule.averaging = Averaging::AfterFirst));
-        assert_ne!(default, with(|rule| rule.averaging = Averaging::BeforeLast));
-        assert_ne!(default, with(|rule| rule.step_at_reversal = StepAtReversal::Old));
-        assert_ne!(default, with(|rule| rule.ceiling = 0.5));
-    }
-
-    #[test]
-    fn the_difference_stays_between_floor_and_ceiling_and_an_endless_track_ends() {
-        let mut track = WeightedUpDown::new(&WeightedUpDownRule::default());
-        while !track.is_done() {
-            track.answer(Correct);
-            assert!(track.delta() >= 0.0);
-        }
-        assert_eq!((track.trials(), track.threshold()), (200, None));
-        let mut track = WeightedUpDown::new(&WeightedUpDownRule::default());
-        (0..50).for_each(|_| {
-            track.answer(Wrong);
-        });
-        assert_eq!(track.delta(), 0.95);
-    }
-
-    #[test]
-    fn impossible_settings_are_refused() {
-        let refused = |change: fn(&mut WeightedUpDownRule)| {
-            let mut rule = WeightedUpDownRule::default();
-            change(&mut rule);
-            rule.check().unwrap_err().to_string()
-        };
-        assert_eq!(WeightedUpDownRule::default().check(), Ok(()));
-        assert_eq!(
-            refused(|rule| rule.target = 0.5),
-            "--target 0.5: legal is above 0.5 (guessing) and below 1"
-        );
-        assert_eq!(refused(|rule| rule.first_step = f64::NAN), "--step NaN: legal is above 0 and below 1");
-        assert_eq!(
-            refused(|rule| rule.initial_delta = 0.0),
-            "--initial 0: legal is above --floor and up to --ceiling"
-        );
-        assert_eq!(refused(|rule| rule.floor = -0.1), "--floor -0.1: legal is 0 to below --ceiling");
-        assert_eq!(refused(|rule| rule.average_from = 9), "--average-from 9: legal is 1 to --stop-after (8)");
-    }
-}
+mod tests;

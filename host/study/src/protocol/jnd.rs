@@ -98,7 +98,7 @@ impl JndProtocol {
         self.procedure.check()?;
         for (what, value) in [("close", self.demo.close), ("nearly equal", self.demo.nearly_equal)] {
             if !(0.0..1.0).contains(&value) {
-                return Err(ProtocolError::Value { what, value, legal: "legal is 0 to below 1, a share" });
+                return Err(ProtocolError::Value { what, value, legal: "must be a share from 0 to below 1" });
             }
         }
         Ok(())

@@ -140,7 +140,7 @@ impl TryFrom<u16> for SubjectNumber {
     type Error = String;
 
     fn try_from(number: u16) -> Result<Self, String> {
-        Self::new(number).ok_or_else(|| format!("subject number {number}; legal is 1 to {}", Self::MOST))
+        Self::new(number).ok_or_else(|| format!("subject number {number}: must be 1 to {}", Self::MOST))
     }
 }
 
@@ -302,11 +302,7 @@ fn positive_and_different(what: &'static str, values: &[f64]) -> Result<(), Prot
     };
     let wrong = values.iter().find(|value| !is_right(**value));
     wrong.map_or(Ok(()), |value| {
-        Err(ProtocolError::Value {
-            what,
-            value: *value,
-            legal: "legal is a finite number above 0, each once",
-        })
+        Err(ProtocolError::Value { what, value: *value, legal: "must be a finite number above 0, each once" })
     })
 }
 
@@ -314,7 +310,7 @@ fn at_least_one(what: &'static str, number: u32) -> Result<(), ProtocolError> {
     if number > 0 {
         Ok(())
     } else {
-        Err(ProtocolError::Value { what, value: 0.0, legal: "legal is 1 or more" })
+        Err(ProtocolError::Value { what, value: 0.0, legal: "must be 1 or more" })
     }
 }
 

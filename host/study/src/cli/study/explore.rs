@@ -34,9 +34,9 @@ const MATERIALS: [(&str, [&str; 2]); 4] = [
 
 #[derive(Args)]
 #[command(after_help = "While it runs, type:\n  \
-    wire_diameter_mm 0.8      a new value; a parameter that is not live creates a new model\n  \
+    wire_diameter_mm 0.8      a new value; the host creates a new model if the parameter cannot change during a run\n  \
     material phosphor-bronze  music-wire, stainless, phosphor-bronze, inconel\n  \
-    (Enter)                   stiffness and force at the hand since the last line\n  \
+    (Enter)                   stiffness and largest force that the hand felt since the previous command\n  \
     ?                         all parameters\n  \
     q                         end of the session\n\n\
     Examples:\n  \
@@ -101,6 +101,8 @@ fn end(
     match outcome.end {
         flotor_servo::RunEnd::DeviceFault(fault) => Err(CommandError::DeviceFault(fault)),
         flotor_servo::RunEnd::EmergencyStop(source) => Err(CommandError::EmergencyStop(source)),
+        flotor_servo::RunEnd::NotPaced => Err(CommandError::NotPaced),
+        flotor_servo::RunEnd::Unguarded => Err(CommandError::Unguarded),
         _ => Ok(()),
     }
 }

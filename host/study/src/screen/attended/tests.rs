@@ -1,0 +1,110 @@
+use super::*;
+use crate::protocol::{JndProtocol, MagnitudeProtocol, SubjectNumber};
+
+fn attended(protocol: &Protocol, rest_every: u32) -> Attended {
+    let sitting = Sitting::new(protocol, 4, SubjectNumber::new(1).unwrap());
+    Attended::new(sitting, protocol, 4, rest_every)
+}
+
+/// A whole sitting through the screens gives the trials of the bare state machine, in its order.
+#[test]
+fn screens_lead_through_every_trial_of_the_sitting() {
+    let protocol = Protocol::Magnitude(MagnitudeProtocol::default());
+    let mut person = attended(&protocol, 10);
+    let mut bare = Sitting::new(&protocol, 4, SubjectNumber::new(1).unwrap());
+    let (mut pauses, mut felt, mut answered) = (Vec::new(), 0, 0);
+    loop {
+        let screen = person.screen();
+        assert_eq!(screen, person.screen(), "looking changes nothing");
+        let input = match screen {
+            Screen::Over => break,
+            Screen::Ready { reason, .. } => {
+                pauses.push(reason);
+                Input::Continue
+            }
+            Screen::Feel { position, .. } => {
+                assert_eq!(position, None);
+                let (trial, value) = person.stimulus().unwrap();
+                assert_eq!((Some(trial), trial.presented), (bare.next(), Presented::One { value }));
+                felt += 1;
+                Input::Continue
+            }
+            Screen::Ask { question: Question::Nothing, .. } => Input::Continue,
+            Screen::Ask { question, trial } => {
+                assert_eq!((question, trial.quality), (Question::HowMuch, Quality::Stiffness));
+                Input::Answer { response: Response::Rating(3.0) }
+            }
+        };
+        if let Step::Answered(event) = person.input(input, 0.5).unwrap() {
+            assert_eq!(bare.answer(event.response, &event.exploration), Ok(event.verdict));
+            assert_eq!(event.exploration.response_time_s, Some(0.5));
+            answered += 1;
+        }
+    }
+    assert_eq!((felt, answered, bare.is_over()), (82, 82, true));
+    assert_eq!(pauses.iter().filter(|pause| **pause == Pause::Welcome).count(), 1);
+    assert_eq!(pauses.iter().filter(|pause| **pause == Pause::PhaseChanges).count(), 3);
+    assert!(pauses.iter().filter(|pause| **pause == Pause::Rest).count() >= 6, "{pauses:?}");
+}
+
+#[test]
+fn what_does_not_fit_the_screen_changes_nothing() {
+    let mut jnd = JndProtocol::default();
+    jnd.demo.shown = false;
+    let mut person = attended(&Protocol::Jnd(jnd), 0);
+    let wrong = |person: &mut Attended, input: Input| {
+        let before = person.screen();
+        assert!(person.input(input, 0.0).is_err());
+        assert_eq!(person.screen(), before);
+    };
+    let answer = |response| Input::Answer { response };
+    wrong(&mut person, answer(Response::First));
+    wrong(&mut person, Input::Again);
+    person.input(Input::Continue, 0.0).unwrap();
+    assert!(matches!(person.screen(), Screen::Feel { position: Some(Position::First), .. }));
+    wrong(&mut person, answer(Response::First));
+    person.input(Input::Continue, 0.0).unwrap();
+    person.input(Input::Continue, 0.0).unwrap();
+    wrong(&mut person, Input::Continue);
+    wrong(&mut person, answer(Response::Rating(1.0)));
+    // Once more, then an answer; a note in between.
+    person.input(Input::Again, 0.0).unwrap();
+    assert!(matches!(person.screen(), Screen::Feel { position: Some(Position::First), .. }));
+    let note = Input::Note { text: "dog barked".to_owned() };
+    assert_eq!(person.input(note, 0.0), Ok(Step::Note("dog barked".to_owned())));
+    person.input(Input::Continue, 0.0).unwrap();
+    person.input(Input::Continue, 0.0).unwrap();
+    assert!(matches!(person.input(answer(Response::DontKnow), 1.0), Ok(Step::Answered(_))));
+    assert_eq!(person.input(Input::Stop, 0.0), Ok(Step::Stopped));
+}
+
+/// A handle out of its range: the person is told, and the same trial comes again.
+#[test]
+fn out_of_range_is_said_and_repeated() {
+    let mut jnd = JndProtocol::default();
+    jnd.demo.shown = false;
+    let mut person = attended(&Protocol::Jnd(jnd), 0);
+    person.input(Input::Continue, 0.0).unwrap();
+    person.felt(Felt { kinematics: None, boundary_hit: true, missed_ticks: 2 });
+    person.input(Input::Continue, 0.0).unwrap();
+    person.input(Input::Continue, 0.0).unwrap();
+    let step = person.input(Input::Answer { response: Response::First }, 0.0).unwrap();
+    let Step::Answered(event) = step else { panic!("{step:?}") };
+    assert_eq!((event.verdict, event.exploration.missed_ticks), (Verdict::Repeated, 2));
+    assert!(matches!(person.screen(), Screen::Ready { reason: Pause::OutOfRange, .. }));
+}
+
+#[test]
+fn screens_and_inputs_travel_as_json_without_a_stimulus() {
+    let mut person = attended(&Protocol::Jnd(JndProtocol::default()), 0);
+    person.input(Input::Continue, 0.0).unwrap();
+    let screen = person.screen();
+    let text = serde_json::to_string(&screen).unwrap();
+    assert_eq!(serde_json::from_str::<Screen>(&text).unwrap(), screen);
+    let (_, value) = person.stimulus().unwrap();
+    assert!(!text.contains(&value.to_string()), "{text}");
+    let rating = r#"{"input":"answer","response":{"rating":7.5}}"#;
+    let expected = Input::Answer { response: Response::Rating(7.5) };
+    assert_eq!(serde_json::from_str::<Input>(rating).unwrap(), expected);
+    assert_eq!(serde_json::from_str::<Input>(r#"{"input":"continue"}"#).unwrap(), Input::Continue);
+}
