@@ -1,16 +1,18 @@
 //! Keys and access control: one command makes a network of which every member is known and may do what it may.
 
 use crate::keys::{Name, ROOT};
-use crate::request::Right;
+use crate::link::MEMBER;
+use crate::request::{ANYONE, Right};
 use rcgen::{
     BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair,
-    KeyUsagePurpose,
+    KeyUsagePurpose, date_time_ymd,
 };
 use serde_json::{Value, json};
 use std::fs::OpenOptions;
 use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// Who is to be a member.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,7 +21,15 @@ pub struct Members {
     pub hosts: Vec<String>,
     /// Who may do what. Names of people or machines, each once.
     pub peers: Vec<(Name, Right)>,
+    /// How long the keys are good for: who leaves without being told out is out by then.
+    pub valid: Duration,
 }
+
+/// How long keys are good for unless told otherwise: a year.
+pub const VALID: Duration = Duration::from_secs(365 * DAY_S);
+const DAY_S: u64 = 86_400;
+/// Under this key a configuration says until when its certificate is good, s since 1970.
+pub const EXPIRES: &str = "expires_s";
 
 /// Why there are no keys.
 #[derive(Debug, thiserror::Error)]
@@ -35,7 +45,7 @@ pub enum AccessError {
         cause: io::Error,
     },
     /// Two members of one name, or one of a name that is taken.
-    #[error("`{0}` is there twice: a peer has one right, and `bridge` and `authority` are taken")]
+    #[error("`{0}` is there twice: a peer has one right, and `bridge`, `authority` and `anyone` are taken")]
     Twice(Name),
     /// A certificate could not be made.
     #[error("no certificate: {0}")]
@@ -54,17 +64,17 @@ const AUTHORITY: &str = "authority";
 pub fn write_keys(folder: &Path, members: &Members) -> Result<Vec<PathBuf>, AccessError> {
     for (at, (name, _)) in members.peers.iter().enumerate() {
         let before = members.peers.iter().take(at).any(|(other, _)| other == name);
-        if before || [BRIDGE, AUTHORITY].contains(&name.to_string().as_str()) {
+        if before || [BRIDGE, AUTHORITY, ANYONE].contains(&name.to_string().as_str()) {
             return Err(AccessError::Twice(name.clone()));
         }
     }
     std::fs::create_dir_all(folder).map_err(|cause| AccessError::File { path: folder.into(), cause })?;
     let folder = folder.canonicalize().map_err(|cause| AccessError::File { path: folder.into(), cause })?;
-    let authority = authority()?;
+    let authority = authority(members.valid)?;
     write(&folder.join(format!("{AUTHORITY}.pem")), &authority.1, Readers::All)?;
     let certify = |name: &str, hosts: &[String]| -> Result<(), AccessError> {
         let key = KeyPair::generate()?;
-        let certificate = member(name, hosts)?.signed_by(&key, &authority.0)?;
+        let certificate = member(name, hosts, members.valid)?.signed_by(&key, &authority.0)?;
         write(&folder.join(format!("{name}.pem")), &certificate.pem(), Readers::All)?;
         write(&folder.join(format!("{name}.key")), &key.serialize_pem(), Readers::Owner)
     };
@@ -75,7 +85,7 @@ pub fn write_keys(folder: &Path, members: &Members) -> Result<Vec<PathBuf>, Acce
         let name = name.to_string();
         certify(&name, std::slice::from_ref(&name))?;
         let file = folder.join(format!("{name}.json5"));
-        write_config(&file, &peer_config(&folder, &name, &members.hosts))?;
+        write_config(&file, &peer_config(&folder, &name, members))?;
         written.push(file);
     }
     Ok(written)
@@ -83,8 +93,9 @@ pub fn write_keys(folder: &Path, members: &Members) -> Result<Vec<PathBuf>, Acce
 
 /// Who guarantees for all members, and the certificate by which they know it. Its key is thrown away: a new member means new keys
 /// for all, and nobody can ever add one secretly.
-fn authority() -> Result<(Issuer<'static, KeyPair>, String), AccessError> {
+fn authority(valid: Duration) -> Result<(Issuer<'static, KeyPair>, String), AccessError> {
     let mut parameters = CertificateParams::default();
+    expire(&mut parameters, valid);
     parameters.distinguished_name.push(DnType::CommonName, format!("{ROOT} {AUTHORITY}"));
     parameters.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
     parameters.key_usages = vec![KeyUsagePurpose::KeyCertSign, KeyUsagePurpose::DigitalSignature];
@@ -93,13 +104,26 @@ fn authority() -> Result<(Issuer<'static, KeyPair>, String), AccessError> {
     Ok((Issuer::new(parameters, key), certificate))
 }
 
-fn member(name: &str, hosts: &[String]) -> Result<CertificateParams, AccessError> {
+fn member(name: &str, hosts: &[String], valid: Duration) -> Result<CertificateParams, AccessError> {
     let mut parameters = CertificateParams::new(hosts)?;
+    expire(&mut parameters, valid);
     parameters.distinguished_name.push(DnType::CommonName, name);
     parameters.extended_key_usages =
         vec![ExtendedKeyUsagePurpose::ServerAuth, ExtendedKeyUsagePurpose::ClientAuth];
     parameters.key_usages = vec![KeyUsagePurpose::DigitalSignature];
     Ok(parameters)
+}
+
+/// Good from yesterday, for clocks that differ, to as long from now as chosen.
+fn expire(parameters: &mut CertificateParams, valid: Duration) {
+    let at = |s: u64| date_time_ymd(1970, 1, 1) + Duration::from_secs(s);
+    parameters.not_before = at(now_s().saturating_sub(DAY_S));
+    // Certificates know no year 10000.
+    parameters.not_after = at(now_s().saturating_add(valid.as_secs()).min(8000 * 365 * DAY_S));
+}
+
+pub(crate) fn now_s() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs())
 }
 
 /// What a Zenoh configuration says of keys: both ends show theirs.
@@ -119,6 +143,7 @@ fn tls(folder: &Path, name: &str) -> Value {
 fn bridge_config(folder: &Path, members: &Members) -> Value {
     json!({
         "mode": "peer",
+        "metadata": metadata(BRIDGE, members),
         "listen": { "endpoints": ["tls/0.0.0.0:7447"] },
         "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
         "transport": { "link": { "protocols": ["tls"], "tls": tls(folder, BRIDGE) } },
@@ -126,21 +151,43 @@ fn bridge_config(folder: &Path, members: &Members) -> Value {
     })
 }
 
-fn peer_config(folder: &Path, name: &str, hosts: &[String]) -> Value {
-    let endpoints: Vec<String> = hosts.iter().map(|host| format!("tls/{host}:7447")).collect();
+fn peer_config(folder: &Path, name: &str, members: &Members) -> Value {
+    let endpoints: Vec<String> = members.hosts.iter().map(|host| format!("tls/{host}:7447")).collect();
     json!({
         "mode": "client",
+        "metadata": metadata(name, members),
         "connect": { "endpoints": endpoints },
         "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
         "transport": { "link": { "protocols": ["tls"], "tls": tls(folder, name) } },
     })
 }
 
-/// Nobody may do anything, but: the bridge tells everybody, members may listen and ask by their rights.
-fn access_control(members: &Members) -> Value {
-    let rule = |id: &str, flow: &str, messages: Value, keys: Vec<String>| json!({ "id": id, "permission": "allow", "flows": [flow], "messages": messages, "key_exprs": keys });
+/// For the program that reads it: who it is, and until when.
+fn metadata(name: &str, members: &Members) -> Value {
+    json!({ MEMBER: name, EXPIRES: now_s().saturating_add(members.valid.as_secs()) })
+}
+
+/// The access control of a bridge without keys: it cannot tell anybody apart, but nobody tells anything in its name.
+pub(crate) fn of_anyone() -> Vec<(&'static str, Value)> {
+    let rules: Vec<Value> = rules().into_iter().chain(asking(&Name::anyone(), Right::Own)).collect();
+    let allowed: Vec<Value> = rules.iter().map(|rule| rule["id"].clone()).collect();
+    vec![
+        ("default_permission", json!("deny")),
+        ("rules", json!(rules)),
+        ("subjects", json!([{ "id": ANYONE }])),
+        ("policies", json!([{ "rules": allowed, "subjects": [ANYONE] }])),
+        ("enabled", json!(true)),
+    ]
+}
+
+fn rule(id: &str, flow: &str, messages: Value, keys: Vec<String>) -> Value {
+    json!({ "id": id, "permission": "allow", "flows": [flow], "messages": messages, "key_exprs": keys })
+}
+
+/// What everybody may do that gets in: the bridge tells, they listen; who may couple puts what its hand does.
+fn rules() -> Vec<Value> {
     let of_any = |keys: &[&str]| keys.iter().map(|key| format!("{ROOT}/*/{key}")).collect::<Vec<_>>();
-    let mut rules = vec![
+    vec![
         rule(
             "tell",
             "egress",
@@ -154,25 +201,36 @@ fn access_control(members: &Members) -> Value {
             of_any(&["*", "news/*"]),
         ),
         rule("couple", "ingress", json!(["put"]), of_any(&["couple/*"])),
-    ];
-    for right in Right::ALL {
-        rules.push(rule(word(right), "ingress", json!(["query"]), of_any(right.keys())));
+    ]
+}
+
+/// What a member may ask for, under its own name only: a rule for each right up to its own.
+fn asking(name: &Name, right: Right) -> Vec<Value> {
+    let rights = Right::ALL.into_iter().filter(|other| *other <= right);
+    let asks = rights.map(|right| {
+        let keys = right.keys().iter().map(|key| format!("{ROOT}/*/{key}/{name}")).collect();
+        rule(&format!("{}-{name}", word(right)), "ingress", json!(["query"]), keys)
+    });
+    asks.collect()
+}
+
+/// Nobody may do anything, but: the bridge tells everybody, members may listen and ask by their rights.
+fn access_control(members: &Members) -> Value {
+    let mut rules = rules();
+    let mut policies = Vec::new();
+    for (name, right) in &members.peers {
+        let asking = asking(name, *right);
+        let mut allowed = vec![json!("tell"), json!("listen")];
+        allowed.extend(asking.iter().map(|rule| rule["id"].clone()));
+        // Who holds the other end of a coupling moves the hand here.
+        allowed.extend((*right >= Right::Operate).then_some(json!("couple")));
+        policies.push(json!({ "rules": allowed, "subjects": [name.to_string()] }));
+        rules.extend(asking);
     }
     let subjects: Vec<Value> = members
         .peers
         .iter()
         .map(|(name, _)| json!({ "id": name.to_string(), "cert_common_names": [name.to_string()] }))
-        .collect();
-    let policies: Vec<Value> = members
-        .peers
-        .iter()
-        .map(|(name, right)| {
-            let mut allowed = vec!["tell", "listen"];
-            allowed.extend(Right::ALL.into_iter().filter(|other| other <= right).map(word));
-            // Who holds the other end of a coupling moves the hand here.
-            allowed.extend((*right >= Right::Operate).then_some("couple"));
-            json!({ "rules": allowed, "subjects": [name.to_string()] })
-        })
         .collect();
     json!({ "enabled": true, "default_permission": "deny", "rules": rules, "subjects": subjects, "policies": policies })
 }

@@ -6,8 +6,8 @@
 //! ```
 //!
 //! Both directions are best effort, and only the newest counts: what finds no room is dropped, here and in Zenoh. Nothing of it
-//! is trusted: what is no [`Dispatch`] is refused and counted, and what a host hears is bounded by its own energy tank and its
-//! own envelope.
+//! is trusted: what is no [`Dispatch`] is refused and counted; a host hears one partner, and believes of its claims what it can check
+//! (`flotor_servo::coupling`).
 
 use crate::keys::Name;
 use crate::link::LinkError;
@@ -76,6 +76,9 @@ struct Counts {
     told: AtomicU64,
     heard: AtomicU64,
     refused: AtomicU64,
+    /// The run here, and the one that the other end answers; 0: none, or not known.
+    here: AtomicU64,
+    answered: AtomicU64,
 }
 
 impl Counts {
@@ -83,6 +86,12 @@ impl Counts {
         let [told, heard, refused] =
             [&self.told, &self.heard, &self.refused].map(|count| count.load(Ordering::Relaxed));
         Carried { told, heard, refused }
+    }
+
+    /// Whether the other end holds another run than the one here.
+    fn is_held_by_another(&self) -> bool {
+        let [here, answered] = [&self.here, &self.answered].map(|run| run.load(Ordering::Relaxed));
+        here != 0 && answered != 0 && here != answered
     }
 }
 
@@ -97,7 +106,7 @@ pub enum CoupleError {
     #[error(transparent)]
     Directory(#[from] DirectoryError),
     /// No thread.
-    #[error("no thread to carry messages: {0}")]
+    #[error("no thread: {0}")]
     Thread(#[from] std::io::Error),
 }
 
@@ -154,6 +163,13 @@ impl Couplers {
         Ok(())
     }
 
+    /// The couplings whose other end holds another run than the one here: this one is let in by nobody.
+    #[must_use]
+    pub fn held_by_others(&self) -> Vec<String> {
+        let held = self.here.iter().filter(|(_, coupler)| coupler.counts.is_held_by_another());
+        held.map(|(name, _)| name.clone()).collect()
+    }
+
     /// What was carried for each.
     #[must_use]
     pub fn carried(&self) -> BTreeMap<String, Carried> {
@@ -175,9 +191,17 @@ pub fn couple(
 ) -> Result<(), CoupleError> {
     let mut couplers = Couplers::new(session, directory, name, Side::Visiting);
     let mut before: BTreeMap<String, (Carried, bool)> = BTreeMap::new();
+    let mut told_of: Vec<String> = Vec::new();
     while !stop.load(Ordering::Relaxed) {
         couplers.follow(tell)?;
         std::thread::sleep(FIND_PERIOD);
+        let held = couplers.held_by_others();
+        for coupling in held.iter().filter(|coupling| !told_of.contains(coupling)) {
+            tell(&format!(
+                "the other end of `{coupling}` is the partner of another run: the one here has none"
+            ));
+        }
+        told_of = held;
         for (coupling, now) in couplers.carried() {
             let (last, was_heard) = before.get(&coupling).copied().unwrap_or_default();
             let is_heard = now.heard > last.heard;
@@ -216,7 +240,10 @@ impl Coupler {
             let dispatch =
                 (payload.len() == DISPATCH_BYTES).then(|| Dispatch::from_bytes(&payload.to_bytes()));
             match dispatch {
-                Some(Ok(dispatch)) => drop(sender.try_send(dispatch)),
+                Some(Ok(dispatch)) => {
+                    of_callback.answered.store(dispatch.partner, Ordering::Relaxed);
+                    let _ = sender.try_send(dispatch);
+                }
                 _ => {
                     of_callback.refused.fetch_add(1, Ordering::Relaxed);
                 }
@@ -270,6 +297,9 @@ fn carry(
         let mut newest = None;
         while let Ok(Some(dispatch)) = socket.hear() {
             newest = Some(dispatch);
+        }
+        if let Some(dispatch) = newest {
+            counts.here.store(dispatch.run, Ordering::Relaxed);
         }
         if let Some(dispatch) = newest
             && tells.put(dispatch.to_bytes()).wait().is_ok()

@@ -12,10 +12,10 @@
 //! | `flotor/NAME/end` | JSON [`flotor_live::End`] | published |
 //! | `flotor/NAME/news/COUPLING` | a [`flotor_core::peer::Dispatch`]: what this end of a coupling tells the other | published, best effort |
 //! | `flotor/NAME/couple/COUPLING` | the same, of the other end | put by who holds it |
-//! | `flotor/NAME/ask/...` | JSON [`crate::request::NumberedRequest`] | a request, answered |
+//! | `flotor/NAME/ask/REQUEST/MEMBER` | JSON [`crate::request::NumberedRequest`] | a request, answered |
 //!
 //! The messages are those of a recording. What may be asked for is one key for each right, so that Zenoh's access control
-//! decides who has it: see [`crate::request::Request::key`].
+//! decides who has it, and as whom: see [`crate::request::Request::key`].
 
 use std::fmt;
 
@@ -42,6 +42,12 @@ impl Name {
             1..=40 if text.chars().all(legal) => Ok(Self(text.to_owned())),
             _ => Err(NoName(text.to_owned())),
         }
+    }
+
+    /// Who asks where there are no keys.
+    #[must_use]
+    pub fn anyone() -> Self {
+        Self(crate::request::ANYONE.to_owned())
     }
 
     /// The name of this machine, as far as it can be one.

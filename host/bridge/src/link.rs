@@ -1,11 +1,21 @@
 //! The way onto the network.
 
+use crate::access;
+use crate::keys::Name;
 use clap::Args;
+use flotor_live::Directory;
+use serde_json::Value;
+use std::net::IpAddr;
+use std::ops::Deref;
 use std::path::PathBuf;
 use zenoh::{Config, Session, Wait};
 
-/// Where a bridge listens unless told otherwise: this machine only.
-pub const LOOPBACK: &str = "tcp/127.0.0.1:7447";
+/// Protocol of a socket in the file system.
+const UNIX: &str = "unixsock-stream/";
+/// How the sockets of bridges are called: `bridge-NAME`.
+const SOCKET: &str = "bridge-";
+/// Under this key of its configuration a member finds its name.
+pub const MEMBER: &str = "member";
 
 /// How to reach others.
 #[derive(Args, Clone, Debug, Default)]
@@ -19,6 +29,9 @@ pub struct LinkOptions {
     /// Whom to reach, such as tls/lab.example.org:7447 (repeatable)
     #[arg(long, value_name = "ENDPOINT", global = true)]
     pub connect: Vec<String>,
+    /// Listen beyond this user without keys: whoever reaches the endpoint has the rights of --allow
+    #[arg(long, global = true)]
+    pub without_keys: bool,
 }
 
 /// Why there is no network.
@@ -32,6 +45,15 @@ pub enum LinkError {
         file: Option<PathBuf>,
         /// What is wrong.
         reason: String,
+    },
+    /// Others than this user could do anything.
+    #[error(
+        "`{endpoint}` is open to others, and only keys distinguish members: `flotor bridge keys` makes some for --config, or say \
+         --without-keys as well"
+    )]
+    WithoutKeys {
+        /// Where it would listen.
+        endpoint: String,
     },
     /// No session.
     #[error("cannot open the session: {0}; is the endpoint free, and the peer there?")]
@@ -56,25 +78,98 @@ pub enum End {
     Visiting,
 }
 
+/// A session, and as whom it asks.
+#[derive(Clone)]
+pub struct Link {
+    session: Session,
+    member: Name,
+    expires_s: Option<u64>,
+}
+
+impl Link {
+    /// As whom it asks: the name of the member in its configuration; without keys, anyone.
+    #[must_use]
+    pub fn member(&self) -> &Name {
+        &self.member
+    }
+
+    /// How many days its keys are still good for.
+    #[must_use]
+    pub fn days_left(&self) -> Option<u64> {
+        Some(self.expires_s?.saturating_sub(access::now_s()) / 86_400)
+    }
+}
+
+impl Deref for Link {
+    type Target = Session;
+
+    fn deref(&self) -> &Session {
+        &self.session
+    }
+}
+
+impl LinkOptions {
+    /// The same with where to listen, or whom to reach, where nothing was said: sockets in the folder of this user's runs, which
+    /// nobody else may enter. A bridge listens on its own; visitors go to all that are there.
+    #[must_use]
+    pub fn or_this_user(mut self, directory: &Directory, serves: Option<&Name>) -> Self {
+        if self.config.is_some() || !self.listen.is_empty() || !self.connect.is_empty() {
+            return self;
+        }
+        let endpoint = |file: &str| format!("{UNIX}{}", directory.path().join(file).display());
+        match serves {
+            Some(name) => self.listen.push(endpoint(&format!("{SOCKET}{name}"))),
+            None => {
+                let entries = std::fs::read_dir(directory.path()).into_iter().flatten().flatten();
+                let files = entries.filter_map(|entry| entry.file_name().into_string().ok());
+                let sockets = files
+                    .filter(|file| file.strip_prefix(SOCKET).is_some_and(|name| Name::new(name).is_ok()));
+                self.connect.extend(sockets.map(|file| endpoint(&file)));
+            }
+        }
+        self
+    }
+
+    /// The first endpoint that is open to more than this user.
+    #[must_use]
+    pub fn open_to_others(&self) -> Option<&str> {
+        self.listen.iter().map(String::as_str).find(|endpoint| !endpoint.starts_with(UNIX))
+    }
+}
+
+/// Whether an endpoint can be reached from this machine only.
+fn is_loopback(endpoint: &str) -> bool {
+    let address = endpoint.split_once('/').map_or("", |(_, address)| address);
+    let host = address.rsplit_once(':').map_or(address, |(host, _)| host).trim_matches(['[', ']']);
+    endpoint.starts_with(UNIX)
+        || host == "localhost"
+        || host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())
+}
+
 /// A session. Nothing is searched for by multicast: who is to be reached is said, by somebody.
 ///
 /// # Errors
 /// [`LinkError`].
-pub fn open(options: &LinkOptions, end: End) -> Result<Session, LinkError> {
+pub fn open(options: &LinkOptions, end: End) -> Result<Link, LinkError> {
     let file = options.config.clone();
     let wrong = |error: zenoh::Error| LinkError::Config { file: file.clone(), reason: error.to_string() };
     let mut config = match &options.config {
         Some(path) => Config::from_file(path).map_err(wrong)?,
         None => Config::default(),
     };
-    let (listen, connect) = endpoints(options, end);
     if options.config.is_none() {
         config.insert_json5("mode", "\"peer\"").map_err(wrong)?;
         config.insert_json5("scouting/multicast/enabled", "false").map_err(wrong)?;
         config.insert_json5("scouting/gossip/enabled", "false").map_err(wrong)?;
         // Without this, a visitor would listen on all interfaces.
-        config.insert_json5("listen/endpoints", &list(&listen)).map_err(wrong)?;
-        config.insert_json5("connect/endpoints", &list(&connect)).map_err(wrong)?;
+        config.insert_json5("listen/endpoints", &list(&options.listen)).map_err(wrong)?;
+        config.insert_json5("connect/endpoints", &list(&options.connect)).map_err(wrong)?;
+        if end == End::Serving {
+            // Whoever it is: only the bridge tells.
+            for (key, value) in access::of_anyone() {
+                config.insert_json5(&format!("access_control/{key}"), &value.to_string()).map_err(wrong)?;
+            }
+        }
     } else {
         for (key, given) in [("listen/endpoints", &options.listen), ("connect/endpoints", &options.connect)] {
             if !given.is_empty() {
@@ -82,21 +177,71 @@ pub fn open(options: &LinkOptions, end: End) -> Result<Session, LinkError> {
             }
         }
     }
-    zenoh::open(config).wait().map_err(|error| LinkError::Open(error.to_string()))
+    let says = |key: &str| -> Option<Value> { serde_json::from_str(&config.get_json(key).ok()?).ok() };
+    let has_keys = options.config.is_some() && says("access_control/enabled") == Some(Value::Bool(true));
+    let listens = says("listen/endpoints").unwrap_or_default();
+    let beyond = || endpoints_in(&listens).into_iter().find(|endpoint| !is_loopback(endpoint));
+    if let (End::Serving, false, false, Some(endpoint)) = (end, has_keys, options.without_keys, beyond()) {
+        return Err(LinkError::WithoutKeys { endpoint });
+    }
+    let metadata = says("metadata").unwrap_or_default();
+    let member = metadata.get(MEMBER).and_then(Value::as_str).and_then(|name| Name::new(name).ok());
+    let expires_s = metadata.get(access::EXPIRES).and_then(Value::as_u64);
+    let session = zenoh::open(config).wait().map_err(|error| LinkError::Open(error.to_string()))?;
+    Ok(Link { session, member: member.unwrap_or_else(Name::anyone), expires_s })
 }
 
-/// What to listen on and connect to, where nothing was said.
-fn endpoints(options: &LinkOptions, end: End) -> (Vec<String>, Vec<String>) {
-    let (mut listen, mut connect) = (options.listen.clone(), options.connect.clone());
-    if listen.is_empty() && connect.is_empty() {
-        match end {
-            End::Serving => listen.push(LOOPBACK.to_owned()),
-            End::Visiting => connect.push(LOOPBACK.to_owned()),
-        }
+/// All endpoints of a configuration, which may have some for each mode.
+fn endpoints_in(value: &Value) -> Vec<String> {
+    match value {
+        Value::String(endpoint) => vec![endpoint.clone()],
+        Value::Array(values) => values.iter().flat_map(endpoints_in).collect(),
+        Value::Object(values) => values.values().flat_map(endpoints_in).collect(),
+        _ => Vec::new(),
     }
-    (listen, connect)
 }
 
 fn list(endpoints: &[String]) -> String {
     serde_json::to_string(endpoints).unwrap_or_else(|_| "[]".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_can_be_reached_from_elsewhere_is_known() {
+        for here in ["tcp/127.0.0.1:7447", "tcp/localhost:1", "tcp/[::1]:7447", "unixsock-stream//tmp/x"] {
+            assert!(is_loopback(here), "{here}");
+        }
+        for elsewhere in
+            ["tcp/0.0.0.0:7447", "tcp/[::]:7447", "tls/lab.example.org:7447", "tcp/10.0.0.1:1", ""]
+        {
+            assert!(!is_loopback(elsewhere), "{elsewhere}");
+        }
+    }
+
+    #[test]
+    fn beyond_this_machine_without_keys_is_refused_unless_said_twice() {
+        let listen = vec!["tcp/0.0.0.0:0".to_owned()];
+        let options = LinkOptions { listen, ..LinkOptions::default() };
+        assert!(matches!(open(&options, End::Serving), Err(LinkError::WithoutKeys { .. })));
+        assert!(open(&LinkOptions { without_keys: true, ..options }, End::Serving).is_ok());
+    }
+
+    #[test]
+    fn where_nothing_is_said_only_this_user_gets_in() {
+        let scratch = tempfile::tempdir().unwrap();
+        let directory = Directory::at(scratch.path());
+        let name = Name::new("lab").unwrap();
+        let serving = LinkOptions::default().or_this_user(&directory, Some(&name));
+        assert_eq!(serving.listen, [format!("unixsock-stream/{}/bridge-lab", scratch.path().display())]);
+        assert_eq!(serving.open_to_others(), None);
+        std::fs::write(scratch.path().join("bridge-lab"), "").unwrap();
+        std::fs::write(scratch.path().join("bridge-lab.lock"), "").unwrap();
+        let visiting = LinkOptions::default().or_this_user(&directory, None);
+        assert_eq!(visiting.connect, serving.listen);
+        let said = LinkOptions { connect: vec!["tcp/127.0.0.1:1".to_owned()], ..LinkOptions::default() };
+        assert_eq!(said.clone().or_this_user(&directory, None).connect, said.connect);
+    }
 }

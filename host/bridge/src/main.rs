@@ -6,7 +6,7 @@ use flotor_bridge::attach::attach;
 use flotor_bridge::couple::couple;
 use flotor_bridge::keep::{RecordingEnd, keep};
 use flotor_bridge::keys::Name;
-use flotor_bridge::link::{End, LinkError, LinkOptions, open};
+use flotor_bridge::link::{End, Link, LinkError, LinkOptions, open};
 use flotor_bridge::remote::{Remote, bridges};
 use flotor_bridge::request::{Request, Right};
 use flotor_bridge::serve::{Launcher, Service, serve};
@@ -16,6 +16,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 /// Put a running host on a network (Zenoh), or bring one from there to this machine
 #[derive(Parser)]
@@ -23,8 +24,8 @@ use std::sync::atomic::AtomicBool;
     name = "flotor bridge",
     version,
     subcommand_required = true,
-    after_help = "Without --config, only this machine is reached: a bridge listens on tcp/127.0.0.1:7447, and visitors go there.\n\
-    For more machines, `flotor bridge keys` writes keys and configurations; without keys, do not leave the machine.\n\n\
+    after_help = "Without --config, --listen and --connect only programs of this user are reached: a bridge listens on a socket in\n\
+    the folder of the user's runs, and visitors go there. For others, `flotor bridge keys` writes keys and configurations.\n\n\
     Examples:\n  \
     flotor bridge serve --name lab                        whatever runs here, for others to see\n  \
     flotor bridge list                                    who is there\n  \
@@ -144,6 +145,9 @@ struct KeysArguments {
     /// A member who may also start runs and take an emergency stop back (repeatable)
     #[arg(long, value_name = "NAME")]
     own: Vec<Name>,
+    /// How long the keys are good for
+    #[arg(long, value_name = "DAYS", default_value = "365", value_parser = clap::value_parser!(u64).range(1..=36_500))]
+    days: u64,
 }
 
 fn set_value(text: &str) -> Result<SetValue, String> {
@@ -161,8 +165,9 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
-            let is_usage =
-                error.downcast_ref::<LinkError>().is_some_and(|e| matches!(e, LinkError::Config { .. }));
+            let is_usage = error
+                .downcast_ref::<LinkError>()
+                .is_some_and(|e| matches!(e, LinkError::Config { .. } | LinkError::WithoutKeys { .. }));
             if is_usage { ExitCode::from(USAGE) } else { ExitCode::FAILURE }
         }
     }
@@ -175,26 +180,39 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
     }
     let directory = Directory::of_this_user();
+    let visit = |link: LinkOptions| {
+        let link = open(&link.or_this_user(&directory, None), End::Visiting)?;
+        tell_expiry(&link, &mut |line| eprintln!("{line}"));
+        Ok::<Link, LinkError>(link)
+    };
     let mut tell = |line: &str| eprintln!("{line}");
     match command {
         Command::Serve(serving) => {
             let service = service(serving)?;
+            directory.make()?;
+            let link = link.or_this_user(&directory, Some(&service.name));
             let session = open(&link, End::Serving)?;
+            tell_expiry(&session, &mut tell);
+            if let (None, Some(endpoint)) = (&link.config, link.open_to_others()) {
+                tell(&format!(
+                    "without keys: whoever reaches {endpoint}, on this machine every user, has the rights of --allow"
+                ));
+            }
             tell(&format!("zenoh/{}: waiting for a run on this machine (Ctrl-C ends)", service.name));
             serve(&session, &directory, service, &stop, &mut tell)?;
         }
         Command::Attach { name } => {
-            let remote = Remote::listen(&open(&link, End::Visiting)?, &name)?;
+            let remote = Remote::listen(&visit(link)?, &name)?;
             tell(&format!("waiting for a run of zenoh/{name} (Ctrl-C ends)"));
             attach(&remote, &directory, &stop, &mut tell)?;
         }
         Command::Couple { name } => {
-            let session = open(&link, End::Visiting)?;
+            let session = visit(link)?;
             tell(&format!("waiting for a coupling to hold with zenoh/{name} (Ctrl-C ends)"));
             couple(&session, &directory, &name, &stop, &mut tell)?;
         }
         Command::Record { name, file } => {
-            let remote = Remote::listen(&open(&link, End::Visiting)?, &name)?;
+            let remote = Remote::listen(&visit(link)?, &name)?;
             tell(&format!("waiting for a run of zenoh/{name} (Ctrl-C ends)"));
             let kept = keep(&remote, &file, &stop)?;
             let words = match &kept.end {
@@ -210,7 +228,7 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
             }
         }
         Command::Ask { name, request } => {
-            let remote = Remote::listen(&open(&link, End::Visiting)?, &name)?;
+            let remote = Remote::listen(&visit(link)?, &name)?;
             // Most requests are for the current run; the bridge knows without us when none is.
             let status =
                 remote.status()?.ok_or(format!("zenoh/{name} cannot be seen; `flotor bridge list`"))?;
@@ -218,7 +236,7 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
             remote.errand().run(request.into())?;
         }
         Command::List => {
-            let session = open(&link, End::Visiting)?;
+            let session = visit(link)?;
             let names = bridges(&session)?;
             if names.is_empty() {
                 tell("no bridge can be seen; `flotor bridge serve` starts one, --connect says where to look");
@@ -228,13 +246,15 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
                 println!("zenoh/{name:<20} {:<18} {}", status.state.word(), status.title);
             }
         }
-        Command::Keys(KeysArguments { folder, hosts, watch, operate, own }) => {
+        Command::Keys(KeysArguments { folder, hosts, watch, operate, own, days }) => {
             let with = |names: Vec<Name>, right| names.into_iter().map(move |name| (name, right));
             let peers = with(watch, Right::Watch)
                 .chain(with(operate, Right::Operate))
                 .chain(with(own, Right::Own))
                 .collect();
-            for written in write_keys(&folder, &Members { hosts, peers })? {
+            for written in
+                write_keys(&folder, &Members { hosts, peers, valid: Duration::from_secs(days * 86_400) })?
+            {
                 println!("{}", written.display());
             }
             tell(
@@ -243,6 +263,14 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
         }
     }
     Ok(())
+}
+
+/// Keys that are soon no longer good, in time to make new ones.
+fn tell_expiry(link: &Link, tell: &mut dyn FnMut(&str)) {
+    const SOON_DAYS: u64 = 30;
+    if let Some(days) = link.days_left().filter(|days| *days < SOON_DAYS) {
+        tell(&format!("the keys are good for {days} more days; `flotor bridge keys` makes new ones"));
+    }
 }
 
 fn service(arguments: ServeArguments) -> Result<Service, Box<dyn Error>> {

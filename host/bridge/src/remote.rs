@@ -1,8 +1,8 @@
 //! A run on another machine: what it tells, and how it is asked for something.
 
 use crate::keys::Name;
-use crate::link::LinkError;
-use crate::request::{NumberedRequest, Request};
+use crate::link::{Link, LinkError};
+use crate::request::{NumberedRequest, Request, Right};
 use crate::status::Status;
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
@@ -56,6 +56,8 @@ pub struct Remote {
 pub struct Errand {
     session: Session,
     name: Name,
+    /// As whom it asks: the name in the keys.
+    member: Name,
     /// The last that was used; held until the letter has left, for letters to leave in the order of their numbers.
     number: Arc<Mutex<u64>>,
     /// Process of the run that is meant.
@@ -67,7 +69,7 @@ impl Remote {
     ///
     /// # Errors
     /// [`LinkError`]: the network refuses.
-    pub fn listen(session: &Session, name: &Name) -> Result<Self, LinkError> {
+    pub fn listen(session: &Link, name: &Name) -> Result<Self, LinkError> {
         let (sender, told) = channel();
         let queue = Queue { sender, waiting: Arc::default(), lost: Arc::default() };
         let mut ear = Ear { queue: queue.clone(), pose: None, number: None };
@@ -84,13 +86,14 @@ impl Remote {
             })
             .wait()?;
         let errand = Errand {
-            session: session.clone(),
+            session: Session::clone(session),
             name: name.clone(),
+            member: session.member().clone(),
             number: Arc::default(),
             run: Arc::default(),
         };
         Ok(Self {
-            session: session.clone(),
+            session: Session::clone(session),
             name: name.clone(),
             told,
             queue,
@@ -147,7 +150,7 @@ impl Remote {
     /// # Errors
     /// [`LinkError`]: the network refuses.
     pub fn status(&self) -> Result<Option<Status>, LinkError> {
-        Ok(self.get("status")?.and_then(|bytes| serde_json::from_slice(&bytes).ok()))
+        self.errand.status()
     }
 
     /// The way to ask for something.
@@ -157,9 +160,13 @@ impl Remote {
     }
 
     fn get(&self, what: &str) -> Result<Option<Vec<u8>>, LinkError> {
-        let answers = self.session.get(self.name.key(what)).timeout(ANSWER_WAIT).wait()?;
-        Ok(first(&answers))
+        get(&self.session, &self.name, what)
     }
+}
+
+fn get(session: &Session, name: &Name, what: &str) -> Result<Option<Vec<u8>>, LinkError> {
+    let answers = session.get(name.key(what)).timeout(ANSWER_WAIT).wait()?;
+    Ok(first(&answers))
 }
 
 impl Errand {
@@ -168,29 +175,52 @@ impl Errand {
     /// # Errors
     /// In words, for people.
     pub fn run(&self, request: Request) -> Result<(), String> {
-        let key = self.name.key(request.key());
-        let answer =
-            self.send(&key, request).map_err(|error| error.to_string()).map(|answers| first(&answers))?;
-        let answer = answer.ok_or(
-            "nobody answers: the bridge is gone, or does not take this request, or not from this peer; \
-             `flotor bridge serve --allow` and the network's access control say who may",
-        )?;
+        let key = format!("{}/{}", self.name.key(request.key()), self.member);
+        // Of the emergency stop nothing is asked first.
+        let status = match request.right() {
+            Right::Watch => Status::default(),
+            right => {
+                let status = self.status().map_err(|error| error.to_string())?.ok_or(NOBODY_ANSWERS)?;
+                if status.allow < right {
+                    let word = request.key().trim_start_matches("ask/");
+                    return Err(format!(
+                        "the bridge `{}` does not take `{word}`; `flotor bridge serve --allow` says what it takes",
+                        self.name
+                    ));
+                }
+                status
+            }
+        };
+        let answer = self
+            .send(&key, request, &status)
+            .map_err(|error| error.to_string())
+            .map(|answers| first(&answers))?;
+        let answer = answer.ok_or(NOBODY_ANSWERS)?;
         let answer: Answer = serde_json::from_slice(&answer).map_err(|error| error.to_string())?;
         answer.refused.map_or(Ok(()), Err)
     }
 
-    fn send(&self, key: &str, request: Request) -> Result<Answers, LinkError> {
+    fn status(&self) -> Result<Option<Status>, LinkError> {
+        let status = get(&self.session, &self.name, "status")?;
+        Ok(status.and_then(|bytes| serde_json::from_slice(&bytes).ok()))
+    }
+
+    fn send(&self, key: &str, request: Request, status: &Status) -> Result<Answers, LinkError> {
         let mut number = self.number.lock().unwrap_or_else(PoisonError::into_inner);
         *number += 1;
-        let letter = NumberedRequest {
-            peer: self.session.zid().to_string(),
-            number: *number,
-            run: u32::try_from(self.run.load(Ordering::Relaxed)).unwrap_or(0),
-            request,
+        let run = match request.right() {
+            Right::Own => status.run,
+            Right::Watch | Right::Operate => u32::try_from(self.run.load(Ordering::Relaxed)).unwrap_or(0),
         };
+        let (session, ticket) = (self.session.zid().to_string(), status.ticket);
+        let letter = NumberedRequest { session, number: *number, run, ticket, request };
         Ok(self.session.get(key).timeout(ANSWER_WAIT).payload(letter.to_bytes()).wait()?)
     }
 }
+
+/// Why there is no answer, as far as can be known here.
+const NOBODY_ANSWERS: &str = "nobody answers: the bridge is gone, or does not take this request, or not from this peer; \
+                              `flotor bridge serve --allow` and the network's access control say who may";
 
 /// What comes back.
 type Answers = FifoChannelHandler<Reply>;
@@ -268,7 +298,7 @@ impl Ear {
     /// A tick, if its pose came before it; gaps in the numbers are losses.
     fn tick(&mut self, payload: &[u8], number: Option<u64>) -> Option<Told> {
         if let Some(number) = number {
-            let missing = self.number.map_or(0, |last| number.saturating_sub(last + 1));
+            let missing = self.number.map_or(0, |last| number.saturating_sub(last).saturating_sub(1));
             self.queue.lose(missing);
             self.number = Some(number);
         }

@@ -1,13 +1,21 @@
 //! What peers may ask for, and which letters are not even read.
 
+use crate::keys::Name;
 use flotor_live::{Ask, SetValue};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 /// A longer letter is refused before it is looked at, bytes.
 pub const MAX_REQUEST_BYTES: usize = 64 * 1024;
-/// Peers whose last number is remembered for each right; a peer beyond them is refused until the bridge starts anew.
-const MOST_PEERS: usize = 4096;
+/// Sessions of a member whose last number is remembered for each right; of more, the one that asked longest ago is forgotten.
+const MOST_SESSIONS: usize = 256;
+/// Members that are distinguished: the access control of our keys knows far fewer.
+const MOST_MEMBERS: usize = 1024;
+/// How old the bridge's word may be on which a run is started or the emergency stop released, ms.
+const FRESH_MS: u64 = 10_000;
+/// Who asks where there are no keys: nobody is distinguished there.
+pub const ANYONE: &str = "anyone";
 
 /// Something a peer asks for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,9 +44,11 @@ pub enum Request {
 }
 
 /// Who may ask for what. Each includes the ones before it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Right {
     /// See everything, and press the emergency stop.
+    #[default]
     Watch,
     /// Change parameters, end a run in order.
     Operate,
@@ -50,7 +60,7 @@ impl Right {
     /// All of them, the least first.
     pub const ALL: [Right; 3] = [Right::Watch, Right::Operate, Right::Own];
 
-    /// The last parts of the keys on which this right's own requests arrive.
+    /// Parts of the keys on which this right's own requests arrive; the name of the member comes last.
     #[must_use]
     pub const fn keys(self) -> &'static [&'static str] {
         match self {
@@ -72,7 +82,7 @@ impl Request {
         }
     }
 
-    /// The last parts of the key on which it must arrive: access control sees keys, not letters.
+    /// The parts of the key on which it must arrive, before the member's name: access control sees keys, not letters.
     #[must_use]
     pub const fn key(&self) -> &'static str {
         match self {
@@ -110,16 +120,28 @@ impl Request {
     }
 }
 
+/// The bridge's word on which a request is made: which start of the bridge, and when, by its own clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ticket {
+    /// The bridge's start, ns since 1970: no request is valid for another.
+    pub began: u64,
+    /// Time since then, ms.
+    pub at_ms: u64,
+}
+
 /// A request with what makes it valid once.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NumberedRequest {
-    /// Who asks: anything that no other peer calls itself, new with every start of a program.
-    pub peer: String,
-    /// Higher than that of the peer's letter before.
+    /// The session of the member: anything that no other of its sessions calls itself. Who the member is says the key.
+    pub session: String,
+    /// Higher than that of the session's letter before.
     pub number: u64,
-    /// Process of the run that is meant, from its greeting; 0 for the bridge itself.
+    /// Process of the run that is meant, from its greeting; 0: none is on.
     pub run: u32,
+    /// From the bridge's status.
+    pub ticket: Ticket,
     /// What is wished.
     pub request: Request,
 }
@@ -149,26 +171,64 @@ pub enum Refusal {
     /// It is meant for a run that is over, or none is on.
     #[error("no run is on, or not the one that was meant")]
     Stale,
-    /// More peers than anybody needs.
-    #[error("too many peers since the bridge started; start it anew")]
+    /// It was made on the word of an earlier start of the bridge, or too long ago.
+    #[error("asked too long ago, or before the bridge started; ask again")]
+    Expired,
+    /// More members than anybody has.
+    #[error("too many members")]
     Crowded,
     /// More requests than the host answers.
     #[error("too many requests wait for the host's answer; ask again")]
     Busy,
 }
 
-/// Lets letters through once. The emergency stop alone is let through however often: a stop too many is safe, and whoever may use
-/// up the numbers of another peer could press it anyway.
-#[derive(Debug, Default)]
+/// Lets letters through once. The emergency stop alone is let through however often: a stop too many is safe.
+#[derive(Debug)]
 pub struct Gate {
-    /// The last number of each peer, for each right by itself: who may only press the emergency stop, and calls itself like an
-    /// owner, does not use up the owner's numbers.
-    last: BTreeMap<Right, BTreeMap<String, u64>>,
+    began: u64,
+    since: Instant,
+    /// By right and member: nobody uses up numbers or room of another.
+    members: BTreeMap<(Right, Name), Sessions>,
     refused: BTreeMap<Refusal, u64>,
 }
 
+/// The sessions of a member.
+#[derive(Debug, Default)]
+struct Sessions {
+    last: BTreeMap<String, Last>,
+    /// Letters of unknown sessions on an older word than this are refused, ms: they may be of a forgotten one.
+    forgotten_ms: u64,
+}
+
+/// The last letter of a session.
+#[derive(Clone, Copy, Debug)]
+struct Last {
+    number: u64,
+    at_ms: u64,
+}
+
+impl Default for Gate {
+    fn default() -> Self {
+        let began = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
+        #[allow(clippy::cast_possible_truncation)] // in the year 2554
+        Self {
+            began: began as u64,
+            since: Instant::now(),
+            members: BTreeMap::new(),
+            refused: BTreeMap::new(),
+        }
+    }
+}
+
 impl Gate {
-    /// What a letter on a key asks for, while `run` is the current run (0: none).
+    /// The bridge's word, for requests that are made on it.
+    #[must_use]
+    pub fn ticket(&self) -> Ticket {
+        let at_ms = u64::try_from(self.since.elapsed().as_millis()).unwrap_or(u64::MAX);
+        Ticket { began: self.began, at_ms }
+    }
+
+    /// What a letter on a key (`flotor/NAME/ask/REQUEST/MEMBER`) asks for, while `run` is the current run (0: none).
     ///
     /// # Errors
     /// [`Refusal`], counted.
@@ -192,56 +252,119 @@ impl Gate {
         if payload.len() > MAX_REQUEST_BYTES {
             return Err(Refusal::TooLong);
         }
-        let letter: NumberedRequest = serde_json::from_slice(payload).map_err(|_| Refusal::Malformed)?;
+        let letter = exactly(payload).ok_or(Refusal::Malformed)?;
+        let (key, member) = key.rsplit_once('/').ok_or(Refusal::Malformed)?;
+        let member = Name::new(member).map_err(|_| Refusal::Malformed)?;
         let belongs = key.strip_suffix(letter.request.key()).is_some_and(|rest| rest.ends_with('/'));
-        if !belongs || letter.peer.is_empty() || letter.peer.len() > 64 {
+        if !belongs || letter.session.is_empty() || letter.session.len() > 64 {
             return Err(Refusal::Malformed);
         }
+        let now = self.ticket();
+        let right = letter.request.right();
         // Whoever presses the emergency stop means whatever runs.
-        let is_meant = match letter.request.right() {
+        let is_meant = match right {
             Right::Watch => return Ok(letter.request),
             Right::Operate => run != 0 && letter.run == run,
-            Right::Own => true,
+            Right::Own => letter.run == run,
         };
-        self.use_up(letter.request.right(), letter.peer, letter.number)?;
+        let is_fresh = right != Right::Own || now.at_ms.saturating_sub(letter.ticket.at_ms) <= FRESH_MS;
+        if letter.ticket.began != now.began || letter.ticket.at_ms > now.at_ms || !is_fresh {
+            return Err(Refusal::Expired);
+        }
+        self.use_up((right, member), &letter)?;
         if is_meant { Ok(letter.request) } else { Err(Refusal::Stale) }
     }
 
     /// A number is valid once.
-    fn use_up(&mut self, right: Right, peer: String, number: u64) -> Result<(), Refusal> {
-        let last = self.last.entry(right).or_default();
-        let peers = last.len();
-        match last.get_mut(&peer) {
-            Some(last) if number <= *last => return Err(Refusal::Replayed),
-            Some(last) => *last = number,
-            None if peers >= MOST_PEERS => return Err(Refusal::Crowded),
-            None => {
-                last.insert(peer, number);
-            }
+    fn use_up(&mut self, member: (Right, Name), letter: &NumberedRequest) -> Result<(), Refusal> {
+        if self.members.len() >= MOST_MEMBERS && !self.members.contains_key(&member) {
+            return Err(Refusal::Crowded);
         }
+        let Sessions { last, forgotten_ms } = self.members.entry(member).or_default();
+        match last.get(&letter.session) {
+            Some(before) if letter.number <= before.number => return Err(Refusal::Replayed),
+            None if letter.ticket.at_ms < *forgotten_ms => return Err(Refusal::Expired),
+            Some(_) => {}
+            None if last.len() >= MOST_SESSIONS => {
+                let oldest = last.iter().min_by_key(|(_, last)| last.at_ms);
+                if let Some((session, at_ms)) = oldest.map(|(session, last)| (session.clone(), last.at_ms)) {
+                    last.remove(&session);
+                    *forgotten_ms = at_ms.saturating_add(1).max(*forgotten_ms);
+                }
+            }
+            None => {}
+        }
+        last.insert(letter.session.clone(), Last { number: letter.number, at_ms: letter.ticket.at_ms });
         Ok(())
     }
+}
+
+/// A letter that says what we read, and not a word more: an unknown key anywhere is a misunderstanding.
+fn exactly(payload: &[u8]) -> Option<NumberedRequest> {
+    let said: serde_json::Value = serde_json::from_slice(payload).ok()?;
+    let letter: NumberedRequest = serde_json::from_slice(payload).ok()?;
+    (serde_json::to_value(&letter).ok()? == said).then_some(letter)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn letter(number: u64, run: u32, request: Request) -> Vec<u8> {
-        serde_json::to_vec(&NumberedRequest { peer: "somebody".to_owned(), number, run, request }).unwrap()
+    fn key(request: &Request, member: &str) -> String {
+        format!("flotor/a/{}/{member}", request.key())
+    }
+
+    fn letter(gate: &Gate, session: &str, number: u64, run: u32, request: &Request) -> NumberedRequest {
+        let (session, request, ticket) = (session.to_owned(), request.clone(), gate.ticket());
+        NumberedRequest { session, number, run, ticket, request }
+    }
+
+    /// A letter of ada's on its key.
+    fn ask(
+        gate: &mut Gate,
+        number: u64,
+        run: u32,
+        request: Request,
+        current: u32,
+    ) -> Result<Request, Refusal> {
+        let letter = letter(gate, "one", number, run, &request);
+        gate.admit(&key(&request, "ada"), &letter.to_bytes(), current)
     }
 
     #[test]
     fn a_letter_is_valid_once_and_for_its_run() {
         let mut gate = Gate::default();
-        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(1, 7, Request::Stop), 7), Ok(Request::Stop));
-        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(1, 7, Request::Stop), 7), Err(Refusal::Replayed));
-        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(2, 7, Request::Stop), 8), Err(Refusal::Stale));
-        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(3, 0, Request::Stop), 0), Err(Refusal::Stale));
-        let stop = letter(4, 7, Request::EmergencyStop);
-        assert_eq!(gate.admit("flotor/a/ask/emergency-stop", &stop, 8), Ok(Request::EmergencyStop));
+        assert_eq!(ask(&mut gate, 1, 7, Request::Stop, 7), Ok(Request::Stop));
+        assert_eq!(ask(&mut gate, 1, 7, Request::Stop, 7), Err(Refusal::Replayed));
+        assert_eq!(ask(&mut gate, 2, 7, Request::Stop, 8), Err(Refusal::Stale));
+        assert_eq!(ask(&mut gate, 3, 0, Request::Stop, 0), Err(Refusal::Stale));
+        assert_eq!(ask(&mut gate, 4, 7, Request::EmergencyStop, 8), Ok(Request::EmergencyStop));
+        // Starting and releasing are for the run that was seen, too.
+        assert_eq!(ask(&mut gate, 5, 0, Request::Start, 0), Ok(Request::Start));
+        assert_eq!(ask(&mut gate, 6, 7, Request::Release, 8), Err(Refusal::Stale));
         let refused: Vec<_> = gate.refused().iter().map(|(refusal, count)| (*refusal, *count)).collect();
-        assert_eq!(refused, [(Refusal::Replayed, 1), (Refusal::Stale, 2)]);
+        assert_eq!(refused, [(Refusal::Replayed, 1), (Refusal::Stale, 3)]);
+    }
+
+    #[test]
+    fn a_letter_is_of_one_start_of_the_bridge_and_starting_and_releasing_of_ten_seconds() {
+        let mut gate = Gate::default();
+        gate.since -= std::time::Duration::from_secs(60);
+        for request in [Request::Stop, Request::Start, Request::Release] {
+            let of = |ticket| NumberedRequest { ticket, ..letter(&gate, "one", 9, 7, &request) }.to_bytes();
+            let now = gate.ticket();
+            let letters = [
+                (Ticket { began: now.began - 1, ..now }, Err(Refusal::Expired)),
+                (Ticket { at_ms: now.at_ms + 60_000, ..now }, Err(Refusal::Expired)),
+                (
+                    Ticket { at_ms: now.at_ms - FRESH_MS - 1000, ..now },
+                    if request == Request::Stop { Ok(request.clone()) } else { Err(Refusal::Expired) },
+                ),
+            ];
+            for (letter, expected) in letters.map(|(ticket, expected)| (of(ticket), expected)) {
+                assert_eq!(gate.admit(&key(&request, "ada"), &letter, 7), expected, "{request:?}");
+            }
+        }
     }
 
     #[test]
@@ -255,11 +378,16 @@ mod tests {
             Request::Start,
             Request::Release,
         ] {
-            for right in Right::ALL {
-                for key in right.keys().iter().filter(|key| **key != request.key()) {
-                    let refused = gate.admit(&format!("flotor/a/{key}"), &letter(9, 7, request.clone()), 7);
-                    assert_eq!(refused, Err(Refusal::Malformed), "{request:?} on {key}");
-                }
+            let payload = letter(&gate, "one", 9, 7, &request).to_bytes();
+            let others = Right::ALL.into_iter().flat_map(Right::keys).filter(|key| **key != request.key());
+            let wrong = others.map(|key| format!("flotor/a/{key}/ada"));
+            let nobody = ["", "*", "**", "Ada", "a/b"].map(|member| key(&request, member));
+            for wrong in wrong.chain(nobody).chain([format!("flotor/a/{}", request.key())]) {
+                assert_eq!(
+                    gate.admit(&wrong, &payload, 7),
+                    Err(Refusal::Malformed),
+                    "{request:?} on {wrong}"
+                );
             }
         }
     }
@@ -267,47 +395,85 @@ mod tests {
     #[test]
     fn what_is_no_letter_is_refused_and_counted() {
         let mut gate = Gate::default();
-        let key = "flotor/a/ask/stop";
-        for nonsense in [b"".as_slice(), b"{}", b"\xff\xfe", b"[[[[", &letter(1, 7, Request::Stop)[1..]] {
-            assert_eq!(gate.admit(key, nonsense, 7), Err(Refusal::Malformed));
+        let stop = Request::Stop;
+        let good = letter(&gate, "one", 1, 7, &stop).to_bytes();
+        for nonsense in [b"".as_slice(), b"{}", b"\xff\xfe", b"[[[[", &good[1..]] {
+            assert_eq!(gate.admit(&key(&stop, "ada"), nonsense, 7), Err(Refusal::Malformed));
         }
-        let mut more = letter(1, 7, Request::Stop);
-        more.splice(1..1, br#""extra":1,"#.iter().copied());
-        assert_eq!(gate.admit(key, &more, 7), Err(Refusal::Malformed), "an unknown word");
         let long = vec![b' '; MAX_REQUEST_BYTES + 1];
-        assert_eq!(gate.admit(key, &long, 7), Err(Refusal::TooLong));
-        assert_eq!(gate.refused().values().sum::<u64>(), 7);
+        assert_eq!(gate.admit(&key(&stop, "ada"), &long, 7), Err(Refusal::TooLong));
+        assert_eq!(gate.refused().values().sum::<u64>(), 6);
+        assert_eq!(gate.admit(&key(&stop, "ada"), &good, 7), Ok(Request::Stop));
     }
 
     #[test]
-    fn no_flood_of_peers_fills_the_memory() {
-        let mut gate = Gate::default();
-        let from = |peer: usize| {
-            let letter =
-                NumberedRequest { peer: peer.to_string(), number: 1, run: 7, request: Request::Stop };
-            serde_json::to_vec(&letter).unwrap()
-        };
-        let admitted = (0..2 * MOST_PEERS)
-            .filter(|peer| gate.admit("flotor/a/ask/stop", &from(*peer), 7).is_ok())
-            .count();
-        assert_eq!(admitted, MOST_PEERS);
-        let stop = letter(1, 0, Request::EmergencyStop);
-        assert_eq!(gate.admit("flotor/a/ask/emergency-stop", &stop, 7), Ok(Request::EmergencyStop));
-        assert_eq!(gate.admit("flotor/a/ask/start", &letter(1, 0, Request::Start), 7), Ok(Request::Start));
+    fn an_unknown_word_anywhere_is_refused() {
+        let values =
+            vec![SetValue { plugin: "a".to_owned(), parameter: "b".to_owned(), value: "1".to_owned() }];
+        for request in [
+            Request::EmergencyStop,
+            Request::Set { values },
+            Request::Weight { model: "spring".to_owned(), weight: 0.1 },
+            Request::Stop,
+            Request::Start,
+            Request::Release,
+        ] {
+            let mut gate = Gate::default();
+            let good = letter(&gate, "one", 1, 7, &request).to_bytes();
+            let text = String::from_utf8(good.clone()).unwrap();
+            // After every opening brace: in the letter, its ticket, its request, a value of that.
+            for (at, _) in text.match_indices('{') {
+                let mut more = good.clone();
+                more.splice(at + 1..=at, br#""extra":1,"#.iter().copied());
+                assert_eq!(
+                    gate.admit(&key(&request, "ada"), &more, 7),
+                    Err(Refusal::Malformed),
+                    "{request:?}"
+                );
+            }
+            assert_eq!(gate.admit(&key(&request, "ada"), &good, 7), Ok(request));
+        }
     }
 
     #[test]
-    fn who_calls_itself_like_another_peer_keeps_nothing_from_it_that_it_may_not_do_itself() {
+    fn no_flood_of_sessions_or_names_fills_the_memory_or_keeps_another_member_out() {
         let mut gate = Gate::default();
-        let key = "flotor/a/ask/emergency-stop";
-        let last_of_all = letter(u64::MAX, 0, Request::EmergencyStop);
-        assert_eq!(gate.admit(key, &last_of_all, 7), Ok(Request::EmergencyStop));
-        assert_eq!(gate.admit("flotor/a/ask/stop", &letter(1, 7, Request::Stop), 7), Ok(Request::Stop));
+        let release = Request::Release;
+        let old = letter(&gate, "old", 1, 7, &release).to_bytes();
+        assert_eq!(gate.admit(&key(&release, "bob"), &old, 7), Ok(Request::Release));
+        std::thread::sleep(std::time::Duration::from_millis(3));
+        for session in 0..4 * MOST_SESSIONS {
+            if session % 32 == 0 {
+                std::thread::sleep(std::time::Duration::from_millis(1)); // no member has so many in a millisecond
+            }
+            let payload = letter(&gate, &session.to_string(), 1, 7, &release).to_bytes();
+            assert_eq!(gate.admit(&key(&release, "bob"), &payload, 7), Ok(Request::Release));
+        }
         assert_eq!(
-            gate.admit("flotor/a/ask/release", &letter(2, 0, Request::Release), 7),
-            Ok(Request::Release)
+            gate.admit(&key(&release, "bob"), &old, 7),
+            Err(Refusal::Expired),
+            "forgotten, not valid again"
         );
-        assert_eq!(gate.admit(key, &letter(3, 0, Request::EmergencyStop), 7), Ok(Request::EmergencyStop));
-        assert_eq!(gate.refused().len(), 0);
+        assert!(gate.members.values().all(|sessions| sessions.last.len() <= MOST_SESSIONS));
+        let payload = letter(&gate, "one", 1, 7, &release).to_bytes();
+        assert_eq!(gate.admit(&key(&release, "ada"), &payload, 7), Ok(Request::Release));
+        for name in 0..2 * MOST_MEMBERS {
+            let _ = gate.admit(&key(&release, &format!("n{name}")), &payload, 7);
+        }
+        assert!(gate.members.len() <= MOST_MEMBERS);
+        let payload = letter(&gate, "one", 2, 7, &release).to_bytes();
+        assert_eq!(gate.admit(&key(&release, "ada"), &payload, 7), Ok(Request::Release));
+    }
+
+    #[test]
+    fn numbers_up_to_the_last_overflow_nothing() {
+        let mut gate = Gate::default();
+        let stop = Request::Stop;
+        for (number, at_ms) in [(u64::MAX, u64::MAX), (u64::MAX, 0), (0, 0)] {
+            let ticket = Ticket { at_ms, ..gate.ticket() };
+            let payload =
+                NumberedRequest { ticket, ..letter(&gate, "one", number, u32::MAX, &stop) }.to_bytes();
+            let _ = gate.admit(&key(&stop, "ada"), &payload, 7);
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! How a bridge is doing: what is lost or refused is shown.
 
 use crate::couple::Carried;
-use crate::request::Refusal;
+use crate::request::{Refusal, Right, Ticket};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -20,6 +20,12 @@ pub struct Status {
     pub dropped: u64,
     /// Requests not followed, by reason.
     pub refused: BTreeMap<Refusal, u64>,
+    /// The most that may be asked for here.
+    #[serde(default)]
+    pub allow: Right,
+    /// The bridge's word now: requests are made on it.
+    #[serde(default)]
+    pub ticket: Ticket,
     /// What was carried for each coupling with another host.
     #[serde(default)]
     pub couplings: BTreeMap<String, Carried>,
@@ -34,7 +40,7 @@ pub enum State {
     Waiting,
     /// A host runs.
     Running,
-    /// The emergency stop was pressed from the network, and its owner has not released it.
+    /// The emergency stop of its machine is pressed, and its owner has not released it.
     EmergencyStopped,
 }
 

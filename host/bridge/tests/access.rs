@@ -3,11 +3,11 @@
 mod common;
 
 use common::{Bridge, FakeHost, free_port, wait_until};
-use flotor_bridge::access::{AccessError, Members, write_keys};
+use flotor_bridge::access::{AccessError, Members, VALID, write_keys};
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkOptions, open};
 use flotor_bridge::remote::Remote;
-use flotor_bridge::request::{Request, Right};
+use flotor_bridge::request::{NumberedRequest, Request, Right};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -23,7 +23,7 @@ fn name(text: &str) -> Name {
 fn members() -> Members {
     let peers =
         vec![(name("alan"), Right::Watch), (name("grace"), Right::Operate), (name("ada"), Right::Own)];
-    Members { hosts: vec!["localhost".to_owned(), "127.0.0.1".to_owned()], peers }
+    Members { hosts: vec!["localhost".to_owned(), "127.0.0.1".to_owned()], peers, valid: VALID }
 }
 
 /// A member, as its own configuration makes it, at the port of this test.
@@ -105,6 +105,40 @@ fn members_cannot_pretend_to_be_the_bridge() {
         session.put(bridge.name.key("end"), lie.clone()).wait().unwrap();
     }
     assert_eq!(honest.next(Duration::from_millis(500)), None);
+}
+
+#[test]
+fn members_ask_under_their_own_names_only() {
+    let host = FakeHost::start();
+    let folder = tempfile::tempdir().unwrap();
+    write_keys(folder.path(), &members()).unwrap();
+    let endpoint = format!("tls/localhost:{}", free_port());
+    let link = LinkOptions { config: Some(folder.path().join("bridge.json5")), ..LinkOptions::default() };
+    let bridge = Bridge::start_with(&host.directory, Right::Own, endpoint.clone(), link);
+    let connect = vec![endpoint];
+    let link =
+        LinkOptions { config: Some(folder.path().join("grace.json5")), connect, ..LinkOptions::default() };
+    let session = open(&link, End::Visiting).unwrap();
+    assert_eq!(session.member(), &name("grace"));
+    assert!(session.days_left().is_some_and(|days| (363..=365).contains(&days)));
+    let remote = Remote::listen(&session, &bridge.name).unwrap();
+    remote.wait_for_run(&NEVER).unwrap();
+    let status = remote.status().unwrap().expect("every member may see");
+    let ask = |member: &str| {
+        let request = Request::Weight { model: "spring".to_owned(), weight: 0.5 };
+        let letter = NumberedRequest {
+            session: "tester".to_owned(),
+            number: 1,
+            run: status.run,
+            ticket: status.ticket,
+            request,
+        };
+        let key = bridge.name.key(&format!("ask/weight/{member}"));
+        let answers =
+            session.get(key).payload(letter.to_bytes()).timeout(Duration::from_secs(1)).wait().unwrap();
+        answers.iter().filter(|answer| answer.result().is_ok()).count()
+    };
+    assert_eq!((ask("ada"), ask("**"), ask("grace")), (0, 0, 1));
 }
 
 #[test]

@@ -7,7 +7,7 @@ mod common;
 use common::process::Owned;
 use common::{free_port, is_full_size, program, wait_until};
 use flotor_bridge::keys::Name;
-use flotor_bridge::link::{End, LinkOptions, open};
+use flotor_bridge::link::{End, Link, LinkOptions, open};
 use flotor_bridge::remote::{Remote, Told};
 use flotor_bridge::request::{MAX_REQUEST_BYTES, NumberedRequest, Refusal, Request};
 use flotor_live::SetValue;
@@ -18,7 +18,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
-use zenoh::{Session, Wait};
+use zenoh::Wait;
 
 const NAME: &str = "far";
 
@@ -68,7 +68,7 @@ impl Bridge {
         Self { process, endpoint }
     }
 
-    fn session(&self) -> Session {
+    fn session(&self) -> Link {
         let connect = vec![self.endpoint.clone()];
         open(&LinkOptions { connect, ..LinkOptions::default() }, End::Visiting).unwrap()
     }
@@ -176,15 +176,18 @@ fn run_with_bridge(program: &Path, clock: &str, duration_s: u64, fate: Fate) -> 
 }
 
 /// Requests no bridge follows, and messages that are none, until it is over.
-fn flood(session: &Session, run: u32, is_over: &AtomicBool) {
+fn flood(session: &Link, run: u32, is_over: &AtomicBool) {
     /// How long a request is remembered here, and how many go out between two breaths.
     const FORGOTTEN: Duration = Duration::from_millis(500);
     const BURST: usize = 32;
     let key = |what: &str| Name::new(NAME).unwrap().key(what);
     let [plugin, parameter, value] = ["spring", "no_such_parameter", "1"].map(str::to_owned);
     let request = Request::Set { values: vec![SetValue { plugin, parameter, value }] };
+    let remote = Remote::listen(session, &Name::new(NAME).unwrap()).unwrap();
+    let ticket = remote.status().unwrap().expect("the bridge is there").ticket;
     let letter = |number: u64, request: &Request| {
-        NumberedRequest { peer: "flood".to_owned(), number, run, request: request.clone() }.to_bytes()
+        NumberedRequest { session: "flood".to_owned(), number, run, ticket, request: request.clone() }
+            .to_bytes()
     };
     let huge = vec![b'x'; 4 * MAX_REQUEST_BYTES];
     for number in 1.. {
@@ -194,15 +197,15 @@ fn flood(session: &Session, run: u32, is_over: &AtomicBool) {
         for _ in 0..BURST {
             // The same number again: a replay.
             for payload in [letter(number, &request), b"{".to_vec(), vec![0xff; 300]] {
-                let asked = session.get(key("ask/set")).payload(payload).timeout(FORGOTTEN);
+                let asked = session.get(key("ask/set/anyone")).payload(payload).timeout(FORGOTTEN);
                 asked.callback(|_| {}).wait().unwrap();
             }
-            for what in ["ask/set", "ask/emergency-stop", "tick", "end", "couple/pair"] {
+            for what in ["ask/set/anyone", "ask/emergency-stop/anyone", "tick", "end", "couple/pair"] {
                 session.put(key(what), vec![0xff; 168]).wait().unwrap();
             }
         }
         session
-            .get(key("ask/stop"))
+            .get(key("ask/stop/anyone"))
             .payload(huge.clone())
             .timeout(FORGOTTEN)
             .callback(|_| {})

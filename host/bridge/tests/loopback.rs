@@ -141,7 +141,7 @@ fn requests_reach_the_host_and_its_message_come_back() {
     assert!(matches!(asked.as_slice(), [Ask::Set { .. }, Ask::Set { .. }, Ask::EmergencyStop]), "{asked:?}");
     // Starting is the owner's, and this bridge does not let anybody.
     let refused = errand.run(Request::Start).unwrap_err();
-    assert!(refused.contains("nobody answers"), "{refused}");
+    assert!(refused.contains("does not take `start`"), "{refused}");
 }
 
 #[test]
@@ -173,21 +173,25 @@ fn malformed_long_stale_and_replayed_requests_are_refused_and_counted() {
         let answer: flotor_live::Answer = serde_json::from_slice(&answer.payload().to_bytes()).unwrap();
         answer.refused
     };
+    let ticket = remote.status().unwrap().expect("the bridge is there").ticket;
     let letter = |number, run, request| {
-        serde_json::to_vec(&NumberedRequest { peer: "tester".to_owned(), number, run, request }).unwrap()
+        NumberedRequest { session: "tester".to_owned(), number, run, ticket, request }.to_bytes()
     };
     let good = letter(5, greeting.process, Request::Stop);
-    assert_eq!(ask("ask/stop", good.clone()), None);
+    assert_eq!(ask("ask/stop/anyone", good.clone()), None);
     let before = host.asked.0.lock().unwrap().len();
-    assert!(ask("ask/stop", good).is_some(), "replayed");
-    assert!(ask("ask/stop", letter(4, greeting.process, Request::Stop)).is_some(), "older");
-    assert!(ask("ask/stop", letter(6, greeting.process + 1, Request::Stop)).is_some(), "of another run");
+    assert!(ask("ask/stop/anyone", good).is_some(), "replayed");
+    assert!(ask("ask/stop/anyone", letter(4, greeting.process, Request::Stop)).is_some(), "older");
     assert!(
-        ask("ask/emergency-stop", letter(7, greeting.process, set("gamma_n"))).is_some(),
+        ask("ask/stop/anyone", letter(6, greeting.process + 1, Request::Stop)).is_some(),
+        "of another run"
+    );
+    assert!(
+        ask("ask/emergency-stop/anyone", letter(7, greeting.process, set("gamma_n"))).is_some(),
         "through the wrong door"
     );
-    assert!(ask("ask/set", b"{".to_vec()).is_some(), "no letter");
-    assert!(ask("ask/set", vec![b'x'; 4 * MAX_REQUEST_BYTES]).is_some(), "long");
+    assert!(ask("ask/set/anyone", b"{".to_vec()).is_some(), "no letter");
+    assert!(ask("ask/set/anyone", vec![b'x'; 4 * MAX_REQUEST_BYTES]).is_some(), "long");
     assert_eq!(host.asked.0.lock().unwrap().len(), before, "the host heard of none of them");
     let refused = remote.status().unwrap().expect("the bridge is there").refused;
     let expected =
@@ -298,4 +302,27 @@ fn a_remote_run_is_recorded_whole_and_the_bridge_may_die() {
     });
     assert_eq!(kept.end, RecordingEnd::Cut);
     assert!(Recording::open(&file).is_ok(), "what was recorded is there");
+}
+
+#[test]
+fn without_keys_only_the_bridge_tells_what_becomes_of_a_run() {
+    let host = FakeHost::start();
+    let bridge = Bridge::start(&host.directory, Right::Own);
+    let listener = listening(&bridge, &host);
+    let link = LinkOptions { connect: vec![bridge.endpoint.clone()], ..LinkOptions::default() };
+    let forger = open(&link, End::Visiting).unwrap();
+    let lie = serde_json::to_vec(&flotor_live::End { words: "a lie".to_owned() }).unwrap();
+    for what in ["end", "tick", "tf", "change", "status", "news/pair"] {
+        for _ in 0..20 {
+            forger.put(bridge.name.key(what), lie.clone()).wait().unwrap();
+        }
+    }
+    let _token = forger.liveliness().declare_token(bridge.name.key("alive")).wait().unwrap();
+    drop(_token);
+    let until = std::time::Instant::now() + Duration::from_millis(500);
+    while std::time::Instant::now() < until {
+        let told = listener.next(Duration::from_millis(50));
+        assert!(told.is_none() || matches!(told, Some(Told::Tick(_))), "{told:?}");
+    }
+    assert_eq!(listener.lost(), 0, "no forged tick was counted");
 }

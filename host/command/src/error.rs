@@ -6,8 +6,8 @@
 use flotor_hal::Fault;
 use flotor_hal::abi::loader::LoadError;
 use flotor_servo::{EmergencySource, Place, Stuck};
-use flotor_session::RunError;
 use flotor_session::registry::LookupError;
+use flotor_session::{Call, CallError, RunError};
 use std::path::{Path, PathBuf};
 
 /// Why a command failed, with its exit code.
@@ -42,10 +42,15 @@ pub enum CommandError {
          `flotor doctor`, or raise `[limits] watchdog_ms`", .0.tick
     )]
     Watchdog(Stuck),
+    /// The watchdog process was gone, without which the scene does not run.
+    #[error(
+        "the watchdog process is gone; nothing stops the devices if this program is killed, so the run was ended, as `[limits] require_independent_stop` asks"
+    )]
+    Unguarded,
     /// The device sets the pace, and its rate is above the scene's.
     #[error(
-        "the device paces the loop with {samples_per_s} samples a second, above the scene's `rate_hz = {rate_hz}`: all limits \
-         per second would be too high; set `rate_hz = {samples_per_s}`, or `pacing = \"host\"`"
+        "the device paces the loop with {samples_per_s} samples a second, above the scene's `rate_hz = {rate_hz}`: ramps would be \
+         too short and slew limits too high; set `rate_hz = {samples_per_s}`, or `pacing = \"host\"`"
     )]
     TooFast {
         /// Sample rate of the device.
@@ -53,6 +58,11 @@ pub enum CommandError {
         /// Loop rate of the scene.
         rate_hz: f64,
     },
+    /// The scene lets the device set the pace, and the device does not.
+    #[error(
+        "the device does not set the pace of the loop with its present settings; remove `pacing = \"device\"` from the scene"
+    )]
+    NotPaced,
     /// A plugin was refused.
     #[error("{0}")]
     PluginRefused(String),
@@ -100,15 +110,20 @@ impl CommandError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Usage(_) | Self::Read(_) => 2,
+            Self::Usage(_) | Self::Read(_) | Self::NotPaced => 2,
             Self::Run(error) => match error {
                 wrong if wrong.is_configuration() => 2,
-                RunError::Lookup(_) | RunError::Plugin(_) => 3,
+                // Nobody knows whether it exerts a force.
+                RunError::Calls(CallError::Unresponsive(hung)) if hung.call == Call::SafeStop => 4,
+                RunError::Calls(CallError::Stopped)
+                | RunError::Lookup(LookupError::Calls(CallError::Stopped)) => 1,
+                RunError::Lookup(_) | RunError::Plugin(_) | RunError::Calls(_) => 3,
                 RunError::Hung { stuck, .. } => match stuck.place {
                     Place::Model(_) => 3,
                     Place::DeviceWait(_) | Place::DeviceRead(_) | Place::DeviceWrite(_) => 4,
                     Place::Waiting | Place::Host => 1,
                 },
+                RunError::Latched(_) => 4,
                 _ => 1,
             },
             Self::PluginRefused(_) => 3,
@@ -117,7 +132,7 @@ impl CommandError {
             | Self::EmergencyStop(_)
             | Self::TooFast { .. }
             | Self::Watchdog(_) => 4,
-            Self::File { .. } | Self::Record(_) | Self::Failed(_) => 1,
+            Self::Unguarded | Self::File { .. } | Self::Record(_) | Self::Failed(_) => 1,
         }
     }
 }

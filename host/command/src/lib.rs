@@ -22,8 +22,8 @@ pub mod tables;
 
 pub use error::{CommandError, before_advice};
 pub use output::{
-    exit_code_of, first_error, note, print_error_line, print_line, print_result, report_line, write_json,
-    write_text,
+    exit_code_of, first_error, keep_results_apart, note, print_error_line, print_line, print_result,
+    report_line, write_json, write_text,
 };
 pub use progress::progress_bar;
 pub use reference::reference;

@@ -1,9 +1,11 @@
 //! What commands print, for people and for machines.
 
 use crate::{CommandError, style};
+use std::fs::File;
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::OnceLock;
 
 /// Prints a line; a closed pipe (`flotor plugins | head`) ends the program without a message.
 #[macro_export]
@@ -11,20 +13,54 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::print_line(format_args!($($text)*)) };
 }
 
-/// The exit code of a command; its error is printed. Not real-time.
+/// The exit code of a command; its error is printed. Ends the process itself where code of a plugin has not returned: what a
+/// process does at its end might wait for it. Not real-time.
 pub fn exit_code_of(result: Result<(), CommandError>) -> ExitCode {
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
+    let code = match result {
+        Ok(()) => 0,
         Err(error) => {
             print_error_line(format_args!("{} {error}", style::error("error:")));
-            ExitCode::from(error.exit_code())
+            error.exit_code()
         }
+    };
+    if flotor_session::is_left_behind() {
+        let _ = std::io::stdout().flush();
+        signal_hook::low_level::exit(code.into());
+    }
+    ExitCode::from(code)
+}
+
+/// Standard output, where it is for results alone.
+static RESULTS: OnceLock<File> = OnceLock::new();
+
+/// From now on standard output is for results of this program alone: what a plugin prints there goes to standard error. Not
+/// real-time.
+///
+/// # Errors
+/// What the system says.
+pub fn keep_results_apart() -> Result<(), CommandError> {
+    let moved = || {
+        let own = rustix::io::fcntl_dupfd_cloexec(std::io::stdout(), 3)?;
+        rustix::stdio::dup2_stdout(std::io::stderr())?;
+        let _ = RESULTS.set(File::from(own));
+        Ok(())
+    };
+    moved().map_err(|cause: std::io::Error| {
+        CommandError::file(Path::new("standard output"), "cannot be kept for the result", cause)
+    })
+}
+
+/// Writes a line of a result.
+fn write_line(line: std::fmt::Arguments<'_>) -> std::io::Result<()> {
+    match RESULTS.get() {
+        Some(mut results) => writeln!(results, "{line}"),
+        None => writeln!(std::io::stdout(), "{line}"),
     }
 }
 
 /// What `say!` does.
 pub fn print_line(line: std::fmt::Arguments<'_>) {
-    if let Err(error) = writeln!(std::io::stdout(), "{line}") {
+    if let Err(error) = write_line(line) {
         let gone = error.kind() == std::io::ErrorKind::BrokenPipe;
         std::process::exit(if gone { 0 } else { 1 });
     }
@@ -36,7 +72,7 @@ pub fn print_line(line: std::fmt::Arguments<'_>) {
 /// # Errors
 /// If standard output cannot be written; a closed pipe is no error.
 pub fn report_line(line: std::fmt::Arguments<'_>) -> Result<(), CommandError> {
-    match writeln!(std::io::stdout(), "{line}") {
+    match write_line(line) {
         Err(cause) if cause.kind() != std::io::ErrorKind::BrokenPipe => {
             Err(CommandError::file(Path::new("standard output"), "cannot write the result", cause))
         }

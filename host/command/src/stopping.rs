@@ -7,7 +7,9 @@
 //! blocks signals takes none of them away.
 
 use super::note;
-use flotor_servo::last_stop::{block_signals, leave_process, stop_all, wait_for_signal, was_armed};
+use flotor_servo::last_stop::{
+    block_signals, leave_process, leave_sent_signals_to_the_loop, stop_all, wait_for_signal, was_armed,
+};
 use flotor_servo::{StopSwitch, enter_guard_priority};
 use rustix::process::getpgrp;
 use rustix::termios::{LocalModes, OptionalActions, Termios, isatty, tcgetattr, tcgetpgrp, tcsetattr};
@@ -85,6 +87,8 @@ fn register(first: First, stop: &StopSwitch) -> io::Result<()> {
         .chain([SIGUSR1])
         .collect();
     block_signals(&heard)?;
+    // This thread may wait for a processor while a plugin in the loop keeps it busy.
+    leave_sent_signals_to_the_loop()?;
     // A thread that does not block them, because a library has unblocked them, does no harm when it takes one.
     for signal in &heard {
         let flag = if *signal == SIGUSR1 { stop.emergency_flag() } else { stop.stop_flag() };

@@ -30,8 +30,12 @@ pub struct TankState {
 /// The peer state with what its transport to another host needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dispatch {
-    /// Which run tells: when it began, ns since 1970. A later run counts its energy from nothing.
+    /// Which run tells: when it began, ns since 1970. Another run counts its energy from nothing.
     pub run: u64,
+    /// The run whose messages it answers; 0: none. Only who is named here is meant, by the energy as well.
+    pub partner: u64,
+    /// The tick from which on it names that run: what it had passed on before was for somebody else.
+    pub since: u64,
     /// The tick that tells: of two dispatches of a run the higher is the newer.
     pub tick: u64,
     /// The peer state.
@@ -41,11 +45,11 @@ pub struct Dispatch {
 }
 
 /// 64-bit words of a [`Dispatch`].
-pub const DISPATCH_WORDS: usize = 20;
+pub const DISPATCH_WORDS: usize = 22;
 /// Bytes of a [`Dispatch`] on its way: a mark with the version, then [`DISPATCH_WORDS`], all little endian.
 pub const DISPATCH_BYTES: usize = 8 * (1 + DISPATCH_WORDS);
 /// The word that says what it is; the digit is the version.
-const MARK: u64 = u64::from_le_bytes(*b"flotnew1");
+const MARK: u64 = u64::from_le_bytes(*b"flotnew2");
 /// Largest error of the length of a quaternion that is one after all: far above that of arithmetic.
 const UNIT_TOLERANCE: f64 = 1.0e-6;
 
@@ -96,12 +100,6 @@ impl Dispatch {
         if dispatch.is_possible() { Ok(dispatch) } else { Err(InvalidDispatch::Numbers) }
     }
 
-    /// True if it comes after `other`: of a later run, or later in the same.
-    #[must_use]
-    pub fn is_newer_than(&self, other: &Self) -> bool {
-        (self.run, self.tick) > (other.run, other.tick)
-    }
-
     fn is_possible(&self) -> bool {
         let Self { state: PeerState { pose, twist, told_j }, tank, .. } = self;
         let TankState { level_j, lowest_j, gone_in_j, given_up_j } = tank;
@@ -117,7 +115,7 @@ impl Dispatch {
 impl Words<DISPATCH_WORDS> for Dispatch {
     #[inline]
     fn to_words(&self) -> [u64; DISPATCH_WORDS] {
-        let Self { run, tick, state: PeerState { pose, twist, told_j }, tank } = self;
+        let Self { run, partner, since, tick, state: PeerState { pose, twist, told_j }, tank } = self;
         let Pose { position_m: [x, y, z], orientation_xyzw: [qx, qy, qz, qw] } = *pose;
         let Twist { linear_m_per_s: [vx, vy, vz], angular_rad_per_s: [wx, wy, wz] } = *twist;
         let TankState { level_j, lowest_j, gone_in_j, given_up_j } = *tank;
@@ -127,7 +125,7 @@ impl Words<DISPATCH_WORDS> for Dispatch {
             [*told_j, level_j, lowest_j, gone_in_j, given_up_j].map(f64::to_bits);
         #[rustfmt::skip] // a line for each part
         let words = [
-            *run, *tick,
+            *run, *partner, *since, *tick,
             x, y, z, qx, qy, qz, qw,
             vx, vy, vz, wx, wy, wz,
             told, level, lowest, gone_in, given_up,
@@ -137,7 +135,7 @@ impl Words<DISPATCH_WORDS> for Dispatch {
 
     #[inline]
     fn from_words(words: &[u64; DISPATCH_WORDS]) -> Self {
-        let [run, tick, numbers @ ..] = *words;
+        let [run, partner, since, tick, numbers @ ..] = *words;
         let [
             x,
             y,
@@ -161,7 +159,7 @@ impl Words<DISPATCH_WORDS> for Dispatch {
         let pose = Pose { position_m: [x, y, z], orientation_xyzw: [qx, qy, qz, qw] };
         let twist = Twist { linear_m_per_s: [vx, vy, vz], angular_rad_per_s: [wx, wy, wz] };
         let tank = TankState { level_j, lowest_j, gone_in_j, given_up_j };
-        Self { run, tick, state: PeerState { pose, twist, told_j }, tank }
+        Self { run, partner, since, tick, state: PeerState { pose, twist, told_j }, tank }
     }
 }
 
@@ -173,7 +171,14 @@ mod tests {
         let pose = Pose { position_m: [1.0e-3, -2.0e-3, 3.0e-3], orientation_xyzw: [0.6, 0.0, 0.0, 0.8] };
         let twist = Twist { linear_m_per_s: [0.1, 0.2, 0.3], angular_rad_per_s: [1.0, 2.0, 3.0] };
         let tank = TankState { level_j: 4.0e-3, lowest_j: -1.0e-3, gone_in_j: -0.5, given_up_j: 0.25 };
-        Dispatch { run: 7, tick: 9, state: PeerState { pose, twist, told_j: 0.125 }, tank }
+        Dispatch {
+            run: 7,
+            partner: 5,
+            since: 3,
+            tick: 9,
+            state: PeerState { pose, twist, told_j: 0.125 },
+            tank,
+        }
     }
 
     #[test]
@@ -195,7 +200,7 @@ mod tests {
         let mut other = bytes;
         other[7] += 1;
         assert_eq!(Dispatch::from_bytes(&other), Err(InvalidDispatch::Mark));
-        for word in 2..DISPATCH_WORDS {
+        for word in 4..DISPATCH_WORDS {
             for number in [f64::NAN, f64::INFINITY] {
                 let mut wrong = bytes;
                 wrong[8 * (1 + word)..8 * (2 + word)].copy_from_slice(&number.to_le_bytes());
@@ -212,13 +217,5 @@ mod tests {
             let wrong = Dispatch { state, ..dispatch() };
             assert_eq!(Dispatch::from_bytes(&wrong.to_bytes()), Err(InvalidDispatch::Numbers));
         }
-    }
-
-    #[test]
-    fn a_later_run_is_newer_whatever_its_tick() {
-        let (first, later) = (dispatch(), Dispatch { tick: 10, ..dispatch() });
-        assert!(later.is_newer_than(&first) && !first.is_newer_than(&later) && !first.is_newer_than(&first));
-        let other_run = Dispatch { run: 8, tick: 0, ..first };
-        assert!(other_run.is_newer_than(&later) && !later.is_newer_than(&other_run));
     }
 }

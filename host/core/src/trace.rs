@@ -58,9 +58,13 @@ impl Events {
     pub const PARTNER_SILENT: Events = Events { bits: 1 << 20 };
     /// A device, or a coupling's other end, reported what cannot be: it was not used.
     pub const IMPLAUSIBLE_SAMPLE: Events = Events { bits: 1 << 21 };
+    /// A plugin left rounding mode, flush-to-zero or traps of the loop's thread changed; they were put back at once.
+    pub const FLOAT_ENVIRONMENT: Events = Events { bits: 1 << 22 };
+    /// The other end of a coupling, on another host, claimed more than is believed: a motion too fast, or too much energy.
+    pub const PARTNER_LIMITED: Events = Events { bits: 1 << 23 };
 
     /// Names of the bits, lowest first: for reports and recordings.
-    pub const NAMES: [&'static str; 22] = [
+    pub const NAMES: [&'static str; 24] = [
         "stale_sample",
         "not_finite",
         "force_limited",
@@ -83,6 +87,8 @@ impl Events {
         "excess_force",
         "partner_silent",
         "implausible_sample",
+        "float_environment",
+        "partner_limited",
     ];
 
     /// Adds events. Real-time: bounded, no allocation.

@@ -97,6 +97,14 @@ impl Directory {
         runs
     }
 
+    /// Makes the folder if need be, for this user alone.
+    ///
+    /// # Errors
+    /// [`DirectoryError`]: the folder is not usable, or not ours alone.
+    pub fn make(&self) -> Result<(), DirectoryError> {
+        private(&self.path)
+    }
+
     /// Makes the folder if need be, and a socket of this process in it.
     ///
     /// # Errors
@@ -153,7 +161,7 @@ pub(crate) fn private(path: &Path) -> Result<(), DirectoryError> {
     }
 }
 
-fn unusable(path: &Path) -> impl FnOnce(io::Error) -> DirectoryError {
+pub(crate) fn unusable(path: &Path) -> impl FnOnce(io::Error) -> DirectoryError {
     let path = path.to_path_buf();
     move |cause| DirectoryError::Unusable { path, cause }
 }

@@ -42,6 +42,11 @@
 //! does nothing per tick without a client. Between loop and socket lies a queue of fixed length for each client; what
 //! finds no room is dropped and counted. Requests are answered at most a thousand times a second for each client.
 //!
+//! # The latch
+//!
+//! An emergency stop of any run stops every run of the folder and refuses new ones until it is released: [`Latch`], a file beside
+//! the sockets.
+//!
 //! # Couplings
 //!
 //! A run with a coupling whose other end is on another host has a second socket, for datagrams: [`PeerSocket`] gives
@@ -52,6 +57,7 @@
 mod client;
 mod directory;
 mod frame;
+mod latch;
 mod message;
 mod peer_socket;
 mod server;
@@ -59,6 +65,7 @@ mod server;
 pub use client::{Asker, Client, Event, LiveError};
 pub use directory::{Directory, DirectoryError, Found, Listener};
 pub use frame::{Frames, Kind, LongFrame, MOST_PAYLOAD, frame, ticks_from_payload, ticks_to_payload};
+pub use latch::{Latch, LatchState, Pressed};
 pub use message::{
     Answer, Ask, ChangeMessage, End, Greeting, Outcome, PanelParameter, PanelPlugin, ParameterShape,
     RefusalCause, Request, SetValue, Subject, WrenchLimits,

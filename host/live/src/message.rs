@@ -22,13 +22,19 @@ pub struct Greeting {
     pub limits: WrenchLimits,
 }
 
-/// The most that may reach the hand, along and about each axis of the device frame.
+/// The most that may reach the hand, along and about each axis of the device frame, and in any direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WrenchLimits {
     /// Force, N; without one, no limit.
     pub force_n: [Option<f64>; 3],
     /// Torque, N·m; without one, no limit.
     pub torque_nm: [Option<f64>; 3],
+    /// The norm of the force, N; without one, no limit.
+    #[serde(default)]
+    pub force_norm_n: Option<f64>,
+    /// The norm of the torque, N·m; without one, no limit.
+    #[serde(default)]
+    pub torque_norm_nm: Option<f64>,
 }
 
 /// A plugin of the run and what it can be told: all that a panel is made of.

@@ -194,7 +194,7 @@ mod tests {
 
     fn dispatch(tick: u64) -> Dispatch {
         let state = PeerState { pose: flotor_hal::Pose::HOME, twist: flotor_hal::Twist::ZERO, told_j: 0.0 };
-        Dispatch { run: 1, tick, state, tank: TankState::default() }
+        Dispatch { run: 1, partner: 0, since: 0, tick, state, tank: TankState::default() }
     }
 
     #[test]
@@ -243,7 +243,7 @@ mod tests {
         let directory = Directory::at(scratch.path().join("runs"));
         let mut host = PeerSocket::listen(&directory, "pair").unwrap();
         let stranger = UnixDatagram::unbound().unwrap();
-        for length in [1, 167, 169, 5000] {
+        for length in [1, 168, 175, 177, 5000] {
             stranger.send_to(&vec![7; length], host.path()).unwrap();
             assert!(matches!(host.hear(), Err(InvalidDispatch::Length { .. })), "{length} bytes");
         }

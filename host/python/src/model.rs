@@ -9,10 +9,11 @@ use flotor_lab::evaluate::{Answer, Details, Evaluation, Handle, Travel};
 use flotor_session::registry::Registry;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1,
+    PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 use std::path::PathBuf;
-use std::sync::{Mutex, MutexGuard};
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
 /// One parameter of a plugin's schema.
 #[pyclass(frozen, get_all, module = "flotor")]
@@ -43,6 +44,8 @@ pub(crate) struct Model {
     plugin: Plugin,
     settings: Vec<Setting>,
     instance: Mutex<flotor_hal::abi::loader::Model>,
+    /// Where it was made: a lock that another thread held at an `os.fork()` is never given back in the child.
+    process: u32,
 }
 
 #[pymethods]
@@ -54,7 +57,7 @@ impl Model {
             settings.iter().map(|(key, value)| Setting::parse(plugin.parameters(), key, value)).collect();
         let settings = settings.map_err(refuse)?;
         let instance = Mutex::new(plugin.create_model(&settings).map_err(refuse)?);
-        Ok(Self { plugin, settings, instance })
+        Ok(Self { plugin, settings, instance, process: std::process::id() })
     }
 
     #[getter]
@@ -81,12 +84,12 @@ impl Model {
     fn parameter(&self, id: &str) -> PyResult<f64> {
         let index = self.plugin.parameters().iter().position(|parameter| parameter.id() == id);
         let index = index.ok_or_else(|| refuse(format!("`{}` has no parameter `{id}`", self.id())))?;
-        Ok(self.lock().parameter(index))
+        Ok(self.lock()?.parameter(index))
     }
 
     fn set_parameter(&self, id: &str, value: &str) -> PyResult<()> {
         let setting = Setting::parse(self.plugin.parameters(), id, value).map_err(refuse)?;
-        let mut instance = self.lock();
+        let mut instance = self.lock()?;
         match instance.set_parameter(setting.index(), setting.value()) {
             CallStatus::Ok => Ok(()),
             CallStatus::Unsupported => Err(refuse(format!("`{id}` cannot change while the model lives"))),
@@ -94,8 +97,9 @@ impl Model {
         }
     }
 
-    fn reset(&self) {
-        self.lock().reset();
+    fn reset(&self) -> PyResult<()> {
+        self.lock()?.reset();
+        Ok(())
     }
 
     /// Steps through rows in order, in place; the model's own batch code, without copies, without the GIL.
@@ -112,13 +116,20 @@ impl Model {
             ));
         }
         let inputs = InputRow::peel(inputs.as_slice()?);
+        // NumPy tells views of one array apart, not two arrays on one buffer.
+        let [read, written] = [inputs.as_ptr() as usize, outputs.data() as usize];
+        let (read_end, written_end) =
+            (read + size_of_val(inputs), written + outputs.len() * size_of::<OutputRow>());
+        if read < written_end && written < read_end {
+            return Err(refuse("inputs and outputs share memory; pass a copy of one of them"));
+        }
         let outputs = OutputRow::peel_mut(outputs.as_slice_mut()?);
         if inputs.len() != outputs.len() {
             let (rows, room) = (inputs.len(), outputs.len());
             return Err(refuse(format!("{rows} inputs and room for {room} outputs; give as many")));
         }
         py.detach(|| {
-            let mut instance = self.lock();
+            let mut instance = self.lock()?;
             match instance.step_batch(inputs, outputs) {
                 CallStatus::Ok => Ok(()),
                 _ => Err(refuse(format!("the model stopped answering: {}", instance.last_message()))),
@@ -162,9 +173,19 @@ impl Model {
 }
 
 impl Model {
-    /// A panic of the model does not poison it: the contract reports panics as a status.
-    fn lock(&self) -> MutexGuard<'_, flotor_hal::abi::loader::Model> {
-        self.instance.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    /// A panic of the model does not poison it: the contract reports panics as a status. In a child of `os.fork()` nothing is
+    /// waited for.
+    fn lock(&self) -> PyResult<MutexGuard<'_, flotor_hal::abi::loader::Model>> {
+        if self.process == std::process::id() {
+            return Ok(self.instance.lock().unwrap_or_else(PoisonError::into_inner));
+        }
+        match self.instance.try_lock() {
+            Ok(instance) => Ok(instance),
+            Err(TryLockError::Poisoned(poisoned)) => Ok(poisoned.into_inner()),
+            Err(TryLockError::WouldBlock) => Err(refuse(
+                "a thread stepped this model when the process was forked; make a new one here, or start processes by \"spawn\"",
+            )),
+        }
     }
 }
 

@@ -101,8 +101,11 @@ fn record<'py>(
         layout.set_item("formats", formats)?;
         layout.set_item("offsets", offsets)?;
         layout.set_item("itemsize", size_bytes)?;
+        // NumPy then lays arrays of them out as the structs are, and knows of one that is not.
+        layout.set_item("aligned", true)?;
         let dtype = PyArrayDescr::new(py, layout)?;
         assert_eq!(dtype.itemsize(), size_bytes, "NumPy read the record layout differently");
+        assert_eq!(dtype.alignment(), align_of::<Input>(), "NumPy aligns the record differently");
         Ok(dtype.unbind())
     };
     let dtype = once.get_or_try_init(py, make);

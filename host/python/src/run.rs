@@ -57,5 +57,5 @@ fn legal(name: &str, value: f64, min: f64, max: f64) -> PyResult<f64> {
     if (min..=max).contains(&value) {
         return Ok(value);
     }
-    Err(refuse(format!("{name} = {value}: legal is {min} to {max}")))
+    Err(refuse(format!("{name} = {value}: must be {min} to {max}")))
 }

@@ -4,7 +4,10 @@ import csv
 import io
 import os
 import shutil
+import signal
 import subprocess
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -74,9 +77,111 @@ def test_an_array_that_is_not_aligned_is_refused():
         model.step_batch(inputs, odd)
 
 
-def test_records_have_the_contract_s_size():
+@pytest.mark.parametrize("first", [0, 64, 130, 136 * 9])
+def test_arrays_that_share_memory_are_refused(first):
+    model = flotor.Model("spring")
+    memory = bytearray(136 * 20)
+    inputs = np.frombuffer(memory, flotor.INPUT, count=10)
+    inputs[:] = model.inputs(poses(10))
+    outputs = np.frombuffer(memory, flotor.OUTPUT, count=10, offset=first - first % 8)
+    with pytest.raises(flotor.FlotorError, match="share memory"):
+        model.step_batch(inputs, outputs)
+    apart = np.frombuffer(memory, flotor.OUTPUT, count=10, offset=136 * 10)
+    assert np.isfinite(model.step_batch(inputs, apart)["force_n"]).all()
+
+
+def layout(random, rows, dtype):
+    """The rows in memory of some layout: offset, stride, order, owner, type; and whether a model may take them."""
+    kind = random.integers(8)
+    if kind == 0:
+        return rows.copy(), True
+    if kind == 1:  # at any address
+        offset = int(random.integers(17))
+        memory = bytearray(rows.nbytes + 16)
+        odd = np.frombuffer(memory, dtype, count=len(rows), offset=offset)
+        odd[:] = rows
+        return odd, odd.ctypes.data % 8 == 0
+    if kind == 2:  # with a stride
+        wide = np.zeros((len(rows), int(random.integers(2, 4))), dtype)
+        wide[:, 0] = rows
+        return wide[:, 0], len(rows) < 2
+    if kind == 3:
+        return rows[::-1].copy()[::-1], len(rows) < 2
+    if kind == 4:
+        return rows.astype(dtype.newbyteorder(">")), False
+    if kind == 5:
+        return rows.reshape(1, -1).copy(), False
+    if kind == 6:
+        return rows.view(np.uint8).copy(), False
+    frozen = rows.copy()
+    frozen.setflags(write=False)
+    return frozen, None  # an input, no output
+
+
+def test_whatever_lies_in_memory_is_stepped_right_or_refused():
+    random = np.random.default_rng(30)
+    model = flotor.Model("spring")
+    for _ in range(10_000):
+        count = int(random.integers(1, 9))
+        rows = model.inputs(poses(count, int(random.integers(1000))))
+        expected = model.step_batch(rows.copy())
+        inputs, takes_inputs = layout(random, rows, flotor.INPUT)
+        outputs, takes_outputs = layout(random, np.zeros(count, flotor.OUTPUT), flotor.OUTPUT)
+        if random.integers(8) == 0:  # both in one buffer, at any distance
+            memory = bytearray(count * 200)
+            inputs, takes_inputs = np.frombuffer(memory, flotor.INPUT, count=count), True
+            inputs[:] = rows
+            offset = 8 * int(random.integers(count * 136 // 8 + 1))
+            outputs = np.frombuffer(memory, flotor.OUTPUT, count=count, offset=offset)
+            takes_outputs = offset >= count * 136
+        before = outputs.tobytes()
+        try:
+            model.step_batch(inputs, outputs)
+        except (flotor.FlotorError, TypeError, ValueError):
+            assert takes_inputs is False or not takes_outputs
+            assert outputs.tobytes() == before
+        else:
+            assert takes_inputs is not False and takes_outputs
+            assert outputs.tobytes() == expected.tobytes()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
+def test_a_fork_while_a_thread_steps_hangs_nobody():
+    model = flotor.Model("spring", variant="rod")
+    inputs, stepping = model.inputs(poses(200_000)), threading.Event()
+
+    def step():
+        stepping.set()
+        model.step_batch(inputs)
+
+    thread = threading.Thread(target=step)
+    thread.start()
+    stepping.wait()
+    time.sleep(0.05)
+    child = os.fork()
+    if child == 0:
+        try:
+            model.step_batch(inputs[:1])
+        except flotor.FlotorError:
+            os._exit(7)
+        os._exit(0)
+    for _ in range(1200):
+        done, status = os.waitpid(child, os.WNOHANG)
+        if done:
+            break
+        time.sleep(0.05)
+    else:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        pytest.fail("the child hangs")
+    assert os.waitstatus_to_exitcode(status) in (0, 7)
+    thread.join()
+
+
+def test_records_have_the_contract_s_layout():
     assert flotor.INPUT.itemsize == 136
     assert flotor.OUTPUT.itemsize == 64
+    assert flotor.INPUT.alignment == flotor.OUTPUT.alignment == 8
 
 
 def test_a_live_parameter_changes_the_force():
@@ -92,8 +197,8 @@ def test_a_live_parameter_changes_the_force():
     [
         (dict(id="sprung"), "did you mean `spring`"),
         (dict(id="spring", gama_n=3), "did you mean `gamma_n`"),
-        (dict(id="spring", gamma_n=-1), "legal is"),
-        (dict(id="spring", variant="exact"), "legal is"),
+        (dict(id="spring", gamma_n=-1), "must be"),
+        (dict(id="spring", variant="exact"), "must be"),
         (dict(id="simulated"), "device"),
         (dict(id="spring", variant=True), "no value of a parameter"),
     ],

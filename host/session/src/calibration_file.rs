@@ -20,7 +20,7 @@
 //! ```
 
 use crate::scene::Location;
-use flotor_hal::VerticalCalibration;
+use flotor_hal::{InvalidCalibration, VerticalCalibration};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -189,8 +189,15 @@ impl CalibrationFile {
             let found = read.format;
             return Err(whole(format!("format {found}, this program reads {FORMAT}; calibrate again")));
         }
-        let calibration = read.vertical.calibration();
-        Ok((read, calibration.map_err(|invalid| whole(format!("[vertical] {invalid}")))?))
+        let calibration = read.vertical.calibration().map_err(|invalid| match invalid {
+            // In the unit of the file.
+            InvalidCalibration::Range(_) => {
+                let [from, to] = read.vertical.range_mm;
+                whole(format!("[vertical] invalid range {from} mm to {to} mm"))
+            }
+            other => whole(format!("[vertical] {other}")),
+        })?;
+        Ok((read, calibration))
     }
 
     /// The file as text, the same for the same content.
@@ -283,7 +290,7 @@ mod tests {
         assert!(said("format = 1", "format = 2").contains("format 2, this program reads 1"));
         assert!(said("1.05", "nan").contains("[vertical]"));
         assert!(said("1.05", "0.01").contains("plausible"));
-        assert!(said("[-7.0, 7.0]", "[7.0, -7.0]").contains("range"));
+        assert!(said("[-7.0, 7.0]", "[7.0, -7.0]").contains("invalid range 7 mm to -7 mm"));
         assert!(said("-0.0011]", "0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]").contains("9 coefficients"));
     }
 

@@ -35,12 +35,14 @@ pub fn run(
 ) -> Result<RunSummary, HeadlessError> {
     let options = RunOptions { clock: Clock::Virtual, seed };
     let session = Session::prepare(scene, registry, &options)?;
-    let plugins = session.plugins().to_vec();
+    let (plugins, notices) = (session.plugins().to_vec(), session.notices());
     let recorder =
         recording.map(|path| Recorder::create(path, &describe(scene, &options, &plugins))).transpose()?;
     let recording = RunRecording::new(recorder);
     let mut watchers = Watchers { tally: Tally::default(), digest: TraceDigest::new(), recording };
-    let outcome = session.run(&mut watchers, &StopSwitch::default())?;
+    let mut outcome = session.run(&mut watchers, &StopSwitch::default())?;
+    // Nobody was there to be told before.
+    outcome.warnings.splice(0..0, notices);
     let Watchers { tally, digest, mut recording } = watchers;
     recording.finish(&[])?;
     let facts = RunFacts {

@@ -7,13 +7,17 @@
 //! - [`scene`]: what is to be run, read from TOML.
 //! - [`registry`]: where plugins are.
 //! - [`Session`]: from a scene to a run.
+//! - [`program`]: the program itself as a source of force.
 //! - [`headless`]: a whole run in virtual time, recorded and reported.
 //! - [`summary`]: what a run came to; [`run_description`]: all it takes to repeat it.
 //! - [`telemetry`]: a running session, for other programs to watch and change.
 //! - [`calibration_file`]: the correction of a device's vertical force, as measured and kept.
 
 pub mod calibration_file;
+mod calls;
 pub mod headless;
+mod machine;
+pub mod program;
 pub mod registry;
 pub mod run_description;
 mod run_recording;
@@ -22,8 +26,12 @@ mod session;
 pub mod summary;
 pub mod telemetry;
 
+pub use calls::{
+    Call, CallError, LIMIT_VARIABLE, Notice, Unresponsive, is_left_behind, stop_waits_with, tell_notices,
+};
 pub use run_recording::RunRecording;
 pub use session::{
-    ControlError, Controls, DeviceOutcome, Misbehaved, NewValue, Observer, Outcome, PluginReport, RunError,
-    RunOptions, Session, Steps, Strength, StrongDevice, prepare_model,
+    ControlError, Controls, DeviceOutcome, LatchGuard, LatchWatch, Lockstep, Misbehaved, NewValue, Observer,
+    Outcome, PluginReport, Remains, RunError, RunOptions, Session, Steps, Strength, StrongDevice, Tap,
+    prepare_model,
 };

@@ -65,6 +65,13 @@ impl Tally {
         std::array::from_fn(|bit| self.event_ticks[bit] + u64::from(self.events.bits() >> bit & 1))
     }
 
+    /// Time of the last tick, ns.
+    #[must_use]
+    pub fn last_ns(&self) -> u64 {
+        let last = |device: &DeviceTally| device.last.as_ref().map(|(record, _)| record.time_ns);
+        self.devices.iter().filter_map(last).max().unwrap_or(0)
+    }
+
     /// Largest of a number of all devices.
     fn largest(&self, number: impl Fn(&DeviceTally) -> f64) -> f64 {
         self.devices.iter().map(number).fold(0.0, f64::max)
@@ -178,7 +185,8 @@ pub struct DeviceSummary {
 pub struct CouplingSummary {
     /// Name in the scene.
     pub name: String,
-    /// The lowest the tank of each end ever was, J: below zero, the coupling has generated energy.
+    /// The lowest the tank of each end ever was, J: below zero, more has come out there than this end had and was told of. That of an
+    /// end on another host is what that host says of itself, and proves nothing.
     pub lowest_j: [f64; 2],
     /// What the hand at each end has put in altogether less what came out, J.
     pub gone_in_j: [f64; 2],
@@ -202,6 +210,16 @@ pub struct LinkSummary {
     pub implausible: u64,
     /// Counts of messages.
     pub carried: LinkCounts,
+    /// The partner's run, as text: when it began, ns since 1970; empty without one.
+    pub partner: String,
+    /// The energy that was believed of the partner, J: no more than this and what the hand here had put in came out here.
+    pub believed_j: f64,
+    /// Energy it claimed beyond what can be checked here, J.
+    pub cut_j: f64,
+    /// Way it claimed beyond what a hand can do, m.
+    pub cut_path_m: f64,
+    /// How often a partner was let go because of its claims.
+    pub let_go: u32,
 }
 
 /// Energy balance of a run.
@@ -261,18 +279,35 @@ pub struct RunFacts<'a> {
 impl LinkSummary {
     /// For people.
     fn to_text(&self) -> String {
-        let Self { heard_ticks, silences, longest_wait_ms, implausible, carried } = self;
-        let LinkCounts { lost, overtaken, refused, .. } = carried;
+        let Self { heard_ticks, silences, longest_wait_ms, implausible, carried, .. } = self;
+        let LinkCounts { lost, overtaken, refused, others, .. } = carried;
         let silent = match silences {
             0 => format!("longest wait for a message {longest_wait_ms:.0} ms"),
             silences => format!("force removed {silences} times for want of messages"),
         };
         let impossible = match implausible {
             0 => String::new(),
-            count => format!(", {count} cannot be"),
+            count => format!(", {count} implausible"),
+        };
+        let partner = match self.partner.as_str() {
+            "" => "no partner".to_owned(),
+            run => format!("partner: run {run}"),
+        };
+        let others = match others {
+            0 => String::new(),
+            others => format!(", {others} of other runs ignored"),
+        };
+        let cut = match (self.cut_j > 0.0 || self.cut_path_m > 0.0, self.let_go) {
+            (false, 0) => String::new(),
+            (_, times) => format!(
+                "; not believed: {:.3} mJ, {:.1} mm; let go {times} times because of it",
+                self.cut_j * 1.0e3,
+                self.cut_path_m * 1.0e3
+            ),
         };
         format!(
-            "messages in {heard_ticks} ticks, {silent}; {lost} lost, {overtaken} overtaken, {refused} refused{impossible}"
+            "{partner}; messages in {heard_ticks} ticks, {silent}; {lost} lost, {overtaken} overtaken, {refused} \
+             refused{impossible}{others}{cut}"
         )
     }
 }
@@ -295,7 +330,9 @@ impl RunSummary {
                 RunEnd::DeviceFault(_) => "device_fault",
                 RunEnd::EmergencyStop(_) => "emergency_stop",
                 RunEnd::TooFast(_) => "too_fast",
+                RunEnd::NotPaced => "not_paced",
                 RunEnd::Watchdog(_) => "watchdog",
+                RunEnd::Unguarded => "unguarded",
             },
             clock: facts.clock,
             seed: facts.seed,
@@ -337,6 +374,14 @@ impl RunSummary {
                 .chain(outcome.misbehaved.iter().map(misbehaved_summary))
                 .collect(),
         }
+    }
+
+    /// The same with what a plugin did that ended the run.
+    #[must_use]
+    pub fn blaming(mut self, name: &str, what: &str) -> Self {
+        let cause = self.plugins.iter_mut().filter(|plugin| plugin.name == name);
+        cause.for_each(|plugin| what.clone_into(&mut plugin.health));
+        self
     }
 
     /// The run in one line, under the title of a picture.
@@ -387,8 +432,15 @@ impl RunSummary {
         for CouplingSummary { name, lowest_j, given_up_j, link, .. } in &self.couplings {
             let [first, second] = lowest_j.map(|joule| joule * 1.0e3);
             let heat_mj = given_up_j.iter().sum::<f64>() * 1.0e3;
-            let tanks =
-                format!("tanks never below {first:+.3} and {second:+.3} mJ, {heat_mj:.3} mJ dissipated");
+            let tanks = match link {
+                None => {
+                    format!("tanks never below {first:+.3} and {second:+.3} mJ, {heat_mj:.3} mJ dissipated")
+                }
+                Some(link) => format!(
+                    "tank never below {first:+.3} mJ with {:.3} mJ believed of the partner, whose own says {second:+.3} mJ",
+                    link.believed_j * 1.0e3
+                ),
+            };
             row("coupling", format!("{name}: {tanks}"));
             link.iter().for_each(|link| row("link", format!("{name}: {}", link.to_text())));
         }
@@ -441,6 +493,11 @@ fn coupling_summary(
         longest_wait_ms: hearing.longest_wait_ns as f64 * 1.0e-6,
         implausible: hearing.implausible,
         carried: carried.unwrap_or_default(),
+        partner: if hearing.run == 0 { String::new() } else { hearing.run.to_string() },
+        believed_j: hearing.believed_j,
+        cut_j: hearing.cut.energy_j,
+        cut_path_m: hearing.cut.path_m,
+        let_go: hearing.let_go,
     };
     CouplingSummary {
         name: coupling.name.clone(),
@@ -469,21 +526,32 @@ fn health_words(health: &ModelHealth, words: &str) -> String {
     if let Some(tick) = health.first_late {
         return format!("late in {} ticks, the first at tick {tick}", health.late_ticks);
     }
-    health.first_rejected.map_or_else(
+    if let Some(tick) = health.first_rejected {
+        let count = health.rejected_ticks;
+        return format!(
+            "{count} answers were not finite, the first at tick {tick}; each counted as no force"
+        );
+    }
+    health.first_float_change.map_or_else(
         || "ok".to_owned(),
         |tick| {
-            let count = health.rejected_ticks;
-            format!("{count} answers were not finite, the first at tick {tick}; each counted as no force")
+            let ticks = health.float_changes;
+            format!("changed the floating-point environment in {ticks} ticks, the first at tick {tick}; it was put back each time")
         },
     )
 }
 
 /// The devices of a run come first.
 fn plugin_summary(number: usize, plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
-    let device = outcome.devices.get(number).and_then(|device| device.problem.clone());
+    let device = outcome.devices.get(number);
+    let float_changes = device.map_or(0, |device| device.float_changes);
+    let float_changes = (float_changes > 0).then(|| {
+        format!("changed the floating-point environment in {float_changes} calls; it was put back each time")
+    });
+    let problem = device.and_then(|device| device.problem.clone());
     let model = outcome.models.iter().find(|(name, ..)| *name == plugin.name);
     let model = model.map(|(_, health, words)| health_words(health, words));
-    summary_of(plugin, device.or(model).unwrap_or_else(|| "ok".to_owned()))
+    summary_of(plugin, problem.or(float_changes).or(model).unwrap_or_else(|| "ok".to_owned()))
 }
 
 /// A plugin that was put in while the run was on.

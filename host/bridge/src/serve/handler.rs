@@ -1,5 +1,6 @@
 //! Where requests arrive: letters in, answers out, and what is known of the run for who asks.
 
+use super::emergency::Emergency;
 use super::station::{Station, json};
 use super::{Launcher, WaitNow};
 use crate::couple::Carried;
@@ -7,7 +8,7 @@ use crate::keys::Name;
 use crate::link::LinkError;
 use crate::request::{Gate, MAX_REQUEST_BYTES, Refusal, Request, Right};
 use crate::status::{State, Status};
-use flotor_live::{Answer, Asker, ChangeMessage, Client, Greeting, RefusalCause};
+use flotor_live::{Answer, Asker, ChangeMessage, Client, Directory, Greeting, Latch, RefusalCause};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -16,7 +17,7 @@ use zenoh::query::{Query, Queryable};
 
 /// How long a host may take to answer.
 const ANSWER_WAIT: Duration = Duration::from_secs(2);
-/// Requests that wait for the host at most, which answers some thousand a second: an emergency stop is never far behind them.
+/// Requests that wait for the host at most, which answers some thousand a second. An emergency stop goes its own way.
 const MOST_OPEN: usize = 32;
 /// How often the status goes out when nothing changes: who lost one gets the next.
 const STATUS_PERIOD: Duration = Duration::from_secs(1);
@@ -24,6 +25,7 @@ const STATUS_PERIOD: Duration = Duration::from_secs(1);
 /// Everything a bridge knows.
 pub(super) struct RequestHandler {
     name: Name,
+    emergency: Emergency,
     inside: Mutex<Inside>,
 }
 
@@ -32,7 +34,7 @@ struct Inside {
     status: Status,
     run: Option<Run>,
     launcher: Option<Launcher>,
-    is_latched: bool,
+    latch: Latch,
     reported: Option<(Status, Instant)>,
     /// Ticks that were to be published since the bridge started, dropped ones among them.
     due: u64,
@@ -72,26 +74,34 @@ pub(super) fn open(
     for right in Right::ALL.into_iter().filter(|right| *right <= allow) {
         for key in right.keys() {
             let key = handler.name.key(key);
-            let (handler, name) = (Arc::clone(handler), key.clone());
-            let receive = move |query: Query| handler.receive(&name, query);
-            counter.push(session.declare_queryable(key).callback(receive).wait_now()?);
+            let handler = Arc::clone(handler);
+            let receive = move |query: Query| handler.receive(query);
+            // The last part is who asks.
+            counter.push(session.declare_queryable(format!("{key}/*")).callback(receive).wait_now()?);
         }
     }
     Ok(counter)
 }
 
 impl RequestHandler {
-    pub(super) fn new(name: Name, launcher: Option<Launcher>) -> Self {
+    pub(super) fn new(
+        name: Name,
+        launcher: Option<Launcher>,
+        allow: Right,
+        directory: &Directory,
+    ) -> std::io::Result<Self> {
+        let emergency = Emergency::start(directory)?;
+        let latch = emergency.latch().clone();
         let inside = Inside {
             gate: Gate::default(),
-            status: Status::default(),
+            status: Status { allow, ..Status::default() },
             run: None,
             launcher,
-            is_latched: false,
+            latch,
             reported: None,
             due: 0,
         };
-        Self { name, inside: Mutex::new(inside) }
+        Ok(Self { name, emergency, inside: Mutex::new(inside) })
     }
 
     fn lock(&self) -> MutexGuard<'_, Inside> {
@@ -132,7 +142,7 @@ impl RequestHandler {
     /// What the host could not hand over in this run so far: a gap in the numbers, for all to see.
     pub(super) fn dropped(&self, dropped: u64) {
         let mut inside = self.lock();
-        inside.due += dropped.saturating_sub(inside.status.dropped);
+        inside.due = inside.due.saturating_add(dropped.saturating_sub(inside.status.dropped));
         inside.status.dropped = dropped;
     }
 
@@ -181,6 +191,7 @@ impl RequestHandler {
                 since.elapsed() >= STATUS_PERIOD
                     || Status {
                         published: last.published,
+                        ticket: last.ticket,
                         couplings: last.couplings.clone(),
                         ..status.clone()
                     } != *last
@@ -207,8 +218,8 @@ impl RequestHandler {
     }
 
     /// A letter on one of our keys.
-    fn receive(&self, key: &str, query: Query) {
-        // A long one is not even copied; one on a pattern of keys is not meant for us.
+    fn receive(&self, query: Query) {
+        // A long one is not even copied.
         let length = query.payload().map_or(0, zenoh::bytes::ZBytes::len);
         let letter =
             query.payload().filter(|_| length <= MAX_REQUEST_BYTES).map(|payload| payload.to_bytes());
@@ -216,11 +227,17 @@ impl RequestHandler {
             Some(letter) => letter.into_owned(),
             None => vec![0; length.min(MAX_REQUEST_BYTES + 1)],
         };
-        let asked = if query.key_expr().as_str() == key { key } else { "" };
+        // A pattern of keys names no member, and is refused.
+        let asked = query.key_expr().as_str().to_owned();
         let mut inside = self.lock();
         let run = inside.status.run;
-        match inside.gate.admit(asked, &letter, run) {
+        match inside.gate.admit(&asked, &letter, run) {
             Err(refusal) => reply(&query, Some(refusal.to_string())),
+            Ok(Request::EmergencyStop) => {
+                drop(inside);
+                self.emergency
+                    .press(&format!("{} over the network (bridge {})", member(&asked), self.name), query);
+            }
             Ok(request) => inside.follow(&request, query),
         }
     }
@@ -228,18 +245,19 @@ impl RequestHandler {
 
 impl Inside {
     fn now(&self) -> Status {
-        let state = match (self.is_latched, &self.run) {
+        let is_latched = self.latch.state().pressed.is_some();
+        let state = match (is_latched, &self.run) {
             (true, _) => State::EmergencyStopped,
             (false, Some(_)) => State::Running,
             (false, None) => State::Waiting,
         };
-        Status { state, refused: self.gate.refused().clone(), ..self.status.clone() }
+        let (refused, ticket) = (self.gate.refused().clone(), self.gate.ticket());
+        Status { state, refused, ticket, ..self.status.clone() }
     }
 
     fn follow(&mut self, request: &Request, query: Query) {
-        self.is_latched |= *request == Request::EmergencyStop;
         match (request.ask(), &mut self.run) {
-            (Some(_), Some(run)) if run.open.len() >= MOST_OPEN && *request != Request::EmergencyStop => {
+            (Some(_), Some(run)) if run.open.len() >= MOST_OPEN => {
                 reply(&query, Some(self.gate.refuse(Refusal::Busy).to_string()));
             }
             (Some(ask), Some(run)) => match run.asker.ask(ask) {
@@ -249,16 +267,14 @@ impl Inside {
                 }
                 Err(error) => reply(&query, Some(error.to_string())),
             },
-            (Some(_), None) => {
-                let is_done = *request == Request::EmergencyStop;
-                reply(&query, (!is_done).then(|| "no host runs".to_owned()));
-            }
+            (Some(_), None) => reply(&query, Some("no host runs".to_owned())),
             (None, _) => {
                 let done = match request {
-                    Request::Release => {
-                        self.is_latched = false;
-                        Ok(())
-                    }
+                    Request::Release => self
+                        .latch
+                        .release(&format!("{} over the network", member(query.key_expr().as_str())))
+                        .map(drop)
+                        .map_err(|e| e.to_string()),
                     _ => self.start(),
                 };
                 reply(&query, done.err());
@@ -267,8 +283,8 @@ impl Inside {
     }
 
     fn start(&mut self) -> Result<(), String> {
-        if self.is_latched {
-            return Err("the emergency stop was pressed; its owner releases it first".to_owned());
+        if let Some(pressed) = self.latch.state().pressed {
+            return Err(format!("the emergency stop is pressed ({pressed}); its owner releases it first"));
         }
         if self.run.is_some() {
             return Err("a run is on; stop it first".to_owned());
@@ -278,8 +294,13 @@ impl Inside {
     }
 }
 
+/// Who asks, from the key.
+fn member(key: &str) -> &str {
+    key.rsplit('/').next().unwrap_or_default()
+}
+
 /// What became of a letter. Nobody waits for whether it arrived.
-fn reply(query: &Query, refused: Option<String>) {
+pub(super) fn reply(query: &Query, refused: Option<String>) {
     let answer = json(&Answer { number: 0, refused, cause: RefusalCause::Other });
     let _ = query.reply(query.key_expr(), answer).wait_now();
 }

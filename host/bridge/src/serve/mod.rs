@@ -8,6 +8,7 @@
 //! The bridge is one of the host's watchers, in a process of its own: whatever happens to it, the host drops what the bridge does
 //! not take, counts it, and goes on.
 
+mod emergency;
 mod handler;
 mod launcher;
 mod station;
@@ -56,7 +57,9 @@ pub fn serve(
     tell: &mut dyn FnMut(&str),
 ) -> Result<(), CoupleError> {
     let Service { name, allow, every, launcher } = service;
-    let handler = Arc::new(RequestHandler::new(name.clone(), launcher));
+    let handler =
+        RequestHandler::new(name.clone(), launcher, allow, directory).map_err(CoupleError::Thread)?;
+    let handler = Arc::new(handler);
     let station = Station::declare(session, &name)?;
     let _counter = handler::open(session, &handler, allow)?;
     // Last of all: who sees it can ask.

@@ -91,8 +91,13 @@ pub struct FakeHost {
 
 impl FakeHost {
     pub fn start() -> Self {
+        Self::start_in("runs")
+    }
+
+    /// In a folder of this name.
+    pub fn start_in(name: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let directory = Directory::at(folder.path().join("runs"));
+        let directory = Directory::at(folder.path().join(name));
         let mut host = Self { directory, asked: Arc::default(), publication: None, _folder: folder };
         host.run();
         host

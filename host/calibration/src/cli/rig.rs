@@ -9,6 +9,7 @@ use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, progress_bar};
 use flotor_hal::abi::PluginKind;
 use flotor_servo::StopSwitch;
+use flotor_session::LatchGuard;
 use flotor_session::registry::Registry;
 use indicatif::ProgressBar;
 use std::ops::ControlFlow;
@@ -40,7 +41,7 @@ pub(super) struct RigArguments {
     /// Plugin of the force sensor (id or file): a device with a parameter `port`
     #[arg(long, value_name = "ID", default_value = SERIAL_SENSOR, conflicts_with = "simulated")]
     sensor_plugin: String,
-    /// Tolerance of the height of each stop, in mm
+    /// Largest distance of the handle from a requested height, in mm
     #[arg(long, value_name = "MM", default_value_t = 0.4, conflicts_with = "simulated", value_parser = number("mm", "length", 0.005..=1.0))]
     tolerance_mm: f64,
     /// Time limit for moving the sensor to the next height
@@ -80,6 +81,7 @@ impl RigArguments {
         let progress = progress_bar(stops, "{pos}/{len}  {wide_bar}\n{msg}");
         progress.enable_steady_tick(REDRAWN);
         let stop = stop_on_signals();
+        LatchGuard::of_this_user().obey(&stop)?;
         let guide = guide(&progress, &stop);
         let rig = DeviceRig::open(&plugin, &settings, sensor, close_m, patience, stop, guide);
         Ok((rig.map_err(refused)?, progress))

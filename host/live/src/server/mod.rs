@@ -24,11 +24,14 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use watcher::Watcher;
 
-/// Watchers of one run at a time: every one costs two threads and a queue.
+/// Programs that watch one run at a time: every one costs two threads and a queue.
 const MOST_WATCHERS: usize = 16;
+/// Connections at a time. There is always one that does not watch: the one that was silent for longest makes room for a new
+/// one, so that an emergency stop finds a place whoever is connected.
+const MOST_CONNECTIONS: usize = MOST_WATCHERS + 8;
 /// Stack of the threads here, bytes. With locked memory every page of it is real.
 const STACK_BYTES: usize = 256 * 1024;
 /// Pause after a connection that failed for lack of something (descriptors, mostly).
@@ -72,6 +75,7 @@ struct Shared {
     run: Vec<u8>,
     host: Arc<dyn Serve>,
     is_over: AtomicBool,
+    started: Instant,
 }
 
 impl Publication {
@@ -93,6 +97,7 @@ impl Publication {
             run: run.to_bytes(),
             host,
             is_over: AtomicBool::new(false),
+            started: Instant::now(),
         });
         let (socket, for_acceptor) = (listener.socket().try_clone()?, Arc::clone(&shared));
         let acceptor = thread("flotor-live").spawn(move || accept(&socket, &for_acceptor))?;
@@ -156,6 +161,22 @@ impl Shared {
         self.greeting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Time since the publication began, ms.
+    fn now_ms(&self) -> u64 {
+        u64::try_from(self.started.elapsed().as_millis()).unwrap_or(u64::MAX)
+    }
+
+    /// Lets one more watch, unless too many do.
+    fn admit(&self, outbox: &Outbox, every: u32) -> Result<(), String> {
+        let watchers = self.watchers();
+        if !outbox.wants_ticks() && self.watching.load(Ordering::Relaxed) >= MOST_WATCHERS {
+            return Err(format!("{MOST_WATCHERS} programs watch already; close one of them"));
+        }
+        outbox.want_ticks(every.max(1));
+        self.count(&watchers);
+        Ok(())
+    }
+
     /// Counts who wants ticks, after somebody changed their mind or left.
     fn count(&self, watchers: &[Watcher]) {
         let watching = watchers.iter().filter(|watcher| watcher.outbox.wants_ticks()).count();
@@ -179,15 +200,24 @@ fn accept(socket: &UnixListener, shared: &Arc<Shared>) {
 fn welcome(stream: UnixStream, shared: &Arc<Shared>) {
     sweep(shared);
     let mut watchers = shared.watchers();
-    if watchers.len() >= MOST_WATCHERS {
-        return;
-    }
+    let evicted = if watchers.len() >= MOST_CONNECTIONS {
+        let idle = watchers.iter().enumerate().filter(|(_, watcher)| !watcher.outbox.wants_ticks());
+        let longest = idle.min_by_key(|(_, watcher)| watcher.heard_ms()).map(|(place, _)| place);
+        let Some(place) = longest else { return };
+        Some(watchers.remove(place))
+    } else {
+        None
+    };
     let outbox = Arc::new(Outbox::default());
     let Ok(greeting) = serde_json::to_vec(&*shared.greeting()) else { return };
     outbox.push(frame(Kind::Greeting, &greeting));
     outbox.push(frame(Kind::Run, &shared.run));
     // With the list locked, so that no change is told between greeting and list.
     watchers.extend(Watcher::start(stream, outbox, shared));
+    drop(watchers);
+    if let Some(evicted) = evicted {
+        evicted.evict();
+    }
 }
 
 /// Drops disconnected clients.

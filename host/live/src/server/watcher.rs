@@ -7,6 +7,7 @@ use std::io::{ErrorKind, Write};
 use std::net::Shutdown;
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -24,6 +25,8 @@ pub(super) struct Watcher {
     stream: UnixStream,
     writer: JoinHandle<()>,
     reader: JoinHandle<()>,
+    /// When it came or asked for something last, ms.
+    heard_ms: Arc<AtomicU64>,
 }
 
 impl Watcher {
@@ -33,14 +36,16 @@ impl Watcher {
         let (to_write, to_read) = (stream.try_clone().ok()?, stream.try_clone().ok()?);
         let (for_writer, for_reader, of_run) = (Arc::clone(&outbox), Arc::clone(&outbox), Arc::clone(shared));
         let writer = thread("flotor-live-out").spawn(move || write(to_write, &for_writer)).ok()?;
+        let heard_ms = Arc::new(AtomicU64::new(shared.now_ms()));
+        let heard = Arc::clone(&heard_ms);
         let reader = thread("flotor-live-in").spawn(move || {
-            read(to_read, &for_reader, &of_run);
+            read(to_read, &for_reader, &of_run, &heard);
             // The watcher has gone or talks nonsense: the writer ends, too.
             for_reader.want_ticks(0);
             for_reader.close();
         });
         match reader {
-            Ok(reader) => Some(Self { outbox, stream, writer, reader }),
+            Ok(reader) => Some(Self { outbox, stream, writer, reader, heard_ms }),
             Err(_) => {
                 outbox.close();
                 None
@@ -53,12 +58,30 @@ impl Watcher {
         self.outbox.is_closed()
     }
 
+    /// When it came or asked for something last, ms since the publication began.
+    pub(super) fn heard_ms(&self) -> u64 {
+        self.heard_ms.load(Ordering::Relaxed)
+    }
+
+    /// Closes the connection, whatever waits.
+    pub(super) fn evict(self) {
+        let _ = self.stream.shutdown(Shutdown::Both);
+        self.dismiss();
+    }
+
     /// Sends what waits to whoever reads it within some patience, and ends.
     pub(super) fn dismiss(self) {
         self.outbox.close();
         let _ = self.writer.join();
         let _ = self.stream.shutdown(Shutdown::Both);
-        let _ = self.reader.join();
+        // It may be at a request whose answer takes its time; nobody waits for that any more.
+        let since = Instant::now();
+        while !self.reader.is_finished() && since.elapsed() < PATIENCE {
+            std::thread::sleep(BATCH_PERIOD);
+        }
+        if self.reader.is_finished() {
+            let _ = self.reader.join();
+        }
     }
 }
 
@@ -96,7 +119,7 @@ fn write_whole(stream: &mut UnixStream, mut bytes: &[u8], outbox: &Outbox) -> bo
 }
 
 /// Does what is asked for until the watcher goes.
-fn read(mut stream: UnixStream, outbox: &Outbox, shared: &Shared) {
+fn read(mut stream: UnixStream, outbox: &Outbox, shared: &Shared, heard_ms: &AtomicU64) {
     let mut frames = Frames::default();
     loop {
         match frames.fill(&mut stream) {
@@ -108,6 +131,7 @@ fn read(mut stream: UnixStream, outbox: &Outbox, shared: &Shared) {
         loop {
             match frames.take() {
                 Ok(Some((Kind::Request, payload))) => {
+                    heard_ms.store(shared.now_ms(), Ordering::Relaxed);
                     let answer = answer(payload, outbox, shared);
                     if let Ok(payload) = serde_json::to_vec(&answer) {
                         outbox.push(frame(Kind::Answer, &payload));
@@ -134,8 +158,7 @@ fn answer(payload: &[u8], outbox: &Outbox, shared: &Shared) -> Answer {
 fn carry_out(ask: Ask, outbox: &Outbox, shared: &Shared) -> Result<(), (RefusalCause, String)> {
     match ask {
         Ask::Watch { every } => {
-            outbox.want_ticks(every.max(1));
-            shared.count(&shared.watchers());
+            shared.admit(outbox, every).map_err(|refused| (RefusalCause::Other, refused))?
         }
         Ask::LookAway => {
             outbox.want_ticks(0);

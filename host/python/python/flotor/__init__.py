@@ -146,7 +146,9 @@ class Model:
     def step_batch(self, inputs: np.ndarray, outputs: np.ndarray | None = None) -> np.ndarray:
         """Steps through ``inputs`` (n,) of :data:`INPUT`, in order, into ``outputs`` (n,) of :data:`OUTPUT`.
 
-        Both arrays are used where they lie, nothing is copied; pass ``outputs`` to reuse its memory.
+        Both arrays are used where they lie, nothing is copied; pass ``outputs`` to reuse its memory. They may not share
+        memory, and nobody may move them meanwhile: ``ndarray.resize(..., refcheck=False)`` in another thread frees what
+        is being written to. A child of ``os.fork()`` makes models of its own.
         """
         if outputs is None:
             outputs = np.empty(len(inputs), OUTPUT)
@@ -167,7 +169,7 @@ class Model:
 
 
 def _poses(poses: object) -> np.ndarray:
-    poses = np.ascontiguousarray(poses, dtype=np.float64)
+    poses = np.require(poses, np.float64, ["C_CONTIGUOUS", "ALIGNED"])
     if poses.ndim != 2 or poses.shape[1] != 6:
         raise FlotorError(f"poses have shape {poses.shape}; it is (n, 6): x_m, y_m, z_m, rx_rad, ry_rad, rz_rad")
     return poses

@@ -5,6 +5,7 @@
 mod stamp;
 
 use self::stamp::{FileStamp, hash_of};
+use crate::calls::{self, Call, CallError, attended_while};
 use crate::scene::nearest;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, read_metadata};
 use flotor_hal::abi::{Entry, PluginKind};
@@ -66,6 +67,9 @@ pub enum LookupError {
     /// The plugin was found and refused.
     #[error(transparent)]
     Refused(#[from] LoadError),
+    /// Its initialisers do not return.
+    #[error(transparent)]
+    Calls(#[from] CallError),
 }
 
 impl Registry {
@@ -76,12 +80,10 @@ impl Registry {
         if let Some(path) = std::env::var_os(PATH_VARIABLE) {
             folders.extend(std::env::split_paths(&path).filter(|folder| !folder.as_os_str().is_empty()));
         }
-        if let Some(own) = std::env::current_exe().ok().as_deref().and_then(Path::parent) {
-            // `deps` before the folder itself: `cargo run` refreshes only `deps`, and an older copy may lie above it.
-            folders.extend([own.join("deps"), own.to_path_buf(), own.join("plugins")]);
-        }
+        folders.extend(own_folders());
         let mut registry = Self {
-            linked: Vec::new(),
+            // Part of the host; it says itself that it needs a program.
+            linked: Plugin::in_process(&crate::program::ENTRY).into_iter().collect(),
             found: Vec::new(),
             shadowed: Vec::new(),
             broken: Vec::new(),
@@ -195,7 +197,7 @@ impl Registry {
         }
         let found = self.found.iter().find(|known| known.id == id).ok_or_else(|| self.unknown(id, kind))?;
         check_kind(found, kind)?;
-        Ok(self.open(&found.path)?)
+        self.open(&found.path)
     }
 
     /// That no plugin (of a kind) has an id, with the nearest that one has.
@@ -203,7 +205,7 @@ impl Registry {
         let candidates = self.found.iter().filter(|known| kind.is_none_or(|kind| known.kind == kind));
         let here = Path::new(id)
             .is_file()
-            .then(|| format!("a file is written with a folder: `.{MAIN_SEPARATOR}{id}`"));
+            .then(|| format!("for the file of this name write `.{MAIN_SEPARATOR}{id}`"));
         let broken = || self.broken.iter().map(ToString::to_string).find(|text| text.contains(id));
         LookupError::Unknown {
             id: id.to_owned(),
@@ -215,23 +217,51 @@ impl Registry {
 
     /// Loads a file, or gives what was loaded before if the file is unchanged: libraries are never unloaded, and a
     /// thousand models of one plugin share one mapping of it.
-    fn open(&self, path: &Path) -> Result<Plugin, LoadError> {
+    fn open(&self, path: &Path) -> Result<Plugin, LookupError> {
         // Taken before the bytes are read: whoever writes meanwhile is noticed the next time.
-        let Ok(stamp) = FileStamp::of(path) else { return load_file(path) }; // it says what is wrong
+        let Ok(stamp) = FileStamp::of(path) else { return load_in_time(path) }; // it says what is wrong
         let mut loaded = self.loaded.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = loaded.iter().find(|known| known.path == path && known.stamp.is_same_as(&stamp))
         {
             return Ok(known.plugin.clone());
         }
-        let Ok(hash) = hash_of(path) else { return load_file(path) };
+        let Ok(hash) = hash_of(path) else { return load_in_time(path) };
         if let Some(known) = loaded.iter_mut().find(|known| known.path == path && known.hash == hash) {
             known.stamp = stamp;
             return Ok(known.plugin.clone());
         }
-        let plugin = load_file(path)?;
+        let plugin = load_in_time(path)?;
         loaded.push(Loaded { path: path.into(), stamp, hash, plugin: plugin.clone() });
         Ok(plugin)
     }
+}
+
+/// Where the plugins of this installation are: beside the program.
+fn own_folders() -> Vec<PathBuf> {
+    let program = flotor_servo::guest::program().cloned().or_else(|| std::env::current_exe().ok());
+    let Some(own) = program.as_deref().and_then(Path::parent) else { return Vec::new() };
+    // `deps` before the folder itself: `cargo run` refreshes only `deps`, and an older copy may lie above it.
+    vec![own.join("deps"), own.to_path_buf(), own.join("plugins")]
+}
+
+/// Whether a plugin belongs to this installation: it is linked into the program, or lies beside it or in
+/// `../lib/flotor/plugins`. Not real-time.
+pub(crate) fn is_installed(plugin: &Path) -> bool {
+    let mut folders = own_folders();
+    folders.extend(folders.get(1).map(|own| own.join("../lib/flotor/plugins")));
+    let Ok(file) = plugin.canonicalize() else { return plugin.as_os_str().is_empty() };
+    let folder = file.parent();
+    folders.iter().any(|own| own.canonicalize().is_ok_and(|own| Some(own.as_path()) == folder))
+}
+
+/// Loads a plugin file, but waits no longer than a limit for its initialisers.
+fn load_in_time(path: &Path) -> Result<Plugin, LookupError> {
+    let path = path.to_path_buf();
+    let loaded = attended_while(calls::limit(), calls::is_to_begin, move |progress| {
+        progress.enter(&path.display().to_string(), Call::Load);
+        load_file(&path)
+    });
+    Ok(loaded??)
 }
 
 /// Loads a plugin file. The one place of the host that does. Not real-time; runs the plugin's code.
@@ -244,7 +274,6 @@ pub fn load_file(path: &Path) -> Result<Plugin, LoadError> {
     unsafe { Plugin::load(path) }
 }
 
-/// Whether two paths lead to one file. Not real-time.
 /// Whether two paths lead to one file that exists. Not real-time.
 #[must_use]
 pub fn is_same_file(one: &Path, other: &Path) -> bool {

@@ -83,7 +83,7 @@ pub(super) fn read(sections: Vec<Section<'_>>) -> Result<Vec<ChangeUse>, SceneEr
         }
         if alone != Alternative::default() && !either.is_empty() {
             return wrong(
-                "`change.either` has a `plugin` and `parameters` for each alternative: not beside it",
+                "`change.either` has `plugin` and `parameters` in each alternative; remove those beside `either`",
             );
         }
         if let Some(swap) = swap {

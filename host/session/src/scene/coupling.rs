@@ -69,8 +69,8 @@ fn coupling(
     };
     if limits.passivity == PassivityMode::Control {
         return Err(wrong(
-            "`limits.passivity = \"control\"` keeps back what comes from the other device; leave it out: a coupling \
-             has an energy controller of its own",
+            "`limits.passivity = \"control\"` would remove the energy that comes from the other device; remove the \
+             key: a coupling has an energy controller of its own",
         ));
     }
     let named = |end: CouplingEnd| devices.get(usize::from(end.device)).map_or("", |device| &device.name);

@@ -56,7 +56,8 @@ pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<DeviceUse>, SceneError>
 
 /// A name that can be told from that of a model on a device.
 pub(super) fn name(value: Value<'_>) -> Result<String, SceneError> {
-    let wrong = value.problem(format!("`{ON}` in a name stands between a model and its device"));
+    let wrong =
+        value.problem(format!("a name must not contain `{ON}`, which separates a model from its device"));
     let name = value.text()?;
     if name.contains(ON) { Err(wrong) } else { Ok(name) }
 }
@@ -92,7 +93,7 @@ pub(super) fn of_model(
     let names = value.one_or_more_texts()?;
     if names.is_empty() {
         return Err(location.problem(
-            "`model.device` names no device; name one at least, or leave it out where there is only one",
+            "`model.device` names no device; name at least one, or omit the key if the scene has only one device",
         ));
     }
     names.iter().map(|name| find(devices, name, &location)).collect()

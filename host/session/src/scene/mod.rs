@@ -125,8 +125,11 @@ pub struct ModelUse {
 /// What stands between a model and the host.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Isolation {
-    /// Nothing: the model runs in the loop's own thread.
+    /// What its origin asks for: a process of its own for a model from outside the installation where a hand is, that is on a
+    /// real device in real time; else nothing.
     #[default]
+    ByOrigin,
+    /// Nothing: the model runs in the loop's own thread.
     None,
     /// A process of its own, which may hang or crash.
     Process,
@@ -277,7 +280,7 @@ fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse
     let blend = section.section("blend")?.map_or_else(|| Ok(Blend::default()), blend)?;
     let isolation = section.take("isolation").map(isolation).transpose()?.unwrap_or_default();
     let budget_us = section.number("budget_us", 1.0..=1.0e6)?;
-    let field = section.section("field")?.map(|section| field(section, isolation)).transpose()?;
+    let field = section.section("field")?.map(field).transpose()?;
     section.finish()?;
     let name = name.unwrap_or_else(|| plugin.plugin.clone());
     let model = ModelUse {
@@ -301,14 +304,8 @@ fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse
 }
 
 /// When an asynchronous model is computed.
-fn field(mut section: Section<'_>, isolation: Isolation) -> Result<FieldTiming, SceneError> {
-    let rate = section.require("rate_hz")?;
-    if isolation == Isolation::Process {
-        return Err(
-            rate.problem("a model in a process of its own is asked in the loop; remove one of the two")
-        );
-    }
-    let rate_hz = rate.number(1.0..=10_000.0)?;
+fn field(mut section: Section<'_>) -> Result<FieldTiming, SceneError> {
+    let rate_hz = section.require("rate_hz")?.number(1.0..=10_000.0)?;
     let period_s = 1.0 / rate_hz;
     let latency_s =
         section.number("latency_ms", 0.0..=period_s * 1.0e3)?.map(|milliseconds| milliseconds * 1.0e-3);
@@ -388,8 +385,8 @@ fn legal_watchdog_s(watchdog_s: f64, rate_hz: f64, place: Location) -> Result<f6
     // Upwards, so that what the message names is legal.
     let least_ms = (least_ms * 100.0).ceil() / 100.0;
     let problem = format!(
-        "`limits.watchdog_ms` = {watchdog_ms}: legal at {rate_hz} Hz is {least_ms} to {LONGEST_WATCHDOG_MS}, \
-         three periods of the loop at least"
+        "`limits.watchdog_ms` = {watchdog_ms}: at {rate_hz} Hz it must be {least_ms} to {LONGEST_WATCHDOG_MS}, \
+         at least three periods of the loop"
     );
     Err(place.problem(problem))
 }

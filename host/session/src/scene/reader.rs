@@ -284,7 +284,7 @@ impl<'t> Section<'t> {
                 DeValue::Boolean(flag) => flag.to_string(),
                 other => {
                     let (key, found) = (key.get_ref(), other.type_str());
-                    let problem = format!("`{key}` is a number, a word or true/false, not {found}");
+                    let problem = format!("`{key}` must be a number, a word or true/false; found: {found}");
                     return Err(location.problem(problem));
                 }
             };
@@ -340,9 +340,11 @@ impl Value<'_> {
     pub(super) fn text(self) -> Result<String, SceneError> {
         match self.value {
             DeValue::String(text) => Ok(text.into_owned()),
-            ref other => {
-                Err(self.problem(format!("`{}` is text in quotes, not {}", self.key, other.type_str())))
-            }
+            ref other => Err(self.problem(format!(
+                "`{}` must be text in quotes; found: {}",
+                self.key,
+                other.type_str()
+            ))),
         }
     }
 
@@ -350,22 +352,24 @@ impl Value<'_> {
     pub(super) fn truth(self) -> Result<bool, SceneError> {
         match self.value {
             DeValue::Boolean(truth) => Ok(truth),
-            ref other => {
-                Err(self.problem(format!("`{}` is true or false, not {}", self.key, other.type_str())))
-            }
+            ref other => Err(self.problem(format!(
+                "`{}` must be true or false; found: {}",
+                self.key,
+                other.type_str()
+            ))),
         }
     }
 
     /// One of a few words, each of which means something.
     pub(super) fn one_of<T: Copy>(self, words: &[(&str, T)]) -> Result<T, SceneError> {
         let legal: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
-        let wrong = self.problem(format!("`{}` is one of: {}", self.key, legal.join(", ")));
+        let wrong = self.problem(format!("`{}` must be one of: {}", self.key, legal.join(", ")));
         let text = self.text()?;
         words.iter().find(|(word, _)| *word == text).map(|(_, meaning)| *meaning).ok_or(wrong)
     }
 
     pub(super) fn texts(self) -> Result<Vec<String>, SceneError> {
-        let wrong = self.problem(format!("`{}` is a list of texts in quotes", self.key));
+        let wrong = self.problem(format!("`{}` must be a list of texts in quotes", self.key));
         let DeValue::Array(list) = self.value else { return Err(wrong) };
         let texts = list.into_iter().map(|value| match value.into_inner() {
             DeValue::String(text) => Ok(text.into_owned()),
@@ -385,7 +389,7 @@ impl Value<'_> {
     pub(super) fn number(self, range: RangeInclusive<f64>) -> Result<f64, SceneError> {
         let number = parse_number(&self.value);
         let number = number.ok_or_else(|| {
-            self.problem(format!("`{}` is a number, not {}", self.key, self.value.type_str()))
+            self.problem(format!("`{}` must be a number; found: {}", self.key, self.value.type_str()))
         })?;
         self.in_range(number, &range)
     }
@@ -396,7 +400,7 @@ impl Value<'_> {
         }
         if !matches!(self.value, DeValue::Array(_)) {
             let (key, found) = (&self.key, self.value.type_str());
-            return Err(self.problem(format!("`{key}` is a number or a list of three, not {found}")));
+            return Err(self.problem(format!("`{key}` must be a number or a list of three; found: {found}")));
         }
         let numbers = self.numbers::<3>()?;
         for number in numbers {
@@ -414,7 +418,7 @@ impl Value<'_> {
 
     fn no_bound(&self) -> SceneError {
         self.problem(format!(
-            "`{}` is one number, the largest norm, or three, the largest along each axis",
+            "`{}` must be one number (the largest norm) or three numbers (the largest along each axis)",
             self.key
         ))
     }
@@ -422,7 +426,7 @@ impl Value<'_> {
     /// A whole number in `range`.
     pub(super) fn whole(self, range: RangeInclusive<u32>) -> Result<u32, SceneError> {
         let wrong = self.problem(format!(
-            "`{}` is a whole number from {} to {}",
+            "`{}` must be a whole number from {} to {}",
             self.key,
             range.start(),
             range.end()
@@ -440,7 +444,7 @@ impl Value<'_> {
         counts: RangeInclusive<usize>,
     ) -> Result<Vec<[f64; 3]>, SceneError> {
         let wrong = self.problem(format!(
-            "`{}` is a list of {} to {} points, each three numbers from {} to {}",
+            "`{}` must be a list of {} to {} points, each three numbers from {} to {}",
             self.key,
             counts.start(),
             counts.end(),
@@ -461,7 +465,7 @@ impl Value<'_> {
     }
 
     pub(super) fn numbers<const N: usize>(&self) -> Result<[f64; N], SceneError> {
-        let wrong = || self.problem(format!("`{}` is a list of {N} numbers", self.key));
+        let wrong = || self.problem(format!("`{}` must be a list of {N} numbers", self.key));
         let DeValue::Array(list) = &self.value else { return Err(wrong()) };
         let numbers: Option<Vec<f64>> = list.iter().map(|value| parse_number(value.get_ref())).collect();
         numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(wrong)
@@ -471,7 +475,7 @@ impl Value<'_> {
         if range.contains(&number) {
             return Ok(number);
         }
-        Err(self.problem(format!("`{}` = {number}: legal is {}", self.key, legal(range))))
+        Err(self.problem(format!("`{}` = {number}: must be {}", self.key, legal(range))))
     }
 }
 

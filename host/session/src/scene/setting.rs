@@ -120,7 +120,10 @@ impl PluginKeyValue {
             models.iter().map(|model| model.name.as_str()).chain(others.iter().copied()).collect();
         let (plugin, key) = (&self.plugin, &self.setting.key);
         let hint = did_you_mean(plugin, names.iter().copied());
-        format!("--set {plugin}.{key}: there is no plugin `{plugin}`{hint} (plugins: {})", names.join(", "))
+        format!(
+            "--set {plugin}.{key}: the scene has no plugin `{plugin}`{hint} (its plugins: {})",
+            names.join(", ")
+        )
     }
 
     fn parameter(&self) -> ParameterText {

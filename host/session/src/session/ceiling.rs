@@ -63,7 +63,7 @@ impl StrongDevice {
         let Ceiling { force_n, torque_nm } = CEILING;
         match strength {
             Strength::UnderCeiling => format!(
-                "{self}; the host sends at most {force_n} N and {torque_nm} N·m in any direction. `--allow-strong` sends more"
+                "{self}; the host sends at most {force_n} N and {torque_nm} N·m in any direction. `--allow-strong` permits more"
             ),
             Strength::Strong => format!(
                 "{self}, and the host sends it: `--allow-strong` lifted its ceiling of {force_n} N and {torque_nm} N·m"
@@ -121,8 +121,8 @@ fn changed(key: &str, bound: Bound, devices: impl Iterator<Item = [f64; 3]>, uni
     // A rounding of the corner is no change.
     (before > most * (1.0 + 1.0e-12)).then(|| {
         format!(
-            "`limits.{key} = {most}` allowed up to {before:.2} {unit} and allows {most} {unit}; `[{most}, {most}, {most}]` \
-             limits each axis"
+            "in earlier versions `limits.{key} = {most}` allowed up to {before:.2} {unit}, now {most} {unit}; \
+             `[{most}, {most}, {most}]` limits each axis"
         )
     })
 }

@@ -2,7 +2,9 @@
 //!
 //! Words are checked against the plugin's schema here, off the loop; only numbers travel into it.
 
-use super::{PluginReport, prepare_model};
+use super::PluginReport;
+use super::prepare::prepare_model_while;
+use crate::calls::{Attended, Call, Unresponsive, end_limit};
 use crate::registry::Registry;
 use crate::scene::{Location, ModelUse, is_named, nearest};
 use flotor_core::{Change, ChangeSubject};
@@ -11,11 +13,12 @@ use flotor_hal::abi::loader::{Setting, SettingError};
 use flotor_hal::{LoopConfig, Mutability, Parameter};
 use flotor_live::RefusalCause;
 use flotor_servo::{
-    ChangeReport, ChangeSender, Clock, HostSwaps, LayerReport, ModelHealth, PLUGIN, ParameterChange,
+    ChangeReport, ChangeSender, Clock, HostSwaps, Layer, LayerReport, ModelHealth, PLUGIN, ParameterChange,
     Replacement, ReportReceiver, WEIGHT,
 };
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 /// Why the loop was not told.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -23,7 +26,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub enum ControlError {
     /// No plugin of the run has this name.
     #[error(
-        "there is no plugin `{name}`{} (plugins: {})",
+        "the run has no plugin `{name}`{} (its plugins: {})",
         nearest.as_ref().map_or(String::new(), |n| format!("; did you mean `{n}`?")),
         names.join(", ")
     )]
@@ -79,7 +82,7 @@ fn live_words(live: &[String]) -> String {
     if live.is_empty() {
         "none of its parameters can".to_owned()
     } else {
-        format!("what can: {}", live.join(", "))
+        format!("parameters that can: {}", live.join(", "))
     }
 }
 
@@ -137,20 +140,80 @@ struct Supervised {
     misbehaved: Vec<(usize, u16, Misbehaved)>,
     /// What people should know of plugins that came later, a sentence each.
     warnings: Vec<String>,
+    /// Those that are being freed: whoever sweeps does not wait for the code of a plugin.
+    leaving: Vec<Attended<LayerReport>>,
+    /// The first that was not freed in time.
+    hung: Option<Unresponsive>,
+}
+
+/// What is known of the models of a run that is over.
+pub(super) struct Settled {
+    /// Health and last words of those it began with, in the scene's order.
+    pub(super) first: Vec<(ModelHealth, String)>,
+    /// Of those that came later the ones that did not behave.
+    pub(super) misbehaved: Vec<Misbehaved>,
+    /// The first that was not freed in time.
+    pub(super) hung: Option<Unresponsive>,
 }
 
 impl Supervised {
-    /// Drops what the loop has handed back. Not real-time.
+    /// Lets what the loop has handed back be freed, and hears of those that are. Not real-time; waits for nobody.
     fn sweep(&mut self, parts: &Parts) {
         while let Ok((model, mut layer)) = self.swaps.retired.pop() {
             let number = model as usize;
-            let report = layer.report(number);
-            drop(layer);
-            let generation = report.generation;
-            self.note(parts, report);
-            parts.forget(number, generation);
+            let who = parts.plugin(number, layer.generation()).map_or_else(String::new, |plugin| plugin.name);
+            let freed = Attended::start(end_limit(), move |progress| {
+                let report = layer.report(number, || progress.enter(&who, Call::LastMessage));
+                progress.enter(&who, Call::Destroy);
+                drop(layer);
+                report
+            });
+            self.leaving.extend(freed);
             if let Some(busy) = self.busy.get_mut(number) {
                 *busy = false;
+            }
+        }
+        self.hear(parts, Duration::ZERO);
+    }
+
+    /// Takes these models for a replacement, all or none.
+    fn take(&mut self, parts: &Parts, numbers: &[usize]) -> Result<(), ControlError> {
+        self.sweep(parts);
+        if numbers.iter().any(|number| self.busy.get(*number).is_none_or(|busy| *busy)) {
+            return Err(ControlError::Busy);
+        }
+        self.set_busy(numbers, true);
+        Ok(())
+    }
+
+    /// Gives them back: there is no replacement.
+    fn release(&mut self, numbers: &[usize]) {
+        self.set_busy(numbers, false);
+    }
+
+    fn set_busy(&mut self, numbers: &[usize], is_busy: bool) {
+        let models = self.busy.iter_mut().enumerate().filter(|(number, _)| numbers.contains(number));
+        models.for_each(|(_, busy)| *busy = is_busy);
+    }
+
+    /// Hears of those that are freed, each within a time.
+    fn hear(&mut self, parts: &Parts, time: Duration) {
+        let mut at = 0;
+        while let Some(calls) = self.leaving.get(at) {
+            let Some(freed) = calls.look(time) else {
+                at += 1;
+                continue;
+            };
+            self.leaving.swap_remove(at);
+            match freed {
+                Ok(report) => {
+                    let (model, generation) = (report.model, report.generation);
+                    self.note(parts, report);
+                    parts.forget(model, generation);
+                }
+                Err(hung) => {
+                    self.hung.get_or_insert(hung);
+                }
             }
         }
     }
@@ -186,6 +249,8 @@ impl Controls {
             busy: vec![false; models.len()],
             misbehaved: Vec::new(),
             warnings: Vec::new(),
+            leaving: Vec::new(),
+            hung: None,
         };
         let (changes, supervised) = (Mutex::new(changes), Mutex::new(supervised));
         Self {
@@ -253,16 +318,12 @@ impl Controls {
         plugin: Option<&str>,
         settings: &[(&str, &str)],
     ) -> Result<(), ControlError> {
-        let Shared { parts, models, config, clock, supervised, .. } = &*self.shared;
+        let Shared { parts, models, config, clock, .. } = &*self.shared;
         let numbers = parts.models(model)?;
         if self.shared.changes().is_abandoned() {
             return Err(ControlError::Ended);
         }
-        let mut supervised = supervised.lock().unwrap_or_else(PoisonError::into_inner);
-        supervised.sweep(parts);
-        if numbers.iter().any(|number| supervised.busy.get(*number).is_none_or(|busy| *busy)) {
-            return Err(ControlError::Busy);
-        }
+        self.supervised().take(parts, &numbers)?;
         let refused = |error: super::RunError| ControlError::Refused {
             model: model.to_owned(),
             problem: error.to_string(),
@@ -273,9 +334,14 @@ impl Controls {
             if plugin.is_some() {
                 other.plugin.location = Location { file: "--plugin".into(), line: 0 };
             }
-            prepare_model(registry, &other, config, *clock).map_err(refused)
+            // A run that is over does not wait for the code of a plugin.
+            let is_wanted = || !self.shared.changes().is_abandoned();
+            prepare_model_while(registry, &other, config, *clock, is_wanted).map_err(refused)
         };
-        let made = numbers.iter().map(make).collect::<Result<Vec<_>, _>>()?;
+        // Without the lock: the run goes on meanwhile, and may end.
+        let made = numbers.iter().map(make).collect::<Result<Vec<_>, _>>();
+        let mut supervised = self.supervised();
+        let made = made.inspect_err(|_| supervised.release(&numbers))?;
         for (number, (layer, report)) in numbers.into_iter().zip(made) {
             supervised.warnings.extend(report.warning());
             let generation = parts.put_in(number, report);
@@ -293,8 +359,11 @@ impl Controls {
 
     /// What people should know of plugins that came later, a sentence each. Not real-time.
     pub(super) fn warnings(&self) -> Vec<String> {
-        let mut supervised = self.shared.supervised.lock().unwrap_or_else(PoisonError::into_inner);
-        std::mem::take(&mut supervised.warnings)
+        std::mem::take(&mut self.supervised().warnings)
+    }
+
+    fn supervised(&self) -> MutexGuard<'_, Supervised> {
+        self.shared.supervised.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Drops models the loop has handed back, unless somebody else is at it. Not real-time.
@@ -304,13 +373,19 @@ impl Controls {
         }
     }
 
-    /// How the plugins in place of the models have behaved in a run that is over, `left` being what is still in the loop:
-    /// health and last words of those it began with, in the scene's order, and of those that came later the ones that did
-    /// not behave. Not real-time.
-    pub(super) fn settle(&self, left: Vec<LayerReport>) -> (Vec<(ModelHealth, String)>, Vec<Misbehaved>) {
-        let Shared { parts, models, supervised, .. } = &*self.shared;
-        let mut supervised = supervised.lock().unwrap_or_else(PoisonError::into_inner);
-        supervised.sweep(parts);
+    /// What a loop that is over handed back last, each with the number of its model. Not real-time.
+    pub(super) fn take_retired(&self) -> Vec<(usize, Box<Layer>)> {
+        let mut supervised = self.supervised();
+        let retired = std::iter::from_fn(|| supervised.swaps.retired.pop().ok());
+        retired.map(|(model, layer)| (model as usize, layer)).collect()
+    }
+
+    /// How the plugins in place of the models have behaved in a run that is over, `left` being what is still in the loop.
+    /// Not real-time.
+    pub(super) fn settle(&self, left: Vec<LayerReport>) -> Settled {
+        let Shared { parts, models, .. } = &*self.shared;
+        let mut supervised = self.supervised();
+        supervised.hear(parts, end_limit());
         let mut first = vec![(ModelHealth::default(), String::new()); models.len()];
         for report in left {
             if let (0, Some(first)) = (report.generation, first.get_mut(report.model)) {
@@ -326,9 +401,12 @@ impl Controls {
                 _ => later.push(misbehaved.clone()),
             }
         }
-        (first, later)
+        Settled { first, misbehaved: later, hung: supervised.hung.take() }
     }
 }
+
+/// Versions of a model that there is room for all the time: the one in place, the one before, one that comes, one that goes.
+const USUAL_VERSIONS: usize = 4;
 
 /// A plugin of a run, and those that took its place.
 pub(super) struct Versions {
@@ -375,6 +453,8 @@ impl Versions {
             self.later.pop_front();
             old -= 1;
         }
+        // More were here once, when somebody was slow.
+        self.later.shrink_to(USUAL_VERSIONS);
     }
 
     fn now(&self) -> &PluginReport {

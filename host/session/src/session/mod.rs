@@ -3,36 +3,51 @@
 mod ceiling;
 mod choice;
 mod controls;
+mod epilogue;
+mod latch;
+mod lockstep;
 mod prepare;
+mod remains;
 mod steps;
+mod unguarded;
 
 pub use ceiling::{Strength, StrongDevice};
 pub use controls::{ControlError, Controls, Misbehaved, NewValue};
+pub use latch::{LatchGuard, LatchWatch};
+pub use lockstep::Lockstep;
 pub use prepare::prepare_model;
+pub use remains::Remains;
 pub use steps::Steps;
 
+use crate::calls::{Call, CallError, Progress, Unresponsive, end_limit, leave_behind, limit};
 use crate::registry::{LookupError, Registry};
 use crate::scene::{Pacing, Scene, SceneError};
 use ceiling::{norm_notice, under_ceiling};
 use controls::{ChangeLog, Parts};
+use epilogue::Epilogue;
 use flotor_core::Change;
 use flotor_core::MOST_DEVICES;
 use flotor_core::limits::Limits;
-use flotor_core::trace::TickRecord;
+use flotor_core::trace::{RECORD_WORDS, TickRecord};
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{ActiveDevice, LoadError, Metadata, Stopper};
-use flotor_hal::{Capabilities, DVec3, EnergyLedger, Fault, LoopConfig, Parameter};
-use flotor_live::WrenchLimits;
-use flotor_servo::coupling::{Line, Patience};
+use flotor_hal::abi::loader::{LoadError, Metadata, Stopper};
+use flotor_hal::{Capabilities, Embodiment, EnergyLedger, Fault, LoopConfig, Parameter};
+use flotor_hal::{Pose, Twist, Wrench};
+use flotor_live::{Directory, Pressed, WrenchLimits};
+use flotor_servo::coupling::{Line, Patience, Reach};
 use flotor_servo::last_stop::TakenSignals;
 use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{
     Clock, Core, Coupled, CouplingOutcome, Envelope, Forces, Guarded, ImplausibleSamples, Loop, ModelHealth,
-    ParameterQueue, Place, RealTimeReport, Reported, RunConfig, RunEnd, Schedule, Servo, SpinWindow, Standby,
+    ParameterQueue, Place, RealTimeReport, RunConfig, RunEnd, Schedule, Servo, SpinWindow, Standby,
     StopSwitch, Stuck, Timing, drain, enter_real_time, queue, start_watchdog, swap_queues,
 };
-use prepare::{Scheduled, activate};
+use prepare::{Scheduled, activate, activate_here};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use unguarded::Guardian;
 
 /// How a scene is to be run.
 #[derive(Clone, Debug)]
@@ -64,14 +79,20 @@ pub enum RunError {
         /// What does not fit, each with a remedy.
         mismatches: Vec<String>,
     },
+    /// A plugin did not return from a call before the run.
+    #[error(transparent)]
+    Calls(#[from] CallError),
     /// The servo's thread could not be started or died.
     #[error("the servo thread {0}; no device was moved")]
     Thread(&'static str),
     /// The scene requires a stop that does not depend on this process, and there is none.
     #[error(
-        "no watchdog process: {0}; `[limits] require_independent_stop = true` asks for one, so remove that line or mend this"
+        "no watchdog process: {0}; `[limits] require_independent_stop = true` requires one; correct the cause, or remove that line"
     )]
     WatchdogProcess(std::io::Error),
+    /// The emergency stop of the machine is pressed, or was while the run started; nothing was energised.
+    #[error("{}", latch::latched_words(.0.as_ref()))]
+    Latched(Option<Pressed>),
     /// A call of the loop did not return; the watchdog has stopped the device.
     #[error(
         "`{who}` did not return from {} in tick {}; the watchdog stopped the device after {} ms",
@@ -94,7 +115,12 @@ impl RunError {
         match self {
             Self::Scene(_) | Self::Mismatch { .. } | Self::Lookup(LookupError::Unknown { .. }) => true,
             Self::Lookup(LookupError::Refused(error)) | Self::Plugin(error) => error.is_configuration(),
-            Self::Thread(_) | Self::Hung { .. } | Self::WatchdogProcess(_) => false,
+            Self::Thread(_)
+            | Self::Hung { .. }
+            | Self::WatchdogProcess(_)
+            | Self::Calls(_)
+            | Self::Latched(_)
+            | Self::Lookup(LookupError::Calls(_)) => false,
         }
     }
 }
@@ -121,7 +147,7 @@ impl PluginReport {
     pub(crate) fn warning(&self) -> Option<String> {
         let Self { name, signals_taken, .. } = self;
         (!signals_taken.is_none()).then(|| {
-            format!("`{name}` took {signals_taken} away from the host while it was made; the host has taken them back")
+            format!("`{name}` took {signals_taken} away from the host during its creation; the host has taken them back")
         })
     }
 }
@@ -134,6 +160,37 @@ pub trait Observer {
     /// A parameter that changed, before the tick that saw it first. Not real-time.
     fn change(&mut self, _change: &Change) {}
 }
+
+/// The newest record of a device, for another thread: version 0 is a device at home before the first tick. Read without waiting.
+pub type Tap = flotor_sync::Observer<TickRecord, RECORD_WORDS>;
+
+/// The loop's ends of the taps, each with the number of its device.
+type TapEnds = Vec<(u16, flotor_sync::Publisher<TickRecord, RECORD_WORDS>)>;
+
+/// Makes a record the newest of its device. Real-time: bounded, no allocation.
+#[inline]
+fn publish_to(taps: &mut TapEnds, record: &TickRecord) {
+    taps.iter_mut().filter(|(device, _)| *device == record.device).for_each(|(_, tap)| tap.publish(record));
+}
+
+/// A device before the first tick.
+const AT_HOME: TickRecord = TickRecord {
+    tick: 0,
+    device: 0,
+    time_ns: 0,
+    dt_ns: 0,
+    pose: Pose::HOME,
+    twist: Twist::ZERO,
+    model: Wrench::ZERO,
+    commanded: Wrench::ZERO,
+    delivered: Wrench::ZERO,
+    energy_j: 0.0,
+    port_energy_j: 0.0,
+    events: flotor_core::trace::Events::NONE,
+    buttons: 0,
+    lateness_ns: 0,
+    compute_ns: 0,
+};
 
 /// A scene ready to run: everything loaded, paired and opened, nothing energised.
 pub struct Session {
@@ -156,6 +213,11 @@ pub struct Session {
     warnings: Vec<String>,
     /// Stops what has a means of its own to be stopped, if this process is gone (real clock only).
     watchdog_process: Option<WatchdogProcess>,
+    /// The run ends without that.
+    requires_independent_stop: bool,
+    latch: LatchGuard,
+    taps: TapEnds,
+    capabilities: Vec<Capabilities>,
 }
 
 /// What is known after a run.
@@ -182,8 +244,12 @@ pub struct Outcome {
     pub misbehaved: Vec<Misbehaved>,
     /// What people should know, a sentence each: first what was known before the run.
     pub warnings: Vec<String>,
-    /// How many of them were.
+    /// How many of them were told then, or at once.
     known_before: usize,
+    /// The first plugin that did not return from a call right after the run.
+    pub unresponsive: Option<Unresponsive>,
+    /// The plugins themselves. To be freed or dropped after all that depends on no plugin: their code may hang.
+    pub remains: Remains,
 }
 
 impl Outcome {
@@ -191,6 +257,26 @@ impl Outcome {
     #[must_use]
     pub fn later_warnings(&self) -> &[String] {
         self.warnings.get(self.known_before..).unwrap_or_default()
+    }
+    /// What is known of a run whose loop did not come back: how it ended, and for how long it was observed.
+    #[must_use]
+    pub fn of_hung_loop(stuck: Stuck, elapsed_ns: u64) -> Self {
+        Self {
+            end: RunEnd::Watchdog(stuck),
+            timing: Timing { ticks: stuck.tick, ..Timing::default() },
+            elapsed_ns,
+            wall_s: elapsed_ns as f64 * 1.0e-9,
+            dropped_records: 0,
+            real_time: RealTimeReport::not_asked(),
+            devices: Vec::new(),
+            couplings: Vec::new(),
+            models: Vec::new(),
+            misbehaved: Vec::new(),
+            warnings: Vec::new(),
+            known_before: 0,
+            unresponsive: None,
+            remains: Remains::default(),
+        }
     }
 
     /// Which device faulted, and its last words.
@@ -215,12 +301,16 @@ pub struct DeviceOutcome {
     pub ledger: Option<EnergyLedger>,
     /// Its last message, or what the host found wrong with it; empty if there is neither.
     pub words: String,
+    /// Calls that left the floating-point environment of the loop's thread changed; it was put back each time.
+    pub float_changes: u64,
 }
 
 /// Records that fit between loop and observers: four seconds at 1 kHz.
 const RING_RECORDS: usize = 4096;
 /// Ticks run between two looks of the observers on the virtual clock.
 const VIRTUAL_BATCH: usize = 1024;
+/// How long a watchdog that is not needed any more may take to end.
+const WATCHDOG_END: Duration = Duration::from_millis(50);
 /// How often observers look at a loop in real time.
 const OBSERVER_PERIOD: Duration = Duration::from_millis(5);
 /// How long a loop whose device the watchdog has stopped may take to come back before it is given up: a tick that
@@ -238,6 +328,7 @@ impl Session {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
         let duration_ns = (scene.duration_s * 1.0e9).round() as u64;
         let config = LoopConfig { period_ns, seed: options.seed };
+        let latch = LatchGuard::of_this_user();
 
         let mut plugins = Vec::new();
         let mut opened = Vec::new();
@@ -246,6 +337,13 @@ impl Session {
             opened.push(device);
             plugins.push(report);
         }
+        let mut scene = scene.clone();
+        let simulated: Vec<bool> =
+            opened.iter().map(|device| device.embodiment == Embodiment::Simulated).collect();
+        for model in &mut scene.models {
+            prepare::settle_isolation(model, options.clock, &simulated);
+        }
+        let scene = &scene;
         let mut models = Vec::new();
         for model in &scene.models {
             let (layer, report) = prepare_model(registry, model, &config, options.clock)?;
@@ -298,7 +396,10 @@ impl Session {
         let patience = Patience { silence_ns: watchdog_ns, fade_ns: ramp_ns };
         let mut lines = Vec::new();
         let couplings = scene.couplings.iter().map(|coupling| {
-            let (coupled, line) = Coupled::new(coupling, period_s, patience);
+            let here = coupling.ends.here().first().and_then(|end| capabilities.get(usize::from(end.device)));
+            let reach = here.map(|device| Reach { range_m: device.range_m, range_rad: device.range_rad });
+            let reach = reach.unwrap_or_default();
+            let (coupled, line) = Coupled::new(coupling, period_s, patience, reach);
             lines.extend(line.map(|line| (coupling.name.clone(), line)));
             coupled
         });
@@ -323,6 +424,10 @@ impl Session {
             norm_notice: norm_notice(&scene.limits, &capabilities),
             warnings,
             watchdog_process,
+            requires_independent_stop: scene.limits.require_independent_stop,
+            latch,
+            taps: Vec::new(),
+            capabilities,
         }
         .with_strength(Strength::of_the_environment()))
     }
@@ -374,12 +479,25 @@ impl Session {
         Self { core, ..self }
     }
 
+    /// The same with the latch of another folder than that of this user's runs, from now on.
+    #[must_use]
+    pub fn latched_in(self, directory: &Directory) -> Self {
+        Self { latch: LatchGuard::of(directory), ..self }
+    }
+
+    /// The latch that stops this run and that it presses; none on the virtual clock, where no hand is held.
+    #[must_use]
+    pub fn latch(&self) -> Option<&LatchGuard> {
+        (self.clock == Clock::Real).then_some(&self.latch)
+    }
+
     /// The loop itself, its devices energised, for whoever paces it differently; the stoppers must be used before it is
     /// dropped. Not real-time.
     ///
     /// # Errors
-    /// [`RunError::Plugin`] if a device says no; then none is energised.
+    /// [`RunError::Plugin`] if a device says no, [`RunError::Latched`]; then none is energised.
     pub fn into_loop(self) -> Result<(Servo, Vec<Stopper>), RunError> {
+        self.latch().map_or(Ok(()), LatchGuard::check)?;
         let stoppers = self.standby.stoppers();
         Ok((activate(self.standby, &self.plugins)?, stoppers))
     }
@@ -403,9 +521,11 @@ impl Session {
     /// The most that may reach a hand at any device: the tighter of what scene and device allow.
     #[must_use]
     pub fn limits(&self) -> WrenchLimits {
-        let finite = |most: DVec3| most.to_array().map(|limit| limit.is_finite().then_some(limit));
-        let [force_n, torque_nm] = self.standby.most().map(finite);
-        WrenchLimits { force_n, torque_nm }
+        let finite = |limit: f64| limit.is_finite().then_some(limit);
+        let most = self.standby.most();
+        let [force_n, torque_nm] = most.map(|bound| bound.axes().map(finite));
+        let [force_norm_n, torque_norm_nm] = most.map(|bound| finite(bound.norm()));
+        WrenchLimits { force_n, torque_nm, force_norm_n, torque_norm_nm }
     }
 
     /// The couplings whose other end is on another host, by name, each with the line for its peer state.
@@ -413,6 +533,20 @@ impl Session {
     #[must_use]
     pub fn take_lines(&mut self) -> Vec<(String, Line)> {
         std::mem::take(&mut self.lines)
+    }
+
+    /// The newest record of a device, as soon as its tick is over: for a program that runs along with the loop. Not real-time.
+    #[must_use]
+    pub fn tap(&mut self, device: u16) -> Tap {
+        let (end, tap) = flotor_sync::latest(TickRecord { device, ..AT_HOME });
+        self.taps.push((device, end));
+        tap
+    }
+
+    /// What the devices can do, in the scene's order.
+    #[must_use]
+    pub fn capabilities(&self) -> &[Capabilities] {
+        &self.capabilities
     }
 
     /// The handle by which other threads change parameters of the run.
@@ -425,64 +559,31 @@ impl Session {
     ///
     /// # Errors
     /// [`RunError::Plugin`] if a device refuses to be energised, [`RunError::Thread`] if the servo's thread cannot be had,
-    /// [`RunError::Hung`] if it does not come back: it is left behind then, and the process should end soon.
-    pub fn run(mut self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Outcome, RunError> {
-        let started = Instant::now();
-        let (mut warnings, heart) = (std::mem::take(&mut self.warnings), self.standby.heart());
-        let known_before = warnings.len();
-        let names: Vec<String> = self.plugins.iter().map(|plugin| plugin.name.clone()).collect();
-        let controls = self.controls.clone();
+    /// [`RunError::Hung`] if it does not come back: it is left behind then, and the process should end soon;
+    /// [`RunError::Latched`] if the emergency stop of the machine is pressed, on the real clock.
+    pub fn run(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Outcome, RunError> {
+        let epilogue = self.epilogue();
         let finished = match self.clock {
             Clock::Virtual => self.run_virtual(observer, stop)?,
             Clock::Real => self.run_real(observer, stop)?,
         };
-        let Finished { mut servo, end, elapsed_ns, dropped_records, real_time } = finished;
-        let told = |(device, reported): (&mut ActiveDevice, Reported)| {
-            let problem = reported.problem();
-            DeviceOutcome {
-                fault: reported.fault,
-                implausible: reported.implausible,
-                ledger: device.energy_ledger(),
-                words: match &problem {
-                    Some(problem) if !reported.is_own_fault => problem.clone(),
-                    _ => device.last_message(),
-                },
-                problem,
-            }
-        };
-        let devices: Vec<DeviceOutcome> = servo.devices().map(told).collect();
-        let couplings = servo.forces().coupling_outcomes();
-        let (health, misbehaved) = controls.settle(servo.forces().reports());
-        let models = names.into_iter().skip(devices.len()).zip(health);
-        let models = models.map(|(name, (health, words))| (name, health, words)).collect();
-        let timing = servo.into_timing();
-        let wall_s = started.elapsed().as_secs_f64();
-        warnings.extend(controls.warnings());
-        let taken = heart.signals_taken();
-        if !taken.is_none() {
-            warnings.push(format!(
-                "a plugin took {taken} away from the host during the run; the host has taken them back"
-            ));
+        Ok(epilogue.conclude(finished))
+    }
+
+    /// What the end of this run needs to know of its beginning.
+    fn epilogue(&self) -> Epilogue {
+        Epilogue {
+            started: Instant::now(),
+            warnings: self.warnings.clone(),
+            heart: self.standby.heart(),
+            names: self.plugins.iter().map(|plugin| plugin.name.clone()).collect(),
+            controls: self.controls.clone(),
         }
-        Ok(Outcome {
-            warnings,
-            known_before,
-            end,
-            timing,
-            elapsed_ns,
-            wall_s,
-            dropped_records,
-            real_time,
-            devices,
-            couplings,
-            models,
-            misbehaved,
-        })
     }
 
     /// Same tick, no waiting: observers look between batches, so that a slow one slows the run and loses nothing.
     fn run_virtual(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Finished, RunError> {
-        let Session { standby, controls, mut changes, period_ns, duration_ns, plugins, .. } = self;
+        let Session { standby, controls, mut changes, mut taps, period_ns, duration_ns, plugins, .. } = self;
         let stoppers = standby.stoppers();
         let mut runner =
             Loop::new(activate(standby, &plugins)?, Schedule::start_virtual(period_ns), duration_ns);
@@ -490,7 +591,10 @@ impl Session {
         let mut batch = Vec::with_capacity(VIRTUAL_BATCH + usize::from(MOST_DEVICES));
         while runner.end().is_none() {
             while batch.len() < VIRTUAL_BATCH && runner.end().is_none() {
-                runner.advance(stop, |record| batch.push(*record));
+                runner.advance(stop, |record| {
+                    publish_to(&mut taps, record);
+                    batch.push(*record);
+                });
             }
             if runner.end().is_some() {
                 stoppers.iter().for_each(Stopper::safe_stop);
@@ -519,8 +623,15 @@ impl Session {
             core,
             plugins,
             watchdog_process,
+            requires_independent_stop,
+            latch,
+            mut taps,
             ..
         } = self;
+        let watchdog_process = watchdog_process.map(Arc::new);
+        let mut guardian = Guardian::of(watchdog_process.as_ref(), requires_independent_stop);
+        // Before the look at the latch that counts: a press after that is seen here.
+        let _watch = latch.watch(stop).map_err(|_| RunError::Thread(latch::NO_WATCH))?;
         let mut look = |record: TickRecord| {
             changes.up_to(record.tick, |change| observer.change(change));
             observer.observe(&record);
@@ -529,7 +640,12 @@ impl Session {
         let loop_stop = stop.clone();
         // Not scoped: a thread that is stuck in a plugin has to be left behind.
         let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
-        let (loop_heart, loop_plugins) = (heart.clone(), plugins.clone());
+        let (loop_heart, loop_plugins, loop_latch) = (heart.clone(), plugins.clone(), latch.clone());
+        let (progress, all_stoppers) = (Progress::default(), standby.stoppers());
+        let loop_progress = progress.clone();
+        // Number of the device that is being stopped, from 1: looked at from here, as `safe_stop` may hang too.
+        let stopping = Arc::new(AtomicUsize::new(0));
+        let loop_stopping = Arc::clone(&stopping);
         let servo_thread = thread.spawn(move || {
             let real_time = enter_real_time(core);
             let spin = match pacing {
@@ -538,7 +654,8 @@ impl Session {
             };
             // Last of all that takes time.
             let stoppers = standby.stoppers();
-            let servo = activate(standby, &loop_plugins)?;
+            loop_latch.check()?;
+            let servo = activate_here(standby, &loop_plugins, &loop_progress)?;
             let schedule = match spin {
                 Some(window) => Schedule::start_real(period_ns, window),
                 None => Schedule::start_paced(period_ns),
@@ -550,33 +667,74 @@ impl Session {
             let mut dropped_records = 0;
             while watchdog.is_ok() && runner.end().is_none() {
                 runner.advance(&loop_stop, |record| {
+                    publish_to(&mut taps, record);
                     dropped_records += u64::from(sender.push(*record).is_err())
                 });
             }
             // Here, whatever the thread that looks on is at, and while the watchdog still watches.
-            stoppers.iter().for_each(Stopper::safe_stop);
+            for (number, stopper) in (1..).zip(&stoppers) {
+                loop_stopping.store(number, Ordering::Relaxed);
+                stopper.safe_stop();
+            }
+            loop_stopping.store(0, Ordering::Relaxed);
             runner.servo().heart().finish();
             // From here on nothing is energised.
             drop(watchdog_process);
+            if let Ok(watchdog) = &watchdog {
+                wait_for_end_of(watchdog);
+            }
             watchdog.map_err(|_| RunError::Thread("got no watchdog"))?;
             Ok::<_, RunError>(Finished::of(runner, dropped_records, real_time))
         });
         let servo_thread = servo_thread.map_err(|_| RunError::Thread("could not be started"))?;
         let mut bitten = None;
+        let mut stopping_since = None;
         while !servo_thread.is_finished() {
             drain(&mut receiver, &mut look);
             controls.sweep();
+            guardian.look(stop);
+            if let Err(hung) = progress.look(limit()) {
+                // Others may be energised by now.
+                all_stoppers.iter().for_each(Stopper::safe_stop);
+                return Err(CallError::from(hung).into());
+            }
+            stopping_since = match stopping.load(Ordering::Relaxed) {
+                0 => None,
+                number => Some(stopping_since.unwrap_or((number, Instant::now()))),
+            };
+            if let Some((number, since)) = stopping_since
+                && since.elapsed() > end_limit()
+            {
+                leave_behind();
+                let who = plugins.get(number - 1).map_or_else(String::new, |plugin| plugin.name.clone());
+                let hung = Unresponsive { who, call: Call::SafeStop, limit: end_limit() };
+                return Err(CallError::from(hung).into());
+            }
             bitten = bitten.or_else(|| heart.bitten().map(|stuck| (stuck, Instant::now())));
             if let Some((stuck, since)) = bitten
                 && since.elapsed() > COME_BACK
             {
+                leave_behind();
                 return Err(hung(stuck, &plugins, watchdog_ns));
             }
             std::thread::sleep(OBSERVER_PERIOD);
         }
         let finished = servo_thread.join().map_err(|_| RunError::Thread("panicked"))??;
         drain(&mut receiver, &mut look);
-        Ok(finished)
+        // A button or the device itself closes no switch, which would have pressed by now.
+        if let (RunEnd::EmergencyStop(source), None) = (finished.end, stop.emergency()) {
+            latch.press(source);
+        }
+        Ok(Finished { end: guardian.end(finished.end), warning: guardian.warning(), ..finished })
+    }
+}
+
+/// Waits until the watchdog, which looks every millisecond, no longer holds the devices: they are closed where a hang is named.
+/// Not for longer: it may be in a `safe_stop` that hangs.
+fn wait_for_end_of(watchdog: &JoinHandle<()>) {
+    let since = Instant::now();
+    while !watchdog.is_finished() && since.elapsed() < WATCHDOG_END {
+        std::thread::sleep(Duration::from_millis(1));
     }
 }
 
@@ -600,11 +758,13 @@ struct Finished {
     elapsed_ns: u64,
     dropped_records: u64,
     real_time: RealTimeReport,
+    /// What people should know, and were told.
+    warning: Option<String>,
 }
 
 impl Finished {
     fn of(ended: Loop, dropped_records: u64, real_time: RealTimeReport) -> Self {
         let (servo, end, elapsed_ns) = ended.finish();
-        Self { servo, end, elapsed_ns, dropped_records, real_time }
+        Self { servo, end, elapsed_ns, dropped_records, real_time, warning: None }
     }
 }

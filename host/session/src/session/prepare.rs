@@ -4,7 +4,8 @@ use super::choice::chosen;
 use super::controls::{ControlError, NewValue, Parts, understands};
 use super::{PluginReport, RunError};
 use crate::calibration_file::{CalibrationFile, CalibrationFileError};
-use crate::registry::Registry;
+use crate::calls::{Call, Progress, attended_while, is_to_begin, keeping_machine, limit};
+use crate::registry::{Registry, is_installed};
 use crate::scene::{
     Alternative, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, Pacing,
     ParameterText, PluginUse, Scene, SceneError,
@@ -12,7 +13,7 @@ use crate::scene::{
 use flotor_core::limits::Boundary;
 use flotor_core::mapping::Mapping;
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting};
+use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting, Stopper};
 use flotor_hal::{
     Axes, Capabilities, Embodiment, Independence, LoopConfig, Parameter, ParameterKind, Refusal,
 };
@@ -24,6 +25,7 @@ use flotor_servo::{
     Clock, Engine, Layer, Replacement, ScheduledChange, Servo, Standby, TimeBudget, pushes_at_home,
 };
 use std::borrow::Cow;
+use std::time::Duration;
 
 pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
     registry.load(&plugin.plugin, kind).map_err(|error| match RunError::from(error) {
@@ -38,10 +40,28 @@ pub(super) fn refused(metadata: &Metadata, refusal: Refusal) -> RunError {
     RunError::Plugin(LoadError::Refused { path, id, refusal })
 }
 
-/// Energises the devices of a run right before its first tick. Not real-time.
+/// Energises the devices of a run right before its first tick, each within a time limit. Not real-time.
 pub(super) fn activate(standby: Standby, plugins: &[PluginReport]) -> Result<Servo, RunError> {
+    let (plugins, stoppers) = (plugins.to_vec(), standby.stoppers());
+    let activated =
+        attended_while(limit(), is_to_begin, move |progress| activate_here(standby, &plugins, progress));
+    let activated = activated.inspect_err(|_| stoppers.iter().for_each(Stopper::safe_stop))?;
+    activated.inspect(Servo::follow_here)
+}
+
+/// The same on this thread; somebody else looks at the progress. Not real-time.
+pub(super) fn activate_here(
+    standby: Standby,
+    plugins: &[PluginReport],
+    progress: &Progress,
+) -> Result<Servo, RunError> {
+    let enters = |device: usize| {
+        progress.enter(plugins.get(device).map_or("", |plugin| plugin.name.as_str()), Call::Activate);
+    };
     let names = plugins.iter().map(|plugin| plugin.name.clone()).collect();
-    standby.activate(names).map_err(|(device, refusal)| match plugins.get(device) {
+    let activated = standby.activate(names, enters);
+    progress.leave();
+    activated.map_err(|(device, refusal)| match plugins.get(device) {
         Some(report) => refused(&report.metadata, refusal),
         None => RunError::Thread("names a device that the scene has not"),
     })
@@ -119,10 +139,19 @@ pub(super) fn open_device(
     let signals = SignalGuard::take();
     let plugin = load(registry, used, PluginKind::Device)?;
     let settings = settings(&plugin, name, &used.parameters)?;
-    let mut device = plugin.open_device(&settings)?;
-    let capabilities = device.capabilities().map_err(|refusal| refused(plugin.metadata(), refusal))?;
-    let independence = device.independent_stop().map_err(|refusal| refused(plugin.metadata(), refusal))?;
-    let mut report = report(&plugin, name, used, &settings, |index| device.parameter(index));
+    let (who, opening, given) = (name.clone(), plugin.clone(), settings.clone());
+    let open = move |progress: &Progress| {
+        progress.enter(&who, Call::Open);
+        let refuse = |refusal| refused(opening.metadata(), refusal);
+        let mut device = opening.open_device(&given)?;
+        let capabilities = device.capabilities().map_err(refuse)?;
+        let independence = device.independent_stop().map_err(refuse)?;
+        let values: Vec<f64> = (0..opening.parameters().len()).map(|index| device.parameter(index)).collect();
+        Ok::<_, RunError>((device, capabilities, independence, values))
+    };
+    let (mut device, capabilities, independence, values) =
+        keeping_machine(name, || attended_while(limit(), is_to_begin, open))??;
+    let mut report = report(&plugin, name, used, &settings, |index| value_at(&values, index));
     if let Some(calibration) = calibration {
         calibrate(&plugin, &mut device, calibration)?;
     }
@@ -131,72 +160,168 @@ pub(super) fn open_device(
     Ok((Opened { device, capabilities, embodiment, independence }, report))
 }
 
+/// A number of a plugin's parameter; NaN if it has none.
+fn value_at(values: &[f64], index: usize) -> f64 {
+    values.get(index).copied().unwrap_or(f64::NAN)
+}
+
 /// Loads one model of a scene and creates it in all its places. Not real-time.
 ///
 /// # Errors
-/// [`RunError`]: the plugin is unknown, was refused, or said no.
+/// [`RunError`]: the plugin is unknown, was refused, said no, or does not return.
 pub fn prepare_model(
     registry: &Registry,
     model: &ModelUse,
     config: &LoopConfig,
     clock: Clock,
 ) -> Result<(Layer, PluginReport), RunError> {
+    prepare_model_while(registry, model, config, clock, is_to_begin)
+}
+
+/// The same only while it is wanted.
+pub(super) fn prepare_model_while(
+    registry: &Registry,
+    model: &ModelUse,
+    config: &LoopConfig,
+    clock: Clock,
+    is_wanted: impl Fn() -> bool,
+) -> Result<(Layer, PluginReport), RunError> {
     let signals = SignalGuard::take();
     let plugin = load(registry, &model.plugin, PluginKind::Model)?;
     let settings = settings(&plugin, &model.name, &model.plugin.parameters)?;
-    let budget_ns = budget_ns(model, clock, config.period_ns);
-    let mapping = Mapping::new(&model.mapping);
-    let instance = |place_m: &[f64; 3]| {
-        let engine = match (model.isolation, &model.field) {
-            (Isolation::None, None) => {
-                let mut instance = plugin.create_model(&settings)?;
-                instance.prepare(config).map_err(|refusal| refused(plugin.metadata(), refusal))?;
-                Engine::Here(instance)
+    let making = Making {
+        isolation: isolation(model, plugin.metadata(), clock)?,
+        plugin: plugin.clone(),
+        settings: settings.clone(),
+        model: model.clone(),
+        config: *config,
+        clock,
+    };
+    let most = match making.isolation {
+        // A worker that is not made in time has to be ended, not left behind.
+        Isolation::Process => limit() + END_OF_A_WORKER,
+        Isolation::ByOrigin | Isolation::None => limit(),
+    };
+    let make = move |progress: &Progress| making.layer(progress);
+    let (layer, values) = keeping_machine(&model.name, || attended_while(most, is_wanted, make))??;
+    let mut report = report(&plugin, &model.name, &model.plugin, &settings, |index| value_at(&values, index));
+    report.signals_taken = signals.put_back();
+    Ok((layer, report))
+}
+
+/// Where no hand is, the origin of a model does not matter.
+pub(super) fn settle_isolation(model: &mut ModelUse, clock: Clock, simulated: &[bool]) {
+    let is_felt = clock == Clock::Real && simulated.get(usize::from(model.device)) != Some(&true);
+    if model.isolation == Isolation::ByOrigin && !is_felt {
+        model.isolation = Isolation::None;
+    }
+}
+
+/// How long it may take to end a worker whose model was not made in time.
+const END_OF_A_WORKER: Duration = Duration::from_secs(10);
+
+/// Most objects of a model that get a process each without the scene saying so.
+const MOST_PROCESSES: usize = 64;
+
+/// What stands between a model and the host, its origin looked at.
+fn isolation(model: &ModelUse, plugin: &Metadata, clock: Clock) -> Result<Isolation, SceneError> {
+    let is_outside = clock == Clock::Real && !is_installed(&plugin.path);
+    match model.isolation {
+        Isolation::ByOrigin if is_outside && model.places_m.len() > MOST_PROCESSES => {
+            let objects = model.places_m.len();
+            Err(complain(
+                model,
+                &format!(
+                    "it comes from outside the installation, and each of its {objects} objects would have a process of its own; \
+                     say `isolation = \"process\"` or `isolation = \"none\"`"
+                ),
+            ))
+        }
+        Isolation::ByOrigin if is_outside => Ok(Isolation::Process),
+        Isolation::ByOrigin => Ok(Isolation::None),
+        said => Ok(said),
+    }
+}
+
+/// All it takes to create a model.
+struct Making {
+    isolation: Isolation,
+    plugin: Plugin,
+    settings: Vec<Setting>,
+    model: ModelUse,
+    config: LoopConfig,
+    clock: Clock,
+}
+
+impl Making {
+    /// The model in all its places, and the values of its parameters in force. Runs the plugin's code.
+    fn layer(&self, progress: &Progress) -> Result<(Layer, Vec<f64>), RunError> {
+        let Self { plugin, model, config, clock, .. } = self;
+        let budget_ns = budget_ns(model, *clock, config.period_ns);
+        let mapping = Mapping::new(&model.mapping);
+        let instance = |place_m: &[f64; 3]| {
+            let (mut engine, mapping) = (self.engine(budget_ns, progress)?, mapping.at(*place_m));
+            if pushes_at_home(&engine.workspace_bounds(), &mapping) {
+                let problem = format!(
+                    "at {:?} mm the model ends before the home of its device, and the wall at its end would push there; move it \
+                     (`position_mm`) or make it longer",
+                    place_m.map(|m| m * 1.0e3)
+                );
+                return Err(complain(model, &problem).into());
             }
-            (Isolation::None, Some(timing)) => {
-                let instance = plugin.create_model(&settings)?;
-                if !instance.has_linear_field() {
-                    let problem =
-                        "it has no linear field, so it can only run in the loop; remove `[model.field]`";
-                    return Err(complain(model, problem).into());
-                }
-                let slow =
-                    AsynchronousModel::start(instance, plugin.parameters().len(), timing, config, clock);
-                Engine::Asynchronous(Box::new(slow.map_err(|refusal| refused(plugin.metadata(), refusal))?))
-            }
-            (Isolation::Process, _) => {
+            Ok((engine, mapping))
+        };
+        let mut instances = model.places_m.iter().map(instance).collect::<Result<Vec<_>, RunError>>()?;
+        let mut value = |index| instances.first_mut().map_or(f64::NAN, |(first, _)| first.parameter(index));
+        let values = (0..plugin.parameters().len()).map(&mut value).collect();
+        let budget = match (self.isolation, &model.field) {
+            // Nobody waits for it any longer than that: how often is the same rule.
+            (Isolation::Process, None) => TimeBudget::new(Some(budget_ns.unwrap_or(PATIENCE_NS))),
+            (_, None) => TimeBudget::new(budget_ns),
+            (_, Some(_)) => TimeBudget::default(),
+        };
+        Ok((Layer::new(instances, &model.blend, budget, config), values))
+    }
+
+    /// One instance, wherever it is to run.
+    fn engine(&self, budget_ns: Option<u64>, progress: &Progress) -> Result<Engine, RunError> {
+        let Self { isolation, plugin, settings, model, config, clock } = self;
+        let no = |refusal| refused(plugin.metadata(), refusal);
+        progress.enter(&model.name, Call::Create);
+        let mut engine = match isolation {
+            Isolation::Process => {
                 let keys = model.plugin.parameters.iter().map(|parameter| parameter.key.clone());
                 let values = settings.iter().map(|setting| setting.display());
+                let in_the_loop = model.field.is_none().then_some(budget_ns).flatten();
                 let order = WorkerOrder {
                     plugin: &plugin.metadata().path,
                     sets: keys.zip(values).collect(),
-                    config: *config,
-                    patience_ns: budget_ns.unwrap_or(PATIENCE_NS),
+                    config: model
+                        .field
+                        .as_ref()
+                        .map_or(*config, |field| AsynchronousModel::config(field, config)),
+                    // Nobody in the loop waits for a field.
+                    patience_ns: in_the_loop.unwrap_or(PATIENCE_NS),
+                    making: limit(),
                 };
-                Engine::Process(Worker::start(&order).map_err(|refusal| refused(plugin.metadata(), refusal))?)
+                Engine::Process(Worker::start(&order).map_err(no)?)
             }
+            Isolation::ByOrigin | Isolation::None => Engine::Here(plugin.create_model(settings)?),
         };
-        let (mut engine, mapping) = (engine, mapping.at(*place_m));
-        if pushes_at_home(&engine.workspace_bounds(), &mapping) {
-            let problem = format!(
-                "at {:?} mm the model ends before the home of its device, and the wall at its end would push there; move it \
-                 (`position_mm`) or make it longer",
-                place_m.map(|m| m * 1.0e3)
-            );
-            return Err(complain(model, &problem).into());
+        let Some(timing) = &model.field else {
+            progress.enter(&model.name, Call::Prepare);
+            engine.prepare(config).map_err(no)?;
+            return Ok(engine);
+        };
+        if !engine.has_linear_field() {
+            let problem =
+                "the plugin has no local linear model; remove `[model.field]` to run it in the loop";
+            return Err(complain(model, problem).into());
         }
-        Ok((engine, mapping))
-    };
-    let mut instances = model.places_m.iter().map(instance).collect::<Result<Vec<_>, RunError>>()?;
-    let mut value = |index| instances.first_mut().map_or(f64::NAN, |(first, _)| first.parameter(index));
-    let budget = match (model.isolation, &model.field) {
-        (Isolation::None, None) => TimeBudget::new(budget_ns),
-        // Nobody waits for it any longer than that, or at all.
-        (Isolation::Process, _) | (_, Some(_)) => TimeBudget::default(),
-    };
-    let mut report = report(&plugin, &model.name, &model.plugin, &settings, &mut value);
-    report.signals_taken = signals.put_back();
-    Ok((Layer::new(instances, &model.blend, budget, config), report))
+        progress.enter(&model.name, Call::Prepare);
+        let slow = AsynchronousModel::start(engine, plugin.parameters().len(), timing, config, *clock);
+        Ok(Engine::Asynchronous(Box::new(slow.map_err(no)?)))
+    }
 }
 
 /// What a scene says of a model that cannot be.
@@ -357,13 +482,13 @@ fn unfelt(wanted_n: &[f64; 3], device: &Capabilities) -> Option<String> {
     let accepted = accepted.join(", ");
     Some(if is_driven == [false; 3] {
         format!(
-            "the device gives no force, so no model can be felt; `[limits] force_n = [{accepted}]` accepts that: models \
-             are computed, shown and recorded. Without a `[[model]]` it records poses"
+            "the device gives no force, so no model can be felt; set `[limits] force_n = [{accepted}]` to accept that: the \
+             host then computes, shows and records the models. A scene without a `[[model]]` records poses"
         )
     } else {
         format!(
-            "the device gives no force along {}, so that part of a model cannot be felt; `[limits] force_n = \
-             [{accepted}]` accepts that",
+            "the device gives no force along {}, and the hand cannot feel that part of a model; set `[limits] force_n = \
+             [{accepted}]` to accept that",
             unfelt.join(" and ")
         )
     })

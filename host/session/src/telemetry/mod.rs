@@ -11,20 +11,22 @@
 //! A model that somebody wants in place of another is loaded and made here, on a thread of its own, and goes to the loop when
 //! it is ready.
 
+mod pairing;
 mod peer_link;
 
-pub use peer_link::{LinkCounts, PeerLink, start_peer_link};
+pub use pairing::{LinkCounts, Pairing};
+pub use peer_link::{PeerLink, start_peer_link};
 
 use crate::registry::Registry;
 use crate::scene::Scene;
-use crate::{ControlError, Controls, NewValue, Observer, PluginReport, Session};
+use crate::{ControlError, Controls, LatchGuard, NewValue, Observer, PluginReport, Session};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_live::{
     Ask, Directory, Greeting, PROTOCOL, PanelPlugin, Publication, PublishError, RefusalCause, Serve,
 };
 use flotor_record::RunDescription;
-use flotor_servo::StopSwitch;
+use flotor_servo::{EmergencySource, StopSwitch};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -40,7 +42,8 @@ pub fn publish(
     stop: &StopSwitch,
 ) -> Result<Publication, PublishError> {
     let folders = scene.plugin_folders.clone();
-    let host = Host { controls: session.controls(), stop: stop.clone(), folders, registry: Mutex::new(None) };
+    let (controls, stop, latch) = (session.controls(), stop.clone(), session.latch().cloned());
+    let host = Host { controls, stop, latch, folders, registry: Mutex::new(None) };
     announce(directory, scene, run, session, Arc::new(host))
 }
 
@@ -108,6 +111,8 @@ impl<O: Observer> Observer for Watched<O> {
 struct Host {
     controls: Controls,
     stop: StopSwitch,
+    /// Pressed by an emergency stop before that is answered.
+    latch: Option<LatchGuard>,
     /// Where the scene has plugins looked for.
     folders: Vec<PathBuf>,
     /// Searched when the first model is replaced; kept, so that a file that has not changed is not mapped once more.
@@ -152,7 +157,7 @@ fn refused(error: &ControlError) -> (RefusalCause, String) {
 
 impl Serve for Host {
     fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
-        let Self { controls, stop, .. } = self;
+        let Self { controls, stop, latch, .. } = self;
         match ask {
             Ask::Watch { .. } | Ask::LookAway => {} // the publication's own
             Ask::Set { values } => {
@@ -170,7 +175,12 @@ impl Serve for Host {
                 swapped.map_err(|error| refused(&error))?;
             }
             Ask::Stop => stop.stop(),
-            Ask::EmergencyStop => stop.emergency_by_watcher(),
+            Ask::EmergencyStop => {
+                stop.emergency_by_watcher();
+                let problem = latch.as_ref().and_then(|latch| latch.press(EmergencySource::Watcher));
+                let refused = |problem| (RefusalCause::Other, format!("this run stops, no other: {problem}"));
+                return problem.map_or(Ok(()), |problem| Err(refused(problem)));
+            }
         }
         Ok(())
     }

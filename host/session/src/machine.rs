@@ -1,0 +1,88 @@
+//! What belongs to the whole process and any plugin can change: looked at before and after its code has run, and put back.
+//!
+//! What belongs to a thread (priority, cores, floating-point environment) needs no such look: the code of a plugin runs in a
+//! thread that ends with it. The main thread is the one that others can change by the number of the process.
+
+use rustix::process::{Resource, Rlimit, chdir, getcwd, getpid, getrlimit, setrlimit};
+use rustix::process::{getpriority_process, setpriority_process};
+use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
+use std::ffi::CString;
+
+/// Limits that a run depends on.
+const LIMITS: [(Resource, &str); 6] = [
+    (Resource::Nofile, "the limit of open files"),
+    (Resource::Fsize, "the limit of file sizes"),
+    (Resource::As, "the limit of address space"),
+    (Resource::Memlock, "the limit of locked memory"),
+    (Resource::Cpu, "the limit of processor time"),
+    (Resource::Rttime, "the limit of real-time processor time"),
+];
+
+/// The state of the process that plugins share with the host.
+pub(crate) struct MachineState {
+    folder: Option<CString>,
+    limits: [Rlimit; LIMITS.len()],
+    cores: Option<CpuSet>,
+    nice: Option<i32>,
+}
+
+impl MachineState {
+    /// As it is. Not real-time.
+    pub(crate) fn now() -> Self {
+        Self {
+            folder: getcwd(Vec::new()).ok(),
+            limits: LIMITS.map(|(resource, _)| getrlimit(resource)),
+            cores: sched_getaffinity(Some(getpid())).ok(),
+            nice: getpriority_process(Some(getpid())).ok(),
+        }
+    }
+
+    /// Puts back what is different now: its names. What the system refuses to put back is named all the same. Not
+    /// real-time.
+    pub(crate) fn restore(&self) -> Vec<&'static str> {
+        let Self { folder, limits, cores, nice } = self;
+        let now = Self::now();
+        let mut changed = Vec::new();
+        if let Some(folder) = folder
+            && now.folder.as_ref() != Some(folder)
+        {
+            let _ = chdir(folder);
+            changed.push("the working folder");
+        }
+        for ((resource, name), (before, after)) in LIMITS.into_iter().zip(limits.iter().zip(&now.limits)) {
+            if before != after {
+                let _ = setrlimit(resource, *before);
+                changed.push(name);
+            }
+        }
+        if let Some(cores) = cores
+            && now.cores.as_ref() != Some(cores)
+        {
+            let _ = sched_setaffinity(Some(getpid()), cores);
+            changed.push("the cores of the main thread");
+        }
+        if let Some(nice) = nice
+            && now.nice != Some(*nice)
+        {
+            let _ = setpriority_process(Some(getpid()), *nice);
+            changed.push("the priority of the main thread");
+        }
+        changed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_that_was_changed_is_put_back_and_named() {
+        let before = MachineState::now();
+        let files = getrlimit(Resource::Nofile);
+        let fewer = Rlimit { current: Some(64), maximum: files.maximum };
+        setrlimit(Resource::Nofile, fewer).expect("fewer are always allowed");
+        assert_eq!(before.restore(), ["the limit of open files"]);
+        assert_eq!(getrlimit(Resource::Nofile), files);
+        assert_eq!(MachineState::now().restore(), Vec::<&str>::new());
+    }
+}
