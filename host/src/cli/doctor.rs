@@ -71,7 +71,12 @@ pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
         }
     }
     let bad = diagnoses.iter().filter(|diagnosis| diagnosis.grade == Grade::Bad).count();
-    let verdict = if bad == 0 { "ready".to_owned() } else { format!("not ready; bad findings: {bad}") };
+    let verdict = match bad {
+        0 => "ready".to_owned(),
+        bad => format!(
+            "not ready for real time; bad findings: {bad}. Runs with `--clock virtual` do not need real time"
+        ),
+    };
     say!("{}", style::title(&verdict));
     Ok(())
 }
@@ -113,7 +118,7 @@ fn throttling() -> Diagnosis {
         (Some(runtime), Some(period)) => Diagnosis::note(
             "RT throttling",
             format!("at {:.0} % of a core", runtime / period * 100.0),
-            "the kernel suspends faster loops at this limit: `sysctl kernel.sched_rt_runtime_us=950000`",
+            "the kernel suspends a loop that needs more processor time: `sysctl kernel.sched_rt_runtime_us=950000`",
         ),
         _ => Diagnosis::good("RT throttling", "unknown"),
     }
@@ -148,8 +153,10 @@ fn privileges(report: &RealTimeReport) -> [Diagnosis; 2] {
         Privilege::Refused(reason) => Diagnosis::bad(what, reason.clone(), remedy),
         Privilege::NotAsked => Diagnosis::note(what, "not requested", remedy),
     };
-    let fifo = "`@realtime - rtprio 99` in /etc/security/limits.conf, then log in again";
-    let lock = "`@realtime - memlock unlimited` in /etc/security/limits.conf, then log in again";
+    let fifo = "as root: `groupadd -f realtime`, `usermod -aG realtime USER`, and a line `@realtime - rtprio 99` in \
+                /etc/security/limits.conf; then log in again";
+    let lock = "as root: `groupadd -f realtime`, `usermod -aG realtime USER`, and a line `@realtime - memlock unlimited` \
+                in /etc/security/limits.conf; then log in again";
     [diagnose("SCHED_FIFO", &report.fifo, fifo), diagnose("memory lock", &report.memory_lock, lock)]
 }
 

@@ -14,6 +14,7 @@ use std::ffi::OsString;
     flotor emulate maglev\n  \
     flotor emulate maglev --transport pty --link /tmp/flotor-tty\n  \
     flotor emulate maglev --pace lockstep --set preset=full\n  \
+    flotor emulate maglev --protocol ml-api     for programs of the Maglev 200\n  \
     flotor emulate maglev --help                 options of that emulator",
     // After NAME the flag belongs to the emulator.
     disable_help_flag = true
@@ -38,7 +39,7 @@ pub(crate) fn run(arguments: &EmulateArguments) -> Result<(), CommandError> {
         && device.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
     if !is_id {
         return Err(CommandError::Usage(format!(
-            "`{device}` is no id of a device's plugin: it starts with a letter; `flotor emulate NAME --help` lists the options"
+            "`{device}` is no id of a device's plugin: an id starts with a letter; `flotor emulate NAME --help` lists the options"
         )));
     }
     let program = format!("flotor-{device}-emulator");
@@ -46,7 +47,7 @@ pub(crate) fn run(arguments: &EmulateArguments) -> Result<(), CommandError> {
     let emulator = SeparateProgram { program: &program, built: Built::WithThis, build };
     if device != "maglev" && emulator.command().is_err() {
         let words = format!(
-            "there is no emulator `{program}` in the folder of `flotor`; `flotor emulate maglev` has one"
+            "there is no emulator `{program}` in the folder of `flotor`; Flotor provides one for `maglev` only"
         );
         return Err(CommandError::Usage(words));
     }

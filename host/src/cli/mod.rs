@@ -5,9 +5,11 @@
 mod bridge;
 mod doctor;
 mod emulate;
+mod lend;
 mod new;
 mod plugins;
 mod record;
+mod release;
 mod run;
 mod swap;
 mod view;
@@ -17,15 +19,15 @@ mod worker;
 use bridge::BRIDGE;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use flotor_command::separate::{Built, SeparateProgram};
-use flotor_command::{exit_code_of, options};
+use flotor_command::{exit_code_of, options, say};
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-/// Runs force models and haptic devices, which are plugins, in a servo loop inside safety limits.
+/// Runs force models and haptic devices (both are plugins) in a servo loop with safety limits.
 #[derive(Parser)]
 #[command(name = "flotor", version, propagate_version = true, max_term_width = 110)]
 #[command(after_help = "Examples:\n  \
-    flotor                                            simulate spring 1 of the thesis for 10 s\n  \
+    flotor                                            the built-in demo: simulate a spring for 10 s\n  \
     flotor run --clock virtual --seed 1 --plot run.svg    the same, repeatable, as a picture\n  \
     flotor run scene.toml --set spring.variant=closed-form --record run.mcap\n  \
     flotor eval --model spring --set preset=thesis-2 --poses poses.csv --out -\n\n\
@@ -44,6 +46,10 @@ const STUDY: SeparateProgram<'static> =
 /// Calibration of devices.
 const CALIBRATION: SeparateProgram<'static> =
     SeparateProgram { program: "flotor-calibration", built: Built::WithThis, build: "cargo build --release" };
+
+/// Scenes with expectations.
+const TEST: SeparateProgram<'static> =
+    SeparateProgram { program: "flotor-test", built: Built::WithThis, build: "cargo build --release" };
 
 /// Sweeps into tables; its own workspace, because it brings Parquet.
 const SWEEP: SeparateProgram<'static> = SeparateProgram {
@@ -67,7 +73,7 @@ enum Command {
     Run(run::RunArguments),
     /// Re-evaluate the models on a recorded trajectory: bit-exact, or with changed parameters
     Replay(Separate),
-    /// Show a running host or a recording: the spring in 3D, and traces
+    /// Show a running session or a recording: the model in 3D, and plots over time
     View(view::ViewArguments),
     /// Evaluate a force model at poses from a CSV file
     Eval(Separate),
@@ -75,11 +81,13 @@ enum Command {
     Plugins(plugins::PluginsArguments),
     /// Check a plugin file against the rules of the contract
     Validate(Separate),
-    /// Create a plugin: a folder that builds, validates and runs
+    /// Create a plugin: a folder that builds, passes `validate` and runs
     New(new::NewArguments),
-    /// Measure the timing of the servo on this machine, next to a bare loop
+    /// Run scenes with expectations: pass or fail, for CI
+    Test(Separate),
+    /// Measure the timing of the servo on this machine, compared with a bare loop
     Jitter(Separate),
-    /// Find the largest stable stiffness of a virtual spring, next to theory
+    /// Find the largest stable stiffness of a virtual spring, compared with theory
     Stability(Separate),
     /// Measure cost and error of an evaluation, for many settings of a force model
     Bench(Separate),
@@ -89,6 +97,8 @@ enum Command {
     Record(record::RecordArguments),
     /// Hot-swap a model of a running session, without a jump in the force
     Swap(swap::SwapArguments),
+    /// Release the emergency stop of this machine: runs may start again
+    Release(release::ReleaseArguments),
     /// Publish a running host on a network, or show a remote one here
     Bridge(Separate),
     /// Sweep a model or a scene over parameters, poses and seeds into a Parquet table
@@ -101,6 +111,8 @@ enum Command {
     Calibrate(Separate),
     /// Emulate the controller of a device, to use its plugin without hardware
     Emulate(emulate::EmulateArguments),
+    /// Run a program that was written for another maker's device on a Flotor device, inside its limits
+    Lend(lend::LendArguments),
     /// Check this machine's real-time configuration and suggest fixes
     Doctor(doctor::DoctorArguments),
     /// A process that holds one force model, started by `run` for `isolation = "process"`
@@ -134,6 +146,7 @@ pub fn command_names() -> Vec<String> {
 #[must_use]
 pub fn main() -> ExitCode {
     let arguments = options::arguments::<Arguments>();
+    flotor_session::tell_notices(|notice| flotor_command::note(notice));
     let result = match arguments.command {
         None => run::run(run::RunArguments::default()),
         Some(Command::Run(arguments)) => run::run(arguments),
@@ -143,23 +156,29 @@ pub fn main() -> ExitCode {
         Some(Command::Plugins(arguments)) => plugins::run(&arguments),
         Some(Command::Validate(separate)) => LAB.carry_out("validate", &separate.arguments),
         Some(Command::New(arguments)) => new::run(&arguments),
+        Some(Command::Test(separate)) => TEST.carry_out("test", &separate.arguments),
         Some(Command::Jitter(separate)) => LAB.carry_out("jitter", &separate.arguments),
         Some(Command::Stability(separate)) => LAB.carry_out("stability", &separate.arguments),
         Some(Command::Bench(separate)) => LAB.carry_out("bench", &separate.arguments),
         Some(Command::Stress(separate)) => LAB.carry_out("stress", &separate.arguments),
         Some(Command::Record(arguments)) => record::run(&arguments),
         Some(Command::Swap(arguments)) => swap::run(&arguments),
+        Some(Command::Release(arguments)) => release::run(&arguments),
         Some(Command::Bridge(separate)) => BRIDGE.become_with(&separate.arguments),
         Some(Command::Sweep(separate)) => SWEEP.become_with(&separate.arguments),
         Some(Command::Study(separate)) => STUDY.carry_out("study", &separate.arguments),
         Some(Command::Analyse(separate)) => STUDY.carry_out("analyse", &separate.arguments),
         Some(Command::Calibrate(separate)) => CALIBRATION.carry_out("calibrate", &separate.arguments),
         Some(Command::Emulate(arguments)) => emulate::run(&arguments),
+        Some(Command::Lend(arguments)) => lend::run(arguments),
         Some(Command::Doctor(arguments)) => doctor::run(&arguments),
         Some(Command::Worker(arguments)) => worker::run(arguments),
         Some(Command::Watchdog(arguments)) => watchdog::run(arguments),
         Some(Command::Completions { shell }) => {
-            clap_complete::generate(shell, &mut Arguments::command(), "flotor", &mut std::io::stdout());
+            // Into memory first: the generator panics where its reader goes away.
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Arguments::command(), "flotor", &mut script);
+            say!("{}", String::from_utf8_lossy(&script).trim_end());
             Ok(())
         }
     };

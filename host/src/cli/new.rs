@@ -8,7 +8,7 @@ use flotor_hal::abi::PluginKind;
 use flotor_session::registry::Registry;
 use std::path::{Path, PathBuf};
 
-/// Create a plugin: a folder that builds, validates and runs.
+/// Create a plugin: a folder that builds, passes `validate` and runs.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  flotor new model jelly\n  flotor new device crank\n  \
     flotor new model jelly --language c\n\nCreates the folder ./NAME with a plugin that builds, passes \
@@ -61,7 +61,7 @@ fn refuse_an_id_in_use(name: &PluginName) -> Result<(), CommandError> {
 
 fn report(name: &PluginName, made: &Scaffold) {
     say!("{} in {}:", style::title(&name.title()), made.folder.display());
-    let first = made.files.first().copied().unwrap_or_default();
+    let first = made.files.first().map_or("", String::as_str);
     say!("  {first:<16} the plugin: change this");
     for file in made.files.iter().skip(1) {
         say!("  {file}");
@@ -74,6 +74,9 @@ fn report(name: &PluginName, made: &Scaffold) {
         "flotor run scene.toml --plot run.svg",
     ] {
         say!("  {command}");
+    }
+    if let Some(test) = made.files.iter().find(|file| file.ends_with(".test.toml")) {
+        say!("  flotor test {test}");
     }
 }
 

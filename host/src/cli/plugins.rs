@@ -148,6 +148,7 @@ fn print_description(plugin: &Plugin, parameters: &[Described<'_>]) {
             "text" => "text".to_owned(),
             "file" if parameter.choices.is_empty() => "a file".to_owned(),
             "file" => format!("a file, or {}", parameter.choices.join(" | ")),
+            _ if parameter.unit == "1" => format!("{} to {}", parameter.min, parameter.max),
             _ => format!("{} to {} {}", parameter.min, parameter.max, parameter.unit),
         };
         let live = if parameter.live { ", live" } else { "" };

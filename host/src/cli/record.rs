@@ -6,7 +6,7 @@ use flotor_command::options::mcap_file;
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, first_error, report_line, style};
 use flotor_core::Change;
-use flotor_live::{Ask, Client, Directory, Event, LiveError};
+use flotor_live::{Answer, Ask, Client, Directory, Event, LiveError};
 use flotor_record::{Note, Recorder, Severity};
 use flotor_servo::StopSwitch;
 use std::path::{Path, PathBuf};
@@ -93,6 +93,11 @@ fn keep(mut client: Client, out: &Path, stop: &StopSwitch) -> Result<Kept, Comma
     let mut kept = Kept { ticks: 0, dropped: 0, end: RecordingEnd::Complete("stopped recording".to_owned()) };
     while !stop.is_stop_asked() {
         match client.next(LOOK_PERIOD) {
+            // There is only the request to watch.
+            Ok(Some(Event::Answer(Answer { refused: Some(reason), .. }))) => {
+                recorder.finish()?;
+                return Err(CommandError::Failed(reason));
+            }
             Ok(None | Some(Event::Answer(_))) => {}
             Ok(Some(Event::Ticks { records, dropped })) => {
                 if let (true, Some(first)) = (dropped > kept.dropped, records.first()) {

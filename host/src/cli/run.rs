@@ -6,10 +6,12 @@ use flotor_command::options::{
     ClockOption, PluginKeyValue, StrengthOption, core, duration_s, mcap_file, rate_hz, svg_file, whole,
 };
 use flotor_command::stopping::{Keys, stop_run_on_signals};
-use flotor_command::{CommandError, first_error, note, print_result, progress_bar, style};
+use flotor_command::{
+    CommandError, first_error, keep_results_apart, note, print_result, progress_bar, style, write_json,
+};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
-use flotor_live::Directory;
+use flotor_live::{Directory, Latch};
 use flotor_record::{Note, Recorder, Severity, TraceDigest};
 use flotor_servo::RunEnd;
 use flotor_servo::coupling::Line;
@@ -19,8 +21,11 @@ use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
 use flotor_session::summary::{RunFacts, RunSummary, Tally};
 use flotor_session::telemetry::{LinkCounts, PeerLink, Watched, publish, start_peer_link};
-use flotor_session::{Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session};
+use flotor_session::{
+    Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session, stop_waits_with,
+};
 use indicatif::ProgressBar;
+use rustix::process::{Resource, getrlimit};
 use std::path::PathBuf;
 
 /// Run a scene in the servo loop.
@@ -67,7 +72,14 @@ pub(crate) struct RunArguments {
 pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     // First of all: a signal during loading ends the run, too.
     let stop = stop_run_on_signals();
+    stop_waits_with(&stop);
+    if arguments.json.as_deref().is_some_and(|json| json.as_os_str() == "-") {
+        keep_results_apart()?;
+    }
     let scene = scene(&arguments)?;
+    if matches!(arguments.clock, ClockOption::Real) {
+        enough_files()?;
+    }
     let clock = match arguments.clock {
         ClockOption::Real => Clock::Real,
         ClockOption::Virtual => Clock::Virtual,
@@ -106,6 +118,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     };
     let keys = (clock == Clock::Real).then(|| Keys::listen(&stop)).flatten();
     let mut watched = Watched { observer: watchers, publication };
+    let latch = session.latch().map(|guard| guard.latch().clone());
     let outcome = session.run(&mut watched, &stop);
     drop(keys);
     let Watched { observer: Watchers { tally, digest, mut recording, plot, progress }, publication } =
@@ -113,7 +126,28 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     progress.finish_and_clear();
     let outcome = match outcome {
         Ok(outcome) => outcome,
-        Err(error) => return first_error([Err(error.into()), recording.finish(&[]).map_err(Into::into)]),
+        Err(error) => {
+            let recorded = recording.finish(&[]).map_err(Into::into);
+            let told = match (&error, &arguments.json) {
+                (RunError::Hung { who, stuck, .. }, Some(json)) => {
+                    let elapsed_ns = tally.last_ns();
+                    let facts = RunFacts {
+                        title: &scene.title,
+                        clock: clock_word,
+                        seed: arguments.seed,
+                        rate_hz: scene.rate_hz,
+                        plugins: &plugins,
+                        couplings: &[],
+                        carried: &[],
+                        trace_digest: digest.finish(),
+                    };
+                    let summary = RunSummary::new(facts, &Outcome::of_hung_loop(*stuck, elapsed_ns), &tally);
+                    write_json(json, &summary.blaming(who, &error.to_string()))
+                }
+                _ => Ok(()),
+            };
+            return first_error([Err(error.into()), recorded, told]);
+        }
     };
 
     let carried: Vec<(String, LinkCounts)> =
@@ -143,8 +177,16 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let printed = print_result(arguments.json.as_deref(), &summary, text);
     outcome.real_time.advice().into_iter().for_each(note);
     outcome.later_warnings().iter().for_each(note);
+    if let (RunEnd::EmergencyStop(_), Some(latch)) = (outcome.end, latch) {
+        note_latch(&latch);
+    }
+    let verdict = verdict(&outcome, &plugins, &summary);
+    // Last of all: the code of a plugin may hang, or end the process.
+    let Outcome { unresponsive, remains, .. } = outcome;
+    let freed = remains.free();
+    let freed = unresponsive.map_or(freed, Err).map_err(|hung| CommandError::PluginRefused(hung.to_string()));
     // Scripts need the outcome of the run first, a missing file second.
-    first_error([verdict(&outcome, &plugins, &summary), recorded, drawn, printed])
+    first_error([verdict, freed, recorded, drawn, printed])
 }
 
 /// Notes for readers of the recording: why the run ended, which plugins failed, which ticks are missing.
@@ -168,6 +210,17 @@ fn notes(outcome: &Outcome, summary: &RunSummary) -> Vec<Note> {
     notes
 }
 
+/// What an emergency stop means for other runs of this machine.
+fn note_latch(latch: &Latch) {
+    match latch.length() {
+        Some(_) => note("all runs of this machine are stopped, and none starts until `flotor release`"),
+        None => {
+            let path = latch.path().display();
+            note(format_args!("the emergency stop is of this run only: {path} cannot be written"));
+        }
+    }
+}
+
 /// What the end of the run means for the exit code.
 fn verdict(outcome: &Outcome, plugins: &[PluginReport], summary: &RunSummary) -> Result<(), CommandError> {
     match outcome.end {
@@ -181,8 +234,23 @@ fn verdict(outcome: &Outcome, plugins: &[PluginReport], summary: &RunSummary) ->
         RunEnd::TooFast(samples_per_s) => {
             Err(CommandError::TooFast { samples_per_s, rate_hz: summary.rate_hz })
         }
+        RunEnd::NotPaced => Err(CommandError::NotPaced),
         RunEnd::Watchdog(stuck) => Err(CommandError::Watchdog(stuck)),
-        RunEnd::Finished | RunEnd::Stopped => broken_models(outcome, summary),
+        RunEnd::Unguarded => Err(CommandError::Unguarded),
+        RunEnd::Finished | RunEnd::Stopped => broken_plugins(outcome, summary),
+    }
+}
+
+/// Files a run in real time has open at most, with a margin: plugins, recording, socket, sixteen watchers.
+const OPEN_FILES: u64 = 64;
+
+/// A run that finds no descriptor has no signal handlers, no recording or no socket, while a hand is at the device.
+fn enough_files() -> Result<(), CommandError> {
+    match getrlimit(Resource::Nofile).current {
+        Some(most) if most < OPEN_FILES => Err(CommandError::Usage(format!(
+            "only {most} files may be open, and a run in real time needs {OPEN_FILES}; `ulimit -n {OPEN_FILES}` allows them"
+        ))),
+        _ => Ok(()),
     }
 }
 
@@ -237,15 +305,21 @@ fn end_words(outcome: &Outcome, rate_hz: f64) -> String {
         }
         RunEnd::EmergencyStop(source) => CommandError::EmergencyStop(source).to_string(),
         RunEnd::TooFast(samples_per_s) => CommandError::TooFast { samples_per_s, rate_hz }.to_string(),
+        RunEnd::NotPaced => CommandError::NotPaced.to_string(),
         RunEnd::Watchdog(stuck) => CommandError::Watchdog(stuck).to_string(),
+        RunEnd::Unguarded => CommandError::Unguarded.to_string(),
     }
 }
 
-/// A model that failed is a refused plugin, reported in the exit code as well, for scripts.
-fn broken_models(outcome: &Outcome, summary: &RunSummary) -> Result<(), CommandError> {
-    // The devices come first. One that failed has ended the run; what was borne of it is in the summary.
-    let broken = summary.plugins.iter().skip(outcome.devices.len()).find(|plugin| plugin.health != "ok");
-    broken.map_or(Ok(()), |plugin| {
+/// A model that failed, or a device that changed how the host computes, is a refused plugin, reported in the exit code as well,
+/// for scripts.
+fn broken_plugins(outcome: &Outcome, summary: &RunSummary) -> Result<(), CommandError> {
+    // The devices come first. One that failed has ended the run; what was borne of its samples is in the summary.
+    let is_borne =
+        |number: usize| outcome.devices.get(number).is_some_and(|device| device.float_changes == 0);
+    let mut plugins = summary.plugins.iter().enumerate();
+    let broken = plugins.find(|(number, plugin)| plugin.health != "ok" && !is_borne(*number));
+    broken.map_or(Ok(()), |(_, plugin)| {
         let problem = format!(
             "{}: `{}` {}; run `flotor validate` for details",
             plugin.file, plugin.name, plugin.health

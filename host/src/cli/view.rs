@@ -2,15 +2,15 @@
 
 use super::bridge::{BRIDGE, Way, is_remote};
 use clap::Args;
-use flotor_command::CommandError;
 use flotor_command::separate::{Running, SeparateProgram};
-use flotor_record::Recording;
+use flotor_command::{CommandError, note};
+use flotor_record::{Ending, Recording};
 use flotor_session::registry::Registry;
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
-/// Show a running host or a recording: the spring in 3D, and traces.
+/// Show a running session or a recording: the model in 3D, and plots over time.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     flotor view                                   the session in another terminal\n  \
@@ -26,7 +26,7 @@ pub(crate) struct ViewArguments {
     /// Write a picture of one moment; needs no display and no GPU
     #[arg(long, value_name = "OUT.png", requires = "file")]
     screenshot: Option<PathBuf>,
-    /// Draw the whole window with its panels
+    /// With --screenshot: draw the whole window with its panels
     #[arg(long, requires = "screenshot")]
     window: bool,
     /// Show the session of this process (default: the newest session)
@@ -66,6 +66,9 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
         // Opened here as well: an error in the file is reported before another program starts.
         let recording = Recording::open(file)?;
         plugin_files(&recording).into_iter().for_each(|plugin| add("--plugin", plugin.into()));
+        if arguments.screenshot.is_some() {
+            tell_damage(file, recording);
+        }
     }
     let options = [
         ("--at", &arguments.at),
@@ -106,6 +109,17 @@ fn view_remote(for_bridge: &[OsString], mut for_viewer: Vec<OsString>) -> Result
     }
     // The viewer has printed the reason.
     std::process::exit(shown.code().unwrap_or(1));
+}
+
+/// A picture shows a moment; whether the file is whole does not show in it.
+fn tell_damage(file: &Path, mut recording: Recording) {
+    let broken = recording.by_ref().find_map(Result::err);
+    let damage = match (broken, recording.ending()) {
+        (Some(error), _) => error.to_string(),
+        (None, Ending::CutOff) => format!("{}: its end is missing", file.display()),
+        (None, _) => return,
+    };
+    note(format_args!("{damage}; the picture shows what can be read"));
 }
 
 /// Files of the plugins of a recording that were found; the viewer reports the missing ones.
