@@ -26,7 +26,7 @@ pub enum Rule {
     TimeBudget,
     /// Two instances give the same answers alternately, on two threads and alone.
     Independent,
-    /// A step starts no thread.
+    /// Neither `create` nor `prepare` nor a step leaves a thread behind.
     NoThreads,
     /// The force of a model without a history is minus the gradient of its energy: units and frame agree.
     EnergyGradient,
@@ -36,11 +36,19 @@ pub enum Rule {
     Lifecycle,
     /// After `safe_stop` from another thread the device gives no wrench and still answers.
     SafeStop,
+    /// Reads and writes take less than half a period; stopping and activating end soon.
+    DeviceTime,
+    /// Every extension that is offered answers, and the instance works afterwards.
+    Extensions,
+    /// What belongs to the host's process stays as it is: signals, floating-point mode, environment, limits.
+    HostUntouched,
+    /// No call reads or writes memory that is not the plugin's or was not given to it.
+    InsideMemory,
 }
 
 impl Rule {
     /// All rules, in the order they are checked.
-    pub const ALL: [Rule; 15] = [
+    pub const ALL: [Rule; 19] = [
         Rule::Metadata,
         Rule::Loads,
         Rule::Schema,
@@ -56,6 +64,10 @@ impl Rule {
         Rule::Capabilities,
         Rule::Lifecycle,
         Rule::SafeStop,
+        Rule::DeviceTime,
+        Rule::Extensions,
+        Rule::HostUntouched,
+        Rule::InsideMemory,
     ];
 
     /// Short name in reports.
@@ -77,6 +89,10 @@ impl Rule {
             Rule::Capabilities => "capabilities",
             Rule::Lifecycle => "lifecycle",
             Rule::SafeStop => "safe-stop",
+            Rule::DeviceTime => "device-time",
+            Rule::Extensions => "extensions",
+            Rule::HostUntouched => "host-untouched",
+            Rule::InsideMemory => "inside-memory",
         }
     }
 
@@ -94,7 +110,7 @@ impl Rule {
             Rule::ResetRepeats => "after reset the same poses give the same bits",
             Rule::TimeBudget => "99 of 100 steps take less than half a period at 1 kHz",
             Rule::Independent => "two instances give the same answers alternately, on two threads and alone",
-            Rule::NoThreads => "a step starts no thread",
+            Rule::NoThreads => "neither create nor prepare nor a step leaves a thread behind",
             Rule::EnergyGradient => {
                 "the force of a model without a history is minus the gradient of its energy"
             }
@@ -103,6 +119,14 @@ impl Rule {
             Rule::SafeStop => {
                 "after safe_stop from another thread the device gives no wrench and still answers"
             }
+            Rule::DeviceTime => {
+                "reads and writes take less than half a period, a stop 100 ms, the rest of the life cycle 2 s"
+            }
+            Rule::Extensions => "every extension that is offered answers, and the instance works afterwards",
+            Rule::HostUntouched => {
+                "no call changes the host's signals, floating-point mode, environment, folder, limits or files"
+            }
+            Rule::InsideMemory => "no call reads or writes memory that is not its own or was not given to it",
         }
     }
 
@@ -116,7 +140,13 @@ impl Rule {
     #[must_use]
     pub const fn applies_to(self, kind: PluginKind) -> bool {
         match self {
-            Rule::Metadata | Rule::Loads | Rule::Schema | Rule::Defaults => true,
+            Rule::Metadata
+            | Rule::Loads
+            | Rule::Schema
+            | Rule::Defaults
+            | Rule::Extensions
+            | Rule::HostUntouched
+            | Rule::InsideMemory => true,
             Rule::FiniteNearHome
             | Rule::SurvivesNotFinite
             | Rule::SurvivesFarPoses
@@ -125,7 +155,9 @@ impl Rule {
             | Rule::Independent
             | Rule::NoThreads
             | Rule::EnergyGradient => matches!(kind, PluginKind::Model),
-            Rule::Capabilities | Rule::Lifecycle | Rule::SafeStop => matches!(kind, PluginKind::Device),
+            Rule::Capabilities | Rule::Lifecycle | Rule::SafeStop | Rule::DeviceTime => {
+                matches!(kind, PluginKind::Device)
+            }
         }
     }
 }

@@ -187,7 +187,7 @@ fn refused(path: &str, error: &serialport::Error) -> String {
             format!("{path} is in use by another program; close that one first")
         }
         _ => format!(
-            "no board at {path} ({}); is it connected? `port` says where it is, `ls /dev/serial/by-id` what there is",
+            "no board at {path} ({}); is it connected? The parameter `port` must be its path; `ls /dev/serial/by-id` lists the ports",
             error.description
         ),
     }

@@ -66,6 +66,20 @@ impl Str {
     }
 }
 
+#[cfg(feature = "loader")]
+impl Str {
+    /// Its length, as its maker says.
+    pub(crate) const fn bytes(&self) -> usize {
+        if self.ptr.is_null() { 0 } else { self.len }
+    }
+
+    /// What a foreign plugin may have made.
+    #[cfg(test)]
+    pub(crate) const fn of_raw(ptr: *const u8, len: usize) -> Self {
+        Self { ptr, len }
+    }
+}
+
 impl fmt::Debug for Str {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Debug::fmt(self.as_str(), f)
@@ -107,6 +121,20 @@ impl Choices {
     }
 }
 
+#[cfg(feature = "loader")]
+impl Choices {
+    /// How many there are, as their maker says.
+    pub(crate) const fn count(&self) -> usize {
+        if self.ptr.is_null() { 0 } else { self.len }
+    }
+
+    /// What a foreign plugin may have made.
+    #[cfg(test)]
+    pub(crate) const fn of_raw(ptr: *const Str, len: usize) -> Self {
+        Self { ptr, len }
+    }
+}
+
 impl fmt::Debug for Choices {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Debug::fmt(self.as_slice(), f)
@@ -132,6 +160,15 @@ impl Default for Message {
 }
 
 impl Message {
+    /// What is wrong with a message of a foreign plugin: it is longer than a message can be, or not text.
+    #[must_use]
+    pub fn problem(&self) -> Option<String> {
+        let Some(bytes) = self.text.get(..self.len as usize) else {
+            return Some(format!("a message of {} bytes, above the limit of {MESSAGE_BYTES}", self.len));
+        };
+        std::str::from_utf8(bytes).is_err().then(|| "a message that is not UTF-8".to_owned())
+    }
+
     /// Stores as much of `text` as fits, cut at a character. Real-time: bounded, no allocation.
     #[allow(clippy::cast_possible_truncation)] // at most MESSAGE_BYTES
     pub fn set(&mut self, text: &str) {
@@ -154,6 +191,23 @@ impl Message {
             Err(error) => std::str::from_utf8(bytes.get(..error.valid_up_to()).unwrap_or(&[])).unwrap_or(""),
         }
     }
+
+    /// The sentence for a person and a terminal, whatever a foreign plugin wrote, up to its first null: what is not UTF-8 as
+    /// a replacement character, control characters but the end of a line escaped. Not real-time.
+    #[cfg(feature = "loader")]
+    pub(crate) fn for_people(&self) -> String {
+        let bytes = self.text.get(..self.len as usize).unwrap_or(&self.text);
+        let bytes = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
+        let mut text = String::with_capacity(bytes.len());
+        for character in String::from_utf8_lossy(bytes).chars() {
+            if character.is_control() && character != '\n' {
+                text.extend(character.escape_default());
+            } else {
+                text.push(character);
+            }
+        }
+        text
+    }
 }
 
 layout! {
@@ -165,6 +219,20 @@ layout! {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_message_that_is_none_is_told() {
+        let mut message = Message::default();
+        message.set("ok");
+        assert_eq!(message.problem(), None);
+        message.text[1] = 0xff;
+        assert_eq!(message.problem().as_deref(), Some("a message that is not UTF-8"));
+        message.len = 4_000_000_000;
+        assert_eq!(
+            message.problem().as_deref(),
+            Some("a message of 4000000000 bytes, above the limit of 508")
+        );
+    }
 
     #[test]
     fn a_message_is_cut_at_a_character() {
@@ -182,6 +250,17 @@ mod tests {
         message.text[2] = 0xff;
         message.len = u32::MAX;
         assert_eq!(message.as_str(), "ok");
+    }
+
+    #[cfg(feature = "loader")]
+    #[test]
+    fn a_reason_is_told_whatever_its_bytes() {
+        let mut message = Message::default();
+        message.set("no table ??\x1b[2J of forces\n");
+        message.text[9] = 0xff;
+        assert_eq!(message.for_people(), "no table \u{fffd}?\\u{1b}[2J of forces\n");
+        message.len = u32::MAX;
+        assert!(message.for_people().ends_with("of forces\n"), "what was not written is not told");
     }
 
     #[test]

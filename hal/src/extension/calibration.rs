@@ -52,7 +52,7 @@ impl std::fmt::Display for InvalidCalibration {
         match self {
             Self::Range([from, to]) => write!(f, "invalid range {from} m to {to} m"),
             Self::Count(count) => {
-                write!(f, "{count} coefficients; legal is 1 to {CALIBRATION_COEFFICIENTS}")
+                write!(f, "{count} coefficients; there must be 1 to {CALIBRATION_COEFFICIENTS}")
             }
             Self::Share { height_m, share } => write!(
                 f,

@@ -143,7 +143,7 @@ pub mod means {
             let state = match told.state {
                 0 => StoppedState::Zero,
                 1 => StoppedState::Landed,
-                other => return Err(wrong(format!("leads to a state {other}, legal is 0 or 1"))),
+                other => return Err(wrong(format!("leads to state {other}; it must be 0 or 1"))),
             };
             let length = told.length as usize;
             if told.descriptor == BY_ITSELF {
@@ -154,7 +154,7 @@ pub mod means {
             }
             let message = told.message.get(..length).filter(|message| !message.is_empty());
             let Some(message) = message.map(<[u8]>::to_vec) else {
-                return Err(wrong(format!("has {length} bytes, legal is 1 to {STOP_MESSAGE_BYTES}")));
+                return Err(wrong(format!("has {length} bytes; it must have 1 to {STOP_MESSAGE_BYTES}")));
             };
             if told.descriptor < 0 {
                 return Err(wrong(format!("names the descriptor {}", told.descriptor)));

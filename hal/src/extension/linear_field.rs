@@ -155,7 +155,8 @@ impl Model {
             return CallStatus::Unsupported;
         };
         // SAFETY: a live instance used by this thread only (`&mut`), pointers valid for the call.
-        CallStatus::from_code(unsafe { ask(self.instance, input, field) })
+        let asked = || unsafe { ask(self.instance, input, field) };
+        CallStatus::from_code(crate::abi::loader::keeping_floats(&mut self.float_changes, asked))
     }
 }
 

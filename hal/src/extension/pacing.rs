@@ -96,8 +96,10 @@ impl loader::ActiveDevice {
         let pacing = self.extensions().and_then(|extensions| extensions.pacing);
         let Some(wait) = pacing.and_then(|table| table.wait_for_sample) else { return SampleWait::NotPaced };
         let mut samples = 0;
+        let instance = self.instance();
         // SAFETY: a live, active instance used by this thread only (`&mut`), an out pointer valid for the call.
-        let code = unsafe { wait(self.instance(), timeout_ns, &raw mut samples) };
+        let waited = || unsafe { wait(instance, timeout_ns, &raw mut samples) };
+        let code = loader::keeping_floats(&mut self.float_changes, waited);
         match CallStatus::from_code(code) {
             CallStatus::Ok if samples > 0 => SampleWait::Arrived { samples },
             CallStatus::Unsupported => SampleWait::NotPaced,

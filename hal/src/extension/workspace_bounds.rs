@@ -30,6 +30,12 @@ impl WorkspaceBounds {
         Self { lower_m, upper_m }
     }
 
+    /// Where it ends, m: lower and upper; infinite where there is no end.
+    #[must_use]
+    pub const fn ends_m(&self) -> [[f64; 3]; 2] {
+        [self.lower_m, self.upper_m]
+    }
+
     /// True if there is an end anywhere. A box with home outside, or with a limit that is no number, bounds nothing: a
     /// wall there would throw the handle out of where a run begins.
     #[must_use]

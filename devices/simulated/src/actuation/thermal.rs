@@ -90,6 +90,12 @@ impl Thermal {
         self.load_a2.iter().copied().fold(0.0, f64::max).sqrt()
     }
 
+    /// Temperature of each coil, °C. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn temperatures_c(&self) -> Currents {
+        self.temperature_c
+    }
+
     /// Temperature of the hottest coil, °C. Real-time: bounded, no allocation.
     #[must_use]
     pub fn hottest_c(&self) -> f64 {

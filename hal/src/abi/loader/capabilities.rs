@@ -85,7 +85,7 @@ impl Group {
         range.is_more_than_nothing_on(held, "say how far it moves there, or leave it out of `actuated`")?;
         if driven == [false; 3] {
             // Endless is the slew of nothing, and no slew is none either.
-            return if slew.value >= 0.0 { Ok(()) } else { Err(slew.wrong("legal is 0 and more")) };
+            return if slew.value >= 0.0 { Ok(()) } else { Err(slew.wrong("must be 0 or more")) };
         }
         slew.has_an_end()?;
         if slew.value == 0.0 {
@@ -101,7 +101,7 @@ impl Number<f64> {
         if (0.0..=*most).contains(value) {
             return Ok(()); // false for NaN
         }
-        Err(self.wrong(&format!("legal is 0 to {most} {unit}")))
+        Err(self.wrong(&format!("must be 0 to {most} {unit}")))
     }
 
     fn wrong(&self, mend: &str) -> Refusal {
@@ -115,7 +115,7 @@ impl Number<[f64; 3]> {
         if value.iter().all(|value| (0.0..=*most).contains(value)) {
             return Ok(()); // false for NaN
         }
-        Err(wrong(field, &format!("{value:?}"), &format!("legal is 0 to {most} {unit} on each axis")))
+        Err(wrong(field, &format!("{value:?}"), &format!("must be 0 to {most} {unit} on each axis")))
     }
 
     fn is_more_than_nothing_on(&self, axes: [bool; 3], mend: &str) -> Result<(), Refusal> {

@@ -1,6 +1,7 @@
 //! A device a host may use, in two types: opened (it answers) and active (it moves hands).
 
 use super::capabilities::{check, check_unchanged};
+use super::float_control::keeping_floats;
 use super::model::refusal_from;
 use super::setting::{Setting, index_of, live_index, to_raw};
 use crate::abi::{CallStatus, DeviceTable, Instance, Message};
@@ -29,7 +30,7 @@ impl Drop for Handle {
     fn drop(&mut self) {
         if let Some(close) = self.table.close {
             // SAFETY: the last handle: nobody uses the instance after this.
-            unsafe { close(self.instance) };
+            keeping_floats(&mut 0, || unsafe { close(self.instance) });
         }
     }
 }
@@ -49,6 +50,10 @@ pub struct ActiveDevice {
     instance: Instance,
     read: unsafe extern "C" fn(Instance, *const Tick, *mut DeviceState) -> u32,
     write: unsafe extern "C" fn(Instance, *const Tick, *const Wrench) -> u32,
+    /// Calls that left the floating-point environment changed.
+    pub(crate) float_changes: u64,
+    /// Those that were told.
+    float_changes_told: u64,
 }
 
 // SAFETY: the contract lets an instance be used by any one thread at a time; `&mut self` sees to "one".
@@ -65,7 +70,7 @@ impl Stopper {
     pub fn safe_stop(&self) {
         if let Some(safe_stop) = self.handle.table.safe_stop {
             // SAFETY: a live instance (this handle keeps it open); `safe_stop` may come from any thread.
-            unsafe { safe_stop(self.handle.instance) };
+            keeping_floats(&mut 0, || unsafe { safe_stop(self.handle.instance) });
         }
     }
 }
@@ -86,7 +91,9 @@ impl OpenedDevice {
         let mut instance = std::ptr::null_mut();
         let count = u32::try_from(values.len()).unwrap_or(u32::MAX);
         // SAFETY: all pointers are valid for the call, as the contract of `open` asks.
-        let code = unsafe { open(values.as_ptr(), count, &raw mut message, &raw mut instance) };
+        let opened = || unsafe { open(values.as_ptr(), count, &raw mut message, &raw mut instance) };
+        // Nothing depends on it before the device is active: it is put back, and nobody is told.
+        let code = keeping_floats(&mut 0, opened);
         refusal_from(code, &message)?;
         if instance.is_null() {
             return Err(Refusal::broken("it reported success but opened nothing"));
@@ -140,11 +147,21 @@ impl OpenedDevice {
         };
         let mut message = Message::default();
         // SAFETY: a live instance, used by this thread only (`self` is owned), pointers valid for the call.
-        let code = unsafe { activate(self.handle.instance, config, &raw mut message) };
+        let activated = || unsafe { activate(self.handle.instance, config, &raw mut message) };
+        let mut float_changes = 0;
+        let code = keeping_floats(&mut float_changes, activated);
         match refusal_from(code, &message) {
             Ok(()) => {
                 let instance = self.handle.instance;
-                Ok(ActiveDevice { handle: Some(self.handle), told: self.told, instance, read, write })
+                Ok(ActiveDevice {
+                    handle: Some(self.handle),
+                    told: self.told,
+                    instance,
+                    read,
+                    write,
+                    float_changes,
+                    float_changes_told: 0,
+                })
             }
             Err(refusal) => Err((self, refusal)),
         }
@@ -169,7 +186,7 @@ impl OpenedDevice {
             // SAFETY: a live instance, used by this thread only (`&mut`), an out pointer valid for the call.
             unsafe { last_message(self.handle.instance, &raw mut message) };
         }
-        message.as_str().to_owned()
+        message.for_people()
     }
 }
 
@@ -178,14 +195,31 @@ impl ActiveDevice {
     #[inline]
     pub fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
         // SAFETY: a live, active instance used by this thread only (`&mut`), pointers valid for the call.
-        Cycle::from_code(unsafe { (self.read)(self.instance, tick, state) })
+        let read = || unsafe { (self.read)(self.instance, tick, state) };
+        Cycle::from_code(keeping_floats(&mut self.float_changes, read))
+    }
+
+    /// Calls so far that left rounding mode, flush-to-zero or traps of the thread changed; each time the host has put them
+    /// back. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn float_changes(&self) -> u64 {
+        self.float_changes
+    }
+
+    /// True if there was such a call since this was asked last. Real-time: bounded, no allocation.
+    #[inline]
+    pub fn has_changed_floats(&mut self) -> bool {
+        let is_new = self.float_changes != self.float_changes_told;
+        self.float_changes_told = self.float_changes;
+        is_new
     }
 
     /// Commands the wrench on the hand until the next write. Real-time: bounded by the device, no allocation.
     #[inline]
     pub fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle {
         // SAFETY: as in `read`.
-        Cycle::from_code(unsafe { (self.write)(self.instance, tick, wrench) })
+        let written = || unsafe { (self.write)(self.instance, tick, wrench) };
+        Cycle::from_code(keeping_floats(&mut self.float_changes, written))
     }
 
     /// Changes a live parameter, by its index in the schema, at a tick boundary (for a choice, `value` is its index).
@@ -195,8 +229,8 @@ impl ActiveDevice {
         let Some(set_parameter) = handle.table.set_parameter else { return CallStatus::Unsupported };
         let Some(index) = live_index(handle.parameters, index, value) else { return CallStatus::OutOfRange };
         // SAFETY: as in `read`.
-        let code = unsafe { set_parameter(self.instance, index, value) };
-        CallStatus::from_code(code)
+        let set = || unsafe { set_parameter(self.instance, index, value) };
+        CallStatus::from_code(keeping_floats(&mut self.float_changes, set))
     }
 
     pub(crate) fn extensions(&self) -> Option<&DeviceExtensions> {
@@ -220,7 +254,7 @@ impl ActiveDevice {
             // SAFETY: as in `read`; the out pointer is valid for the call.
             unsafe { last_message(self.instance, &raw mut message) };
         }
-        message.as_str().to_owned()
+        message.for_people()
     }
 
     /// Zero wrench, then opened again. Not real-time. `None` if the plugin broke.
@@ -244,15 +278,16 @@ impl Drop for ActiveDevice {
 
 /// Asks the owner's instance, of whose table the function is; both `asked` above have it by `&mut`.
 fn asked<T>(instance: Instance, ask: Option<Ask<T>>, mut answer: T) -> Option<T> {
+    let ask = ask?;
     // SAFETY: a live instance, used by this thread only, an out pointer valid for the call.
-    let code = unsafe { ask?(instance, &raw mut answer) };
+    let code = keeping_floats(&mut 0, || unsafe { ask(instance, &raw mut answer) });
     (code == CallStatus::Ok as u32).then_some(answer)
 }
 
 fn deactivate(handle: &Handle) -> CallStatus {
     let Some(deactivate) = handle.table.deactivate else { return CallStatus::Unsupported };
     // SAFETY: called from the owner of the one working handle, which is giving it up.
-    CallStatus::from_code(unsafe { deactivate(handle.instance) })
+    CallStatus::from_code(keeping_floats(&mut 0, || unsafe { deactivate(handle.instance) }))
 }
 
 /// What the out parameter holds before the plugin fills it: fails every check if it does not.

@@ -108,6 +108,14 @@ pub enum LoadError {
         /// Which struct and field, on both sides.
         difference: String,
     },
+    /// What the plugin declares (ids, texts, parameters) cannot be.
+    #[error("{}: it declares {cause}; correct its tables and build it again", path.display())]
+    BadDeclaration {
+        /// The file.
+        path: PathBuf,
+        /// What, and what is wrong with it.
+        cause: String,
+    },
     /// The plugin does not offer the interface its kind promises, or a required function is missing in it.
     #[error("{}: `{interface}` lacks {missing}; a plugin must offer it", path.display())]
     MissingFunction {
@@ -118,8 +126,16 @@ pub enum LoadError {
         /// Which function, or the whole table.
         missing: &'static str,
     },
+    /// Its list of parameters has counts or texts no host reads.
+    #[error("{}: its list of parameters cannot be read: {problem}; correct it and build the plugin again", path.display())]
+    Schema {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
     /// The plugin is of the other kind.
-    #[error("{}: `{id}` is a {found}, a {wanted} is needed here; name another plugin", path.display())]
+    #[error("{}: `{id}` is a {found} plugin, but a {wanted} is needed here; name another plugin", path.display())]
     OtherKind {
         /// The file.
         path: PathBuf,

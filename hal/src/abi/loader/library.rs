@@ -1,8 +1,9 @@
 //! A loaded plugin: a private copy of its file, opened once, never unloaded.
 
+use super::declaration;
 use super::interfaces::Interface;
 use super::model::{Model, ModelTables};
-use super::{LoadError, Metadata, OpenedDevice, Setting, check, metadata_file};
+use super::{LoadError, Metadata, OpenedDevice, Setting, check, metadata_file, schema};
 use crate::abi::{
     ABI_CANDIDATE, ABI_MAJOR, ABI_MINOR, CONTRACT, Entry, HOST_QUIET_PANICS, Host, MAGIC, PluginKind,
 };
@@ -28,6 +29,7 @@ enum Runtime {
 pub struct Plugin {
     metadata: Metadata,
     interface: Interface,
+    parameters: &'static [Parameter],
     proof: check::Proof,
 }
 
@@ -58,7 +60,10 @@ impl Plugin {
         let entry = unsafe { open_private_copy(&metadata, copy) }?;
         // SAFETY: null, or what the metadata call the entry, in a library that is never unloaded; that it keeps the
         // contract is the caller's trust in the file.
-        unsafe { Self::from_entry(metadata, entry, Runtime::Own) }
+        let plugin = unsafe { Self::from_entry(metadata, entry, Runtime::Own) }?;
+        declaration::check(&plugin.interface, &plugin.metadata.id)
+            .map_err(|cause| LoadError::BadDeclaration { path: path.into(), cause })?;
+        Ok(plugin)
     }
 
     /// Wraps a plugin that is linked into this program: for debuggers, sanitizers and tests. Not real-time;
@@ -136,7 +141,15 @@ impl Plugin {
         }
         // SAFETY: the plugin keeps the contract, as this function demands.
         let interface = unsafe { Interface::find(path, entry, metadata.kind) }?;
-        Ok(Self { metadata, interface, proof })
+        let (parameters, count) = match interface {
+            Interface::Model(ModelTables { force, .. }) => (force.parameters, force.parameter_count),
+            Interface::Device { device, .. } => (device.parameters, device.parameter_count),
+        };
+        // SAFETY: a table's schema is a static array of `parameter_count` parameters of the checked layout, unless that
+        // number is beyond all reason, when none of it is read.
+        let schema = unsafe { schema::checked(parameters, count) };
+        let parameters = schema.map_err(|problem| LoadError::Schema { path: path.clone(), problem })?;
+        Ok(Self { metadata, interface, parameters, proof })
     }
 
     /// What the plugin says about itself.
@@ -154,15 +167,7 @@ impl Plugin {
     /// What the plugin can be told.
     #[must_use]
     pub fn parameters(&self) -> &'static [Parameter] {
-        let (parameters, count) = match self.interface {
-            Interface::Model(ModelTables { force, .. }) => (force.parameters, force.parameter_count),
-            Interface::Device { device, .. } => (device.parameters, device.parameter_count),
-        };
-        if parameters.is_null() || count == 0 {
-            return &[];
-        }
-        // SAFETY: a table's schema is a static array of `parameter_count` parameters of the checked layout.
-        unsafe { std::slice::from_raw_parts(parameters, count as usize) }
+        self.parameters
     }
 
     /// What a model says about itself; `None` for a device.

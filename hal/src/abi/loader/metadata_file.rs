@@ -115,7 +115,9 @@ pub(super) fn parse<'d>(path: &Path, data: impl ReadRef<'d>, length: u64) -> Res
 fn key_and_value(line: &str) -> Option<(&str, &str)> {
     let (key, value) = line.split_once('=')?;
     let value = value.trim().strip_prefix('"')?.strip_suffix('"')?;
-    (!value.contains(['"', '\\'])).then_some((key.trim(), value))
+    // A control character would go to a terminal.
+    let is_plain = |sign: char| !matches!(sign, '"' | '\\') && !sign.is_control();
+    value.chars().all(is_plain).then_some((key.trim(), value))
 }
 
 /// Bytes a file needs to hold its section headers.

@@ -3,21 +3,25 @@
 //!
 //! Order of a load, each step cheaper and safer than the next:
 //! file -> ELF section with metadata -> contract version -> private copy -> `dlopen` -> entry -> kind ->
-//! layouts -> interface table. Nothing of the plugin runs before `dlopen`, and a file that fails before it
+//! layouts -> interface table -> declarations. Nothing of the plugin runs before `dlopen`, and a file that fails before it
 //! never gets that far: a truncated library would otherwise raise SIGBUS inside `dlopen`.
 
 mod capabilities;
 mod check;
+mod declaration;
 mod device;
 mod error;
+mod float_control;
 mod interfaces;
 mod library;
 mod metadata_file;
 mod model;
+mod schema;
 mod setting;
 
 pub use device::{ActiveDevice, OpenedDevice, Stopper};
 pub use error::LoadError;
+pub(crate) use float_control::keeping_floats;
 pub(crate) use interfaces::Offers;
 pub use library::Plugin;
 pub use metadata_file::{Metadata, read_metadata};

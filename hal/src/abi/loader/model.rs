@@ -1,5 +1,6 @@
 //! A force model a host may call: an instance and its function table.
 
+use super::float_control::keeping_floats;
 use super::setting::{Setting, index_of, live_index, to_raw};
 use crate::abi::{CallStatus, ForceTable, Instance, Message};
 use crate::extension::ModelExtensions;
@@ -24,6 +25,8 @@ pub struct Model {
     pub(crate) extensions: ModelExtensions,
     pub(crate) variant: VariantInfo,
     parameters: &'static [Parameter],
+    /// Calls that left the floating-point environment changed.
+    pub(crate) float_changes: u64,
 }
 
 // SAFETY: the contract lets an instance be used by any one thread at a time; `&mut self` sees to "one".
@@ -44,15 +47,17 @@ impl Model {
         let mut message = Message::default();
         let mut instance = std::ptr::null_mut();
         let count = u32::try_from(values.len()).unwrap_or(u32::MAX);
+        let mut float_changes = 0;
         // SAFETY: all pointers are valid for the call, as the contract of `create` asks.
-        let code = unsafe { create(values.as_ptr(), count, &raw mut message, &raw mut instance) };
+        let made = || unsafe { create(values.as_ptr(), count, &raw mut message, &raw mut instance) };
+        let code = keeping_floats(&mut float_changes, made);
         refusal_from(code, &message)?;
         if instance.is_null() {
             return Err(Refusal::broken("it reported success but made nothing"));
         }
         let variant = VariantInfo::new(table.info.serves(), table.info.memory());
         let extensions = tables.extensions;
-        let mut model = Self { instance, step, table, extensions, variant, parameters };
+        let mut model = Self { instance, step, table, extensions, variant, parameters, float_changes };
         model.variant = model.ask_variant();
         Ok(model)
     }
@@ -63,8 +68,10 @@ impl Model {
         ask: Option<unsafe extern "C" fn(Instance, *mut T) -> u32>,
         mut answer: T,
     ) -> Option<T> {
+        let ask = ask?;
         // SAFETY: a live instance used by this thread only (`&mut`), an out pointer valid for the call.
-        let code = unsafe { ask?(self.instance, &raw mut answer) };
+        let asked = || unsafe { ask(self.instance, &raw mut answer) };
+        let code = keeping_floats(&mut self.float_changes, asked);
         (code == CallStatus::Ok as u32).then_some(answer)
     }
 
@@ -80,6 +87,17 @@ impl Model {
         self.parameters
     }
 
+    /// What is wrong with its last message, whatever it is about: that it is too long for one, or no text. Not real-time.
+    #[must_use]
+    pub fn message_problem(&mut self) -> Option<String> {
+        let mut message = Message::default();
+        if let Some(last_message) = self.table.last_message {
+            // SAFETY: a live instance, used by this thread only (`&mut`), an out pointer valid for the call.
+            unsafe { last_message(self.instance, &raw mut message) };
+        }
+        message.problem()
+    }
+
     /// Which demands it can serve, with the settings it was created with.
     #[must_use]
     pub fn serves(&self) -> Demand {
@@ -92,6 +110,14 @@ impl Model {
         self.variant.memory()
     }
 
+    /// Calls so far that left rounding mode, flush-to-zero or traps of the thread changed; each time the host has put them
+    /// back. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn float_changes(&self) -> u64 {
+        self.float_changes
+    }
+
     /// Last chance for the model to allocate before the loop starts. Not real-time.
     ///
     /// # Errors
@@ -100,7 +126,8 @@ impl Model {
         let Some(prepare) = self.table.prepare else { return Ok(()) };
         let mut message = Message::default();
         // SAFETY: a live instance, used by this thread only (`&mut`), pointers valid for the call.
-        let code = unsafe { prepare(self.instance, config, &raw mut message) };
+        let prepared = || unsafe { prepare(self.instance, config, &raw mut message) };
+        let code = keeping_floats(&mut self.float_changes, prepared);
         refusal_from(code, &message)
     }
 
@@ -108,7 +135,8 @@ impl Model {
     #[inline]
     pub fn step(&mut self, input: &Input, output: &mut Output) -> CallStatus {
         // SAFETY: as in `prepare`.
-        CallStatus::from_code(unsafe { (self.step)(self.instance, input, output) })
+        let stepped = || unsafe { (self.step)(self.instance, input, output) };
+        CallStatus::from_code(keeping_floats(&mut self.float_changes, stepped))
     }
 
     /// Steps through poses in order; the shorter slice decides how many. Real-time per pose.
@@ -116,9 +144,9 @@ impl Model {
         let count = inputs.len().min(outputs.len());
         if let Some(step_batch) = self.table.step_batch {
             // SAFETY: as in `prepare`; both slices hold at least `count` structs and do not overlap (`&`, `&mut`).
-            let code =
-                unsafe { step_batch(self.instance, count as u64, inputs.as_ptr(), outputs.as_mut_ptr()) };
-            return CallStatus::from_code(code);
+            let stepped =
+                || unsafe { step_batch(self.instance, count as u64, inputs.as_ptr(), outputs.as_mut_ptr()) };
+            return CallStatus::from_code(keeping_floats(&mut self.float_changes, stepped));
         }
         for (input, output) in inputs.iter().zip(outputs) {
             match self.step(input, output) {
@@ -135,7 +163,8 @@ impl Model {
         let Some(set_parameter) = self.table.set_parameter else { return CallStatus::Unsupported };
         let Some(index) = live_index(self.parameters, index, value) else { return CallStatus::OutOfRange };
         // SAFETY: as in `prepare`.
-        CallStatus::from_code(unsafe { set_parameter(self.instance, index, value) })
+        let set = || unsafe { set_parameter(self.instance, index, value) };
+        CallStatus::from_code(keeping_floats(&mut self.float_changes, set))
     }
 
     /// The value in force of the parameter at `index`, presets resolved; NaN if unknown. Real-time.
@@ -144,14 +173,14 @@ impl Model {
         let Some(parameter) = self.table.parameter else { return f64::NAN };
         let Some(index) = index_of(self.parameters, index) else { return f64::NAN };
         // SAFETY: as in `prepare`.
-        unsafe { parameter(self.instance, index) }
+        keeping_floats(&mut self.float_changes, || unsafe { parameter(self.instance, index) })
     }
 
     /// Forgets history. Real-time: bounded, no allocation.
     pub fn reset(&mut self) -> CallStatus {
         let Some(reset) = self.table.reset else { return CallStatus::Ok };
         // SAFETY: as in `prepare`.
-        CallStatus::from_code(unsafe { reset(self.instance) })
+        CallStatus::from_code(keeping_floats(&mut self.float_changes, || unsafe { reset(self.instance) }))
     }
 
     /// What the model said when a call failed. Not real-time.
@@ -160,9 +189,11 @@ impl Model {
         let mut message = Message::default();
         if let Some(last_message) = self.table.last_message {
             // SAFETY: as in `prepare`.
-            unsafe { last_message(self.instance, &raw mut message) };
+            keeping_floats(&mut self.float_changes, || unsafe {
+                last_message(self.instance, &raw mut message)
+            });
         }
-        message.as_str().to_owned()
+        message.for_people()
     }
 }
 
@@ -170,7 +201,7 @@ impl Drop for Model {
     fn drop(&mut self) {
         if let Some(destroy) = self.table.destroy {
             // SAFETY: the instance came from `create` of this table and is not used after this.
-            unsafe { destroy(self.instance) };
+            keeping_floats(&mut self.float_changes, || unsafe { destroy(self.instance) });
         }
     }
 }
@@ -180,9 +211,9 @@ pub(crate) fn refusal_from(code: u32, message: &Message) -> Result<(), Refusal> 
     if code == 0 {
         return Ok(());
     }
-    let reason = match message.as_str() {
-        "" => format!("no reason given (code {code})"),
-        text => text.to_owned(),
+    let reason = match message.for_people() {
+        text if text.is_empty() => format!("no reason given (code {code})"),
+        text => text,
     };
     Err(Refusal { kind: RefusalKind::from_code(code), reason })
 }

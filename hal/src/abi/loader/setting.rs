@@ -26,7 +26,7 @@ pub enum SettingError {
         nearest: Option<String>,
     },
     /// A number was expected.
-    #[error("`{id}` is a number{}, not `{value}`", if unit.is_empty() { String::new() } else { format!(" in {unit}") })]
+    #[error("`{id}` must be a number{}, not `{value}`", if unit.is_empty() { String::new() } else { format!(" in {unit}") })]
     NotANumber {
         /// The parameter.
         id: String,
@@ -36,7 +36,7 @@ pub enum SettingError {
         value: String,
     },
     /// The number is outside the range.
-    #[error("`{id}` = {}: legal is {} to {}{}", range.value, range.min, range.max, if unit.is_empty() { String::new() } else { format!(" {unit}") })]
+    #[error("`{id}` = {}: must be {} to {}{}", range.value, range.min, range.max, if unit.is_empty() { String::new() } else { format!(" {unit}") })]
     OutOfRange {
         /// The parameter.
         id: String,
@@ -46,7 +46,7 @@ pub enum SettingError {
         range: OutOfRange,
     },
     /// Not one of the choices.
-    #[error("`{id}` = `{value}`: legal is {}", choices.join(" | "))]
+    #[error("`{id}` = `{value}`: must be {}", choices.join(" | "))]
     NotAChoice {
         /// The parameter.
         id: String,

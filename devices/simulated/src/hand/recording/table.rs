@@ -26,7 +26,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<Sample>, String> {
         let add = |problem: String| format!("line {line}: {problem}");
         let mut numbers = [0.0; COLUMNS.len()];
         for ((number, text), column) in numbers.iter_mut().zip(&row).zip(COLUMNS) {
-            *number = text.parse().map_err(|_| add(format!("`{column}` is a number, not `{text}`")))?;
+            *number = text.parse().map_err(|_| add(format!("`{column}` must be a number, not `{text}`")))?;
         }
         let [time_s, x, y, z, rx, ry, rz] = numbers;
         let rotation_rad = DVec3::new(rx, ry, rz);

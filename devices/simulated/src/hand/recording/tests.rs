@@ -33,7 +33,7 @@ fn complaints_name_the_line_and_the_column() {
         ("", "line 1: the columns are time_s,x_m,y_m,z_m or time_s,"),
         ("t,x,y,z\n0,0,0,0\n", "line 1: the columns are"),
         ("time_s,x_m,y_m,z_m\n", "holds no pose"),
-        ("time_s,x_m,y_m,z_m\n0,0,0,0\n1,0,up,0\n", "line 3: `y_m` is a number, not `up`"),
+        ("time_s,x_m,y_m,z_m\n0,0,0,0\n1,0,up,0\n", "line 3: `y_m` must be a number, not `up`"),
         ("time_s,x_m,y_m,z_m\n0,0,0,0\n0,0,0,0\n", "line 3: time 0 ns is not after 0 ns"),
         ("time_s,x_m,y_m,z_m\n0,0,0,nan\n", "line 2: position_m is not a finite number"),
         ("time_s,x_m,y_m,z_m\n0,0,0,4\n", "line 2: ([0, 0, 4]) m is outside the workspace of"),
