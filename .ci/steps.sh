@@ -168,14 +168,29 @@ bits() {
     done
 }
 
-# Coverage-guided fuzzing of the maglev's frame decoder for a minute. The instrumentation is LLVM's, as `cargo fuzz` asks for it;
+# Coverage-guided fuzzing of the maglev's decoders, a minute each. The instrumentation is LLVM's, as `cargo fuzz` asks for it;
 # without its address sanitizer no nightly compiler is needed, and the decoder has no `unsafe`.
 fuzz() {
     local coverage="--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4
         -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table
         -Cllvm-args=-sanitizer-coverage-trace-compares"
-    RUSTFLAGS="$(echo $coverage)" cargo run --release --manifest-path devices/maglev/fuzz/Cargo.toml --target "$(target)" \
-        --target-dir target/fuzz --bin decode -- -max_total_time=60 -print_final_stats=1
+    for decoder in decode ml_api; do
+        RUSTFLAGS="$(echo $coverage)" cargo run --release --manifest-path devices/maglev/fuzz/Cargo.toml \
+            --target "$(target)" --target-dir target/fuzz --bin "$decoder" -- -max_total_time=60 -print_final_stats=1
+    done
+}
+
+# Advisories, licences and sources of all workspaces by deny.toml. The daily tests compare licences and sources without it; it
+# needs the network, for the advisories, and `cargo install cargo-deny --locked`.
+deny() {
+    local workspace
+    if ! command -v cargo-deny >/dev/null; then
+        echo "skipped: cargo-deny is not installed"
+        return 0
+    fi
+    for workspace in . host/python host/bridge host/sweep; do
+        cargo deny --manifest-path "$workspace/Cargo.toml" check --config deny.toml advisories licenses sources
+    done
 }
 
 # The Python wheel as a user installs it, and its tests against the command: models, runs, sweeps on threads and Dask; and the
@@ -187,7 +202,22 @@ wheel() {
     cargo build --release
     cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target/sweep
     FLOTOR=target/release/flotor FLOTOR_SWEEP=target/sweep/release/flotor-sweep target/venv/bin/python -m pytest -q host/python
+    # Whatever array is passed, no call of ours reads or writes beside it; CPython and the loader have findings of their own.
+    PYTHONMALLOC=malloc valgrind --error-limit=no --num-callers=40 --log-file=target/wheel-memory.log target/venv/bin/python -m pytest \
+        -q -p no:cacheprovider host/python/tests/test_model.py -k "whatever_lies or share_memory or not_aligned"
+    if grep "_flotor\|libflotor" target/wheel-memory.log; then return 1; fi
     FLOTOR_TEST_SIZE=full FLOTOR_PYTHON=$PWD/target/venv/bin/python cargo test --release -p flotor-tests --test system book::
+}
+
+# Programs of other makers' interfaces, as they are published: each drives the simulated flotor for a minute at its own pace.
+programs() {
+    cargo build --release -p flotor -p flotor-simulated -p flotor-dhd -p flotor-openhaptics -p flotor-chai3d
+    python3 -m venv target/programs
+    target/programs/bin/pip install --quiet forcedimension-core==1.0.0 pyopenhaptics==1.0.1
+    target/release/flotor lend --api dhd -- target/programs/bin/python tests/programs/dhd.py 60
+    target/release/flotor lend --api openhaptics -- target/programs/bin/python tests/programs/openhaptics.py 60
+    cc -std=c11 -Wall -Wextra -Werror -O2 -o target/programs/phantom tests/c/programs/phantom.c -ldl -lm -lpthread
+    target/release/flotor lend --api chai3d -- target/programs/phantom plain 60000
 }
 
 # The sweeper: a table of every kind.

@@ -1,5 +1,5 @@
 /* A force model in C that ends the process, or takes signals away from the host, as the environment variable FIXTURE_DEATH
- * says: until tick 300 of a run it is an honest spring to home. */
+ * says: until tick 400 of a run it is an honest spring to home. Where it loops, it makes the file FIXTURE_MARK before. */
 #define _GNU_SOURCE
 #include "flotor.h"
 #include <math.h>
@@ -17,7 +17,7 @@ FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-c-dies\"\nname = \"Dies\"\ndoc
                 "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_dies\"\n");
 
 static const double stiffness_n_per_m = 200.0;
-static const uint64_t at_tick = 300;
+static const uint64_t at_tick = 400;
 static volatile int zero = 0;
 static char death[64] = "none";
 
@@ -36,6 +36,11 @@ static void take_signals(void) {
 }
 
 static void loop(void) {
+    const char *mark = getenv("FIXTURE_MARK");
+    FILE *file = mark == NULL ? NULL : fopen(mark, "w");
+    if (file != NULL) {
+        fclose(file);
+    }
     while (zero == 0) {
     }
 }

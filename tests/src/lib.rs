@@ -7,6 +7,7 @@ pub mod library;
 pub mod process;
 pub mod program;
 pub mod scratch;
+pub mod side_by_side;
 pub mod tables;
 pub mod tools;
 pub mod watched;
@@ -99,7 +100,7 @@ impl TestSize {
             Err(_) => Self::Quick,
             Ok(word) => match Self::from_word(&word) {
                 Some(size) => size,
-                None => panic!("{}={word}: legal is quick or full", Self::VARIABLE),
+                None => panic!("{}={word}: quick or full is expected", Self::VARIABLE),
             },
         }
     }

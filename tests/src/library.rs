@@ -1,6 +1,8 @@
 //! Shared libraries to load: the plugins cargo has built, copies of them with other bytes, and C compiled on
 //! the spot.
 
+use flotor_hal::abi::PluginKind;
+use flotor_judge::validate::Check;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -13,6 +15,12 @@ pub fn build_folder() -> PathBuf {
     let own = std::env::current_exe().expect("a running test has a file");
     let deps = own.parent().expect("cargo runs tests from a folder");
     deps.parent().expect("and that folder is `deps`").to_path_buf()
+}
+
+/// How many rules `flotor validate` checks of a device.
+#[must_use]
+pub fn rules_of_a_device() -> usize {
+    Check::all().filter(|check| check.applies_to(PluginKind::Device)).count()
 }
 
 /// The library of a plugin crate of this workspace, built with the tests because they depend on it.

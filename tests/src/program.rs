@@ -2,6 +2,7 @@
 
 use crate::library::build_folder;
 use crate::process::Owned;
+use crate::scratch::Scratch;
 use std::ffi::OsStr;
 use std::io::Write;
 use std::ops::Deref;
@@ -28,6 +29,8 @@ pub mod exit_code {
 pub struct Flotor {
     command: Command,
     input: String,
+    /// Where its runs are found and its emergency stops stay: no test meets those of another, or of who runs the tests.
+    runtime: Scratch,
 }
 
 /// What came of a call.
@@ -52,7 +55,9 @@ impl Flotor {
         command.args(arguments).env_remove(flotor_session::registry::PATH_VARIABLE).env("NO_COLOR", "1");
         // What a plugin's panic would do to a terminal must not depend on how the tests were started.
         command.env("RUST_BACKTRACE", "1");
-        Self { command, input: String::new() }
+        let runtime = Scratch::default();
+        command.env("XDG_RUNTIME_DIR", runtime.path());
+        Self { command, input: String::new(), runtime }
     }
 
     /// Searches these folders for plugins, first to last, before the program's own.
@@ -122,7 +127,7 @@ impl Flotor {
         let (mut pipe, input) = (process.stdin.take().expect("a pipe was requested"), self.input);
         // On a thread of its own: neither side waits for the other to empty a full pipe.
         let writer = std::thread::spawn(move || pipe.write_all(input.as_bytes()));
-        Running { process, writer }
+        Running { process, writer, _runtime: self.runtime }
     }
 }
 
@@ -130,6 +135,7 @@ impl Flotor {
 pub struct Running {
     process: Owned,
     writer: JoinHandle<std::io::Result<()>>,
+    _runtime: Scratch,
 }
 
 impl Deref for Running {
@@ -171,7 +177,7 @@ impl Ran {
 }
 
 /// What `flotor` starts for its commands. Built, as itself, by the same `cargo test`, because each has an integration test.
-const SEPARATE: [&str; 3] = ["flotor-lab", "flotor-study", "flotor-calibration"];
+const SEPARATE: [&str; 4] = ["flotor-lab", "flotor-study", "flotor-calibration", "flotor-test"];
 
 /// The program beside the tests.
 fn program() -> PathBuf {

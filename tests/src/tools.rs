@@ -95,7 +95,9 @@ pub fn skipped(why: &str) {
 fn names(words: &str, tool: Tool) -> bool {
     let named = words.split(',').map(str::trim).filter(|word| !word.is_empty()).map(|word| {
         let known = Tool::ALL.into_iter().find(|tool| tool.word() == word);
-        known.unwrap_or_else(|| panic!("{VARIABLE}: no `{word}`; legal is {:?}", Tool::ALL.map(Tool::word)))
+        known.unwrap_or_else(|| {
+            panic!("{VARIABLE}: no `{word}`; one of {:?} is expected", Tool::ALL.map(Tool::word))
+        })
     });
     // All are looked at, for the wrong one among them.
     named.filter(|named| *named == tool).count() > 0

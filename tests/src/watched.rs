@@ -3,6 +3,7 @@
 use crate::library::build_folder;
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
+use flotor_live::Directory;
 use flotor_servo::{Clock, StopSwitch};
 use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
@@ -53,7 +54,9 @@ fn prepared_with(registry: &Registry, clock: Clock, scene: &str) -> Session {
 fn seeded(registry: &Registry, options: RunOptions, scene: &str) -> Session {
     let scene = Scene::parse(Path::new("scene.toml"), scene).expect("the scene is right");
     let session = Session::prepare(&scene, registry, &options);
-    session.unwrap_or_else(|error| panic!("it does not start: {error}"))
+    let session = session.unwrap_or_else(|error| panic!("it does not start: {error}"));
+    // No folder: an emergency stop of a test stays with its run.
+    session.latched_in(&Directory::at("/dev/null/no-folder"))
 }
 
 /// Runs the text of a scene on the virtual clock; as [`prepared`].

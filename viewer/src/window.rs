@@ -65,7 +65,7 @@ fn size(text: &str) -> Result<[usize; 2], String> {
 
 /// `10`
 fn seconds(text: &str) -> Result<Duration, String> {
-    let wrong = || format!("`{text}` is no time to watch a window; legal is 1 to 3600 seconds");
+    let wrong = || format!("`{text}` is no time to watch a window; it must be 1 to 3600 seconds");
     let seconds: f64 =
         text.parse().ok().filter(|seconds| (1.0..=3600.0).contains(seconds)).ok_or_else(wrong)?;
     Ok(Duration::from_secs_f64(seconds))
@@ -73,7 +73,7 @@ fn seconds(text: &str) -> Result<Duration, String> {
 
 /// `1.5`
 fn scale(text: &str) -> Result<f32, String> {
-    let wrong = || format!("`{text}` is no size of text; legal is 1 to 3");
+    let wrong = || format!("`{text}` is no size of text; it must be 1 to 3");
     text.parse().ok().filter(|scale| (1.0..=3.0).contains(scale)).ok_or_else(wrong)
 }
 

@@ -22,8 +22,24 @@ typedef struct {
     double way_m_s; /* height integrated over time */
 } Spring;
 
+#ifdef TEXT_OF_BYTES
+#define DOC {(const uint8_t *)"Stiffness \xff", 11}
+#elif defined(TEXT_WITHOUT_END)
+#define DOC {(const uint8_t *)"Stiffness", (size_t)1 << 50}
+#elif defined(TEXT_NOWHERE)
+#define DOC {NULL, 9}
+#else
+#define DOC FLOTOR_STR("Stiffness of the spring")
+#endif
+#ifdef CHOICES_WITHOUT_END
+static const FlotorStr word = FLOTOR_STR("one");
+#define CHOICES {&word, (size_t)1 << 50}
+#else
+#define CHOICES {NULL, 0}
+#endif
+
 static const FlotorParameter parameters[] = {
-    {.id = FLOTOR_STR("stiffness_n_per_m"), .unit = FLOTOR_STR("N/m"), .doc = FLOTOR_STR("Stiffness of the spring"),
+    {.id = FLOTOR_STR("stiffness_n_per_m"), .unit = FLOTOR_STR("N/m"), .doc = DOC, .choices = CHOICES,
      .kind = FlotorParameterKind_Real, .mutability = FlotorMutability_Live, .min = 0.0, .max = 2000.0, .default_ = 500.0},
 };
 
@@ -177,9 +193,20 @@ static uint32_t reset(FlotorInstance instance) {
 
 static const FlotorForceTable table = {
     .size = sizeof(FlotorForceTable),
+#ifdef PARAMETERS_WITHOUT_END
+    .parameter_count = 1000000,
+#else
     .parameter_count = 1,
+#endif
+#ifndef PARAMETERS_NOWHERE
     .parameters = parameters,
-    .info = {.id = FLOTOR_STR("fixture-c-bad-model"), .name = FLOTOR_STR("Bad model"),
+#endif
+#ifdef OTHER_ID
+    .info = {.id = FLOTOR_STR("fixture-c-other-model"),
+#else
+    .info = {.id = FLOTOR_STR("fixture-c-bad-model"),
+#endif
+             .name = FLOTOR_STR("Bad model"),
              .doc = FLOTOR_STR("A spring with a mistake"),
              .serves = {FLOTOR_DEMAND_FORCE | FLOTOR_DEMAND_TORQUE}, .memory = MEMORY},
     .create = create,

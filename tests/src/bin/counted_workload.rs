@@ -22,7 +22,7 @@ use flotor_spring::pose::Pose;
 use flotor_spring::precision::Precision;
 use flotor_spring::preset::Preset;
 use flotor_spring::response::Demand;
-use flotor_spring::rod::{Accuracy, Coils, Rod};
+use flotor_spring::rod::{Accuracy, Rod};
 use flotor_spring::rod_blend::RodBlend;
 use flotor_spring::thesis::Thesis;
 use flotor_tests::watched::prepared;
@@ -117,22 +117,29 @@ fn replacements(ticks: u32) -> String {
 /// The workspace of the thesis: a quarter of the free length, seven degrees.
 const WORKSPACE: Workspace = Workspace { shear: 0.25, height: 0.3, tilt_rad: 0.12, yaw_rad: 0.12 };
 
-/// Two parts of each law: printed, closed-form, energy, energy that may blend, and the batches of closed-form and
-/// energy.
+/// Two parts of each law: printed, closed-form, energy; energy and energy that may blend where the rod has no share; and the
+/// batches of closed-form and energy.
 fn laws() {
     let spring = Preset::Thesis1.spring();
     let (_, _, stiffness) = Preset::Thesis1.parameters();
     let mut sampler = Sampler::new(3);
-    let poses: Vec<Pose> =
-        (0..1024).map(|_| WORKSPACE.pose(&mut sampler, spring.geometry().free_length_m)).collect();
+    let mut drawn = || WORKSPACE.pose(&mut sampler, spring.geometry().free_length_m);
+    let poses: Vec<Pose> = (0..1024).map(|_| drawn()).collect();
     let printed = Thesis::new(&spring, stiffness, Precision::Double);
     let closed = ClosedForm::new(&spring, Form::Printed);
     let energy = EnergyForm::new(&spring);
-    let mut blending = RodBlend::new(&spring, Coils::Pass);
+    let mut blending = RodBlend::new(&spring);
+    let mut has_no_rod = |pose: &Pose| {
+        let _ = blending.respond(pose, Demand::Wrench);
+        blending.share() == 0.0
+    };
+    let without_rod: Vec<Pose> =
+        std::iter::repeat_with(drawn).filter(|pose| has_no_rod(pose)).take(1024).collect();
     law(&poses, |pose| printed.respond(pose, Demand::Wrench));
     law(&poses, |pose| closed.respond(pose, Demand::Wrench));
     law(&poses, |pose| energy.respond(pose, Demand::Wrench));
-    law(&poses, |pose| blending.respond(pose, Demand::Wrench));
+    law(&without_rod, |pose| energy.respond(pose, Demand::Wrench));
+    law(&without_rod, |pose| blending.respond(pose, Demand::Wrench));
 
     let input = |pose: &Pose| Input {
         demand: Demanded::WRENCH,

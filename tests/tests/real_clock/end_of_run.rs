@@ -8,11 +8,13 @@ use flotor_hal::{
     ActiveDevice, Axes, Capabilities, Cycle, Device, DeviceInfo, DeviceState, LoopConfig, Refusal, SafeStop,
     Settings, Tick, Wrench,
 };
+use flotor_live::Directory;
 use flotor_servo::RunEnd;
 use flotor_servo::{Clock, EmergencySource, StopSwitch};
 use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
 use flotor_session::{Observer, RunOptions, Session};
+use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::{watch, watch_on};
 use std::path::Path;
 use std::sync::Mutex;
@@ -118,11 +120,16 @@ fn a_device_is_energised_and_stopped_by_the_loops_own_thread_whatever_an_observe
     let registry = Registry::search(&[]).with_linked(&ENTRY).expect("it is a plugin");
     let options = RunOptions { clock: Clock::Real, seed: 1 };
     let session = Session::prepare(&scene, &registry, &options).expect("it starts");
+    let scratch = Scratch::default();
+    let directory = Directory::at(scratch.path().join("runs"));
+    let session = session.latched_in(&directory);
     let energised_by = || ENERGISED_BY.lock().expect("nobody panics with it").clone();
     assert_eq!(energised_by(), None, "before it runs nothing is energised");
     let mut dawdler = Dawdler::default();
     let outcome = session.run(&mut dawdler, &StopSwitch::default()).expect("it runs");
     assert_eq!(outcome.end, RunEnd::EmergencyStop(EmergencySource::Button));
+    let pressed = directory.latch().state().pressed.expect("it stays");
+    assert!(pressed.who.starts_with("emergency stop (button of the device)"), "{pressed}");
     assert!(dawdler.saw_it_stopped, "the device was stopped after the observer had looked");
     assert_eq!(energised_by().as_deref(), Some("flotor-servo"));
 }

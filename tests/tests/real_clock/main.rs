@@ -1,13 +1,22 @@
-//! What depends on the machine's clock: in a program of its own and one test after the other, so that nothing else runs beside it.
+//! What depends on the machine's clock: in a program of its own, so that nothing runs beside a test but what it allows.
 
+mod board;
 mod deaths;
 mod end_of_run;
 mod jitter;
+mod lateness;
+mod signals;
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+
+static TURN: RwLock<()> = RwLock::new(());
 
 /// Waits until no other test of this program runs.
-fn alone() -> MutexGuard<'static, ()> {
-    static TURN: Mutex<()> = Mutex::new(());
-    TURN.lock().unwrap_or_else(PoisonError::into_inner) // a test that failed has ended, too
+fn alone() -> RwLockWriteGuard<'static, ()> {
+    TURN.write().unwrap_or_else(PoisonError::into_inner) // a test that failed has ended, too
+}
+
+/// Waits until only tests run that wait more than they compute.
+fn among_idle_ones() -> RwLockReadGuard<'static, ()> {
+    TURN.read().unwrap_or_else(PoisonError::into_inner)
 }

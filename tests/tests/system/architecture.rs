@@ -29,14 +29,24 @@ enum Role {
     Live,
     /// Embeds Flotor in a program.
     Session,
+    /// What the libraries that stand in for other makers' share.
+    Compat,
+    /// A library that answers where a program calls another maker's.
+    DropIn,
     /// Knows numbers only.
     Statistics,
     /// Draws, and knows nothing of what.
     Plot,
     /// What the programs share: options, output, errors.
     Command,
+    /// Judges models and devices.
+    Judge,
     Lab,
+    /// An allocator for one process of the lab.
+    Guard,
     Calibration,
+    /// Judges runs from outside.
+    SceneTest,
     Study,
     Host,
     Viewer,
@@ -46,8 +56,8 @@ enum Role {
 }
 
 use Role::{
-    Calibration, Command, Contract, Core, Emulator, Fixture, Host, Lab, Live, Plot, Plugin, Record, Servo,
-    Session, Statistics, Study, Sync, Tests, Viewer,
+    Calibration, Command, Compat, Contract, Core, DropIn, Emulator, Fixture, Guard, Host, Judge, Lab, Live,
+    Plot, Plugin, Record, SceneTest, Servo, Session, Statistics, Study, Sync, Tests, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
@@ -59,11 +69,19 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("host/record", Record, &[Contract, Sync, Core]),
     ("host/live", Live, &[Contract, Sync, Core, Record]),
     ("host/session", Session, &[Contract, Sync, Core, Servo, Record, Live]),
+    ("host/compat/common", Compat, &[Contract, Sync, Core, Servo, Record, Live, Session]),
+    ("host/compat/chai3d", DropIn, &[Contract, Compat]),
+    ("host/compat/openhaptics", DropIn, &[Contract, Compat]),
+    ("host/compat/dhd", DropIn, &[Contract, Compat]),
     ("host/statistics", Statistics, &[]),
     ("host/plot", Plot, &[]),
     ("host/command", Command, &[Contract, Sync, Core, Servo, Record, Live, Session]),
-    ("host/lab", Lab, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command]),
+    ("host/lab/guard", Guard, &[]),
+    ("host/judge", Judge, &[Contract, Core, Session, Plot]),
+    ("host/lab", Lab, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command, Judge]),
     ("host/calibration", Calibration, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command]),
+    // Neither the session nor the loader: everything it runs is a process of its own.
+    ("host/scene-test", SceneTest, &[Core, Command]),
     ("host/study", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Statistics, Command]),
     // The plugins only as paths, so that one `cargo run` builds them; no line of the host names them.
     ("host", Host, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command, Plugin]),
@@ -82,8 +100,11 @@ const CRATES: &[(&str, Role, &[Role])] = &[
             Plot,
             Command,
             Statistics,
+            Judge,
             Lab,
+            Guard,
             Calibration,
+            SceneTest,
             Study,
             Plugin,
             Emulator,
@@ -164,7 +185,10 @@ fn wrong_dependencies(members: &[Member]) -> Vec<String> {
                     member.name, member.role, used.name, used.role
                 ));
             }
-            let is_foreign = used.role == Role::Plugin && member.name != format!("{}-emulator", used.name);
+            // The simulated flotor has the coils and the sensors of every levitated device.
+            let is_foreign = used.role == Role::Plugin
+                && used.name != "flotor-simulated"
+                && member.name != format!("{}-emulator", used.name);
             if member.role == Role::Emulator && is_foreign {
                 complaints.push(format!("{} uses {}, which it does not emulate", member.name, used.name));
             }
@@ -202,6 +226,7 @@ fn a_plugin_that_uses_the_host_is_noticed() {
     assert_eq!(complaints("flotor-wall", Role::Plugin, "flotor-wall-emulator", Role::Emulator), 1);
     assert_eq!(complaints("flotor-wall-emulator", Role::Emulator, "flotor-wall", Role::Plugin), 0);
     assert_eq!(complaints("flotor-wall-emulator", Role::Emulator, "flotor-spring", Role::Plugin), 1);
+    assert_eq!(complaints("flotor-wall-emulator", Role::Emulator, "flotor-simulated", Role::Plugin), 0);
 }
 
 /// Crates a plugin is made of that belong to hosts and programs, and the contract with its loader. The lines are those of
@@ -306,6 +331,14 @@ const UNSAFE: &[(&str, &str)] = &[
     (
         "host/session/src/registry/mod.rs",
         "the one place of the host that loads a plugin file, which the user guarantees",
+    ),
+    (
+        "host/compat/",
+        "entry points in C for programs of other makers' interfaces, and what a library in another program hooks: `fork`, `exit`",
+    ),
+    (
+        "host/lab/guard/src/lib.rs",
+        "an allocator in the place of the C library's, for the one process in which `validate` looks for overruns",
     ),
     ("viewer/src/shape.rs", "the one place of the viewer that loads a plugin file"),
     (

@@ -112,9 +112,7 @@ fn what_cannot_be_is_told_with_file_and_line() {
         ran.error().to_owned()
     };
     let no_field = error("plugin = \"spring\"\n[model.field]\nrate_hz = 200\n");
-    assert!(no_field.contains("scene.toml:5") && no_field.contains("no linear field"), "{no_field}");
-    let isolated = error("plugin = \"membrane\"\nisolation = \"process\"\n[model.field]\nrate_hz = 200\n");
-    assert!(isolated.contains("process of its own"), "{isolated}");
+    assert!(no_field.contains("scene.toml:5") && no_field.contains("no local linear model"), "{no_field}");
     let late = error("plugin = \"membrane\"\n[model.field]\nrate_hz = 200\nlatency_ms = 6\n");
     assert!(late.contains("latency_ms"), "{late}");
 }

@@ -60,7 +60,7 @@ impl Mark {
             "run" if !rest.is_empty() => Ok(Some(Self::Run(rest))),
             "file" if !rest.is_empty() => Ok(Some(Self::File(rest))),
             _ => Err(format!(
-                "`{said}`: legal is `skip, needs ...`, `full, takes ...`, `numbers, WHY`, `run ...`, `file ...`"
+                "`{said}`: a marker is `skip, needs ...`, `full, takes ...`, `numbers, WHY`, `run ...`, `file ...`"
             )),
         }
     }

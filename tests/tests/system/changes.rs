@@ -128,16 +128,16 @@ fn what_is_wrong_with_a_change_is_said_before_it_reaches_the_loop() {
         };
         assert_eq!(
             complaint("frist", "gamma_n", "20"),
-            "there is no plugin `frist`; did you mean `first`? (plugins: device, first, second)"
+            "the run has no plugin `frist`; did you mean `first`? (its plugins: device, first, second)"
         );
         assert_eq!(
             complaint("first", "gama_n", "20"),
             "[first] no parameter `gama_n`; did you mean `gamma_n`?"
         );
-        assert!(complaint("first", "gamma_n", "1e9").contains("legal is 0.01 to 10000 N"));
+        assert!(complaint("first", "gamma_n", "1e9").contains("must be 0.01 to 10000 N"));
         let fixed = complaint("first", "variant", "thesis");
         assert!(
-            fixed.starts_with("[first] `variant` cannot change while the loop runs; what can: "),
+            fixed.starts_with("[first] `variant` cannot change while the loop runs; parameters that can: "),
             "{fixed}"
         );
         // One that is wrong holds back the others of its group.

@@ -180,14 +180,14 @@ fn what_is_wrong_with_places_and_mixing_is_said() {
         ),
         (
             "[model.mapping]\npositions_mm = [[0, 0]]\n",
-            "scene.toml:7: `model.mapping.positions_mm` is a list of 1 to 1000000 points, each three numbers from \
+            "scene.toml:7: `model.mapping.positions_mm` must be a list of 1 to 1000000 points, each three numbers from \
              -10000 to 10000",
         ),
         (
             "[model.mapping]\npositions_mm = [[0, 0, 0]]\ngrid = { count = 1, spacing_mm = 1 }\n",
             "scene.toml:7: a model has `positions_mm` or a `grid`, not both",
         ),
-        ("[model.blend]\nweight = 2\n", "scene.toml:7: `model.blend.weight` = 2: legal is 0 to 1"),
+        ("[model.blend]\nweight = 2\n", "scene.toml:7: `model.blend.weight` = 2: must be 0 to 1"),
         (
             "[[change]]\nat_s = 1\nweight = \"wall\"\n",
             "scene.toml:8: `change.weight`: `wall` is not MODEL=WEIGHT with a weight from 0 to 1, like spring=0.5",

@@ -85,6 +85,7 @@ fn all() -> BTreeMap<String, String> {
         folder
             .map(|file| file.expect("it can be read").path())
             .filter(|file| file.extension() == Some("toml".as_ref()))
+            .filter(|file| !file.to_string_lossy().ends_with(".test.toml"))
     };
     let stem = |file: &std::path::Path| file.file_stem().expect("it has a name").display().to_string();
     for file in folder("host/scenes").filter(|file| !NOT_VIRTUAL.contains(&stem(file).as_str())) {

@@ -262,6 +262,46 @@ fn the_emergency_stop_of_a_watcher_is_one() {
     assert_eq!(ticks, 1);
 }
 
+/// Of any program's making: it connects and says nothing.
+fn idle(directory: &Directory) -> UnixStream {
+    let run = directory.runs().into_iter().next().expect("there is a run");
+    UnixStream::connect(run.path).expect("anybody may connect")
+}
+
+#[test]
+fn who_only_occupies_the_socket_locks_no_emergency_stop_out() {
+    let meet = |directory: &Directory| {
+        let idle: Vec<UnixStream> = (0..40).map(|_| idle(directory)).collect();
+        (idle, connect(directory), false)
+    };
+    let (_, ticks, outcome, _) = run_watched(Clock::Virtual, meet, |(_, client, pressed), _| {
+        if !*pressed {
+            *pressed = true;
+            assert_eq!(answer(client, Ask::EmergencyStop).refused, None);
+        }
+    });
+    assert_eq!(outcome.end, RunEnd::EmergencyStop(EmergencySource::Watcher));
+    assert!(ticks < 2000, "{ticks}");
+}
+
+#[test]
+fn one_watcher_too_many_is_told_and_can_still_press_the_emergency_stop() {
+    let meet = |directory: &Directory| {
+        let watching: Vec<Client> = (0..16).map(|_| watch(directory, 1000)).collect();
+        let mut late = connect(directory);
+        let refused = answer(&mut late, Ask::Watch { every: 1 }).refused.expect("sixteen are enough");
+        assert_eq!(refused, "16 programs watch already; close one of them");
+        (watching, late, false)
+    };
+    let (_, _, outcome, _) = run_watched(Clock::Virtual, meet, |(_, client, pressed), _| {
+        if !*pressed {
+            *pressed = true;
+            assert_eq!(answer(client, Ask::EmergencyStop).refused, None);
+        }
+    });
+    assert_eq!(outcome.end, RunEnd::EmergencyStop(EmergencySource::Watcher));
+}
+
 #[test]
 fn a_run_of_the_program_is_found_watched_and_stopped() {
     let scratch = Scratch::default();
@@ -309,7 +349,7 @@ fn a_model_of_a_run_of_the_program_is_replaced_from_another_terminal() {
             &["spring", "--set", "gama_n=3"],
             "--set gama_n: [spring] no parameter `gama_n`; did you mean `gamma_n`?",
         ),
-        (&["spring", "--set", "gamma_n=zz"], "`gamma_n` is a number in N, not `zz`"),
+        (&["spring", "--set", "gamma_n=zz"], "`gamma_n` must be a number in N, not `zz`"),
         (&["spring", "--plugin", "wal"], "--plugin: no model plugin `wal`; did you mean `wall`?"),
         (&["spring", "--run", "1"], &running_here),
     ] {

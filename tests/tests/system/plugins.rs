@@ -45,3 +45,11 @@ fn no_plugin_violates_a_rule() {
         assert!(findings.len() >= 7 && checked >= 3, "{folder}: {ran:?}");
     }
 }
+
+#[test]
+fn completions_end_in_order_where_their_reader_has_gone() {
+    let ran = Flotor::with(["completions", "bash"]).through_shell("\"$1\" completions bash | true").run();
+    assert_eq!(ran.stderr, "", "{ran:#?}");
+    let whole = Flotor::with(["completions", "bash"]).run();
+    assert!(whole.stdout.starts_with("_flotor()") && whole.stderr.is_empty(), "{}", whole.stderr);
+}

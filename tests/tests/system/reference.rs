@@ -30,8 +30,12 @@ fn committed(chapter: &str, text: &str) {
 fn commands() {
     let head = "# Reference: commands\n\nEvery command with its arguments, as `--help` says it. \
                 [Command line](../command-line.md) tells what they are for.\n\n";
-    let mut separate =
-        [flotor_lab::cli::command(), flotor_study::cli::command(), flotor_calibration::cli::command()];
+    let mut separate = [
+        flotor_lab::cli::command(),
+        flotor_study::cli::command(),
+        flotor_calibration::cli::command(),
+        flotor_test::cli::command(),
+    ];
     let commands = flotor_command::reference(flotor::cli::command(), &mut separate);
     committed("commands.md", &format!("{NOTE}{head}{commands}"));
 }

@@ -294,9 +294,15 @@ fn a_plugin_cut_off_anywhere_is_refused_before_any_of_it_is_mapped() {
 fn a_device_is_no_model_and_a_model_no_device() {
     let (spring, flotor) = (plugin_file("flotor-spring"), plugin_file("flotor-simulated"));
     let wrong = [
-        (model_scene(&flotor), "`simulated` is a device, a model is needed here; name another plugin"),
-        (scene(&spring, &spring, ""), "`spring` is a model, a device is needed here; name another plugin"),
-        (model_scene(Path::new("simulated")), "`simulated` is a device, a model is needed here"),
+        (
+            model_scene(&flotor),
+            "`simulated` is a device plugin, but a model is needed here; name another plugin",
+        ),
+        (
+            scene(&spring, &spring, ""),
+            "`spring` is a model plugin, but a device is needed here; name another plugin",
+        ),
+        (model_scene(Path::new("simulated")), "`simulated` is a device plugin, but a model is needed here"),
     ];
     for (scene, cause) in wrong {
         let ran = run_scene(&scene);
@@ -317,7 +323,7 @@ fn a_path_without_a_plugin_file_is_a_mistake_in_the_scene_or_command() {
         let ran = Flotor::with(["validate".as_ref(), path.as_os_str()]).run();
         assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
         assert!(
-            ran.error().ends_with("is no plugin file; `flotor plugins` lists the files of the ids"),
+            ran.error().ends_with("is not a plugin file; `flotor plugins` lists the file of each id"),
             "{ran:#?}"
         );
     }
@@ -325,7 +331,7 @@ fn a_path_without_a_plugin_file_is_a_mistake_in_the_scene_or_command() {
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
     let _ = scratch.file("bad.so", "I am no library.\n");
     let ran = Flotor::with(["eval", "--model", "bad.so", "--poses", "-"]).inside(scratch.path()).run();
-    assert!(ran.error().contains("(a file is written with a folder: `./bad.so`)"), "{ran:#?}");
+    assert!(ran.error().contains("(for the file of this name write `./bad.so`)"), "{ran:#?}");
 }
 
 #[test]
@@ -491,7 +497,7 @@ fn a_device_that_fails_before_the_start_is_a_refused_plugin() {
         ("refuses-to-activate", "the power supply is off; switch it on"),
         (
             "nan-limit",
-            "its capability `max_force_n` is [NaN, NaN, NaN]: legal is 0 to 100000 N on each axis; report this to the \
+            "its capability `max_force_n` is [NaN, NaN, NaN]: must be 0 to 100000 N on each axis; report this to the \
              author of the plugin",
         ),
     ];
@@ -585,7 +591,7 @@ fn a_device_without_a_usable_sample_gets_no_force_and_is_named_with_the_reason()
         }
         // 101 samples of this kind: a tenth of a second.
         let told = format!(
-            "{}: device fault: 101 samples cannot be ({why} 101), the first at tick {}; ",
+            "{}: device fault: 101 implausible samples ({why} 101), the first at tick {}; ",
             plugin_file(DEVICE).display(),
             last - 9
         );
@@ -601,7 +607,7 @@ fn a_device_that_jumps_about_is_found_out_although_every_pose_could_be() {
     for (sample, why) in [("teleports", "speed"), ("shakes", "acceleration")] {
         let (ran, commanded) = run_with_odd_samples(sample);
         assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{sample}: {ran:#?}");
-        assert!(ran.error().contains(&format!(" cannot be ({why} ")), "{sample}: {ran:#?}");
+        assert!(ran.error().contains(&format!(" implausible samples ({why} ")), "{sample}: {ran:#?}");
         let with_force = commanded.iter().filter(|(tick, force_n)| *tick >= 50 && *force_n != 0.0).count();
         assert!(with_force < 50, "{sample}: {with_force} ticks with a force before it is withdrawn");
         assert!(ran.stdout.contains("holding "), "{sample}: {ran:#?}");
@@ -612,13 +618,13 @@ fn a_device_that_jumps_about_is_found_out_although_every_pose_could_be() {
 fn a_sample_in_ten_that_cannot_be_takes_the_force_away_and_a_single_one_is_borne_and_told() {
     let (ran, commanded) = run_with_odd_samples("far-once-in-ten");
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
-    assert!(ran.stdout.contains("cannot be (range 95), the first at tick 50"), "{ran:#?}");
+    assert!(ran.stdout.contains("95 implausible samples (range 95), the first at tick 50"), "{ran:#?}");
     assert!(commanded.iter().all(|(_, force_n)| [0.0, 0.1].contains(force_n)));
     assert!(commanded.iter().filter(|(tick, _)| *tick >= 300).all(|(_, force_n)| *force_n == 0.0));
 
     let (ran, commanded) = run_with_odd_samples("far-once");
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
-    assert!(ran.stdout.contains("1 sample cannot be (range 1), the first at tick 50"), "{ran:#?}");
+    assert!(ran.stdout.contains("1 implausible sample (range 1), the first at tick 50"), "{ran:#?}");
     assert!(ran.stdout.contains("implausible_sample 1"), "{ran:#?}");
     assert!(commanded.iter().all(|(_, force_n)| *force_n == 0.1), "nothing of it is felt");
 }
@@ -783,5 +789,5 @@ fn emulate_helps_with_itself_until_a_name_is_given() {
     assert!(ran.error().starts_with("`--port` is no id of a device's plugin"), "{ran:#?}");
     let ran = Flotor::with(["emulate", "maglev", "--set", "preset=xx"]).run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
-    assert!(ran.error().starts_with("--set preset=xx: `preset` = `xx`: legal is "), "{ran:#?}");
+    assert!(ran.error().starts_with("--set preset=xx: `preset` = `xx`: must be "), "{ran:#?}");
 }

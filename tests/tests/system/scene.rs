@@ -99,32 +99,32 @@ fn an_unknown_key_is_named_with_its_line_and_the_closest_valid_one() {
 #[test]
 fn wrong_types_and_ranges_say_what_would_be_right() {
     for (piece, wrong, expected) in [
-        ("rate_hz = 1000", "rate_hz = \"fast\"", "scene.toml:2: `rate_hz` is a number"),
-        ("rate_hz = 1000", "rate_hz = 5", "`rate_hz` = 5: legal is 100 to 10000"),
-        ("rate_hz = 1000", "rate_hz = nan", "`rate_hz` = NaN: legal is 100 to 10000"),
+        ("rate_hz = 1000", "rate_hz = \"fast\"", "scene.toml:2: `rate_hz` must be a number"),
+        ("rate_hz = 1000", "rate_hz = 5", "`rate_hz` = 5: must be 100 to 10000"),
+        ("rate_hz = 1000", "rate_hz = nan", "`rate_hz` = NaN: must be 100 to 10000"),
         (
             "[30, 30, 60]",
             "[30, 30]",
-            "scene.toml:14: `limits.force_n` is one number, the largest norm, or three",
+            "scene.toml:14: `limits.force_n` must be one number (the largest norm) or three numbers",
         ),
         (
             "[30, 30, 60]",
             "\"10 N\"",
-            "scene.toml:14: `limits.force_n` is one number, the largest norm, or three",
+            "scene.toml:14: `limits.force_n` must be one number (the largest norm) or three numbers",
         ),
-        ("[30, 30, 60]", "-1", "scene.toml:14: `limits.force_n` = -1: legal is 0 or more"),
-        ("[30, 30, 60]", "[30, nan, 60]", "`limits.force_n` = NaN: legal is 0 or more"),
+        ("[30, 30, 60]", "-1", "scene.toml:14: `limits.force_n` = -1: must be 0 or more"),
+        ("[30, 30, 60]", "[30, nan, 60]", "`limits.force_n` = NaN: must be 0 or more"),
         ("[30, 30, 60]", "{ norm = 5 }", "scene.toml:14: `limits.force_n.axes` is missing"),
-        ("[30, 30, 60]", "{ norm = -5, axes = [1, 1, 1] }", "`limits.force_n.norm` = -5: legal is 0 or more"),
+        ("[30, 30, 60]", "{ norm = -5, axes = [1, 1, 1] }", "`limits.force_n.norm` = -5: must be 0 or more"),
         ("[30, 30, 60]", "{ norm = 5, axis = [1, 1, 1] }", "`limits.force_n.axis`; did you mean `axes`?"),
         (
             "force_n = [30, 30, 60]",
             "velocity_m_per_s = 0",
-            "`limits.velocity_m_per_s` = 0: legal is 0.000001 or more",
+            "`limits.velocity_m_per_s` = 0: must be 0.000001 or more",
         ),
         ("[device]\nplugin = \"simulated\"", "", "scene.toml:1: `device` is missing"),
         ("plugin = \"spring\"", "", "`model.plugin` is missing"),
-        ("plugin = \"spring\"", "plugin = 3", "`model.plugin` is text in quotes"),
+        ("plugin = \"spring\"", "plugin = 3", "`model.plugin` must be text in quotes"),
         (
             "motion_scale = 1.6666666666666667",
             "rotation_xyzw = [0, 0, 0, 2]",
@@ -151,14 +151,14 @@ fn wrong_types_and_ranges_say_what_would_be_right() {
         (
             "plugin = \"spring\"",
             "plugin = \"spring\"\ndevice = []",
-            "scene.toml:9: `model.device` names no device; name one at least",
+            "scene.toml:9: `model.device` names no device; name at least one",
         ),
         (
             "force_n = [30, 30, 60]",
             "emergency_button = 1.7",
-            "scene.toml:14: `limits.emergency_button` is a whole number from 0 to 31",
+            "scene.toml:14: `limits.emergency_button` must be a whole number from 0 to 31",
         ),
-        ("force_n = [30, 30, 60]", "emergency_button = 32", "is a whole number from 0 to 31"),
+        ("force_n = [30, 30, 60]", "emergency_button = 32", "must be a whole number from 0 to 31"),
     ] {
         let complaint = spoiled(piece, wrong);
         assert!(complaint.contains(expected), "{complaint}");
@@ -181,8 +181,8 @@ fn a_watchdog_waits_for_three_periods_at_least() {
         [(1000, "2.9", "3 to 60000"), (100, "20", "30 to 60000"), (700, "4", "4.29 to 60000")]
     {
         let expected = format!(
-            "scene.toml:14: `limits.watchdog_ms` = {short}: legal at {rate_hz} Hz is {legal}, \
-             three periods of the loop at least"
+            "scene.toml:14: `limits.watchdog_ms` = {short}: at {rate_hz} Hz it must be {legal}, \
+             at least three periods of the loop"
         );
         assert_eq!(complaint(&with(rate_hz, short)), expected);
     }
@@ -197,7 +197,7 @@ fn a_watchdog_waits_for_three_periods_at_least() {
     let ran = at("200");
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
     assert!(
-        ran.error().starts_with("--rate: `limits.watchdog_ms` = 10: legal at 200 Hz is 15 to"),
+        ran.error().starts_with("--rate: `limits.watchdog_ms` = 10: at 200 Hz it must be 15 to"),
         "{ran:?}"
     );
 }
@@ -208,10 +208,10 @@ fn parameters_are_checked_against_the_plugin_and_complain_with_file_and_line() {
     let with_parameters = |text: &str| format!("{RIGHT}\n[device.parameters]\n{text}\n");
     for (parameters, expected) in [
         ("mass_gk = 1", "scene.toml:20: [device] no parameter `mass_gk`; did you mean `mass_kg`?"),
-        ("mass_kg = -1", "scene.toml:20: [device] `mass_kg` = -1: legal is 0.01 to 10 kg"),
-        ("hand = \"squeeze\"", "legal is oscillate | press | release | hold | open"),
-        ("mass_kg = true", "`mass_kg` is a number in kg, not `true`"),
-        ("mass_kg = \"heavy\"", "`mass_kg` is a number in kg, not `heavy`"),
+        ("mass_kg = -1", "scene.toml:20: [device] `mass_kg` = -1: must be 0.01 to 10 kg"),
+        ("hand = \"squeeze\"", "must be oscillate | press | release | hold | open"),
+        ("mass_kg = true", "`mass_kg` must be a number in kg, not `true`"),
+        ("mass_kg = \"heavy\"", "`mass_kg` must be a number in kg, not `heavy`"),
     ] {
         let scene = scratch.file("scene.toml", with_parameters(parameters));
         let ran = Flotor::with(["run", "--clock", "virtual", &scene.display().to_string()]).run();
@@ -223,7 +223,10 @@ fn parameters_are_checked_against_the_plugin_and_complain_with_file_and_line() {
 #[test]
 fn what_the_command_line_gets_wrong_is_said_there() {
     for (arguments, expected) in [
-        (&["run", "--set", "sprng.gamma_n=17"][..], "there is no plugin `sprng`; did you mean `spring`?"),
+        (
+            &["run", "--set", "sprng.gamma_n=17"][..],
+            "the scene has no plugin `sprng`; did you mean `spring`?",
+        ),
         (&["run", "--set", "spring.gama_n=17"], "no parameter `gama_n`; did you mean `gamma_n`?"),
         (&["run", "--set", "spring.alpha_n_mm2=170"], "set `mode` to `alpha` as well"),
         (&["run", "--clock", "virtual", "--core", "0"], "--core needs the real clock"),

@@ -275,9 +275,9 @@ fn the_plain_flotor_tells_when_more_than_its_limits_is_commanded() {
 #[test]
 fn bad_parameters_are_refused_before_anything_moves_with_the_reason() {
     for (settings, reason) in [
-        (&["mass_kg=-0.58"][..], "`mass_kg` = -0.58: legal is 0.01 to 10 kg"),
-        (&["mass_kg=nan"], "`mass_kg` = NaN: legal is"),
-        (&["mass_kg=heavy"], "`mass_kg` is a number in kg, not `heavy`"),
+        (&["mass_kg=-0.58"][..], "`mass_kg` = -0.58: must be 0.01 to 10 kg"),
+        (&["mass_kg=nan"], "`mass_kg` = NaN: must be"),
+        (&["mass_kg=heavy"], "`mass_kg` must be a number in kg, not `heavy`"),
         (&["inertia_z_kg_m2=0.5"], "no body has the moments of inertia"),
         (&["fault=sensor-loss"], "`fault` has no say in preset `plain`"),
         (&["velocity=kalman", "preset=plain"], "set `preset` to `full` as well"),

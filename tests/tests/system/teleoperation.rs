@@ -297,7 +297,7 @@ fn what_is_wrong_with_devices_and_couplings_is_said() {
         ),
         (
             format!("{two}[[model]]\nplugin = \"spring\"\ndevice = \"left\"\nname = \"a@b\"\n"),
-            "`@` in a name stands between a model and its device",
+            "a name must not contain `@`, which separates a model from its device",
         ),
         (format!("{two}[[coupling]]\nend = [{{ device = \"left\" }}]\n"), "a coupling has two ends"),
         (
@@ -329,7 +329,7 @@ fn what_is_wrong_with_devices_and_couplings_is_said() {
             format!(
                 "{two}[[coupling]]\ndelay_ticks = 0\nend = [{{ device = \"left\" }}, {{ device = \"right\" }}]\n"
             ),
-            "`coupling.delay_ticks` is a whole number from 1 to 4096",
+            "`coupling.delay_ticks` must be a whole number from 1 to 4096",
         ),
     ] {
         let told = complaint(&wrong);

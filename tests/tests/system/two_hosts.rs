@@ -3,14 +3,17 @@
 //! The same sessions, envelopes and ends as on two machines; what differs is the transport of the peer state. The
 //! bridge's own tests run over Zenoh.
 
+mod liars;
+
 use flotor_core::peer::Dispatch;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, Fault};
 use flotor_servo::CouplingOutcome;
 use flotor_servo::RunEnd;
-use flotor_servo::coupling::Line;
+use flotor_servo::coupling::{Cut, Line};
 use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
+use flotor_session::telemetry::Pairing;
 use flotor_session::{Observer, Steps};
 use flotor_tests::TestSize;
 use rayon::prelude::*;
@@ -35,13 +38,11 @@ fn scene(hand: &str, duration_s: f64, more: &str) -> String {
 
 /// One of the hosts.
 struct Host {
-    /// A later one has a higher number.
-    run: u64,
+    /// Who its partner is, as a peer link has it.
+    pairing: Pairing,
     steps: Steps,
     line: Line,
     version: u64,
-    /// What came last, if anything did.
-    newest: Option<Dispatch>,
     records: Kept,
     end: Option<RunEnd>,
 }
@@ -62,7 +63,8 @@ impl Host {
         let mut lines = steps.take_lines();
         let (name, line) = lines.pop().expect("the scene has a coupling");
         assert_eq!((name.as_str(), lines.len()), ("pair", 0));
-        Self { run, steps, line, version: 0, newest: None, records: Kept::default(), end: None }
+        let pairing = Pairing::new(run, line.silence_ns);
+        Self { pairing, steps, line, version: 0, records: Kept::default(), end: None }
     }
 
     fn advance(&mut self) {
@@ -75,13 +77,12 @@ impl Host {
     fn told(&mut self) -> Option<Dispatch> {
         let (version, dispatch) = self.line.told.read().expect("nobody writes now");
         let is_new = std::mem::replace(&mut self.version, version) != version;
-        is_new.then_some(Dispatch { run: self.run, ..dispatch })
+        is_new.then(|| self.pairing.address(&dispatch))
     }
 
-    /// As a peer link does: only what is newer.
-    fn hear(&mut self, dispatch: Dispatch) {
-        if self.newest.is_none_or(|newest| dispatch.is_newer_than(&newest)) {
-            self.newest = Some(dispatch);
+    /// As a peer link does: only what is newer, of the partner.
+    fn hear(&mut self, dispatch: Dispatch, tick: u64) {
+        if let Some(dispatch) = self.pairing.take(dispatch, tick * 1_000_000) {
             self.line.heard.publish(&dispatch);
         }
     }
@@ -161,14 +162,15 @@ struct Pair {
 
 impl Pair {
     fn start(registry: &Registry, scenes: [&str; 2], seed: u64) -> Self {
-        let hosts = scenes.map(|scene| Host::start(registry, scene, 1));
+        let [left, right] = scenes;
+        let hosts = [Host::start(registry, left, 1), Host::start(registry, right, 2)];
         Self { hosts, way: Way::new(seed), tick: 0, is_cut: false }
     }
 
     fn run(&mut self, ticks: u64) {
         for _ in 0..ticks {
             for (to, dispatch) in self.way.arrived(self.tick) {
-                self.hosts[to].hear(dispatch);
+                self.hosts[to].hear(dispatch, self.tick);
             }
             for from in [0, 1] {
                 self.hosts[from].advance();
@@ -240,6 +242,8 @@ fn every_pair_of_hands_is_stable_over_20_ms_with_jitter_and_loss_and_no_tank_fal
                 // A thrown handle ends one run; then the other one removes its force, once.
                 assert!(hearing.silences <= u64::from(throws), "{left} and {right}: {hearing:?}");
                 assert!(hearing.ticks > 100, "{left} and {right}: {hearing:?}");
+                // Who tells the truth is believed.
+                assert_eq!((hearing.cut, hearing.let_go), (Cut::default(), 0), "{left} and {right}");
                 let speeds = host.records.0.iter().map(|record| record.twist.linear().length());
                 fastest_m_per_s = speeds.fold(fastest_m_per_s, f64::max);
             }
@@ -327,11 +331,13 @@ fn a_partner_that_tells_what_cannot_be_is_not_believed_and_soon_not_felt() {
         pair.hosts[0].records.0.iter().map(|record| record.commanded.force().length()).fold(0.0, f64::max);
     pair.cut();
     let from = pair.hosts[0].records.0.len();
-    let last = pair.hosts[0].newest.expect("it was heard");
+    let (_, told) = pair.hosts[1].line.told.read().expect("nobody writes now");
+    let last = pair.hosts[1].pairing.address(&told);
     for tick in 1..=300 {
         let mut dispatch = Dispatch { tick: last.tick + tick, ..last };
         dispatch.state.pose.position_m[2] = -1.0e30;
-        pair.hosts[0].hear(dispatch);
+        let now = pair.tick;
+        pair.hosts[0].hear(dispatch, now);
         pair.run(1);
     }
     let after = &pair.hosts[0].records.0[from..];
@@ -378,7 +384,7 @@ fn a_host_that_starts_anew_brings_no_energy_of_its_last_run() {
     let mut pair = Pair::start(&registry, [&scene("hand = \"oscillate\"", 9.0, ""), &still], 5);
     pair.run(3000);
     // The left has passed on a lot by now. The right one starts again, and knows nothing of it.
-    pair.hosts[1] = Host::start(&registry, &still, 2);
+    pair.hosts[1] = Host::start(&registry, &still, 3);
     pair.way.cut();
     for _ in 0..3000 {
         pair.run(1);

@@ -5,7 +5,7 @@
 use flotor_tests::library::{compile_c_file, plugin_file};
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
-use flotor_tests::workspace_root;
+use flotor_tests::{TestSize, crate_name_of, plugin_folders, workspace_root};
 use rayon::prelude::*;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -48,6 +48,13 @@ fn assert_nothing_found(library: &Path) {
 #[test]
 fn every_mistake_of_a_model_is_found_under_its_rule() {
     let mistakes = [
+        ("CHOICES_WITHOUT_END", "loads", "1125899906842624 choices"),
+        ("PARAMETERS_WITHOUT_END", "loads", "1000000 parameters"),
+        ("PARAMETERS_NOWHERE", "loads", "1 parameters at a null pointer"),
+        ("TEXT_OF_BYTES", "loads", "not UTF-8"),
+        ("TEXT_WITHOUT_END", "loads", "1125899906842624 bytes"),
+        ("TEXT_NOWHERE", "schema", "lacks an id or a doc"),
+        ("OTHER_ID", "loads", "the id `fixture-c-other-model`, but its metadata say `fixture-c-bad-model`"),
         ("NAN_IN_MOTION", "finite-in-motion", "NaN"),
         ("NAN_IN_MOTION", "live-parameters", "NaN"),
         ("CRASHES_IN_MOTION", "finite-in-motion", "by signal 11"),
@@ -86,9 +93,9 @@ fn every_mistake_of_a_device_is_found_under_its_rule() {
             "capabilities",
             "`range_m` is [0.0, 0.0, 0.0]: x is driven, so say how far it moves there",
         ),
-        ("ENDLESS_RANGE", "capabilities", "`range_rad` is [0.1, inf, 0.1]: legal is 0 to 1000 rad"),
-        ("ENDLESS_FORCE", "capabilities", "`max_force_n` is [10.0, 10.0, inf]: legal is 0 to 100000 N"),
-        ("ABSURD_FORCE", "capabilities", "`max_force_n` is [1e308, 10.0, 10.0]: legal is 0 to 100000 N"),
+        ("ENDLESS_RANGE", "capabilities", "`range_rad` is [0.1, inf, 0.1]: must be 0 to 1000 rad"),
+        ("ENDLESS_FORCE", "capabilities", "`max_force_n` is [10.0, 10.0, inf]: must be 0 to 100000 N"),
+        ("ABSURD_FORCE", "capabilities", "`max_force_n` is [1e308, 10.0, 10.0]: must be 0 to 100000 N"),
         (
             "NO_FORCE",
             "capabilities",
@@ -99,10 +106,10 @@ fn every_mistake_of_a_device_is_found_under_its_rule() {
             "capabilities",
             "`max_torque_nm` is [0.0, 0.0, 0.0]: x is driven, so say the most it gives",
         ),
-        ("NEGATIVE_TORQUE", "capabilities", "`max_torque_nm` is [0.5, 0.5, -1.0]: legal is 0 to 100000 N·m"),
+        ("NEGATIVE_TORQUE", "capabilities", "`max_torque_nm` is [0.5, 0.5, -1.0]: must be 0 to 100000 N·m"),
         ("NO_SLEW", "capabilities", "`max_force_slew_n_per_s` is 0: its force could never change"),
-        ("ENDLESS_SLEW", "capabilities", "`max_torque_slew_nm_per_s` is inf: legal is 0 to"),
-        ("ENDLESS_STIFFNESS", "capabilities", "`max_stiffness_n_per_m` is inf: legal is 0 to"),
+        ("ENDLESS_SLEW", "capabilities", "`max_torque_slew_nm_per_s` is inf: must be 0 to"),
+        ("ENDLESS_STIFFNESS", "capabilities", "`max_stiffness_n_per_m` is inf: must be 0 to"),
         ("SEVEN_AXES", "capabilities", "`sensed` is 0b1111111: there are six axes"),
         ("EVERY_AXIS", "capabilities", "`actuated` is 0b11111111111111111111111111111111: there are six"),
         ("CHANGES_ITS_MIND=0", "capabilities", "capabilities changed from one call to the next"),
@@ -123,12 +130,12 @@ fn every_mistake_of_a_device_is_found_under_its_rule() {
 fn a_run_refuses_a_device_whose_capabilities_cannot_be_enforced() {
     let mistakes = [
         ("NO_RANGE", "`range_m` is [0.0, 0.0, 0.0]: x is driven, so say how far it moves there"),
-        ("ENDLESS_RANGE", "`range_rad` is [0.1, inf, 0.1]: legal is 0 to 1000 rad on each axis"),
-        ("ENDLESS_FORCE", "`max_force_n` is [10.0, 10.0, inf]: legal is 0 to 100000 N on each axis"),
+        ("ENDLESS_RANGE", "`range_rad` is [0.1, inf, 0.1]: must be 0 to 1000 rad on each axis"),
+        ("ENDLESS_FORCE", "`max_force_n` is [10.0, 10.0, inf]: must be 0 to 100000 N on each axis"),
         ("NO_TORQUE", "`max_torque_nm` is [0.0, 0.0, 0.0]: x is driven, so say the most it gives there"),
-        ("ENDLESS_SLEW", "`max_torque_slew_nm_per_s` is inf: legal is 0 to"),
+        ("ENDLESS_SLEW", "`max_torque_slew_nm_per_s` is inf: must be 0 to"),
         ("RATES_REVERSED", "`rate_hz` is 10000 to 100 Hz: say the slowest rate first"),
-        ("NAN_LATENCY", "`latency_s` is NaN: legal is 0 to 10 s"),
+        ("NAN_LATENCY", "`latency_s` is NaN: must be 0 to 10 s"),
         ("SEVEN_AXES", "`sensed` is 0b1111111: there are six axes; set no bit beyond them"),
         ("CHANGES_ITS_MIND=0", "its capabilities changed from one call to the next"),
     ];
@@ -165,6 +172,26 @@ fn what_is_right_passes() {
     for (name, macro_name) in right {
         assert_nothing_found(&compiled(&Scratch::default(), name, &[macro_name]));
     }
+}
+
+/// Every rule, times included: at full size a hundred times each, eight at a time, which are each other's load.
+#[test]
+fn no_shipped_plugin_is_accused() {
+    let size = TestSize::of_this_run();
+    let plugins =
+        plugin_folders().into_iter().map(|folder| (plugin_file(&crate_name_of(&folder)), Vec::new()));
+    let full = (plugin_file("flotor-simulated"), vec!["--set", "preset=full"]);
+    let all: Vec<_> = plugins.chain([full]).collect();
+    let runs = (0..size.pick(1, 100)).flat_map(|_| &all).collect::<Vec<_>>();
+    let pool =
+        rayon::ThreadPoolBuilder::new().num_threads(size.pick(1, 8)).build().expect("threads can be started");
+    pool.install(|| {
+        runs.par_iter().for_each(|(library, settings)| {
+            let arguments = ["validate".as_ref(), library.as_os_str(), "--json".as_ref()];
+            let ran = Flotor::with(arguments.into_iter().chain(settings.iter().map(AsRef::as_ref))).run();
+            assert_eq!(ran.code, Some(exit_code::OK), "{}: {ran:#?}", library.display());
+        });
+    });
 }
 
 #[test]

@@ -14,11 +14,17 @@ use flotor_live::WrenchLimits;
 /// Shows how much of each limit is used, and a line for everything that has happened.
 pub fn standing(ui: &mut Ui, sample: &Sample, limits: &WrenchLimits, tally: &Tally, palette: &Palette) {
     CollapsingHeader::new(RichText::new("Limits and faults").strong()).default_open(true).show(ui, |ui| {
-        for (quantity, limits) in [(Quantity::Force, limits.force_n), (Quantity::Torque, limits.torque_nm)] {
+        let of_force = (Quantity::Force, limits.force_n, limits.force_norm_n);
+        let of_torque = (Quantity::Torque, limits.torque_nm, limits.torque_norm_nm);
+        for (quantity, axes, norm) in [of_force, of_torque] {
+            let unit = quantity.unit(Units::Handy);
+            let mut squares = 0.0;
             for (component, name) in quantity.components().iter().enumerate() {
                 let value = quantity.value(sample, component);
-                bar(ui, name, value, limits[component], quantity.unit(Units::Handy), palette);
+                squares += value * value;
+                bar(ui, name, value, axes[component], unit, palette);
             }
+            bar(ui, "norm", squares.sqrt(), norm, unit, palette);
         }
         ui.add_space(4.0);
         let events =
@@ -56,7 +62,7 @@ fn bar(
     };
     ui.horizontal(|ui| {
         ui.add_sized(
-            vec2(22.0, 14.0),
+            vec2(30.0, 14.0),
             egui::Label::new(RichText::new(name).size(SMALL_PT).color(palette.faint)),
         );
         let width = (ui.available_width() - 112.0).max(20.0);

@@ -126,7 +126,12 @@ impl FakeHost {
             process: std::process::id(),
             title: "A spring under test".to_owned(),
             plugins,
-            limits: WrenchLimits { force_n: [Some(30.0); 3], torque_nm: [Some(1.0); 3] },
+            limits: WrenchLimits {
+                force_n: [Some(30.0); 3],
+                torque_nm: [Some(1.0); 3],
+                force_norm_n: Some(30.0),
+                torque_norm_nm: Some(1.0),
+            },
         };
         Self { directory, listener, greeting, run, stream: None, frames: Frames::default(), next_tick: 0 }
     }
