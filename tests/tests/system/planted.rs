@@ -228,6 +228,19 @@ fn validate_finds_the_faults_of_devices_that_the_table_says() {
     assert_as_in_the_table("device", DEVICE);
 }
 
+/// A script in the background ignores Ctrl-C, and so does whatever it starts.
+#[test]
+fn a_model_that_sends_signals_is_found_where_the_shell_ignores_them() {
+    let scratch = Scratch::default();
+    let library = compiled(&scratch, "model").display().to_string();
+    for fault in ["kill_int3", "kill_term"] {
+        let set = format!("fault={fault}");
+        let ran = Flotor::with(["validate", &library, "--only", "defaults", "--set", &set]);
+        let ran = ran.through_shell("trap '' INT TERM; \"$@\"").run();
+        assert!(ran.stdout.contains("the process died by signal"), "{fault}: {ran:#?}");
+    }
+}
+
 /// The faults that a source of `c/planted/` knows: the words in `X(...)`.
 fn planted(name: &str) -> BTreeSet<String> {
     let file = workspace_root().join("tests/c/planted").join(name).with_extension("c");

@@ -5,6 +5,7 @@ use flotor_command::options::{KeyValue, duration_s};
 use flotor_command::say;
 use flotor_command::{CommandError, style, write_json};
 use flotor_judge::validate::{Check, Figures, Finding, Verdict, check, validate};
+use flotor_servo::last_stop::ignore_no_signal;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -43,6 +44,7 @@ fn rule(id: &str) -> Result<Check, String> {
 
 pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     if let Some(rule) = arguments.rule {
+        ignore_no_signal(); // a plugin that sends one is found, also in the background of a shell
         let verdict = Verdict::of(check(&arguments.plugin, &arguments.sets, rule));
         if arguments.deliver {
             return verdict.deliver().map_err(|error| CommandError::Failed(error.to_string()));

@@ -12,8 +12,8 @@ mod system;
 
 pub(crate) use system::take_sent;
 pub use system::{
-    SignalGuard, TakenSignals, block_signals, leave_process, leave_sent_signals_to_the_loop, spawn_unblocked,
-    wait_for_signal,
+    SignalGuard, TakenSignals, block_signals, ignore_no_signal, leave_process,
+    leave_sent_signals_to_the_loop, spawn_unblocked, wait_for_signal,
 };
 
 use crate::{Heartbeat, Place, Stuck};

@@ -313,6 +313,20 @@ pub fn wait_for_signal(signals: &[i32], patience: Duration) -> Option<i32> {
     (signal > 0).then_some(signal)
 }
 
+/// Lets every signal that this process ignores end it again: whoever started it, a shell in the background or `nohup`, ignored
+/// some, and a program inherits that. For a process that runs nothing but a plugin: a signal the plugin sends ends it, wherever
+/// it was started. Not real-time.
+pub fn ignore_no_signal() {
+    let ends = |signal: &c_int| !HARMLESS.contains(signal) && *signal != libc::SIGPIPE; // which Rust programs ignore
+    for signal in (1..).take(SIGNALS - 1).filter(ends) {
+        let Some(mut found) = action(signal) else { continue };
+        if found.sa_sigaction == libc::SIG_IGN {
+            found.sa_sigaction = libc::SIG_DFL;
+            set_action(signal, &found);
+        }
+    }
+}
+
 /// Starts a process that blocks no signal, whatever the calling thread does: it would else inherit that. Not real-time.
 ///
 /// # Errors
@@ -414,7 +428,8 @@ fn action(signal: c_int) -> Option<sigaction> {
 
 /// Takes a signal like that: as the system said it was taken, or by the handler of this module.
 fn set_action(signal: c_int, action: &sigaction) {
-    // SAFETY: an initialised action whose handler, if any, was there before or is `on_signal`, which may run at any time.
+    // SAFETY: an initialised action whose handler, if any, was there before, is `on_signal`, which may run at any time, or is the
+    // system's default.
     let _ = unsafe { libc::sigaction(signal, action, std::ptr::null_mut()) };
 }
 

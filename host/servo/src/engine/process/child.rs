@@ -4,6 +4,7 @@ use super::Greeting;
 use super::memory::{MESSAGE_BYTES, SharedMemory};
 use super::shared_words::{self, Order, wait_for_change};
 use crate::enter_worker_priority;
+use crate::last_stop::ignore_no_signal;
 use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
 use flotor_hal::abi::{CallStatus, PluginKind};
 use flotor_hal::{LinearField, LoopConfig, Memory, Output, Refusal, RefusalKind};
@@ -40,7 +41,9 @@ pub type LoadFile = fn(&Path) -> Result<Plugin, LoadError>;
 /// # Errors
 /// Standard input is not the memory: nobody started this as a worker.
 pub fn serve(arguments: &WorkerArguments, load: LoadFile) -> io::Result<()> {
-    // Before anything of the plugin runs: whatever that does, it ends with its host. The host may have gone before.
+    // Before anything of the plugin runs: whatever that does, it ends with its host, and by a signal that it sends to itself. The
+    // host may have gone before.
+    ignore_no_signal();
     set_parent_process_death_signal(Some(Signal::KILL))?;
     let host = Pid::from_raw(arguments.host);
     let has_gone = || getppid() != host;
