@@ -114,7 +114,7 @@ every_change() {
     step size .ci/lines
     # The README's `cargo test`; the viewer, whose GPU stack that leaves out; and what needs tools that take long to build. One
     # command: of two, the second builds half of what both use again, with other features.
-    step test cargo test --workspace --features flotor-tests/formats --no-fail-fast
+    step test cargo test --workspace --features flotor-tests/formats,flotor-tests/drop-ins --no-fail-fast
     step lint cargo clippy --workspace --all-targets --all-features -- -D warnings
     step docs env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
     # That a workspace of its own still compiles against the host; `full` tests them.

@@ -13,7 +13,6 @@ use object::{Object, ObjectSymbol};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::OnceLock;
 
 /// What a plugin looks for before it loads a maker's library.
 const MARKER: &str = "flotor_dropin";
@@ -32,31 +31,6 @@ const PHANTOM: &str = "hdPhantomGetNumDevices hdPhantomOpen hdPhantomClose hdPha
 /// Largest force of the built-in scene, N.
 const MOST_N: f64 = 8.0;
 
-/// Builds the libraries, which no plain build makes.
-fn built() -> PathBuf {
-    static BUILT: OnceLock<()> = OnceLock::new();
-    BUILT.get_or_init(|| {
-        let mut cargo = Command::new(env!("CARGO"));
-        cargo.args([
-            "build",
-            "--offline",
-            "--quiet",
-            "-p",
-            "flotor-dhd",
-            "-p",
-            "flotor-openhaptics",
-            "-p",
-            "flotor-chai3d",
-        ]);
-        if !cfg!(debug_assertions) {
-            cargo.arg("--release");
-        }
-        let output = cargo.current_dir(workspace_root()).output().expect("cargo starts");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    });
-    build_folder()
-}
-
 /// What a library exports, sorted.
 fn exported(library: &Path) -> Vec<String> {
     let bytes = std::fs::read(library).expect("it is built");
@@ -72,7 +46,7 @@ fn exported(library: &Path) -> Vec<String> {
 
 #[test]
 fn each_library_exports_the_names_of_its_interface_and_a_mark() {
-    let folder = built();
+    let folder = build_folder();
     let dhd = std::fs::read_to_string(workspace_root().join("tests/data/cases/dhd-names.txt"))
         .expect("the table is there");
     let cases = [
@@ -135,7 +109,6 @@ fn a_program_drives_a_device_without_a_changed_line_and_in_lockstep_bit_for_bit(
     if !tools::required(Tool::Cc) {
         return;
     }
-    built();
     let scratch = Scratch::default();
     let program = phantom(&scratch);
     let summary = scratch.path().join("summary.json");
@@ -165,7 +138,6 @@ fn nothing_a_program_does_gets_past_the_limits_or_takes_report_and_recording_wit
     if !tools::required(Tool::Cc) {
         return;
     }
-    built();
     let scratch = Scratch::default();
     let program = phantom(&scratch);
     let calls = TestSize::of_this_run().pick(2_000, 1_000_000);
@@ -215,7 +187,6 @@ fn what_cannot_be_lent_is_said_in_one_line_with_what_helps() {
     if !tools::required(Tool::Cc) {
         return;
     }
-    built();
     let scratch = Scratch::default();
     let program = phantom(&scratch).display().to_string();
     let source =

@@ -164,7 +164,8 @@ fn the_page_has_the_card() {
 #[test]
 fn shipped_models_pass() {
     let models: &[&[&str]] = match TestSize::of_this_run() {
-        TestSize::Quick => &[&["spring"], &["wall"], &["load"]],
+        // `flotor test` judges the spring and the wall each day: `host/scenes` has a file for each.
+        TestSize::Quick => &[&["load"]],
         TestSize::Full => &[
             &["spring"],
             &["spring", "--set", "preset=thesis-2"],

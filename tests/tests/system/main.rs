@@ -12,6 +12,7 @@ mod composition;
 mod crash;
 mod determinism;
 mod documents;
+#[cfg(feature = "drop-ins")]
 mod drop_ins;
 mod ends;
 mod force_sensor;

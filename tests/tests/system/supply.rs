@@ -2,6 +2,7 @@
 //! `cargo deny` checks the same and the advisories; this needs no network and no further tool.
 
 use cargo_metadata::{Metadata, MetadataCommand, Package};
+use flotor_tests::tools::VARIABLE;
 use flotor_tests::workspace_root;
 use std::collections::BTreeSet;
 use toml::{Table, Value};
@@ -106,7 +107,11 @@ fn every_crate_has_a_licence_that_the_list_allows() {
     let (rules, _) = rules();
     for workspace in WORKSPACES {
         let Some(metadata) = locked(workspace) else {
-            assert_ne!(workspace, ".", "the core is what was just built");
+            // A plain `cargo test` fetches what the default members need; the viewer's crates may be missing. The daily checks have all.
+            assert!(
+                workspace != "." || std::env::var_os(VARIABLE).is_none(),
+                "the checks have fetched the core"
+            );
             println!("skipped: the crates of {workspace} were never fetched on this machine");
             continue;
         };
