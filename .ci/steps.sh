@@ -117,12 +117,8 @@ every_change() {
     step test cargo test --workspace --features flotor-tests/formats,flotor-tests/drop-ins --no-fail-fast
     step lint cargo clippy --workspace --all-targets --all-features -- -D warnings
     step docs env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
-    # That a workspace of its own still compiles against the host; `full` tests them.
-    step beside cargo check --manifest-path host/python/Cargo.toml --target-dir target
     # Counts of instructions of the optimised program against their budgets.
     step budgets cargo test --release -p flotor-tests --features budgets --test instructions
-    # Plugins against the USB, HID and serial drivers of a kernel.
-    step usb .ci/vm
     # Every interleaving of the lock-free cell. A target folder of its own: the flag changes every crate. The crate forbids
     # `unsafe`, so that data races are left to the compiler.
     step loom env RUSTFLAGS="--cfg loom" cargo test -p flotor-sync --release --test loom --target-dir target/loom
