@@ -158,7 +158,7 @@ pub fn real(text: &str) -> Result<f64, String> {
 /// # Errors
 /// If the text is none.
 pub fn whole(text: &str) -> Result<u64, String> {
-    text.trim().parse().map_err(|_| "write a whole number from 0".to_owned())
+    text.trim().parse().map_err(|_| "write a whole number from 0 to 2^64 - 1".to_owned())
 }
 
 /// A core of the machine.
@@ -219,7 +219,7 @@ mod tests {
         let seed = clap::Arg::new("seed").long("seed").value_parser(whole);
         let command = with_negative_numbers(Command::new("test").arg(seed));
         let error = command.try_get_matches_from(["test", "--seed", "-1"]).unwrap_err().to_string();
-        assert!(error.contains("write a whole number from 0"), "{error}");
+        assert!(error.contains("write a whole number from 0 to 2^64 - 1"), "{error}");
     }
 
     #[test]

@@ -70,7 +70,7 @@ struct TestArguments {
     /// Draw a picture of each failure into this folder
     #[arg(long, value_name = "FOLDER")]
     plots: Option<PathBuf>,
-    /// Change missed numbers of the form { value, within } in the files to what came out
+    /// In the files, replace the value of each missed { value, within } with the measured one
     #[arg(long, conflicts_with_all = ["filter", "shard", "list"])]
     bless: bool,
     /// With --bless: write the digest of every run too
@@ -161,7 +161,7 @@ fn found(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CommandError> {
             true => search(path, &mut found)?,
             false if path.display().to_string().ends_with(SUFFIX) => found.push(path.clone()),
             false => {
-                let wrong = format!("{}: no folder, and no file NAME{SUFFIX}", path.display());
+                let wrong = format!("{} is neither a folder nor a file NAME{SUFFIX}", path.display());
                 return Err(CommandError::Usage(wrong));
             }
         }

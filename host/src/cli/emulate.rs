@@ -14,7 +14,7 @@ use std::ffi::OsString;
     flotor emulate maglev\n  \
     flotor emulate maglev --transport pty --link /tmp/flotor-tty\n  \
     flotor emulate maglev --pace lockstep --set preset=full\n  \
-    flotor emulate maglev --protocol ml-api     for programs of the Maglev 200\n  \
+    flotor emulate maglev --protocol ml-api     for programs written for the Maglev 200\n  \
     flotor emulate maglev --help                 options of that emulator",
     // After NAME the flag belongs to the emulator.
     disable_help_flag = true

@@ -18,19 +18,20 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus};
 use std::time::{Duration, Instant};
 
-/// Run a program that was written for another maker's device on a Flotor device, inside its limits.
+/// Run an unmodified program for another maker's device on the device of a scene, within the scene's limits.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     flotor lend -- python3 my_openhaptics_script.py      on the simulated flotor, held by a hand\n  \
-    flotor lend --api dhd maglev.toml -- ./surgery       on the device of a scene, inside its limits\n  \
-    flotor lend --pace lockstep --record run.mcap -- ./my_test   one tick a call: repeatable, faster than real time\n\n\
-    Environment of the program: FLOTOR_SIGNALS=stop stops the devices when it dies of a signal; FLOTOR_DHD_TYPE,\n\
-    FLOTOR_HD_MODEL and FLOTOR_PHANTOM_TYPE say which device it is told of. The exit code is that of the program.")]
+    flotor lend --api dhd maglev.toml -- ./surgery       on a scene's device, within the scene's limits\n  \
+    flotor lend --pace lockstep --record run.mcap -- ./my_test   one call, one tick: repeatable, fast\n\n\
+    Environment variables: FLOTOR_SIGNALS=stop stops the devices before a signal ends the program. FLOTOR_DHD_TYPE,\n\
+    FLOTOR_HD_MODEL and FLOTOR_PHANTOM_TYPE set the type of device that the program sees.\n\n\
+    The exit code is that of the program.")]
 pub(crate) struct LendArguments {
-    /// The interface the program was written for (default: whichever of them it calls)
+    /// The interface that the program calls (default: the program finds all three)
     #[arg(long, value_name = "dhd|openhaptics|chai3d")]
     api: Option<String>,
-    /// Who makes time go on
+    /// What advances the time of the run
     #[arg(long, value_enum, default_value_t = PaceOption::Real)]
     pace: PaceOption,
     /// Seed of all random numbers
@@ -49,12 +50,12 @@ pub(crate) struct LendArguments {
     program: Vec<OsString>,
 }
 
-/// Who makes time go on.
+/// What advances the time of the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum PaceOption {
     /// The machine's clock: the program runs at its own rate
     Real,
-    /// The program: each of its calls is a tick
+    /// The program: each call that sets a force, or each callback of a scheduler, is one tick
     Lockstep,
 }
 
@@ -65,7 +66,7 @@ pub(crate) enum Api {
     Dhd,
     /// 3D Systems' OpenHaptics (HDAPI)
     Openhaptics,
-    /// CHAI3D's way to a Phantom
+    /// CHAI3D's interface to a Phantom
     Chai3d,
 }
 
@@ -76,7 +77,7 @@ impl Api {
     fn of_word(word: &str) -> Result<Self, CommandError> {
         Self::ALL.into_iter().find(|api| api.word() == word).ok_or_else(|| {
             CommandError::Usage(format!(
-                "there is no drop-in library for `--api {word}`; there are {}. Leave it out, and the program finds all of them",
+                "no drop-in library for `--api {word}`; give one of {}. Without `--api` the program finds all of them",
                 Self::ALL.map(Self::word).join(", ")
             ))
         })

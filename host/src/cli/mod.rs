@@ -111,7 +111,7 @@ enum Command {
     Calibrate(Separate),
     /// Emulate the controller of a device, to use its plugin without hardware
     Emulate(emulate::EmulateArguments),
-    /// Run a program that was written for another maker's device on a Flotor device, inside its limits
+    /// Run an unmodified program for another maker's device on the device of a scene, within the scene's limits
     Lend(lend::LendArguments),
     /// Check this machine's real-time configuration and suggest fixes
     Doctor(doctor::DoctorArguments),

@@ -42,7 +42,7 @@ impl Program {
             let help = match (here, given.components().count()) {
                 (true, 1) => "; a program of this folder is written `./NAME`",
                 (true, _) => "; it may not be executed: `chmod +x` it, or name the interpreter before it",
-                (false, _) => "; it stands after `--`, and is searched for as a shell does",
+                (false, _) => "; give it after `--`, as a path or as a name that a folder of PATH contains",
             };
             return Err(CommandError::Usage(format!("there is no program `{}`{help}", given.display())));
         };

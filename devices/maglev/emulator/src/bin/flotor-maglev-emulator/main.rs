@@ -215,8 +215,9 @@ fn link_to(target: &Path, link: &Path) -> Result<(), Box<dyn Error>> {
 /// Listens where it is said, or at this port of this machine, and says where.
 fn listen(arguments: &Arguments, port: u16) -> Result<TcpListener, Box<dyn Error>> {
     let at = arguments.listen.clone().unwrap_or_else(|| format!("127.0.0.1:{port}"));
-    let listener = TcpListener::bind(&at)
-        .map_err(|error| format!("cannot listen at {at}: {error}; --listen 127.0.0.1:0 takes any"))?;
+    let listener = TcpListener::bind(&at).map_err(|error| {
+        format!("cannot listen at {at}: {error}; --listen 127.0.0.1:0 takes any free port")
+    })?;
     say(&format!("listening tcp {}", listener.local_addr()?));
     Ok(listener)
 }
