@@ -71,6 +71,12 @@ fn list(registry: &Registry, json: bool) -> Result<(), CommandError> {
     for Metadata { path, id, .. } in registry.shadowed() {
         say!("{note} {}: not used, because a plugin listed above has the same id `{id}`", path.display());
     }
+    for (one, other) in registry.ambiguous() {
+        let (one, other, id) = (one.path.display(), other.path.display(), &one.id);
+        say!(
+            "{note} {one} and {other} have the same id `{id}`: a scene that names it is refused; remove one of them"
+        );
+    }
     for broken in registry.broken() {
         say!("{note} {broken}");
     }

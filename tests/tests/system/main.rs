@@ -18,6 +18,7 @@ mod ends;
 mod force_sensor;
 mod golden;
 mod haply;
+mod installation;
 mod isolation;
 mod judges;
 mod latch;

@@ -9,6 +9,7 @@ use crate::calls::{self, Call, CallError, attended_while};
 use crate::scene::nearest;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, read_metadata};
 use flotor_hal::abi::{Entry, PluginKind};
+use rustix::process::geteuid;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -25,11 +26,13 @@ pub struct SkippedFolder {
     pub reason: String,
 }
 
-/// Plugins found, in search order; of two with one id the first wins.
+/// Plugins found, in search order: of two folders with a plugin of one id the first wins; two files with one id in one folder
+/// are refused.
 pub struct Registry {
     linked: Vec<Plugin>,
     found: Vec<Metadata>,
     shadowed: Vec<Metadata>,
+    ambiguous: Vec<(Metadata, Metadata)>,
     broken: Vec<LoadError>,
     skipped: Vec<SkippedFolder>,
     folders: Vec<PathBuf>,
@@ -64,6 +67,16 @@ pub enum LookupError {
         /// A file of that name, and why it is not meant or cannot be read as a plugin.
         hint: Option<String>,
     },
+    /// Two files of one folder have the id.
+    #[error("`{id}` is the id of two plugins in one folder: `{}` and `{}`; remove one of them", one.display(), other.display())]
+    Ambiguous {
+        /// The id.
+        id: String,
+        /// One file.
+        one: PathBuf,
+        /// The other.
+        other: PathBuf,
+    },
     /// The plugin was found and refused.
     #[error(transparent)]
     Refused(#[from] LoadError),
@@ -73,7 +86,8 @@ pub enum LookupError {
 }
 
 impl Registry {
-    /// Searches the folders of a scene, of the environment and beside the executable. Not real-time.
+    /// Searches the folders of a scene, of the environment, of this installation and of the user, in this order. Not
+    /// real-time.
     #[must_use]
     pub fn search(scene_folders: &[PathBuf]) -> Self {
         let mut folders = scene_folders.to_vec();
@@ -81,11 +95,13 @@ impl Registry {
             folders.extend(std::env::split_paths(&path).filter(|folder| !folder.as_os_str().is_empty()));
         }
         folders.extend(own_folders());
+        folders.extend(user_folder());
         let mut registry = Self {
             // Part of the host; it says itself that it needs a program.
             linked: Plugin::in_process(&crate::program::ENTRY).into_iter().collect(),
             found: Vec::new(),
             shadowed: Vec::new(),
+            ambiguous: Vec::new(),
             broken: Vec::new(),
             skipped: Vec::new(),
             folders,
@@ -109,11 +125,7 @@ impl Registry {
 
     fn scan(&mut self, folder: &Path) {
         let Ok(attributes) = std::fs::metadata(folder) else { return };
-        if attributes.permissions().mode() & 0o002 != 0 {
-            let reason = format!(
-                "anybody may write into it, and loading a plugin runs its code; `chmod o-w {}`",
-                folder.display()
-            );
+        if let Some(reason) = distrust(folder, &attributes) {
             self.skipped.push(SkippedFolder { folder: folder.into(), reason });
             return;
         }
@@ -129,6 +141,9 @@ impl Registry {
                     None => self.found.push(metadata),
                     // Cargo links what it builds into two folders: one file under two names hides nothing.
                     Some(known) if is_same_file(&known.path, &metadata.path) => {}
+                    Some(known) if known.path.parent() == metadata.path.parent() => {
+                        self.ambiguous.push((known.clone(), metadata));
+                    }
                     Some(_) => self.shadowed.push(metadata),
                 },
                 // Other libraries may lie beside plugins; only files that claim to be one are worth a word.
@@ -148,6 +163,12 @@ impl Registry {
     #[must_use]
     pub fn shadowed(&self) -> &[Metadata] {
         &self.shadowed
+    }
+
+    /// Pairs of files with one id in one folder. A scene that names the id is refused.
+    #[must_use]
+    pub fn ambiguous(&self) -> &[(Metadata, Metadata)] {
+        &self.ambiguous
     }
 
     /// Files that look like plugins and cannot be read as one.
@@ -197,6 +218,10 @@ impl Registry {
         }
         let found = self.found.iter().find(|known| known.id == id).ok_or_else(|| self.unknown(id, kind))?;
         check_kind(found, kind)?;
+        if let Some((one, other)) = self.ambiguous.iter().find(|(one, _)| one.path == found.path) {
+            let (one, other) = (one.path.clone(), other.path.clone());
+            return Err(LookupError::Ambiguous { id: id.to_owned(), one, other });
+        }
         self.open(&found.path)
     }
 
@@ -236,22 +261,49 @@ impl Registry {
     }
 }
 
-/// Where the plugins of this installation are: beside the program.
+/// Where the plugins of this installation are: beside the program, or where its archive puts them.
 fn own_folders() -> Vec<PathBuf> {
     let program = flotor_servo::guest::program().cloned().or_else(|| std::env::current_exe().ok());
     let Some(own) = program.as_deref().and_then(Path::parent) else { return Vec::new() };
     // `deps` before the folder itself: `cargo run` refreshes only `deps`, and an older copy may lie above it.
-    vec![own.join("deps"), own.to_path_buf(), own.join("plugins")]
+    let beside = ["deps", "", "plugins", "../lib/flotor/plugins"];
+    beside.map(|folder| if folder.is_empty() { own.to_path_buf() } else { own.join(folder) }).to_vec()
+}
+
+/// Where a user keeps plugins for all installations, by the XDG base directory specification. Root has none: a file of a home
+/// folder is no reason to run code with all rights.
+fn user_folder() -> Option<PathBuf> {
+    if geteuid().is_root() {
+        return None;
+    }
+    let absolute = |variable| std::env::var_os(variable).map(PathBuf::from).filter(|path| path.is_absolute());
+    let data = absolute("XDG_DATA_HOME").or_else(|| Some(absolute("HOME")?.join(".local/share")));
+    Some(data?.join("flotor/plugins"))
+}
+
+/// Why a folder is not searched: somebody could put a plugin there whom the user has not trusted yet. Trusted are root, the user,
+/// and the owner of this program.
+fn distrust(folder: &Path, attributes: &std::fs::Metadata) -> Option<String> {
+    let folder = folder.display();
+    if attributes.permissions().mode() & 0o002 != 0 {
+        return Some(format!(
+            "anybody may write into it, and loading a plugin runs its code; `chmod o-w {folder}`"
+        ));
+    }
+    let owner = attributes.uid();
+    let owns_program =
+        || std::env::current_exe().and_then(std::fs::metadata).is_ok_and(|own| own.uid() == owner);
+    (owner != 0 && owner != geteuid().as_raw() && !owns_program()).then(|| {
+        format!("user {owner} owns it, and loading a plugin runs its code; `chown` it, or copy its plugins to a folder of yours")
+    })
 }
 
 /// Whether a plugin belongs to this installation: it is linked into the program, or lies beside it or in
 /// `../lib/flotor/plugins`. Not real-time.
 pub(crate) fn is_installed(plugin: &Path) -> bool {
-    let mut folders = own_folders();
-    folders.extend(folders.get(1).map(|own| own.join("../lib/flotor/plugins")));
     let Ok(file) = plugin.canonicalize() else { return plugin.as_os_str().is_empty() };
     let folder = file.parent();
-    folders.iter().any(|own| own.canonicalize().is_ok_and(|own| Some(own.as_path()) == folder))
+    own_folders().iter().any(|own| own.canonicalize().is_ok_and(|own| Some(own.as_path()) == folder))
 }
 
 /// Loads a plugin file, but waits no longer than a limit for its initialisers.

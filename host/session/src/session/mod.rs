@@ -113,7 +113,9 @@ impl RunError {
     #[must_use]
     pub fn is_configuration(&self) -> bool {
         match self {
-            Self::Scene(_) | Self::Mismatch { .. } | Self::Lookup(LookupError::Unknown { .. }) => true,
+            Self::Scene(_)
+            | Self::Mismatch { .. }
+            | Self::Lookup(LookupError::Unknown { .. } | LookupError::Ambiguous { .. }) => true,
             Self::Lookup(LookupError::Refused(error)) | Self::Plugin(error) => error.is_configuration(),
             Self::Thread(_)
             | Self::Hung { .. }
