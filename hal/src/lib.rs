@@ -35,6 +35,7 @@ pub mod math;
 mod model;
 mod parameter;
 mod refusal;
+mod text_file;
 
 pub use abi::Choices;
 pub use device::{
@@ -63,3 +64,4 @@ pub use glam::{DMat3, DQuat, DVec3};
 pub use model::{Demand, ForceModel, Input, LoopConfig, Memory, ModelInfo, Output, StepStatus};
 pub use parameter::{Mutability, OutOfRange, Parameter, ParameterKind, ParameterValue, Settings};
 pub use refusal::{Refusal, RefusalKind};
+pub use text_file::{TextProblem, read_text};

@@ -18,6 +18,8 @@ pub const CALIBRATION_COEFFICIENTS: usize = 8;
 /// Smallest and largest delivered share a calibration may claim. An uneven field is off by tens of percent at
 /// most; what claims more is a mistake, and would multiply a command by it.
 const PLAUSIBLE_SHARE: [f64; 2] = [0.5, 2.0];
+/// Farthest from the centre that a calibration may reach, m.
+const MOST_RANGE_M: f64 = 1.0;
 
 /// Heights at which a calibration is checked: fine enough for a polynomial of degree seven.
 const CHECKED_HEIGHTS: u32 = 256;
@@ -34,7 +36,7 @@ pub struct VerticalCalibration {
 /// Why numbers are no calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InvalidCalibration {
-    /// The range is not finite, empty or upside down, m.
+    /// The range is not finite, empty, upside down, or larger than any device has, m.
     Range([f64; 2]),
     /// None, or more than there is room for.
     Count(usize),
@@ -50,13 +52,13 @@ pub enum InvalidCalibration {
 impl std::fmt::Display for InvalidCalibration {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Range([from, to]) => write!(f, "invalid range {from} m to {to} m"),
+            Self::Range([from, to]) => write!(f, "invalid range {from:?} m to {to:?} m"),
             Self::Count(count) => {
                 write!(f, "{count} coefficients; there must be 1 to {CALIBRATION_COEFFICIENTS}")
             }
             Self::Share { height_m, share } => write!(
                 f,
-                "{share} of the force would arrive at {:.3} mm; a share between {} and {} is plausible",
+                "{share:?} of the force would arrive at {:.3} mm; a share between {} and {} is plausible",
                 height_m * 1.0e3,
                 PLAUSIBLE_SHARE[0],
                 PLAUSIBLE_SHARE[1]
@@ -92,7 +94,7 @@ impl VerticalCalibration {
     /// [`InvalidCalibration`], unless the share is plausible all over the range.
     pub fn check(&self) -> Result<(), InvalidCalibration> {
         let [from, to] = self.range_m;
-        if !(from.is_finite() && to.is_finite() && from < to) {
+        if !(from.abs() <= MOST_RANGE_M && to.abs() <= MOST_RANGE_M && from < to) {
             return Err(InvalidCalibration::Range(self.range_m));
         }
         let [least, most] = PLAUSIBLE_SHARE;
@@ -260,6 +262,8 @@ mod tests {
             VerticalCalibration::new([0.0, f64::NAN], &[1.0]),
             Err(InvalidCalibration::Range(_))
         ));
+        let room = VerticalCalibration::new([-1.0e300, 7.0], &[1.0]);
+        assert!(matches!(room, Err(InvalidCalibration::Range(_))));
         for coefficients in [&[0.0][..], &[f64::NAN], &[1.0, 1.0e3], &[-1.0], &[f64::INFINITY]] {
             let refused = VerticalCalibration::new(range, coefficients);
             assert!(matches!(refused, Err(InvalidCalibration::Share { .. })), "{coefficients:?}");

@@ -20,9 +20,10 @@
 //! ```
 
 use crate::scene::Location;
-use flotor_hal::{InvalidCalibration, VerticalCalibration};
+use flotor_hal::{InvalidCalibration, TextProblem, VerticalCalibration, read_text};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use toml::de::DeTable;
 
 /// The format this program writes and reads.
 pub const FORMAT: u32 = 1;
@@ -158,6 +159,18 @@ impl VerticalCurve {
     }
 }
 
+/// Line of the value under these keys, from 1; 0 if there is none.
+fn line_of(text: &str, keys: &[&str]) -> usize {
+    let Ok(root) = DeTable::parse(text) else { return 0 };
+    let (mut table, mut start) = (Some(root.get_ref()), None);
+    for key in keys {
+        let value = table.and_then(|table| table.get(*key));
+        start = value.map(|value| value.span().start);
+        table = value.and_then(|value| value.get_ref().as_table());
+    }
+    start.and_then(|start| text.get(..start)).map_or(0, |before| before.matches('\n').count() + 1)
+}
+
 impl CalibrationFile {
     /// Reads and checks a file.
     ///
@@ -165,9 +178,8 @@ impl CalibrationFile {
     /// [`CalibrationFileError`].
     pub fn load(path: &Path) -> Result<(Self, VerticalCalibration), CalibrationFileError> {
         let file = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|cause| {
-            CalibrationFileError::new(&file, 0, format!("cannot read the calibration: {cause}"))
-        })?;
+        let text = read_text(path, "the calibration")
+            .map_err(|TextProblem { line, problem }| CalibrationFileError::new(&file, line, problem))?;
         Self::parse(&file, &text)
     }
 
@@ -184,18 +196,22 @@ impl CalibrationFile {
             let problem = format!("is no calibration file ({cause})");
             CalibrationFileError::new(file, before.matches('\n').count() + 1, problem)
         })?;
-        let whole = |problem: String| CalibrationFileError::new(file, 0, problem);
+        let wrong =
+            |keys: &[&str], problem: String| CalibrationFileError::new(file, line_of(text, keys), problem);
         if read.format != FORMAT {
             let found = read.format;
-            return Err(whole(format!("format {found}, this program reads {FORMAT}; calibrate again")));
+            return Err(wrong(
+                &["format"],
+                format!("format {found}, this program reads {FORMAT}; calibrate again"),
+            ));
         }
         let calibration = read.vertical.calibration().map_err(|invalid| match invalid {
             // In the unit of the file.
             InvalidCalibration::Range(_) => {
                 let [from, to] = read.vertical.range_mm;
-                whole(format!("[vertical] invalid range {from} mm to {to} mm"))
+                wrong(&["vertical", "range_mm"], format!("[vertical] invalid range {from:?} mm to {to:?} mm"))
             }
-            other => whole(format!("[vertical] {other}")),
+            other => wrong(&["vertical", "coefficients_per_mm"], format!("[vertical] {other}")),
         })?;
         Ok((read, calibration))
     }

@@ -4,8 +4,9 @@ use crate::curve::Curve;
 use crate::table;
 use flotor_hal::{
     CenterlineInfo, CenterlineModel, DQuat, DVec3, Demand, ForceModel, Input, ModelInfo, OutOfRange, Output,
-    Parameter, Pose, Refusal, Settings, StepStatus, Wrench, choices,
+    Parameter, Pose, Refusal, Settings, StepStatus, Wrench, choices, read_text,
 };
+use std::path::Path;
 
 /// Without a table: spring 1 of the thesis, 0.68 N/mm, straight over 12 mm.
 const SPRING_1: &str = "compression_mm,force_n\n0,0\n6,4.08\n12,8.16\n";
@@ -69,12 +70,10 @@ impl ForceModel for Measured {
 
     fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {
         let curve = match settings.text("curve") {
-            None => table::parse(SPRING_1).map_err(Refusal::parameter)?,
-            Some(file) => {
-                let text = std::fs::read_to_string(file)
-                    .map_err(|error| Refusal::resource(format!("{file}: cannot read the curve: {error}")))?;
-                table::parse(&text).map_err(|problem| Refusal::parameter(format!("{file}: {problem}")))?
-            }
+            None => table::parse(SPRING_1).map_err(|wrong| Refusal::broken(wrong.problem))?,
+            Some(file) => read_text(Path::new(file), "the curve")
+                .and_then(|text| table::parse(&text))
+                .map_err(|wrong| Refusal::parameter(wrong.in_file(file)))?,
         };
         let metres = |id| settings.number_or_default(id) * 1.0e-3;
         let (free_length_m, coil_diameter_m) = (metres("free_length_mm"), metres("coil_diameter_mm"));

@@ -1,6 +1,6 @@
 //! What is linked to what: sheets, chains, and the edges of a mesh file. Not real-time.
 
-use flotor_hal::DVec3;
+use flotor_hal::{DVec3, TextProblem};
 use std::collections::BTreeSet;
 
 /// A spring between two masses.
@@ -97,8 +97,13 @@ impl Mesh {
     /// without force. Edges of one face only are the border; their ends are held. The mass is shared out evenly.
     ///
     /// # Errors
-    /// One sentence with the number of the line.
-    pub fn from_obj(text: &str, mass_kg: f64, stiffness_n_per_m: f64, stretch: f64) -> Result<Self, String> {
+    /// The line that is wrong.
+    pub fn from_obj(
+        text: &str,
+        mass_kg: f64,
+        stiffness_n_per_m: f64,
+        stretch: f64,
+    ) -> Result<Self, TextProblem> {
         let mut mesh = Self::default();
         let mut edges: Vec<[usize; 2]> = Vec::new();
         for (line, text) in text.lines().enumerate().map(|(index, text)| (index + 1, text)) {
@@ -109,7 +114,7 @@ impl Mesh {
                     let finite = |word: &str| word.parse::<f64>().ok().filter(|number| number.is_finite());
                     let numbers: Vec<f64> = words.take(3).filter_map(finite).collect();
                     let [x, y, z] = numbers[..] else {
-                        return Err(format!("line {line}: a vertex is `v X Y Z`, three finite numbers"));
+                        return Err(TextProblem::at(line, "a vertex is `v X Y Z`, three finite numbers"));
                     };
                     mesh.positions_m.push(DVec3::new(x, y, z));
                 }
@@ -117,9 +122,9 @@ impl Mesh {
                     let corners = words.map(|word| corner(word, mesh.positions_m.len()));
                     let corners = corners.collect::<Option<Vec<usize>>>();
                     let corners = corners.filter(|corners| corners.len() >= 2).ok_or_else(|| {
-                        format!(
-                            "line {line}: `{kind}` takes two and more numbers of vertices that stand above it"
-                        )
+                        let problem =
+                            format!("`{kind}` takes two and more numbers of vertices that stand above it");
+                        TextProblem::at(line, problem)
                     })?;
                     edges.extend(corners.windows(2).map(|pair| [pair[0], pair[1]]));
                     if let (true, [first, .., last]) = (kind == "f", &corners[..]) {
@@ -135,7 +140,8 @@ impl Mesh {
             edges.chunk_by(|a, b| a == b).filter(|same| same.len() == 1).flat_map(|same| same[0]).collect();
         edges.dedup();
         if edges.is_empty() || border.len() == mesh.positions_m.len() {
-            return Err("there is nothing in it that could move: no mass inside a border of edges".to_owned());
+            let problem = "there is nothing in it that could move: no mass inside a border of edges";
+            return Err(TextProblem::of_file(problem));
         }
         let node_kg = mass_kg / (mesh.positions_m.len() - border.len()) as f64;
         mesh.masses_kg = (0..mesh.positions_m.len())
@@ -192,14 +198,14 @@ mod tests {
 
     #[test]
     fn a_broken_mesh_file_names_the_line() {
-        let error = |text: &str| Mesh::from_obj(text, 1.0, 1.0, 1.0).unwrap_err();
-        assert!(error("v 0 0\n").starts_with("line 1: a vertex"));
+        let error = |text: &str| Mesh::from_obj(text, 1.0, 1.0, 1.0).unwrap_err().in_file("m");
+        assert!(error("v 0 0\n").starts_with("m:1: a vertex"));
         for vertex in ["v nan 0 0", "v 0 inf 0", "v 0 0 -inf", "v 1e999 0 0"] {
             let text = format!("v 0 0 0\n{vertex}\nv 0 1 0\n");
-            assert!(error(&text).starts_with("line 2: a vertex"), "{vertex}");
+            assert!(error(&text).starts_with("m:2: a vertex"), "{vertex}");
         }
-        assert!(error("v 0 0 0\nf 1 2 3\n").starts_with("line 2: `f`"));
-        assert!(error("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").starts_with("there is nothing"));
-        assert!(error("").starts_with("there is nothing"));
+        assert!(error("v 0 0 0\nf 1 2 3\n").starts_with("m:2: `f`"));
+        assert!(error("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").starts_with("m: there is nothing"));
+        assert!(error("").starts_with("m: there is nothing"));
     }
 }

@@ -5,8 +5,9 @@ use crate::network::{Network, Surroundings};
 use crate::touch::Touch;
 use flotor_hal::{
     DVec3, ForceModel, Input, LinearField, LinearFieldModel, Memory, ModelInfo, OutOfRange, Output,
-    Parameter, Refusal, Settings, StepStatus, Wrench, choices,
+    Parameter, Refusal, Settings, StepStatus, Wrench, choices, read_text,
 };
+use std::path::Path;
 
 /// Farther from home than this there is no handle, m: the answer is that at the edge, and says so.
 const REACH_M: f64 = 1.0;
@@ -110,13 +111,9 @@ impl ForceModel for Membrane {
                 stiffness_n_per_m,
                 stretch,
             }),
-            Some(file) => {
-                let text = std::fs::read_to_string(file);
-                let text = text
-                    .map_err(|error| Refusal::resource(format!("{file}: cannot read the mesh: {error}")))?;
-                Mesh::from_obj(&text, mass_kg, stiffness_n_per_m, stretch)
-                    .map_err(|problem| Refusal::resource(format!("{file}: {problem}")))?
-            }
+            Some(file) => read_text(Path::new(file), "the mesh")
+                .and_then(|text| Mesh::from_obj(&text, mass_kg, stiffness_n_per_m, stretch))
+                .map_err(|wrong| Refusal::parameter(wrong.in_file(file)))?,
         };
         let radius_m = number("ball_radius_mm") * 1.0e-3;
         if radius_m < 0.75 * mesh.coarseness_m() {

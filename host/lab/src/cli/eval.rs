@@ -9,7 +9,6 @@ use flotor_command::{CommandError, note, progress_bar, write_text};
 use flotor_hal::Detail;
 use flotor_hal::abi::PluginKind;
 use flotor_session::registry::{Registry, is_same_file};
-use flotor_session::scene::cannot_read;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -82,8 +81,9 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
 
 /// Reads the poses, from a file or from standard input.
 fn read_poses(path: &Path) -> Result<Poses, CommandError> {
-    let problem =
-        |cause| CommandError::Usage(format!("{}: {}", path.display(), cannot_read("the poses", &cause)));
+    let problem = |cause| {
+        CommandError::Usage(format!("{}: {}", path.display(), format_args!("cannot read the poses: {cause}")))
+    };
     let bytes = read(path).map_err(problem)?;
     Poses::parse(&path.display().to_string(), &bytes).map_err(|error| CommandError::Usage(error.to_string()))
 }

@@ -18,6 +18,7 @@ pub use reader::{Location, SceneError};
 pub use reference::{KeyReference, SectionReference, reference};
 pub use setting::{KeyValue, PluginKeyValue};
 
+use flotor_hal::{TextProblem, read_text};
 use reader::{Section, Source, Value};
 pub use reader::{did_you_mean, nearest};
 use std::path::{Path, PathBuf};
@@ -183,9 +184,8 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] with file, line, key and remedy.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
-        let text = std::fs::read_to_string(path).map_err(|error| {
-            Location { file: path.into(), line: 0 }.problem(cannot_read("the scene", &error))
-        })?;
+        let text = read_text(path, "the scene")
+            .map_err(|TextProblem { line, problem }| Location { file: path.into(), line }.problem(problem))?;
         let mut scene = Self::parse(path, &text)?;
         let base = path.parent().unwrap_or(Path::new(""));
         for folder in &mut scene.plugin_folders {
@@ -243,15 +243,6 @@ impl Scene {
         };
         root.finish()?;
         Ok(scene)
-    }
-}
-
-/// Why a text cannot be read, in words; `what` names it. Not real-time.
-#[must_use]
-pub fn cannot_read(what: &str, error: &std::io::Error) -> String {
-    match error.kind() {
-        std::io::ErrorKind::InvalidData => "is not a text file in UTF-8; save it as UTF-8".to_owned(),
-        _ => format!("cannot read {what}: {error}"),
     }
 }
 

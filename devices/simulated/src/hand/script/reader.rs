@@ -2,6 +2,7 @@
 
 use super::{Grip, Leg, Movement, Place, Script};
 use flotor_hal::glam::DVec3;
+use flotor_hal::{TextProblem, read_text};
 use serde::Deserialize;
 use std::fmt;
 use std::ops::Range;
@@ -256,7 +257,11 @@ pub(super) fn read_file(path: &Path) -> Result<Script, ScriptError> {
     if !size.is_file() || size.len() > MAX_BYTES {
         return Err(wrong(format!("is no script: that is a TOML file of at most {MAX_BYTES} bytes")));
     }
-    let text = std::fs::read_to_string(path).map_err(|error| wrong(format!("cannot be read: {error}")))?;
+    let text = read_text(path, "the script").map_err(|TextProblem { line, problem }| ScriptError {
+        line,
+        problem,
+        file: file.clone(),
+    })?;
     read(&file, &text)
 }
 

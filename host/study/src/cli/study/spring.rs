@@ -5,6 +5,7 @@ use crate::curve::{CurveError, FITTED, MeasuredCurve, ServedCurve, SpringFit};
 use clap::Args;
 use flotor_command::options::{new_file, number, svg_file};
 use flotor_command::{CommandError, print_result, style, write_text};
+use flotor_hal::{TextProblem, read_text};
 use flotor_plot::{Axis, Figure, Panel, Series};
 use flotor_session::registry::is_same_file;
 use std::path::{Path, PathBuf};
@@ -43,10 +44,15 @@ pub(super) struct SpringArguments {
 
 pub(super) fn run(arguments: &SpringArguments) -> Result<(), CommandError> {
     let path = &arguments.curve;
-    let text = std::fs::read_to_string(path).map_err(|cause| {
-        CommandError::Usage(format!("{}: cannot read the table: {cause}", path.display()))
-    })?;
-    let refused = |error| CommandError::Usage(format!("{}: {error}", path.display()));
+    let text =
+        read_text(path, "the table").map_err(|wrong| CommandError::Usage(wrong.in_file(path.display())))?;
+    let refused = |error| {
+        let wrong = match error {
+            CurveError::Line { line, problem } => TextProblem::at(line, problem),
+            other => TextProblem::of_file(other.to_string()),
+        };
+        CommandError::Usage(wrong.in_file(path.display()))
+    };
     let curve =
         MeasuredCurve::parse(&text, arguments.free_length_mm.map(|mm| mm * 1.0e-3)).map_err(refused)?;
     let fit = curve.fit().map_err(refused)?;
