@@ -19,7 +19,7 @@ pub fn exit_code_of(result: Result<(), CommandError>) -> ExitCode {
     let code = match result {
         Ok(()) => 0,
         Err(error) => {
-            print_error_line(format_args!("{} {error}", style::error("error:")));
+            print_error_line(format_args!("{} {}", style::error("error:"), for_terminal(&error)));
             error.exit_code()
         }
     };
@@ -85,9 +85,22 @@ pub fn print_error_line(line: std::fmt::Arguments<'_>) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
+/// A message, control characters but ends of lines and tabs escaped: a file that it quotes may be anybody's, the terminal is not.
+fn for_terminal(message: impl std::fmt::Display) -> String {
+    let mut shown = String::new();
+    for character in message.to_string().chars() {
+        if character.is_control() && !matches!(character, '\n' | '\t') {
+            shown.extend(character.escape_default());
+        } else {
+            shown.push(character);
+        }
+    }
+    shown
+}
+
 /// Prints a note on standard error; it changes no exit code.
 pub fn note(text: impl std::fmt::Display) {
-    print_error_line(format_args!("{} {text}", style::warning("note:")));
+    print_error_line(format_args!("{} {}", style::warning("note:"), for_terminal(text)));
 }
 
 /// The first error: it decides the exit code, and the caller prints it last. This function prints the others.
@@ -97,7 +110,9 @@ pub fn note(text: impl std::fmt::Display) {
 pub fn first_error(results: impl IntoIterator<Item = Result<(), CommandError>>) -> Result<(), CommandError> {
     let mut errors = results.into_iter().filter_map(Result::err);
     let first = errors.next();
-    errors.for_each(|error| print_error_line(format_args!("{} {error}", style::error("error:"))));
+    errors.for_each(|error| {
+        print_error_line(format_args!("{} {}", style::error("error:"), for_terminal(error)));
+    });
     first.map_or(Ok(()), Err)
 }
 

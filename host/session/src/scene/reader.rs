@@ -133,6 +133,11 @@ impl<'t> Source<'t> {
     }
 }
 
+/// Whether a text, which ends up on a terminal, does nothing to it.
+fn is_for_people(text: &str) -> bool {
+    text.chars().all(|character| !character.is_control() || matches!(character, '\n' | '\t'))
+}
+
 /// One table of a scene; keys are taken out of it until none is left.
 pub(super) struct Section<'t> {
     source: &'t Source<'t>,
@@ -339,7 +344,10 @@ impl Value<'_> {
 
     pub(super) fn text(self) -> Result<String, SceneError> {
         match self.value {
-            DeValue::String(text) => Ok(text.into_owned()),
+            DeValue::String(ref text) if is_for_people(text) => Ok(text.to_string()),
+            DeValue::String(_) => {
+                Err(self.problem(format!("`{}` must not contain control characters", self.key)))
+            }
             ref other => Err(self.problem(format!(
                 "`{}` must be text in quotes; found: {}",
                 self.key,
@@ -369,10 +377,11 @@ impl Value<'_> {
     }
 
     pub(super) fn texts(self) -> Result<Vec<String>, SceneError> {
-        let wrong = self.problem(format!("`{}` must be a list of texts in quotes", self.key));
+        let wrong = self
+            .problem(format!("`{}` must be a list of texts in quotes, without control characters", self.key));
         let DeValue::Array(list) = self.value else { return Err(wrong) };
         let texts = list.into_iter().map(|value| match value.into_inner() {
-            DeValue::String(text) => Ok(text.into_owned()),
+            DeValue::String(text) if is_for_people(&text) => Ok(text.into_owned()),
             _ => Err(wrong.clone()),
         });
         texts.collect()
