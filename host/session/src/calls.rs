@@ -6,6 +6,7 @@
 
 use crate::machine::MachineState;
 use flotor_servo::StopSwitch;
+use flotor_servo::last_stop::{enter_call, leave_call};
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -206,12 +207,14 @@ impl Progress {
 
     /// Whose code runs from now on.
     pub(crate) fn enter(&self, who: &str, call: Call) {
+        enter_call(who, call);
         *self.lock() = Some(Now { who: who.to_owned(), call, since: Instant::now(), is_told: false });
     }
 
     /// The host's own code runs from now on.
     pub(crate) fn leave(&self) {
         *self.lock() = None;
+        leave_call();
     }
 
     /// Tells of a call that takes long; an error for one that takes longer than the limit.

@@ -95,9 +95,39 @@ fn a_plugin_that_hangs_at_the_end_costs_neither_the_recording_nor_the_summary_an
 fn a_model_that_ends_the_process_when_it_is_freed_costs_neither_the_recording_nor_the_summary() {
     let scratch = Scratch::default();
     let ran = run(&scratch, &scene_of(&scratch, HONEST, "IN_DESTROY=leave();", ""), "virtual");
+    assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:?}");
+    assert!(
+        ran.stderr.contains("error: `jelly` ended the process in `destroy`: it called `exit`\n"),
+        "{ran:?}"
+    );
     assert!(ran.stdout.contains("digest"), "{ran:?}");
     assert_eq!(summary(&scratch)["end"], "finished");
     assert_eq!(ending(&scratch), Ending::Finished);
+}
+
+/// `exit(0)` would else be a run that went well, and a crash one of which nobody says whose it was.
+#[test]
+fn a_plugin_that_ends_the_process_outside_the_loop_is_named_and_is_a_plugin_that_failed() {
+    let (exit, abort, trap) = ("it called `exit`", "signal 6 (SIGABRT", "signal 4 (SIGILL");
+    let cases = [
+        (HONEST, "IN_CREATE=leave();", "`jelly`", "`create`", exit),
+        (HONEST, "IN_CREATE=__builtin_trap();", "`jelly`", "`create`", trap),
+        (HONEST, "IN_PREPARE=abort();", "`jelly`", "`prepare`", abort),
+        (HONEST, "IN_INITIALISER=leave();", ".so`", "its initialisers", exit),
+        (HONEST, "IN_DESTROY=abort();", "`jelly`", "`destroy`", abort),
+        ("IN_OPEN=exit(0);", HONEST, "`handle`", "`open`", exit),
+        ("IN_ACTIVATE=abort();", HONEST, "`handle`", "`activate`", abort),
+        ("IN_DEACTIVATE=exit(0);", HONEST, "`handle`", "`deactivate`", exit),
+        ("IN_CLOSE=abort();", HONEST, "`handle`", "`close`", abort),
+    ];
+    show_each(&on_both_clocks(&cases), |((device, model, who, call, words), clock)| {
+        let scratch = Scratch::default();
+        let ran = run(&scratch, &scene_of(&scratch, device, model, ""), clock);
+        assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{who} {call} {clock}: {ran:?}");
+        let told = format!("{who} ended the process in {call}: {words}");
+        let is_told = |line: &str| line.starts_with("error: ") && line.contains(&told);
+        assert!(ran.stderr.lines().any(is_told), "{told} {clock}: {ran:?}");
+    });
 }
 
 #[test]

@@ -4,18 +4,22 @@
 const BYTES: usize = 512;
 
 /// A line that is being written.
+#[derive(Clone, Copy)]
 pub(super) struct Line {
     bytes: [u8; BYTES],
     len: usize,
 }
 
-impl Default for Line {
-    fn default() -> Self {
-        Self { bytes: [0; BYTES], len: 0 }
-    }
-}
-
 impl Line {
+    /// Nothing yet.
+    pub(super) const EMPTY: Self = Self { bytes: [0; BYTES], len: 0 };
+
+    /// The line so far, without a character that was cut.
+    pub(super) fn text(&self) -> &str {
+        let written = self.bytes.get(..self.len).unwrap_or_default();
+        written.utf8_chunks().next().map_or("", |chunk| chunk.valid())
+    }
+
     /// The line with its end.
     pub(super) fn as_bytes(&mut self) -> &[u8] {
         let len = self.len.min(BYTES - 1);
@@ -48,14 +52,14 @@ mod tests {
 
     #[test]
     fn a_line_ends_and_holds_no_other_ends() {
-        let mut line = Line::default();
+        let mut line = Line::EMPTY;
         write!(line, "tick {}\n\u{1b}[2J", 17).expect("it fits");
         assert_eq!(line.as_bytes(), b"tick 17??[2J\n");
     }
 
     #[test]
     fn a_line_that_is_too_long_is_cut() {
-        let mut line = Line::default();
+        let mut line = Line::EMPTY;
         assert!(write!(line, "{}", "x".repeat(10_000)).is_err());
         assert_eq!(line.as_bytes().len(), BYTES);
         assert_eq!(line.as_bytes().last(), Some(&b'\n'));

@@ -7,9 +7,11 @@
 //! What nobody can catch (`_exit`, `exec`, SIGKILL, a stack that overflows in a thread without an alternate one) is left to
 //! a process of its own: [`crate::watchdog_process`].
 
+mod call;
 mod line;
 mod system;
 
+pub use call::{enter_call, leave_call};
 pub(crate) use system::take_sent;
 pub use system::{
     SignalGuard, TakenSignals, block_signals, ignore_no_signal, leave_process,
@@ -184,6 +186,13 @@ fn end_if_armed(death: Death) {
     }
 }
 
+/// The same; returns if the calling thread is in no call of a plugin outside the loop.
+fn end_if_in_call(death: Death) {
+    if call::current().is_some() {
+        die(death);
+    }
+}
+
 /// Whether this process is dying: somebody stops its devices, and will end it.
 pub(crate) fn is_dying() -> bool {
     DYING.load(Ordering::Acquire) != 0
@@ -211,7 +220,7 @@ fn die(death: Death) -> ! {
         }
     }
     stop_the_rest();
-    let mut line = Line::default();
+    let mut line = Line::EMPTY;
     describe(&mut line, death, own);
     system::say(line.as_bytes());
     system::end_by(death, ENDED)
@@ -238,6 +247,14 @@ fn stop_the_rest() {
 /// One line: what it was, in which tick, in whose code.
 fn describe(line: &mut Line, death: Death, own: i32) {
     use std::fmt::Write;
+    if let Some(call) = call::current() {
+        let _ = write!(line, "error: {}: ", call.text());
+        describe_death(line, death);
+        if is_armed() {
+            let _ = write!(line, "; every device was told to stop");
+        }
+        return;
+    }
     let is_own = |run: &ManuallyDrop<Arc<Armed>>| run.thread.load(Ordering::Acquire) == own;
     let own_run = runs().find(|run| is_own(run) && !run.is_over());
     let Some(run) = own_run.or_else(|| runs().find(|run| !run.is_over())) else {
@@ -258,6 +275,18 @@ fn describe(line: &mut Line, death: Death, own: i32) {
         }
     };
     let _ = write!(line, ", tick {tick}: ");
+    describe_death(line, death);
+    if !culprit {
+        let _ = write!(line, "; the loop was in {} of `{}`; its plugins:", place.call(), run.name(place));
+        for name in &run.names {
+            let _ = write!(line, " `{name}`");
+        }
+    }
+    let _ = write!(line, "; every device was told to stop");
+}
+
+fn describe_death(line: &mut Line, death: Death) {
+    use std::fmt::Write;
     let _ = match death {
         Death::Signal { signal, sender } => {
             let told = write!(line, "signal {signal} ({})", system::signal_words(signal));
@@ -266,11 +295,4 @@ fn describe(line: &mut Line, death: Death, own: i32) {
         Death::Exit => write!(line, "it called `exit`"),
         Death::Thread => write!(line, "it ended the thread of the loop"),
     };
-    if !culprit {
-        let _ = write!(line, "; the loop was in {} of `{}`; its plugins:", place.call(), run.name(place));
-        for name in &run.names {
-            let _ = write!(line, " `{name}`");
-        }
-    }
-    let _ = write!(line, "; every device was told to stop");
 }

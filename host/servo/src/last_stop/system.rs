@@ -3,7 +3,7 @@
 //! Nothing that runs in a handler allocates, locks or formats into memory of its own.
 #![allow(unsafe_code)] // handlers of deadly signals and of `exit` cannot be made without; tests/tests/system/architecture.rs
 
-use super::{Death, end_if_armed, is_armed};
+use super::{Death, call, end_if_armed, end_if_in_call, is_armed};
 use crate::guest::{is_guest, leaves_signals};
 use libc::{c_int, c_void, sigaction, siginfo_t, sigset_t};
 use std::io;
@@ -69,6 +69,12 @@ static BEFORE: [OnceLock<sigaction>; SIGNALS] = [const { OnceLock::new() }; SIGN
 /// Takes every signal that would end the process, in this thread on a stack of its own, and `exit`. Again for each run: a
 /// plugin may have put something else there. Not real-time.
 pub(super) fn install() {
+    install_handlers();
+    take_sent();
+}
+
+/// The same, but signals that are sent to the process as a whole are left to other threads. Not real-time.
+pub(super) fn install_handlers() {
     static AT_EXIT: Once = Once::new();
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
@@ -81,7 +87,6 @@ pub(super) fn install() {
         return;
     }
     STACK.with(|_| ());
-    take_sent();
     for signal in (1..).take(SIGNALS - 1).filter(|signal| !HARMLESS.contains(signal)) {
         let Some(found) = action(signal) else { continue };
         let is_ours = found.sa_sigaction == handler();
@@ -129,7 +134,11 @@ extern "C" fn on_signal(signal: c_int, info: *mut siginfo_t, _: *mut c_void) {
     let was_sent = [libc::SI_USER, libc::SI_TKILL, libc::SI_QUEUE].contains(&code);
     let sender = Some(sender).filter(|sender| was_sent && *sender != process_number());
     if is_own_process() {
-        end_if_armed(Death::Signal { signal, sender });
+        let death = Death::Signal { signal, sender };
+        end_if_armed(death);
+        if RAISED.contains(&signal) && sender.is_none() {
+            end_if_in_call(death);
+        }
     }
     // No run: as if we had never been here.
     let before = usize::try_from(signal).ok().and_then(|signal| BEFORE.get(signal)?.get());
@@ -143,11 +152,12 @@ extern "C" fn on_signal(signal: c_int, info: *mut siginfo_t, _: *mut c_void) {
 }
 
 extern "C" fn at_exit() {
-    if is_armed() && is_own_process() {
+    if is_own_process() && (is_armed() || call::current().is_some()) {
         // A stop that calls `exit` itself comes here once more.
         // SAFETY: as where it was registered first.
         let _ = unsafe { libc::atexit(at_exit) };
         end_if_armed(Death::Exit);
+        end_if_in_call(Death::Exit);
     }
 }
 
