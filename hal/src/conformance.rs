@@ -26,7 +26,7 @@ pub enum Rule {
     TimeBudget,
     /// Two instances give the same answers alternately, on two threads and alone.
     Independent,
-    /// Neither `create` nor `prepare` nor a step leaves a thread behind.
+    /// Neither `create`, `prepare`, a step nor `destroy` leaves a thread behind.
     NoThreads,
     /// The force of a model without a history is minus the gradient of its energy: units and frame agree.
     EnergyGradient,
@@ -110,7 +110,7 @@ impl Rule {
             Rule::ResetRepeats => "after reset the same poses give the same bits",
             Rule::TimeBudget => "99 of 100 steps take less than half a period at 1 kHz",
             Rule::Independent => "two instances give the same answers alternately, on two threads and alone",
-            Rule::NoThreads => "neither create nor prepare nor a step leaves a thread behind",
+            Rule::NoThreads => "neither create, prepare, a step nor destroy leaves a thread behind",
             Rule::EnergyGradient => {
                 "the force of a model without a history is minus the gradient of its energy"
             }

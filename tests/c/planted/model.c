@@ -13,7 +13,8 @@ FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-planted-model\"\nname = \"Plan
     X(neg_status) X(destroy_segv) X(destroy_exit) X(atexit_loop) X(dtor_segv) X(exec) X(ptrace) X(double_answer)          \
     X(null_deref_thread) X(free_host) X(write_host_stack) X(munmap_self) X(env)                                           \
     X(heap_read) X(use_after_free) X(write_input) X(umask) X(late_alloc) X(thread_prepare) X(crash_reach)                 \
-    X(crash_activity) X(crash_field) X(crash_centerline) X(crash_details) X(field_nan) X(sigaltered_step)
+    X(crash_activity) X(crash_field) X(crash_centerline) X(crash_details) X(field_nan) X(sigaltered_step)           \
+    X(thread_destroy) X(timer)
 
 PLANTED_SCHEMA
 
@@ -157,6 +158,14 @@ static uint32_t create(const FlotorParameterValue *values, uint32_t count, Floto
     case FAULT_rlimit: setrlimit(RLIMIT_FSIZE, &(struct rlimit){0, RLIM_INFINITY}); break;
     case FAULT_nice_idle: sched_setscheduler(0, SCHED_IDLE, &(struct sched_param){0}); break;
     case FAULT_setitimer: setitimer(ITIMER_REAL, &(struct itimerval){{0, 20000}, {0, 20000}}, NULL); break;
+    case FAULT_timer: {
+        timer_t timer;
+        struct sigevent event = {.sigev_notify = SIGEV_SIGNAL, .sigev_signo = SIGUSR2};
+        if (timer_create(CLOCK_MONOTONIC, &event, &timer) == 0) {
+            timer_settime(timer, 0, &(struct itimerspec){.it_value = {3600, 0}}, NULL);
+        }
+        break;
+    }
     case FAULT_ptrace: ptrace(PTRACE_TRACEME, 0, NULL, NULL); break;
     case FAULT_env: setenv("PLANTED", "1", 1); break;
     case FAULT_atexit_loop: atexit(loop_for_ever); break;
@@ -185,6 +194,7 @@ static void destroy(FlotorInstance instance) {
     case FAULT_loop_destroy: loop_for_ever(); break;
     case FAULT_destroy_segv: crash(); break;
     case FAULT_destroy_exit: exit(0);
+    case FAULT_thread_destroy: start(naps); break;
     default: break;
     }
     free(spring->block);

@@ -123,14 +123,16 @@ pub(super) fn independent(subject: &Subject) -> Result<(), String> {
 }
 
 /// Compares with the number of threads before the library was loaded.
-pub(super) fn no_threads(model: &mut Model, before: usize) -> Result<(), String> {
+pub(super) fn no_threads(mut model: Model, before: usize) -> Result<(), String> {
     let more = |when: &str| match threads().saturating_sub(before) {
         0 => Ok(()),
         more => Err(format!("the process has {more} more threads after {when}")),
     };
     more("create and prepare")?;
-    let _ = walked(&mut [model])?;
-    more("500 steps")
+    let _ = walked(&mut [&mut model])?;
+    more("500 steps")?;
+    drop(model);
+    more("destroy")
 }
 
 /// Compares force and torque with the energy over steps of a micrometre and of a hundredth of a milliradian at poses of a

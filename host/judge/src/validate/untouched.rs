@@ -13,7 +13,7 @@ use std::path::Path;
 use std::time::Duration;
 
 /// How long the process is left alone at the end: a timer or a signal that was left behind comes by then.
-const REST: Duration = Duration::from_millis(50);
+const REST: Duration = Duration::from_millis(300);
 
 /// How one part of the state may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,6 +72,7 @@ impl Host {
             ),
             ("umask or tracer", May::Stay, named(&process, &["Umask:", "TracerPid:"])),
             ("child processes", May::Stay, vec![children().to_owned()]),
+            ("timers", May::Stay, named(&whole("/proc/self/timers"), &["ID:", "signal:"])),
             ("open files", May::Grow, files()),
         ];
         Self { parts, threads: threads() }
