@@ -112,6 +112,7 @@ every_change() {
     step machine machine
     step format format
     step size .ci/lines
+    step deny deny
     # The README's `cargo test`; the viewer, whose GPU stack that leaves out; and what needs tools that take long to build. One
     # command: of two, the second builds half of what both use again, with other features.
     step test cargo test --workspace --features flotor-tests/formats,flotor-tests/drop-ins --no-fail-fast
