@@ -122,7 +122,19 @@ fn what_cannot_be_is_refused_in_one_line() {
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
     let broken = scratch.file("broken.toml", "format = 1\n[device]\nplugin = 3\n");
     let missing = scratch.path().join("missing.toml");
-    for (file, words) in [(&other, "`maglev` 7"), (&broken, "broken.toml:3"), (&missing, "cannot read")] {
+    let head = "format = 1\n[device]\nplugin = \"simulated\"\n[vertical]\n";
+    let tail = "[provenance]\nsource = \"imported\"\nprogram = \"x\"\n";
+    let far = format!("{head}range_mm = [-1e300, 7]\ncoefficients_per_mm = [1]\n{tail}");
+    let steep = format!("{head}range_mm = [-7, 7]\ncoefficients_per_mm = [1, 1e300]\n{tail}");
+    let [far, steep] =
+        [("far.toml", far), ("steep.toml", steep)].map(|(name, text)| scratch.file(name, text));
+    for (file, words) in [
+        (&other, "`maglev` 7"),
+        (&broken, "broken.toml:3"),
+        (&missing, "cannot read"),
+        (&far, "far.toml:5: [vertical] invalid range -1e300 mm"),
+        (&steep, "steep.toml:6: [vertical] "),
+    ] {
         let ran = Flotor::with(["calibrate", "verify", text(file), "--simulated"]).run();
         assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
         assert!(ran.error().contains(words), "{}", ran.error());

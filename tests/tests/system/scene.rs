@@ -257,3 +257,44 @@ fn an_unknown_plugin_is_named_with_the_nearest_one() {
         "{ran:?}"
     );
 }
+
+#[test]
+fn a_file_that_is_no_text_is_told_with_its_line() {
+    let scratch = Scratch::default();
+    let wrong = |name: &str| {
+        let bytes = [b"# one\n# two\n# ".to_vec(), vec![0xff], b"\n".to_vec()].concat();
+        scratch.file(name, bytes).display().to_string()
+    };
+    let scene = |name: &str, tables: String| {
+        let text = format!("duration_s = 0.01\n[device]\nplugin = \"simulated\"\n{tables}");
+        scratch.file(name, text).display().to_string()
+    };
+    let curve = "[[model]]\nplugin = \"measured\"\n[model.parameters]\ncurve";
+    let mesh = "[[model]]\nplugin = \"membrane\"\n[model.parameters]\nfile";
+    let scenes = [
+        ("scene.toml", wrong("scene.toml")),
+        (
+            "hand.toml",
+            scene("a.toml", format!("[device.parameters]\nhand_script = {:?}\n", wrong("hand.toml"))),
+        ),
+        ("unit.toml", scene("b.toml", format!("calibration = {:?}\n", wrong("unit.toml")))),
+        ("curve.csv", scene("c.toml", format!("{curve} = {:?}\n", wrong("curve.csv")))),
+        ("mesh.obj", scene("d.toml", format!("{mesh} = {:?}\n", wrong("mesh.obj")))),
+    ];
+    for (name, scene) in scenes {
+        let ran = Flotor::with(["run", &scene, "--clock", "virtual"]).run();
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+        assert!(ran.error().contains(&format!("{name}:3: this is not UTF-8")), "{ran:?}");
+    }
+}
+
+#[test]
+fn a_scene_writes_no_control_characters_to_a_terminal() {
+    let title = spoiled("A spring", "\\u001b[2J");
+    assert_eq!(title, "scene.toml:1: `title` must not contain control characters");
+    let scratch = Scratch::default();
+    let scene = scratch.file("scene.toml", "title = \"\x1b[2J\"\n").display().to_string();
+    let ran = Flotor::with(["run", &scene]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    assert!(ran.stderr.contains("\\u{1b}[2J") && !ran.stderr.contains('\x1b'), "{ran:?}");
+}
