@@ -67,17 +67,17 @@ impl Controller {
         match self.flight {
             Flight::Landed => Self::refused(Function::Land, Status::LANDED),
             // A second one waits with the first.
-            Flight::Landing => Answer::When(self.last_ticket),
+            Flight::Landing => match self.procedure {
+                Some((landing, _)) => Answer::When(landing),
+                None => Answer::When(self.begin_landing()),
+            },
             Flight::TakingOff | Flight::Flying => Answer::When(self.begin_landing()),
         }
     }
 
     fn find_gravity(&mut self) -> Answer {
         match self.flight {
-            Flight::Flying => {
-                self.command = Command::Position;
-                Answer::When(self.begin_search())
-            }
+            Flight::Flying => Answer::When(self.begin_search()),
             _ => Self::refused(Function::FindGravity, Status::LANDED),
         }
     }
@@ -158,6 +158,7 @@ impl Controller {
             }
             Function::Shutdown => {
                 self.end_procedure(Status::OFF_LINE);
+                self.end_resets(Status::OFF_LINE, |_| true);
                 let mut anew = Self::new(self.config);
                 // Calls that wait for a procedure still get their reply.
                 (anew.finished, anew.last_ticket) = (std::mem::take(&mut self.finished), self.last_ticket);
@@ -288,7 +289,7 @@ impl Controller {
     }
 
     /// Where the flotor is sent from when it is told a velocity: its target while it follows one, else where it is.
-    fn at_target(&self) -> [f64; 6] {
+    pub(super) fn at_target(&self) -> [f64; 6] {
         match self.command {
             Command::Position | Command::Velocity(_) => self.desired,
             Command::Forces(_) | Command::Currents(_) => self.at,

@@ -91,19 +91,14 @@ impl Gains {
     }
 }
 
-/// Where an axis is and should be: m or rad, m/s or rad/s.
+/// How far an axis is from where it should be: m or rad, m/s or rad/s.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AxisError {
     pub(super) off: f64,
     pub(super) speed_off: f64,
-    /// Integral of `off` over time, s.
-    pub(super) integral: f64,
 }
 
-/// Force or torque of the PIDF law, N or N·m.
+/// Force or torque of the PIDF law without its integral, N or N·m.
 pub(super) fn force(pid: Pid, error: AxisError) -> f64 {
-    f64::from(pid.p) * error.off
-        + f64::from(pid.i) * error.integral
-        + f64::from(pid.d) * error.speed_off
-        + f64::from(pid.ff)
+    f64::from(pid.p) * error.off + f64::from(pid.d) * error.speed_off + f64::from(pid.ff)
 }

@@ -37,38 +37,67 @@ impl Controller {
     /// What the gains give on an axis.
     fn held(&self, axis: Axis) -> f64 {
         let index = axis as usize;
-        let (at, speed) = (self.at[index], self.speed[index]);
+        let error = self.error(axis, self.desired[index], 0.0);
+        let normal = self.gains.of(GainSet::Normal, axis);
+        match self.flight {
+            Flight::Landing => {
+                let (gains, left) = &self.landing;
+                let pid = gains[index];
+                force(Pid { d: 0.0, ..pid }, error) * left + f64::from(pid.d) * error.speed_off
+            }
+            Flight::TakingOff => force(normal, error),
+            Flight::Landed | Flight::Flying => {
+                let laws = self.laws(axis).map(|(pid, error)| force(pid, error));
+                self.trim[index] + self.integral_n[index] + laws.iter().sum::<f64>()
+            }
+        }
+    }
+
+    fn error(&self, axis: Axis, to: f64, wanted_speed: f64) -> AxisError {
+        let index = axis as usize;
+        AxisError { off: to - self.at[index], speed_off: wanted_speed - self.speed[index] }
+    }
+
+    /// Gains that act on an axis in the air: those of its mode and, beyond the range of a constrained axis, on top of them
+    /// those that push back. On top, because it is the normal gains that carry the weight.
+    pub(super) fn laws(&self, axis: Axis) -> [(Pid, AxisError); 2] {
+        let index = axis as usize;
         let wanted_speed = match self.command {
             Command::Velocity(speeds) => f64::from(speeds[index]),
             _ => 0.0,
         };
-        let error = |to: f64, wanted_speed: f64| AxisError {
-            off: to - at,
-            speed_off: wanted_speed - speed,
-            integral: self.integral[index],
-        };
-        if self.flight == Flight::Landing {
-            let (gains, left) = &self.landing;
-            let pid = gains[index];
-            let damping = f64::from(pid.d) * -speed;
-            return (force(Pid { d: 0.0, ..pid }, error(self.desired[index], 0.0))) * left + damping;
-        }
-        let normal = self.gains.of(GainSet::Normal, axis);
-        if self.flight == Flight::TakingOff {
-            return force(normal, error(self.desired[index], 0.0));
-        }
-        self.trim[index]
-            + match self.modes[index] {
-                AxisMode::Locked => {
-                    force(self.gains.of(GainSet::Locked, axis), error(self.locked_at[index], 0.0))
-                }
-                AxisMode::Constrained if self.side(axis) != 0 => {
-                    let [least, most] = self.ranges[index].map(f64::from);
-                    let nearest = if at < least { least } else { most };
-                    force(self.gains.of(GainSet::Constrained, axis), error(nearest, 0.0))
-                }
-                _ => force(normal, error(self.target(axis), wanted_speed)),
+        let mode = match self.modes[index] {
+            AxisMode::Locked => {
+                (self.gains.of(GainSet::Locked, axis), self.error(axis, self.locked_at[index], 0.0))
             }
+            _ => (self.gains.of(GainSet::Normal, axis), self.error(axis, self.target(axis), wanted_speed)),
+        };
+        let [least, most] = self.ranges[index].map(f64::from);
+        let beyond = match self.side(axis) {
+            0 => (Pid::ZERO, AxisError::default()),
+            side => {
+                let nearest = if side < 0 { least } else { most };
+                (self.gains.of(GainSet::Constrained, axis), self.error(axis, nearest, 0.0))
+            }
+        };
+        [mode, beyond]
+    }
+
+    /// Carries the integrals on by a cycle, s. What is summed is force: a gain that changes acts from then on, and one that
+    /// is zero forgets.
+    pub(super) fn integrate(&mut self, dt_s: f64) {
+        let are_held = self.flight == Flight::Flying
+            && (matches!(self.command, Command::Position | Command::Velocity(_))
+                || self.config.force_command == ForceCommand::Adds);
+        for axis in Axis::ALL {
+            let laws = self.laws(axis);
+            let sum = &mut self.integral_n[axis as usize];
+            if are_held && laws.iter().any(|(pid, _)| pid.i != 0.0) {
+                *sum += laws.iter().map(|(pid, error)| f64::from(pid.i) * error.off * dt_s).sum::<f64>();
+            } else {
+                *sum = 0.0;
+            }
+        }
     }
 
     /// Where an axis should be: the desired position, within the range of a constrained axis.

@@ -2,11 +2,11 @@
 
 use super::coils::CoilSet;
 use super::gains::Gains;
-use super::procedure::{Procedure, Ticket};
+use super::procedure::{GainReset, Procedure, Ticket};
 use crate::controller::Sample;
 use flotor_hal::{DVec3, Wrench};
 use flotor_maglev::ml_api::{
-    Axis, AxisMode, Buttons, CellOffset, Event, FaultBits, Pid, Reply, Six, Status, angles,
+    Axis, AxisMode, Buttons, CellOffset, Event, FaultBits, GainSet, Pid, Reply, Six, Status, angles,
 };
 
 /// What a force command does to the gains.
@@ -88,6 +88,9 @@ pub(super) enum Command {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Injected(pub FaultBits);
 
+/// How far inside a boundary the flotor is back inside, m or rad: the resolution of the sensors.
+const INSIDE_M: f64 = 2.0e-6;
+
 /// Replies and events that have room before anybody takes them.
 pub(super) const KEPT: usize = 64;
 
@@ -102,6 +105,8 @@ pub struct Controller {
     pub(super) coils: CoilSet,
     pub(super) flight: Flight,
     pub(super) procedure: Option<(Ticket, Procedure)>,
+    /// Gains that glide to their defaults, one at most a set.
+    pub(super) resets: Vec<GainReset>,
     pub(super) finished: Vec<(Ticket, Reply)>,
     pub(super) last_ticket: Ticket,
     pub(super) command: Command,
@@ -110,7 +115,8 @@ pub struct Controller {
     pub(super) ranges: [[f32; 2]; 6],
     pub(super) desired: [f64; 6],
     pub(super) desired_told: Six,
-    pub(super) integral: [f64; 6],
+    /// What the integrals have come to, N and N·m.
+    pub(super) integral_n: [f64; 6],
     /// What finding gravity adds, N and N·m.
     pub(super) trim: [f64; 6],
     /// Gains while landing, and the share of them that is left.
@@ -153,6 +159,7 @@ impl Controller {
             coils: CoilSet::default(),
             flight: Flight::Landed,
             procedure: None,
+            resets: Vec::with_capacity(GainSet::ALL.len()),
             finished: Vec::with_capacity(KEPT),
             last_ticket: Ticket::default(),
             command: Command::Position,
@@ -161,7 +168,7 @@ impl Controller {
             ranges: [[0.0; 2]; 6],
             desired: [0.0; 6],
             desired_told: [0.0; 6],
-            integral: [0.0; 6],
+            integral_n: [0.0; 6],
             trim: [0.0; 6],
             landing: ([Pid::ZERO; 6], 0.0),
             faults: FaultBits::NONE,
@@ -211,7 +218,7 @@ impl Controller {
     /// True while a procedure is in progress.
     #[must_use]
     pub fn is_busy(&self) -> bool {
-        self.procedure.is_some()
+        self.procedure.is_some() || !self.resets.is_empty()
     }
 
     /// True while the flotor is held by a force that a client has to keep up.
@@ -256,12 +263,7 @@ impl Controller {
     /// The wrench over the interval, s: what the newest command asks for, within the limits of the coils.
     pub fn drive(&mut self, dt_s: f64) -> Wrench {
         let wanted = self.wanted();
-        if self.flight == Flight::Flying {
-            for axis in Axis::ALL {
-                let off = self.target(axis) - self.at[axis as usize];
-                self.integral[axis as usize] += off * dt_s;
-            }
-        }
+        self.integrate(dt_s);
         let (currents_a, driven) = self.coils.driven(&wanted);
         self.coils.carry(&currents_a, dt_s);
         driven
@@ -339,7 +341,7 @@ impl Controller {
         self.end_procedure(self.cause_status());
         self.flight = Flight::Landed;
         self.command = Command::Position;
-        self.integral = [0.0; 6];
+        self.integral_n = [0.0; 6];
         self.trim = [0.0; 6];
     }
 
@@ -368,13 +370,22 @@ impl Controller {
         Buttons { left: self.sample.buttons & 1 != 0, right: self.sample.buttons & 2 != 0 }
     }
 
+    /// Where the flotor is by boundary. It is back inside a bit before it is: one that rests at its boundary crosses it once.
     fn sides_now(&self) -> Sides {
         let mut sides = [0; 7];
         for axis in Axis::ALL {
-            sides[axis as usize] = i32::from(self.side(axis));
+            let (side, told) = (i32::from(self.side(axis)), self.sides[axis as usize]);
+            let is_constrained = self.modes[axis as usize] == AxisMode::Constrained;
+            let stays = told != 0 && is_constrained && {
+                let [least, most] = self.ranges[axis as usize].map(f64::from);
+                let depth =
+                    if told > 0 { self.at[axis as usize] - most } else { least - self.at[axis as usize] };
+                depth > -INSIDE_M
+            };
+            sides[axis as usize] = if side == 0 && stays { told } else { side };
         }
-        let outside = vector(&self.at, 0).length() > f64::from(self.boundary_radius_m);
-        sides[6] = i32::from(outside);
+        let depth = vector(&self.at, 0).length() - f64::from(self.boundary_radius_m);
+        sides[6] = i32::from(depth > if self.sides[6] == 0 { 0.0 } else { -INSIDE_M });
         sides
     }
 }

@@ -1,9 +1,9 @@
-//! What takes seconds: taking off, landing, finding gravity, gliding to default gains. One at a time; a new one takes the
-//! place of the one before.
+//! What takes seconds: taking off, landing and finding gravity, one at a time; a new one takes the place of the one before.
+//! Gains glide to their defaults meanwhile: that neither ends a landing nor waits for it.
 
 use super::machine::{Command, Controller, Flight, KEPT, narrow, vector};
 use flotor_hal::DVec3;
-use flotor_maglev::ml_api::{GainSet, Pid, Reply, Results, Status};
+use flotor_maglev::ml_api::{Axis, GainSet, Pid, Reply, Results, Status};
 
 /// Which call waits for a procedure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,7 +35,15 @@ pub(super) enum Procedure {
     TakeOff { at_home_s: f64 },
     Land { faded_s: f64 },
     FindGravity(Search),
-    ResetGains { set: GainSet, from: [Pid; 6], elapsed_s: f64 },
+}
+
+/// Gains of a set on their way to the defaults.
+#[derive(Clone, Debug)]
+pub(super) struct GainReset {
+    ticket: Ticket,
+    set: GainSet,
+    from: [Pid; 6],
+    elapsed_s: f64,
 }
 
 /// A search for the wrench that holds the flotor.
@@ -62,34 +70,53 @@ impl Controller {
     }
 
     pub(super) fn begin_take_off(&mut self) -> Ticket {
+        self.end_resets(Status::OK, |set| set == GainSet::Normal);
         self.gains.glide(GainSet::Normal, &[Pid::ZERO; 6], 1.0);
         (self.desired, self.command) = (self.at, Command::Position);
-        self.integral = [0.0; 6];
+        self.integral_n = [0.0; 6];
         self.flight = Flight::TakingOff;
         self.begin(Procedure::TakeOff { at_home_s: 0.0 })
     }
 
     pub(super) fn begin_landing(&mut self) -> Ticket {
         (self.desired, self.command) = (self.at, Command::Position);
-        self.integral = [0.0; 6];
+        self.integral_n = [0.0; 6];
         self.landing = (self.gains.landing(), 1.0);
         self.flight = Flight::Landing;
         self.begin(Procedure::Land { faded_s: 0.0 })
     }
 
     pub(super) fn begin_search(&mut self) -> Ticket {
+        // Where it is, unless the gains hold it somewhere already.
+        (self.desired, self.command) = (self.at_target(), Command::Position);
+        self.desired_told = narrow(vector(&self.desired, 0), vector(&self.desired, 3));
         self.begin(Procedure::FindGravity(Search::default()))
     }
 
     pub(super) fn begin_reset(&mut self, set: GainSet) -> Ticket {
-        let from = *self.gains.set(set);
-        self.begin(Procedure::ResetGains { set, from, elapsed_s: 0.0 })
+        self.end_resets(Status::REPLACED, |other| other == set);
+        let (ticket, from) = (self.next_ticket(), *self.gains.set(set));
+        self.resets.push(GainReset { ticket, set, from, elapsed_s: 0.0 });
+        ticket
+    }
+
+    /// Ends the glides of some sets where they are.
+    pub(super) fn end_resets(&mut self, status: Status, is_meant: impl Fn(GainSet) -> bool) {
+        while let Some(place) = self.resets.iter().position(|reset| is_meant(reset.set)) {
+            let ticket = self.resets.swap_remove(place).ticket;
+            self.finish(ticket, Reply::status(status));
+        }
     }
 
     fn begin(&mut self, procedure: Procedure) -> Ticket {
         self.end_procedure(Status::REPLACED);
+        let ticket = self.next_ticket();
+        self.procedure = Some((ticket, procedure));
+        ticket
+    }
+
+    fn next_ticket(&mut self) -> Ticket {
         self.last_ticket.0 += 1;
-        self.procedure = Some((self.last_ticket, procedure));
         self.last_ticket
     }
 
@@ -121,21 +148,33 @@ impl Controller {
             }
             self.desired_told = narrow(vector(&self.desired, 0), vector(&self.desired, 3));
         }
+        self.glide_gains(dt_s);
         let Some((ticket, mut procedure)) = self.procedure.take() else { return };
         let reply = match &mut procedure {
             Procedure::TakeOff { at_home_s } => self.take_off(at_home_s, dt_s),
             Procedure::Land { faded_s } => self.let_down(faded_s, dt_s),
             Procedure::FindGravity(search) => self.search(search, dt_s),
-            Procedure::ResetGains { set, from, elapsed_s } => {
-                *elapsed_s += dt_s;
-                #[allow(clippy::cast_possible_truncation)] // a share
-                self.gains.glide(*set, from, (*elapsed_s / RESET_S).min(1.0) as f32);
-                (*elapsed_s >= RESET_S).then_some(Reply::status(Status::OK))
-            }
         };
         match reply {
             Some(reply) => self.finish(ticket, reply),
             None => self.procedure = Some((ticket, procedure)),
+        }
+    }
+
+    fn glide_gains(&mut self, dt_s: f64) {
+        let Self { resets, gains, .. } = self;
+        let mut finished = None;
+        for reset in resets {
+            reset.elapsed_s += dt_s;
+            #[allow(clippy::cast_possible_truncation)] // a share
+            gains.glide(reset.set, &reset.from, (reset.elapsed_s / RESET_S).min(1.0) as f32);
+            if reset.elapsed_s >= RESET_S {
+                finished = Some(reset.set);
+            }
+        }
+        // One a cycle: a second one that is over has its defaults already.
+        if let Some(set) = finished {
+            self.end_resets(Status::OK, |other| other == set);
         }
     }
 
@@ -184,16 +223,17 @@ impl Controller {
         if search.settled_s < SETTLE_S {
             return None;
         }
-        for (index, sum) in search.sums.iter_mut().enumerate() {
-            *sum += self.desired[index] - self.at[index];
+        for (axis, sum) in Axis::ALL.into_iter().zip(&mut search.sums) {
+            let [(_, error), _] = self.laws(axis);
+            *sum += error.off;
         }
         search.samples += 1;
         if search.samples < SAMPLES {
             return None;
         }
-        let normal = *self.gains.set(GainSet::Normal);
+        let acting = Axis::ALL.map(|axis| self.laws(axis)[0].0);
         let mut is_found = true;
-        for (index, pid) in normal.iter().enumerate() {
+        for (index, pid) in acting.iter().enumerate() {
             let missing = f64::from(pid.p) * search.sums[index] / f64::from(SAMPLES);
             self.trim[index] += missing;
             is_found &= missing.abs() < if index < 3 { FOUND_N } else { FOUND_NM };
@@ -203,8 +243,8 @@ impl Controller {
             return None;
         }
         let mut found = [0.0; 6];
-        for (index, pid) in normal.iter().enumerate() {
-            found[index] = f64::from(pid.ff) + self.trim[index];
+        for (index, pid) in acting.iter().enumerate() {
+            found[index] = f64::from(pid.ff) + self.trim[index] + self.integral_n[index];
         }
         self.trim = [0.0; 6];
         let status = if is_found { Status::OK } else { Status::TIMER };

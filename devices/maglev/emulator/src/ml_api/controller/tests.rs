@@ -152,13 +152,101 @@ fn locks_hold_and_constraints_push_back() {
     assert_eq!(rig.status(Request::ConstrainAxis { axis: Axis::X, range }), Status::OK);
     rig.run(1000);
     assert!((rig.position.x - 1.0e-3).abs() < 2.0e-6, "{}", rig.position.x);
-    // A push of 2.4 N beyond the range goes as deep as the constrained gains let it.
-    rig.position.x = 1.5e-3;
+    // Beyond the range the constrained gains push back, on top of the normal ones that pull to its edge.
+    (rig.position.x, rig.velocity.x) = (1.5e-3, 0.0);
     rig.controller.sense(&rig.sample(), 0.0);
     let back = f64::from(rig.six(Function::GetForces)[0]);
-    assert!((back + 4800.0 * 0.5e-3).abs() < 1.0e-4, "{back}");
-    let sides: Vec<Event> = rig.controller.take_events().collect();
-    assert!(sides.contains(&Event::Boundary([1, 0, 0, 0, 0, 0, 0])), "{sides:?}");
+    assert!((back + (2400.0 + 4800.0) * 0.5e-3).abs() < 1.0e-4, "{back}");
+}
+
+#[test]
+fn a_flotor_is_as_heavy_beyond_a_range_as_inside_it() {
+    let mut rig = Rig::flying(ForceCommand::Replaces);
+    let range = [1.0e-3, 3.0e-3];
+    assert_eq!(rig.status(Request::ConstrainAxis { axis: Axis::Z, range }), Status::OK);
+    rig.run(1000);
+    // Weight less the feed-forward of 3.5 N, over both stiffnesses.
+    let expected = 1.0e-3 - (MASS_KG * GRAVITY - 3.5) / (10_000.0 + 15_000.0);
+    assert!((rig.position.z - expected).abs() < 1.0e-6, "{}", rig.position.z);
+}
+
+#[test]
+fn a_flotor_that_rests_at_a_boundary_crosses_it_once() {
+    let mut rig = Rig::flying(ForceCommand::Replaces);
+    rig.run(10);
+    let _ = rig.controller.take_events();
+    let range = [-1.0e-3, 1.0e-3];
+    assert_eq!(rig.status(Request::ConstrainAxis { axis: Axis::X, range }), Status::OK);
+    let crossings = |rig: &mut Rig| -> Vec<Event> { rig.controller.take_events().collect() };
+    // The sensors' noise is less than their resolution.
+    for step in 0..20 {
+        rig.position.x = 1.0e-3 + if step % 2 == 0 { 1.0e-6 } else { -1.0e-6 };
+        rig.controller.sense(&rig.sample(), 0.0);
+    }
+    assert_eq!(crossings(&mut rig), [Event::Boundary([1, 0, 0, 0, 0, 0, 0])]);
+    rig.position.x = 0.9e-3;
+    rig.controller.sense(&rig.sample(), 0.0);
+    assert_eq!(crossings(&mut rig), [Event::Boundary([0; 7])]);
+    assert_eq!(rig.status(Request::OfAxis(Function::UnlockAxis, Axis::X)), Status::OK);
+    assert_eq!(rig.status(Request::Number(Function::SetBoundaryRadius, 0.9e-3)), Status::OK);
+    for step in 0..20 {
+        rig.position = DVec3::X * (0.9e-3 + if step % 2 == 0 { 1.0e-6 } else { -1.0e-6 });
+        rig.controller.sense(&rig.sample(), 0.0);
+    }
+    assert_eq!(crossings(&mut rig), [Event::Boundary([0, 0, 0, 0, 0, 0, 1])]);
+}
+
+#[test]
+fn an_integral_gain_acts_from_when_it_is_set_and_takes_the_sag_away() {
+    let mut rig = Rig::flying(ForceCommand::Replaces);
+    rig.run(10_000);
+    let (sag, before) = (rig.position.z, rig.six(Function::GetForces)[2]);
+    assert!(sag < -1.0e-4, "{sag}");
+    let set = Request::SetGainVecSingle(GainSet::Normal, Axis::Z, Gain::I, 20_000.0);
+    assert_eq!(rig.status(set), Status::OK);
+    rig.step();
+    // In a millisecond it adds 20 000 N/(m s) times the sag.
+    let step = (rig.six(Function::GetForces)[2] - before).abs();
+    assert!(step < 0.01, "a step of {step} N");
+    rig.run(10_000);
+    assert!(rig.position.z.abs() < 1.0e-6, "{}", rig.position.z);
+    // What the integral carries is part of what holds it.
+    let gravity = rig.six(Function::FindGravity);
+    assert!((f64::from(gravity[2]) - MASS_KG * GRAVITY).abs() < 5.0e-3, "{gravity:?}");
+}
+
+#[test]
+fn gains_that_are_reset_end_no_landing_and_a_second_landing_waits_for_the_first() {
+    let mut rig = Rig::flying(ForceCommand::Replaces);
+    let ticket = |answer: Answer| match answer {
+        Answer::When(ticket) => ticket,
+        Answer::Now(reply) => panic!("{reply:?}"),
+    };
+    let landing = ticket(rig.controller.answer(&Request::Plain(Function::Land)));
+    rig.run(100);
+    let reset = ticket(rig.controller.answer(&Request::OfSet(Function::ResetGainVecAxes, GainSet::Locked)));
+    let second = ticket(rig.controller.answer(&Request::Plain(Function::Land)));
+    assert_eq!(rig.finish(second).status, Status::OK);
+    assert_eq!((rig.controller.flight(), rig.position.z), (Flight::Landed, FLOOR_M));
+    assert_eq!(rig.finish(landing).status, Status::OK);
+    assert_eq!(rig.finish(reset).status, Status::OK);
+}
+
+#[test]
+fn gravity_is_found_where_the_flotor_is() {
+    let mut rig = Rig::flying(ForceCommand::Replaces);
+    // Carried by a force at some height, and far from where the gains held it; one axis locked beside its target.
+    let to = WirePose { at: [1.0e-3, 0.0, 0.0, 0.0, 0.0, 0.0], ..WirePose::default() };
+    assert_eq!(rig.status(Request::OfAxis(Function::LockAxis, Axis::X)), Status::OK);
+    assert_eq!(rig.status(Request::Pose(Function::SetDesiredPosition, to)), Status::OK);
+    let weight = [0.0, 0.0, 5.442_69, 0.0, 0.0, 0.0];
+    assert_eq!(rig.status(Request::Six(Function::SetForces, weight)), Status::OK);
+    (rig.position, rig.velocity) = (DVec3::Z * 4.0e-3, DVec3::ZERO);
+    rig.step();
+    let gravity = rig.six(Function::FindGravity);
+    assert!((f64::from(gravity[2]) - MASS_KG * GRAVITY).abs() < 5.0e-3, "{gravity:?}");
+    assert!(gravity[0].abs() < 5.0e-3, "{gravity:?}");
+    assert!((rig.position.z - 4.0e-3).abs() < 1.0e-3, "{}", rig.position.z);
 }
 
 #[test]
