@@ -10,10 +10,26 @@ use std::time::{Duration, Instant};
 
 /// Intervals made up for at most after a delay; what is more is lost.
 const MADE_UP: u32 = 1000;
+/// How long the loop waits in all for clients that answer late, and the share of an interval that it may wait longer for each
+/// tick that was answered in time.
+const LENIENCE: Duration = Duration::from_millis(30);
+const REGAINED_SHARE: u32 = 10;
 /// How long a lockstep loop waits for an acknowledgement before it looks whether it is to end.
 const LOOK: Duration = Duration::from_millis(50);
 /// How long a lockstep loop sleeps where nothing happens.
 const NAP: Duration = Duration::from_millis(1);
+
+/// How long the loop may still wait for a late answer. Most machines keep a client from running for some milliseconds now and
+/// then: its ticks are made up for instead of dropped. A client that is slow by itself uses this time up once.
+struct Lenience(Duration);
+
+impl Lenience {
+    /// After an interval of this length whose ticks were taken or not, and what was waited for that beyond its end.
+    fn after(&mut self, taken: bool, waited: Duration, period: Duration) {
+        let regained = if taken { period / REGAINED_SHARE } else { Duration::ZERO };
+        self.0 = (self.0.saturating_sub(waited) + regained).min(LENIENCE);
+    }
+}
 
 /// A plant under the controller.
 pub struct Machine<P> {
@@ -44,22 +60,28 @@ impl<P: Plant> Machine<P> {
         let mut sample = self.plant.advance(0, &Wrench::ZERO);
         let mut deadline = Instant::now();
         let mut made_up = 0;
+        let mut lenience = Lenience(LENIENCE);
         while !stop.load(Ordering::Relaxed) {
             let period_s = self.hub.period_s();
             let period = Duration::from_secs_f64(period_s);
             self.hub.begin(&sample, period_s);
             deadline += period;
             let now = Instant::now();
-            if let Some(rest) = deadline.checked_duration_since(now) {
+            let due = if let Some(rest) = deadline.checked_duration_since(now) {
                 made_up = 0;
                 std::thread::sleep(rest);
+                Duration::ZERO
             } else if made_up < MADE_UP {
                 // Late: the interval is made up for at once, but its tick is given a chance to be answered.
                 made_up += 1;
-                let _ = self.hub.wait_for_ticks_taken(period);
+                period
             } else {
                 (deadline, made_up) = (now, 0);
-            }
+                Duration::ZERO
+            };
+            let began = Instant::now();
+            let taken = self.hub.wait_for_ticks_taken(due + lenience.0) == TickWait::Taken;
+            lenience.after(taken, began.elapsed().saturating_sub(due), period);
             sample = self.advance(period_s);
         }
     }
@@ -99,5 +121,29 @@ impl<P: Plant> Machine<P> {
         let dt_us = until_us - self.now_us;
         self.now_us = until_us;
         self.plant.advance(dt_us, &wrench)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slow_client_is_waited_for_once_and_a_prompt_one_again() {
+        let period = Duration::from_millis(1);
+        let mut lenience = Lenience(LENIENCE);
+        let mut waited = Duration::ZERO;
+        for _ in 0..100 {
+            // It takes a second for each tick: all that is left is waited for.
+            waited += lenience.0;
+            lenience.after(false, lenience.0, period);
+        }
+        assert_eq!(waited, LENIENCE);
+        // Of a prompt one, every hundredth answer comes 8 ms late.
+        for tick in 1..=10_000 {
+            let late = Duration::from_millis(if tick % 100 == 0 { 8 } else { 0 });
+            assert!(late <= lenience.0, "tick {tick}: {:?} are left", lenience.0);
+            lenience.after(true, late, period);
+        }
     }
 }
