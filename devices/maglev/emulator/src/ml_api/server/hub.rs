@@ -122,7 +122,7 @@ impl Hub {
         let mut state = self.state();
         let id = state.next_id;
         state.next_id += 1;
-        state.clients.push(Client { id, callback: None, registered: Vec::new() });
+        state.clients.push(Client { id, callback: None, registered: Vec::new(), ticks_lost_s: None });
         drop(state);
         (self.log)(format_args!("connected {from} client={id}"));
         id
@@ -248,6 +248,7 @@ impl Hub {
         state.callbacks.retain(|callback| callback.token != token);
         for client in state.clients.iter_mut().filter(|client| client.callback == Some(token)) {
             client.callback = None;
+            client.ticks_lost_s = client.registered.contains(&EventKind::Tick).then_some(0.0);
             client.registered.clear();
         }
         drop(state);

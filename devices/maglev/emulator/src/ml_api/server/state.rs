@@ -31,6 +31,8 @@ pub(super) struct Client {
     pub(super) id: Id,
     pub(super) callback: Option<Id>,
     pub(super) registered: Vec<EventKind>,
+    /// How long ago its callback connection was lost while it wanted ticks, s.
+    pub(super) ticks_lost_s: Option<f64>,
 }
 
 pub(super) struct Callback {
@@ -126,6 +128,7 @@ impl State {
                 }
                 if let Some(client) = self.client(id) {
                     client.registered.clear();
+                    client.ticks_lost_s = None;
                 }
                 Status::OK
             }
@@ -137,7 +140,8 @@ impl State {
 
     fn map(&mut self, id: Id, token: i32) -> Status {
         let token = Id::try_from(token).ok();
-        if self.callback(token).is_none() {
+        let is_anothers = self.clients.iter().any(|client| client.id != id && client.callback == token);
+        if self.callback(token).is_none() || is_anothers {
             return Status::NO_MATCH;
         }
         if let Some(client) = self.client(id) {
@@ -152,10 +156,16 @@ impl State {
             if !client.registered.contains(&kind) {
                 client.registered.push(kind);
             }
-            self.is_restart_wanted |= kind == EventKind::Tick && self.restarts_with_ticks;
+            if kind == EventKind::Tick {
+                client.ticks_lost_s = None;
+                self.is_restart_wanted |= self.restarts_with_ticks;
+            }
         }
         if let Some(kind) = function.unregisters() {
             client.registered.retain(|registered| *registered != kind);
+            if kind == EventKind::Tick {
+                client.ticks_lost_s = None;
+            }
             let token = client.callback;
             if let Some(callback) = self.callback(token).filter(|_| kind == EventKind::Tick) {
                 callback.tick = None;
@@ -195,14 +205,13 @@ impl State {
 
     /// A force that nobody keeps up ends in a landing.
     fn watch_silence(&mut self, dt_s: f64, log: &Log) {
-        let token = self.commander.and_then(|id| self.client(id)).and_then(|client| client.callback);
-        for callback in &mut self.callbacks {
-            if let Some(open_s) = &mut callback.tick_open_s {
-                *open_s += dt_s;
-            }
-        }
+        let opened = self.callbacks.iter_mut().filter_map(|callback| callback.tick_open_s.as_mut());
+        let lost = self.clients.iter_mut().filter_map(|client| client.ticks_lost_s.as_mut());
+        opened.chain(lost).for_each(|silent_s| *silent_s += dt_s);
+        let commander = self.commander.and_then(|id| self.client(id));
+        let (token, lost_s) = commander.map_or((None, None), |client| (client.callback, client.ticks_lost_s));
         let config = *self.controller.config();
-        let open_s = self.callback(token).and_then(|callback| callback.tick_open_s).unwrap_or(0.0);
+        let open_s = self.callback(token).and_then(|callback| callback.tick_open_s).or(lost_s).unwrap_or(0.0);
         // A client whose call waits for a procedure cannot acknowledge what its handler commands in.
         let waits = self.controller.is_busy();
         let is_silent = open_s > config.watchdog_s && self.controller.is_driven_by_forces() && !waits;
