@@ -136,7 +136,8 @@ impl Session {
         self.clear_faults()?;
         self.call(&Request::Number(Function::SetServoFrequency, plan.rate_hz))?;
         match self.call_within(&Request::Plain(Function::Takeoff), PROCEDURE_PATIENCE) {
-            Ok(_) | Err(Failed::At(_, NoResults::Refused(Status::TAKEN_OFF))) => {}
+            Ok(_) => {}
+            Err(Failed::At(_, NoResults::Refused(Status::TAKEN_OFF))) => self.take_over()?,
             Err(failed) => return Err(failed),
         }
         let gravity = self.carry(plan)?;
@@ -154,6 +155,17 @@ impl Session {
             }
         }
         Err(Failed::NoTick)
+    }
+
+    /// Somebody left the flotor in the air, perhaps without gains and with a force in their place: first the default gains,
+    /// which rise slowly, then a target in the force's place.
+    fn take_over(&mut self) -> Result<(), Failed> {
+        let reset = Request::OfSet(Function::ResetGainVecAxes, GainSet::Normal);
+        self.call_within(&reset, PROCEDURE_PATIENCE)?;
+        let Results::Pose(pose) = self.call(&Request::Plain(Function::GetActualPosition))? else {
+            return Err(Failed::At(Function::GetActualPosition, NoResults::Malformed));
+        };
+        self.call(&Request::Pose(Function::SetDesiredPosition, pose)).map(|_| ())
     }
 
     fn clear_faults(&mut self) -> Result<(), Failed> {
