@@ -16,6 +16,9 @@ const ACROSS_NS_PER_M: f64 = 30.0;
 const TURN_NM_PER_RAD: f64 = 2.0;
 const TURN_NMS_PER_RAD: f64 = 0.03;
 
+/// How long the flotor is given to come to rest on its stator before anybody sees it, and in what steps, ms.
+const SETTLING_MS: u64 = 500;
+
 /// A plant above a stator.
 pub(crate) struct OnStator<P> {
     plant: P,
@@ -25,7 +28,11 @@ pub(crate) struct OnStator<P> {
 impl<P: Plant> OnStator<P> {
     pub(crate) fn new(mut plant: P) -> Self {
         let sample = plant.advance(0, &Wrench::ZERO);
-        Self { plant, sample }
+        let mut settled = Self { plant, sample };
+        for _ in 0..SETTLING_MS {
+            settled.advance(1000, &Wrench::ZERO);
+        }
+        settled
     }
 
     /// The force of the stator on the flotor.
@@ -53,6 +60,9 @@ impl<P: Plant> Plant for OnStator<P> {
     fn restart(&mut self) {
         self.plant.restart();
         self.sample = self.plant.advance(0, &Wrench::ZERO);
+        for _ in 0..SETTLING_MS {
+            self.advance(1000, &Wrench::ZERO);
+        }
     }
 }
 
