@@ -22,16 +22,16 @@ use std::time::Duration;
 const LINKAGE: Pantograph = Pantograph { inner_m: 0.07, outer_m: 0.09, base_m: 0.038 };
 const CENTRE_M: DVec2 = DVec2::new(0.019, 0.1);
 /// The hand holds the handle here, away from the user and to the right, m in the host's frame.
-const HELD_M: DVec3 = DVec3::new(0.005, 0.004, 0.0);
+pub(super) const HELD_M: DVec3 = DVec3::new(0.005, 0.004, 0.0);
 
 /// A board on a thread of its own, until it is dropped.
-struct Board {
-    path: String,
+pub(super) struct Board {
+    pub(super) path: String,
     is_over: Arc<AtomicBool>,
 }
 
 impl Board {
-    fn start() -> Self {
+    pub(super) fn start() -> Self {
         let (mut port, host_end) = TTYPort::pair().expect("the system has pseudo terminals");
         port.set_timeout(Duration::from_millis(5)).expect("it is ours");
         let path = host_end.name().expect("it has a path");

@@ -1,10 +1,11 @@
 //! The maglev plugin over the ML API, against the emulated controller of the Maglev 200: one scene on three devices, what goes
 //! wrong on the link, and what becomes of a flotor whose host is gone.
 
+use super::haply::{Board, HELD_M};
 use flotor_core::trace::TickRecord;
 use flotor_hal::abi::loader::{ActiveDevice, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
-use flotor_maglev::ml_api::{Function, Reply, Request, Results, Status};
+use flotor_maglev::ml_api::{EventKind, Function, GainSet, Pid, Reply, Request, Results, Six, Status};
 use flotor_session::registry::load_file;
 use flotor_tests::TestSize;
 use flotor_tests::library::{build_folder, plugin_file, rules_of_a_device};
@@ -220,6 +221,68 @@ fn a_program_for_the_maglev_200_commands_any_device_through_the_host() {
 }
 
 #[test]
+fn a_device_of_two_axes_is_served_with_those_it_drives() {
+    let (board, scratch) = (Board::start(), Scratch::default());
+    let (port, recording) = (format!("port={}", board.path), scratch.path().join("proxy.mcap"));
+    let device = ["--device", "haply", "--set", &port, "--set", "timeout_ms=9000", "--record"];
+    let controller = Controller::start("ml-api", &[&device[..], &[recording.to_str().unwrap()]].concat());
+    let mut client = controller.client();
+    assert_eq!(client.plain(Function::Takeoff).status, Status::OK);
+    let Results::Pose(pose) = client.plain(Function::GetActualPosition).results else { panic!("a pose") };
+    // A count of its encoders is 0.1 mm of the handle.
+    let off_m = DVec3::new(pose.at[0].into(), pose.at[1].into(), pose.at[2].into()) - HELD_M;
+    assert!(off_m.length() < 2.0e-4, "{pose:?}");
+    let forces = [0.5, -0.25, 1.0, 0.0, 0.0, 0.0];
+    assert_eq!(client.call(&Request::Six(Function::SetForces, forces)).status, Status::OK);
+}
+
+/// A flotor in the air, carried by a force; the gravity that was found.
+fn carried_by_a_force(client: &mut Client) -> Six {
+    assert_eq!(client.plain(Function::Takeoff).status, Status::OK);
+    let Results::Six(gravity) = client.plain(Function::FindGravity).results else { panic!("six numbers") };
+    assert_eq!(client.call(&Request::Six(Function::SetForces, gravity)).status, Status::OK);
+    gravity
+}
+
+#[test]
+fn a_force_whose_client_hears_no_ticks_any_more_ends_in_a_landing() {
+    let mut controller = Controller::start("ml-api", &[]);
+    let mut client = controller.client();
+    let mut events = controller.client();
+    let Results::Token(token) = events.plain(Function::RequestToken).results else { panic!("a token") };
+    assert_eq!(client.call(&Request::MapToken(token)).status, Status::OK);
+    // A connection that carries one client's events is no other's.
+    assert_eq!(controller.client().call(&Request::MapToken(token)).status, Status::NO_MATCH);
+    carried_by_a_force(&mut client);
+    assert_eq!(client.call(&Request::register(EventKind::Tick, 1)).status, Status::OK);
+    drop(events);
+    controller.wait_for(&["landing why=silence"]);
+    controller.wait_for(&["flight Landed faults=none"]);
+    assert_eq!(client.plain(Function::GetVersion).status, Status::OK, "the control connection lives");
+}
+
+#[test]
+fn a_flotor_that_somebody_left_in_the_air_is_taken_over() {
+    let controller = Controller::start("ml-api", &["--on-silence", "ignore"]);
+    let mut client = controller.client();
+    let gravity = carried_by_a_force(&mut client);
+    for set in [GainSet::Normal, GainSet::Locked, GainSet::Constrained] {
+        assert_eq!(client.call(&Request::SetGainVecAxes(set, [Pid::ZERO; 6])).status, Status::OK);
+    }
+    drop(client);
+    // Without gains nothing would be found that carries it, and it would fall.
+    let mut active = taken_off(&controller, &[("gravity", "auto"), ("timeout_ms", "8000")]);
+    let mut state = DeviceState::HOME;
+    for index in 0..300 {
+        let tick = Tick { index, time_ns: index * 1_000_000, dt_ns: 1_000_000 };
+        let _ = active.wait_for_sample(1_000_000_000);
+        assert!(!matches!(active.read(&tick, &mut state), Cycle::Fault(_)), "tick {index}");
+        assert!(!matches!(active.write(&tick, &Wrench::ZERO), Cycle::Fault(_)), "tick {index}");
+    }
+    assert!(state.pose.position().z > -3.0e-3, "{:?} with {gravity:?}", state.pose);
+}
+
+#[test]
 fn the_script_for_a_laboratory_answers_its_questions() {
     if !required(Tool::Python) {
         return;
@@ -396,8 +459,9 @@ fn taken_off(controller: &Controller, settings: &[(&str, &str)]) -> ActiveDevice
     let plugin = load_file(&plugin_file("flotor-maglev")).expect("it loads");
     let all =
         [("protocol", "ml-api"), ("address", &*controller.address), ("gravity", "off"), ("fade_ms", "0")];
-    let settings =
-        all.iter().chain(settings).map(|(key, value)| Setting::parse(plugin.parameters(), key, value));
+    let is_default = |key: &str| settings.iter().all(|(other, _)| *other != key);
+    let all = all.iter().filter(|(key, _)| is_default(key)).chain(settings);
+    let settings = all.map(|(key, value)| Setting::parse(plugin.parameters(), key, value));
     let settings: Vec<_> = settings.collect::<Result<_, _>>().expect("they are legal");
     let opened = plugin.open_device(&settings).expect("it opens");
     opened

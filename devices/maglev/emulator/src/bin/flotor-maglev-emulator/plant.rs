@@ -15,9 +15,14 @@ const PERIOD_NS: u64 = 1_000_000;
 
 /// Loads the plugin of a file, or the simulated flotor from the folders beside this program.
 pub(crate) fn load(file: Option<&Path>) -> Result<Plugin, Box<dyn Error>> {
-    if let Some(file) = file {
-        return load_file(file);
+    match file {
+        Some(file) => load_file(file),
+        None => load_device(SIMULATED),
     }
+}
+
+/// Loads the device plugin of this id from the folders beside this program.
+pub(crate) fn load_device(id: &str) -> Result<Plugin, Box<dyn Error>> {
     let program = std::env::current_exe()?;
     let own = program.parent().unwrap_or(Path::new("."));
     for folder in [own.join("deps"), own.to_path_buf(), own.join("plugins")] {
@@ -25,15 +30,15 @@ pub(crate) fn load(file: Option<&Path>) -> Result<Plugin, Box<dyn Error>> {
         let mut files: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
         files.retain(|file| file.extension().is_some_and(|ending| ending == std::env::consts::DLL_EXTENSION));
         files.sort();
-        let is_flotor = |file: &PathBuf| {
-            read_metadata(file).is_ok_and(|found| found.id == SIMULATED && found.kind == PluginKind::Device)
+        let is_meant = |file: &PathBuf| {
+            read_metadata(file).is_ok_and(|found| found.id == id && found.kind == PluginKind::Device)
         };
-        if let Some(file) = files.into_iter().find(is_flotor) {
+        if let Some(file) = files.into_iter().find(is_meant) {
             return load_file(&file);
         }
     }
     let folder = own.display();
-    Err(format!("no plugin `{SIMULATED}` beside {folder}; `cargo build -p flotor-simulated` makes it").into())
+    Err(format!("no plugin `{id}` beside {folder}; `cargo build -p flotor-{id}` makes it").into())
 }
 
 /// Loads a plugin file; runs its code.

@@ -1,8 +1,9 @@
 //! A device of Flotor for programs written for the Maglev 200: a scene with that device and the controller as its model, run by
 //! the host. What stands between program and hand is what stands there in every run.
 
-use super::{Arguments, ProtocolOption};
-use flotor_hal::Refusal;
+use super::{Arguments, ProtocolOption, plant};
+use flotor_hal::abi::loader::Setting;
+use flotor_hal::{Axes, Capabilities, Refusal};
 use flotor_maglev::ml_api::PORT;
 use std::error::Error;
 use std::fmt::Write;
@@ -26,18 +27,44 @@ pub(crate) fn become_host(device: &str, arguments: &Arguments) -> Result<(), Box
 fn scene(device: &str, arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     // Until Ctrl-C.
     let mut scene = format!("duration_s = 3.0e7\n[device]\nplugin = {device:?}\n[device.parameters]\n");
+    let mut sets = Vec::new();
     for text in &arguments.sets {
         let (key, value) = text
             .split_once('=')
             .ok_or_else(|| Refusal::parameter(format!("--set {text}: write KEY=VALUE")))?;
+        sets.push((key.trim(), value.trim()));
+    }
+    for (key, value) in &sets {
         // Numbers as they are, everything else as text.
-        match value.trim().parse::<f64>() {
-            Ok(number) => writeln!(scene, "{} = {number:?}", key.trim())?,
-            Err(_) => writeln!(scene, "{} = {:?}", key.trim(), value.trim())?,
+        match value.parse::<f64>() {
+            Ok(number) => writeln!(scene, "{key} = {number:?}")?,
+            Err(_) => writeln!(scene, "{key} = {value:?}")?,
         }
+    }
+    if let Some(felt) = capabilities(device, &sets).as_ref().and_then(felt) {
+        writeln!(scene, "[limits]\nforce_n = {felt:?}")?;
     }
     let listen = arguments.listen.clone().unwrap_or_else(|| format!("127.0.0.1:{PORT}"));
     let parameters = arguments.ml_api.model_parameters();
     write!(scene, "[[model]]\nplugin = \"ml-api\"\n[model.parameters]\nlisten = {listen:?}\n{parameters}")?;
     Ok(scene)
+}
+
+/// What a device can do; nothing if it cannot be opened: the host says why.
+fn capabilities(device: &str, sets: &[(&str, &str)]) -> Option<Capabilities> {
+    let plugin = plant::load_device(device).ok()?;
+    let settings = sets.iter().map(|(key, value)| Setting::parse(plugin.parameters(), key, value));
+    let settings: Vec<Setting> = settings.collect::<Result<_, _>>().ok()?;
+    plugin.open_device(&settings).ok()?.capabilities().ok()
+}
+
+/// Forces of a device that does not drive all three directions, N. The host wants the others given up by name; that a program
+/// commands six axes says nothing about the device.
+fn felt(device: &Capabilities) -> Option<[f64; 3]> {
+    let is_driven = [Axes::X, Axes::Y, Axes::Z].map(|axis| device.actuated.contains(axis));
+    let mut felt_n = device.max_force_n;
+    for (most_n, is_driven) in felt_n.iter_mut().zip(is_driven) {
+        *most_n = if is_driven { *most_n } else { 0.0 };
+    }
+    (is_driven != [true; 3]).then_some(felt_n)
 }
