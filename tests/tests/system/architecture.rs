@@ -33,6 +33,8 @@ enum Role {
     Compat,
     /// A library that answers where a program calls another maker's.
     DropIn,
+    /// A program that answers where a program calls another maker's service.
+    Service,
     /// Knows numbers only.
     Statistics,
     /// Draws, and knows nothing of what.
@@ -57,7 +59,7 @@ enum Role {
 
 use Role::{
     Calibration, Command, Compat, Contract, Core, DropIn, Emulator, Fixture, Guard, Host, Judge, Lab, Live,
-    Plot, Plugin, Record, SceneTest, Servo, Session, Statistics, Study, Sync, Tests, Viewer,
+    Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study, Sync, Tests, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
@@ -73,6 +75,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("host/compat/chai3d", DropIn, &[Contract, Compat]),
     ("host/compat/openhaptics", DropIn, &[Contract, Compat]),
     ("host/compat/dhd", DropIn, &[Contract, Compat]),
+    ("host/compat/haply", Service, &[Contract, Compat, Command]),
     ("host/statistics", Statistics, &[]),
     ("host/plot", Plot, &[]),
     ("host/command", Command, &[Contract, Sync, Core, Servo, Record, Live, Session]),

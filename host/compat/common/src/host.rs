@@ -3,7 +3,7 @@
 use crate::process::{at_end, guarded, is_copy, is_first, library, notice_copies, quietly};
 use crate::run::{LockstepRun, Prepared, tell};
 use crate::settings::{Pace, Settings, said};
-use crate::station::Station;
+use crate::station::{Station, Turn};
 use flotor_servo::{Clock, StopSwitch, guest, monotonic_ns};
 use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
@@ -42,10 +42,21 @@ pub fn host() -> Option<&'static Host> {
         return None;
     }
     let prepare = || {
-        let prepared = guarded(Err("it panicked".to_owned()), || quietly(Host::prepare));
+        let prepare = || Host::prepare(Settings::from_environment()?, &StopSwitch::default());
+        let prepared = guarded(Err("it panicked".to_owned()), || quietly(prepare));
         prepared.map_err(|problem| tell(&problem)).ok()
     };
     HOST.get_or_init(prepare).as_ref()
+}
+
+/// The run of this process, as its own program wants it, instead of as the environment says; `stop` ends it. To be called once,
+/// before [`host`]. Not real-time.
+///
+/// # Errors
+/// Why the scene cannot be run, in a line.
+pub fn prepare(settings: Settings, stop: &StopSwitch) -> Result<&'static Host, String> {
+    let prepared = Host::prepare(settings, stop)?;
+    HOST.get_or_init(|| Some(prepared)).as_ref().ok_or_else(|| "there is a run already".to_owned())
 }
 
 /// The run of this process, if anybody has asked for it yet. Not real-time.
@@ -76,8 +87,7 @@ enum Stage {
 }
 
 impl Host {
-    fn prepare() -> Result<Self, String> {
-        let mut settings = Settings::read(said)?;
+    fn prepare(mut settings: Settings, stop: &StopSwitch) -> Result<Self, String> {
         if !is_first() {
             settings.keep_apart(library().as_deref().and_then(Path::file_stem).unwrap_or_default());
         }
@@ -113,7 +123,7 @@ impl Host {
         let stations = stations.collect();
         notice_copies();
         let stage = Stage::Prepared(Box::new(Prepared { session, scene, options, settings }));
-        Ok(Self { stations, pace, period_ns, stop: StopSwitch::default(), stage: Mutex::new(stage) })
+        Ok(Self { stations, pace, period_ns, stop: stop.clone(), stage: Mutex::new(stage) })
     }
 
     /// The devices of the scene, in its order.
@@ -249,11 +259,16 @@ impl Host {
     /// Waits until there is a tick that the caller has not seen, a period usually and never longer than 10 ms; in lockstep the
     /// call makes it. Whether there was one. Not real-time.
     pub fn wait(&self, station: &Station) -> bool {
+        self.wait_in(station, station.turn())
+    }
+
+    /// The same for one of several callers that share a device, each with the ticks that it has seen. Not real-time.
+    pub fn wait_in(&self, station: &Station, turn: &Turn) -> bool {
         match self.pace {
-            Pace::Real => station.wait_for_tick(),
+            Pace::Real => station.wait_for_tick(turn),
             // Several devices share a tick: the first that is commanded makes it.
             Pace::Lockstep if self.stations.len() > 1 => {
-                station.has_unseen_tick() || self.advance() && station.has_unseen_tick()
+                station.has_unseen_tick(turn) || self.advance() && station.has_unseen_tick(turn)
             }
             Pace::Lockstep => self.advance(),
         }

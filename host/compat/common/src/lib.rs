@@ -21,10 +21,10 @@ mod settings;
 mod station;
 
 pub use frame::Frame;
-pub use host::{Host, host};
+pub use host::{Host, host, prepare};
 pub use process::{guarded, library, quietly};
-pub use settings::{Pace, said};
-pub use station::{Axes, State, Station};
+pub use settings::{Pace, Settings, said};
+pub use station::{Axes, State, Station, Turn};
 
 /// What a drop-in exports as `flotor_dropin`, so that a plugin that loads a maker's library can refuse one of these: it would
 /// load itself, without end. The version of Flotor, terminated.

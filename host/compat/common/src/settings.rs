@@ -15,22 +15,22 @@ pub enum Pace {
 
 /// How a program is to be served.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Settings {
+pub struct Settings {
     /// `FLOTOR_SCENE`: the scene; without it a simulated flotor with a hand.
-    pub(crate) scene: Option<PathBuf>,
+    pub scene: Option<PathBuf>,
     /// `FLOTOR_RECORD`: the recording (MCAP).
-    pub(crate) record: Option<PathBuf>,
+    pub record: Option<PathBuf>,
     /// `FLOTOR_REPORT`: where the summary goes, for people; `-` is standard error. While the program runs there is one so far
     /// beside it.
-    pub(crate) report: Option<PathBuf>,
+    pub report: Option<PathBuf>,
     /// `FLOTOR_JSON`: where the summary goes as JSON.
-    pub(crate) json: Option<PathBuf>,
+    pub json: Option<PathBuf>,
     /// `FLOTOR_PACE`: `real` or `lockstep`.
-    pub(crate) pace: Pace,
+    pub pace: Pace,
     /// `FLOTOR_SEED`: seed of all random numbers.
-    pub(crate) seed: u64,
+    pub seed: u64,
     /// `FLOTOR_SIGNALS`: `stop` to stop the devices when the program dies of a signal.
-    pub(crate) signals: Signals,
+    pub signals: Signals,
 }
 
 /// The value of a variable, if it is set and not empty. Not real-time.
@@ -40,6 +40,20 @@ pub fn said(variable: &str) -> Option<String> {
 }
 
 impl Settings {
+    /// As the environment of this process says. Not real-time.
+    ///
+    /// # Errors
+    /// The variable, what it says and what it may say.
+    pub fn from_environment() -> Result<Self, String> {
+        Self::read(said)
+    }
+
+    /// The same for a program of Flotor's own: a deadly signal stops the devices first.
+    #[must_use]
+    pub fn of_own_process(self) -> Self {
+        Self { signals: Signals::StopFirst, ..self }
+    }
+
     /// Puts the name of a library into the names of all files: another drop-in of this process writes to the others.
     pub(crate) fn keep_apart(&mut self, library: &OsStr) {
         for file in [&mut self.record, &mut self.report, &mut self.json].into_iter().flatten() {
@@ -57,11 +71,7 @@ impl Settings {
         }
     }
 
-    /// As the environment says.
-    ///
-    /// # Errors
-    /// The variable, what it says and what it may say.
-    pub(crate) fn read(said: impl Fn(&str) -> Option<String>) -> Result<Self, String> {
+    fn read(said: impl Fn(&str) -> Option<String>) -> Result<Self, String> {
         let file = |variable| said(variable).map(PathBuf::from);
         let wrong =
             |variable: &str, value: &str, legal: &str| Err(format!("{variable}={value}: must be {legal}"));

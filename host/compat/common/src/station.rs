@@ -44,13 +44,19 @@ pub struct Station {
     period_ns: u64,
     opened: AtomicU64,
     is_open: AtomicBool,
-    /// The tick the program has waited for last.
-    waited: AtomicU64,
-    /// When a wait returned last, ns of the machine's clock.
-    returned_ns: AtomicU64,
+    turn: Turn,
     /// When the loop began, as near as was seen, ns of the machine's clock.
     begun_ns: AtomicU64,
     rate: Mutex<Rate>,
+}
+
+/// The ticks that a caller has waited for: its place in the pace of the loop.
+#[derive(Debug, Default)]
+pub struct Turn {
+    /// The tick it has waited for last.
+    waited: AtomicU64,
+    /// When a wait returned last, ns of the machine's clock.
+    returned_ns: AtomicU64,
 }
 
 /// Commands per time.
@@ -111,8 +117,7 @@ impl Station {
             period_ns,
             opened: AtomicU64::new(0),
             is_open: AtomicBool::new(false),
-            waited: AtomicU64::new(0),
-            returned_ns: AtomicU64::new(0),
+            turn: Turn::default(),
             begun_ns: AtomicU64::new(u64::MAX),
             rate: Mutex::new(Rate::default()),
         }
@@ -271,37 +276,32 @@ impl Station {
         }
     }
 
-    /// Whether there is a tick that nobody has waited for; it counts as waited for then.
-    pub(crate) fn has_unseen_tick(&self) -> bool {
+    /// The turn of a program that is the only caller.
+    pub(crate) fn turn(&self) -> &Turn {
+        &self.turn
+    }
+
+    /// Whether there is a tick that the caller has not waited for; it counts as waited for then.
+    pub(crate) fn has_unseen_tick(&self, turn: &Turn) -> bool {
         let ticks = self.ticks();
-        self.waited.fetch_max(ticks, Ordering::AcqRel) < ticks
+        turn.waited.fetch_max(ticks, Ordering::AcqRel) < ticks
     }
 
-    /// Takes one of the ticks that a program in a loop was too late for.
-    fn takes_late_tick(&self, ticks: u64, now_ns: u64) -> bool {
-        if now_ns.saturating_sub(self.returned_ns.load(Ordering::Relaxed)) > LONGEST_WAIT_NS {
-            self.waited.store(ticks, Ordering::Relaxed); // it is not in a loop
-            return false;
-        }
-        let take = |waited| (waited < ticks).then_some(waited + 1);
-        self.waited.fetch_update(Ordering::AcqRel, Ordering::Relaxed, take).is_ok()
-    }
-
-    /// Waits for the next tick on the machine's clock. A program in a loop that comes late by a few ticks does not wait until
+    /// Waits for the next tick on the machine's clock. A caller in a loop that comes late by a few ticks does not wait until
     /// it has made up for them: it keeps the rate of the loop, though it needs now more and now less than a period.
-    pub(crate) fn wait_for_tick(&self) -> bool {
+    pub(crate) fn wait_for_tick(&self, turn: &Turn) -> bool {
         let entered_ns = monotonic_ns();
         let (entered, _) = self.newest();
-        if self.takes_late_tick(entered, entered_ns) {
-            self.returned_ns.fetch_max(entered_ns, Ordering::Relaxed);
+        if turn.takes_late_tick(entered, entered_ns) {
+            turn.returned_ns.fetch_max(entered_ns, Ordering::Relaxed);
             return true;
         }
         let mut now_ns = entered_ns;
         loop {
             let (ticks, record) = self.newest();
             if ticks > entered {
-                self.waited.fetch_max(entered + 1, Ordering::AcqRel);
-                self.returned_ns.fetch_max(now_ns, Ordering::Relaxed);
+                turn.waited.fetch_max(entered + 1, Ordering::AcqRel);
+                turn.returned_ns.fetch_max(now_ns, Ordering::Relaxed);
                 return true;
             }
             if now_ns - entered_ns >= LONGEST_WAIT_NS {
@@ -314,5 +314,17 @@ impl Station {
             sleep_until(until_ns);
             now_ns = monotonic_ns();
         }
+    }
+}
+
+impl Turn {
+    /// Takes one of the ticks that a caller in a loop was too late for.
+    fn takes_late_tick(&self, ticks: u64, now_ns: u64) -> bool {
+        if now_ns.saturating_sub(self.returned_ns.load(Ordering::Relaxed)) > LONGEST_WAIT_NS {
+            self.waited.store(ticks, Ordering::Relaxed); // it is not in a loop
+            return false;
+        }
+        let take = |waited| (waited < ticks).then_some(waited + 1);
+        self.waited.fetch_update(Ordering::AcqRel, Ordering::Relaxed, take).is_ok()
     }
 }

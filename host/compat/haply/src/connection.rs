@@ -1,0 +1,168 @@
+//! One port for two protocols: a connection says in its first lines whether it wants a WebSocket or an answer by HTTP.
+
+use crate::http;
+use crate::service::Service;
+use crate::session;
+use std::io::{self, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::time::Duration;
+use tungstenite::handshake::derive_accept_key;
+
+/// How long a client may take for its first lines, or to take an answer.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// Longest head and body of a request, bytes.
+const LONGEST_HEAD: usize = 16 << 10;
+const LONGEST_BODY: usize = 64 << 10;
+/// Pause after a connection could not be accepted: there may be no descriptor left.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// A request by HTTP.
+#[derive(Debug, Default, PartialEq)]
+pub(crate) struct Request {
+    pub(crate) method: String,
+    /// Path and query.
+    pub(crate) target: String,
+    pub(crate) body: String,
+}
+
+/// The head of a request, and what was sent after it.
+#[derive(Debug, Default)]
+pub(crate) struct Head {
+    request: Request,
+    /// Key of a client that wants a WebSocket.
+    key: Option<String>,
+    length: usize,
+    rest: Vec<u8>,
+}
+
+/// Serves each connection in a thread of its own.
+///
+/// # Errors
+/// If there is no thread that accepts them.
+pub(crate) fn serve(service: &'static Service, listener: TcpListener) -> io::Result<()> {
+    accept(listener, "flotor-accept", move |stream| serve_one(service, stream))
+}
+
+/// Accepts connections in a thread, and lets each be served in one of its own.
+///
+/// # Errors
+/// If there is no thread that accepts them.
+pub(crate) fn accept(
+    listener: TcpListener,
+    name: &str,
+    serve: impl Fn(TcpStream) -> io::Result<()> + Copy + Send + 'static,
+) -> io::Result<()> {
+    let accept = move || {
+        loop {
+            let Ok((stream, _)) = listener.accept() else {
+                std::thread::sleep(PAUSE);
+                continue;
+            };
+            let thread = std::thread::Builder::new().name("flotor-client".to_owned());
+            // Without a thread the connection is closed; a client that goes away while it is served is nobody's problem.
+            let _ = thread.spawn(move || serve(stream));
+        }
+    };
+    std::thread::Builder::new().name(name.to_owned()).spawn(accept)?;
+    Ok(())
+}
+
+fn serve_one(service: &Service, mut stream: TcpStream) -> io::Result<()> {
+    let Some(mut head) = prepared(&mut stream)? else { return Ok(()) };
+    match upgraded(&mut stream, &head)? {
+        true => session::serve(service, session::socket(stream, head.rest)),
+        false => {
+            read_body(&mut stream, &mut head)?;
+            stream.write_all(http::answer(service, &head.request).as_bytes())?;
+        }
+    }
+    Ok(())
+}
+
+/// Reads the first lines of a connection.
+pub(crate) fn prepared(stream: &mut TcpStream) -> io::Result<Option<Head>> {
+    stream.set_nodelay(true)?;
+    stream.set_read_timeout(Some(PATIENCE))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
+    let mut bytes = Vec::new();
+    let mut buffer = [0; 2048];
+    while bytes.len() < LONGEST_HEAD {
+        let count = stream.read(&mut buffer)?;
+        if count == 0 {
+            return Ok(None);
+        }
+        bytes.extend_from_slice(buffer.get(..count).unwrap_or_default());
+        if let Some(end) = bytes.windows(4).position(|window| window == b"\r\n\r\n") {
+            let rest = bytes.split_off(end + 4);
+            return Ok(Head::read(&String::from_utf8_lossy(&bytes), rest));
+        }
+    }
+    Ok(None)
+}
+
+/// Lets a client that wants a WebSocket go on; whether it does.
+pub(crate) fn upgraded(stream: &mut TcpStream, head: &Head) -> io::Result<bool> {
+    let Some(key) = &head.key else { return Ok(false) };
+    let accept = derive_accept_key(key.as_bytes());
+    write!(
+        stream,
+        "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: {accept}\r\n\r\n"
+    )?;
+    stream.set_read_timeout(None)?;
+    Ok(true)
+}
+
+/// What a client sent after the lines that asked for a WebSocket.
+pub(crate) fn rest(head: Head) -> Vec<u8> {
+    head.rest
+}
+
+fn read_body(stream: &mut TcpStream, head: &mut Head) -> io::Result<()> {
+    let length = head.length.min(LONGEST_BODY);
+    let mut body = std::mem::take(&mut head.rest);
+    if body.len() < length {
+        let missing = length - body.len();
+        stream.take(missing as u64).read_to_end(&mut body)?;
+    }
+    body.truncate(length);
+    head.request.body = String::from_utf8_lossy(&body).into_owned();
+    Ok(())
+}
+
+impl Head {
+    fn read(text: &str, rest: Vec<u8>) -> Option<Self> {
+        let mut lines = text.split("\r\n");
+        let mut words = lines.next()?.split(' ');
+        let request =
+            Request { method: words.next()?.to_owned(), target: words.next()?.to_owned(), body: String::new() };
+        let mut head = Self { request, rest, ..Self::default() };
+        let (mut wants_socket, mut key) = (false, None);
+        for (name, value) in lines.filter_map(|line| line.split_once(':')) {
+            let value = value.trim();
+            match name.trim().to_ascii_lowercase().as_str() {
+                "upgrade" => wants_socket = value.eq_ignore_ascii_case("websocket"),
+                "sec-websocket-key" => key = Some(value.to_owned()),
+                "content-length" => head.length = value.parse().unwrap_or(0),
+                _ => {}
+            }
+        }
+        head.key = key.filter(|_| wants_socket);
+        Some(head)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_request_and_a_websocket_are_distinguished_by_their_first_lines() {
+        let plain = Head::read("POST /sessions/1/profile HTTP/1.1\r\nHost: x\r\nContent-Length: 12\r\n", Vec::new());
+        let plain = plain.expect("it is a request");
+        assert_eq!((plain.request.method.as_str(), plain.request.target.as_str()), ("POST", "/sessions/1/profile"));
+        assert_eq!((plain.key, plain.length), (None, 12));
+        let socket = "GET / HTTP/1.1\r\nupgrade: WebSocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZQ==\r\n";
+        assert_eq!(Head::read(socket, Vec::new()).and_then(|head| head.key).as_deref(), Some("dGhlIHNhbXBsZQ=="));
+        assert!(Head::read("malformed", Vec::new()).is_none());
+    }
+}

@@ -1,0 +1,143 @@
+//! What the hand is to feel: the sum of what all sessions want of a device. All of it in Flotor's axes.
+
+use flotor_compat::State;
+use flotor_hal::DVec3;
+
+/// How long a command is valid without another one of its session, and how long it fades then, ns.
+const VALID_NS: u64 = 50_000_000;
+const FADE_NS: u64 = 50_000_000;
+/// Spring and damper that move the handle to a commanded position, N/m and N·s/m: soft enough for any device.
+const STIFFNESS_N_PER_M: f64 = 400.0;
+const DAMPING_NS_PER_M: f64 = 4.0;
+/// Largest component of a force that is added up, N: a sum stays finite.
+const LARGEST_N: f64 = 1.0e300;
+/// Largest damping that a session may add, N·s/m.
+const LARGEST_DAMPING_NS_PER_M: f64 = 50.0;
+
+/// What a session commands a device by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Domain {
+    Cartesian,
+    Angular,
+}
+
+/// What a session wants of a device.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wanted {
+    pub(crate) domain: Domain,
+    pub(crate) force_n: Option<DVec3>,
+    pub(crate) target_m: Option<DVec3>,
+    /// N·s/m along each axis.
+    pub(crate) damping: DVec3,
+}
+
+/// A device's commands.
+#[derive(Debug, Default)]
+pub(crate) struct Forces(Vec<(u64, u64, Wanted)>);
+
+impl Forces {
+    /// A session's newest command, in place of its last.
+    pub(crate) fn want(&mut self, session: u64, now_ns: u64, wanted: Wanted) {
+        self.leave(session);
+        self.0.push((session, now_ns, wanted));
+    }
+
+    /// A session wants nothing any more.
+    pub(crate) fn leave(&mut self, session: u64) {
+        self.0.retain(|(of, ..)| *of != session);
+    }
+
+    /// Forgets what has faded; whether nobody wants anything.
+    pub(crate) fn forget(&mut self, now_ns: u64) -> bool {
+        self.0.retain(|(_, since_ns, _)| now_ns.saturating_sub(*since_ns) < VALID_NS + FADE_NS);
+        self.0.is_empty()
+    }
+
+    /// Whether the sum changes between two commands of a session: it follows the handle, or another session's fades.
+    pub(crate) fn follow_the_handle(&self) -> bool {
+        let follows = |wanted: &Wanted| wanted.target_m.is_some() || wanted.damping != DVec3::ZERO;
+        self.0.len() > 1 || self.0.iter().any(|(.., wanted)| follows(wanted))
+    }
+
+    /// The newest command that is valid, for who asks how the device is controlled.
+    pub(crate) fn newest(&self, now_ns: u64) -> Option<&Wanted> {
+        let valid = self.0.iter().filter(|(_, since_ns, _)| now_ns.saturating_sub(*since_ns) <= VALID_NS);
+        valid.max_by_key(|(_, since_ns, _)| *since_ns).map(|(.., wanted)| wanted)
+    }
+
+    /// Force on the hand, N.
+    pub(crate) fn sum(&self, state: &State, now_ns: u64) -> DVec3 {
+        let largest = DVec3::splat(LARGEST_N);
+        let force = |(_, since_ns, wanted): &(u64, u64, Wanted)| {
+            let late_ns = now_ns.saturating_sub(*since_ns).saturating_sub(VALID_NS);
+            let left = 1.0 - late_ns.min(FADE_NS) as f64 / FADE_NS as f64;
+            let own_n = wanted.force_n.unwrap_or(DVec3::ZERO).clamp(-largest, largest);
+            let held_n = wanted.target_m.map_or(DVec3::ZERO, |target_m| {
+                (target_m - state.position_m) * STIFFNESS_N_PER_M - state.velocity_m_per_s * DAMPING_NS_PER_M
+            });
+            let damping = wanted.damping.clamp(DVec3::ZERO, DVec3::splat(LARGEST_DAMPING_NS_PER_M));
+            (own_n + held_n - damping * state.velocity_m_per_s) * left
+        };
+        self.0.iter().map(force).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_hal::{DQuat, Wrench};
+
+    const AT_HOME: State = State {
+        ticks: 1,
+        position_m: DVec3::ZERO,
+        orientation: DQuat::IDENTITY,
+        velocity_m_per_s: DVec3::ZERO,
+        angular_velocity_rad_per_s: DVec3::ZERO,
+        buttons: 0,
+        applied: Wrench::ZERO,
+    };
+
+    fn force(x: f64) -> Wanted {
+        let force_n = Some(DVec3::new(x, 0.0, 0.0));
+        Wanted { domain: Domain::Cartesian, force_n, target_m: None, damping: DVec3::ZERO }
+    }
+
+    #[test]
+    fn forces_of_sessions_add_and_the_newest_of_one_counts() {
+        let mut forces = Forces::default();
+        forces.want(1, 0, force(1.0));
+        forces.want(2, 0, force(0.5));
+        forces.want(1, 1, force(2.0));
+        assert_eq!(forces.sum(&AT_HOME, 1).x, 2.5);
+        assert!(forces.follow_the_handle());
+        forces.leave(2);
+        assert_eq!(forces.sum(&AT_HOME, 1).x, 2.0);
+        assert!(!forces.follow_the_handle());
+    }
+
+    #[test]
+    fn a_session_that_stalls_fades_while_the_other_goes_on() {
+        let mut forces = Forces::default();
+        forces.want(1, 0, force(2.0));
+        let now_ns = VALID_NS + FADE_NS / 4;
+        forces.want(2, now_ns, force(1.0));
+        assert_eq!(forces.sum(&AT_HOME, now_ns).x, 1.0 + 2.0 * 0.75);
+        assert!(!forces.forget(VALID_NS + FADE_NS));
+        assert_eq!(forces.sum(&AT_HOME, VALID_NS + FADE_NS).x, 1.0);
+        assert!(forces.forget(10 * VALID_NS));
+    }
+
+    #[test]
+    fn huge_forces_add_up_to_a_finite_one_and_a_target_pulls() {
+        let mut forces = Forces::default();
+        for session in 0..8 {
+            forces.want(session, 0, force(f64::MAX));
+        }
+        assert!(forces.sum(&AT_HOME, 0).is_finite());
+        let mut forces = Forces::default();
+        let target_m = Some(DVec3::new(0.0, 0.01, 0.0));
+        forces.want(1, 0, Wanted { force_n: None, target_m, ..force(0.0) });
+        let away = State { velocity_m_per_s: DVec3::new(0.0, 0.1, 0.0), ..AT_HOME };
+        assert!((forces.sum(&away, 0).y - (4.0 - 0.4)).abs() < 1.0e-12);
+    }
+}

@@ -1,0 +1,337 @@
+//! Answers by HTTP: version, devices, sessions, and what is set of a device.
+
+use crate::connection::Request;
+use crate::message::set;
+use crate::service::{Service, Session, Shared, grip_id, inverse_id, kept_at_first};
+use crate::state::{Extent, damping, force_gate, told_session, write};
+use crate::view::View;
+use serde_json::{Value, json};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Version of the service whose interface this is.
+const VERSION: &str = "3.5.0";
+
+/// What is answered: a status and JSON.
+type Answer = (u16, Value);
+
+/// The whole answer to a request.
+pub(crate) fn answer(service: &Service, request: &Request) -> String {
+    let (path, query) = request.target.split_once('?').unwrap_or((&request.target, ""));
+    let parts: Vec<&str> = path.split('/').filter(|part| !part.is_empty()).collect();
+    let body: Value = serde_json::from_str(&request.body).unwrap_or(Value::Null);
+    let (status, told) = route(service, &request.method, &parts, query, &body);
+    let reason = if status == 200 { "OK" } else { "Error" };
+    let text = told.to_string();
+    format!(
+        "HTTP/1.1 {status} {reason}\r\nContent-Type: application/json\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{text}",
+        text.len()
+    )
+}
+
+fn done(data: Value) -> Answer {
+    (200, json!({ "ok": true, "data": data }))
+}
+
+fn failed(status: u16, why: &str) -> Answer {
+    (status, json!({ "ok": false, "error": why }))
+}
+
+fn route(service: &Service, method: &str, parts: &[&str], query: &str, body: &Value) -> Answer {
+    match (method, parts) {
+        ("GET", [] | ["version"] | ["3.0" | "3.1", "version"]) => (200, version()),
+        ("GET", ["devices"]) => (200, devices(service)),
+        ("GET", ["expert", "status"]) => {
+            let shared = service.shared();
+            let sessions: Vec<Value> = shared.sessions.iter().map(told_session).collect();
+            (200, json!({ "detection": {}, "devices": service.host.stations().len(), "sessions": sessions, "global": {} }))
+        }
+        ("GET", ["sessions"]) => {
+            let shared = service.shared();
+            let sessions: Vec<Value> = shared.sessions.iter().map(told_session).collect();
+            done(json!({ "session_count": sessions.len(), "sessions": sessions }))
+        }
+        (_, ["sessions", id, rest @ ..]) => session(service, method, id, rest, body),
+        ("GET", ["settings"]) => done(json!(service.shared().settings)),
+        ("POST", ["settings"]) => match body {
+            Value::Object(settings) => {
+                service.shared().settings.extend(settings.clone());
+                (200, json!({ "ok": true }))
+            }
+            _ => failed(400, "settings are an object"),
+        },
+        (_, ["settings", key]) => setting(service, method, key, body),
+        ("POST", ["save_configuration"] | ["ports", _, "reset"]) => (200, json!({ "ok": true })),
+        (_, [kind, device, "config", name @ ..]) => {
+            configured(service, method, [kind, device], &name.join("/"), query, body)
+        }
+        (_, [kind, device, "state", "transform"]) => {
+            configured(service, method, [kind, device], "transform", query, body)
+        }
+        _ => failed(404, "there is no such route"),
+    }
+}
+
+fn version() -> Value {
+    json!({
+        "build_time": "", "git_branch": "", "git_describe": format!("{VERSION}-flotor-{}", env!("CARGO_PKG_VERSION")),
+        "git_hash": "", "git_tag": VERSION, "project_name": "flotor-haply-service", "project_version": format!("{VERSION}.0"),
+    })
+}
+
+/// The inventory, as a new session sees it.
+fn devices(service: &Service) -> Value {
+    let mut text = String::new();
+    write(&mut text, service, 0, Extent::Inventory);
+    serde_json::from_str(&text).unwrap_or_default()
+}
+
+fn session(service: &Service, method: &str, id: &str, rest: &[&str], body: &Value) -> Answer {
+    let mut shared = service.shared();
+    let own = id.parse().ok().and_then(|id| shared.session_mut(id));
+    let Some(own) = own else { return failed(404, "there is no such session") };
+    match (method, rest) {
+        ("GET", []) => done(told_session(own)),
+        ("GET", ["profile"]) => done(json!({ "name": own.profile })),
+        ("POST", ["profile"]) => match body.get("name").and_then(Value::as_str) {
+            Some(name) => {
+                name.clone_into(&mut own.profile);
+                done(json!({ "name": name }))
+            }
+            None => failed(400, "a profile has a name"),
+        },
+        ("DELETE", ["profile"]) => {
+            "default".clone_into(&mut own.profile);
+            (200, json!({ "ok": true }))
+        }
+        _ => failed(404, "there is no such route"),
+    }
+}
+
+fn setting(service: &Service, method: &str, key: &str, body: &Value) -> Answer {
+    let mut shared = service.shared();
+    match method {
+        "GET" => match shared.settings.get(key) {
+            Some(value) => (200, value.clone()),
+            None => failed(404, "there is no such setting"),
+        },
+        "POST" => {
+            shared.settings.insert(key.to_owned(), body.clone());
+            (200, json!({ "ok": true }))
+        }
+        "DELETE" => {
+            shared.settings.remove(key);
+            (200, json!({ "ok": true }))
+        }
+        _ => failed(405, "GET, POST or DELETE"),
+    }
+}
+
+/// The devices that a path means, and whether they are grips.
+fn selected(service: &Service, [kind, device]: [&str; 2]) -> Option<(Vec<usize>, usize)> {
+    let count = service.host.stations().len();
+    let (part, name): (usize, fn(usize) -> String) = match kind {
+        "inverse3" | "inverse3x" | "minverse" | "*inverse" => (0, inverse_id),
+        "verse_grip" | "wireless_verse_grip" | "custom_verse_grip" | "*verse_grip" => (1, grip_id),
+        _ => return None,
+    };
+    let numbers = match (device, device.parse::<usize>()) {
+        ("*", _) => (0..count).collect(),
+        (_, Ok(index)) if index < count => vec![index],
+        _ => (0..count).filter(|number| name(*number).eq_ignore_ascii_case(device)).collect::<Vec<_>>(),
+    };
+    (!numbers.is_empty()).then_some((numbers, part))
+}
+
+/// The sessions that a query means, by their ids.
+fn of_query(shared: &Shared, query: &str) -> Vec<u64> {
+    let expression = query.split('&').find_map(|pair| pair.strip_prefix("session=")).map(decoded);
+    let ids = |sessions: Vec<&Session>| sessions.into_iter().map(|session| session.id).collect();
+    let Some(expression) = expression else { return ids(shared.sessions.iter().collect()) };
+    if let Ok(id) = expression.trim_start_matches('#').parse::<u64>() {
+        return ids(shared.session(id).into_iter().collect());
+    }
+    let (profile, index) = expression.trim_start_matches(':').rsplit_once(':').map_or_else(
+        || match expression.strip_prefix(':') {
+            Some(index) => ("*".to_owned(), index.to_owned()),
+            None => (expression.clone(), "0".to_owned()),
+        },
+        |(profile, index)| (profile.to_owned(), index.to_owned()),
+    );
+    // A profile that has colons of its own, without an index.
+    let (profile, index) = match index.parse::<i64>() {
+        Ok(index) => (profile, index),
+        Err(_) => (expression.trim_start_matches(':').to_owned(), 0),
+    };
+    let found: Vec<&Session> =
+        shared.sessions.iter().filter(|session| is_like(&session.profile, &profile)).collect();
+    let place = if index < 0 { found.len().checked_sub(index.unsigned_abs() as usize) } else { usize::try_from(index).ok() };
+    ids(place.and_then(|place| found.get(place).copied()).into_iter().collect())
+}
+
+/// Whether a name fits a pattern with `*` and `?`.
+fn is_like(name: &str, pattern: &str) -> bool {
+    let (name, pattern): (Vec<char>, Vec<char>) = (name.chars().collect(), pattern.chars().collect());
+    let (mut at, mut of, mut star) = (0, 0, None);
+    while let Some(letter) = name.get(at) {
+        match pattern.get(of) {
+            Some('*') => {
+                star = Some((at, of));
+                of += 1;
+            }
+            Some(wanted) if *wanted == '?' || wanted == letter => (at, of) = (at + 1, of + 1),
+            // The last `*` takes one letter more.
+            _ => match star {
+                Some((from, place)) => {
+                    star = Some((from + 1, place));
+                    (at, of) = (from + 1, place + 1);
+                }
+                None => return false,
+            },
+        }
+    }
+    pattern.get(of..).unwrap_or_default().iter().all(|rest| *rest == '*')
+}
+
+/// A query without its `%` escapes.
+fn decoded(text: &str) -> String {
+    let mut bytes = Vec::new();
+    let mut rest = text.as_bytes();
+    while let Some((first, after)) = rest.split_first() {
+        let escaped = (*first == b'%').then(|| after.get(..2)).flatten();
+        let byte = escaped.and_then(|digits| u8::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok());
+        bytes.push(byte.unwrap_or(*first));
+        rest = if byte.is_some() { after.get(2..).unwrap_or_default() } else { after };
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+fn configured(service: &Service, method: &str, device: [&str; 2], name: &str, query: &str, body: &Value) -> Answer {
+    let Some((numbers, part)) = selected(service, device) else { return failed(404, "there is no such device") };
+    if method == "GET" && (numbers.len() > 1 || device[1] == "*") {
+        return failed(400, "a wildcard reads nothing");
+    }
+    let mut shared = service.shared();
+    let at_first = kept_at_first();
+    if let (0, Some((name, first))) = (part, at_first.get_key_value(name)) {
+        let kept = numbers.iter().filter_map(|number| shared.kept.get(*number)?.get(name).cloned()).next();
+        return match method {
+            "GET" => done(kept.unwrap_or_default()),
+            "POST" | "DELETE" => {
+                let value = if method == "POST" { body } else { first };
+                for number in numbers {
+                    shared.kept.get_mut(number).map(|kept| kept.insert(name, value.clone()));
+                }
+                done(value.clone())
+            }
+            _ => failed(405, "GET, POST or DELETE"),
+        };
+    }
+    let sessions = of_query(&shared, query);
+    if sessions.is_empty() {
+        return failed(404, "there is no such session");
+    }
+    let mut last = Value::Null;
+    for id in sessions {
+        let Some(own) = shared.session_mut(id) else { continue };
+        for number in &numbers {
+            let Some(view) = own.views.get_mut(*number).and_then(|views| views.get_mut(part)) else { continue };
+            match change(view, method, name, body) {
+                Ok(value) => last = value,
+                Err(answer) => return answer,
+            }
+        }
+    }
+    done(last)
+}
+
+/// Reads or changes one thing of a view; what it is then.
+fn change(view: &mut View, method: &str, name: &str, body: &Value) -> Result<Value, Answer> {
+    let plain = View::default();
+    let short = name.strip_prefix("filters/").unwrap_or(name);
+    match (method, short) {
+        ("GET", _) => {}
+        ("POST" | "PATCH", "transform") => {
+            let patch = body.get("transform").unwrap_or(body);
+            view.workspace = view.workspace.patched(patch).ok_or_else(|| failed(400, "it is no transform"))?;
+        }
+        ("POST", _) => set(view, short, body).map_err(|why| failed(400, &why))?,
+        ("PATCH", "mount") => {
+            let patch = body.get("transform").unwrap_or(body);
+            let mount = view.mount.patched(patch).ok_or_else(|| failed(400, "it is no transform"))?;
+            view.set_mount(mount);
+        }
+        ("DELETE", "basis") => view.basis = plain.basis,
+        ("DELETE", "mount" | "preset") => {
+            view.set_preset("defaults");
+        }
+        ("DELETE", "damping") => view.damping = plain.damping,
+        ("DELETE", "force_gate") => view.force_gate = plain.force_gate,
+        ("DELETE", "transform") => view.workspace = plain.workspace,
+        _ => return Err(failed(405, "not for this setting")),
+    }
+    match short {
+        "basis" => Ok(json!({ "permutation": view.basis.name() })),
+        "mount" => Ok(json!({ "transform": view.mount.told() })),
+        "preset" => Ok(json!({ "preset": view.preset })),
+        "damping" => Ok(damping(view)),
+        "force_gate" => Ok(force_gate(view)),
+        "transform" => Ok(json!({ "transform": view.workspace.told() })),
+        _ => Err(failed(404, "there is no such setting")),
+    }
+}
+
+/// Now, as the service writes it: date and time in UTC.
+pub(crate) fn now_text() -> String {
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
+    let (days, second) = (seconds / 86_400, seconds % 86_400);
+    // Years of 400 begin in March: a day of the year is a month and a day without leap days in between.
+    let shifted = days + 719_468;
+    let (era, day) = (shifted / 146_097, shifted % 146_097);
+    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
+    let day = day - (365 * year + year / 4 - year / 100);
+    let month = (5 * day + 2) / 153;
+    let (day, month) = (day - (153 * month + 2) / 5 + 1, if month < 10 { month + 3 } else { month - 9 });
+    let year = year + era * 400 + u64::from(month <= 2);
+    format!("{year:04}-{month:02}-{day:02} {:02}:{:02}:{:02}", second / 3600, second / 60 % 60, second % 60)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shared() -> Shared {
+        let session = |id, profile: &str| Session { id, profile: profile.to_owned(), started: String::new(), views: Vec::new() };
+        let sessions = vec![session(4, "default"), session(5, "co.haply.hub::demo-orb"), session(7, "myapp")];
+        Shared { sessions, ..Shared::default() }
+    }
+
+    #[test]
+    fn a_selector_finds_sessions_by_number_place_and_profile() {
+        let shared = shared();
+        let cases: [(&str, &[u64]); 13] = [
+            ("", &[4, 5, 7]),
+            ("session=%235", &[5]),
+            ("session=7", &[7]),
+            ("session=9", &[]),
+            ("session=:0", &[4]),
+            ("session=:-1", &[7]),
+            ("session=:-4", &[]),
+            ("session=myapp", &[7]),
+            ("session=myapp:0", &[7]),
+            ("session=myapp:1", &[]),
+            ("session=:default:0", &[4]),
+            ("session=co.haply.hub::*:0", &[5]),
+            ("session=co.haply.hub::demo-orb", &[5]),
+        ];
+        for (query, ids) in cases {
+            assert_eq!(of_query(&shared, query), ids, "{query}");
+        }
+    }
+
+    #[test]
+    fn names_fit_patterns_and_escapes_are_undone() {
+        assert!(is_like("co.haply", "co.*") && is_like("abc", "a?c") && is_like("", "*"));
+        assert!(!is_like("abc", "a?") && !is_like("a", "") && !is_like("ac", "a?c"));
+        assert_eq!((decoded("%23a%2"), decoded("%")), ("#a%2".to_owned(), "%".to_owned()));
+    }
+}

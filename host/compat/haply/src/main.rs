@@ -1,0 +1,137 @@
+//! Haply's Inverse Service, answered by the devices of a Flotor scene. `flotor emulate haply-service` starts it.
+//!
+//! ```text
+//!  program -> WebSocket 10001 -> session: view, commands -> sum of all sessions -> force model `program` -> envelope -> device
+//!          <- one state for each message                 <- newest tick <---------------------------------------------+
+//! ```
+//!
+//! - [`connection`]: one port for the simulation channel and for HTTP; a thread for each connection.
+//! - [`session`]: a client of the simulation channel, its pace and its answers.
+//! - [`message`]: what a client's message says. [`state`]: what is answered.
+//! - [`view`]: axes, mount and workspace of a session. [`force`]: the sum of what all sessions want.
+//! - [`http`]: version, devices, sessions, settings. [`events`]: port 10020.
+//!
+//! Source: the public documentation of the service, version 3.5, and its open clients: names, shapes and units only. Positions in
+//! m, velocities in m/s, forces in N, joint angles in degrees; x right, y away from the user, z up. Not real-time: the loop has a
+//! thread of its own.
+
+mod connection;
+mod events;
+mod force;
+mod http;
+mod message;
+mod service;
+mod session;
+mod state;
+mod view;
+
+use clap::{Parser, ValueEnum};
+use flotor_command::options::{arguments, mcap_file, whole};
+use flotor_command::stopping::stop_on_signals;
+use flotor_command::{CommandError, exit_code_of, say};
+use flotor_compat::{Pace, Settings, prepare};
+use service::Service;
+use std::net::TcpListener;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+/// Haply's Inverse Service for any Flotor device.
+#[derive(Parser)]
+#[command(name = "flotor emulate haply-service", version, max_term_width = 110)]
+#[command(after_help = "The first line on standard output says where to connect.\n\nExamples:\n  \
+    flotor emulate haply-service                            a simulated flotor, held by a hand\n  \
+    flotor emulate haply-service proxy.toml --record run.mcap   the device of a scene, inside its limits\n  \
+    flotor lend --api haply -- python3 my_program.py        the same around one program")]
+struct Arguments {
+    /// Scene file (TOML); without it, a simulated flotor held by a hand
+    scene: Option<PathBuf>,
+    /// Where to listen for the simulation channel and HTTP (port 0: any free one)
+    #[arg(long, default_value = "127.0.0.1:10001", value_name = "HOST:PORT")]
+    listen: String,
+    /// Where to listen for the events channel (port 0: any free one)
+    #[arg(long, default_value = "127.0.0.1:10020", value_name = "HOST:PORT")]
+    events: String,
+    /// Who makes time go on
+    #[arg(long, value_enum, value_name = "WHO")]
+    pace: Option<PaceOption>,
+    /// Seed of all random numbers
+    #[arg(long, value_parser = whole, value_name = "N")]
+    seed: Option<u64>,
+    /// Record every tick to an MCAP file
+    #[arg(long, value_parser = mcap_file, value_name = "FILE.mcap")]
+    record: Option<PathBuf>,
+    /// Write the summary as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// Who makes time go on.
+#[derive(Clone, Copy, ValueEnum)]
+enum PaceOption {
+    /// The machine's clock
+    Real,
+    /// The clients: each message that commands a device is a tick
+    Lockstep,
+}
+
+/// Pause between two looks whether the run is to end.
+const LOOK: Duration = Duration::from_millis(20);
+
+fn main() -> ExitCode {
+    exit_code_of(run(arguments::<Arguments>()))
+}
+
+fn run(arguments: Arguments) -> Result<(), CommandError> {
+    // First of all: a signal while the scene is prepared ends the run, too.
+    let stop = stop_on_signals();
+    let mut settings = Settings::from_environment().map_err(CommandError::Usage)?.of_own_process();
+    settings.scene = arguments.scene.or(settings.scene);
+    settings.record = arguments.record.or(settings.record);
+    settings.json = arguments.json.or(settings.json);
+    settings.seed = arguments.seed.unwrap_or(settings.seed);
+    settings.pace = match arguments.pace {
+        Some(PaceOption::Real) => Pace::Real,
+        Some(PaceOption::Lockstep) => Pace::Lockstep,
+        None => settings.pace,
+    };
+    if settings.report.is_none() {
+        settings.report = Some("-".into());
+    }
+    let (simulation, simulation_at) = listen("--listen", &arguments.listen)?;
+    let (events, events_at) = listen("--events", &arguments.events)?;
+    let host = prepare(settings, &stop).map_err(CommandError::Usage)?;
+    if (0..host.stations().len()).any(|number| !host.open(number)) {
+        return Err(CommandError::Failed("the run did not begin".to_owned()));
+    }
+    let service = Service::leak(host);
+    let started = service.follow().and_then(|()| events::serve(service, events));
+    started
+        .and_then(|()| connection::serve(service, simulation))
+        .map_err(|cause| CommandError::Failed(format!("there is no thread for the service: {cause}")))?;
+    say!("listening ws://{simulation_at}/ events ws://{events_at}/");
+    while !stop.is_stop_asked() && host.is_running() {
+        std::thread::sleep(LOOK);
+    }
+    let was_asked = stop.is_stop_asked();
+    service.device_lost();
+    host.end();
+    if was_asked {
+        Ok(())
+    } else {
+        Err(CommandError::Failed("the run ended before the service; its summary says why".to_owned()))
+    }
+}
+
+/// A port, and its address.
+fn listen(option: &str, at: &str) -> Result<(TcpListener, String), CommandError> {
+    let bound = TcpListener::bind(at).and_then(|listener| {
+        let address = listener.local_addr()?.to_string();
+        Ok((listener, address))
+    });
+    bound.map_err(|cause| {
+        CommandError::Usage(format!(
+            "cannot listen at {at}: {cause}; Haply's own service may be running; `{option} 127.0.0.1:0` takes any port"
+        ))
+    })
+}

@@ -1,0 +1,208 @@
+//! What all connections share: the run, its devices, the sessions and what they set.
+
+use crate::events::{Events, Level};
+use crate::force::{Domain, Forces, Wanted};
+use crate::view::View;
+use flotor_compat::{Host, Pace, State, Station};
+use flotor_hal::{DVec3, Wrench};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::io;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// Sessions at the same time at most.
+const MOST_SESSIONS: usize = 64;
+
+/// The service.
+pub(crate) struct Service {
+    pub(crate) host: &'static Host,
+    pub(crate) events: Events,
+    shared: Mutex<Shared>,
+    /// Something is to be followed.
+    following: Condvar,
+    next_session: AtomicU64,
+}
+
+/// A client of the simulation channel, as all see it.
+#[derive(Debug)]
+pub(crate) struct Session {
+    pub(crate) id: u64,
+    pub(crate) profile: String,
+    pub(crate) started: String,
+    /// How it sees each device, and each grip: one at a device.
+    pub(crate) views: Vec<[View; 2]>,
+}
+
+/// What changes.
+#[derive(Default)]
+pub(crate) struct Shared {
+    pub(crate) sessions: Vec<Session>,
+    /// Of each device.
+    forces: Vec<Forces>,
+    /// Settings of each device by their names in a path, kept and told.
+    pub(crate) kept: Vec<BTreeMap<&'static str, Value>>,
+    /// Settings of the service, kept and told.
+    pub(crate) settings: BTreeMap<String, Value>,
+}
+
+/// Settings of a device that belong to no session, and what they are at first.
+pub(crate) fn kept_at_first() -> BTreeMap<&'static str, Value> {
+    BTreeMap::from([
+        ("gravity_compensation", json!({ "enabled": true, "scaling_factor": 1.0 })),
+        ("handedness", json!("right")),
+        ("torque_scaling", json!({ "enabled": true })),
+        ("home_return", json!({ "enabled": false })),
+    ])
+}
+
+impl Service {
+    /// The service of this process, for as long as that lives.
+    pub(crate) fn leak(host: &'static Host) -> &'static Self {
+        let devices = host.stations().len();
+        let shared = Shared {
+            forces: std::iter::repeat_with(Forces::default).take(devices).collect(),
+            kept: std::iter::repeat_with(kept_at_first).take(devices).collect(),
+            ..Shared::default()
+        };
+        Box::leak(Box::new(Self {
+            host,
+            events: Events::default(),
+            shared: Mutex::new(shared),
+            following: Condvar::new(),
+            next_session: AtomicU64::new(1),
+        }))
+    }
+
+    pub(crate) fn shared(&self) -> MutexGuard<'_, Shared> {
+        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A new session; nothing if there are too many.
+    pub(crate) fn enter(&self) -> Option<u64> {
+        let mut shared = self.shared();
+        if shared.sessions.len() >= MOST_SESSIONS {
+            return None;
+        }
+        let id = self.next_session.fetch_add(1, Ordering::Relaxed);
+        let views = self.host.stations().iter().map(|_| <[View; 2]>::default()).collect();
+        let profile = "default".to_owned();
+        shared.sessions.push(Session { id, profile, started: crate::http::now_text(), views });
+        Some(id)
+    }
+
+    /// A session ends: it wants nothing any more.
+    pub(crate) fn leave(&self, session: u64) {
+        let mut shared = self.shared();
+        shared.sessions.retain(|there| there.id != session);
+        for (forces, station) in shared.forces.iter_mut().zip(self.host.stations()) {
+            forces.leave(session);
+            self.command(forces, station, &station.state());
+        }
+    }
+
+    /// A session commands a device, in Flotor's axes. Force begins with the first one, and fades in.
+    pub(crate) fn want(&self, shared: &mut Shared, session: u64, device: usize, wanted: Wanted) {
+        let (Some(forces), Some(station)) = (shared.forces.get_mut(device), self.host.station(device)) else {
+            return;
+        };
+        forces.want(session, self.host.now_ns(), wanted);
+        self.command(forces, station, &station.state());
+        if self.host.pace() == Pace::Real && forces.follow_the_handle() {
+            self.following.notify_one();
+        }
+    }
+
+    /// Sends the sum of what is wanted of a device.
+    fn command(&self, forces: &mut Forces, station: &Station, state: &State) {
+        let now_ns = self.host.now_ns();
+        if forces.forget(now_ns) {
+            station.disable();
+            return;
+        }
+        let sum_n = forces.sum(state, now_ns);
+        // A sum is finite: its parts are, and they are limited.
+        let _ = station.command(&Wrench::from_force(sum_n), now_ns);
+        station.enable();
+    }
+
+    /// Follows the handle with what depends on it, and fades what is not renewed: a thread of its own in real time.
+    ///
+    /// # Errors
+    /// If there is no thread.
+    pub(crate) fn follow(&'static self) -> io::Result<()> {
+        let thread = std::thread::Builder::new().name("flotor-sum".to_owned());
+        thread.spawn(move || {
+            let period = Duration::from_nanos(self.host.period_ns());
+            loop {
+                let mut shared = self.shared();
+                while !shared.forces.iter().any(Forces::follow_the_handle) {
+                    shared = self.following.wait(shared).unwrap_or_else(PoisonError::into_inner);
+                }
+                for (forces, station) in shared.forces.iter_mut().zip(self.host.stations()) {
+                    if forces.follow_the_handle() {
+                        self.command(forces, station, &station.state());
+                    }
+                }
+                drop(shared);
+                std::thread::sleep(period);
+            }
+        })?;
+        Ok(())
+    }
+
+    /// How a device is controlled: the words of `mode`, `control_domain` and `control_mode`.
+    pub(crate) fn control(&self, shared: &Shared, device: usize) -> [&'static str; 3] {
+        let newest = shared.forces.get(device).and_then(|forces| forces.newest(self.host.now_ns()));
+        let Some(wanted) = newest else { return ["idle", "cartesian", "idle"] };
+        let domain = if wanted.domain == Domain::Angular { "angular" } else { "cartesian" };
+        match (wanted.target_m, wanted.domain) {
+            (Some(_), _) => ["position", domain, "position"],
+            (None, Domain::Angular) => ["angular", domain, "force"],
+            (None, Domain::Cartesian) => ["idle", domain, "force"],
+        }
+    }
+
+    /// Says once that the devices are gone.
+    pub(crate) fn device_lost(&self) {
+        for number in 0..self.host.stations().len() {
+            let data = json!({ "device_family": "inverse", "device_id": inverse_id(number) });
+            self.events.emit("device-disconnected", "device", Level::Warning, data, "the run ended");
+        }
+    }
+
+    /// Says that a client sent what is not legal.
+    pub(crate) fn refuse(&self, field: &str, reason: &str, context: &str) {
+        let context: String = context.chars().take(200).collect();
+        let data = json!({ "field": field, "reason": reason, "context": context });
+        self.events.emit("invalid-value", "input", Level::Warning, data, reason);
+    }
+}
+
+impl Shared {
+    pub(crate) fn session(&self, id: u64) -> Option<&Session> {
+        self.sessions.iter().find(|session| session.id == id)
+    }
+
+    pub(crate) fn session_mut(&mut self, id: u64) -> Option<&mut Session> {
+        self.sessions.iter_mut().find(|session| session.id == id)
+    }
+}
+
+/// Id of the arm of a device, and of its grip: four digits, as on the label of the original.
+pub(crate) fn inverse_id(number: usize) -> String {
+    format!("F{:03X}", number + 1)
+}
+
+pub(crate) fn grip_id(number: usize) -> String {
+    format!("A{:03X}", number + 1)
+}
+
+/// A nominal arm, m: joint angles are displacements over its length, and a torque is a force along it.
+pub(crate) const ARM_M: f64 = 0.2;
+
+/// Joint angles of the nominal arm for a displacement, degrees.
+pub(crate) fn joint_angles(displacement_m: DVec3) -> DVec3 {
+    displacement_m / ARM_M * (180.0 / std::f64::consts::PI)
+}

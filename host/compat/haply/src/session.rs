@@ -1,0 +1,128 @@
+//! A client of the simulation channel: one state for each of its messages. A message that commands a device waits for the next
+//! tick before it is answered, unless the next message is there already; one that only reads is answered at once.
+
+use crate::message::carry_out;
+use crate::service::Service;
+use crate::state::{Extent, write};
+use flotor_compat::{Pace, Turn};
+use rustix::net::{RecvFlags, recv};
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::TcpStream;
+use tungstenite::protocol::{Role, WebSocketConfig};
+use tungstenite::{Error, Message, WebSocket};
+
+/// Longest message of a client, bytes.
+const LONGEST: usize = 1 << 20;
+/// Room for what a client sends in one go, bytes.
+const ROOM: usize = 16 << 10;
+
+/// A connection that may be asked whether something is there.
+pub(crate) struct Link {
+    pub(crate) stream: TcpStream,
+    /// A read does not wait.
+    is_asking: bool,
+}
+
+impl Read for Link {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.is_asking {
+            Ok(recv(&self.stream, buffer, RecvFlags::DONTWAIT).map(|(count, _)| count)?)
+        } else {
+            self.stream.read(buffer)
+        }
+    }
+}
+
+impl Write for Link {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.stream.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.stream.flush()
+    }
+}
+
+/// The WebSocket of a connection whose client has been answered that it may go on; `read` is what it has sent since.
+pub(crate) fn socket(stream: TcpStream, read: Vec<u8>) -> WebSocket<Link> {
+    let config = WebSocketConfig::default()
+        .read_buffer_size(ROOM)
+        .write_buffer_size(0)
+        .max_message_size(Some(LONGEST))
+        .max_frame_size(Some(LONGEST));
+    WebSocket::from_partially_read(Link { stream, is_asking: false }, read, Role::Server, Some(config))
+}
+
+/// Serves a client until it is gone.
+pub(crate) fn serve(service: &Service, mut socket: WebSocket<Link>) {
+    let Some(session) = service.enter() else {
+        let _ = socket.close(None);
+        return;
+    };
+    let ended = answer(service, session, &mut socket);
+    service.leave(session);
+    if let Err(Error::Capacity(_) | Error::Utf8(_) | Error::Protocol(_)) = &ended {
+        let _ = socket.close(None);
+    }
+    let _ = socket.flush();
+}
+
+/// Answers each message of a session; comes back with the reason why there are no more.
+fn answer(service: &Service, session: u64, socket: &mut WebSocket<Link>) -> Result<(), Error> {
+    let turn = Turn::default();
+    let mut text = String::new();
+    write(&mut text, service, session, Extent::All);
+    socket.send(Message::text(text.as_str()))?;
+    let mut next = None;
+    loop {
+        let message = match next.take() {
+            Some(message) => message,
+            None => read(socket)?,
+        };
+        let carried = match &message {
+            Message::Text(message) => carry_out(service, session, message),
+            Message::Binary(message) => match std::str::from_utf8(message) {
+                Ok(message) => carry_out(service, session, message),
+                Err(_) => {
+                    service.refuse("", "a message is text", "binary");
+                    Default::default()
+                }
+            },
+            _ => continue,
+        };
+        if let Some(station) = carried.commanded.and_then(|device| service.host.station(device)) {
+            if service.host.pace() == Pace::Lockstep {
+                service.host.advance();
+            } else {
+                next = waiting(socket)?;
+                if next.is_none() {
+                    service.host.wait_in(station, &turn);
+                }
+            }
+        }
+        write(&mut text, service, session, if carried.wants_all { Extent::All } else { Extent::State });
+        socket.send(Message::text(text.as_str()))?;
+    }
+}
+
+/// The next message.
+fn read(socket: &mut WebSocket<Link>) -> Result<Message, Error> {
+    loop {
+        match socket.read() {
+            Err(Error::Io(error)) if error.kind() == ErrorKind::Interrupted => {}
+            read => return read,
+        }
+    }
+}
+
+/// The next message, if it is there.
+fn waiting(socket: &mut WebSocket<Link>) -> Result<Option<Message>, Error> {
+    socket.get_mut().is_asking = true;
+    let read = socket.read();
+    socket.get_mut().is_asking = false;
+    match read {
+        Ok(message) => Ok(Some(message)),
+        Err(Error::Io(error)) if [ErrorKind::WouldBlock, ErrorKind::Interrupted].contains(&error.kind()) => Ok(None),
+        Err(error) => Err(error),
+    }
+}

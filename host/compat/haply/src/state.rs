@@ -1,0 +1,193 @@
+//! What a client is told: the state of all devices, and at first or when it asks all there is to know.
+
+use crate::service::{Service, Session, Shared, grip_id, inverse_id, joint_angles};
+use crate::view::View;
+use flotor_compat::{Axes, State};
+use flotor_hal::{DQuat, DVec3};
+use serde_json::{Value, json};
+use std::fmt::Write;
+
+/// How much is told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Extent {
+    /// State and status, after each message.
+    State,
+    /// Configuration as well.
+    Inventory,
+    /// And the session itself.
+    All,
+}
+
+/// Numbers below this are told as 0: their digits would fill a message.
+const SMALLEST: f64 = 1.0e-12;
+
+/// Writes a message for a session, in place of what was in `text`.
+pub(crate) fn write(text: &mut String, service: &Service, session: u64, extent: Extent) {
+    text.clear();
+    let shared = service.shared();
+    let plain = Session { id: session, profile: String::new(), started: String::new(), views: Vec::new() };
+    let own = shared.session(session).unwrap_or(&plain);
+    let _ = write!(text, "{{\"session_id\":{session}");
+    if extent == Extent::All {
+        let _ = write!(text, ",\"session\":{}", told_session(own));
+    }
+    text.push_str(",\"inverse3\":[");
+    devices(text, service, &shared, own, extent, arm);
+    text.push_str("],\"verse_grip\":[],\"wireless_verse_grip\":[");
+    devices(text, service, &shared, own, extent, grip);
+    text.push_str("],\"custom_verse_grip\":[]}");
+}
+
+/// A session, as it is told.
+pub(crate) fn told_session(session: &Session) -> Value {
+    json!({
+        "session_id": session.id,
+        "config": { "profile": { "name": session.profile }, "started_time": session.started },
+    })
+}
+
+/// A device as a session sees it.
+struct Seen<'a> {
+    service: &'a Service,
+    shared: &'a Shared,
+    number: usize,
+    state: State,
+    axes: Axes,
+    is_alive: bool,
+}
+
+type Part = fn(&mut String, &Seen<'_>, &[View; 2], Extent);
+
+fn devices(text: &mut String, service: &Service, shared: &Shared, own: &Session, extent: Extent, part: Part) {
+    let plain = <[View; 2]>::default();
+    let is_alive = service.host.is_running();
+    for (number, station) in service.host.stations().iter().enumerate() {
+        if number > 0 {
+            text.push(',');
+        }
+        let seen = Seen { service, shared, number, state: station.state(), axes: station.axes(), is_alive };
+        part(text, &seen, own.views.get(number).unwrap_or(&plain), extent);
+    }
+}
+
+fn arm(text: &mut String, seen: &Seen<'_>, [view, _]: &[View; 2], extent: Extent) {
+    let Seen { service, shared, number, state, is_alive, .. } = seen;
+    let _ = write!(text, "{{\"device_id\":\"{}\"", inverse_id(*number));
+    if extent != Extent::State {
+        let _ = write!(text, ",\"config\":{}", arm_config(shared, *number, view));
+    }
+    let [mode, domain, control] = service.control(shared, *number);
+    text.push_str(",\"state\":{\"cursor_position\":");
+    let position = view.position(state.position_m);
+    vector(text, position);
+    text.push_str(",\"cursor_velocity\":");
+    vector(text, view.velocity(state.velocity_m_per_s));
+    text.push_str(",\"angular_position\":");
+    angles(text, joint_angles(state.position_m));
+    text.push_str(",\"angular_velocity\":");
+    angles(text, joint_angles(state.velocity_m_per_s));
+    text.push_str(",\"body_orientation\":");
+    quaternion(text, DQuat::IDENTITY);
+    text.push_str(",\"current_cursor_force\":");
+    let applied_n = state.applied.force();
+    vector(text, view.force(applied_n));
+    text.push_str(",\"current_cursor_position\":");
+    vector(text, position);
+    text.push_str(",\"current_angular_torques\":");
+    angles(text, applied_n * crate::service::ARM_M);
+    text.push_str(",\"current_angular_position\":");
+    angles(text, joint_angles(state.position_m));
+    let in_use = control != "idle";
+    let _ = write!(
+        text,
+        ",\"mode\":\"{mode}\",\"control_domain\":\"{domain}\",\"control_mode\":\"{control}\",\"transform\":{},\
+         \"transform_velocity\":{{}}}},\"status\":{{\"calibrated\":true,\"in_use\":{in_use},\"power_supply\":{is_alive},\
+         \"ready\":{is_alive},\"started\":{is_alive}}}}}",
+        view.workspace.told()
+    );
+}
+
+fn grip(text: &mut String, seen: &Seen<'_>, [_, view]: &[View; 2], extent: Extent) {
+    let Seen { number, state, axes, is_alive, .. } = seen;
+    let _ = write!(text, "{{\"device_id\":\"{}\"", grip_id(*number));
+    if extent != Extent::State {
+        let config = json!({
+            "type": "wireless_verse_grip", "port": "flotor", "major_version": 2, "minor_version": 2, "hardware_version": 1,
+            "streaming_mode": "USB", "preset": view.preset, "basis": { "permutation": view.basis.name() },
+            "mount": view.mount.told(),
+        });
+        let _ = write!(text, ",\"config\":{config}");
+    }
+    let pressed = |bit: u32| state.buttons >> bit & 1 == 1;
+    let _ = write!(
+        text,
+        ",\"state\":{{\"battery_level\":1.0,\"battery_voltage\":4.2,\"buttons\":{{\"a\":{},\"b\":{},\"c\":{}}},\"hall\":0,\"orientation\":",
+        pressed(0),
+        pressed(1),
+        pressed(2)
+    );
+    quaternion(text, view.orientation(if *axes == Axes::Three { DQuat::IDENTITY } else { state.orientation }));
+    let _ = write!(
+        text,
+        ",\"transform\":{},\"transform_velocity\":{{}}}},\"status\":{{\"ready\":{is_alive},\"connected\":{is_alive},\"awake\":{is_alive}}}}}",
+        view.workspace.told()
+    );
+}
+
+fn arm_config(shared: &Shared, number: usize, view: &View) -> Value {
+    let id = inverse_id(number);
+    let mut config = json!({
+        "type": "inverse3",
+        "port": "flotor",
+        "device_info": { "id": id, "major_version": 7, "minor_version": 4, "device_type": 4,
+            "uuid": format!("00000000-0000-0000-0000-00000000{id}") },
+        "extended_device_id": format!("00000000000000000000{id}"),
+        "extended_firmware_version": concat!("flotor ", env!("CARGO_PKG_VERSION")),
+        "streaming_mode": "USB",
+        "preset": view.preset,
+        "basis": { "permutation": view.basis.name() },
+        "mount": view.mount.told(),
+        "filters": { "force_gate": force_gate(view), "damping": damping(view) },
+    });
+    if let (Value::Object(config), Some(kept)) = (&mut config, shared.kept.get(number)) {
+        config.extend(kept.iter().map(|(name, value)| ((*name).to_owned(), value.clone())));
+    }
+    config
+}
+
+pub(crate) fn force_gate(view: &View) -> Value {
+    json!({ "gain": view.force_gate })
+}
+
+pub(crate) fn damping(view: &View) -> Value {
+    let DVec3 { x, y, z } = view.damping;
+    if x == y && y == z { json!({ "scalar": x }) } else { json!({ "scalar": 0.0, "vector": crate::view::of_vector(view.damping) }) }
+}
+
+fn number(text: &mut String, number: f64) {
+    // What is no number never gets here: the loop replaces it.
+    let number = if number.abs() < SMALLEST || !number.is_finite() { 0.0 } else { number };
+    let _ = write!(text, "{number}");
+}
+
+fn named(text: &mut String, parts: &[(&str, f64)]) {
+    for (place, (name, value)) in parts.iter().enumerate() {
+        text.push_str(if place == 0 { "{\"" } else { ",\"" });
+        text.push_str(name);
+        text.push_str("\":");
+        number(text, *value);
+    }
+    text.push('}');
+}
+
+fn vector(text: &mut String, DVec3 { x, y, z }: DVec3) {
+    named(text, &[("x", x), ("y", y), ("z", z)]);
+}
+
+fn angles(text: &mut String, DVec3 { x, y, z }: DVec3) {
+    named(text, &[("a0", x), ("a1", y), ("a2", z)]);
+}
+
+fn quaternion(text: &mut String, DQuat { x, y, z, w }: DQuat) {
+    named(text, &[("w", w), ("x", x), ("y", y), ("z", z)]);
+}
