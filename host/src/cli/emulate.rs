@@ -15,6 +15,7 @@ use std::ffi::OsString;
     flotor emulate maglev --transport pty --link /tmp/flotor-tty\n  \
     flotor emulate maglev --pace lockstep --set preset=full\n  \
     flotor emulate maglev --protocol ml-api     for programs written for the Maglev 200\n  \
+    flotor emulate haply-service                for programs written for Haply's service\n  \
     flotor emulate maglev --help                 options of that emulator",
     // After NAME the flag belongs to the emulator.
     disable_help_flag = true
@@ -43,11 +44,14 @@ pub(crate) fn run(arguments: &EmulateArguments) -> Result<(), CommandError> {
         )));
     }
     let program = format!("flotor-{device}-emulator");
-    let build = "cargo build --release -p flotor-maglev-emulator";
+    let build = match device.as_str() {
+        "haply-service" => "cargo build --release -p flotor-haply-service",
+        _ => "cargo build --release -p flotor-maglev-emulator",
+    };
     let emulator = SeparateProgram { program: &program, built: Built::WithThis, build };
-    if device != "maglev" && emulator.command().is_err() {
+    if !["maglev", "haply-service"].contains(&device.as_str()) && emulator.command().is_err() {
         let words = format!(
-            "there is no emulator `{program}` in the folder of `flotor`; Flotor provides one for `maglev` only"
+            "there is no emulator `{program}` in the folder of `flotor`; Flotor provides `maglev` and `haply-service`"
         );
         return Err(CommandError::Usage(words));
     }

@@ -133,8 +133,11 @@ impl Head {
     fn read(text: &str, rest: Vec<u8>) -> Option<Self> {
         let mut lines = text.split("\r\n");
         let mut words = lines.next()?.split(' ');
-        let request =
-            Request { method: words.next()?.to_owned(), target: words.next()?.to_owned(), body: String::new() };
+        let request = Request {
+            method: words.next()?.to_owned(),
+            target: words.next()?.to_owned(),
+            body: String::new(),
+        };
         let mut head = Self { request, rest, ..Self::default() };
         let (mut wants_socket, mut key) = (false, None);
         for (name, value) in lines.filter_map(|line| line.split_once(':')) {
@@ -157,12 +160,19 @@ mod tests {
 
     #[test]
     fn a_request_and_a_websocket_are_distinguished_by_their_first_lines() {
-        let plain = Head::read("POST /sessions/1/profile HTTP/1.1\r\nHost: x\r\nContent-Length: 12\r\n", Vec::new());
+        let plain =
+            Head::read("POST /sessions/1/profile HTTP/1.1\r\nHost: x\r\nContent-Length: 12\r\n", Vec::new());
         let plain = plain.expect("it is a request");
-        assert_eq!((plain.request.method.as_str(), plain.request.target.as_str()), ("POST", "/sessions/1/profile"));
+        assert_eq!(
+            (plain.request.method.as_str(), plain.request.target.as_str()),
+            ("POST", "/sessions/1/profile")
+        );
         assert_eq!((plain.key, plain.length), (None, 12));
         let socket = "GET / HTTP/1.1\r\nupgrade: WebSocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZQ==\r\n";
-        assert_eq!(Head::read(socket, Vec::new()).and_then(|head| head.key).as_deref(), Some("dGhlIHNhbXBsZQ=="));
+        assert_eq!(
+            Head::read(socket, Vec::new()).and_then(|head| head.key).as_deref(),
+            Some("dGhlIHNhbXBsZQ==")
+        );
         assert!(Head::read("malformed", Vec::new()).is_none());
     }
 }

@@ -43,7 +43,8 @@ impl Events {
 
 fn event(name: &str, category: &str, level: Level, data: Value, message: &str) -> String {
     let level = if level == Level::Info { "info" } else { "warning" };
-    json!({ "name": name, "category": category, "level": level, "data": data, "message": message }).to_string()
+    json!({ "name": name, "category": category, "level": level, "data": data, "message": message })
+        .to_string()
 }
 
 /// Serves the channel.

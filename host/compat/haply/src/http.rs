@@ -43,7 +43,10 @@ fn route(service: &Service, method: &str, parts: &[&str], query: &str, body: &Va
         ("GET", ["expert", "status"]) => {
             let shared = service.shared();
             let sessions: Vec<Value> = shared.sessions.iter().map(told_session).collect();
-            (200, json!({ "detection": {}, "devices": service.host.stations().len(), "sessions": sessions, "global": {} }))
+            (
+                200,
+                json!({ "detection": {}, "devices": service.host.stations().len(), "sessions": sessions, "global": {} }),
+            )
         }
         ("GET", ["sessions"]) => {
             let shared = service.shared();
@@ -164,7 +167,11 @@ fn of_query(shared: &Shared, query: &str) -> Vec<u64> {
     };
     let found: Vec<&Session> =
         shared.sessions.iter().filter(|session| is_like(&session.profile, &profile)).collect();
-    let place = if index < 0 { found.len().checked_sub(index.unsigned_abs() as usize) } else { usize::try_from(index).ok() };
+    let place = if index < 0 {
+        found.len().checked_sub(index.unsigned_abs() as usize)
+    } else {
+        usize::try_from(index).ok()
+    };
     ids(place.and_then(|place| found.get(place).copied()).into_iter().collect())
 }
 
@@ -205,8 +212,17 @@ fn decoded(text: &str) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-fn configured(service: &Service, method: &str, device: [&str; 2], name: &str, query: &str, body: &Value) -> Answer {
-    let Some((numbers, part)) = selected(service, device) else { return failed(404, "there is no such device") };
+fn configured(
+    service: &Service,
+    method: &str,
+    device: [&str; 2],
+    name: &str,
+    query: &str,
+    body: &Value,
+) -> Answer {
+    let Some((numbers, part)) = selected(service, device) else {
+        return failed(404, "there is no such device");
+    };
     if method == "GET" && (numbers.len() > 1 || device[1] == "*") {
         return failed(400, "a wildcard reads nothing");
     }
@@ -234,7 +250,9 @@ fn configured(service: &Service, method: &str, device: [&str; 2], name: &str, qu
     for id in sessions {
         let Some(own) = shared.session_mut(id) else { continue };
         for number in &numbers {
-            let Some(view) = own.views.get_mut(*number).and_then(|views| views.get_mut(part)) else { continue };
+            let Some(view) = own.views.get_mut(*number).and_then(|views| views.get_mut(part)) else {
+                continue;
+            };
             match change(view, method, name, body) {
                 Ok(value) => last = value,
                 Err(answer) => return answer,
@@ -252,7 +270,8 @@ fn change(view: &mut View, method: &str, name: &str, body: &Value) -> Result<Val
         ("GET", _) => {}
         ("POST" | "PATCH", "transform") => {
             let patch = body.get("transform").unwrap_or(body);
-            view.workspace = view.workspace.patched(patch).ok_or_else(|| failed(400, "it is no transform"))?;
+            view.workspace =
+                view.workspace.patched(patch).ok_or_else(|| failed(400, "it is no transform"))?;
         }
         ("POST", _) => set(view, short, body).map_err(|why| failed(400, &why))?,
         ("PATCH", "mount") => {
@@ -300,7 +319,12 @@ mod tests {
     use super::*;
 
     fn shared() -> Shared {
-        let session = |id, profile: &str| Session { id, profile: profile.to_owned(), started: String::new(), views: Vec::new() };
+        let session = |id, profile: &str| Session {
+            id,
+            profile: profile.to_owned(),
+            started: String::new(),
+            views: Vec::new(),
+        };
         let sessions = vec![session(4, "default"), session(5, "co.haply.hub::demo-orb"), session(7, "myapp")];
         Shared { sessions, ..Shared::default() }
     }

@@ -38,7 +38,8 @@ pub(crate) fn carry_out(service: &Service, session: u64, text: &str) -> Carried 
     }
     for entry in entries(&message, "inverse3") {
         let Some(device) = number(service, entry, inverse_id) else { continue };
-        if let (Some(configure), Some(view)) = (entry.get("configure"), view(&mut shared, session, device, 0)) {
+        if let (Some(configure), Some(view)) = (entry.get("configure"), view(&mut shared, session, device, 0))
+        {
             configure_device(service, view, configure);
         }
         if let Some(commands) = entry.get("commands").or_else(|| entry.get("command"))
@@ -54,7 +55,8 @@ pub(crate) fn carry_out(service: &Service, session: u64, text: &str) -> Carried 
             if let Some(configure) = entry.get("configure") {
                 configure_device(service, view, configure);
             }
-            if let Some(transform) = entry.get("commands").and_then(|commands| commands.get("set_transform")) {
+            if let Some(transform) = entry.get("commands").and_then(|commands| commands.get("set_transform"))
+            {
                 set_workspace(service, view, transform);
             }
         }
@@ -133,7 +135,8 @@ pub(crate) fn set(view: &mut View, name: &str, value: &Value) -> Result<(), Stri
         }
         "damping" => {
             let scalar = value.get("scalar").and_then(Value::as_f64).unwrap_or(0.0);
-            let along = value.get("vector").filter(|vector| !vector.is_null()).map_or(Some(DVec3::ZERO), vector);
+            let along =
+                value.get("vector").filter(|vector| !vector.is_null()).map_or(Some(DVec3::ZERO), vector);
             let damping = along.map(|along| along + scalar).filter(|damping| damping.min_element() >= 0.0);
             view.damping = damping.ok_or("a damping is not negative, N·s/m")?;
         }
@@ -186,7 +189,9 @@ fn command(service: &Service, shared: &mut Shared, session: u64, device: usize, 
             "set_cursor_position" => read(["position", "values"], cartesian),
             "set_angular_torques" => read(["torques", "values"], angular),
             "set_angular_position" => read(["angles", "values"], angular),
-            "set_transform" | "probe_position" | "probe_cursor_position" | "probe_angular_position" => continue,
+            "set_transform" | "probe_position" | "probe_cursor_position" | "probe_angular_position" => {
+                continue;
+            }
             other => {
                 service.refuse(other, "this command has no effect here", &command.to_string());
                 continue;

@@ -122,7 +122,9 @@ fn waiting(socket: &mut WebSocket<Link>) -> Result<Option<Message>, Error> {
     socket.get_mut().is_asking = false;
     match read {
         Ok(message) => Ok(Some(message)),
-        Err(Error::Io(error)) if [ErrorKind::WouldBlock, ErrorKind::Interrupted].contains(&error.kind()) => Ok(None),
+        Err(Error::Io(error)) if [ErrorKind::WouldBlock, ErrorKind::Interrupted].contains(&error.kind()) => {
+            Ok(None)
+        }
         Err(error) => Err(error),
     }
 }

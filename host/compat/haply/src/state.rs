@@ -126,7 +126,10 @@ fn grip(text: &mut String, seen: &Seen<'_>, [_, view]: &[View; 2], extent: Exten
         pressed(1),
         pressed(2)
     );
-    quaternion(text, view.orientation(if *axes == Axes::Three { DQuat::IDENTITY } else { state.orientation }));
+    quaternion(
+        text,
+        view.orientation(if *axes == Axes::Three { DQuat::IDENTITY } else { state.orientation }),
+    );
     let _ = write!(
         text,
         ",\"transform\":{},\"transform_velocity\":{{}}}},\"status\":{{\"ready\":{is_alive},\"connected\":{is_alive},\"awake\":{is_alive}}}}}",
@@ -161,7 +164,11 @@ pub(crate) fn force_gate(view: &View) -> Value {
 
 pub(crate) fn damping(view: &View) -> Value {
     let DVec3 { x, y, z } = view.damping;
-    if x == y && y == z { json!({ "scalar": x }) } else { json!({ "scalar": 0.0, "vector": crate::view::of_vector(view.damping) }) }
+    if x == y && y == z {
+        json!({ "scalar": x })
+    } else {
+        json!({ "scalar": 0.0, "vector": crate::view::of_vector(view.damping) })
+    }
 }
 
 fn number(text: &mut String, number: f64) {

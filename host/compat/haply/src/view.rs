@@ -42,7 +42,10 @@ impl Basis {
 
     pub(crate) fn name(&self) -> String {
         let letter = |(axis, sign): (usize, f64)| {
-            [if sign < 0.0 { "-" } else { "" }.to_owned(), AXES.get(axis).map(char::to_string).unwrap_or_default()]
+            [
+                if sign < 0.0 { "-" } else { "" }.to_owned(),
+                AXES.get(axis).map(char::to_string).unwrap_or_default(),
+            ]
         };
         self.axes.into_iter().zip(self.signs).flat_map(letter).collect()
     }
@@ -186,7 +189,9 @@ impl Default for View {
 impl View {
     /// Takes a preset of the service; whether there is one of this name.
     pub(crate) fn set_preset(&mut self, name: &str) -> bool {
-        let Some((name, is_centred)) = PRESETS.iter().find(|(preset, _)| *preset == name) else { return false };
+        let Some((name, is_centred)) = PRESETS.iter().find(|(preset, _)| *preset == name) else {
+            return false;
+        };
         self.preset = name;
         if *name != "custom" {
             self.mount = Transform::NONE;
@@ -235,9 +240,12 @@ mod tests {
     #[test]
     fn a_basis_names_the_device_axis_of_each_of_its_own() {
         let device = DVec3::new(1.0, 2.0, 3.0);
-        for (text, own) in
-            [("XYZ", [1.0, 2.0, 3.0]), ("YZX", [2.0, 3.0, 1.0]), ("X-YZ", [1.0, -2.0, 3.0]), ("+xz-y", [1.0, 3.0, -2.0])]
-        {
+        for (text, own) in [
+            ("XYZ", [1.0, 2.0, 3.0]),
+            ("YZX", [2.0, 3.0, 1.0]),
+            ("X-YZ", [1.0, -2.0, 3.0]),
+            ("+xz-y", [1.0, 3.0, -2.0]),
+        ] {
             let basis = Basis::parse(text).expect(text);
             assert_eq!(basis.of_device(device).to_array(), own, "{text}");
             assert_eq!(basis.to_device(basis.of_device(device)), device, "{text}");
@@ -265,7 +273,9 @@ mod tests {
         let mount = json!({ "position": { "x": 0.1, "y": 0.0, "z": -0.2 }, "rotation": { "w": 2.0, "x": 0.0, "y": 1.0, "z": 0.0 },
             "scale": { "x": 2.0, "y": 3.0, "z": -1.0 } });
         view.set_mount(Transform::NONE.patched(&mount).expect("it can be undone"));
-        view.workspace = Transform::NONE.patched(&json!({ "scale": { "x": 5.0, "y": 5.0, "z": 5.0 } })).expect("it can be undone");
+        view.workspace = Transform::NONE
+            .patched(&json!({ "scale": { "x": 5.0, "y": 5.0, "z": 5.0 } }))
+            .expect("it can be undone");
         let (place, force) = (DVec3::new(0.01, -0.02, 0.005), DVec3::new(1.0, 2.0, -2.0));
         assert!((view.position_back(view.position(place)) - place).length() < 1.0e-15);
         assert!((view.force(force).length() - 3.0).abs() < 1.0e-14);
@@ -279,10 +289,12 @@ mod tests {
     #[test]
     fn what_cannot_be_undone_is_no_transform_and_what_is_plain_is_not_told() {
         assert_eq!(Transform::NONE.told(), json!({}));
-        for wrong in
-            [json!({ "scale": { "x": 0.0, "y": 1.0, "z": 1.0 } }), json!({ "rotation": { "w": 0.0, "x": 0.0, "y": 0.0, "z": 0.0 } }),
-             json!({ "position": { "x": 0.0 } }), json!({ "position": "here" })]
-        {
+        for wrong in [
+            json!({ "scale": { "x": 0.0, "y": 1.0, "z": 1.0 } }),
+            json!({ "rotation": { "w": 0.0, "x": 0.0, "y": 0.0, "z": 0.0 } }),
+            json!({ "position": { "x": 0.0 } }),
+            json!({ "position": "here" }),
+        ] {
             assert_eq!(Transform::NONE.patched(&wrong), None, "{wrong}");
         }
     }
