@@ -2,6 +2,7 @@
 //! calls its maker's.
 
 mod program;
+mod service;
 
 use clap::{Args, ValueEnum};
 use flotor_command::options::{mcap_file, whole};
@@ -11,6 +12,7 @@ use flotor_servo::StopSwitch;
 use flotor_servo::last_stop::spawn_unblocked;
 use program::Program;
 use rustix::process::{Pid, Signal, kill_process};
+use service::Service;
 use std::ffi::OsString;
 use std::os::unix::fs::{DirBuilderExt, symlink};
 use std::os::unix::process::ExitStatusExt;
@@ -23,14 +25,18 @@ use std::time::{Duration, Instant};
 #[command(after_help = "Examples:\n  \
     flotor lend -- python3 my_openhaptics_script.py      on the simulated flotor, held by a hand\n  \
     flotor lend --api dhd maglev.toml -- ./surgery       on a scene's device, within the scene's limits\n  \
+    flotor lend --api haply -- python3 my_haply_script.py       over the network: a service beside the program\n  \
     flotor lend --pace lockstep --record run.mcap -- ./my_test   one call, one tick: repeatable, fast\n\n\
     Environment variables: FLOTOR_SIGNALS=stop stops the devices before a signal ends the program. FLOTOR_DHD_TYPE,\n\
     FLOTOR_HD_MODEL and FLOTOR_PHANTOM_TYPE set the type of device that the program sees.\n\n\
     The exit code is that of the program.")]
 pub(crate) struct LendArguments {
-    /// The interface that the program calls (default: the program finds all three)
-    #[arg(long, value_name = "dhd|openhaptics|chai3d")]
+    /// The interface that the program calls (default: the program finds the three libraries)
+    #[arg(long, value_name = "dhd|openhaptics|chai3d|haply|ml-api")]
     api: Option<String>,
+    /// Haply, ml-api: where the service listens (default: where programs look for it, port 10001 or 5678)
+    #[arg(long, value_name = "HOST:PORT")]
+    listen: Option<String>,
     /// What advances the time of the run
     #[arg(long, value_enum, default_value_t = PaceOption::Real)]
     pace: PaceOption,
@@ -70,15 +76,28 @@ pub(crate) enum Api {
     Chai3d,
 }
 
+/// How a program reaches a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Interface {
+    /// It loads a library.
+    Library(Api),
+    /// It connects to a service.
+    Service(Service),
+}
+
 impl Api {
     const ALL: [Self; 3] = [Self::Dhd, Self::Openhaptics, Self::Chai3d];
 
     /// The interface of this name.
-    fn of_word(word: &str) -> Result<Self, CommandError> {
-        Self::ALL.into_iter().find(|api| api.word() == word).ok_or_else(|| {
+    fn of_word(word: &str) -> Result<Interface, CommandError> {
+        let library = Self::ALL.into_iter().find(|api| api.word() == word).map(Interface::Library);
+        let service = || Service::ALL.into_iter().find(|api| api.word() == word).map(Interface::Service);
+        library.or_else(service).ok_or_else(|| {
             CommandError::Usage(format!(
-                "no drop-in library for `--api {word}`; give one of {}. Without `--api` the program finds all of them",
-                Self::ALL.map(Self::word).join(", ")
+                "no interface `--api {word}`; give one of the libraries {}, or of the services {}. Without `--api` the program finds \
+                 all libraries",
+                Self::ALL.map(Self::word).join(", "),
+                Service::ALL.map(Service::word).join(" and ")
             ))
         })
     }
@@ -195,8 +214,16 @@ pub(crate) fn run(arguments: LendArguments) -> Result<(), CommandError> {
     };
     let api = arguments.api.as_deref().map(Api::of_word).transpose()?;
     let program = Program::find(name)?;
-    program.check(api)?;
     let own = std::env::current_exe().map_err(|cause| CommandError::Failed(cause.to_string()))?;
+    let api = match api {
+        Some(Interface::Service(service)) => return serve(&arguments, service, &program, rest, &own, &stop),
+        Some(Interface::Library(api)) => Some(api),
+        None => None,
+    };
+    if arguments.listen.is_some() {
+        return Err(CommandError::Usage("--listen is for `--api haply` and `--api ml-api`".to_owned()));
+    }
+    program.check(api)?;
     let folder = Folder::new()?;
     for wanted in api.map_or(Api::ALL.to_vec(), |api| vec![api]) {
         match wanted.library(&own) {
@@ -224,12 +251,62 @@ pub(crate) fn run(arguments: LendArguments) -> Result<(), CommandError> {
     let child = spawn_unblocked(&mut command)
         .map_err(|cause| CommandError::file(&program.path, "cannot be started", cause))?;
     let status = wait(child, &stop);
-    tell(&status, &program, &report, api)?;
+    if !tell(&status, &program, &report) && (status.code() == Some(0) || status.signal().is_some()) {
+        let which = api.map_or_else(
+            || "none of dhd, openhaptics and chai3d".to_owned(),
+            |api| format!("nothing of `--api {}`", api.word()),
+        );
+        note(format_args!(
+            "`{}` opened no device: it called {which}, or has its maker's library linked in; linked in, it has to be linked anew \
+             with the library of `flotor lend`",
+            program.path.display()
+        ));
+    }
     drop(folder);
+    end_as(&status)
+}
+
+/// Serves a program by the network.
+fn serve(
+    arguments: &LendArguments,
+    service: Service,
+    program: &Program,
+    rest: &[OsString],
+    own: &Path,
+    stop: &StopSwitch,
+) -> Result<(), CommandError> {
+    is_scene(arguments)?;
+    let folder = Folder::new()?;
+    let report = folder.0.join("report.txt");
+    let mut served = service.start(arguments, &folder, &report, own)?;
+    let mut command = Command::new(&program.path);
+    command.args(rest);
+    let child = spawn_unblocked(&mut command)
+        .map_err(|cause| CommandError::file(&program.path, "cannot be started", cause))?;
+    let status = wait(child, stop);
+    served.tell();
+    tell(&status, program, &report);
+    drop((served, folder));
+    end_as(&status)
+}
+
+/// The exit code of the program.
+fn end_as(status: &ExitStatus) -> Result<(), CommandError> {
     match (status.code(), status.signal()) {
         (Some(0), _) => Ok(()),
         (Some(code), _) => std::process::exit(code),
         (None, signal) => std::process::exit(128 + signal.unwrap_or_default()),
+    }
+}
+
+/// Whether the scene is there.
+fn is_scene(arguments: &LendArguments) -> Result<(), CommandError> {
+    match &arguments.scene {
+        Some(scene) if !scene.is_file() => Err(CommandError::Usage(format!(
+            "`{}` is no scene: there is no such file; the program stands after `--`",
+            scene.display()
+        ))),
+        _ => Ok(()),
     }
 }
 
@@ -251,16 +328,21 @@ fn environment(
             command.env(variable, folder);
         }
     }
+    told(command, arguments, report, own)
+}
+
+/// What a run behind a program is told, whether that is a library or a service.
+fn told(
+    command: &mut Command,
+    arguments: &LendArguments,
+    report: &Path,
+    own: &Path,
+) -> Result<(), CommandError> {
     let absolute = |path: &Path| {
         std::path::absolute(path).map_err(|cause| CommandError::file(path, "cannot be found", cause))
     };
+    is_scene(arguments)?;
     if let Some(scene) = &arguments.scene {
-        if !scene.is_file() {
-            return Err(CommandError::Usage(format!(
-                "`{}` is no scene: there is no such file; the program stands after `--`",
-                scene.display()
-            )));
-        }
         command.env("FLOTOR_SCENE", absolute(scene)?);
     }
     if let Some(record) = &arguments.record {
@@ -305,12 +387,12 @@ fn wait(mut child: Child, stop: &StopSwitch) -> ExitStatus {
     }
 }
 
-/// What became of the program and of the run behind it.
-fn tell(status: &ExitStatus, program: &Program, report: &Path, api: Option<Api>) -> Result<(), CommandError> {
+/// What became of the program and of the run behind it; whether anything is known of that.
+fn tell(status: &ExitStatus, program: &Program, report: &Path) -> bool {
     let name = program.path.display();
     if let Ok(text) = std::fs::read_to_string(report) {
         say!("{}", text.trim_end());
-        return Ok(());
+        return true;
     }
     let mut so_far = report.as_os_str().to_owned();
     so_far.push(".so-far");
@@ -324,17 +406,7 @@ fn tell(status: &ExitStatus, program: &Program, report: &Path, api: Option<Api>)
                 "`{name}` ended without an end of its run: this is its summary up to half a second before"
             )),
         }
-        return Ok(());
+        return true;
     }
-    if status.code() == Some(0) || status.signal().is_some() {
-        let which = api.map_or_else(
-            || "none of dhd, openhaptics and chai3d".to_owned(),
-            |api| format!("nothing of `--api {}`", api.word()),
-        );
-        note(format_args!(
-            "`{name}` opened no device: it called {which}, or has its maker's library linked in; linked in, it has to be linked \
-             anew with the library of `flotor lend`"
-        ));
-    }
-    Ok(())
+    false
 }

@@ -26,7 +26,7 @@ use flotor_session::{
 };
 use indicatif::ProgressBar;
 use rustix::process::{Resource, getrlimit};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Run a scene in the servo loop.
 #[derive(Args, Default)]
@@ -65,9 +65,15 @@ pub(crate) struct RunArguments {
     /// Set a parameter of a plugin of the scene (repeatable)
     #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
     sets: Vec<PluginKeyValue>,
+    /// The controller of the Maglev 200 as one more model of the first device, for programs of the ML API that connect there
+    #[arg(long, hide = true, value_name = "HOST:PORT")]
+    ml_api: Option<String>,
     #[command(flatten)]
     strength: StrengthOption,
 }
+
+/// The scene of that model, with a device that stands for the first one.
+const ML_API: &str = "[device]\nplugin = \"none\"\n[[model]]\nplugin = \"ml-api\"\n";
 
 pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     // First of all: a signal during loading ends the run, too.
@@ -266,6 +272,10 @@ fn scene(arguments: &RunArguments) -> Result<Scene, CommandError> {
     }
     if let Some(rate_hz) = arguments.rate {
         scene.set_rate(rate_hz, "--rate").map_err(RunError::Scene)?;
+    }
+    if let Some(listen) = &arguments.ml_api {
+        let added = Scene::parse(Path::new("--ml-api"), ML_API).map_err(RunError::Scene)?.models;
+        scene.models.extend(added.iter().map(|model| model.replaced_by(None, &[("listen", listen)])));
     }
     for set in &arguments.sets {
         set.apply(&mut scene).map_err(CommandError::Usage)?;
