@@ -208,13 +208,32 @@ wheel() {
 
 # Programs of other makers' interfaces, as they are published: each drives the simulated flotor for a minute at its own pace.
 programs() {
-    cargo build --release -p flotor -p flotor-simulated -p flotor-dhd -p flotor-openhaptics -p flotor-chai3d
+    cargo build --release -p flotor -p flotor-simulated -p flotor-dhd -p flotor-openhaptics -p flotor-chai3d \
+        -p flotor-haply-service
     python3 -m venv target/programs
     target/programs/bin/pip install --quiet forcedimension-core==1.0.0 pyopenhaptics==1.0.1
     target/release/flotor lend --api dhd -- target/programs/bin/python tests/programs/dhd.py 60
     target/release/flotor lend --api openhaptics -- target/programs/bin/python tests/programs/openhaptics.py 60
     cc -std=c11 -Wall -Wextra -Werror -O2 -o target/programs/phantom tests/c/programs/phantom.c -ldl -lm -lpthread
     target/release/flotor lend --api chai3d -- target/programs/phantom plain 60000
+    target/release/flotor lend --api haply -- python3 tests/programs/haply.py 60
+    haply_examples
+    target/release/flotor lend --api haply -- tests/programs/haply.sh target/programs/haply/target/debug/examples
+}
+
+# The examples of Haply's crate, whose sources cargo fetches as those of a dependency.
+haply_examples() {
+    local asking=target/programs/haply-source source
+    mkdir -p "$asking/src"
+    touch "$asking/src/lib.rs"
+    printf '%s\n' '[workspace]' '[package]' 'name = "haply-source"' 'edition = "2024"' '[dependencies]' 'haply = "=1.3.1"' \
+        > "$asking/Cargo.toml"
+    source=$(cargo metadata --format-version 1 --manifest-path "$asking/Cargo.toml" | python3 -c 'import json, os, sys
+print(*(os.path.dirname(package["manifest_path"]) for package in json.load(sys.stdin)["packages"] if package["name"] == "haply"))')
+    rm -rf target/programs/haply
+    cp -r "$source" target/programs/haply
+    printf '\n[workspace]\n' >> target/programs/haply/Cargo.toml
+    (cd target/programs/haply && cargo build --examples)
 }
 
 # The sweeper: a table of every kind.

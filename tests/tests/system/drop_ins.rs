@@ -29,7 +29,7 @@ const PHANTOM: &str = "hdPhantomGetNumDevices hdPhantomOpen hdPhantomClose hdPha
     hdPhantomSetForceAndTorque hdPhantomGetWorkspaceRadius hdPhantomGetType hdPhantomStartServo hdPhantomStopServo";
 
 /// Largest force of the built-in scene, N.
-const MOST_N: f64 = 8.0;
+pub(super) const MOST_N: f64 = 8.0;
 
 /// What a library exports, sorted.
 fn exported(library: &Path) -> Vec<String> {
@@ -94,7 +94,7 @@ fn fact(ran: &Ran, name: &str) -> f64 {
 }
 
 /// Largest force that was sent, N, and ticks of a recording; all of it is finite.
-fn largest_n(recording: &Path) -> (f64, usize) {
+pub(super) fn largest_n(recording: &Path) -> (f64, usize) {
     let mut largest = (0.0_f64, 0);
     for record in Recording::open(recording).expect("it can be read") {
         let Ok(record) = record else { break }; // cut off where the program was killed

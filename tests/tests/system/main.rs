@@ -40,6 +40,8 @@ mod safety;
 mod scaffold;
 mod scene;
 mod scene_test;
+#[cfg(feature = "drop-ins")]
+mod services;
 mod simulated;
 mod study;
 mod supply;
