@@ -25,7 +25,7 @@ use flotor_session::{
     Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session, stop_waits_with,
 };
 use indicatif::ProgressBar;
-use rustix::process::{Resource, getrlimit};
+use rustix::process::{Resource, Signal, getrlimit, set_parent_process_death_signal};
 use std::path::{Path, PathBuf};
 
 /// Run a scene in the servo loop.
@@ -81,6 +81,10 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     stop_waits_with(&stop);
     if arguments.json.as_deref().is_some_and(|json| json.as_os_str() == "-") {
         keep_results_apart()?;
+    }
+    if arguments.ml_api.is_some() {
+        // `flotor lend` started this: nobody else would end it. Without it, this one would only go on for longer.
+        let _ = set_parent_process_death_signal(Some(Signal::TERM));
     }
     let scene = scene(&arguments)?;
     if matches!(arguments.clock, ClockOption::Real) {

@@ -393,3 +393,25 @@ fn a_service_is_lent_beside_a_program_and_what_cannot_be_is_said_in_one_line() {
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(said.contains("-p flotor-haply-service`") && said.trim_end().lines().count() == 1, "{said}");
 }
+
+/// A service that nobody needs any more would hold a device, and the port of the next one.
+#[test]
+fn a_service_ends_with_the_process_that_lends_it() {
+    built();
+    let free =
+        TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("a port is free");
+    let address = free.to_string();
+    for api in ["haply", "ml-api"] {
+        let lending = Flotor::with(["lend", "--api", api, "--listen", &address, "--", "sleep", "20"]).start();
+        let becomes = |is_there: bool| {
+            let looks = (0..600).find(|_| {
+                std::thread::sleep(Duration::from_millis(50));
+                TcpStream::connect(&address).is_ok() == is_there
+            });
+            assert!(looks.is_some(), "{api}: there: {is_there}");
+        };
+        becomes(true);
+        lending.signal(Signal::KILL);
+        becomes(false);
+    }
+}

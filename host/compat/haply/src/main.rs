@@ -30,6 +30,7 @@ use flotor_command::options::{arguments, mcap_file, whole};
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, exit_code_of, say};
 use flotor_compat::{Pace, Settings, prepare};
+use rustix::process::{Signal, set_parent_process_death_signal};
 use service::Service;
 use std::net::TcpListener;
 use std::path::PathBuf;
@@ -64,6 +65,9 @@ struct Arguments {
     /// Write the summary as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// End with the process that started this one, however that ends
+    #[arg(long, hide = true)]
+    lent: bool,
 }
 
 /// Who makes time go on.
@@ -85,6 +89,10 @@ fn main() -> ExitCode {
 fn run(arguments: Arguments) -> Result<(), CommandError> {
     // First of all: a signal while the scene is prepared ends the run, too.
     let stop = stop_on_signals();
+    if arguments.lent {
+        // Without it, this one would only go on for longer.
+        let _ = set_parent_process_death_signal(Some(Signal::TERM));
+    }
     let mut settings = Settings::from_environment().map_err(CommandError::Usage)?.of_own_process();
     settings.scene = arguments.scene.or(settings.scene);
     settings.record = arguments.record.or(settings.record);

@@ -61,6 +61,7 @@ impl Service {
                 };
                 let mut command = program.command()?;
                 told(&mut command, arguments, report, own)?;
+                command.arg("--lent");
                 if let Some(listen) = &arguments.listen {
                     command.args(["--listen", listen, "--events", "127.0.0.1:0"]);
                 }
