@@ -5,7 +5,7 @@ use clap::Args;
 use flotor_command::options::{
     ClockOption, PluginKeyValue, StrengthOption, core, duration_s, mcap_file, rate_hz, svg_file, whole,
 };
-use flotor_command::stopping::{Keys, stop_run_on_signals};
+use flotor_command::stopping::{Keys, stop_on_signals, stop_run_on_signals};
 use flotor_command::{
     CommandError, first_error, keep_results_apart, note, print_result, progress_bar, style, write_json,
 };
@@ -76,8 +76,9 @@ pub(crate) struct RunArguments {
 const ML_API: &str = "[device]\nplugin = \"none\"\n[[model]]\nplugin = \"ml-api\"\n";
 
 pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
-    // First of all: a signal during loading ends the run, too.
-    let stop = stop_run_on_signals();
+    // First of all: a signal during loading ends the run, too. One that serves a program ends with a summary, however short the
+    // program was.
+    let stop = if arguments.ml_api.is_some() { stop_on_signals() } else { stop_run_on_signals() };
     stop_waits_with(&stop);
     if arguments.json.as_deref().is_some_and(|json| json.as_os_str() == "-") {
         keep_results_apart()?;
@@ -103,7 +104,9 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let registry = Registry::search(&scene.plugin_folders);
     let session = Session::prepare(&scene, &registry, &options)?;
     let mut session = session.with_strength(arguments.strength.strength()).on_core(arguments.core);
-    session.notices().into_iter().for_each(note);
+    if arguments.ml_api.is_none() {
+        session.notices().into_iter().for_each(note);
+    }
     session.warnings().iter().for_each(note);
     let links = peer_links(&mut session, clock)?;
     let plugins = session.plugins().to_vec();

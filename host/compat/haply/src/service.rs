@@ -40,7 +40,7 @@ pub(crate) struct Session {
 pub(crate) struct Shared {
     pub(crate) sessions: Vec<Session>,
     /// Of each device.
-    forces: Vec<Forces>,
+    pub(crate) forces: Vec<Forces>,
     /// Settings of each device by their names in a path, kept and told.
     pub(crate) kept: Vec<BTreeMap<&'static str, Value>>,
     /// Settings of the service, kept and told.

@@ -56,7 +56,7 @@ impl Basis {
         DVec3::new(part(0), part(1), part(2))
     }
 
-    fn to_device(&self, vector: DVec3) -> DVec3 {
+    fn to_device(self, vector: DVec3) -> DVec3 {
         let mut device = [0.0; 3];
         for (place, value) in vector.to_array().into_iter().enumerate() {
             device[self.axes[place]] = self.signs[place] * value;
