@@ -30,6 +30,24 @@ pub enum Ground {
         /// Radius of the edges, m.
         rounding_m: f64,
     },
+    /// A round cylinder, its bottom clamped.
+    Cylinder {
+        /// Its radius, m.
+        radius_m: f64,
+        /// Its height, m.
+        height_m: f64,
+        /// Ratio of energies over the distance from the axis; the second axis is idle.
+        ratio: Box<Volume>,
+        /// Radius of the rim, m.
+        rounding_m: f64,
+    },
+    /// The plane top of a body of any shape: the whole plane is touched, and beyond the face's box the answer says so.
+    Face {
+        /// Smallest and largest x and y of the face, m.
+        outline_m: [[f64; 2]; 2],
+        /// Ratio of energies over x and y.
+        ratio: Box<Volume>,
+    },
 }
 
 /// The law of one sphere.
@@ -57,6 +75,7 @@ const NOTHING_M: f64 = 1.0e-15;
 struct Touch {
     depth_m: Jet,
     ratio: Jet,
+    is_beyond: bool,
 }
 
 /// Power with which the depths below several faces are joined to the least of them.
@@ -69,6 +88,8 @@ pub struct Answer {
     pub energy: Jet,
     /// How far the face is inside the sphere; not positive without contact.
     pub depth_m: f64,
+    /// True where the law is that of a place nearby: off a face, or on the side of a cylinder.
+    pub is_beyond: bool,
 }
 
 impl Atlas {
@@ -77,19 +98,74 @@ impl Atlas {
     pub fn answer(&self, centre_m: [f64; 3]) -> Answer {
         let centre = [0, 1, 2].map(|axis| Jet::variable(centre_m[axis], axis));
         let touch = match &self.ground {
-            Ground::HalfSpace => Touch { depth_m: -centre[2] + self.radius_m, ratio: Jet::constant(1.0) },
+            Ground::HalfSpace => Some(Touch {
+                depth_m: -centre[2] + self.radius_m,
+                ratio: Jet::constant(1.0),
+                is_beyond: false,
+            }),
             Ground::Block { size, ratios, rounding_m } => {
-                match self.touch_block(centre, *size, ratios, *rounding_m) {
-                    Some(touch) => touch,
-                    None => return Answer { energy: Jet::default(), depth_m: -1.0 },
-                }
+                self.touch_block(centre, *size, ratios, *rounding_m)
             }
+            Ground::Cylinder { radius_m, height_m, ratio, rounding_m } => {
+                self.touch_cylinder(centre, [*radius_m, *height_m], ratio, *rounding_m)
+            }
+            Ground::Face { outline_m, ratio } => self.touch_face(centre, *outline_m, ratio),
         };
-        let depth_m = touch.depth_m.value;
+        let Some(touch) = touch else {
+            return Answer { energy: Jet::default(), depth_m: -1.0, is_beyond: false };
+        };
+        let (depth_m, is_beyond) = (touch.depth_m.value, touch.is_beyond);
         if depth_m <= 0.0 {
-            return Answer { energy: Jet::default(), depth_m };
+            return Answer { energy: Jet::default(), depth_m, is_beyond: false };
         }
-        Answer { energy: self.unbounded(touch.depth_m) * touch.ratio, depth_m }
+        Answer { energy: self.unbounded(touch.depth_m) * touch.ratio, depth_m, is_beyond }
+    }
+
+    /// Root of depth over radius, up to where the ratio ends.
+    fn root(&self, depth_m: Jet, ratio: &Volume) -> Jet {
+        let value = (depth_m.value / self.radius_m).sqrt();
+        ease_at(depth_m.chain(value, 0.5 * value / depth_m.value), ratio.range(2).1, RATIO_END)
+    }
+
+    /// Depth and ratio at a plane face; `None` above it.
+    fn touch_face(&self, centre: [Jet; 3], outline_m: [[f64; 2]; 2], ratio: &Volume) -> Option<Touch> {
+        let depth_m = -centre[2] + self.radius_m;
+        if depth_m.value <= 0.0 {
+            return None;
+        }
+        let within = |k: usize| {
+            let (low, high) = ratio.range(k);
+            let width = 0.05 * (high - low);
+            -ease_at(-ease_at(centre[k], high, width), -low, width)
+        };
+        let is_beyond = (0..2).any(|k| !(outline_m[k][0]..=outline_m[k][1]).contains(&centre[k].value));
+        Some(Touch { depth_m, ratio: ratio.at([within(0), within(1), self.root(depth_m, ratio)]), is_beyond })
+    }
+
+    /// Depth and ratio at a cylinder; `None` far from it.
+    fn touch_cylinder(
+        &self,
+        centre: [Jet; 3],
+        [radius_m, height_m]: [f64; 2],
+        ratio: &Volume,
+        rounding_m: f64,
+    ) -> Option<Touch> {
+        let from_axis = (centre[0] * centre[0] + centre[1] * centre[1]).sqrt();
+        let blunt_m = 0.25 * radius_m.min(0.5 * height_m);
+        let up = smooth_size(centre[2] + 0.5 * height_m, blunt_m);
+        let beyond = [
+            smooth_size(from_axis, blunt_m) - (radius_m - rounding_m),
+            Jet::constant(f64::NEG_INFINITY),
+            up - (0.5 * height_m - rounding_m),
+        ];
+        let (distance_m, shares) = distance(beyond);
+        let depth_m = -distance_m + (self.radius_m + rounding_m);
+        if depth_m.value <= 0.0 {
+            return None;
+        }
+        let place = ease_at(from_axis, ratio.range(0).1, rounding_m);
+        let ratio = ratio.at([place, Jet::constant(0.0), self.root(depth_m, ratio)]);
+        Some(Touch { depth_m, ratio, is_beyond: shares[0].value > 0.5 })
     }
 
     /// `P(d)`: beyond the deepest, a straight line.
@@ -121,10 +197,7 @@ impl Atlas {
         if depth_m.value <= 0.0 {
             return None;
         }
-        let root = {
-            let value = (depth_m.value / self.radius_m).sqrt();
-            ease_at(depth_m.chain(value, 0.5 * value / depth_m.value), ratios[0].range(2).1, RATIO_END)
-        };
+        let root = self.root(depth_m, &ratios[0]);
         let across = |axis: usize, volume: &Volume, k: usize| {
             ease_at(smooth_size(middle[axis], 0.0), volume.range(k).1, rounding_m)
         };
@@ -143,7 +216,7 @@ impl Atlas {
             };
             ratio = ratio + share * part;
         }
-        Some(Touch { depth_m, ratio })
+        Some(Touch { depth_m, ratio, is_beyond: false })
     }
 }
 

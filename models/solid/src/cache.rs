@@ -11,7 +11,7 @@ use std::path::PathBuf;
 const MAGIC: &[u8; 16] = b"flotor-solid 01\n";
 
 /// `FNV-1a` over 64 bits: finds damage, proves nothing.
-fn digest(bytes: &[u8]) -> u64 {
+pub(crate) fn digest(bytes: &[u8]) -> u64 {
     bytes
         .iter()
         .fold(0xcbf2_9ce4_8422_2325, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))

@@ -1,12 +1,88 @@
-//! Sparse Cholesky factorisation of a grid by nested dissection.
+//! Sparse Cholesky factorisation of a grid or a mesh by nested dissection.
 //!
-//! A box of elements is cut across its longest side until single elements are left. On the way back, the stiffness of two
+//! A body is cut across its longest side until single elements are left. On the way back, the stiffness of two
 //! neighbours is added, the nodes that touch nothing outside are eliminated, and what is left is the stiffness of the pair
-//! to its border. Each step is a dense matrix, and the order of all sums follows from the grid alone: the same bits on every
-//! machine, with no search for an ordering and no threads.
+//! to its border. Each step is a dense matrix, and the order of all sums follows from the elements alone: the same bits on
+//! every machine, with no search for an ordering and no threads.
 
 use crate::dense::{self, NotPositive};
 use crate::grid::{Elements, Grid, Lame};
+
+/// Elements, their nodes and their stiffness.
+pub trait Assembly {
+    /// Number of nodes.
+    fn node_count(&self) -> usize;
+    /// Number of elements.
+    fn element_count(&self) -> usize;
+    /// Nodes of an element.
+    fn nodes(&self, element: usize) -> Vec<usize>;
+    /// Stiffness of an element, N/m: three unknowns to a node, by columns.
+    fn stiffness(&self, element: usize) -> Vec<f64>;
+    /// Two or more elements, cut in two.
+    fn halves(&self, elements: Vec<usize>) -> [Vec<usize>; 2];
+}
+
+/// The stiffness of a grid of one material.
+#[derive(Clone, Debug)]
+pub struct GridStiffness<'a> {
+    grid: &'a Grid,
+    elements: Elements,
+    lame: Lame,
+}
+
+impl<'a> GridStiffness<'a> {
+    /// Integrates single elements. Not real-time.
+    #[must_use]
+    pub fn new(grid: &'a Grid, lame: Lame) -> Self {
+        Self { grid, elements: Elements::new(grid.order), lame }
+    }
+
+    fn index(&self, element: usize) -> [usize; 3] {
+        let [nx, ny, _] = self.counts();
+        [element % nx, element / nx % ny, element / (nx * ny)]
+    }
+
+    fn counts(&self) -> [usize; 3] {
+        [0, 1, 2].map(|axis| self.grid.axes[axis].elements())
+    }
+}
+
+impl Assembly for GridStiffness<'_> {
+    fn node_count(&self) -> usize {
+        self.grid.node_count()
+    }
+
+    fn element_count(&self) -> usize {
+        self.counts().iter().product()
+    }
+
+    fn nodes(&self, element: usize) -> Vec<usize> {
+        self.grid.element_nodes(self.index(element))
+    }
+
+    fn stiffness(&self, element: usize) -> Vec<f64> {
+        let index = self.index(element);
+        let size_m = [0, 1, 2].map(|axis| {
+            let borders = &self.grid.axes[axis].borders_m;
+            borders[index[axis] + 1] - borders[index[axis]]
+        });
+        self.elements.stiffness(size_m, self.lame)
+    }
+
+    /// Across the side with the most elements.
+    fn halves(&self, elements: Vec<usize>) -> [Vec<usize>; 2] {
+        let range = |axis: usize| {
+            let all = || elements.iter().map(|&element| self.index(element)[axis]);
+            (all().min().unwrap_or_default(), all().max().unwrap_or_default() + 1)
+        };
+        let ranges = [range(0), range(1), range(2)];
+        let longest =
+            (0..3).max_by_key(|&axis| (ranges[axis].1 - ranges[axis].0, 2 - axis)).unwrap_or_default();
+        let middle = ranges[longest].0.midpoint(ranges[longest].1);
+        let (lower, upper) = elements.into_iter().partition(|&element| self.index(element)[longest] < middle);
+        [lower, upper]
+    }
+}
 
 /// One dense step: some unknowns, and those of the border they couple to.
 #[derive(Debug)]
@@ -18,7 +94,7 @@ struct Front {
     panel: Vec<f64>,
 }
 
-/// A factored stiffness matrix of a grid with fixed unknowns.
+/// A factored stiffness matrix with fixed unknowns.
 #[derive(Debug)]
 pub struct Stiffness {
     fronts: Vec<Front>,
@@ -27,44 +103,47 @@ pub struct Stiffness {
     fixed: Vec<[bool; 3]>,
 }
 
-/// What is left of a box of elements: its border.
+/// What is left of some elements: their border.
 struct Rest {
     unknowns: Vec<u32>,
     /// Lower triangle by columns.
     matrix: Vec<f64>,
 }
 
-struct Builder<'a> {
-    grid: &'a Grid,
-    elements: Elements,
-    lame: Lame,
+struct Builder<'a, A> {
+    assembly: &'a A,
     fixed: &'a [[bool; 3]],
     fronts: Vec<Front>,
     /// Position of an unknown in the front that is being built.
     place: Vec<u32>,
+    /// Number of elements around a node, and of those in the part that is being built.
+    around: Vec<u32>,
+    inside: Vec<u32>,
 }
-
-/// Range of elements along each axis.
-type Region = [(usize, usize); 3];
 
 impl Stiffness {
     /// Assembles and factors. `fixed` says of each node which displacements are prescribed. Not real-time.
     ///
     /// # Errors
     /// [`NotPositive`] if the block can move freely, or the material is none.
-    pub fn new(grid: &Grid, lame: Lame, fixed: Vec<[bool; 3]>) -> Result<Self, NotPositive> {
-        let unknowns = 3 * grid.node_count();
+    pub fn new(assembly: &impl Assembly, fixed: Vec<[bool; 3]>) -> Result<Self, NotPositive> {
+        let nodes = assembly.node_count();
+        let elements: Vec<usize> = (0..assembly.element_count()).collect();
+        let mut around = vec![0; nodes];
+        for &element in &elements {
+            assembly.nodes(element).into_iter().for_each(|node| around[node] += 1);
+        }
         let mut builder = Builder {
-            grid,
-            elements: Elements::new(grid.order),
-            lame,
+            assembly,
             fixed: &fixed,
             fronts: Vec::new(),
-            place: vec![0; unknowns],
+            place: vec![0; 3 * nodes],
+            around,
+            inside: vec![0; nodes],
         };
-        builder.build([0, 1, 2].map(|axis| (0, grid.axes[axis].elements())))?;
+        builder.build(elements)?;
         let fronts = builder.fronts;
-        Ok(Self { fronts, unknowns, fixed })
+        Ok(Self { fronts, unknowns: 3 * nodes, fixed })
     }
 
     /// Numbers the factor holds: what a solve reads twice.
@@ -142,35 +221,29 @@ impl Front {
     }
 }
 
-impl Builder<'_> {
-    fn build(&mut self, region: Region) -> Result<Rest, NotPositive> {
-        let longest =
-            (0..3).max_by_key(|&axis| (region[axis].1 - region[axis].0, 2 - axis)).unwrap_or_default();
-        let (from, to) = region[longest];
-        let parts = if to - from == 1 {
-            vec![self.element(region.map(|(first, _)| first))]
+impl<A: Assembly> Builder<'_, A> {
+    fn build(&mut self, elements: Vec<usize>) -> Result<Rest, NotPositive> {
+        let mut nodes: Vec<usize> =
+            elements.iter().flat_map(|&element| self.assembly.nodes(element)).collect();
+        let parts = if let [element] = elements[..] {
+            vec![self.element(element)]
         } else {
-            let middle = from.midpoint(to);
-            [(from, middle), (middle, to)]
+            self.assembly
+                .halves(elements)
                 .into_iter()
-                .map(|part| {
-                    let mut half = region;
-                    half[longest] = part;
-                    self.build(half)
-                })
+                .map(|half| self.build(half))
                 .collect::<Result<_, _>>()?
         };
-        self.eliminate(region, parts)
+        nodes.iter().for_each(|&node| self.inside[node] += 1);
+        let rest = self.eliminate(parts);
+        nodes.drain(..).for_each(|node| self.inside[node] = 0);
+        rest
     }
 
     /// Stiffness of one element, without what is fixed.
-    fn element(&self, element: [usize; 3]) -> Rest {
-        let size_m = [0, 1, 2].map(|axis| {
-            let borders = &self.grid.axes[axis].borders_m;
-            borders[element[axis] + 1] - borders[element[axis]]
-        });
-        let whole = self.elements.stiffness(size_m, self.lame);
-        let nodes = self.grid.element_nodes(element);
+    fn element(&self, element: usize) -> Rest {
+        let whole = self.assembly.stiffness(element);
+        let nodes = self.assembly.nodes(element);
         let size = 3 * nodes.len();
         let free: Vec<(usize, u32)> = (0..size)
             .filter(|&local| !self.fixed[nodes[local / 3]][local % 3])
@@ -186,25 +259,15 @@ impl Builder<'_> {
         Rest { unknowns: free.into_iter().map(|(_, unknown)| unknown).collect(), matrix }
     }
 
-    /// True if all elements around a node are in the region.
-    fn is_inside(&self, node: usize, region: Region) -> bool {
-        let index = self.grid.index(node);
-        (0..3).all(|axis| {
-            let order = self.grid.order;
-            let all = self.grid.axes[axis].elements();
-            let (first, rest) = (index[axis] / order, index[axis] % order);
-            let low = if rest == 0 { first.saturating_sub(1) } else { first };
-            let high = first.min(all - 1);
-            region[axis].0 <= low && high < region[axis].1
-        })
-    }
-
-    fn eliminate(&mut self, region: Region, parts: Vec<Rest>) -> Result<Rest, NotPositive> {
+    fn eliminate(&mut self, parts: Vec<Rest>) -> Result<Rest, NotPositive> {
         let mut unknowns: Vec<u32> = parts.iter().flat_map(|part| part.unknowns.iter().copied()).collect();
         unknowns.sort_unstable();
         unknowns.dedup();
-        let (inside, border): (Vec<u32>, Vec<u32>) =
-            unknowns.iter().partition(|&&unknown| self.is_inside(unknown as usize / 3, region));
+        // Nodes with all their elements in this part touch nothing outside.
+        let (inside, border): (Vec<u32>, Vec<u32>) = unknowns.iter().partition(|&&unknown| {
+            let node = unknown as usize / 3;
+            self.inside[node] == self.around[node]
+        });
         let eliminated = inside.len();
         let unknowns: Vec<u32> = inside.into_iter().chain(border.iter().copied()).collect();
         let size = unknowns.len();
@@ -240,7 +303,7 @@ impl Builder<'_> {
     }
 }
 
-/// Numbers of unknowns fit: a grid with more than 2^32 of them fits no machine.
+/// Numbers of unknowns fit: a body with more than 2^32 of them fits no machine.
 #[allow(clippy::cast_possible_truncation)]
 fn narrow(index: usize) -> u32 {
     index as u32
@@ -249,23 +312,16 @@ fn narrow(index: usize) -> u32 {
 /// Subtracts the forces `K u` of a displacement from `forces`, N: with `u` prescribed at fixed nodes, the right side of a
 /// problem whose fixed nodes move; with the whole `u`, the reactions. Elements without displacement are skipped. Not
 /// real-time.
-pub fn subtract_forces(grid: &Grid, lame: Lame, displacement: &[f64], forces: &mut [f64], columns: usize) {
-    let elements = Elements::new(grid.order);
-    let counts = [0, 1, 2].map(|axis| grid.axes[axis].elements());
-    for e in 0..counts[0] * counts[1] * counts[2] {
-        let element = [e % counts[0], e / counts[0] % counts[1], e / (counts[0] * counts[1])];
-        let nodes = grid.element_nodes(element);
+pub fn subtract_forces(assembly: &impl Assembly, displacement: &[f64], forces: &mut [f64], columns: usize) {
+    for element in 0..assembly.element_count() {
+        let nodes = assembly.nodes(element);
         let moved = |node: &usize| {
             displacement[3 * node * columns..3 * (node + 1) * columns].iter().any(|u| *u != 0.0)
         };
         if !nodes.iter().any(moved) {
             continue;
         }
-        let size_m = [0, 1, 2].map(|axis| {
-            let borders = &grid.axes[axis].borders_m;
-            borders[element[axis] + 1] - borders[element[axis]]
-        });
-        let matrix = elements.stiffness(size_m, lame);
+        let matrix = assembly.stiffness(element);
         let size = 3 * nodes.len();
         for (b, node) in nodes.iter().enumerate().filter(|(_, node)| moved(node)) {
             for j in 0..3 {

@@ -1,12 +1,14 @@
 //! From parameters to a law: which bodies and tools go together, what has to be solved, what the cache has.
 
 use crate::atlas::Atlas;
+use crate::body;
 use crate::cache;
 use crate::dense::NotPositive;
 use crate::grid::{Grid, Lame, graded};
 use crate::half_space::HalfSpace;
+use crate::mesh::Mesh;
 use crate::plate::plate;
-use crate::prepare::{Prepared, Resolution, sphere_on_block, sphere_on_half_space};
+use crate::prepare::{Footing, Prepared, Resolution, sphere_on_block, sphere_on_half_space, sphere_on_mesh};
 use crate::punch::{Bond, Outline, extrapolated};
 use crate::remainder::{Face, Fineness, Remainder, Size};
 use crate::rigid::{MODES, RigidPatch};
@@ -25,6 +27,18 @@ pub enum Body {
     },
     /// All below `z = 0`.
     HalfSpace,
+    /// Round, its top about the origin, its bottom clamped.
+    Cylinder {
+        /// Radius, m.
+        radius_m: f64,
+        /// Height, m.
+        height_m: f64,
+    },
+    /// A mesh; the origin is the middle of its touched face.
+    File {
+        /// Of its text and of the names of its faces.
+        digest: u64,
+    },
 }
 
 /// What touches it.
@@ -74,15 +88,21 @@ pub const RESOLUTIONS: [Resolution; 3] = [
     Resolution { fineness: Fineness { across: 4, high: 5, order: 3 }, rings: 6 },
     Resolution { fineness: Fineness { across: 4, high: 5, order: 4 }, rings: 8 },
 ];
+/// Bricks along a side of the square in the middle of a cylinder, by resolution.
+const CYLINDER_BRICKS: [usize; 3] = [4, 6, 8];
 /// Order of the elements under a plate, by resolution.
 const PLATE_ORDERS: [usize; 3] = [2, 3, 4];
 
 impl Description {
-    /// Reads parameters (`value`: those in force, by id). Not real-time.
+    /// Reads parameters (`value`: those in force, by id; `mesh_digest`: that of the mesh's text and names). Not real-time.
     ///
     /// # Errors
     /// A [`Refusal`] for a combination that has no meaning or is not there yet.
-    pub fn new(settings: &Settings<'_>, value: impl Fn(&str) -> f64) -> Result<Self, Refusal> {
+    pub fn new(
+        settings: &Settings<'_>,
+        value: impl Fn(&str) -> f64,
+        mesh_digest: u64,
+    ) -> Result<Self, Refusal> {
         let metres = |id| value(id) * 1.0e-3;
         let size_m = [metres("size_x_mm"), metres("size_y_mm"), metres("size_z_mm")];
         let body = match settings.choice_or_default("body") {
@@ -92,13 +112,17 @@ impl Description {
                 height_m: size_m[2],
             }),
             1 => Body::Beam { size_m },
+            2 => {
+                if settings.number("size_y_mm").is_some_and(|y| y * 1.0e-3 != size_m[0]) {
+                    return Err(Refusal::parameter(
+                        "a cylinder is round: leave `size_y_mm` out, `size_x_mm` is its diameter",
+                    ));
+                }
+                Body::Cylinder { radius_m: 0.5 * size_m[0], height_m: size_m[2] }
+            }
             3 => Body::HalfSpace,
-            2 => return Err(not_there("body = \"cylinder\"")),
-            _ => return Err(not_there("body = \"file\"")),
+            _ => Body::File { digest: mesh_digest },
         };
-        if settings.text("file").is_some() {
-            return Err(not_there("file"));
-        }
         let radius_m = metres("tool_radius_mm");
         let bond = match settings.choice_or_default("bond") {
             0 => Bond::Bonded,
@@ -138,6 +162,7 @@ impl Description {
         };
         match (self.body, self.tool) {
             (Body::Beam { .. }, Tool::Plate)
+            | (Body::File { .. }, _)
             | (Body::HalfSpace, Tool::Sphere { .. } | Tool::Punch { .. }) => Ok(()),
             (Body::Beam { .. }, _) => {
                 Err(Refusal::unsupported("a beam is held by its end: set tool = \"plate\""))
@@ -145,11 +170,16 @@ impl Description {
             (Body::HalfSpace, Tool::Plate) => Err(Refusal::parameter(
                 "a half-space has no face a plate could cover: choose another `tool` or `body`",
             )),
-            (Body::Block(size), _) => {
-                let limit_m = 0.9 * size.half_x_m.min(size.half_y_m).min(size.height_m);
+            (Body::Block(_) | Body::Cylinder { .. }, _) => {
+                let least_m = match self.body {
+                    Body::Cylinder { radius_m, height_m } => radius_m.min(height_m),
+                    Body::Block(size) => size.half_x_m.min(size.half_y_m).min(size.height_m),
+                    _ => f64::INFINITY,
+                };
+                let limit_m = 0.9 * least_m;
                 if extent_m > limit_m {
                     return Err(Refusal::parameter(format!(
-                        "{what} is {:.4} mm, too much for this block (at most {:.4} mm): make the tool smaller or the block larger",
+                        "{what} is {:.4} mm, too much for this body (at most {:.4} mm): make the tool smaller or the body larger",
                         extent_m * 1.0e3,
                         limit_m * 1.0e3
                     )));
@@ -165,31 +195,37 @@ impl Description {
         format!("{self:?}")
     }
 
-    /// The law, from the cache or solved, and the estimated error of its mesh. Not real-time: up to some seconds.
+    /// The law, from the cache or solved, and the estimated error of its mesh; `mesh` is that of [`Body::File`]. Not real-time:
+    /// up to some seconds, for a large mesh a minute.
     ///
     /// # Errors
     /// A [`Refusal`] if no solution exists for these numbers.
-    pub fn prepare(&self) -> Result<(Law, f64), Refusal> {
+    pub fn prepare(&self, mesh: Option<&Mesh>) -> Result<(Law, f64), Refusal> {
         let words = self.words();
         if let Some(found) = cache::load(&words).and_then(|numbers| self.read(&numbers)) {
             return Ok(found);
         }
-        let (law, mesh_error) = self.solve().map_err(|NotPositive { pivot }| {
-            Refusal::parameter(format!(
-                "the stiffness matrix is not positive definite (unknown {pivot}): sides too unlike each other, or a Poisson's ratio too near 0.5"
-            ))
-        })?;
+        let (law, mesh_error) = match mesh {
+            Some(mesh) => self.solve_on(mesh)?,
+            None => self.solve()?,
+        };
         cache::store(&words, &to_numbers(&law, mesh_error));
         Ok((law, mesh_error))
     }
 
+    /// What carries a sphere.
+    fn footing(&self) -> Footing {
+        match self.body {
+            Body::Block(size) => Footing::Block(size),
+            Body::Cylinder { radius_m, height_m } => Footing::Cylinder([radius_m, height_m]),
+            Body::File { .. } => Footing::Face,
+            Body::Beam { .. } | Body::HalfSpace => Footing::HalfSpace,
+        }
+    }
+
     fn read(&self, numbers: &[f64]) -> Option<(Law, f64)> {
         if let Tool::Sphere { radius_m } = self.tool {
-            let size = match self.body {
-                Body::Block(size) => Some(size),
-                _ => None,
-            };
-            let prepared = Prepared::from_numbers(numbers, self.poisson_ratio, radius_m, size)?;
+            let prepared = Prepared::from_numbers(numbers, self.poisson_ratio, radius_m, self.footing())?;
             return Some((Law::Sphere(Box::new(prepared.atlas)), prepared.mesh_error));
         }
         let (&mesh_error, rest) = numbers.split_first()?;
@@ -206,8 +242,61 @@ impl Description {
     /// The law, solved anew, and the estimated error of its mesh. Not real-time: up to some seconds.
     ///
     /// # Errors
-    /// [`NotPositive`] if the numbers do not describe a solid.
-    pub fn solve(&self) -> Result<(Law, f64), NotPositive> {
+    /// A [`Refusal`] if no solution exists for these numbers, or a mesh is needed: see [`Self::solve_on`].
+    pub fn solve(&self) -> Result<(Law, f64), Refusal> {
+        match self.body {
+            Body::Cylinder { radius_m, height_m } => {
+                let mesh = Mesh::cylinder(radius_m, height_m, CYLINDER_BRICKS[self.resolution.min(2)])
+                    .map_err(|problem| Refusal::parameter(format!("the cylinder: {problem}")))?;
+                self.solve_on(&mesh)
+            }
+            Body::File { .. } => Err(Refusal::parameter("body = \"file\" needs a mesh: set `file`")),
+            _ => self.solve_boxes().map_err(not_positive),
+        }
+    }
+
+    /// The law on a mesh. Not real-time.
+    ///
+    /// # Errors
+    /// A [`Refusal`] if no solution exists for these numbers, or the tool does not fit the touched face.
+    pub fn solve_on(&self, mesh: &Mesh) -> Result<(Law, f64), Refusal> {
+        let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio: self.poisson_ratio };
+        if self.tool == Tool::Plate {
+            let (patch, mesh_error) =
+                body::plate(mesh, Lame::new(1.0, self.poisson_ratio)).map_err(not_positive)?;
+            return Ok((Law::Bonded(Box::new(patch)), mesh_error));
+        }
+        let [[left, right], [front, back]] = body::outline_m(mesh);
+        let uneven_m = body::unevenness_m(mesh);
+        if uneven_m > 1.0e-6 * (right - left).max(back - front) {
+            return Err(Refusal::parameter(format!(
+                "the touched face is not plane, or not the top of the body (by {:.4} mm): turn the mesh so that it is the highest face, across z; or set tool = \"plate\", which fits any face",
+                uneven_m * 1.0e3
+            )));
+        }
+        if let Tool::Sphere { radius_m } = self.tool {
+            let rings = RESOLUTIONS[self.resolution.min(2)].rings;
+            let prepared = sphere_on_mesh(mesh, self.footing(), self.poisson_ratio, radius_m, rings);
+            return Ok(sphere(prepared.map_err(not_positive)?));
+        }
+        let Tool::Punch { outline, bond } = self.tool else {
+            return Err(Refusal::unsupported("this tool does not touch a mesh"));
+        };
+        let extent_m = outline.extent_m();
+        let base = body::Body::new(mesh, solid).map_err(not_positive)?;
+        if !outline.rim().into_iter().all(|at| base.is_on_face(at)) {
+            return Err(Refusal::parameter(
+                "the punch reaches beyond the touched face, whose middle it stands on: make it smaller",
+            ));
+        }
+        let nodes: Vec<f64> = [-1.0, -0.5, 0.0, 0.5, 1.0].map(|share| share * extent_m).to_vec();
+        let table = base.table([nodes.clone(), nodes], |at| at);
+        let (patch, step) = extrapolated(&solid, Some(&table), outline, bond).map_err(not_positive)?;
+        Ok((Law::Bonded(Box::new(patch)), step.max(base.mesh_error(extent_m, &[[0.0; 2]]))))
+    }
+
+    /// The law of a body made of boxes.
+    fn solve_boxes(&self) -> Result<(Law, f64), NotPositive> {
         let resolution = RESOLUTIONS[self.resolution.min(2)];
         let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio: self.poisson_ratio };
         let (patch, mesh_error) = match (self.body, self.tool) {
@@ -218,10 +307,7 @@ impl Description {
                 return Ok(sphere(sphere_on_half_space(self.poisson_ratio, radius_m)));
             }
             (Body::Block(size), Tool::Punch { outline, bond }) => {
-                let extent_m = match outline {
-                    Outline::Round { radius_m } => radius_m,
-                    Outline::Square { half_m } => half_m,
-                };
+                let extent_m = outline.extent_m();
                 let remainder = Remainder::new(size, solid, resolution.fineness)?;
                 let nodes = [0.0, 0.5 * extent_m, extent_m];
                 let table = Table::new(&remainder, Face::Top, [&nodes, &nodes]);
@@ -250,8 +336,10 @@ impl Description {
                 let across = |half_m: f64| both(-half_m, half_m, 2);
                 ([across(size.half_x_m), across(size.half_y_m), both(-size.height_m, 0.0, 2)], 2)
             }
-            // Refused before.
-            Body::HalfSpace => ([both(-1.0, 0.0, 1), both(-1.0, 0.0, 1), both(-1.0, 0.0, 1)], 2),
+            // Refused, or solved on a mesh, before.
+            Body::HalfSpace | Body::Cylinder { .. } | Body::File { .. } => {
+                ([both(-1.0, 0.0, 1), both(-1.0, 0.0, 1), both(-1.0, 0.0, 1)], 2)
+            }
         };
         let order = PLATE_ORDERS[self.resolution.min(2)];
         let solve = |order| plate(&Grid::new(borders.clone(), order), lame, axis);
@@ -280,8 +368,8 @@ fn to_numbers(law: &Law, mesh_error: f64) -> Vec<f64> {
     }
 }
 
-fn not_there(what: &str) -> Refusal {
-    Refusal::unsupported(format!(
-        "{what} is not supported by this version; bodies are block, beam and half-space"
+fn not_positive(NotPositive { pivot }: NotPositive) -> Refusal {
+    Refusal::parameter(format!(
+        "the stiffness matrix is not positive definite (unknown {pivot}): sides too unlike each other, or a Poisson's ratio too near 0.5"
     ))
 }

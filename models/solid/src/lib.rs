@@ -7,6 +7,8 @@
 //!   factorisation with one order of sums.
 //! - [`half_space`]: the field of forces on an elastic half-space, which carries the pole of every contact.
 //! - [`remainder`], [`table`]: what a block does that a half-space would not, by finite elements.
+//! - [`gmsh`], [`cylinder`], [`mesh`], [`cells`], [`facet`]: bodies of any shape, their elements and their surface; [`body`]: what such a
+//!   body does that a half-space would not; [`recovery`]: how good its mesh is.
 //! - [`sphere`]: contact of a sphere in contact space. [`punch`], [`plate`]: rigid patches bonded to a surface.
 //! - [`prepare`], [`law`], [`cache`]: from a description to a law.
 //! - [`atlas`], [`rigid`], [`friction`]: the laws, as a tick evaluates them; [`jet`], [`spline`] under them.
@@ -17,18 +19,25 @@
 
 pub mod atlas;
 pub mod basis;
+pub mod body;
 pub mod cache;
+pub mod cells;
+pub mod cylinder;
 pub mod dense;
 pub mod dissection;
+pub mod facet;
 pub mod friction;
+pub mod gmsh;
 pub mod grid;
 pub mod half_space;
 pub mod jet;
 pub mod law;
+pub mod mesh;
 pub mod plate;
 mod plugin;
 pub mod prepare;
 pub mod punch;
+pub mod recovery;
 pub mod remainder;
 pub mod rigid;
 pub mod sphere;

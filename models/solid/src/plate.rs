@@ -1,7 +1,7 @@
-//! A rigid plate bonded to a whole face of a block of finite elements.
+//! A rigid plate bonded to a face of a body of finite elements.
 
 use crate::dense::NotPositive;
-use crate::dissection::{Stiffness, subtract_forces};
+use crate::dissection::{Assembly, GridStiffness, Stiffness, subtract_forces};
 use crate::grid::{Grid, Lame};
 use crate::rigid::{MODES, RigidPatch};
 
@@ -11,39 +11,71 @@ use crate::rigid::{MODES, RigidPatch};
 /// # Errors
 /// [`NotPositive`] if the numbers do not describe a solid.
 pub fn plate(grid: &Grid, lame: Lame, axis: usize) -> Result<RigidPatch, NotPositive> {
-    let count = grid.node_count();
     let last = grid.nodes_along()[axis] - 1;
-    let at_end = |node: usize| grid.index(node)[axis] == last;
-    let fixed = (0..count).map(|node| [grid.index(node)[axis] == 0 || at_end(node); 3]).collect();
-    let stiffness = Stiffness::new(grid, lame, fixed)?;
     let centre = [0, 1, 2].map(|k| {
         let nodes = &grid.axes[k].nodes_m;
         if k == axis { nodes[last] } else { 0.5 * (nodes[0] + nodes[nodes.len() - 1]) }
     });
+    let hold = |node: usize| {
+        let index = grid.index(node);
+        if index[axis] == last {
+            let position = grid.position_m(node);
+            let mut from_centre = [0, 1, 2].map(|k| position[k] - centre[k]);
+            from_centre[axis] = 0.0;
+            return Hold::Plate(from_centre);
+        }
+        if index[axis] == 0 { Hold::Fixed } else { Hold::Free }
+    };
+    Ok(plate_on(&GridStiffness::new(grid, lame), hold)?.0)
+}
+
+/// What holds a node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Hold {
+    /// Nothing.
+    Free,
+    /// It does not move.
+    Fixed,
+    /// The plate; where the node is from the plate's centre, m.
+    Plate([f64; 3]),
+}
+
+/// Stiffness of a plate that is bonded to some nodes of any body, and the displacement of all nodes under each of its modes.
+/// Not real-time.
+///
+/// # Errors
+/// [`NotPositive`] if the numbers do not describe a solid.
+pub fn plate_on(
+    assembly: &impl Assembly,
+    hold: impl Fn(usize) -> Hold,
+) -> Result<(RigidPatch, Vec<f64>), NotPositive> {
+    let count = assembly.node_count();
+    let fixed = (0..count).map(|node| [hold(node) != Hold::Free; 3]).collect();
+    let stiffness = Stiffness::new(assembly, fixed)?;
     let mut prescribed = vec![0.0; 3 * count * MODES];
-    for node in (0..count).filter(|&node| at_end(node)) {
-        let position = grid.position_m(node);
+    for node in 0..count {
+        let Hold::Plate(from_centre) = hold(node) else { continue };
         for i in 0..3 {
             let row = &mut prescribed[(3 * node + i) * MODES..(3 * node + i + 1) * MODES];
             row[i] = 1.0;
-            for j in (0..3).filter(|&j| j != axis) {
-                row[RigidPatch::entry(i, j)] = position[j] - centre[j];
+            for (j, x) in from_centre.into_iter().enumerate() {
+                row[RigidPatch::entry(i, j)] = x;
             }
         }
     }
     let mut displacement = vec![0.0; prescribed.len()];
-    subtract_forces(grid, lame, &prescribed, &mut displacement, MODES);
+    subtract_forces(assembly, &prescribed, &mut displacement, MODES);
     stiffness.solve(&mut displacement, MODES);
     displacement.iter_mut().zip(&prescribed).for_each(|(u, p)| *u += p);
     let mut forces = vec![0.0; prescribed.len()];
-    subtract_forces(grid, lame, &displacement, &mut forces, MODES);
+    subtract_forces(assembly, &displacement, &mut forces, MODES);
     let mut matrix = [[0.0; MODES]; MODES];
     for (moved, reaction) in prescribed.chunks_exact(MODES).zip(forces.chunks_exact(MODES)) {
         for (row, u) in matrix.iter_mut().zip(moved).filter(|(_, u)| **u != 0.0) {
             row.iter_mut().zip(reaction).for_each(|(k, f)| *k -= u * f);
         }
     }
-    Ok(RigidPatch { stiffness: symmetric(&matrix) })
+    Ok((RigidPatch { stiffness: symmetric(&matrix) }, displacement))
 }
 
 /// The symmetric part: reciprocity holds for the exact matrix.

@@ -2,6 +2,8 @@
 
 use crate::friction::Friction;
 use crate::law::{Description, Law, Tool};
+use crate::mesh::Mesh;
+use crate::{cache, gmsh};
 use flotor_hal::{
     Choices, DVec3, Demand, Detail, DetailsModel, ForceModel, Input, Memory, ModelInfo, OutOfRange, Output,
     Parameter, Refusal, Settings, StepStatus, VariantInfo, VariantModel, Wrench, choices,
@@ -19,14 +21,19 @@ const RESOLUTIONS: Choices = choices!["quick", "standard", "fine"];
 const YOUNGS_MODULUS: usize = 4;
 
 const SCHEMA: &[Parameter] = &[
-    Parameter::choice("body", BODIES, 0, "What is touched; block: bottom clamped; beam: clamped at -x"),
+    Parameter::choice(
+        "body",
+        BODIES,
+        0,
+        "What is touched; block, cylinder: bottom clamped; beam: clamped at -x",
+    ),
     Parameter::real(
         "size_x_mm",
         "mm",
         1.0,
         2000.0,
         80.0,
-        "Side along x of a block or a beam (200 by default)",
+        "Side along x of a block or a beam (200 by default), diameter of a cylinder",
     ),
     Parameter::real(
         "size_y_mm",
@@ -42,7 +49,7 @@ const SCHEMA: &[Parameter] = &[
         1.0,
         2000.0,
         80.0,
-        "Side along z of a block or a beam (40 by default)",
+        "Side along z of a block or a beam (40 by default), height of a cylinder",
     ),
     Parameter::real("youngs_modulus_pa", "Pa", 1.0, 1.0e9, 1.0e4, "Young's modulus").live(),
     Parameter::real("poisson_ratio", "1", 0.0, 0.49, 0.3, "Poisson's ratio"),
@@ -57,7 +64,13 @@ const SCHEMA: &[Parameter] = &[
         1,
         "Elements and contact cells of the preparation; a tick costs the same",
     ),
-    Parameter::file("file", choices![], "A mesh for body `file`"),
+    Parameter::file(
+        "file",
+        choices![],
+        "The mesh of body `file`: Gmsh 4.1 text, metres, tetrahedra of 10 nodes, bricks of 20",
+    ),
+    Parameter::text("fixed_face", "Physical surface of the mesh that is fixed; `fixed`, if empty"),
+    Parameter::text("touched_face", "Physical surface of the mesh that is touched; `touched`, if empty"),
 ];
 
 const DETAILS: &[Detail] = &[
@@ -91,6 +104,35 @@ fn resolve(settings: &Settings<'_>) -> [f64; SCHEMA.len()] {
     values
 }
 
+/// Reads the mesh of `body = "file"`; also its digest. Nothing for other bodies. Not real-time.
+///
+/// # Errors
+/// A [`Refusal`] that names the file, the place and the remedy.
+fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
+    let file = settings.text("file");
+    let faces = ["fixed_face", "touched_face"].map(|id| settings.text(id));
+    if BODIES.as_slice()[settings.choice_or_default("body")].as_str() != "file" {
+        let stray = [file, faces[0], faces[1]].iter().any(Option::is_some);
+        let refusal = "`file`, `fixed_face` and `touched_face` belong to a mesh: set body = \"file\"";
+        return if stray { Err(Refusal::parameter(refusal)) } else { Ok(None) };
+    }
+    let Some(path) = file else {
+        return Err(Refusal::parameter("body = \"file\" needs a mesh: set `file` to one of Gmsh (.msh)"));
+    };
+    let sizes = ["size_x_mm", "size_y_mm", "size_z_mm"];
+    if let Some(id) = sizes.into_iter().find(|id| settings.number(id).is_some()) {
+        return Err(Refusal::parameter(format!("`{id}`: a mesh has a size of its own; leave it out")));
+    }
+    let bytes = std::fs::read(path)
+        .map_err(|error| Refusal::resource(format!("{path}: cannot read the mesh: {error}")))?;
+    let [fixed, touched] = [faces[0].unwrap_or("fixed"), faces[1].unwrap_or("touched")];
+    let wrong = |problem: &dyn std::fmt::Display| Refusal::resource(format!("{path}: {problem}"));
+    let parts = gmsh::read(&String::from_utf8_lossy(&bytes)).map_err(|problem| wrong(&problem))?;
+    let mesh = Mesh::new(parts, fixed, touched).map_err(|problem| wrong(&problem))?;
+    let named = [&bytes[..], b"\0", fixed.as_bytes(), b"\0", touched.as_bytes()].concat();
+    Ok(Some((mesh, cache::digest(&named))))
+}
+
 impl ForceModel for Solid {
     const INFO: ModelInfo =
         ModelInfo::new("solid", "Solid", "An elastic solid, touched with a sphere, a punch or a plate")
@@ -101,10 +143,10 @@ impl ForceModel for Solid {
 
     fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {
         let parameters = resolve(settings);
-        let description = Description::new(settings, |id| {
-            SCHEMA.iter().position(|parameter| parameter.id() == id).map_or(f64::NAN, |i| parameters[i])
-        })?;
-        let (law, mesh_error) = description.prepare()?;
+        let mesh = read_mesh(settings)?;
+        let value = |id: &str| SCHEMA.iter().position(|p| p.id() == id).map_or(f64::NAN, |i| parameters[i]);
+        let description = Description::new(settings, value, mesh.as_ref().map_or(0, |(_, digest)| *digest))?;
+        let (law, mesh_error) = description.prepare(mesh.as_ref().map(|(mesh, _)| mesh))?;
         let reach_m = match description.tool {
             Tool::Sphere { radius_m } => radius_m,
             _ => 0.0,
@@ -135,6 +177,8 @@ impl ForceModel for Solid {
                 self.depth_m = answer.depth_m;
                 if answer.depth_m > atlas.deepest_m {
                     status = StepStatus::Clamped;
+                } else if answer.is_beyond && status == StepStatus::Ok {
+                    status = StepStatus::OutOfDomain;
                 }
                 let normal_n = DVec3::from_array(answer.energy.slope) * -modulus;
                 let rubbing = self.friction.follow(reached_m, normal_n, modulus);

@@ -1,8 +1,10 @@
 //! From a description of a solid and a tool to its law: everything slow, before the loop.
 
 use crate::atlas::{Atlas, Ground};
+use crate::body::{Body, outline_m};
 use crate::dense::NotPositive;
 use crate::half_space::HalfSpace;
+use crate::mesh::Mesh;
 use crate::remainder::{Face, Fineness, Remainder, Size};
 use crate::sphere::{Contact, Patch, Problem};
 use crate::spline::{Curve, End, Volume};
@@ -22,6 +24,13 @@ const PROFILE_RINGS: i32 = 10;
 const TABLE_SHARES: [f64; 9] = [1.0, 0.8, 0.62, 0.47, 0.34, 0.23, 0.145, 0.08, 0.03];
 /// Places of the sphere along half a side, from the middle to where the ratio ends.
 const PLACES: [f64; 9] = [0.0, 0.25, 0.44, 0.59, 0.7, 0.785, 0.86, 0.93, 1.0];
+
+/// Distances of the points of a mesh's table and of the places of the sphere from the middle of a face, in halves of a side.
+const FACE_TABLE: [f64; 6] = [0.0, 0.3, 0.55, 0.75, 0.9, 1.0];
+const FACE_PLACES: [f64; 5] = [0.0, 0.35, 0.65, 0.85, 1.0];
+/// How their ratios end.
+const FACE_ENDS: [[End; 2]; 3] = [[End::Parabola; 2]; 3];
+const CYLINDER_ENDS: [[End; 2]; 3] = [[End::Level, End::Parabola], [End::Parabola; 2], [End::Parabola; 2]];
 
 /// How finely a sphere's law is prepared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,6 +72,46 @@ fn unbounded(solid: &HalfSpace, rings: i32, roots: &[f64]) -> Vec<Contact> {
         contacts.push(contact);
     }
     contacts
+}
+
+/// Roots of depth over radius at which contacts are solved.
+fn roots() -> Vec<f64> {
+    (1..=LEVELS).map(|level| DEEPEST_SOLVED.sqrt() * level as f64 / LEVELS as f64).collect()
+}
+
+/// Ratios of a body's energy to that of a half-space at one place, for growing depth; `on_face` tells where the face is.
+fn column(
+    patch: &Patch,
+    table: &Table,
+    radius_m: f64,
+    place_m: [f64; 2],
+    roots: &[f64],
+    reference: &[Contact],
+    on_face: &dyn Fn([f64; 2]) -> bool,
+) -> Vec<f64> {
+    let mut ratios: Vec<f64> = Vec::with_capacity(roots.len());
+    let mut start: Option<Contact> = None;
+    for (root, unbounded) in roots.iter().zip(reference) {
+        let depth_m = radius_m * root * root;
+        let cell_m = cell_m(radius_m, depth_m, patch.rings());
+        let points: Vec<[f64; 2]> =
+            patch.points_m(cell_m).iter().map(|at| [at[0] + place_m[0], at[1] + place_m[1]]).collect();
+        let on_face: Vec<bool> = points.iter().map(|&at| on_face(at)).collect();
+        let smooth = table.among(&points);
+        let problem = Problem { radius_m, depth_m, cell_m, on_face: &on_face, smooth: &smooth };
+        let contact = patch.solve(&problem, start.as_ref());
+        let ratio = contact.energy_j / (unbounded.energy_j * radius_m * radius_m * radius_m);
+        let before = ratios.last().copied().unwrap_or(1.0);
+        if contact.residual < 1.0e-4 && (ratio / before - 1.0).abs() < 0.3 {
+            ratios.push(ratio);
+            start = Some(contact);
+        } else {
+            // It has snapped through: on with what was.
+            let earlier = ratios.len().checked_sub(2).map_or(1.0, |i| ratios[i]);
+            ratios.push(2.0 * before - earlier);
+        }
+    }
+    ratios
 }
 
 /// Hertz's energy of a sphere of radius one at a root of depth, for a modulus of one.
@@ -138,37 +187,145 @@ fn rounding_m(size: Size, radius_m: f64) -> f64 {
     (0.02 * least_m).min(0.25 * radius_m)
 }
 
+/// What carries a sphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Footing {
+    /// All below `z = 0`.
+    HalfSpace,
+    /// A block.
+    Block(Size),
+    /// A round cylinder: radius and height, m.
+    Cylinder([f64; 2]),
+    /// The touched face of a mesh.
+    Face,
+}
+
+/// The half of a cylinder's diameter and height, as the size of the block about it.
+fn around([radius_m, height_m]: [f64; 2]) -> Size {
+    Size { half_x_m: radius_m, half_y_m: radius_m, height_m }
+}
+
+/// A sphere on the touched face of a mesh: that of a cylinder ([`Footing::Cylinder`]), or any plane one. Not real-time: some
+/// seconds.
+///
+/// # Errors
+/// [`NotPositive`] if the numbers do not describe a solid.
+pub fn sphere_on_mesh(
+    mesh: &Mesh,
+    footing: Footing,
+    poisson_ratio: f64,
+    radius_m: f64,
+    rings: i32,
+) -> Result<Prepared, NotPositive> {
+    let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
+    let body = Body::new(mesh, solid)?;
+    let patch = Patch::new(&solid, rings);
+    let roots = roots();
+    let reference = unbounded(&solid, rings, &roots);
+    let outline_m = outline_m(mesh);
+    let column = |table: &Table, place_m: [f64; 2]| {
+        let on_face = |at: [f64; 2]| body.is_on_face(at);
+        column(&patch, table, radius_m, place_m, &roots, &reference, &on_face)
+    };
+    let mut levels = vec![0.0];
+    levels.extend(&roots);
+    let ground = if let Footing::Cylinder(size @ [rim_m, height_m]) = footing {
+        let rounding_m = rounding_m(around(size), radius_m);
+        let line = table_nodes(rim_m);
+        let line: Vec<f64> = line.iter().skip(1).rev().map(|x| -x).chain(line.iter().copied()).collect();
+        // A little inside the polygon that the elements make of the rim.
+        let nearest = |at: [f64; 2]| {
+            let most = 0.999 * rim_m / (at[0] * at[0] + at[1] * at[1]).sqrt().max(0.999 * rim_m);
+            at.map(|c| c * most)
+        };
+        let table = body.table([line.clone(), line], nearest);
+        let places: Vec<f64> = PLACES.iter().map(|share| share * (rim_m - 2.0 * rounding_m)).collect();
+        let mut values = vec![1.0; 3 * places.len() * levels.len()];
+        for (i, &place) in places.iter().enumerate() {
+            for (level, ratio) in column(&table, [place, 0.0]).into_iter().enumerate() {
+                (0..3).for_each(|idle| values[((level + 1) * 3 + idle) * places.len() + i] = ratio);
+            }
+        }
+        let ratio = Volume::new([places, vec![-1.0, 0.0, 1.0], levels], &values, CYLINDER_ENDS);
+        Ground::Cylinder { radius_m: rim_m, height_m, ratio: Box::new(ratio), rounding_m }
+    } else {
+        let spread = |shares: &[f64], k: usize, margin: f64| -> Vec<f64> {
+            let [low, high] = outline_m[k];
+            let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * margin);
+            let below = shares.iter().skip(1).rev().map(|share| middle - share * half);
+            below.chain(shares.iter().map(|share| middle + share * half)).collect()
+        };
+        let [x, y] = [0, 1].map(|k| spread(&FACE_TABLE, k, 0.97));
+        let table = body.table([x, y], |at| at);
+        let [x, y] = [0, 1].map(|k| spread(&FACE_PLACES, k, 0.92));
+        let mut values = vec![1.0; x.len() * y.len() * levels.len()];
+        for (j, &py) in y.iter().enumerate() {
+            for (i, &px) in x.iter().enumerate() {
+                for (level, ratio) in column(&table, [px, py]).into_iter().enumerate() {
+                    values[((level + 1) * y.len() + j) * x.len() + i] = ratio;
+                }
+            }
+        }
+        Ground::Face { outline_m, ratio: Box::new(Volume::new([x, y, levels], &values, FACE_ENDS)) }
+    };
+    // In the middle, and at a quarter of the side from an edge.
+    let mesh_error = body.mesh_error(radius_m, &[[0.0; 2], [0.75 * outline_m[0][1], 0.0]]);
+    Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid), ground), mesh_error })
+}
+
 impl Prepared {
     /// All that was solved, for the cache. Not real-time.
     #[must_use]
     pub fn to_numbers(&self) -> Vec<f64> {
         let mut numbers = vec![self.mesh_error];
         self.atlas.profile.write_numbers(&mut numbers);
-        if let Ground::Block { ratios, .. } = &self.atlas.ground {
-            ratios.iter().for_each(|volume| volume.write_numbers(&mut numbers));
+        match &self.atlas.ground {
+            Ground::HalfSpace => {}
+            Ground::Block { ratios, .. } => {
+                ratios.iter().for_each(|volume| volume.write_numbers(&mut numbers))
+            }
+            Ground::Cylinder { ratio, .. } => ratio.write_numbers(&mut numbers),
+            Ground::Face { outline_m, ratio } => {
+                ratio.write_numbers(&mut numbers);
+                numbers.extend(outline_m.as_flattened());
+            }
         }
         numbers
     }
 
-    /// The same law from these numbers, bit for bit; `None` if they are not those of such a law. Without a size: on a
-    /// half-space. Not real-time.
+    /// The same law from these numbers, bit for bit; `None` if they are not those of such a law. Not real-time.
     #[must_use]
     pub fn from_numbers(
         mut numbers: &[f64],
         poisson_ratio: f64,
         radius_m: f64,
-        size: Option<Size>,
+        footing: Footing,
     ) -> Option<Self> {
         let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
         let (&mesh_error, rest) = numbers.split_first()?;
         numbers = rest;
         let profile = Curve::from_numbers(&mut numbers, [End::Parabola; 2])?;
-        let ground = match size {
-            None => Ground::HalfSpace,
-            Some(size) => {
+        let ground = match footing {
+            Footing::HalfSpace => Ground::HalfSpace,
+            Footing::Block(size) => {
                 let mut next = |face| Volume::from_numbers(&mut numbers, ends(face));
                 let ratios = Box::new([next(Face::Top)?, next(Face::SideX)?, next(Face::SideY)?]);
                 Ground::Block { size, ratios, rounding_m: rounding_m(size, radius_m) }
+            }
+            Footing::Cylinder(size @ [rim_m, height_m]) => {
+                let ratio = Box::new(Volume::from_numbers(&mut numbers, CYLINDER_ENDS)?);
+                Ground::Cylinder {
+                    radius_m: rim_m,
+                    height_m,
+                    ratio,
+                    rounding_m: rounding_m(around(size), radius_m),
+                }
+            }
+            Footing::Face => {
+                let ratio = Box::new(Volume::from_numbers(&mut numbers, FACE_ENDS)?);
+                let (&[a, b, c, d], rest) = numbers.split_first_chunk()?;
+                numbers = rest;
+                Ground::Face { outline_m: [[a, b], [c, d]], ratio }
             }
         };
         numbers.is_empty().then(|| Self { atlas: atlas(&solid, radius_m, profile, ground), mesh_error })
@@ -235,9 +392,12 @@ impl Builder<'_> {
         let table = self.table(face);
         let rings = self.resolution.rings;
         let patch = Patch::new(&self.solid, rings);
-        let roots: Vec<f64> =
-            (1..=LEVELS).map(|level| DEEPEST_SOLVED.sqrt() * level as f64 / LEVELS as f64).collect();
+        let roots = roots();
         let reference = unbounded(&self.solid, rings, &roots);
+        let inside = |axis: usize, x: f64| {
+            if axis < 2 { x.abs() <= self.half_along(axis) } else { -self.size.height_m <= x && x <= 0.0 }
+        };
+        let on_face = |at: [f64; 2]| inside(p, at[0]) && inside(q, at[1]);
         let places = [self.places(p), self.places(q)];
         let counts = [places[0].len(), places[1].len()];
         let mut values = vec![1.0; counts[0] * counts[1] * (LEVELS + 1)];
@@ -248,8 +408,8 @@ impl Builder<'_> {
                 if symmetric && i < j {
                     continue;
                 }
-                let column =
-                    self.column(&patch, &table, face, [places[0][i], places[1][j]], &roots, &reference);
+                let place_m = [places[0][i], places[1][j]];
+                let column = column(&patch, &table, self.radius_m, place_m, &roots, &reference, &on_face);
                 for (level, ratio) in column.into_iter().enumerate() {
                     values[at(level + 1, i, j)] = ratio;
                     if symmetric {
@@ -262,46 +422,6 @@ impl Builder<'_> {
         levels.extend(roots);
         let [a, b] = places;
         Volume::new([a, b, levels], &values, ends(face))
-    }
-
-    /// Ratios at one place, for growing depth.
-    fn column(
-        &self,
-        patch: &Patch,
-        table: &Table,
-        face: Face,
-        place_m: [f64; 2],
-        roots: &[f64],
-        reference: &[Contact],
-    ) -> Vec<f64> {
-        let [p, q, _] = face.axes();
-        let inside = |axis: usize, x: f64| {
-            if axis < 2 { x.abs() <= self.half_along(axis) } else { -self.size.height_m <= x && x <= 0.0 }
-        };
-        let radius_m = self.radius_m;
-        let mut ratios: Vec<f64> = Vec::with_capacity(roots.len());
-        let mut start: Option<Contact> = None;
-        for (root, unbounded) in roots.iter().zip(reference) {
-            let depth_m = radius_m * root * root;
-            let cell_m = cell_m(radius_m, depth_m, self.resolution.rings);
-            let points: Vec<[f64; 2]> =
-                patch.points_m(cell_m).iter().map(|at| [at[0] + place_m[0], at[1] + place_m[1]]).collect();
-            let on_face: Vec<bool> = points.iter().map(|at| inside(p, at[0]) && inside(q, at[1])).collect();
-            let smooth = table.among(&points);
-            let problem = Problem { radius_m, depth_m, cell_m, on_face: &on_face, smooth: &smooth };
-            let contact = patch.solve(&problem, start.as_ref());
-            let ratio = contact.energy_j / (unbounded.energy_j * radius_m * radius_m * radius_m);
-            let before = ratios.last().copied().unwrap_or(1.0);
-            if contact.residual < 1.0e-4 && (ratio / before - 1.0).abs() < 0.3 {
-                ratios.push(ratio);
-                start = Some(contact);
-            } else {
-                // It has snapped through: on with what was.
-                let earlier = ratios.len().checked_sub(2).map_or(1.0, |i| ratios[i]);
-                ratios.push(2.0 * before - earlier);
-            }
-        }
-        ratios
     }
 
     /// Change of the stiffness under the sphere between these elements and coarser ones, in the middle and at a quarter of

@@ -63,6 +63,32 @@ fn crowded(count: usize) -> Vec<f64> {
 }
 
 impl Outline {
+    /// Radius, or half of the side, m.
+    #[must_use]
+    pub fn extent_m(self) -> f64 {
+        match self {
+            Self::Round { radius_m } => radius_m,
+            Self::Square { half_m } => half_m,
+        }
+    }
+
+    /// Some points of the rim, m.
+    #[must_use]
+    pub fn rim(self) -> Vec<[f64; 2]> {
+        (0..16)
+            .map(|k| {
+                let (sine, cosine) = flotor_hal::math::sin_cos(0.125 * PI * f64::from(k));
+                match self {
+                    Self::Round { radius_m } => [radius_m * cosine, radius_m * sine],
+                    Self::Square { half_m } => {
+                        let longest = sine.abs().max(cosine.abs());
+                        [half_m * cosine / longest, half_m * sine / longest]
+                    }
+                }
+            })
+            .collect()
+    }
+
     /// Cells of a punch of size one, scaled; `fineness` of them from the middle to the rim.
     fn cells(self, fineness: usize) -> Vec<Cell> {
         let line = crowded(fineness);

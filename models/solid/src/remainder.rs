@@ -8,7 +8,7 @@
 
 use crate::basis::{element_points, gauss, lagrange};
 use crate::dense::NotPositive;
-use crate::dissection::{Stiffness, subtract_forces};
+use crate::dissection::{GridStiffness, Stiffness, subtract_forces};
 use crate::grid::{Grid, Lame, Sample, graded};
 use crate::half_space::{Block, HalfSpace};
 
@@ -142,7 +142,7 @@ impl Remainder {
         let stiffness = (0..4)
             .map(|parity| {
                 let fixed = (0..grid.node_count()).map(|node| fixed(&grid, node, parity)).collect();
-                Stiffness::new(&grid, lame, fixed)
+                Stiffness::new(&GridStiffness::new(&grid, lame), fixed)
             })
             .collect::<Result<_, _>>()?;
         let quadrature = boundary(&grid);
@@ -171,7 +171,7 @@ impl Remainder {
         let mut answers = vec![vec![[[[0.0; 3]; 3]; 4]; samples.len()]; sources_m.len()];
         for (parity, mut values) in forces.into_iter().enumerate() {
             let prescribed = self.prescribed(face, sources_m, parity);
-            subtract_forces(&self.grid, self.lame, &prescribed, &mut values, columns);
+            subtract_forces(&GridStiffness::new(&self.grid, self.lame), &prescribed, &mut values, columns);
             self.stiffness[parity].solve(&mut values, columns);
             values.iter_mut().zip(&prescribed).for_each(|(u, p)| *u += p);
             for (target, sample) in samples.iter().enumerate() {

@@ -85,6 +85,12 @@ impl Patch {
         Self { rings, cells, kernel }
     }
 
+    /// Cells from the middle to the rim.
+    #[must_use]
+    pub fn rings(&self) -> i32 {
+        self.rings
+    }
+
     /// Number of cells.
     #[must_use]
     pub fn count(&self) -> usize {

@@ -82,6 +82,23 @@ impl Table {
                 }
             }
         }
+        let mut table = Self { nodes_m, blocks };
+        table.make_reciprocal();
+        table
+    }
+
+    /// Of the answers at all points of a grid (`p` first) to forces at all of them: for each source, for each target. Not
+    /// real-time.
+    #[must_use]
+    pub fn of(nodes_m: [Vec<f64>; 2], answers: &[Vec<Block>]) -> Self {
+        let mut table = Self { nodes_m, blocks: answers.concat() };
+        table.make_reciprocal();
+        table
+    }
+
+    fn make_reciprocal(&mut self) {
+        let total = self.nodes_m[0].len() * self.nodes_m[1].len();
+        let blocks = &mut self.blocks;
         // Betti: what the one does at the other is what the other does at the one. Elements and quadrature break it by little.
         for source in 0..total {
             for target in 0..=source {
@@ -95,7 +112,6 @@ impl Table {
                 }
             }
         }
-        Self { nodes_m, blocks }
     }
 
     /// Remainder between all pairs of these points, m/N: for each target, for each source. Not real-time.

@@ -2,7 +2,7 @@
 
 use crate::table::rows;
 use flotor_solid::basis::gauss;
-use flotor_solid::dissection::{Stiffness, subtract_forces};
+use flotor_solid::dissection::{GridStiffness, Stiffness, subtract_forces};
 use flotor_solid::grid::{Grid, Lame};
 
 /// Displacements of the outside prescribed as a linear field: the inside follows exactly.
@@ -21,7 +21,8 @@ fn a_linear_field_on_the_outside_continues_inside() {
         (0..3).any(|axis| index[axis] == 0 || index[axis] == along[axis] - 1)
     };
     let count = grid.node_count();
-    let stiffness = Stiffness::new(&grid, lame, (0..count).map(|node| [outside(node); 3]).collect()).unwrap();
+    let assembly = GridStiffness::new(&grid, lame);
+    let stiffness = Stiffness::new(&assembly, (0..count).map(|node| [outside(node); 3]).collect()).unwrap();
     let mut prescribed = vec![0.0; 3 * count];
     for node in (0..count).filter(|&node| outside(node)) {
         for i in 0..3 {
@@ -29,7 +30,7 @@ fn a_linear_field_on_the_outside_continues_inside() {
         }
     }
     let mut u = vec![0.0; 3 * count];
-    subtract_forces(&grid, lame, &prescribed, &mut u, 1);
+    subtract_forces(&assembly, &prescribed, &mut u, 1);
     stiffness.solve(&mut u, 1);
     for node in (0..count).filter(|&node| !outside(node)) {
         for i in 0..3 {
@@ -88,8 +89,8 @@ fn a_beam_of_few_elements_bends_as_it_should() {
     let loads: Vec<Vec<f64>> = modes.iter().map(|mode| spread(mode)).collect();
     assert!((0..count).filter(|&node| grid.index(node)[0] == last).count() == 25);
     for row in rows("a_cantilever_load.csv") {
-        let stiffness =
-            Stiffness::new(&grid, Lame::new(row.number("E_pa"), row.number("nu")), fixed.clone()).unwrap();
+        let lame = Lame::new(row.number("E_pa"), row.number("nu"));
+        let stiffness = Stiffness::new(&GridStiffness::new(&grid, lame), fixed.clone()).unwrap();
         let mut u = vec![0.0; 3 * count];
         for (load, column) in loads.iter().zip(columns) {
             u.iter_mut().zip(load).for_each(|(sum, f)| *sum += row.number(column) * f);

@@ -1,0 +1,121 @@
+//! A round cylinder of bricks whose edges follow its rim.
+
+use crate::cells::Kind;
+use crate::grid::graded;
+use crate::mesh::{Element, Mesh, MeshError, Parts};
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::PI;
+
+impl Mesh {
+    /// A round cylinder, its top about the origin and touched, its bottom fixed: bricks whose edges follow the rim, `m` times
+    /// `m` of them in a square in the middle. Lengths in m. Not real-time.
+    ///
+    /// # Errors
+    /// [`MeshError::Inverted`] for numbers that are no cylinder.
+    pub fn cylinder(radius_m: f64, height_m: f64, m: usize) -> Result<Self, MeshError> {
+        let half = 0.45 * radius_m;
+        // All positions by twice their index, so that middles of edges are whole numbers too.
+        let line = |i: usize| half * (i as f64 / m as f64 - 1.0);
+        let around = |t: usize| {
+            let (side, along) = (t / (2 * m) % 4, t % (2 * m));
+            let (a, b) = (line(along), half);
+            match side {
+                0 => [a, -b],
+                1 => [b, a],
+                2 => [-a, b],
+                _ => [-b, -a],
+            }
+        };
+        let rings = m.div_ceil(2) + 1;
+        let shares = graded(1.0, 0.0, rings, 1.35);
+        let heights = graded(0.0, -height_m, m + 1, 1.35);
+        let between = |borders: &[f64], i: usize| 0.5 * (borders[i / 2] + borders[i.div_ceil(2)]);
+        let ring = |r: usize, t: usize| {
+            let share = between(&shares, r);
+            let turn = PI * (t as f64 / (4 * m) as f64 - 0.75);
+            let (sine, cosine) = flotor_hal::math::sin_cos(turn);
+            let square = around(t % (8 * m));
+            [
+                square[0] * (1.0 - share) + share * radius_m * cosine,
+                square[1] * (1.0 - share) + share * radius_m * sine,
+            ]
+        };
+        let mut builder =
+            Gatherer { parts: Parts::default(), found: BTreeMap::new(), unit_m: 1.0e-7 * radius_m };
+        for layer in 0..=m {
+            let high = |k: f64| between(&heights, (2.0 * layer as f64 + 1.0 + k) as usize);
+            for j in 0..m {
+                for i in 0..m {
+                    builder.brick(&|at| {
+                        let index = |c: f64, e: usize| (2.0 * e as f64 + 1.0 + c) as usize;
+                        [line(index(at[0], i)), line(index(at[1], j)), high(at[2])]
+                    });
+                }
+            }
+            for t in 0..4 * m {
+                for r in 0..rings {
+                    builder.brick(&|at| {
+                        let index = |c: f64, e: usize| (2.0 * e as f64 + 1.0 + c) as usize;
+                        let [x, y] = ring(index(at[0], r), index(at[1], t));
+                        [x, y, high(at[2])]
+                    });
+                }
+            }
+        }
+        let parts = builder.into_parts(|z| {
+            if z > -1.0e-6 * height_m {
+                Some("touched")
+            } else {
+                (z < -height_m * (1.0 - 1.0e-6)).then_some("fixed")
+            }
+        });
+        Self::new(parts, "fixed", "touched")
+    }
+}
+
+/// Puts bricks together whose nodes are at the same places.
+struct Gatherer {
+    parts: Parts,
+    found: BTreeMap<[i64; 3], usize>,
+    unit_m: f64,
+}
+
+impl Gatherer {
+    /// One brick: `place` puts the signs of corners (and zero, of middles) where they belong.
+    fn brick(&mut self, place: &dyn Fn([f64; 3]) -> [f64; 3]) {
+        let corners = Kind::Brick.corner_places();
+        let mut places = corners.clone();
+        for [a, b] in Kind::Brick.edges() {
+            places.push([0, 1, 2].map(|k| 0.5 * (corners[*a][k] + corners[*b][k])));
+        }
+        let nodes = places.into_iter().map(|at| self.node(place(at))).collect();
+        let tag = self.parts.elements.len() + 1;
+        self.parts.elements.push(Element { kind: Kind::Brick, nodes, tag });
+    }
+
+    #[allow(clippy::cast_possible_truncation)] // 1e7 units to a radius
+    fn node(&mut self, at: [f64; 3]) -> usize {
+        // Off the middle of a unit, so that rounding does not part what is one.
+        let key = at.map(|c| (c / self.unit_m + 0.237).floor() as i64);
+        let nodes_m = &mut self.parts.nodes_m;
+        *self.found.entry(key).or_insert_with(|| {
+            nodes_m.push(at);
+            nodes_m.len() - 1
+        })
+    }
+
+    /// With the faces that lie at a height of a name.
+    fn into_parts(mut self, name: impl Fn(f64) -> Option<&'static str>) -> Parts {
+        for element in &self.parts.elements {
+            for face in element.kind.faces() {
+                let corners: Vec<usize> = face.iter().map(|&k| element.nodes[k]).collect();
+                let names: BTreeSet<_> =
+                    corners.iter().map(|&node| name(self.parts.nodes_m[node][2])).collect();
+                if let (1, Some(Some(name))) = (names.len(), names.first()) {
+                    self.parts.surfaces.entry((*name).to_owned()).or_default().push(corners);
+                }
+            }
+        }
+        self.parts
+    }
+}

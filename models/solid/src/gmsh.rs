@@ -1,0 +1,283 @@
+//! Gmsh's mesh format 4.1 in text: nodes, tetrahedra of 10 nodes, bricks of 20, and named surfaces. Not real-time.
+//!
+//! The format is described in Gmsh's manual, "MSH file format". Elements of other kinds are refused, points and curves
+//! skipped. A line of the file stands in every error.
+
+use crate::cells::Kind;
+use crate::mesh::{Element, Parts};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::str::{FromStr, SplitAsciiWhitespace};
+
+/// Why a file is no such mesh.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FormatError {
+    /// Line of the file, from 1.
+    pub line: usize,
+    /// What is wrong, and what to do.
+    pub problem: String,
+}
+
+impl fmt::Display for FormatError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "line {}: {}", self.line, self.problem)
+    }
+}
+
+/// Most nodes and most elements: 40 000 nodes take about a gigabyte and some minutes of preparation.
+const MOST: usize = 40_000;
+
+/// The lines of a file.
+struct Lines<'a> {
+    all: std::iter::Enumerate<std::str::Lines<'a>>,
+    line: usize,
+}
+
+impl<'a> Lines<'a> {
+    fn next(&mut self) -> Option<&'a str> {
+        let (index, text) = self.all.next()?;
+        self.line = index + 1;
+        Some(text.trim())
+    }
+
+    fn fail<T>(&self, problem: impl Into<String>) -> Result<T, FormatError> {
+        Err(FormatError { line: self.line, problem: problem.into() })
+    }
+
+    fn words(&mut self) -> Result<Words<'a>, FormatError> {
+        match self.next() {
+            Some(text) => Ok(Words { words: text.split_ascii_whitespace(), line: self.line }),
+            None => self.fail("the file ends here, in the middle of a section"),
+        }
+    }
+}
+
+/// The words of a line.
+struct Words<'a> {
+    words: SplitAsciiWhitespace<'a>,
+    line: usize,
+}
+
+impl Words<'_> {
+    fn number<T: FromStr>(&mut self) -> Result<T, FormatError> {
+        let word = self.words.next();
+        word.and_then(|word| word.parse().ok()).ok_or_else(|| FormatError {
+            line: self.line,
+            problem: match word {
+                Some(word) => format!("`{word}` is not the number that belongs here"),
+                None => "a number is missing".to_owned(),
+            },
+        })
+    }
+
+    fn count(&mut self) -> Result<usize, FormatError> {
+        let count = self.number()?;
+        if count > MOST {
+            let problem =
+                format!("{count} entries are too many, at most {MOST} are solved: use a coarser mesh");
+            return Err(FormatError { line: self.line, problem });
+        }
+        Ok(count)
+    }
+
+    fn skip(&mut self, count: usize) -> Result<(), FormatError> {
+        (0..count).try_for_each(|_| self.number::<f64>().map(|_| ()))
+    }
+}
+
+#[derive(Default)]
+struct Reader {
+    /// Names of physical surfaces, by tag.
+    names: BTreeMap<i64, String>,
+    /// Tags of the physical groups of a surface, by its own tag.
+    groups: BTreeMap<i64, Vec<i64>>,
+    /// Numbers of the nodes, by tag.
+    numbers: BTreeMap<usize, usize>,
+    parts: Parts,
+    has_format: bool,
+}
+
+/// Reads a mesh. Coordinates are metres.
+///
+/// # Errors
+/// A [`FormatError`] with the line.
+pub fn read(text: &str) -> Result<Parts, FormatError> {
+    let mut lines = Lines { all: text.lines().enumerate(), line: 1 };
+    let mut reader = Reader::default();
+    while let Some(line) = lines.next() {
+        let Some(section) = line.strip_prefix('$') else {
+            if line.is_empty() {
+                continue;
+            }
+            return lines.fail("a section is expected here: this is not a Gmsh mesh (format 4.1, text)");
+        };
+        if !reader.has_format && section != "MeshFormat" && section != "Comments" {
+            return lines.fail("`$MeshFormat` is missing before this section");
+        }
+        match section {
+            "MeshFormat" => reader.format(&mut lines)?,
+            "PhysicalNames" => reader.names(&mut lines)?,
+            "Entities" => reader.entities(&mut lines)?,
+            "Nodes" => reader.nodes(&mut lines)?,
+            "Elements" => reader.elements(&mut lines)?,
+            _ => {}
+        }
+        let end = format!("$End{section}");
+        let is_known = matches!(section, "MeshFormat" | "PhysicalNames" | "Entities" | "Nodes" | "Elements");
+        loop {
+            match lines.next() {
+                Some(line) if line == end => break,
+                Some(line) if is_known && !line.is_empty() => {
+                    return lines.fail(format!("`{end}` is expected here"));
+                }
+                Some(_) => {}
+                None => return lines.fail(format!("the file ends without `{end}`")),
+            }
+        }
+    }
+    if !reader.has_format {
+        return lines.fail("not a Gmsh mesh: there is no `$MeshFormat`");
+    }
+    Ok(reader.parts)
+}
+
+impl Reader {
+    fn format(&mut self, lines: &mut Lines<'_>) -> Result<(), FormatError> {
+        let mut words = lines.words()?;
+        let version: f64 = words.number()?;
+        let is_binary = words.number::<u8>()? != 0;
+        if !(4.1..4.2).contains(&version) {
+            return lines.fail(format!(
+                "format {version} is not read: write format 4.1 (`gmsh -format msh41`, or `Mesh.MshFileVersion = 4.1`)"
+            ));
+        }
+        if is_binary {
+            return lines.fail("a binary file: write text (`Mesh.Binary = 0`)");
+        }
+        self.has_format = true;
+        Ok(())
+    }
+
+    fn names(&mut self, lines: &mut Lines<'_>) -> Result<(), FormatError> {
+        for _ in 0..lines.words()?.count()? {
+            let mut words = lines.words()?;
+            let (dimension, tag): (u8, i64) = (words.number()?, words.number()?);
+            let name = words.words.collect::<Vec<_>>().join(" ");
+            if dimension == 2 {
+                self.names.insert(tag, name.trim_matches('"').to_owned());
+            }
+        }
+        Ok(())
+    }
+
+    fn entities(&mut self, lines: &mut Lines<'_>) -> Result<(), FormatError> {
+        let mut words = lines.words()?;
+        let counts: [usize; 4] = [words.count()?, words.count()?, words.count()?, words.count()?];
+        for (dimension, count) in counts.into_iter().enumerate() {
+            for _ in 0..count {
+                let mut words = lines.words()?;
+                let tag: i64 = words.number()?;
+                words.skip(if dimension == 0 { 3 } else { 6 })?;
+                let groups = (0..words.count()?).map(|_| words.number()).collect::<Result<Vec<i64>, _>>()?;
+                if dimension == 2 {
+                    self.groups.insert(tag, groups);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn nodes(&mut self, lines: &mut Lines<'_>) -> Result<(), FormatError> {
+        let mut words = lines.words()?;
+        let blocks = words.count()?;
+        words.count()?;
+        for _ in 0..blocks {
+            let mut words = lines.words()?;
+            words.skip(3)?;
+            let count = words.count()?;
+            let tags =
+                (0..count).map(|_| lines.words()?.number()).collect::<Result<Vec<usize>, FormatError>>()?;
+            for tag in tags {
+                let mut words = lines.words()?;
+                let position = [words.number()?, words.number()?, words.number()?];
+                if self.numbers.insert(tag, self.parts.nodes_m.len()).is_some() {
+                    return lines.fail(format!("node {tag} is here twice"));
+                }
+                self.parts.nodes_m.push(position);
+            }
+        }
+        Ok(())
+    }
+
+    fn elements(&mut self, lines: &mut Lines<'_>) -> Result<(), FormatError> {
+        let mut words = lines.words()?;
+        let blocks = words.count()?;
+        words.count()?;
+        for _ in 0..blocks {
+            let mut words = lines.words()?;
+            words.skip(1)?;
+            let (entity, kind): (i64, u32) = (words.number()?, words.number()?);
+            let count = words.count()?;
+            let nodes = match kind {
+                9 => 6,
+                11 => 10,
+                16 => 8,
+                17 => 20,
+                2..=7 => {
+                    return lines.fail(
+                        "linear elements are 20 to 50 % too stiff: write quadratic ones (`gmsh -order 2`, or `Mesh.ElementOrder = 2`)",
+                    );
+                }
+                10 | 12 => {
+                    return lines
+                        .fail("bricks of 27 nodes: write those of 20 (`Mesh.SecondOrderIncomplete = 1`)");
+                }
+                1 | 8 | 15 => 0, // lines and points
+                _ => {
+                    return lines.fail(format!(
+                        "elements of Gmsh's type {kind} are not read: tetrahedra of 10 nodes (11) and bricks of 20 (17) are"
+                    ));
+                }
+            };
+            for _ in 0..count {
+                let mut words = lines.words()?;
+                if nodes == 0 {
+                    continue;
+                }
+                let tag: usize = words.number()?;
+                let mut found = Vec::with_capacity(nodes);
+                for _ in 0..nodes {
+                    let node: usize = words.number()?;
+                    match self.numbers.get(&node) {
+                        Some(&number) => found.push(number),
+                        None => {
+                            return lines
+                                .fail(format!("element {tag} has a node {node} that is not in `$Nodes`"));
+                        }
+                    }
+                }
+                self.add(entity, kind, tag, found);
+            }
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, entity: i64, kind: u32, tag: usize, mut nodes: Vec<usize>) {
+        let volume = match kind {
+            11 => Some(Kind::Tetrahedron),
+            17 => Some(Kind::Brick),
+            _ => None,
+        };
+        if let Some(kind) = volume {
+            self.parts.elements.push(Element { kind, nodes, tag });
+            return;
+        }
+        nodes.truncate(if kind == 9 { 3 } else { 4 });
+        for group in self.groups.get(&entity).into_iter().flatten() {
+            // The sign tells the orientation; a group without a name goes by its number.
+            let name = self.names.get(&group.abs()).cloned().unwrap_or_else(|| group.abs().to_string());
+            self.parts.surfaces.entry(name).or_default().push(nodes.clone());
+        }
+        self.parts.faces.push(nodes);
+    }
+}

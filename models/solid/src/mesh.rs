@@ -1,0 +1,392 @@
+//! Bodies of any shape: elements, the surface they leave, and which part of it is fixed and which is touched.
+
+use crate::cells::{Geometry, Kind};
+use crate::dissection::Assembly;
+use crate::grid::Lame;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+
+/// An element of a mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Element {
+    /// Its shape.
+    pub kind: Kind,
+    /// Its nodes, in the order of [`Kind`].
+    pub nodes: Vec<usize>,
+    /// Its number in the file.
+    pub tag: usize,
+}
+
+/// A face of an element that no other element shares.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Facet {
+    /// Three or four.
+    pub corners: usize,
+    /// Corners, counterclockwise seen from outside, then the middles of the edges.
+    pub nodes: Vec<usize>,
+}
+
+/// What a mesh is made of, before anything is checked.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Parts {
+    /// Where the nodes are, m.
+    pub nodes_m: Vec<[f64; 3]>,
+    /// Elements of volume.
+    pub elements: Vec<Element>,
+    /// Corners of the faces that have a name, by name.
+    pub surfaces: BTreeMap<String, Vec<Vec<usize>>>,
+    /// Corners of all faces in the file.
+    pub faces: Vec<Vec<usize>>,
+}
+
+/// A body: the origin is the middle of the touched face.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mesh {
+    /// Where the nodes are, m.
+    pub nodes_m: Vec<[f64; 3]>,
+    /// The elements.
+    pub elements: Vec<Element>,
+    /// Nodes that do not move.
+    pub fixed: Vec<bool>,
+    /// The surface that is touched.
+    pub touched: Vec<Facet>,
+    /// The rest of the surface, less what is fixed.
+    pub free: Vec<Facet>,
+}
+
+/// Why a mesh is no body.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MeshError {
+    /// No element has a volume. `open_m`: an end of the surface, if it is not closed.
+    NoVolume {
+        /// Middle of an edge that only one face has, m.
+        open_m: Option<[f64; 3]>,
+    },
+    /// An element is turned inside out, or folded.
+    Inverted {
+        /// Its number in the file.
+        tag: usize,
+        /// Volume of its reference element's unit at the worst point, m3.
+        jacobian_m3: f64,
+    },
+    /// Three elements share a face, or a face of four corners meets two of three.
+    Overlap {
+        /// One of the elements.
+        tag: usize,
+    },
+    /// Two nodes are at one place: the body has a crack.
+    Twins {
+        /// Where, m.
+        at_m: [f64; 3],
+    },
+    /// No surface has this name.
+    NoSurface {
+        /// `fixed` or `touched`.
+        role: &'static str,
+        /// The name.
+        name: String,
+        /// Those there are.
+        names: Vec<String>,
+    },
+    /// A named face is not on the surface that the elements leave: elements are missing or too many there.
+    NotOnSurface {
+        /// The name of the surface.
+        name: String,
+        /// Where, m.
+        at_m: [f64; 3],
+    },
+    /// A part of the body hangs on nothing.
+    Loose {
+        /// One of its elements.
+        tag: usize,
+    },
+    /// The fixed and the touched surface share nodes.
+    Shared,
+    /// Coordinates are not metres, or not numbers.
+    Extent {
+        /// The longest side, m.
+        extent_m: f64,
+    },
+}
+
+impl fmt::Display for MeshError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mm =
+            |at: &[f64; 3]| format!("({:.3}, {:.3}, {:.3}) mm", at[0] * 1.0e3, at[1] * 1.0e3, at[2] * 1.0e3);
+        match self {
+            Self::NoVolume { open_m: Some(at) } => write!(
+                f,
+                "an open surface and no volume: the surface ends at {}; close it, and mesh the volume (`gmsh -3 -order 2`)",
+                mm(at)
+            ),
+            Self::NoVolume { open_m: None } => {
+                write!(
+                    f,
+                    "no element has a volume: mesh it (`gmsh -3 -order 2`), and give the volume a physical group"
+                )
+            }
+            Self::Inverted { tag, jacobian_m3 } => write!(
+                f,
+                "element {tag} is inverted or folded (Jacobian determinant {jacobian_m3:.3e} m3): its nodes are in the wrong order, or a curved edge is bent too far"
+            ),
+            Self::Overlap { tag } => {
+                write!(
+                    f,
+                    "the faces of element {tag} do not fit those of its neighbours: elements overlap or differ in kind there"
+                )
+            }
+            Self::Twins { at_m } => {
+                write!(
+                    f,
+                    "two nodes at {}: the body has a crack there; merge them (`Coherence Mesh;`)",
+                    mm(at_m)
+                )
+            }
+            Self::NoSurface { role, name, names } => {
+                let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+                let (what, parameter) = if *role == "fixed" {
+                    ("no fixed nodes", "fixed_face")
+                } else {
+                    ("nothing to touch", "touched_face")
+                };
+                write!(
+                    f,
+                    "{what}: no physical surface is named \"{name}\" (there are: {known}); name one so, or set `{parameter}`"
+                )
+            }
+            Self::NotOnSurface { name, at_m } => write!(
+                f,
+                "the surface \"{name}\" is open: at {} it is not the border of the elements; elements are missing there, or it lies inside",
+                mm(at_m)
+            ),
+            Self::Loose { tag } => {
+                write!(f, "element {tag} is connected to no fixed face: fix every part of the body")
+            }
+            Self::Shared => {
+                write!(f, "the fixed and the touched face share nodes: leave a gap between them")
+            }
+            Self::Extent { extent_m } => write!(
+                f,
+                "the mesh is {extent_m} m long: coordinates are metres, and a body is at most 10 m long (`Mesh.ScalingFactor = 0.001` turns millimetres into metres)"
+            ),
+        }
+    }
+}
+
+fn middle(nodes_m: &[[f64; 3]], of: &[usize]) -> [f64; 3] {
+    [0, 1, 2].map(|k| of.iter().map(|&node| nodes_m[node][k]).sum::<f64>() / of.len() as f64)
+}
+
+fn sorted(corners: &[usize]) -> Vec<usize> {
+    let mut key = corners.to_vec();
+    key.sort_unstable();
+    key
+}
+
+/// Middle of an edge that an odd number of faces have.
+fn open_edge(nodes_m: &[[f64; 3]], faces: &[Vec<usize>]) -> Option<[f64; 3]> {
+    let mut edges: BTreeMap<Vec<usize>, usize> = BTreeMap::new();
+    for face in faces {
+        for (i, &from) in face.iter().enumerate() {
+            *edges.entry(sorted(&[from, face[(i + 1) % face.len()]])).or_default() += 1;
+        }
+    }
+    edges.iter().find(|(_, count)| **count % 2 == 1).map(|(edge, _)| middle(nodes_m, edge))
+}
+
+impl Mesh {
+    /// A body of these parts, its surfaces by name. Not real-time.
+    ///
+    /// # Errors
+    /// A [`MeshError`] that names the place and the remedy.
+    pub fn new(parts: Parts, fixed_name: &str, touched_name: &str) -> Result<Self, MeshError> {
+        let Parts { mut nodes_m, elements, surfaces, faces } = parts;
+        if elements.is_empty() {
+            return Err(MeshError::NoVolume { open_m: open_edge(&nodes_m, &faces) });
+        }
+        check_places(&nodes_m, &elements)?;
+        for element in &elements {
+            check_element(&nodes_m, element)?;
+        }
+        let mut border = border(&elements)?;
+        let mut take = |role: &'static str, name: &str| -> Result<Vec<Facet>, MeshError> {
+            let found =
+                surfaces.get(name).filter(|faces| !faces.is_empty()).ok_or_else(|| MeshError::NoSurface {
+                    role,
+                    name: name.to_owned(),
+                    names: surfaces.keys().cloned().collect(),
+                })?;
+            let unique: BTreeSet<Vec<usize>> = found.iter().map(|corners| sorted(corners)).collect();
+            unique
+                .into_iter()
+                .map(|corners| {
+                    let at_m = middle(&nodes_m, &corners);
+                    border
+                        .remove(&corners)
+                        .ok_or_else(|| MeshError::NotOnSurface { name: name.to_owned(), at_m })
+                })
+                .collect()
+        };
+        let (clamped, touched) = (take("fixed", fixed_name)?, take("touched", touched_name)?);
+        let mut fixed = vec![false; nodes_m.len()];
+        clamped.iter().flat_map(|facet| &facet.nodes).for_each(|&node| fixed[node] = true);
+        if touched.iter().flat_map(|facet| &facet.nodes).any(|&node| fixed[node]) {
+            return Err(MeshError::Shared);
+        }
+        check_held(&elements, &fixed)?;
+        let free = border.into_values().collect();
+        let (mut area, mut centre) = (0.0, [0.0; 3]);
+        for facet in &touched {
+            for point in facet.points(&nodes_m) {
+                let size = point.normal_m2.iter().map(|c| c * c).sum::<f64>().sqrt();
+                area += size;
+                centre.iter_mut().zip(point.position_m).for_each(|(sum, c)| *sum += size * c);
+            }
+        }
+        for node in &mut nodes_m {
+            node.iter_mut().zip(centre).for_each(|(x, c)| *x -= c / area);
+        }
+        Ok(Self { nodes_m, elements, fixed, touched, free })
+    }
+}
+
+fn check_places(nodes_m: &[[f64; 3]], elements: &[Element]) -> Result<(), MeshError> {
+    let used: BTreeSet<usize> = elements.iter().flat_map(|element| element.nodes.iter().copied()).collect();
+    let side = |k: usize| {
+        let (low, high) = used
+            .iter()
+            .map(|&node| nodes_m[node][k])
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), c| (low.min(c), high.max(c)));
+        high - low
+    };
+    let extent_m = side(0).max(side(1)).max(side(2));
+    if !(extent_m > 0.0 && extent_m <= 10.0)
+        || used.iter().any(|&node| nodes_m[node].iter().any(|c| !c.is_finite()))
+    {
+        return Err(MeshError::Extent { extent_m });
+    }
+    // Sorted along x, twins are neighbours within a billionth of the body.
+    let near = 1.0e-9 * extent_m;
+    let mut order: Vec<usize> = used.into_iter().collect();
+    order.sort_by(|&a, &b| nodes_m[a][0].total_cmp(&nodes_m[b][0]));
+    for (i, &a) in order.iter().enumerate() {
+        for &b in order[i + 1..].iter().take_while(|&&b| nodes_m[b][0] - nodes_m[a][0] <= near) {
+            if (1..3).all(|k| (nodes_m[a][k] - nodes_m[b][k]).abs() <= near) {
+                return Err(MeshError::Twins { at_m: nodes_m[a] });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Positive volume at the points of integration and at the corners.
+fn check_element(nodes_m: &[[f64; 3]], element: &Element) -> Result<(), MeshError> {
+    let places: Vec<[f64; 3]> = element.nodes.iter().map(|&node| nodes_m[node]).collect();
+    let geometry = Geometry { kind: element.kind, nodes_m: &places };
+    let points = element.kind.rule().into_iter().map(|(at, _)| at).chain(element.kind.corner_places());
+    let worst = points
+        .map(|at| geometry.slopes(at).1)
+        .fold(f64::INFINITY, |least, j| if j < least { j } else { least });
+    if worst > 0.0 { Ok(()) } else { Err(MeshError::Inverted { tag: element.tag, jacobian_m3: worst }) }
+}
+
+/// Faces that one element has, by their sorted corners.
+fn border(elements: &[Element]) -> Result<BTreeMap<Vec<usize>, Facet>, MeshError> {
+    let mut all: BTreeMap<Vec<usize>, (usize, Facet)> = BTreeMap::new();
+    let mut tags: BTreeMap<Vec<usize>, usize> = BTreeMap::new();
+    for element in elements {
+        for face in 0..element.kind.faces().len() {
+            let nodes: Vec<usize> =
+                element.kind.face_nodes(face).into_iter().map(|local| element.nodes[local]).collect();
+            let corners = element.kind.faces()[face].len();
+            let key = sorted(&nodes[..corners]);
+            tags.insert(key.clone(), element.tag);
+            let entry = all.entry(key).or_insert((0, Facet { corners, nodes }));
+            entry.0 += 1;
+            if entry.0 > 2 {
+                return Err(MeshError::Overlap { tag: element.tag });
+            }
+        }
+    }
+    let single: BTreeMap<Vec<usize>, Facet> =
+        all.into_iter().filter(|(_, (count, _))| *count == 1).map(|(key, (_, facet))| (key, facet)).collect();
+    // A square that two triangles cover from the other side.
+    for (key, facet) in single.iter().filter(|(_, facet)| facet.corners == 4) {
+        for left_out in 0..4 {
+            let mut triangle = key.clone();
+            triangle.remove(left_out);
+            if facet.corners == 4 && single.contains_key(&triangle) {
+                return Err(MeshError::Overlap { tag: tags[key] });
+            }
+        }
+    }
+    Ok(single)
+}
+
+/// Every element hangs on something fixed, over the nodes it shares.
+fn check_held(elements: &[Element], fixed: &[bool]) -> Result<(), MeshError> {
+    let mut around: Vec<Vec<usize>> = vec![Vec::new(); fixed.len()];
+    for (index, element) in elements.iter().enumerate() {
+        element.nodes.iter().for_each(|&node| around[node].push(index));
+    }
+    let mut held: Vec<bool> = elements.iter().map(|e| e.nodes.iter().any(|&node| fixed[node])).collect();
+    let mut next: Vec<usize> = (0..elements.len()).filter(|&index| held[index]).collect();
+    while let Some(index) = next.pop() {
+        for &node in &elements[index].nodes {
+            for &other in &around[node] {
+                if !held[other] {
+                    held[other] = true;
+                    next.push(other);
+                }
+            }
+        }
+    }
+    held.iter()
+        .position(|held| !held)
+        .map_or(Ok(()), |index| Err(MeshError::Loose { tag: elements[index].tag }))
+}
+
+/// The stiffness of a mesh of one material.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshStiffness<'a> {
+    /// The body.
+    pub mesh: &'a Mesh,
+    /// The material.
+    pub lame: Lame,
+}
+
+impl Assembly for MeshStiffness<'_> {
+    fn node_count(&self) -> usize {
+        self.mesh.nodes_m.len()
+    }
+
+    fn element_count(&self) -> usize {
+        self.mesh.elements.len()
+    }
+
+    fn nodes(&self, element: usize) -> Vec<usize> {
+        self.mesh.elements[element].nodes.clone()
+    }
+
+    fn stiffness(&self, element: usize) -> Vec<f64> {
+        let Element { kind, nodes, .. } = &self.mesh.elements[element];
+        let places: Vec<[f64; 3]> = nodes.iter().map(|&node| self.mesh.nodes_m[node]).collect();
+        Geometry { kind: *kind, nodes_m: &places }.stiffness(self.lame)
+    }
+
+    /// Across the longest side of the box about the elements' middles.
+    fn halves(&self, mut elements: Vec<usize>) -> [Vec<usize>; 2] {
+        let at = |element: usize, axis: usize| {
+            middle(&self.mesh.nodes_m, &self.mesh.elements[element].nodes)[axis]
+        };
+        let side = |axis: usize| {
+            let all = || elements.iter().map(|&element| at(element, axis));
+            all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min)
+        };
+        let sides = [side(0), side(1), side(2)];
+        let longest = (0..3).fold(0, |best, axis| if sides[axis] > sides[best] { axis } else { best });
+        elements.sort_by(|&a, &b| at(a, longest).total_cmp(&at(b, longest)).then(a.cmp(&b)));
+        let upper = elements.split_off(elements.len() / 2);
+        [elements, upper]
+    }
+}

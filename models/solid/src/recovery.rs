@@ -1,0 +1,78 @@
+//! How good a mesh is: stresses smoothed over the nodes against those of the elements.
+//!
+//! Zienkiewicz and Zhu, *Int. J. Numer. Meth. Engng* 24 (1987) 337-357: elements disagree about the stress at a node they
+//! share, and the energy of the difference between their stress and its mean estimates the energy of the error.
+
+use crate::cells::{Geometry, Kind};
+use crate::mesh::MeshStiffness;
+
+type Stress = [[f64; 3]; 3];
+
+/// Twice the energy of the error of each column of displacements, J: the error of a stiffness, where displacements of size one
+/// are prescribed, or of a compliance under forces of size one. Not real-time.
+#[must_use]
+pub fn twice_error_j(body: &MeshStiffness<'_>, displacement: &[f64], columns: usize) -> Vec<f64> {
+    let MeshStiffness { mesh, lame } = body;
+    let zero: Stress = [[0.0; 3]; 3];
+    let mut smooth = vec![zero; mesh.nodes_m.len() * columns];
+    let mut around = vec![0.0; mesh.nodes_m.len()];
+    let stress = |nodes: &[usize], slopes: &[[f64; 3]], column: usize| -> Stress {
+        let mut gradient = zero;
+        for (&node, slope) in nodes.iter().zip(slopes) {
+            for (i, row) in gradient.iter_mut().enumerate() {
+                let u = displacement[(3 * node + i) * columns + column];
+                row.iter_mut().zip(slope).for_each(|(g, s)| *g += u * s);
+            }
+        }
+        let trace = lame.lambda_pa * (gradient[0][0] + gradient[1][1] + gradient[2][2]);
+        [0, 1, 2].map(|i| {
+            [0, 1, 2]
+                .map(|j| lame.mu_pa * (gradient[i][j] + gradient[j][i]) + if i == j { trace } else { 0.0 })
+        })
+    };
+    let places = |nodes: &[usize]| nodes.iter().map(|&node| mesh.nodes_m[node]).collect::<Vec<_>>();
+    for element in &mesh.elements {
+        let nodes_m = places(&element.nodes);
+        let geometry = Geometry { kind: element.kind, nodes_m: &nodes_m };
+        for (&node, at) in element.nodes.iter().zip(node_places(element.kind)) {
+            let (slopes, _) = geometry.slopes(at);
+            around[node] += 1.0;
+            for column in 0..columns {
+                let sum = &mut smooth[node * columns + column];
+                for (row, more) in sum.iter_mut().zip(stress(&element.nodes, &slopes, column)) {
+                    row.iter_mut().zip(more).for_each(|(s, m)| *s += m);
+                }
+            }
+        }
+    }
+    let mut errors = vec![0.0; columns];
+    for element in &mesh.elements {
+        let nodes_m = places(&element.nodes);
+        let geometry = Geometry { kind: element.kind, nodes_m: &nodes_m };
+        for (at, weight) in element.kind.rule() {
+            let shapes = element.kind.shapes(at);
+            let (slopes, determinant) = geometry.slopes(at);
+            for (column, error) in errors.iter_mut().enumerate() {
+                let mut d = stress(&element.nodes, &slopes, column);
+                for (&node, (share, _)) in element.nodes.iter().zip(&shapes) {
+                    for (row, mean) in d.iter_mut().zip(smooth[node * columns + column]) {
+                        row.iter_mut().zip(mean).for_each(|(s, m)| *s -= share * m / around[node]);
+                    }
+                }
+                let square: f64 = d.iter().flatten().map(|c| c * c).sum();
+                let trace = d[0][0] + d[1][1] + d[2][2];
+                let bulk = lame.lambda_pa / (3.0 * lame.lambda_pa + 2.0 * lame.mu_pa);
+                *error += weight * determinant * (square - bulk * trace * trace) / (2.0 * lame.mu_pa);
+            }
+        }
+    }
+    errors
+}
+
+/// Where the nodes are in the reference element.
+fn node_places(kind: Kind) -> Vec<[f64; 3]> {
+    let corners = kind.corner_places();
+    let middles =
+        kind.edges().iter().map(|[a, b]| [0, 1, 2].map(|k| 0.5 * (corners[*a][k] + corners[*b][k])));
+    corners.iter().copied().chain(middles).collect()
+}
