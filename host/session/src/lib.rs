@@ -15,6 +15,7 @@
 
 pub mod calibration_file;
 mod calls;
+mod estimates;
 pub mod headless;
 mod machine;
 pub mod program;
@@ -29,6 +30,7 @@ pub mod telemetry;
 pub use calls::{
     Call, CallError, LIMIT_VARIABLE, Notice, Unresponsive, is_left_behind, stop_waits_with, tell_notices,
 };
+pub use estimates::estimates;
 pub use run_recording::RunRecording;
 pub use session::{
     ControlError, Controls, DeviceOutcome, LatchGuard, LatchWatch, Lockstep, Misbehaved, NewValue, Observer,

@@ -254,6 +254,9 @@ pub struct PluginSummary {
     pub health: String,
     /// Every parameter with the value in force.
     pub parameters: std::collections::BTreeMap<String, String>,
+    /// What a model says of its own error, by the names of its details.
+    #[serde(skip_serializing_if = "std::collections::BTreeMap::is_empty")]
+    pub estimates: std::collections::BTreeMap<String, f64>,
 }
 
 /// What a summary is made of, beyond the outcome.
@@ -456,6 +459,9 @@ impl RunSummary {
         for plugin in &self.plugins {
             let health = if plugin.health == "ok" { String::new() } else { format!("  {}", plugin.health) };
             row(plugin.kind, format!("{} {} ({}){health}", plugin.id, plugin.version, plugin.file));
+            for (name, value) in &plugin.estimates {
+                row("", format!("{name} {value:.1e}, by the model's own estimate"));
+            }
         }
         for warning in &self.warnings {
             row("warning", warning.clone());
@@ -568,6 +574,7 @@ fn summary_of(plugin: &PluginReport, health: String) -> PluginSummary {
         file: plugin.metadata.path.display().to_string(),
         health,
         parameters: plugin.parameters.iter().cloned().collect(),
+        estimates: plugin.estimates.iter().cloned().collect(),
     }
 }
 

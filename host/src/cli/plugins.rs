@@ -1,24 +1,31 @@
 //! `flotor plugins`: the installed plugins, read from their files without running any of them.
 
 use clap::Args;
+use flotor_command::options::{KeyValue, settings};
 use flotor_command::say;
 use flotor_command::{CommandError, style, write_json};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Metadata, Plugin};
-use flotor_hal::{Mutability, Parameter, ParameterKind};
+use flotor_hal::{Input, Mutability, Output, Parameter, ParameterKind, Pose, Wrench};
+use flotor_session::estimates;
 use flotor_session::registry::{PATH_VARIABLE, Registry, SkippedFolder};
 use serde::Serialize;
 use std::path::Path;
+use std::time::Instant;
 
 /// List the installed plugins, without running any of them.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  flotor plugins\n  flotor plugins spring        its parameters, with units and ranges\n  \
+    flotor plugins solid --set tool_radius_mm=5      also its own estimate of its error, and its time\n  \
     flotor plugins --json | python3 -m json.tool"
 )]
 pub(crate) struct PluginsArguments {
     /// Id of a plugin: show its parameters (this loads the plugin)
     id: Option<String>,
+    /// Setting with which the model's own error and its time are told (repeatable)
+    #[arg(long = "set", value_name = "KEY=VALUE", requires = "id", conflicts_with = "json")]
+    sets: Vec<KeyValue>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -38,7 +45,7 @@ struct Listed<'a> {
 pub(crate) fn run(arguments: &PluginsArguments) -> Result<(), CommandError> {
     let registry = Registry::search(&[]);
     match &arguments.id {
-        Some(id) => describe(&registry, id, arguments.json),
+        Some(id) => describe(&registry, id, &arguments.sets, arguments.json),
         None => list(&registry, arguments.json),
     }
 }
@@ -104,13 +111,53 @@ struct Described<'a> {
     doc: &'a str,
 }
 
-fn describe(registry: &Registry, id: &str, json: bool) -> Result<(), CommandError> {
+fn describe(registry: &Registry, id: &str, sets: &[KeyValue], json: bool) -> Result<(), CommandError> {
     let plugin = registry.load_any(id)?;
     let parameters: Vec<Described<'_>> = plugin.parameters().iter().map(described).collect();
     if json {
         return write_json(Path::new("-"), &parameters);
     }
     print_description(&plugin, &parameters);
+    if plugin.metadata().kind == PluginKind::Model {
+        print_certificate(&plugin, sets)?;
+    }
+    Ok(())
+}
+
+/// Ticks at home whose time is told.
+const TIMED_TICKS: usize = 1000;
+
+/// What a model says of its own error with some settings, and the time of a tick: where it estimates one, or settings are
+/// given.
+fn print_certificate(plugin: &Plugin, sets: &[KeyValue]) -> Result<(), CommandError> {
+    let settings = settings(plugin, sets)?;
+    let started = Instant::now();
+    let mut model = match plugin.create_model(&settings) {
+        Ok(model) => model,
+        Err(_) if sets.is_empty() => return Ok(()), // not without settings
+        Err(error) => return Err(error.into()),
+    };
+    let ready_s = started.elapsed().as_secs_f64();
+    let estimates = estimates(&mut model);
+    if estimates.is_empty() && sets.is_empty() {
+        return Ok(());
+    }
+    let home = Input::at_rest(Pose::HOME);
+    let mut output = Output::from(Wrench::ZERO);
+    let mut times_ns: Vec<u128> = (0..TIMED_TICKS)
+        .map(|_| {
+            let started = Instant::now();
+            let _ = model.step(&home, &mut output);
+            started.elapsed().as_nanos()
+        })
+        .collect();
+    times_ns.sort_unstable();
+    let with = if sets.is_empty() { "defaults" } else { "these settings" };
+    say!("with {with}: ready in {ready_s:.2} s, a tick at home {} ns (median)", times_ns[TIMED_TICKS / 2]);
+    for (detail, value) in estimates {
+        say!("  {:<28} {value:.1e}", detail.id());
+        say!("  {:<28} {}", "", detail.doc());
+    }
     Ok(())
 }
 

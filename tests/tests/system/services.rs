@@ -397,7 +397,6 @@ fn a_service_is_lent_beside_a_program_and_what_cannot_be_is_said_in_one_line() {
 /// A service that nobody needs any more would hold a device, and the port of the next one.
 #[test]
 fn a_service_ends_with_the_process_that_lends_it() {
-    built();
     let free =
         TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("a port is free");
     let address = free.to_string();

@@ -142,6 +142,8 @@ pub struct PluginReport {
     pub parameters: Vec<(String, String)>,
     /// Signals of the host that it took away while it was made, and that were taken back.
     pub signals_taken: TakenSignals,
+    /// What a model says of its own error when it is ready ([`crate::estimates`]), by name.
+    pub estimates: Vec<(String, f64)>,
 }
 
 impl PluginReport {

@@ -5,6 +5,7 @@ use super::controls::{ControlError, NewValue, Parts, understands};
 use super::{PluginReport, RunError};
 use crate::calibration_file::{CalibrationFile, CalibrationFileError};
 use crate::calls::{Call, Progress, attended_while, is_to_begin, keeping_machine, limit};
+use crate::estimates;
 use crate::registry::{Registry, is_installed};
 use crate::scene::{
     Alternative, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, Pacing,
@@ -203,9 +204,10 @@ pub(super) fn prepare_model_while(
         Isolation::ByOrigin | Isolation::None => limit(),
     };
     let make = move |progress: &Progress| making.layer(progress);
-    let (layer, values) = keeping_machine(&model.name, || attended_while(most, is_wanted, make))??;
+    let (layer, values, estimates) = keeping_machine(&model.name, || attended_while(most, is_wanted, make))??;
     let mut report = report(&plugin, &model.name, &model.plugin, &settings, |index| value_at(&values, index));
     report.signals_taken = signals.put_back();
+    report.estimates = estimates;
     Ok((layer, report))
 }
 
@@ -243,6 +245,9 @@ fn isolation(model: &ModelUse, plugin: &Metadata, clock: Clock) -> Result<Isolat
     }
 }
 
+/// Estimates of a model's own error, by the names of its details.
+type Estimates = Vec<(String, f64)>;
+
 /// All it takes to create a model.
 struct Making {
     isolation: Isolation,
@@ -254,8 +259,9 @@ struct Making {
 }
 
 impl Making {
-    /// The model in all its places, and the values of its parameters in force. Runs the plugin's code.
-    fn layer(&self, progress: &Progress) -> Result<(Layer, Vec<f64>), RunError> {
+    /// The model in all its places, the values of its parameters in force, and its estimates of its own error. Runs the
+    /// plugin's code.
+    fn layer(&self, progress: &Progress) -> Result<(Layer, Vec<f64>, Estimates), RunError> {
         let Self { plugin, model, config, clock, .. } = self;
         let budget_ns = budget_ns(model, *clock, config.period_ns);
         let mapping = Mapping::new(&model.mapping);
@@ -274,13 +280,19 @@ impl Making {
         let mut instances = model.places_m.iter().map(instance).collect::<Result<Vec<_>, RunError>>()?;
         let mut value = |index| instances.first_mut().map_or(f64::NAN, |(first, _)| first.parameter(index));
         let values = (0..plugin.parameters().len()).map(&mut value).collect();
+        let estimates = match instances.first_mut() {
+            Some((Engine::Here(model), _)) => estimates(model),
+            _ => Vec::new(), // the process of a model tells wrenches only
+        };
+        let estimates =
+            estimates.into_iter().map(|(detail, value)| (detail.id().to_owned(), value)).collect();
         let budget = match (self.isolation, &model.field) {
             // Nobody waits for it any longer than that: how often is the same rule.
             (Isolation::Process, None) => TimeBudget::new(Some(budget_ns.unwrap_or(PATIENCE_NS))),
             (_, None) => TimeBudget::new(budget_ns),
             (_, Some(_)) => TimeBudget::default(),
         };
-        Ok((Layer::new(instances, &model.blend, budget, config), values))
+        Ok((Layer::new(instances, &model.blend, budget, config), values, estimates))
     }
 
     /// One instance, wherever it is to run.
@@ -392,6 +404,7 @@ fn report(
         settings: written.collect(),
         parameters: in_force(plugin, settings, value),
         signals_taken: TakenSignals::default(),
+        estimates: Vec::new(),
     }
 }
 
