@@ -17,6 +17,9 @@ const TOOLS: Choices = choices!["sphere", "plate", "punch-round", "punch-square"
 const BONDS: Choices = choices!["bonded", "frictionless"];
 const RESOLUTIONS: Choices = choices!["quick", "standard", "fine"];
 
+/// By how much the squared length of an orientation may differ from one: as in the spring.
+const UNIT_NORM_TOLERANCE: f64 = 1.0e-6;
+
 /// Index of the one live parameter.
 const YOUNGS_MODULUS: usize = 4;
 
@@ -158,7 +161,9 @@ impl ForceModel for Solid {
     }
 
     fn step(&mut self, input: &Input) -> Output {
-        if !input.pose.is_finite() {
+        let norm_error = input.pose.orientation().length_squared() - 1.0;
+        // NaN is no length either.
+        if !(input.pose.is_finite() && norm_error.abs() < UNIT_NORM_TOLERANCE) {
             self.depth_m = f64::NAN;
             return Output::new(Wrench::ZERO, f64::NAN, StepStatus::InvalidInput);
         }

@@ -51,3 +51,31 @@ impl RigidPatch {
         (Wrench::new(force_n, torque_nm), energy_j)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_wrench_is_minus_the_slope_of_the_energy() {
+        let mut stiffness = [[0.0; MODES]; MODES];
+        for i in 0..MODES {
+            for j in 0..MODES {
+                stiffness[i][j] = ((3 * i * j + i + j) as f64).sin() + if i == j { 12.0 } else { 0.0 };
+            }
+        }
+        let patch = RigidPatch { stiffness };
+        let (position, turn) =
+            (DVec3::new(0.3, -0.2, 0.5), DQuat::from_scaled_axis(DVec3::new(0.4, -0.7, 0.2)));
+        let (wrench, _) = patch.answer(position, turn);
+        let h = 1.0e-5;
+        for axis in DVec3::AXES {
+            let moved = |s: f64| patch.answer(position + axis * s, turn).1;
+            let turned = |s: f64| patch.answer(position, DQuat::from_scaled_axis(axis * s) * turn).1;
+            let (force, torque) = ((moved(h) - moved(-h)) / (2.0 * h), (turned(h) - turned(-h)) / (2.0 * h));
+            // Central differences: h squared times third derivatives of order twelve.
+            assert!((wrench.force().dot(axis) + force).abs() < 1.0e-8, "{axis}");
+            assert!((wrench.torque().dot(axis) + torque).abs() < 1.0e-8, "{axis}");
+        }
+    }
+}

@@ -187,6 +187,17 @@ fn any_pose_has_a_finite_answer_and_a_status() {
     }
 }
 
+/// A rotation is a quaternion of length one: anything else is no pose, however finite.
+#[test]
+fn an_orientation_that_is_none_is_invalid_input() {
+    let mut punch = model(&[("body", "half-space"), ("tool", "punch-square"), ("tool_side_mm", "20")]);
+    for orientation_xyzw in [[0.0; 4], [1.0e199; 4], [0.0, 0.0, 0.0, 1.0e308], [0.0, 0.0, 0.0, 1.01]] {
+        let output = step(&mut punch, Pose { position_m: [1.0e-3; 3], orientation_xyzw });
+        assert_eq!(output.status(), Some(StepStatus::InvalidInput), "{orientation_xyzw:?}");
+        assert_eq!(output.wrench, Wrench::ZERO);
+    }
+}
+
 /// With friction a closed path costs energy, or nothing where nothing slips.
 #[test]
 fn friction_only_takes_energy() {
