@@ -120,6 +120,10 @@ fn describe(registry: &Registry, id: &str, sets: &[KeyValue], json: bool) -> Res
     print_description(&plugin, &parameters);
     if plugin.metadata().kind == PluginKind::Model {
         print_certificate(&plugin, sets)?;
+    } else if !sets.is_empty() {
+        return Err(CommandError::Usage(format!(
+            "--set: `{id}` is a device; only models tell their own error"
+        )));
     }
     Ok(())
 }

@@ -46,6 +46,29 @@ fn no_plugin_violates_a_rule() {
     }
 }
 
+/// A model that estimates its own error is believed aloud: before a run and after it.
+#[test]
+fn a_model_tells_its_estimate_of_its_own_error() {
+    let settings = ["--set", "tool=punch-square", "--set", "body=half-space"];
+    let ran = Flotor::with(["plugins", "solid"].into_iter().chain(settings)).run();
+    let line =
+        ran.stdout.lines().find(|line| line.trim_start().starts_with("mesh_error")).unwrap_or_default();
+    let told: f64 = line.split_whitespace().nth(1).and_then(|word| word.parse().ok()).unwrap_or_default();
+    assert!(told > 0.0 && told < 0.1 && ran.stdout.contains("a tick at home"), "{ran:?}");
+    let scratch = Scratch::default();
+    let scene = "[device]\nplugin = \"simulated\"\n[[model]]\nplugin = \"solid\"\n[model.parameters]\n\
+                 tool = \"punch-square\"\nbody = \"half-space\"\n";
+    let scene = scratch.file("solid.toml", scene.as_bytes()).display().to_string();
+    let ran = Flotor::with(["run", &scene, "--clock", "virtual", "--duration", "10ms", "--json", "-"]).run();
+    let summary: Value = serde_json::from_str(&ran.stdout).expect("the summary is JSON");
+    let plugins = summary["plugins"].as_array().cloned().unwrap_or_default();
+    let solid = plugins.iter().find(|plugin| plugin["id"] == "solid").expect("the solid");
+    let estimate = solid["estimates"]["mesh_error"].as_f64().expect("an estimate");
+    assert!((estimate / told - 1.0).abs() < 0.1, "{estimate} {told}");
+    let ran = Flotor::with(["plugins", "simulated", "--set", "preset=full"]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+}
+
 #[test]
 fn completions_end_in_order_where_their_reader_has_gone() {
     let ran = Flotor::with(["completions", "bash"]).through_shell("\"$1\" completions bash | true").run();
