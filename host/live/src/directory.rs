@@ -2,7 +2,7 @@
 
 use rustix::process::{Pid, getuid, test_kill_process};
 use std::ffi::OsStr;
-use std::fs::DirBuilder;
+use std::fs::{DirBuilder, DirEntry, Metadata};
 use std::io;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::os::unix::net::UnixListener;
@@ -77,11 +77,23 @@ impl Directory {
         &self.path
     }
 
+    /// Whether it is a folder of this user. Of another user's nothing is believed: in `/tmp` anybody can make one of this name.
+    #[must_use]
+    pub fn is_ours(&self) -> bool {
+        std::fs::symlink_metadata(&self.path).is_ok_and(|attributes| is_our_folder(&attributes))
+    }
+
+    /// The files in it; none in a folder of another user.
+    #[must_use]
+    pub fn files(&self) -> Vec<DirEntry> {
+        let entries = self.is_ours().then(|| std::fs::read_dir(&self.path).ok()).flatten();
+        entries.into_iter().flatten().flatten().collect()
+    }
+
     /// Runs of processes that live, the newest first. Sockets of dead ones are removed on the way.
     #[must_use]
     pub fn runs(&self) -> Vec<Found> {
-        let entries = std::fs::read_dir(&self.path).into_iter().flatten().flatten();
-        let mut runs: Vec<Found> = entries
+        let mut runs: Vec<Found> = (self.files().into_iter())
             .filter_map(|entry| {
                 let path = entry.path();
                 let process = process_of(&path)?;
@@ -153,12 +165,15 @@ impl Drop for Listener {
 pub(crate) fn private(path: &Path) -> Result<(), DirectoryError> {
     DirBuilder::new().recursive(true).mode(PRIVATE).create(path).map_err(unusable(path))?;
     let attributes = std::fs::symlink_metadata(path).map_err(unusable(path))?;
-    let ours = attributes.is_dir() && attributes.uid() == getuid().as_raw();
-    if ours && attributes.mode() & 0o077 == 0 {
+    if is_our_folder(&attributes) && attributes.mode() & 0o077 == 0 {
         Ok(())
     } else {
         Err(DirectoryError::NotPrivate { path: path.to_path_buf() })
     }
+}
+
+fn is_our_folder(attributes: &Metadata) -> bool {
+    attributes.is_dir() && attributes.uid() == getuid().as_raw()
 }
 
 pub(crate) fn unusable(path: &Path) -> impl FnOnce(io::Error) -> DirectoryError {
@@ -217,5 +232,31 @@ mod tests {
         std::fs::set_permissions(scratch.path(), std::fs::Permissions::from_mode(0o755)).unwrap();
         let refused = Directory::at(scratch.path()).listen();
         assert!(matches!(refused, Err(DirectoryError::NotPrivate { .. })), "{refused:?}");
+    }
+
+    /// Who made the folder first wrote what this user's runs obeyed, and showed runs of its own.
+    #[test]
+    fn of_a_folder_of_another_user_nothing_is_believed() {
+        let scratch = tempfile::tempdir().unwrap();
+        let directory = Directory::at(scratch.path().join("flotor"));
+        let run = directory.listen().unwrap();
+        let peer = scratch.path().join(format!("flotor/{}-pair.peer", std::process::id()));
+        std::fs::write(peer, "").unwrap();
+        directory.latch().press("a stranger").unwrap();
+        let seen = |directory: &Directory| {
+            let pressed = directory.latch().state().pressed.is_some();
+            (directory.runs().len(), directory.couplings().len(), pressed)
+        };
+        assert_eq!(seen(&directory), (1, 1, true));
+        // Only root can give it away; by a link to it nobody gets further.
+        if getuid().is_root() {
+            std::os::unix::fs::chown(directory.path(), Some(65534), None).unwrap();
+            assert_eq!(seen(&directory), (0, 0, false));
+            std::os::unix::fs::chown(directory.path(), Some(0), None).unwrap();
+        }
+        let link = Directory::at(scratch.path().join("link"));
+        std::os::unix::fs::symlink(directory.path(), link.path()).unwrap();
+        assert_eq!(seen(&link), (0, 0, false));
+        drop(run);
     }
 }

@@ -5,7 +5,7 @@
 //! cannot be read counts as a press. Not real-time.
 
 use crate::Directory;
-use crate::directory::{DirectoryError, private, unusable};
+use crate::directory::{DirectoryError, unusable};
 use serde::{Deserialize, Serialize};
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
@@ -21,6 +21,7 @@ const LONGEST_NAME: usize = 120;
 /// Stops every run of this user on this machine until it is released.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Latch {
+    directory: Directory,
     path: PathBuf,
 }
 
@@ -54,7 +55,7 @@ impl Directory {
     /// The latch of the runs whose sockets are in this folder.
     #[must_use]
     pub fn latch(&self) -> Latch {
-        Latch { path: self.path().join(FILE) }
+        Latch { directory: self.clone(), path: self.path().join(FILE) }
     }
 }
 
@@ -71,9 +72,12 @@ impl Latch {
         std::fs::metadata(&self.path).ok().map(|attributes| attributes.len())
     }
 
-    /// What it says now.
+    /// What it says now. In a folder of another user there is none: others could press it, and nothing can be pressed there.
     #[must_use]
     pub fn state(&self) -> LatchState {
+        if !self.directory.is_ours() {
+            return LatchState::default();
+        }
         let bytes = match std::fs::read(&self.path) {
             Ok(bytes) => bytes,
             Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
@@ -124,8 +128,7 @@ impl Latch {
     }
 
     fn append(&self, entry: &Entry) -> Result<(), DirectoryError> {
-        let folder = self.path.parent().unwrap_or(&self.path);
-        private(folder)?;
+        self.directory.make()?;
         // Neither word nor number of it fails to become JSON.
         let line = serde_json::to_string(entry).unwrap_or_default() + "\n";
         let file = OpenOptions::new().append(true).create(true).mode(0o600).open(&self.path);

@@ -3,6 +3,7 @@
 use flotor_core::{Change, ChangeOutcome, ChangeSubject};
 use flotor_hal::{Mutability, Parameter, ParameterKind};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::path::PathBuf;
 
 /// The first thing a host says.
@@ -163,6 +164,42 @@ pub struct Request {
     /// What is asked for.
     #[serde(flatten)]
     pub ask: Ask,
+}
+
+impl Request {
+    /// Reads one. A key that we do not know is a misunderstanding; the emergency stop is followed whatever stands beside it.
+    ///
+    /// # Errors
+    /// Its number, as far as there is one, and what is wrong.
+    pub(crate) fn read(json: &[u8]) -> Result<Self, (u64, serde_json::Error)> {
+        let said: Value = serde_json::from_slice(json).map_err(|error| (0, error))?;
+        let number = said.get("number").and_then(Value::as_u64).unwrap_or(0);
+        let read = || {
+            let request = Self::deserialize(&said)?;
+            let unknown = unknown_key(&said, &serde_json::to_value(&request)?);
+            match unknown.filter(|_| request.ask != Ask::EmergencyStop) {
+                Some(key) => Err(serde::de::Error::custom(format!("unknown key `{key}`"))),
+                None => Ok(request),
+            }
+        };
+        read().map_err(|error| (number, error))
+    }
+}
+
+/// A key that was said and not read, wherever it is.
+fn unknown_key(said: &Value, read: &Value) -> Option<String> {
+    match (said, read) {
+        (Value::Object(said), Value::Object(read)) => {
+            said.iter().find_map(|(key, said)| match read.get(key) {
+                Some(read) => unknown_key(said, read),
+                None => Some(key.clone()),
+            })
+        }
+        (Value::Array(said), Value::Array(read)) => {
+            said.iter().zip(read).find_map(|(said, read)| unknown_key(said, read))
+        }
+        _ => None,
+    }
 }
 
 /// What can be asked for.
@@ -346,9 +383,6 @@ mod tests {
         let Ask::Set { values } = &request.ask else { panic!("{request:?}") };
         assert_eq!((request.number, values[0].parameter.as_str()), (7, "gamma_n"));
         assert_eq!(serde_json::to_string(&request).unwrap(), text);
-        let stop: Request =
-            serde_json::from_str(r#"{"number":1,"ask":"emergency-stop","why":"later"}"#).unwrap();
-        assert_eq!(stop.ask, Ask::EmergencyStop, "keys of a later protocol are left alone");
         let swap: Request = serde_json::from_str(
             r#"{"number":2,"ask":"swap","model":"spring","settings":[["gamma_n","9"]]}"#,
         )
@@ -357,5 +391,29 @@ mod tests {
         assert_eq!((model.as_str(), plugin), ("spring", None));
         assert_eq!(settings, [("gamma_n".to_owned(), "9".to_owned())]);
         assert!(serde_json::from_str::<Request>(r#"{"number":1,"ask":"fly"}"#).is_err());
+    }
+
+    #[test]
+    fn an_unknown_key_anywhere_is_refused_but_beside_an_emergency_stop() {
+        let read = |text: &str| Request::read(text.as_bytes());
+        for (text, key) in [
+            (r#"{"number":7,"ask":"stop","x":1}"#, "x"),
+            (r#"{"number":7,"ask":"look-away","every":1}"#, "every"),
+            (r#"{"number":7,"ask":"watch","every":1,"from":3}"#, "from"),
+            (
+                r#"{"number":7,"ask":"set","values":[{"plugin":"a","parameter":"b","value":"1","tick":5}]}"#,
+                "tick",
+            ),
+            (r#"{"number":7,"ask":"swap","model":"spring","weight":0.5}"#, "weight"),
+        ] {
+            let (number, error) = read(text).unwrap_err();
+            assert_eq!((number, error.to_string()), (7, format!("unknown key `{key}`")), "{text}");
+        }
+        assert_eq!(read(r#"{"number":3,"ask":"fly"}"#).unwrap_err().0, 3);
+        assert_eq!(read("[").unwrap_err().0, 0);
+        let known = read(r#"{"number":2,"ask":"swap","model":"spring","settings":[["gamma_n","9"]]}"#);
+        assert!(known.is_ok(), "{known:?}");
+        let stop = read(r#"{"number":1,"ask":"emergency-stop","why":"later"}"#).unwrap();
+        assert_eq!(stop.ask, Ask::EmergencyStop, "a stop too many is safe");
     }
 }

@@ -60,8 +60,7 @@ impl Directory {
     /// Couplings of runs that live. Sockets of dead ones are removed on the way.
     #[must_use]
     pub fn couplings(&self) -> Vec<FoundCoupling> {
-        let entries = std::fs::read_dir(self.path()).into_iter().flatten().flatten();
-        let mut found: Vec<FoundCoupling> = entries
+        let mut found: Vec<FoundCoupling> = (self.files().into_iter())
             .filter_map(|entry| {
                 let path = entry.path();
                 let ending = path.extension()?.to_str()?;

@@ -147,9 +147,11 @@ fn read(mut stream: UnixStream, outbox: &Outbox, shared: &Shared, heard_ms: &Ato
 }
 
 fn answer(payload: &[u8], outbox: &Outbox, shared: &Shared) -> Answer {
-    let (number, done) = match serde_json::from_slice::<Request>(payload) {
+    let (number, done) = match Request::read(payload) {
         Ok(Request { number, ask }) => (number, carry_out(ask, outbox, shared)),
-        Err(error) => (0, Err((RefusalCause::Request, format!("no request this host knows: {error}")))),
+        Err((number, error)) => {
+            (number, Err((RefusalCause::Request, format!("no request this host knows: {error}"))))
+        }
     };
     let (cause, refused) = done.err().map(|(cause, words)| (cause, Some(words))).unwrap_or_default();
     Answer { number, refused, cause }
