@@ -10,7 +10,7 @@ use super::note;
 use flotor_servo::last_stop::{
     block_signals, leave_process, leave_sent_signals_to_the_loop, stop_all, wait_for_signal, was_armed,
 };
-use flotor_servo::{StopSwitch, enter_guard_priority};
+use flotor_servo::{EmergencySource, StopSwitch, enter_guard_priority};
 use rustix::process::getpgrp;
 use rustix::termios::{LocalModes, OptionalActions, Termios, isatty, tcgetattr, tcgetpgrp, tcsetattr};
 use signal_hook::consts::{
@@ -207,7 +207,7 @@ impl Keys {
         let listening = thread.spawn(move || {
             for key in stdin().lock().bytes().map_while(Result::ok) {
                 match KeyRequest::of(key) {
-                    Some(KeyRequest::Emergency) => stop.emergency_by_key(),
+                    Some(KeyRequest::Emergency) => stop.press(EmergencySource::Key),
                     Some(KeyRequest::Stop) => stop.stop(),
                     None => {}
                 }

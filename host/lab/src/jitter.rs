@@ -7,8 +7,8 @@
 use flotor_hal::SampleWait;
 use flotor_hal::abi::loader::Stopper;
 use flotor_servo::{
-    Percentiles, RealTimeReport, Schedule, SpinWindow, StopSwitch, Timing, enter_real_time, monotonic_ns,
-    sleep_until,
+    Percentiles, RealTimeReport, RunState, Schedule, SpinWindow, StopSwitch, Timing, enter_real_time,
+    monotonic_ns, sleep_until,
 };
 use flotor_session::{RunError, Session};
 use serde::Serialize;
@@ -75,7 +75,7 @@ pub fn measure(
     progress: impl Fn(u64) + Send,
 ) -> Result<JitterReport, RunError> {
     let period_ns = session.period_ns();
-    session.latch().map_or(Ok(()), |latch| latch.obey(stop))?;
+    let _watch = session.latch().map(|latch| latch.obey(stop)).transpose()?;
     let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
     std::thread::scope(|scope| {
         let measured = thread.spawn_scoped(scope, move || {
@@ -98,6 +98,10 @@ pub fn measure(
                 pairs.add(with_servo.missed - servo_before, bare.missed - bare_before);
                 done += 1;
                 progress(done);
+            }
+            // A button, or the device itself.
+            if let RunState::EmergencyStopped(source) = servo.run() {
+                stop.press(source);
             }
             stoppers.iter().for_each(Stopper::safe_stop);
             let rate_hz = 1.0e9 / period_ns as f64;

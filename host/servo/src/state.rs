@@ -45,6 +45,10 @@ pub enum EmergencySource {
 }
 
 impl EmergencySource {
+    /// All of them.
+    pub(crate) const ALL: [EmergencySource; 6] =
+        [Self::Key, Self::Signal, Self::Latch, Self::Watcher, Self::Button, Self::Device];
+
     /// For people.
     #[must_use]
     pub const fn word(self) -> &'static str {

@@ -2,7 +2,7 @@
 
 use super::state::EmergencySource;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 /// Ends a run from any thread or signal handler. Clones are the same switch.
 ///
@@ -10,10 +10,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 #[derive(Clone, Debug, Default)]
 pub struct StopSwitch {
     in_order: Arc<AtomicBool>,
-    by_key: Arc<AtomicBool>,
     by_signal: Arc<AtomicBool>,
-    by_watcher: Arc<AtomicBool>,
-    by_latch: Arc<AtomicBool>,
+    /// Who else has pressed the emergency stop first: the place in [`EmergencySource::ALL`], from 1; 0: nobody.
+    pressed: Arc<AtomicU8>,
 }
 
 impl StopSwitch {
@@ -22,19 +21,11 @@ impl StopSwitch {
         self.in_order.store(true, Ordering::Relaxed);
     }
 
-    /// The emergency stop of the keyboard. Real-time: bounded, no allocation.
-    pub fn emergency_by_key(&self) {
-        self.by_key.store(true, Ordering::Relaxed);
-    }
-
-    /// The emergency stop of a program that watches the run. Real-time: bounded, no allocation.
-    pub fn emergency_by_watcher(&self) {
-        self.by_watcher.store(true, Ordering::Relaxed);
-    }
-
-    /// The emergency stop of this machine, pressed elsewhere. Real-time: bounded, no allocation.
-    pub fn emergency_by_latch(&self) {
-        self.by_latch.store(true, Ordering::Relaxed);
+    /// Presses the emergency stop. Who pressed first stays known. Real-time: bounded, no allocation.
+    pub fn press(&self, source: EmergencySource) {
+        let place = EmergencySource::ALL.iter().position(|other| *other == source);
+        let code = place.and_then(|place| u8::try_from(place + 1).ok()).unwrap_or(1);
+        let _ = self.pressed.compare_exchange(0, code, Ordering::Relaxed, Ordering::Relaxed);
     }
 
     /// True if an orderly end is asked for. Real-time: bounded, no allocation.
@@ -48,16 +39,9 @@ impl StopSwitch {
     #[inline]
     #[must_use]
     pub fn emergency(&self) -> Option<EmergencySource> {
-        if self.by_key.load(Ordering::Relaxed) {
-            return Some(EmergencySource::Key);
-        }
-        if self.by_watcher.load(Ordering::Relaxed) {
-            return Some(EmergencySource::Watcher);
-        }
-        if self.by_signal.load(Ordering::Relaxed) {
-            return Some(EmergencySource::Signal);
-        }
-        self.by_latch.load(Ordering::Relaxed).then_some(EmergencySource::Latch)
+        let place = usize::from(self.pressed.load(Ordering::Relaxed)).checked_sub(1);
+        let by_signal = || self.by_signal.load(Ordering::Relaxed).then_some(EmergencySource::Signal);
+        place.and_then(|place| EmergencySource::ALL.get(place).copied()).or_else(by_signal)
     }
 
     /// The flag a signal handler sets for an orderly end.

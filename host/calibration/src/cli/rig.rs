@@ -9,8 +9,8 @@ use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, progress_bar};
 use flotor_hal::abi::PluginKind;
 use flotor_servo::StopSwitch;
-use flotor_session::LatchGuard;
 use flotor_session::registry::Registry;
+use flotor_session::{LatchGuard, LatchWatch};
 use indicatif::ProgressBar;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -81,16 +81,18 @@ impl RigArguments {
         let progress = progress_bar(stops, "{pos}/{len}  {wide_bar}\n{msg}");
         progress.enable_steady_tick(REDRAWN);
         let stop = stop_on_signals();
-        LatchGuard::of_this_user().obey(&stop)?;
-        let guide = guide(&progress, &stop);
+        let watch = LatchGuard::of_this_user().obey(&stop)?;
+        let guide = guide(&progress, &stop, watch);
         let rig = DeviceRig::open(&plugin, &settings, sensor, close_m, patience, stop, guide);
         Ok((rig.map_err(refused)?, progress))
     }
 }
 
-fn guide(progress: &ProgressBar, stop: &StopSwitch) -> Guide {
+/// The latch is watched for as long as there is a guide, and so a rig.
+fn guide(progress: &ProgressBar, stop: &StopSwitch, watch: LatchWatch) -> Guide {
     let (progress, stop) = (progress.clone(), stop.clone());
     Box::new(move |waiting| {
+        let _ = &watch;
         match waiting {
             Some(Waiting { target_m, height_m, command_n }) => {
                 let (target_mm, height_mm) = (target_m * 1.0e3, height_m * 1.0e3);

@@ -10,8 +10,8 @@ use flotor_core::trace::Events;
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
 use flotor_hal::{Cycle, DeviceState, Fault, Tick};
 use flotor_servo::{
-    Envelope, Gate, Heartbeat, LastStop, Place, PlausibilityCheck, StopSwitch, Trust, enter_real_time,
-    start_watchdog,
+    EmergencySource, Envelope, Gate, Heartbeat, LastStop, Place, PlausibilityCheck, StopSwitch, Trust,
+    enter_real_time, start_watchdog,
 };
 use flotor_sync::{Observer, Publisher, Words, latest};
 use std::thread::JoinHandle;
@@ -285,6 +285,9 @@ fn hold(
         });
         // The watchdog has told the device by now, or will within a millisecond.
         let fault = faulted.or(stop.emergency().map(|_| Fault::EmergencyStop));
+        if fault == Some(Fault::EmergencyStop) {
+            stop.press(EmergencySource::Device);
+        }
         let doing = match fault {
             Some(fault) => Holding::Faulted(fault),
             None if ran_away => Holding::RanAway,

@@ -1,8 +1,9 @@
 //! Rules of a device: its description, its life cycle, and its stop.
 
 use super::path::CONFIG;
-use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice};
+use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
 use flotor_hal::{Axes, Capabilities, Conditions, Cycle, DVec3, DeviceState, Fault, Tick, Wrench};
+use flotor_session::LatchGuard;
 use std::time::{Duration, Instant};
 
 /// How long a device may take for what is to happen soon: a sample, a force, its end.
@@ -117,6 +118,8 @@ fn push(told: &Capabilities) -> Wrench {
 /// A device in a loop without a model.
 pub(super) struct Running {
     pub(super) device: ActiveDevice,
+    stopper: Stopper,
+    latch: LatchGuard,
     told: Capabilities,
     state: DeviceState,
     ticks: u64,
@@ -158,9 +161,14 @@ impl From<Trouble> for String {
 impl Running {
     pub(super) fn start(mut device: OpenedDevice) -> Result<Self, String> {
         let told = device.capabilities().map_err(|refusal| refusal.to_string())?;
+        let latch = LatchGuard::of_this_user();
+        latch.check().map_err(|error| error.to_string())?;
+        let stopper = device.stopper();
         let device = device.activate(&CONFIG).map_err(|(_, refusal)| refusal.to_string())?;
         Ok(Self {
             device,
+            stopper,
+            latch,
             told,
             state: DeviceState::HOME,
             ticks: 0,
@@ -176,6 +184,11 @@ impl Running {
         let dt_ns = if index == 0 { 0 } else { CONFIG.period_ns };
         let tick = Tick { index, time_ns: index * CONFIG.period_ns, dt_ns };
         self.ticks += 1;
+        // Not real-time: whoever presses the emergency stop of the machine means this device, too.
+        if let Err(pressed) = self.latch.check() {
+            self.stopper.safe_stop();
+            return Err(Trouble { fault: None, words: pressed.to_string() });
+        }
         let fault_of = |call: &str, fault: Fault| {
             let words = format!("{call} at tick {index}: {}", fault.advice());
             Trouble { fault: Some(fault), words }

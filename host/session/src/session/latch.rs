@@ -20,6 +20,9 @@ const LOOK_PERIOD: Duration = Duration::from_millis(5);
 pub struct LatchGuard {
     latch: Latch,
     presses: u64,
+    /// Whether it was pressed then. A second press adds no line to the file: who pressed while the run began would not be seen
+    /// behind a release.
+    was_pressed: bool,
 }
 
 impl LatchGuard {
@@ -27,8 +30,8 @@ impl LatchGuard {
     #[must_use]
     pub fn of(directory: &Directory) -> Self {
         let latch = directory.latch();
-        let presses = latch.state().presses;
-        Self { latch, presses }
+        let LatchState { presses, pressed } = latch.state();
+        Self { latch, presses, was_pressed: pressed.is_some() }
     }
 
     /// Of the folder in which runs of this user are found. Not real-time.
@@ -50,7 +53,9 @@ impl LatchGuard {
     pub fn check(&self) -> Result<(), RunError> {
         match self.latch.state() {
             LatchState { pressed: Some(pressed), .. } => Err(RunError::Latched(Some(pressed))),
-            LatchState { presses, .. } if presses > self.presses => Err(RunError::Latched(None)),
+            LatchState { presses, .. } if self.was_pressed || presses > self.presses => {
+                Err(RunError::Latched(None))
+            }
             _ => Ok(()),
         }
     }
@@ -77,15 +82,14 @@ impl LatchGuard {
         self.latch.press(&who).err().map(|error| error.to_string())
     }
 
-    /// Checks once, and watches as long as the process lives: for what moves a device without a session. Not real-time.
+    /// Checks once, and watches until the watch is dropped: for what moves a device without [`Session::run`](super::Session::run).
+    /// Not real-time.
     ///
     /// # Errors
     /// [`RunError::Latched`], or no thread.
-    pub fn obey(&self, stop: &StopSwitch) -> Result<(), RunError> {
-        let mut watch = self.watch(stop).map_err(|_| RunError::Thread(NO_WATCH))?;
-        // The thread is never told that it is over.
-        (watch.is_over, watch.thread) = (Arc::default(), None);
-        self.check()
+    pub fn obey(&self, stop: &StopSwitch) -> Result<LatchWatch, RunError> {
+        let watch = self.watch(stop).map_err(|_| RunError::Thread(NO_WATCH))?;
+        self.check().map(|()| watch)
     }
 
     fn attend(&self, stop: &StopSwitch, is_over: &AtomicBool) {
@@ -98,7 +102,7 @@ impl LatchGuard {
                     if now != length {
                         length = now;
                         if self.check().is_err() {
-                            stop.emergency_by_latch();
+                            stop.press(EmergencySource::Latch);
                         }
                     }
                 }
@@ -139,5 +143,34 @@ pub(super) fn latched_words(pressed: Option<&Pressed>) -> String {
         None => {
             "the emergency stop of this machine was pressed while the run started: start it again".to_owned()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two presses are one line: a run that began between them, and looked only after the release, went on behind the second "done".
+    #[test]
+    fn a_run_that_began_while_it_was_pressed_stays_refused_after_the_release() {
+        let scratch = tempfile::tempdir().unwrap();
+        let directory = Directory::at(scratch.path().join("runs"));
+        directory.latch().press("first").unwrap();
+        let run = LatchGuard::of(&directory);
+        directory.latch().press("second").unwrap();
+        directory.latch().release("owner").unwrap();
+        assert!(matches!(run.check(), Err(RunError::Latched(None))));
+        assert!(LatchGuard::of(&directory).check().is_ok(), "the next one runs");
+    }
+
+    #[test]
+    fn an_emergency_stop_right_before_the_end_presses() {
+        let scratch = tempfile::tempdir().unwrap();
+        let directory = Directory::at(scratch.path().join("runs"));
+        let stop = StopSwitch::default();
+        let watch = LatchGuard::of(&directory).obey(&stop).unwrap();
+        stop.press(EmergencySource::Key);
+        drop(watch);
+        assert!(directory.latch().state().pressed.is_some());
     }
 }

@@ -675,6 +675,10 @@ impl Session {
                     dropped_records += u64::from(sender.push(*record).is_err())
                 });
             }
+            // A button, or the device itself: for the latch, whatever becomes of `safe_stop`.
+            if let Some(RunEnd::EmergencyStop(source)) = runner.end() {
+                loop_stop.press(source);
+            }
             // Here, whatever the thread that looks on is at, and while the watchdog still watches.
             for (number, stopper) in (1..).zip(&stoppers) {
                 loop_stopping.store(number, Ordering::Relaxed);
@@ -725,10 +729,6 @@ impl Session {
         }
         let finished = servo_thread.join().map_err(|_| RunError::Thread("panicked"))??;
         drain(&mut receiver, &mut look);
-        // A button or the device itself closes no switch, which would have pressed by now.
-        if let (RunEnd::EmergencyStop(source), None) = (finished.end, stop.emergency()) {
-            latch.press(source);
-        }
         Ok(Finished { end: guardian.end(finished.end), warning: guardian.warning(), ..finished })
     }
 }

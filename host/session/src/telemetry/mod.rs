@@ -155,6 +155,17 @@ fn refused(error: &ControlError) -> (RefusalCause, String) {
     (cause, error.to_string())
 }
 
+/// The emergency stop of a client: of this run, and of the machine before the client is answered.
+///
+/// # Errors
+/// Only this run stops.
+pub fn emergency_stop(stop: &StopSwitch, latch: Option<&LatchGuard>) -> Result<(), (RefusalCause, String)> {
+    stop.press(EmergencySource::Watcher);
+    let problem = latch.and_then(|latch| latch.press(EmergencySource::Watcher));
+    problem
+        .map_or(Ok(()), |problem| Err((RefusalCause::Other, format!("this run stops, no other: {problem}"))))
+}
+
 impl Serve for Host {
     fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
         let Self { controls, stop, latch, .. } = self;
@@ -175,12 +186,7 @@ impl Serve for Host {
                 swapped.map_err(|error| refused(&error))?;
             }
             Ask::Stop => stop.stop(),
-            Ask::EmergencyStop => {
-                stop.emergency_by_watcher();
-                let problem = latch.as_ref().and_then(|latch| latch.press(EmergencySource::Watcher));
-                let refused = |problem| (RefusalCause::Other, format!("this run stops, no other: {problem}"));
-                return problem.map_or(Ok(()), |problem| Err(refused(problem)));
-            }
+            Ask::EmergencyStop => return emergency_stop(stop, latch.as_ref()),
         }
         Ok(())
     }

@@ -11,8 +11,10 @@ use crate::trial::Trial;
 use flotor_live::{Ask, Directory, RefusalCause, Serve};
 use flotor_record::Recorder;
 use flotor_servo::{Clock, StopSwitch};
-use flotor_session::telemetry::{Watched, announce};
-use flotor_session::{ControlError, Controls, Outcome, RunError, RunOptions, RunRecording, Session};
+use flotor_session::telemetry::{Watched, announce, emergency_stop};
+use flotor_session::{
+    ControlError, Controls, LatchGuard, Outcome, RunError, RunOptions, RunRecording, Session,
+};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -33,14 +35,17 @@ pub struct RealTimeRig<'a> {
 }
 
 /// A client of a study may end it, and nothing else.
-struct OnlyStop(StopSwitch);
+struct OnlyStop {
+    stop: StopSwitch,
+    latch: Option<LatchGuard>,
+}
 
 impl Serve for OnlyStop {
     fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
         match ask {
             Ask::Watch { .. } | Ask::LookAway => {} // the publication's own
-            Ask::Stop => self.0.stop(),
-            Ask::EmergencyStop => self.0.emergency_by_watcher(),
+            Ask::Stop => self.stop.stop(),
+            Ask::EmergencyStop => return emergency_stop(&self.stop, self.latch.as_ref()),
             Ask::Set { .. } | Ask::Weight { .. } | Ask::Swap { .. } => {
                 let words = "an experiment is under way: what is felt is its own to change";
                 return Err((RefusalCause::Other, words.to_owned()));
@@ -67,7 +72,7 @@ impl<'a> RealTimeRig<'a> {
         apparatus.show(&controls, false)?;
         let (shared, stop) = (Shared::default(), stop.clone());
         let run = apparatus.describe(apparatus.scene(), Clock::Real, 0);
-        let host = Arc::new(OnlyStop(stop.clone()));
+        let host = Arc::new(OnlyStop { stop: stop.clone(), latch: session.latch().cloned() });
         let publication = announce(&Directory::of_this_user(), apparatus.scene(), &run, &session, host);
         let unseen = publication.as_ref().err().map(ToString::to_string);
         let mut observers = Watched { observer: shared.clone(), publication: publication.ok() };
