@@ -29,7 +29,7 @@ pub struct LinkOptions {
     /// Whom to reach, such as tls/lab.example.org:7447 (repeatable)
     #[arg(long, value_name = "ENDPOINT", global = true)]
     pub connect: Vec<String>,
-    /// Listen beyond this user without keys: whoever reaches the endpoint has the rights of --allow
+    /// Listen or connect beyond this machine without keys: whoever is reached there has the rights of --allow
     #[arg(long, global = true)]
     pub without_keys: bool,
 }
@@ -120,8 +120,8 @@ impl LinkOptions {
         match serves {
             Some(name) => self.listen.push(endpoint(&format!("{SOCKET}{name}"))),
             None => {
-                let entries = std::fs::read_dir(directory.path()).into_iter().flatten().flatten();
-                let files = entries.filter_map(|entry| entry.file_name().into_string().ok());
+                let files = directory.files().into_iter();
+                let files = files.filter_map(|entry| entry.file_name().into_string().ok());
                 let sockets = files
                     .filter(|file| file.strip_prefix(SOCKET).is_some_and(|name| Name::new(name).is_ok()));
                 self.connect.extend(sockets.map(|file| endpoint(&file)));
@@ -130,10 +130,14 @@ impl LinkOptions {
         self
     }
 
-    /// The first endpoint that is open to more than this user.
+    /// The first endpoint at which more than this user gets in.
     #[must_use]
     pub fn open_to_others(&self) -> Option<&str> {
-        self.listen.iter().map(String::as_str).find(|endpoint| !endpoint.starts_with(UNIX))
+        self.listen
+            .iter()
+            .chain(&self.connect)
+            .map(String::as_str)
+            .find(|endpoint| !endpoint.starts_with(UNIX))
     }
 }
 
@@ -164,12 +168,6 @@ pub fn open(options: &LinkOptions, end: End) -> Result<Link, LinkError> {
         // Without this, a visitor would listen on all interfaces.
         config.insert_json5("listen/endpoints", &list(&options.listen)).map_err(wrong)?;
         config.insert_json5("connect/endpoints", &list(&options.connect)).map_err(wrong)?;
-        if end == End::Serving {
-            // Whoever it is: only the bridge tells.
-            for (key, value) in access::of_anyone() {
-                config.insert_json5(&format!("access_control/{key}"), &value.to_string()).map_err(wrong)?;
-            }
-        }
     } else {
         for (key, given) in [("listen/endpoints", &options.listen), ("connect/endpoints", &options.connect)] {
             if !given.is_empty() {
@@ -177,14 +175,28 @@ pub fn open(options: &LinkOptions, end: End) -> Result<Link, LinkError> {
             }
         }
     }
-    let says = |key: &str| -> Option<Value> { serde_json::from_str(&config.get_json(key).ok()?).ok() };
-    let has_keys = options.config.is_some() && says("access_control/enabled") == Some(Value::Bool(true));
-    let listens = says("listen/endpoints").unwrap_or_default();
-    let beyond = || endpoints_in(&listens).into_iter().find(|endpoint| !is_loopback(endpoint));
-    if let (End::Serving, false, false, Some(endpoint)) = (end, has_keys, options.without_keys, beyond()) {
-        return Err(LinkError::WithoutKeys { endpoint });
+    let says = |config: &Config, key: &str| -> Option<Value> {
+        serde_json::from_str(&config.get_json(key).ok()?).ok()
+    };
+    let has_rules = says(&config, "access_control/enabled") == Some(Value::Bool(true));
+    // A configuration is somebody's own; what it means for a visitor is not known here.
+    let is_known = end == End::Serving || options.config.is_none();
+    if is_known && !(options.config.is_some() && has_rules) && !options.without_keys {
+        let places = ["listen/endpoints", "connect/endpoints"];
+        // A visitor goes wherever it is sent, and lets in nobody.
+        let places = places.get(..if end == End::Serving { 2 } else { 1 }).unwrap_or_default();
+        let endpoints = places.iter().flat_map(|key| endpoints_in(&says(&config, key).unwrap_or_default()));
+        if let Some(endpoint) = endpoints.into_iter().find(|endpoint| !is_loopback(endpoint)) {
+            return Err(LinkError::WithoutKeys { endpoint });
+        }
     }
-    let metadata = says("metadata").unwrap_or_default();
+    if end == End::Serving && !has_rules {
+        // Whoever it is: only the bridge tells.
+        for (key, value) in access::of_anyone() {
+            config.insert_json5(&format!("access_control/{key}"), &value.to_string()).map_err(wrong)?;
+        }
+    }
+    let metadata = says(&config, "metadata").unwrap_or_default();
     let member = metadata.get(MEMBER).and_then(Value::as_str).and_then(|name| Name::new(name).ok());
     let expires_s = metadata.get(access::EXPIRES).and_then(Value::as_u64);
     let session = zenoh::open(config).wait().map_err(|error| LinkError::Open(error.to_string()))?;
@@ -225,8 +237,15 @@ mod tests {
     fn beyond_this_machine_without_keys_is_refused_unless_said_twice() {
         let listen = vec!["tcp/0.0.0.0:0".to_owned()];
         let options = LinkOptions { listen, ..LinkOptions::default() };
-        assert!(matches!(open(&options, End::Serving), Err(LinkError::WithoutKeys { .. })));
+        // A visitor that listens would be told anything by anybody.
+        for end in [End::Serving, End::Visiting] {
+            assert!(matches!(open(&options, end), Err(LinkError::WithoutKeys { .. })), "{end:?}");
+        }
         assert!(open(&LinkOptions { without_keys: true, ..options }, End::Serving).is_ok());
+        // Whoever is at the other end has the rights, too.
+        let connect = vec!["tcp/192.0.2.1:7447".to_owned()];
+        let options = LinkOptions { connect, ..LinkOptions::default() };
+        assert!(matches!(open(&options, End::Serving), Err(LinkError::WithoutKeys { .. })));
     }
 
     #[test]

@@ -229,10 +229,6 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
         }
         Command::Ask { name, request } => {
             let remote = Remote::listen(&visit(link)?, &name)?;
-            // Most requests are for the current run; the bridge knows without us when none is.
-            let status =
-                remote.status()?.ok_or(format!("zenoh/{name} cannot be seen; `flotor bridge list`"))?;
-            remote.mean(status.run);
             remote.errand().run(request.into())?;
         }
         Command::List => {

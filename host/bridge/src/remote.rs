@@ -2,7 +2,7 @@
 
 use crate::keys::Name;
 use crate::link::{Link, LinkError};
-use crate::request::{NumberedRequest, Request, Right};
+use crate::request::{NumberedRequest, Refusal, Request, Right};
 use crate::status::Status;
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
@@ -11,10 +11,10 @@ use flotor_record::{RunDescription, tick_from_messages};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use zenoh::handlers::FifoChannelHandler;
 use zenoh::pubsub::Subscriber;
-use zenoh::query::Reply;
+use zenoh::query::{ConsolidationMode, QueryTarget, Reply};
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait};
 
@@ -24,6 +24,13 @@ const MOST_TICKS: usize = 8192;
 const MOST_WAITING: usize = 2 * MOST_TICKS;
 /// How long a bridge may take to answer.
 const ANSWER_WAIT: Duration = Duration::from_secs(3);
+/// The same for the emergency stop: until the hosts have confirmed an earlier one, and this one.
+const STOP_WAIT: Duration = Duration::from_secs(5);
+/// How long a bridge may take to be seen by a new session, and how often it is looked for.
+const SEEN_WAIT: Duration = Duration::from_secs(1);
+const SEEN_PERIOD: Duration = Duration::from_millis(20);
+/// How often a request for the current run is made anew because that has changed meanwhile.
+const MOST_LOOKS: u32 = 5;
 /// Pause between two looks for a bridge or run that is not there.
 const LOOK_PERIOD: Duration = Duration::from_millis(300);
 
@@ -60,7 +67,7 @@ pub struct Errand {
     member: Name,
     /// The last that was used; held until the letter has left, for letters to leave in the order of their numbers.
     number: Arc<Mutex<u64>>,
-    /// Process of the run that is meant.
+    /// Process of the run that is meant; 0: the current one.
     run: Arc<AtomicU64>,
 }
 
@@ -134,11 +141,6 @@ impl Remote {
         }
     }
 
-    /// Requests are for this run from now on (its process, 0 for none). Not needed after [`Remote::wait_for_run`].
-    pub fn mean(&self, run: u32) {
-        self.errand.run.store(u64::from(run), Ordering::Relaxed);
-    }
-
     /// Ticks that were published and did not get here, as far as is known.
     #[must_use]
     pub fn lost(&self) -> u64 {
@@ -175,29 +177,30 @@ impl Errand {
     /// # Errors
     /// In words, for people.
     pub fn run(&self, request: Request) -> Result<(), String> {
-        let key = format!("{}/{}", self.name.key(request.key()), self.member);
-        // Of the emergency stop nothing is asked first.
-        let status = match request.right() {
-            Right::Watch => Status::default(),
-            right => {
-                let status = self.status().map_err(|error| error.to_string())?.ok_or(NOBODY_ANSWERS)?;
-                if status.allow < right {
-                    let word = request.key().trim_start_matches("ask/");
-                    return Err(format!(
-                        "the bridge `{}` does not take `{word}`; `flotor bridge serve --allow` says what it takes",
-                        self.name
-                    ));
-                }
-                status
+        let right = request.right();
+        if right == Right::Watch {
+            // Of the emergency stop nothing is asked first.
+            return seen(|| done(&self.send(request.clone(), &Status::default())?));
+        }
+        let is_for_the_current = right == Right::Own || self.run.load(Ordering::Relaxed) == 0;
+        let mut looks = 0;
+        loop {
+            let status = seen(|| self.status().map_err(|error| error.to_string()))?;
+            if status.allow < right {
+                let word = request.key().trim_start_matches("ask/");
+                return Err(format!(
+                    "the bridge `{}` does not take `{word}`; `flotor bridge serve --allow` says what it takes",
+                    self.name
+                ));
             }
-        };
-        let answer = self
-            .send(&key, request, &status)
-            .map_err(|error| error.to_string())
-            .map(|answers| first(&answers))?;
-        let answer = answer.ok_or(NOBODY_ANSWERS)?;
-        let answer: Answer = serde_json::from_slice(&answer).map_err(|error| error.to_string())?;
-        answer.refused.map_or(Ok(()), Err)
+            looks += 1;
+            match done(&self.send(request.clone(), &status)?) {
+                // A run has begun or ended since the status said which one is on.
+                Err(words)
+                    if is_for_the_current && looks < MOST_LOOKS && words == Refusal::Stale.to_string() => {}
+                answered => return answered?.ok_or_else(|| NOBODY_ANSWERS.to_owned()),
+            }
+        }
     }
 
     fn status(&self) -> Result<Option<Status>, LinkError> {
@@ -205,16 +208,24 @@ impl Errand {
         Ok(status.and_then(|bytes| serde_json::from_slice(&bytes).ok()))
     }
 
-    fn send(&self, key: &str, request: Request, status: &Status) -> Result<Answers, LinkError> {
+    fn send(&self, request: Request, status: &Status) -> Result<Answers, String> {
+        let key = format!("{}/{}", self.name.key(request.key()), self.member);
         let mut number = self.number.lock().unwrap_or_else(PoisonError::into_inner);
         *number += 1;
         let run = match request.right() {
             Right::Own => status.run,
-            Right::Watch | Right::Operate => u32::try_from(self.run.load(Ordering::Relaxed)).unwrap_or(0),
+            Right::Watch | Right::Operate => match u32::try_from(self.run.load(Ordering::Relaxed)) {
+                Ok(0) | Err(_) => status.run,
+                Ok(run) => run,
+            },
         };
         let (session, ticket) = (self.session.zid().to_string(), status.ticket);
+        let wait = if request == Request::EmergencyStop { STOP_WAIT } else { ANSWER_WAIT };
         let letter = NumberedRequest { session, number: *number, run, ticket, request };
-        Ok(self.session.get(key).timeout(ANSWER_WAIT).payload(letter.to_bytes()).wait()?)
+        let get = self.session.get(key).timeout(wait).payload(letter.to_bytes());
+        // Bridges on two machines may have one name: whatever is asked is done when all of them have.
+        let get = get.target(QueryTarget::All).consolidation(ConsolidationMode::None);
+        get.wait().map_err(|error| LinkError::from(error).to_string())
     }
 }
 
@@ -224,6 +235,31 @@ const NOBODY_ANSWERS: &str = "nobody answers: the bridge is gone, or does not ta
 
 /// What comes back.
 type Answers = FifoChannelHandler<Reply>;
+
+/// Asks until there is an answer: a session that was opened a moment ago may not know of the bridge yet.
+fn seen<T>(ask: impl Fn() -> Result<Option<T>, String>) -> Result<T, String> {
+    let until = Instant::now() + SEEN_WAIT;
+    loop {
+        match ask()? {
+            Some(answer) => return Ok(answer),
+            None if Instant::now() < until => std::thread::sleep(SEEN_PERIOD),
+            None => return Err(NOBODY_ANSWERS.to_owned()),
+        }
+    }
+}
+
+/// Whether all that answer have done it; nothing if none does.
+fn done(answers: &Answers) -> Result<Option<()>, String> {
+    let mut is_answered = None;
+    for answer in answers.iter() {
+        let answer = answer.into_result().map_err(|_| NOBODY_ANSWERS)?;
+        let answer: Answer =
+            serde_json::from_slice(&answer.payload().to_bytes()).map_err(|error| error.to_string())?;
+        answer.refused.map_or(Ok(()), Err)?;
+        is_answered = Some(());
+    }
+    Ok(is_answered)
+}
 
 /// What is answered first, if anything is.
 fn first(answers: &Answers) -> Option<Vec<u8>> {

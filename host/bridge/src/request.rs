@@ -10,7 +10,7 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 pub const MAX_REQUEST_BYTES: usize = 64 * 1024;
 /// Sessions of a member whose last number is remembered for each right; of more, the one that asked longest ago is forgotten.
 const MOST_SESSIONS: usize = 256;
-/// Members that are distinguished: the access control of our keys knows far fewer.
+/// Members that are distinguished, the access control of our keys knows far fewer; of more, the one that asked longest ago is forgotten.
 const MOST_MEMBERS: usize = 1024;
 /// How old the bridge's word may be on which a run is started or the emergency stop released, ms.
 const FRESH_MS: u64 = 10_000;
@@ -174,9 +174,6 @@ pub enum Refusal {
     /// It was made on the word of an earlier start of the bridge, or too long ago.
     #[error("asked too long ago, or before the bridge started; ask again")]
     Expired,
-    /// More members than anybody has.
-    #[error("too many members")]
-    Crowded,
     /// More requests than the host answers.
     #[error("too many requests wait for the host's answer; ask again")]
     Busy,
@@ -189,6 +186,8 @@ pub struct Gate {
     since: Instant,
     /// By right and member: nobody uses up numbers or room of another.
     members: BTreeMap<(Right, Name), Sessions>,
+    /// Letters of unknown members on an older word than this are refused, ms.
+    forgotten_ms: u64,
     refused: BTreeMap<Refusal, u64>,
 }
 
@@ -198,6 +197,8 @@ struct Sessions {
     last: BTreeMap<String, Last>,
     /// Letters of unknown sessions on an older word than this are refused, ms: they may be of a forgotten one.
     forgotten_ms: u64,
+    /// The newest word on which it asked, ms.
+    asked_ms: u64,
 }
 
 /// The last letter of a session.
@@ -215,6 +216,7 @@ impl Default for Gate {
             began: began as u64,
             since: Instant::now(),
             members: BTreeMap::new(),
+            forgotten_ms: 0,
             refused: BTreeMap::new(),
         }
     }
@@ -252,13 +254,7 @@ impl Gate {
         if payload.len() > MAX_REQUEST_BYTES {
             return Err(Refusal::TooLong);
         }
-        let letter = exactly(payload).ok_or(Refusal::Malformed)?;
-        let (key, member) = key.rsplit_once('/').ok_or(Refusal::Malformed)?;
-        let member = Name::new(member).map_err(|_| Refusal::Malformed)?;
-        let belongs = key.strip_suffix(letter.request.key()).is_some_and(|rest| rest.ends_with('/'));
-        if !belongs || letter.session.is_empty() || letter.session.len() > 64 {
-            return Err(Refusal::Malformed);
-        }
+        let (member, letter) = letter_on(key, payload).ok_or(Refusal::Malformed)?;
         let now = self.ticket();
         let right = letter.request.right();
         // Whoever presses the emergency stop means whatever runs.
@@ -277,10 +273,19 @@ impl Gate {
 
     /// A number is valid once.
     fn use_up(&mut self, member: (Right, Name), letter: &NumberedRequest) -> Result<(), Refusal> {
-        if self.members.len() >= MOST_MEMBERS && !self.members.contains_key(&member) {
-            return Err(Refusal::Crowded);
+        if !self.members.contains_key(&member) {
+            if letter.ticket.at_ms < self.forgotten_ms {
+                return Err(Refusal::Expired);
+            }
+            if self.members.len() >= MOST_MEMBERS {
+                let oldest = self.members.iter().min_by_key(|(_, sessions)| sessions.asked_ms);
+                if let Some((member, asked_ms)) = oldest.map(|(member, s)| (member.clone(), s.asked_ms)) {
+                    self.members.remove(&member);
+                    self.forgotten_ms = asked_ms.saturating_add(1).max(self.forgotten_ms);
+                }
+            }
         }
-        let Sessions { last, forgotten_ms } = self.members.entry(member).or_default();
+        let Sessions { last, forgotten_ms, asked_ms } = self.members.entry(member).or_default();
         match last.get(&letter.session) {
             Some(before) if letter.number <= before.number => return Err(Refusal::Replayed),
             None if letter.ticket.at_ms < *forgotten_ms => return Err(Refusal::Expired),
@@ -294,9 +299,25 @@ impl Gate {
             }
             None => {}
         }
+        *asked_ms = letter.ticket.at_ms.max(*asked_ms);
         last.insert(letter.session.clone(), Last { number: letter.number, at_ms: letter.ticket.at_ms });
         Ok(())
     }
+}
+
+/// Whether a letter on its key presses the emergency stop: that needs nothing that a gate remembers, and waits for none.
+#[must_use]
+pub fn is_emergency_stop(key: &str, payload: &[u8]) -> bool {
+    letter_on(key, payload).is_some_and(|(_, letter)| letter.request == Request::EmergencyStop)
+}
+
+/// A letter, and whose it is, if it belongs on its key.
+fn letter_on(key: &str, payload: &[u8]) -> Option<(Name, NumberedRequest)> {
+    let letter = exactly(payload)?;
+    let (key, member) = key.rsplit_once('/')?;
+    let member = Name::new(member).ok()?;
+    let belongs = key.strip_suffix(letter.request.key())?.ends_with('/');
+    (belongs && (1..=64).contains(&letter.session.len())).then_some((member, letter))
 }
 
 /// A letter that says what we read, and not a word more: an unknown key anywhere is a misunderstanding.
@@ -457,12 +478,19 @@ mod tests {
         assert!(gate.members.values().all(|sessions| sessions.last.len() <= MOST_SESSIONS));
         let payload = letter(&gate, "one", 1, 7, &release).to_bytes();
         assert_eq!(gate.admit(&key(&release, "ada"), &payload, 7), Ok(Request::Release));
+        std::thread::sleep(std::time::Duration::from_millis(3));
+        let fresh = letter(&gate, "one", 1, 7, &release).to_bytes();
         for name in 0..2 * MOST_MEMBERS {
-            let _ = gate.admit(&key(&release, &format!("n{name}")), &payload, 7);
+            let _ = gate.admit(&key(&release, &format!("n{name}")), &fresh, 7);
         }
         assert!(gate.members.len() <= MOST_MEMBERS);
+        assert_eq!(gate.admit(&key(&release, "ada"), &payload, 7), Err(Refusal::Expired), "not valid again");
+        std::thread::sleep(std::time::Duration::from_millis(3));
+        // Neither who was known nor who is new is kept out.
         let payload = letter(&gate, "one", 2, 7, &release).to_bytes();
-        assert_eq!(gate.admit(&key(&release, "ada"), &payload, 7), Ok(Request::Release));
+        for member in ["ada", "grace"] {
+            assert_eq!(gate.admit(&key(&release, member), &payload, 7), Ok(Request::Release));
+        }
     }
 
     #[test]

@@ -139,7 +139,9 @@ fn by_default_another_user_can_do_nothing_and_this_one_can() {
     assert_eq!(host.directory.latch().state().presses, 0);
 
     let does = |ask: &[&str]| is_done(bridge(&runtime).args(["ask", "lab"]).args(ask));
-    assert!(does(&["set", "spring.gamma_n=30"]) && does(&["stop"]) && does(&["emergency-stop"]));
+    for ask in [&["set", "spring.gamma_n=30"][..], &["stop"], &["emergency-stop"]] {
+        assert!(does(ask), "{ask:?}");
+    }
     assert!(matches!(&asked()[..], [Ask::Set { .. }, Ask::Stop, Ask::EmergencyStop]), "{:?}", asked());
     // Who is let in may forge nothing either: `loopback` has that test; here, that the forger can get in at all.
     assert!(is_done(
@@ -147,6 +149,26 @@ fn by_default_another_user_can_do_nothing_and_this_one_can() {
             .args(["--exact", "a_stranger_forges", "--ignored"])
             .env(ENDPOINT, &endpoint)
     ));
+}
+
+/// The socket of a bridge that was killed stays behind: it keeps neither the next bridge nor a visitor of another one out.
+#[test]
+fn a_socket_that_a_killed_bridge_left_is_in_nobody_s_way() {
+    let host = FakeHost::start_in("flotor");
+    let runtime = host.directory.path().parent().unwrap().to_path_buf();
+    let serve = |name: &str| {
+        let served = Owned::start(bridge(&runtime).args(["serve", "--name", name, "--allow", "operate"]));
+        let does = || is_done(bridge(&runtime).args(["ask", name, "set", "spring.gamma_n=30"]));
+        wait_until("the bridge answers", does);
+        served
+    };
+    let (killed, _other) = (serve("lab0"), serve("lab1"));
+    killed.signal(rustix::process::Signal::KILL);
+    drop(killed);
+    assert!(host.directory.path().join("bridge-lab0").exists(), "or there is nothing to see here");
+    assert!(is_done(bridge(&runtime).args(["ask", "lab1", "stop"])));
+    assert!(!is_done(bridge(&runtime).args(["ask", "lab0", "stop"])));
+    let _again = serve("lab0");
 }
 
 /// Puts what only a bridge says on its keys; succeeds if it has a session to put it on. Started by the test above.

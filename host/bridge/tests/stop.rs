@@ -10,10 +10,11 @@ use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkOptions, open};
 use flotor_bridge::remote::{Errand, Remote};
 use flotor_bridge::request::Request;
-use flotor_live::Directory;
+use flotor_live::{Directory, SetValue};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// A machine with bridges: a folder in which its runs are found, and what runs there.
@@ -25,6 +26,7 @@ struct Machine {
 /// A bridge in a process of its own, and a way to it.
 struct Bridge {
     process: Owned,
+    endpoint: String,
     errand: Errand,
     remote: Remote,
 }
@@ -58,11 +60,16 @@ impl Machine {
         command.args(["serve", "--name", name, "--allow", "own", "--listen", &endpoint]);
         let process = Owned::start(self.quiet(&mut command));
         wait_until("the bridge listens", || TcpStream::connect(("127.0.0.1", port)).is_ok());
-        let link = LinkOptions { connect: vec![endpoint], ..LinkOptions::default() };
-        let remote = Remote::listen(&open(&link, End::Visiting).unwrap(), &Name::new(name).unwrap()).unwrap();
+        let remote = visit(&endpoint, name);
         wait_until("the bridge is seen", || remote.status().unwrap().is_some());
-        Bridge { process, errand: remote.errand(), remote }
+        Bridge { process, endpoint, errand: remote.errand(), remote }
     }
+}
+
+/// By a session of its own.
+fn visit(endpoint: &str, name: &str) -> Remote {
+    let link = LinkOptions { connect: vec![endpoint.to_owned()], ..LinkOptions::default() };
+    Remote::listen(&open(&link, End::Visiting).unwrap(), &Name::new(name).unwrap()).unwrap()
 }
 
 /// Exit code of a run that was stopped for safety, or refused because of it.
@@ -130,17 +137,31 @@ fn stopped(mut run: Owned) -> Option<i32> {
     run.wait().unwrap().code()
 }
 
+/// Machines at which scenes start at the same time: each waits most of the time.
+const LANES: usize = 4;
+
 #[test]
 fn a_stop_at_any_moment_of_a_start_stops_every_run() {
     let Some(program) = program() else { return };
     let step_ms = if is_full_size() { 1 } else { 125 };
-    let mut trial = Trial::new(&program);
-    for after_ms in (1..=500).step_by(step_ms) {
+    let moments: Vec<u64> = (1..=500).step_by(step_ms).collect();
+    std::thread::scope(|scope| {
+        for lane in 0..LANES {
+            let (program, moments) = (&program, moments.iter().skip(lane).step_by(LANES));
+            scope.spawn(move || stop_at(program, moments.copied()));
+        }
+    });
+}
+
+/// Presses so many milliseconds after starts, at a machine of its own.
+fn stop_at(program: &Path, moments: impl Iterator<Item = u64>) {
+    let mut trial = Trial::new(program);
+    for after_ms in moments {
         let killed = Way::Killed(Duration::from_micros(500 * (after_ms % 80)));
-        for (count, way) in [1, 2, 5].into_iter().zip([Way::Through(0), Way::Through(1), killed]) {
+        let ways = [Way::Through(0), Way::Through(1), killed];
+        for (at, count) in [1, 2, 5].into_iter().enumerate() {
             // At full size each number of runs in each way.
-            let ways = [Way::Through(0), Way::Through(1), killed];
-            let ways = if is_full_size() { &ways[..] } else { &[way] };
+            let ways = if is_full_size() { &ways[..] } else { &ways[at..=at] };
             ways.iter().for_each(|way| trial.stops(count, Duration::from_millis(after_ms), *way));
         }
     }
@@ -166,4 +187,59 @@ fn a_host_that_does_not_confirm_makes_no_done() {
     assert_eq!(stopped(other), STOPPED);
     frozen.signal(rustix::process::Signal::CONT);
     assert_eq!(stopped(frozen), STOPPED, "it sees the latch when it comes back");
+}
+
+/// A host that takes nothing in, and a member that sends it more than fits on the way: the stop of all others waits for neither.
+#[test]
+fn a_frozen_host_and_a_flood_for_it_delay_no_stop() {
+    let Some(program) = program() else { return };
+    let machine = Machine::new(&program);
+    let bridge = machine.bridge("lab");
+    let frozen = machine.run();
+    let carried = || bridge.remote.status().unwrap().expect("it is there").run;
+    wait_until("the bridge carries it", || carried() == frozen.id());
+    let other = machine.run();
+    wait_until("both run", || machine.directory().runs().len() == 2);
+    frozen.signal(rustix::process::Signal::STOP);
+    let is_over = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let values =
+            vec![SetValue { plugin: "x".repeat(60_000), parameter: String::new(), value: String::new() }];
+        for _ in 0..8 {
+            let (errand, values, is_over) = (bridge.remote.errand(), values.clone(), &is_over);
+            scope.spawn(move || {
+                while !is_over.load(Ordering::Relaxed) {
+                    let _ = errand.run(Request::Set { values: values.clone() });
+                }
+            });
+        }
+        // Until the socket of the frozen host is full.
+        std::thread::sleep(Duration::from_millis(1000));
+        let refused = visit(&bridge.endpoint, "lab").errand().run(Request::EmergencyStop).unwrap_err();
+        is_over.store(true, Ordering::Relaxed);
+        assert!(refused.contains(&format!("not confirmed by process {}", frozen.id())), "{refused}");
+    });
+    assert_eq!(stopped(other), STOPPED);
+    frozen.signal(rustix::process::Signal::CONT);
+    assert_eq!(stopped(frozen), STOPPED);
+}
+
+/// Bridges on two machines may have one name: one "done" is not that of both.
+#[test]
+fn of_two_bridges_of_one_name_both_have_to_confirm() {
+    let Some(program) = program() else { return };
+    let machines = [Machine::new(&program), Machine::new(&program)];
+    let bridges = machines.each_ref().map(|machine| machine.bridge("lab"));
+    let [frozen, other] = machines.each_ref().map(Machine::run);
+    wait_until("both run", || machines.iter().all(|machine| !machine.directory().runs().is_empty()));
+    frozen.signal(rustix::process::Signal::STOP);
+    let connect = bridges.iter().map(|bridge| bridge.endpoint.clone()).collect();
+    let link = open(&LinkOptions { connect, ..LinkOptions::default() }, End::Visiting).unwrap();
+    let remote = Remote::listen(&link, &Name::new("lab").unwrap()).unwrap();
+    let seen = || zenoh::Wait::wait(link.info().peers_zid()).count() == 2;
+    wait_until("both are seen", seen);
+    assert!(remote.errand().run(Request::EmergencyStop).is_err());
+    assert_eq!(stopped(other), STOPPED);
+    frozen.signal(rustix::process::Signal::CONT);
+    assert_eq!(stopped(frozen), STOPPED);
 }

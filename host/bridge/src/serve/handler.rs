@@ -1,15 +1,20 @@
 //! Where requests arrive: letters in, answers out, and what is known of the run for who asks.
+//!
+//! The network has two threads for all members: there only the emergency stop is read, and pressed. Everything else waits in a line
+//! for a thread of its own, which a host or a member that takes nothing in may delay.
 
 use super::emergency::Emergency;
 use super::station::{Station, json};
 use super::{Launcher, WaitNow};
-use crate::couple::Carried;
+use crate::couple::{Carried, CoupleError};
 use crate::keys::Name;
 use crate::link::LinkError;
-use crate::request::{Gate, MAX_REQUEST_BYTES, Refusal, Request, Right};
+use crate::request::{Gate, MAX_REQUEST_BYTES, Refusal, Request, Right, is_emergency_stop};
 use crate::status::{State, Status};
 use flotor_live::{Answer, Asker, ChangeMessage, Client, Directory, Greeting, Latch, RefusalCause};
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use zenoh::Session;
@@ -19,6 +24,10 @@ use zenoh::query::{Query, Queryable};
 const ANSWER_WAIT: Duration = Duration::from_secs(2);
 /// Requests that wait for the host at most, which answers some thousand a second. An emergency stop goes its own way.
 const MOST_OPEN: usize = 32;
+/// Requests, and questions for what is known, that wait in the line at most.
+const MOST_IN_LINE: usize = 256;
+/// Of them, longer ones than any letter.
+const MOST_LONG_ONES: usize = 4;
 /// How often the status goes out when nothing changes: who lost one gets the next.
 const STATUS_PERIOD: Duration = Duration::from_secs(1);
 
@@ -27,6 +36,20 @@ pub(super) struct RequestHandler {
     name: Name,
     emergency: Emergency,
     inside: Mutex<Inside>,
+    /// Letters that found no room in the line, and letters that were too long for it.
+    turned_away: [AtomicU64; 2],
+    /// Of the latter, how many are in the line to be told so.
+    long_ones: AtomicUsize,
+}
+
+/// What waits in the line.
+enum Asked {
+    /// For what is known, under this key.
+    Known(fn(&RequestHandler) -> Option<Vec<u8>>, String),
+    /// A letter.
+    Letter,
+    /// Something longer than any letter.
+    TooLong,
 }
 
 struct Inside {
@@ -54,7 +77,12 @@ pub(super) fn open(
     session: &Session,
     handler: &Arc<RequestHandler>,
     allow: Right,
-) -> Result<Vec<Queryable<()>>, LinkError> {
+) -> Result<Vec<Queryable<()>>, CoupleError> {
+    let (sender, line) = sync_channel(MOST_IN_LINE);
+    let of_thread = Arc::clone(handler);
+    // Ends with the last queryable.
+    let thread = std::thread::Builder::new().name("flotor-requests".to_owned());
+    thread.spawn(move || attend(&of_thread, &line))?;
     let mut counter = Vec::new();
     for (key, read) in [
         ("status", RequestHandler::status as fn(&RequestHandler) -> Option<Vec<u8>>),
@@ -62,25 +90,45 @@ pub(super) fn open(
         ("run", RequestHandler::description),
     ] {
         let key = handler.name.key(key);
-        let (handler, name) = (Arc::clone(handler), key.clone());
-        let answer = move |query: Query| {
-            // Without a run there is nothing to say, which is an answer, too.
-            if let Some(bytes) = read(&handler) {
-                let _ = query.reply(&name, bytes).wait_now();
+        let (line, name) = (sender.clone(), key.clone());
+        let ask = move |query: Query| {
+            // Nobody who asks for what is known has anything to say.
+            if query.payload().is_none() {
+                let _ = line.try_send((Asked::Known(read, name.clone()), query));
             }
         };
-        counter.push(session.declare_queryable(key).callback(answer).wait_now()?);
+        counter.push(session.declare_queryable(key).callback(ask).wait_now()?);
     }
     for right in Right::ALL.into_iter().filter(|right| *right <= allow) {
         for key in right.keys() {
             let key = handler.name.key(key);
-            let handler = Arc::clone(handler);
-            let receive = move |query: Query| handler.receive(query);
+            let (handler, line) = (Arc::clone(handler), sender.clone());
+            let receive = move |query: Query| handler.receive(query, &line);
             // The last part is who asks.
             counter.push(session.declare_queryable(format!("{key}/*")).callback(receive).wait_now()?);
         }
     }
     Ok(counter)
+}
+
+/// Answers one after the other.
+fn attend(handler: &RequestHandler, line: &Receiver<(Asked, Query)>) {
+    for (asked, query) in line {
+        match asked {
+            // Without a run there is nothing to say, which is an answer, too.
+            Asked::Known(read, key) => {
+                if let Some(bytes) = read(handler) {
+                    let _ = query.reply(key, bytes).wait_now();
+                }
+            }
+            Asked::Letter => handler.admit(query),
+            Asked::TooLong => {
+                reply(&query, Some(Refusal::TooLong.to_string()));
+                drop(query);
+                handler.long_ones.fetch_sub(1, Ordering::Relaxed);
+            }
+        }
+    }
 }
 
 impl RequestHandler {
@@ -101,7 +149,13 @@ impl RequestHandler {
             reported: None,
             due: 0,
         };
-        Ok(Self { name, emergency, inside: Mutex::new(inside) })
+        Ok(Self {
+            name,
+            emergency,
+            inside: Mutex::new(inside),
+            turned_away: Default::default(),
+            long_ones: AtomicUsize::new(0),
+        })
     }
 
     fn lock(&self) -> MutexGuard<'_, Inside> {
@@ -184,7 +238,7 @@ impl RequestHandler {
                 !is_late
             });
         }
-        let status = inside.now();
+        let status = self.now(&inside);
         let has_changed = match &inside.reported {
             None => true,
             Some((last, since)) => {
@@ -206,7 +260,7 @@ impl RequestHandler {
     }
 
     fn status(&self) -> Option<Vec<u8>> {
-        Some(json(&self.lock().now()))
+        Some(json(&self.now(&self.lock())))
     }
 
     fn greeting(&self) -> Option<Vec<u8>> {
@@ -217,44 +271,65 @@ impl RequestHandler {
         self.lock().run.as_ref().map(|run| run.description.clone())
     }
 
-    /// A letter on one of our keys.
-    fn receive(&self, query: Query) {
-        // A long one is not even copied.
-        let length = query.payload().map_or(0, zenoh::bytes::ZBytes::len);
-        let letter =
-            query.payload().filter(|_| length <= MAX_REQUEST_BYTES).map(|payload| payload.to_bytes());
-        let letter = match letter {
-            Some(letter) => letter.into_owned(),
-            None => vec![0; length.min(MAX_REQUEST_BYTES + 1)],
-        };
+    /// A letter on one of our keys, in a thread of the network: nothing here waits for anybody.
+    fn receive(&self, query: Query, line: &SyncSender<(Asked, Query)>) {
+        let [no_room, too_long] = &self.turned_away;
+        let payload = query.payload();
+        // A long one is not even copied, and few of them are kept until their answer.
+        if payload.is_some_and(|payload| payload.len() > MAX_REQUEST_BYTES) {
+            too_long.fetch_add(1, Ordering::Relaxed);
+            if self.long_ones.fetch_add(1, Ordering::Relaxed) >= MOST_LONG_ONES
+                || line.try_send((Asked::TooLong, query)).is_err()
+            {
+                self.long_ones.fetch_sub(1, Ordering::Relaxed);
+            }
+            return;
+        }
+        let letter = payload.map(|payload| payload.to_bytes()).unwrap_or_default();
         // A pattern of keys names no member, and is refused.
-        let asked = query.key_expr().as_str().to_owned();
+        let asked = query.key_expr().as_str();
+        if is_emergency_stop(asked, &letter) {
+            let who = format!("{} over the network (bridge {})", member(asked), self.name);
+            drop(letter);
+            self.emergency.press(&who, query);
+        } else {
+            drop(letter);
+            if line.try_send((Asked::Letter, query)).is_err() {
+                no_room.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+    }
+
+    /// A letter whose turn it is.
+    fn admit(&self, query: Query) {
+        let letter = query.payload().map(|payload| payload.to_bytes().into_owned()).unwrap_or_default();
         let mut inside = self.lock();
         let run = inside.status.run;
-        match inside.gate.admit(&asked, &letter, run) {
+        match inside.gate.admit(query.key_expr().as_str(), &letter, run) {
             Err(refusal) => reply(&query, Some(refusal.to_string())),
-            Ok(Request::EmergencyStop) => {
-                drop(inside);
-                self.emergency
-                    .press(&format!("{} over the network (bridge {})", member(&asked), self.name), query);
-            }
             Ok(request) => inside.follow(&request, query),
         }
     }
-}
 
-impl Inside {
-    fn now(&self) -> Status {
-        let is_latched = self.latch.state().pressed.is_some();
-        let state = match (is_latched, &self.run) {
+    fn now(&self, inside: &Inside) -> Status {
+        let is_latched = inside.latch.state().pressed.is_some();
+        let state = match (is_latched, &inside.run) {
             (true, _) => State::EmergencyStopped,
             (false, Some(_)) => State::Running,
             (false, None) => State::Waiting,
         };
-        let (refused, ticket) = (self.gate.refused().clone(), self.gate.ticket());
-        Status { state, refused, ticket, ..self.status.clone() }
+        let (mut refused, ticket) = (inside.gate.refused().clone(), inside.gate.ticket());
+        for (refusal, count) in [Refusal::Busy, Refusal::TooLong].into_iter().zip(&self.turned_away) {
+            let count = count.load(Ordering::Relaxed);
+            if count > 0 {
+                *refused.entry(refusal).or_default() += count;
+            }
+        }
+        Status { state, refused, ticket, ..inside.status.clone() }
     }
+}
 
+impl Inside {
     fn follow(&mut self, request: &Request, query: Query) {
         match (request.ask(), &mut self.run) {
             (Some(_), Some(run)) if run.open.len() >= MOST_OPEN => {
