@@ -218,8 +218,12 @@ pub struct LinkSummary {
     pub cut_j: f64,
     /// Way it claimed beyond what a hand can do, m.
     pub cut_path_m: f64,
-    /// How often a partner was let go because of its claims.
-    pub let_go: u32,
+    /// Turn it claimed beyond what a hand can do, rad.
+    pub cut_turn_rad: f64,
+    /// Ticks in which a claim was not believed, or a place beyond the range of the device here.
+    pub cut_ticks: u64,
+    /// The runs that were let go because of their claims, as text.
+    pub let_go: Vec<String>,
 }
 
 /// Energy balance of a run.
@@ -300,17 +304,22 @@ impl LinkSummary {
             0 => String::new(),
             others => format!(", {others} of other runs ignored"),
         };
-        let cut = match (self.cut_j > 0.0 || self.cut_path_m > 0.0, self.let_go) {
-            (false, 0) => String::new(),
-            (_, times) => format!(
-                "; not believed: {:.3} mJ, {:.1} mm; let go {times} times because of it",
+        let cut = match self.cut_ticks {
+            0 => String::new(),
+            ticks => format!(
+                "; not believed in {ticks} ticks: {:.3} mJ, {:.1} mm, {:.3} rad",
                 self.cut_j * 1.0e3,
-                self.cut_path_m * 1.0e3
+                self.cut_path_m * 1.0e3,
+                self.cut_turn_rad
             ),
+        };
+        let let_go = match self.let_go.as_slice() {
+            [] => String::new(),
+            runs => format!("; not heard any more because of its claims: run {}", runs.join(", run ")),
         };
         format!(
             "{partner}; messages in {heard_ticks} ticks, {silent}; {lost} lost, {overtaken} overtaken, {refused} \
-             refused{impossible}{others}{cut}"
+             refused{impossible}{others}{cut}{let_go}"
         )
     }
 }
@@ -503,7 +512,9 @@ fn coupling_summary(
         believed_j: hearing.believed_j,
         cut_j: hearing.cut.energy_j,
         cut_path_m: hearing.cut.path_m,
-        let_go: hearing.let_go,
+        cut_turn_rad: hearing.cut.turn_rad,
+        cut_ticks: hearing.cut_ticks,
+        let_go: hearing.let_go.iter().filter(|run| **run != 0).map(u64::to_string).collect(),
     };
     CouplingSummary {
         name: coupling.name.clone(),

@@ -243,7 +243,7 @@ fn every_pair_of_hands_is_stable_over_20_ms_with_jitter_and_loss_and_no_tank_fal
                 assert!(hearing.silences <= u64::from(throws), "{left} and {right}: {hearing:?}");
                 assert!(hearing.ticks > 100, "{left} and {right}: {hearing:?}");
                 // Who tells the truth is believed.
-                assert_eq!((hearing.cut, hearing.let_go), (Cut::default(), 0), "{left} and {right}");
+                assert_eq!((hearing.cut, hearing.let_go), (Cut::default(), [0; 3]), "{left} and {right}");
                 let speeds = host.records.0.iter().map(|record| record.twist.linear().length());
                 fastest_m_per_s = speeds.fold(fastest_m_per_s, f64::max);
             }

@@ -45,8 +45,11 @@ pub struct Hearing {
     pub believed_j: f64,
     /// What of their claims was not believed.
     pub cut: Cut,
-    /// How often a partner was let go because of its claims.
-    pub let_go: u32,
+    /// Ticks in which something was not believed.
+    pub cut_ticks: u64,
+    /// The runs that were let go because of their claims, and are not heard again; 0: none so far. With the last place taken, no
+    /// other is heard.
+    pub let_go: [u64; 3],
 }
 
 /// An end, and the line to its partner.
@@ -64,15 +67,10 @@ pub struct RemoteEnd {
     partner: Option<(u64, u64)>,
     hold: Hold,
     claims: Claims,
-    /// The run that was let go because of its claims.
-    refused: Option<u64>,
     hearing: Hearing,
     /// Whether the message of this tick was not believed.
     is_implausible: bool,
 }
-
-/// So many partners are let go because of their claims; then no other is heard.
-const MOST_LET_GO: u32 = 3;
 
 /// Whether the end holds on to its partner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,7 +113,6 @@ impl RemoteEnd {
             version: 0,
             partner: None,
             hold: Hold::Released,
-            refused: None,
             hearing: Hearing::default(),
             is_implausible: false,
         };
@@ -195,6 +192,9 @@ impl RemoteEnd {
             } else {
                 self.is_implausible = true;
                 self.hearing.implausible += 1;
+                if self.hearing.run == 0 {
+                    self.hearing.run = dispatch.run;
+                }
             }
         }
         if let Hold::On { heard_ns, .. } = self.hold {
@@ -210,7 +210,8 @@ impl RemoteEnd {
 
     #[inline]
     fn hear(&mut self, dispatch: &Dispatch, now_ns: u64, here: &DeviceState) {
-        if self.refused == Some(dispatch.run) || self.hearing.let_go >= MOST_LET_GO {
+        let is_let_go = self.hearing.let_go.contains(&dispatch.run);
+        if is_let_go || !self.hearing.let_go.contains(&0) {
             return;
         }
         let partner = (dispatch.run, dispatch.since);
@@ -230,9 +231,11 @@ impl RemoteEnd {
         let mapping = self.end.mapping();
         let believed = self.claims.believe(&dispatch.state, here, mapping, silent_ns as f64 * 1.0e-9);
         self.end.hear(&believed);
+        self.hearing.cut_ticks += u64::from(self.claims.is_cut());
         if self.claims.is_too_much() {
-            self.refused = Some(dispatch.run);
-            self.hearing.let_go += 1;
+            if let Some(place) = self.hearing.let_go.iter_mut().find(|run| **run == 0) {
+                *place = dispatch.run;
+            }
             self.hold = Hold::Released;
             return;
         }
