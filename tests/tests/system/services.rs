@@ -25,7 +25,8 @@ struct Service {
 
 impl Service {
     fn start(arguments: &[&str]) -> Self {
-        let program = build_folder().join(format!("flotor-haply-service-emulator{}", std::env::consts::EXE_SUFFIX));
+        let program =
+            build_folder().join(format!("flotor-haply-service-emulator{}", std::env::consts::EXE_SUFFIX));
         let mut command = Command::new(program);
         command.args(["--listen", "127.0.0.1:0", "--events", "127.0.0.1:0"]).args(arguments);
         let mut process = Owned::start(command.stdout(Stdio::piped()).stderr(Stdio::piped()));
