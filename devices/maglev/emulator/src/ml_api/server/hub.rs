@@ -10,6 +10,9 @@ use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+/// A tick that is unanswered for so long is waited for no more, s.
+const GIVEN_UP_S: f64 = 0.06;
+
 /// Where lines about what happens go.
 pub type Log = Box<dyn Fn(std::fmt::Arguments<'_>) + Send + Sync>;
 
@@ -90,7 +93,7 @@ impl Hub {
         self.state().controller.observe(sample);
     }
 
-    /// Waits until no tick is on its way, or until the time is over; true if somebody wants ticks at all.
+    /// Waits until no tick is on its way to a client that answers, or until the time is over.
     #[must_use]
     pub fn wait_for_ticks_taken(&self, patience: Duration) -> TickWait {
         let until = Instant::now() + patience;
@@ -103,7 +106,9 @@ impl Hub {
             let open = wanted.any(|client| {
                 let callback =
                     state.callbacks.iter().find(|callback| client.callback == Some(callback.token));
-                callback.is_some_and(|callback| callback.tick.is_some() || callback.tick_open_s.is_some())
+                callback.is_some_and(|callback| {
+                    callback.tick_open_s.map_or(callback.tick.is_some(), |open_s| open_s < GIVEN_UP_S)
+                })
             });
             let rest = until.saturating_duration_since(Instant::now());
             if !open {
@@ -267,4 +272,34 @@ pub enum TickWait {
     Taken,
     /// One still is.
     Open,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ml_api::controller::ControllerConfig;
+
+    #[test]
+    fn a_tick_that_nobody_answers_is_waited_for_for_a_while() {
+        let controller = Controller::new(ControllerConfig::DEFAULT);
+        let hub = Hub::new(controller, Vec::new(), false, Box::new(|_| ()));
+        let client = hub.connect("here");
+        let token = hub.becomes_callback(hub.connect("here"));
+        let map = Request::MapToken(i32::try_from(token).expect("a small number"));
+        for request in [map, Request::register(EventKind::Tick, 1)] {
+            let _ = hub.handle(client, Ok(request));
+        }
+        let interval = || hub.begin(&Sample::HOME, 1.0e-3);
+        interval();
+        assert!(hub.next(token, Duration::ZERO).is_some(), "a tick is sent");
+        for _ in 0..50 {
+            interval();
+            assert_eq!(hub.wait_for_ticks_taken(Duration::ZERO), TickWait::Open);
+        }
+        (0..20).for_each(|_| interval());
+        assert_eq!(hub.wait_for_ticks_taken(Duration::ZERO), TickWait::Taken);
+        // The next one is waited for again.
+        hub.acknowledged(token);
+        assert_eq!(hub.wait_for_ticks_taken(Duration::ZERO), TickWait::Open);
+    }
 }
