@@ -271,7 +271,7 @@ fn a_flotor_that_somebody_left_in_the_air_is_taken_over() {
     }
     drop(client);
     // Without gains nothing would be found that carries it, and it would fall.
-    let mut active = taken_off(&controller, &[("gravity", "auto"), ("timeout_ms", "8000")]);
+    let mut active = taken_off(&controller, &[("gravity", "auto")]);
     let mut state = DeviceState::HOME;
     for index in 0..300 {
         let tick = Tick { index, time_ns: index * 1_000_000, dt_ns: 1_000_000 };
@@ -457,8 +457,14 @@ fn what_goes_wrong_in_each_state_is_the_right_fault_and_others_are_served() {
 /// The plugin, opened with these settings beside the protocol and the address, and taken off.
 fn taken_off(controller: &Controller, settings: &[(&str, &str)]) -> ActiveDevice {
     let plugin = load_file(&plugin_file("flotor-maglev")).expect("it loads");
-    let all =
-        [("protocol", "ml-api"), ("address", &*controller.address), ("gravity", "off"), ("fade_ms", "0")];
+    let all = [
+        ("protocol", "ml-api"),
+        ("address", &*controller.address),
+        ("gravity", "off"),
+        ("fade_ms", "0"),
+        // A machine that is delayed for long is no fault of the controller.
+        ("timeout_ms", "8000"),
+    ];
     let is_default = |key: &str| settings.iter().all(|(other, _)| *other != key);
     let all = all.iter().filter(|(key, _)| is_default(key)).chain(settings);
     let settings = all.map(|(key, value)| Setting::parse(plugin.parameters(), key, value));
