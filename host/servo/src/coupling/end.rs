@@ -1,5 +1,6 @@
 //! One end of a coupling: pulls its handle to where the partner was when last heard of.
 
+use super::brake::Brake;
 use super::{CouplingConfig, PassivityMode, Pull, Tank};
 use crate::port_energy::{Controller, Expected, PortObserver};
 use flotor_core::mapping::{Mapping, MappingConfig};
@@ -102,14 +103,17 @@ impl End {
     /// What this end asks for. Real-time: bounded, no allocation.
     #[inline]
     pub fn pull(&mut self, state: &DeviceState) -> Pull {
-        self.pull_part(state, 1.0)
+        let pull = self.whole_pull(state);
+        self.bounce.asked = pull.wrench;
+        pull
     }
 
-    /// A part of that, 0 to 1: it brings out no more than the whole would. Real-time: bounded, no allocation.
+    /// A part of that, 0 to 1, which throws nothing out of the range: it brings out no more than the whole would. Real-time: bounded,
+    /// no allocation.
     #[inline]
-    pub(super) fn pull_part(&mut self, state: &DeviceState, part: f64) -> Pull {
+    pub(super) fn pull_part(&mut self, state: &DeviceState, part: f64, brake: &Brake) -> Pull {
         let whole = self.whole_pull(state);
-        let pull = Pull { wrench: whole.wrench * part, ..whole };
+        let pull = Pull { wrench: brake.braked(&(whole.wrench * part), state), ..whole };
         self.bounce.asked = pull.wrench;
         pull
     }

@@ -1,5 +1,6 @@
 //! One end of a coupling whose other end is on another host.
 
+use super::brake::Brake;
 use super::claims::{Claims, Cut, Reach};
 use super::{CouplingConfig, CouplingEnd, End, Grip, Pull};
 use flotor_core::peer::{DISPATCH_WORDS, Dispatch, PeerState, TankState};
@@ -67,6 +68,7 @@ pub struct RemoteEnd {
     partner: Option<(u64, u64)>,
     hold: Hold,
     claims: Claims,
+    brake: Brake,
     hearing: Hearing,
     /// Whether the message of this tick was not believed.
     is_implausible: bool,
@@ -106,6 +108,7 @@ impl RemoteEnd {
         let end = End::new(config, &end.mapping, period_s);
         let end = Self {
             claims: Claims::new(config, end.mapping(), reach, period_s),
+            brake: Brake::new(reach, period_s),
             end,
             patience,
             told,
@@ -141,7 +144,7 @@ impl RemoteEnd {
             Hold::Released => self.end.let_go(),
             Hold::On { since_ns, .. } => {
                 let part = self.part_at(tick.time_ns - since_ns);
-                self.end.pull_part(grip.state, part)
+                self.end.pull_part(grip.state, part, &self.brake)
             }
         }
     }

@@ -1,0 +1,95 @@
+//! Against a partner on another host that throws a handle here out of the range of its device.
+//!
+//! Energy that is believed may be that of a partner who lies, and a spring that is pulled to and fro at the right moments collects it in
+//! the handle. So a handle that moves outwards is let to be no faster than can be stopped before the edge: above that speed nothing pulls
+//! it outwards, and a damper slows it down. Both take energy away. Hands are not that fast near an edge.
+
+use super::Reach;
+use flotor_hal::{DVec3, DeviceState, Wrench, rotation_vector};
+
+/// How well a handle can be slowed down by hand, spring and boundary, m/s² and rad/s²: a few newtons on the flotor, 0.1 N·m.
+const SLOWED_M_PER_S2: f64 = 5.0;
+const SLOWED_RAD_PER_S2: f64 = 50.0;
+/// Mass and moment of inertia of the lightest handle and hand, kg and kg m²: the damper stops half of its motion in a period.
+const LIGHTEST_KG: f64 = 0.1;
+const LIGHTEST_KG_M2: f64 = 1.0e-4;
+
+/// Slows a handle down that could not be stopped before the edge.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Brake {
+    reach: Reach,
+    damping_ns_per_m: f64,
+    damping_nms_per_rad: f64,
+}
+
+impl Brake {
+    /// For a device with this range, and a tick this often. Not real-time.
+    pub(super) fn new(reach: Reach, period_s: f64) -> Self {
+        let half = 0.5 / period_s;
+        Self { reach, damping_ns_per_m: half * LIGHTEST_KG, damping_nms_per_rad: half * LIGHTEST_KG_M2 }
+    }
+
+    /// What is left of a wrench (device frame). Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn braked(&self, wrench: &Wrench, state: &DeviceState) -> Wrench {
+        let Reach { range_m, range_rad } = self.reach;
+        let turned = rotation_vector(state.pose.orientation());
+        let (linear, angular) = (state.twist.linear(), state.twist.angular());
+        let damping = [self.damping_ns_per_m, self.damping_nms_per_rad];
+        Wrench::new(
+            slowed(wrench.force(), state.pose.position(), linear, range_m, SLOWED_M_PER_S2, damping[0]),
+            slowed(wrench.torque(), turned, angular, range_rad, SLOWED_RAD_PER_S2, damping[1]),
+        )
+    }
+}
+
+/// The force at a place inside an ellipsoid of these semi-axes, while the handle moves. An axis without a range (0) is not looked at.
+#[inline]
+fn slowed(force: DVec3, place: DVec3, speed: DVec3, range: [f64; 3], slowed: f64, damping: f64) -> DVec3 {
+    let range = DVec3::from_array(range);
+    let inverse = DVec3::select(range.cmpgt(DVec3::ZERO), range.recip(), DVec3::ZERO);
+    let inside = place * inverse;
+    // The direction in which the way to the edge gets shorter fastest.
+    let (Some(outwards), part) = ((inside * inverse).try_normalize(), inside.length()) else { return force };
+    let along = outwards.dot(speed);
+    // How far the edge is in that direction: exact on the axes, and between them no farther than it is.
+    let edge = (1.0 - part).max(0.0) / (outwards * inverse).length();
+    let excess = along - (2.0 * slowed * edge).sqrt();
+    if excess > 0.0 { force - outwards * (outwards.dot(force).max(0.0) + damping * excess) } else { force }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_hal::{Pose, Twist};
+
+    const REACH: Reach = Reach { range_m: [0.0125, 0.0125, 0.0], range_rad: [0.1; 3] };
+
+    fn left_of(force: DVec3, place: DVec3, speed: DVec3) -> DVec3 {
+        let state = DeviceState {
+            pose: Pose::new(place, Pose::HOME.orientation()),
+            twist: Twist::new(speed, DVec3::ZERO),
+            ..DeviceState::HOME
+        };
+        Brake::new(REACH, 1.0e-3).braked(&Wrench::from_force(force), &state).force()
+    }
+
+    #[test]
+    fn a_handle_that_can_be_stopped_is_left_alone_and_another_is_only_slowed() {
+        let (pull, place) = (DVec3::new(3.0, 1.0, 2.0), DVec3::X * 0.008);
+        // v² / 2 a is the way that is left: sqrt(2 * 5 m/s² * 4.5 mm) = 0.212 m/s.
+        for speed in [0.0, 0.2, -1.0] {
+            assert_eq!(left_of(pull, place, DVec3::X * speed), pull, "{speed} m/s");
+        }
+        assert_eq!(left_of(pull, DVec3::ZERO, DVec3::X), pull, "in the middle no way is outwards");
+        for speed in [0.22, 0.5, 2.0] {
+            let left = left_of(pull, place, DVec3::X * speed);
+            assert!(left.x < 0.0 && (left.y, left.z) == (1.0, 2.0), "{speed} m/s: {left}");
+            let inwards = left_of(-pull, place, DVec3::X * speed);
+            assert!(inwards.x < -3.0, "{speed} m/s: {inwards}");
+        }
+        // Nothing is known of an axis without a range; outside of the range no speed outwards is slow.
+        assert_eq!(left_of(pull, DVec3::Z, DVec3::Z * 9.0), pull);
+        assert!(left_of(pull, DVec3::Y * 0.02, DVec3::Y * 0.01).y < 0.0);
+    }
+}
