@@ -28,6 +28,19 @@ fn swing(tick: u64, most_m: f64, frequency_hz: f64, told_j: f64) -> PeerState {
     up(most_m * phase.sin(), most_m * rate * phase.cos(), told_j)
 }
 
+/// From one end of the range to the other and back, almost as fast as is believed, with almost all the energy that is.
+fn throw(tick: u64, period: u64, dispatch: Dispatch) -> Dispatch {
+    const SPEED_M_PER_S: f64 = 1.9;
+    let (half, most_m) = (period / 2, 7.0e-3);
+    let way_m = (1.0e-3 * SPEED_M_PER_S * (tick % half) as f64).min(2.0 * most_m);
+    let direction = if tick % period < half { 1.0 } else { -1.0 };
+    let speed_m_per_s = if way_m < 2.0 * most_m { SPEED_M_PER_S } else { 0.0 };
+    Dispatch {
+        state: up(direction * (way_m - most_m), direction * speed_m_per_s, 0.95e-3 * tick as f64),
+        ..dispatch
+    }
+}
+
 /// Any number there is, of any size.
 fn wild(random: &mut Random) -> f64 {
     let exponent = 40.0 * random.next() - 20.0;
@@ -42,7 +55,8 @@ fn wild_state(random: &mut Random) -> PeerState {
     PeerState { pose, twist: Twist::new(linear, angular), told_j: wild(random).abs() }
 }
 
-const LIES: [(&str, Lie); 13] = [
+const LIES: [(&str, Lie); 14] = [
+    ("a throw at 2 Hz", |tick, _, d| throw(tick, 500, d)),
     ("1 J a tick on a swing at its resonance", |tick, _, d| Dispatch {
         state: swing(tick, 0.01, 4.0, tick as f64),
         ..d
