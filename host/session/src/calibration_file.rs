@@ -209,7 +209,7 @@ impl CalibrationFile {
             // In the unit of the file.
             InvalidCalibration::Range(_) => {
                 let [from, to] = read.vertical.range_mm;
-                wrong(&["vertical", "range_mm"], format!("[vertical] invalid range {from:?} mm to {to:?} mm"))
+                wrong(&["vertical", "range_mm"], format!("[vertical] invalid range {from} mm to {to} mm"))
             }
             other => wrong(&["vertical", "coefficients_per_mm"], format!("[vertical] {other}")),
         })?;

@@ -30,6 +30,12 @@ impl Mesh {
         let shares = graded(1.0, 0.0, rings, 1.35);
         let heights = graded(0.0, -height_m, m + 1, 1.35);
         let between = |borders: &[f64], i: usize| 0.5 * (borders[i / 2] + borders[i.div_ceil(2)]);
+        // Of a brick's 20 nodes each coordinate is -1, 0 or 1: the border before the brick, its middle, the border after.
+        let index = |coordinate: f64, brick: usize| match coordinate {
+            c if c < -0.5 => 2 * brick,
+            c if c > 0.5 => 2 * brick + 2,
+            _ => 2 * brick + 1,
+        };
         let ring = |r: usize, t: usize| {
             let share = between(&shares, r);
             let turn = PI * (t as f64 / (4 * m) as f64 - 0.75);
@@ -43,19 +49,15 @@ impl Mesh {
         let mut builder =
             Gatherer { parts: Parts::default(), found: BTreeMap::new(), unit_m: 1.0e-7 * radius_m };
         for layer in 0..=m {
-            let high = |k: f64| between(&heights, (2.0 * layer as f64 + 1.0 + k) as usize);
+            let high = |k: f64| between(&heights, index(k, layer));
             for j in 0..m {
                 for i in 0..m {
-                    builder.brick(&|at| {
-                        let index = |c: f64, e: usize| (2.0 * e as f64 + 1.0 + c) as usize;
-                        [line(index(at[0], i)), line(index(at[1], j)), high(at[2])]
-                    });
+                    builder.brick(&|at| [line(index(at[0], i)), line(index(at[1], j)), high(at[2])]);
                 }
             }
             for t in 0..4 * m {
                 for r in 0..rings {
                     builder.brick(&|at| {
-                        let index = |c: f64, e: usize| (2.0 * e as f64 + 1.0 + c) as usize;
                         let [x, y] = ring(index(at[0], r), index(at[1], t));
                         [x, y, high(at[2])]
                     });

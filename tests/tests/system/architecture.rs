@@ -114,6 +114,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
             Host,
             Viewer,
             Fixture,
+            DropIn,
         ],
     ),
 ];
