@@ -209,7 +209,7 @@ impl CalibrationFile {
             // In the unit of the file.
             InvalidCalibration::Range(_) => {
                 let [from, to] = read.vertical.range_mm;
-                wrong(&["vertical", "range_mm"], format!("[vertical] invalid range {from} mm to {to} mm"))
+                wrong(&["vertical", "range_mm"], format!("[vertical] invalid range {from:?} mm to {to:?} mm"))
             }
             other => wrong(&["vertical", "coefficients_per_mm"], format!("[vertical] {other}")),
         })?;
@@ -306,7 +306,7 @@ mod tests {
         assert!(said("format = 1", "format = 2").contains("format 2, this program reads 1"));
         assert!(said("1.05", "nan").contains("[vertical]"));
         assert!(said("1.05", "0.01").contains("plausible"));
-        assert!(said("[-7.0, 7.0]", "[7.0, -7.0]").contains("invalid range 7 mm to -7 mm"));
+        assert!(said("[-7.0, 7.0]", "[7.0, -7.0]").contains("invalid range 7.0 mm to -7.0 mm"));
         assert!(said("-0.0011]", "0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]").contains("9 coefficients"));
     }
 

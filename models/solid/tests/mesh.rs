@@ -83,19 +83,19 @@ impl Boxes {
         }
         let side = self.counts.map(|n| 2 * n + 1);
         let mut text = String::from("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n");
-        writeln!(text, "{}", self.named.len() + 1).unwrap();
+        writeln!(text, "{}", self.named.len() + 1).expect("text grows");
         for (i, (_, _, name)) in self.named.iter().enumerate() {
-            writeln!(text, "2 {} \"{name}\"", i + 1).unwrap();
+            writeln!(text, "2 {} \"{name}\"", i + 1).expect("text grows");
         }
         text += "3 9 \"body\"\n$EndPhysicalNames\n$Entities\n";
-        writeln!(text, "0 0 {} 1", self.named.len()).unwrap();
+        writeln!(text, "0 0 {} 1", self.named.len()).expect("text grows");
         for i in 0..self.named.len() {
-            writeln!(text, "{} 0 0 0 0 0 0 1 {} 0", i + 1, i + 1).unwrap();
+            writeln!(text, "{} 0 0 0 0 0 0 1 {} 0", i + 1, i + 1).expect("text grows");
         }
         text += "1 0 0 0 0 0 0 1 9 0\n$EndEntities\n$Nodes\n";
         let total = side[0] * side[1] * side[2];
-        writeln!(text, "1 {total} 1 {total}\n3 1 0 {total}").unwrap();
-        (1..=total).for_each(|tag| writeln!(text, "{tag}").unwrap());
+        writeln!(text, "1 {total} 1 {total}\n3 1 0 {total}").expect("text grows");
+        (1..=total).for_each(|tag| writeln!(text, "{tag}").expect("text grows"));
         for z in 0..side[2] {
             for y in 0..side[1] {
                 for x in 0..side[0] {
@@ -103,24 +103,24 @@ impl Boxes {
                     for k in 0..3 {
                         let share = at[k] as f64 / (side[k] - 1) as f64;
                         write!(text, "{:e} ", self.from_m[k] + share * (self.to_m[k] - self.from_m[k]))
-                            .unwrap();
+                            .expect("text grows");
                     }
                     text.push('\n');
                 }
             }
         }
         let count = volumes.len() + faces.iter().map(Vec::len).sum::<usize>();
-        writeln!(text, "$EndNodes\n$Elements\n{} {count} 1 {count}", faces.len() + 1).unwrap();
+        writeln!(text, "$EndNodes\n$Elements\n{} {count} 1 {count}", faces.len() + 1).expect("text grows");
         let mut tag = 0;
         let (flat, solid) = if self.kind == Kind::Brick { (16, 17) } else { (9, 11) };
         for (i, list) in faces.iter().chain([&volumes]).enumerate() {
             let is_volume = i == faces.len();
             let (dimension, entity, kind) = if is_volume { (3, 1, solid) } else { (2, i + 1, flat) };
-            writeln!(text, "{dimension} {entity} {kind} {}", list.len()).unwrap();
+            writeln!(text, "{dimension} {entity} {kind} {}", list.len()).expect("text grows");
             for nodes in list {
                 tag += 1;
-                write!(text, "{tag}").unwrap();
-                nodes.iter().for_each(|node| write!(text, " {node}").unwrap());
+                write!(text, "{tag}").expect("text grows");
+                nodes.iter().for_each(|node| write!(text, " {node}").expect("text grows"));
                 text.push('\n');
             }
         }

@@ -167,11 +167,10 @@ fn of_query(shared: &Shared, query: &str) -> Vec<u64> {
     };
     let found: Vec<&Session> =
         shared.sessions.iter().filter(|session| is_like(&session.profile, &profile)).collect();
-    let place = if index < 0 {
-        found.len().checked_sub(index.unsigned_abs() as usize)
-    } else {
-        usize::try_from(index).ok()
-    };
+    let distance = usize::try_from(index.unsigned_abs()).ok();
+    // A negative index counts from the end.
+    let place =
+        if index < 0 { distance.and_then(|distance| found.len().checked_sub(distance)) } else { distance };
     ids(place.and_then(|place| found.get(place).copied()).into_iter().collect())
 }
 
