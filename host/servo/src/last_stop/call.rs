@@ -1,7 +1,7 @@
 //! Which call of a plugin outside the loop a thread is at: whose code it was, if the process ends there.
 
 use super::line::Line;
-use super::system::install_handlers;
+use super::system::install_for_crashes;
 use std::cell::Cell;
 use std::fmt::{Display, Write};
 
@@ -15,7 +15,7 @@ thread_local! {
 /// ends with code 3. Not real-time.
 pub fn enter_call(who: &str, call: impl Display) {
     if !HAS_HANDLERS.replace(true) {
-        install_handlers();
+        install_for_crashes();
     }
     let mut line = Line::EMPTY;
     // A name that is too long is cut, and the call with it.

@@ -69,12 +69,17 @@ static BEFORE: [OnceLock<sigaction>; SIGNALS] = [const { OnceLock::new() }; SIGN
 /// Takes every signal that would end the process, in this thread on a stack of its own, and `exit`. Again for each run: a
 /// plugin may have put something else there. Not real-time.
 pub(super) fn install() {
-    install_handlers();
+    install_for(|signal| !HARMLESS.contains(&signal));
     take_sent();
 }
 
-/// The same, but signals that are sent to the process as a whole are left to other threads. Not real-time.
-pub(super) fn install_handlers() {
+/// Takes the signals that this thread itself raises when it crashes, and `exit`. What asks the process to end is left as it is:
+/// the host has not said yet who is to hear of it. Not real-time.
+pub(super) fn install_for_crashes() {
+    install_for(|signal| RAISED.contains(&signal));
+}
+
+fn install_for(is_wanted: impl Fn(c_int) -> bool) {
     static AT_EXIT: Once = Once::new();
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
@@ -87,7 +92,7 @@ pub(super) fn install_handlers() {
         return;
     }
     STACK.with(|_| ());
-    for signal in (1..).take(SIGNALS - 1).filter(|signal| !HARMLESS.contains(signal)) {
+    for signal in (1..).take(SIGNALS - 1).filter(|signal| is_wanted(*signal)) {
         let Some(found) = action(signal) else { continue };
         let is_ours = found.sa_sigaction == handler();
         if is_ours || found.sa_sigaction != libc::SIG_DFL && !RAISED.contains(&signal) {
