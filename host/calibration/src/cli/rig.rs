@@ -71,6 +71,8 @@ impl RigArguments {
 
     /// The device and its sensor, and a progress bar over this many stops that shows the next height of the sensor.
     pub(super) fn device_rig(&self, stops: u64) -> Result<(DeviceRig<Guide>, ProgressBar), CommandError> {
+        // Before a plugin is loaded: a thread that is there already would still take Ctrl-C.
+        let stop = stop_on_signals();
         let registry = Registry::search(&self.folders);
         let plugin = registry.load(self.plugin(), PluginKind::Device)?;
         let sensor_plugin = registry.load(&self.sensor_plugin, PluginKind::Device)?;
@@ -80,7 +82,6 @@ impl RigArguments {
         let (close_m, patience) = (self.tolerance_mm * 1.0e-3, Duration::from_secs_f64(self.patience));
         let progress = progress_bar(stops, "{pos}/{len}  {wide_bar}\n{msg}");
         progress.enable_steady_tick(REDRAWN);
-        let stop = stop_on_signals();
         let watch = LatchGuard::of_this_user().obey(&stop)?;
         let guide = guide(&progress, &stop, watch);
         let rig = DeviceRig::open(&plugin, &settings, sensor, close_m, patience, stop, guide);
