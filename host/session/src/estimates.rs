@@ -1,4 +1,4 @@
-//! What a model says of its own accuracy when it is ready: details that are named `..._error` and known before the first step.
+//! Estimates by a model of its own error, before the first step: details that are named `..._error` and known before the first step.
 
 use flotor_hal::Detail;
 use flotor_hal::abi::CallStatus;

@@ -1,4 +1,4 @@
-//! A body of any shape whose touched face is plane and its top: what it does that a half-space would not.
+//! A body of any shape whose touched face is its plane top: the difference between its response and that of a half-space.
 //!
 //! The half-space behind the touched face carries the pole of every contact, as for a block ([`crate::remainder`]); the mesh
 //! carries the rest: tractions that undo those of the half-space on the free surface, displacements that undo its own on the

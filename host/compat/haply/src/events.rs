@@ -1,4 +1,4 @@
-//! The events channel: a WebSocket that only tells. One message for each event, to whoever listens then.
+//! The events channel: a WebSocket that sends each event to all its clients and reads nothing.
 
 use crate::connection::{accept, prepared, rest, upgraded};
 use crate::service::{Service, inverse_id};

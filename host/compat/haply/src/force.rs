@@ -1,4 +1,4 @@
-//! What the hand is to feel: the sum of what all sessions want of a device. All of it in Flotor's axes.
+//! The wrench that a device receives: the sum of the requests of all sessions, in Flotor's axes.
 
 use flotor_compat::State;
 use flotor_hal::DVec3;

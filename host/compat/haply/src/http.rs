@@ -1,4 +1,4 @@
-//! Answers by HTTP: version, devices, sessions, and what is set of a device.
+//! HTTP requests: version, devices, sessions, and the settings of a device.
 
 use crate::connection::Request;
 use crate::message::set;

@@ -1,4 +1,4 @@
-//! What a client's message says, and what it changes.
+//! Messages of clients: reads them, and applies what they request.
 
 use crate::force::{Domain, Wanted};
 use crate::service::{ARM_M, Service, Session, Shared, grip_id, inverse_id};

@@ -1,4 +1,4 @@
-//! What all connections share: the run, its devices, the sessions and what they set.
+//! State that all connections share: the run, its devices, the sessions and their settings.
 
 use crate::events::{Events, Level};
 use crate::force::{Domain, Forces, Wanted};

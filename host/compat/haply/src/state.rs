@@ -1,4 +1,4 @@
-//! What a client is told: the state of all devices, and at first or when it asks all there is to know.
+//! Messages to clients: the state of all devices; the first one, and on request, has the configuration too.
 
 use crate::service::{Service, Session, Shared, grip_id, inverse_id, joint_angles};
 use crate::view::{Transform, View};

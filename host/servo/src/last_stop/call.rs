@@ -1,4 +1,4 @@
-//! Which call of a plugin outside the loop a thread is at: whose code it was, if the process ends there.
+//! The plugin call outside the loop that a thread executes: if the process ends there, the message names plugin and call.
 
 use super::line::Line;
 use super::system::install_for_crashes;
