@@ -98,9 +98,6 @@ impl State {
     }
 }
 
-const SERVO: Effort =
-    Effort { most_steps: 4, most_matrices: 3, matrix_life: 32, tolerance: 1e-8, renewal: 1e-7 };
-
 /// Each equilibrium to rounding, so that nothing of the past is left in an answer.
 const TO_ROUNDING: Effort = Effort {
     most_steps: 10,
@@ -150,12 +147,16 @@ impl Rod {
     pub fn with_coils(spring: &Spring, accuracy: Accuracy, coils: Coils) -> Self {
         let ratios = Ratios::new(spring, coils);
         let solver = match accuracy {
-            // Coils meet at one place after the other, and each changes the matrix.
-            Accuracy::Servo if coils == Coils::Touch => {
-                let effort = Effort { most_steps: 12, most_matrices: 8, ..SERVO };
+            Accuracy::Servo => {
+                let effort = Effort {
+                    most_steps: 4,
+                    most_matrices: 3,
+                    matrix_life: 32,
+                    tolerance: 1e-8,
+                    renewal: 1e-7,
+                };
                 Solver::Servo(Box::new(Equilibrium::new(ratios, effort)))
             }
-            Accuracy::Servo => Solver::Servo(Box::new(Equilibrium::new(ratios, SERVO))),
             Accuracy::Tight => {
                 let effort = Effort {
                     most_steps: 8,
@@ -175,11 +176,7 @@ impl Rod {
     /// ([`crate::seat`]). Not real-time: allocates.
     #[must_use]
     pub fn to_rounding(spring: &Spring, coils: Coils) -> Self {
-        let effort = match coils {
-            Coils::Pass => TO_ROUNDING,
-            Coils::Touch => Effort { most_steps: 20, most_matrices: 12, ..TO_ROUNDING },
-        };
-        let equilibrium = Equilibrium::new(Ratios::new(spring, coils), effort);
+        let equilibrium = Equilibrium::new(Ratios::new(spring, coils), TO_ROUNDING);
         Self::solved_by(Solver::Servo(Box::new(equilibrium)), spring, coils)
     }
 
