@@ -24,9 +24,6 @@
 //! shortened as far would press down: as the hanging rim comes free, friction fades and with it all that it holds, so lifting off is
 //! continuous. (Coulomb's law alone lets a bent spring jam in its friction beyond that, and snap.)
 //!
-//! Pressed past buckling a base may lose the ground under a bent spring. Where standing up as it would hang takes more energy
-//! than was left, it has fallen over, and carries nothing until it is lifted or can stand up with less.
-//!
 //! Derivation: the book, chapter "The spring"; the step with a tip is the proximal Newton step of Lee, Sun
 //! and Saunders (2014); one bound for force and torque of friction: Howe and Cutkosky (1996), a limit surface.
 
@@ -93,8 +90,6 @@ pub struct Seat {
     /// Curvature by the tilt as observed, without the tip (N·m/rad).
     curvature: DMat2,
     lifted: bool,
-    /// Energy that was lost as it fell over (J), of one that lies on the ground.
-    fallen_j: Option<f64>,
     /// Stiffness along the axis at rest (N/m).
     axial_n_per_m: f64,
     /// Coefficient of friction on the ground.
@@ -145,7 +140,6 @@ impl Seat {
             tilt_rad: DVec2::ZERO,
             curvature: DMat2::from_diagonal(DVec2::splat(stiffness_nm_per_rad)),
             lifted: false,
-            fallen_j: None,
             axial_n_per_m: spring.axial_stiffness_n_per_m(),
             friction: friction.coefficient,
             slide_m: DVec2::ZERO,
@@ -158,14 +152,14 @@ impl Seat {
     /// Takes other parameters at a tick boundary and keeps the tilt. Real-time: bounded, no allocation.
     pub fn set_spring(&mut self, spring: &Spring, friction: Friction) {
         let fresh = Self::new(spring, friction);
-        let Self { tilt_rad, slide_m, turn_rad, lifted, fallen_j, .. } = *self;
-        *self = Self { tilt_rad, slide_m, turn_rad, lifted, fallen_j, ..fresh };
+        let Self { tilt_rad, slide_m, turn_rad, lifted, .. } = *self;
+        *self = Self { tilt_rad, slide_m, turn_rad, lifted, ..fresh };
     }
 
     /// Seated again, where it was at first. Real-time: bounded, no allocation.
     pub fn reset(&mut self) {
         self.stand(&Standing { tilt_rad: DVec2::ZERO, slide_m: DVec2::ZERO, turn_rad: 0.0 });
-        (self.lifted, self.fallen_j) = (false, None);
+        self.lifted = false;
     }
 
     /// Stands at a place, with nothing known of the spring there.
@@ -220,11 +214,9 @@ impl Seat {
         let (standing, height_m) = self.hanging(pose);
         let was_lifted = std::mem::replace(&mut self.lifted, height_m > 0.0);
         if self.lifted {
-            self.fallen_j = None;
-            spring.unload();
-            return without_load(demand);
+            return in_the_air(demand);
         }
-        if was_lifted || self.fallen_j.is_some() {
+        if was_lifted {
             self.stand(&standing);
         }
         let noise_rad = spring.noise_rad();
@@ -232,23 +224,19 @@ impl Seat {
         let mut last: Option<Stood> = None;
         let mut slid: Option<(f64, f64)> = None;
         let mut tip_nm = None;
-        // The energy it may have at most where it stands up anew.
-        let mut most_upright_j = self.fallen_j;
-        let mut failures = 0;
+        let (mut has_sat_down, mut failures) = (false, 0);
         for _ in 0..MOST_EVALUATIONS {
             let base = self.base();
             let response = self.held(spring, pose, &base, Demand::WrenchAndEnergy);
-            let has_settled = matches!(response.validity, Validity::Ok | Validity::Clamped);
-            if !has_settled && last.is_none() && most_upright_j.is_none() {
-                // It snaps between its plates: the base waits for it.
+            if !matches!(response.validity, Validity::Ok | Validity::Clamped) {
                 return only(response, demand);
             }
             let stored_j = response.energy_j.unwrap_or_default();
             if let Some(stood) = &last {
-                // Too far: it would snap, lose the ground, or gain energy.
+                // Too far: it would lose the ground, or gain energy.
                 let most_j = stood.stored_j + ENERGY_TOLERANCE * self.stiffness_nm_per_rad;
-                if !has_settled || response.force_n.z <= 0.0 || stored_j > most_j {
-                    if let (true, Some(before), Some(tip_nm)) = (has_settled, stood.slope, tip_nm) {
+                if response.force_n.z <= 0.0 || stored_j > most_j {
+                    if let (Some(before), Some(tip_nm)) = (stood.slope, tip_nm) {
                         let slope = self.slope(pose, &base, &response) - tip_nm * base.direction;
                         self.observe(self.tilt_rad - stood.at.tilt_rad, slope - before, noise_rad);
                     }
@@ -261,21 +249,15 @@ impl Seat {
                         _ => -SHORTER,
                     };
                     self.go_back_to(&stood.at, part);
-                    spring.go_back();
                     continue;
                 }
-            } else if let Some(most_j) = most_upright_j {
-                // It cannot stand up with energy that it does not have.
-                self.fallen_j = (!has_settled || stored_j > most_j).then_some(most_j);
-                if self.fallen_j.is_some() || response.force_n.z <= 0.0 {
-                    spring.unload();
-                    return without_load(demand);
-                }
             } else if response.force_n.z <= 0.0 {
-                // Nothing holds it there any more: it stands as it would have hung, or falls over.
-                most_upright_j = Some(stored_j);
-                spring.unload();
+                // Nothing holds it there any more: it stands as it would have hung.
+                if has_sat_down {
+                    return in_the_air(demand);
+                }
                 self.stand(&standing);
+                has_sat_down = true;
                 continue;
             }
             // What lifting costs to first order; the rest of the energy has no tip. Off the tip any other number would
@@ -310,7 +292,6 @@ impl Seat {
                     // Friction holds it short of here: by the straight line between the two.
                     let part = before_n / (before_n - excess_n);
                     self.go_back_to(&stood.at, part);
-                    spring.go_back();
                     slid = Some((distance_m * part, before_n));
                     continue;
                 }
@@ -319,7 +300,6 @@ impl Seat {
             let slides = excess_n > tolerance_n;
             // After a slide the slope is another one at the same tilt: nothing to observe.
             last = Some(Stood { at, response, stored_j, slope: (!slides).then_some(slope) });
-            spring.mark();
             if slides {
                 slid = Some((self.slide(pull_n, excess_n), excess_n));
                 continue;
@@ -332,7 +312,6 @@ impl Seat {
         }
         // On its way: it stays where it last stood.
         let Some(Stood { at, response, .. }) = last else { return Response::none(Validity::NotConverged) };
-        spring.go_back();
         (self.tilt_rad, self.slide_m, self.turn_rad) = (at.tilt_rad, at.slide_m, at.turn_rad);
         only(Response { validity: Validity::NotConverged, ..response }, demand)
     }
@@ -467,7 +446,7 @@ impl Seat {
 }
 
 /// The wrench of a spring that carries nothing.
-fn without_load(demand: Demand) -> Response {
+fn in_the_air(demand: Demand) -> Response {
     let energy_j = (demand >= Demand::WrenchAndEnergy).then_some(0.0);
     Response { energy_j, ..Response::none(Validity::Ok) }
 }
