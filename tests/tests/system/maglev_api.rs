@@ -224,7 +224,9 @@ fn a_program_for_the_maglev_200_commands_any_device_through_the_host() {
 fn a_device_of_two_axes_is_served_with_those_it_drives() {
     let (board, scratch) = (Board::start(), Scratch::default());
     let (port, recording) = (format!("port={}", board.path), scratch.path().join("proxy.mcap"));
-    let device = ["--device", "haply", "--set", &port, "--set", "timeout_ms=9000", "--record"];
+    // A busy machine may delay the board, which is a process of its own, for longer than a tick may take.
+    let patient = ["--set", "timeout_ms=9000", "--host-watchdog-ms", "60000"];
+    let device = [&["--device", "haply", "--set", &port][..], &patient, &["--record"]].concat();
     let controller = Controller::start("ml-api", &[&device[..], &[recording.to_str().unwrap()]].concat());
     let mut client = controller.client();
     assert_eq!(client.plain(Function::Takeoff).status, Status::OK);

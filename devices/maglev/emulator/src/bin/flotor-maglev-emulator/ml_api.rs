@@ -29,6 +29,9 @@ pub(crate) struct MlApiArguments {
     /// Recording of a device that is served
     #[arg(long, default_value = "ml-api.mcap", value_name = "FILE")]
     pub(crate) record: std::path::PathBuf,
+    /// Longest time of a tick of the host that serves a device, in ms (default: that of every run)
+    #[arg(long, requires = "device", value_name = "MS", value_parser = watchdog_ms)]
+    pub(crate) host_watchdog_ms: Option<f64>,
     /// Who holds the flotor at the start
     #[arg(long, value_enum, default_value = "none", value_name = "WHO")]
     hand: HandOption,

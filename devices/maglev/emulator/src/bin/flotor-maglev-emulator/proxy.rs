@@ -41,8 +41,12 @@ fn scene(device: &str, arguments: &Arguments) -> Result<String, Box<dyn Error>> 
             Err(_) => writeln!(scene, "{key} = {value:?}")?,
         }
     }
+    scene.push_str("[limits]\n");
     if let Some(felt) = capabilities(device, &sets).as_ref().and_then(felt) {
-        writeln!(scene, "[limits]\nforce_n = {felt:?}")?;
+        writeln!(scene, "force_n = {felt:?}")?;
+    }
+    if let Some(most_ms) = arguments.ml_api.host_watchdog_ms {
+        writeln!(scene, "watchdog_ms = {most_ms:?}")?;
     }
     let listen = arguments.listen.clone().unwrap_or_else(|| format!("127.0.0.1:{PORT}"));
     let parameters = arguments.ml_api.model_parameters();
