@@ -46,7 +46,7 @@ fn exported(library: &Path) -> Vec<String> {
 
 #[test]
 fn each_library_exports_the_names_of_its_interface_and_a_mark() {
-    let folder = build_folder();
+    let folder = build_folder().join("deps");
     let dhd = std::fs::read_to_string(workspace_root().join("tests/data/cases/dhd-names.txt"))
         .expect("the table is there");
     let cases = [
