@@ -253,18 +253,24 @@ fn every_pair_of_hands_is_stable_over_20_ms_with_jitter_and_loss_and_no_tank_fal
             // A hand swings with up to 0.1 m/s or so; what drives itself gets to the boundary and past it.
             assert!(fastest_m_per_s < 0.5, "{left} and {right}: {fastest_m_per_s} m/s");
             let [apart_mm, passed_on_j] = transparency(&pair);
-            Outcome { lowest_tank_j, lowest_ports_j, fastest_m_per_s, apart_mm, passed_on_j }
+            let throws = throws_a_free_handle(left) || throws_a_free_handle(right);
+            Outcome { throws, lowest_tank_j, lowest_ports_j, fastest_m_per_s, apart_mm, passed_on_j }
         })
         .collect();
     let worst = |number: fn(&Outcome) -> f64| outcomes.iter().map(number).fold(0.0, f64::max);
-    let mean = |number: fn(&Outcome) -> f64| outcomes.iter().map(number).sum::<f64>() / outcomes.len() as f64;
+    // Where a handle is thrown the run ends, in one build and not in another: those pairs compare nothing.
+    let whole: Vec<&Outcome> = outcomes.iter().filter(|outcome| !outcome.throws).collect();
+    let mean = |number: fn(&Outcome) -> f64| {
+        whole.iter().map(|outcome| number(outcome)).sum::<f64>() / whole.len() as f64
+    };
     println!(
         "{} pairs of hands at 20 ± 5 ms with 1 % loss: lowest tank {:.3e} J, lowest sum of ports {:.3e} J, fastest \
-         {:.3} m/s; on average the handles are {:.9} mm apart, and {:.9} mJ are passed on",
+         {:.3} m/s; on average of {} that throw none the handles are {:.9} mm apart, and {:.9} mJ are passed on",
         outcomes.len(),
         -worst(|outcome| -outcome.lowest_tank_j),
         -worst(|outcome| -outcome.lowest_ports_j),
         worst(|outcome| outcome.fastest_m_per_s),
+        whole.len(),
         mean(|outcome| outcome.apart_mm),
         mean(|outcome| 1.0e3 * outcome.passed_on_j),
     );
@@ -272,6 +278,7 @@ fn every_pair_of_hands_is_stable_over_20_ms_with_jitter_and_loss_and_no_tank_fal
 
 /// What a pair of hands came to.
 struct Outcome {
+    throws: bool,
     lowest_tank_j: f64,
     lowest_ports_j: f64,
     fastest_m_per_s: f64,

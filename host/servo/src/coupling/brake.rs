@@ -1,15 +1,15 @@
 //! Against a partner on another host that throws a handle here out of the range of its device.
 //!
 //! Energy that is believed may be that of a partner who lies, and a spring that is pulled to and fro at the right moments collects it in
-//! the handle. So a handle that moves outwards is let to be no faster than can be stopped before the edge: above that speed nothing pulls
-//! it outwards, and a damper slows it down. Both take energy away. Hands are not that fast near an edge.
+//! the handle. So a handle that would be outside of its range a little later, were it to go on as it does, is not pulled outwards, and
+//! a damper slows it down. Both take energy away. Hands are not that fast near an edge.
 
 use super::Reach;
 use flotor_hal::{DVec3, DeviceState, Wrench, rotation_vector};
 
-/// How well a handle can be slowed down by hand, spring and boundary, m/s² and rad/s²: a few newtons on the flotor, 0.1 N·m.
-const SLOWED_M_PER_S2: f64 = 5.0;
-const SLOWED_RAD_PER_S2: f64 = 50.0;
+/// How far is looked ahead, s. A handle that comes straight outwards is let to have a twentieth of a second of the way that is left; the
+/// damper, 50 N·s/m at 1 kHz, keeps it and a hand, 1.1 kg, to that with a damping ratio of `sqrt(50 * 0.05 / (4 * 1.1)) = 0.75`.
+const AHEAD_S: f64 = 0.05;
 /// Mass and moment of inertia of the lightest handle and hand, kg and kg m²: the damper stops half of its motion in a period.
 const LIGHTEST_KG: f64 = 0.1;
 const LIGHTEST_KG_M2: f64 = 1.0e-4;
@@ -37,25 +37,27 @@ impl Brake {
         let (linear, angular) = (state.twist.linear(), state.twist.angular());
         let damping = [self.damping_ns_per_m, self.damping_nms_per_rad];
         Wrench::new(
-            slowed(wrench.force(), state.pose.position(), linear, range_m, SLOWED_M_PER_S2, damping[0]),
-            slowed(wrench.torque(), turned, angular, range_rad, SLOWED_RAD_PER_S2, damping[1]),
+            slowed(wrench.force(), state.pose.position(), linear, range_m, damping[0]),
+            slowed(wrench.torque(), turned, angular, range_rad, damping[1]),
         )
     }
 }
 
 /// The force at a place inside an ellipsoid of these semi-axes, while the handle moves. An axis without a range (0) is not looked at.
 #[inline]
-fn slowed(force: DVec3, place: DVec3, speed: DVec3, range: [f64; 3], slowed: f64, damping: f64) -> DVec3 {
+fn slowed(force: DVec3, place: DVec3, speed: DVec3, range: [f64; 3], damping: f64) -> DVec3 {
     let range = DVec3::from_array(range);
     let inverse = DVec3::select(range.cmpgt(DVec3::ZERO), range.recip(), DVec3::ZERO);
-    let inside = place * inverse;
-    // The direction in which the way to the edge gets shorter fastest.
-    let (Some(outwards), part) = ((inside * inverse).try_normalize(), inside.length()) else { return force };
-    let along = outwards.dot(speed);
-    // How far the edge is in that direction: exact on the axes, and between them no farther than it is.
-    let edge = (1.0 - part).max(0.0) / (outwards * inverse).length();
-    let excess = along - (2.0 * slowed * edge).sqrt();
-    if excess > 0.0 { force - outwards * (outwards.dot(force).max(0.0) + damping * excess) } else { force }
+    let ahead = place + speed * AHEAD_S;
+    let part = (ahead * inverse).length();
+    if part <= 1.0 {
+        return force;
+    }
+    let edge = ahead / part;
+    // Normal of the ellipsoid there. The place is inside, so the speed along it is outwards: the damper only takes energy.
+    let Some(outwards) = (edge * inverse * inverse).try_normalize() else { return force };
+    let excess = outwards.dot(ahead - edge) / AHEAD_S;
+    force - outwards * (outwards.dot(force).max(0.0) + damping * excess)
 }
 
 #[cfg(test)]
@@ -77,12 +79,16 @@ mod tests {
     #[test]
     fn a_handle_that_can_be_stopped_is_left_alone_and_another_is_only_slowed() {
         let (pull, place) = (DVec3::new(3.0, 1.0, 2.0), DVec3::X * 0.008);
-        // v² / 2 a is the way that is left: sqrt(2 * 5 m/s² * 4.5 mm) = 0.212 m/s.
-        for speed in [0.0, 0.2, -1.0] {
+        // A twentieth of a second of the way that is left: 20 / s * 4.5 mm = 0.09 m/s.
+        for speed in [0.0, 0.089, -0.4] {
             assert_eq!(left_of(pull, place, DVec3::X * speed), pull, "{speed} m/s");
         }
-        assert_eq!(left_of(pull, DVec3::ZERO, DVec3::X), pull, "in the middle no way is outwards");
-        for speed in [0.22, 0.5, 2.0] {
+        assert_eq!(left_of(pull, DVec3::ZERO, DVec3::X * 0.24), pull, "a range in a twentieth of a second");
+        // Along the edge it is brought outside as well: sqrt(12.5² - 12²) = 3.5 mm in 50 ms.
+        assert_eq!(left_of(pull, DVec3::X * 0.012, DVec3::Y * 0.069), pull);
+        let (along, wanted) = (left_of(-pull, DVec3::X * 0.012, DVec3::Y * 0.2), -pull);
+        assert!(along.x < wanted.x && along.y < wanted.y, "{along}");
+        for speed in [0.091, 0.5, 2.0] {
             let left = left_of(pull, place, DVec3::X * speed);
             assert!(left.x < 0.0 && (left.y, left.z) == (1.0, 2.0), "{speed} m/s: {left}");
             let inwards = left_of(-pull, place, DVec3::X * speed);

@@ -4,7 +4,7 @@ use super::brake::Brake;
 use super::claims::{Claims, Cut, Reach};
 use super::{CouplingConfig, CouplingEnd, End, Grip, Pull};
 use flotor_core::peer::{DISPATCH_WORDS, Dispatch, PeerState, TankState};
-use flotor_hal::{DeviceState, Tick};
+use flotor_hal::{DeviceState, Tick, Wrench};
 use flotor_sync::{Observer, Publisher, latest};
 
 /// How long an end goes by what it heard last.
@@ -72,6 +72,8 @@ pub struct RemoteEnd {
     hearing: Hearing,
     /// Whether the message of this tick was not believed.
     is_implausible: bool,
+    /// Whether a partner that was let go may have thrown the handle: it is braked until it no longer needs to be.
+    is_thrown: bool,
 }
 
 /// Whether the end holds on to its partner.
@@ -118,6 +120,7 @@ impl RemoteEnd {
             hold: Hold::Released,
             hearing: Hearing::default(),
             is_implausible: false,
+            is_thrown: false,
         };
         (end, Line { told: for_partner, heard: from_partner, silence_ns: patience.silence_ns })
     }
@@ -141,6 +144,11 @@ impl RemoteEnd {
             tank: self.end.tank().state(),
         });
         match self.hold {
+            Hold::Released if self.is_thrown => {
+                let pull = self.end.pull_part(grip.state, 0.0, &self.brake);
+                self.is_thrown = pull.wrench != Wrench::ZERO;
+                pull
+            }
             Hold::Released => self.end.let_go(),
             Hold::On { since_ns, .. } => {
                 let part = self.part_at(tick.time_ns - since_ns);
@@ -240,6 +248,7 @@ impl RemoteEnd {
                 *place = dispatch.run;
             }
             self.hold = Hold::Released;
+            self.is_thrown = true;
             return;
         }
         self.hearing.run = dispatch.run;

@@ -14,7 +14,7 @@ const LIAR: u64 = 99;
 const HAND_W: f64 = 1.0;
 const AT_ONCE_J: f64 = 0.25;
 
-/// A lie: what is claimed in a tick, to the run that was heard.
+/// A lie: what is claimed in a tick, by who else would tell the run where its own handle is.
 type Lie = fn(u64, &mut Random, Dispatch) -> Dispatch;
 
 fn up(z_m: f64, speed_m_per_s: f64, told_j: f64) -> PeerState {
@@ -41,6 +41,17 @@ fn throw(tick: u64, period: u64, dispatch: Dispatch) -> Dispatch {
     }
 }
 
+/// Ahead of the handle by its own speed times a time: a damper that drives. A small swing begins it.
+fn drive(tick: u64, ahead_s: f64, dispatch: Dispatch) -> Dispatch {
+    let PeerState { pose, twist, .. } = dispatch.state;
+    let begin_m = 0.5e-3 * (std::f64::consts::TAU * 4.0e-3 * tick as f64).sin();
+    let position = pose.position() + twist.linear() * ahead_s + DVec3::Z * begin_m;
+    let orientation =
+        DQuat::from_scaled_axis(twist.angular() * ahead_s + DVec3::X * begin_m) * pose.orientation();
+    let pose = Pose::new(position, orientation.normalize());
+    Dispatch { state: PeerState { pose, twist, told_j: 0.95e-3 * tick as f64 }, ..dispatch }
+}
+
 /// Any number there is, of any size.
 fn wild(random: &mut Random) -> f64 {
     let exponent = 40.0 * random.next() - 20.0;
@@ -55,8 +66,23 @@ fn wild_state(random: &mut Random) -> PeerState {
     PeerState { pose, twist: Twist::new(linear, angular), told_j: wild(random).abs() }
 }
 
-const LIES: [(&str, Lie); 14] = [
+const LIES: [(&str, Lie); 24] = [
+    ("a throw at 1 Hz", |tick, _, d| throw(tick, 1000, d)),
     ("a throw at 2 Hz", |tick, _, d| throw(tick, 500, d)),
+    ("a throw at 3 Hz", |tick, _, d| throw(tick, 334, d)),
+    ("a throw at 4 Hz", |tick, _, d| throw(tick, 250, d)),
+    ("a throw at 6 Hz", |tick, _, d| throw(tick, 166, d)),
+    ("a throw at 10 Hz", |tick, _, d| throw(tick, 100, d)),
+    ("a throw at 25 Hz", |tick, _, d| throw(tick, 40, d)),
+    ("a drive 50 ms ahead", |tick, _, d| drive(tick, 0.05, d)),
+    ("a drive 0.2 s ahead", |tick, _, d| drive(tick, 0.2, d)),
+    ("a drive 1 s ahead", |tick, _, d| drive(tick, 1.0, d)),
+    ("a drive that is let go at its fastest", |tick, _, d| {
+        let told = drive(tick, 0.2, d);
+        let is_fast = d.state.twist.linear().length() > 0.2;
+        let told_j = if is_fast { f64::MAX } else { told.state.told_j };
+        Dispatch { state: PeerState { told_j, ..told.state }, ..told }
+    }),
     ("1 J a tick on a swing at its resonance", |tick, _, d| Dispatch {
         state: swing(tick, 0.01, 4.0, tick as f64),
         ..d
@@ -109,17 +135,19 @@ fn no_lie_brings_out_more_than_was_checked_here_or_throws_the_handle() {
         let mut host =
             Host::start(&registry, &scene("hand = \"hold\"\nhand_grip = \"relaxed\"", duration_s, ""), 5);
         let mut random = Random(30);
+        let mut seen = up(0.0, 0.0, 0.0);
         for tick in 0..ticks {
             let honest = Dispatch {
                 run: LIAR,
                 partner: 5,
                 since: 1,
                 tick: tick + 1,
-                state: up(0.0, 0.0, 0.0),
+                state: seen,
                 tank: TankState::default(),
             };
             host.hear(lie(tick, &mut random, honest), tick);
             host.advance();
+            seen = host.told().map_or(seen, |told| told.state);
             assert_eq!(host.end, None, "{name}: in tick {tick}");
         }
         let coupling = host.coupling();
