@@ -148,31 +148,18 @@ fn start_calibrating(emulator: &Emulator, sensor: &Path, arguments: &[&str]) -> 
     Flotor::with(["calibrate"].iter().chain(arguments).chain(&device).chain(&sensor)).start()
 }
 
-#[test]
-#[ignore = "a stand that moves for 25 s, and wants both cores: .ci/full runs it alone"]
-fn a_device_is_calibrated_with_a_force_sensor_on_a_serial_port() {
+/// In lockstep, on an emulated stand: the controller waits for a delayed host, and so does the stand. The file is a calibration of a
+/// device with this serial number.
+fn calibrate_on_the_stand(protocol: &[&str], settings: &[&str], serial: &str, ended: &str) {
     let scratch = Scratch::default();
     let (sensor, file) = (scratch.path().join("force"), scratch.path().join("mine.toml"));
     let rig = ["--calibration-rig", sensor.to_str().unwrap(), "--rig-step-mm", "2", "--rig-stop-s", "0.8"];
-    // In lockstep: the controller waits for a delayed host, and so does the stand.
     let mut emulator =
-        Emulator::listening("tcp", "127.0.0.1:0", &[&["--pace", "lockstep"], &rig[..]].concat());
-    let plan = [
-        "vertical",
-        "--set",
-        "pace=lockstep",
-        "--steps",
-        "7",
-        "--step-mm",
-        "2",
-        "--runs",
-        "1",
-        "--readings",
-        "2",
-        "--json",
-        "-",
-    ];
-    let ran = calibrate(&emulator, &sensor, &[&plan[..], &["--out", file.to_str().unwrap()]].concat());
+        Emulator::staying("tcp", "127.0.0.1:0", &[&["--pace", "lockstep"], protocol, &rig[..]].concat());
+    let plan =
+        ["vertical", "--steps", "7", "--step-mm", "2", "--runs", "1", "--readings", "2", "--json", "-"];
+    let to = ["--out", file.to_str().unwrap(), "--set", "pace=lockstep"];
+    let ran = calibrate(&emulator, &sensor, &[&plan[..], &to, settings].concat());
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
     let report: serde_json::Value = serde_json::from_str(&ran.stdout).expect("the summary is JSON");
     let number = |key: &str| report[key].as_f64().unwrap_or_else(|| panic!("{key} in {report}"));
@@ -181,9 +168,24 @@ fn a_device_is_calibrated_with_a_force_sensor_on_a_serial_port() {
     assert!((number("error_before_percent") - 10.87).abs() < 0.4, "{report}");
     assert!(number("error_after_percent") <= 0.5, "{report}");
     assert!((number("weight_n") - 8.58).abs() < 0.05, "{report}");
-    emulator.wait_for(&["mode Disarmed"]);
+    emulator.wait_for(&[ended]);
     let text = std::fs::read_to_string(&file).expect("the file was written");
-    assert!(text.contains("plugin = \"maglev\"") && text.contains("serial = \"emulated\""), "{text}");
+    let serial = format!("serial = \"{serial}\"");
+    assert!(text.contains("plugin = \"maglev\"") && text.contains(&serial), "{text}");
+}
+
+#[test]
+#[ignore = "a stand that moves for 25 s, and wants both cores: .ci/full runs it alone"]
+fn a_device_is_calibrated_with_a_force_sensor_on_a_serial_port() {
+    calibrate_on_the_stand(&[], &[], "emulated", "mode Disarmed");
+}
+
+#[test]
+#[ignore = "a stand that moves for 25 s, and wants both cores: .ci/full runs it alone"]
+fn a_device_is_calibrated_over_the_ml_api() {
+    let settings = ["--set", "protocol=ml-api", "--set", "gravity=off"];
+    let protocol = ["--protocol", "ml-api"];
+    calibrate_on_the_stand(&protocol, &settings, "ml-api 1.5b-flotor", "flight Landed");
 }
 
 #[test]
