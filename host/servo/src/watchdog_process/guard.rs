@@ -21,6 +21,9 @@ const PAUSE: Duration = Duration::from_millis(2);
 /// How long a handle that is full is waited for, each time.
 const PATIENCE: Timespec = Timespec { tv_sec: 0, tv_nsec: 5_000_000 };
 
+/// How long a host whose thread has ended has to say that this is in order.
+const LAST_WORD: Timespec = Timespec { tv_sec: 0, tv_nsec: 1_000_000 };
+
 /// A device on guard.
 struct Guarded {
     name: String,
@@ -79,26 +82,37 @@ enum Ended {
     Gone,
 }
 
-/// Waits until the host says that it is over, closes the link, or ends.
+/// Waits until the host says that it is over, closes the link, or ends, or the thread of its loop does.
 fn wait_for_end(link: impl AsFd, process: &OwnedFd) -> Ended {
+    let mut thread: Option<OwnedFd> = None;
     loop {
-        let mut both = [PollFd::new(&link, PollFlags::IN), PollFd::new(process, PollFlags::IN)];
-        match poll(&mut both, None) {
+        let mut all = vec![PollFd::new(&link, PollFlags::IN), PollFd::new(process, PollFlags::IN)];
+        all.extend(thread.as_ref().map(|thread| PollFd::new(thread, PollFlags::IN)));
+        match poll(&mut all, None) {
             Ok(_) => {}
             Err(Errno::INTR) => continue,
             Err(_) => return Ended::Gone,
         }
-        let [said, ended] = both.map(|which| !which.revents().is_empty());
-        if said {
-            return match receive(link.as_fd()) {
-                Ok((Some(Packet::End), ..)) => Ended::InOrder,
-                _ => Ended::Gone,
-            };
+        if all.first().is_none_or(|said| said.revents().is_empty()) {
+            // Nothing was said, so something has ended. What says that this is in order may be on its way from another thread.
+            let mut link = [PollFd::new(&link, PollFlags::IN)];
+            if !poll(&mut link, Some(&LAST_WORD)).is_ok_and(|seen| seen > 0) {
+                return Ended::Gone;
+            }
         }
-        if ended {
-            return Ended::Gone;
+        match receive(link.as_fd()) {
+            Ok((Some(Packet::End), ..)) => return Ended::InOrder,
+            Ok((Some(Packet::Thread), number, _)) => thread = thread_of(&number),
+            _ => return Ended::Gone,
         }
     }
+}
+
+/// A handle of the thread with this number; nothing before Linux 6.9, which knows processes only.
+fn thread_of(number: &[u8]) -> Option<OwnedFd> {
+    // PIDFD_THREAD, which rustix has no name for, is this flag.
+    let of_thread = PidfdFlags::from_bits_retain(OFlags::EXCL.bits());
+    pidfd_open(Pid::from_raw(i32::from_le_bytes(number.try_into().ok()?))?, of_thread).ok()
 }
 
 /// Writes each message, to all devices before it is written once more.
@@ -190,6 +204,34 @@ mod tests {
             }
             drop(host);
             assert_eq!(wait_for_end(&link, &own), ended, "{said:?}");
+        }
+    }
+    #[test]
+    fn a_host_whose_loop_ends_without_a_word_is_gone_however_long_its_other_threads_live() {
+        for (last_words, ended) in [(&b"e"[..], Ended::InOrder), (b"", Ended::Gone)] {
+            let (host, link) =
+                socketpair(AddressFamily::UNIX, SocketType::SEQPACKET, SocketFlags::CLOEXEC, None)
+                    .expect("two ends");
+            let own =
+                pidfd_open(rustix::process::getpid(), PidfdFlags::empty()).expect("this process is there");
+            let (begin, begun) = std::sync::mpsc::channel::<()>();
+            std::thread::scope(|scope| {
+                let host = &host;
+                scope.spawn(move || {
+                    let number = rustix::thread::gettid().as_raw_nonzero().get().to_le_bytes();
+                    let packet = [&[Packet::Thread as u8][..], &number].concat();
+                    send(host, &packet, SendFlags::NOSIGNAL).expect("it is sent");
+                    begun.recv().expect("it is told");
+                    if !last_words.is_empty() {
+                        send(host, last_words, SendFlags::NOSIGNAL).expect("it is sent");
+                    }
+                });
+                let waiting = scope.spawn(|| wait_for_end(&link, &own));
+                // It waits by now, or will see the thread end all the same.
+                std::thread::sleep(Duration::from_millis(20));
+                begin.send(()).expect("it listens");
+                assert_eq!(waiting.join().expect("it returns"), ended, "{last_words:?}");
+            });
         }
     }
 }

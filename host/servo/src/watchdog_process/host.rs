@@ -8,6 +8,7 @@ use rustix::net::{
     AddressFamily, RecvFlags, SendAncillaryBuffer, SendAncillaryMessage, SendFlags, SocketFlags, SocketType,
     recv, send, sendmsg, socketpair,
 };
+use rustix::thread::gettid;
 use std::io::{self, IoSlice};
 use std::mem::MaybeUninit;
 use std::os::fd::{AsFd, OwnedFd};
@@ -54,6 +55,14 @@ impl WatchdogProcess {
         process.say(Packet::Begin, &[])?;
         process.wait_until_ready()?;
         Ok(Some(process))
+    }
+
+    /// The calling thread runs the loop: when it ends without an end in order, the host counts as gone. Not real-time.
+    ///
+    /// # Errors
+    /// The process is gone.
+    pub fn follow_this_thread(&self) -> io::Result<()> {
+        self.say(Packet::Thread, &gettid().as_raw_nonzero().get().to_le_bytes())
     }
 
     fn say(&self, packet: Packet, rest: &[u8]) -> io::Result<()> {

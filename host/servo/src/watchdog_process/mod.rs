@@ -3,8 +3,8 @@
 //!
 //! The host starts its own program once more, as `flotor watchdog`, and hands it, over the socket that is its standard input,
 //! for each device a handle and a message of the device's own (extension `flotor.independent-stop/1`). It runs nothing of any
-//! plugin. When the socket closes without an end in order, or the host's process has ended, it writes the messages. It is of
-//! a process group of its own and takes no signal that asks it to end: it ends with its host, right after.
+//! plugin. When the socket closes without an end in order, or the host's process or the thread of its loop has ended, it writes the
+//! messages. It is of a process group of its own and takes no signal that asks it to end: it ends with its host, right after.
 
 mod guard;
 mod host;
@@ -25,6 +25,9 @@ enum Packet {
     Name = b'n',
     /// To the process: these were all.
     Begin = b'b',
+    /// To the process: the number of the thread that runs the loop. A killed process ends with its last thread, which on a busy
+    /// machine may wait for its turn; this one has priority.
+    Thread = b't',
     /// From the process: it is on guard.
     Ready = b'r',
     /// To the process: the devices are stopped, nobody has to guard them any more.
@@ -33,7 +36,7 @@ enum Packet {
 
 impl Packet {
     fn of(byte: u8) -> Option<Self> {
-        [Self::Device, Self::Name, Self::Begin, Self::Ready, Self::End]
+        [Self::Device, Self::Name, Self::Begin, Self::Thread, Self::Ready, Self::End]
             .into_iter()
             .find(|packet| *packet as u8 == byte)
     }

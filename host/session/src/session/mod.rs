@@ -652,6 +652,10 @@ impl Session {
         let loop_stopping = Arc::clone(&stopping);
         let servo_thread = thread.spawn(move || {
             let real_time = enter_real_time(core);
+            if let Some(process) = &watchdog_process {
+                // That it is gone is noticed by who looks on.
+                let _ = process.follow_this_thread();
+            }
             let spin = match pacing {
                 Pacing::Host => Some(SpinWindow::measure(period_ns)),
                 Pacing::Device => None,
