@@ -203,7 +203,7 @@ wheel() {
     PYTHONMALLOC=malloc valgrind --error-limit=no --num-callers=40 --log-file=target/wheel-memory.log target/venv/bin/python -m pytest \
         -q -p no:cacheprovider host/python/tests/test_model.py -k "whatever_lies or share_memory or not_aligned"
     if grep "_flotor\|libflotor" target/wheel-memory.log; then return 1; fi
-    FLOTOR_TEST_SIZE=full FLOTOR_PYTHON=$PWD/target/venv/bin/python cargo test --release -p flotor-tests --test system book::
+    FLOTOR_TEST_SIZE=full FLOTOR_PYTHON=$PWD/target/venv/bin/python cargo test --release -p flotor-tests --test system -- book:: examples::
 }
 
 # Programs of other makers' interfaces, as they are published: each drives the simulated flotor for a minute at its own pace.
@@ -250,4 +250,11 @@ bridge() {
     FLOTOR=target/release/flotor FLOTOR_TEST_SIZE=full \
         cargo test --release --manifest-path host/bridge/Cargo.toml --target-dir target/bridge
     cargo clippy --release --all-targets --manifest-path host/bridge/Cargo.toml --target-dir target/bridge -- -D warnings
+}
+
+# The archive of a release, unpacked into an empty folder: the demo and the scenes of the repository, without a network.
+archive() {
+    local trial=target/ci/archive
+    rm -rf "$trial"
+    .ci/archive.d/trial "$(.ci/archive)" "$trial"
 }

@@ -22,10 +22,18 @@ use flotor_command::separate::{Built, SeparateProgram};
 use flotor_command::{exit_code_of, options, say};
 use std::ffi::OsString;
 use std::process::ExitCode;
+use std::sync::LazyLock;
+
+/// The version, and the commit in a release: `.ci/archive` sets the variable. A build for oneself has none, so that a new commit
+/// compiles nothing anew.
+static VERSION: LazyLock<String> = LazyLock::new(|| {
+    let commit = option_env!("FLOTOR_COMMIT").map(|commit| format!(" ({commit})")).unwrap_or_default();
+    format!("{}{commit}", env!("CARGO_PKG_VERSION"))
+});
 
 /// Runs force models and haptic devices (both are plugins) in a servo loop with safety limits.
 #[derive(Parser)]
-#[command(name = "flotor", version, propagate_version = true, max_term_width = 110)]
+#[command(name = "flotor", version = VERSION.as_str(), propagate_version = true, max_term_width = 110)]
 #[command(after_help = "Examples:\n  \
     flotor                                            the built-in demo: simulate a spring for 10 s\n  \
     flotor run --clock virtual --seed 1 --plot run.svg    the same, repeatable, as a picture\n  \
