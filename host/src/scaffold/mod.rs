@@ -129,7 +129,7 @@ fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'sta
     const IGNORE: (&str, &str) = (".gitignore", "/target\n/lib*.so\n");
     const MODEL_SCENE: (&str, &str) = ("scene.toml", include_str!("templates/model-scene.toml"));
     const DEVICE_SCENE: (&str, &str) = ("scene.toml", include_str!("templates/device-scene.toml"));
-    const MODEL_TEST: (&str, &str) = ("your-name.test.toml", include_str!("templates/model.test.toml"));
+    const MODEL_TEST: (&str, &str) = ("your-name.test.toml", include_str!("templates/model-test.toml"));
     const MODEL_CURVE: (&str, &str) = ("your-name.csv", include_str!("templates/model.csv"));
     const WORKFLOW: (&str, &str) = (".github/workflows/haptics.yml", include_str!("templates/workflow.yml"));
     const MANIFEST: (&str, &str) = ("Cargo.toml", include_str!("templates/rust/manifest.toml"));
