@@ -65,6 +65,8 @@ impl Rect {
 pub(super) struct Path {
     data: String,
     at: (f64, f64),
+    /// Where the data end in a level step, and how far it goes: the next one the same way makes it longer.
+    level: Option<(usize, f64)>,
 }
 
 impl Path {
@@ -78,6 +80,7 @@ impl Path {
 
     fn move_to(&mut self, x: f64, y: f64) {
         self.at = (tenths(x), tenths(y));
+        self.level = None;
         self.data.push('M');
         self.push_pair(self.at);
     }
@@ -86,11 +89,16 @@ impl Path {
         let to = (tenths(x), tenths(y));
         let step = (to.0 - self.at.0, to.1 - self.at.1);
         self.at = to;
+        let level = if step == (0.0, 0.0) { self.level } else { self.level.take() };
         match step {
             (0.0, 0.0) => {}
             (dx, 0.0) => {
+                let before = level.filter(|(_, before)| before.is_sign_positive() == dx.is_sign_positive());
+                let (start, before) = before.unwrap_or((self.data.len(), 0.0));
+                self.data.truncate(start);
                 self.data.push('h');
-                text::push_tenths(&mut self.data, dx);
+                text::push_tenths(&mut self.data, before + dx);
+                self.level = Some((start, before + dx));
             }
             (0.0, dy) => {
                 self.data.push('v');
@@ -112,6 +120,7 @@ impl Path {
     }
 
     fn close(&mut self) {
+        self.level = None;
         self.data.push('z');
     }
 
@@ -125,6 +134,7 @@ impl Path {
             self.line_to(x, y);
         }
         if self.data.len() == drawn {
+            self.level = None;
             self.data.push_str("h0");
         }
     }

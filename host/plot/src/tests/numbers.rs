@@ -5,6 +5,7 @@ use super::super::decimate::decimate;
 use super::super::ticks::{Spacing, Ticks};
 use super::super::{Axis, text};
 use super::{Domain, Point, Scale, Sequence, linear, ten_minutes};
+use crate::path::Path;
 
 fn vertical() -> Spacing {
     Spacing::Vertical { pitch_px: 21.0 }
@@ -168,4 +169,14 @@ fn text_is_escaped_shortened_and_wrapped() {
 fn coordinates_are_short() {
     let written = [12.34, 0.26, -0.26, -0.04, 7.0, -3.0, 1e5].map(text::px);
     assert_eq!(written, ["12.3", ".3", "-.3", "0", "7", "-3", "100000"]);
+}
+
+#[test]
+fn a_level_stretch_of_a_line_is_one_step() {
+    let mut path = Path::default();
+    let level = (0..100).map(|x| (f64::from(x), 2.0));
+    path.polyline(level.chain([(99.0, 3.0), (100.0, 3.0), (105.5, 3.0), (101.0, 3.0), (101.0, 3.0)]));
+    assert_eq!(path.data(), "M0 2h99v1h6.5h-4.5");
+    path.polyline([(0.0, 3.0), (1.0, 3.0)]);
+    assert_eq!(path.data(), "M0 2h99v1h6.5h-4.5M0 3h1");
 }
