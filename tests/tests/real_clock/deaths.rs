@@ -90,11 +90,17 @@ fn an_exception_in_cpp_that_nobody_catches_takes_the_force_along() {
     }
     let _turn = crate::alone();
     let scratch = Scratch::default();
+    let source =
+        std::fs::read_to_string(workspace_root().join("examples/model-cpp/jelly.cpp")).expect("a source");
+    let first_line = "output = FlotorOutput{};\n";
+    assert!(source.contains(first_line), "{source}");
+    let throws =
+        source.replacen(first_line, "if (input.tick >= 300) { throw 1; }\noutput = FlotorOutput{};\n", 1);
     let library = scratch.path().join("libthrows.so");
     let compiled = Command::new("c++")
-        .args(["-std=c++17", "-DTHROWS", "-O1", "-shared", "-fPIC", "-I"])
+        .args(["-std=c++17", "-O1", "-shared", "-fPIC", "-I"])
         .arg(workspace_root().join("hal/include"))
-        .arg(workspace_root().join("tests/cpp/jelly.cpp"))
+        .arg(scratch.file("throws.cpp", throws))
         .arg("-o")
         .arg(&library)
         .output()

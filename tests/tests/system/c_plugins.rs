@@ -89,7 +89,7 @@ fn a_plugin_in_cpp_passes_validation() {
     let compiled = Command::new("c++")
         .args(["-std=c++17", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O1", "-shared", "-fPIC", "-I"])
         .arg(workspace_root().join("hal/include"))
-        .arg(workspace_root().join("tests/cpp/jelly.cpp"))
+        .arg(workspace_root().join("examples/model-cpp/jelly.cpp"))
         .arg("-o")
         .arg(&library)
         .output()

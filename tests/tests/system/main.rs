@@ -15,6 +15,7 @@ mod documents;
 #[cfg(feature = "drop-ins")]
 mod drop_ins;
 mod ends;
+mod examples;
 mod force_sensor;
 mod golden;
 mod haply;

@@ -1,11 +1,10 @@
-// A force model in C++: a jelly that gives way in every direction, and declares its active region. THROWS lets an exception
-// out of tick 300.
+// A force model in C++: a jelly that gives way in every direction, and declares its active region.
 #include "flotor.h"
 #include <cmath>
 #include <cstring>
 #include <new>
 
-FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-cpp-jelly\"\nname = \"Jelly\"\ndoc = \"A soft block, in C++\"\n"
+FLOTOR_METADATA("kind = \"model\"\nid = \"jelly-cpp\"\nname = \"Jelly\"\ndoc = \"A soft block, in C++\"\n"
                 "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_jelly\"\n");
 
 namespace {
@@ -19,11 +18,6 @@ public:
     // Real-time: bounded, no allocation.
     uint32_t step(const FlotorInput &input, FlotorOutput &output) const {
         output = FlotorOutput{};
-#ifdef THROWS
-        if (input.tick >= 300) {
-            throw 1;
-        }
-#endif
         for (int axis = 0; axis < 3; axis++) {
             const double at_m = input.pose.position_m[axis];
             // Also for what is no number: farther off its energy could be none.
@@ -60,7 +54,7 @@ uint32_t region(FlotorInstance, FlotorActiveRegion *out) {
 FlotorForceTable force_table() {
     FlotorForceTable table{};
     table.size = sizeof table;
-    table.info = {FLOTOR_STR("fixture-cpp-jelly"), FLOTOR_STR("Jelly"), FLOTOR_STR("A soft block, in C++"),
+    table.info = {FLOTOR_STR("jelly-cpp"), FLOTOR_STR("Jelly"), FLOTOR_STR("A soft block, in C++"),
                   {FLOTOR_DEMAND_FORCE | FLOTOR_DEMAND_TORQUE | FLOTOR_DEMAND_ENERGY}, FlotorMemory_Stateless};
     table.create = create;
     table.destroy = destroy;

@@ -1,0 +1,126 @@
+//! `examples/`: every command of its page does what it is there for, and what the book also shows is the same there.
+
+use flotor_session::scene::Scene;
+use flotor_tests::program::Flotor;
+use flotor_tests::scratch::Scratch;
+use flotor_tests::tools::{Tool, required, skipped};
+use flotor_tests::{files_under, workspace_root};
+use std::process::Command;
+
+/// Environment variable: a Python interpreter with the packages that the page names.
+const PYTHON: &str = "FLOTOR_PYTHON";
+
+fn text(path: &str) -> String {
+    std::fs::read_to_string(workspace_root().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+/// The commands of the page, in order.
+fn commands() -> Vec<String> {
+    text("examples/README.md").lines().filter_map(|line| line.strip_prefix("$ ").map(str::to_owned)).collect()
+}
+
+/// Runs the commands in one shell, as a reader does, and returns what they print. The programs are those of this build.
+fn run(commands: &[String]) -> String {
+    let commands: String = commands.iter().map(|command| format!("({command}) || exit 1\n")).collect();
+    let scratch = Scratch::default();
+    let script = format!(
+        "set -e\nexport PATH=\"${{1%/*}}:$PATH\" FLOTOR_PLUGIN_PATH=target/examples/debug\nunset CARGO_TARGET_DIR\n\
+         cd '{}'\n{commands}",
+        workspace_root().display()
+    );
+    let file = scratch.file("script", script);
+    let ran =
+        Flotor::with([&file]).through_shell("exec bash \"$2\" \"$1\"").env("CARGO_NET_OFFLINE", "true").run();
+    assert_eq!(ran.code, Some(0), "{ran:#?}");
+    ran.stdout
+}
+
+#[test]
+fn every_command_of_the_examples_runs() {
+    let (python, cxx) = (std::env::var(PYTHON).ok(), required(Tool::Cxx));
+    if python.is_none() {
+        skipped(&format!("{PYTHON} names no Python with mcap: read_recording.py"));
+    }
+    let chosen: Vec<String> = commands()
+        .into_iter()
+        .filter(|command| !command.starts_with("export ") && (cxx || !command.contains("cpp")))
+        .filter_map(|command| match (&python, command.contains("python3")) {
+            (_, false) => Some(command),
+            (Some(python), true) => Some(command.replace("python3", python)),
+            (None, true) => None,
+        })
+        .collect();
+    let printed = run(&chosen);
+    for title in ["A jelly", "A wall on a crank", "Honey", "A jelly in C++", "Two hands, one spring"] {
+        let shown = printed.lines().any(|line| line == title);
+        assert!(shown || (!cxx && title.contains("C++")), "`{title}` did not run: {printed}");
+    }
+    let peaks = printed.lines().filter(|line| line.starts_with("  peak "));
+    let without_force: Vec<&str> = peaks.filter(|line| line.contains("  0.000 N ")).collect();
+    assert_eq!(without_force, Vec::<&str>::new(), "an example without force shows nothing: {printed}");
+    assert!(printed.contains("cases passed"), "{printed}");
+}
+
+#[test]
+fn the_workflow_of_the_examples_tests_the_files_beside_it() {
+    let workflow = text("examples/ci/workflow.yml");
+    let folder = workspace_root().join("examples/ci");
+    let test = workflow.lines().find_map(|line| line.trim().strip_prefix("- run: flotor test "));
+    let file = test.and_then(|test| test.split(' ').next()).expect("it has a test");
+    let scratch = Scratch::default();
+    let junit = scratch.path().join("results.xml");
+    let ran = Flotor::with(["test".as_ref(), file.as_ref(), "--junit".as_ref(), junit.as_os_str()])
+        .inside(&folder)
+        .run();
+    assert_eq!(ran.code, Some(0), "{ran:#?}");
+    // The same without what makes the floor a floor fails.
+    let test = text("examples/ci/floor.test.toml")
+        .replace("[expect]", "[set]\nfloor.stiffness_n_per_m = [1]\n[expect]");
+    let (_, _) =
+        (scratch.file("soft.test.toml", test), scratch.file("scene.toml", text("examples/ci/scene.toml")));
+    let ran = Flotor::with(["test", "soft.test.toml"]).inside(scratch.path()).run();
+    assert_eq!(ran.code, Some(1), "{ran:#?}");
+    assert!(ran.stdout.contains("peak_force_n"), "{ran:#?}");
+}
+
+#[test]
+fn a_scene_runs_in_a_program_of_ones_own() {
+    let ran = Command::new(env!("CARGO_BIN_EXE_embed")).output().expect("it is built with the tests");
+    let printed = String::from_utf8_lossy(&ran.stdout);
+    assert!(ran.status.success(), "{ran:?}");
+    assert!(printed.contains("after 2000 ticks; largest force "), "{printed}");
+}
+
+#[test]
+fn the_gallery_has_every_scene_and_its_picture() {
+    let gallery = text("docs/src/gallery.md");
+    let scenes = files_under("host/scenes", "toml").expect("there are scenes");
+    let names = scenes.iter().filter_map(|file| file.file_name()?.to_str()?.strip_suffix(".toml"));
+    for name in names.filter(|name| !name.ends_with(".test")) {
+        let command = format!("$ flotor run host/scenes/{name}.toml --clock virtual ");
+        let needs_more = gallery.contains(&format!("\n- `{name}.toml`: "));
+        assert_ne!(gallery.contains(&command), needs_more, "{name} is shown, or the reason why not is told");
+        if needs_more {
+            continue;
+        }
+        // The title of the scene, and the peak that the book's test compares with what the command prints.
+        let title =
+            Scene::load(&workspace_root().join(format!("host/scenes/{name}.toml"))).expect("a scene").title;
+        let picture = text(&format!("docs/src/images/scenes/{name}.svg"));
+        assert!(picture.contains(&format!("<title>{title}</title>")), "{name}: another picture");
+    }
+}
+
+#[test]
+fn what_the_book_shows_of_an_example_is_its_file() {
+    for (file, shown_in) in [
+        ("examples/model/src/lib.rs", "README.md"),
+        ("examples/device/src/lib.rs", "docs/src/write-a-device.md"),
+        ("examples/read_recording.py", "docs/src/recording.md"),
+    ] {
+        let block = format!("\n{}```\n", text(file));
+        assert!(text(shown_in).contains(&block), "{file} is not what {shown_in} shows");
+    }
+    let lines = text("examples/model/src/lib.rs").lines().count();
+    assert!(lines <= 25, "a model in {lines} lines");
+}
