@@ -105,6 +105,7 @@ format() {
     local satellite
     cargo fmt --all --check
     for satellite in $satellites; do cargo fmt --manifest-path "$satellite/Cargo.toml" --check; done
+    cargo fmt --all --manifest-path examples/Cargo.toml --check
 }
 
 # The checks of every change, cheapest first.

@@ -75,7 +75,8 @@ impl ActiveDevice for TurningCrank {
         let speed_m_per_s = self.crank.amplitude_m * TAU * FREQUENCY_HZ * cos;
         state.pose = Pose::new(DVec3::Z * self.crank.amplitude_m * sin, DQuat::IDENTITY);
         state.twist = Twist::new(DVec3::Z * speed_m_per_s, DVec3::ZERO);
-        state.delivered = if self.crank.stopped.load(Ordering::Acquire) { Wrench::ZERO } else { self.commanded };
+        state.delivered =
+            if self.crank.stopped.load(Ordering::Acquire) { Wrench::ZERO } else { self.commanded };
         state.sampled_ns = tick.time_ns;
         Cycle::Fresh
     }

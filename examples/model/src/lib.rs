@@ -6,7 +6,8 @@ struct Jelly {
 }
 
 impl ForceModel for Jelly {
-    const INFO: ModelInfo = ModelInfo::new("jelly", "Jelly", "A soft block that gives way in every direction");
+    const INFO: ModelInfo =
+        ModelInfo::new("jelly", "Jelly", "A soft block that gives way in every direction");
     const PARAMETERS: &'static [Parameter] =
         &[Parameter::real("stiffness_n_per_m", "N/m", 0.0, 2000.0, 300.0, "How hard it pulls home")];
 
