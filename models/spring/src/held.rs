@@ -17,6 +17,16 @@ pub trait HeldSpring {
     fn noise_rad(&self) -> f64 {
         0.0
     }
+
+    /// Marks the last answer as one that [`Self::go_back`] returns to. Real-time: bounded, no allocation.
+    fn mark(&mut self) {}
+
+    /// As it was when it answered what was marked: what it tried since then is forgotten. Real-time: bounded, no
+    /// allocation.
+    fn go_back(&mut self) {}
+
+    /// Without load: forgets the past. Real-time: bounded, no allocation.
+    fn unload(&mut self) {}
 }
 
 impl HeldSpring for EnergyForm {
@@ -32,6 +42,18 @@ impl HeldSpring for Rod {
 
     fn noise_rad(&self) -> f64 {
         Rod::noise_rad(self)
+    }
+
+    fn mark(&mut self) {
+        Rod::mark(self);
+    }
+
+    fn go_back(&mut self) {
+        Rod::go_back(self);
+    }
+
+    fn unload(&mut self) {
+        self.reset();
     }
 }
 
@@ -71,5 +93,17 @@ impl<L: HeldSpring> HeldSpring for Held<L> {
 
     fn noise_rad(&self) -> f64 {
         self.law.noise_rad()
+    }
+
+    fn mark(&mut self) {
+        self.law.mark();
+    }
+
+    fn go_back(&mut self) {
+        self.law.go_back();
+    }
+
+    fn unload(&mut self) {
+        self.law.unload();
     }
 }

@@ -108,7 +108,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.01,
         10.0,
         10.0,
-        "Friction under a free seat; at 10 nothing slides",
+        "Friction under a free seat; at 10 hardly any base slides",
     )
     .live(),
     Parameter::choice("hand_over", OFF_ON, 1, "Near buckling to the rod, as one energy (variant energy)"),

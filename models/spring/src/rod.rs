@@ -215,6 +215,16 @@ impl Rod {
         either!(&self.solver, equilibrium => equilibrium.tolerance())
     }
 
+    /// Marks the shape of the last tick.
+    pub(crate) fn mark(&mut self) {
+        either!(&mut self.solver, equilibrium => equilibrium.mark());
+    }
+
+    /// In the shape that was marked.
+    pub(crate) fn go_back(&mut self) {
+        either!(&mut self.solver, equilibrium => equilibrium.go_back());
+    }
+
     /// What the last tick cost. Real-time: bounded, no allocation.
     #[must_use]
     pub fn work(&self) -> Work {

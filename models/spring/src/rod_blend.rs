@@ -37,6 +37,8 @@ pub struct RodBlend {
     spring: Spring,
     share: f64,
     follows: Follows,
+    /// The last two as they were marked.
+    marked: (f64, Follows),
 }
 
 /// Whether the rod goes on from its last tick.
@@ -59,6 +61,7 @@ impl RodBlend {
             spring: *spring,
             share: 0.0,
             follows: Follows::Pose,
+            marked: (0.0, Follows::Pose),
         }
     }
 
@@ -169,5 +172,19 @@ impl HeldSpring for RodBlend {
 
     fn noise_rad(&self) -> f64 {
         if self.share > 0.0 { self.rod.noise_rad() } else { 0.0 }
+    }
+
+    fn mark(&mut self) {
+        self.rod.mark();
+        self.marked = (self.share, self.follows);
+    }
+
+    fn go_back(&mut self) {
+        self.rod.go_back();
+        (self.share, self.follows) = self.marked;
+    }
+
+    fn unload(&mut self) {
+        self.reset();
     }
 }

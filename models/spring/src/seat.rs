@@ -20,9 +20,13 @@
 //!
 //! A spring that would be pulled hangs from the upper plate, without load: its base goes, tilts and turns with it. It
 //! touches down where its rim meets the ground, with no stored energy, and stands there as it hung. It leaves the ground
-//! where a hanging rim would. Friction holds no more than three times what a straight spring
-//! shortened as far would press down: as the hanging rim comes free, friction fades and with it all that it holds, so lifting off is
-//! continuous. (Coulomb's law alone lets a bent spring jam in its friction beyond that, and snap.)
+//! where a hanging rim would. Coulomb's law alone lets a bent spring jam in its friction where the coefficient is above `D/L0`, and
+//! snap as it is lifted. What such a coefficient holds beyond `D/L0` is therefore a share of what a straight spring shortened as
+//! far would press down: as the hanging rim comes free, friction fades and with it all that it holds, so lifting off is continuous.
+//!
+//! Pressed past buckling a base may lose the ground under a bent spring, or roll on without end. Where it cannot stand up as it
+//! would hang with the energy that it has, it falls over: wrench and energy fade together, a share a tick, and it carries nothing
+//! until it is lifted.
 //!
 //! Derivation: the book, chapter "The spring"; the step with a tip is the proximal Newton step of Lee, Sun
 //! and Saunders (2014); one bound for force and torque of friction: Howe and Cutkosky (1996), a limit surface.
@@ -47,21 +51,29 @@ const ENERGY_TOLERANCE: f64 = 1e-13;
 const SHORTER: f64 = 0.25;
 /// Largest change of the tilt between evaluations (rad).
 const LONGEST_STEP_RAD: f64 = 0.05;
-/// Largest tilt (rad): beyond it the plate would stand on edge.
-const LARGEST_TILT_RAD: f64 = 1.5;
+/// Longest way of the tilt in a tick that ends in no equilibrium (rad).
+const LONGEST_WAY_RAD: f64 = 0.1;
+/// Largest tilt (rad) of a base that stands: slender springs roll as far as 0.78 and stay there, and beyond 1.1 no law knows
+/// a coil. A base that goes on falls over.
+const LARGEST_TILT_RAD: f64 = 0.9;
+/// Share of its wrench that a spring which falls over loses in a tick.
+const FALL_PER_TICK: f64 = 1.0 / 32.0;
 /// Newton steps on the secular equation; it is nearly straight, three give all digits.
 const SECULAR_STEPS: u32 = 8;
 /// Share of the friction by which the force along the ground may exceed it: no coefficient is known as well.
 const FRICTION_TOLERANCE: f64 = 1e-6;
-/// Most that friction holds, of the force of a straight spring shortened as far. More than any pose of the reference tables
-/// asks for, and few enough that lifting off is gradual.
-const STEEPEST: f64 = 3.0;
+/// Friction by the height over that by the force, at most. Tables of a base that sticks ask for half of both together; from
+/// 0.9 on slender springs jam.
+const BY_HEIGHT: f64 = 0.8;
 /// A sliding base is moved by what the stiffness along the ground makes of the excess; as observed, but within this
 /// factor of that at rest.
 const STIFFNESS_RANGE: f64 = 8.0;
 /// Least surprise of the slope, in what the law leaves open of it, that says something about the curvature: the quotient
 /// of noise and a short step is any number.
 const LEAST_SURPRISE: f64 = 3.0;
+/// Change of the tilt (rad) below which it is clear whether the base slides: one that has not rolled as far as it will is
+/// pulled harder.
+const ROLLED_RAD: f64 = 3e-4;
 /// Longest slide between evaluations, in free lengths.
 const LONGEST_SLIDE: f64 = 0.05;
 /// Least curvature assumed, of that of the spring at rest: a flatter model would take wild steps.
@@ -70,12 +82,12 @@ const LEAST_CURVATURE: f64 = 1e-3;
 /// Friction between the base and the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
-    /// Force along the ground per force onto it at which the base slides.
+    /// Force along the ground per force onto it at which the base slides; of more than `D/L0`, see the module's documentation.
     pub coefficient: f64,
 }
 
 impl Friction {
-    /// As good as none slides: no spring pulls its base that hard sideways while it stands.
+    /// As much as any holds.
     pub const STICKING: Self = Self { coefficient: 10.0 };
 }
 
@@ -90,6 +102,8 @@ pub struct Seat {
     /// Curvature by the tilt as observed, without the tip (N·m/rad).
     curvature: DMat2,
     lifted: bool,
+    /// Share of its wrench that is left as it falls over: 1 while it stands, 0 where it lies.
+    hold: f64,
     /// Stiffness along the axis at rest (N/m).
     axial_n_per_m: f64,
     /// Coefficient of friction on the ground.
@@ -140,6 +154,7 @@ impl Seat {
             tilt_rad: DVec2::ZERO,
             curvature: DMat2::from_diagonal(DVec2::splat(stiffness_nm_per_rad)),
             lifted: false,
+            hold: 1.0,
             axial_n_per_m: spring.axial_stiffness_n_per_m(),
             friction: friction.coefficient,
             slide_m: DVec2::ZERO,
@@ -152,14 +167,14 @@ impl Seat {
     /// Takes other parameters at a tick boundary and keeps the tilt. Real-time: bounded, no allocation.
     pub fn set_spring(&mut self, spring: &Spring, friction: Friction) {
         let fresh = Self::new(spring, friction);
-        let Self { tilt_rad, slide_m, turn_rad, lifted, .. } = *self;
-        *self = Self { tilt_rad, slide_m, turn_rad, lifted, ..fresh };
+        let Self { tilt_rad, slide_m, turn_rad, lifted, hold, .. } = *self;
+        *self = Self { tilt_rad, slide_m, turn_rad, lifted, hold, ..fresh };
     }
 
     /// Seated again, where it was at first. Real-time: bounded, no allocation.
     pub fn reset(&mut self) {
         self.stand(&Standing { tilt_rad: DVec2::ZERO, slide_m: DVec2::ZERO, turn_rad: 0.0 });
-        self.lifted = false;
+        (self.lifted, self.hold) = (false, 1.0);
     }
 
     /// Stands at a place, with nothing known of the spring there.
@@ -202,6 +217,12 @@ impl Seat {
         self.lifted
     }
 
+    /// Whether the spring has fallen over, or falls.
+    #[must_use]
+    pub fn has_fallen(&self) -> bool {
+        self.hold < 1.0
+    }
+
     /// Wrench on the hand of the spring on its seat, at the pose of this tick.
     ///
     /// Total where the law is; [`Validity::NotConverged`] while the base is on its way, by a bounded tilt per
@@ -214,29 +235,38 @@ impl Seat {
         let (standing, height_m) = self.hanging(pose);
         let was_lifted = std::mem::replace(&mut self.lifted, height_m > 0.0);
         if self.lifted {
-            return in_the_air(demand);
+            self.hold = 1.0;
+            spring.unload();
+            return without_load(demand);
         }
         if was_lifted {
             self.stand(&standing);
         }
-        let noise_rad = spring.noise_rad();
+        if self.hold < 1.0 {
+            return self.fall(spring, pose, demand);
+        }
+        let (noise_rad, started_rad) = (spring.noise_rad(), self.tilt_rad);
         // The last place of the base in this tick at which it stood, and what was felt there.
         let mut last: Option<Stood> = None;
         let mut slid: Option<(f64, f64)> = None;
         let mut tip_nm = None;
-        let (mut has_sat_down, mut failures) = (false, 0);
+        // Where it lost the ground, and the energy it may have at most where it stands up.
+        let mut lost: Option<(Standing, f64)> = None;
+        let (mut failures, mut has_rolled) = (0, false);
         for _ in 0..MOST_EVALUATIONS {
             let base = self.base();
             let response = self.held(spring, pose, &base, Demand::WrenchAndEnergy);
-            if !matches!(response.validity, Validity::Ok | Validity::Clamped) {
+            let has_settled = matches!(response.validity, Validity::Ok | Validity::Clamped);
+            if !has_settled && last.is_none() && lost.is_none() {
+                // It snaps between its plates: the base waits for it.
                 return only(response, demand);
             }
             let stored_j = response.energy_j.unwrap_or_default();
             if let Some(stood) = &last {
-                // Too far: it would lose the ground, or gain energy.
+                // Too far: it would snap, lose the ground, or gain energy.
                 let most_j = stood.stored_j + ENERGY_TOLERANCE * self.stiffness_nm_per_rad;
-                if response.force_n.z <= 0.0 || stored_j > most_j {
-                    if let (Some(before), Some(tip_nm)) = (stood.slope, tip_nm) {
+                if !has_settled || response.force_n.z <= 0.0 || stored_j > most_j {
+                    if let (true, Some(before), Some(tip_nm)) = (has_settled, stood.slope, tip_nm) {
                         let slope = self.slope(pose, &base, &response) - tip_nm * base.direction;
                         self.observe(self.tilt_rad - stood.at.tilt_rad, slope - before, noise_rad);
                     }
@@ -249,15 +279,25 @@ impl Seat {
                         _ => -SHORTER,
                     };
                     self.go_back_to(&stood.at, part);
+                    spring.go_back();
                     continue;
                 }
-            } else if response.force_n.z <= 0.0 {
-                // Nothing holds it there any more: it stands as it would have hung.
-                if has_sat_down {
-                    return in_the_air(demand);
+            } else if let Some((at, most_j)) = lost {
+                if !has_settled || stored_j > most_j {
+                    self.go_back_to(&at, 0.0);
+                    spring.go_back();
+                    return self.fall(spring, pose, demand);
                 }
+                if response.force_n.z <= 0.0 {
+                    // It merely touches the ground.
+                    return without_load(demand);
+                }
+            } else if response.force_n.z <= 0.0 {
+                // Nothing holds it there any more: it stands as it would have hung, where that costs nothing.
+                lost = Some((self.standing(), stored_j));
+                spring.mark();
+                spring.unload();
                 self.stand(&standing);
-                has_sat_down = true;
                 continue;
             }
             // What lifting costs to first order; the rest of the energy has no tip. Off the tip any other number would
@@ -278,12 +318,10 @@ impl Seat {
                 // Where the curvature is no cup the model's best is not downhill.
                 step = (whole_slope / -self.stiffness_nm_per_rad).clamp_length_max(LONGEST_STEP_RAD);
             }
-            step = (self.tilt_rad + step).clamp_length_max(LARGEST_TILT_RAD) - self.tilt_rad;
             let pull_n = self.pull_n(pose, &base, &response);
-            // Coulomb's, and no more than what would press down a straight spring that is shortened as far.
             let straight_n = -height_m * self.axial_n_per_m;
-            let friction_n =
-                (self.friction * response.force_n.z).min(self.friction.min(STEEPEST) * straight_n);
+            let (by_force, by_height) = self.friction_shares();
+            let friction_n = by_force * response.force_n.z + by_height * straight_n;
             let excess_n = pull_n.length() - friction_n;
             let tolerance_n = FRICTION_TOLERANCE * friction_n;
             if let (Some((distance_m, before_n)), Some(stood)) = (slid.take(), &last) {
@@ -292,14 +330,17 @@ impl Seat {
                     // Friction holds it short of here: by the straight line between the two.
                     let part = before_n / (before_n - excess_n);
                     self.go_back_to(&stood.at, part);
+                    spring.go_back();
                     slid = Some((distance_m * part, before_n));
                     continue;
                 }
             }
             let at = self.standing();
-            let slides = excess_n > tolerance_n;
+            has_rolled |= step.length() <= ROLLED_RAD;
+            let slides = has_rolled && excess_n > tolerance_n;
             // After a slide the slope is another one at the same tilt: nothing to observe.
             last = Some(Stood { at, response, stored_j, slope: (!slides).then_some(slope) });
+            spring.mark();
             if slides {
                 slid = Some((self.slide(pull_n, excess_n), excess_n));
                 continue;
@@ -307,13 +348,41 @@ impl Seat {
             if step.length() <= noise_rad.max(TOLERANCE_RAD) {
                 return only(response, demand);
             }
+            if (self.tilt_rad + step).length() >= LARGEST_TILT_RAD {
+                return self.fall(spring, pose, demand);
+            }
+            if (self.tilt_rad + step).distance(started_rad) > LONGEST_WAY_RAD {
+                break;
+            }
             failures = 0;
             self.tilt_rad += step;
         }
         // On its way: it stays where it last stood.
         let Some(Stood { at, response, .. }) = last else { return Response::none(Validity::NotConverged) };
+        spring.go_back();
         (self.tilt_rad, self.slide_m, self.turn_rad) = (at.tilt_rad, at.slide_m, at.turn_rad);
         only(Response { validity: Validity::NotConverged, ..response }, demand)
+    }
+
+    /// Gives way where it stood, a share a tick: its energy and its wrench are that share of the law's, so what it loses
+    /// nobody gets.
+    #[cold]
+    fn fall<S: HeldSpring>(&mut self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
+        self.hold = (self.hold - FALL_PER_TICK).max(0.0);
+        let response = self.held(spring, pose, &self.base(), Demand::WrenchAndEnergy);
+        let stored_j = response.energy_j.unwrap_or_default();
+        if self.hold == 0.0 || !response.validity.has_answer() || stored_j <= 0.0 {
+            self.hold = 0.0;
+            spring.unload();
+            return without_load(demand);
+        }
+        let response = Response {
+            force_n: response.force_n * self.hold,
+            torque_nm: response.torque_nm * self.hold,
+            energy_j: Some(stored_j * self.hold),
+            validity: Validity::NotConverged,
+        };
+        only(response, demand)
     }
 
     fn standing(&self) -> Standing {
@@ -341,7 +410,9 @@ impl Seat {
             (pose.orientation, pose.position_m, Pose::HOME)
         } else {
             let base = self.base();
-            (base.rotation, base.rotation * rise + base.center_m - rise, self.relative(pose, &base))
+            // One that has fallen lies there, unloaded.
+            let relative = if self.hold > 0.0 { self.relative(pose, &base) } else { Pose::HOME };
+            (base.rotation, base.rotation * rise + base.center_m - rise, relative)
         };
         if !draw(&relative, sections) {
             return false;
@@ -351,6 +422,15 @@ impl Seat {
             section.orientation = rotation * section.orientation;
         }
         true
+    }
+
+    /// What friction holds, of the force onto the ground and of the force of a straight spring that is shortened as far.
+    /// Coulomb's law up to `D/L0`. Beyond that a bent spring whose rim slides loses force onto the ground faster than it is
+    /// relieved: what such a coefficient holds beyond is taken by the height.
+    fn friction_shares(&self) -> (f64, f64) {
+        let gentle = 2.0 * self.rim_radius_m / self.free_length_m;
+        let by_force = self.friction.min(gentle);
+        (by_force, (self.friction - by_force).min(BY_HEIGHT * gentle))
     }
 
     /// What the spring pulls its base with along the ground, and turns it with about its normal, over the radius (N).
@@ -446,7 +526,7 @@ impl Seat {
 }
 
 /// The wrench of a spring that carries nothing.
-fn in_the_air(demand: Demand) -> Response {
+fn without_load(demand: Demand) -> Response {
     let energy_j = (demand >= Demand::WrenchAndEnergy).then_some(0.0);
     Response { energy_j, ..Response::none(Validity::Ok) }
 }

@@ -294,6 +294,78 @@ fn a_spring_that_is_set_down_turned_is_not_twisted() {
     assert!((hand.felt.force_n.z - spring.axial_stiffness_n_per_m() * 2e-3).abs() < 1e-9, "{:?}", hand.felt);
 }
 
+/// A plate that is tilted and was moved sideways comes off as gradually as a level one, whatever the friction.
+#[test]
+fn a_tilted_plate_lifts_off_without_a_jump() {
+    for preset in Preset::ALL {
+        let spring = preset.spring();
+        let geometry = spring.geometry();
+        let free_length_m = geometry.free_length_m;
+        // Tilts beyond which a base is on its way over as the plate lifts off are not for the slender one.
+        let (depth, tilts) = if preset == Preset::Slender {
+            (0.03, &[0.035, 0.1][..])
+        } else {
+            (0.08, &[0.035, 0.1, 0.2][..])
+        };
+        let mut most = 0.0f64;
+        for friction in [0.3, 1.0, 10.0] {
+            for tilt_rad in tilts.iter().copied() {
+                for aside in [-0.06, 0.0, 0.06] {
+                    let mut hand = Hand::new(&spring, RodBlend::new(&spring), friction);
+                    let [above, pressed, shoved, off] =
+                        [[0.0, 0.1], [0.0, -depth], [aside, -depth], [aside, 0.1]]
+                            .map(|[x, z]| DVec3::new(x, 0.0, z) * free_length_m);
+                    hand.go(above);
+                    let tilted = DVec3::Y * tilt_rad;
+                    for (to_m, tick_m) in [(pressed, 4e-6), (shoved, 4e-6), (off, 1e-6)] {
+                        let from_m = hand.pose.position_m;
+                        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some thousands
+                        let ticks = ((to_m - from_m).length() / tick_m).ceil() as u32;
+                        hand.step_n = 0.0;
+                        for tick in 1..=ticks {
+                            let part = f64::from(tick) / f64::from(ticks);
+                            hand.tick(from_m.lerp(to_m, part), tilted);
+                        }
+                    }
+                    assert!(hand.seat.is_lifted() && hand.felt.force_n == DVec3::ZERO);
+                    // A micrometre of the axial stiffness, and of a base on its rim L0/D times that again.
+                    let slope =
+                        spring.axial_stiffness_n_per_m() * (1.0 + free_length_m / geometry.coil_diameter_m);
+                    most = most.max(hand.step_n / (1e-6 * slope));
+                }
+            }
+        }
+        println!("{preset:?}: steps up to {most:.2} of stiffness and travel");
+        assert!(most < 1.5, "{preset:?}: {most}");
+    }
+}
+
+/// Past buckling a free spring falls over: it gives way step by step, carries nothing where it lies, and stands again once
+/// it has been lifted.
+#[test]
+fn a_spring_that_falls_over_gives_way_and_lies_until_it_is_lifted() {
+    let spring = Preset::Thesis3.spring();
+    let free_length_m = spring.geometry().free_length_m;
+    let mut hand = Hand::new(&spring, Rod::to_rounding(&spring, Coils::Pass), 1.0);
+    let mm = |x: f64, z: f64| DVec3::new(x, 0.3 * x, z) * 1e-3;
+    hand.go(mm(0.5, -0.3 * free_length_m * 1e3));
+    assert!(!hand.seat.has_fallen() && hand.felt.force_n.z > 2.0, "{:?}", hand.felt);
+    hand.go(mm(0.5, -0.6 * free_length_m * 1e3));
+    assert!(hand.seat.has_fallen());
+    let nothing = (DVec3::ZERO, DVec3::ZERO, Some(0.0), Validity::Ok);
+    let felt = |felt: &Response| (felt.force_n, felt.torque_nm, felt.energy_j, felt.validity);
+    assert_eq!(felt(&hand.felt), nothing);
+    hand.go(mm(2.0, -0.1 * free_length_m * 1e3));
+    assert_eq!(felt(&hand.felt), nothing);
+    println!("falls with steps of up to {:.2} N", hand.step_n);
+    assert!(hand.step_n < 0.5, "a step of {} N", hand.step_n);
+    hand.go(mm(2.0, 1.0));
+    hand.go(mm(2.0, -2.0));
+    let pressed_n = spring.axial_stiffness_n_per_m() * 2e-3;
+    assert!((hand.felt.force_n - DVec3::Z * pressed_n).length() < 1e-6, "{:?}", hand.felt);
+    assert!(hand.felt.energy_j.unwrap() < hand.work_j, "{} J", hand.work_j);
+}
+
 /// Random laps of a hand in all six dimensions, through the air and over the ground, rolling and sliding.
 #[test]
 fn no_lap_through_the_air_generates_energy() {

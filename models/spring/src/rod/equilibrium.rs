@@ -109,6 +109,7 @@ pub(crate) struct Equilibrium<const K: usize, const N: usize, const Q: usize> {
     effort: Effort,
     shape: Shape<N>,
     history: History<N>,
+    marked: (Plate, Shape<N>),
     matrix: KeptMatrix<N>,
     descent: Descent<N>,
     damping: f64,
@@ -178,6 +179,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
             effort,
             shape: [0.0; N],
             history: History::new(Plate::HOME, [0.0; N]),
+            marked: (Plate::HOME, [0.0; N]),
             matrix: KeptMatrix::none(),
             descent: Descent::new(),
             damping: LEAST_DAMPING,
@@ -194,6 +196,18 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         self.matrix.steps_left = 0;
         self.damping = LEAST_DAMPING;
         self.unstable_directions = 0;
+    }
+
+    /// Marks the shape of the last tick. Real-time: bounded, no allocation.
+    pub(crate) fn mark(&mut self) {
+        self.marked = (*self.history.plate(), self.shape);
+    }
+
+    /// In the shape that was marked, with no other past. Real-time: bounded, no allocation.
+    pub(crate) fn go_back(&mut self) {
+        let (plate, shape) = &self.marked;
+        self.history.restart(plate, shape);
+        (self.shape, self.damping) = (*shape, LEAST_DAMPING);
     }
 
     /// Another rod in the same shape. Real-time: bounded, no allocation.
