@@ -13,7 +13,7 @@ use prost::{Enumeration, Message};
 use prost_types::Timestamp;
 
 /// `host/proto` compiled (a `google.protobuf.FileDescriptorSet`): what a stranger needs to read the messages.
-pub(crate) const DESCRIPTOR_SET: &[u8] = include_bytes!("../../proto/flotor.binpb");
+pub(crate) const DESCRIPTOR_SET: &[u8] = include_bytes!("../proto/flotor.binpb");
 
 /// The encoding of messages and schemas, as MCAP's registry names it.
 pub(crate) const ENCODING: &str = "protobuf";

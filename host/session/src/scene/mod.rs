@@ -24,10 +24,10 @@ pub use reader::{did_you_mean, nearest};
 use std::path::{Path, PathBuf};
 
 /// The scene `flotor` runs when none is named: spring 1 on the simulated flotor, held by a hand.
-pub const DEMO: &str = include_str!("../../../scenes/demo.toml");
+pub const DEMO: &str = include_str!("../../scenes/demo.toml");
 
 /// The scene of experiments: a spring to be judged, on the simulated flotor.
-pub const STUDY: &str = include_str!("../../../scenes/study.toml");
+pub const STUDY: &str = include_str!("../../scenes/study.toml");
 
 /// A scene as read: complete, checked against itself, not yet against the plugins it names.
 #[derive(Clone, Debug, PartialEq)]
