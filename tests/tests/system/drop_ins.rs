@@ -71,13 +71,33 @@ fn each_library_exports_the_names_of_its_interface_and_a_mark() {
 
 /// The program in C that looks for a Phantom, compiled.
 fn phantom(scratch: &Scratch) -> PathBuf {
-    let program = scratch.path().join("phantom");
+    compiled(scratch, "phantom")
+}
+
+/// A program in C, compiled.
+fn compiled(scratch: &Scratch, name: &str) -> PathBuf {
+    let program = scratch.path().join(name);
     let mut compiler = Command::new("cc");
     compiler.args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-o"]).arg(&program);
-    compiler.arg(workspace_root().join("tests/c/programs/phantom.c")).args(["-ldl", "-lm", "-lpthread"]);
+    let source = workspace_root().join(format!("tests/c/programs/{name}.c"));
+    compiler.arg(source).args(["-ldl", "-lm", "-lpthread"]);
     let output = compiler.output().expect("a C compiler is installed; the README asks for one");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     program
+}
+
+#[test]
+fn numbers_and_errors_are_those_of_each_interface() {
+    if !tools::required(Tool::Cc) {
+        return;
+    }
+    let scratch = Scratch::default();
+    let program = compiled(&scratch, "numbers");
+    for (api, library) in [("openhaptics", "hd"), ("dhd", "dhd")] {
+        let ran = lent(&program, &["--api", api, "--pace", "lockstep"], library, 1);
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+        assert!(ran.stdout.starts_with("0 wrong\n"), "{api}: {}", ran.stdout);
+    }
 }
 
 /// Lends it the built-in device.
