@@ -153,12 +153,14 @@ fn start_calibrating(emulator: &Emulator, sensor: &Path, arguments: &[&str]) -> 
 fn calibrate_on_the_stand(protocol: &[&str], settings: &[&str], serial: &str, ended: &str) {
     let scratch = Scratch::default();
     let (sensor, file) = (scratch.path().join("force"), scratch.path().join("mine.toml"));
-    let rig = ["--calibration-rig", sensor.to_str().unwrap(), "--rig-step-mm", "2", "--rig-stop-s", "0.8"];
+    let [sensor_name, file_name] =
+        [&sensor, &file].map(|path| path.to_str().expect("a scratch folder has a plain name"));
+    let rig = ["--calibration-rig", sensor_name, "--rig-step-mm", "2", "--rig-stop-s", "0.8"];
     let mut emulator =
         Emulator::staying("tcp", "127.0.0.1:0", &[&["--pace", "lockstep"], protocol, &rig[..]].concat());
     let plan =
         ["vertical", "--steps", "7", "--step-mm", "2", "--runs", "1", "--readings", "2", "--json", "-"];
-    let to = ["--out", file.to_str().unwrap(), "--set", "pace=lockstep"];
+    let to = ["--out", file_name, "--set", "pace=lockstep"];
     let ran = calibrate(&emulator, &sensor, &[&plan[..], &to, settings].concat());
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
     let report: serde_json::Value = serde_json::from_str(&ran.stdout).expect("the summary is JSON");
