@@ -1,8 +1,9 @@
 //! Programs of other makers' interfaces: the libraries that stand in for theirs export what those do, drive any device inside its
 //! limits, and whatever a program does, neither limits nor summary go with it.
 
+use super::campaign::log::{Allowed, Seen, check, read};
 use flotor_record::Recording;
-use flotor_tests::library::build_folder;
+use flotor_tests::library::{build_folder, compile_c_file};
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::side_by_side::show_each;
@@ -13,6 +14,7 @@ use object::{Object, ObjectSymbol};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What a plugin looks for before it loads a maker's library.
 const MARKER: &str = "flotor_dropin";
@@ -153,6 +155,19 @@ fn a_program_drives_a_device_without_a_changed_line_and_in_lockstep_bit_for_bit(
     assert_eq!(run().1["trace_digest"], first["trace_digest"]);
 }
 
+/// What the device of the scene below may be told: its own share of each axis, under one norm for all.
+const ALLOWED: Allowed =
+    Allowed { norm: [MOST_N, 0.5], axes: [[MOST_N; 3], [0.5; 3]], slew_per_s: [5_000.0, 500.0] };
+
+/// A scene of a device that writes down what it is told (`tests/c/campaign/device.c`).
+fn with_a_log(scratch: &Scratch, device: &Path, log: &Path, name: &str) -> PathBuf {
+    let text = format!(
+        "duration_s = 1.0e6\n[device]\nplugin = {device:?}\n[device.parameters]\nlog = {log:?}\nforce = 50.0\ntorque = 5.0\n\
+         slew = 5000.0\nrange_mm = 12.0\n[limits]\nforce_n = {MOST_N:?}\ntorque_nm = 0.5\n"
+    );
+    scratch.file(&format!("{name}.toml"), &text)
+}
+
 #[test]
 fn nothing_a_program_does_gets_past_the_limits_or_takes_report_and_recording_with_it() {
     if !tools::required(Tool::Cc) {
@@ -160,12 +175,12 @@ fn nothing_a_program_does_gets_past_the_limits_or_takes_report_and_recording_wit
     }
     let scratch = Scratch::default();
     let program = phantom(&scratch);
-    let calls = TestSize::of_this_run().pick(2_000, 1_000_000);
-    // In lockstep a tick a call: as many as are wanted. What depends on time or dies runs in real time.
-    let cases = [
-        ("steps", "lockstep", calls),
-        ("huge", "lockstep", calls),
-        ("nan", "lockstep", calls),
+    let device = scratch.path().join("libdevice.so");
+    compile_c_file(&workspace_root().join("tests/c/campaign/device.c"), &["SIMULATED"], &device);
+    // In lockstep a tick a call: as many as are wanted, and as a log has room for. What depends on time or dies runs in real time.
+    let (calls, rounds) = (TestSize::of_this_run().pick(2_000, 120_000), TestSize::of_this_run().pick(1, 3));
+    let in_lockstep = ["steps", "huge", "nan"].map(|way| (way, "lockstep", calls));
+    let in_real_time = [
         ("plain", "real", 600),
         ("steps", "real", 600),
         ("stall", "real", 250),
@@ -175,16 +190,32 @@ fn nothing_a_program_does_gets_past_the_limits_or_takes_report_and_recording_wit
         ("kill", "real", 1600),
         ("crash", "real", 1600),
     ];
-    show_each(&cases, |(way, pace, calls)| {
-        let recording = scratch.path().join(format!("{way}-{pace}.mcap"));
-        let ran =
-            lent(&program, &["--pace", pace, "--record", &recording.display().to_string()], way, *calls);
+    let cases: Vec<_> =
+        std::iter::repeat_n(in_lockstep, rounds).flatten().chain(in_real_time).enumerate().collect();
+    let told = AtomicUsize::new(0);
+    show_each(&cases, |(number, (way, pace, calls))| {
+        let name = format!("{number}-{way}");
+        let [recording, log] = ["mcap", "log"].map(|kind| scratch.path().join(format!("{name}.{kind}")));
+        let scene = with_a_log(&scratch, &device, &log, &name).display().to_string();
+        let ran = lent(
+            &program,
+            &["--pace", pace, "--record", &recording.display().to_string(), &scene],
+            way,
+            *calls,
+        );
         let (largest_n, ticks) = largest_n(&recording);
         assert!(largest_n <= MOST_N * (1.0 + 1.0e-12), "{way}: {largest_n} N");
         assert!(
             ticks > 100 && ran.stdout.contains("  program    `device` opened "),
             "{way}: {ticks} ticks, {ran:?}"
         );
+        let Seen { commands, felt, violations } = check(&read(&log), &ALLOWED);
+        told.fetch_add(commands, Ordering::Relaxed);
+        // Nothing stops this device once its process is gone at a blow, and the host says so when it pairs a real one.
+        let dies = ["kill", "crash"].contains(way);
+        let left: Vec<_> = violations.iter().filter(|(_, what)| !(dies && *what == "force stays")).collect();
+        assert!(left.is_empty(), "{way}: {left:?}");
+        assert!(felt > 50 || *way == "nan", "{way}: force in {felt} of {commands} commands");
         let expected = match *way {
             "kill" => 128 + 9,
             "crash" => 128 + 6,
@@ -200,6 +231,9 @@ fn nothing_a_program_does_gets_past_the_limits_or_takes_report_and_recording_wit
             _ => {}
         }
     });
+    let told = told.into_inner();
+    println!("{told} commands in the device's own log");
+    assert!(told >= TestSize::of_this_run().pick(0, 1_000_000), "{told} commands");
 }
 
 #[test]

@@ -7,7 +7,7 @@ const ENTRY: usize = 64;
 
 /// What a host did with a device.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Entry {
+pub(crate) enum Entry {
     /// Energised, in a loop of this period, ns.
     Activated(u64),
     /// Told this force (N) and torque (N·m).
@@ -21,7 +21,7 @@ pub(super) enum Entry {
 }
 
 /// The entries of a file; one that its process was writing when it died is left out.
-pub(super) fn read(path: &Path) -> Vec<Entry> {
+pub(crate) fn read(path: &Path) -> Vec<Entry> {
     let bytes = std::fs::read(path).unwrap_or_default();
     let word =
         |entry: &[u8], at: usize| u64::from_le_bytes(entry[at..at + 8].try_into().expect("eight bytes"));
@@ -44,20 +44,20 @@ pub(super) fn read(path: &Path) -> Vec<Entry> {
 
 /// What may reach a hand at a device: norms, shares of the axes, and the fastest change; of force (N), then of torque (N·m).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Allowed {
-    pub(super) norm: [f64; 2],
-    pub(super) axes: [[f64; 3]; 2],
-    pub(super) slew_per_s: [f64; 2],
+pub(crate) struct Allowed {
+    pub(crate) norm: [f64; 2],
+    pub(crate) axes: [[f64; 3]; 2],
+    pub(crate) slew_per_s: [f64; 2],
 }
 
 /// What was seen of a device.
 #[derive(Debug, Default)]
-pub(super) struct Seen {
+pub(crate) struct Seen {
     /// Commands, and those with force.
-    pub(super) commands: usize,
-    pub(super) felt: usize,
+    pub(crate) commands: usize,
+    pub(crate) felt: usize,
     /// What must not be, with the number of the entry.
-    pub(super) violations: Vec<(usize, &'static str)>,
+    pub(crate) violations: Vec<(usize, &'static str)>,
 }
 
 /// Relative slack for a norm that is computed here once more, and for a difference.
@@ -65,7 +65,7 @@ const ROUNDING: f64 = 1.0e-12;
 const ROUNDING_OF_A_STEP: f64 = 1.0e-9;
 
 /// Holds a log against what is allowed.
-pub(super) fn check(log: &[Entry], allowed: &Allowed) -> Seen {
+pub(crate) fn check(log: &[Entry], allowed: &Allowed) -> Seen {
     let mut seen = Seen::default();
     let (mut last, mut period_s, mut is_active, mut is_stopped) = ([[0.0; 3]; 2], 0.0, false, false);
     for (number, entry) in log.iter().enumerate() {

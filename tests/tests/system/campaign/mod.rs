@@ -3,7 +3,7 @@
 //!
 //! `FLOTOR_TEST_SIZE=full cargo test --release -p flotor-tests campaign -- --nocapture` prints how many.
 
-mod log;
+pub(super) mod log;
 mod scenes;
 
 use flotor_tests::TestSize;
@@ -96,7 +96,7 @@ fn no_wrench_of_a_million_is_over_a_limit_jumps_or_comes_after_a_stop() {
     let plugins = plugins(&scratch);
     let (scenes, ticks) = match TestSize::of_this_run() {
         TestSize::Quick => (24, 3000),
-        TestSize::Full => (520, 20_000),
+        TestSize::Full => (700, 20_000),
     };
     let rates = [100.0, 250.0, 500.0, 1000.0, 1000.0, 2000.0, 5000.0, 10_000.0];
     let run = |seed: u64| {
@@ -113,6 +113,8 @@ fn no_wrench_of_a_million_is_over_a_limit_jumps_or_comes_after_a_stop() {
         "{} runs, {} of them ended by a fault or a death: {} commands, {} with force; {} devices within a tenth of a limit",
         all.runs, all.ended, all.commands, all.felt, all.close
     );
+    let most = TestSize::of_this_run().pick(0, 10_000_000);
+    assert!(all.commands >= most, "more scenes are needed for {most} commands: {}", all.commands);
     assert!(all.felt > all.commands / 4, "there was force");
     assert!(all.close > all.runs / 2, "which came close to what is allowed");
     assert!(all.ended > all.runs / 10);
