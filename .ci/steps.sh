@@ -116,7 +116,7 @@ every_change() {
     step deny deny
     # The README's `cargo test`; the viewer, whose GPU stack that leaves out; and what needs tools that take long to build. One
     # command: of two, the second builds half of what both use again, with other features.
-    step test cargo test --workspace --features flotor-tests/formats,flotor-tests/drop-ins --no-fail-fast
+    step test env FLOTOR_TEST_SIZE=daily cargo test --workspace --features flotor-tests/formats,flotor-tests/drop-ins --no-fail-fast
     step lint cargo clippy --workspace --all-targets --all-features -- -D warnings
     step docs env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
     # Counts of instructions of the optimised program against their budgets.

@@ -78,16 +78,18 @@ pub fn holds_ticks(recording: &Path) -> bool {
 }
 
 /// How much work tests that scale may do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum TestSize {
-    /// Seconds: what every change runs.
+    /// Seconds: what a plain `cargo test` runs.
     Quick,
+    /// The same, and the tests that take longer: what every change runs (`.ci/run`).
+    Daily,
     /// Minutes: what `.ci/full` runs.
     Full,
 }
 
 impl TestSize {
-    /// Environment variable that chooses the size: `quick` (also when unset) or `full`.
+    /// Environment variable that chooses the size: `quick` (also when unset), `daily` or `full`.
     pub const VARIABLE: &str = "FLOTOR_TEST_SIZE";
 
     /// The size this run asks for.
@@ -100,7 +102,7 @@ impl TestSize {
             Err(_) => Self::Quick,
             Ok(word) => match Self::from_word(&word) {
                 Some(size) => size,
-                None => panic!("{}={word}: quick or full is expected", Self::VARIABLE),
+                None => panic!("{}={word}: quick, daily or full is expected", Self::VARIABLE),
             },
         }
     }
@@ -109,14 +111,25 @@ impl TestSize {
     #[must_use]
     pub const fn pick(self, quick: usize, full: usize) -> usize {
         match self {
-            Self::Quick => quick,
+            Self::Quick | Self::Daily => quick,
             Self::Full => full,
         }
+    }
+
+    /// Whether a test that takes longer than others is left out; tells so.
+    #[must_use]
+    pub fn leaves_out_long_tests(self) -> bool {
+        let is_quick = self == Self::Quick;
+        if is_quick {
+            tools::skipped("takes longer than others: `FLOTOR_TEST_SIZE=daily`, as in `.ci/run`, has it");
+        }
+        is_quick
     }
 
     fn from_word(word: &str) -> Option<Self> {
         match word {
             "quick" => Some(Self::Quick),
+            "daily" => Some(Self::Daily),
             "full" => Some(Self::Full),
             _ => None,
         }
@@ -159,7 +172,8 @@ mod tests {
     fn a_mistyped_size_is_no_size() {
         assert_eq!(TestSize::from_word("full"), Some(TestSize::Full));
         assert_eq!(TestSize::from_word("ful"), None);
-        assert_eq!(TestSize::Quick.pick(10, 1000), 10);
+        assert_eq!(TestSize::from_word("daily"), Some(TestSize::Daily));
+        assert_eq!((TestSize::Quick.pick(10, 1000), TestSize::Daily.pick(10, 1000)), (10, 10));
         assert_eq!(TestSize::Full.pick(10, 1000), 1000);
     }
 }

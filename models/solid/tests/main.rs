@@ -5,3 +5,22 @@ mod mesh;
 mod rows;
 mod solver;
 mod table;
+
+use std::io::Write;
+
+/// Whether a test that prepares a solid for seconds is left out; tells so, past the harness.
+///
+/// The variable is that of `flotor_tests::TestSize`; plugins depend on nothing else of the workspace, so it is read here.
+fn leaves_out_long_tests() -> bool {
+    let is_quick =
+        !std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| ["daily", "full"].contains(&size.as_str()));
+    if is_quick {
+        let thread = std::thread::current();
+        let _ = writeln!(
+            std::io::stderr(),
+            "skipped: {}: takes longer than others: `FLOTOR_TEST_SIZE=daily`, as in `.ci/run`, has it",
+            thread.name().unwrap_or("a test")
+        );
+    }
+    is_quick
+}

@@ -180,6 +180,9 @@ fn a_plate_on_a_beam_from_a_file() {
 /// The bound of the block's own rows, on sixteen-millimetre bricks: the half-space carries the contact.
 #[test]
 fn a_sphere_on_a_block_from_a_file() {
+    if crate::leaves_out_long_tests() {
+        return;
+    }
     let mesh = cube(Kind::Brick, 5).mesh();
     let (nu, radius_m) = (0.45, 0.0127);
     let (Law::Sphere(atlas), mesh_error) = on_mesh(Tool::Sphere { radius_m }, nu, &mesh) else {
@@ -275,6 +278,9 @@ fn a_cylinder_twists_as_a_round_bar_does() {
 /// More material is stiffer: a cylinder lies between the blocks inside and around it, and its force is the slope of its energy.
 #[test]
 fn a_sphere_on_a_cylinder_lies_between_two_blocks() {
+    if crate::leaves_out_long_tests() {
+        return;
+    }
     let (radius_m, poisson_ratio) = (0.0127, 0.3);
     let solve = |body| {
         let description = Description { body, tool: Tool::Sphere { radius_m }, poisson_ratio, resolution: 0 };

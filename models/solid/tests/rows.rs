@@ -75,6 +75,9 @@ fn a_punch_on_a_block() {
 
 #[test]
 fn a_sphere_on_a_block() {
+    if crate::leaves_out_long_tests() {
+        return;
+    }
     // Each takes some seconds to prepare: quick size has one.
     let is_full = std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size == "full");
     for nu in [0.3, 0.45] {
@@ -104,6 +107,9 @@ fn a_sphere_on_a_block() {
 /// Displacement of the top face under an even load on a disc, at points and distances of the table.
 #[test]
 fn a_loaded_disc_on_a_block() {
+    if crate::leaves_out_long_tests() {
+        return;
+    }
     let corners: Vec<[f64; 2]> = (0..64)
         .map(|k| {
             let angle = std::f64::consts::TAU * f64::from(k) / 64.0;

@@ -33,11 +33,7 @@ fn died(death: &str, model: &Path) -> (Board, Scratch, Ran) {
 /// All of them at full size, else those whose ways out of the process differ most.
 fn of_this_size<T: Copy>(cases: &[(T, TestSize)]) -> Vec<T> {
     let size = TestSize::of_this_run();
-    cases
-        .iter()
-        .filter(|(_, least)| *least == TestSize::Quick || size == TestSize::Full)
-        .map(|(case, _)| *case)
-        .collect()
+    cases.iter().filter(|(_, least)| *least <= size).map(|(case, _)| *case).collect()
 }
 
 #[test]

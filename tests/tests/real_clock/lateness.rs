@@ -1,5 +1,6 @@
 //! A model in a process of its own that answers late now and then.
 
+use flotor_tests::TestSize;
 use flotor_tests::library::compile_c_file;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
@@ -8,6 +9,9 @@ use serde_json::Value;
 
 #[test]
 fn a_late_answer_from_another_process_costs_a_tick_and_not_the_run() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let _turn = crate::alone();
     let scratch = Scratch::default();
     // Later than its budget and before the next tick, in one tick of fifty.

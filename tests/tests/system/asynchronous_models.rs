@@ -6,6 +6,7 @@ use flotor_core::trace::Events;
 use flotor_servo::Clock;
 use flotor_servo::RunEnd;
 use flotor_session::scene::Scene;
+use flotor_tests::TestSize;
 use flotor_tests::field_error::{FieldError, Swing, field_error};
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
@@ -22,6 +23,9 @@ const NO_LIMIT_N_PER_S: f64 = 1.0e6;
 
 #[test]
 fn a_field_makes_no_step_that_a_slew_limit_would_have_to_cut() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     for swing in [SLOW, FAST] {
         // A limit that a force held from one field to the next would break with each of the larger steps.
         let plain = field_error(200.0, swing, NO_LIMIT_N_PER_S, 2.0);
@@ -39,6 +43,9 @@ fn a_field_makes_no_step_that_a_slew_limit_would_have_to_cut() {
 
 #[test]
 fn a_field_is_nearer_to_the_membrane_than_a_force_that_is_held() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let errors: Vec<FieldError> =
         [50.0, 100.0, 200.0].map(|rate_hz| field_error(rate_hz, FAST, NO_LIMIT_N_PER_S, 2.0)).to_vec();
     let shares = |of: fn(&FieldError) -> f64| -> Vec<f64> {

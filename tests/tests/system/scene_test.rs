@@ -5,7 +5,7 @@ use flotor_tests::library::plugin_file;
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::tools::{Tool, required};
-use flotor_tests::workspace_root;
+use flotor_tests::{TestSize, workspace_root};
 use quick_xml::Reader;
 use quick_xml::events::Event;
 use rustix::process::Signal;
@@ -42,6 +42,9 @@ fn json(ran: &Ran) -> Value {
 
 #[test]
 fn in_the_root_of_the_repository_all_its_tests_pass() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let ran = test(&workspace_root(), &[]);
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
     for case in ["host/scenes/demo: validate", "examples/ci/floor: validate"] {

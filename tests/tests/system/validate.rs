@@ -47,6 +47,9 @@ fn assert_nothing_found(library: &Path) {
 
 #[test]
 fn every_mistake_of_a_model_is_found_under_its_rule() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let mistakes = [
         ("CHOICES_WITHOUT_END", "loads", "1125899906842624 choices"),
         ("PARAMETERS_WITHOUT_END", "loads", "1000000 parameters"),
@@ -82,6 +85,9 @@ fn every_mistake_of_a_model_is_found_under_its_rule() {
 
 #[test]
 fn every_mistake_of_a_device_is_found_under_its_rule() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let mistakes = [
         ("RATES_REVERSED", "capabilities", "10000 to 100 Hz"),
         ("RATES_WITHOUT_END", "capabilities", "100 to inf Hz"),

@@ -9,8 +9,8 @@ use flotor_spring::pose::Pose;
 pub(crate) fn of(all: u32, day: u32) -> u32 {
     match std::env::var("FLOTOR_TEST_SIZE").as_deref() {
         Ok("full") => all,
-        Ok("quick") | Err(_) => day,
-        Ok(other) => panic!("FLOTOR_TEST_SIZE is `quick` or `full`, not `{other}`"),
+        Ok("quick" | "daily") | Err(_) => day,
+        Ok(other) => panic!("FLOTOR_TEST_SIZE is `quick`, `daily` or `full`, not `{other}`"),
     }
 }
 
