@@ -5,7 +5,7 @@ use crate::controller::Sample;
 use crate::ml_api::controller::{Answer, Controller, Flight, Silence, Ticket};
 use crate::ml_api::misbehavior::{Deed, Misbehavior, Plan};
 use flotor_hal::Wrench;
-use flotor_maglev::ml_api::{EventKind, Reply, Request, Unreadable};
+use flotor_maglev::ml_api::{EventKind, Function, Reply, Request, Unreadable};
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -159,6 +159,8 @@ impl Hub {
     pub(super) fn handle(&self, id: Id, request: Result<Request, Unreadable>) -> Handled {
         let mut state = self.state();
         let deed = state.plan.deed(id);
+        // Nobody waits for a command: to wake the servo loop for it would delay its reply.
+        let wakes = deed != Deed::Answer || !request.is_ok_and(|request| is_command(request.function()));
         let answer = match (deed, request) {
             (Deed::Status(status), request) => {
                 let function =
@@ -178,7 +180,9 @@ impl Hub {
         }
         state.log_changes(&self.log);
         drop(state);
-        self.changed.notify_all();
+        if wakes {
+            self.changed.notify_all();
+        }
         Handled { deed, answer }
     }
 
@@ -259,6 +263,18 @@ impl Hub {
         drop(state);
         self.changed.notify_all();
     }
+}
+
+/// Whether a function does no more than say what the controller exerts from the next interval on.
+fn is_command(function: Function) -> bool {
+    matches!(
+        function,
+        Function::SetForces
+            | Function::SetForceAxis
+            | Function::SetCurrents
+            | Function::SetDesiredPosition
+            | Function::SetVelocity
+    )
 }
 
 /// Whether ticks are on their way.
