@@ -24,8 +24,8 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 use std::sync::LazyLock;
 
-/// The version, and the commit in a release: `.ci/archive` sets the variable. A build for oneself has none, so that a new commit
-/// compiles nothing anew.
+/// The version, and the commit in a release: `.ci/archive` sets the variable. Other builds have none, so that a new
+/// commit does not force a rebuild.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
     let commit = option_env!("FLOTOR_COMMIT").map(|commit| format!(" ({commit})")).unwrap_or_default();
     format!("{}{commit}", env!("CARGO_PKG_VERSION"))

@@ -1,14 +1,14 @@
 //! Against a partner on another host that throws a handle here out of the range of its device.
 //!
 //! Energy that is believed may be that of a partner who lies, and a spring that is pulled to and fro at the right moments collects it in
-//! the handle. So a handle that would be outside of its range a little later, were it to go on as it does, is not pulled outwards, and
-//! a damper slows it down. Both take energy away. Hands are not that fast near an edge.
+//! the handle. So the position is extrapolated by the velocity: where that leaves the range, nothing pulls the handle outwards, and a
+//! damper slows it down. Inside the range both take energy away. Hands are not that fast near an edge.
 
 use super::Reach;
 use flotor_hal::{DVec3, DeviceState, Wrench, rotation_vector};
 
-/// How far is looked ahead, s. A handle that comes straight outwards is let to have a twentieth of a second of the way that is left; the
-/// damper, 50 N·s/m at 1 kHz, keeps it and a hand, 1.1 kg, to that with a damping ratio of `sqrt(50 * 0.05 / (4 * 1.1)) = 0.75`.
+/// Time by which the position is extrapolated, s. A handle that moves straight outwards may cover the distance that is left in that
+/// time; the damper, 50 N·s/m at 1 kHz, keeps handle and hand, 1.1 kg, to that with a damping ratio of `sqrt(50 * 0.05 / (4 * 1.1)) = 0.75`.
 const AHEAD_S: f64 = 0.05;
 /// Mass and moment of inertia of the lightest handle and hand, kg and kg m²: the damper stops half of its motion in a period.
 const LIGHTEST_KG: f64 = 0.1;
@@ -54,7 +54,8 @@ fn slowed(force: DVec3, place: DVec3, speed: DVec3, range: [f64; 3], damping: f6
         return force;
     }
     let edge = ahead / part;
-    // Normal of the ellipsoid there. The place is inside, so the speed along it is outwards: the damper only takes energy.
+    // Normal of the ellipsoid there. From inside, the velocity along it is outwards and the damper only takes energy; from outside
+    // it also pushes back.
     let Some(outwards) = (edge * inverse * inverse).try_normalize() else { return force };
     let excess = outwards.dot(ahead - edge) / AHEAD_S;
     force - outwards * (outwards.dot(force).max(0.0) + damping * excess)

@@ -14,7 +14,7 @@ const LIAR: u64 = 99;
 const HAND_W: f64 = 1.0;
 const AT_ONCE_J: f64 = 0.25;
 
-/// A lie: what is claimed in a tick, by who else would tell the run where its own handle is.
+/// A lie: the message that the partner sends in a tick, made of an honest one with the pose of the run's own handle.
 type Lie = fn(u64, &mut Random, Dispatch) -> Dispatch;
 
 fn up(z_m: f64, speed_m_per_s: f64, told_j: f64) -> PeerState {

@@ -265,7 +265,7 @@ impl Hub {
     }
 }
 
-/// Whether a function does no more than say what the controller exerts from the next interval on.
+/// Whether a function only sets the target or the wrench of the next servo interval.
 fn is_command(function: Function) -> bool {
     matches!(
         function,
