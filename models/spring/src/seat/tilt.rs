@@ -1,0 +1,68 @@
+//! The tilt of least energy: a step of Newton's method on an energy with a tip.
+
+use flotor_hal::glam::{DMat2, DVec2};
+
+/// Newton steps on the secular equation; it is nearly straight, three give all digits.
+const SECULAR_STEPS: u32 = 8;
+/// Least surprise of the slope, in what the law leaves open of it, that says something about the curvature: the quotient
+/// of noise and a short step is any number.
+const LEAST_SURPRISE: f64 = 3.0;
+/// Least curvature assumed, of that of the spring at rest: a flatter model would take wild steps.
+const LEAST_CURVATURE: f64 = 1e-3;
+
+/// The energy by the tilt, without its tip, as a quadratic.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Quadratic {
+    /// As observed (N·m/rad).
+    curvature: DMat2,
+    /// At rest (N·m/rad).
+    pub(super) stiffness_nm_per_rad: f64,
+}
+
+impl Quadratic {
+    /// That of a spring at rest.
+    pub(super) fn at_rest(stiffness_nm_per_rad: f64) -> Self {
+        Self { curvature: DMat2::from_diagonal(DVec2::splat(stiffness_nm_per_rad)), stiffness_nm_per_rad }
+    }
+
+    /// The tilt of least energy, from the slope at a tilt and the cost of lifting.
+    pub(super) fn least(&self, tilt_rad: DVec2, slope: DVec2, tip_nm: f64, largest_rad: f64) -> DVec2 {
+        tipped_minimum(self.curvature, self.curvature * tilt_rad - slope, tip_nm, largest_rad)
+    }
+
+    /// Symmetric rank-one correction of the curvature (Nocedal and Wright, *Numerical Optimization*, 6.2).
+    pub(super) fn observe(&mut self, step: DVec2, change: DVec2, noise_rad: f64) {
+        let surprise = change - self.curvature * step;
+        if surprise.length() < LEAST_SURPRISE * noise_rad * self.stiffness_nm_per_rad {
+            return;
+        }
+        let along = surprise.dot(step);
+        if along.abs() > 1e-8 * surprise.length() * step.length() {
+            let update = DMat2::from_cols(surprise * surprise.x, surprise * surprise.y);
+            self.curvature += update * (1.0 / along);
+        }
+    }
+}
+
+/// Minimum of `s.H s/2 - b.s + c |s|`: zero while `|b| <= c`, else `s = t (t H + c)⁻¹ b` with its own length
+/// `t`.
+fn tipped_minimum(curvature: DMat2, pull: DVec2, tip: f64, largest: f64) -> DVec2 {
+    if pull.length() <= tip {
+        return DVec2::ZERO;
+    }
+    let mut length = 0.0;
+    let mut direction = pull / pull.length();
+    for _ in 0..SECULAR_STEPS {
+        // One Newton step on 1 - 1 / |(t H + c)⁻¹ b| = 0 for the length `t`.
+        let matrix = curvature * length + DMat2::from_diagonal(DVec2::splat(tip));
+        let inverse = matrix.inverse();
+        let scaled = inverse * pull;
+        let size = scaled.length();
+        let falling = scaled.dot(inverse * (curvature * scaled)) / (size * size * size);
+        let least = LEAST_CURVATURE / tip.max(f64::MIN_POSITIVE);
+        direction = scaled / size;
+        length = (length + (1.0 - 1.0 / size) / falling.max(least)).clamp(0.0, largest);
+    }
+    let tilt = length * direction;
+    if tilt.is_finite() { tilt } else { DVec2::ZERO }
+}
