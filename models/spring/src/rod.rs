@@ -55,7 +55,7 @@ mod start;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Accuracy {
     /// For the servo: force to a micronewton before buckling and to a millinewton past it, in about a
-    /// microsecond and a half per tick.
+    /// microsecond per tick.
     Servo,
     /// For reference: force to 1e-13 N before buckling and to 1e-10 N past it, in about a hundred
     /// microseconds.
@@ -98,6 +98,10 @@ impl State {
     }
 }
 
+/// For the servo: a force to a nanonewton, in one evaluation of the energy on a smooth path.
+const SERVO: Effort =
+    Effort { most_steps: 6, most_matrices: 3, matrix_life: 32, tolerance: 1e-11, renewal: 1e-6 };
+
 /// Each equilibrium to rounding, so that nothing of the past is left in an answer.
 const TO_ROUNDING: Effort = Effort {
     most_steps: 10,
@@ -107,6 +111,16 @@ const TO_ROUNDING: Effort = Effort {
     // A step costs a ninth of a matrix: better several with an old one, as long as they contract.
     renewal: 1e-3,
 };
+
+impl Effort {
+    /// Where coils touch they meet at one place after the other in a tick, and each changes the matrix.
+    fn with(self, coils: Coils) -> Self {
+        match coils {
+            Coils::Pass => self,
+            Coils::Touch => Self { most_steps: 20, most_matrices: 10, ..self },
+        }
+    }
+}
 
 /// The exact rod of one spring, following the pose from tick to tick.
 #[derive(Clone, Debug, PartialEq)]
@@ -147,16 +161,7 @@ impl Rod {
     pub fn with_coils(spring: &Spring, accuracy: Accuracy, coils: Coils) -> Self {
         let ratios = Ratios::new(spring, coils);
         let solver = match accuracy {
-            Accuracy::Servo => {
-                let effort = Effort {
-                    most_steps: 4,
-                    most_matrices: 3,
-                    matrix_life: 32,
-                    tolerance: 1e-8,
-                    renewal: 1e-7,
-                };
-                Solver::Servo(Box::new(Equilibrium::new(ratios, effort)))
-            }
+            Accuracy::Servo => Solver::Servo(Box::new(Equilibrium::new(ratios, SERVO.with(coils)))),
             Accuracy::Tight => {
                 let effort = Effort {
                     most_steps: 8,
@@ -176,7 +181,7 @@ impl Rod {
     /// ([`crate::seat`]). Not real-time: allocates.
     #[must_use]
     pub fn to_rounding(spring: &Spring, coils: Coils) -> Self {
-        let equilibrium = Equilibrium::new(Ratios::new(spring, coils), TO_ROUNDING);
+        let equilibrium = Equilibrium::new(Ratios::new(spring, coils), TO_ROUNDING.with(coils));
         Self::solved_by(Solver::Servo(Box::new(equilibrium)), spring, coils)
     }
 

@@ -55,6 +55,18 @@ impl Contact {
     }
 }
 
+/// Sections that touch, a bit each. Another set of them is another matrix.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Touching(u32);
+
+impl Touching {
+    pub(crate) const NONE: Self = Self(0);
+
+    fn add(&mut self, section: usize) {
+        self.0 |= 1 << section;
+    }
+}
+
 /// How far sections are from meeting their coils' thickness, and how that changes.
 struct Excess {
     /// `e`
@@ -80,8 +92,8 @@ pub(crate) struct Solution {
     pub(crate) compliance: DMat3,
     /// `(K/2) <e>²`, summed.
     pub(crate) energy: f64,
-    /// Whether any section touches.
-    pub(crate) touches: bool,
+    /// The sections that touch.
+    pub(crate) touching: Touching,
 }
 
 /// Solves `missing = compliance force + (K/gamma) sum of <e> d`, from the force without contact. Real-time: bounded, no
@@ -95,15 +107,15 @@ pub(crate) fn solve<const Q: usize>(
     compliance: DMat3,
 ) -> Solution {
     let Contact { compliance: c, stiffness, .. } = *contact;
-    let mut solution = Solution { force: free, compliance, energy: 0.0, touches: false };
+    let mut solution = Solution { force: free, compliance, energy: 0.0, touching: Touching::NONE };
     for _ in 0..MOST_STEPS {
         // Sums over the sections that touch: (K/gamma) <e> d, its derivative by the force, and (K/2) <e>².
         let (mut pressed, mut released, mut energy) = (DVec3::ZERO, DMat3::ZERO, 0.0);
-        let mut touches = false;
+        let mut touching = Touching::NONE;
         for (i, weight) in weight.iter().enumerate() {
             let excess = sections.excess(contact, solution.force, i);
             if excess > 0.0 {
-                touches = true;
+                touching.add(i);
                 let normal = sections.normal_at(i);
                 let share = weight * stiffness;
                 pressed += share * c * excess * normal;
@@ -112,11 +124,13 @@ pub(crate) fn solve<const Q: usize>(
                 energy += 0.5 * share * excess * excess;
             }
         }
-        solution = Solution { compliance: compliance - released, energy, touches, ..solution };
+        solution = Solution { compliance: compliance - released, energy, touching, ..solution };
         let rest = missing - compliance * solution.force - pressed;
         let step = solution.compliance.inverse() * rest;
         // To rounding of the force: the next step would move it by nothing.
-        if !touches || step.length_squared() <= 1e-30 * (1.0 + solution.force.length_squared()) {
+        if touching == Touching::NONE
+            || step.length_squared() <= 1e-30 * (1.0 + solution.force.length_squared())
+        {
             break;
         }
         solution.force += step;

@@ -11,6 +11,7 @@
 
 use flotor_hal::glam::{DVec2, DVec3};
 
+use super::contact::Touching;
 use super::curve::Curve;
 use super::descent::{Descent, Found};
 use super::functional::{Curvature, Functional, Ratios, Reaction, Shape, Value, joined};
@@ -23,8 +24,9 @@ use crate::response::Demand;
 use crate::rigidity::Spring;
 
 /// Longest change of shape in a tick that ends in no equilibrium, as the root mean square slope of `p`; of one that does,
-/// beyond what the plates' motion predicts. A full bulge has about 3.
-const LONGEST_WAY: f64 = 0.1;
+/// beyond what the plates' motion predicts. A full bulge has about 3. Short of 0.1 by what the lean of a bulge adds to its
+/// torque in second order.
+const LONGEST_WAY: f64 = 0.09;
 /// Longest step where the way is not felt, but only its end.
 const LONGEST_UNFELT_STEP: f64 = 0.4;
 /// How often a search that is not felt may begin anew.
@@ -45,6 +47,13 @@ const MOST_DAMPINGS: u32 = 3;
 const PUSH: f64 = 0.02;
 /// A step that is not at least this much shorter than the one before was taken with a matrix too old.
 const CONTRACTION: f64 = 0.3;
+
+/// Part of a step that is left of one that went uphill.
+const SHORTER: f64 = 0.25;
+/// Steps below this are not asked whether they go uphill: rounding of the energy would answer.
+const LEAST_CHECKED_STEP: f64 = 1.0e-6;
+/// Error that a step leaves, of the step, where coils may meet within it.
+const KINK: f64 = 1.0e-3;
 
 /// How hard a tick tries.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -141,6 +150,13 @@ impl Work {
     }
 }
 
+/// A step, from where and from which energy.
+struct Stepped<const N: usize> {
+    from: Shape<N>,
+    energy: f64,
+    step: Shape<N>,
+}
+
 /// Factored second derivatives and where they were computed.
 #[derive(Clone, Debug, PartialEq)]
 struct KeptMatrix<const N: usize> {
@@ -148,7 +164,8 @@ struct KeptMatrix<const N: usize> {
     reaction: Reaction<N>,
     shape: Shape<N>,
     plate: Plate,
-    /// Smallest pivot, at least the smallest eigenvalue.
+    touching: Touching,
+    /// Smallest eigenvalue.
     softest: f64,
     /// Curvature taken for none.
     neutral: f64,
@@ -164,6 +181,7 @@ impl<const N: usize> KeptMatrix<N> {
             reaction,
             shape: [0.0; N],
             plate: Plate::HOME,
+            touching: Touching::NONE,
             softest: 0.0,
             neutral: NEUTRAL,
             steps_left: 0,
@@ -299,21 +317,32 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
     #[inline]
     fn search(&mut self, plate: &Plate, demand: Demand) -> Outcome {
         let (mut last_size, mut way_left) = (f64::INFINITY, self.stride.way);
-        let mut outcome = Outcome::Failed;
+        let mut last: Option<Stepped<N>> = None;
         for _ in 0..self.effort.most_steps {
             let longest = self.stride.step.min(way_left);
             let value = self.functional.value(&self.shape, plate);
             self.work.evaluations += 1;
+            if let Some(Stepped { from, energy, step }) = &mut last
+                && value.energy > *energy
+            {
+                // Coils met on the way and the step went uphill.
+                *step = step.map(|entry| entry * SHORTER);
+                self.shape = added(from, 1.0, step);
+                continue;
+            }
             let bent = distance(&self.shape, &self.matrix.shape);
             let fall = self.functional.eigenvalue_fall(plate.distance(&self.matrix.plate), bent);
-            if self.matrix.steps_left == 0 || fall > self.matrix.softest {
+            if self.matrix.steps_left == 0
+                || fall > self.matrix.softest
+                || value.touching != self.matrix.touching
+            {
                 if self.work.matrices == self.effort.most_matrices {
                     break;
                 }
                 let curvature = self.functional.curvature(&value);
                 self.work.matrices += 1;
-                if self.keep(&curvature, plate, &value.slope) > 0 {
-                    return self.slide(&value, &curvature, longest, demand);
+                if self.keep(&curvature, plate, &value) > 0 {
+                    return self.slide(&value, &curvature, longest, plate, demand);
                 }
             }
             let step = self.matrix.factored.step_down(&value.slope);
@@ -321,17 +350,16 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
             if !size.is_finite() {
                 return Outcome::Failed;
             }
-            let error = size * (size + distance(&self.shape, &self.matrix.shape));
+            let error = size * (size + distance(&self.shape, &self.matrix.shape)).max(self.kink(&value));
             let step = capped(step, size, longest);
             way_left -= size.min(longest);
-            self.shape = added(&self.shape, 1.0, &step).map(or_zero);
+            let from = self.shape;
+            self.shape = added(&from, 1.0, &step).map(or_zero);
             self.matrix.steps_left = self.matrix.steps_left.saturating_sub(1);
-            let reading = read(&value, &self.matrix.reaction, &step, demand);
             if error <= self.effort.tolerance && size <= longest && self.matrix.neutral <= SETTLED {
                 self.damping = LEAST_DAMPING;
-                return Outcome::Settled(reading);
+                return Outcome::Settled(read(&value, &self.matrix.reaction, &step, demand));
             }
-            outcome = Outcome::Moving(reading);
             if size > longest || size > CONTRACTION * last_size || error > self.effort.renewal {
                 self.matrix.steps_left = 0;
             }
@@ -339,18 +367,36 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
                 break;
             }
             last_size = size;
+            last = (value.touching != Touching::NONE && size > LEAST_CHECKED_STEP).then_some(Stepped {
+                from,
+                energy: value.energy,
+                step,
+            });
         }
-        outcome
+        self.moving(plate)
+    }
+
+    /// What is felt of the shape as it is now, short of equilibrium: the derivatives of its own energy, so that the hand gets
+    /// what the rod loses.
+    fn moving(&mut self, plate: &Plate) -> Outcome {
+        let (reading, _) = self.functional.reading(&self.shape, plate);
+        self.work.evaluations += 1;
+        if reading.energy.is_finite() { Outcome::Moving(reading) } else { Outcome::Failed }
+    }
+
+    /// Least factor between a step and the error it leaves: where coils touch, others may meet within the step.
+    fn kink(&self, value: &Value<N, Q>) -> f64 {
+        if value.touching == Touching::NONE { 0.0 } else { KINK }
     }
 
     /// Factors the matrix for the coming steps; returns its number of negative eigenvalues.
-    fn keep(&mut self, curvature: &Curvature<N>, plate: &Plate, slope: &Shape<N>) -> usize {
+    fn keep(&mut self, curvature: &Curvature<N>, plate: &Plate, value: &Value<N, Q>) -> usize {
         self.matrix.neutral = NEUTRAL;
         self.matrix.steps_left = self.effort.matrix_life;
         self.matrix.factored = Factored::new(&curvature.matrix, NEUTRAL);
         self.work.factorings += 1;
         if self.matrix.factored.negative() > 0 {
-            self.matrix.neutral = neutral(slope);
+            self.matrix.neutral = neutral(&value.slope);
             self.matrix.steps_left = 1;
             self.matrix.factored = Factored::new(&curvature.matrix, self.matrix.neutral);
             self.work.factorings += 1;
@@ -360,7 +406,8 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
             self.matrix.reaction = curvature.reaction.clone();
             self.matrix.shape = self.shape;
             self.matrix.plate = *plate;
-            self.matrix.softest = self.matrix.factored.smallest_pivot();
+            self.matrix.touching = value.touching;
+            self.matrix.softest = self.matrix.factored.smallest_eigenvalue();
         } else {
             self.matrix.steps_left = 0;
         }
@@ -375,6 +422,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         value: &Value<N, Q>,
         curvature: &Curvature<N>,
         longest: f64,
+        plate: &Plate,
         demand: Demand,
     ) -> Outcome {
         let mut damping = self.damping;
@@ -407,7 +455,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         }
         let step = capped(step, size, longest);
         self.shape = added(&self.shape, 1.0, &step);
-        Outcome::Moving(read(value, &curvature.reaction, &step, demand))
+        self.moving(plate)
     }
 }
 

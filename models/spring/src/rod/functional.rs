@@ -23,7 +23,7 @@ use flotor_hal::glam::{DMat3, DVec2, DVec3};
 
 use super::Coils;
 use super::basis::Basis;
-use super::contact::{self, Contact};
+use super::contact::{self, Contact, Touching};
 use super::equilibrium::Reading;
 use super::matrix::dot;
 use super::plate::Plate;
@@ -80,7 +80,8 @@ pub(crate) struct Value<const N: usize, const Q: usize> {
     /// The derivatives by the upper plate's displacement and by its turn are force and torsion.
     pub(crate) load: Load,
     compliance: DMat3,
-    /// The contact, where coils touch.
+    /// The sections that touch, and their contact.
+    pub(crate) touching: Touching,
     contact: Option<Contact>,
     sections: Sections<Q>,
 }
@@ -140,19 +141,19 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
         let twist_rad = plate.turn_rad - integrals.winding_rad;
         let mut force = solve_symmetric(&compliance, missing);
         let mut stretching = 0.5 * missing.dot(force);
-        let mut touching = None;
+        let (mut touching, mut touched) = (Touching::NONE, None);
         if let Some(contact) = &contact {
             let solved = contact::solve(contact, &sections, &self.basis.weight, force, missing, compliance);
-            if solved.touches {
+            if solved.touching != Touching::NONE {
                 force = solved.force;
                 stretching = missing.dot(force) - 0.5 * force.dot(compliance * force) + solved.energy;
                 compliance = solved.compliance;
-                touching = Some(*contact);
+                (touching, touched) = (solved.touching, Some(*contact));
             }
         }
         let load = Load { force, torsion: torsion * twist_rad, softening };
         let mut slopes = sections.slopes(&load, &self.basis.weight);
-        if let Some(contact) = &touching {
+        if let Some(contact) = &touched {
             sections.add_contact_slopes(contact, &load, &self.basis.weight, &mut slopes);
         }
         let [by_lean, by_rate] = slopes;
@@ -165,7 +166,8 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
             by_lean: DVec2::from_array(by_end),
             load,
             compliance,
-            contact: touching,
+            touching,
+            contact: touched,
             sections,
         }
     }

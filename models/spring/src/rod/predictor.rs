@@ -7,12 +7,19 @@
 use super::functional::Shape;
 use super::plate::Plate;
 
-/// Highest order plus one.
-const DEPTH: usize = 4;
+/// Highest order plus one. Each order brings the prediction of a smooth hand some thirty times closer; from here on it is
+/// as close as the shapes are solved.
+const DEPTH: usize = 6;
 
 /// Weights of the last ticks, newest first: binomial coefficients with alternating signs.
-const WEIGHTS: [[f64; DEPTH]; DEPTH] =
-    [[1.0, 0.0, 0.0, 0.0], [2.0, -1.0, 0.0, 0.0], [3.0, -3.0, 1.0, 0.0], [4.0, -6.0, 4.0, -1.0]];
+const WEIGHTS: [[f64; DEPTH]; DEPTH] = [
+    [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [2.0, -1.0, 0.0, 0.0, 0.0, 0.0],
+    [3.0, -3.0, 1.0, 0.0, 0.0, 0.0],
+    [4.0, -6.0, 4.0, -1.0, 0.0, 0.0],
+    [5.0, -10.0, 10.0, -5.0, 1.0, 0.0],
+    [6.0, -15.0, 20.0, -15.0, 6.0, -1.0],
+];
 
 /// The last equilibria of successive ticks, newest first.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,10 +48,9 @@ impl<const N: usize> History<N> {
     /// The equilibrium of this tick.
     #[inline]
     pub(crate) fn push(&mut self, plate: Plate, shape: &Shape<N>) {
-        let [a, b, c, _] = self.plates;
-        self.plates = [plate, a, b, c];
-        let [a, b, c, _] = self.shapes;
-        self.shapes = [*shape, a, b, c];
+        self.plates.rotate_right(1);
+        self.shapes.rotate_right(1);
+        (self.plates[0], self.shapes[0]) = (plate, *shape);
         self.length = DEPTH.min(self.length + 1);
     }
 
