@@ -26,7 +26,7 @@ use crate::rigidity::Spring;
 /// Longest change of shape in a tick that ends in no equilibrium, as the root mean square slope of `p`; of one that does,
 /// beyond what the plates' motion predicts. A full bulge has about 3. Short of 0.1 by what the lean of a bulge adds to its
 /// torque in second order.
-const LONGEST_WAY: f64 = 0.09;
+const LONGEST_WAY: f64 = 0.097;
 /// Longest step where the way is not felt, but only its end.
 const LONGEST_UNFELT_STEP: f64 = 0.4;
 /// How often a search that is not felt may begin anew.
@@ -260,11 +260,16 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         self.work = Work::default();
         self.stride = Stride::FELT;
         self.shape = self.history.predict(plate);
+        let may_miss = self.functional.ratios.contact.is_some() && self.shape != before;
         let mut outcome = self.search(plate, demand);
-        if matches!(outcome, Outcome::Moving(_)) && distance(&self.shape, &before) > LONGEST_WAY {
-            // The branch ends between the last tick and this one, and the prediction went across: from where it was.
+        if matches!(outcome, Outcome::Moving(_)) && (may_miss || distance(&self.shape, &before) > LONGEST_WAY)
+        {
+            // The branch ends between the last tick and this one, or coils meet, and the prediction went across: from where
+            // it was.
             self.shape = before;
+            let work = std::mem::take(&mut self.work);
             outcome = self.search(plate, demand);
+            self.work = work.and(&self.work);
         }
         self.remember(plate, &before, &outcome);
         outcome
