@@ -260,6 +260,67 @@ typedef uint32_t FlotorStoppedState;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
+// The form of a [`Primitive`]. In C as a number of this value.
+enum FlotorForm
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // A rectangle across z at the pose; the solid is below it.
+    FlotorForm_Plane = 0,
+    // A ball.
+    FlotorForm_Sphere = 1,
+    // A box with sides along the axes of the pose.
+    FlotorForm_Box = 2,
+    // A round cylinder about the z axis of the pose.
+    FlotorForm_Cylinder = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum FlotorForm FlotorForm;
+#else
+typedef uint32_t FlotorForm;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// What a [`Primitive`] is to the hand. In C as a number of this value.
+enum FlotorPart
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // What is touched.
+    FlotorPart_Body = 0,
+    // What touches: the hand holds it.
+    FlotorPart_Tool = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum FlotorPart FlotorPart;
+#else
+typedef uint32_t FlotorPart;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// From where a surface is seen. In C as a number of this value.
+enum FlotorSides
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // From outside: it encloses a body.
+    FlotorSides_Outer = 0,
+    // From both sides: a sheet.
+    FlotorSides_Both = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum FlotorSides FlotorSides;
+#else
+typedef uint32_t FlotorSides;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
 // One row of the layout table: a field, or a struct as a whole.
 typedef struct FlotorFieldLayout {
     // `Struct.field`, or `Struct` for the whole of it; filled up with zeros.
@@ -352,7 +413,7 @@ typedef struct FlotorParameter {
 
 // Which outputs a scene needs from a step; what is not demanded need not be computed.
 //
-// Shape is not among them: it is an extension ([`crate::extension::centerline`]) that observers call off the loop.
+// Shape is not among them: it is an extension ([`crate::extension::centerline`], [`crate::extension::shape`]) that observers call off the loop.
 typedef struct FlotorDemand {
     uint32_t bits;
 } FlotorDemand;
@@ -636,6 +697,64 @@ typedef struct FlotorCenterlineTable {
                            uint32_t *count);
 } FlotorCenterlineTable;
 
+// A body of a simple form. 88 bytes.
+typedef struct FlotorPrimitive {
+    // A value of [`Form`].
+    uint32_t form;
+    // A value of [`Part`].
+    uint32_t part;
+    // Its centre (m, model frame) and how it is turned.
+    struct FlotorPose pose;
+    // Half its sides along the axes of the pose, m.
+    double half_sides_m[3];
+} FlotorPrimitive;
+
+// A corner of the surface. 56 bytes.
+typedef struct FlotorSurfaceVertex {
+    // Where it is, m, model frame.
+    double position_m[3];
+    // Outward unit normal.
+    double normal[3];
+    // The field there, in its unit; 0 without a field.
+    double value;
+} FlotorSurfaceVertex;
+
+// What the numbers of a surface are. 32 bytes.
+typedef struct FlotorScalarField {
+    struct FlotorStr name;
+    struct FlotorStr unit;
+} FlotorScalarField;
+
+// A [`Shape`] as it crosses the boundary: the plugin's own memory, valid until the next call of the instance. 88 bytes.
+typedef struct FlotorShapeView {
+    // Bodies of simple form, and the tool; may be null if there are none, as the two below.
+    const struct FlotorPrimitive *primitives;
+    // Corners of the surface.
+    const struct FlotorSurfaceVertex *vertices;
+    // Its triangles: indices of corners, counter-clockwise seen from outside.
+    const uint32_t (*triangles)[3];
+    // Number of primitives.
+    uint32_t primitive_count;
+    // Number of corners.
+    uint32_t vertex_count;
+    // Number of triangles.
+    uint32_t triangle_count;
+    // A value of [`Sides`].
+    uint32_t sides;
+    // What the values are; texts are constant.
+    struct FlotorScalarField field;
+} FlotorShapeView;
+
+// `flotor.shape/1`: see [`ShapeModel`]. Not real-time.
+typedef struct FlotorShapeTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // The shape at an input; a [`crate::abi::CallStatus`] code.
+    uint32_t (*shape)(FlotorInstance instance, const struct FlotorInput *input, struct FlotorShapeView *out);
+} FlotorShapeTable;
+
 // What one instance serves and whether it remembers; the same for its whole life. 8 bytes.
 typedef struct FlotorVariantInfo {
     struct FlotorDemand serves;
@@ -847,6 +966,7 @@ typedef struct FlotorPacingTable {
 #define FLOTOR_INTERFACE_INDEPENDENT_STOP "flotor.independent-stop/1"
 #define FLOTOR_INTERFACE_LINEAR_FIELD "flotor.linear-field/1"
 #define FLOTOR_INTERFACE_PACING "flotor.pacing/1"
+#define FLOTOR_INTERFACE_SHAPE "flotor.shape/1"
 #define FLOTOR_INTERFACE_VARIANT "flotor.variant/1"
 #define FLOTOR_INTERFACE_WORKSPACE_BOUNDS "flotor.workspace-bounds/1"
 
@@ -1083,6 +1203,31 @@ __attribute__((unused)) static const FlotorFieldLayout flotor_layouts[] = {
     FLOTOR_FIELD(LinearFieldTable, size),
     FLOTOR_FIELD(LinearFieldTable, reserved),
     FLOTOR_FIELD(LinearFieldTable, linear_field),
+    FLOTOR_STRUCT(Primitive),
+    FLOTOR_FIELD(Primitive, form),
+    FLOTOR_FIELD(Primitive, part),
+    FLOTOR_FIELD(Primitive, pose),
+    FLOTOR_FIELD(Primitive, half_sides_m),
+    FLOTOR_STRUCT(SurfaceVertex),
+    FLOTOR_FIELD(SurfaceVertex, position_m),
+    FLOTOR_FIELD(SurfaceVertex, normal),
+    FLOTOR_FIELD(SurfaceVertex, value),
+    FLOTOR_STRUCT(ScalarField),
+    FLOTOR_FIELD(ScalarField, name),
+    FLOTOR_FIELD(ScalarField, unit),
+    FLOTOR_STRUCT(ShapeView),
+    FLOTOR_FIELD(ShapeView, primitives),
+    FLOTOR_FIELD(ShapeView, vertices),
+    FLOTOR_FIELD(ShapeView, triangles),
+    FLOTOR_FIELD(ShapeView, primitive_count),
+    FLOTOR_FIELD(ShapeView, vertex_count),
+    FLOTOR_FIELD(ShapeView, triangle_count),
+    FLOTOR_FIELD(ShapeView, sides),
+    FLOTOR_FIELD(ShapeView, field),
+    FLOTOR_STRUCT(ShapeTable),
+    FLOTOR_FIELD(ShapeTable, size),
+    FLOTOR_FIELD(ShapeTable, reserved),
+    FLOTOR_FIELD(ShapeTable, shape),
     FLOTOR_STRUCT(VariantInfo),
     FLOTOR_FIELD(VariantInfo, serves),
     FLOTOR_FIELD(VariantInfo, memory),

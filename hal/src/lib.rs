@@ -56,6 +56,9 @@ pub use extension::independent_stop::{
 };
 pub use extension::linear_field::{LinearField, LinearFieldModel};
 pub use extension::pacing::{PacingDevice, SampleWait};
+pub use extension::shape::{
+    Form, InvalidShape, Part, Primitive, ScalarField, Shape, ShapeModel, Sides, Surface, SurfaceVertex,
+};
 pub use extension::variant::{VariantInfo, VariantModel};
 pub use extension::workspace_bounds::{WorkspaceBounds, WorkspaceBoundsModel};
 pub use frame::{Pose, Twist, Wrench, orientation_from_rotation_vector, rotation_vector};

@@ -14,7 +14,7 @@ layout! {
 
 /// Which outputs a scene needs from a step; what is not demanded need not be computed.
 ///
-/// Shape is not among them: it is an extension ([`crate::extension::centerline`]) that observers call off the loop.
+/// Shape is not among them: it is an extension ([`crate::extension::centerline`], [`crate::extension::shape`]) that observers call off the loop.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]

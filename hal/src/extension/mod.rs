@@ -10,6 +10,7 @@ pub mod energy_ledger;
 pub mod independent_stop;
 pub mod linear_field;
 pub mod pacing;
+pub mod shape;
 pub mod variant;
 pub mod workspace_bounds;
 
@@ -48,6 +49,7 @@ extensions! {
         centerline: CenterlineTable,
         details: DetailsTable,
         linear_field: LinearFieldTable,
+        shape: ShapeTable,
         variant: VariantTable,
         workspace_bounds: WorkspaceBoundsTable,
     }

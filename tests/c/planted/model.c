@@ -14,7 +14,7 @@ FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-planted-model\"\nname = \"Plan
     X(null_deref_thread) X(free_host) X(write_host_stack) X(munmap_self) X(env)                                           \
     X(heap_read) X(use_after_free) X(write_input) X(umask) X(late_alloc) X(thread_prepare) X(crash_reach)                 \
     X(crash_activity) X(crash_field) X(crash_centerline) X(crash_details) X(field_nan) X(sigaltered_step)           \
-    X(thread_destroy) X(timer)
+    X(thread_destroy) X(timer) X(crash_shape) X(shape_corner)
 
 PLANTED_SCHEMA
 
@@ -384,6 +384,21 @@ static uint32_t line(FlotorInstance instance, const FlotorInput *input, FlotorPo
     return FlotorCallStatus_Ok;
 }
 
+static uint32_t shape(FlotorInstance instance, const FlotorInput *input, FlotorShapeView *out) {
+    static FlotorSurfaceVertex corners[3] = {{.value = 1.0}, {.position_m = {1e-3}}, {.position_m = {0.0, 1e-3}}};
+    static uint32_t triangle[1][3] = {{0, 1, 2}};
+    (void)input;
+    if (((const Spring *)instance)->fault == FAULT_crash_shape) {
+        crash();
+    }
+    triangle[0][2] = ((const Spring *)instance)->fault == FAULT_shape_corner ? 3 : 2;
+    out->vertices = corners;
+    out->vertex_count = 3;
+    out->triangles = (const uint32_t(*)[3])triangle;
+    out->triangle_count = 1;
+    return FlotorCallStatus_Ok;
+}
+
 static const FlotorDetail detail[] = {{.id = FLOTOR_STR("steps"), .doc = FLOTOR_STR("Steps so far")}};
 
 static uint32_t detail_values(FlotorInstance instance, double *values, uint32_t capacity) {
@@ -402,6 +417,7 @@ static const void *get_interface(FlotorStr id) {
     static const FlotorWorkspaceBoundsTable reaches = {.size = sizeof reaches, .bounds = bounds};
     static const FlotorLinearFieldTable fields = {.size = sizeof fields, .linear_field = linear_field};
     static const FlotorCenterlineTable lines = {.size = sizeof lines, .info = line_info, .centerline = line};
+    static const FlotorShapeTable shapes = {.size = sizeof shapes, .shape = shape};
     static const FlotorDetailsTable details = {
         .size = sizeof details, .detail_count = 1, .details = detail, .values = detail_values};
     const struct {
@@ -413,6 +429,7 @@ static const void *get_interface(FlotorStr id) {
         {FLOTOR_INTERFACE_WORKSPACE_BOUNDS, &reaches},
         {FLOTOR_INTERFACE_LINEAR_FIELD, &fields},
         {FLOTOR_INTERFACE_CENTERLINE, &lines},
+        {FLOTOR_INTERFACE_SHAPE, &shapes},
         {FLOTOR_INTERFACE_DETAILS, &details},
     };
     schema[0] = parameters[0];

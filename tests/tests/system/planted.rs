@@ -99,6 +99,8 @@ const MODEL: &[Row] = &[
     ("crash_activity", "crash in `active-region`", By("extensions")),
     ("crash_field", "crash in `linear-field`", By("extensions")),
     ("crash_centerline", "crash in `centerline`", By("extensions")),
+    ("crash_shape", "crash in `shape`", By("extensions")),
+    ("shape_corner", "a triangle with a corner that there is not", By("extensions")),
     ("crash_details", "crash in `details`", By("extensions")),
     ("field_nan", "NaN in its local linear model", By("extensions")),
 ];

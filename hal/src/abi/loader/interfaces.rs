@@ -132,7 +132,7 @@ mod tests {
     use crate::extension::{
         active_region::ActiveRegionTable, calibration::CalibrationTable, centerline::CenterlineTable,
         details::DetailsTable, energy_ledger::EnergyLedgerTable, independent_stop::IndependentStopTable,
-        linear_field::LinearFieldTable, pacing::PacingTable, variant::VariantTable,
+        linear_field::LinearFieldTable, pacing::PacingTable, shape::ShapeTable, variant::VariantTable,
         workspace_bounds::WorkspaceBoundsTable,
     };
 
@@ -170,6 +170,7 @@ mod tests {
     fn no_table_is_read_that_is_shorter_than_the_contracts() {
         is_held_to_its_length::<ForceTable>();
         is_held_to_its_length::<CenterlineTable>();
+        is_held_to_its_length::<ShapeTable>();
         is_held_to_its_length::<VariantTable>();
         is_held_to_its_length::<DetailsTable>();
         is_held_to_its_length::<ActiveRegionTable>();

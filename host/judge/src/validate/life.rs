@@ -98,6 +98,11 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
                 return Err("centerline gave no finite points".to_owned());
             }
         }
+        if model.has_shape() {
+            let shape = model.shape(&input);
+            works(model, "shape")?;
+            shape.map_err(|invalid| format!("shape gave nothing that can be drawn: {invalid}"))?;
+        }
         let mut values = vec![f64::NAN; model.details().len()];
         let answer = model.read_details(&mut values);
         works(model, "details")?;

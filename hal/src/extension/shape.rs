@@ -1,0 +1,497 @@
+//! Extension `flotor.shape/1`: what a body looks like that is no slender one, for people to look at.
+//!
+//! Primitives (plane, sphere, box, cylinder) for what does not deform and for the tool, and one surface of triangles with
+//! normals and one number a corner, which a name and a unit explain. As with a centreline, an observer makes its own instance of
+//! the model and asks it at its own rate; the servo never calls this.
+
+use crate::abi::instance::fill;
+use crate::abi::interface::table;
+use crate::abi::layout::layout;
+#[cfg(feature = "loader")]
+use crate::abi::loader::Model;
+use crate::abi::{Instance, ModelPlug, Str};
+use crate::{DVec3, ForceModel, Input, Pose};
+use std::ptr::null;
+
+/// The form of a [`Primitive`]. In C as a number of this value.
+#[repr(u32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// A rectangle across z at the pose; the solid is below it.
+    Plane = 0,
+    /// A ball.
+    Sphere = 1,
+    /// A box with sides along the axes of the pose.
+    Box = 2,
+    /// A round cylinder about the z axis of the pose.
+    Cylinder = 3,
+}
+
+/// What a [`Primitive`] is to the hand. In C as a number of this value.
+#[repr(u32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// What is touched.
+    Body = 0,
+    /// What touches: the hand holds it.
+    Tool = 1,
+}
+
+/// A body of a simple form. 88 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct Primitive {
+    /// A value of [`Form`].
+    form: u32,
+    /// A value of [`Part`].
+    part: u32,
+    /// Its centre (m, model frame) and how it is turned.
+    pose: Pose,
+    /// Half its sides along the axes of the pose, m.
+    half_sides_m: [f64; 3],
+}
+
+impl Primitive {
+    /// A body of a form, half of its sides given, m: a plane has no third, a sphere three equal ones (its radius), a
+    /// cylinder its radius twice and half its height.
+    #[must_use]
+    pub const fn new(form: Form, part: Part, pose: Pose, half_sides_m: [f64; 3]) -> Self {
+        Self { form: form as u32, part: part as u32, pose, half_sides_m }
+    }
+
+    /// A ball.
+    #[must_use]
+    pub const fn sphere(part: Part, pose: Pose, radius_m: f64) -> Self {
+        Self::new(Form::Sphere, part, pose, [radius_m; 3])
+    }
+
+    /// Its form; `None` for one of a later contract.
+    #[must_use]
+    pub const fn form(&self) -> Option<Form> {
+        match self.form {
+            0 => Some(Form::Plane),
+            1 => Some(Form::Sphere),
+            2 => Some(Form::Box),
+            3 => Some(Form::Cylinder),
+            _ => None,
+        }
+    }
+
+    /// What it is to the hand; anything unknown is a body.
+    #[must_use]
+    pub const fn part(&self) -> Part {
+        if self.part == Part::Tool as u32 { Part::Tool } else { Part::Body }
+    }
+
+    /// Its centre (m, model frame) and how it is turned.
+    #[must_use]
+    pub const fn pose(&self) -> Pose {
+        self.pose
+    }
+
+    /// Half its sides along the axes of the pose, m.
+    #[must_use]
+    pub const fn half_sides_m(&self) -> [f64; 3] {
+        self.half_sides_m
+    }
+}
+
+/// A corner of the surface. 56 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct SurfaceVertex {
+    /// Where it is, m, model frame.
+    pub position_m: [f64; 3],
+    /// Outward unit normal.
+    pub normal: [f64; 3],
+    /// The field there, in its unit; 0 without a field.
+    pub value: f64,
+}
+
+/// From where a surface is seen. In C as a number of this value.
+#[repr(u32)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sides {
+    /// From outside: it encloses a body.
+    #[default]
+    Outer = 0,
+    /// From both sides: a sheet.
+    Both = 1,
+}
+
+/// What the numbers of a surface are. 32 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct ScalarField {
+    name: Str,
+    unit: Str,
+}
+
+impl ScalarField {
+    /// No field: the numbers are not shown.
+    pub const NONE: Self = Self::new("", "");
+
+    /// In words for people: "contact pressure", "kPa".
+    #[must_use]
+    pub const fn new(name: &'static str, unit: &'static str) -> Self {
+        Self { name: Str::new(name), unit: Str::new(unit) }
+    }
+
+    /// What it is; empty if there is none.
+    #[must_use]
+    pub const fn name(&self) -> &str {
+        self.name.as_str()
+    }
+
+    /// Its unit; empty for a number without one.
+    #[must_use]
+    pub const fn unit(&self) -> &str {
+        self.unit.as_str()
+    }
+}
+
+impl Default for ScalarField {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+impl PartialEq for ScalarField {
+    fn eq(&self, other: &Self) -> bool {
+        (self.name(), self.unit()) == (other.name(), other.unit())
+    }
+}
+
+/// A surface of triangles; empty for none.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Surface {
+    /// Its corners.
+    pub vertices: Vec<SurfaceVertex>,
+    /// Three corners each, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// From where it is seen.
+    pub sides: Sides,
+    /// What its numbers are.
+    pub field: ScalarField,
+}
+
+impl Surface {
+    /// Makes the normals those of the triangles at each corner, larger ones counting more. Not real-time.
+    ///
+    /// # Panics
+    /// If a triangle has a corner that there is not.
+    pub fn set_normals(&mut self) {
+        let Self { vertices, triangles, .. } = self;
+        vertices.iter_mut().for_each(|vertex| vertex.normal = [0.0; 3]);
+        for triangle in triangles.iter() {
+            let [a, b, c] = triangle.map(|corner| DVec3::from_array(vertices[corner as usize].position_m));
+            let twice_area = (b - a).cross(c - a);
+            for corner in triangle {
+                let normal = &mut vertices[*corner as usize].normal;
+                *normal = (DVec3::from_array(*normal) + twice_area).to_array();
+            }
+        }
+        for vertex in vertices {
+            vertex.normal = DVec3::from_array(vertex.normal).normalize_or_zero().to_array();
+        }
+    }
+}
+
+/// What a model looks like at a pose of the handle, in the model frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Shape {
+    /// Bodies of simple form, and the tool.
+    pub primitives: Vec<Primitive>,
+    /// The surface that deforms.
+    pub surface: Surface,
+}
+
+/// A force model with a shape of any form. Not real-time.
+pub trait ShapeModel: ForceModel {
+    /// The shape with the handle at an input, with the parameters now in force. The model keeps it until the next call, so that a
+    /// picture allocates nothing. A model with a history shows where it comes to rest if the handle stays there.
+    fn shape(&mut self, input: &Input) -> &Shape;
+}
+
+/// A [`Shape`] as it crosses the boundary: the plugin's own memory, valid until the next call of the instance. 88 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct ShapeView {
+    /// Bodies of simple form, and the tool; may be null if there are none, as the two below.
+    pub primitives: *const Primitive,
+    /// Corners of the surface.
+    pub vertices: *const SurfaceVertex,
+    /// Its triangles: indices of corners, counter-clockwise seen from outside.
+    pub triangles: *const [u32; 3],
+    /// Number of primitives.
+    pub primitive_count: u32,
+    /// Number of corners.
+    pub vertex_count: u32,
+    /// Number of triangles.
+    pub triangle_count: u32,
+    /// A value of [`Sides`].
+    pub sides: u32,
+    /// What the values are; texts are constant.
+    pub field: ScalarField,
+}
+
+/// `flotor.shape/1`: see [`ShapeModel`]. Not real-time.
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct ShapeTable {
+    /// Bytes of this table as the plugin knows it.
+    pub size: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
+    /// The shape at an input; a [`crate::abi::CallStatus`] code.
+    pub shape:
+        Option<unsafe extern "C" fn(instance: Instance, input: *const Input, out: *mut ShapeView) -> u32>,
+}
+
+layout! {
+    Primitive { form, part, pose, half_sides_m }
+    SurfaceVertex { position_m, normal, value }
+    ScalarField { name, unit }
+    ShapeView { primitives, vertices, triangles, primitive_count, vertex_count, triangle_count, sides, field }
+    ShapeTable { size, reserved, shape }
+}
+
+impl ShapeView {
+    const EMPTY: Self = Self {
+        primitives: null(),
+        vertices: null(),
+        triangles: null(),
+        primitive_count: 0,
+        vertex_count: 0,
+        triangle_count: 0,
+        sides: Sides::Outer as u32,
+        field: ScalarField::NONE,
+    };
+
+    /// What a shape looks like across the boundary, as long as it is not changed.
+    fn of(shape: &Shape) -> Self {
+        let Shape { primitives, surface: Surface { vertices, triangles, sides, field } } = shape;
+        // A shape that a picture can hold has fewer; a host refuses what is cut off, because indices then lead nowhere.
+        let count = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
+        Self {
+            primitives: primitives.as_ptr(),
+            vertices: vertices.as_ptr(),
+            triangles: triangles.as_ptr(),
+            primitive_count: count(primitives.len()),
+            vertex_count: count(vertices.len()),
+            triangle_count: count(triangles.len()),
+            sides: *sides as u32,
+            field: *field,
+        }
+    }
+}
+
+unsafe extern "C" fn shape<M: ShapeModel>(
+    instance: Instance,
+    input: *const Input,
+    out: *mut ShapeView,
+) -> u32 {
+    // SAFETY: the contract of every table call. What `out` points at belongs to the model, which keeps it until the next call.
+    unsafe { fill::<ModelPlug<M>, _>(instance, out, |model| Ok(ShapeView::of(model.shape(&*input)))) }
+}
+
+table!(ShapeTable: "flotor.shape/1", M: [ShapeModel] {
+    reserved: 0,
+    shape: Some(shape::<M>),
+});
+
+/// Why a model's shape is none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InvalidShape {
+    /// The model failed.
+    Failed,
+    /// More corners, triangles or primitives than a picture can hold.
+    TooLarge,
+    /// Nothing at all.
+    Empty,
+    /// A list that is not there.
+    Missing,
+    /// A triangle with a corner that there is not.
+    Corner,
+    /// A number that is not finite, or a side that is negative.
+    Number,
+    /// A name or a unit that nobody could read.
+    Text,
+}
+
+impl std::fmt::Display for InvalidShape {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Failed => "the call failed",
+            Self::TooLarge => "more than a million corners, triangles or primitives",
+            Self::Empty => "neither a primitive nor a triangle",
+            Self::Missing => "a list of the given length is not there",
+            Self::Corner => "a triangle has a corner that is not in the list",
+            Self::Number => "a number is not finite, or a side is negative",
+            Self::Text => "the name or the unit of its field is longer than 64 bytes",
+        })
+    }
+}
+
+impl std::error::Error for InvalidShape {}
+
+/// Most corners, triangles or primitives that are read.
+const MOST: u32 = 1 << 20;
+/// Longest name or unit.
+#[cfg(feature = "loader")]
+const MOST_TEXT_BYTES: usize = 64;
+
+impl Shape {
+    /// Checks what came from elsewhere. Not real-time.
+    ///
+    /// # Errors
+    /// [`InvalidShape`].
+    pub fn check(&self) -> Result<(), InvalidShape> {
+        let Surface { vertices, triangles, .. } = &self.surface;
+        if self.primitives.is_empty() && triangles.is_empty() {
+            return Err(InvalidShape::Empty);
+        }
+        let is_finite = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
+        let primitives_are = self.primitives.iter().all(|primitive| {
+            let sides = &primitive.half_sides_m;
+            primitive.pose.is_finite() && is_finite(sides) && sides.iter().all(|side| *side >= 0.0)
+        });
+        let vertices_are = vertices.iter().all(|vertex| {
+            is_finite(&vertex.position_m) && is_finite(&vertex.normal) && vertex.value.is_finite()
+        });
+        if !(primitives_are && vertices_are) {
+            return Err(InvalidShape::Number);
+        }
+        let corners = triangles.as_flattened().iter();
+        if corners.into_iter().any(|corner| *corner as usize >= vertices.len()) {
+            return Err(InvalidShape::Corner);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(feature = "loader")]
+impl Model {
+    /// True if the model has a shape.
+    #[must_use]
+    pub fn has_shape(&self) -> bool {
+        self.extensions.shape.is_some_and(|table| table.shape.is_some())
+    }
+
+    /// The model's shape at an input, copied and checked. Not real-time: for observers with an instance of their own.
+    ///
+    /// # Errors
+    /// [`InvalidShape`]; also for a model without a shape.
+    pub fn shape(&mut self, input: &Input) -> Result<Shape, InvalidShape> {
+        let ask = self.extensions.shape.and_then(|table| table.shape).ok_or(InvalidShape::Failed)?;
+        let mut view = ShapeView::EMPTY;
+        // SAFETY: a live instance used by this thread only (`&mut`), pointers valid for the call.
+        let code = unsafe { ask(self.instance, input, &raw mut view) };
+        if code != crate::abi::CallStatus::Ok as u32 {
+            return Err(InvalidShape::Failed);
+        }
+        if [view.field.name, view.field.unit].iter().any(|text| text.bytes() > MOST_TEXT_BYTES) {
+            return Err(InvalidShape::Text);
+        }
+        // SAFETY: the plugin's lists are of the checked layout and valid until its next call, which `&mut` keeps away.
+        let shape = unsafe {
+            Shape {
+                primitives: list(view.primitives, view.primitive_count)?,
+                surface: Surface {
+                    vertices: list(view.vertices, view.vertex_count)?,
+                    triangles: list(view.triangles, view.triangle_count)?,
+                    sides: if view.sides == Sides::Both as u32 { Sides::Both } else { Sides::Outer },
+                    field: view.field,
+                },
+            }
+        };
+        shape.check()?;
+        Ok(shape)
+    }
+}
+
+/// A copy of a plugin's list.
+///
+/// # Safety
+/// `first` is null or points at `count` initialised values.
+#[cfg(feature = "loader")]
+unsafe fn list<T: Copy>(first: *const T, count: u32) -> Result<Vec<T>, InvalidShape> {
+    match count {
+        0 => Ok(Vec::new()),
+        MOST.. => Err(InvalidShape::TooLarge),
+        _ if first.is_null() || !first.is_aligned() => Err(InvalidShape::Missing),
+        // SAFETY: by the contract of this function; not null and aligned, as was seen above.
+        _ => Ok(unsafe { std::slice::from_raw_parts(first, count as usize) }.to_vec()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sheet() -> Shape {
+        let vertex =
+            |x: f64, y: f64| SurfaceVertex { position_m: [x, y, 0.0], normal: [0.0, 0.0, 1.0], value: 1.0 };
+        let surface = Surface {
+            vertices: vec![vertex(0.0, 0.0), vertex(1.0, 0.0), vertex(0.0, 1.0)],
+            triangles: vec![[0, 1, 2]],
+            sides: Sides::Both,
+            field: ScalarField::new("height", "mm"),
+        };
+        Shape { primitives: vec![Primitive::sphere(Part::Tool, Pose::HOME, 1.0)], surface }
+    }
+
+    #[test]
+    fn what_no_picture_can_show_is_no_shape() {
+        assert_eq!(sheet().check(), Ok(()));
+        assert_eq!(Shape::default().check(), Err(InvalidShape::Empty));
+        let mut beyond = sheet();
+        beyond.surface.triangles[0][1] = 3;
+        assert_eq!(beyond.check(), Err(InvalidShape::Corner));
+        let mut odd = sheet();
+        odd.surface.vertices[2].value = f64::NAN;
+        assert_eq!(odd.check(), Err(InvalidShape::Number));
+        for radius_m in [-1.0, f64::INFINITY] {
+            let mut odd = sheet();
+            odd.primitives[0] = Primitive::sphere(Part::Body, Pose::HOME, radius_m);
+            assert_eq!(odd.check(), Err(InvalidShape::Number));
+        }
+    }
+
+    #[test]
+    fn the_normals_of_a_corner_are_those_of_the_triangles_about_it() {
+        // A roof of two squares' halves, at right angles along the y axis.
+        let at = |position_m| SurfaceVertex { position_m, ..SurfaceVertex::default() };
+        let vertices =
+            vec![at([0.0; 3]), at([0.0, 1.0, 0.0]), at([1.0, 0.0, 0.0]), at([0.0, 0.0, -1.0]), at([5.0; 3])];
+        let mut surface = Surface { vertices, triangles: vec![[0, 2, 1], [0, 1, 3]], ..Surface::default() };
+        surface.set_normals();
+        let ridge = -std::f64::consts::FRAC_1_SQRT_2;
+        assert_eq!(surface.vertices[2].normal, [0.0, 0.0, 1.0]);
+        assert!((surface.vertices[0].normal[0] - ridge).abs() < 1.0e-15, "{:?}", surface.vertices[0]);
+        assert_eq!(surface.vertices[4].normal, [0.0; 3], "a corner of no triangle has none");
+    }
+
+    #[test]
+    fn a_primitive_of_a_later_contract_is_one_of_no_known_form() {
+        let later = Primitive { form: 9, part: 9, ..Primitive::sphere(Part::Tool, Pose::HOME, 1.0) };
+        assert_eq!((later.form(), later.part()), (None, Part::Body));
+    }
+
+    #[cfg(feature = "loader")]
+    #[test]
+    fn a_list_that_is_not_there_is_not_read() {
+        // SAFETY: null, or a list of its length.
+        unsafe {
+            assert_eq!(list::<f64>(null(), 0), Ok(Vec::new()));
+            assert_eq!(list::<f64>(null(), 1), Err(InvalidShape::Missing));
+            assert_eq!(list::<f64>(null(), MOST), Err(InvalidShape::TooLarge));
+            assert_eq!(list([1.0, 2.0].as_ptr(), 2), Ok(vec![1.0, 2.0]));
+        }
+    }
+}
