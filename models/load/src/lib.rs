@@ -12,8 +12,8 @@
 //! `F d0 ln cosh(d / d0)`, so nothing is gained on a way there and back.
 
 use flotor_hal::{
-    Choices, DVec3, Demand, ForceModel, Input, ModelInfo, OutOfRange, Output, Parameter, Refusal, Settings,
-    StepStatus, Wrench, choices, math,
+    Choices, DQuat, DVec3, Demand, ForceModel, Form, Input, ModelInfo, OutOfRange, Output, Parameter, Part,
+    Pose, Primitive, Refusal, Settings, Shape, ShapeModel, StepStatus, Wrench, choices, math,
 };
 
 /// Farther from home than this there is no handle, m: the energy there is that at the edge, and the answer says so.
@@ -31,18 +31,24 @@ pub enum Kind {
 }
 
 /// A load.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Load {
     kind: Kind,
     force_n: f64,
     onset_m: f64,
+    drawn: Shape,
 }
+
+/// Radius of the disc in the hand, and half its height, m.
+const DRAWN_HANDLE_M: [f64; 2] = [8.0e-3, 1.0e-3];
+/// Half a side of the block beneath it, m: the same for every force, so that nobody sees a stimulus.
+const DRAWN_HALF_M: f64 = 10.0e-3;
 
 impl Load {
     /// A load of so many newtons; `onset_m` is the depth over which a resistance comes up.
     #[must_use]
     pub fn new(kind: Kind, force_n: f64, onset_m: f64) -> Self {
-        Self { kind, force_n, onset_m }
+        Self { kind, force_n, onset_m, drawn: Shape::default() }
     }
 
     /// Force along z, N, and energy, J, at a height. Real-time: bounded, no allocation.
@@ -118,4 +124,26 @@ impl ForceModel for Load {
     fn reset(&mut self) {}
 }
 
-flotor_hal::export_model!(Load);
+impl ShapeModel for Load {
+    /// A disc in the hand, and beneath it a block: a weight hangs on the hand, a resistance is pushed down by it.
+    fn shape(&mut self, input: &Input) -> &Shape {
+        let handle_m = input.pose.position();
+        let [radius_m, half_height_m] = DRAWN_HANDLE_M;
+        let top_m = handle_m - input.pose.orientation() * DVec3::Z * (2.0 * half_height_m);
+        let (turn, top_m) = match self.kind {
+            Kind::Felt => (input.pose.orientation(), top_m),
+            Kind::Exerted => (DQuat::IDENTITY, DVec3::Z * (handle_m.z.min(0.0) - 2.0 * half_height_m)),
+        };
+        let below = |from_m: DVec3, turn: DQuat, by_m: f64| Pose::new(from_m - turn * DVec3::Z * by_m, turn);
+        let disc = below(handle_m, input.pose.orientation(), half_height_m);
+        let block = below(top_m, turn, DRAWN_HALF_M);
+        self.drawn.primitives.clear();
+        self.drawn.primitives.extend([
+            Primitive::new(Form::Cylinder, Part::Tool, disc, [radius_m, radius_m, half_height_m]),
+            Primitive::new(Form::Box, Part::Body, block, [DRAWN_HALF_M; 3]),
+        ]);
+        &self.drawn
+    }
+}
+
+flotor_hal::export_model!(Load, shape);

@@ -23,6 +23,8 @@ pub struct Mesh {
     pub masses_kg: Vec<f64>,
     /// The springs.
     pub links: Vec<Link>,
+    /// Triangles of masses, for a drawing.
+    pub triangles: Vec<[u32; 3]>,
 }
 
 /// What a sheet is made of.
@@ -56,6 +58,9 @@ impl Mesh {
             mesh.positions_m.push(DVec3::new(place(column), place(row), 0.0));
             mesh.masses_kg.push(if held { 0.0 } else { node_kg });
             let node = row * n + column;
+            if column + 1 < n && row + 1 < n {
+                mesh.face(&[node, node + 1, node + n + 1, node + n]);
+            }
             // Springs along the border would join two masses that are held: they do nothing.
             if column + 1 < n && ![0, n - 1].contains(&row) {
                 mesh.links.push(Link {
@@ -129,6 +134,7 @@ impl Mesh {
                     edges.extend(corners.windows(2).map(|pair| [pair[0], pair[1]]));
                     if let (true, [first, .., last]) = (kind == "f", &corners[..]) {
                         edges.push([*last, *first]);
+                        mesh.face(&corners);
                     }
                 }
                 _ => {} // normals, texture, groups, comments: not ours
@@ -152,6 +158,14 @@ impl Mesh {
             mesh.links.push(Link { ends: [a, b], rest_m, stiffness_n_per_m });
         }
         Ok(mesh)
+    }
+
+    /// Adds a polygon to the drawing.
+    fn face(&mut self, corners: &[usize]) {
+        let place = |corner: usize| u32::try_from(corner).unwrap_or(u32::MAX);
+        if let [first, rest @ ..] = corners {
+            self.triangles.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]].map(place)));
+        }
     }
 
     /// The longest spring as it starts, m.

@@ -76,6 +76,11 @@ impl Vectors {
         self.slices_mut(range).into_iter().for_each(|component| component.fill(0.0));
     }
 
+    /// Sum of the squares of all lengths.
+    fn sum_of_squares(&self) -> f64 {
+        [&self.x, &self.y, &self.z].iter().map(|component| component.iter().map(|c| c * c).sum::<f64>()).sum()
+    }
+
     /// Square of the longest of a range.
     #[inline]
     pub(crate) fn longest_square(&self, range: Range<usize>) -> f64 {
@@ -114,6 +119,14 @@ pub struct State {
     positions_m: Vectors,
     velocities_m_per_s: Vectors,
     regions: Regions,
+}
+
+impl State {
+    /// Where the masses are, m.
+    #[must_use]
+    pub fn positions_m(&self) -> &Vectors {
+        &self.positions_m
+    }
 }
 
 impl Clone for State {
@@ -254,6 +267,33 @@ impl Network {
             self.step(self.longest_step_s, None);
             self.active_nodes() == 0
         })
+    }
+
+    /// Steps without drag until the masses rest against a ball, at most so often: whenever the kinetic energy has passed a peak,
+    /// all velocities are taken away (Cundall 1976). Not real-time.
+    pub fn relax(&mut self, ball: &Ball, most_steps: usize) {
+        /// It rests when nothing moves by more of a ball's radius in a step.
+        const STILL: f64 = 1.0e-5;
+        // Without drag, contacts that come and go pump up what swings with three or four steps a period: not below eight.
+        let step_s = 0.5 * self.longest_step_s;
+        let drag_per_s = std::mem::take(&mut self.surroundings.damping_per_s);
+        let nodes = self.inverse_masses_per_kg.len();
+        self.state.velocities_m_per_s.clear(0..nodes);
+        let mut rising = 0.0;
+        for _ in 0..most_steps {
+            self.step(step_s, Some(ball));
+            let squares = self.state.velocities_m_per_s.sum_of_squares();
+            if squares > rising {
+                rising = squares;
+                continue;
+            }
+            if rising.sqrt() * step_s <= STILL * ball.radius_m {
+                break;
+            }
+            self.state.velocities_m_per_s.clear(0..nodes);
+            rising = 0.0;
+        }
+        self.surroundings.damping_per_s = drag_per_s;
     }
 
     /// Changes what acts on every mass, but for the contact stiffness, which the longest step depends on. Real-time:

@@ -1,11 +1,12 @@
 //! The membrane as a plugin: parameters and the step.
 
 use crate::mesh::{Mesh, Sheet};
-use crate::network::{Network, Surroundings};
+use crate::network::{Network, State, Surroundings};
 use crate::touch::Touch;
 use flotor_hal::{
-    DVec3, ForceModel, Input, LinearField, LinearFieldModel, Memory, ModelInfo, OutOfRange, Output,
-    Parameter, Refusal, Settings, StepStatus, Wrench, choices, read_text,
+    DQuat, DVec3, ForceModel, Input, LinearField, LinearFieldModel, Memory, ModelInfo, OutOfRange, Output,
+    Parameter, Part, Pose, Primitive, Refusal, ScalarField, Settings, Shape, ShapeModel, Sides, StepStatus,
+    Surface, SurfaceVertex, Wrench, choices, read_text,
 };
 use std::path::Path;
 
@@ -66,6 +67,10 @@ pub struct Membrane {
     /// Distance of masses, m: the scale on which the sheet is no longer linear.
     coarseness_m: f64,
     parameters: [f64; SCHEMA.len()],
+    /// The masses of the last picture, at rest.
+    pictured: State,
+    untouched_m: Vec<DVec3>,
+    drawn: Shape,
 }
 
 impl Membrane {
@@ -147,10 +152,21 @@ impl ForceModel for Membrane {
         for (value, parameter) in parameters.iter_mut().zip(Self::PARAMETERS) {
             *value = settings.number_or_default(parameter.id());
         }
+        let coarseness_m = mesh.coarseness_m();
+        let pictured = network.state().clone();
+        let surface = Surface {
+            vertices: vec![SurfaceVertex::default(); mesh.positions_m.len()],
+            triangles: mesh.triangles,
+            sides: Sides::Both,
+            field: ScalarField::new("displacement", "mm"),
+        };
         Ok(Self {
+            pictured,
+            untouched_m: mesh.positions_m,
+            drawn: Shape { primitives: Vec::new(), surface },
             touch: Touch::new(network, radius_m, DVec3::Z * radius_m),
             radius_m,
-            coarseness_m: mesh.coarseness_m(),
+            coarseness_m,
             parameters,
         })
     }
@@ -182,6 +198,30 @@ impl ForceModel for Membrane {
     }
 }
 
+/// Steps of a picture until the sheet rests: from picture to picture it moves little.
+const MOST_STEPS_A_PICTURE: usize = 2_000;
+
+impl ShapeModel for Membrane {
+    /// The sheet as it rests with the ball where it is, and the ball: an observer sees some of the ticks only, so it cannot follow
+    /// the sheet's swings.
+    fn shape(&mut self, input: &Input) -> &Shape {
+        let handle_m = Self::reached(input).map_or(DVec3::ZERO, |(handle_m, _)| handle_m);
+        let centre_m = self.centre_m(handle_m);
+        self.touch.rest_under(centre_m, &mut self.pictured, MOST_STEPS_A_PICTURE);
+        let Shape { primitives, surface } = &mut self.drawn;
+        let positions_m = self.pictured.positions_m();
+        for (index, (vertex, untouched_m)) in surface.vertices.iter_mut().zip(&self.untouched_m).enumerate() {
+            let position_m = positions_m.get(index);
+            vertex.position_m = position_m.to_array();
+            vertex.value = position_m.distance(*untouched_m) * 1.0e3;
+        }
+        surface.set_normals();
+        primitives.clear();
+        primitives.push(Primitive::sphere(Part::Tool, Pose::new(centre_m, DQuat::IDENTITY), self.radius_m));
+        &self.drawn
+    }
+}
+
 /// How far the ball is moved to feel the slope, over the distance of two masses: several come into contact on the way.
 const PROBE_SHARE: f64 = 0.125;
 
@@ -198,4 +238,4 @@ impl LinearFieldModel for Membrane {
 /// Steps until a sheet has come to rest under gravity, before it is taken as it is.
 const MOST_SETTLING_STEPS: usize = 20_000;
 
-flotor_hal::export_model!(Membrane, linear_field);
+flotor_hal::export_model!(Membrane, linear_field, shape);

@@ -86,6 +86,16 @@ impl Touch {
         Felt { force_n, slope_n_per_m }
     }
 
+    /// Where the masses come to rest if the ball stays at `centre_m`, found from `state`, which is changed; the network itself is
+    /// as before. Not real-time.
+    pub fn rest_under(&mut self, centre_m: DVec3, state: &mut State, most_steps: usize) {
+        self.before.clone_from(self.network.state());
+        self.network.restore(state);
+        self.network.relax(&Ball { centre_m, radius_m: self.ball.radius_m }, most_steps);
+        state.clone_from(self.network.state());
+        self.network.restore(&self.before);
+    }
+
     /// Back to before anybody touched it, the ball at `start_m`. Real-time: bounded, no allocation.
     pub fn reset(&mut self, start_m: DVec3) {
         self.network.restore(&self.untouched);

@@ -1,6 +1,7 @@
 //! Networks in motion: frequency, momentum, inactive blocks, and the field a faster loop is given.
 
-use flotor_hal::DVec3;
+use flotor_hal::abi::loader::{Model, Plugin};
+use flotor_hal::{DQuat, DVec3, Input, Output, Pose};
 use flotor_membrane::mesh::{Link, Mesh, Sheet};
 use flotor_membrane::network::{Ball, Network, Surroundings};
 use flotor_membrane::touch::Touch;
@@ -19,6 +20,7 @@ fn a_mass_on_a_spring_swings_at_the_frequency_of_the_textbook() {
         positions_m: vec![DVec3::ZERO, DVec3::X * 0.101],
         masses_kg: vec![0.0, 0.2],
         links: vec![Link { ends: [0, 1], rest_m: 0.1, stiffness_n_per_m: 80.0 }],
+        triangles: Vec::new(),
     };
     let mut network = Network::new(&mesh, FREE);
     let step_s = network.longest_step_s() / 200.0;
@@ -151,4 +153,39 @@ fn the_slope_of_a_field_is_the_change_of_the_force_it_predicts() {
     plain.network_mut().restore(&before);
     let force_n = plain.advance(at(0.002), period_s);
     assert_eq!((force_n, plain.network().positions_m().get(144)), (field.force_n, after));
+}
+
+/// What an observer sees depends on where the ball is and not on where it came from, and the hand does not feel that somebody looks.
+#[test]
+fn the_picture_is_the_sheet_at_rest_whatever_was_before() {
+    let plugin = Plugin::in_process(&flotor_membrane::FLOTOR_ENTRY).expect("a plugin");
+    let make = || plugin.create_model(&[]).expect("a membrane");
+    let at = |x_m: f64, z_m: f64| Input::at_rest(Pose::new(DVec3::new(x_m, 0.001, z_m), DQuat::IDENTITY));
+    let (here, there) = (at(0.002, -0.004), at(-0.006, -0.001));
+    let (mut direct, mut roundabout) = (make(), make());
+    let picture = |model: &mut Model, input: &Input| model.shape(input).expect("a sheet");
+    let first = picture(&mut direct, &here);
+    let _ = [picture(&mut roundabout, &here), picture(&mut roundabout, &there)];
+    let again = picture(&mut roundabout, &here);
+    assert_eq!(first.surface.triangles.len(), 2 * 16 * 16);
+    let centre = DVec3::new(0.002, 0.001, -0.004 + RADIUS_M);
+    let mut lowest_m: f64 = 0.0;
+    for (a, b) in first.surface.vertices.iter().zip(&again.surface.vertices) {
+        let [a, b] = [a, b].map(|vertex| DVec3::from_array(vertex.position_m));
+        // A hundredth of the depth: what a picture of a few hundred pixels shows.
+        assert!(a.distance(b) < 4.0e-5, "{a} {b}");
+        // The ball pushes a mass out with 400 N/m, and none of them carries more than a quarter of a newton.
+        assert!(a.distance(centre) > RADIUS_M - 0.25 / 400.0, "{a} is inside the ball");
+        lowest_m = lowest_m.min(a.z);
+    }
+    assert!(lowest_m < -0.003, "{lowest_m}");
+    let (mut seen, mut unseen) = (make(), make());
+    let _ = picture(&mut seen, &there);
+    for step in 0..20 {
+        let input = Input { dt_ns: 1_000_000, ..at(0.0, -1.0e-4 * f64::from(step)) };
+        let mut outputs = [Output::default(), Output::default()];
+        let _ = [seen.step(&input, &mut outputs[0]), unseen.step(&input, &mut outputs[1])];
+        let _ = picture(&mut seen, &there);
+        assert_eq!(outputs[0].wrench, outputs[1].wrench, "step {step}");
+    }
 }

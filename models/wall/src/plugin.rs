@@ -3,12 +3,18 @@
 use crate::proxy::{Proxy, Surface};
 use crate::shape::Shape;
 use flotor_hal::{
-    ActiveRegion, ActiveRegionModel, Choices, DVec3, Demand, ForceModel, Input, Memory, ModelInfo,
-    OutOfRange, Output, Parameter, Refusal, Settings, StepStatus, Wrench, choices,
+    self as hal, ActiveRegion, ActiveRegionModel, Choices, DQuat, DVec3, Demand, ForceModel, Form, Input,
+    Memory, ModelInfo, OutOfRange, Output, Parameter, Part, Pose, Primitive, Refusal, Settings, ShapeModel,
+    StepStatus, Wrench, choices,
 };
 
 /// Farther from home than this there is no handle, m: the answer is that at the edge, and says so.
 const REACH_M: f64 = 1.0;
+
+/// Half the side of the piece of a plane that is drawn, m: a plane has no end.
+const DRAWN_HALF_M: f64 = 0.03;
+/// Radius of the balls at the handle and at the proxy, which are points, m.
+const DRAWN_HANDLE_M: f64 = 1.5e-3;
 
 const SHAPES: Choices = choices!["plane", "sphere", "box"];
 
@@ -19,6 +25,9 @@ pub struct Wall {
     height_m: f64,
     surface: Surface,
     proxy: Proxy,
+    /// The proxy of an observer's pictures, which are no ticks.
+    drawn_proxy: Proxy,
+    drawn: hal::Shape,
 }
 
 impl ForceModel for Wall {
@@ -60,6 +69,8 @@ impl ForceModel for Wall {
                 friction: settings.number_or_default("friction"),
             },
             proxy: Proxy::default(),
+            drawn_proxy: Proxy::default(),
+            drawn: hal::Shape::default(),
         })
     }
 
@@ -120,4 +131,26 @@ impl ActiveRegionModel for Wall {
     }
 }
 
-flotor_hal::export_model!(Wall, active_region);
+impl ShapeModel for Wall {
+    /// The solid, the handle, and, while the handle is inside, the proxy.
+    fn shape(&mut self, input: &Input) -> &hal::Shape {
+        let (form, half_sides_m) = match self.shape {
+            Shape::Plane => (Form::Plane, [DRAWN_HALF_M, DRAWN_HALF_M, 0.0]),
+            Shape::Sphere { radius_m } => (Form::Sphere, [radius_m; 3]),
+            Shape::Cube { half_m } => (Form::Box, [half_m; 3]),
+        };
+        let above_top_m = input.pose.position() - DVec3::Z * self.height_m;
+        self.drawn_proxy.follow(&self.shape, &self.surface, above_top_m, DVec3::ZERO);
+        let at = |point_m: DVec3| Pose::new(point_m + DVec3::Z * self.height_m, DQuat::IDENTITY);
+        let primitives = &mut self.drawn.primitives;
+        primitives.clear();
+        primitives.push(Primitive::new(form, Part::Body, at(self.shape.centre_m()), half_sides_m));
+        primitives.push(Primitive::sphere(Part::Tool, input.pose, DRAWN_HANDLE_M));
+        if let Some(proxy) = self.drawn_proxy.contact() {
+            primitives.push(Primitive::sphere(Part::Tool, at(proxy.point_m), DRAWN_HANDLE_M));
+        }
+        &self.drawn
+    }
+}
+
+flotor_hal::export_model!(Wall, active_region, shape);

@@ -99,7 +99,8 @@ impl Shape {
     }
 
     /// Centre of the solid, m; of a plane, the origin.
-    fn centre_m(&self) -> DVec3 {
+    #[must_use]
+    pub fn centre_m(&self) -> DVec3 {
         match *self {
             Self::Plane => DVec3::ZERO,
             Self::Sphere { radius_m: half_m } | Self::Cube { half_m } => -DVec3::Z * half_m,
