@@ -53,17 +53,24 @@ pub fn unevenness_m(mesh: &Mesh) -> f64 {
 /// # Errors
 /// [`NotPositive`] if the numbers do not describe a solid.
 pub fn plate(mesh: &Mesh, lame: Lame) -> Result<(RigidPatch, f64), NotPositive> {
+    let (patch, displacement) = plate_modes(mesh, lame)?;
+    let errors = twice_error_j(&MeshStiffness { mesh, lame }, &displacement, MODES);
+    let shares = errors.iter().enumerate().filter(|(i, _)| patch.stiffness[*i][*i] > 0.0);
+    let error = shares.map(|(i, error)| error / patch.stiffness[i][i]).fold(0.0, f64::max);
+    Ok((patch, error))
+}
+
+/// A plate bonded to the touched face of a mesh, and the displacement of all nodes under each of its modes. Not real-time.
+///
+/// # Errors
+/// [`NotPositive`] if the numbers do not describe a solid.
+pub fn plate_modes(mesh: &Mesh, lame: Lame) -> Result<(RigidPatch, Vec<f64>), NotPositive> {
     let mut hold: Vec<Hold> = mesh.fixed.iter().map(|&f| if f { Hold::Fixed } else { Hold::Free }).collect();
     mesh.touched
         .iter()
         .flat_map(|facet| &facet.nodes)
         .for_each(|&node| hold[node] = Hold::Plate(mesh.nodes_m[node]));
-    let body = MeshStiffness { mesh, lame };
-    let (patch, displacement) = plate_on(&body, |node| hold[node])?;
-    let errors = twice_error_j(&body, &displacement, MODES);
-    let shares = errors.iter().enumerate().filter(|(i, _)| patch.stiffness[*i][*i] > 0.0);
-    let error = shares.map(|(i, error)| error / patch.stiffness[i][i]).fold(0.0, f64::max);
-    Ok((patch, error))
+    plate_on(&MeshStiffness { mesh, lame }, |node| hold[node])
 }
 
 impl<'a> Body<'a> {

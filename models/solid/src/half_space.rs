@@ -133,7 +133,7 @@ impl Edges {
 }
 
 /// Inverse hyperbolic sine.
-fn arsinh(x: f64) -> f64 {
+pub(crate) fn arsinh(x: f64) -> f64 {
     let size = x.abs();
     math::ln_1p(size + size * size / (1.0 + (1.0 + size * size).sqrt())).copysign(x)
 }

@@ -319,16 +319,15 @@ impl Description {
         Ok((Law::Bonded(Box::new(patch)), mesh_error))
     }
 
-    /// Two orders of elements on one grid: the better one, and the largest relative difference of a stiffness.
-    fn plate(&self, body: Body) -> Result<(RigidPatch, f64), NotPositive> {
-        let lame = Lame::new(1.0, self.poisson_ratio);
+    /// Borders of the elements under a plate, and the axis that it is across.
+    pub(crate) fn plate_borders(body: Body) -> ([Vec<f64>; 3], usize) {
         let both = |near: f64, far: f64, half: usize| {
             let middle = 0.5 * (near + far);
             let mut borders = graded(near, middle, half, 1.5);
             borders.extend(graded(far, middle, half, 1.5).into_iter().skip(1));
             borders
         };
-        let (borders, axis) = match body {
+        match body {
             Body::Beam { size_m: [x, y, z] } => {
                 ([both(-x, 0.0, 4), both(-0.5 * y, 0.5 * y, 2), both(-0.5 * z, 0.5 * z, 2)], 0)
             }
@@ -340,10 +339,16 @@ impl Description {
             Body::HalfSpace | Body::Cylinder { .. } | Body::File { .. } => {
                 ([both(-1.0, 0.0, 1), both(-1.0, 0.0, 1), both(-1.0, 0.0, 1)], 2)
             }
-        };
+        }
+    }
+
+    /// Two orders of elements on one grid: the better one, and the largest relative difference of a stiffness.
+    fn plate(&self, body: Body) -> Result<(RigidPatch, f64), NotPositive> {
+        let lame = Lame::new(1.0, self.poisson_ratio);
+        let (borders, axis) = Self::plate_borders(body);
         let order = PLATE_ORDERS[self.resolution.min(2)];
         let solve = |order| plate(&Grid::new(borders.clone(), order), lame, axis);
-        let (fine, coarse) = (solve(order)?, solve(order - 1)?);
+        let ((fine, _), (coarse, _)) = (solve(order)?, solve(order - 1)?);
         let error = (0..MODES)
             .filter(|&i| fine.stiffness[i][i] > 0.0)
             .map(|i| (coarse.stiffness[i][i] / fine.stiffness[i][i] - 1.0).abs())

@@ -12,6 +12,7 @@
 //! - [`sphere`]: contact of a sphere in contact space. [`punch`], [`plate`]: rigid patches bonded to a surface.
 //! - [`prepare`], [`law`], [`cache`]: from a description to a law.
 //! - [`atlas`], [`rigid`], [`friction`]: the laws, as a tick evaluates them; [`jet`], [`spline`] under them.
+//! - [`drawing`], [`skin`]: what it looks like, for people.
 //! - `plugin`: parameters and the contract.
 
 // Indices name the components of vectors and tensors, in several at once.
@@ -25,6 +26,7 @@ pub mod cells;
 pub mod cylinder;
 pub mod dense;
 pub mod dissection;
+pub mod drawing;
 pub mod facet;
 pub mod friction;
 pub mod gmsh;
@@ -40,6 +42,7 @@ pub mod punch;
 pub mod recovery;
 pub mod remainder;
 pub mod rigid;
+pub mod skin;
 pub mod sphere;
 pub mod spline;
 pub mod table;

@@ -5,12 +5,12 @@ use crate::dissection::{Assembly, GridStiffness, Stiffness, subtract_forces};
 use crate::grid::{Grid, Lame};
 use crate::rigid::{MODES, RigidPatch};
 
-/// Stiffness of the face at the upper end of an axis, with the face at its lower end clamped; `X` from the face's centre.
-/// Not real-time.
+/// Stiffness of the face at the upper end of an axis, with the face at its lower end clamped, and the displacement of all nodes
+/// under each of its modes; `X` from the face's centre. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the numbers do not describe a solid.
-pub fn plate(grid: &Grid, lame: Lame, axis: usize) -> Result<RigidPatch, NotPositive> {
+pub fn plate(grid: &Grid, lame: Lame, axis: usize) -> Result<(RigidPatch, Vec<f64>), NotPositive> {
     let last = grid.nodes_along()[axis] - 1;
     let centre = [0, 1, 2].map(|k| {
         let nodes = &grid.axes[k].nodes_m;
@@ -26,7 +26,7 @@ pub fn plate(grid: &Grid, lame: Lame, axis: usize) -> Result<RigidPatch, NotPosi
         }
         if index[axis] == 0 { Hold::Fixed } else { Hold::Free }
     };
-    Ok(plate_on(&GridStiffness::new(grid, lame), hold)?.0)
+    plate_on(&GridStiffness::new(grid, lame), hold)
 }
 
 /// What holds a node.

@@ -1,12 +1,13 @@
 //! The solid as a plugin: parameters, the law they name, and one handle's friction.
 
 use crate::friction::Friction;
+use crate::drawing::Drawing;
 use crate::law::{Description, Law, Tool};
 use crate::mesh::Mesh;
 use crate::{cache, gmsh};
 use flotor_hal::{
     Choices, DVec3, Demand, Detail, DetailsModel, ForceModel, Input, Memory, ModelInfo, OutOfRange, Output,
-    Parameter, Refusal, Settings, StepStatus, VariantInfo, VariantModel, Wrench, choices,
+    Parameter, Pose, Refusal, Settings, Shape, ShapeModel, StepStatus, VariantInfo, VariantModel, Wrench, choices,
 };
 
 /// Farther from home than this along an axis there is no handle, m: the answer is that at the edge, and says so.
@@ -89,6 +90,11 @@ pub struct Solid {
     friction: Friction,
     depth_m: f64,
     parameters: [f64; SCHEMA.len()],
+    description: Description,
+    mesh: Option<Mesh>,
+    /// Made for the first picture.
+    drawing: Option<Drawing>,
+    nothing: Shape,
 }
 
 /// Values in force: sizes of a beam have defaults of their own.
@@ -149,7 +155,8 @@ impl ForceModel for Solid {
         let mesh = read_mesh(settings)?;
         let value = |id: &str| SCHEMA.iter().position(|p| p.id() == id).map_or(f64::NAN, |i| parameters[i]);
         let description = Description::new(settings, value, mesh.as_ref().map_or(0, |(_, digest)| *digest))?;
-        let (law, mesh_error) = description.prepare(mesh.as_ref().map(|(mesh, _)| mesh))?;
+        let mesh = mesh.map(|(mesh, _)| mesh);
+        let (law, mesh_error) = description.prepare(mesh.as_ref())?;
         let reach_m = match description.tool {
             Tool::Sphere { radius_m } => radius_m,
             _ => 0.0,
@@ -157,7 +164,18 @@ impl ForceModel for Solid {
         let friction =
             Friction::new(settings.number_or_default("friction"), description.poisson_ratio, reach_m);
         let youngs_modulus_pa = parameters[YOUNGS_MODULUS];
-        Ok(Self { law, mesh_error, youngs_modulus_pa, friction, depth_m: f64::NAN, parameters })
+        Ok(Self {
+            law,
+            mesh_error,
+            youngs_modulus_pa,
+            friction,
+            depth_m: f64::NAN,
+            parameters,
+            description,
+            mesh,
+            drawing: None,
+            nothing: Shape::default(),
+        })
     }
 
     fn step(&mut self, input: &Input) -> Output {
@@ -212,6 +230,34 @@ impl ForceModel for Solid {
     }
 }
 
+impl ShapeModel for Solid {
+    /// The deformed surface with the pressure of the contact (under a plate, the displacement), and the tool. The first picture of a
+    /// punch or a plate takes up to a second.
+    fn shape(&mut self, input: &Input) -> &Shape {
+        let pose = if input.pose.is_finite() { input.pose } else { Pose::HOME };
+        let mesh = self.mesh.as_ref();
+        let drawing = match self.drawing.take() {
+            Some(drawing) => drawing,
+            None => match Drawing::new(&self.description, mesh) {
+                Ok(drawing) => drawing,
+                Err(_) => return &self.nothing,
+            },
+        };
+        let drawing = self.drawing.insert(drawing);
+        let reached_m = pose.position().clamp(DVec3::splat(-REACH_M), DVec3::splat(REACH_M));
+        match &self.law {
+            Law::Bonded(_) => {
+                drawing.bonded(&Pose::new(reached_m, pose.orientation()), self.youngs_modulus_pa)
+            }
+            Law::Sphere(atlas) => {
+                let centre_m = reached_m + DVec3::Z * atlas.radius_m;
+                let answer = atlas.answer(centre_m.to_array());
+                drawing.sphere(atlas, centre_m, &answer, self.youngs_modulus_pa)
+            }
+        }
+    }
+}
+
 impl VariantModel for Solid {
     /// Only friction remembers.
     fn variant_info(&self) -> VariantInfo {
@@ -230,4 +276,4 @@ impl DetailsModel for Solid {
     }
 }
 
-flotor_hal::export_model!(Solid, variant, details);
+flotor_hal::export_model!(Solid, variant, details, shape);

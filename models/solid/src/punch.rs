@@ -168,6 +168,14 @@ pub fn extrapolated(
     Ok((RigidPatch { stiffness }, error))
 }
 
+/// What a punch does to the surface under each of its modes.
+pub struct Loads {
+    /// Corners of the cells, counterclockwise, m.
+    pub cells_m: Vec<Vec<[f64; 2]>>,
+    /// Forces on the cells along x, y, z, by mode, N for a mode of one.
+    pub forces: Vec<[[f64; MODES]; 3]>,
+}
+
 /// Stiffness of a punch at the origin of the surface `z = 0`. Not real-time.
 ///
 /// # Errors
@@ -179,6 +187,20 @@ pub fn punch(
     bond: Bond,
     fineness: usize,
 ) -> Result<RigidPatch, NotPositive> {
+    Ok(punch_loads(solid, remainder, outline, bond, fineness)?.0)
+}
+
+/// The same, and its loads. Not real-time.
+///
+/// # Errors
+/// [`NotPositive`] if the numbers do not describe a solid.
+pub fn punch_loads(
+    solid: &HalfSpace,
+    remainder: Option<&Table>,
+    outline: Outline,
+    bond: Bond,
+    fineness: usize,
+) -> Result<(RigidPatch, Loads), NotPositive> {
     let cells = outline.cells(fineness);
     let centres: Vec<[f64; 2]> = cells.iter().map(|cell| cell.centre).collect();
     let smooth = remainder.map(|table| table.among(&centres));
@@ -224,6 +246,7 @@ pub fn punch(
         }
     }
     let mut matrix = [[0.0; MODES]; MODES];
+    let mut forces = vec![[[0.0; MODES]; 3]; cells.len()];
     for (mode, row) in matrix.iter_mut().enumerate() {
         let mut tractions = patterns[mode].clone();
         if tractions.iter().all(|value| *value == 0.0) {
@@ -233,8 +256,12 @@ pub fn punch(
         for (value, pattern) in row.iter_mut().zip(&patterns) {
             *value = tractions.iter().zip(pattern).map(|(t, u)| t * u).sum();
         }
+        for (force, tractions) in forces.iter_mut().zip(tractions.chunks_exact(count)) {
+            components.iter().zip(tractions).for_each(|(&i, traction)| force[i][mode] = *traction);
+        }
     }
-    Ok(RigidPatch { stiffness: symmetric(&matrix) })
+    let cells_m = cells.into_iter().map(|cell| cell.corners).collect();
+    Ok((RigidPatch { stiffness: symmetric(&matrix) }, Loads { cells_m, forces }))
 }
 
 #[cfg(test)]

@@ -23,18 +23,26 @@ impl RigidPatch {
         3 + 3 * i + j
     }
 
+    /// The twelve numbers of a pose. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn modes(position_m: DVec3, orientation: DQuat) -> [f64; MODES] {
+        let rotation = DMat3::from_quat(orientation);
+        let mut modes = [0.0; MODES];
+        modes[..3].copy_from_slice(&position_m.to_array());
+        for (j, column) in [rotation.x_axis, rotation.y_axis, rotation.z_axis].into_iter().enumerate() {
+            for (i, value) in column.to_array().into_iter().enumerate() {
+                modes[Self::entry(i, j)] = value - if i == j { 1.0 } else { 0.0 };
+            }
+        }
+        modes
+    }
+
     /// Wrench on the hand, and stored energy, J. Real-time: bounded, no allocation.
     #[must_use]
     pub fn answer(&self, position_m: DVec3, orientation: DQuat) -> (Wrench, f64) {
         let rotation = DMat3::from_quat(orientation);
         let columns = [rotation.x_axis, rotation.y_axis, rotation.z_axis];
-        let mut modes = [0.0; MODES];
-        modes[..3].copy_from_slice(&position_m.to_array());
-        for (j, column) in columns.iter().enumerate() {
-            for (i, value) in column.to_array().into_iter().enumerate() {
-                modes[Self::entry(i, j)] = value - if i == j { 1.0 } else { 0.0 };
-            }
-        }
+        let modes = Self::modes(position_m, orientation);
         let mut slope = [0.0; MODES];
         let mut energy_j = 0.0;
         for ((target, row), mode) in slope.iter_mut().zip(&self.stiffness).zip(&modes) {
