@@ -16,9 +16,7 @@ use crate::plate::plate;
 use crate::punch::{Bond, Loads, Outline, punch_loads};
 use crate::rigid::{MODES, RigidPatch};
 use crate::skin::{Face, Focus, Skin};
-use flotor_hal::{
-    DMat3, DQuat, DVec3, Form, Part, Pose, Primitive, ScalarField, Shape, SurfaceVertex, math,
-};
+use flotor_hal::{DMat3, DQuat, DVec3, Form, Part, Pose, Primitive, ScalarField, Shape, SurfaceVertex, math};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Order of the elements of a plate's picture.
@@ -107,10 +105,7 @@ impl Drawing {
     /// Under a sphere with its centre at `centre_m` (finite), where the law's answer is `answer`.
     pub fn sphere(&mut self, atlas: &Atlas, centre_m: DVec3, answer: &Answer, modulus_pa: f64) -> &Shape {
         let contact = Contact::new(self.height_m, atlas, centre_m, answer, modulus_pa);
-        let focus = Focus {
-            at_m: contact.at_m,
-            width_m: 0.6 * contact.radius_m.max(0.15 * atlas.radius_m),
-        };
+        let focus = Focus { at_m: contact.at_m, width_m: 0.6 * contact.radius_m.max(0.15 * atlas.radius_m) };
         let own;
         let skin = match (&self.look, self.body) {
             (Look::Sphere(Some(skin)), _) => skin,
@@ -257,7 +252,12 @@ impl Modal {
         let (form, half_sides_m) = self.tool;
         let centre_m = pose.position() + pose.orientation() * self.tool_centre_m;
         primitives.clear();
-        primitives.push(Primitive::new(form, Part::Tool, Pose::new(centre_m, pose.orientation()), half_sides_m));
+        primitives.push(Primitive::new(
+            form,
+            Part::Tool,
+            Pose::new(centre_m, pose.orientation()),
+            half_sides_m,
+        ));
     }
 }
 
@@ -405,9 +405,11 @@ impl<'a> Loaded<'a> {
                 moved[axis] = rigid;
             }
         }
-        let nearest = self.centres_m.iter().enumerate().min_by(|(_, a), (_, b)| {
-            a.distance_squared(at).total_cmp(&b.distance_squared(at))
-        });
+        let nearest = self
+            .centres_m
+            .iter()
+            .enumerate()
+            .min_by(|(_, a), (_, b)| a.distance_squared(at).total_cmp(&b.distance_squared(at)));
         let pressure = nearest.map_or([0.0; MODES], |(cell, _)| {
             self.loads.forces[cell][2].map(|force| -force / self.areas_m2[cell])
         });

@@ -1,13 +1,14 @@
 //! The solid as a plugin: parameters, the law they name, and one handle's friction.
 
-use crate::friction::Friction;
 use crate::drawing::Drawing;
+use crate::friction::Friction;
 use crate::law::{Description, Law, Tool};
 use crate::mesh::Mesh;
 use crate::{cache, gmsh};
 use flotor_hal::{
     Choices, DVec3, Demand, Detail, DetailsModel, ForceModel, Input, Memory, ModelInfo, OutOfRange, Output,
-    Parameter, Pose, Refusal, Settings, Shape, ShapeModel, StepStatus, VariantInfo, VariantModel, Wrench, choices,
+    Parameter, Pose, Refusal, Settings, Shape, ShapeModel, StepStatus, VariantInfo, VariantModel, Wrench,
+    choices,
 };
 
 /// Farther from home than this along an axis there is no handle, m: the answer is that at the edge, and says so.

@@ -79,9 +79,11 @@ impl Skin {
     /// Quads between rows and columns: along a row, then across rows, is a left turn seen from outside.
     fn lattice(&mut self, rows: &[f64], columns: &[f64], place: impl Fn(f64, f64) -> DVec3) {
         let first = self.places_m.len();
-        self.places_m.extend(rows.iter().flat_map(|&row| columns.iter().map(move |&c| (row, c))).map(
-            |(row, column)| place(row, column),
-        ));
+        self.places_m.extend(
+            rows.iter()
+                .flat_map(|&row| columns.iter().map(move |&c| (row, c)))
+                .map(|(row, column)| place(row, column)),
+        );
         self.quads(first, rows.len(), columns.len(), columns.len() - 1);
     }
 
@@ -91,8 +93,12 @@ impl Skin {
         for row in 0..rows.saturating_sub(1) {
             for step in 0..steps {
                 let corner = |row: usize, step: usize| (first + row * columns + step % columns) as u32;
-                let [a, b, c, d] =
-                    [corner(row, step), corner(row, step + 1), corner(row + 1, step + 1), corner(row + 1, step)];
+                let [a, b, c, d] = [
+                    corner(row, step),
+                    corner(row, step + 1),
+                    corner(row + 1, step + 1),
+                    corner(row + 1, step),
+                ];
                 self.triangles.extend([[a, b, c], [a, c, d]]);
             }
         }

@@ -8,6 +8,12 @@ mod table;
 
 use std::io::Write;
 
+/// So many cases: at `FLOTOR_TEST_SIZE=full` all of them, else the first number.
+fn cases(quick: usize, full: usize) -> usize {
+    let is_full = std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size == "full");
+    if is_full { full } else { quick }
+}
+
 /// Whether a test that prepares a solid for seconds is left out; tells so, past the harness.
 ///
 /// The variable is that of `flotor_tests::TestSize`; plugins depend on nothing else of the workspace, so it is read here.
