@@ -1,4 +1,5 @@
-//! What a picture of a running host costs the processor: the shape of the spring, its mesh, and six traces of ten seconds.
+//! What a picture of a running host costs the processor: the shape of the spring or of a solid of 5 000 triangles, its mesh, and
+//! six traces of ten seconds.
 //!
 //! Processor time of the thread, not time on the wall: what other programs take meanwhile does not count.
 
@@ -64,11 +65,11 @@ const HEIGHT_PX: f64 = 448.0;
 /// The 3D view in a window of 1280 x 800 with its panel.
 const SCENE_PX: [usize; 2] = [980, 396];
 
-fn run() -> RunDescription {
+fn run(model: &str) -> RunDescription {
     RunDescription {
         plugins: vec![PluginDescription {
-            name: "spring".to_owned(),
-            id: "spring".to_owned(),
+            name: model.to_owned(),
+            id: model.to_owned(),
             version: String::new(),
             file: String::new(),
             role: Role::Model(MappingConfig::default()),
@@ -84,7 +85,7 @@ fn run() -> RunDescription {
 }
 
 fn history() -> History {
-    let mut history = History::new(run(), Keep::All);
+    let mut history = History::new(run("spring"), Keep::All);
     (0..TICKS).for_each(|tick| history.push(&record(tick)));
     history
 }
@@ -102,31 +103,34 @@ fn record(tick: u64) -> TickRecord {
     record
 }
 
-fn library() -> PathBuf {
+fn library(model: &str) -> PathBuf {
     let own = std::env::current_exe().expect("a bench is a program");
-    let file = own.with_file_name("libflotor_spring.so");
+    let file = own.with_file_name(format!("libflotor_{model}.so"));
     assert!(file.is_file(), "{} is missing: run `cargo build --release` first", file.display());
     file
 }
 
 fn frame(criterion: &mut Criterion<ProcessorTime>) {
     let history = history();
-    let (mut shapes, missing) = shapes_of(history.run(), &[library()]);
-    assert!(missing.is_empty(), "{missing:?}");
-    let camera = Camera::experimenter(SceneBuilder::height_mm(&shapes));
     let (palette, scale) = (Palette::of(Look::Dark), ArrowScale::fitting(history.samples()));
-    let mut builder = SceneBuilder::default();
-    let mut moment_s = 0.0;
-    criterion.bench_function("shape and mesh", |bench| {
-        bench.iter(|| {
-            moment_s = (moment_s + 0.016) % 10.0;
-            let sample = history.at(moment_s).expect("ten seconds");
-            let (mesh, facts) = builder.build(&mut shapes, sample, &palette, &camera, HEIGHT_PX, scale, true);
-            black_box((mesh.indices.len(), facts))
+    for model in ["spring", "solid", "membrane"] {
+        let (mut shapes, missing) = shapes_of(&run(model), &[library(model)]);
+        assert!(missing.is_empty() && shapes.len() == 1, "{missing:?}");
+        let camera = Camera::experimenter(SceneBuilder::height_mm(&shapes));
+        let mut builder = SceneBuilder::default();
+        let mut moment_s = 0.0;
+        criterion.bench_function(&format!("shape and mesh, {model}"), |bench| {
+            bench.iter(|| {
+                moment_s = (moment_s + 0.016) % 10.0;
+                let sample = history.at(moment_s).expect("ten seconds");
+                let (mesh, facts) =
+                    builder.build(&mut shapes, sample, &palette, &camera, HEIGHT_PX, scale, true);
+                black_box((mesh.indices.len(), facts))
+            });
         });
-    });
+    }
     // As while ticks come: each picture has 16 new ones.
-    let mut coming = History::new(run(), Keep::Newest(20_000));
+    let mut coming = History::new(run("spring"), Keep::Newest(20_000));
     let mut ticks = (0..).map(record);
     ticks.by_ref().take(10_000).for_each(|record| coming.push(&record));
     let mut traces = [Trace::of(Quantity::Force), Trace::of(Quantity::Position)];
@@ -144,7 +148,7 @@ fn frame(criterion: &mut Criterion<ProcessorTime>) {
 /// The whole picture but its rasterising: interface, six traces of ten seconds, 3D scene, and egui's triangles of it all.
 fn whole_picture(criterion: &mut Criterion<ProcessorTime>) {
     let context = egui::Context::default();
-    let start = Start::Recording(Box::new(history()), Some(0.0), vec![library()]);
+    let start = Start::Recording(Box::new(history()), Some(0.0), vec![library("spring")]);
     // Drawn by an adapter, whose threads are not this one; without any, by this one.
     let state =
         std::panic::catch_unwind(|| create_render_state(default_wgpu_setup(), Default::default())).ok();
@@ -154,7 +158,7 @@ fn whole_picture(criterion: &mut Criterion<ProcessorTime>) {
     let mut viewer = Viewer::new(&context, state.as_ref(), start, Look::Dark);
     // What a GPU does otherwise, at the size the scene has in this window: not part of the bound.
     let run = history();
-    let (mut shapes, _) = shapes_of(run.run(), &[library()]);
+    let (mut shapes, _) = shapes_of(run.run(), &[library("spring")]);
     let camera = Camera::experimenter(SceneBuilder::height_mm(&shapes));
     let (palette, scale) = (Palette::of(Look::Dark), ArrowScale::fitting(run.samples()));
     let sample = run.at(0.2).expect("ten seconds");

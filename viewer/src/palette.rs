@@ -44,6 +44,8 @@ pub struct Palette {
     pub ground: [Color; 2],
     /// Plate at the handle, plate at the fixed end.
     pub plates: [Color; 2],
+    /// A body that is no spring.
+    pub body: Color,
     /// Force and torque arrows.
     pub force: Color,
     /// Torque arrows.
@@ -88,6 +90,7 @@ impl Palette {
                 cursor: Color32::from_rgb(240, 244, 250),
                 ground: [[58, 66, 80, 255], [98, 110, 130, 255]],
                 plates: [[232, 118, 48, 255], [62, 122, 188, 255]],
+                body: [118, 128, 144, 255],
                 force: [250, 224, 92, 255],
                 torque: [222, 142, 190, 255],
                 contact: [255, 84, 96, 255],
@@ -109,6 +112,7 @@ impl Palette {
                 cursor: Color32::from_rgb(30, 36, 46),
                 ground: [[206, 213, 223, 255], [176, 186, 200, 255]],
                 plates: [[222, 104, 32, 255], [38, 104, 172, 255]],
+                body: [168, 178, 192, 255],
                 force: [236, 174, 16, 255],
                 torque: [196, 96, 158, 255],
                 contact: [226, 42, 62, 255],

@@ -2,14 +2,14 @@
 
 use crate::camera::Camera;
 use crate::geometry::{
-    Body, Curve, Detail, Ground, LocalStrain, MM_PER_M, Mesh, Section, Shadow, append_tube, contact_strain,
-    force_arrow, plate, torque_arrow,
+    Body, Color, Curve, Detail, Ground, LocalStrain, MM_PER_M, Mesh, Section, Shadow, Strain,
+    append_primitive, append_surface, append_tube, contact_strain, force_arrow, plate, torque_arrow,
 };
 use crate::history::Sample;
 use crate::light;
 use crate::palette::{Palette, strain_color};
-use crate::shape::{Posed, Shape};
-use flotor_hal::{DVec3, Pose, Wrench};
+use crate::shape::{Posed, Rest, Shape};
+use flotor_hal::{DVec3, Part, Pose, ScalarField, Wrench};
 
 /// Lengths of arrows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,17 +51,30 @@ pub struct SceneBuilder {
     /// The mesh with the ground and nothing else: so many corners, so many indices.
     bare: [usize; 2],
     corners_made: u64,
+    /// Largest number of a surface so far: the end of its scale.
+    largest: f64,
 }
 
 /// What a scene shows beside the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SceneFacts {
-    /// Largest local strain, as part of the scale.
+    /// What colours mean; nothing without.
+    pub scale: Option<ColorScale>,
+    /// Largest number shown, as part of the scale.
     pub peak_part: f64,
     /// True where turns of a coil touch.
     pub touching: bool,
     /// True if a model had no shape at this pose.
     pub no_shape: bool,
+}
+
+/// What the colours of a body mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ColorScale {
+    /// Strain of a slender body.
+    Strain,
+    /// Numbers of a surface, from 0 to the largest so far.
+    Field(ScalarField, f64),
 }
 
 /// Strain at the end of the scale for a body whose turns cannot touch.
@@ -77,7 +90,7 @@ impl SceneBuilder {
     /// Height of what is drawn, mm: the tallest body, or a stand-in.
     #[must_use]
     pub fn height_mm(shapes: &[Shape]) -> f64 {
-        let tallest = shapes.iter().map(|shape| shape.body().rest_length_m).fold(0.0, f64::max);
+        let tallest = shapes.iter().map(Shape::height_m).fold(0.0, f64::max);
         MM_PER_M * if tallest > 0.0 { tallest } else { EMPTY_HEIGHT_M }
     }
 
@@ -106,20 +119,47 @@ impl SceneBuilder {
         let drawn = || shapes.iter().zip(&posed).filter_map(|(shape, posed)| Some((shape, posed.as_ref()?)));
 
         let plate_radius_m =
-            drawn().map(|(shape, _)| plate_radius_m(shape.body())).fold(0.25 * height_m, f64::max);
+            drawn().map(|(shape, _)| footprint_m(shape.rest())).fold(0.25 * height_m, f64::max);
         let (handle, wrench) = in_scene_frame(shapes.first(), sample);
-        let ground = ground(palette, height_m, plate_radius_m);
+        let depth_m = shapes.iter().map(Shape::ground_m).fold(0.0, f64::max);
+        let depth_m = if depth_m > 0.0 { depth_m } else { height_m };
+        let ground = ground(palette, height_m, depth_m + PLATE_THICKNESS * plate_radius_m);
         self.begin(ground);
         let shadows = shadows(&ground, palette, plate_radius_m, handle.position());
         ground.shade(&mut self.mesh.vertices, &shadows);
         let pixels_per_mm = camera.pixels_per_mm(height_px);
         for (shape, posed) in drawn() {
-            let part =
-                body_of(&mut self.mesh, shape.body(), posed, palette, pixels_per_mm, &mut facts.touching);
+            let part = match (shape.rest(), posed) {
+                (Rest::Slender(body), Posed::Slender { curve, strain }) => {
+                    facts.scale = Some(ColorScale::Strain);
+                    let posed = (curve, strain);
+                    body_of(&mut self.mesh, body, posed, palette, pixels_per_mm, &mut facts.touching)
+                }
+                (_, Posed::Solid(solid)) => {
+                    let part = self.surface(solid, palette);
+                    let field = solid.surface.field;
+                    if !field.name().is_empty() {
+                        facts.scale = Some(ColorScale::Field(field, self.largest));
+                    }
+                    part
+                }
+                (Rest::Solid(_), Posed::Slender { .. }) => 0.0,
+            };
             facts.peak_part = facts.peak_part.max(part);
         }
         if shapes.is_empty() {
             self.bare_handle(&sample.pose, palette, 0.25 * height_m);
+        }
+        // What is seen through comes after what is behind it: tools after surfaces, bodies that a handle enters after tools.
+        let solids = || {
+            drawn().filter_map(|(_, posed)| if let Posed::Solid(solid) = posed { Some(solid) } else { None })
+        };
+        for solid in solids() {
+            let opacity = if solid.surface.triangles.is_empty() { u8::MAX } else { SEEN_THROUGH };
+            self.primitives(solid, Part::Tool, with_opacity(palette.plates[0], opacity));
+        }
+        for solid in solids() {
+            self.primitives(solid, Part::Body, with_opacity(palette.body, SEEN_THROUGH));
         }
         if shows_arrows {
             self.arrows((handle, wrench), palette, scale, height_m, plate_radius_m);
@@ -138,6 +178,20 @@ impl SceneBuilder {
         }
         self.mesh.vertices.truncate(self.bare[0]);
         self.mesh.indices.truncate(self.bare[1]);
+    }
+
+    fn primitives(&mut self, solid: &flotor_hal::Shape, part: Part, color: Color) {
+        let of_part = solid.primitives.iter().filter(|primitive| primitive.part() == part);
+        of_part.for_each(|primitive| append_primitive(&mut self.mesh, primitive, color));
+    }
+
+    /// Adds a surface; gives the largest part of its scale in it.
+    fn surface(&mut self, solid: &flotor_hal::Shape, palette: &Palette) -> f64 {
+        let most = solid.surface.vertices.iter().map(|vertex| vertex.value.abs()).fold(0.0, f64::max);
+        self.largest = self.largest.max(most);
+        let largest = if self.largest > 0.0 { self.largest } else { 1.0 };
+        append_surface(&mut self.mesh, &solid.surface, |value| field_color(value.abs() / largest, palette));
+        most / largest
     }
 
     /// Without a body to draw, the handle is a disc.
@@ -172,10 +226,29 @@ impl SceneBuilder {
     }
 }
 
-/// The ground beneath bodies so high, with plates so large.
-fn ground(palette: &Palette, height_m: f64, plate_radius_m: f64) -> Ground {
+/// How much of what is behind it a body hides that is seen through, of 255.
+const SEEN_THROUGH: u8 = 130;
+
+fn with_opacity([r, g, b, _]: Color, opacity: u8) -> Color {
+    [r, g, b, opacity]
+}
+
+/// Colour of a part of the scale of a surface: that of the body at 0, that of the scale from a tenth on.
+#[must_use]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // between two bytes
+pub fn field_color(part: f64, palette: &Palette) -> Color {
+    let share = (10.0 * part).min(1.0);
+    let scale = strain_color(part);
+    std::array::from_fn(|k| {
+        let (from, to) = (f64::from(palette.body[k]), f64::from(scale[k]));
+        (from + share * (to - from) + 0.5) as u8
+    })
+}
+
+/// The ground so far beneath home, of a scene so high.
+fn ground(palette: &Palette, height_m: f64, depth_m: f64) -> Ground {
     Ground {
-        height_m: -height_m - PLATE_THICKNESS * plate_radius_m,
+        height_m: -depth_m,
         radius_m: 3.2 * height_m,
         spacing_m: 0.2 * height_m,
         surface: palette.ground[0],
@@ -206,6 +279,14 @@ fn in_scene_frame(first: Option<&Shape>, sample: &Sample) -> (Pose, Wrench) {
     (mapping.pose_to_model(&sample.pose), Wrench::new(turn * force_n, turn * torque_nm))
 }
 
+/// Radius of what a body stands on, m.
+fn footprint_m(rest: &Rest) -> f64 {
+    match rest {
+        Rest::Slender(body) => plate_radius_m(body),
+        Rest::Solid(extent) => 0.7 * extent.beside_m,
+    }
+}
+
 fn plate_radius_m(body: &Body) -> f64 {
     PLATE_OVERHANG * body.info.plate_radius_m
 }
@@ -214,7 +295,7 @@ fn plate_radius_m(body: &Body) -> f64 {
 fn body_of(
     mesh: &mut Mesh,
     body: &Body,
-    Posed { curve, strain }: &Posed,
+    (curve, strain): (&Curve, &Strain),
     palette: &Palette,
     pixels_per_mm: f64,
     touching: &mut bool,

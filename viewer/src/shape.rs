@@ -1,14 +1,14 @@
 //! Shapes of the models of a run, from instances of the viewer's own.
 //!
-//! The viewer loads the plugins a run names and asks them where their bodies are (extension
-//! `flotor.centerline/1`). The servo never computes a shape, and a recording holds none: 65 sections at 60 Hz would
+//! The viewer loads the plugins a run names and asks them where their bodies are (extensions
+//! `flotor.centerline/1` and `flotor.shape/1`). The servo never computes a shape, and a recording holds none: 65 sections at 60 Hz would
 //! double it, and nothing but the recorded parameters could be shown (docs/src/adr/0008-viewer-process.md).
 
 use crate::geometry::{Body, Curve, Strain};
 use flotor_core::mapping::Mapping;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting, read_metadata};
-use flotor_hal::{Input, Pose};
+use flotor_hal::{DVec3, Form, Input, Pose};
 use flotor_record::{PluginDescription, Role, RunDescription};
 use std::path::{Path, PathBuf};
 
@@ -17,16 +17,60 @@ pub struct Shape {
     name: String,
     model: Model,
     mapping: Mapping,
-    body: Body,
+    rest: Rest,
+}
+
+/// What is known of a model's body at rest.
+#[derive(Clone, Debug)]
+pub enum Rest {
+    /// A centreline.
+    Slender(Body),
+    /// Anything else.
+    Solid(Extent),
+}
+
+/// How much room a body at rest takes, m.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Extent {
+    /// How far it reaches below home.
+    pub below_m: f64,
+    /// How far it reaches from the vertical axis through home.
+    pub beside_m: f64,
+}
+
+impl Extent {
+    /// Of a shape.
+    #[must_use]
+    pub fn of(shape: &flotor_hal::Shape) -> Self {
+        let corners = shape.surface.vertices.iter().map(|vertex| DVec3::from_array(vertex.position_m));
+        let primitives = shape.primitives.iter().flat_map(|primitive| {
+            let (pose, half) = (primitive.pose(), DVec3::from_array(primitive.half_sides_m()));
+            let half = if primitive.form() == Some(Form::Sphere) { half * 0.58 } else { half }; // 1 / root of 3
+            [-1.0, 1.0].into_iter().flat_map(move |x| {
+                [-1.0, 1.0].into_iter().flat_map(move |y| {
+                    [-1.0, 1.0].map(|z| pose.position() + pose.orientation() * (half * DVec3::new(x, y, z)))
+                })
+            })
+        });
+        corners.chain(primitives).fold(Self::default(), |extent, place| Self {
+            below_m: extent.below_m.max(-place.z),
+            beside_m: extent.beside_m.max(place.truncate().length()),
+        })
+    }
 }
 
 /// A body at one pose of the handle.
 #[derive(Clone, Debug)]
-pub struct Posed {
-    /// Its centreline.
-    pub curve: Curve,
-    /// How it is strained against rest.
-    pub strain: Strain,
+pub enum Posed {
+    /// A slender one.
+    Slender {
+        /// Its centreline.
+        curve: Curve,
+        /// How it is strained against rest.
+        strain: Strain,
+    },
+    /// Any other.
+    Solid(flotor_hal::Shape),
 }
 
 /// Why a model is not drawn.
@@ -101,8 +145,8 @@ impl Shape {
         };
         let settings = description.settings.iter().map(parse).collect::<Result<Vec<_>, _>>()?;
         let mut model = plugin.create_model(&settings)?;
-        let Some(body) = body(&mut model) else { return Ok(None) };
-        Ok(Some(Self { name: name.clone(), model, mapping, body }))
+        let Some(rest) = rest(&mut model) else { return Ok(None) };
+        Ok(Some(Self { name: name.clone(), model, mapping, rest }))
     }
 
     /// What the scene calls the model.
@@ -113,8 +157,30 @@ impl Shape {
 
     /// The body at rest.
     #[must_use]
-    pub fn body(&self) -> &Body {
-        &self.body
+    pub fn rest(&self) -> &Rest {
+        &self.rest
+    }
+
+    /// How far beneath home the ground of this body is, m.
+    #[must_use]
+    pub fn ground_m(&self) -> f64 {
+        /// A flat body stands so high above the ground, in radii.
+        const FLAT: f64 = 0.8;
+        match &self.rest {
+            Rest::Slender(body) => body.rest_length_m,
+            Rest::Solid(extent) => extent.below_m.max(FLAT * extent.beside_m),
+        }
+    }
+
+    /// Height of a slender body that fills a picture as this one does, m.
+    #[must_use]
+    pub fn height_m(&self) -> f64 {
+        /// A wide body needs more room.
+        const WIDE: f64 = 1.3;
+        match &self.rest {
+            Rest::Slender(body) => body.rest_length_m,
+            Rest::Solid(_) => WIDE * self.ground_m(),
+        }
     }
 
     /// Way from the device's frame to the model's.
@@ -127,8 +193,8 @@ impl Shape {
     pub fn set_parameter(&mut self, key: &str, number: f64) {
         if let Ok(setting) = Setting::number(self.model.parameters(), key, number) {
             self.model.set_parameter(setting.index(), setting.value());
-            if let Some(body) = body(&mut self.model) {
-                self.body = body;
+            if let Some(rest) = rest(&mut self.model) {
+                self.rest = rest;
             }
         }
     }
@@ -156,21 +222,29 @@ impl Shape {
     #[must_use]
     pub fn at(&mut self, handle: &Pose) -> Option<Posed> {
         let input = Input::at_rest(self.mapping.pose_to_model(handle));
-        let points = self.body.info.suggested_points as usize;
-        let sections = self.model.centerline()?.points(&input, points)?;
-        let curve = Curve::through(&sections)?;
-        let strain = Strain::between(&self.body.rest, &curve);
-        Some(Posed { curve, strain })
+        match &self.rest {
+            Rest::Slender(body) => {
+                let points = body.info.suggested_points as usize;
+                let curve = Curve::through(&self.model.centerline()?.points(&input, points)?)?;
+                let strain = Strain::between(&body.rest, &curve);
+                Some(Posed::Slender { curve, strain })
+            }
+            Rest::Solid(_) => self.model.shape(&input).ok().map(Posed::Solid),
+        }
     }
 }
 
 /// The body of a model at rest, if it has a shape.
-fn body(model: &mut Model) -> Option<Body> {
+fn rest(model: &mut Model) -> Option<Rest> {
+    let home = Input::at_rest(Pose::HOME);
+    if model.has_shape() {
+        return model.shape(&home).ok().map(|shape| Rest::Solid(Extent::of(&shape)));
+    }
     /// Sections asked for: as many as the model suggests, within what can be drawn well.
     const SECTIONS: std::ops::RangeInclusive<u32> = 17..=1025;
     let mut shape = model.centerline()?;
     let mut info = shape.info()?;
     info.suggested_points = info.suggested_points.clamp(*SECTIONS.start(), *SECTIONS.end());
-    let rest = shape.points(&Input::at_rest(Pose::HOME), info.suggested_points as usize)?;
-    Body::new(info, &rest)
+    let sections = shape.points(&home, info.suggested_points as usize)?;
+    Body::new(info, &sections).map(Rest::Slender)
 }

@@ -1,4 +1,5 @@
-//! From a centreline to triangles: the wire wound about it, end plates, ground, arrows.
+//! From what a model describes to triangles: the wire wound about a centreline, primitives, surfaces, end plates, ground,
+//! arrows.
 //!
 //! Everything here is in metres and `f64` until a vertex is written. Frames are right-handed with z up.
 
@@ -8,6 +9,7 @@ mod curve;
 mod detail;
 mod ground;
 mod mesh;
+mod primitive;
 mod revolve;
 mod strain;
 mod tube;
@@ -21,6 +23,7 @@ pub use curve::{Curve, Section};
 pub use detail::Detail;
 pub use ground::{Ground, Shadow};
 pub use mesh::{Color, MM_PER_M, Mesh, Vertex};
+pub use primitive::{append_primitive, append_surface};
 pub use revolve::{Frame, plate, revolve};
 pub use strain::{LocalStrain, Strain, contact_strain};
 pub use tube::append_tube;

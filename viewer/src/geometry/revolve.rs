@@ -1,8 +1,8 @@
 //! Surfaces of revolution: plates, arrows, knobs.
 
 use super::{Color, Mesh, Section};
-use flotor_hal::DVec3;
 use flotor_hal::glam::DVec2;
+use flotor_hal::{DVec3, Pose};
 use std::f64::consts::TAU;
 
 /// Where an axis stands: origin and three unit vectors, z along the axis.
@@ -29,8 +29,14 @@ impl Frame {
     /// That of a section.
     #[must_use]
     pub fn of(section: &Section) -> Self {
-        let turn = section.orientation;
-        Self { origin_m: section.center_m, x: turn * DVec3::X, y: turn * DVec3::Y, z: turn * DVec3::Z }
+        Self::at(&Pose::new(section.center_m, section.orientation))
+    }
+
+    /// That of a pose.
+    #[must_use]
+    pub fn at(pose: &Pose) -> Self {
+        let turn = pose.orientation();
+        Self { origin_m: pose.position(), x: turn * DVec3::X, y: turn * DVec3::Y, z: turn * DVec3::Z }
     }
 }
 
