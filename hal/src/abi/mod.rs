@@ -40,3 +40,7 @@ pub use layout::{FieldLayout, LAYOUTS};
 pub(crate) use model::ModelPlug;
 pub use model::{ForceTable, model_entry, model_entry_with};
 pub use text::{Choices, MESSAGE_BYTES, Message, Str};
+
+/// The contract for C: the text of `include/flotor.h`.
+#[cfg(feature = "loader")]
+pub const C_HEADER: &str = include_str!("../../include/flotor.h");

@@ -1,6 +1,6 @@
 //! `flotor new`: creates the folder of a plugin.
 
-use crate::scaffold::{ContractFolder, Language, PluginName, Scaffold, ScaffoldError, scaffold};
+use crate::scaffold::{Contract, Language, PluginName, Scaffold, ScaffoldError, scaffold};
 use clap::{Args, ValueEnum};
 use flotor_command::say;
 use flotor_command::{CommandError, style};
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Create a plugin: a folder that builds, passes `validate` and runs.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  flotor new model jelly\n  flotor new device crank\n  \
-    flotor new model jelly --language c\n\nCreates the folder ./NAME with a plugin that builds, passes \
+    flotor new model jelly --language c\n  flotor new model jelly --vendor\n\nCreates the folder ./NAME with a plugin that builds, passes \
     `flotor validate` and runs in the scene of the same folder.\nIt overwrites no file.")]
 pub(crate) struct NewArguments {
     /// Kind of plugin
@@ -22,9 +22,12 @@ pub(crate) struct NewArguments {
     /// Programming language
     #[arg(long, value_enum, default_value = "rust")]
     language: Language,
-    /// Folder of the contract's sources (default: the sources of this program)
+    /// Folder of the contract's sources (default: those of this installation)
     #[arg(long, value_name = "PATH")]
     hal: Option<PathBuf>,
+    /// Copy the contract's sources into the new folder: it then builds wherever it is checked out
+    #[arg(long)]
+    vendor: bool,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -42,7 +45,8 @@ pub(crate) fn run(arguments: &NewArguments) -> Result<(), CommandError> {
     };
     let name = PluginName::new(&arguments.name).map_err(ScaffoldError::from)?;
     refuse_an_id_in_use(&name)?;
-    let contract = ContractFolder::found_by(arguments.hal.as_deref())?;
+    let sources = if arguments.vendor { Contract::copied } else { Contract::of_installation };
+    let contract = sources(arguments.hal.as_deref())?;
     let made = scaffold(Path::new("."), &name, kind, arguments.language, &contract)?;
     report(&name, &made);
     Ok(())

@@ -1,31 +1,115 @@
-//! Where the sources of the contract are that a new plugin is built with: those of the running program.
+//! Where a new plugin has the crate `flotor-hal` from: the registry, the sources of the running program, or a copy of its own.
 
 use super::ScaffoldError;
+use super::vendor::{write_copy, write_file};
 use std::path::{Path, PathBuf};
 
 /// Where this program's own sources were when it was built.
 const BUILT_FROM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../hal");
+/// Where an installation has the contract, below its prefix.
+const INSTALLED: &str = "share/flotor/hal";
+/// Folder of a copy, in that of the plugin.
+const COPY: &str = "flotor-hal";
+/// Where cargo is told on one machine what the registry does not have; git ignores it.
+const CONFIG: &str = ".cargo/config.toml";
+
+/// Where the sources of the contract come from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Contract {
+    /// The registry has this version.
+    Published,
+    /// A folder of this machine stands in for the registry.
+    Patched(ContractFolder),
+    /// The plugin gets a copy.
+    Vendored(ContractFolder),
+}
+
+impl Contract {
+    /// The sources of this installation, in place of the registry; or the registry, if the installation has none and the user names
+    /// none. Not real-time.
+    ///
+    /// # Errors
+    /// [`ScaffoldError::NoContract`] if the named folder has none.
+    pub fn of_installation(named: Option<&Path>) -> Result<Self, ScaffoldError> {
+        match ContractFolder::found(named) {
+            Ok(folder) => Ok(Self::Patched(folder)),
+            Err(_) if named.is_none() => Ok(Self::Published),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// A copy for the plugin. Not real-time.
+    ///
+    /// # Errors
+    /// [`ScaffoldError::NoContract`] if there are no sources.
+    pub fn copied(named: Option<&Path>) -> Result<Self, ScaffoldError> {
+        ContractFolder::found(named).map(Self::Vendored)
+    }
+
+    /// The dependency on it, for a manifest.
+    pub(super) fn dependency(&self) -> String {
+        let version = env!("CARGO_PKG_VERSION");
+        match self {
+            Self::Vendored(_) => format!("{{ path = \"{COPY}\", version = \"{version}\" }}"),
+            Self::Published | Self::Patched(_) => format!("\"{version}\""),
+        }
+    }
+
+    /// Options of `cargo build` on a forge, where a checkout of Flotor's sources is in `flotor/`.
+    pub(super) fn option_on_a_forge(&self) -> &'static str {
+        match self {
+            Self::Patched(_) => r#" --config "patch.crates-io.flotor-hal.path='flotor/hal'""#,
+            Self::Published | Self::Vendored(_) => "",
+        }
+    }
+
+    /// Writes what a crate needs beside its manifest, and returns the files and folders.
+    pub(super) fn write_beside(&self, plugin: &Path) -> Result<Vec<String>, ScaffoldError> {
+        match self {
+            Self::Published => Ok(Vec::new()),
+            Self::Patched(folder) => {
+                let path = folder.as_text()?;
+                let text = format!(
+                    "# Until the registry has flotor-hal: its sources on this machine. Git ignores this file.\n\
+                     [patch.crates-io]\nflotor-hal = {{ path = \"{path}\" }}\n"
+                );
+                write_file(&plugin.join(CONFIG), &text)?;
+                folder.copy_lock_file(plugin)?;
+                Ok(vec![CONFIG.to_owned()])
+            }
+            Self::Vendored(folder) => {
+                write_copy(&folder.0, &plugin.join(COPY))?;
+                folder.copy_lock_file(plugin)?;
+                Ok(vec![COPY.to_owned()])
+            }
+        }
+    }
+
+    /// Whether the workspace of the contract would take every new folder in `parent` as a member.
+    pub(super) fn has_as_member(&self, parent: &Path) -> bool {
+        let (Self::Patched(folder) | Self::Vendored(folder)) = self else { return false };
+        let (Some(workspace), Ok(parent)) = (folder.0.parent(), parent.canonicalize()) else { return false };
+        ["devices", "models"].iter().any(|members| parent == workspace.join(members))
+    }
+}
 
 /// The folder of `flotor-hal`: manifest, sources and C header.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ContractFolder(PathBuf);
 
 impl ContractFolder {
-    /// The folder a user names, else `hal/` in a folder above the program, else where the program was built.
-    /// Not real-time.
-    ///
-    /// # Errors
-    /// [`ScaffoldError::NoContract`] if it is in none of these places.
-    pub fn found_by(named: Option<&Path>) -> Result<Self, ScaffoldError> {
+    /// The folder a user names; else `hal/` or that of an installation in a folder above the program; else where the program was
+    /// built.
+    fn found(named: Option<&Path>) -> Result<Self, ScaffoldError> {
         let own = std::env::current_exe().unwrap_or_default();
-        let above = own.ancestors().skip(1).map(|folder| folder.join("hal"));
+        let above = own.ancestors().skip(1).flat_map(|folder| [folder.join("hal"), folder.join(INSTALLED)]);
         let candidates: Vec<PathBuf> = match named {
             Some(named) => vec![named.into()],
             None => above.chain([BUILT_FROM.into()]).collect(),
         };
         let is_contract = |folder: &&PathBuf| {
             let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).unwrap_or_default();
-            manifest.contains("name = \"flotor-hal\"") && folder.join("include/flotor.h").is_file()
+            manifest.contains("name = \"flotor-hal\"") && folder.join("src/lib.rs").is_file()
         };
         let found = candidates.iter().find(is_contract).and_then(|folder| folder.canonicalize().ok());
         found.map(Self).ok_or_else(|| {
@@ -33,22 +117,21 @@ impl ContractFolder {
         })
     }
 
-    /// The path, for a manifest.
-    pub(super) fn as_text(&self) -> Result<String, ScaffoldError> {
-        // Quotes and backslashes would end the text a manifest has it in; `$` and backquotes mean something to a shell.
-        let text = self.0.to_str().filter(|text| !text.contains(['"', '\\', '$', '`', '\n']));
-        text.map(str::to_owned).ok_or_else(|| ScaffoldError::NotText(self.0.clone()))
+    /// The path, for cargo.
+    fn as_text(&self) -> Result<&str, ScaffoldError> {
+        // Quotes and backslashes would end the text that cargo has it in.
+        let text = self.0.to_str().filter(|text| !text.contains(['"', '\\', '\n']));
+        text.ok_or_else(|| ScaffoldError::NotText(self.0.clone()))
     }
 
-    /// Whether the workspace of the contract would take every new folder in `parent` as a member.
-    pub(super) fn has_as_member(&self, parent: &Path) -> bool {
-        let (Some(workspace), Ok(parent)) = (self.0.parent(), parent.canonicalize()) else { return false };
-        ["devices", "models"].iter().any(|members| parent == workspace.join(members))
-    }
-
-    /// The versions the contract was built with, so that a plugin needs nothing that is not there already.
-    pub(super) fn lock_file(&self) -> Option<String> {
-        std::fs::read_to_string(self.0.parent()?.join("Cargo.lock")).ok()
+    /// The versions the contract was built with, so that a plugin needs nothing that is not there already: the lock file of a
+    /// package, or that of the workspace.
+    fn copy_lock_file(&self, plugin: &Path) -> Result<(), ScaffoldError> {
+        let places = [Some(self.0.as_path()), self.0.parent()].into_iter().flatten();
+        let lock = places
+            .map(|folder| folder.join("Cargo.lock"))
+            .find_map(|file| std::fs::read_to_string(file).ok());
+        lock.map_or(Ok(()), |lock| write_file(&plugin.join("Cargo.lock"), &lock))
     }
 }
 

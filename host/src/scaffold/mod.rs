@@ -2,18 +2,19 @@
 //!
 //! The templates are whole files that compile once `your-name` (the id), `your_name` (in symbols), `YourName` (the
 //! type), `Your name` (for people) and what differs by language and place are replaced. A crate that is made lies
-//! anywhere: it has the path of the contract (`hal`) and a workspace of its own.
+//! anywhere, and travels: it depends on a version of the contract, it has a workspace of its own, and what belongs to this machine is
+//! in a file that git ignores. A plugin in C has the header beside it.
 
 mod contract;
 mod name;
+mod vendor;
 
-pub use contract::ContractFolder;
+pub use contract::{Contract, ContractFolder};
 pub use name::{NameError, PluginName};
 
-use flotor_hal::abi::PluginKind;
-use std::fs::File;
-use std::io::Write;
+use flotor_hal::abi::{C_HEADER, PluginKind};
 use std::path::{Path, PathBuf};
+use vendor::write_file;
 
 /// Programming language of a plugin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -51,14 +52,30 @@ pub enum ScaffoldError {
     InsideWorkspace(PathBuf),
     /// The contract's sources are not where this program was built.
     #[error(
-        "the sources of the contract (`hal/`) are neither in a folder above this program nor at {}; give \
+        "the sources of the contract (`hal/`, `share/flotor/hal/`) are neither in a folder above this program nor at {}; give \
          their folder with --hal PATH",
         .0.display()
     )]
     NoContract(PathBuf),
+    /// A copy of the contract cannot have its manifest.
+    #[error("{}: {reason}; give the folder of whole sources with --hal PATH", path.display())]
+    Manifest {
+        /// The manifest.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// A path that cannot be written into a manifest.
-    #[error("{}: the path is not valid UTF-8, or has quotes, backslashes or `$`; use another folder", .0.display())]
+    #[error("{}: the path is not valid UTF-8, or has quotes or backslashes; use another folder", .0.display())]
     NotText(PathBuf),
+    /// The system reports an error.
+    #[error("{}: cannot read: {cause}", path.display())]
+    Read {
+        /// What was to be read.
+        path: PathBuf,
+        /// What the system said.
+        cause: std::io::Error,
+    },
     /// The system reports an error.
     #[error("{}: cannot write: {cause}", path.display())]
     Write {
@@ -91,9 +108,9 @@ pub fn scaffold(
     name: &PluginName,
     kind: PluginKind,
     language: Language,
-    contract: &ContractFolder,
+    contract: &Contract,
 ) -> Result<Scaffold, ScaffoldError> {
-    let text = Placeholders::new(name, language, contract)?;
+    let text = Placeholders::new(name, language, contract);
     let files = files(kind, language);
     if files.iter().any(|(path, source)| path.ends_with(".rs") && text.clashes_with(source)) {
         return Err(ScaffoldError::Clash { id: name.id().to_owned(), type_name: name.type_name() });
@@ -103,22 +120,18 @@ pub fn scaffold(
     }
     let folder = parent.join(name.id());
     make_folder(&folder)?;
+    let mut written = Vec::new();
     for (path, template) in files {
-        let file = folder.join(text.fill(path));
-        if let Some(below) = file.parent() {
-            let made = std::fs::create_dir_all(below);
-            made.map_err(|cause| ScaffoldError::Write { path: below.into(), cause })?;
-        }
-        write(&file, &text.fill(template))?;
+        let path = text.fill(path);
+        write_file(&folder.join(&path), &text.fill(template))?;
+        written.push(path);
     }
-    if language == Language::Rust
-        && let Some(lock) = contract.lock_file()
-    {
-        write(&folder.join("Cargo.lock"), &lock)?;
+    if language == Language::Rust {
+        written.extend(contract.write_beside(&folder)?);
     }
     Ok(Scaffold {
         folder,
-        files: files.iter().map(|(path, _)| text.fill(path)).collect(),
+        files: written,
         build: text.fill(BUILD),
         library: text.fill("path/to/library/libyour_name.so"),
     })
@@ -126,7 +139,8 @@ pub fn scaffold(
 
 /// The files of a plugin: path and template, the one to edit first.
 fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'static str)] {
-    const IGNORE: (&str, &str) = (".gitignore", "/target\n/lib*.so\n");
+    const IGNORE: (&str, &str) = (".gitignore", "/target\n/lib*.so\n/.cargo/config.toml\n");
+    const HEADER: (&str, &str) = ("flotor.h", C_HEADER);
     const MODEL_SCENE: (&str, &str) = ("scene.toml", include_str!("templates/model-scene.toml"));
     const DEVICE_SCENE: (&str, &str) = ("scene.toml", include_str!("templates/device-scene.toml"));
     const MODEL_TEST: (&str, &str) = ("your-name.test.toml", include_str!("templates/model-test.toml"));
@@ -143,10 +157,10 @@ fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'sta
         }
         (PluginKind::Model, Language::C) => {
             const MODEL: (&str, &str) = ("plugin.c", include_str!("templates/c/model.c"));
-            &[MODEL, MODEL_SCENE, MODEL_TEST, MODEL_CURVE, WORKFLOW, IGNORE]
+            &[MODEL, MODEL_SCENE, MODEL_TEST, MODEL_CURVE, WORKFLOW, HEADER, IGNORE]
         }
         (PluginKind::Device, Language::C) => {
-            &[("plugin.c", include_str!("templates/c/device.c")), DEVICE_SCENE, IGNORE]
+            &[("plugin.c", include_str!("templates/c/device.c")), DEVICE_SCENE, HEADER, IGNORE]
         }
     }
 }
@@ -158,30 +172,23 @@ const BUILD: &str = "BUILD_COMMAND";
 struct Placeholders([(&'static str, String); 8]);
 
 impl Placeholders {
-    fn new(name: &PluginName, language: Language, contract: &ContractFolder) -> Result<Self, ScaffoldError> {
-        let (build, built_in, on_a_forge) = match language {
-            // The manifest has the folder of the contract on the author's machine.
-            Language::Rust => (
-                "cargo build --release",
-                "target/release",
-                r#"sed -i "s|path = \".*/hal\"|path = \"$PWD/flotor/hal\"|" Cargo.toml && cargo build --release"#,
-            ),
-            Language::C => (
-                "cc -std=c11 -O2 -Wall -Wextra -shared -fPIC -I\"path/to/hal/include\" -o libyour_name.so plugin.c -lm",
-                ".",
-                "cc -std=c11 -O2 -shared -fPIC -Iflotor/hal/include -o libyour_name.so plugin.c -lm",
-            ),
+    fn new(name: &PluginName, language: Language, contract: &Contract) -> Self {
+        let cc = "cc -std=c11 -O2 -Wall -Wextra -shared -fPIC -o libyour_name.so plugin.c -lm";
+        let cargo = "cargo build --release";
+        let (build, on_a_forge, built_in) = match language {
+            Language::Rust => (cargo, format!("{cargo}{}", contract.option_on_a_forge()), "target/release"),
+            Language::C => (cc, cc.to_owned(), "."),
         };
-        Ok(Self([
+        Self([
             (BUILD, build.to_owned()),
-            ("WORKFLOW_BUILD", on_a_forge.to_owned()),
+            ("WORKFLOW_BUILD", on_a_forge),
             ("path/to/library", built_in.to_owned()),
             ("your-name", name.id().to_owned()),
             ("your_name", name.symbol()),
             ("YourName", name.type_name()),
             ("Your name", name.title()),
-            ("path/to/hal", contract.as_text()?),
-        ]))
+            ("CONTRACT_DEPENDENCY", contract.dependency()),
+        ])
     }
 
     fn fill(&self, template: &str) -> String {
@@ -204,11 +211,6 @@ fn make_folder(folder: &Path) -> Result<(), ScaffoldError> {
     })
 }
 
-fn write(path: &Path, text: &str) -> Result<(), ScaffoldError> {
-    let written = File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes()));
-    written.map_err(|cause| ScaffoldError::Write { path: path.into(), cause })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -227,10 +229,9 @@ mod tests {
 
     #[test]
     fn no_placeholder_is_left() {
-        let contract = ContractFolder::found_by(None).expect("a test runs beside its sources");
         let name = PluginName::new("soft-wall").unwrap();
         for language in [Language::Rust, Language::C] {
-            let text = Placeholders::new(&name, language, &contract).unwrap();
+            let text = Placeholders::new(&name, language, &Contract::Published);
             let kinds = [PluginKind::Model, PluginKind::Device];
             for (path, template) in kinds.into_iter().flat_map(|kind| files(kind, language)) {
                 let filled = text.fill(template);
@@ -243,10 +244,9 @@ mod tests {
 
     #[test]
     fn a_type_of_the_contract_is_no_name() {
-        let contract = ContractFolder::found_by(None).expect("a test runs beside its sources");
         let clashes = |name: &str, template: &str| {
             let name = PluginName::new(name).unwrap();
-            Placeholders::new(&name, Language::Rust, &contract).unwrap().clashes_with(template)
+            Placeholders::new(&name, Language::Rust, &Contract::Published).clashes_with(template)
         };
         assert!(clashes("wrench", include_str!("templates/rust/model.rs")));
         assert!(clashes("model-info", include_str!("templates/rust/model.rs")));

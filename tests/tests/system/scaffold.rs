@@ -4,6 +4,7 @@
 use flotor_tests::library::build_folder;
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
+use flotor_tests::{TestSize, workspace_root};
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -107,6 +108,65 @@ fn a_new_device_builds_validates_and_moves() {
         let peak = peak_force_n(&folder, &name, language);
         assert!((peak - 2.7).abs() < 0.3, "{language}: {peak} N");
     }
+}
+
+/// The files of a new plugin that git would track, by their paths in its folder.
+fn tracked(folder: &Path) -> Vec<PathBuf> {
+    fn search(folder: &Path, found: &mut Vec<PathBuf>) {
+        for entry in
+            std::fs::read_dir(folder).expect("it was made").map(|entry| entry.expect("it is ours").path())
+        {
+            if entry.is_dir() { search(&entry, found) } else { found.push(entry) }
+        }
+    }
+    let ignored = std::fs::read_to_string(folder.join(".gitignore")).expect("it was made");
+    let mut found = Vec::new();
+    search(folder, &mut found);
+    found.retain(|file| {
+        let path = format!("/{}", file.strip_prefix(folder).expect("it lies in the folder").display());
+        !ignored.lines().any(|line| line == path)
+    });
+    found
+}
+
+#[test]
+fn no_tracked_file_has_a_path_of_this_machine() {
+    let root = workspace_root().display().to_string();
+    for (language, option) in [("rust", "--language=rust"), ("c", "--language=c"), ("rust", "--vendor")] {
+        let scratch = Scratch::default();
+        let ran = new(scratch.path(), &["model", "jelly", option]);
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+        let folder = scratch.path().join("jelly");
+        let files = tracked(&folder);
+        assert!(files.len() >= 6, "{files:?}");
+        for file in files {
+            let text = std::fs::read_to_string(&file).expect("text");
+            assert!(!text.contains(&root) && !text.contains("/hal\""), "{language}: {}", file.display());
+        }
+    }
+}
+
+#[test]
+fn a_crate_with_a_copy_of_the_contract_builds_after_a_move() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
+    let scratch = Scratch::default();
+    let ran = new(scratch.path(), &["model", "jelly", "--vendor"]);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let moved = scratch.folder("elsewhere").join("jelly");
+    std::fs::rename(scratch.path().join("jelly"), &moved).expect("it can be moved");
+    for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
+        assert!(moved.join("flotor-hal").join(licence).is_file(), "a copy has its {licence}");
+    }
+    let mut cargo = Command::new("cargo");
+    cargo
+        .args(["check", "--offline", "--target-dir"])
+        .arg(build_folder().join("scaffold"))
+        .current_dir(&moved);
+    let checked = cargo.output().expect("cargo starts");
+    assert!(checked.status.success(), "{}", String::from_utf8_lossy(&checked.stderr));
+    assert!(!moved.join(".cargo").exists());
 }
 
 #[test]
