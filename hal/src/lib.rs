@@ -1,6 +1,6 @@
-//! Flotor's contract between a host, force models and devices.
+#![doc = include_str!("../README.md")]
 //!
-//! # The model in one page
+//! # The loop
 //!
 //! A **device** gives the pose of a handle and takes a wrench. A **force model** gives the wrench for a pose.
 //! A host runs both in a loop of a thousand ticks a second and more; between them it maps frames and scales
@@ -20,11 +20,13 @@
 //! - *Real-time: bounded, no allocation*: runs inside a tick. No allocation, lock, system call, formatting or
 //!   panic; the boundary catches a panic, but it costs the instance its life and the tick its force.
 //!
-//! # Writing a plugin
+//! # Where to look
 //!
-//! Implement [`ForceModel`] or [`Device`] and write [`export_model!`] or [`export_device!`]; set
-//! `crate-type = ["cdylib", "rlib"]`. What else a plugin may offer is in [`extension`]. The trait's documentation has a whole model in twenty lines. You never
-//! see the binary contract; it is in [`abi`], and C authors get it as `include/flotor.h`.
+//! - Models: [`ForceModel`], [`export_model!`]; parameters: [`Parameter`], [`Settings`].
+//! - Devices: [`Device`], [`ActiveDevice`], [`SafeStop`], [`export_device!`].
+//! - What else a plugin may offer: [`extension`].
+//! - Rules for every plugin: [`conformance`]; functions with the same bits on every machine: [`math`].
+//! - The binary contract, which authors in Rust never see: [`abi`].
 
 pub mod abi;
 pub mod conformance;
