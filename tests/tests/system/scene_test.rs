@@ -134,6 +134,23 @@ fn a_defect_of_the_model_is_found_with_its_cause_and_a_picture() {
 }
 
 #[test]
+fn a_newcomer_has_a_green_run_in_ten_commands_and_a_red_one_after_each_mistake() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
+    let (scratch, script) = (Scratch::default(), workspace_root().join("tests/newcomer"));
+    let folder = scratch.path().join("newcomer");
+    let ran = Flotor::with([script.as_os_str(), folder.as_os_str(), "installed".as_ref()])
+        .through_shell("unset CARGO_TARGET_DIR; PATH=\"${1%/*}:$PATH\" exec bash \"$2\" \"$3\" \"$4\"")
+        .env("CARGO_NET_OFFLINE", "true")
+        // The model is the same; its dependencies compile in a third of the time.
+        .env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "0")
+        .run();
+    assert_eq!(ran.code, Some(0), "{}{}", ran.stdout, ran.stderr);
+    assert!(ran.stdout.ends_with("green, and red four times\n"), "{}", ran.stdout);
+}
+
+#[test]
 fn a_plugin_that_crashes_fails_its_case_alone_and_the_command_repeats_it() {
     let scratch = faulty(WITH_A_CRASH);
     let ran = test(scratch.path(), &["--json", "-"]);
@@ -214,20 +231,57 @@ fn a_reference_and_a_golden_recording_are_compared_within_a_tolerance() {
 fn junit(file: &Path) -> (usize, usize) {
     let text = std::fs::read_to_string(file).expect("the results were written");
     let mut reader = Reader::from_str(&text);
-    let (mut cases, mut failures) = (0, 0);
+    let (mut cases, mut failures, mut announced) = (0, 0, Vec::new());
     loop {
         match reader.read_event().unwrap_or_else(|error| panic!("{error}: {text}")) {
             Event::Start(element) | Event::Empty(element) => {
+                let totals = ["tests", "failures"].map(|name| {
+                    let total =
+                        element.try_get_attribute(name).unwrap_or_else(|error| panic!("{error}: {text}"));
+                    total.map(|total| {
+                        String::from_utf8_lossy(&total.value).parse::<usize>().expect("a number")
+                    })
+                });
+                announced.extend(totals[0].zip(totals[1]));
                 for attribute in element.attributes() {
                     assert!(!attribute.unwrap_or_else(|error| panic!("{error}: {text}")).value.is_empty());
                 }
                 cases += usize::from(element.name().as_ref() == b"testcase");
                 failures += usize::from(element.name().as_ref() == b"failure");
             }
-            Event::Eof => return (cases, failures),
+            Event::Eof => {
+                assert_eq!(announced, [(cases, failures); 2], "both totals are those of the cases");
+                return (cases, failures);
+            }
             _ => {}
         }
     }
+}
+
+#[test]
+fn a_name_that_xml_has_to_escape_comes_back_as_it_was() {
+    let (scratch, name) = (Scratch::default(), "a <b> & \"c\" 'd'\t");
+    let _ = scratch.file(
+        "scene.toml",
+        "duration_s = 0.01\n[device]\nplugin = \"simulated\"\n[[model]]\nplugin = \"wall\"\n",
+    );
+    let _ =
+        scratch.file(&format!("{name}.test.toml"), "scene = \"scene.toml\"\n[expect]\nend = \"finished\"\n");
+    let ran = test(scratch.path(), &["--junit", "results.xml"]);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    let file = scratch.path().join("results.xml");
+    assert_eq!(junit(&file), (1, 0));
+    let text = std::fs::read_to_string(file).expect("the results were written");
+    let mut reader = Reader::from_str(&text);
+    let class = std::iter::repeat_with(|| reader.read_event().expect("XML")).find_map(|event| match event {
+        Event::Empty(case) => {
+            let class = case.try_get_attribute("classname").expect("XML")?;
+            Some(class.unescape_value().expect("text").into_owned())
+        }
+        _ => None,
+    });
+    // A control character has no place in XML.
+    assert_eq!(class.as_deref(), Some(name.replace('\t', "?").as_str()));
 }
 
 #[test]
@@ -240,6 +294,21 @@ fn the_number_of_jobs_changes_nothing() {
         (ran.stdout, std::fs::read(xml).expect("it was written"))
     };
     assert_eq!(report("1"), report("4"));
+}
+
+#[test]
+fn the_order_of_the_files_changes_nothing() {
+    let scratch = faulty(WITH_A_CRASH);
+    let second = format!("scene = \"scene.toml\"\n{WITH_A_CRASH}").replace("[50]", "[60]");
+    let _ = scratch.file("another.test.toml", second);
+    let report = |paths: &[&str]| {
+        let ran = test(scratch.path(), &[paths, &["--json", "-"]].concat());
+        assert_eq!(json(&ran)["failed"], 4, "{ran:#?}");
+        ran.stdout
+    };
+    let (one, other) = ("faulty.test.toml", "./another.test.toml");
+    assert_eq!(report(&[one, other]), report(&[other, one]));
+    assert_eq!(report(&[one, other]), report(&["."]), "found in a folder, in the order of its files");
 }
 
 #[test]
@@ -259,6 +328,20 @@ fn the_parts_add_up_to_the_whole() {
 }
 
 #[test]
+fn the_reports_of_the_parts_add_up_to_that_of_the_whole() {
+    let scratch = faulty(&format!("seeds = [1, 2]\n{WITH_A_CRASH}"));
+    let reported = |arguments: &[&str]| {
+        let _ = test(scratch.path(), &[&["--junit", "results.xml"], arguments].concat());
+        junit(&scratch.path().join("results.xml"))
+    };
+    let whole = reported(&[]);
+    assert_eq!(whole, (6, 4));
+    let parts = ["1/2", "2/2"].map(|part| reported(&["--shard", part]));
+    assert!(parts.iter().all(|(cases, _)| *cases > 0), "{parts:?}");
+    assert_eq!(parts.iter().fold((0, 0), |sum, part| (sum.0 + part.0, sum.1 + part.1)), whole);
+}
+
+#[test]
 fn a_killed_test_leaves_no_report_not_even_an_old_one() {
     let scratch = faulty("duration = \"1000s\"\n[expect]\nend = \"finished\"\n");
     let results = scratch.file("results.xml", "<testsuites/>");
@@ -270,6 +353,10 @@ fn a_killed_test_leaves_no_report_not_even_an_old_one() {
     running.signal(Signal::KILL);
     assert_eq!(running.wait().code, None);
     assert!(!results.exists());
+    // It starts anew.
+    let _ = scratch.file("faulty.test.toml", "scene = \"scene.toml\"\n[expect]\nend = \"finished\"\n");
+    let ran = test(scratch.path(), &["--junit", "results.xml"]);
+    assert_eq!((ran.code, junit(&results)), (Some(exit_code::OK), (1, 0)), "{ran:#?}");
 }
 
 #[test]
