@@ -148,6 +148,12 @@ mod documents {
     #[doc = include_str!("../../docs/src/write-a-device.md")]
     struct WriteADevice;
 
+    #[doc = include_str!("../../docs/src/slow-model.md")]
+    struct SlowModel;
+
+    #[doc = include_str!("../../docs/src/cable.md")]
+    struct Cable;
+
     #[doc = include_str!("../../docs/src/concepts.md")]
     struct Concepts;
 }

@@ -1,0 +1,60 @@
+//! The board without hardware: the other end of a pseudo terminal, where the device finds an ordinary port.
+
+use crate::TIMEOUT;
+use crate::frame::{Decoder, FORCE, POSITION, encode};
+use serialport::{SerialPort, TTYPort};
+use std::io::{Read, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// A board that rests at one position. Dropped, its cable is pulled.
+pub struct Board {
+    force_mn: Arc<AtomicI64>,
+    is_ending: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Board {
+    /// Starts it, and returns the port for the device.
+    pub fn start(position_um: i16) -> (Self, TTYPort) {
+        let (mut ours, mut theirs) = TTYPort::pair().expect("the system has pseudo terminals");
+        theirs.set_timeout(TIMEOUT).expect("a timeout");
+        ours.set_timeout(Duration::from_millis(1)).expect("a timeout");
+        let (force_mn, is_ending) = (Arc::new(AtomicI64::new(i64::MIN)), Arc::new(AtomicBool::new(false)));
+        let (heard, ending) = (Arc::clone(&force_mn), Arc::clone(&is_ending));
+        let thread = std::thread::spawn(move || {
+            let (mut decoder, mut bytes) = (Decoder::new(FORCE), [0; 64]);
+            while !ending.load(Ordering::Acquire) {
+                let _ = ours.write_all(&encode(POSITION, position_um));
+                // A read waits for a millisecond where there is nothing: the period of the board.
+                let count = ours.read(&mut bytes).unwrap_or(0);
+                for force in bytes[..count].iter().filter_map(|byte| decoder.push(*byte)) {
+                    heard.store(force.into(), Ordering::Release);
+                }
+            }
+        });
+        (Self { force_mn, is_ending, thread: Some(thread) }, theirs)
+    }
+
+    /// Waits until the last force that has come is this one.
+    pub fn wait_for_force_mn(&self, force_mn: i64) {
+        let started = Instant::now();
+        while self.force_mn.load(Ordering::Acquire) != force_mn {
+            assert!(
+                started.elapsed() < Duration::from_secs(10),
+                "{} mN",
+                self.force_mn.load(Ordering::Acquire)
+            );
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+}
+
+impl Drop for Board {
+    fn drop(&mut self) {
+        self.is_ending.store(true, Ordering::Release);
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
+}

@@ -1,0 +1,194 @@
+//! A bar of gel. Its forces come from a solver in another language and another process, too slow for the loop.
+
+use flotor_hal::{
+    DVec3, ForceModel, Input, LinearField, LinearFieldModel, ModelInfo, OutOfRange, Output, Parameter,
+    Refusal, Settings, StepStatus, Wrench,
+};
+use std::io::{self, BufRead, BufReader, Write};
+use std::os::fd::OwnedFd;
+use std::os::unix::net::UnixStream;
+use std::process::{Child, Command};
+use std::time::Duration;
+
+/// The solver, part of the plugin's file.
+const SOLVER: &str = include_str!("solver.py");
+/// How long an answer may take. A process that hangs must not hang the thread that asks it.
+const PATIENCE: Duration = Duration::from_millis(500);
+/// The deepest compression that the solver is asked for, m. Farther down the force stays as it is there.
+const DEEPEST_M: f64 = 0.012;
+/// How far from its anchor a field holds, m: there the slope has changed by less than a tenth.
+const VALID_M: f64 = 0.0005;
+
+struct Gel {
+    shear_modulus_pa: f64,
+    solver: Asking,
+}
+
+/// Where the model stands with its solver.
+enum Asking {
+    NotYet,
+    Running(Solver),
+    /// It did not start, gave no answer in time, or one that is none. It is not asked again: an answer could belong to an
+    /// earlier question.
+    Failed,
+}
+
+impl ForceModel for Gel {
+    const INFO: ModelInfo = ModelInfo::new("gel", "Gel", "A bar of gel, computed by a solver in Python");
+    const PARAMETERS: &'static [Parameter] =
+        &[Parameter::real("shear_modulus_pa", "Pa", 100.0, 1.0e5, 5000.0, "Shear modulus at the top").live()];
+
+    fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        Ok(Self { shear_modulus_pa: settings.number_or_default("shear_modulus_pa"), solver: Asking::NotYet })
+    }
+
+    /// In the loop there is no time for the solver: no force, and a status that says so.
+    fn step(&mut self, input: &Input) -> Output {
+        let is_finite = input.pose.is_finite();
+        let status = if is_finite { StepStatus::OutOfDomain } else { StepStatus::InvalidInput };
+        Output::new(Wrench::ZERO, f64::NAN, status)
+    }
+
+    fn set_parameter(&mut self, _index: usize, value: f64) -> Result<(), OutOfRange> {
+        self.shear_modulus_pa = value;
+        Ok(())
+    }
+
+    fn parameter(&self, _index: usize) -> f64 {
+        self.shear_modulus_pa
+    }
+}
+
+impl LinearFieldModel for Gel {
+    fn linear_field(&mut self, input: &Input) -> LinearField {
+        let height_m = input.pose.position().z;
+        if !input.pose.is_finite() {
+            return LinearField::NONE;
+        }
+        if height_m >= 0.0 {
+            return LinearField::of_force(input, DVec3::ZERO, [DVec3::ZERO; 3], height_m);
+        }
+        match self.solve((-height_m).min(DEEPEST_M)) {
+            Some([force_n, stiffness_n_per_m]) => {
+                let stiffness_n_per_m = if -height_m < DEEPEST_M { stiffness_n_per_m } else { 0.0 };
+                let slope = [DVec3::ZERO, DVec3::ZERO, DVec3::Z * -stiffness_n_per_m];
+                LinearField::of_force(input, DVec3::Z * force_n, slope, VALID_M)
+            }
+            // Not a number: the host takes the force away, and its report names this model.
+            None => LinearField { wrench: Wrench::from_force(DVec3::NAN), ..LinearField::NONE },
+        }
+    }
+}
+flotor_hal::export_model!(Gel, linear_field);
+
+impl Gel {
+    /// Force, N, and stiffness, N/m, at a depth. The first call starts the solver.
+    fn solve(&mut self, depth_m: f64) -> Option<[f64; 2]> {
+        if let Asking::NotYet = self.solver {
+            self.solver = Solver::start().map_or(Asking::Failed, Asking::Running);
+        }
+        let Asking::Running(solver) = &mut self.solver else { return None };
+        let answer = solver.answer(depth_m, self.shear_modulus_pa).ok();
+        if answer.is_none() {
+            self.solver = Asking::Failed;
+        }
+        answer
+    }
+}
+
+/// A process that answers each line with a line.
+struct Solver {
+    process: Child,
+    answers: BufReader<UnixStream>,
+    line: String,
+}
+
+impl Solver {
+    fn start() -> io::Result<Self> {
+        let (ours, theirs) = UnixStream::pair()?;
+        ours.set_read_timeout(Some(PATIENCE))?;
+        ours.set_write_timeout(Some(PATIENCE))?;
+        let mut python = Command::new("python3");
+        python.args(["-c", SOLVER]).stdin(OwnedFd::from(theirs.try_clone()?)).stdout(OwnedFd::from(theirs));
+        Ok(Self { process: python.spawn()?, answers: BufReader::new(ours), line: String::new() })
+    }
+
+    fn answer(&mut self, depth_m: f64, modulus_pa: f64) -> io::Result<[f64; 2]> {
+        writeln!(self.answers.get_mut(), "{depth_m:e} {modulus_pa:e}")?;
+        self.line.clear();
+        self.answers.read_line(&mut self.line)?;
+        let mut numbers = self.line.split_whitespace().map(str::parse);
+        match (numbers.next(), numbers.next()) {
+            (Some(Ok(force_n)), Some(Ok(stiffness_n_per_m))) => Ok([force_n, stiffness_n_per_m]),
+            _ => Err(io::ErrorKind::InvalidData.into()),
+        }
+    }
+}
+
+impl Drop for Solver {
+    fn drop(&mut self) {
+        let _ = self.process.kill(); // it may have ended already
+        let _ = self.process.wait();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_hal::{DQuat, Pose};
+
+    fn gel() -> Gel {
+        Gel { shear_modulus_pa: 5000.0, solver: Asking::NotYet }
+    }
+
+    fn at(z_m: f64) -> Input {
+        Input::at_rest(Pose::new(DVec3::Z * z_m, DQuat::IDENTITY))
+    }
+
+    /// Compression of the bar under a force: each element by bisection of its own law.
+    fn depth_m(force_n: f64, modulus_pa: f64) -> f64 {
+        let element = |i: u8| {
+            let pressure = force_n / 4.0e-4 / (modulus_pa * (2.0 - (f64::from(i) + 0.5) / 20.0));
+            let (mut low, mut high) = (0.1, 1.0_f64);
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                if middle.powi(-2) - middle > pressure { low = middle } else { high = middle }
+            }
+            (1.0 - low) * 0.03 / 20.0
+        };
+        (0..20).map(element).sum()
+    }
+
+    #[test]
+    fn the_solver_finds_the_force_of_elements_in_series() {
+        let mut gel = gel();
+        for z_m in [-0.0005, -0.004, -0.012] {
+            let force_n = gel.linear_field(&at(z_m)).wrench.force_n[2];
+            assert!((depth_m(force_n, 5000.0) + z_m).abs() < 1.0e-9, "{force_n} N at {z_m} m");
+        }
+    }
+
+    #[test]
+    fn a_field_is_near_the_solver_as_far_as_it_says() {
+        let mut gel = gel();
+        let field = gel.linear_field(&at(-0.004));
+        for z_m in [-0.0045, -0.0035] {
+            let (there, is_valid) = field.at(&at(z_m).pose);
+            let exact_n = gel.linear_field(&at(z_m)).wrench.force_n[2];
+            // The slope changes by less than a tenth, so the force is off by less than a twentieth of its change.
+            let change_n = (exact_n - field.wrench.force_n[2]).abs();
+            assert!(is_valid && (there.force_n[2] - exact_n).abs() < 0.05 * change_n, "{there:?} {exact_n}");
+        }
+        assert_eq!(gel.linear_field(&at(0.001)).wrench, Wrench::ZERO);
+    }
+
+    #[test]
+    fn a_solver_that_has_died_gives_no_number() {
+        let mut gel = gel();
+        let _ = gel.linear_field(&at(-0.004));
+        let Asking::Running(solver) = &mut gel.solver else { panic!("it was asked") };
+        solver.process.kill().expect("it runs");
+        solver.process.wait().expect("it ends");
+        assert!(!gel.linear_field(&at(-0.004)).is_finite());
+    }
+}
