@@ -12,6 +12,8 @@ use std::time::Duration;
 
 /// The solver, part of the plugin's file.
 const SOLVER: &str = include_str!("solver.py");
+/// How long Python may take to start.
+const START: Duration = Duration::from_secs(5);
 /// How long an answer may take. A process that hangs must not hang the thread that asks it.
 const PATIENCE: Duration = Duration::from_millis(500);
 /// The deepest compression that the solver is asked for, m. Farther down the force stays as it is there.
@@ -82,7 +84,7 @@ impl LinearFieldModel for Gel {
 flotor_hal::export_model!(Gel, linear_field);
 
 impl Gel {
-    /// Force, N, and stiffness, N/m, at a depth. The first call starts the solver.
+    /// Force, N, and stiffness, N/m, at a depth. The first call starts the solver and waits for it.
     fn solve(&mut self, depth_m: f64) -> Option<[f64; 2]> {
         if let Asking::NotYet = self.solver {
             self.solver = Solver::start().map_or(Asking::Failed, Asking::Running);
@@ -106,11 +108,15 @@ struct Solver {
 impl Solver {
     fn start() -> io::Result<Self> {
         let (ours, theirs) = UnixStream::pair()?;
-        ours.set_read_timeout(Some(PATIENCE))?;
+        ours.set_read_timeout(Some(START))?;
         ours.set_write_timeout(Some(PATIENCE))?;
         let mut python = Command::new("python3");
         python.args(["-c", SOLVER]).stdin(OwnedFd::from(theirs.try_clone()?)).stdout(OwnedFd::from(theirs));
-        Ok(Self { process: python.spawn()?, answers: BufReader::new(ours), line: String::new() })
+        let mut solver =
+            Self { process: python.spawn()?, answers: BufReader::new(ours), line: String::new() };
+        solver.answer(0.0, 1.0)?;
+        solver.answers.get_ref().set_read_timeout(Some(PATIENCE))?;
+        Ok(solver)
     }
 
     fn answer(&mut self, depth_m: f64, modulus_pa: f64) -> io::Result<[f64; 2]> {

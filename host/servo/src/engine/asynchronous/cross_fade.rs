@@ -33,12 +33,14 @@ impl CrossFade {
                 *old += share * (new - *old);
             }
         }
+        // The one before has a say until the new one has come in wholly, and none after that.
+        let before = if share < 1.0 { &self.old } else { &self.new };
         self.old = LinearField {
             anchor: *pose,
             wrench,
             stiffness,
-            valid_m: self.old.valid_m.min(self.new.valid_m),
-            valid_rad: self.old.valid_rad.min(self.new.valid_rad),
+            valid_m: before.valid_m.min(self.new.valid_m),
+            valid_rad: before.valid_rad.min(self.new.valid_rad),
             time_ns: self.new.time_ns,
         };
         (self.new, self.since_ns) = (field, now_ns);

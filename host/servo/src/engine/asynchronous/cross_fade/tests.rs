@@ -44,3 +44,13 @@ fn beyond_either_field_it_says_so() {
     fade.take(field(1.0, 10.0), &Pose::HOME, 0);
     assert!(fade.at(&up(0.009), 2 * MS).1 && !fade.at(&up(0.011), 2 * MS).1);
 }
+
+#[test]
+fn a_field_that_held_nowhere_is_forgotten_once_it_has_gone() {
+    let mut fade = CrossFade::new(4 * MS);
+    fade.take(LinearField { valid_m: 0.0, ..field(0.0, 0.0) }, &Pose::HOME, 0);
+    for (at_ms, is_valid) in [(4, false), (8, true), (12, true)] {
+        fade.take(field(1.0, 10.0), &Pose::HOME, at_ms * MS);
+        assert_eq!(fade.at(&up(0.009), (at_ms + 1) * MS).1, is_valid, "at {at_ms} ms");
+    }
+}
