@@ -328,7 +328,7 @@ fn the_parts_add_up_to_the_whole() {
 }
 
 #[test]
-fn the_reports_of_the_parts_add_up_to_that_of_the_whole() {
+fn reports_of_parts_add_up_to_that_of_the_whole() {
     let scratch = faulty(&format!("seeds = [1, 2]\n{WITH_A_CRASH}"));
     let reported = |arguments: &[&str]| {
         let _ = test(scratch.path(), &[&["--junit", "results.xml"], arguments].concat());

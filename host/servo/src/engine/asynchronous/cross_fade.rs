@@ -33,7 +33,7 @@ impl CrossFade {
                 *old += share * (new - *old);
             }
         }
-        // The one before has a say until the new one has come in wholly, and none after that.
+        // The one before counts until the new one has come in wholly, and no longer.
         let before = if share < 1.0 { &self.old } else { &self.new };
         self.old = LinearField {
             anchor: *pose,
