@@ -149,7 +149,7 @@ mod documents {
     struct WriteADevice;
 
     #[doc = include_str!("../../docs/src/slow-model.md")]
-    struct SlowModel;
+    struct AsynchronousModel;
 
     #[doc = include_str!("../../docs/src/cable.md")]
     struct Cable;
