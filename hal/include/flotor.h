@@ -241,6 +241,27 @@ typedef uint32_t FlotorEmbodiment;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
+// Through what a device on USB is used, as a closed set. In C as a number of this value.
+enum FlotorUsbAccess
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // The bus itself, without a driver of the kernel.
+    FlotorUsbAccess_Raw = 0,
+    // A serial port of the kernel's.
+    FlotorUsbAccess_Serial = 1,
+    // The kernel's raw HID.
+    FlotorUsbAccess_Hid = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum FlotorUsbAccess FlotorUsbAccess;
+#else
+typedef uint32_t FlotorUsbAccess;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
 // What a device exerts once it is stopped. In C as a number of this value.
 enum FlotorStoppedState
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -914,6 +935,24 @@ typedef struct FlotorCalibrationTable {
                                    struct FlotorMessage *message);
 } FlotorCalibrationTable;
 
+// A kind of device on USB. 8 bytes.
+typedef struct FlotorUsbKind {
+    uint16_t vendor;
+    uint16_t product;
+    // Code of a [`UsbAccess`].
+    uint32_t access;
+} FlotorUsbKind;
+
+// `flotor.connection/1`: see [`ConnectionDevice`].
+typedef struct FlotorConnectionTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Number of kinds.
+    uint32_t usb_count;
+    // What it is on USB, constant.
+    const struct FlotorUsbKind *usb;
+} FlotorConnectionTable;
+
 // How a device is stopped without its host. 88 bytes.
 typedef struct FlotorIndependentStop {
     // Time from the end of the host's commands, or from the message, until the device is in its safe state, ns.
@@ -961,6 +1000,7 @@ typedef struct FlotorPacingTable {
 #define FLOTOR_INTERFACE_ACTIVE_REGION "flotor.active-region/1"
 #define FLOTOR_INTERFACE_CALIBRATION "flotor.calibration/1"
 #define FLOTOR_INTERFACE_CENTERLINE "flotor.centerline/1"
+#define FLOTOR_INTERFACE_CONNECTION "flotor.connection/1"
 #define FLOTOR_INTERFACE_DETAILS "flotor.details/1"
 #define FLOTOR_INTERFACE_ENERGY_LEDGER "flotor.energy-ledger/1"
 #define FLOTOR_INTERFACE_INDEPENDENT_STOP "flotor.independent-stop/1"
@@ -1250,6 +1290,14 @@ __attribute__((unused)) static const FlotorFieldLayout flotor_layouts[] = {
     FLOTOR_FIELD(CalibrationTable, reserved),
     FLOTOR_FIELD(CalibrationTable, serial),
     FLOTOR_FIELD(CalibrationTable, calibrate_vertical),
+    FLOTOR_STRUCT(UsbKind),
+    FLOTOR_FIELD(UsbKind, vendor),
+    FLOTOR_FIELD(UsbKind, product),
+    FLOTOR_FIELD(UsbKind, access),
+    FLOTOR_STRUCT(ConnectionTable),
+    FLOTOR_FIELD(ConnectionTable, size),
+    FLOTOR_FIELD(ConnectionTable, usb_count),
+    FLOTOR_FIELD(ConnectionTable, usb),
     FLOTOR_STRUCT(EnergyLedger),
     FLOTOR_FIELD(EnergyLedger, stored_j),
     FLOTOR_FIELD(EnergyLedger, initial_j),

@@ -49,6 +49,7 @@ pub use extension::calibration::{
     CALIBRATION_COEFFICIENTS, CalibrationDevice, InvalidCalibration, VerticalCalibration,
 };
 pub use extension::centerline::{CenterlineInfo, CenterlineModel};
+pub use extension::connection::{ConnectionDevice, UsbAccess, UsbKind};
 pub use extension::details::{Detail, DetailsModel};
 pub use extension::energy_ledger::{EnergyLedger, EnergyLedgerDevice};
 #[cfg(feature = "loader")]

@@ -5,6 +5,7 @@
 pub mod active_region;
 pub mod calibration;
 pub mod centerline;
+pub mod connection;
 pub mod details;
 pub mod energy_ledger;
 pub mod independent_stop;
@@ -55,6 +56,7 @@ extensions! {
     }
     DeviceExtensions {
         calibration: CalibrationTable,
+        connection: ConnectionTable,
         energy_ledger: EnergyLedgerTable,
         independent_stop: IndependentStopTable,
         pacing: PacingTable,

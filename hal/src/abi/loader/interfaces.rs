@@ -131,7 +131,7 @@ mod tests {
     use super::*;
     use crate::extension::{
         active_region::ActiveRegionTable, calibration::CalibrationTable, centerline::CenterlineTable,
-        details::DetailsTable, energy_ledger::EnergyLedgerTable, independent_stop::IndependentStopTable,
+        connection::ConnectionTable, details::DetailsTable, energy_ledger::EnergyLedgerTable, independent_stop::IndependentStopTable,
         linear_field::LinearFieldTable, pacing::PacingTable, shape::ShapeTable, variant::VariantTable,
         workspace_bounds::WorkspaceBoundsTable,
     };
@@ -181,5 +181,6 @@ mod tests {
         is_held_to_its_length::<CalibrationTable>();
         is_held_to_its_length::<IndependentStopTable>();
         is_held_to_its_length::<PacingTable>();
+        is_held_to_its_length::<ConnectionTable>();
     }
 }

@@ -7,6 +7,7 @@ use super::{LoadError, Metadata, OpenedDevice, Setting, check, metadata_file, sc
 use crate::abi::{
     ABI_CANDIDATE, ABI_MAJOR, ABI_MINOR, CONTRACT, Entry, HOST_QUIET_PANICS, Host, MAGIC, PluginKind,
 };
+use crate::extension::DeviceExtensions;
 use crate::{DeviceInfo, ModelInfo, Parameter};
 use object::ReadCache;
 use std::ffi::CString;
@@ -209,6 +210,14 @@ impl Plugin {
         };
         OpenedDevice::open(device, extensions, self.parameters(), settings)
             .map_err(|refusal| self.refused(refusal))
+    }
+
+    /// The extensions of a device; `None` for a model.
+    pub(crate) fn device_extensions(&self) -> Option<&DeviceExtensions> {
+        match &self.interface {
+            Interface::Device { extensions, .. } => Some(extensions),
+            Interface::Model(_) => None,
+        }
     }
 
     fn other_kind(&self, wanted: PluginKind) -> LoadError {
