@@ -363,6 +363,10 @@ impl Session {
             }
         }
         let mut warnings: Vec<String> = plugins.iter().filter_map(PluginReport::warning).collect();
+        let torqueless = (0..)
+            .zip(&opened)
+            .filter_map(|(number, opened)| prepare::without_torque(scene, number, &opened.capabilities));
+        warnings.extend(torqueless);
         let watchdog_process = match options.clock {
             Clock::Real => prepare::watchdog_process(scene, &opened, &mut warnings)?,
             Clock::Virtual => None,

@@ -102,6 +102,21 @@ impl Opened {
     }
 }
 
+/// That models may ask for torque and the device gives none, unless the scene says that none is wanted. A model says that it can
+/// give torque, not that it will: so this is no mismatch.
+pub(super) fn without_torque(scene: &Scene, number: u16, device: &Capabilities) -> Option<String> {
+    let is_driven = device.actuated != Axes::NONE && !device.actuated.contains(Axes::ROTATION);
+    let is_felt = scene.models.iter().any(|model| model.device == number);
+    let is_wanted = scene.limits.torque_nm.axes().iter().any(|most_nm| *most_nm > 0.0);
+    (is_driven && is_felt && is_wanted).then(|| {
+        let name = scene.devices.get(usize::from(number)).map_or("", |device| device.name.as_str());
+        format!(
+            "`{name}` gives no torque, and the hand cannot feel that of a model; `[limits] torque_nm = [0, 0, 0]` says that \
+             none is wanted"
+        )
+    })
+}
+
 /// Starts the process that stops devices when this one is gone, and says which devices nothing stops then. Not real-time.
 pub(super) fn watchdog_process(
     scene: &Scene,
