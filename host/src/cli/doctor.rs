@@ -1,20 +1,35 @@
-//! `flotor doctor`: the real-time configuration of this machine, and how to improve it.
+//! `flotor doctor`: the real-time configuration of this machine, or why a device does not start, and how to improve it.
+
+mod device;
+mod usb;
 
 use clap::Args;
+use flotor_command::options::KeyValue;
 use flotor_command::say;
 use flotor_command::{CommandError, style, write_json};
 use flotor_servo::{Privilege, RealTimeReport, probe_real_time};
 use flotor_session::registry::Registry;
 use serde::Serialize;
 use std::fs::read_to_string;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Check this machine's real-time configuration and suggest fixes.
+/// Check this machine's real-time configuration, or why a device does not start, and suggest fixes.
 #[derive(Args)]
 #[command(
-    after_help = "Example:\n  flotor doctor\n\nThe command changes nothing; each finding names its remedy. The exit code is 0 whatever it finds."
+    after_help = "Examples:\n  flotor doctor\n  flotor doctor --device openhaptics\n  flotor doctor --device force-dimension --set library=/opt/sdk/libdrd.so.3\n\n\
+    The command changes nothing; with `--device` it opens the device, without force. Each finding names its remedy. The exit \
+    code is 0 whatever it finds."
 )]
 pub(crate) struct DoctorArguments {
+    /// Id of a device: look for what keeps it from starting
+    #[arg(long, value_name = "ID")]
+    device: Option<String>,
+    /// Parameter with which the device is opened (repeatable)
+    #[arg(long = "set", value_name = "KEY=VALUE", requires = "device")]
+    sets: Vec<KeyValue>,
+    /// Folder that is looked at as the root of the machine's files
+    #[arg(long, value_name = "DIR", default_value = "/", hide = true)]
+    root: PathBuf,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -47,15 +62,24 @@ impl Diagnosis {
         Self { what, grade: Grade::Note, found: found.into(), remedy: Some(remedy.into()) }
     }
 
+    /// Bad, and what was found says what to do.
+    fn told(what: &'static str, found: impl Into<String>) -> Self {
+        Self { what, grade: Grade::Bad, found: found.into(), remedy: None }
+    }
+
     fn bad(what: &'static str, found: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self { what, grade: Grade::Bad, found: found.into(), remedy: Some(remedy.into()) }
     }
 }
 
 pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
-    let mut diagnoses = vec![cores(), isolated_cores(), kernel(), throttling(), governor()];
-    diagnoses.extend(privileges(&probe_real_time()));
-    diagnoses.push(plugins());
+    let (diagnoses, subject) = match &arguments.device {
+        Some(id) => (
+            device::diagnose(id, &arguments.sets, &usb::Machine::at(&arguments.root))?,
+            "to start this device",
+        ),
+        None => (machine(), "for real time"),
+    };
     if arguments.json {
         return write_json(Path::new("-"), &diagnoses);
     }
@@ -73,12 +97,21 @@ pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
     let bad = diagnoses.iter().filter(|diagnosis| diagnosis.grade == Grade::Bad).count();
     let verdict = match bad {
         0 => "ready".to_owned(),
+        bad if arguments.device.is_some() => format!("not ready {subject}; bad findings: {bad}"),
         bad => format!(
-            "not ready for real time; bad findings: {bad}. Runs with `--clock virtual` do not need real time"
+            "not ready {subject}; bad findings: {bad}. Runs with `--clock virtual` do not need real time"
         ),
     };
     say!("{}", style::title(&verdict));
     Ok(())
+}
+
+/// The real-time configuration.
+fn machine() -> Vec<Diagnosis> {
+    let mut diagnoses = vec![cores(), isolated_cores(), kernel(), throttling(), governor()];
+    diagnoses.extend(privileges(&probe_real_time()));
+    diagnoses.push(plugins());
+    diagnoses
 }
 
 fn cores() -> Diagnosis {

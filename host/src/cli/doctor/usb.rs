@@ -1,0 +1,395 @@
+//! The connection of a device on USB, as the machine's files tell it: is it there, behind what, who has it, who may use it.
+
+use super::Diagnosis;
+use flotor_hal::{UsbAccess, UsbKind};
+use rustix::fs::{Access, access};
+use std::fs::{read_dir, read_link, read_to_string};
+use std::path::{Path, PathBuf};
+
+/// Folders of rules for udev.
+const RULES: [&str; 4] = ["etc/udev/rules.d", "run/udev/rules.d", "usr/lib/udev/rules.d", "lib/udev/rules.d"];
+/// A rule that tells ModemManager to leave a port alone.
+const IGNORED: &str = "ID_MM_DEVICE_IGNORE";
+
+/// The files of a machine.
+pub(super) struct Machine {
+    root: PathBuf,
+    /// Whether this user may read and write a file.
+    may_use: fn(&Path) -> bool,
+}
+
+/// A device that the system sees.
+struct Seen {
+    /// Its folder below `sys/bus/usb/devices`.
+    folder: PathBuf,
+    /// Its place on the bus: `1-4.2` is the second port of a hub at the fourth of the first bus.
+    place: String,
+    vendor: u16,
+    product: u16,
+    access: UsbAccess,
+}
+
+impl Machine {
+    /// Whose files are below a folder: `/`, but for tests.
+    pub(super) fn at(root: &Path) -> Self {
+        let may_use = |path: &Path| access(path, Access::READ_OK | Access::WRITE_OK).is_ok();
+        Self { root: root.to_path_buf(), may_use }
+    }
+
+    /// The devices of these kinds.
+    fn seen(&self, kinds: &[UsbKind]) -> Vec<Seen> {
+        let entries = read_dir(self.root.join("sys/bus/usb/devices")).into_iter().flatten().flatten();
+        let mut seen: Vec<Seen> = entries.filter_map(|entry| Seen::of(&entry.path(), kinds)).collect();
+        seen.sort_by(|a, b| a.place.cmp(&b.place));
+        seen
+    }
+
+    /// Whether a program of this name runs.
+    fn runs(&self, program: &str) -> bool {
+        let processes = read_dir(self.root.join("proc")).into_iter().flatten().flatten();
+        processes.filter_map(|process| text_of(&process.path(), "comm")).any(|name| name == program)
+    }
+
+    /// Whether a rule of udev keeps ModemManager away from a vendor's ports.
+    fn keeps_modem_manager_away(&self, vendor: u16) -> bool {
+        let vendor = format!("{vendor:04x}");
+        let files =
+            RULES.iter().flat_map(|folder| read_dir(self.root.join(folder)).into_iter().flatten().flatten());
+        let texts = files.filter_map(|file| read_to_string(file.path()).ok());
+        let is_rule = |line: &str| {
+            !line.trim_start().starts_with('#')
+                && line.contains(IGNORED)
+                && line.to_ascii_lowercase().contains(&vendor)
+        };
+        texts.into_iter().any(|text| text.lines().any(is_rule))
+    }
+}
+
+impl Seen {
+    fn of(folder: &Path, kinds: &[UsbKind]) -> Option<Self> {
+        let number = |file: &str| u16::from_str_radix(&text_of(folder, file)?, 16).ok();
+        let (vendor, product) = (number("idVendor")?, number("idProduct")?);
+        let is_one = |kind: &&UsbKind| {
+            kind.vendor() == vendor && kind.product().is_none_or(|wanted| wanted == product)
+        };
+        let access = kinds.iter().find(is_one)?.access()?;
+        let place = folder.file_name()?.to_str()?.to_owned();
+        Some(Self { folder: folder.to_path_buf(), place, vendor, product, access })
+    }
+
+    /// Its interfaces: `1-4.2:1.0`, in order.
+    fn interfaces(&self) -> Vec<PathBuf> {
+        let begins = format!("{}:", self.place);
+        let siblings =
+            self.folder.parent().and_then(|bus| read_dir(bus).ok()).into_iter().flatten().flatten();
+        let is_own = |path: &PathBuf| {
+            path.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.starts_with(&begins))
+        };
+        let mut own: Vec<PathBuf> = siblings.map(|entry| entry.path()).filter(is_own).collect();
+        own.sort();
+        own
+    }
+
+    /// The node through which a program uses it, below the root.
+    fn node(&self, machine: &Machine) -> Option<PathBuf> {
+        if self.access == UsbAccess::Raw {
+            let number = |file| text_of(&self.folder, file)?.parse::<u16>().ok();
+            let (bus, device) = (number("busnum")?, number("devnum")?);
+            return Some(machine.root.join(format!("dev/bus/usb/{bus:03}/{device:03}")));
+        }
+        // tty/ttyACM0 below an interface, or hidraw/hidraw0 below the device of its driver.
+        let kind = if self.access == UsbAccess::Serial { "tty" } else { "hidraw" };
+        let name = self.interfaces().into_iter().find_map(|interface| {
+            let below = read_dir(&interface).into_iter().flatten().flatten().map(|entry| entry.path());
+            let folders = [interface.join(kind)].into_iter().chain(below.map(|path| path.join(kind)));
+            folders
+                .filter_map(|folder| read_dir(folder).ok())
+                .flatten()
+                .flatten()
+                .next()
+                .map(|node| node.file_name())
+        })?;
+        Some(machine.root.join("dev").join(name))
+    }
+
+    /// The line for udev that lets the person at the machine use it.
+    fn rule(&self) -> String {
+        let Self { vendor, access, .. } = self;
+        match access {
+            UsbAccess::Raw => {
+                format!("SUBSYSTEM==\"usb\", ATTR{{idVendor}}==\"{vendor:04x}\", TAG+=\"uaccess\"")
+            }
+            UsbAccess::Serial => format!(
+                "SUBSYSTEM==\"tty\", ATTRS{{idVendor}}==\"{vendor:04x}\", ENV{{{IGNORED}}}=\"1\", TAG+=\"uaccess\""
+            ),
+            UsbAccess::Hid => {
+                format!("KERNEL==\"hidraw*\", ATTRS{{idVendor}}==\"{vendor:04x}\", TAG+=\"uaccess\"")
+            }
+        }
+    }
+
+    fn remedy_by_rule(&self) -> String {
+        format!(
+            "as root, put the line `{}` into /etc/udev/rules.d/70-flotor.rules; then `udevadm control --reload`, and \
+             connect the device anew",
+            self.rule()
+        )
+    }
+
+    fn diagnose(&self, machine: &Machine) -> Vec<Diagnosis> {
+        let mut diagnoses = vec![Diagnosis::good(
+            "on USB",
+            format!("{:04x}:{:04x} at {}", self.vendor, self.product, self.place),
+        )];
+        if self.place.contains('.') {
+            diagnoses.push(Diagnosis::note(
+                "hub",
+                format!("behind a hub ({})", self.place),
+                "connect it to a port of the computer: a hub delays the exchange, and resets what is behind it",
+            ));
+        }
+        diagnoses.extend(self.driver());
+        diagnoses.extend(self.permission(machine));
+        if self.access == UsbAccess::Serial && machine.runs("ModemManager") {
+            diagnoses.push(match machine.keeps_modem_manager_away(self.vendor) {
+                true => Diagnosis::good("ModemManager", "leaves its port alone"),
+                false => Diagnosis::bad(
+                    "ModemManager",
+                    "writes to its port whenever it is connected, to find a modem",
+                    self.remedy_by_rule(),
+                ),
+            });
+        }
+        diagnoses
+    }
+
+    /// Who has it: a driver of the kernel, or another program.
+    fn driver(&self) -> Option<Diagnosis> {
+        if self.access != UsbAccess::Raw {
+            return None;
+        }
+        self.interfaces().into_iter().find_map(|interface| {
+            let driver = read_link(interface.join("driver")).ok()?.file_name()?.to_str()?.to_owned();
+            let interface = interface.file_name()?.to_str()?.to_owned();
+            Some(match driver.as_str() {
+                "usbfs" => Diagnosis::bad(
+                    "driver",
+                    "another program has it open",
+                    "end that program; one at a time has it",
+                ),
+                _ => Diagnosis::bad(
+                    "driver",
+                    format!("the kernel's driver `{driver}` has it"),
+                    format!("as root: `echo {interface} > /sys/bus/usb/drivers/{driver}/unbind`"),
+                ),
+            })
+        })
+    }
+
+    fn permission(&self, machine: &Machine) -> Option<Diagnosis> {
+        let Some(node) = self.node(machine) else {
+            let (what, module) = match self.access {
+                UsbAccess::Raw => return None,
+                UsbAccess::Serial => ("serial port", "cdc_acm"),
+                UsbAccess::Hid => ("raw HID", "usbhid"),
+            };
+            return Some(Diagnosis::bad(
+                "driver",
+                format!("the kernel gives it no {what}"),
+                format!("as root: `modprobe {module}`, and connect the device anew"),
+            ));
+        };
+        let shown = Path::new("/").join(node.strip_prefix(&machine.root).unwrap_or(&node));
+        Some(if (machine.may_use)(&node) {
+            Diagnosis::good("permission", format!("this user may use {}", shown.display()))
+        } else {
+            Diagnosis::bad(
+                "permission",
+                format!("this user may not use {}", shown.display()),
+                self.remedy_by_rule(),
+            )
+        })
+    }
+}
+
+/// What the machine says of a device of these kinds; whether it could be opened says how bad it is if none is there.
+pub(super) fn connection(machine: &Machine, kinds: &[UsbKind], is_open: bool) -> Vec<Diagnosis> {
+    if kinds.is_empty() {
+        return Vec::new(); // a simulated one, or behind something else
+    }
+    let seen = machine.seen(kinds);
+    if seen.is_empty() {
+        let wanted: Vec<String> = kinds.iter().map(wanted).collect();
+        let found = format!("no device {}", wanted.join(" or "));
+        return vec![match is_open {
+            true => {
+                Diagnosis::note("on USB", found, "it is open all the same: simulated, or connected otherwise")
+            }
+            false => Diagnosis::bad(
+                "on USB",
+                found,
+                "connect it and switch it on; `lsusb` lists what the system sees",
+            ),
+        }];
+    }
+    seen.iter().flat_map(|seen| seen.diagnose(machine)).collect()
+}
+
+fn wanted(kind: &UsbKind) -> String {
+    let product = kind.product().map_or_else(|| "*".to_owned(), |product| format!("{product:04x}"));
+    format!("{:04x}:{product}", kind.vendor())
+}
+
+/// The text of a small file.
+fn text_of(folder: &Path, file: &str) -> Option<String> {
+    Some(read_to_string(folder.join(file)).ok()?.trim().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Grade;
+    use super::*;
+    use std::fs::{create_dir_all, write};
+    use std::os::unix::fs::symlink;
+
+    const KINDS: &[UsbKind] = &[
+        UsbKind::of_vendor(0x1451, UsbAccess::Raw),
+        UsbKind::new(0x2988, 0x0302, UsbAccess::Serial),
+        UsbKind::of_vendor(0x2988, UsbAccess::Hid),
+    ];
+
+    /// A machine with one device, at this place of the bus.
+    struct Fixture(tempfile::TempDir);
+
+    impl Fixture {
+        fn new(place: &str, ids: [&str; 2]) -> Self {
+            let fixture = Self(tempfile::tempdir().expect("there is room"));
+            let device = format!("sys/bus/usb/devices/{place}");
+            for (file, text) in
+                [("idVendor", ids[0]), ("idProduct", ids[1]), ("busnum", "1"), ("devnum", "7")]
+            {
+                fixture.file(&format!("{device}/{file}"), &format!("{text}\n"));
+            }
+            create_dir_all(fixture.0.path().join(format!("sys/bus/usb/devices/{place}:1.0")))
+                .expect("there is room");
+            fixture
+        }
+
+        fn file(&self, path: &str, text: &str) {
+            let path = self.0.path().join(path);
+            create_dir_all(path.parent().expect("it is below the root")).expect("there is room");
+            write(path, text).expect("there is room");
+        }
+
+        fn driven_by(&self, place: &str, driver: &str) {
+            let link = self.0.path().join(format!("sys/bus/usb/devices/{place}:1.0/driver"));
+            symlink(format!("../../drivers/{driver}"), link).expect("there is room");
+        }
+
+        /// What is wrong or worth a note: what, found, remedy.
+        fn told(&self, may_use: fn(&Path) -> bool) -> Vec<(&'static str, Grade, String)> {
+            let machine = Machine { root: self.0.path().to_path_buf(), may_use };
+            let diagnoses = connection(&machine, KINDS, false);
+            let told = diagnoses.into_iter().filter(|diagnosis| diagnosis.grade != Grade::Good);
+            told.map(|told| {
+                (told.what, told.grade, format!("{} -> {}", told.found, told.remedy.unwrap_or_default()))
+            })
+            .collect()
+        }
+    }
+
+    fn one<'a>(told: &'a [(&'static str, Grade, String)]) -> (&'static str, Grade, &'a str) {
+        let [(what, grade, words)] = told else { panic!("{told:?}") };
+        (what, *grade, words)
+    }
+
+    #[test]
+    fn a_device_that_is_well_connected_is_good() {
+        let fixture = Fixture::new("1-4", ["1451", "0402"]);
+        assert_eq!(fixture.told(|_| true), []);
+    }
+
+    #[test]
+    fn one_that_is_not_there_is_told_by_its_numbers() {
+        let fixture = Fixture::new("1-4", ["0403", "cb48"]);
+        let told = fixture.told(|_| true);
+        let (what, grade, words) = one(&told);
+        assert_eq!((what, grade), ("on USB", Grade::Bad));
+        assert!(words.starts_with("no device 1451:* or 2988:0302 or 2988:* -> connect it"), "{words}");
+    }
+
+    #[test]
+    fn a_hub_is_noted() {
+        let fixture = Fixture::new("1-4.2", ["1451", "0402"]);
+        let told = fixture.told(|_| true);
+        let (what, grade, words) = one(&told);
+        assert_eq!((what, grade), ("hub", Grade::Note));
+        assert!(words.starts_with("behind a hub (1-4.2) -> connect it to a port of the computer"), "{words}");
+    }
+
+    #[test]
+    fn a_driver_or_a_program_that_has_it_is_named() {
+        for (driver, expected) in [
+            (
+                "ftdi_sio",
+                "the kernel's driver `ftdi_sio` has it -> as root: `echo 1-4:1.0 > /sys/bus/usb/drivers/ftdi_sio/unbind`",
+            ),
+            ("usbfs", "another program has it open -> end that program; one at a time has it"),
+        ] {
+            let fixture = Fixture::new("1-4", ["1451", "0402"]);
+            fixture.driven_by("1-4", driver);
+            let told = fixture.told(|_| true);
+            assert_eq!(one(&told), ("driver", Grade::Bad, expected));
+        }
+    }
+
+    #[test]
+    fn who_may_not_use_it_gets_the_line_for_udev() {
+        let fixture = Fixture::new("1-4", ["1451", "0402"]);
+        let told = fixture.told(|_| false);
+        let (what, grade, words) = one(&told);
+        assert_eq!((what, grade), ("permission", Grade::Bad));
+        assert!(words.starts_with("this user may not use /dev/bus/usb/001/007 -> "), "{words}");
+        assert!(
+            words.contains("`SUBSYSTEM==\"usb\", ATTR{idVendor}==\"1451\", TAG+=\"uaccess\"`"),
+            "{words}"
+        );
+    }
+
+    #[test]
+    fn a_serial_port_that_is_missing_is_the_drivers() {
+        let fixture = Fixture::new("1-4", ["2988", "0302"]);
+        let told = fixture.told(|_| true);
+        let (what, _, words) = one(&told);
+        assert_eq!(what, "driver");
+        assert!(words.contains("no serial port -> as root: `modprobe cdc_acm`"), "{words}");
+    }
+
+    #[test]
+    fn modem_manager_is_kept_away_by_a_rule() {
+        let fixture = Fixture::new("1-4", ["2988", "0302"]);
+        fixture.file("sys/bus/usb/devices/1-4:1.0/tty/ttyACM0/dev", "166:0\n");
+        assert_eq!(fixture.told(|_| true), [], "nobody disturbs it");
+        fixture.file("proc/77/comm", "ModemManager\n");
+        let told = fixture.told(|_| true);
+        let (what, grade, words) = one(&told);
+        assert_eq!((what, grade), ("ModemManager", Grade::Bad));
+        let line =
+            "SUBSYSTEM==\"tty\", ATTRS{idVendor}==\"2988\", ENV{ID_MM_DEVICE_IGNORE}=\"1\", TAG+=\"uaccess\"";
+        assert!(words.contains(line), "{words}");
+        fixture.file("etc/udev/rules.d/70-flotor.rules", &format!("# {line}\n"));
+        assert_eq!(fixture.told(|_| true).len(), 1, "a comment is no rule");
+        fixture.file("etc/udev/rules.d/70-flotor.rules", &format!("{line}\n"));
+        assert_eq!(fixture.told(|_| true), []);
+    }
+
+    #[test]
+    fn raw_hid_lies_below_the_device_of_its_driver() {
+        let fixture = Fixture::new("1-4", ["2988", "0305"]);
+        fixture.file("sys/bus/usb/devices/1-4:1.0/0003:2988:0305.0001/hidraw/hidraw3/dev", "240:3\n");
+        let told = fixture.told(|_| false);
+        let (what, _, words) = one(&told);
+        assert_eq!(what, "permission");
+        assert!(words.starts_with("this user may not use /dev/hidraw3"), "{words}");
+    }
+}
