@@ -59,16 +59,26 @@ pub fn plugin_folders() -> Vec<String> {
             format!("{kind}/{}", entry.expect("a folder can be read").file_name().to_string_lossy())
         })
     });
-    let mut folders: Vec<String> =
-        entries.filter(|folder| workspace_root().join(folder).join("Cargo.toml").is_file()).collect();
+    let is_plugin = |folder: &String| manifest(folder).is_some_and(|text| text.contains("\"cdylib\""));
+    let mut folders: Vec<String> = entries.filter(is_plugin).collect();
     folders.sort();
     folders
 }
 
-/// The crate of a plugin's folder.
+/// The manifest of a folder, if it has one.
+fn manifest(folder: &str) -> Option<String> {
+    std::fs::read_to_string(workspace_root().join(folder).join("Cargo.toml")).ok()
+}
+
+/// The crate of a plugin's folder: its own name, because a drop-in library may have that of the folder.
+///
+/// # Panics
+/// If the folder has no crate.
 #[must_use]
 pub fn crate_name_of(plugin_folder: &str) -> String {
-    format!("flotor-{}", plugin_folder.rsplit('/').next().unwrap_or_default())
+    let text = manifest(plugin_folder).expect("a plugin's folder has a manifest");
+    let name = text.lines().find_map(|line| line.strip_prefix("name = \"")?.strip_suffix('"'));
+    name.expect("a manifest names its crate").to_owned()
 }
 
 /// True once ticks have reached a recording that is being written: its loop runs.

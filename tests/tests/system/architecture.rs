@@ -17,6 +17,8 @@ use std::process;
 enum Role {
     Contract,
     Plugin,
+    /// What device plugins over a vendor's SDK share.
+    VendorSdk,
     /// The other end of a device's link, without hardware.
     Emulator,
     Sync,
@@ -59,12 +61,14 @@ enum Role {
 
 use Role::{
     Calibration, Command, Compat, Contract, Core, DropIn, Emulator, Fixture, Guard, Host, Judge, Lab, Live,
-    Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study, Sync, Tests, Viewer,
+    Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study, Sync, Tests, VendorSdk,
+    Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
 const CRATES: &[(&str, Role, &[Role])] = &[
     ("hal", Contract, &[]),
+    ("devices/vendor-sdk", VendorSdk, &[Contract]),
     ("host/sync", Sync, &[]),
     ("host/core", Core, &[Contract, Sync]),
     ("host/servo", Servo, &[Contract, Sync, Core]),
@@ -134,7 +138,8 @@ impl Role {
     /// The roles a crate of this role may depend on.
     fn may_use(self) -> &'static [Role] {
         match self {
-            Plugin | Fixture => &[Contract],
+            Plugin => &[Contract, VendorSdk],
+            Fixture => &[Contract],
             Emulator => &[Contract, Plugin],
             _ => CRATES.iter().find(|(_, role, _)| *role == self).map_or(&[], |(.., used)| used),
         }
@@ -352,6 +357,19 @@ const UNSAFE: &[(&str, &str)] = &[
     (
         "devices/maglev/src/transport/usb/queue.rs",
         "USB transfers that wait on the bus while the loop runs: rusb wraps only those that block",
+    ),
+    (
+        "devices/vendor-sdk/src/library.rs",
+        "opens the library of a vendor's SDK that the user has installed, and looks up its functions by name",
+    ),
+    (
+        "devices/vendor-sdk/src/signals.rs",
+        "the signal mask of a thread: threads that an SDK starts take it over, and signals belong to the host",
+    ),
+    ("devices/force-dimension/src/ffi.rs", "calls into the user's DHD, which is C"),
+    (
+        "devices/openhaptics/src/ffi.rs",
+        "calls into the user's HDAPI, which is C, and the callback of its scheduler",
     ),
     (
         "host/python/src/rows.rs",

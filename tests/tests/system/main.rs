@@ -50,4 +50,6 @@ mod swap;
 mod teleoperation;
 mod two_hosts;
 mod validate;
+#[cfg(feature = "drop-ins")]
+mod vendor_sdks;
 mod z_width;

@@ -1,0 +1,112 @@
+//! The thread that follows the SDK: pose, velocity, buttons; then the loop's wrench, whose call waits for the exchange.
+
+use crate::dhd::{Dhd, Failed, Given, Setup};
+use flotor_hal::{Conditions, Fault, Wrench};
+use flotor_vendor_sdk::{Exchange, Orders, Sample, without_signals};
+use std::io;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Shortest cycle: the fastest device answers at 4 kHz, and a call that does not wait must not make the thread spin.
+const SHORTEST: Duration = Duration::from_micros(250);
+/// Every so many cycles the device is asked whether it has switched its force off.
+const STATUS_EVERY: u64 = 16;
+
+/// The thread, and the device at its end.
+pub(crate) struct Driver {
+    thread: Option<JoinHandle<Dhd>>,
+    exchange: Arc<Exchange>,
+}
+
+impl Driver {
+    /// Energises the device and starts the thread. Not real-time.
+    pub(crate) fn start(
+        dhd: Dhd,
+        setup: &Setup,
+        exchange: &Arc<Exchange>,
+    ) -> Result<Self, (Option<Dhd>, Why)> {
+        if let Err(failed) = dhd.energize(setup) {
+            dhd.relax();
+            return Err((Some(dhd), Why::Failed(failed)));
+        }
+        let orders = exchange.begin();
+        let of_thread = Arc::clone(exchange);
+        let thread = std::thread::Builder::new().name("force-dimension".to_owned());
+        let started = without_signals(|| thread.spawn(move || follow(dhd, &of_thread, orders)));
+        match started {
+            Ok(thread) => Ok(Self { thread: Some(thread), exchange: Arc::clone(exchange) }),
+            Err(error) => Err((None, Why::NoThread(error))),
+        }
+    }
+
+    /// Waits for the end of the thread; the device, relaxed, unless the thread panicked. Not real-time.
+    pub(crate) fn end(&mut self) -> Option<Dhd> {
+        self.exchange.end();
+        self.thread.take()?.join().ok()
+    }
+}
+
+impl Drop for Driver {
+    fn drop(&mut self) {
+        drop(self.end());
+    }
+}
+
+/// Why a device was not energised.
+#[derive(Debug)]
+pub(crate) enum Why {
+    Failed(Failed),
+    NoThread(io::Error),
+}
+
+fn follow(dhd: Dhd, exchange: &Exchange, mut orders: Orders) -> Dhd {
+    let mut given = Given::All;
+    let mut cycle = 0_u64;
+    while !exchange.is_over() {
+        let began = Instant::now();
+        match step(&dhd, exchange, &mut orders, given, cycle) {
+            Ok(now) => given = now,
+            Err(fault) => {
+                exchange.fail(fault);
+                break;
+            }
+        }
+        cycle += 1;
+        if exchange.runs_free() {
+            std::thread::sleep(SHORTEST.saturating_sub(began.elapsed()));
+        }
+    }
+    dhd.relax();
+    exchange.note_silence();
+    dhd
+}
+
+/// One cycle; whether the motors give all of it.
+fn step(
+    dhd: &Dhd,
+    exchange: &Exchange,
+    orders: &mut Orders,
+    given: Given,
+    cycle: u64,
+) -> Result<Given, Fault> {
+    let sample = measure(dhd, given).map_err(|failed| failed.fault())?;
+    exchange.publish(&sample);
+    let wrench = exchange.next_wrench(orders);
+    let given = dhd.send(&wrench).map_err(|failed| failed.fault())?;
+    exchange.note_sent(&wrench);
+    if cycle % STATUS_EVERY == STATUS_EVERY - 1 {
+        let force_off = dhd.force_off().map_err(|failed| failed.fault())?;
+        force_off.map_or(Ok(()), Err)?;
+    }
+    Ok(given)
+}
+
+fn measure(dhd: &Dhd, given: Given) -> Result<Sample, Failed> {
+    let conditions = match given {
+        Given::All => Conditions::NONE,
+        Given::Saturated => Conditions::SATURATED,
+    };
+    let delivered: Wrench = dhd.wrench()?;
+    Ok(Sample { pose: dhd.pose()?, twist: dhd.twist()?, delivered, buttons: dhd.buttons(), conditions })
+}

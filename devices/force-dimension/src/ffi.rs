@@ -1,0 +1,248 @@
+//! The functions of DHD and DRD that are used, as their public interface declares them (version 3.17): names, numbers and types
+//! only. All return `int`, 0 or a greater number for success and -1 for failure, unless the type says otherwise.
+//!
+//! Every call takes the id of a device as its last argument. Pointers lead to as many numbers as the call writes; each is a
+//! local of the function here that calls it, so that none outlives the call.
+#![allow(unsafe_code)] // calls into the SDK; listed in tests/tests/system/architecture.rs
+
+use flotor_vendor_sdk::sdk_functions;
+use std::ffi::{CStr, c_char, c_double, c_int, c_uint, c_ushort};
+
+/// A truth value of C, which an SDK of C++ returns: anything but 0 is true.
+type Truth = u8;
+
+sdk_functions! {
+    /// Where the functions are.
+    pub(crate) struct Functions needs "version 3.14 of the Force Dimension SDK" {
+        fn dhdGetSDKVersion(*mut c_int, *mut c_int, *mut c_int, *mut c_int);
+        fn dhdErrorGetLast() -> c_int;
+        fn dhdErrorGetLastStr() -> *const c_char;
+        fn dhdGetDeviceCount() -> c_int;
+        fn dhdOpenID(i8) -> c_int;
+        fn dhdClose(i8) -> c_int;
+        fn dhdGetSystemType(i8) -> c_int;
+        fn dhdGetSystemName(i8) -> *const c_char;
+        fn dhdGetSerialNumber(*mut c_ushort, i8) -> c_int;
+        fn dhdHasWrist(i8) -> Truth;
+        fn dhdHasActiveWrist(i8) -> Truth;
+        fn dhdGetStatus(*mut c_int, i8) -> c_int;
+        fn dhdEnableForce(u8, i8) -> c_int;
+        fn dhdStop(i8) -> c_int;
+        fn dhdSetBrakes(c_int, i8) -> c_int;
+        fn dhdSetGravityCompensation(c_int, i8) -> c_int;
+        fn dhdSetMaxForce(c_double, i8) -> c_int;
+        fn dhdSetMaxTorque(c_double, i8) -> c_int;
+        fn dhdConfigLinearVelocity(c_int, c_int, i8) -> c_int;
+        fn dhdConfigAngularVelocity(c_int, c_int, i8) -> c_int;
+        fn dhdEnableExpertMode() -> c_int;
+        fn dhdDisableExpertMode() -> c_int;
+        fn dhdSetWatchdog(u8, i8) -> c_int;
+        fn dhdGetPositionAndOrientationFrame(*mut c_double, *mut c_double, *mut c_double, *mut c_double, i8) -> c_int;
+        fn dhdGetLinearVelocity(*mut c_double, *mut c_double, *mut c_double, i8) -> c_int;
+        fn dhdGetAngularVelocityRad(*mut c_double, *mut c_double, *mut c_double, i8) -> c_int;
+        fn dhdGetForceAndTorque(
+            *mut c_double, *mut c_double, *mut c_double, *mut c_double, *mut c_double, *mut c_double, i8
+        ) -> c_int;
+        fn dhdGetButtonMask(i8) -> c_uint;
+        fn dhdSetForceAndTorqueAndGripperForce(
+            c_double, c_double, c_double, c_double, c_double, c_double, c_double, i8
+        ) -> c_int;
+        optional fn drdOpenID(i8) -> c_int;
+        optional fn drdClose(i8) -> c_int;
+        optional fn drdIsInitialized(i8) -> Truth;
+        optional fn drdAutoInit(i8) -> c_int;
+        optional fn drdStop(Truth, i8) -> c_int;
+    }
+}
+
+/// The estimator of the velocity that takes a window.
+const WINDOWING: c_int = 0;
+/// Room for the numbers of a status: 17 in version 3.17, and some that a later one may add.
+pub(crate) const STATUS: usize = 64;
+
+/// Safe calls: each passes numbers, and pointers to locals of its own.
+impl Functions {
+    /// Version of the SDK: major, minor, release, revision.
+    pub(crate) fn version(&self) -> [c_int; 4] {
+        let mut version = [0; 4];
+        let [major, minor, release, revision] = &mut version;
+        // SAFETY: a function without preconditions; four places for a number each.
+        unsafe { (self.dhdGetSDKVersion)(major, minor, release, revision) };
+        version
+    }
+
+    /// Number and words of the newest error of this thread.
+    pub(crate) fn last_error(&self) -> (c_int, String) {
+        // SAFETY: functions without preconditions; the words are a static text, or null.
+        unsafe { ((self.dhdErrorGetLast)(), text((self.dhdErrorGetLastStr)())) }
+    }
+
+    pub(crate) fn device_count(&self) -> c_int {
+        // SAFETY: a function without preconditions.
+        unsafe { (self.dhdGetDeviceCount)() }
+    }
+
+    pub(crate) fn open(&self, index: i8) -> c_int {
+        // SAFETY: any index is legal; one without a device fails.
+        unsafe { (self.drdOpenID.unwrap_or(self.dhdOpenID))(index) }
+    }
+
+    pub(crate) fn close(&self, id: i8) -> c_int {
+        // SAFETY: any id is legal; nobody uses the device any more.
+        unsafe { (self.drdClose.unwrap_or(self.dhdClose))(id) }
+    }
+
+    pub(crate) fn system_type(&self, id: i8) -> c_int {
+        // SAFETY: any id is legal.
+        unsafe { (self.dhdGetSystemType)(id) }
+    }
+
+    pub(crate) fn system_name(&self, id: i8) -> String {
+        // SAFETY: any id is legal; the name is a static text, or null.
+        text(unsafe { (self.dhdGetSystemName)(id) })
+    }
+
+    pub(crate) fn serial_number(&self, id: i8) -> (c_int, u16) {
+        let mut serial = 0;
+        // SAFETY: any id is legal; a place for the number.
+        (unsafe { (self.dhdGetSerialNumber)(&raw mut serial, id) }, serial)
+    }
+
+    pub(crate) fn has_wrist(&self, id: i8) -> bool {
+        // SAFETY: any id is legal.
+        unsafe { (self.dhdHasWrist)(id) != 0 }
+    }
+
+    pub(crate) fn has_active_wrist(&self, id: i8) -> bool {
+        // SAFETY: any id is legal.
+        unsafe { (self.dhdHasActiveWrist)(id) != 0 }
+    }
+
+    pub(crate) fn status(&self, id: i8) -> (c_int, [c_int; STATUS]) {
+        let mut status = [0; STATUS];
+        // SAFETY: any id is legal; more places than a status has numbers.
+        (unsafe { (self.dhdGetStatus)(status.as_mut_ptr(), id) }, status)
+    }
+
+    /// Whether the device knows where it is; `None` if the library cannot tell.
+    pub(crate) fn is_initialized(&self, id: i8) -> Option<bool> {
+        // SAFETY: any id is legal.
+        self.drdIsInitialized.map(|is_initialized| unsafe { is_initialized(id) != 0 })
+    }
+
+    /// Moves the arm to find out where it is, for seconds; `None` if the library cannot.
+    pub(crate) fn auto_init(&self, id: i8) -> Option<c_int> {
+        // SAFETY: any id is legal.
+        self.drdAutoInit.map(|auto_init| unsafe { auto_init(id) })
+    }
+
+    /// Ends the regulation that holds the arm; force may stay on.
+    pub(crate) fn stop_regulation(&self, id: i8) -> c_int {
+        // SAFETY: any id is legal.
+        self.drdStop.map_or(0, |stop| unsafe { stop(1, id) })
+    }
+
+    pub(crate) fn enable_force(&self, on: bool, id: i8) -> c_int {
+        // SAFETY: any id is legal.
+        unsafe { (self.dhdEnableForce)(u8::from(on), id) }
+    }
+
+    pub(crate) fn stop(&self, id: i8) -> c_int {
+        // SAFETY: any id is legal.
+        unsafe { (self.dhdStop)(id) }
+    }
+
+    pub(crate) fn set_brakes(&self, on: bool, id: i8) -> c_int {
+        // SAFETY: any id is legal.
+        unsafe { (self.dhdSetBrakes)(c_int::from(on), id) }
+    }
+
+    pub(crate) fn set_gravity_compensation(&self, on: bool, id: i8) -> c_int {
+        // SAFETY: any id is legal.
+        unsafe { (self.dhdSetGravityCompensation)(c_int::from(on), id) }
+    }
+
+    pub(crate) fn set_most_force(&self, most_n: f64, id: i8) -> c_int {
+        // SAFETY: any id is legal.
+        unsafe { (self.dhdSetMaxForce)(most_n, id) }
+    }
+
+    pub(crate) fn set_most_torque(&self, most_nm: f64, id: i8) -> c_int {
+        // SAFETY: any id is legal.
+        unsafe { (self.dhdSetMaxTorque)(most_nm, id) }
+    }
+
+    /// Velocity from a window of so many ms.
+    pub(crate) fn config_velocity(&self, window_ms: c_int, id: i8) -> c_int {
+        // SAFETY: any id is legal.
+        unsafe { (self.dhdConfigLinearVelocity)(window_ms, WINDOWING, id) }
+    }
+
+    /// The same of the angular velocity.
+    pub(crate) fn config_angular_velocity(&self, window_ms: c_int, id: i8) -> c_int {
+        // SAFETY: any id is legal.
+        unsafe { (self.dhdConfigAngularVelocity)(window_ms, WINDOWING, id) }
+    }
+
+    /// Force goes when no other one comes for so long, in units of 125 µs.
+    pub(crate) fn set_watchdog(&self, units: u8, id: i8) -> c_int {
+        // SAFETY: any id is legal. Expert mode belongs to the process, and lasts for this call only.
+        unsafe {
+            (self.dhdEnableExpertMode)();
+            let code = (self.dhdSetWatchdog)(units, id);
+            (self.dhdDisableExpertMode)();
+            code
+        }
+    }
+
+    /// Position, m, and rows of the rotation matrix.
+    pub(crate) fn pose(&self, id: i8) -> (c_int, [f64; 3], [[f64; 3]; 3]) {
+        let (mut position, mut rows) = ([0.0; 3], [[0.0; 3]; 3]);
+        let [x, y, z] = &mut position;
+        // SAFETY: any id is legal; three places, and nine of a matrix that lie one after the other.
+        let code = unsafe { (self.dhdGetPositionAndOrientationFrame)(x, y, z, rows.as_mut_ptr().cast(), id) };
+        (code, position, rows)
+    }
+
+    pub(crate) fn linear_velocity(&self, id: i8) -> (c_int, [f64; 3]) {
+        let mut velocity = [0.0; 3];
+        let [x, y, z] = &mut velocity;
+        // SAFETY: any id is legal; three places.
+        (unsafe { (self.dhdGetLinearVelocity)(x, y, z, id) }, velocity)
+    }
+
+    pub(crate) fn angular_velocity(&self, id: i8) -> (c_int, [f64; 3]) {
+        let mut velocity = [0.0; 3];
+        let [x, y, z] = &mut velocity;
+        // SAFETY: any id is legal; three places.
+        (unsafe { (self.dhdGetAngularVelocityRad)(x, y, z, id) }, velocity)
+    }
+
+    /// Force, N, and torque, N·m.
+    pub(crate) fn wrench(&self, id: i8) -> (c_int, [f64; 3], [f64; 3]) {
+        let (mut force, mut torque) = ([0.0; 3], [0.0; 3]);
+        let ([x, y, z], [a, b, g]) = (&mut force, &mut torque);
+        // SAFETY: any id is legal; six places.
+        (unsafe { (self.dhdGetForceAndTorque)(x, y, z, a, b, g, id) }, force, torque)
+    }
+
+    pub(crate) fn buttons(&self, id: i8) -> u32 {
+        // SAFETY: any id is legal.
+        unsafe { (self.dhdGetButtonMask)(id) }
+    }
+
+    /// Force, N, and torque, N·m, and none of a gripper; waits for the exchange with the device.
+    pub(crate) fn set_wrench(&self, [x, y, z]: [f64; 3], [a, b, g]: [f64; 3], id: i8) -> c_int {
+        // SAFETY: any id is legal.
+        unsafe { (self.dhdSetForceAndTorqueAndGripperForce)(x, y, z, a, b, g, 0.0, id) }
+    }
+}
+
+/// A text of the SDK.
+fn text(place: *const c_char) -> String {
+    if place.is_null() {
+        return String::new();
+    }
+    // SAFETY: not null: a static text that ends in a null byte, as the SDK documents.
+    unsafe { CStr::from_ptr(place) }.to_string_lossy().into_owned()
+}

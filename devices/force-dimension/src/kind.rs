@@ -1,0 +1,41 @@
+//! What the devices can do, by the number that the SDK gives them.
+//!
+//! Source: the maker's data sheets (workspace, continuous force and torque). Where a sheet gives a cylinder, the range is the
+//! one that fits into it; where it gives nothing, the smallest of the family.
+
+use std::f64::consts::PI;
+
+/// What a device can do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Kind {
+    /// Half the range to the right, away from the user, and up, m.
+    pub(crate) range_m: [f64; 3],
+    /// Largest rotation about any axis, rad.
+    pub(crate) range_rad: f64,
+    /// Largest force in any direction, N.
+    pub(crate) force_n: f64,
+    /// Largest torque about any axis, N·m; 0: none.
+    pub(crate) torque_nm: f64,
+}
+
+const OMEGA: Kind = Kind { range_m: [0.08, 0.055, 0.08], range_rad: PI, force_n: 12.0, torque_nm: 0.0 };
+const DELTA: Kind = Kind { range_m: [0.2, 0.13, 0.2], range_rad: PI, force_n: 20.0, torque_nm: 0.0 };
+const SIGMA: Kind = Kind { range_m: [0.095, 0.065, 0.095], range_rad: 1.2, force_n: 20.0, torque_nm: 0.4 };
+const LAMBDA: Kind = Kind { range_m: [0.12, 0.085, 0.12], range_rad: 1.2, force_n: 20.0, torque_nm: 0.2 };
+const FALCON: Kind = Kind { range_m: [0.05, 0.05, 0.05], range_rad: PI, force_n: 8.0, torque_nm: 0.0 };
+
+impl Kind {
+    /// By its number; an unknown one is taken for the weakest.
+    pub(crate) fn of_number(number: i32) -> Self {
+        match number {
+            60 => FALCON,
+            61..=64 => DELTA,
+            104..=107 => SIGMA,
+            206 => Self { torque_nm: 0.0, ..SIGMA },
+            108 | 109 | 131 | 132 => LAMBDA,
+            203 => Self { torque_nm: 0.0, ..LAMBDA },
+            31..=37 => OMEGA,
+            _ => Self { force_n: FALCON.force_n, ..OMEGA },
+        }
+    }
+}

@@ -1,0 +1,281 @@
+//! The device as a plugin: parameters and the contract.
+
+use crate::dhd::{Dhd, Setup, Which, Wrist};
+use crate::driver::{Driver, Why};
+use crate::kind::Kind;
+use flotor_hal::{
+    ActiveDevice, Axes, Capabilities, Choices, ConnectionDevice, Cycle, Device, DeviceInfo, DeviceState,
+    IndependentStop, IndependentStopDevice, LoopConfig, PacingDevice, Parameter, Refusal, SampleWait,
+    Settings, StoppedState, Tick, UsbAccess, UsbKind, Wrench, choices, export_device,
+};
+use flotor_vendor_sdk::{Exchange, LoopEnd, Pace, StandIn, StopSwitch};
+use std::sync::Arc;
+use std::time::Duration;
+
+const NO_YES: Choices = choices!["false", "true"];
+const INITIALISE: Choices = choices!["never", "automatic"];
+const PACES: Choices = choices!["real", "lockstep"];
+
+/// Fastest exchange of the devices, Hz.
+const FASTEST_HZ: f64 = 4000.0;
+/// Unit of the watchdog, ms; it has eight bits.
+const WATCHDOG_UNIT_MS: f64 = 0.125;
+/// Steps of the encoders at the handle, m: the coarsest of the family.
+const RESOLUTION_M: f64 = 3.0e-5;
+
+const SCHEMA: &[Parameter] = &[
+    Parameter::file(
+        "library",
+        choices![],
+        "The SDK's library, libdrd.so.3; without it, looked for in $FDSDK and where the system has libraries",
+    ),
+    Parameter::choice(
+        "stand_in",
+        NO_YES,
+        0,
+        "Whether Flotor's own drop-in library may stand in for a device",
+    ),
+    Parameter::real("serial", "1", 0.0, 65_535.0, 0.0, "Serial number of the device; 0: the first one"),
+    Parameter::choice(
+        "initialise",
+        INITIALISE,
+        0,
+        "automatic: a device that does not know where it is moves its arm to find out, when it is energised",
+    ),
+    Parameter::real("max_force_n", "N", 0.0, 100.0, 0.0, "Largest force on the hand; 0: that of the device"),
+    Parameter::real(
+        "max_torque_nm",
+        "N·m",
+        0.0,
+        10.0,
+        0.0,
+        "Largest torque on the hand; 0: that of the device",
+    ),
+    Parameter::real(
+        "velocity_window_ms",
+        "ms",
+        1.0,
+        100.0,
+        20.0,
+        "Window from which the SDK takes the velocity",
+    ),
+    Parameter::real(
+        "watchdog_ms",
+        "ms",
+        1.0,
+        31.875,
+        20.0,
+        "Time without a command after which the device itself takes its force away",
+    ),
+    Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 200.0, "Time without a sample that is a fault"),
+    Parameter::choice(
+        "pace",
+        PACES,
+        0,
+        "real: samples are taken as they come; lockstep: each tick waits for its own (virtual clock, simulated device)",
+    ),
+];
+
+/// A device of Force Dimension, opened: known, without force.
+pub struct ForceDimensionDevice {
+    /// Nothing once the thread that had it is lost.
+    dhd: Option<Dhd>,
+    exchange: Arc<Exchange>,
+    kind: Kind,
+    wrist: Wrist,
+    initialises: bool,
+    setup: Setup,
+    timeout: Duration,
+    parameters: [f64; SCHEMA.len()],
+}
+
+/// The same, energised.
+pub struct EnergizedDevice {
+    opened: ForceDimensionDevice,
+    driver: Driver,
+    end: LoopEnd,
+}
+
+impl Device for ForceDimensionDevice {
+    const INFO: DeviceInfo = DeviceInfo::new(
+        "force-dimension",
+        "Force Dimension omega, delta, sigma, lambda",
+        "A parallel arm with three to six driven axes, over the SDK that its user has installed",
+    );
+    const PARAMETERS: &'static [Parameter] = SCHEMA;
+    type Active = EnergizedDevice;
+    type Stop = StopSwitch;
+
+    fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        let stand_in = [StandIn::Refuse, StandIn::Accept];
+        let stand_in =
+            stand_in.get(settings.choice_or_default("stand_in")).copied().unwrap_or(StandIn::Refuse);
+        let dhd =
+            Dhd::open(settings.text("library"), stand_in, which(settings.number_or_default("serial"))?)?;
+        let initialises = settings.choice_or_default("initialise") == 1;
+        if !initialises && !dhd.is_initialized() {
+            return Err(Refusal::resource(format!(
+                "the {} does not know where its arm is: let the maker's program initialise it, or keep your hands off \
+                 and set `initialise = \"automatic\"`, which moves the arm",
+                dhd.name()
+            )));
+        }
+        let wrist = dhd.wrist();
+        let of_kind = Kind::of_number(dhd.kind());
+        let told = |id: &str, own: f64| match settings.number_or_default(id) {
+            0.0 => own,
+            told => told,
+        };
+        let kind = Kind {
+            force_n: told("max_force_n", of_kind.force_n),
+            torque_nm: if wrist == Wrist::Driven { told("max_torque_nm", of_kind.torque_nm) } else { 0.0 },
+            ..of_kind
+        };
+        if wrist == Wrist::Driven && kind.torque_nm == 0.0 {
+            return Err(Refusal::parameter(format!(
+                "the {} drives its wrist, and its largest torque is not known here: set `max_torque_nm`",
+                dhd.name()
+            )));
+        }
+        let mut parameters = [0.0; SCHEMA.len()];
+        for (value, parameter) in parameters.iter_mut().zip(SCHEMA) {
+            *value = settings.number_or_default(parameter.id());
+        }
+        let pace = [Pace::Real, Pace::Lockstep];
+        let pace = pace.get(settings.choice_or_default("pace")).copied().unwrap_or(Pace::Real);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // in the ranges of the schema
+        let setup = Setup {
+            most: [kind.force_n, kind.torque_nm],
+            window_ms: settings.number_or_default("velocity_window_ms").round() as i32,
+            watchdog_units: (settings.number_or_default("watchdog_ms") / WATCHDOG_UNIT_MS).round() as u8,
+        };
+        Ok(Self {
+            dhd: Some(dhd),
+            exchange: Arc::new(Exchange::new(pace)),
+            kind,
+            wrist,
+            initialises,
+            setup,
+            timeout: Duration::from_secs_f64(settings.number_or_default("timeout_ms") * 1.0e-3),
+            parameters,
+        })
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        let Kind { range_m, range_rad, force_n, torque_nm } = self.kind;
+        let (sensed, actuated) = match self.wrist {
+            Wrist::None => (Axes::TRANSLATION, Axes::TRANSLATION),
+            Wrist::Sensed => (Axes::ALL, Axes::TRANSLATION),
+            Wrist::Driven => (Axes::ALL, Axes::ALL),
+        };
+        let turns = self.wrist != Wrist::None;
+        Capabilities {
+            sensed,
+            actuated,
+            range_m,
+            range_rad: [if turns { range_rad } else { 0.0 }; 3],
+            resolution_m: RESOLUTION_M,
+            max_force_n: [force_n; 3],
+            max_torque_nm: [torque_nm; 3],
+            // From nothing to the most in a millisecond: the motors are driven directly.
+            max_force_slew_n_per_s: force_n * 1.0e3,
+            max_torque_slew_nm_per_s: if torque_nm > 0.0 { torque_nm * 1.0e3 } else { f64::INFINITY },
+            // The maker states it for the closed loop at 4 kHz, not for this one.
+            max_stiffness_n_per_m: 0.0,
+            rate_hz: [100.0, FASTEST_HZ],
+            // The wrench waits for the next exchange, which brings the sample after it.
+            latency_s: 1.0 / 1000.0,
+        }
+    }
+
+    fn stopper(&self) -> StopSwitch {
+        StopSwitch(Arc::clone(&self.exchange))
+    }
+
+    fn activate(mut self, _config: &LoopConfig) -> Result<EnergizedDevice, (Self, Refusal)> {
+        let Some(dhd) = self.dhd.take() else {
+            return Err((
+                self,
+                Refusal::resource("the device was closed when its thread was lost; open it again"),
+            ));
+        };
+        if self.initialises
+            && !dhd.is_initialized()
+            && let Err(refusal) = dhd.initialize()
+        {
+            self.dhd = Some(dhd);
+            return Err((self, refusal));
+        }
+        match Driver::start(dhd, &self.setup, &self.exchange) {
+            Ok(driver) => {
+                let end = LoopEnd::new(Arc::clone(&self.exchange), self.setup.most, self.timeout);
+                Ok(EnergizedDevice { opened: self, driver, end })
+            }
+            Err((dhd, why)) => {
+                self.dhd = dhd;
+                let refusal = match why {
+                    Why::Failed(failed) => failed.refusal(),
+                    Why::NoThread(error) => {
+                        Refusal::resource(format!("the system starts no thread for the device: {error}"))
+                    }
+                };
+                Err((self, refusal))
+            }
+        }
+    }
+
+    fn parameter(&self, index: usize) -> f64 {
+        self.parameters.get(index).copied().unwrap_or(f64::NAN)
+    }
+}
+
+/// The device of a serial number.
+fn which(serial: f64) -> Result<Which, Refusal> {
+    if serial == 0.0 {
+        return Ok(Which::First);
+    }
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // in the range of the schema
+    let number = serial as u16;
+    match f64::from(number) == serial {
+        true => Ok(Which::Serial(number)),
+        false => Err(Refusal::parameter(format!("`serial` is {serial}; it must be a whole number"))),
+    }
+}
+
+impl ActiveDevice for EnergizedDevice {
+    type Opened = ForceDimensionDevice;
+
+    fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
+        self.end.read(tick, state)
+    }
+
+    fn write(&mut self, _tick: &Tick, wrench: &Wrench) -> Cycle {
+        self.end.write(wrench)
+    }
+
+    fn deactivate(self) -> ForceDimensionDevice {
+        let Self { mut opened, mut driver, .. } = self;
+        opened.dhd = driver.end();
+        opened
+    }
+}
+
+impl PacingDevice for EnergizedDevice {
+    fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
+        self.end.wait_for_sample(timeout_ns)
+    }
+}
+
+impl IndependentStopDevice for ForceDimensionDevice {
+    /// The device's own watchdog.
+    fn independent_stop(&self) -> IndependentStop {
+        let within_ns = u64::from(self.setup.watchdog_units) * 125_000;
+        IndependentStop::by_itself(StoppedState::Zero, within_ns)
+    }
+}
+
+impl ConnectionDevice for ForceDimensionDevice {
+    const USB: &'static [UsbKind] = &[UsbKind::of_vendor(0x1451, UsbAccess::Raw)];
+}
+
+export_device!(ForceDimensionDevice, connection, pacing, independent_stop);

@@ -1,0 +1,235 @@
+//! The functions of HDAPI that are used, as its public interface declares them (version 3): names, numbers and types only.
+//! Errors lie on a stack that `hdGetError` takes from. Parameters are those of the current device of the process.
+//!
+//! Pointers lead to as many numbers as the parameter has; each is a local of the function here that calls it, so that none
+//! outlives the call.
+#![allow(unsafe_code)] // calls into the SDK; listed in tests/tests/system/architecture.rs
+
+use crate::scheduler::Client;
+use flotor_vendor_sdk::sdk_functions;
+use std::ffi::{CStr, CString, c_char, c_double, c_int, c_uint, c_ulong, c_ushort, c_void};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// `HDErrorInfo`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ErrorInfo {
+    code: c_uint,
+    internal: c_int,
+    device: c_uint,
+}
+
+/// What the scheduler calls: 1 to be called again, 0 for the end.
+type Callback = unsafe extern "C" fn(*mut c_void) -> c_uint;
+
+/// Priority of a callback that is neither first nor last.
+const PRIORITY: c_ushort = 0x7FFF;
+
+sdk_functions! {
+    /// Where the functions are.
+    pub(crate) struct Functions needs "OpenHaptics 3.0" {
+        fn hdGetString(c_uint) -> *const c_char;
+        fn hdInitDevice(*const c_char) -> c_uint;
+        fn hdDisableDevice(c_uint);
+        fn hdMakeCurrentDevice(c_uint);
+        fn hdBeginFrame(c_uint);
+        fn hdEndFrame(c_uint);
+        fn hdGetDoublev(c_uint, *mut c_double);
+        fn hdGetIntegerv(c_uint, *mut c_int);
+        fn hdSetDoublev(c_uint, *const c_double);
+        fn hdEnable(c_uint);
+        fn hdDisable(c_uint);
+        fn hdGetError() -> ErrorInfo;
+        fn hdGetErrorString(c_uint) -> *const c_char;
+        fn hdCheckCalibration() -> c_uint;
+        fn hdUpdateCalibration(c_uint);
+        fn hdStartScheduler();
+        fn hdStopScheduler();
+        fn hdScheduleAsynchronous(Callback, *mut c_void, c_ushort) -> c_ulong;
+        fn hdUnschedule(c_ulong);
+    }
+}
+
+/// Safe calls: each passes numbers, and pointers to locals of its own.
+impl Functions {
+    /// A text of the interface or of the current device.
+    pub(crate) fn text(&self, parameter: c_uint) -> String {
+        // SAFETY: any number is legal; the text is static, or null.
+        text(unsafe { (self.hdGetString)(parameter) })
+    }
+
+    /// Opens the device of this name, which becomes the current one; the default one without a name.
+    pub(crate) fn init(&self, name: Option<&CStr>) -> c_uint {
+        // SAFETY: null, or a text that lives for the call.
+        unsafe { (self.hdInitDevice)(name.map_or(std::ptr::null(), CStr::as_ptr)) }
+    }
+
+    pub(crate) fn close(&self, handle: c_uint) {
+        // SAFETY: any handle is legal; nobody uses the device any more.
+        unsafe { (self.hdDisableDevice)(handle) }
+    }
+
+    pub(crate) fn make_current(&self, handle: c_uint) {
+        // SAFETY: any handle is legal.
+        unsafe { (self.hdMakeCurrentDevice)(handle) }
+    }
+
+    pub(crate) fn begin_frame(&self, handle: c_uint) {
+        // SAFETY: any handle is legal.
+        unsafe { (self.hdBeginFrame)(handle) }
+    }
+
+    pub(crate) fn end_frame(&self, handle: c_uint) {
+        // SAFETY: any handle is legal.
+        unsafe { (self.hdEndFrame)(handle) }
+    }
+
+    /// Numbers of a parameter that has `N` of them.
+    pub(crate) fn numbers<const N: usize>(&self, parameter: Numbers<N>) -> [f64; N] {
+        let mut numbers = [0.0; N];
+        // SAFETY: as many places as the parameter has numbers, by its type.
+        unsafe { (self.hdGetDoublev)(parameter.0, numbers.as_mut_ptr()) };
+        numbers
+    }
+
+    /// A whole number.
+    pub(crate) fn whole(&self, parameter: c_uint) -> c_int {
+        let mut places = [0; 6];
+        // SAFETY: no parameter of whole numbers has more than six.
+        unsafe { (self.hdGetIntegerv)(parameter, places.as_mut_ptr()) };
+        places[0]
+    }
+
+    pub(crate) fn set(&self, parameter: Numbers<3>, numbers: [f64; 3]) {
+        // SAFETY: as many numbers as the parameter has, by its type.
+        unsafe { (self.hdSetDoublev)(parameter.0, numbers.as_ptr()) }
+    }
+
+    pub(crate) fn enable(&self, capability: c_uint) {
+        // SAFETY: any number is legal.
+        unsafe { (self.hdEnable)(capability) }
+    }
+
+    pub(crate) fn disable(&self, capability: c_uint) {
+        // SAFETY: any number is legal.
+        unsafe { (self.hdDisable)(capability) }
+    }
+
+    /// Takes the newest error of this thread; 0 if there is none.
+    pub(crate) fn take_error(&self) -> c_uint {
+        // SAFETY: a function without preconditions.
+        unsafe { (self.hdGetError)() }.code
+    }
+
+    pub(crate) fn words(&self, code: c_uint) -> String {
+        // SAFETY: any number is legal; the words are a static text, or null.
+        text(unsafe { (self.hdGetErrorString)(code) })
+    }
+
+    pub(crate) fn check_calibration(&self) -> c_uint {
+        // SAFETY: a function without preconditions.
+        unsafe { (self.hdCheckCalibration)() }
+    }
+
+    pub(crate) fn update_calibration(&self, style: c_uint) {
+        // SAFETY: any number is legal.
+        unsafe { (self.hdUpdateCalibration)(style) }
+    }
+
+    pub(crate) fn start_scheduler(&self) {
+        // SAFETY: a function without preconditions; whatever is scheduled lives until it is taken out.
+        unsafe { (self.hdStartScheduler)() }
+    }
+
+    pub(crate) fn stop_scheduler(&self) -> Stopped {
+        // SAFETY: a function without preconditions.
+        unsafe { (self.hdStopScheduler)() }
+        Stopped(())
+    }
+
+    /// Has a client called once a tick, until it is taken out.
+    pub(crate) fn schedule(&self, client: Box<Client>) -> Scheduled {
+        let data = Box::into_raw(client);
+        // SAFETY: `data` stays valid until `free`, before which the scheduler has ended.
+        let handle = unsafe { (self.hdScheduleAsynchronous)(called, data.cast(), PRIORITY) };
+        Scheduled { handle, data }
+    }
+
+    /// Takes a client out. A call of it may still be under way.
+    pub(crate) fn unschedule(&self, scheduled: &Scheduled) {
+        // SAFETY: any handle is legal; one that is not in is an error of the SDK.
+        unsafe { (self.hdUnschedule)(scheduled.handle) };
+    }
+}
+
+/// A parameter that has `N` numbers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Numbers<const N: usize>(c_uint);
+
+/// Parameters by their numbers in the interface.
+pub(crate) const TRANSFORM: Numbers<16> = Numbers(0x2052);
+pub(crate) const VELOCITY: Numbers<3> = Numbers(0x2051);
+pub(crate) const ANGULAR_VELOCITY: Numbers<3> = Numbers(0x2053);
+pub(crate) const LAST_FORCE: Numbers<3> = Numbers(0x2800);
+pub(crate) const LAST_TORQUE: Numbers<3> = Numbers(0x2801);
+pub(crate) const FORCE: Numbers<3> = Numbers(0x2700);
+pub(crate) const TORQUE: Numbers<3> = Numbers(0x2701);
+pub(crate) const USABLE_WORKSPACE: Numbers<6> = Numbers(0x2551);
+pub(crate) const MAX_STIFFNESS: Numbers<1> = Numbers(0x2602);
+pub(crate) const MAX_FORCE: Numbers<1> = Numbers(0x2603);
+pub(crate) const MAX_TORQUE: Numbers<1> = Numbers(0x2622);
+
+/// The scheduler has ended: nobody calls a client any more.
+pub(crate) struct Stopped(());
+
+/// A client in the scheduler's list.
+pub(crate) struct Scheduled {
+    handle: c_ulong,
+    data: *mut Client,
+}
+
+impl Scheduled {
+    /// Whether the SDK took it.
+    pub(crate) fn is_in(&self) -> bool {
+        // What the interface calls an invalid handle, in 32 or 64 bits.
+        self.handle != 0xFFFF_FFFF && self.handle != c_ulong::MAX
+    }
+}
+
+impl Scheduled {
+    /// Frees a client that was taken out before the scheduler ended.
+    pub(crate) fn free(self, _stopped: &Stopped) {
+        // SAFETY: the box of `schedule`, taken back once: nobody calls it any more.
+        drop(unsafe { Box::from_raw(self.data) });
+    }
+}
+
+// SAFETY: the pointer is only handed to `free`; the client it leads to may be used from any thread (see below).
+unsafe impl Send for Scheduled {}
+const _: fn() = || {
+    fn is_send<T: Send>() {}
+    is_send::<Client>();
+};
+
+/// The callback of every client.
+unsafe extern "C" fn called(data: *mut c_void) -> c_uint {
+    // SAFETY: the data of `schedule`: a client that lives until it is taken out, and that only the scheduler uses.
+    let client = unsafe { &mut *data.cast::<Client>() };
+    // Nothing unwinds into the SDK.
+    let goes_on = catch_unwind(AssertUnwindSafe(|| client.step()));
+    c_uint::from(goes_on.unwrap_or_else(|_| client.break_off()))
+}
+
+/// A text of the SDK.
+fn text(place: *const c_char) -> String {
+    if place.is_null() {
+        return String::new();
+    }
+    // SAFETY: not null: a static text that ends in a null byte, as the SDK documents.
+    unsafe { CStr::from_ptr(place) }.to_string_lossy().into_owned()
+}
+
+/// The name of a device, if it can be one.
+pub(crate) fn name_of(text: &str) -> Option<CString> {
+    CString::new(text).ok()
+}

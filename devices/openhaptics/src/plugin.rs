@@ -1,0 +1,186 @@
+//! The device as a plugin: parameters and the contract.
+
+use crate::hd::{Facts, Hd};
+use crate::scheduler::Driver;
+use flotor_hal::{
+    ActiveDevice, Axes, Capabilities, Choices, ConnectionDevice, Cycle, Device, DeviceInfo, DeviceState,
+    LoopConfig, PacingDevice, Parameter, Refusal, SampleWait, Settings, Tick, UsbAccess, UsbKind, Wrench,
+    choices, export_device,
+};
+use flotor_vendor_sdk::{Exchange, LoopEnd, Pace, StandIn, StopSwitch};
+use std::f64::consts::PI;
+use std::sync::Arc;
+use std::time::Duration;
+
+const NO_YES: Choices = choices!["false", "true"];
+const PACES: Choices = choices!["real", "lockstep"];
+
+/// The scheduler's rate, Hz.
+const RATE_HZ: f64 = 1000.0;
+/// Steps of the encoders at the handle, m (450 dpi, the coarsest of the family).
+const RESOLUTION_M: f64 = 5.5e-5;
+
+const SCHEMA: &[Parameter] = &[
+    Parameter::file(
+        "library",
+        choices![],
+        "OpenHaptics' library, libHD.so; without it, looked for where the SDK and the system have libraries",
+    ),
+    Parameter::choice(
+        "stand_in",
+        NO_YES,
+        0,
+        "Whether Flotor's own drop-in library may stand in for a device",
+    ),
+    Parameter::text(
+        "name",
+        "Name of the device, as the maker's setup program calls it; the default one without it",
+    ),
+    Parameter::real("max_force_n", "N", 0.0, 40.0, 0.0, "Largest force on the hand; 0: that of the device"),
+    Parameter::real(
+        "max_torque_nm",
+        "N·m",
+        0.0,
+        1.0,
+        0.0,
+        "Largest torque on the hand; 0: that of the device",
+    ),
+    Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 200.0, "Time without a sample that is a fault"),
+    Parameter::choice(
+        "pace",
+        PACES,
+        0,
+        "real: samples are taken as they come; lockstep: each tick waits for its own (virtual clock, simulated device)",
+    ),
+];
+
+/// A device of the family, opened: known, without force.
+pub struct TouchDevice {
+    hd: Arc<Hd>,
+    exchange: Arc<Exchange>,
+    /// Largest force, N, and torque, N·m.
+    most: [f64; 2],
+    timeout: Duration,
+    parameters: [f64; SCHEMA.len()],
+}
+
+/// The same, driven by the scheduler of the SDK.
+pub struct ScheduledDevice {
+    opened: TouchDevice,
+    driver: Driver,
+    end: LoopEnd,
+}
+
+impl Device for TouchDevice {
+    const INFO: DeviceInfo = DeviceInfo::new(
+        "openhaptics",
+        "3D Systems Touch, Geomagic Touch, Phantom",
+        "An arm with a stylus, over the OpenHaptics that its user has installed; its scheduler sets the pace",
+    );
+    const PARAMETERS: &'static [Parameter] = SCHEMA;
+    type Active = ScheduledDevice;
+    type Stop = StopSwitch;
+
+    fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        let stand_in = [StandIn::Refuse, StandIn::Accept];
+        let stand_in =
+            stand_in.get(settings.choice_or_default("stand_in")).copied().unwrap_or(StandIn::Refuse);
+        let hd = Hd::open(settings.text("library"), stand_in, settings.text("name"))?;
+        hd.calibrate()?;
+        let Facts { force_n, torque_nm, gives_torque, .. } = *hd.facts();
+        let told = |id: &str, own: f64| match settings.number_or_default(id) {
+            0.0 => own,
+            told => told.min(own),
+        };
+        let most =
+            [told("max_force_n", force_n), if gives_torque { told("max_torque_nm", torque_nm) } else { 0.0 }];
+        let mut parameters = [0.0; SCHEMA.len()];
+        for (value, parameter) in parameters.iter_mut().zip(SCHEMA) {
+            *value = settings.number_or_default(parameter.id());
+        }
+        let pace = [Pace::Real, Pace::Lockstep];
+        let pace = pace.get(settings.choice_or_default("pace")).copied().unwrap_or(Pace::Real);
+        Ok(Self {
+            hd: Arc::new(hd),
+            exchange: Arc::new(Exchange::new(pace)),
+            most,
+            timeout: Duration::from_secs_f64(settings.number_or_default("timeout_ms") * 1.0e-3),
+            parameters,
+        })
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        let Facts { range_m, is_turned, gives_torque, stiffness_n_per_m, .. } = *self.hd.facts();
+        let [force_n, torque_nm] = self.most;
+        Capabilities {
+            sensed: if is_turned { Axes::ALL } else { Axes::TRANSLATION },
+            actuated: if gives_torque { Axes::ALL } else { Axes::TRANSLATION },
+            range_m: range_m.to_array(),
+            // The SDK says no range of the stylus: whatever a rotation can be.
+            range_rad: [if is_turned { PI } else { 0.0 }; 3],
+            resolution_m: RESOLUTION_M,
+            max_force_n: [force_n; 3],
+            max_torque_nm: [torque_nm; 3],
+            // From nothing to the most in a tick of the scheduler; the SDK limits the slew further.
+            max_force_slew_n_per_s: force_n * RATE_HZ,
+            max_torque_slew_nm_per_s: if torque_nm > 0.0 { torque_nm * RATE_HZ } else { f64::INFINITY },
+            max_stiffness_n_per_m: stiffness_n_per_m,
+            rate_hz: [100.0, RATE_HZ],
+            // The wrench waits for the next call of the scheduler.
+            latency_s: 1.0 / RATE_HZ,
+        }
+    }
+
+    fn stopper(&self) -> StopSwitch {
+        StopSwitch(Arc::clone(&self.exchange))
+    }
+
+    fn activate(self, _config: &LoopConfig) -> Result<ScheduledDevice, (Self, Refusal)> {
+        if let Err(refusal) = self.hd.calibrate() {
+            return Err((self, refusal));
+        }
+        match Driver::start(&self.hd, &self.exchange) {
+            Ok(driver) => {
+                let end = LoopEnd::new(Arc::clone(&self.exchange), self.most, self.timeout);
+                Ok(ScheduledDevice { opened: self, driver, end })
+            }
+            Err(failed) => Err((self, failed.refusal())),
+        }
+    }
+
+    fn parameter(&self, index: usize) -> f64 {
+        self.parameters.get(index).copied().unwrap_or(f64::NAN)
+    }
+}
+
+impl ActiveDevice for ScheduledDevice {
+    type Opened = TouchDevice;
+
+    fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
+        self.end.read(tick, state)
+    }
+
+    fn write(&mut self, _tick: &Tick, wrench: &Wrench) -> Cycle {
+        self.end.write(wrench)
+    }
+
+    fn deactivate(self) -> TouchDevice {
+        let Self { opened, driver, .. } = self;
+        drop(driver);
+        opened
+    }
+}
+
+impl PacingDevice for ScheduledDevice {
+    fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
+        self.end.wait_for_sample(timeout_ns)
+    }
+}
+
+impl ConnectionDevice for TouchDevice {
+    /// Those of 3D Systems: a serial port of the older ones, raw HID of the newer.
+    const USB: &'static [UsbKind] =
+        &[UsbKind::new(0x2988, 0x0302, UsbAccess::Serial), UsbKind::of_vendor(0x2988, UsbAccess::Hid)];
+}
+
+export_device!(TouchDevice, connection, pacing);

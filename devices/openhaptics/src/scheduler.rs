@@ -1,0 +1,128 @@
+//! The scheduler of the SDK, which all devices of a process share, and what it calls once a tick.
+//!
+//! Which device a call of the SDK is about is a state of the process, and a frame sets it. So force is switched in a frame, by
+//! the thread of the scheduler: no other device can come in between.
+
+use crate::ffi::{Scheduled, Stopped};
+use crate::hd::{Failed, Force, Hd};
+use flotor_hal::{Fault, Wrench};
+use flotor_vendor_sdk::{Exchange, Orders, without_signals};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Who is in the scheduler of this process, which runs as long as there is anybody.
+static CLIENTS: Mutex<Clients> = Mutex::new(Clients { running: 0, retired: Vec::new() });
+
+struct Clients {
+    running: usize,
+    /// Taken out while the scheduler ran on for others: freed when it ends.
+    retired: Vec<Scheduled>,
+}
+
+fn clients() -> MutexGuard<'static, Clients> {
+    CLIENTS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What the scheduler calls for a device.
+pub(crate) struct Client {
+    hd: Arc<Hd>,
+    exchange: Arc<Exchange>,
+    orders: Orders,
+    force: Force,
+}
+
+impl Client {
+    /// A tick: a frame with a sample and a wrench. Whether it is to be called again.
+    pub(crate) fn step(&mut self) -> bool {
+        match self.frame() {
+            Ok(()) if self.exchange.is_over() => self.give_up(),
+            Ok(()) => true,
+            Err(fault) => {
+                self.exchange.fail(fault);
+                self.give_up()
+            }
+        }
+    }
+
+    fn frame(&mut self) -> Result<(), Fault> {
+        let sample = self.hd.begin()?;
+        if self.force == Force::Off {
+            self.hd.switch_here(Force::On);
+            self.force = Force::On;
+        }
+        self.exchange.publish(&sample);
+        let wrench = self.exchange.next_wrench(&mut self.orders);
+        self.hd.finish(&wrench)?;
+        self.exchange.note_sent(&wrench);
+        Ok(())
+    }
+
+    /// No force, and no further call.
+    pub(crate) fn give_up(&mut self) -> bool {
+        // What the SDK says of it changes nothing any more; a frame that is open is ended.
+        let _ = self.hd.finish(&Wrench::ZERO);
+        let _ = self.hd.begin();
+        self.hd.switch_here(Force::Off);
+        let _ = self.hd.finish(&Wrench::ZERO);
+        self.exchange.note_silence();
+        false
+    }
+
+    /// The same after a panic.
+    pub(crate) fn break_off(&mut self) -> bool {
+        self.exchange.fail(Fault::Broken);
+        self.give_up()
+    }
+}
+
+/// A device that the scheduler drives, until it is dropped.
+pub(crate) struct Driver {
+    hd: Arc<Hd>,
+    exchange: Arc<Exchange>,
+    scheduled: Option<Scheduled>,
+}
+
+impl Driver {
+    /// Has the scheduler call the device, which is energised at zero in the first frame. Not real-time.
+    pub(crate) fn start(hd: &Arc<Hd>, exchange: &Arc<Exchange>) -> Result<Self, Failed> {
+        let (hd, exchange) = (Arc::clone(hd), Arc::clone(exchange));
+        let orders = exchange.begin();
+        let client =
+            Client { hd: Arc::clone(&hd), exchange: Arc::clone(&exchange), orders, force: Force::Off };
+        let mut clients = clients();
+        let scheduled = hd.functions().schedule(Box::new(client));
+        if !scheduled.is_in() {
+            // What was never in is never called; it is freed with the others.
+            clients.retired.push(scheduled);
+            return Err(hd.failure("scheduling"));
+        }
+        if clients.running == 0 {
+            without_signals(|| hd.functions().start_scheduler());
+        }
+        clients.running += 1;
+        drop(clients);
+        let driver = Self { hd, exchange, scheduled: Some(scheduled) };
+        driver.hd.check("starting the scheduler").map(|()| driver)
+    }
+}
+
+impl Drop for Driver {
+    /// Zero force, then nothing is called any more. Not real-time.
+    fn drop(&mut self) {
+        let Some(scheduled) = self.scheduled.take() else { return };
+        let functions = self.hd.functions();
+        self.exchange.end();
+        self.exchange.stop();
+        let mut clients = clients();
+        functions.unschedule(&scheduled);
+        clients.running = clients.running.saturating_sub(1);
+        clients.retired.push(scheduled);
+        if clients.running == 0 {
+            let stopped: Stopped = functions.stop_scheduler();
+            clients.retired.drain(..).for_each(|retired| retired.free(&stopped));
+        }
+        drop(clients);
+        // One that was called for the last time is out already: that it cannot be taken out again is no error.
+        let _ = self.hd.check("the end");
+        self.exchange.note_silence();
+    }
+}

@@ -1,0 +1,126 @@
+//! The user's own library, opened at run time and never closed: SDKs leave threads and handlers behind.
+#![allow(unsafe_code)] // libloading; listed in tests/tests/system/architecture.rs
+
+use crate::problem::LibraryProblem;
+use crate::search::{Sdk, looked_at};
+use libloading::os::unix::{Library as Loaded, RTLD_LOCAL, RTLD_NOW};
+use std::mem::ManuallyDrop;
+use std::path::{Path, PathBuf};
+
+/// What Flotor's own drop-in libraries export.
+const MARKER: &[u8] = b"flotor_dropin\0";
+
+/// What to do with one of Flotor's own drop-in libraries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StandIn {
+    /// Nothing is simulated unless somebody says so.
+    Refuse,
+    /// It stands in for a device.
+    Accept,
+}
+
+/// A library of an SDK.
+#[derive(Debug)]
+pub struct Library {
+    loaded: ManuallyDrop<Loaded>,
+    path: PathBuf,
+}
+
+impl Library {
+    /// Opens the library: the file `told`, else the first that fits where the SDK and the system have libraries. Not
+    /// real-time; runs the constructors of the library.
+    ///
+    /// # Errors
+    /// [`LibraryProblem`].
+    pub fn open(sdk: &Sdk, told: Option<&str>, stand_in: StandIn) -> Result<Self, LibraryProblem> {
+        let places = match told {
+            Some(path) => vec![PathBuf::from(path)],
+            None => sdk.places(|variable| std::env::var(variable).ok().filter(|value| !value.is_empty())),
+        };
+        let mut problem = None;
+        for place in &places {
+            match looked_at(place) {
+                Some(Ok(())) => return Self::load(place, stand_in),
+                // One for other processors, perhaps: the right one may lie elsewhere.
+                Some(Err(why)) => problem = problem.or(Some(why)),
+                None => {}
+            }
+        }
+        Err(problem.unwrap_or(LibraryProblem::NotFound { sdk: sdk.name, searched: places }))
+    }
+
+    fn load(path: &Path, stand_in: StandIn) -> Result<Self, LibraryProblem> {
+        // SAFETY: the user guarantees that the file is the library of the SDK that is named: loading it runs its code. It is
+        // bound at once and shares no names with other libraries.
+        let loaded = unsafe { Loaded::open(Some(path), RTLD_NOW | RTLD_LOCAL) };
+        let loaded = loaded.map_err(|error| {
+            let mut cause: &dyn std::error::Error = &error;
+            while let Some(deeper) = cause.source() {
+                cause = deeper;
+            }
+            LibraryProblem::Refused { path: path.to_path_buf(), reason: cause.to_string() }
+        })?;
+        let library = Self { loaded: ManuallyDrop::new(loaded), path: path.to_path_buf() };
+        // SAFETY: only its address is looked at; it is not called.
+        let is_stand_in = unsafe { library.optional::<*const ()>(MARKER) }.is_some();
+        match stand_in {
+            StandIn::Refuse if is_stand_in => Err(LibraryProblem::StandIn { path: library.path }),
+            StandIn::Refuse | StandIn::Accept => Ok(library),
+        }
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// A function of the library; its name ends in `\0`. Not real-time.
+    ///
+    /// # Safety
+    /// `F` is a function pointer of the type that the SDK documents for this name.
+    #[must_use]
+    pub unsafe fn optional<F: Copy>(&self, name: &[u8]) -> Option<F> {
+        // SAFETY: by the contract of this function; the library is never closed, so that the copy stays valid.
+        unsafe { self.loaded.get::<F>(name) }.ok().map(|symbol| *symbol)
+    }
+}
+
+/// Declares functions of an SDK: a struct with a pointer for each, and `load`, which looks all of them up. Those after
+/// `optional` may be missing. To be used in a module of FFI, whose declarations are those that the SDK documents: whoever calls
+/// one guarantees its arguments.
+#[macro_export]
+macro_rules! sdk_functions {
+    (
+        $(#[$meta:meta])* $visibility:vis struct $table:ident needs $needed:literal {
+            $(fn $name:ident($($argument:ty),* $(,)?) $(-> $result:ty)?;)+
+            $(optional fn $perhaps:ident($($given:ty),* $(,)?) $(-> $answer:ty)?;)*
+        }
+    ) => {
+        $(#[$meta])*
+        #[allow(non_snake_case)] // the names are another maker's
+        #[derive(Clone, Copy, Debug)]
+        $visibility struct $table {
+            $($visibility $name: unsafe extern "C" fn($($argument),*) $(-> $result)?,)+
+            $($visibility $perhaps: Option<unsafe extern "C" fn($($given),*) $(-> $answer)?>,)*
+        }
+
+        impl $table {
+            /// Looks all of them up. Not real-time.
+            $visibility fn load(library: &$crate::Library) -> Result<Self, $crate::LibraryProblem> {
+                let missing = |function| $crate::LibraryProblem::MissingFunction {
+                    path: library.path().to_path_buf(),
+                    function,
+                    needed: $needed.to_owned(),
+                };
+                Ok(Self {
+                    // SAFETY: the types of this block are those the SDK documents for the names.
+                    $($name: unsafe { library.optional(concat!(stringify!($name), "\0").as_bytes()) }
+                        .ok_or_else(|| missing(stringify!($name)))?,)+
+                    // SAFETY: as above.
+                    $($perhaps: unsafe { library.optional(concat!(stringify!($perhaps), "\0").as_bytes()) },)*
+                })
+            }
+        }
+    };
+}

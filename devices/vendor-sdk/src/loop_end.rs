@@ -1,0 +1,85 @@
+//! The loop's side of an exchange, as the contract wants it.
+
+use crate::exchange::Exchange;
+use flotor_hal::{Cycle, DVec3, DeviceState, Fault, SafeStop, SampleWait, Tick, Wrench};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Takes the force away, from any thread.
+#[derive(Clone, Debug)]
+pub struct StopSwitch(pub Arc<Exchange>);
+
+impl SafeStop for StopSwitch {
+    fn safe_stop(&self) {
+        self.0.stop();
+    }
+}
+
+/// What `read`, `write` and `wait_for_sample` of a device do that a thread of an SDK drives.
+#[derive(Debug)]
+pub struct LoopEnd {
+    exchange: Arc<Exchange>,
+    /// Largest force, N, and torque, N·m, in any direction.
+    most: [f64; 2],
+    timeout: Duration,
+    seen: u64,
+    /// Samples that a wait has told of.
+    awaited: u64,
+    fresh: Instant,
+    state: DeviceState,
+}
+
+impl LoopEnd {
+    /// Of an exchange that has begun; a sample is a fault when it does not come within `timeout`. Not real-time.
+    #[must_use]
+    pub fn new(exchange: Arc<Exchange>, most: [f64; 2], timeout: Duration) -> Self {
+        let seen = exchange.begun_at();
+        Self { exchange, most, timeout, seen, awaited: seen, fresh: Instant::now(), state: DeviceState::HOME }
+    }
+
+    /// The newest sample. Real-time: bounded, no allocation; in lockstep it waits.
+    pub fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
+        if let Some(patience) = self.exchange.lockstep_patience() {
+            self.exchange.wait_for_sample(self.seen, patience);
+        }
+        let newest = self.exchange.newest().filter(|(count, _)| *count > self.seen);
+        let cycle = match (self.exchange.fault(), newest) {
+            (Some(fault), _) => Cycle::Fault(fault),
+            (None, Some((count, sample))) => {
+                (self.seen, self.fresh) = (count, Instant::now());
+                self.state = DeviceState { sampled_ns: tick.time_ns, ..sample };
+                Cycle::Fresh
+            }
+            (None, None) if self.fresh.elapsed() > self.timeout => Cycle::Fault(Fault::Timeout),
+            (None, None) => Cycle::Stale,
+        };
+        *state = self.state;
+        cycle
+    }
+
+    /// The wrench from now on, within the limits of the device. Real-time: bounded, no allocation.
+    pub fn write(&mut self, wrench: &Wrench) -> Cycle {
+        let [force_n, torque_nm] = [wrench.force(), wrench.torque()];
+        let within = |vector: DVec3, most: f64| {
+            if vector.is_finite() { vector.clamp_length_max(most) } else { DVec3::ZERO }
+        };
+        let [most_n, most_nm] = self.most;
+        let limited = Wrench::new(within(force_n, most_n), within(torque_nm, most_nm));
+        self.exchange.command(&limited);
+        self.exchange.fault().map_or(Cycle::Fresh, Cycle::Fault)
+    }
+
+    /// Waits for a sample that no earlier wait has told of. Real-time but for the waiting: no allocation.
+    pub fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
+        self.exchange.wait_for_sample(self.awaited, Duration::from_nanos(timeout_ns));
+        let samples = self.exchange.samples();
+        let new = samples.saturating_sub(self.awaited);
+        self.awaited = samples;
+        match (new, self.exchange.fault()) {
+            // What is wrong is told by the next read.
+            (0, Some(_)) => SampleWait::Arrived { samples: 1 },
+            (0, None) => SampleWait::TimedOut,
+            (samples, _) => SampleWait::Arrived { samples },
+        }
+    }
+}

@@ -1,0 +1,54 @@
+/* A model that presses along one axis after the other: x, y, z, then about them. It begins after 400 steps; each axis is pressed
+ * for 300 and free for 300. */
+#include "flotor.h"
+#include <stdlib.h>
+#include <string.h>
+
+FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-press\"\nname = \"Press\"\ndoc = \"Presses along each axis\"\n"
+                "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_press\"\n");
+
+enum { BEGIN = 400, PRESSED = 300, ROUND = 600 };
+
+static uint32_t create(const FlotorParameterValue *values, uint32_t count, FlotorMessage *message, FlotorInstance *out) {
+    (void)values, (void)count, (void)message;
+    *out = calloc(1, sizeof(uint64_t));
+    return 0;
+}
+
+static void destroy(FlotorInstance instance) { free(instance); }
+
+static uint32_t step(FlotorInstance instance, const FlotorInput *input, FlotorOutput *output) {
+    (void)input;
+    uint64_t *steps = instance;
+    const uint64_t at = (*steps)++;
+    *output = (FlotorOutput){0};
+    if (at >= BEGIN && (at - BEGIN) / ROUND < 6 && (at - BEGIN) % ROUND < PRESSED) {
+        const uint64_t axis = (at - BEGIN) / ROUND;
+        if (axis < 3) {
+            output->wrench.force_n[axis] = 1.0;
+        } else {
+            output->wrench.torque_nm[axis - 3] = 0.02;
+        }
+    }
+    return FlotorCallStatus_Ok;
+}
+
+static const FlotorForceTable table = {
+    .size = sizeof(FlotorForceTable),
+    .info = {.id = FLOTOR_STR("fixture-press"), .name = FLOTOR_STR("Press"), .doc = FLOTOR_STR("Presses along each axis"),
+             .serves = {FLOTOR_DEMAND_FORCE | FLOTOR_DEMAND_TORQUE},
+             .memory = FlotorMemory_PathDependent},
+    .create = create,
+    .destroy = destroy,
+    .step = step,
+};
+
+static const void *get_interface(FlotorStr id) {
+    static const char force[] = FLOTOR_INTERFACE_FORCE;
+    return id.len == sizeof force - 1 && memcmp(id.ptr, force, id.len) == 0 ? &table : NULL;
+}
+
+FLOTOR_ENTRY(flotor_entry_press) = {
+    FLOTOR_ENTRY_HEAD(FlotorPluginKind_Model),
+    .get_interface = get_interface,
+};
