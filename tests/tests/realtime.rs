@@ -4,6 +4,8 @@
 //! the plugins are counted linked into this test; the host is counted with the libraries it really loads.
 #![allow(unsafe_code)] // an allocator cannot be written without; tests/tests/system/architecture.rs lists it
 
+#[path = "realtime/inverse3.rs"]
+mod inverse3;
 #[path = "realtime/ml_api.rs"]
 mod ml_api;
 

@@ -20,6 +20,8 @@ mod force_sensor;
 mod golden;
 mod haply;
 mod installation;
+#[cfg(feature = "drop-ins")]
+mod inverse3;
 mod isolation;
 mod judges;
 mod latch;

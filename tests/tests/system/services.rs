@@ -17,14 +17,14 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 /// The service in a process of its own; ended with the test.
-struct Service {
-    process: Owned,
-    simulation: String,
+pub(super) struct Service {
+    pub(super) process: Owned,
+    pub(super) simulation: String,
     events: String,
 }
 
 impl Service {
-    fn start(arguments: &[&str]) -> Self {
+    pub(super) fn start(arguments: &[&str]) -> Self {
         let program =
             build_folder().join(format!("flotor-haply-service-emulator{}", std::env::consts::EXE_SUFFIX));
         let mut command = Command::new(program);
@@ -66,7 +66,7 @@ impl Service {
     }
 
     /// Ends it in order; what it said of the run.
-    fn end(self) -> String {
+    pub(super) fn end(self) -> String {
         self.process.signal(Signal::TERM);
         let output = self.process.output();
         assert!(output.status.success(), "{output:?}");

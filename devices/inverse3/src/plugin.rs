@@ -1,0 +1,276 @@
+//! The device as a plugin: positions from the service, forces to it, the grip's orientation and buttons.
+
+use crate::exchange::{Exchange, ForceSwitch};
+use crate::message::Sample;
+use crate::session::{GripRequest, Request, Session};
+use crate::trouble::Trouble;
+use flotor_hal::{
+    ActiveDevice, Axes, Capabilities, Conditions, Cycle, DVec3, Device, DeviceInfo, DeviceState,
+    IndependentStop, IndependentStopDevice, LoopConfig, Parameter, Pose, Refusal, Settings, StoppedState,
+    Tick, Twist, Wrench, export_device, math, rotation_vector,
+};
+use std::f64::consts::{PI, TAU};
+use std::time::{Duration, Instant};
+
+/// Where the service listens.
+const ADDRESS: &str = "127.0.0.1:10001";
+/// The word for no grip.
+const NO_GRIP: &str = "none";
+/// Smallest step of the cursor, m: the maker's number.
+const RESOLUTION_M: f64 = 1.0e-5;
+/// Change of force, N/s: from nothing to the default limit in a millisecond.
+const SLEW_N_PER_S: f64 = 5000.0;
+/// From a tick to the force that answers it, beyond one period: to the service and to the device, s.
+const LATENCY_S: f64 = 1.0e-3;
+/// How long commands that are not renewed may count, several times over.
+const COMMANDS_FADE: Duration = Duration::from_millis(500);
+const LOOK: Duration = Duration::from_millis(5);
+/// Time after which a service takes the force of a session without messages away: documented as a return to idle, without
+/// a number; Flotor's own service takes 0.1 s. Of a host that is gone the connection ends at once.
+const STOP_NS: u64 = 100_000_000;
+
+const SCHEMA: &[Parameter] = &[
+    Parameter::text(
+        "address",
+        "Where the Inverse Service listens, as 127.0.0.1:10001, which it is if not said",
+    ),
+    Parameter::text("device", "Which Inverse3, by the id on its label; the only one if not said"),
+    Parameter::text("grip", "Which VerseGrip, by its id, or none; the only one if not said"),
+    Parameter::real("max_force_n", "N", 0.0, 20.0, 5.0, "Largest force on the hand"),
+    Parameter::real("range_mm", "mm", 1.0, 200.0, 60.0, "Farthest from the centre of the arm's range"),
+    Parameter::real("force_gate", "1", 0.0, 1.0, 0.0, "Gain of the service's force gate; 0: none"),
+    Parameter::real(
+        "foreign_force_n",
+        "N",
+        0.0,
+        100.0,
+        0.5,
+        "Force beyond the commanded one that is another program's, and a fault",
+    ),
+    Parameter::real(
+        "spin_cutoff_hz",
+        "Hz",
+        1.0,
+        500.0,
+        30.0,
+        "Angular velocity is the difference of orientations, smoothed below this frequency",
+    ),
+    Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 100.0, "Silence of the service that is a fault"),
+];
+
+/// What of the parameters is in force.
+#[derive(Clone, Debug)]
+struct Options {
+    request: Request,
+    max_force_n: f64,
+    range_m: f64,
+    spin_cutoff_hz: f64,
+    parameters: [f64; SCHEMA.len()],
+}
+
+impl Options {
+    fn new(settings: &Settings<'_>) -> Self {
+        let mut parameters = [0.0; SCHEMA.len()];
+        for (value, parameter) in parameters.iter_mut().zip(SCHEMA) {
+            *value = settings.number_or_default(parameter.id());
+        }
+        let grip = match settings.text("grip") {
+            None => GripRequest::OnlyOne,
+            Some(NO_GRIP) => GripRequest::None,
+            Some(id) => GripRequest::Named(id.to_owned()),
+        };
+        let request = Request {
+            address: settings.text("address").unwrap_or(ADDRESS).to_owned(),
+            arm: settings.text("device").map(str::to_owned),
+            grip,
+            force_gate: settings.number_or_default("force_gate"),
+            timeout: Duration::from_secs_f64(settings.number_or_default("timeout_ms") * 1.0e-3),
+            foreign_force_n: settings.number_or_default("foreign_force_n"),
+        };
+        Self {
+            request,
+            max_force_n: settings.number_or_default("max_force_n"),
+            range_m: settings.number_or_default("range_mm") * 1.0e-3,
+            spin_cutoff_hz: settings.number_or_default("spin_cutoff_hz"),
+            parameters,
+        }
+    }
+}
+
+/// An Inverse3, opened: a session of the service that commands nothing.
+pub struct Inverse3Device {
+    options: Options,
+    /// Gone after a fault: the next activation opens another.
+    session: Option<Session>,
+    has_grip: bool,
+    switch: ForceSwitch,
+}
+
+/// An Inverse3 that follows the host.
+pub struct DrivenDevice {
+    opened: Inverse3Device,
+    exchange: Exchange,
+    /// The sample of the activation, until it is read.
+    first: Option<Sample>,
+    state: DeviceState,
+    /// When the last sample was taken, ns.
+    sampled_ns: Option<u64>,
+}
+
+impl Device for Inverse3Device {
+    const INFO: DeviceInfo = DeviceInfo::new(
+        "inverse3",
+        "Haply Inverse3",
+        "A desktop arm with three driven axes and a grip that turns freely, through Haply's Inverse Service",
+    );
+    const PARAMETERS: &'static [Parameter] = SCHEMA;
+    type Active = DrivenDevice;
+    type Stop = ForceSwitch;
+
+    fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        let options = Options::new(settings);
+        let session = Session::open(&options.request).map_err(Refusal::resource)?;
+        let has_grip = session.chosen().grip.is_some();
+        Ok(Self { options, session: Some(session), has_grip, switch: ForceSwitch::default() })
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        let Options { max_force_n, range_m, .. } = self.options;
+        let (sensed, range_rad) =
+            if self.has_grip { (Axes::ALL, [PI; 3]) } else { (Axes::TRANSLATION, [0.0; 3]) };
+        Capabilities {
+            sensed,
+            actuated: Axes::TRANSLATION,
+            range_m: [range_m; 3],
+            range_rad,
+            resolution_m: RESOLUTION_M,
+            max_force_n: [max_force_n; 3],
+            max_torque_nm: [0.0; 3],
+            max_force_slew_n_per_s: SLEW_N_PER_S,
+            max_torque_slew_nm_per_s: f64::INFINITY, // of nothing
+            max_stiffness_n_per_m: 0.0,
+            rate_hz: [100.0, 4000.0],
+            latency_s: LATENCY_S,
+        }
+    }
+
+    fn stopper(&self) -> ForceSwitch {
+        self.switch.clone()
+    }
+
+    fn activate(mut self, _config: &LoopConfig) -> Result<DrivenDevice, (Self, Refusal)> {
+        match self.start() {
+            Ok((exchange, sample)) => Ok(DrivenDevice {
+                opened: self,
+                exchange,
+                first: Some(sample),
+                state: DeviceState::HOME,
+                sampled_ns: None,
+            }),
+            Err(refusal) => Err((self, refusal)),
+        }
+    }
+
+    fn parameter(&self, index: usize) -> f64 {
+        self.options.parameters.get(index).copied().unwrap_or(f64::NAN)
+    }
+}
+
+impl Inverse3Device {
+    fn start(&mut self) -> Result<(Exchange, Sample), Refusal> {
+        let mut session = match self.session.take() {
+            Some(session) => session,
+            None => Session::open(&self.options.request).map_err(Refusal::resource)?,
+        };
+        let failed = |trouble: Trouble| {
+            Refusal::resource(format!("the Inverse Service at {}: {trouble}", self.options.request.address))
+        };
+        let (mut sample, started) = (session.look().map_err(failed)?, Instant::now());
+        // The last commands of this session are valid for a moment.
+        while sample.is_commanded && started.elapsed() < COMMANDS_FADE {
+            std::thread::sleep(LOOK);
+            sample = session.look().map_err(failed)?;
+        }
+        if sample.is_commanded {
+            self.session = Some(session);
+            return Err(Refusal::resource(
+                "another program commands this Inverse3, and the forces of both would add up; end that one first",
+            ));
+        }
+        self.switch.rearm();
+        let exchange = Exchange::start(session, &self.switch).map_err(Refusal::resource)?;
+        Ok((exchange, sample))
+    }
+}
+
+impl ActiveDevice for DrivenDevice {
+    type Opened = Inverse3Device;
+
+    fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
+        let newest = match self.exchange.take() {
+            Ok(newest) => newest.or(self.first),
+            Err(trouble) => return Cycle::Fault(trouble.fault()),
+        };
+        self.first = None;
+        let cycle = match newest {
+            Some(sample) => {
+                self.sample(&sample, tick.time_ns);
+                Cycle::Fresh
+            }
+            // A service that is silent for too long is told by the thread.
+            None => Cycle::Stale,
+        };
+        *state = self.state;
+        cycle
+    }
+
+    fn write(&mut self, _tick: &Tick, wrench: &Wrench) -> Cycle {
+        let asked_n = wrench.force();
+        let force_n = match asked_n.is_finite() && !self.opened.switch.is_stopped() {
+            true => asked_n.clamp_length_max(self.opened.options.max_force_n),
+            false => DVec3::ZERO,
+        };
+        if self.exchange.leave(force_n) { Cycle::Fresh } else { Cycle::Stale }
+    }
+
+    fn deactivate(mut self) -> Inverse3Device {
+        self.opened.session = self.exchange.end();
+        self.opened
+    }
+}
+
+impl DrivenDevice {
+    /// Takes what the service says as the sample of a time.
+    fn sample(&mut self, sample: &Sample, time_ns: u64) {
+        let pose = Pose::new(sample.position_m, sample.orientation);
+        let angular = match self.sampled_ns {
+            Some(before_ns) if time_ns > before_ns => {
+                let dt_s = (time_ns - before_ns) as f64 * 1.0e-9;
+                let before = self.state.pose.orientation();
+                let turned_rad = rotation_vector(sample.orientation * before.conjugate());
+                // A first-order low pass, exact for a difference that is held over the interval.
+                let share = 1.0 - math::exp(-TAU * self.opened.options.spin_cutoff_hz * dt_s);
+                self.state.twist.angular().lerp(turned_rad / dt_s, share)
+            }
+            _ => DVec3::ZERO,
+        };
+        self.sampled_ns = Some(time_ns);
+        self.state = DeviceState {
+            pose,
+            twist: Twist::new(sample.velocity_m_per_s, angular),
+            delivered: Wrench::from_force(sample.force_n),
+            sampled_ns: time_ns,
+            buttons: sample.buttons,
+            conditions: Conditions::NONE,
+        };
+    }
+}
+
+impl IndependentStopDevice for Inverse3Device {
+    /// The connection ends with the host's process, and the session and its force with the connection.
+    fn independent_stop(&self) -> IndependentStop {
+        IndependentStop::by_itself(StoppedState::Zero, STOP_NS)
+    }
+}
+
+export_device!(Inverse3Device, independent_stop);

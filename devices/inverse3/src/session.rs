@@ -1,0 +1,164 @@
+//! A session of the service: opened with settings that are read back, then one sample for each force.
+
+use crate::foreign::ForeignForce;
+use crate::message::{self, Chosen, Grip, Inventory, Sample};
+use crate::socket::Socket;
+use crate::trouble::Trouble;
+use flotor_hal::DVec3;
+use std::time::Duration;
+
+/// How long the service may take to agree to a session.
+const PATIENCE: Duration = Duration::from_secs(3);
+/// Room for a message that commands a force: the longest has some 200 bytes.
+const MESSAGE_BYTES: usize = 512;
+
+/// What a session is to be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Request {
+    /// `host:port` of the service.
+    pub address: String,
+    /// Id of the arm; the only one if not said.
+    pub arm: Option<String>,
+    /// Which grip.
+    pub grip: GripRequest,
+    /// Gain of the service's force gate.
+    pub force_gate: f64,
+    /// Silence of the service that is a fault.
+    pub timeout: Duration,
+    /// Force of the device beyond this session's own that is a fault, N.
+    pub foreign_force_n: f64,
+}
+
+/// Which grip a session is to have.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum GripRequest {
+    /// The only one; none if there is none.
+    OnlyOne,
+    /// None.
+    None,
+    /// The one with this id.
+    Named(String),
+}
+
+/// An open session.
+#[derive(Debug)]
+pub struct Session {
+    socket: Socket,
+    chosen: Chosen,
+    message: Vec<u8>,
+    foreign: ForeignForce,
+}
+
+impl Session {
+    /// Opens a session, sets what is to be set, and reads it back. Not real-time.
+    ///
+    /// # Errors
+    /// One sentence: what is wrong, and what to do.
+    pub fn open(request: &Request) -> Result<Self, String> {
+        let address = &request.address;
+        let of_service = |cause: String| format!("the Inverse Service at {address}: {cause}");
+        let mut socket = Socket::connect(address, PATIENCE).map_err(|cause| {
+            of_service(format!(
+                "{cause}; start Haply's service, or `flotor emulate haply-service` for one without hardware"
+            ))
+        })?;
+        let mut talk = |text: &str| {
+            if !text.is_empty() {
+                socket.send(text.as_bytes())?;
+            }
+            socket.receive().map(<[u8]>::to_vec)
+        };
+        let failed = |trouble: Trouble| of_service(trouble.to_string());
+        // The service speaks first.
+        let first = talk("").map_err(failed)?;
+        let inventory = message::inventory(&first).map_err(|malformed| failed(malformed.into()))?;
+        let chosen = choose(request, &inventory).map_err(of_service)?;
+        let told = talk(&message::configure(&chosen, request.force_gate)).map_err(failed)?;
+        let wanted = message::settings(request.force_gate);
+        if let Some((path, said)) = message::differing(&told, &chosen.arm, &wanted).map_err(failed)? {
+            return Err(of_service(format!(
+                "`{}` of the device {} is {said} and cannot be changed; the force on the hand would not be the commanded one. \
+                 End other programs that configure the device, and update the service to 3.5 or newer",
+                path.join("."),
+                chosen.arm
+            )));
+        }
+        socket.set_patience(request.timeout).map_err(|error| of_service(error.to_string()))?;
+        let message = Vec::with_capacity(MESSAGE_BYTES);
+        Ok(Self { socket, chosen, message, foreign: ForeignForce::new(request.foreign_force_n) })
+    }
+
+    /// The devices it has.
+    #[must_use]
+    pub fn chosen(&self) -> &Chosen {
+        &self.chosen
+    }
+
+    /// Reads a sample without a command. Real-time but for the waiting: no allocation.
+    ///
+    /// # Errors
+    /// A [`Trouble`].
+    pub fn look(&mut self) -> Result<Sample, Trouble> {
+        self.socket.send(message::LOOK)?;
+        message::sample(self.socket.receive()?, &self.chosen)
+    }
+
+    /// Commands a force on the hand, N, and waits for the sample that answers it. Real-time but for the waiting: no
+    /// allocation.
+    ///
+    /// # Errors
+    /// A [`Trouble`]; end the session then, with which its force ends.
+    pub fn exchange(&mut self, force_n: DVec3) -> Result<Sample, Trouble> {
+        message::force(&mut self.message, &self.chosen.arm, force_n);
+        self.socket.send(&self.message)?;
+        let sample = message::sample(self.socket.receive()?, &self.chosen)?;
+        match self.foreign.is_there(force_n, sample.force_n) {
+            true => Err(Trouble::ForeignForce),
+            false => Ok(sample),
+        }
+    }
+
+    /// Takes the force away and ends the session, whatever became of it.
+    pub fn end(&mut self) {
+        message::force(&mut self.message, &self.chosen.arm, DVec3::ZERO);
+        // One that is gone has taken its force along.
+        let _ = self.socket.send(&self.message);
+        self.socket.close();
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+fn choose(request: &Request, Inventory { arms, grips }: &Inventory) -> Result<Chosen, String> {
+    let listed = |ids: &[&str]| if ids.is_empty() { "none".to_owned() } else { ids.join(", ") };
+    let ids: Vec<&str> = arms.iter().map(String::as_str).collect();
+    let arm = match (&request.arm, arms.as_slice()) {
+        (Some(named), _) => arms.iter().find(|id| id.eq_ignore_ascii_case(named)).ok_or_else(|| {
+            format!("it has no device {named}, but {}; `device` must be one of them", listed(&ids))
+        })?,
+        (None, [only]) => only,
+        (None, []) => return Err("it has no device; is one connected, and its power on?".to_owned()),
+        (None, _) => {
+            return Err(format!("it has several devices; say with `device` which: {}", listed(&ids)));
+        }
+    };
+    let ids: Vec<&str> = grips.iter().map(|grip| grip.id.as_str()).collect();
+    let grip = match (&request.grip, grips.as_slice()) {
+        (GripRequest::None, _) | (GripRequest::OnlyOne, []) => None,
+        (GripRequest::OnlyOne, [only]) => Some(only.clone()),
+        (GripRequest::OnlyOne, _) => {
+            return Err(format!("it has several grips; say with `grip` which, or `none`: {}", listed(&ids)));
+        }
+        (GripRequest::Named(named), _) => {
+            let found: Option<&Grip> = grips.iter().find(|grip| grip.id.eq_ignore_ascii_case(named));
+            Some(found.cloned().ok_or_else(|| {
+                format!("it has no grip {named}, but {}; `grip` must be one of them, or `none`", listed(&ids))
+            })?)
+        }
+    };
+    Ok(Chosen { arm: arm.clone(), grip })
+}

@@ -1,0 +1,215 @@
+//! A WebSocket to the service: whole text messages, one way and the other, in buffers that never grow.
+//!
+//! The frames are tungstenite's (RFC 6455). Its own reader would take a message of any length up to its limit before it
+//! is asked; here the header of a message that is too long is enough to refuse it.
+
+use crate::trouble::Trouble;
+use std::io::{self, Cursor, ErrorKind, Read, Write};
+use std::net::{Shutdown, TcpStream, ToSocketAddrs};
+use std::time::{Duration, Instant};
+use tungstenite::handshake::client::generate_key;
+use tungstenite::handshake::derive_accept_key;
+use tungstenite::protocol::frame::FrameHeader;
+use tungstenite::protocol::frame::coding::{Control, Data, OpCode};
+
+/// Longest message of the service: a state of one device has about a kilobyte, an inventory a few for each.
+pub const LONGEST_BYTES: usize = 256 << 10;
+/// Room for a message to the service: the longest configures a session.
+const SENT_BYTES: usize = 2048;
+/// Longest answer to the request for a WebSocket.
+const LONGEST_HEAD: usize = 8 << 10;
+/// Longest control frame (RFC 6455, section 5.5).
+const LONGEST_CONTROL: usize = 125;
+
+/// A connection on which one message waits for one answer.
+#[derive(Debug)]
+pub struct Socket {
+    stream: TcpStream,
+    patience: Duration,
+    /// What has arrived lies between `start` and `end`.
+    buffer: Box<[u8]>,
+    start: usize,
+    end: usize,
+    sent: Vec<u8>,
+    /// What the next frame is masked with.
+    mask: u32,
+}
+
+impl Socket {
+    /// Connects, and waits for the service to agree. Not real-time.
+    ///
+    /// # Errors
+    /// One clause: what the system or the other end says.
+    pub fn connect(address: &str, patience: Duration) -> Result<Self, String> {
+        let lookup = address.to_socket_addrs().map_err(|error| error.to_string())?;
+        let mut failed = "no host has that name".to_owned();
+        for candidate in lookup {
+            match TcpStream::connect_timeout(&candidate, patience) {
+                Ok(stream) => return Self::on(stream, address, patience).map_err(|error| error.to_string()),
+                Err(error) => failed = error.to_string(),
+            }
+        }
+        Err(failed)
+    }
+
+    fn on(stream: TcpStream, address: &str, patience: Duration) -> io::Result<Self> {
+        stream.set_nodelay(true)?;
+        stream.set_read_timeout(Some(patience))?;
+        stream.set_write_timeout(Some(patience))?;
+        let key = generate_key();
+        // Masks are there for old proxies: on the way to a service of this machine any will do, each frame its own.
+        let mask = key.bytes().fold(0x9e37_79b9, |mask: u32, byte| mask.rotate_left(5) ^ u32::from(byte));
+        let buffer = vec![0; LONGEST_BYTES + LONGEST_CONTROL].into_boxed_slice();
+        let sent = Vec::with_capacity(SENT_BYTES);
+        let mut socket = Self { stream, patience, buffer, start: 0, end: 0, sent, mask };
+        socket.upgrade(address, &key)?;
+        Ok(socket)
+    }
+
+    fn upgrade(&mut self, host: &str, key: &str) -> io::Result<()> {
+        let no_service = || io::Error::new(ErrorKind::InvalidData, "what answers there is no WebSocket");
+        write!(
+            self.stream,
+            "GET / HTTP/1.1\r\nHost: {host}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+             Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: {key}\r\n\r\n"
+        )?;
+        let head = loop {
+            let arrived = self.buffer.get(..self.end).unwrap_or_default();
+            if let Some(end) = arrived.windows(4).position(|window| window == b"\r\n\r\n") {
+                self.start = end + 4;
+                break String::from_utf8_lossy(arrived.get(..end).unwrap_or_default()).into_owned();
+            }
+            if self.end >= LONGEST_HEAD {
+                return Err(no_service());
+            }
+            let room = self.buffer.get_mut(self.end..).unwrap_or_default();
+            match self.stream.read(room)? {
+                0 => return Err(no_service()),
+                length => self.end += length,
+            }
+        };
+        let mut lines = head.split("\r\n");
+        let is_agreed = lines.next().is_some_and(|status| status.split(' ').nth(1) == Some("101"));
+        let accepted = derive_accept_key(key.as_bytes());
+        let proves_it = |line: &str| {
+            line.split_once(':').is_some_and(|(name, value)| {
+                name.trim().eq_ignore_ascii_case("sec-websocket-accept") && value.trim() == accepted
+            })
+        };
+        if is_agreed && lines.any(proves_it) { Ok(()) } else { Err(no_service()) }
+    }
+
+    /// Sends a text. Real-time but for the system: bounded, no allocation.
+    ///
+    /// # Errors
+    /// [`Trouble::Gone`].
+    pub fn send(&mut self, text: &[u8]) -> Result<(), Trouble> {
+        self.send_frame(OpCode::Data(Data::Text), text)
+    }
+
+    fn send_frame(&mut self, opcode: OpCode, payload: &[u8]) -> Result<(), Trouble> {
+        // Xorshift (Marsaglia 2003): another mask for each frame.
+        self.mask ^= self.mask << 13;
+        self.mask ^= self.mask >> 17;
+        self.mask ^= self.mask << 5;
+        let mask = self.mask.to_le_bytes();
+        let header = FrameHeader { opcode, mask: Some(mask), ..FrameHeader::default() };
+        self.sent.clear();
+        header.format(payload.len() as u64, &mut self.sent).map_err(|_| Trouble::Gone)?;
+        self.sent.extend(payload.iter().zip(mask.iter().cycle()).map(|(byte, mask)| byte ^ mask));
+        self.stream.write_all(&self.sent).map_err(|_| Trouble::Gone)
+    }
+
+    /// Waits for the next text, which stays in the buffer until the next call. Real-time but for the waiting: bounded, no
+    /// allocation.
+    ///
+    /// # Errors
+    /// A [`Trouble`]: the other end is gone, silent, or sends what is no whole message.
+    pub fn receive(&mut self) -> Result<&[u8], Trouble> {
+        let until = Instant::now() + self.patience;
+        loop {
+            let (opcode, from, to) = self.next_frame(until)?;
+            self.start = to;
+            match opcode {
+                OpCode::Data(Data::Text | Data::Binary) => {
+                    return Ok(self.buffer.get(from..to).unwrap_or_default());
+                }
+                OpCode::Control(Control::Close) => return Err(Trouble::Gone),
+                OpCode::Control(Control::Ping) => {
+                    let mut echoed = [0; LONGEST_CONTROL];
+                    let payload = self.buffer.get(from..to).unwrap_or_default();
+                    let length = payload.len().min(LONGEST_CONTROL);
+                    echoed.iter_mut().zip(payload).for_each(|(place, byte)| *place = *byte);
+                    self.send_frame(
+                        OpCode::Control(Control::Pong),
+                        echoed.get(..length).unwrap_or_default(),
+                    )?;
+                }
+                OpCode::Control(_) => {}
+                OpCode::Data(_) => return Err(Trouble::NoFrame),
+            }
+        }
+    }
+
+    /// The next frame: its kind, and where its payload begins and ends.
+    fn next_frame(&mut self, until: Instant) -> Result<(OpCode, usize, usize), Trouble> {
+        loop {
+            let arrived = self.buffer.get(self.start..self.end).unwrap_or_default();
+            let mut cursor = Cursor::new(arrived);
+            if let Some((header, length)) = FrameHeader::parse(&mut cursor).map_err(|_| Trouble::NoFrame)? {
+                let is_control = matches!(header.opcode, OpCode::Control(_));
+                let longest = if is_control { LONGEST_CONTROL } else { LONGEST_BYTES };
+                let length = match usize::try_from(length) {
+                    Ok(length) if length <= longest => length,
+                    _ => return Err(Trouble::TooLong(length)),
+                };
+                let is_plain = header.is_final && !(header.rsv1 || header.rsv2 || header.rsv3);
+                if !is_plain || header.mask.is_some() {
+                    return Err(Trouble::NoFrame);
+                }
+                let from = self.start + usize::try_from(cursor.position()).unwrap_or(0);
+                if from + length <= self.end {
+                    return Ok((header.opcode, from, from + length));
+                }
+            }
+            self.fill(until)?;
+        }
+    }
+
+    /// Waits for more bytes.
+    fn fill(&mut self, until: Instant) -> Result<(), Trouble> {
+        // The frame that is being read goes to the beginning: there is room for the longest.
+        self.buffer.copy_within(self.start..self.end, 0);
+        (self.start, self.end) = (0, self.end - self.start);
+        let late = if self.end == 0 { Trouble::Silent } else { Trouble::Unfinished };
+        let room = self.buffer.get_mut(self.end..).unwrap_or_default();
+        match self.stream.read(room) {
+            Ok(0) => Err(Trouble::Gone),
+            Ok(_) if Instant::now() > until => Err(late),
+            Ok(length) => {
+                self.end += length;
+                Ok(())
+            }
+            Err(error) => match error.kind() {
+                ErrorKind::Interrupted if Instant::now() < until => Ok(()),
+                ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted => Err(late),
+                _ => Err(Trouble::Gone),
+            },
+        }
+    }
+
+    /// How long to wait for a message from now on. Not real-time.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn set_patience(&mut self, patience: Duration) -> io::Result<()> {
+        self.patience = patience;
+        self.stream.set_read_timeout(Some(patience))?;
+        self.stream.set_write_timeout(Some(patience))
+    }
+
+    /// Ends the connection, at once and for both ends.
+    pub fn close(&self) {
+        let _ = self.stream.shutdown(Shutdown::Both);
+    }
+}

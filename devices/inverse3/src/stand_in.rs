@@ -1,0 +1,187 @@
+//! A service of a few lines: it says what a test wants, when it wants, and remembers what it was told. Not real-time.
+//!
+//! `flotor emulate haply-service` is a service that keeps its promises; this one breaks them.
+
+use flotor_hal::DVec3;
+use std::io::{self, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use tungstenite::handshake::derive_accept_key;
+
+/// Ids of its devices: two arms and a grip.
+pub const ARM: &str = "049D";
+/// The other arm.
+pub const OTHER_ARM: &str = "0001";
+/// The grip.
+pub const GRIP: &str = "61B8";
+
+/// Its state with the cursor here, m, and this force on the hand, N.
+#[must_use]
+pub fn state(position_m: DVec3, force_n: DVec3) -> String {
+    told(position_m, force_n, "")
+}
+
+/// Its answer to who sets everything as it is to be, with this gain of the force gate.
+#[must_use]
+pub fn configured(force_gate: f64) -> String {
+    let config = format!(
+        "\"config\":{{\"type\":\"inverse3\",\"basis\":{{\"permutation\":\"XYZ\"}},\"preset\":\"arm_front_centered\",\
+         \"filters\":{{\"force_gate\":{{\"gain\":{force_gate}}},\"damping\":{{\"scalar\":0.0}}}},\
+         \"gravity_compensation\":{{\"enabled\":true,\"scaling_factor\":1.0}}}},"
+    );
+    told(DVec3::ZERO, DVec3::ZERO, &config)
+}
+
+fn told(position_m: DVec3, force_n: DVec3, config: &str) -> String {
+    let vector = |DVec3 { x, y, z }: DVec3| format!("{{\"x\":{x:?},\"y\":{y:?},\"z\":{z:?}}}");
+    let arm = |id: &str, config: &str, position_m: DVec3, force_n: DVec3| {
+        format!(
+            "{{\"device_id\":\"{id}\",{config}\"state\":{{\"cursor_position\":{},\"cursor_velocity\":{},\
+             \"angular_position\":{{\"a0\":1.0,\"a1\":2.0,\"a2\":3.0}},\"current_cursor_force\":{},\
+             \"control_domain\":\"cartesian\",\"control_mode\":\"idle\",\"transform\":{{}}}},\
+             \"status\":{{\"calibrated\":true,\"in_use\":false,\"power_supply\":true,\"ready\":true,\"started\":true}}}}",
+            vector(position_m),
+            vector(DVec3::ZERO),
+            vector(force_n)
+        )
+    };
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let (other, own) = (arm(OTHER_ARM, "", DVec3::ONE, DVec3::ONE), arm(ARM, config, position_m, force_n));
+    format!(
+        "{{\"session_id\":7,\"inverse3\":[{other},{own}],\"verse_grip\":[],\"wireless_verse_grip\":[\
+         {{\"device_id\":\"{GRIP}\",\"state\":{{\"battery_level\":0.9,\"buttons\":{{\"a\":true,\"b\":false,\"c\":true}},\
+         \"orientation\":{{\"w\":{half},\"x\":0.0,\"y\":0.0,\"z\":{half}}}}},\
+         \"status\":{{\"ready\":true,\"connected\":true,\"awake\":true}}}}]}}"
+    )
+}
+
+/// What is sent for a message.
+#[derive(Clone, Debug)]
+pub enum Said {
+    /// A text message.
+    Text(String),
+    /// These bytes.
+    Raw(Vec<u8>),
+    /// Nothing, and the connection stays.
+    Nothing,
+    /// The connection is closed.
+    Close,
+}
+
+/// The service, on a port of this machine, for one client after another.
+#[derive(Debug)]
+pub struct StandIn {
+    /// Where it listens.
+    pub address: String,
+    heard: Arc<Mutex<Vec<String>>>,
+    ended: Arc<AtomicUsize>,
+}
+
+impl StandIn {
+    /// Starts one. `answer` gets each message of a client, and its number in the connection: 0 for the connection itself.
+    ///
+    /// # Errors
+    /// If there is no port, or no thread.
+    pub fn start(answer: impl FnMut(usize, &str) -> Said + Send + 'static) -> io::Result<Self> {
+        let listener = TcpListener::bind("127.0.0.1:0")?;
+        let address = listener.local_addr()?.to_string();
+        let heard = Arc::new(Mutex::new(Vec::new()));
+        let ended = Arc::new(AtomicUsize::new(0));
+        let (mut answer, hearing, ending) = (answer, Arc::clone(&heard), Arc::clone(&ended));
+        std::thread::Builder::new().name("stand-in".to_owned()).spawn(move || {
+            while let Ok((stream, _)) = listener.accept() {
+                // A client that goes is no failure.
+                let _ = serve(stream, &mut answer, &hearing);
+                ending.fetch_add(1, Ordering::Release);
+            }
+        })?;
+        Ok(Self { address, heard, ended })
+    }
+
+    /// How many sessions have ended, and their forces with them.
+    #[must_use]
+    pub fn ended(&self) -> usize {
+        self.ended.load(Ordering::Acquire)
+    }
+
+    /// All messages so far.
+    #[must_use]
+    pub fn heard(&self) -> Vec<String> {
+        self.heard.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// A frame of the service: a text, whole.
+#[must_use]
+pub fn frame(text: &str) -> Vec<u8> {
+    let mut frame = vec![0x81];
+    match u16::try_from(text.len()) {
+        Ok(short @ 0..126) => frame.extend(short.to_be_bytes().get(1)),
+        Ok(long) => {
+            frame.push(126);
+            frame.extend(long.to_be_bytes());
+        }
+        Err(_) => {
+            frame.push(127);
+            frame.extend((text.len() as u64).to_be_bytes());
+        }
+    }
+    frame.extend(text.as_bytes());
+    frame
+}
+
+fn serve(
+    mut stream: TcpStream,
+    answer: &mut impl FnMut(usize, &str) -> Said,
+    hearing: &Mutex<Vec<String>>,
+) -> io::Result<()> {
+    stream.set_nodelay(true)?;
+    let mut head = Vec::new();
+    while !head.ends_with(b"\r\n\r\n") {
+        let mut byte = [0];
+        stream.read_exact(&mut byte)?;
+        head.extend(byte);
+    }
+    let head = String::from_utf8_lossy(&head).into_owned();
+    let key = head.lines().find_map(|line| line.strip_prefix("Sec-WebSocket-Key: ")).unwrap_or_default();
+    let accept = derive_accept_key(key.as_bytes());
+    write!(
+        stream,
+        "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: {accept}\r\n\r\n"
+    )?;
+    let mut text = String::new();
+    for number in 0.. {
+        if number > 0 {
+            text = receive(&mut stream)?;
+            hearing.lock().unwrap_or_else(PoisonError::into_inner).push(text.clone());
+        }
+        match answer(number, &text) {
+            Said::Text(text) => stream.write_all(&frame(&text))?,
+            Said::Raw(bytes) => stream.write_all(&bytes)?,
+            Said::Nothing => {}
+            Said::Close => break,
+        }
+    }
+    Ok(())
+}
+
+/// The next text of the client.
+fn receive(stream: &mut TcpStream) -> io::Result<String> {
+    let mut head = [0; 2];
+    stream.read_exact(&mut head)?;
+    let length = match head[1] & 0x7f {
+        126 => {
+            let mut long = [0; 2];
+            stream.read_exact(&mut long)?;
+            usize::from(u16::from_be_bytes(long))
+        }
+        short => usize::from(short),
+    };
+    let mut mask = [0; 4];
+    stream.read_exact(&mut mask)?;
+    let mut payload = vec![0; length];
+    stream.read_exact(&mut payload)?;
+    payload.iter_mut().zip(mask.iter().cycle()).for_each(|(byte, mask)| *byte ^= mask);
+    Ok(String::from_utf8_lossy(&payload).into_owned())
+}

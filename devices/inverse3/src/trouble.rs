@@ -1,0 +1,73 @@
+//! What goes wrong between the plugin and the service.
+
+use crate::json::Malformed;
+use flotor_hal::Fault;
+use std::fmt;
+
+/// What went wrong, as a closed set; after each the session is over and its force with it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Trouble {
+    /// The service closed the connection, or is gone.
+    Gone,
+    /// No state came in time.
+    Silent,
+    /// A state began and did not go on in time.
+    Unfinished,
+    /// A message is longer than any state, bytes.
+    TooLong(u64),
+    /// What came is no frame of a WebSocket from a server, or a piece of a message.
+    NoFrame,
+    /// A state is no JSON, or a field of it is of another kind.
+    NoState,
+    /// A field of the state is missing.
+    Missing(&'static str),
+    /// A field of the state is infinite.
+    Infinite(&'static str),
+    /// The device, or its grip, is no longer among those of the service.
+    Unplugged,
+    /// The service says that the device is not ready: no power, or not calibrated.
+    NotReady,
+    /// The device exerts a force that this session did not command: another program pushes, too.
+    ForeignForce,
+}
+
+impl Trouble {
+    /// What a host is told.
+    #[must_use]
+    pub const fn fault(self) -> Fault {
+        match self {
+            Self::Gone | Self::Unplugged | Self::NotReady => Fault::Disconnected,
+            Self::Silent | Self::Unfinished => Fault::Timeout,
+            Self::TooLong(_)
+            | Self::NoFrame
+            | Self::NoState
+            | Self::Missing(_)
+            | Self::Infinite(_)
+            | Self::ForeignForce => Fault::Protocol,
+        }
+    }
+}
+
+impl From<Malformed> for Trouble {
+    fn from(_: Malformed) -> Self {
+        Self::NoState
+    }
+}
+
+impl fmt::Display for Trouble {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Gone => f.write_str("it closed the connection"),
+            Self::Silent => f.write_str("it does not answer"),
+            Self::Unfinished => f.write_str("a state of it does not end"),
+            Self::TooLong(bytes) => write!(f, "a message of {bytes} bytes is no state of a device"),
+            Self::NoFrame => f.write_str("what it sends is no whole message of a WebSocket"),
+            Self::NoState => f.write_str("what it sends is no state of a device"),
+            Self::Missing(field) => write!(f, "its state has no `{field}`"),
+            Self::Infinite(field) => write!(f, "`{field}` of its state is no finite number"),
+            Self::Unplugged => f.write_str("the device is no longer there"),
+            Self::NotReady => f.write_str("the device has no power, or is not calibrated"),
+            Self::ForeignForce => f.write_str("another program pushes the device, too; end that one first"),
+        }
+    }
+}
