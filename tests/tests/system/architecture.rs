@@ -21,6 +21,8 @@ enum Role {
     VendorSdk,
     /// The other end of a device's link, without hardware.
     Emulator,
+    /// What emulators plug devices into a kernel with.
+    Cable,
     Sync,
     /// Plain data and maths of a run.
     Core,
@@ -60,15 +62,15 @@ enum Role {
 }
 
 use Role::{
-    Calibration, Command, Compat, Contract, Core, DropIn, Emulator, Fixture, Guard, Host, Judge, Lab, Live,
-    Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study, Sync, Tests, VendorSdk,
-    Viewer,
+    Cable, Calibration, Command, Compat, Contract, Core, DropIn, Emulator, Fixture, Guard, Host, Judge, Lab,
+    Live, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study, Sync, Tests, VendorSdk, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
 const CRATES: &[(&str, Role, &[Role])] = &[
     ("hal", Contract, &[]),
     ("devices/vendor-sdk", VendorSdk, &[Contract]),
+    ("devices/usbip", Cable, &[]),
     ("host/sync", Sync, &[]),
     ("host/core", Core, &[Contract, Sync]),
     ("host/servo", Servo, &[Contract, Sync, Core]),
@@ -140,7 +142,7 @@ impl Role {
         match self {
             Plugin => &[Contract, VendorSdk],
             Fixture => &[Contract],
-            Emulator => &[Contract, Plugin],
+            Emulator => &[Contract, Plugin, Cable],
             _ => CRATES.iter().find(|(_, role, _)| *role == self).map_or(&[], |(.., used)| used),
         }
     }

@@ -12,7 +12,7 @@
 //! and for all of them it ends with the cable.
 
 use super::personality::{CONFIGURATION, DEVICE, IN, OUT, Personality, REPORT, REPORT_DESCRIPTOR, STRING};
-use super::wire::{self, INPUT, Message, Transfer};
+use flotor_usbip::wire::{self, INPUT, Message, Transfer};
 use std::collections::VecDeque;
 use std::io::{self, Read};
 use std::os::unix::net::UnixStream;

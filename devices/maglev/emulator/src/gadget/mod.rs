@@ -6,18 +6,16 @@
 //! ```
 //!
 //! - [`personality`]: what the device claims to be: interrupt or bulk endpoints, HID, a serial port.
-//! - `wire`: the messages of USB/IP.
 //! - `bus`: answers what the kernel asks: descriptors, settings, transfers; nothing to say is a transfer that waits.
-//! - [`vhci`]: where it is plugged in.
 //! - `link`: what the emulator sees of it.
+//!
+//! The messages between kernel and bus are `flotor-usbip`'s.
 //!
 //! Needs Linux with the module `vhci_hcd`, and the right to plug something in. Not real-time.
 
 mod bus;
 mod link;
 pub mod personality;
-pub mod vhci;
-mod wire;
 
 #[cfg(test)]
 mod tests;
@@ -26,6 +24,7 @@ pub use personality::Personality;
 
 use bus::Bus;
 use flotor_maglev::transport::Transport;
+use flotor_usbip::vhci::{Speed, attach};
 use std::io;
 use std::net::Shutdown;
 use std::os::unix::net::UnixStream;
@@ -48,7 +47,7 @@ impl Gadget {
     pub fn plug_in(personality: Personality, serial: &str) -> io::Result<Self> {
         let (ours, kernels) = UnixStream::pair()?;
         let gadget = Self::serve(personality, serial, ours)?;
-        vhci::attach(kernels)?;
+        attach(&kernels, Speed::High)?;
         Ok(gadget)
     }
 

@@ -6,8 +6,15 @@ use std::os::unix::net::UnixStream;
 use std::path::Path;
 
 const FOLDER: &str = "/sys/devices/platform/vhci_hcd.0";
-/// `USB_SPEED_HIGH` of the kernel: packets every 125 µs.
-const HIGH_SPEED: u32 = 3;
+/// Speed of a device, as the kernel numbers it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Speed {
+    /// 12 Mbit/s: packets every millisecond.
+    Full = 2,
+    /// 480 Mbit/s: packets every 125 µs.
+    High = 3,
+}
+
 /// State of a port without a device (`VDEV_ST_NULL`).
 const FREE: &str = "004";
 /// Bus number of the device's far end; any will do.
@@ -19,8 +26,11 @@ pub fn is_available() -> bool {
     Path::new(FOLDER).join("attach").exists()
 }
 
-/// Plugs what speaks USB/IP at the other end of the stream into a free port of high speed.
-pub(super) fn attach(stream: UnixStream) -> io::Result<()> {
+/// Plugs what speaks USB/IP at the other end of the stream into a free port, as a device of this speed.
+///
+/// # Errors
+/// What the system says: usually that the module `vhci_hcd` is not loaded, or that this user may not.
+pub fn attach(stream: &UnixStream, speed: Speed) -> io::Result<()> {
     let explained = |error: io::Error| {
         let hint = match error.kind() {
             ErrorKind::NotFound => "load the kernel's module: sudo modprobe vhci_hcd",
@@ -31,12 +41,12 @@ pub(super) fn attach(stream: UnixStream) -> io::Result<()> {
     };
     let status = std::fs::read_to_string(format!("{FOLDER}/status")).map_err(explained)?;
     let port = free_port(&status).ok_or_else(|| explained(ErrorKind::ResourceBusy.into()))?;
-    let line = format!("{port} {} {} {HIGH_SPEED}", stream.as_raw_fd(), FAR_BUS + port + 1);
+    let line = format!("{port} {} {} {}", stream.as_raw_fd(), FAR_BUS + port + 1, speed as u32);
     // The kernel takes a reference of its own; ours ends here.
     std::fs::write(format!("{FOLDER}/attach"), line).map_err(explained)
 }
 
-/// The first free port of high speed in the controller's table: `hub port sta spd dev sockfd local_busid`.
+/// The first free port up to high speed in the controller's table: `hub port sta spd dev sockfd local_busid`.
 fn free_port(status: &str) -> Option<u32> {
     status.lines().find_map(|line| {
         let mut words = line.split_whitespace();

@@ -15,36 +15,44 @@ const LONGEST_DATA: usize = 1 << 20;
 const STALLED: i32 = -32;
 const TAKEN_BACK: i32 = -104;
 
-/// What the host controller asks.
+/// What the host controller requests.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Message {
+pub enum Message {
     /// A transfer.
     Submit(Transfer),
     /// Take a transfer back.
-    Unlink { number: u32, transfer: u32 },
+    Unlink {
+        /// Number of this message.
+        number: u32,
+        /// Number of the transfer.
+        transfer: u32,
+    },
 }
 
 /// A transfer that waits for its end.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Transfer {
-    pub(super) number: u32,
+pub struct Transfer {
+    /// Its number.
+    pub number: u32,
     /// Address of the endpoint, with the direction in bit 7.
-    pub(super) endpoint: u8,
+    pub endpoint: u8,
     /// Bytes asked for, or given.
-    pub(super) length: usize,
-    pub(super) setup: [u8; 8],
-    pub(super) data: Vec<u8>,
+    pub length: usize,
+    /// Of a control transfer: its setup packet.
+    pub setup: [u8; 8],
+    /// What the host sent.
+    pub data: Vec<u8>,
 }
 
 /// Bit 7 of an endpoint's address: towards the host.
-pub(super) const INPUT: u8 = 0x80;
+pub const INPUT: u8 = 0x80;
 
 impl Message {
     /// Reads one message.
     ///
     /// # Errors
     /// The stream's, and `InvalidData` for what is no message.
-    pub(super) fn read(stream: &mut impl Read) -> io::Result<Self> {
+    pub fn read(stream: &mut impl Read) -> io::Result<Self> {
         let mut header = [0; HEADER_BYTES];
         stream.read_exact(&mut header)?;
         let number = |at: usize| {
@@ -71,19 +79,28 @@ impl Message {
 }
 
 /// Ends a transfer: with data towards the host, or all bytes of the host taken.
-pub(super) fn complete(stream: &mut impl Write, transfer: &Transfer, data: &[u8]) -> io::Result<()> {
+///
+/// # Errors
+/// The stream's.
+pub fn complete(stream: &mut impl Write, transfer: &Transfer, data: &[u8]) -> io::Result<()> {
     let is_input = transfer.endpoint & INPUT != 0;
     let actual = if is_input { data.len() } else { transfer.length };
     end(stream, SUBMITTED, transfer.number, 0, u32::try_from(actual).unwrap_or(0), data)
 }
 
 /// Ends a transfer the device refuses.
-pub(super) fn stall(stream: &mut impl Write, transfer: &Transfer) -> io::Result<()> {
+///
+/// # Errors
+/// The stream's.
+pub fn stall(stream: &mut impl Write, transfer: &Transfer) -> io::Result<()> {
     end(stream, SUBMITTED, transfer.number, STALLED, 0, &[])
 }
 
 /// Says that a transfer was taken back, or that it had ended already.
-pub(super) fn unlinked(stream: &mut impl Write, number: u32, in_time: bool) -> io::Result<()> {
+///
+/// # Errors
+/// The stream's.
+pub fn unlinked(stream: &mut impl Write, number: u32, in_time: bool) -> io::Result<()> {
     end(stream, UNLINKED, number, if in_time { TAKEN_BACK } else { 0 }, 0, &[])
 }
 
