@@ -15,6 +15,7 @@ use std::ffi::OsString;
     flotor emulate maglev --transport pty --link /tmp/flotor-tty\n  \
     flotor emulate maglev --pace lockstep --set preset=full\n  \
     flotor emulate maglev --protocol ml-api     for programs written for the Maglev 200\n  \
+    flotor emulate falcon                       for the plugin `falcon`, and with `--transport usb` for every program\n  \
     flotor emulate haply-service                for programs written for Haply's service\n  \
     flotor emulate maglev --help                 options of that emulator",
     // After NAME the flag belongs to the emulator.
@@ -45,13 +46,14 @@ pub(crate) fn run(arguments: &EmulateArguments) -> Result<(), CommandError> {
     }
     let program = format!("flotor-{device}-emulator");
     let build = match device.as_str() {
+        "falcon" => "cargo build --release -p flotor-falcon-emulator",
         "haply-service" => "cargo build --release -p flotor-haply-service",
         _ => "cargo build --release -p flotor-maglev-emulator",
     };
     let emulator = SeparateProgram { program: &program, built: Built::WithThis, build };
-    if !["maglev", "haply-service"].contains(&device.as_str()) && emulator.command().is_err() {
+    if !["falcon", "haply-service", "maglev"].contains(&device.as_str()) && emulator.command().is_err() {
         let words = format!(
-            "there is no emulator `{program}` in the folder of `flotor`; Flotor provides `maglev` and `haply-service`"
+            "there is no emulator `{program}` in the folder of `flotor`; Flotor provides `falcon`, `haply-service` and `maglev`"
         );
         return Err(CommandError::Usage(words));
     }

@@ -15,8 +15,8 @@ use std::fmt::Write;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Scenes that need a device or another host.
-const NOT_VIRTUAL: [&str; 6] =
-    ["force-dimension", "haply", "inverse3", "openhaptics", "spacemouse", "teleoperation-apart"];
+const NOT_VIRTUAL: [&str; 7] =
+    ["falcon", "force-dimension", "haply", "inverse3", "openhaptics", "spacemouse", "teleoperation-apart"];
 /// Models by setting, of the spring unless they are named.
 const TABLES: [(&str, &str); 10] = [
     ("spring", "preset=thesis-1"),

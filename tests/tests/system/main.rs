@@ -16,6 +16,8 @@ mod documents;
 mod drop_ins;
 mod ends;
 mod examples;
+#[cfg(feature = "drop-ins")]
+mod falcon;
 mod force_sensor;
 mod golden;
 mod haply;

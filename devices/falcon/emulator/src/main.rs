@@ -1,0 +1,131 @@
+//! A Novint Falcon without hardware: `flotor emulate falcon` starts it.
+
+use clap::{Parser, ValueEnum};
+use flotor_falcon::kinematics::CENTRE_M;
+use flotor_falcon_emulator::in_process::InProcess;
+use flotor_falcon_emulator::machine::{Machine, Motion, Power};
+use flotor_falcon_emulator::server;
+use flotor_hal::DVec3;
+use std::error::Error;
+use std::io::Write;
+use std::net::TcpListener;
+use std::process::ExitCode;
+
+/// Emulate a Novint Falcon: a hand moves its handle up and down.
+#[derive(Parser)]
+#[command(name = "flotor emulate falcon", version, max_term_width = 110)]
+#[command(after_help = "The first line on standard output says where it is.\n\nExamples:\n  \
+    flotor emulate falcon\n  \
+    sudo modprobe vhci_hcd && sudo flotor emulate falcon --transport usb --power off")]
+struct Arguments {
+    /// What the host connects by
+    #[arg(long, value_enum, default_value = "tcp")]
+    transport: TransportOption,
+    /// Tcp: where to listen (port 0: any free one)
+    #[arg(long, default_value = "127.0.0.1:4108", value_name = "HOST:PORT")]
+    listen: String,
+    /// Whether its firmware runs already
+    #[arg(long, value_enum, default_value = "on")]
+    power: PowerOption,
+    /// From the middle of the motion to its ends, in mm
+    #[arg(long, default_value_t = 15.0, value_name = "MM", value_parser = amplitude_mm)]
+    amplitude_mm: f64,
+    /// How often the handle goes up and down, in Hz
+    #[arg(long, default_value_t = 0.5, value_name = "HZ", value_parser = frequency_hz)]
+    frequency_hz: f64,
+    /// End when the first host is gone
+    #[arg(long)]
+    once: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum TransportOption {
+    /// A connection, for the plugin with `address = "tcp:HOST:PORT"`
+    Tcp,
+    /// This machine's own USB, for every program (with the module vhci_hcd, as root)
+    #[cfg(target_os = "linux")]
+    Usb,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum PowerOption {
+    /// It was off: the boot loader waits for a firmware, any bytes
+    Off,
+    /// The firmware runs, and the arms count
+    On,
+}
+
+fn amplitude_mm(text: &str) -> Result<f64, String> {
+    within(text, 0.0, 40.0, "mm")
+}
+
+fn frequency_hz(text: &str) -> Result<f64, String> {
+    within(text, 0.0, 10.0, "Hz")
+}
+
+fn within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> {
+    let number: f64 = text.trim().parse().map_err(|_| format!("`{text}` is no number"))?;
+    if (least..=most).contains(&number) {
+        Ok(number)
+    } else {
+        Err(format!("must be {least} to {most} {unit}"))
+    }
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    let power = match arguments.power {
+        PowerOption::Off => Power::Off,
+        PowerOption::On => Power::On,
+    };
+    // Up is y in the maker's frame.
+    let motion = Motion {
+        centre_m: CENTRE_M,
+        amplitude_m: DVec3::Y * (arguments.amplitude_mm * 1.0e-3),
+        frequency_hz: arguments.frequency_hz,
+    };
+    let device = InProcess::new(Machine::new(power, motion));
+    match arguments.transport {
+        TransportOption::Tcp => {
+            let listener = TcpListener::bind(&arguments.listen).map_err(|error| {
+                format!(
+                    "cannot listen at {}: {error}; --listen 127.0.0.1:0 takes any free port",
+                    arguments.listen
+                )
+            })?;
+            say(&format!("listening tcp:{}", listener.local_addr()?));
+            loop {
+                let (stream, _) = listener.accept()?;
+                // A host that goes is no failure.
+                let _ = server::serve(stream, &device);
+                if arguments.once {
+                    return Ok(());
+                }
+            }
+        }
+        #[cfg(target_os = "linux")]
+        TransportOption::Usb => {
+            let gadget = flotor_falcon_emulator::gadget::Gadget::plug_in(device)?;
+            say("listening usb 0403:cb48");
+            while gadget.is_plugged_in() {
+                std::thread::sleep(std::time::Duration::from_millis(50));
+            }
+            Ok(())
+        }
+    }
+}
+
+fn say(line: &str) {
+    let mut out = std::io::stdout().lock();
+    // Nobody reads: nothing to do about it, the device goes on.
+    let _ = writeln!(out, "{line}").and_then(|()| out.flush());
+}

@@ -1,0 +1,7 @@
+//! The plugin against the emulated device: boot loader, exchange and the contract, and on a kernel's own USB.
+
+mod boot;
+mod contract;
+mod exchange;
+#[cfg(target_os = "linux")]
+mod kernel;

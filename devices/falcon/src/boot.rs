@@ -1,0 +1,277 @@
+//! The handshake with the boot loader, which has the device whenever its power was off (libnifalcon, `FalconFirmware`).
+//!
+//! ```text
+//! 9600 baud     host 0a 43 0d      device 0a 44 2c 0d, perhaps with 00 before it, perhaps only after many tries
+//! 140 kbaud     host 41            device 41
+//!               host firmware      device each byte again
+//! 1.5 Mbaud     the firmware runs: a report for each command
+//! ```
+
+use crate::chip::{Chip, ChipLost, PACKET_BYTES, PAYLOAD_BYTES, Request, payload};
+use crate::protocol::{Command, Frames, Heard, Report};
+use std::fmt;
+use std::time::{Duration, Instant};
+
+/// What sets the rates of the line: 9600 baud, what the loader takes the firmware at, and 1.5 Mbaud.
+pub const PROMPT_DIVISOR: u16 = 0x4138;
+/// 3 MHz / 21.
+pub const LOAD_DIVISOR: u16 = 0x15;
+/// 3 MHz / 2.
+pub const RUN_DIVISOR: u16 = 0x02;
+/// What the loader is asked, and what it answers.
+pub const PROMPT: [u8; 3] = [0x0a, 0x43, 0x0d];
+/// Perhaps with a zero before it.
+pub const PROMPT_ANSWER: [u8; 4] = [0x0a, 0x44, 0x2c, 0x0d];
+/// What both say before the firmware.
+pub const AGREED: u8 = 0x41;
+
+/// Eight bits, no parity, one stop bit.
+const FORMAT: u16 = 8;
+/// RTS low, DTR low, DTR high.
+const RTS_LOW: u16 = 0x0200;
+const DTR_LOW: u16 = 0x0100;
+const DTR_HIGH: u16 = 0x0101;
+/// Latency timers of the chip while it loads, and while it runs, ms.
+const LOAD_LATENCY_MS: u16 = 16;
+const RUN_LATENCY_MS: u16 = 1;
+
+/// How often the loader is asked.
+const PROMPTS: u32 = 100;
+/// How often the whole handshake is begun anew: it is known to fail at random.
+const ATTEMPTS: u32 = 3;
+/// How long an answer of the loader may take, and the first report of the firmware.
+const ANSWER: Duration = Duration::from_millis(30);
+const ECHO: Duration = Duration::from_millis(1000);
+const FIRST_REPORT: Duration = Duration::from_millis(1000);
+/// How long nothing may come before the line counts as quiet, and how long it may take to become so.
+const QUIET: Duration = Duration::from_millis(20);
+const SETTLED: Duration = Duration::from_millis(500);
+
+/// Why there is no device that reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BootFailure {
+    /// The chip is gone.
+    Lost,
+    /// A packet without its status: the chip is no FTDI, or the link is broken.
+    ShortPacket,
+    /// The firmware does not run, and the user named no file.
+    NoFirmware,
+    /// The loader never answered.
+    NoPrompt,
+    /// The loader did not agree to take a firmware.
+    NotAgreed(Option<u8>),
+    /// A byte of the firmware came back as another one.
+    Echo {
+        /// Which byte, from 0.
+        at: usize,
+        /// What was sent.
+        sent: u8,
+        /// What came back.
+        came: u8,
+    },
+    /// A byte of the firmware did not come back.
+    NoEcho {
+        /// Which byte, from 0.
+        at: usize,
+    },
+    /// The firmware was loaded and does not report.
+    NoReport,
+    /// Reports come that no command was sent for.
+    StaleReports,
+}
+
+impl From<ChipLost> for BootFailure {
+    fn from(_: ChipLost) -> Self {
+        Self::Lost
+    }
+}
+
+impl fmt::Display for BootFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Lost => f.write_str("it was unplugged, or its hub was reset; connect it without a hub, and try again"),
+            Self::ShortPacket => f.write_str(
+                "its chip sends packets without the two bytes of its status; connect it without a hub, and try again",
+            ),
+            Self::NoFirmware => f.write_str(
+                "it has no firmware since its power was off; name your own file with `firmware`: libnifalcon's folder \
+                 `firmware` has `nvent`, and so has the driver for Windows",
+            ),
+            Self::NoPrompt => write!(
+                f,
+                "its boot loader did not answer {PROMPTS} times; switch its power off and on, and try again"
+            ),
+            Self::NotAgreed(None) => f.write_str(
+                "its boot loader did not agree to take a firmware; switch its power off and on, and try again",
+            ),
+            Self::NotAgreed(Some(byte)) => write!(
+                f,
+                "its boot loader said {byte:#04x} instead of {AGREED:#04x}; switch its power off and on, and try again"
+            ),
+            Self::Echo { at, sent, came } => write!(
+                f,
+                "byte {at} of the firmware, {sent:#04x}, came back as {came:#04x}; switch its power off and on, connect it \
+                 without a hub, and try again"
+            ),
+            Self::NoEcho { at } => write!(
+                f,
+                "byte {at} of the firmware did not come back; switch its power off and on, connect it without a hub, and try \
+                 again"
+            ),
+            Self::NoReport => f.write_str(
+                "it has the firmware and does not report; switch its power off and on, and check the file `firmware`",
+            ),
+            Self::StaleReports => f.write_str(
+                "it sends reports that no command was sent for, so that each would be late; unplug it, plug it in again, and \
+                 try again",
+            ),
+        }
+    }
+}
+
+/// Bytes down the line, without the chip's own.
+struct Line<'c> {
+    chip: &'c dyn Chip,
+    waiting: std::collections::VecDeque<u8>,
+}
+
+impl<'c> Line<'c> {
+    fn new(chip: &'c dyn Chip) -> Self {
+        Self { chip, waiting: std::collections::VecDeque::new() }
+    }
+
+    /// The next byte; nothing if none came in time.
+    fn next(&mut self, patience: Duration) -> Result<Option<u8>, BootFailure> {
+        let until = Instant::now() + patience;
+        let mut packets = [0; PACKET_BYTES];
+        loop {
+            if let Some(byte) = self.waiting.pop_front() {
+                return Ok(Some(byte));
+            }
+            let rest = until.saturating_duration_since(Instant::now());
+            if rest.is_zero() {
+                return Ok(None);
+            }
+            let length = self.chip.read(&mut packets, rest)?;
+            let read = packets.get(..length).unwrap_or_default();
+            payload(read, |byte| self.waiting.push_back(byte)).map_err(|_| BootFailure::ShortPacket)?;
+        }
+    }
+
+    /// Takes what comes until nothing does; whether it ended.
+    fn settle(&mut self) -> Result<bool, BootFailure> {
+        let until = Instant::now() + SETTLED;
+        while self.next(QUIET)?.is_some() {
+            if Instant::now() > until {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// Brings a device to where it reports: it may run already, or gets the firmware. Not real-time.
+///
+/// # Errors
+/// A [`BootFailure`]: of several attempts, that of the last one.
+pub fn start(chip: &dyn Chip, firmware: Option<&[u8]>) -> Result<Report, BootFailure> {
+    match run(chip) {
+        Err(BootFailure::NoReport) => {}
+        settled => return settled,
+    }
+    let firmware = firmware.ok_or(BootFailure::NoFirmware)?;
+    let mut attempt = 1;
+    loop {
+        match load(chip, firmware).and_then(|()| run(chip)) {
+            // What another attempt does not change.
+            Err(failure @ (BootFailure::Lost | BootFailure::NoPrompt)) => return Err(failure),
+            Err(_) if attempt < ATTEMPTS => attempt += 1,
+            settled => return settled,
+        }
+    }
+}
+
+/// Sets the line up for a firmware that runs, and asks it for a report.
+fn run(chip: &dyn Chip) -> Result<Report, BootFailure> {
+    chip.request(Request::LatencyTimer, RUN_LATENCY_MS)?;
+    chip.request(Request::BaudRate, RUN_DIVISOR)?;
+    chip.request(Request::DataFormat, FORMAT)?;
+    chip.request(Request::FlowControl, 0)?;
+    chip.request(Request::Reset, 1)?;
+    chip.request(Request::Reset, 2)?;
+    let (mut line, mut frames) = (Line::new(chip), Frames::default());
+    // What an earlier program left.
+    if !line.settle()? {
+        return Err(BootFailure::StaleReports);
+    }
+    chip.write(&Command::REST.bytes())?;
+    let until = Instant::now() + FIRST_REPORT;
+    let mut report = None;
+    loop {
+        // One command, one report: whatever comes after it was there before.
+        let patience = if report.is_some() { QUIET } else { until.saturating_duration_since(Instant::now()) };
+        match (line.next(patience)?, report) {
+            (None, Some(report)) => return Ok(report),
+            (None, None) => return Err(BootFailure::NoReport),
+            (Some(_), Some(_)) => return Err(BootFailure::StaleReports),
+            (Some(byte), None) => {
+                if let Heard::Frame(bytes) = frames.push(byte) {
+                    report = Some(Report::read(&bytes));
+                }
+            }
+        }
+    }
+}
+
+/// Loads the firmware.
+fn load(chip: &dyn Chip, firmware: &[u8]) -> Result<(), BootFailure> {
+    chip.request(Request::Reset, 1)?;
+    chip.request(Request::Reset, 2)?;
+    chip.request(Request::LatencyTimer, LOAD_LATENCY_MS)?;
+    chip.request(Request::BaudRate, PROMPT_DIVISOR)?;
+    chip.request(Request::DataFormat, FORMAT)?;
+    chip.request(Request::FlowControl, 0)?;
+    for lines in [RTS_LOW, DTR_LOW, DTR_HIGH] {
+        chip.request(Request::ModemLines, lines)?;
+    }
+    let mut line = Line::new(chip);
+    let mut has_answered = false;
+    for _ in 0..PROMPTS {
+        chip.write(&PROMPT)?;
+        let mut answer = Vec::with_capacity(PROMPT_ANSWER.len() + 1);
+        while answer.len() <= PROMPT_ANSWER.len()
+            && let Some(byte) = line.next(ANSWER)?
+        {
+            answer.push(byte);
+            has_answered = answer.strip_prefix(&[0]).unwrap_or(&answer) == PROMPT_ANSWER;
+            if has_answered {
+                break;
+            }
+        }
+        if has_answered {
+            break;
+        }
+    }
+    if !has_answered {
+        return Err(BootFailure::NoPrompt);
+    }
+    chip.request(Request::ModemLines, DTR_LOW)?;
+    chip.request(Request::BaudRate, LOAD_DIVISOR)?;
+    chip.write(&[AGREED])?;
+    match line.next(ECHO)? {
+        Some(AGREED) => {}
+        other => return Err(BootFailure::NotAgreed(other)),
+    }
+    for (number, piece) in firmware.chunks(PAYLOAD_BYTES).enumerate() {
+        chip.write(piece)?;
+        for (place, sent) in piece.iter().enumerate() {
+            let at = number * PAYLOAD_BYTES + place;
+            match line.next(ECHO)? {
+                None => return Err(BootFailure::NoEcho { at }),
+                Some(came) if came != *sent => return Err(BootFailure::Echo { at, sent: *sent, came }),
+                Some(_) => {}
+            }
+        }
+    }
+    Ok(())
+}

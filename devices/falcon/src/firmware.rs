@@ -1,0 +1,93 @@
+//! The user's own firmware file. This repository has none, and may have none: see the chapter of the book.
+
+use sha2::{Digest, Sha256};
+use std::fmt::Write;
+
+/// Largest file that is read: twice the known ones.
+const MOST_BYTES: u64 = 20_000;
+
+/// Firmware that is known: its name, its size, and how its SHA-256 begins (libnifalcon, folder `firmware`).
+const KNOWN: [(&str, usize, &str); 2] =
+    [("nvent", 8492, "1119e39c39fab1f3"), ("test_firmware", 7324, "b2700d5cd5ca217e")];
+/// Digits of a digest that are enough to know a file by.
+const LEAST_DIGITS: usize = 16;
+
+/// Reads a file and checks that it is what it should be: one that is known, or one whose digest begins as `expected` says.
+/// Not real-time.
+///
+/// # Errors
+/// One sentence: what the file is instead, and what to do.
+pub fn read(path: &str, expected: Option<&str>) -> Result<Vec<u8>, String> {
+    let size = std::fs::metadata(path).map_err(|error| format!("firmware {path}: {error}"))?.len();
+    if size > MOST_BYTES {
+        return Err(format!(
+            "firmware {path} has {size} bytes, and no firmware of a Falcon has more than {MOST_BYTES}"
+        ));
+    }
+    let bytes = std::fs::read(path).map_err(|error| format!("firmware {path}: {error}"))?;
+    let digest = digest(&bytes);
+    let is_right = match expected {
+        Some(expected) => {
+            expected.len() >= LEAST_DIGITS
+                && digest.starts_with(&expected.to_ascii_lowercase())
+                && !bytes.is_empty()
+        }
+        None => KNOWN.iter().any(|(_, size, begins)| bytes.len() == *size && digest.starts_with(begins)),
+    };
+    if is_right {
+        return Ok(bytes);
+    }
+    Err(match expected {
+        Some(expected) => format!(
+            "firmware {path} has the SHA-256 {digest}, and `firmware_sha256` = {expected} is not its beginning of {LEAST_DIGITS} \
+             digits or more"
+        ),
+        None => {
+            let known =
+                KNOWN.map(|(name, size, begins)| format!("{name} ({size} bytes, SHA-256 {begins}...)"));
+            format!(
+                "firmware {path} has {} bytes and the SHA-256 {digest}; known are {}. If it is the right one, say so with \
+                 `firmware_sha256`",
+                bytes.len(),
+                known.join(" and ")
+            )
+        }
+    })
+}
+
+/// The SHA-256 of bytes, in hex. Not real-time.
+#[must_use]
+pub fn digest(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().fold(String::new(), |mut text, byte| {
+        // Writing to a text cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_taken_for_its_digest_and_for_nothing_else() {
+        let path = std::env::temp_dir().join(format!("flotor-falcon-{}", std::process::id()));
+        let name = path.display().to_string();
+        std::fs::write(&path, b"abc").expect("a folder for such files");
+        // FIPS 180-4, example of one block.
+        let known = "ba7816bf8f01cfea414140de5dae2223";
+        assert_eq!(read(&name, Some(known)), Ok(b"abc".to_vec()));
+        for (expected, words) in [
+            (None, "known are nvent (8492 bytes"),
+            (Some("ba78"), "16 digits"),
+            (Some(&known[1..]), "not its beginning"),
+        ] {
+            let refused = read(&name, expected).expect_err("it is another");
+            assert!(refused.contains(words) && refused.contains(known), "{refused}");
+        }
+        std::fs::write(&path, vec![0; 30_000]).expect("it is ours");
+        assert!(read(&name, None).expect_err("it is too long").contains("30000 bytes"));
+        std::fs::remove_file(&path).expect("it is ours");
+        assert!(read(&name, None).is_err());
+    }
+}

@@ -1,0 +1,32 @@
+//! The Novint Falcon over raw USB: three driven axes and four buttons behind an FTDI chip.
+//!
+//! ```text
+//! encoders -> angles -> Delta -> position          force -> Delta -> torques -> words
+//!     ^                                                                          |
+//!     +--------- frame <- bytes <- packets of the chip ~ USB ~ bytes <- frame <--+
+//! ```
+//!
+//! The device forgets its firmware with its power. The user has it; this plugin has none.
+//!
+//! - [`protocol`]: commands and reports as frames of 16 bytes.
+//! - [`kinematics`]: the delta linkage: from angles to the handle, from force to torques, and back.
+//! - [`chip`]: the FTDI chip: its requests, and the status bytes in its packets.
+//! - [`boot`]: the handshake with the boot loader, and what may go wrong in it.
+//! - [`firmware`]: the user's file.
+//! - `usb`, `remote`: the chip on the bus, and an emulated one over TCP.
+//! - [`exchange`]: a thread that reads, and one that keeps one command in flight.
+//! - `plugin`: parameters and the contract.
+
+pub mod boot;
+pub mod chip;
+pub mod exchange;
+pub mod firmware;
+pub mod kinematics;
+mod plugin;
+pub mod protocol;
+pub mod remote;
+mod trouble;
+mod usb;
+
+pub use plugin::{FLOTOR_ENTRY, FalconDevice};
+pub use trouble::Trouble;

@@ -1,0 +1,393 @@
+//! The device as a plugin: positions from counts, words from wrenches, buttons.
+
+use crate::boot;
+use crate::chip::Chip;
+use crate::exchange::{Exchange, ForceSwitch};
+use crate::firmware;
+use crate::kinematics::{CENTRE_M, Posture, RANGE_M, angles_rad, posture, resolution_m};
+use crate::protocol::{ALL_HOMED, Command, Homing, Lamp, Report, clipped_words};
+use crate::remote::RemoteChip;
+use crate::trouble::Trouble;
+use crate::usb;
+use flotor_hal::{
+    ActiveDevice, Axes, CalibrationDevice, Capabilities, Conditions, Cycle, DQuat, DVec3, Device, DeviceInfo,
+    DeviceState, LoopConfig, Parameter, Pose, Refusal, Settings, Tick, Twist, VerticalCalibration, Wrench,
+    choices, export_device, math,
+};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// What an address begins with.
+const USB: &str = "usb";
+const TCP: &str = "tcp:";
+/// Change of force, N/s: from nothing to the default limit in a millisecond.
+const SLEW_N_PER_S: f64 = 8000.0;
+/// A command and its report over full-speed USB, a frame of 1 ms each, s.
+const LATENCY_S: f64 = 2.0e-3;
+/// Time between two commands while the device looks for its ends.
+const HOMING_NAP: Duration = Duration::from_millis(2);
+
+const SCHEMA: &[Parameter] = &[
+    Parameter::text(
+        "address",
+        "Where it is: usb, which it is if not said, usb:SERIAL, or tcp:HOST:PORT of an emulator",
+    ),
+    Parameter::file(
+        "firmware",
+        choices![],
+        "The firmware: your own file; not needed while the device keeps it",
+    ),
+    Parameter::text("firmware_sha256", "How the SHA-256 of a firmware begins that is none of those known"),
+    Parameter::real("max_force_n", "N", 0.0, 20.0, 8.0, "Largest force on the hand"),
+    Parameter::real(
+        "words_per_nm",
+        "1/(N·m)",
+        100.0,
+        100_000.0,
+        10_000.0,
+        "Motor word for a torque of an arm; a calibration with a force sensor says which",
+    ),
+    Parameter::real(
+        "homing_s",
+        "s",
+        0.0,
+        600.0,
+        30.0,
+        "How long it waits for the handle to be pushed in and pulled out",
+    ),
+    Parameter::real(
+        "velocity_cutoff_hz",
+        "Hz",
+        1.0,
+        500.0,
+        30.0,
+        "Velocity is the difference of positions, smoothed below this frequency",
+    ),
+    Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 100.0, "Silence of the device that is a fault"),
+];
+
+/// The maker's frame (x right, y up, z towards the user) in the host's (x right, y away, z up).
+fn to_host(maker: DVec3) -> DVec3 {
+    DVec3::new(maker.x, -maker.z, maker.y)
+}
+
+/// The host's frame in the maker's.
+fn to_maker(host: DVec3) -> DVec3 {
+    DVec3::new(host.x, host.z, -host.y)
+}
+
+/// What of the parameters is in force.
+#[derive(Clone, Debug)]
+struct Options {
+    address: String,
+    firmware: Option<Vec<u8>>,
+    max_force_n: f64,
+    words_per_nm: f64,
+    homing: Duration,
+    cutoff_hz: f64,
+    timeout: Duration,
+    parameters: [f64; SCHEMA.len()],
+}
+
+/// A Falcon, opened: its firmware runs, its motors are at rest.
+pub struct FalconDevice {
+    options: Options,
+    /// Gone after a fault: the next activation opens it anew.
+    chip: Option<Arc<dyn Chip>>,
+    calibration: VerticalCalibration,
+    switch: ForceSwitch,
+}
+
+/// A Falcon whose motors follow the host.
+pub struct DrivenDevice {
+    opened: FalconDevice,
+    exchange: Exchange,
+    posture: Posture,
+    /// A report nobody has read yet.
+    first: Option<Report>,
+    state: DeviceState,
+    /// When the last sample was taken, ns.
+    sampled_ns: Option<u64>,
+    /// What the motors were told, as a force on the hand, and whether it is less than was wanted.
+    force_n: DVec3,
+    is_clipped: bool,
+    /// Why there is no force any more.
+    trouble: Option<Trouble>,
+}
+
+impl Options {
+    fn new(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        let mut parameters = [0.0; SCHEMA.len()];
+        for (value, parameter) in parameters.iter_mut().zip(SCHEMA) {
+            *value = settings.number_or_default(parameter.id());
+        }
+        let expected = settings.text("firmware_sha256");
+        let firmware = settings.text("firmware").map(|path| firmware::read(path, expected));
+        let seconds = |key| Duration::from_secs_f64(settings.number_or_default(key));
+        Ok(Self {
+            address: settings.text("address").unwrap_or(USB).to_owned(),
+            firmware: firmware.transpose().map_err(Refusal::parameter)?,
+            max_force_n: settings.number_or_default("max_force_n"),
+            words_per_nm: settings.number_or_default("words_per_nm"),
+            homing: seconds("homing_s"),
+            cutoff_hz: settings.number_or_default("velocity_cutoff_hz"),
+            timeout: seconds("timeout_ms") / 1000,
+            parameters,
+        })
+    }
+
+    fn open(&self) -> Result<Arc<dyn Chip>, Refusal> {
+        if let Some(address) = self.address.strip_prefix(TCP) {
+            let connected = RemoteChip::connect(address);
+            return connected.map(|chip| Arc::new(chip) as Arc<dyn Chip>).map_err(|error| {
+                Refusal::resource(format!(
+                    "no emulated Falcon at {address} ({error}); `flotor emulate falcon` starts one and says where"
+                ))
+            });
+        }
+        let serial = match self.address.strip_prefix(USB) {
+            Some("") => None,
+            Some(rest) if rest.starts_with(':') && rest.len() > 1 => rest.get(1..),
+            _ => {
+                return Err(Refusal::parameter(format!(
+                    "`address` = `{}` is none of usb, usb:SERIAL and tcp:HOST:PORT",
+                    self.address
+                )));
+            }
+        };
+        usb::open(serial).map(|chip| Arc::new(chip) as Arc<dyn Chip>).map_err(Refusal::resource)
+    }
+}
+
+impl Device for FalconDevice {
+    const INFO: DeviceInfo = DeviceInfo::new(
+        "falcon",
+        "Novint Falcon",
+        "A desktop delta with three driven axes and four buttons, over raw USB",
+    );
+    const PARAMETERS: &'static [Parameter] = SCHEMA;
+    type Active = DrivenDevice;
+    type Stop = ForceSwitch;
+
+    fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        let options = Options::new(settings)?;
+        let mut device = Self {
+            options,
+            chip: None,
+            calibration: VerticalCalibration::NONE,
+            switch: ForceSwitch::default(),
+        };
+        device.connect()?;
+        Ok(device)
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            sensed: Axes::TRANSLATION,
+            actuated: Axes::TRANSLATION,
+            range_m: [RANGE_M; 3],
+            range_rad: [0.0; 3],
+            resolution_m: resolution_m(),
+            max_force_n: [self.options.max_force_n; 3],
+            max_torque_nm: [0.0; 3],
+            max_force_slew_n_per_s: SLEW_N_PER_S,
+            max_torque_slew_nm_per_s: f64::INFINITY, // of nothing
+            max_stiffness_n_per_m: 0.0,
+            rate_hz: [100.0, 1000.0],
+            latency_s: LATENCY_S,
+        }
+    }
+
+    fn stopper(&self) -> ForceSwitch {
+        self.switch.clone()
+    }
+
+    fn activate(mut self, _config: &LoopConfig) -> Result<DrivenDevice, (Self, Refusal)> {
+        match self.start() {
+            Ok((exchange, report, posture)) => Ok(DrivenDevice {
+                opened: self,
+                exchange,
+                posture,
+                first: Some(report),
+                state: DeviceState::HOME,
+                sampled_ns: None,
+                force_n: DVec3::ZERO,
+                is_clipped: false,
+                trouble: None,
+            }),
+            Err(refusal) => Err((self, refusal)),
+        }
+    }
+
+    fn parameter(&self, index: usize) -> f64 {
+        self.options.parameters.get(index).copied().unwrap_or(f64::NAN)
+    }
+}
+
+impl FalconDevice {
+    /// Opens the chip, and brings the device to where it reports.
+    fn connect(&mut self) -> Result<Arc<dyn Chip>, Refusal> {
+        let chip = self.options.open()?;
+        let firmware = self.options.firmware.as_deref();
+        boot::start(&*chip, firmware)
+            .map_err(|failure| Refusal::resource(format!("the Falcon: {failure}")))?;
+        self.chip = Some(Arc::clone(&chip));
+        Ok(chip)
+    }
+
+    fn start(&mut self) -> Result<(Exchange, Report, Posture), Refusal> {
+        let chip = match self.chip.take() {
+            Some(chip) => chip,
+            None => self.connect()?,
+        };
+        self.switch.rearm();
+        let mut exchange =
+            Exchange::start(&chip, &self.switch, self.options.timeout).map_err(Refusal::resource)?;
+        let report = match self.home(&exchange) {
+            Ok(report) => report,
+            Err(refusal) => {
+                if exchange.end().is_none() {
+                    self.chip = Some(chip);
+                }
+                return Err(refusal);
+            }
+        };
+        self.chip = Some(chip);
+        let posture = posture(angles_rad(report.encoders), CENTRE_M).ok_or_else(|| {
+            Refusal::resource(format!(
+                "the Falcon counts {:?}, which its arms cannot have: switch its power off and on, and start again",
+                report.encoders
+            ))
+        })?;
+        Ok((exchange, report, posture))
+    }
+
+    /// Waits until all arms have met their ends.
+    fn home(&self, exchange: &Exchange) -> Result<Report, Refusal> {
+        let started = Instant::now();
+        let mut newest = None;
+        loop {
+            let report = exchange
+                .take()
+                .map_err(|trouble| Refusal::resource(format!("the Falcon: {}", trouble.fault().advice())))?;
+            newest = report.or(newest);
+            let patience = self.options.homing.max(self.options.timeout);
+            match newest {
+                Some(report) if report.homed == ALL_HOMED => return Ok(report),
+                _ if started.elapsed() > patience => {
+                    return Err(Refusal::resource(
+                        "the Falcon does not know where its handle is: while its lamp is red, push the handle in as far as it \
+                         goes, pull it out as far as it goes, and start again",
+                    ));
+                }
+                _ => {}
+            }
+            let command = Command { motors: [0; 3], lamp: Lamp::Red, homing: Homing::Wanted };
+            exchange.leave(command);
+            std::thread::sleep(HOMING_NAP);
+        }
+    }
+}
+
+impl ActiveDevice for DrivenDevice {
+    type Opened = FalconDevice;
+
+    fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
+        let report = match self.exchange.take() {
+            Ok(report) => report.or(self.first.take()),
+            Err(trouble) => return Cycle::Fault(trouble.fault()),
+        };
+        self.first = None;
+        let Some(report) = report else {
+            // A device that is silent for too long is told by the thread.
+            *state = self.state;
+            return Cycle::Stale;
+        };
+        self.trouble = self.trouble.or((report.homed != ALL_HOMED).then_some(Trouble::NotHomed));
+        match posture(angles_rad(report.encoders), self.posture.position_m()) {
+            Some(posture) => self.posture = posture,
+            None => self.trouble = self.trouble.or(Some(Trouble::NoPosture)),
+        }
+        if let Some(trouble) = self.trouble {
+            self.exchange.leave(Command::REST);
+            return Cycle::Fault(trouble.fault());
+        }
+        self.sample(report.buttons, tick.time_ns);
+        *state = self.state;
+        Cycle::Fresh
+    }
+
+    fn write(&mut self, _tick: &Tick, wrench: &Wrench) -> Cycle {
+        let asked_n = wrench.force();
+        let Options { max_force_n, words_per_nm, .. } = self.opened.options;
+        let may_push = self.trouble.is_none() && !self.opened.switch.is_stopped();
+        let wanted_n = match asked_n.is_finite() && may_push {
+            true => asked_n.clamp_length_max(max_force_n),
+            false => DVec3::ZERO,
+        };
+        let height_m = self.state.pose.position().z;
+        let share = self.opened.calibration.share(height_m);
+        let command_n = wanted_n.with_z(self.opened.calibration.command_n(wanted_n.z, height_m));
+        // The motors pull the other way than the arms' angles count.
+        let wanted = self.posture.torques_nm(to_maker(command_n)) * -words_per_nm;
+        let clipped = clipped_words(wanted.to_array());
+        let torques_nm = DVec3::from_array(clipped.words.map(f64::from)) / -words_per_nm;
+        let given_n = to_host(self.posture.force_n(torques_nm));
+        let command = Command { motors: clipped.words, lamp: Lamp::Green, homing: Homing::Done };
+        if !self.exchange.leave(command) {
+            return Cycle::Stale;
+        }
+        self.force_n = if clipped.words == [0; 3] { DVec3::ZERO } else { given_n.with_z(given_n.z * share) };
+        self.is_clipped = clipped.is_clipped;
+        Cycle::Fresh
+    }
+
+    fn deactivate(mut self) -> FalconDevice {
+        if self.exchange.end().is_some() {
+            self.opened.chip = None;
+        }
+        self.opened
+    }
+}
+
+impl DrivenDevice {
+    /// Takes the posture as the sample of a time.
+    fn sample(&mut self, buttons: u32, time_ns: u64) {
+        let position_m = to_host(self.posture.position_m() - CENTRE_M);
+        let before_m = self.state.pose.position();
+        let velocity = match self.sampled_ns {
+            Some(before_ns) if time_ns > before_ns => {
+                let dt_s = (time_ns - before_ns) as f64 * 1.0e-9;
+                // A first-order low pass, exact for a difference that is held over the interval.
+                let share = 1.0 - math::exp(-TAU * self.opened.options.cutoff_hz * dt_s);
+                self.state.twist.linear().lerp((position_m - before_m) / dt_s, share)
+            }
+            _ => DVec3::ZERO,
+        };
+        self.sampled_ns = Some(time_ns);
+        self.state = DeviceState {
+            pose: Pose::new(position_m, DQuat::IDENTITY),
+            twist: Twist::new(velocity, DVec3::ZERO),
+            // What the motors were told: it measures no force.
+            delivered: Wrench::from_force(self.force_n),
+            sampled_ns: time_ns,
+            buttons,
+            conditions: if self.is_clipped { Conditions::SATURATED } else { Conditions::NONE },
+        };
+    }
+}
+
+impl CalibrationDevice for FalconDevice {
+    /// The firmware says no serial number: the address is all there is.
+    fn serial(&self) -> String {
+        self.options.address.clone()
+    }
+
+    fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
+        self.calibration = *calibration;
+        Ok(())
+    }
+}
+
+export_device!(FalconDevice, calibration);
