@@ -104,7 +104,8 @@ pub fn inverse(position_m: DVec3) -> Option<DVec3> {
         let (along, distance_m) = (u + C_M, math::hypot(u + C_M, w));
         let cosine = (A_M * A_M + distance_m * distance_m - length_m * length_m) / (2.0 * A_M * distance_m);
         // False for NaN. Of both angles, the one with the elbow outside.
-        if !(cosine.abs() <= 1.0) {
+        let is_reached = cosine.abs() <= 1.0;
+        if !is_reached {
             return None;
         }
         *angle = math::atan2(w, along) - math::acos(cosine);

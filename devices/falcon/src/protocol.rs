@@ -257,13 +257,13 @@ mod tests {
 
     /// Frames in packets of any length, behind status bytes, with noise between some of them: all of them come out, and no
     /// other.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // any bits will do
     #[test]
     fn frames_in_any_pieces_decode_with_none_wrong() {
         let mut numbers = Numbers(7);
         let (mut frames, mut expected, mut stream) = (Frames::default(), Vec::new(), Vec::new());
         for _ in 0..frames_of_this_run() {
             let bits = numbers.next();
-            #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // any bits will do
             let encoders = [bits as i16, (bits >> 16) as i16, (bits >> 32) as i16];
             let report =
                 Report { encoders, buttons: (bits >> 48 & 0xf) as u32, homed: (bits >> 52 & 7) as u8 };

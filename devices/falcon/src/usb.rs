@@ -25,7 +25,7 @@ pub(crate) struct UsbChip {
 /// # Errors
 /// One sentence: what is wrong, and what to do.
 pub(crate) fn open(serial: Option<&str>) -> Result<UsbChip, String> {
-    let context = Context::new().map_err(|error| refused(error))?;
+    let context = Context::new().map_err(refused)?;
     let mut problem = Error::NotFound;
     for device in context.devices().map_err(refused)?.iter() {
         let Ok(descriptor) = device.device_descriptor() else { continue };

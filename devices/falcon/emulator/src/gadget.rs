@@ -119,7 +119,7 @@ impl Shared {
         while let Some(transfer) = bus.fetches.front() {
             let Some(mut data) = self.device.machine().packet(self.device.now()) else { break };
             // A transfer ends with a packet that is not full, or with its last byte.
-            while data.len() % PACKET_BYTES == 0 && data.len() + PACKET_BYTES <= transfer.length {
+            while data.len().is_multiple_of(PACKET_BYTES) && data.len() + PACKET_BYTES <= transfer.length {
                 let next = self.device.machine().packet(self.device.now());
                 data.extend(next.unwrap_or_else(|| STATUS.to_vec()));
             }
@@ -200,7 +200,7 @@ fn device_descriptor() -> Vec<u8> {
 }
 
 fn configuration_descriptor() -> Vec<u8> {
-    let [packet_low, packet_high] = (PACKET_BYTES as u16).to_le_bytes();
+    let [packet_low, packet_high] = u16::try_from(PACKET_BYTES).unwrap_or(0).to_le_bytes();
     let (own_class, bulk) = (0xff, 2);
     let mut body = vec![9, 4, 0, 0, 2, own_class, own_class, own_class, 2];
     for address in [IN, OUT] {

@@ -7,8 +7,8 @@ use flotor_falcon_emulator::in_process::InProcess;
 use flotor_falcon_emulator::machine::{Fault, Machine, Motion, Power, place_of};
 
 /// No firmware of anybody's: bytes without a pattern.
-fn dummy(length: usize) -> Vec<u8> {
-    (0..length as u32).map(|number| (number.wrapping_mul(2_654_435_761) >> 24) as u8).collect()
+fn dummy(length: u32) -> Vec<u8> {
+    (0..length).map(|number| number.wrapping_mul(2_654_435_761).to_be_bytes()[0]).collect()
 }
 
 fn device(power: Power, fault: Option<Fault>) -> InProcess {
