@@ -52,7 +52,7 @@ mod friction;
 mod tilt;
 
 /// Evaluations of the law per tick at most.
-const MOST_EVALUATIONS: u32 = 16;
+const MOST_EVALUATIONS: u32 = 24;
 /// Change of the tilt that counts as none (rad), of a law that leaves nothing open.
 const TOLERANCE_RAD: f64 = 1e-11;
 /// Change of the stored energy that counts as none, of the stiffness by the tilt.

@@ -63,7 +63,8 @@ enum Role {
 
 use Role::{
     Cable, Calibration, Command, Compat, Contract, Core, DropIn, Emulator, Fixture, Guard, Host, Judge, Lab,
-    Live, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study, Sync, Tests, VendorSdk, Viewer,
+    Live, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study, Sync, Tests,
+    VendorSdk, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.

@@ -131,9 +131,9 @@ mod tests {
     use super::*;
     use crate::extension::{
         active_region::ActiveRegionTable, calibration::CalibrationTable, centerline::CenterlineTable,
-        connection::ConnectionTable, details::DetailsTable, energy_ledger::EnergyLedgerTable, independent_stop::IndependentStopTable,
-        linear_field::LinearFieldTable, pacing::PacingTable, shape::ShapeTable, variant::VariantTable,
-        workspace_bounds::WorkspaceBoundsTable,
+        connection::ConnectionTable, details::DetailsTable, energy_ledger::EnergyLedgerTable,
+        independent_stop::IndependentStopTable, linear_field::LinearFieldTable, pacing::PacingTable,
+        shape::ShapeTable, variant::VariantTable, workspace_bounds::WorkspaceBoundsTable,
     };
 
     /// One byte short of the shortest tables there are.
