@@ -116,7 +116,7 @@ fn a_force_goes_to_the_service_and_what_it_says_comes_back() {
     }
 }
 
-/// Each fault is told as what it is, and the last thing the service hears is that there is no force.
+/// Each fault is reported as its own kind, and the last message to the service commands zero force.
 #[test]
 fn whatever_the_service_breaks_ends_with_its_own_fault_and_no_force() {
     let good = state(HELD_M, DVec3::ZERO);

@@ -155,7 +155,7 @@ fn the_slope_of_a_field_is_the_change_of_the_force_it_predicts() {
     assert_eq!((force_n, plain.network().positions_m().get(144)), (field.force_n, after));
 }
 
-/// What an observer sees depends on where the ball is and not on where it came from, and the hand does not feel that somebody looks.
+/// The picture depends on where the ball is and not on its history, and drawing it does not change the force.
 #[test]
 fn the_picture_is_the_sheet_at_rest_whatever_was_before() {
     let plugin = Plugin::in_process(&flotor_membrane::FLOTOR_ENTRY).expect("a plugin");
