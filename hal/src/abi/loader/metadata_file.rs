@@ -3,8 +3,8 @@
 use super::LoadError;
 use crate::abi::{CONTRACT, PluginKind, metadata};
 use object::elf::FileHeader64;
-use object::read::elf::{ElfFile64, FileHeader, ProgramHeader, SectionHeader};
-use object::{Endianness, Object, ObjectSection, ReadCache, ReadRef};
+use object::read::elf::{FileHeader, ProgramHeader, SectionHeader};
+use object::{Endianness, ReadCache, ReadRef};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -36,7 +36,7 @@ pub struct Metadata {
 /// may want to show: see [`Metadata::check_contract`].
 pub fn read_metadata(path: &Path) -> Result<Metadata, LoadError> {
     let (file, length) = open_regular(path)?;
-    // Reads headers and one section: a folder of large libraries is listed in a millisecond.
+    // Reads headers, their names and one section, no symbols: a folder of large libraries is listed in a millisecond.
     parse(path, &ReadCache::new(file), length)
 }
 
@@ -77,14 +77,19 @@ pub(super) fn parse<'d>(path: &Path, data: impl ReadRef<'d>, length: u64) -> Res
     if need > length {
         return Err(truncated(need));
     }
-    let elf = ElfFile64::<Endianness, _>::parse(data).map_err(not_a_library)?;
-    let need = end_of_content(&elf);
+    let endian = header.endian().map_err(not_a_library)?;
+    let segments = header.program_headers(endian, data).map_err(not_a_library)?;
+    let sections = header.sections(endian, data).map_err(not_a_library)?;
+    // `dlopen` maps them all and dies of SIGBUS in a file that is shorter.
+    let ends = segments.iter().map(|segment| segment.p_offset(endian).saturating_add(segment.p_filesz(endian)));
+    let ranges = sections.iter().filter_map(|section| section.file_range(endian));
+    let need = ends.chain(ranges.map(|(offset, size)| offset.saturating_add(size))).max().unwrap_or(0);
     if need > length {
         return Err(truncated(need));
     }
-    let section = elf.section_by_name(metadata::SECTION);
-    let section = section.ok_or_else(|| LoadError::NotAPlugin { path: path.into() })?;
-    let text = section.data().map_err(not_a_library)?;
+    let section = sections.section_by_name(endian, metadata::SECTION.as_bytes());
+    let (_, section) = section.ok_or_else(|| LoadError::NotAPlugin { path: path.into() })?;
+    let text = section.data(endian, data).map_err(not_a_library)?;
     let bad = |cause: String| LoadError::BadMetadata { path: path.into(), cause };
     let text = std::str::from_utf8(text).map_err(|cause| bad(cause.to_string()))?;
     let pairs = text.trim_end_matches('\0').lines().map(str::trim).filter(|line| !line.is_empty());
@@ -125,15 +130,4 @@ fn end_of_section_headers(header: &FileHeader64<Endianness>) -> object::Result<u
     let endian = header.endian()?;
     let size = u64::from(header.e_shnum(endian)) * u64::from(header.e_shentsize(endian));
     Ok(header.e_shoff(endian).saturating_add(size))
-}
-
-/// Bytes a file needs to hold its segments and sections: `dlopen` maps them all and dies of SIGBUS in a file that
-/// is shorter.
-fn end_of_content<'d>(elf: &ElfFile64<'d, Endianness, impl ReadRef<'d>>) -> u64 {
-    let endian = elf.endian();
-    let segments = elf.elf_program_headers().iter();
-    let segments = segments.map(|s| s.p_offset(endian).saturating_add(s.p_filesz(endian)));
-    let sections = elf.elf_section_table().iter().filter_map(|section| section.file_range(endian));
-    let sections = sections.map(|(offset, size)| offset.saturating_add(size));
-    segments.chain(sections).max().unwrap_or(0)
 }
