@@ -1,4 +1,4 @@
-//! Every plugin of the tree is found without being opened, and violates no rule of the contract.
+//! Every plugin of the tree is found without being opened.
 
 use flotor_tests::library::{patched, plugin_file};
 use flotor_tests::program::{Flotor, exit_code};
@@ -25,24 +25,6 @@ fn every_plugin_is_listed_without_being_opened() {
         let plugin = plugin.unwrap_or_else(|| panic!("`{id}` is not listed: {}", ran.stdout));
         let file = plugin["file"].as_str().expect("a file is text");
         assert!(file.starts_with(&*scratch.path().to_string_lossy()), "{file} is not the unloadable one");
-    }
-}
-
-#[test]
-fn no_plugin_violates_a_rule() {
-    for folder in plugin_folders() {
-        let library = plugin_file(&crate_name_of(&folder)).display().to_string();
-        let ran = Flotor::with(["validate", &library, "--json", "--timeout", "60s"]).run();
-        let findings: Vec<Value> = serde_json::from_str(&ran.stdout).unwrap_or_default();
-        let checked = findings.iter().filter(|finding| finding["unchecked"].is_null()).count();
-        println!("{folder}: {checked} of {} rules checked", findings.len());
-        // How long a step takes here and now says nothing about the plugin.
-        let violated = findings
-            .iter()
-            .find(|finding| !finding["violation"].is_null() && finding["rule"] != "time-budget");
-        assert_eq!(violated, None, "{folder}");
-        // What needs hardware that is not here says so; everything else is checked.
-        assert!(findings.len() >= 7 && checked >= 3, "{folder}: {ran:?}");
     }
 }
 
